@@ -1,0 +1,45 @@
+//! What is asked of an eye pass and what it gives, the same for GPU and CPU.
+
+use serde::{Deserialize, Serialize};
+
+use crate::optics::LinearSrgb;
+use crate::scene::Camera;
+
+/// How radiance becomes display colour.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum ToneMap {
+    /// Cut at 1.
+    None,
+    /// Khronos PBR Neutral.
+    #[default]
+    Neutral,
+}
+
+/// One picture to be made.
+#[derive(Clone, Debug, PartialEq)]
+pub struct View {
+    /// From where.
+    pub camera: Camera,
+    /// Pixels across, > 0.
+    pub width: u32,
+    /// Pixels down, > 0.
+    pub height: u32,
+    /// Radiance [W/(m² sr)] is multiplied by 2^stops before tone mapping.
+    pub exposure_stops: f64,
+    /// After the exposure.
+    pub tone_map: ToneMap,
+    /// Radiance seen where nothing is hit [W/(m² sr)].
+    pub background: LinearSrgb,
+}
+
+/// Radiance per pixel [W/(m² sr)], linear sRGB, row 0 at the top.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Picture {
+    /// Pixels across.
+    pub width: u32,
+    /// Pixels down.
+    pub height: u32,
+    /// `width × height` values.
+    pub radiance: Vec<[f32; 3]>,
+}

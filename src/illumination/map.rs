@@ -1,0 +1,74 @@
+//! The finished map of one surface.
+
+use std::sync::Arc;
+
+use super::Chart;
+use crate::optics::LinearSrgb;
+use crate::settings::LayerKind;
+
+/// One layer of a map: mean irradiance of each texel [W/m²], linear sRGB, row 0 at v = 0, `width × height` long.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Layer {
+    /// Which light.
+    pub kind: LayerKind,
+    /// E per texel [W/m²].
+    pub irradiance: Vec<[f32; 3]>,
+}
+
+/// The map of one surface.
+#[derive(Clone, Debug)]
+pub struct IlluminationMap {
+    /// How the surface lies in the map, with the map's size and texel areas.
+    pub chart: Arc<Chart>,
+    /// The layers that were baked, in the order of [`LayerKind`], at least one.
+    pub layers: Vec<Layer>,
+    /// √(variance + bias²) of the luminance of the sum [W/m²] per texel, where it was estimated.
+    pub error: Option<Vec<f32>>,
+    /// Estimated relative RMSE of this map, where it was estimated.
+    pub estimated_relative_rmse: Option<f64>,
+}
+
+impl IlluminationMap {
+    /// Texels across.
+    pub fn width(&self) -> usize {
+        self.chart.width
+    }
+
+    /// Texels down.
+    pub fn height(&self) -> usize {
+        self.chart.height
+    }
+
+    /// Sum of all layers: E per texel [W/m²], row 0 at v = 0.
+    pub fn total(&self) -> Vec<[f32; 3]> {
+        let mut sum = vec![[0.0; 3]; self.width() * self.height()];
+        for layer in &self.layers {
+            for (total, part) in sum.iter_mut().zip(&layer.irradiance) {
+                for channel in 0..3 {
+                    total[channel] += part[channel];
+                }
+            }
+        }
+        sum
+    }
+
+    /// The layer of a kind, if it was baked.
+    pub fn layer(&self, kind: LayerKind) -> Option<&Layer> {
+        self.layers.iter().find(|layer| layer.kind == kind)
+    }
+
+    /// Flux of a layer over the whole surface [W per channel]: Σ E·A.
+    pub fn flux_w(&self, kind: LayerKind) -> LinearSrgb {
+        let mut flux = LinearSrgb::BLACK;
+        for (texel, e) in self
+            .layer(kind)
+            .map_or(&[][..], |layer| &layer.irradiance)
+            .iter()
+            .enumerate()
+        {
+            let area = self.chart.texel_area_m2(texel);
+            flux += LinearSrgb::new(f64::from(e[0]), f64::from(e[1]), f64::from(e[2])) * area;
+        }
+        flux
+    }
+}

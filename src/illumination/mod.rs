@@ -1,0 +1,9 @@
+//! Illumination maps: where a surface's light is kept, texel by texel.
+
+pub mod accumulator;
+pub mod chart;
+pub mod compare;
+pub mod map;
+
+pub use chart::{Chart, UvSet};
+pub use map::{IlluminationMap, Layer};

@@ -1,0 +1,3 @@
+//! From the lights through specular surfaces onto diffuse ones.
+
+pub mod ledger;

@@ -1,0 +1,2 @@
+//! The `nephroid` program.
+fn main() {}

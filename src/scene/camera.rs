@@ -1,0 +1,49 @@
+//! Cameras.
+
+use glam::DVec3;
+
+/// A perspective camera.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Camera {
+    /// The node's name in the file; `cameraN` when it has none.
+    pub name: String,
+    /// Scene coordinates [m].
+    pub position: DVec3,
+    /// Unit, where it looks.
+    pub forward: DVec3,
+    /// Unit, perpendicular to `forward`.
+    pub up: DVec3,
+    /// Full vertical angle of view [rad], (0, π).
+    pub vertical_fov_rad: f64,
+    /// Nearest visible distance [m], > 0.
+    pub near_m: f64,
+}
+
+impl Camera {
+    /// A camera at `position` that looks at `target`, y up (z where it looks straight up or down).
+    pub fn look_at(name: impl Into<String>, position: DVec3, target: DVec3, vertical_fov_rad: f64) -> Self {
+        let forward = (target - position).normalize_or(DVec3::NEG_Z);
+        let right = forward.cross(DVec3::Y).try_normalize().unwrap_or(DVec3::X);
+        let near_m = 1e-3 * (target - position).length().max(1e-6);
+        Self {
+            name: name.into(),
+            position,
+            forward,
+            up: right.cross(forward),
+            vertical_fov_rad,
+            near_m,
+        }
+    }
+
+    /// Unit, to the right of the picture.
+    pub fn right(&self) -> DVec3 {
+        self.forward.cross(self.up)
+    }
+
+    /// Unit direction through a point of the picture: x and y in [−1, 1] from left to right and bottom to top,
+    /// `aspect` = width/height.
+    pub fn direction(&self, x: f64, y: f64, aspect: f64) -> DVec3 {
+        let half_height = (0.5 * self.vertical_fov_rad).tan();
+        (self.forward + self.right() * (x * half_height * aspect) + self.up * (y * half_height)).normalize()
+    }
+}

@@ -1,0 +1,90 @@
+//! Materials, as glTF's metallic-roughness model and its extensions state them, and the class that transport treats
+//! each as.
+
+use super::TextureRef;
+use crate::optics::LinearSrgb;
+
+/// Roughness (glTF's, α = roughness²) up to which an interface counts as smooth; above it the surface is pure Lambert.
+pub const SPECULAR_ROUGHNESS_LIMIT: f64 = 0.3;
+
+/// Inside of a solid dielectric, KHR_materials_volume.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Volume {
+    /// Distance [m] after which white light has `attenuation_colour`; infinite when nothing is absorbed.
+    pub attenuation_distance_m: f64,
+    /// Colour after one attenuation distance, (0, 1] per channel.
+    pub attenuation_colour: LinearSrgb,
+}
+
+/// How transport treats a surface.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum SurfaceKind {
+    /// Lambert: takes the full flux into its illumination map.
+    Diffuse,
+    /// Smooth metal: reflects by [`Material::base_colour`], absorbs the rest.
+    Mirror,
+    /// Interface of a solid: reflects and refracts by Fresnel's equations.
+    Dielectric,
+    /// A pane without thickness: reflects and transmits straight on.
+    ThinWall,
+    /// Polish over a diffuse body: the map gets (1 − F)Φ and the ray carries FΦ on.
+    Mixed,
+}
+
+impl SurfaceKind {
+    /// Whether light goes on from it in a single direction.
+    pub fn is_specular(self) -> bool {
+        self != Self::Diffuse
+    }
+
+    /// Whether it takes light into an illumination map.
+    pub fn is_receiver(self) -> bool {
+        matches!(self, Self::Diffuse | Self::Mixed)
+    }
+}
+
+/// A material with its factors; textures multiply them.
+#[derive(Clone, Debug)]
+pub struct Material {
+    /// The file's name for it; `materialN` when it has none.
+    pub name: String,
+    /// How transport treats it.
+    pub surface: SurfaceKind,
+    /// Albedo of a diffuse surface, reflectance at normal incidence of a metal, tint per crossing of a dielectric; [0, 1].
+    pub base_colour: LinearSrgb,
+    /// sRGB-encoded image that multiplies `base_colour`.
+    pub base_colour_texture: Option<TextureRef>,
+    /// [0, 1].
+    pub metallic: f64,
+    /// [0, 1]; GGX α is its square.
+    pub roughness: f64,
+    /// Share of the light under the interface that is transmitted and not scattered diffusely, [0, 1].
+    pub transmission: f64,
+    /// Refractive index at 587.56 nm, at least 1.
+    pub ior: f64,
+    /// Set where the surface bounds a solid body.
+    pub volume: Option<Volume>,
+    /// Emitted radiance [W/(m² sr)], luminous-equivalent: glTF's cd/m² divided by 683 lm/W.
+    pub emitted_radiance: LinearSrgb,
+    /// Whether its back is drawn; transport always treats both sides.
+    pub double_sided: bool,
+}
+
+impl Default for Material {
+    /// White Lambert, albedo 0.8.
+    fn default() -> Self {
+        Self {
+            name: "default".into(),
+            surface: SurfaceKind::Diffuse,
+            base_colour: LinearSrgb::grey(0.8),
+            base_colour_texture: None,
+            metallic: 0.0,
+            roughness: 1.0,
+            transmission: 0.0,
+            ior: 1.5,
+            volume: None,
+            emitted_radiance: LinearSrgb::BLACK,
+            double_sided: true,
+        }
+    }
+}

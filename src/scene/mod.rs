@@ -1,0 +1,81 @@
+//! What is lit: surfaces, materials, lights, cameras. All coordinates are scene coordinates in metres, y up:
+//! world coordinates less [`Scene::origin_world`], which is zero unless the scene lies far from the world's origin.
+
+pub mod builtin;
+pub mod camera;
+pub mod gltf;
+pub mod light;
+pub mod material;
+pub mod mesh;
+pub mod texture;
+
+use glam::DVec3;
+
+pub use camera::Camera;
+pub use light::{Light, LightKind};
+pub use material::{Material, SurfaceKind, Volume};
+pub use mesh::Mesh;
+pub use texture::{Texture, TextureRef};
+
+use crate::error::Warning;
+
+/// One mesh primitive of one node: the unit that has a material and, when light reaches it, an illumination map.
+#[derive(Clone, Debug)]
+pub struct Object {
+    /// The node's name in the file; `nodeN` when it has none.
+    pub name: String,
+    /// glTF index of the node.
+    pub node: usize,
+    /// Index of the primitive within the node's mesh.
+    pub primitive: usize,
+    /// Index into [`Scene::materials`].
+    pub material: usize,
+    /// Geometry in scene coordinates.
+    pub mesh: Mesh,
+}
+
+/// A whole scene, sanitised: every number in it is finite and every index valid.
+#[derive(Clone, Debug, Default)]
+pub struct Scene {
+    /// A short name for titles and files: the file's stem or the built-in's name.
+    pub name: String,
+    /// What the user named: a path as given or `builtin:NAME`.
+    pub source: String,
+    /// World position of the scene's origin [m].
+    pub origin_world: DVec3,
+    /// Surfaces, in file order.
+    pub objects: Vec<Object>,
+    /// Materials; never empty when there are objects.
+    pub materials: Vec<Material>,
+    /// Images that materials refer to.
+    pub textures: Vec<Texture>,
+    /// Lights with some power.
+    pub lights: Vec<Light>,
+    /// Cameras, in file order.
+    pub cameras: Vec<Camera>,
+    /// What was repaired or ignored on loading.
+    pub warnings: Vec<Warning>,
+}
+
+impl Scene {
+    /// The material of an object.
+    pub fn material_of(&self, object: usize) -> &Material {
+        &self.materials[self.objects[object].material]
+    }
+
+    /// Smallest box around all surfaces, as minimum and maximum corner [m]; `None` without surfaces.
+    pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
+        self.objects
+            .iter()
+            .filter_map(|object| object.mesh.bounds())
+            .reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
+    }
+
+    /// Triangles over all objects.
+    pub fn triangle_count(&self) -> usize {
+        self.objects
+            .iter()
+            .map(|object| object.mesh.triangles.len())
+            .sum()
+    }
+}

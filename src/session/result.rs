@@ -1,0 +1,79 @@
+//! What a bake gives.
+
+use serde::{Deserialize, Serialize};
+
+use crate::error::Warning;
+use crate::illumination::IlluminationMap;
+use crate::light_pass::ledger::LightLedger;
+use crate::plan::EffectPlan;
+
+/// Why a bake ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum StopReason {
+    /// The lattice of the asked density was traced.
+    Density,
+    /// Nothing specular is lit, or nothing can receive it: there was nothing to do.
+    NothingToDo,
+    /// It was asked to stop.
+    Cancelled,
+}
+
+/// Counters of a bake; DESIGN's `counts`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct BakeCounts {
+    /// Light directions launched for light transport.
+    pub rays: u64,
+    /// Rays traced to build item buffers.
+    pub item_buffer_rays: u64,
+    /// Closest-hit queries along light paths.
+    pub segments: u64,
+    /// Any-hit queries of the direct layer.
+    pub shadow_rays: u64,
+    /// Interpolated rays against candidate receivers.
+    pub receiver_queries: u64,
+    /// Kernels deposited.
+    pub splats: u64,
+    /// Wavefront cells deposited.
+    pub cells: u64,
+}
+
+/// Seconds per stage; used for wall-clock times and for CPU times of the whole process.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Timings {
+    /// Reading the scene.
+    pub load: f64,
+    /// Building the bounding volume hierarchy.
+    pub build: f64,
+    /// Effects, item buffers, map sizes.
+    pub plan: f64,
+    /// Tracing light rays, shadow rays included.
+    pub trace: f64,
+    /// Depositing flux.
+    pub deposit: f64,
+    /// The whole run.
+    pub total: f64,
+}
+
+/// Maps with everything that is known of how they came about.
+#[derive(Clone, Debug)]
+pub struct BakeResult {
+    /// One per surface that received flux, in the order of `Scene::objects`.
+    pub maps: Vec<IlluminationMap>,
+    /// Which effects were on, and why.
+    pub plan: EffectPlan,
+    /// Energy of the caustic layer, one per light with its name.
+    pub ledgers: Vec<LightLedger>,
+    /// Counters.
+    pub counts: BakeCounts,
+    /// Wall-clock seconds.
+    pub timings_s: Timings,
+    /// CPU seconds over all threads of the process.
+    pub cpu_s: Timings,
+    /// Why it ended.
+    pub stop_reason: StopReason,
+    /// True where it was stopped before it was done.
+    pub partial: bool,
+    /// What the user should know of.
+    pub warnings: Vec<Warning>,
+}

@@ -1,0 +1,239 @@
+//! Everything that a user can set about a bake.
+
+use serde::{Deserialize, Serialize};
+
+use crate::error::{Error, Result};
+
+/// Which light a layer holds. The order is that of the files' channels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum LayerKind {
+    /// LS+D: light that met at least one specular surface.
+    Caustic,
+    /// LD: straight from the lights, stopped by every surface.
+    Direct,
+    /// LD+D: light that other diffuse surfaces send.
+    Indirect,
+}
+
+impl LayerKind {
+    /// Its name in files and on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Caustic => "caustic",
+            Self::Direct => "direct",
+            Self::Indirect => "indirect",
+        }
+    }
+}
+
+/// How the light pass turns rays into irradiance.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Estimator {
+    /// A kernel of flux per ray, scaled to the wavefront (Collins 1994).
+    Splat,
+}
+
+/// Shape of a splat. All have the same area at the same footprint: disc r = 1, box side √π, cone base √3 (footprint
+/// radii), gaussian exp(−r²/2σ).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Kernel {
+    /// exp(−r²/2σ), cut at 4√σ (eq. 4.4).
+    Gaussian,
+    /// 1 − r/√3 up to r = √3.
+    Cone,
+    /// Constant up to r = 1.
+    Disc,
+    /// Constant over the square of the disc's area.
+    Box,
+}
+
+/// How a kernel is taken into texels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum KernelSampling {
+    /// Its integral over each texel.
+    Integrated,
+    /// Its value at each texel's centre, as the paper does; for studies.
+    Point,
+}
+
+/// What sets the size and shape of a splat.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Footprint {
+    /// The ellipse that the neighbouring rays span.
+    Ellipse,
+    /// The disc of the area that the neighbouring rays span (section 3.2.1 of the paper).
+    Disc,
+    /// A disc that grows with the length of the path.
+    Distance,
+    /// The same disc for every ray of a light.
+    Fixed,
+}
+
+/// Where in its lattice cell a light ray starts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum RayPlacement {
+    /// At the centre.
+    Lattice,
+    /// Anywhere, by the seed (section 3.1.2 of the paper).
+    Jittered,
+}
+
+/// How the sphere of directions around a light is divided.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum ItemBufferKind {
+    /// Cells of equal solid angle.
+    Equal,
+    /// The paper's cube: cells of equal area on the cube's faces.
+    Cube,
+}
+
+/// Spread of the gaussian in squared footprint radii (eq. 4.4).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Sigma {
+    /// The same for every splat, > 0.
+    Constant(f64),
+    /// Scaled by how the footprint compares with the map's mean footprint.
+    Adaptive,
+}
+
+/// Size of the maps.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum MapResolution {
+    /// Starts coarse and doubles while footprints are finer than texels.
+    Auto,
+    /// Texels across and down, of every map.
+    Fixed {
+        /// Texels across, 1 to 16384.
+        width: usize,
+        /// Texels down, 1 to 16384.
+        height: usize,
+    },
+}
+
+/// Switch of one effect.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum EffectSwitch {
+    /// On where the scene calls for it.
+    #[default]
+    Auto,
+    /// Always.
+    On,
+    /// Never.
+    Off,
+}
+
+/// All bake options. [`validate`](Self::validate) states the ranges.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct BakeSettings {
+    /// How rays become irradiance.
+    pub estimator: Estimator,
+    /// Light rays per steradian [1/sr]; for suns density/D² rays per m².
+    pub density_per_sr: f64,
+    /// Lattice or jittered.
+    pub rays: RayPlacement,
+    /// Spread of the gaussian.
+    pub sigma: Sigma,
+    /// Shape of a splat.
+    pub kernel: Kernel,
+    /// Integrated over texels, or the paper's point samples.
+    pub kernel_sampling: KernelSampling,
+    /// What sets a splat's size.
+    pub footprint: Footprint,
+    /// How the item buffer divides directions.
+    pub item_buffer: ItemBufferKind,
+    /// Size of the maps.
+    pub map_resolution: MapResolution,
+    /// Largest number of specular surfaces on a path, ≥ 1.
+    pub max_depth: u32,
+    /// Branches that carry less than this share of their light ray's flux are not followed; booked as truncated.
+    pub branch_threshold: f64,
+    /// Layers to bake.
+    pub layers: Vec<LayerKind>,
+    /// Of everything random.
+    pub seed: u64,
+    /// Worker threads; 0 = one per core.
+    pub threads: usize,
+    /// Largest memory for maps [bytes].
+    pub memory_bytes: u64,
+}
+
+/// Largest map side [texels].
+pub const MAX_MAP_SIDE: usize = 16384;
+
+impl Default for BakeSettings {
+    fn default() -> Self {
+        Self {
+            estimator: Estimator::Splat,
+            density_per_sr: 100_000.0,
+            rays: RayPlacement::Lattice,
+            sigma: Sigma::Constant(1.0),
+            kernel: Kernel::Gaussian,
+            kernel_sampling: KernelSampling::Integrated,
+            footprint: Footprint::Ellipse,
+            item_buffer: ItemBufferKind::Equal,
+            map_resolution: MapResolution::Auto,
+            max_depth: 16,
+            branch_threshold: 1e-4,
+            layers: vec![LayerKind::Caustic],
+            seed: 0,
+            threads: 0,
+            memory_bytes: 4 << 30,
+        }
+    }
+}
+
+impl BakeSettings {
+    /// Refuses settings outside their ranges.
+    ///
+    /// # Errors
+    /// A usage error that names the option, its value and its range.
+    pub fn validate(&self) -> Result<()> {
+        let finite_in = |option: &str, value: f64, low: f64, high: f64| {
+            if value.is_finite() && value >= low && value <= high {
+                Ok(())
+            } else {
+                Err(Error::usage(
+                    option,
+                    format!("{value} is outside {low:e} to {high:e}"),
+                    "give a number in that range",
+                ))
+            }
+        };
+        finite_in("--density", self.density_per_sr, 1.0, 1e12)?;
+        if let Sigma::Constant(sigma) = self.sigma {
+            finite_in("--sigma", sigma, 1e-6, 1e4)?;
+        }
+        finite_in("--branch-threshold", self.branch_threshold, 0.0, 0.5)?;
+        if let MapResolution::Fixed { width, height } = self.map_resolution {
+            finite_in("--map-resolution", width as f64, 1.0, MAX_MAP_SIDE as f64)?;
+            finite_in("--map-resolution", height as f64, 1.0, MAX_MAP_SIDE as f64)?;
+        }
+        finite_in("--max-depth", f64::from(self.max_depth), 1.0, 100_000.0)?;
+        finite_in("--threads", self.threads as f64, 0.0, 1024.0)?;
+        if self.layers.is_empty() {
+            return Err(Error::usage(
+                "--layers",
+                "no layer is named",
+                "name at least one of caustic, direct",
+            ));
+        }
+        if self.layers.contains(&LayerKind::Indirect) {
+            return Err(Error::usage(
+                "--layers",
+                "the indirect layer is not available in this version",
+                "use caustic, direct or both",
+            ));
+        }
+        Ok(())
+    }
+}
