@@ -14,6 +14,9 @@ pub mod progress;
 pub mod settings;
 pub mod units;
 
+#[cfg(feature = "gpu")]
+pub mod gpu;
+
 pub mod optics;
 
 pub mod geometry;
