@@ -31,3 +31,6 @@ pub mod light_pass;
 pub mod eye_pass;
 
 pub mod session;
+
+#[cfg(feature = "viewer")]
+pub mod viewer;

@@ -1,1 +1,9 @@
-//! .
+//! Rays, triangles and what finds them; knows nothing of materials or light.
+
+pub mod bvh;
+pub mod cube_face;
+pub mod ray;
+pub mod triangle;
+
+pub use bvh::{TriangleBvh, TriangleHit};
+pub use ray::Ray;

@@ -1,1 +1,9 @@
-//! .
+//! One step of light at a surface: shared by the light pass, the direct layer and the CPU eye pass.
+
+pub mod interaction;
+pub mod medium;
+pub mod tracer;
+
+pub use interaction::{Branch, Event, Interaction};
+pub use medium::MediumStack;
+pub use tracer::{SurfaceHit, Tracer};

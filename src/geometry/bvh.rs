@@ -1,0 +1,170 @@
+//! Closest and any hits among many triangles: obvhs finds the candidates in single precision, the decision is made in
+//! double precision.
+
+use glam::{DVec3, Vec3A};
+use obvhs::{
+    BvhBuildParams,
+    aabb::Aabb,
+    bvh2::{Bvh2, builder::build_bvh2},
+    ray::RayHit,
+};
+
+use super::{Ray, triangle::ShearedRay};
+
+/// Boxes are widened by this share of the scene's size, so that no rounding of the single-precision box test can lose
+/// a hit: origin, direction and slab distances err by at most some 2⁻²⁰ of the size.
+const BOX_MARGIN: f32 = 1.0 / (1 << 19) as f32;
+
+/// Rays that start farther from the centre than this many scene radii are advanced before the box tests, which would
+/// lose their precision out there.
+const FAR_RADII: f64 = 4.0;
+
+/// Where a ray met a triangle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TriangleHit {
+    /// Index in the order that the triangles were given to [`TriangleBvh::build`].
+    pub triangle: u32,
+    /// Distance from the ray's origin [m].
+    pub distance_m: f64,
+    /// Of the three corners; they add up to 1.
+    pub barycentric: [f64; 3],
+}
+
+/// A bounding volume hierarchy over triangles.
+///
+/// Single-precision coordinates are relative to the triangles' centre and scaled by a power of two to a radius of
+/// about one, so that neither a far nor a tiny nor a huge scene loses precision.
+pub struct TriangleBvh {
+    bvh: Bvh2,
+    /// Corners in the order of the hierarchy's leaves.
+    corners: Vec<[DVec3; 3]>,
+    centre: DVec3,
+    /// Single-precision units per metre.
+    scale: f64,
+    /// Of the scene [m].
+    radius_m: f64,
+}
+
+impl std::fmt::Debug for TriangleBvh {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("TriangleBvh")
+            .field("triangles", &self.corners.len())
+            .finish_non_exhaustive()
+    }
+}
+
+impl TriangleBvh {
+    /// Builds the hierarchy. Corners must be finite; triangles without area are allowed and never hit.
+    pub fn build(triangles: &[[DVec3; 3]]) -> Self {
+        let (low, high) = triangles
+            .iter()
+            .flatten()
+            .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), corner| {
+                (low.min(*corner), high.max(*corner))
+            });
+        let centre = if triangles.is_empty() {
+            DVec3::ZERO
+        } else {
+            low * 0.5 + high * 0.5
+        };
+        let radius_m = if triangles.is_empty() {
+            1.0
+        } else {
+            (high - centre).length().max(f64::MIN_POSITIVE)
+        };
+        let scale = (-radius_m.log2().ceil()).exp2();
+        let aabbs: Vec<Aabb> = triangles
+            .iter()
+            .map(|corners| {
+                let local = corners.map(|corner| to_single((corner - centre) * scale));
+                let aabb = Aabb::from_points(&local);
+                Aabb::new(aabb.min - BOX_MARGIN, aabb.max + BOX_MARGIN)
+            })
+            .collect();
+        let mut build_time = std::time::Duration::ZERO;
+        let bvh = build_bvh2(&aabbs, BvhBuildParams::medium_build(), &mut build_time);
+        let corners = bvh
+            .primitive_indices
+            .iter()
+            .map(|&triangle| triangles[triangle as usize])
+            .collect();
+        Self {
+            bvh,
+            corners,
+            centre,
+            scale,
+            radius_m,
+        }
+    }
+
+    /// The nearest triangle in front of the ray's origin, from either side.
+    pub fn closest_hit(&self, ray: &Ray) -> Option<TriangleHit> {
+        let mut best: Option<TriangleHit> = None;
+        let sheared = ShearedRay::new(ray);
+        let (local, advanced_m) = self.local_ray(ray, f64::INFINITY);
+        self.bvh.ray_traverse(local, &mut RayHit::none(), |_, slot| {
+            let Some((distance_m, barycentric)) = sheared.intersect(&self.corners[slot]) else {
+                return f32::INFINITY;
+            };
+            if best.is_some_and(|hit| hit.distance_m <= distance_m) {
+                return f32::INFINITY;
+            }
+            best = Some(TriangleHit {
+                triangle: self.bvh.primitive_indices[slot],
+                distance_m,
+                barycentric,
+            });
+            self.local_distance(distance_m, advanced_m)
+        });
+        best
+    }
+
+    /// Whether any triangle lies on the ray before `distance_m` (exclusive).
+    pub fn is_blocked(&self, ray: &Ray, distance_m: f64) -> bool {
+        let sheared = ShearedRay::new(ray);
+        let (local, _) = self.local_ray(ray, distance_m);
+        !self
+            .bvh
+            .ray_traverse_miss(local, |_, slot| match sheared.intersect(&self.corners[slot]) {
+                Some((hit_m, _)) if hit_m < distance_m => 0.0,
+                _ => f32::INFINITY,
+            })
+    }
+
+    /// Number of triangles.
+    pub fn triangle_count(&self) -> usize {
+        self.corners.len()
+    }
+
+    /// Centre [m] and radius [m] of a sphere around all triangles.
+    pub fn bounding_sphere(&self) -> (DVec3, f64) {
+        (self.centre, self.radius_m)
+    }
+
+    /// The ray in single-precision coordinates, with the distance [m] by which its origin was advanced.
+    fn local_ray(&self, ray: &Ray, limit_m: f64) -> (obvhs::ray::Ray, f64) {
+        let towards_centre = (self.centre - ray.origin).dot(ray.direction);
+        let advanced_m = (towards_centre - FAR_RADII * self.radius_m).max(0.0);
+        let origin = to_single((ray.at(advanced_m) - self.centre) * self.scale);
+        // A negative zero would turn the slab test inside out.
+        let direction = to_single(ray.direction) + Vec3A::ZERO;
+        let limit = if limit_m.is_finite() {
+            self.local_distance(limit_m, advanced_m)
+        } else {
+            f32::INFINITY
+        };
+        (
+            obvhs::ray::Ray::new(origin.clamp(-Vec3A::MAX, Vec3A::MAX), direction, 0.0, limit),
+            advanced_m,
+        )
+    }
+
+    /// A distance [m] along the ray in single-precision units, rounded up so that it never cuts off what it bounds.
+    fn local_distance(&self, distance_m: f64, advanced_m: f64) -> f32 {
+        (((distance_m - advanced_m) * self.scale).max(0.0) as f32).next_up() + BOX_MARGIN
+    }
+}
+
+fn to_single(v: DVec3) -> Vec3A {
+    Vec3A::new(v.x as f32, v.y as f32, v.z as f32)
+}

@@ -1,0 +1,65 @@
+//! Rays, and starting points that do not meet the surface they leave.
+
+use glam::DVec3;
+
+/// A half-line.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ray {
+    /// Where it starts [m].
+    pub origin: DVec3,
+    /// Unit.
+    pub direction: DVec3,
+}
+
+impl Ray {
+    /// The point at a distance [m].
+    pub fn at(&self, distance_m: f64) -> DVec3 {
+        self.origin + self.direction * distance_m
+    }
+}
+
+/// Bound γ(n) = nε/(1 − nε) of the relative error of n rounded operations (Higham 2002, 3.1).
+pub fn gamma(operations: f64) -> f64 {
+    let unit_roundoff = 0.5 * f64::EPSILON;
+    operations * unit_roundoff / (1.0 - operations * unit_roundoff)
+}
+
+/// A point of a triangle from barycentric coordinates, with a bound of its rounding error per axis [m]
+/// (Pharr, Jakob and Humphreys, Physically Based Rendering, 6.8.5).
+pub fn point_with_error(corners: &[DVec3; 3], barycentric: [f64; 3]) -> (DVec3, DVec3) {
+    let terms = [
+        corners[0] * barycentric[0],
+        corners[1] * barycentric[1],
+        corners[2] * barycentric[2],
+    ];
+    let magnitude = terms[0].abs() + terms[1].abs() + terms[2].abs();
+    (terms[0] + terms[1] + terms[2], magnitude * gamma(7.0))
+}
+
+/// Start of a ray that leaves a surface at `point` in `direction`: moved along the geometric normal just beyond the
+/// rounding error of the point, towards the side of the direction. There is no fixed epsilon: in double precision the
+/// step is some 1e-15 of the coordinates.
+pub fn offset_origin(point: DVec3, error: DVec3, geometric_normal: DVec3, direction: DVec3) -> DVec3 {
+    let step = geometric_normal.abs().dot(error);
+    let side = if direction.dot(geometric_normal) < 0.0 {
+        -step
+    } else {
+        step
+    };
+    let moved = point + geometric_normal * side;
+    let away = |moved: f64, offset: f64| {
+        if offset > 0.0 {
+            moved.next_up()
+        } else if offset < 0.0 {
+            moved.next_down()
+        } else {
+            moved
+        }
+    };
+    let offset = geometric_normal * side;
+    DVec3::new(
+        away(moved.x, offset.x),
+        away(moved.y, offset.y),
+        away(moved.z, offset.z),
+    )
+}

@@ -1,0 +1,239 @@
+//! What becomes of light that meets a surface. The shares of reflection, transmission, deposit and absorption add up
+//! to one in every channel.
+
+use glam::DVec3;
+
+use super::{MediumStack, SurfaceHit, Tracer};
+use crate::geometry::Ray;
+use crate::optics::{LinearSrgb, fresnel, refraction};
+use crate::scene::{Material, SurfaceKind};
+
+/// What happened to a ray at a specular surface.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Event {
+    /// Sent back.
+    Reflection,
+    /// Sent back by total internal reflection.
+    TotalInternalReflection,
+    /// Bent through an interface.
+    Refraction,
+    /// Straight through a thin wall.
+    ThinTransmission,
+}
+
+/// One way on from a surface.
+#[derive(Clone, Copy, Debug)]
+pub struct Branch {
+    /// Leaves the surface.
+    pub ray: Ray,
+    /// Share of the flux, [0, 1] per channel.
+    pub share: LinearSrgb,
+    /// What sent it there.
+    pub event: Event,
+    /// Media after the event.
+    pub media: MediumStack,
+    /// n of the side it leaves over n of the side it enters; 1 for reflections. Radiance that comes back along the
+    /// branch is scaled by its square, flux is not.
+    pub ior_ratio: f64,
+}
+
+/// The shares of the light at one hit.
+#[derive(Clone, Copy, Debug)]
+pub struct Interaction {
+    /// Mirror direction.
+    pub reflection: Option<Branch>,
+    /// Through the surface.
+    pub transmission: Option<Branch>,
+    /// Taken by the illumination map, before the albedo.
+    pub deposit: LinearSrgb,
+    /// Turned into heat here.
+    pub absorbed: LinearSrgb,
+}
+
+/// Orientation of a hit: normals on the side of the incoming ray.
+struct Facing {
+    /// Whether the outside was met.
+    front: bool,
+    geometric: DVec3,
+    /// Shading normal, or the geometric one where the shading normal faces away from the ray.
+    shading: DVec3,
+}
+
+impl Facing {
+    fn new(hit: &SurfaceHit, incident: DVec3) -> Self {
+        let front = incident.dot(hit.geometric_normal) < 0.0;
+        let side = if front { 1.0 } else { -1.0 };
+        let geometric = hit.geometric_normal * side;
+        let shading = hit.shading_normal
+            * if hit.shading_normal.dot(geometric) < 0.0 {
+                -1.0
+            } else {
+                1.0
+            };
+        Self {
+            front,
+            geometric,
+            shading: if incident.dot(shading) < 0.0 {
+                shading
+            } else {
+                geometric
+            },
+        }
+    }
+
+    /// Mirror direction by the shading normal; by the geometric one where the former would end below the surface.
+    fn reflected(&self, incident: DVec3) -> DVec3 {
+        let direction = refraction::reflect(incident, self.shading);
+        if direction.dot(self.geometric) > 0.0 {
+            direction
+        } else {
+            refraction::reflect(incident, self.geometric)
+        }
+    }
+
+    /// Refracted direction by the shading normal; by the geometric one where the former would stay above the surface.
+    fn refracted(&self, incident: DVec3, eta: f64) -> Option<DVec3> {
+        let direction = refraction::refract(incident, self.shading, eta)?;
+        if direction.dot(self.geometric) < 0.0 {
+            Some(direction)
+        } else {
+            refraction::refract(incident, self.geometric, eta)
+        }
+    }
+}
+
+impl Tracer {
+    /// What becomes of light that arrives at `hit` along the unit direction `incident`, within `media`.
+    pub fn interact(&self, hit: &SurfaceHit, incident: DVec3, media: &MediumStack) -> Interaction {
+        let material = self.scene().material_of(hit.object);
+        let facing = Facing::new(hit, incident);
+        let cos_incident = -incident.dot(facing.shading);
+        match material.surface {
+            SurfaceKind::Diffuse => Interaction {
+                reflection: None,
+                transmission: None,
+                deposit: LinearSrgb::WHITE,
+                absorbed: LinearSrgb::BLACK,
+            },
+            SurfaceKind::Mirror => {
+                let share = fresnel::metal_reflectance(cos_incident, self.base_colour(hit));
+                Interaction {
+                    reflection: Some(reflection(hit, &facing, incident, media, share)),
+                    transmission: None,
+                    deposit: LinearSrgb::BLACK,
+                    absorbed: LinearSrgb::WHITE - share,
+                }
+            }
+            SurfaceKind::Mixed => {
+                let share = LinearSrgb::grey(fresnel::dielectric_reflectance(
+                    cos_incident,
+                    material.ior / media.ior(self.scene()),
+                ));
+                Interaction {
+                    reflection: Some(reflection(hit, &facing, incident, media, share)),
+                    transmission: None,
+                    deposit: LinearSrgb::WHITE - share,
+                    absorbed: LinearSrgb::BLACK,
+                }
+            }
+            SurfaceKind::ThinWall => self.thin_wall(hit, &facing, incident, media, material),
+            SurfaceKind::Dielectric => self.dielectric(hit, &facing, incident, media, material),
+        }
+    }
+
+    fn thin_wall(
+        &self,
+        hit: &SurfaceHit,
+        facing: &Facing,
+        incident: DVec3,
+        media: &MediumStack,
+        material: &Material,
+    ) -> Interaction {
+        let cos_incident = -incident.dot(facing.shading);
+        let reflectance =
+            fresnel::thin_wall_reflectance(cos_incident, material.ior / media.ior(self.scene()));
+        let transmitted = self.base_colour(hit) * (1.0 - reflectance);
+        let transmission = Branch {
+            ray: hit.spawn(incident),
+            share: transmitted,
+            event: Event::ThinTransmission,
+            media: *media,
+            ior_ratio: 1.0,
+        };
+        Interaction {
+            reflection: Some(reflection(
+                hit,
+                facing,
+                incident,
+                media,
+                LinearSrgb::grey(reflectance),
+            )),
+            transmission: Some(transmission),
+            deposit: LinearSrgb::BLACK,
+            absorbed: LinearSrgb::grey(1.0 - reflectance) - transmitted,
+        }
+    }
+
+    fn dielectric(
+        &self,
+        hit: &SurfaceHit,
+        facing: &Facing,
+        incident: DVec3,
+        media: &MediumStack,
+        material: &Material,
+    ) -> Interaction {
+        let beyond = if facing.front {
+            media.entered(hit.object)
+        } else {
+            media.left(hit.object)
+        };
+        let (ior_near, ior_far) = if facing.front {
+            (media.ior(self.scene()), material.ior)
+        } else {
+            (material.ior, beyond.ior(self.scene()))
+        };
+        let eta = ior_far / ior_near;
+        let Some(direction) = facing.refracted(incident, eta) else {
+            let mut total = reflection(hit, facing, incident, media, LinearSrgb::WHITE);
+            total.event = Event::TotalInternalReflection;
+            return Interaction {
+                reflection: Some(total),
+                transmission: None,
+                deposit: LinearSrgb::BLACK,
+                absorbed: LinearSrgb::BLACK,
+            };
+        };
+        let reflectance = fresnel::dielectric_reflectance(-incident.dot(facing.shading), eta);
+        let transmitted = self.base_colour(hit) * (1.0 - reflectance);
+        let transmission = Branch {
+            ray: hit.spawn(direction),
+            share: transmitted,
+            event: Event::Refraction,
+            media: beyond,
+            ior_ratio: ior_near / ior_far,
+        };
+        Interaction {
+            reflection: (reflectance > 0.0)
+                .then(|| reflection(hit, facing, incident, media, LinearSrgb::grey(reflectance))),
+            transmission: Some(transmission),
+            deposit: LinearSrgb::BLACK,
+            absorbed: LinearSrgb::grey(1.0 - reflectance) - transmitted,
+        }
+    }
+}
+
+fn reflection(
+    hit: &SurfaceHit,
+    facing: &Facing,
+    incident: DVec3,
+    media: &MediumStack,
+    share: LinearSrgb,
+) -> Branch {
+    Branch {
+        ray: hit.spawn(facing.reflected(incident)),
+        share,
+        event: Event::Reflection,
+        media: *media,
+        ior_ratio: 1.0,
+    }
+}

@@ -1,0 +1,73 @@
+//! Which bodies a path is inside of.
+
+use crate::optics::LinearSrgb;
+use crate::scene::{Scene, Volume};
+
+/// Bodies that can be nested around a path.
+const CAPACITY: usize = 8;
+
+/// Objects whose inside the path is in, innermost last. Rule: entering an object puts it on top, leaving takes its
+/// topmost entry out; the medium is the one on top, vacuum when there is none. A body beyond the capacity is not
+/// remembered: the path then leaves it into the medium on top.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct MediumStack {
+    objects: [u32; CAPACITY],
+    depth: u8,
+}
+
+impl MediumStack {
+    /// Refractive index of the medium on top [1].
+    pub fn ior(&self, scene: &Scene) -> f64 {
+        self.top().map_or(1.0, |object| scene.material_of(object).ior)
+    }
+
+    /// The innermost object.
+    pub fn top(&self) -> Option<usize> {
+        self.depth
+            .checked_sub(1)
+            .map(|top| self.objects[usize::from(top)] as usize)
+    }
+
+    /// After entering an object.
+    #[must_use]
+    pub fn entered(mut self, object: usize) -> Self {
+        if usize::from(self.depth) < CAPACITY {
+            self.objects[usize::from(self.depth)] = object as u32;
+            self.depth += 1;
+        }
+        self
+    }
+
+    /// After leaving an object; unchanged where the path was not inside it (an open sheet, or a start within).
+    #[must_use]
+    pub fn left(mut self, object: usize) -> Self {
+        let depth = usize::from(self.depth);
+        if let Some(found) = self.objects[..depth]
+            .iter()
+            .rposition(|&entry| entry as usize == object)
+        {
+            self.objects.copy_within(found + 1..depth, found);
+            self.depth -= 1;
+        }
+        self
+    }
+
+    /// Share of the light that is left after a distance [m] in the medium on top.
+    pub fn transmittance(&self, scene: &Scene, distance_m: f64) -> LinearSrgb {
+        match self.top().and_then(|object| scene.material_of(object).volume) {
+            Some(volume) => volume.transmittance(distance_m),
+            None => LinearSrgb::WHITE,
+        }
+    }
+}
+
+impl Volume {
+    /// Beer and Lambert's law: colour^(distance/attenuation distance).
+    pub fn transmittance(&self, distance_m: f64) -> LinearSrgb {
+        if self.attenuation_distance_m.is_infinite() {
+            return LinearSrgb::WHITE;
+        }
+        self.attenuation_colour
+            .map(|channel| channel.powf(distance_m / self.attenuation_distance_m))
+    }
+}

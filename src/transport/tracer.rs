@@ -1,0 +1,134 @@
+//! Finds the next surface of a scene.
+
+use std::sync::Arc;
+
+use glam::{DVec2, DVec3};
+
+use crate::geometry::{Ray, TriangleBvh, ray};
+use crate::optics::LinearSrgb;
+use crate::scene::Scene;
+
+/// A scene with its hierarchy.
+#[derive(Debug)]
+pub struct Tracer {
+    scene: Arc<Scene>,
+    bvh: TriangleBvh,
+    /// Object and triangle within it, by the hierarchy's triangle index.
+    triangles: Vec<(u32, u32)>,
+}
+
+/// A point of a surface that a ray met.
+#[derive(Clone, Copy, Debug)]
+pub struct SurfaceHit {
+    /// Index into `Scene::objects`.
+    pub object: usize,
+    /// Index into the object's triangles.
+    pub triangle: usize,
+    /// Of the triangle's corners.
+    pub barycentric: [f64; 3],
+    /// From the ray's origin [m].
+    pub distance_m: f64,
+    /// Where [m].
+    pub point: DVec3,
+    /// Bound of the rounding error of `point` per axis [m].
+    pub point_error: DVec3,
+    /// Unit, by the triangle's winding: outwards.
+    pub geometric_normal: DVec3,
+    /// Unit, interpolated from the vertices.
+    pub shading_normal: DVec3,
+}
+
+impl SurfaceHit {
+    /// A ray that leaves this point in a unit direction, without meeting the surface again there.
+    pub fn spawn(&self, direction: DVec3) -> Ray {
+        Ray {
+            origin: ray::offset_origin(self.point, self.point_error, self.geometric_normal, direction),
+            direction,
+        }
+    }
+}
+
+impl Tracer {
+    /// Builds the hierarchy over all triangles of a scene.
+    pub fn new(scene: Arc<Scene>) -> Self {
+        let mut corners = Vec::with_capacity(scene.triangle_count());
+        let mut triangles = Vec::with_capacity(scene.triangle_count());
+        for (object, item) in scene.objects.iter().enumerate() {
+            for triangle in 0..item.mesh.triangles.len() {
+                corners.push(item.mesh.corners(triangle));
+                triangles.push((object as u32, triangle as u32));
+            }
+        }
+        let bvh = TriangleBvh::build(&corners);
+        Self {
+            scene,
+            bvh,
+            triangles,
+        }
+    }
+
+    /// The scene.
+    pub fn scene(&self) -> &Arc<Scene> {
+        &self.scene
+    }
+
+    /// The hierarchy.
+    pub fn bvh(&self) -> &TriangleBvh {
+        &self.bvh
+    }
+
+    /// The nearest surface in front of the ray's origin.
+    pub fn closest_hit(&self, ray: &Ray) -> Option<SurfaceHit> {
+        let hit = self.bvh.closest_hit(ray)?;
+        let (object, triangle) = self.triangles[hit.triangle as usize];
+        let (object, triangle) = (object as usize, triangle as usize);
+        let mesh = &self.scene.objects[object].mesh;
+        let corners = mesh.corners(triangle);
+        let (point, point_error) = ray::point_with_error(&corners, hit.barycentric);
+        let geometric_normal = mesh.face_normal(triangle);
+        let [a, b, c] = mesh.corner_normals(triangle);
+        let [wa, wb, wc] = hit.barycentric;
+        let shading_normal = (a * wa + b * wb + c * wc)
+            .try_normalize()
+            .unwrap_or(geometric_normal);
+        Some(SurfaceHit {
+            object,
+            triangle,
+            barycentric: hit.barycentric,
+            distance_m: hit.distance_m,
+            point,
+            point_error,
+            geometric_normal,
+            shading_normal,
+        })
+    }
+
+    /// Whether any surface lies on the ray before `distance_m`.
+    pub fn is_blocked(&self, ray: &Ray, distance_m: f64) -> bool {
+        self.bvh.is_blocked(ray, distance_m)
+    }
+
+    /// Base colour of the surface at a hit, its texture included.
+    pub fn base_colour(&self, hit: &SurfaceHit) -> LinearSrgb {
+        let object = &self.scene.objects[hit.object];
+        let material = &self.scene.materials[object.material];
+        let Some(reference) = &material.base_colour_texture else {
+            return material.base_colour;
+        };
+        let set = if reference.uv_set == 0 {
+            &object.mesh.uv0
+        } else {
+            &object.mesh.uv1
+        };
+        let Some(uvs) = set else {
+            return material.base_colour;
+        };
+        let uv = object.mesh.triangles[hit.triangle]
+            .iter()
+            .zip(hit.barycentric)
+            .fold(DVec2::ZERO, |sum, (&vertex, weight)| {
+                sum + uvs[vertex as usize] * weight
+            });
+        material.base_colour * self.scene.textures[reference.texture].sample(reference.transform(uv))
+    }
+}
