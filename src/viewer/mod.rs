@@ -1,5 +1,8 @@
 //! The window: fly through a scene, change a setting, see it baked anew.
 
+pub mod navigation;
+pub mod worker;
+
 use std::path::PathBuf;
 use std::sync::Arc;
 

@@ -1,0 +1,227 @@
+//! A fly camera that moves the same at every frame rate: pure, without a window.
+
+use std::f64::consts::FRAC_PI_2;
+
+use glam::{DVec2, DVec3};
+
+use crate::scene::{Camera, Scene};
+
+/// Time after which the velocity has closed 1 − 1/e of its gap to what the keys ask for [s].
+const SETTLING_S: f64 = 0.08;
+/// Below this share of the flying speed a camera without a key held stands still.
+const STILL: f64 = 1e-3;
+/// Turn per counted step of the mouse [rad]: half a turn in about 1250 steps.
+const LOOK_RAD_PER_COUNT: f64 = 0.0025;
+/// Speed factor of one notch of the wheel.
+const WHEEL_FACTOR: f64 = 1.05;
+/// Speed factor while running.
+const RUN_FACTOR: f64 = 4.0;
+/// Slowest and fastest flying speed, in scene radii per second.
+const SPEED_RANGE: (f64, f64) = (1e-3, 1e2);
+/// First flying speed, in scene radii per second.
+const FIRST_SPEED: f64 = 0.6;
+/// Angle of view of a camera that the file does not give: 45° [rad].
+const DEFAULT_FOV_RAD: f64 = std::f64::consts::FRAC_PI_4;
+
+/// Which movement keys are held.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct HeldKeys {
+    /// W
+    pub forward: bool,
+    /// S
+    pub backward: bool,
+    /// A
+    pub left: bool,
+    /// D
+    pub right: bool,
+    /// E
+    pub up: bool,
+    /// Q
+    pub down: bool,
+    /// Shift
+    pub run: bool,
+}
+
+impl HeldKeys {
+    /// Right, up and forward, each −1, 0 or 1.
+    fn direction(self) -> DVec3 {
+        let axis = |plus: bool, minus: bool| f64::from(i8::from(plus) - i8::from(minus));
+        DVec3::new(
+            axis(self.right, self.left),
+            axis(self.up, self.down),
+            axis(self.forward, self.backward),
+        )
+    }
+}
+
+/// Position, gaze and speed of the fly camera, in scene coordinates [m], y up.
+#[derive(Clone, Debug)]
+pub struct Navigator {
+    /// What is held down now.
+    pub keys: HeldKeys,
+    position: DVec3,
+    velocity_m_per_s: DVec3,
+    /// 0 looks along −z, positive turns to the right.
+    yaw_rad: f64,
+    /// Positive looks up, [−π/2, π/2]; both ends are proper views, as the horizon stays defined by the yaw.
+    pitch_rad: f64,
+    /// Of a tilted camera of the file; kept while flying.
+    roll_rad: f64,
+    vertical_fov_rad: f64,
+    near_m: f64,
+    speed_m_per_s: f64,
+    centre: DVec3,
+    radius_m: f64,
+    cameras: Vec<Camera>,
+    /// Which of the file's cameras `C` shows next.
+    next_camera: usize,
+}
+
+impl Navigator {
+    /// Starts at the file's camera of that name, else at its first camera, else so that the scene fills the picture.
+    pub fn new(scene: &Scene, camera: Option<&str>) -> Self {
+        let (low, high) = scene.bounds().unwrap_or((DVec3::splat(-1.0), DVec3::ONE));
+        let half_diagonal_m = 0.5 * (high - low).length();
+        let radius_m = if half_diagonal_m > 0.0 {
+            half_diagonal_m
+        } else {
+            1.0
+        };
+        let mut navigator = Self {
+            keys: HeldKeys::default(),
+            position: DVec3::ZERO,
+            velocity_m_per_s: DVec3::ZERO,
+            yaw_rad: 0.6,
+            pitch_rad: -0.5,
+            roll_rad: 0.0,
+            vertical_fov_rad: DEFAULT_FOV_RAD,
+            near_m: 1e-3 * radius_m,
+            speed_m_per_s: FIRST_SPEED * radius_m,
+            centre: 0.5 * (low + high),
+            radius_m,
+            cameras: scene.cameras.clone(),
+            next_camera: 0,
+        };
+        if let Some(name) = camera {
+            let found = scene.cameras.iter().position(|candidate| candidate.name == name);
+            navigator.next_camera = found.unwrap_or(0);
+        }
+        if navigator.next_camera().is_none() {
+            navigator.frame(1.0);
+        }
+        navigator
+    }
+
+    /// The camera as it stands.
+    pub fn camera(&self) -> Camera {
+        let (right, level_up, forward) = self.level_axes();
+        Camera {
+            name: "viewer".into(),
+            position: self.position,
+            forward,
+            up: level_up * self.roll_rad.cos() + right * self.roll_rad.sin(),
+            vertical_fov_rad: self.vertical_fov_rad,
+            near_m: self.near_m,
+        }
+    }
+
+    /// Flying speed without running [m/s].
+    pub fn speed_m_per_s(&self) -> f64 {
+        self.speed_m_per_s
+    }
+
+    /// Whether the next [`advance`](Self::advance) would move the camera.
+    pub fn is_moving(&self) -> bool {
+        self.keys.direction() != DVec3::ZERO || self.velocity_m_per_s != DVec3::ZERO
+    }
+
+    /// Lets time pass [s, ≥ 0]. The velocity approaches what the keys ask for exponentially and the path is its exact
+    /// integral, so that one long frame ends where many short ones do.
+    pub fn advance(&mut self, seconds: f64) {
+        let wanted = self.wanted_velocity();
+        let remaining = (-seconds / SETTLING_S).exp();
+        let gap = self.velocity_m_per_s - wanted;
+        self.position += wanted * seconds + gap * (SETTLING_S * (1.0 - remaining));
+        self.velocity_m_per_s = wanted + gap * remaining;
+        if wanted == DVec3::ZERO && self.velocity_m_per_s.length() < STILL * self.speed_m_per_s {
+            self.velocity_m_per_s = DVec3::ZERO;
+        }
+    }
+
+    /// Turns the gaze by a movement of the mouse [counts, x to the right, y down].
+    pub fn look(&mut self, counts: DVec2) {
+        self.yaw_rad = (self.yaw_rad + counts.x * LOOK_RAD_PER_COUNT).rem_euclid(std::f64::consts::TAU);
+        self.pitch_rad = (self.pitch_rad - counts.y * LOOK_RAD_PER_COUNT).clamp(-FRAC_PI_2, FRAC_PI_2);
+    }
+
+    /// Changes the flying speed by notches of the wheel, 5 % each; it stays within 0.001 to 100 scene radii per second.
+    pub fn wheel(&mut self, notches: f64) {
+        let (slowest, fastest) = (SPEED_RANGE.0 * self.radius_m, SPEED_RANGE.1 * self.radius_m);
+        self.speed_m_per_s = (self.speed_m_per_s * WHEEL_FACTOR.powf(notches)).clamp(slowest, fastest);
+    }
+
+    /// Releases every key and stands still: the window lost the keyboard.
+    pub fn stop(&mut self) {
+        self.keys = HeldKeys::default();
+        self.velocity_m_per_s = DVec3::ZERO;
+    }
+
+    /// Goes to the file's next camera and tells its name; `None` where the file has no camera.
+    pub fn next_camera(&mut self) -> Option<&str> {
+        let index = self.next_camera.checked_rem(self.cameras.len())?;
+        self.next_camera = index + 1;
+        let camera = self.cameras[index].clone();
+        self.stand_at(&camera);
+        Some(&self.cameras[index].name)
+    }
+
+    /// Steps back or forth along the gaze until the scene fills a picture of that aspect (width/height).
+    pub fn frame(&mut self, aspect: f64) {
+        let half_height = 0.5 * self.vertical_fov_rad;
+        let half_width = (half_height.tan() * aspect).atan();
+        let distance_m = self.radius_m / half_height.min(half_width).sin();
+        let (_, _, forward) = self.level_axes();
+        self.velocity_m_per_s = DVec3::ZERO;
+        self.position = self.centre - forward * distance_m;
+    }
+
+    fn stand_at(&mut self, camera: &Camera) {
+        let forward = camera.forward;
+        let across = DVec2::new(forward.x, forward.z);
+        self.velocity_m_per_s = DVec3::ZERO;
+        self.position = camera.position;
+        self.pitch_rad = forward.y.clamp(-1.0, 1.0).asin();
+        self.yaw_rad = if across.length() > 1e-9 {
+            across.x.atan2(-across.y)
+        } else {
+            // Straight up or down: the picture's upper edge tells the heading.
+            let heading = camera.up * -forward.y.signum();
+            heading.x.atan2(-heading.z)
+        };
+        self.roll_rad = 0.0;
+        let (right, level_up, _) = self.level_axes();
+        self.roll_rad = camera.up.dot(right).atan2(camera.up.dot(level_up));
+        self.vertical_fov_rad = camera.vertical_fov_rad;
+        self.near_m = camera.near_m.min(1e-3 * self.radius_m);
+    }
+
+    /// Right, up and forward of the camera without its roll: orthonormal at every pitch.
+    fn level_axes(&self) -> (DVec3, DVec3, DVec3) {
+        let (sin_yaw, cos_yaw) = self.yaw_rad.sin_cos();
+        let (sin_pitch, cos_pitch) = self.pitch_rad.sin_cos();
+        let heading = DVec3::new(sin_yaw, 0.0, -cos_yaw);
+        let right = DVec3::new(cos_yaw, 0.0, sin_yaw);
+        let forward = heading * cos_pitch + DVec3::Y * sin_pitch;
+        let up = DVec3::Y * cos_pitch - heading * sin_pitch;
+        (right, up, forward)
+    }
+
+    /// What the held keys ask for [m/s]: along the gaze, sideways, and straight up.
+    fn wanted_velocity(&self) -> DVec3 {
+        let keys = self.keys.direction();
+        let (right, _, forward) = self.level_axes();
+        let direction = right * keys.x + DVec3::Y * keys.y + forward * keys.z;
+        let run = if self.keys.run { RUN_FACTOR } else { 1.0 };
+        direction.normalize_or_zero() * (self.speed_m_per_s * run)
+    }
+}

@@ -1,0 +1,399 @@
+//! A thread around a bake: requests in, progress and maps out; the window never waits for it.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use crate::error::Result;
+use crate::progress::{Control, Progress, Stage};
+use crate::session::{BakeResult, BakeSession};
+use crate::settings::BakeSettings;
+
+/// Shortest time between two wake-ups of the window by progress.
+const WAKE_EVERY: Duration = Duration::from_millis(50);
+
+/// What the worker bakes with.
+pub trait Baker {
+    /// See [`BakeSession::bake`].
+    ///
+    /// # Errors
+    /// As the session's.
+    fn bake(
+        &mut self,
+        settings: &BakeSettings,
+        progress: &dyn Progress,
+        control: &Control,
+    ) -> Result<BakeResult>;
+}
+
+impl Baker for BakeSession {
+    fn bake(
+        &mut self,
+        settings: &BakeSettings,
+        progress: &dyn Progress,
+        control: &Control,
+    ) -> Result<BakeResult> {
+        Self::bake(self, settings, progress, control)
+    }
+}
+
+/// Where the bake stands.
+#[derive(Clone, Debug, PartialEq)]
+pub enum BakeState {
+    /// Nothing was asked for yet.
+    Idle,
+    /// At work, or about to be.
+    Baking {
+        /// What it is doing.
+        stage: Stage,
+        /// Of this stage, [0, 1].
+        fraction: f64,
+        /// When it was asked for.
+        since: Instant,
+    },
+    /// The maps belong to the settings last asked for.
+    Done,
+    /// Stopped by the user; the maps are those of an earlier bake.
+    Cancelled,
+    /// One sentence: what failed, where, what to do.
+    Failed(String),
+}
+
+impl BakeState {
+    /// Whether a bake is running or about to.
+    pub fn is_baking(&self) -> bool {
+        matches!(self, Self::Baking { .. })
+    }
+}
+
+/// A complete bake.
+#[derive(Clone, Debug)]
+pub struct FinishedBake {
+    /// What it was asked for with; `threads` as asked, before a core was set aside.
+    pub settings: BakeSettings,
+    /// Maps and accounts.
+    pub result: BakeResult,
+    /// From the request to the maps, wall clock [s].
+    pub seconds: f64,
+}
+
+/// Threads that leave one core to the window where none are asked for (`asked` = 0), at least 1.
+pub fn baking_threads(asked: usize, cores: usize) -> usize {
+    if asked == 0 {
+        cores.saturating_sub(1).max(1)
+    } else {
+        asked
+    }
+}
+
+/// Handle of the thread; dropping it cancels the bake and waits for the thread's end.
+#[derive(Debug)]
+pub struct Worker {
+    shared: Arc<Shared>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Worker {
+    /// Starts the thread. `make_baker` is called there before the first bake, and again after one that panicked.
+    /// `wake` is called from any thread when there is news, at most about every 50 ms for mere progress.
+    ///
+    /// # Errors
+    /// The system gives no thread.
+    pub fn spawn<B: Baker>(
+        make_baker: impl Fn() -> Result<B> + Send + 'static,
+        wake: impl Fn() + Send + Sync + 'static,
+    ) -> Result<Self> {
+        let shared = Arc::new(Shared::new(Box::new(wake)));
+        let of_thread = Arc::clone(&shared);
+        let thread = std::thread::Builder::new()
+            .name("baker".into())
+            .spawn(move || serve(&of_thread, &make_baker))
+            .map_err(|error| {
+                crate::error::Error::failure(
+                    "baker",
+                    format!("the system gives no thread: {error}"),
+                    "close other programs and start again",
+                )
+            })?;
+        Ok(Self {
+            shared,
+            thread: Some(thread),
+        })
+    }
+
+    /// Asks for a bake; replaces what was asked before and stops what is running.
+    pub fn request(&self, settings: BakeSettings) {
+        let mut slot = self.shared.lock();
+        slot.cancel_running();
+        slot.serial += 1;
+        slot.request = Some(Request {
+            settings,
+            since: Instant::now(),
+            serial: slot.serial,
+        });
+        self.shared.news.notify_all();
+    }
+
+    /// Stops the running bake and forgets the waiting one; its unfinished maps are dropped.
+    pub fn cancel(&self) {
+        let mut slot = self.shared.lock();
+        slot.cancel_running();
+        if slot.request.take().is_some() && slot.running.is_none() {
+            slot.settled = BakeState::Cancelled;
+        }
+    }
+
+    /// Where the bake stands now.
+    pub fn state(&self) -> BakeState {
+        let slot = self.shared.lock();
+        let baking = |stage, fraction, since| BakeState::Baking {
+            stage,
+            fraction,
+            since,
+        };
+        match (&slot.request, &slot.running) {
+            (Some(request), _) => baking(Stage::Build, 0.0, request.since),
+            (None, Some(running)) => {
+                let (stage, fraction) = running.meter.read();
+                baking(stage, fraction, running.since)
+            }
+            (None, None) => slot.settled.clone(),
+        }
+    }
+
+    /// The newest complete bake that was not taken yet.
+    pub fn take_finished(&self) -> Option<FinishedBake> {
+        self.shared.lock().finished.take()
+    }
+}
+
+impl Drop for Worker {
+    fn drop(&mut self) {
+        let mut slot = self.shared.lock();
+        slot.quit = true;
+        slot.request = None;
+        slot.cancel_running();
+        drop(slot);
+        self.shared.news.notify_all();
+        if let Some(thread) = self.thread.take()
+            && thread.join().is_err()
+        {
+            log::error!("the baking thread panicked");
+        }
+    }
+}
+
+struct Request {
+    settings: BakeSettings,
+    since: Instant,
+    serial: u64,
+}
+
+struct Running {
+    control: Arc<Control>,
+    meter: Arc<Meter>,
+    since: Instant,
+}
+
+/// What both threads look at, under one lock.
+struct Slot {
+    /// Of the newest request, waiting or not.
+    serial: u64,
+    request: Option<Request>,
+    running: Option<Running>,
+    /// The state while nothing is asked for or running.
+    settled: BakeState,
+    finished: Option<FinishedBake>,
+    quit: bool,
+}
+
+impl Slot {
+    fn cancel_running(&self) {
+        if let Some(running) = &self.running {
+            running.control.cancel();
+        }
+    }
+}
+
+struct Shared {
+    slot: Mutex<Slot>,
+    news: Condvar,
+    wake: Box<dyn Fn() + Send + Sync>,
+}
+
+impl std::fmt::Debug for Shared {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Shared").finish_non_exhaustive()
+    }
+}
+
+impl Shared {
+    fn new(wake: Box<dyn Fn() + Send + Sync>) -> Self {
+        let slot = Slot {
+            serial: 0,
+            request: None,
+            running: None,
+            settled: BakeState::Idle,
+            finished: None,
+            quit: false,
+        };
+        Self {
+            slot: Mutex::new(slot),
+            news: Condvar::new(),
+            wake,
+        }
+    }
+
+    /// No code that can panic runs under the lock, so a poisoned one still holds a valid slot.
+    fn lock(&self) -> MutexGuard<'_, Slot> {
+        self.slot.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Waits for a request and marks it as running; `None` when it is time to end.
+    fn next(&self) -> Option<(Request, Arc<Control>, Arc<Meter>)> {
+        let mut slot = self.lock();
+        loop {
+            if slot.quit {
+                return None;
+            }
+            if let Some(request) = slot.request.take() {
+                let control = Arc::new(Control::default());
+                let meter = Arc::new(Meter::default());
+                slot.running = Some(Running {
+                    control: Arc::clone(&control),
+                    meter: Arc::clone(&meter),
+                    since: request.since,
+                });
+                return Some((request, control, meter));
+            }
+            slot = self.news.wait(slot).unwrap_or_else(PoisonError::into_inner);
+        }
+    }
+
+    fn settle(&self, serial: u64, state: BakeState, finished: Option<FinishedBake>) {
+        let mut slot = self.lock();
+        slot.running = None;
+        // A bake that was complete before it noticed that a newer request came, and was itself cancelled.
+        let outdated = state == BakeState::Done && serial != slot.serial;
+        slot.settled = if outdated { BakeState::Cancelled } else { state };
+        if finished.is_some() {
+            slot.finished = finished;
+        }
+        drop(slot);
+        (self.wake)();
+    }
+}
+
+/// The thread's life.
+fn serve<B: Baker>(shared: &Shared, make_baker: &impl Fn() -> Result<B>) {
+    let mut baker = None;
+    while let Some((request, control, meter)) = shared.next() {
+        (shared.wake)();
+        let progress = Reporter {
+            meter: &meter,
+            wake: &shared.wake,
+            start: request.since,
+            next_wake_ms: AtomicU64::new(0),
+        };
+        let mut settings = request.settings.clone();
+        let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
+        settings.threads = baking_threads(settings.threads, cores);
+        let outcome = catch_unwind(AssertUnwindSafe(|| {
+            if baker.is_none() {
+                baker = Some(make_baker()?);
+            }
+            let baker = baker.as_mut().expect("it was made above");
+            baker.bake(&settings, &progress, &control)
+        }));
+        let (state, finished) = match outcome {
+            Ok(Ok(result)) if result.partial => (BakeState::Cancelled, None),
+            Ok(Ok(result)) => {
+                let seconds = request.since.elapsed().as_secs_f64();
+                (
+                    BakeState::Done,
+                    Some(FinishedBake {
+                        settings: request.settings,
+                        result,
+                        seconds,
+                    }),
+                )
+            }
+            Ok(Err(_)) if control.is_cancelled() => (BakeState::Cancelled, None),
+            Ok(Err(error)) => (BakeState::Failed(error.to_string()), None),
+            Err(panic) => {
+                // What it left behind may be half-built.
+                baker = None;
+                (BakeState::Failed(panic_sentence(panic.as_ref())), None)
+            }
+        };
+        shared.settle(request.serial, state, finished);
+    }
+}
+
+fn panic_sentence(panic: &(dyn std::any::Any + Send)) -> String {
+    let text = panic
+        .downcast_ref::<&str>()
+        .map(|text| (*text).to_owned())
+        .or_else(|| panic.downcast_ref::<String>().cloned())
+        .unwrap_or_else(|| "no message".into());
+    format!(
+        "bake: it ended by a fault of the program ({text}); change a setting or bake again, and please report it"
+    )
+}
+
+/// Stage and fraction in one word, so that they are read together: stage in the upper half, fraction × 2³¹ below.
+#[derive(Debug, Default)]
+struct Meter {
+    packed: AtomicU64,
+}
+
+const STAGES: [Stage; 4] = [Stage::Build, Stage::Plan, Stage::Caustic, Stage::Direct];
+const WHOLE: f64 = (1_u64 << 31) as f64;
+
+impl Meter {
+    fn write(&self, stage: Stage, fraction: f64) {
+        let index = STAGES
+            .iter()
+            .position(|candidate| *candidate == stage)
+            .unwrap_or(0) as u64;
+        let part = (fraction.clamp(0.0, 1.0) * WHOLE) as u64;
+        self.packed.store(index << 32 | part, Ordering::Relaxed);
+    }
+
+    fn read(&self) -> (Stage, f64) {
+        let packed = self.packed.load(Ordering::Relaxed);
+        (
+            STAGES[(packed >> 32) as usize],
+            (packed & 0xffff_ffff) as f64 / WHOLE,
+        )
+    }
+}
+
+/// Progress of one bake; wakes the window now and then.
+struct Reporter<'a> {
+    meter: &'a Meter,
+    wake: &'a (dyn Fn() + Send + Sync),
+    start: Instant,
+    /// When the window may be woken again [ms after `start`].
+    next_wake_ms: AtomicU64,
+}
+
+impl Progress for Reporter<'_> {
+    fn advance(&self, stage: Stage, done: u64, total: u64) {
+        self.meter.write(stage, done as f64 / total.max(1) as f64);
+        let now_ms = self.start.elapsed().as_millis() as u64;
+        let due_ms = self.next_wake_ms.load(Ordering::Relaxed);
+        let next_ms = now_ms + WAKE_EVERY.as_millis() as u64;
+        // Of several threads that come at once, one wakes.
+        if now_ms >= due_ms
+            && self
+                .next_wake_ms
+                .compare_exchange(due_ms, next_ms, Ordering::Relaxed, Ordering::Relaxed)
+                .is_ok()
+        {
+            (self.wake)();
+        }
+    }
+}

@@ -1,0 +1,6 @@
+//! Scenes: the built-in ones and those from files.
+
+mod support;
+
+#[path = "scene/builtins.rs"]
+mod builtins;

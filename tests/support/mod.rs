@@ -1,0 +1,49 @@
+//! What the test binaries share. Each uses a part of it.
+#![allow(dead_code)]
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+static SKIPS: AtomicUsize = AtomicUsize::new(0);
+
+/// A file or folder of the project; fails where it is missing.
+pub fn project_file(path: &str) -> PathBuf {
+    let full = Path::new(env!("CARGO_MANIFEST_DIR")).join(path);
+    assert!(full.exists(), "{path} is missing from the project");
+    full
+}
+
+/// A file or folder of the optional collection beside the project (`oracle/`, `scenes/`, `validator/`). `None`, after
+/// a counted skip, where it is not there.
+pub fn shared_or_skip(path: &str) -> Option<PathBuf> {
+    let full = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared").join(path);
+    if full.exists() {
+        return Some(full);
+    }
+    skip(&format!("../shared/{path} is not there"));
+    None
+}
+
+/// Counts a test (or a part of it) that could not run and says so past the test harness, which holds back what
+/// passing tests print. With CI=true a skip is a failure.
+pub fn skip(reason: &str) {
+    let count = SKIPS.fetch_add(1, Ordering::Relaxed) + 1;
+    let test = std::thread::current().name().unwrap_or("?").to_owned();
+    assert!(
+        std::env::var("CI").as_deref() != Ok("true"),
+        "{test} would be skipped, and CI=true allows none: {reason}"
+    );
+    // Straight to the stream: `eprintln!` would be captured.
+    writeln!(std::io::stderr(), "SKIPPED ({count}): {test}: {reason}").expect("stderr takes a line");
+}
+
+/// Fails unless two values agree to a relative tolerance (absolute where the expected one is zero).
+#[track_caller]
+pub fn assert_close(actual: f64, expected: f64, tolerance: f64, what: &str) {
+    let scale = if expected == 0.0 { 1.0 } else { expected.abs() };
+    assert!(
+        (actual - expected).abs() <= tolerance * scale,
+        "{what}: {actual} instead of {expected} within {tolerance}"
+    );
+}

@@ -1,0 +1,314 @@
+//! The baking thread, with bakers that are made for the test.
+
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
+
+use nephroid::error::{Error, Result};
+use nephroid::plan::EffectPlan;
+use nephroid::progress::{Control, Progress, Stage};
+use nephroid::session::{BakeCounts, BakeResult, StopReason, Timings};
+use nephroid::settings::BakeSettings;
+use nephroid::viewer::worker::{BakeState, Baker, FinishedBake, Worker, baking_threads};
+
+/// Far longer than anything here takes; only a failing test waits for it.
+const PATIENCE: Duration = Duration::from_secs(20);
+
+fn result(rays: u64, partial: bool) -> BakeResult {
+    BakeResult {
+        maps: Vec::new(),
+        plan: EffectPlan::default(),
+        ledgers: Vec::new(),
+        counts: BakeCounts {
+            rays,
+            ..BakeCounts::default()
+        },
+        timings_s: Timings::default(),
+        cpu_s: Timings::default(),
+        stop_reason: if partial {
+            StopReason::Cancelled
+        } else {
+            StopReason::Density
+        },
+        partial,
+        warnings: Vec::new(),
+    }
+}
+
+fn settings(density_per_sr: f64) -> BakeSettings {
+    BakeSettings {
+        density_per_sr,
+        ..BakeSettings::default()
+    }
+}
+
+/// Works by a script: the density tells it what to do.
+struct Scripted {
+    started: Arc<AtomicUsize>,
+    alive: Arc<AtomicUsize>,
+    gate: Arc<Mutex<Receiver<()>>>,
+}
+
+/// Bakes at once.
+const AT_ONCE: f64 = 1000.0;
+/// Bakes until it is cancelled.
+const ENDLESS: f64 = 2000.0;
+const PANICKING: f64 = 3000.0;
+const FAILING: f64 = 4000.0;
+/// Ignores cancelling and ends when the gate opens.
+const STUBBORN: f64 = 5000.0;
+
+impl Baker for Scripted {
+    fn bake(
+        &mut self,
+        settings: &BakeSettings,
+        progress: &dyn Progress,
+        control: &Control,
+    ) -> Result<BakeResult> {
+        self.started.fetch_add(1, Ordering::SeqCst);
+        let rays = settings.density_per_sr as u64;
+        match settings.density_per_sr {
+            ENDLESS => {
+                progress.advance(Stage::Caustic, 1, 4);
+                while !control.is_cancelled() {
+                    std::thread::sleep(Duration::from_millis(1));
+                }
+                Ok(result(rays, true))
+            }
+            PANICKING => panic!("the script says so"),
+            FAILING => Err(Error::failure("floor", "it is too large", "make it smaller")),
+            STUBBORN => {
+                let opened = self.gate.lock().expect("one thread").recv_timeout(PATIENCE);
+                opened.expect("the test opens the gate");
+                Ok(result(rays, false))
+            }
+            _ => Ok(result(rays, false)),
+        }
+    }
+}
+
+impl Drop for Scripted {
+    fn drop(&mut self) {
+        self.alive.fetch_sub(1, Ordering::SeqCst);
+    }
+}
+
+struct Bench {
+    worker: Worker,
+    started: Arc<AtomicUsize>,
+    /// Bakers that exist.
+    alive: Arc<AtomicUsize>,
+    made: Arc<AtomicUsize>,
+    woken: Arc<AtomicUsize>,
+    gate: Sender<()>,
+}
+
+fn bench() -> Bench {
+    let counter = || Arc::new(AtomicUsize::new(0));
+    let (started, alive, made, woken) = (counter(), counter(), counter(), counter());
+    let (gate, opened) = channel();
+    let opened = Arc::new(Mutex::new(opened));
+    let of_baker = (Arc::clone(&started), Arc::clone(&alive), Arc::clone(&made));
+    let of_wake = Arc::clone(&woken);
+    let worker = Worker::spawn(
+        move || {
+            of_baker.2.fetch_add(1, Ordering::SeqCst);
+            of_baker.1.fetch_add(1, Ordering::SeqCst);
+            Ok(Scripted {
+                started: Arc::clone(&of_baker.0),
+                alive: Arc::clone(&of_baker.1),
+                gate: Arc::clone(&opened),
+            })
+        },
+        move || {
+            of_wake.fetch_add(1, Ordering::SeqCst);
+        },
+    );
+    Bench {
+        worker: worker.expect("threads are to be had"),
+        started,
+        alive,
+        made,
+        woken,
+        gate,
+    }
+}
+
+fn wait_for(what: &str, mut condition: impl FnMut() -> bool) {
+    let start = Instant::now();
+    while !condition() {
+        assert!(start.elapsed() < PATIENCE, "waited in vain for {what}");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+}
+
+fn settled(worker: &Worker) -> BakeState {
+    wait_for("the bake to settle", || !worker.state().is_baking());
+    worker.state()
+}
+
+fn rays(finished: Option<FinishedBake>) -> u64 {
+    finished.expect("there are maps").result.counts.rays
+}
+
+#[test]
+fn a_request_is_answered() {
+    let bench = bench();
+    assert_eq!(bench.worker.state(), BakeState::Idle);
+    assert!(bench.worker.take_finished().is_none());
+    bench.worker.request(settings(AT_ONCE));
+    assert_eq!(settled(&bench.worker), BakeState::Done);
+    let finished = bench.worker.take_finished().expect("there are maps");
+    assert_eq!(finished.settings, settings(AT_ONCE), "as asked, its threads too");
+    assert!(finished.seconds >= 0.0);
+    assert!(bench.worker.take_finished().is_none(), "only once");
+    wait_for("the window to be woken", || {
+        bench.woken.load(Ordering::SeqCst) >= 1
+    });
+}
+
+#[test]
+fn progress_is_seen_while_it_bakes() {
+    let bench = bench();
+    bench.worker.request(settings(ENDLESS));
+    wait_for("progress", || {
+        matches!(bench.worker.state(), BakeState::Baking { stage: Stage::Caustic, fraction, .. }
+            if (fraction - 0.25).abs() < 1e-6)
+    });
+    assert!(bench.woken.load(Ordering::SeqCst) >= 1);
+    bench.worker.cancel();
+    assert_eq!(settled(&bench.worker), BakeState::Cancelled);
+    assert!(
+        bench.worker.take_finished().is_none(),
+        "unfinished maps are dropped"
+    );
+}
+
+#[test]
+fn a_new_request_cancels_the_running_one_and_the_last_wins() {
+    let bench = bench();
+    bench.worker.request(settings(ENDLESS));
+    wait_for("the start", || bench.started.load(Ordering::SeqCst) == 1);
+    for request in 0..1000 {
+        bench.worker.request(settings(if request % 2 == 0 {
+            ENDLESS
+        } else {
+            10_000.0 + f64::from(request)
+        }));
+        assert!(bench.worker.state().is_baking());
+    }
+    bench.worker.request(settings(77.0));
+    assert_eq!(settled(&bench.worker), BakeState::Done);
+    assert_eq!(rays(bench.worker.take_finished()), 77);
+    assert!(bench.worker.take_finished().is_none());
+    assert_eq!(
+        bench.made.load(Ordering::SeqCst),
+        1,
+        "one session serves all requests"
+    );
+}
+
+#[test]
+fn earlier_maps_stay_until_newer_ones_are_complete() {
+    let bench = bench();
+    bench.worker.request(settings(AT_ONCE));
+    settled(&bench.worker);
+    bench.worker.request(settings(ENDLESS));
+    wait_for("the start", || bench.started.load(Ordering::SeqCst) == 2);
+    bench.worker.cancel();
+    settled(&bench.worker);
+    assert_eq!(rays(bench.worker.take_finished()), AT_ONCE as u64);
+}
+
+#[test]
+fn a_bake_that_ends_too_late_does_not_pass_for_the_one_that_was_cancelled() {
+    let bench = bench();
+    bench.worker.request(settings(STUBBORN));
+    wait_for("the start", || bench.started.load(Ordering::SeqCst) == 1);
+    bench.worker.request(settings(AT_ONCE));
+    bench.worker.cancel();
+    bench.gate.send(()).expect("the baker listens");
+    assert_eq!(
+        settled(&bench.worker),
+        BakeState::Cancelled,
+        "what was asked last was never baked"
+    );
+    assert_eq!(
+        rays(bench.worker.take_finished()),
+        STUBBORN as u64,
+        "yet its maps are complete"
+    );
+}
+
+#[test]
+fn cancelling_without_a_bake_changes_nothing() {
+    let bench = bench();
+    bench.worker.cancel();
+    assert_eq!(bench.worker.state(), BakeState::Idle);
+    bench.worker.request(settings(AT_ONCE));
+    assert_eq!(settled(&bench.worker), BakeState::Done);
+    bench.worker.cancel();
+    assert_eq!(bench.worker.state(), BakeState::Done);
+}
+
+#[test]
+fn failures_and_panics_become_sentences_and_the_next_bake_works() {
+    let bench = bench();
+    bench.worker.request(settings(FAILING));
+    assert_eq!(
+        settled(&bench.worker),
+        BakeState::Failed("floor: it is too large; make it smaller".into())
+    );
+    bench.worker.request(settings(PANICKING));
+    let BakeState::Failed(sentence) = settled(&bench.worker) else {
+        panic!("it did not fail")
+    };
+    assert!(sentence.contains("the script says so"), "{sentence}");
+    bench.worker.request(settings(AT_ONCE));
+    assert_eq!(settled(&bench.worker), BakeState::Done);
+    assert_eq!(
+        bench.made.load(Ordering::SeqCst),
+        2,
+        "a fresh session after the panic"
+    );
+}
+
+#[test]
+fn dropping_it_ends_the_bake_and_the_thread() {
+    let Bench {
+        worker,
+        started,
+        alive,
+        ..
+    } = bench();
+    worker.request(settings(ENDLESS));
+    wait_for("the start", || started.load(Ordering::SeqCst) == 1);
+    worker.request(settings(ENDLESS));
+    let start = Instant::now();
+    drop(worker);
+    assert!(start.elapsed() < PATIENCE);
+    // The thread owned the baker: it is gone with it.
+    assert_eq!(alive.load(Ordering::SeqCst), 0);
+}
+
+#[test]
+fn many_workers_leave_no_thread_behind() {
+    let alive: Vec<_> = (0..20)
+        .map(|_| {
+            let Bench {
+                worker, alive, made, ..
+            } = bench();
+            worker.request(settings(AT_ONCE));
+            wait_for("its session", || made.load(Ordering::SeqCst) == 1);
+            alive
+        })
+        .collect();
+    assert!(alive.iter().all(|count| count.load(Ordering::SeqCst) == 0));
+}
+
+#[test]
+fn one_core_is_left_to_the_window() {
+    assert_eq!([1, 2, 8].map(|cores| baking_threads(0, cores)), [1, 1, 7]);
+    assert_eq!(baking_threads(5, 2), 5, "what the user asks for is honoured");
+}
