@@ -91,6 +91,20 @@ impl ItemBuffer {
         sum
     }
 
+    /// Lattice cells that touch a marked cell, over all faces: an upper bound of the rays.
+    pub fn lattice_cells(&self, faces: usize, size: (usize, usize)) -> u64 {
+        (0..faces)
+            .into_par_iter()
+            .flat_map_iter(|face| (0..size.1).map(move |row| (face, row)))
+            .map(|(face, row)| {
+                self.lattice_spans(face, row, size)
+                    .iter()
+                    .map(|(start, end)| (end - start) as u64)
+                    .sum::<u64>()
+            })
+            .sum()
+    }
+
     /// Lattice columns of a lattice row that touch a marked cell, as ascending, disjoint half-open spans. `size` is the
     /// lattice's columns and rows.
     pub fn lattice_spans(&self, face: usize, row: usize, size: (usize, usize)) -> Vec<(usize, usize)> {

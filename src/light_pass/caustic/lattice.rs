@@ -4,7 +4,6 @@
 use glam::DVec2;
 use rand_pcg::Pcg64Mcg;
 use rand_pcg::rand_core::{Rng, SeedableRng};
-use rayon::prelude::*;
 
 use super::path::{Arrival, PathLimits, PathTracer};
 use crate::illumination::accumulator::FluxUnit;
@@ -74,17 +73,8 @@ impl Lattice<'_> {
 
     /// Upper bound of the rays: lattice cells that touch a marked cell of the item buffer.
     pub fn ray_count(&self) -> u64 {
-        (0..self.launch.face_count())
-            .into_par_iter()
-            .flat_map_iter(|face| (0..self.size.1).map(move |row| (face, row)))
-            .map(|(face, row)| {
-                self.item_buffer
-                    .lattice_spans(face, row, self.size)
-                    .iter()
-                    .map(|(start, end)| (end - start) as u64)
-                    .sum::<u64>()
-            })
-            .sum()
+        self.item_buffer
+            .lattice_cells(self.launch.face_count(), self.size)
     }
 
     /// Traces one row of one face.
