@@ -14,6 +14,7 @@ pub mod progress;
 pub mod settings;
 pub mod units;
 
+pub mod files;
 #[cfg(feature = "gpu")]
 pub mod gpu;
 

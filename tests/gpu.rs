@@ -3,6 +3,8 @@
 //! An adapter is required, a software one will do: with CI=true its absence is a failure, else a skip that says so.
 #![cfg(feature = "gpu")]
 
+mod support;
+
 #[path = "gpu/device.rs"]
 mod device;
 #[path = "gpu/display.rs"]

@@ -2,16 +2,16 @@
 
 use nephroid::gpu::Gpu;
 
-/// A device, or `None` after a loud skip where there is no adapter.
+use crate::support::skip;
+
+/// A device, or `None` after a counted skip where there is no adapter.
 pub fn gpu() -> Option<Gpu> {
-    match Gpu::headless() {
-        Ok(gpu) => Some(gpu),
-        Err(error) if std::env::var("CI").is_ok_and(|ci| ci == "true") => panic!("{error}"),
-        Err(error) => {
-            eprintln!("SKIPPED: {error}");
-            None
-        }
-    }
+    Gpu::headless()
+        .map_err(|error| {
+            let test = std::thread::current().name().unwrap_or("?").to_owned();
+            skip(&test, &error.to_string());
+        })
+        .ok()
 }
 
 #[test]
