@@ -4,3 +4,5 @@ mod support;
 
 #[path = "scene/builtins.rs"]
 mod builtins;
+#[path = "scene/files.rs"]
+mod files;
