@@ -58,7 +58,8 @@ impl ShearedRay {
         }
         let distance = self.shear.z * (u * a[kz] + v * b[kz] + w * c[kz]) / determinant;
         let z = [a[kz], b[kz], c[kz]].map(|z| (self.shear.z * z).abs());
-        let bound = distance_error(max([ax, bx, cx]), max([ay, by, cy]), max(z), max([u, v, w])) / determinant.abs();
+        let bound =
+            distance_error(max([ax, bx, cx]), max([ay, by, cy]), max(z), max([u, v, w])) / determinant.abs();
         // Also refuses NaN.
         if distance > bound && distance.is_finite() {
             Some((distance, [u / determinant, v / determinant, w / determinant]))

@@ -9,7 +9,12 @@ use nephroid::units::RadiantIntensity;
 use crate::tools::{bake, builtin_scene, caustic, map_of, settings};
 
 fn bits(map: &IlluminationMap) -> Vec<u32> {
-    map.layers.iter().flat_map(|layer| &layer.irradiance).flatten().map(|e| e.to_bits()).collect()
+    map.layers
+        .iter()
+        .flat_map(|layer| &layer.irradiance)
+        .flatten()
+        .map(|e| e.to_bits())
+        .collect()
 }
 
 #[test]
@@ -56,7 +61,10 @@ fn lights_that_see_nothing_specular_change_no_bit() {
             },
         });
     }
-    let (a, b) = (bake(alone.clone(), &settings), bake(with_lamps.clone(), &settings));
+    let (a, b) = (
+        bake(alone.clone(), &settings),
+        bake(with_lamps.clone(), &settings),
+    );
     assert!(bits(map_of(&a, &alone, "floor")) == bits(map_of(&b, &with_lamps, "floor")));
 }
 
@@ -84,10 +92,16 @@ fn two_lights_give_the_sum_of_their_maps() {
     let mut lit = 0;
     for texel in 0..maps[0].len() {
         let sum = maps[0][texel] + maps[1][texel];
-        assert!((maps[2][texel] - sum).abs() <= 1e-6 * sum.max(1e-6), "texel {texel}");
+        assert!(
+            (maps[2][texel] - sum).abs() <= 1e-6 * sum.max(1e-6),
+            "texel {texel}"
+        );
         lit += usize::from(maps[0][texel] > 0.0 && maps[1][texel] > 0.0);
     }
-    assert!(lit > 50, "both lights must reach some of the same texels, only {lit} are");
+    assert!(
+        lit > 50,
+        "both lights must reach some of the same texels, only {lit} are"
+    );
 }
 
 #[test]
@@ -95,9 +109,14 @@ fn power_of_two_changes_of_power_are_exact() {
     let settings = settings(1e4, 64);
     let scene = builtin_scene("mirror");
     let mut bright = scene.clone();
-    let LightKind::Point { intensity, .. } = &mut bright.lights[0].kind else { panic!("a point light") };
+    let LightKind::Point { intensity, .. } = &mut bright.lights[0].kind else {
+        panic!("a point light")
+    };
     *intensity = *intensity * 1024.0;
     let (a, b) = (bake(scene.clone(), &settings), bake(bright.clone(), &settings));
-    let (a, b) = (caustic(map_of(&a, &scene, "floor")), caustic(map_of(&b, &bright, "floor")));
+    let (a, b) = (
+        caustic(map_of(&a, &scene, "floor")),
+        caustic(map_of(&b, &bright, "floor")),
+    );
     assert!(a.iter().zip(&b).all(|(a, b)| a * 1024.0 == *b));
 }

@@ -11,10 +11,17 @@ fn automatic_maps_grow_with_the_density() {
     let scene = builtin_scene("ring");
     let mut last = 0;
     for density in [1e3, 1.6e4, 2.56e5] {
-        let settings = BakeSettings { map_resolution: MapResolution::Auto, ..settings(density, 0) };
+        let settings = BakeSettings {
+            map_resolution: MapResolution::Auto,
+            ..settings(density, 0)
+        };
         let result = bake(scene.clone(), &settings);
         let map = map_of(&result, &scene, "floor");
-        assert!(map.width() > last, "density {density}: {} after {last} texels", map.width());
+        assert!(
+            map.width() > last,
+            "density {density}: {} after {last} texels",
+            map.width()
+        );
         assert_eq!(map.width(), map.height(), "the floor is square");
         // No coarser than the footprints: a texel for every ray, about.
         assert!((map.width() * map.height()) as u64 >= result.counts.splats / 4);

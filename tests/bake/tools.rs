@@ -18,7 +18,10 @@ pub fn builtin_scene(name: &str) -> Scene {
 pub fn settings(density_per_sr: f64, side: usize) -> BakeSettings {
     BakeSettings {
         density_per_sr,
-        map_resolution: MapResolution::Fixed { width: side, height: side },
+        map_resolution: MapResolution::Fixed {
+            width: side,
+            height: side,
+        },
         ..BakeSettings::default()
     }
 }
@@ -56,11 +59,22 @@ pub fn energy_fault(result: &BakeResult) -> Option<String> {
     for ledger in &result.ledgers {
         let imbalance = ledger.energy_w.relative_imbalance();
         if imbalance.is_nan() || imbalance > 1e-6 {
-            return Some(format!("the ledger of {} is off by {imbalance:e}: {ledger:?}", ledger.light));
+            return Some(format!(
+                "the ledger of {} is off by {imbalance:e}: {ledger:?}",
+                ledger.light
+            ));
         }
     }
-    let deposited: f64 = result.ledgers.iter().map(|ledger| ledger.energy_w.deposited).sum();
-    let held: f64 = result.maps.iter().map(|map| map.flux_w(LayerKind::Caustic).luminance()).sum();
+    let deposited: f64 = result
+        .ledgers
+        .iter()
+        .map(|ledger| ledger.energy_w.deposited)
+        .sum();
+    let held: f64 = result
+        .maps
+        .iter()
+        .map(|map| map.flux_w(LayerKind::Caustic).luminance())
+        .sum();
     let off = (held - deposited).abs();
     (off.is_nan() || off > 1e-6 * deposited)
         .then(|| format!("the maps hold {held} W, the ledgers say {deposited} W"))
@@ -71,12 +85,18 @@ pub fn transformed(mut scene: Scene, rotation: DMat3, scale: f64, offset: DVec3)
     let place = |p: DVec3| rotation * p * scale + offset;
     for object in &mut scene.objects {
         object.mesh.positions.iter_mut().for_each(|p| *p = place(*p));
-        object.mesh.normals.iter_mut().for_each(|n| *n = (rotation * *n).normalize());
+        object
+            .mesh
+            .normals
+            .iter_mut()
+            .for_each(|n| *n = (rotation * *n).normalize());
     }
     for light in &mut scene.lights {
         match &mut light.kind {
             LightKind::Point { position, .. } => *position = place(*position),
-            LightKind::Spot { position, direction, .. } => {
+            LightKind::Spot {
+                position, direction, ..
+            } => {
                 *position = place(*position);
                 *direction = rotation * *direction;
             }
