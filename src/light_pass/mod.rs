@@ -1,3 +1,4 @@
 //! From the lights through specular surfaces onto diffuse ones.
 
+pub mod direct;
 pub mod ledger;
