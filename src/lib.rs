@@ -14,6 +14,8 @@ pub mod progress;
 pub mod settings;
 pub mod units;
 
+pub mod files;
+
 pub mod optics;
 
 pub mod geometry;
@@ -31,6 +33,8 @@ pub mod light_pass;
 pub mod eye_pass;
 
 pub mod session;
+
+pub mod export;
 
 #[cfg(feature = "viewer")]
 pub mod viewer;
