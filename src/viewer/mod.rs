@@ -1,6 +1,7 @@
 //! The window: fly through a scene, change a setting, see it baked anew.
 
 pub mod navigation;
+pub mod panel;
 pub mod worker;
 
 use std::path::PathBuf;
