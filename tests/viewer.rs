@@ -1,6 +1,8 @@
 //! The window: its parts without a display, and the whole under Xvfb.
 #![cfg(feature = "viewer")]
 
+#[path = "viewer/debounce.rs"]
+mod debounce;
 #[path = "viewer/headless.rs"]
 mod headless;
 #[path = "viewer/navigation.rs"]

@@ -1,5 +1,9 @@
 //! The window: fly through a scene, change a setting, see it baked anew.
 
+pub mod debounce;
+pub mod event_log;
+mod input;
+pub mod model;
 pub mod navigation;
 pub mod panel;
 pub mod worker;
