@@ -4,6 +4,8 @@ pub mod accumulator;
 pub mod chart;
 pub mod compare;
 pub mod map;
+pub mod parametrisation;
 
 pub use chart::{Chart, UvSet};
 pub use map::{IlluminationMap, Layer};
+pub use parametrisation::{Parametrisation, parametrise};

@@ -1,23 +1,23 @@
 //! How much of the light an interface sends back.
 
 use super::LinearSrgb;
+use super::refraction::cos_transmitted;
 
 /// Reflectance of a smooth dielectric interface for unpolarised light, (Rs + Rp)/2.
 ///
 /// `cos_incident` [0, 1] is the cosine between the incoming ray and the normal on its side, `eta` = n_t/n_i > 0.
-/// Returns 1 beyond the critical angle. At normal incidence this is ((η − 1)/(η + 1))², with no division by zero for
+/// Returns 1 beyond the critical angle, decided exactly as [`refract`](super::refraction::refract) decides it, and 0
+/// at every angle where `eta` is 1. At normal incidence this is ((η − 1)/(η + 1))², with no division by zero for
 /// any angle, because the p-polarised part is taken from the amplitude ratio and not from tangents.
 /// Source: Born and Wolf, Principles of Optics, 1.5.2.
 pub fn dielectric_reflectance(cos_incident: f64, eta: f64) -> f64 {
-    let cos_i = cos_incident.clamp(0.0, 1.0);
-    let sin2_t = (1.0 - cos_i * cos_i) / (eta * eta);
-    if sin2_t >= 1.0 {
-        return 1.0;
-    }
     if eta == 1.0 {
         return 0.0;
     }
-    let cos_t = (1.0 - sin2_t).sqrt();
+    let cos_i = cos_incident.clamp(0.0, 1.0);
+    let Some(cos_t) = cos_transmitted(cos_i, eta) else {
+        return 1.0;
+    };
     let rs = (cos_i - eta * cos_t) / (cos_i + eta * cos_t);
     let rp = (eta * cos_i - cos_t) / (eta * cos_i + cos_t);
     0.5 * (rs * rs + rp * rp)

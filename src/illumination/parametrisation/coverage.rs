@@ -1,0 +1,192 @@
+//! Which part of a triangle lies under which texel: exact, by clipping.
+
+use glam::DVec2;
+
+/// Corners of a triangle cut by the four sides of a texel: at most 3 + 4.
+const MAX_CORNERS: usize = 7;
+
+/// A convex polygon in texels.
+#[derive(Clone, Copy, Debug)]
+pub struct Polygon {
+    corners: [DVec2; MAX_CORNERS],
+    len: usize,
+}
+
+/// The side of a line that is kept.
+#[derive(Clone, Copy)]
+enum Keep {
+    Above,
+    Below,
+}
+
+impl Polygon {
+    /// A triangle, either way round.
+    pub fn triangle(corners: [DVec2; 3]) -> Self {
+        let mut polygon = Self {
+            corners: [DVec2::ZERO; MAX_CORNERS],
+            len: 3,
+        };
+        polygon.corners[..3].copy_from_slice(&corners);
+        polygon
+    }
+
+    /// Its corners, in order.
+    pub fn corners(&self) -> &[DVec2] {
+        &self.corners[..self.len]
+    }
+
+    /// Area [texel²], not negative.
+    pub fn area(&self) -> f64 {
+        let corners = self.corners();
+        let Some(&first) = corners.first() else { return 0.0 };
+        let twice: f64 = corners
+            .windows(2)
+            .map(|pair| (pair[0] - first).perp_dot(pair[1] - first))
+            .sum();
+        0.5 * twice.abs()
+    }
+
+    /// Centre of gravity; the mean of the corners where there is no area.
+    pub fn centroid(&self) -> DVec2 {
+        let corners = self.corners();
+        let first = corners.first().copied().unwrap_or_default();
+        let (mut sum, mut twice) = (DVec2::ZERO, 0.0);
+        for pair in corners.windows(2) {
+            let part = (pair[0] - first).perp_dot(pair[1] - first);
+            sum += (pair[0] + pair[1] + first) * (part / 3.0);
+            twice += part;
+        }
+        if twice == 0.0 {
+            corners.iter().sum::<DVec2>() / corners.len().max(1) as f64
+        } else {
+            sum / twice
+        }
+    }
+
+    /// The part with `low` ≤ coordinate ≤ `high` on an axis (0: x, 1: y).
+    #[must_use]
+    pub fn clipped(&self, axis: usize, low: f64, high: f64) -> Self {
+        self.halved(axis, low, Keep::Above)
+            .halved(axis, high, Keep::Below)
+    }
+
+    /// Sutherland and Hodgman's step. Cut corners lie exactly on the line, so that neighbouring cells share them.
+    fn halved(&self, axis: usize, line: f64, keep: Keep) -> Self {
+        let distance = |corner: DVec2| match keep {
+            Keep::Above => corner[axis] - line,
+            Keep::Below => line - corner[axis],
+        };
+        let mut kept = Self {
+            corners: [DVec2::ZERO; MAX_CORNERS],
+            len: 0,
+        };
+        let corners = self.corners();
+        for (index, &corner) in corners.iter().enumerate() {
+            let next = corners[(index + 1) % corners.len()];
+            let (here, there) = (distance(corner), distance(next));
+            if here >= 0.0 {
+                kept.push(corner);
+            }
+            if (here > 0.0 && there < 0.0) || (here < 0.0 && there > 0.0) {
+                let mut cut = corner + (next - corner) * (here / (here - there));
+                cut[axis] = line;
+                kept.push(cut);
+            }
+        }
+        kept
+    }
+
+    fn push(&mut self, corner: DVec2) {
+        // A convex polygon gains at most one corner per line; rounding may repeat a corner, which adds no area.
+        if self.len < MAX_CORNERS {
+            self.corners[self.len] = corner;
+            self.len += 1;
+        }
+    }
+
+    /// Smallest and largest coordinate on an axis.
+    fn range(&self, axis: usize) -> (f64, f64) {
+        self.corners()
+            .iter()
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), corner| {
+                (low.min(corner[axis]), high.max(corner[axis]))
+            })
+    }
+}
+
+/// Cells of a line of `count` unit cells that an interval within 0..=count reaches.
+pub fn cells(low: f64, high: f64, count: usize) -> std::ops::Range<usize> {
+    if high.is_nan() || low.is_nan() || high < low {
+        return 0..0;
+    }
+    let first = (low.floor().max(0.0) as usize).min(count);
+    let end = (high.ceil().max(0.0) as usize).min(count);
+    first..end.max((first + 1).min(count))
+}
+
+/// Rows that a triangle reaches.
+pub fn rows(corners: [DVec2; 3], height: usize) -> std::ops::Range<usize> {
+    let (low, high) = Polygon::triangle(corners).range(1);
+    cells(low, high, height)
+}
+
+/// Visits the texels of one row that a triangle covers: column, and the covered part of the texel.
+pub fn for_each_texel_in_row(
+    corners: [DVec2; 3],
+    row: usize,
+    width: usize,
+    mut visit: impl FnMut(usize, &Polygon),
+) {
+    let (top, bottom) = (row as f64, row as f64 + 1.0);
+    let strip = Polygon::triangle(corners).clipped(1, top, bottom);
+    if strip.len < 3 {
+        return;
+    }
+    let whole = whole_columns(&strip, top, bottom);
+    let (left, right) = strip.range(0);
+    for column in cells(left, right, width) {
+        let x = column as f64;
+        let part = if whole.0 <= x && x + 1.0 <= whole.1 {
+            unit_square(x, top)
+        } else {
+            strip.clipped(0, x, x + 1.0)
+        };
+        if part.area() > 0.0 {
+            visit(column, &part);
+        }
+    }
+}
+
+/// Interval of x over which a convex strip reaches from `top` to `bottom`, empty where it does not: what lies within
+/// both of its ends lies, by convexity, within everything between them.
+fn whole_columns(strip: &Polygon, top: f64, bottom: f64) -> (f64, f64) {
+    let mut whole = (f64::NEG_INFINITY, f64::INFINITY);
+    for line in [top, bottom] {
+        let (mut left, mut right) = (f64::INFINITY, f64::NEG_INFINITY);
+        for corner in strip.corners().iter().filter(|corner| corner.y == line) {
+            left = left.min(corner.x);
+            right = right.max(corner.x);
+        }
+        whole = (whole.0.max(left), whole.1.min(right));
+    }
+    whole
+}
+
+fn unit_square(x: f64, y: f64) -> Polygon {
+    let mut square = Polygon {
+        corners: [DVec2::ZERO; MAX_CORNERS],
+        len: 4,
+    };
+    square.corners[..4].copy_from_slice(&[
+        DVec2::new(x, y),
+        DVec2::new(x + 1.0, y),
+        DVec2::new(x + 1.0, y + 1.0),
+        DVec2::new(x, y + 1.0),
+    ]);
+    square
+}
+
+/// Twice the signed area of a triangle.
+pub fn twice_signed_area([a, b, c]: [DVec2; 3]) -> f64 {
+    (b - a).perp_dot(c - a)
+}

@@ -1,0 +1,18 @@
+//! Maps on surfaces, the direct layer and the CPU eye pass, on scenes whose answer is known.
+
+#[path = "eye/charts.rs"]
+mod charts;
+#[path = "eye/meshes.rs"]
+mod meshes;
+#[path = "eye/texel_areas.rs"]
+mod texel_areas;
+
+/// How a law is tried: many cases, the same ones in every run, so that a failure can be looked at.
+fn law() -> proptest::test_runner::Config {
+    proptest::test_runner::Config {
+        cases: 2048,
+        rng_seed: proptest::test_runner::RngSeed::Fixed(1),
+        failure_persistence: None,
+        ..proptest::test_runner::Config::default()
+    }
+}

@@ -1,0 +1,125 @@
+//! Meshes and small scenes that the tests share.
+
+use glam::{DMat3, DVec2, DVec3};
+use nephroid::scene::Mesh;
+
+/// Parallelogram with a corner and two sides; faces side_u × side_v turned over, so that u × v = −normal as on the
+/// floors of the reference scenes. TEXCOORD_0 runs 0..1 along the sides.
+pub fn quad(corner: DVec3, side_u: DVec3, side_v: DVec3) -> Mesh {
+    let normal = side_v.cross(side_u).normalize();
+    Mesh {
+        positions: vec![corner, corner + side_u, corner + side_u + side_v, corner + side_v],
+        normals: vec![normal; 4],
+        uv0: Some(vec![DVec2::ZERO, DVec2::X, DVec2::ONE, DVec2::Y]),
+        uv1: None,
+        triangles: vec![[0, 2, 1], [0, 3, 2]],
+    }
+}
+
+/// The square |x|, |z| ≤ half of the plane y = height, facing up.
+pub fn floor(half: f64, height: f64) -> Mesh {
+    quad(
+        DVec3::new(-half, height, -half),
+        DVec3::X * 2.0 * half,
+        DVec3::Z * 2.0 * half,
+    )
+}
+
+/// A surface r(s, t) over a grid of the unit square, s and t included, facing ∂r/∂s × ∂r/∂t.
+pub fn grid(columns: usize, rows: usize, place: impl Fn(f64, f64) -> DVec3) -> Mesh {
+    let mut mesh = Mesh::default();
+    for row in 0..=rows {
+        for column in 0..=columns {
+            let (s, t) = (column as f64 / columns as f64, row as f64 / rows as f64);
+            let h = 1e-6;
+            let (ds, dt) = (
+                place(s + h, t) - place(s - h, t),
+                place(s, t + h) - place(s, t - h),
+            );
+            mesh.positions.push(place(s, t));
+            mesh.normals
+                .push(ds.cross(dt).try_normalize().unwrap_or(DVec3::Y));
+        }
+    }
+    let index = |column: usize, row: usize| (row * (columns + 1) + column) as u32;
+    for row in 0..rows {
+        for column in 0..columns {
+            let [a, b, c, d] = [
+                index(column, row),
+                index(column + 1, row),
+                index(column + 1, row + 1),
+                index(column, row + 1),
+            ];
+            mesh.triangles.push([a, b, c]);
+            mesh.triangles.push([a, c, d]);
+        }
+    }
+    mesh
+}
+
+/// A ball, facing outwards; its normals are the exact ones.
+pub fn sphere(centre: DVec3, radius: f64, columns: usize, rows: usize) -> Mesh {
+    let mut mesh = grid(columns, rows, |s, t| {
+        let (phi, theta) = (s * std::f64::consts::TAU, (1.0 - t) * std::f64::consts::PI);
+        centre + radius * DVec3::new(theta.sin() * phi.cos(), -theta.cos(), theta.sin() * phi.sin())
+    });
+    // Exactly closed: the seam and the poles meet bit for bit.
+    let stride = columns + 1;
+    for row in 0..=rows {
+        mesh.positions[row * stride + columns] = mesh.positions[row * stride];
+    }
+    for column in 0..=columns {
+        mesh.positions[column] = centre + DVec3::Y * radius;
+        mesh.positions[rows * stride + column] = centre - DVec3::Y * radius;
+    }
+    mesh.normals = mesh
+        .positions
+        .iter()
+        .map(|position| (*position - centre).normalize())
+        .collect();
+    mesh
+}
+
+/// A box of six split faces, facing outwards.
+pub fn cuboid(low: DVec3, high: DVec3) -> Mesh {
+    let size = high - low;
+    let (x, y, z) = (DVec3::X * size.x, DVec3::Y * size.y, DVec3::Z * size.z);
+    let faces = [
+        quad(low + y, x, z),
+        quad(low + z, x, -z),
+        quad(low, z, y),
+        quad(low + x + z, -z, y),
+        quad(low + x, -x, y),
+        quad(low + z, x, y),
+    ];
+    let mut mesh = faces.into_iter().reduce(joined).expect("six faces");
+    (mesh.uv0, mesh.uv1) = (None, None);
+    mesh
+}
+
+/// Both meshes as one; coordinates only where both have them.
+pub fn joined(mut a: Mesh, b: Mesh) -> Mesh {
+    let offset = a.positions.len() as u32;
+    a.positions.extend(b.positions);
+    a.normals.extend(b.normals);
+    let both = |a: Option<Vec<DVec2>>, b: Option<Vec<DVec2>>| Some([a?, b?].concat());
+    a.uv0 = both(a.uv0, b.uv0);
+    a.uv1 = both(a.uv1, b.uv1);
+    a.triangles.extend(
+        b.triangles
+            .iter()
+            .map(|triangle| triangle.map(|vertex| vertex + offset)),
+    );
+    a
+}
+
+/// Rotated about the origin, then moved.
+pub fn moved(mut mesh: Mesh, rotation: DMat3, offset: DVec3) -> Mesh {
+    for position in &mut mesh.positions {
+        *position = rotation * *position + offset;
+    }
+    for normal in &mut mesh.normals {
+        *normal = rotation * *normal;
+    }
+    mesh
+}

@@ -1,0 +1,20 @@
+//! The laws of `nephroid::optics`, of lights and of units, tested as laws.
+
+#[path = "physics/colour.rs"]
+mod colour;
+#[path = "physics/fresnel.rs"]
+mod fresnel;
+#[path = "physics/lights.rs"]
+mod lights;
+#[path = "physics/refraction.rs"]
+mod refraction;
+
+/// How a law is tried: many cases, the same ones in every run, so that a failure can be looked at.
+fn law() -> proptest::test_runner::Config {
+    proptest::test_runner::Config {
+        cases: 4096,
+        rng_seed: proptest::test_runner::RngSeed::Fixed(1),
+        failure_persistence: None,
+        ..proptest::test_runner::Config::default()
+    }
+}
