@@ -1,7 +1,7 @@
-//! What keys and mouse mean over the picture.
+//! What keys mean.
 
 use winit::event::ElementState;
-use winit::keyboard::KeyCode;
+use winit::keyboard::{Key, KeyCode, NamedKey};
 
 use super::navigation::HeldKeys;
 
@@ -37,14 +37,17 @@ pub fn hold(keys: &mut HeldKeys, key: KeyCode, state: ElementState) -> bool {
     true
 }
 
-/// What a key press does, if anything.
-pub fn shortcut(key: KeyCode) -> Option<Shortcut> {
+/// What a key press does, if anything, by the letter on the key.
+pub fn shortcut(key: &Key) -> Option<Shortcut> {
     match key {
-        KeyCode::KeyC => Some(Shortcut::NextCamera),
-        KeyCode::KeyF => Some(Shortcut::Frame),
-        KeyCode::KeyR => Some(Shortcut::Rebake),
-        KeyCode::KeyH => Some(Shortcut::Help),
-        KeyCode::Escape => Some(Shortcut::LetGo),
+        Key::Named(NamedKey::Escape) => Some(Shortcut::LetGo),
+        Key::Character(letter) => match letter.to_lowercase().as_str() {
+            "c" => Some(Shortcut::NextCamera),
+            "f" => Some(Shortcut::Frame),
+            "r" => Some(Shortcut::Rebake),
+            "h" => Some(Shortcut::Help),
+            _ => None,
+        },
         _ => None,
     }
 }

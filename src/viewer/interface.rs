@@ -44,7 +44,11 @@ impl Interface {
         );
         state.init_accesskit(event_loop, window, proxy);
         let renderer = egui_wgpu::Renderer::new(device, format, egui_wgpu::RendererOptions::default());
-        Self { context, state, renderer }
+        Self {
+            context,
+            state,
+            renderer,
+        }
     }
 
     /// egui's own state.
@@ -115,8 +119,9 @@ impl Interface {
             size_in_pixels: size,
             pixels_per_point: painting.pixels_per_point,
         };
-        let before =
-            self.renderer.update_buffers(device, queue, encoder, &painting.primitives, &descriptor);
+        let before = self
+            .renderer
+            .update_buffers(device, queue, encoder, &painting.primitives, &descriptor);
         queue.submit(before);
         let pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("interface"),
@@ -131,6 +136,7 @@ impl Interface {
             })],
             ..wgpu::RenderPassDescriptor::default()
         });
-        self.renderer.render(&mut pass.forget_lifetime(), &painting.primitives, &descriptor);
+        self.renderer
+            .render(&mut pass.forget_lifetime(), &painting.primitives, &descriptor);
     }
 }

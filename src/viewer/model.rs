@@ -29,7 +29,8 @@ pub struct Model {
     pub log: EventLog,
     worker: Worker,
     state: BakeState,
-    last: Option<FinishedBake>,
+    /// The bake that the picture shows.
+    pub last: Option<FinishedBake>,
     /// Maps that were baked before the start; until the first bake.
     given: Vec<IlluminationMap>,
     debounce: Debounce,
@@ -75,11 +76,6 @@ impl Model {
         &self.state
     }
 
-    /// The bake that the picture shows.
-    pub fn last(&self) -> Option<&FinishedBake> {
-        self.last.as_ref()
-    }
-
     /// When something is to be done though nothing happens.
     pub fn due(&self) -> Option<Instant> {
         self.debounce.due()
@@ -123,13 +119,14 @@ impl Model {
 
     /// Looks what the baking thread did; tells whether there are new maps.
     pub fn poll(&mut self) -> bool {
+        // The state first: maps that come in between are taken by the next call, which the thread wakes.
+        let state = self.worker.state();
         let finished = self.worker.take_finished();
         let has_maps = finished.is_some();
         if let Some(finished) = finished {
             self.log.write(&Event::Done(&finished));
             self.last = Some(finished);
         }
-        let state = self.worker.state();
         if std::mem::discriminant(&state) != std::mem::discriminant(&self.state) {
             match &state {
                 BakeState::Cancelled => self.log.write(&Event::Cancelled),

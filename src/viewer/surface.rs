@@ -57,7 +57,12 @@ impl Screen {
             config.format = format;
         }
         config.present_mode = wgpu::PresentMode::AutoVsync;
-        let mut screen = Self { surface, config, window, has_area: false };
+        let mut screen = Self {
+            surface,
+            config,
+            window,
+            has_area: false,
+        };
         screen.resize(device);
         Ok(screen)
     }

@@ -95,10 +95,7 @@ impl Headless {
             adapter: "no adapter",
         };
         let output = context.run_ui(input, |ui| {
-            let now = panel.show(ui, &facts);
-            wishes.rebake |= now.rebake;
-            wishes.cancel |= now.cancel;
-            wishes.measure_exposure |= now.measure_exposure;
+            *wishes = wishes.and(panel.show(ui, &facts));
         });
         if let Some(update) = output.platform_output.accesskit_update {
             self.nodes = update.nodes;

@@ -90,6 +90,17 @@ pub fn set_style(context: &egui::Context) {
     });
 }
 
+impl Wishes {
+    /// What was pressed here or there.
+    pub fn and(self, other: Self) -> Self {
+        Self {
+            rebake: self.rebake || other.rebake,
+            cancel: self.cancel || other.cancel,
+            measure_exposure: self.measure_exposure || other.measure_exposure,
+        }
+    }
+}
+
 impl Panel {
     /// A panel with these settings, everything else at its default.
     pub fn new(settings: BakeSettings) -> Self {
