@@ -14,6 +14,8 @@ pub mod progress;
 pub mod settings;
 pub mod units;
 
+pub mod files;
+
 pub mod optics;
 
 pub mod geometry;

@@ -1,1 +1,99 @@
-//! Exact sums of flux.
+//! Exact sums of flux: 64-bit integers in a fixed unit, so that neither the order of the deposits nor the number of
+//! threads changes a bit of the result.
+
+use crate::optics::LinearSrgb;
+
+/// The unit that flux is counted in: a power of two of watts, 2⁻⁶⁰ of the power that can be deposited at most.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FluxUnit {
+    watts: f64,
+}
+
+/// Flux per channel, counted in a [`FluxUnit`].
+pub type FluxCount = [i64; 3];
+
+impl FluxUnit {
+    /// The unit for sums of up to `power_w` [W per channel, > 0]; they stay below 2⁶⁰, so that no sum overflows.
+    pub fn for_power(power_w: f64) -> Self {
+        // Denormal powers keep a unit above zero.
+        Self {
+            watts: (power_w.log2().ceil() - 60.0).clamp(-1022.0, 960.0).exp2(),
+        }
+    }
+
+    /// One count [W].
+    pub fn watts(self) -> f64 {
+        self.watts
+    }
+
+    /// The nearest count of each channel.
+    pub fn count(self, flux_w: LinearSrgb) -> FluxCount {
+        flux_w
+            .to_array()
+            .map(|channel| (channel / self.watts).round() as i64)
+    }
+
+    /// Watts of a count.
+    pub fn flux_w(self, count: FluxCount) -> LinearSrgb {
+        LinearSrgb::from(count.map(|channel| channel as f64 * self.watts))
+    }
+}
+
+/// Flux per texel of one map, row 0 at v = 0.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct FluxAccumulator {
+    width: usize,
+    height: usize,
+    texels: Vec<FluxCount>,
+}
+
+impl FluxAccumulator {
+    /// No flux yet.
+    pub fn new(width: usize, height: usize) -> Self {
+        Self {
+            width,
+            height,
+            texels: vec![[0; 3]; width * height],
+        }
+    }
+
+    /// Texels across.
+    pub fn width(&self) -> usize {
+        self.width
+    }
+
+    /// Texels down.
+    pub fn height(&self) -> usize {
+        self.height
+    }
+
+    /// Counts row by row.
+    pub fn texels(&self) -> &[FluxCount] {
+        &self.texels
+    }
+
+    /// Counts row by row, to be added to.
+    pub fn texels_mut(&mut self) -> &mut [FluxCount] {
+        &mut self.texels
+    }
+
+    /// Twice the size each way: every texel's flux goes in four equal parts to those that replace it (section 3.1.1 of
+    /// the paper); what does not divide by four goes to the first of them, so that the sum stays exact.
+    #[must_use]
+    pub fn doubled(&self) -> Self {
+        let mut fine = Self::new(2 * self.width, 2 * self.height);
+        for row in 0..self.height {
+            for column in 0..self.width {
+                let coarse = self.texels[row * self.width + column];
+                let quarter = coarse.map(|channel| channel / 4);
+                let first = std::array::from_fn(|channel| coarse[channel] - 3 * quarter[channel]);
+                let corner = 2 * row * fine.width + 2 * column;
+                fine.texels[corner] = first;
+                for texel in [corner + 1, corner + fine.width, corner + fine.width + 1] {
+                    fine.texels[texel] = quarter;
+                }
+            }
+        }
+        fine
+    }
+}

@@ -1,3 +1,8 @@
 //! From the lights through specular surfaces onto diffuse ones.
 
+pub mod caustic;
+pub mod item_buffer;
+pub mod launch;
 pub mod ledger;
+pub mod ledger_sum;
+pub mod receiver_maps;

@@ -1,5 +1,9 @@
 //! Which effects a scene calls for, and why.
 
+mod decide;
+
+pub use decide::{CastersByLight, decide};
+
 use serde::{Deserialize, Serialize};
 
 /// One effect that can be simulated or left out.

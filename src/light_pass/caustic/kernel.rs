@@ -1,0 +1,198 @@
+//! Shapes of a splat, and their integrals along a row of texels.
+//!
+//! In the frame in which the footprint is the unit disc, a point of a row has the coordinates (s, t): t is fixed along
+//! the row, s runs along it. Each shape says how far it reaches in t, which chord |s| ≤ S(t) it covers, and the integral
+//! of its weight along the chord from 0 to s.
+
+use std::sync::LazyLock;
+
+use crate::settings::Kernel;
+
+/// A kernel with its spread.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Profile {
+    kernel: Kernel,
+    /// √σ, footprint radii; used by the gaussian.
+    spread: f64,
+}
+
+/// Spreads at which the gaussian is cut.
+const CUT_SPREADS: f64 = 4.0;
+
+/// Half side of the box of the unit disc's area.
+const BOX_HALF_SIDE: f64 = 0.886_226_925_452_758;
+
+impl Profile {
+    /// A kernel; `sigma` > 0 is the gaussian's σ of eq. 4.4, exp(−r²/2σ), r in footprint radii.
+    pub fn new(kernel: Kernel, sigma: f64) -> Self {
+        Self {
+            kernel,
+            spread: sigma.sqrt(),
+        }
+    }
+
+    /// Largest |t| [footprint radii].
+    pub fn reach(&self) -> f64 {
+        match self.kernel {
+            Kernel::Gaussian => CUT_SPREADS * self.spread,
+            Kernel::Cone => 3.0_f64.sqrt(),
+            Kernel::Disc => 1.0,
+            Kernel::Box => BOX_HALF_SIDE,
+        }
+    }
+
+    /// Half chord S at t [footprint radii].
+    pub fn half_chord(&self, t: f64) -> f64 {
+        match self.kernel {
+            Kernel::Box => BOX_HALF_SIDE,
+            Kernel::Gaussian | Kernel::Cone | Kernel::Disc => {
+                let reach = self.reach();
+                (reach * reach - t * t).max(0.0).sqrt()
+            }
+        }
+    }
+
+    /// ∫ w ds from 0 to `s` at `t`, unnormalised; odd in s. `s` within the chord.
+    pub fn chord_integral(&self, s: f64, t: f64) -> f64 {
+        match self.kernel {
+            Kernel::Disc | Kernel::Box => s,
+            Kernel::Cone => {
+                let r = (s * s + t * t).sqrt();
+                let square_part = if t == 0.0 {
+                    0.0
+                } else {
+                    t * t * (s / t.abs()).asinh()
+                };
+                s - (s * r + square_part) / (2.0 * 3.0_f64.sqrt())
+            }
+            Kernel::Gaussian => {
+                let u = t / self.spread;
+                self.spread * (-0.5 * u * u).exp() * half_normal_integral(s / self.spread)
+            }
+        }
+    }
+
+    /// Weight at a point [footprint radii], unnormalised.
+    pub fn weight(&self, s: f64, t: f64) -> f64 {
+        let r2 = s * s + t * t;
+        match self.kernel {
+            Kernel::Gaussian => {
+                let inside = r2 <= (CUT_SPREADS * self.spread).powi(2);
+                if inside {
+                    (-0.5 * r2 / (self.spread * self.spread)).exp()
+                } else {
+                    0.0
+                }
+            }
+            Kernel::Cone => (1.0 - (r2 / 3.0).sqrt()).max(0.0),
+            Kernel::Disc => f64::from(u8::from(r2 <= 1.0)),
+            Kernel::Box => f64::from(u8::from(s.abs() <= BOX_HALF_SIDE && t.abs() <= BOX_HALF_SIDE)),
+        }
+    }
+
+    /// Length scale over which the weight changes [footprint radii].
+    pub fn scale(&self) -> f64 {
+        match self.kernel {
+            Kernel::Gaussian => self.spread,
+            Kernel::Cone | Kernel::Disc | Kernel::Box => 0.5,
+        }
+    }
+}
+
+const TABLE_STEPS: usize = 512;
+
+/// ∫₀ˣ exp(−x²/2) dx at TABLE_STEPS + 1 equal steps of [0, 4], by Simpson's rule on 16 parts a step.
+static HALF_NORMAL: LazyLock<Vec<f64>> = LazyLock::new(|| {
+    let density = |x: f64| (-0.5 * x * x).exp();
+    let step = CUT_SPREADS / TABLE_STEPS as f64;
+    let mut sum = 0.0;
+    let mut table = vec![0.0];
+    for index in 0..TABLE_STEPS {
+        let parts = 16;
+        let h = step / parts as f64;
+        for part in 0..parts {
+            let x = index as f64 * step + part as f64 * h;
+            sum += h / 6.0 * (density(x) + 4.0 * density(x + 0.5 * h) + density(x + h));
+        }
+        table.push(sum);
+    }
+    table
+});
+
+/// ∫₀ˣ exp(−x²/2) dx for |x| ≤ 4, odd; beyond, the value at ±4. Cubic Hermite interpolation: within 1e-10.
+fn half_normal_integral(x: f64) -> f64 {
+    let step = CUT_SPREADS / TABLE_STEPS as f64;
+    let position = x.abs().min(CUT_SPREADS) / step;
+    let index = (position as usize).min(TABLE_STEPS - 1);
+    let f = position - index as f64;
+    let (x0, x1) = (index as f64 * step, (index + 1) as f64 * step);
+    let (y0, y1) = (HALF_NORMAL[index], HALF_NORMAL[index + 1]);
+    let (d0, d1) = (step * (-0.5 * x0 * x0).exp(), step * (-0.5 * x1 * x1).exp());
+    let (a, b) = (d0 - (y1 - y0), (y1 - y0) - d1);
+    let value = y0 + f * (y1 - y0) + f * (1.0 - f) * (a * (1.0 - f) + b * f);
+    value.copysign(x)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Midpoint sums of the weight over a fine grid.
+    fn volume_by_grid(profile: &Profile) -> f64 {
+        let reach = profile.reach() * 1.01;
+        let n = 2000;
+        let h = 2.0 * reach / n as f64;
+        let at = |index: usize| -reach + (index as f64 + 0.5) * h;
+        (0..n)
+            .map(|j| (0..n).map(|i| profile.weight(at(i), at(j))).sum::<f64>())
+            .sum::<f64>()
+            * h
+            * h
+    }
+
+    #[test]
+    fn kernels_of_equal_footprint_have_their_stated_volumes() {
+        let pi = std::f64::consts::PI;
+        // A cone of base radius √3 and height 1 has the volume of the unit disc: πr²/3.
+        for (kernel, volume) in [(Kernel::Disc, pi), (Kernel::Box, pi), (Kernel::Cone, pi)] {
+            let found = volume_by_grid(&Profile::new(kernel, 1.0));
+            assert!(
+                (found / volume - 1.0).abs() < 2e-3,
+                "{kernel:?}: {found} against {volume}"
+            );
+        }
+        for sigma in [0.5, 1.0, 2.0] {
+            let found = volume_by_grid(&Profile::new(Kernel::Gaussian, sigma));
+            let volume = 2.0 * pi * sigma * (1.0 - (-8.0_f64).exp());
+            assert!(
+                (found / volume - 1.0).abs() < 1e-4,
+                "sigma {sigma}: {found} against {volume}"
+            );
+        }
+    }
+
+    #[test]
+    fn chord_integrals_are_the_integrals_of_the_weights() {
+        for kernel in [Kernel::Gaussian, Kernel::Cone, Kernel::Disc, Kernel::Box] {
+            let profile = Profile::new(kernel, 0.7);
+            for t in [0.0, 0.3, -0.8] {
+                let end = 0.9 * profile.half_chord(t);
+                let n = 20_000;
+                let h = end / f64::from(n);
+                let sum: f64 = (0..n)
+                    .map(|i| profile.weight((f64::from(i) + 0.5) * h, t) * h)
+                    .sum();
+                let integral = profile.chord_integral(end, t);
+                assert!(
+                    (sum - integral).abs() < 1e-7,
+                    "{kernel:?} at t = {t}: {sum} against {integral}"
+                );
+                assert_eq!(
+                    profile.chord_integral(-end, t),
+                    -integral,
+                    "{kernel:?} is not odd"
+                );
+            }
+        }
+    }
+}

@@ -1,0 +1,202 @@
+//! Runs the lattice of one light from the first row to the last: trace a band, deposit what has its neighbours.
+
+use std::collections::BTreeSet;
+
+use cpu_time::ProcessTime;
+use rayon::prelude::*;
+use std::time::Instant;
+
+use super::deposit::{DepositReport, Depositor, RowContext};
+use super::lattice::TracedRow;
+use super::statistics::FootprintStatistics;
+use crate::light_pass::ledger_sum::LedgerSum;
+use crate::light_pass::receiver_maps::{ChartFor, ReceiverMaps};
+use crate::progress::{Control, Progress, Stage};
+
+/// Rays that a band aims at: enough for all cores, and no more memory than some ten megabytes.
+const RAYS_PER_BAND: usize = 1 << 16;
+
+/// What the pass of one light did.
+#[derive(Clone, Debug, Default)]
+pub struct PassReport {
+    /// All accounts.
+    pub ledger: LedgerSum,
+    /// Rays launched.
+    pub rays: u64,
+    /// Closest-hit queries.
+    pub segments: u64,
+    /// Kernels deposited.
+    pub splats: u64,
+    /// Sizes of footprints.
+    pub statistics: FootprintStatistics,
+    /// Wall-clock and CPU seconds of tracing.
+    pub trace_s: Seconds,
+    /// Wall-clock and CPU seconds of depositing.
+    pub deposit_s: Seconds,
+    /// Whether it was stopped before the end.
+    pub cancelled: bool,
+}
+
+/// Seconds on the wall and of all cores.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Seconds {
+    /// On the wall.
+    pub wall: f64,
+    /// Of the whole process.
+    pub cpu: f64,
+}
+
+/// Both clocks.
+#[derive(Clone, Copy, Debug)]
+pub struct Stopwatch {
+    wall: Instant,
+    cpu: Option<ProcessTime>,
+}
+
+impl Stopwatch {
+    /// Starts both clocks; where the system has no CPU clock, that one stays at zero.
+    pub fn start() -> Self {
+        Self {
+            wall: Instant::now(),
+            cpu: ProcessTime::try_now().ok(),
+        }
+    }
+
+    /// Since the start.
+    pub fn elapsed(&self) -> Seconds {
+        let cpu = self
+            .cpu
+            .and_then(|start| start.try_elapsed().ok())
+            .map_or(0.0, |time| time.as_secs_f64());
+        Seconds {
+            wall: self.wall.elapsed().as_secs_f64(),
+            cpu,
+        }
+    }
+}
+
+impl Seconds {
+    /// Adds another span.
+    pub fn add(&mut self, other: Self) {
+        self.wall += other.wall;
+        self.cpu += other.cpu;
+    }
+}
+
+/// Who listens to a pass, and how it is stopped.
+#[derive(Clone, Copy)]
+pub struct Listener<'a> {
+    /// Hears how far it is.
+    pub progress: &'a dyn Progress,
+    /// Asks it to stop.
+    pub control: &'a Control,
+    /// Rays of passes before this one.
+    pub done: u64,
+    /// Rays of all passes.
+    pub total: u64,
+}
+
+/// Traces and deposits the whole lattice of one light.
+pub fn run(
+    depositor: &Depositor,
+    maps: &mut ReceiverMaps,
+    chart_for: &ChartFor,
+    listener: &Listener,
+) -> PassReport {
+    let mut report = PassReport::default();
+    let (columns, rows) = depositor.lattice.size;
+    let rows_per_band = (RAYS_PER_BAND / columns).clamp(4, 1024);
+    for face in 0..depositor.lattice.launch.face_count() {
+        let mut carried: Vec<TracedRow> = Vec::new();
+        let mut first_row = 0;
+        while first_row < rows {
+            if listener.control.is_cancelled() {
+                report.cancelled = true;
+                return report;
+            }
+            let end = (first_row + rows_per_band).min(rows);
+            let watch = Stopwatch::start();
+            let traced: Vec<TracedRow> = (first_row..end)
+                .into_par_iter()
+                .map(|row| depositor.lattice.trace_row(face, row))
+                .collect();
+            report.trace_s.add(watch.elapsed());
+            report.count(&traced);
+            let watch = Stopwatch::start();
+            carried = deposit_band(
+                depositor,
+                maps,
+                chart_for,
+                carried,
+                traced,
+                end,
+                end == rows,
+                &mut report,
+            );
+            report.deposit_s.add(watch.elapsed());
+            listener
+                .progress
+                .advance(Stage::Caustic, listener.done + report.rays, listener.total);
+            first_row = end;
+        }
+    }
+    report
+}
+
+/// Deposits all rows that have a row after them (all at the end of a face); returns the last two rows, which the next
+/// band needs. `end` is the lattice index after the last traced row.
+#[allow(
+    clippy::too_many_arguments,
+    reason = "one call site; the band's state travels through it"
+)]
+fn deposit_band(
+    depositor: &Depositor,
+    maps: &mut ReceiverMaps,
+    chart_for: &ChartFor,
+    mut rows: Vec<TracedRow>,
+    traced: Vec<TracedRow>,
+    end: usize,
+    last: bool,
+    report: &mut PassReport,
+) -> Vec<TracedRow> {
+    // The carried rows: one that is deposited and only lends its neighbours, and one that waits.
+    let lent = rows.len().saturating_sub(1);
+    rows.extend(traced);
+    let first_index = end - rows.len();
+    let ready = if last { rows.len() } else { rows.len() - 1 };
+    let contexts: Vec<RowContext> = (lent..ready)
+        .map(|position| RowContext {
+            row: &rows[position],
+            index: first_index + position,
+            before: position.checked_sub(1).map(|before| &rows[before]),
+            after: rows.get(position + 1),
+        })
+        .collect();
+    let objects: BTreeSet<u32> = contexts
+        .iter()
+        .flat_map(|context| &context.row.arrivals)
+        .map(|arrival| arrival.object)
+        .collect();
+    for object in objects {
+        maps.touch(object as usize, chart_for);
+    }
+    report.add(&depositor.deposit(&contexts, maps));
+    let keep = rows.len().saturating_sub(2);
+    rows.split_off(keep)
+}
+
+impl PassReport {
+    fn count(&mut self, traced: &[TracedRow]) {
+        for row in traced {
+            self.ledger.merge(&row.ledger);
+            self.rays += row.rays;
+            self.segments += row.segments;
+        }
+    }
+
+    fn add(&mut self, deposit: &DepositReport) {
+        self.ledger.merge(&deposit.ledger);
+        self.splats += deposit.splats;
+        self.statistics.merge(&deposit.statistics);
+    }
+}

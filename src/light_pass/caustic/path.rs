@@ -1,0 +1,200 @@
+//! Follows one light ray through specular surfaces, on every branch that matters, and books what becomes of its flux.
+
+use glam::{DVec2, DVec3};
+
+use super::super::ledger_sum::{Account, LedgerSum};
+use crate::geometry::Ray;
+use crate::illumination::accumulator::FluxUnit;
+use crate::optics::LinearSrgb;
+use crate::transport::{Branch, Event, MediumStack, SurfaceHit, Tracer};
+
+/// Sequence of (object, event) along a path, as a hash: equal for neighbouring rays that took the same way.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct PathSignature(pub u64);
+
+impl PathSignature {
+    /// After one more event at an object.
+    #[must_use]
+    pub fn with(self, object: usize, event: Event) -> Self {
+        // Steele, Lea and Flood's SplitMix64 finaliser: distinct sequences collide with probability 2⁻⁶⁴.
+        let mut z = (self.0 ^ ((object as u64) << 3 | event as u64)).wrapping_add(0x9e37_79b9_7f4a_7c15);
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        Self(z ^ (z >> 31))
+    }
+}
+
+/// Flux that reached a diffuse surface.
+#[derive(Clone, Copy, Debug)]
+pub struct Arrival {
+    /// Index into `Scene::objects`.
+    pub object: u32,
+    /// Index into the object's triangles.
+    pub triangle: u32,
+    /// How it came here.
+    pub signature: PathSignature,
+    /// Barycentric coordinates of the triangle's second and third corner.
+    pub barycentric: DVec2,
+    /// Where [m].
+    pub point: DVec3,
+    /// Incident flux [W per channel], before the albedo.
+    pub flux_w: LinearSrgb,
+    /// From the light to here [m].
+    pub path_m: f64,
+}
+
+/// Limits of a path.
+#[derive(Clone, Copy, Debug)]
+pub struct PathLimits {
+    /// Most specular events.
+    pub max_depth: u32,
+    /// Least share of the ray's flux (luminance) that a branch must carry to be followed.
+    pub branch_threshold: f64,
+    /// Whether any volume absorbs.
+    pub absorption: bool,
+}
+
+/// What waits to be traced.
+#[derive(Clone, Copy, Debug)]
+struct Segment {
+    ray: Ray,
+    flux_w: LinearSrgb,
+    media: MediumStack,
+    signature: PathSignature,
+    depth: u32,
+    path_m: f64,
+}
+
+/// Traces light rays of one light; reused from ray to ray.
+#[derive(Debug)]
+pub struct PathTracer<'a> {
+    tracer: &'a Tracer,
+    limits: PathLimits,
+    unit: FluxUnit,
+    waiting: Vec<Segment>,
+    /// Accounts of all rays so far.
+    pub ledger: LedgerSum,
+    /// Closest-hit queries so far.
+    pub segments: u64,
+}
+
+impl<'a> PathTracer<'a> {
+    /// A tracer with empty accounts.
+    pub fn new(tracer: &'a Tracer, limits: PathLimits, unit: FluxUnit) -> Self {
+        Self {
+            tracer,
+            limits,
+            unit,
+            waiting: Vec::new(),
+            ledger: LedgerSum::default(),
+            segments: 0,
+        }
+    }
+
+    /// Follows a ray that carries `flux_w` from the light; arrivals on diffuse surfaces after at least one specular
+    /// event are handed to `arrive`. `Deposited` is not booked here but by who places the flux.
+    pub fn trace(&mut self, ray: Ray, flux_w: LinearSrgb, mut arrive: impl FnMut(Arrival)) {
+        if !flux_w.is_finite() {
+            return;
+        }
+        let floor_w = flux_w.luminance() * self.limits.branch_threshold;
+        let media = MediumStack::default();
+        let first = Segment {
+            ray,
+            flux_w,
+            media,
+            signature: PathSignature::default(),
+            depth: 0,
+            path_m: 0.0,
+        };
+        self.waiting.push(first);
+        while let Some(segment) = self.waiting.pop() {
+            self.step(segment, floor_w, &mut arrive);
+        }
+    }
+
+    fn book(&mut self, account: Account, flux_w: LinearSrgb) {
+        self.ledger.book(account, self.unit.count(flux_w));
+    }
+
+    fn step(&mut self, segment: Segment, floor_w: f64, arrive: &mut impl FnMut(Arrival)) {
+        self.segments += 1;
+        let Some(hit) = self.tracer.closest_hit(&segment.ray) else {
+            let account = if segment.depth == 0 {
+                Account::NotEmitted
+            } else {
+                Account::Escaped
+            };
+            return self.book(account, segment.flux_w);
+        };
+        let mut flux_w = segment.flux_w;
+        if self.limits.absorption {
+            flux_w = flux_w * segment.media.transmittance(self.tracer.scene(), hit.distance_m);
+            self.book(Account::Absorbed, segment.flux_w - flux_w);
+        }
+        let path_m = segment.path_m + hit.distance_m;
+        let interaction = self.tracer.interact(&hit, segment.ray.direction, &segment.media);
+        let deposit_w = flux_w * interaction.deposit;
+        if segment.depth == 0 {
+            // What a polished surface takes on the first hit is direct light.
+            self.book(Account::NotEmitted, deposit_w);
+            self.book(Account::Emitted, flux_w - deposit_w);
+        } else if deposit_w.max_channel() > 0.0 {
+            arrive(arrival(&hit, segment.signature, deposit_w, path_m));
+        }
+        self.book(Account::Absorbed, flux_w * interaction.absorbed);
+        for branch in [interaction.reflection, interaction.transmission]
+            .into_iter()
+            .flatten()
+        {
+            self.follow(&branch, hit.object, flux_w, path_m, &segment, floor_w);
+        }
+    }
+
+    fn follow(
+        &mut self,
+        branch: &Branch,
+        object: usize,
+        incident_w: LinearSrgb,
+        path_m: f64,
+        from: &Segment,
+        floor_w: f64,
+    ) {
+        let flux_w = incident_w * branch.share;
+        if flux_w.max_channel() <= 0.0 {
+            return;
+        }
+        if !(flux_w.is_finite() && branch.ray.direction.is_finite() && branch.ray.origin.is_finite()) {
+            return self.book(
+                Account::NonFinite,
+                flux_w.map(|w| if w.is_finite() { w } else { 0.0 }),
+            );
+        }
+        if from.depth + 1 > self.limits.max_depth {
+            return self.book(Account::Depth, flux_w);
+        }
+        if flux_w.luminance() < floor_w {
+            return self.book(Account::Threshold, flux_w);
+        }
+        self.waiting.push(Segment {
+            ray: branch.ray,
+            flux_w,
+            media: branch.media,
+            signature: from.signature.with(object, branch.event),
+            depth: from.depth + 1,
+            path_m,
+        });
+    }
+}
+
+fn arrival(hit: &SurfaceHit, signature: PathSignature, flux_w: LinearSrgb, path_m: f64) -> Arrival {
+    Arrival {
+        object: hit.object as u32,
+        triangle: hit.triangle as u32,
+        signature,
+        barycentric: DVec2::new(hit.barycentric[1], hit.barycentric[2]),
+        point: hit.point,
+        flux_w,
+        path_m,
+    }
+}

@@ -1,0 +1,213 @@
+//! Where the rays of a light start: a domain of one or six unit squares, mapped so that flux per area is known.
+
+use glam::{DMat3, DVec2, DVec3};
+
+use crate::geometry::Ray;
+use crate::geometry::cube_face::{self, FaceMapping};
+use crate::optics::LinearSrgb;
+use crate::scene::{Light, LightKind, Scene};
+use crate::settings::ItemBufferKind;
+
+/// Start domain of one light.
+#[derive(Clone, Debug)]
+pub struct Launch {
+    light: Light,
+    domain: Domain,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Domain {
+    /// Six cube faces around a point.
+    Sphere { position: DVec3, mapping: FaceMapping },
+    /// A rectangle across parallel light, before everything in the scene.
+    Plane {
+        corner: DVec3,
+        across: DVec3,
+        down: DVec3,
+        direction: DVec3,
+    },
+}
+
+impl Launch {
+    /// The domain of a light. For a sun: the smallest rectangle, in a frame fixed by the direction alone, around all
+    /// `casters` (indices of specular objects), moved back before the whole scene. `None` where there is nothing to
+    /// aim at.
+    pub fn new(light: &Light, scene: &Scene, casters: &[usize], item_buffer: ItemBufferKind) -> Option<Self> {
+        let mapping = match item_buffer {
+            ItemBufferKind::Equal => FaceMapping::EqualSolidAngle,
+            ItemBufferKind::Cube => FaceMapping::Plain,
+        };
+        let domain = match light.kind {
+            LightKind::Point { position, .. } | LightKind::Spot { position, .. } => {
+                Domain::Sphere { position, mapping }
+            }
+            LightKind::Sun { direction, .. } => sun_domain(direction, scene, casters)?,
+        };
+        Some(Self {
+            light: light.clone(),
+            domain,
+        })
+    }
+
+    /// The light.
+    pub fn light(&self) -> &Light {
+        &self.light
+    }
+
+    /// Unit squares of the domain.
+    pub fn face_count(&self) -> usize {
+        match self.domain {
+            Domain::Sphere { .. } => 6,
+            Domain::Plane { .. } => 1,
+        }
+    }
+
+    /// Lattice cells across and down each face at a density [1/sr]; suns take density/D² rays per m², D = `reach_m`
+    /// the distance from the casters' centre to their farthest receiver.
+    pub fn lattice_size(&self, density_per_sr: f64, reach_m: f64) -> (usize, usize) {
+        let cells = |count: f64| count.ceil().clamp(1.0, 1e9) as usize;
+        match self.domain {
+            Domain::Sphere { .. } => {
+                let side = cells((density_per_sr * cube_face::FACE_SOLID_ANGLE_SR).sqrt());
+                (side, side)
+            }
+            Domain::Plane { across, down, .. } => {
+                let rays_per_m = density_per_sr.sqrt() / reach_m;
+                (
+                    cells(across.length() * rays_per_m),
+                    cells(down.length() * rays_per_m),
+                )
+            }
+        }
+    }
+
+    /// The ray of a point of the domain; `square` in the unit square of `face`.
+    pub fn ray(&self, face: usize, square: DVec2) -> Ray {
+        match self.domain {
+            Domain::Sphere { position, mapping } => {
+                let direction = mapping.plane_from_square(square).extend(1.0).normalize();
+                Ray {
+                    origin: position,
+                    direction: cube_face::axes_from_face(face) * direction,
+                }
+            }
+            Domain::Plane {
+                corner,
+                across,
+                down,
+                direction,
+            } => Ray {
+                origin: corner + across * square.x + down * square.y,
+                direction,
+            },
+        }
+    }
+
+    /// Flux [W per channel] through the cell between two corners of the unit square, for the strength that the light
+    /// has in the direction of the cell's ray.
+    pub fn cell_flux_w(&self, low: DVec2, high: DVec2, direction: DVec3) -> LinearSrgb {
+        let measure = self.cell_measure(low, high);
+        let strength = match self.light.kind {
+            LightKind::Point { intensity, .. } | LightKind::Spot { intensity, .. } => intensity.0,
+            LightKind::Sun {
+                normal_irradiance, ..
+            } => normal_irradiance.0,
+        };
+        self.light.colour * (strength * self.light.kind.falloff(direction) * measure)
+    }
+
+    /// Solid angle [sr] of a cell, or its area [m²] for a sun.
+    pub fn cell_measure(&self, low: DVec2, high: DVec2) -> f64 {
+        match self.domain {
+            Domain::Sphere { mapping, .. } => mapping.cell_solid_angle_sr(low, high),
+            Domain::Plane { across, down, .. } => {
+                across.cross(down).length() * (high.x - low.x) * (high.y - low.y)
+            }
+        }
+    }
+
+    /// Area [m²] that the cell would light after a path of the given length [m], were it never bent.
+    pub fn cell_area_at_m2(&self, low: DVec2, high: DVec2, path_m: f64) -> f64 {
+        let spread = match self.domain {
+            Domain::Sphere { .. } => path_m * path_m,
+            Domain::Plane { .. } => 1.0,
+        };
+        self.cell_measure(low, high) * spread
+    }
+
+    /// Upper bound of the flux of the whole domain [W], largest channel.
+    pub fn power_bound_w(&self) -> f64 {
+        let measure = self.cell_measure(DVec2::ZERO, DVec2::ONE) * self.face_count() as f64;
+        let strength = match self.light.kind {
+            LightKind::Point { intensity, .. } | LightKind::Spot { intensity, .. } => intensity.0,
+            LightKind::Sun {
+                normal_irradiance, ..
+            } => normal_irradiance.0,
+        };
+        strength * measure * self.light.colour.max_channel()
+    }
+
+    /// Frame of a face: maps scene points to homogeneous plane coordinates (x, y, z) whose (x/z, y/z) is the point of
+    /// the face or, for a sun, with z = 1, of the rectangle as [−1, 1]².
+    pub fn to_face(&self, face: usize, point: DVec3) -> DVec3 {
+        match self.domain {
+            Domain::Sphere { position, .. } => {
+                cube_face::axes_from_face(face).transpose() * (point - position)
+            }
+            Domain::Plane {
+                corner, across, down, ..
+            } => {
+                let local = point - corner;
+                let u = local.dot(across) / across.length_squared();
+                let v = local.dot(down) / down.length_squared();
+                DVec3::new(2.0 * u - 1.0, 2.0 * v - 1.0, 1.0)
+            }
+        }
+    }
+
+    /// How the unit square lies on a face.
+    pub fn mapping(&self) -> FaceMapping {
+        match self.domain {
+            Domain::Sphere { mapping, .. } => mapping,
+            Domain::Plane { .. } => FaceMapping::Plain,
+        }
+    }
+}
+
+/// Two unit vectors perpendicular to `direction` and to each other, that depend on nothing else.
+fn frame_across(direction: DVec3) -> DMat3 {
+    let (across, down) = direction.any_orthonormal_pair();
+    DMat3::from_cols(across, down, direction)
+}
+
+fn sun_domain(direction: DVec3, scene: &Scene, casters: &[usize]) -> Option<Domain> {
+    let scene_from_frame = frame_across(direction);
+    let frame_from_scene = scene_from_frame.transpose();
+    let mut low = DVec3::INFINITY;
+    let mut high = DVec3::NEG_INFINITY;
+    for &object in casters {
+        for position in &scene.objects[object].mesh.positions {
+            let local = frame_from_scene * *position;
+            (low, high) = (low.min(local), high.max(local));
+        }
+    }
+    // The nearest point of anything, occluders included.
+    let before = scene
+        .objects
+        .iter()
+        .flat_map(|object| &object.mesh.positions)
+        .map(|position| (frame_from_scene * *position).z)
+        .fold(f64::INFINITY, f64::min);
+    let size = high - low;
+    // Also false where there is no caster, or none with an area across the light.
+    if !(size.x > 0.0 && size.y > 0.0 && before.is_finite()) {
+        return None;
+    }
+    let margin = size.max_element().max(high.z - before);
+    Some(Domain::Plane {
+        corner: scene_from_frame * DVec3::new(low.x, low.y, before - margin),
+        across: scene_from_frame.x_axis * size.x,
+        down: scene_from_frame.y_axis * size.y,
+        direction,
+    })
+}

@@ -1,0 +1,82 @@
+//! The ledger while it is being summed: exact counts per channel and account.
+
+use super::ledger::{EnergyLedger, LightLedger, Truncated};
+use crate::illumination::accumulator::{FluxCount, FluxUnit};
+use crate::optics::LinearSrgb;
+
+/// What can become of flux.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Account {
+    /// First hit was specular.
+    Emitted,
+    /// First hit was not specular.
+    NotEmitted,
+    /// Reached a diffuse surface.
+    Deposited,
+    /// Became heat.
+    Absorbed,
+    /// Left the scene.
+    Escaped,
+    /// Beyond the depth limit.
+    Depth,
+    /// Below the branch threshold.
+    Threshold,
+    /// Met a number that is not finite.
+    NonFinite,
+    /// No deposit could place it.
+    Unresolved,
+}
+
+const ACCOUNTS: usize = Account::Unresolved as usize + 1;
+
+/// All accounts of one light, exact.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct LedgerSum {
+    counts: [[i128; 3]; ACCOUNTS],
+}
+
+impl LedgerSum {
+    /// Books a count.
+    pub fn book(&mut self, account: Account, count: FluxCount) {
+        for (sum, channel) in self.counts[account as usize].iter_mut().zip(count) {
+            *sum += i128::from(channel);
+        }
+    }
+
+    /// Adds another part of the same light's ledger.
+    pub fn merge(&mut self, other: &Self) {
+        for (sums, parts) in self.counts.iter_mut().zip(other.counts) {
+            for (sum, part) in sums.iter_mut().zip(parts) {
+                *sum += part;
+            }
+        }
+    }
+
+    /// Luminous-equivalent watts of an account.
+    pub fn watts(&self, account: Account, unit: FluxUnit) -> f64 {
+        LinearSrgb::from(self.counts[account as usize].map(|channel| channel as f64 * unit.watts()))
+            .luminance()
+    }
+
+    /// As it is reported.
+    pub fn report(&self, light: &str, unit: FluxUnit) -> LightLedger {
+        let watts = |account| self.watts(account, unit);
+        LightLedger {
+            light: light.to_owned(),
+            energy_w: EnergyLedger {
+                emitted: watts(Account::Emitted),
+                deposited: watts(Account::Deposited),
+                absorbed: watts(Account::Absorbed),
+                escaped: watts(Account::Escaped),
+                truncated: Truncated {
+                    depth: watts(Account::Depth),
+                    threshold: watts(Account::Threshold),
+                    non_finite: watts(Account::NonFinite),
+                    unresolved: watts(Account::Unresolved),
+                    quadrature: 0.0,
+                },
+            },
+            not_emitted_w: watts(Account::NotEmitted),
+        }
+    }
+}

@@ -1,0 +1,103 @@
+//! How large each surface's map is.
+
+use std::sync::{Arc, OnceLock};
+
+use crate::error::{Error, Result};
+use crate::illumination::Chart;
+use crate::illumination::parametrisation::{DEFAULT_NOMINAL_SIDE, Parametrisation, parametrise};
+use crate::light_pass::caustic::statistics::FootprintStatistics;
+use crate::scene::Scene;
+use crate::settings::{BakeSettings, MapResolution};
+
+/// Side of a map before the first doubling [texels].
+pub const FIRST_SIDE: usize = 64;
+
+/// Largest side that doubling leads to by itself [texels]; larger maps have to be asked for.
+const LARGEST_AUTOMATIC_SIDE: usize = 2048;
+
+/// Memory per texel while flux is summed and finished [bytes]: three 64-bit sums, three floats per layer, an area.
+pub const BYTES_PER_TEXEL: u64 = 24 + 2 * 12 + 8;
+
+/// Parametrisations of a scene's surfaces, made on first use.
+#[derive(Debug)]
+pub struct MapSizes {
+    scene: Arc<Scene>,
+    parametrisations: Vec<OnceLock<Option<Parametrisation>>>,
+}
+
+impl MapSizes {
+    /// Nothing made yet.
+    pub fn new(scene: Arc<Scene>) -> Self {
+        let parametrisations = scene.objects.iter().map(|_| OnceLock::new()).collect();
+        Self {
+            scene,
+            parametrisations,
+        }
+    }
+
+    /// The parametrisation of an object; `None` where it has no area.
+    pub fn parametrisation(&self, object: usize) -> Option<&Parametrisation> {
+        self.parametrisations[object]
+            .get_or_init(|| parametrise(object, &self.scene.objects[object].mesh, DEFAULT_NOMINAL_SIDE))
+            .as_ref()
+    }
+
+    /// A chart of the given size.
+    pub fn chart(&self, object: usize, (width, height): (usize, usize)) -> Option<Arc<Chart>> {
+        Some(Arc::new(self.parametrisation(object)?.chart(width, height)))
+    }
+
+    /// The size at which doubling from [`FIRST_SIDE`] ends, because texels are no larger than the mean footprint
+    /// (section 3.1.1 of the paper). `None` where no footprint was seen.
+    pub fn doubled_size(&self, object: usize, statistics: &FootprintStatistics) -> Option<(usize, usize)> {
+        let share = statistics.mean(object)?.map_share;
+        let aspect = self.parametrisation(object)?.suggested_aspect;
+        let (mut width, mut height) = first_size(aspect);
+        while (width * height) as f64 * share < 1.0 && width.max(height) < LARGEST_AUTOMATIC_SIDE {
+            (width, height) = (2 * width, 2 * height);
+        }
+        Some((width, height))
+    }
+
+    /// The size of a map that holds direct light only: texels of a 400th of the scene's diagonal, or what is asked.
+    pub fn direct_size(&self, object: usize, settings: &BakeSettings) -> Option<(usize, usize)> {
+        if let MapResolution::Fixed { width, height } = settings.map_resolution {
+            return Some((width, height));
+        }
+        let parametrisation = self.parametrisation(object)?;
+        let (low, high) = self.scene.bounds()?;
+        let texel_m = (high - low).length() / 400.0;
+        let texels = parametrisation.area_m2() / (texel_m * texel_m);
+        let side = |wanted: f64| (wanted.max(8.0).log2().round().exp2() as usize).min(1024);
+        let aspect = parametrisation.suggested_aspect;
+        Some((side((texels * aspect).sqrt()), side((texels / aspect).sqrt())))
+    }
+}
+
+/// A map of about FIRST_SIDE² texels whose sides have a power of two between them, at most 8:1.
+pub fn first_size(aspect: f64) -> (usize, usize) {
+    let steps = aspect.log2().round().clamp(-3.0, 3.0) as i32;
+    let stretch = |steps: i32| FIRST_SIDE << steps.max(0);
+    (stretch(steps), stretch(-steps))
+}
+
+/// Refuses maps that do not fit.
+///
+/// # Errors
+/// Names the need and the limit.
+pub fn check_memory(texels: u64, settings: &BakeSettings) -> Result<()> {
+    let need = texels.saturating_mul(BYTES_PER_TEXEL);
+    if need <= settings.memory_bytes {
+        return Ok(());
+    }
+    let mebibytes = |bytes: u64| bytes.div_ceil(1 << 20);
+    Err(Error::failure(
+        "--memory",
+        format!(
+            "the maps need {} MiB, the limit is {} MiB",
+            mebibytes(need),
+            mebibytes(settings.memory_bytes)
+        ),
+        "ask for a smaller --map-resolution or allow more --memory",
+    ))
+}

@@ -1,0 +1,8 @@
+//! Scenes: the built-in ones and those from files.
+
+mod support;
+
+#[path = "scene/builtins.rs"]
+mod builtins;
+#[path = "scene/files.rs"]
+mod files;

@@ -1,0 +1,37 @@
+//! What the test binaries share. Each uses a part of it.
+#![allow(dead_code)]
+
+pub mod skip;
+
+use std::path::{Path, PathBuf};
+
+pub use skip::skip;
+
+/// A file or folder of the project; fails where it is missing.
+pub fn project_file(path: &str) -> PathBuf {
+    let full = Path::new(env!("CARGO_MANIFEST_DIR")).join(path);
+    assert!(full.exists(), "{path} is missing from the project");
+    full
+}
+
+/// A file or folder of the optional collection beside the project (`oracle/`, `scenes/`, `validator/`). `None`, after
+/// a counted skip, where it is not there.
+pub fn shared_or_skip(path: &str) -> Option<PathBuf> {
+    let full = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared").join(path);
+    if full.exists() {
+        return Some(full);
+    }
+    let test = std::thread::current().name().unwrap_or("?").to_owned();
+    skip(&test, &format!("../shared/{path} is not there"));
+    None
+}
+
+/// Fails unless two values agree to a relative tolerance (absolute where the expected one is zero).
+#[track_caller]
+pub fn assert_close(actual: f64, expected: f64, tolerance: f64, what: &str) {
+    let scale = if expected == 0.0 { 1.0 } else { expected.abs() };
+    assert!(
+        (actual - expected).abs() <= tolerance * scale,
+        "{what}: {actual} instead of {expected} within {tolerance}"
+    );
+}
