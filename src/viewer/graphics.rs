@@ -163,13 +163,19 @@ impl Graphics {
 
     /// Shows a painting of the interface.
     pub fn show(&mut self, painting: &mut Painting) -> Shown {
+        self.interface.upload(&self.gpu.device, &self.gpu.queue, painting);
+        let shown = self.show_frame(painting);
+        self.interface.release(painting);
+        shown
+    }
+
+    fn show_frame(&mut self, painting: &Painting) -> Shown {
         let Self {
             interface,
             screen,
             gpu,
             ..
         } = self;
-        interface.upload(&gpu.device, &gpu.queue, painting);
         if gpu.is_lost() {
             return Shown::Broken;
         }

@@ -94,14 +94,19 @@ impl Interface {
         }
     }
 
-    /// Uploads what the painting needs. Has to be called for every painting, shown or not: textures come only once.
+    /// Takes over new textures. Has to be called for every painting, shown or not: textures come only once.
     pub fn upload(&mut self, device: &wgpu::Device, queue: &wgpu::Queue, painting: &mut Painting) {
-        let textures = std::mem::take(&mut painting.textures);
-        for (id, delta) in &textures.set {
-            self.renderer.update_texture(device, queue, *id, delta);
+        for (id, deltas) in painting.textures.set.drain() {
+            for delta in &deltas {
+                self.renderer.update_texture(device, queue, id, delta);
+            }
         }
-        for id in &textures.free {
-            self.renderer.free_texture(id);
+    }
+
+    /// Lets old textures go, once the painting was shown or could not be.
+    pub fn release(&mut self, painting: &mut Painting) {
+        for id in painting.textures.free.drain() {
+            self.renderer.free_texture(&id);
         }
     }
 

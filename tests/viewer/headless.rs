@@ -94,9 +94,10 @@ impl Headless {
             speed_m_per_s: 1.0,
             adapter: "no adapter",
         };
-        let output = context.run_ui(input, |ui| {
+        let mut output = context.run_ui(input, |ui| {
             *wishes = wishes.and(panel.show(ui, &facts));
         });
+        output.textures_delta.clear();
         if let Some(update) = output.platform_output.accesskit_update {
             self.nodes = update.nodes;
         }
