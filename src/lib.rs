@@ -34,5 +34,7 @@ pub mod eye_pass;
 
 pub mod session;
 
+pub mod export;
+
 #[cfg(feature = "viewer")]
 pub mod viewer;
