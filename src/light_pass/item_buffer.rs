@@ -32,8 +32,8 @@ pub struct ItemBuffer {
 impl ItemBuffer {
     /// Marks the cells that may see one of the `casters` (indices of specular objects).
     pub fn build(launch: &Launch, scene: &Scene, casters: &[usize]) -> Self {
-        let faces: Vec<Vec<AtomicU64>> = (0..launch.face_count())
-            .map(|_| (0..WORDS).map(|_| AtomicU64::new(0)).collect())
+        let faces: Vec<Face> = (0..launch.face_count())
+            .map(|face| Face::new(launch, face))
             .collect();
         let mut seen = Vec::new();
         for &object in casters {
@@ -55,10 +55,7 @@ impl ItemBuffer {
                 seen.push(object);
             }
         }
-        let faces = faces
-            .into_iter()
-            .map(|face| face.into_iter().map(AtomicU64::into_inner).collect())
-            .collect();
+        let faces = faces.into_iter().map(Face::into_bits).collect();
         Self { faces, casters: seen }
     }
 
