@@ -15,6 +15,8 @@ pub mod settings;
 pub mod units;
 
 pub mod files;
+#[cfg(feature = "gpu")]
+pub mod gpu;
 
 pub mod optics;
 
@@ -33,6 +35,8 @@ pub mod light_pass;
 pub mod eye_pass;
 
 pub mod session;
+
+pub mod export;
 
 #[cfg(feature = "viewer")]
 pub mod viewer;

@@ -5,7 +5,9 @@ use serde::{Deserialize, Serialize};
 use crate::error::{Error, Result};
 
 /// Which light a layer holds. The order is that of the files' channels.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, clap::ValueEnum,
+)]
 #[serde(rename_all = "lowercase")]
 pub enum LayerKind {
     /// LS+D: light that met at least one specular surface.
@@ -13,6 +15,7 @@ pub enum LayerKind {
     /// LD: straight from the lights, stopped by every surface.
     Direct,
     /// LD+D: light that other diffuse surfaces send.
+    #[value(skip)]
     Indirect,
 }
 
@@ -28,7 +31,7 @@ impl LayerKind {
 }
 
 /// How the light pass turns rays into irradiance.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub enum Estimator {
     /// A kernel of flux per ray, scaled to the wavefront (Collins 1994).
@@ -37,7 +40,7 @@ pub enum Estimator {
 
 /// Shape of a splat. All have the same area at the same footprint: disc r = 1, box side √π, cone base √3 (footprint
 /// radii), gaussian exp(−r²/2σ).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub enum Kernel {
     /// exp(−r²/2σ), cut at 4√σ (eq. 4.4).
@@ -51,7 +54,7 @@ pub enum Kernel {
 }
 
 /// How a kernel is taken into texels.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub enum KernelSampling {
     /// Its integral over each texel.
@@ -61,7 +64,7 @@ pub enum KernelSampling {
 }
 
 /// What sets the size and shape of a splat.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub enum Footprint {
     /// The ellipse that the neighbouring rays span.
@@ -75,7 +78,7 @@ pub enum Footprint {
 }
 
 /// Where in its lattice cell a light ray starts.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub enum RayPlacement {
     /// At the centre.
@@ -85,7 +88,7 @@ pub enum RayPlacement {
 }
 
 /// How the sphere of directions around a light is divided.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub enum ItemBufferKind {
     /// Cells of equal solid angle.

@@ -1,7 +1,9 @@
 //! Reading and writing files: bounded reads, whole or not at all writes. The only place that opens files.
 
+mod folder;
 mod read;
 mod write;
 
+pub use folder::{OutputFolder, check_output_file, remove_file};
 pub use read::read_file;
 pub use write::write_atomically;

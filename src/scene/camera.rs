@@ -2,6 +2,9 @@
 
 use glam::DVec3;
 
+/// Full vertical angle of view of a camera that frames a scene [rad].
+const FRAMING_FOV_RAD: f64 = 0.8;
+
 /// A perspective camera.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Camera {
@@ -33,6 +36,17 @@ impl Camera {
             vertical_fov_rad,
             near_m,
         }
+    }
+
+    /// A camera that sees the whole box from above and aside, whatever the `aspect` = width/height of the picture.
+    pub fn framing(name: impl Into<String>, (low, high): (DVec3, DVec3), aspect: f64) -> Self {
+        let centre = 0.5 * (low + high);
+        let radius_m = (0.5 * (high - low).length()).max(1e-6);
+        let half_height: f64 = 0.5 * FRAMING_FOV_RAD;
+        let half_width = (half_height.tan() * aspect).atan();
+        let distance_m = radius_m / half_height.min(half_width).sin();
+        let backward = DVec3::new(-0.5, 0.55, 0.67).normalize();
+        Self::look_at(name, centre + backward * distance_m, centre, FRAMING_FOV_RAD)
     }
 
     /// Unit, to the right of the picture.

@@ -106,7 +106,8 @@ fn unwrap_regions(mesh: &Mesh, nominal_side: usize) -> Vec<[DVec2; 3]> {
 }
 
 impl Parametrisation {
-    fn new(object: usize, mesh: &Mesh, uv_set: UvSet, corner_uvs: Vec<[DVec2; 3]>) -> Self {
+    /// Map coordinates that are known already: [0, 1], three corners per triangle of the mesh.
+    pub fn new(object: usize, mesh: &Mesh, uv_set: UvSet, corner_uvs: Vec<[DVec2; 3]>) -> Self {
         let triangle_areas_m2: Vec<f64> = (0..mesh.triangles.len())
             .map(|triangle| {
                 let [a, b, c] = mesh.corners(triangle);

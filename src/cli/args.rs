@@ -1,0 +1,319 @@
+//! Flags and arguments, as they are typed.
+
+use std::path::PathBuf;
+
+use clap::error::ErrorKind as ClapErrorKind;
+use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand, ValueEnum};
+use nephroid::error::{Error, Result};
+use nephroid::eye_pass::ToneMap;
+
+use super::bake_options::BakeOptions;
+use super::compare::LayerChoice;
+use super::job::Job;
+use super::terminal::{self, Terminal};
+use super::values::{self, Exposure};
+
+/// Bakes light through glass, mirrors and water into illumination maps, and lets you walk through the result.
+///
+/// A scene is a .glb or .gltf file, or builtin:NAME.
+#[derive(Debug, Parser)]
+#[command(
+    name = "nephroid",
+    version,
+    args_conflicts_with_subcommands = true,
+    max_term_width = 110
+)]
+pub struct Arguments {
+    #[command(subcommand)]
+    pub command: Option<Command>,
+    #[command(flatten)]
+    pub view: ViewArguments,
+}
+
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Open a window on a scene and bake it; without a display, write maps and a picture instead (the default command)
+    View(ViewArguments),
+    /// Bake illumination maps and a manifest into a folder
+    Bake(BakeArguments),
+    /// Make one picture
+    Render(RenderArguments),
+    /// Say what is in a scene, which effects it calls for and why
+    Inspect(InspectArguments),
+    /// Measure a map against a reference: relative RMSE, ARD, peak, flux
+    Compare(CompareArguments),
+}
+
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Scene options")]
+pub struct SceneOptions {
+    /// Add a sun to a scene without light
+    #[arg(long)]
+    pub default_light: bool,
+    /// Take transmissive materials without a volume for solid glass, where their meshes are closed
+    #[arg(long)]
+    pub solid_glass: bool,
+}
+
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Run options")]
+pub struct RunOptions {
+    /// Worker threads [default: one per core]
+    #[arg(long, value_name = "N")]
+    pub threads: Option<usize>,
+    /// No progress bar
+    #[arg(long)]
+    pub quiet: bool,
+    /// Print the result as one JSON document
+    #[arg(long)]
+    pub json: bool,
+    /// Log messages of this level and above to stderr
+    #[arg(long, value_enum, value_name = "LEVEL", default_value = "off")]
+    pub log: LogLevel,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum LogLevel {
+    Off,
+    Error,
+    Warn,
+    Info,
+    Debug,
+    Trace,
+}
+
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Picture options")]
+pub struct PictureOptions {
+    /// Camera of the file, by name or index [default: the first, or one that frames the scene]
+    #[arg(long, value_name = "NAME|INDEX")]
+    pub camera: Option<String>,
+    /// Stops by which radiance is multiplied before tone mapping, or `auto` [default: auto]
+    #[arg(long, value_name = "auto|STOPS", value_parser = values::exposure, allow_hyphen_values = true)]
+    pub exposure: Option<Exposure>,
+}
+
+/// Maps that were baked before, instead of baking.
+#[derive(Debug, Args)]
+pub struct MapsOption {
+    /// Use the maps of this folder instead of baking
+    #[arg(long, value_name = "DIR", conflicts_with = "BakeOptions")]
+    pub maps: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub struct ViewArguments {
+    /// .glb, .gltf or builtin:NAME [default: builtin:showroom]
+    pub scene: Option<String>,
+    #[command(flatten)]
+    pub maps: MapsOption,
+    #[command(flatten)]
+    pub picture: PictureOptions,
+    /// Size of the window or picture [default: 1280x720]
+    #[arg(long, value_name = "WxH", value_parser = values::picture_size)]
+    pub size: Option<(u32, u32)>,
+    /// Write one JSON line per change of state of the window
+    #[arg(long, value_name = "FILE")]
+    pub event_log: Option<PathBuf>,
+    /// Without a display: write into ./nephroid-out even if it holds other files
+    #[arg(long)]
+    pub force: bool,
+    #[command(flatten)]
+    pub scene_options: SceneOptions,
+    #[command(flatten)]
+    pub bake: BakeOptions,
+    #[command(flatten)]
+    pub run: RunOptions,
+}
+
+#[derive(Debug, Args)]
+pub struct BakeArguments {
+    /// .glb, .gltf or builtin:NAME
+    pub scene: String,
+    /// Folder for the maps and manifest.json
+    #[arg(short, long, value_name = "DIR")]
+    pub output: PathBuf,
+    /// Write into the folder even if it holds other files
+    #[arg(long)]
+    pub force: bool,
+    #[command(flatten)]
+    pub scene_options: SceneOptions,
+    #[command(flatten)]
+    pub bake: BakeOptions,
+    #[command(flatten)]
+    pub run: RunOptions,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Backend {
+    /// Raster on the graphics card
+    Gpu,
+    /// Reference ray tracer
+    Cpu,
+}
+
+#[derive(Debug, Args)]
+pub struct RenderArguments {
+    /// .glb, .gltf or builtin:NAME
+    pub scene: String,
+    /// Picture: .png for display, .exr for radiance in W/(m² sr)
+    #[arg(short, long, value_name = "FILE")]
+    pub output: PathBuf,
+    #[command(flatten)]
+    pub maps: MapsOption,
+    #[command(flatten)]
+    pub picture: PictureOptions,
+    /// How radiance becomes display colour [default: neutral]
+    #[arg(long, value_enum)]
+    pub tone_map: Option<ToneMap>,
+    /// Size of the picture [default: 1280x720]
+    #[arg(long, value_name = "WxH", value_parser = values::picture_size)]
+    pub size: Option<(u32, u32)>,
+    /// What makes the picture [default: gpu where there is one, else cpu]
+    #[arg(long, value_enum)]
+    pub backend: Option<Backend>,
+    #[command(flatten)]
+    pub scene_options: SceneOptions,
+    #[command(flatten)]
+    pub bake: BakeOptions,
+    #[command(flatten)]
+    pub run: RunOptions,
+}
+
+#[derive(Debug, Args)]
+pub struct InspectArguments {
+    /// .glb, .gltf or builtin:NAME
+    pub scene: String,
+    #[command(flatten)]
+    pub scene_options: SceneOptions,
+    #[command(flatten)]
+    pub bake: BakeOptions,
+    #[command(flatten)]
+    pub run: RunOptions,
+}
+
+#[derive(Debug, Args)]
+pub struct CompareArguments {
+    /// Map to judge: .exr or .pfm
+    pub map: PathBuf,
+    /// What it should be: .exr or .pfm
+    pub reference: PathBuf,
+    /// Layer of EXR maps [default: caustic where there is one, else sum]
+    #[arg(long, value_enum)]
+    pub layer: Option<LayerChoice>,
+    /// Write a picture of the difference: red where the map is brighter, blue where it is darker
+    #[arg(long, value_name = "FILE.png")]
+    pub difference: Option<PathBuf>,
+    /// Fail (exit 1) if the relative RMSE is above this many percent
+    #[arg(long, value_name = "PERCENT", allow_negative_numbers = true)]
+    pub max_rmse: Option<f64>,
+    #[command(flatten)]
+    pub run: RunOptions,
+}
+
+/// What the arguments ask for.
+pub enum Parsed {
+    /// A job to run.
+    Run(Terminal, Box<Job>),
+    /// Help or the version: printed already.
+    Printed,
+}
+
+/// Parses the process's arguments into a validated job.
+///
+/// # Errors
+/// Bad usage, as one sentence.
+pub fn parse() -> Result<Parsed> {
+    let matches = match Arguments::command().try_get_matches() {
+        Ok(matches) => matches,
+        Err(error)
+            if matches!(
+                error.kind(),
+                ClapErrorKind::DisplayHelp | ClapErrorKind::DisplayVersion
+            ) =>
+        {
+            terminal::print(error.render().to_string().trim_end())?;
+            return Ok(Parsed::Printed);
+        }
+        Err(error) => return Err(in_one_sentence(&error)),
+    };
+    let arguments = Arguments::from_arg_matches(&matches).map_err(|error| in_one_sentence(&error))?;
+    let run = arguments.run_options();
+    start_log(run.log);
+    let terminal = Terminal {
+        quiet: run.quiet,
+        json: run.json,
+    };
+    Ok(Parsed::Run(terminal, Box::new(Job::from_arguments(arguments)?)))
+}
+
+impl Arguments {
+    fn run_options(&self) -> &RunOptions {
+        match &self.command {
+            None => &self.view.run,
+            Some(Command::View(view)) => &view.run,
+            Some(Command::Bake(bake)) => &bake.run,
+            Some(Command::Render(render)) => &render.run,
+            Some(Command::Inspect(inspect)) => &inspect.run,
+            Some(Command::Compare(compare)) => &compare.run,
+        }
+    }
+}
+
+/// Clap's report without its usage block, tips joined.
+fn in_one_sentence(error: &clap::Error) -> Error {
+    let report = error.render().to_string();
+    let what: Vec<&str> = report
+        .lines()
+        .map(str::trim)
+        .take_while(|line| !line.starts_with("Usage:") && !line.starts_with("For more information"))
+        .filter(|line| !line.is_empty())
+        .collect();
+    let what = what.join(" ");
+    Error::usage(
+        "command line",
+        what.trim_start_matches("error: "),
+        "see nephroid --help",
+    )
+}
+
+fn start_log(level: LogLevel) {
+    let filter = match level {
+        LogLevel::Off => log::LevelFilter::Off,
+        LogLevel::Error => log::LevelFilter::Error,
+        LogLevel::Warn => log::LevelFilter::Warn,
+        LogLevel::Info => log::LevelFilter::Info,
+        LogLevel::Debug => log::LevelFilter::Debug,
+        LogLevel::Trace => log::LevelFilter::Trace,
+    };
+    env_logger::Builder::new().filter_level(filter).init();
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn definitions_hold_together() {
+        Arguments::command().debug_assert();
+    }
+
+    #[test]
+    fn clap_speaks_in_one_sentence() {
+        for line in [
+            "nephroid bake",
+            "nephroid bake a.glb -o b --kernel round",
+            "nephroid bake a.glb -o b --densty 3",
+            "nephroid compare a.exr",
+            "nephroid render a.glb -o b.png --maps c --density 10",
+        ] {
+            let error = Arguments::try_parse_from(line.split(' ')).expect_err(line);
+            let sentence = in_one_sentence(&error).to_string();
+            assert!(
+                !sentence.contains('\n') && !sentence.contains("Usage"),
+                "{sentence}"
+            );
+            assert!(sentence.len() > 40, "{sentence}");
+        }
+    }
+}

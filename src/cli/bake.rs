@@ -1,0 +1,157 @@
+//! `bake`: maps and a manifest in a folder.
+
+use std::fmt::Write as _;
+use std::sync::Arc;
+use std::time::Instant;
+
+use cpu_time::ProcessTime;
+use nephroid::error::Result;
+use nephroid::export::manifest::Manifest;
+use nephroid::export::map_folder::MapFolder;
+use nephroid::scene::Scene;
+use nephroid::session::{BakeResult, BakeSession, StopReason};
+use nephroid::settings::BakeSettings;
+
+use super::interrupt::Interrupt;
+use super::job::BakeJob;
+use super::progress_bar::BakeBar;
+use super::scene_input::SceneInput;
+use super::terminal::Terminal;
+
+/// Clocks from the start of the run on.
+pub struct Clock {
+    wall: Instant,
+    cpu: ProcessTime,
+}
+
+impl Clock {
+    /// Starts both.
+    pub fn start() -> Self {
+        Self {
+            wall: Instant::now(),
+            cpu: ProcessTime::now(),
+        }
+    }
+
+    /// Wall-clock seconds since the start.
+    pub fn wall_s(&self) -> f64 {
+        self.wall.elapsed().as_secs_f64()
+    }
+
+    /// Wall-clock and CPU seconds since the start.
+    fn seconds(&self) -> (f64, f64) {
+        (self.wall_s(), self.cpu.elapsed().as_secs_f64())
+    }
+}
+
+/// A scene, with the wall-clock and CPU seconds that loading it took.
+pub struct LoadedScene {
+    pub scene: Arc<Scene>,
+    load_s: (f64, f64),
+}
+
+/// Loads a scene and prints its warnings.
+///
+/// # Errors
+/// A scene that cannot be read, or has no light where one is needed.
+pub fn load(input: &SceneInput, clock: &Clock, terminal: &Terminal) -> Result<LoadedScene> {
+    let scene = Arc::new(input.load()?);
+    terminal.print_warnings(&scene.warnings);
+    Ok(LoadedScene {
+        scene,
+        load_s: clock.seconds(),
+    })
+}
+
+/// Bakes with a progress bar, and prints the bake's warnings.
+///
+/// # Errors
+/// Those of [`BakeSession::bake`].
+pub fn bake(
+    loaded: &LoadedScene,
+    settings: &BakeSettings,
+    clock: &Clock,
+    terminal: &Terminal,
+    interrupt: &Interrupt,
+) -> Result<BakeResult> {
+    interrupt.check(&loaded.scene.source)?;
+    let mut session = BakeSession::new(loaded.scene.clone())?;
+    let bar = BakeBar::new(terminal);
+    let mut result = session.bake(settings, &bar, interrupt.control())?;
+    drop(bar);
+    terminal.print_warnings(&result.warnings);
+    (result.timings_s.load, result.cpu_s.load) = loaded.load_s;
+    (result.timings_s.total, result.cpu_s.total) = clock.seconds();
+    Ok(result)
+}
+
+/// Loads, bakes, writes and sums up.
+///
+/// # Errors
+/// Input, output or a bake that failed.
+pub fn run(job: &BakeJob, terminal: &Terminal, interrupt: &Interrupt) -> Result<()> {
+    let clock = Clock::start();
+    let loaded = load(&job.scene, &clock, terminal)?;
+    let folder = MapFolder::open(&job.output, job.force)?;
+    let result = bake(&loaded, &job.settings, &clock, terminal, interrupt)?;
+    let manifest = folder.write(&loaded.scene, &job.settings, &result)?;
+    let text = summary(&manifest, &result, &job.output.display().to_string());
+    terminal.print_result(&text, &manifest)
+}
+
+fn summary(manifest: &Manifest, result: &BakeResult, folder: &str) -> String {
+    let mut text = String::new();
+    let mut line = |name: &str, value: String| {
+        let _ = writeln!(text, "{name:<9} {value}");
+    };
+    line("folder", folder.to_string());
+    for map in &manifest.maps {
+        line(
+            "map",
+            format!("{} {}x{} of {}", map.file, map.width, map.height, map.surface),
+        );
+    }
+    if manifest.maps.is_empty() {
+        line("maps", format!("none: {}", why_nothing(result)));
+    }
+    let counts = &manifest.counts;
+    line("rays", format!("{}, {} splats", counts.rays, counts.splats));
+    let energy = &manifest.energy_w;
+    line(
+        "watts",
+        format!(
+            "{:.6} emitted = {:.6} deposited + {:.6} absorbed + {:.6} escaped + {:.6} truncated",
+            energy.emitted, energy.deposited, energy.absorbed, energy.escaped, energy.truncated
+        ),
+    );
+    line(
+        "seconds",
+        format!(
+            "{:.2} ({:.2} of CPU)",
+            manifest.timings_s.total, manifest.cpu_s.total
+        ),
+    );
+    if manifest.partial {
+        line("partial", "stopped before it was done".to_string());
+    }
+    text
+}
+
+/// The plan's reason for having nothing to do.
+fn why_nothing(result: &BakeResult) -> String {
+    if result.stop_reason == StopReason::Cancelled {
+        return "stopped before anything was deposited".into();
+    }
+    let reasons: Vec<&str> = result
+        .plan
+        .effects
+        .iter()
+        .filter(|line| !line.on)
+        .map(|line| line.reason.as_str())
+        .take(1)
+        .collect();
+    reasons
+        .first()
+        .map_or("no surface received light", |reason| reason)
+        .to_string()
+}

@@ -1,0 +1,163 @@
+//! Bake options: from flags to validated settings.
+
+use clap::{Args, ValueEnum};
+use nephroid::error::{Error, Result};
+use nephroid::settings::{
+    BakeSettings, Estimator, Footprint, ItemBufferKind, Kernel, KernelSampling, LayerKind, MapResolution,
+    RayPlacement, Sigma,
+};
+
+use super::values;
+
+/// How carefully to bake.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum Preset {
+    /// 10,000 rays per steradian.
+    Draft,
+    /// 100,000 rays per steradian.
+    #[default]
+    Preview,
+    /// 1,000,000 rays per steradian.
+    Final,
+}
+
+impl Preset {
+    fn density_per_sr(self) -> f64 {
+        match self {
+            Self::Draft => 1e4,
+            Self::Preview => 1e5,
+            Self::Final => 1e6,
+        }
+    }
+}
+
+/// Flags of a bake; those not given keep the defaults of [`BakeSettings`].
+#[derive(Clone, Debug, Default, Args)]
+#[command(next_help_heading = "Bake options")]
+pub struct BakeOptions {
+    /// Ray density by name [default: preview]
+    #[arg(long, value_enum)]
+    preset: Option<Preset>,
+    /// How light rays become irradiance [default: splat]
+    #[arg(long, value_enum)]
+    estimator: Option<Estimator>,
+    /// Light rays per steradian, exactly; for suns density/D² rays per m², D from the casters' centre to their
+    /// farthest receiver
+    #[arg(long, value_name = "RAYS_PER_SR", allow_negative_numbers = true)]
+    density: Option<f64>,
+    /// Where in its lattice cell a light ray starts [default: lattice]
+    #[arg(long, value_enum, value_name = "PLACEMENT")]
+    rays: Option<RayPlacement>,
+    /// Spread of the gaussian kernel in squared footprint radii, or `adaptive` [default: 1]
+    #[arg(long, value_name = "S|adaptive", value_parser = values::sigma, allow_negative_numbers = true)]
+    sigma: Option<Sigma>,
+    /// Shape of a splat [default: gaussian]
+    #[arg(long, value_enum)]
+    kernel: Option<Kernel>,
+    /// How a kernel is taken into texels [default: integrated]
+    #[arg(long, value_enum, value_name = "SAMPLING")]
+    kernel_sampling: Option<KernelSampling>,
+    /// What sets the size and shape of a splat [default: ellipse]
+    #[arg(long, value_enum)]
+    footprint: Option<Footprint>,
+    /// How the sphere of directions around a light is divided [default: equal]
+    #[arg(long, value_enum, value_name = "DIVISION")]
+    item_buffer: Option<ItemBufferKind>,
+    /// Texels of every map: as needed, N by N, or W by H [default: auto]
+    #[arg(long, value_name = "auto|N|WxH", value_parser = values::map_resolution, allow_hyphen_values = true)]
+    map_resolution: Option<MapResolution>,
+    /// Largest number of specular surfaces on a light path [default: 16]
+    #[arg(long, value_name = "N")]
+    max_depth: Option<u32>,
+    /// Branches that carry less than this share of their light ray's flux are not followed, and booked as truncated
+    /// [default: 0.0001]
+    #[arg(long, value_name = "SHARE", allow_negative_numbers = true)]
+    branch_threshold: Option<f64>,
+    /// Layers to bake [default: caustic for bake, caustic,direct for pictures]
+    #[arg(long, value_enum, value_delimiter = ',', value_name = "LAYER,...")]
+    layers: Option<Vec<LayerKind>>,
+    /// Seed of everything random [default: 0]
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+    /// Largest memory for maps, such as 512M or 2G [default: 4G]
+    #[arg(long, value_name = "SIZE", value_parser = values::memory, allow_hyphen_values = true)]
+    memory: Option<u64>,
+}
+
+impl BakeOptions {
+    /// Validated settings; `default_layers` where no layer is named, `threads` 0 = one per core.
+    ///
+    /// # Errors
+    /// A value outside its range; an option that does not apply to the others given.
+    pub fn settings(&self, default_layers: &[LayerKind], threads: usize) -> Result<BakeSettings> {
+        self.refuse_what_does_not_apply()?;
+        let defaults = BakeSettings::default();
+        let mut layers = self.layers.clone().unwrap_or_else(|| default_layers.to_vec());
+        layers.sort_unstable();
+        layers.dedup();
+        let settings = BakeSettings {
+            estimator: self.estimator.unwrap_or(defaults.estimator),
+            density_per_sr: self
+                .density
+                .unwrap_or_else(|| self.preset.unwrap_or_default().density_per_sr()),
+            rays: self.rays.unwrap_or(defaults.rays),
+            sigma: self.sigma.unwrap_or(defaults.sigma),
+            kernel: self.kernel.unwrap_or(defaults.kernel),
+            kernel_sampling: self.kernel_sampling.unwrap_or(defaults.kernel_sampling),
+            footprint: self.footprint.unwrap_or(defaults.footprint),
+            item_buffer: self.item_buffer.unwrap_or(defaults.item_buffer),
+            map_resolution: self.map_resolution.unwrap_or(defaults.map_resolution),
+            max_depth: self.max_depth.unwrap_or(defaults.max_depth),
+            branch_threshold: self.branch_threshold.unwrap_or(defaults.branch_threshold),
+            layers,
+            seed: self.seed.unwrap_or(defaults.seed),
+            threads,
+            memory_bytes: self.memory.unwrap_or(defaults.memory_bytes),
+        };
+        settings.validate()?;
+        Ok(settings)
+    }
+
+    fn refuse_what_does_not_apply(&self) -> Result<()> {
+        let kernel = self.kernel.unwrap_or(BakeSettings::default().kernel);
+        if self.sigma.is_some() && kernel != Kernel::Gaussian {
+            return Err(Error::usage(
+                "--sigma",
+                "only the gaussian kernel has a sigma",
+                "leave --sigma out or use --kernel gaussian",
+            ));
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn density_overrides_the_preset() {
+        let options = BakeOptions {
+            preset: Some(Preset::Draft),
+            ..Default::default()
+        };
+        let settings = options.settings(&[LayerKind::Caustic], 0).expect("valid");
+        assert!((settings.density_per_sr - 1e4).abs() < 1e-9);
+        let options = BakeOptions {
+            density: Some(123.0),
+            ..options
+        };
+        let settings = options.settings(&[LayerKind::Caustic], 0).expect("valid");
+        assert!((settings.density_per_sr - 123.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn layers_are_named_once_and_in_order() {
+        let options = BakeOptions {
+            layers: Some(vec![LayerKind::Direct, LayerKind::Caustic, LayerKind::Direct]),
+            ..Default::default()
+        };
+        let settings = options.settings(&[LayerKind::Caustic], 0).expect("valid");
+        assert_eq!(settings.layers, [LayerKind::Caustic, LayerKind::Direct]);
+    }
+}

@@ -1,0 +1,282 @@
+//! `inspect`: what is in a scene, and which effects it calls for.
+
+use std::fmt::Write as _;
+
+use nephroid::error::{Result, Warning};
+use nephroid::plan::EffectPlan;
+use nephroid::scene::{Light, LightKind, Scene, SurfaceKind};
+use nephroid::session::{BakeEstimate, BakeSession};
+use serde::Serialize;
+
+use super::bake::{self, Clock};
+use super::job::InspectJob;
+use super::terminal::Terminal;
+
+/// The result, as `--json` prints it.
+#[derive(Debug, Serialize)]
+struct Report {
+    scene: String,
+    name: String,
+    /// Smallest box [m]; `None` without surfaces.
+    bounds_m: Option<[[f64; 3]; 2]>,
+    triangles: usize,
+    objects: Vec<ObjectReport>,
+    materials: Vec<MaterialReport>,
+    lights: Vec<LightReport>,
+    cameras: Vec<String>,
+    plan: EffectPlan,
+    /// Upper bound of the light rays of the caustic layer at these settings.
+    estimated_rays: u64,
+    warnings: Vec<Warning>,
+}
+
+#[derive(Debug, Serialize)]
+struct ObjectReport {
+    name: String,
+    node: usize,
+    primitive: usize,
+    triangles: usize,
+    area_m2: f64,
+    material: String,
+    surface: &'static str,
+}
+
+#[derive(Debug, Serialize)]
+struct MaterialReport {
+    name: String,
+    surface: &'static str,
+    objects: usize,
+    ior: Option<f64>,
+}
+
+#[derive(Debug, Serialize)]
+struct LightReport {
+    name: String,
+    kind: &'static str,
+    /// Luminous-equivalent; `None` for a sun.
+    power_w: Option<f64>,
+    /// Luminous-equivalent, across the beam of a sun; `None` for the others.
+    normal_irradiance_w_per_m2: Option<f64>,
+}
+
+/// Loads, plans, and prints.
+///
+/// # Errors
+/// A scene that cannot be read, settings that do not fit it.
+pub fn run(job: &InspectJob, terminal: &Terminal) -> Result<()> {
+    let loaded = bake::load(&job.scene, &Clock::start(), terminal)?;
+    let estimate = BakeSession::new(loaded.scene.clone())?.estimate(&job.settings)?;
+    let report = Report::new(&loaded.scene, estimate);
+    terminal.print_result(&text(&report), &report)
+}
+
+impl Report {
+    fn new(scene: &Scene, estimate: BakeEstimate) -> Self {
+        Self {
+            scene: scene.source.clone(),
+            name: scene.name.clone(),
+            bounds_m: scene
+                .bounds()
+                .map(|(low, high)| [low.to_array(), high.to_array()]),
+            triangles: scene.triangle_count(),
+            objects: (0..scene.objects.len())
+                .map(|object| object_report(scene, object))
+                .collect(),
+            materials: material_reports(scene),
+            lights: scene.lights.iter().map(light_report).collect(),
+            cameras: scene.cameras.iter().map(|camera| camera.name.clone()).collect(),
+            plan: estimate.plan,
+            estimated_rays: estimate.rays,
+            warnings: scene.warnings.clone(),
+        }
+    }
+}
+
+fn object_report(scene: &Scene, index: usize) -> ObjectReport {
+    let object = &scene.objects[index];
+    let material = scene.material_of(index);
+    ObjectReport {
+        name: object.name.clone(),
+        node: object.node,
+        primitive: object.primitive,
+        triangles: object.mesh.triangles.len(),
+        area_m2: object.mesh.area_m2(),
+        material: material.name.clone(),
+        surface: surface_name(material.surface),
+    }
+}
+
+/// Materials that some object has.
+fn material_reports(scene: &Scene) -> Vec<MaterialReport> {
+    scene
+        .materials
+        .iter()
+        .enumerate()
+        .map(|(index, material)| MaterialReport {
+            name: material.name.clone(),
+            surface: surface_name(material.surface),
+            objects: scene
+                .objects
+                .iter()
+                .filter(|object| object.material == index)
+                .count(),
+            ior: matches!(
+                material.surface,
+                SurfaceKind::Dielectric | SurfaceKind::ThinWall | SurfaceKind::Mixed
+            )
+            .then_some(material.ior),
+        })
+        .filter(|report| report.objects > 0)
+        .collect()
+}
+
+fn light_report(light: &Light) -> LightReport {
+    let luminance = light.colour.luminance();
+    let (kind, power_w, normal_irradiance_w_per_m2) = match light.kind {
+        LightKind::Point { intensity, .. } => (
+            "point",
+            Some(intensity.0 * full_beam_sr(&light.kind) * luminance),
+            None,
+        ),
+        LightKind::Spot { intensity, .. } => (
+            "spot",
+            Some(intensity.0 * full_beam_sr(&light.kind) * luminance),
+            None,
+        ),
+        LightKind::Sun {
+            normal_irradiance, ..
+        } => ("sun", None, Some(normal_irradiance.0 * luminance)),
+    };
+    LightReport {
+        name: light.name.clone(),
+        kind,
+        power_w,
+        normal_irradiance_w_per_m2,
+    }
+}
+
+/// Integral of the fall-off over all directions [sr]: that of a linear ramp's square in the cosine is a third.
+fn full_beam_sr(light: &LightKind) -> f64 {
+    let cap = match *light {
+        LightKind::Spot {
+            inner_cone_rad,
+            outer_cone_rad,
+            ..
+        } => {
+            let (cos_inner, cos_outer) = (inner_cone_rad.cos(), outer_cone_rad.cos());
+            (1.0 - cos_inner) + (cos_inner - cos_outer) / 3.0
+        }
+        LightKind::Point { .. } | LightKind::Sun { .. } => 2.0,
+    };
+    std::f64::consts::TAU * cap
+}
+
+fn surface_name(surface: SurfaceKind) -> &'static str {
+    match surface {
+        SurfaceKind::Diffuse => "diffuse",
+        SurfaceKind::Mirror => "mirror",
+        SurfaceKind::Dielectric => "dielectric",
+        SurfaceKind::ThinWall => "thin wall",
+        SurfaceKind::Mixed => "mixed",
+    }
+}
+
+fn text(report: &Report) -> String {
+    let mut text = String::new();
+    let mut line = |name: &str, value: String| {
+        let _ = writeln!(text, "{name:<9} {value}");
+    };
+    line("scene", report.scene.clone());
+    if let Some([low, high]) = report.bounds_m {
+        line(
+            "size",
+            format!(
+                "{:.4} x {:.4} x {:.4} m, {} triangles",
+                high[0] - low[0],
+                high[1] - low[1],
+                high[2] - low[2],
+                report.triangles
+            ),
+        );
+    }
+    for object in &report.objects {
+        line(
+            "object",
+            format!(
+                "{}: {} triangles, {:.4} m^2, {} ({})",
+                object.name, object.triangles, object.area_m2, object.material, object.surface
+            ),
+        );
+    }
+    for material in &report.materials {
+        let ior = material
+            .ior
+            .map_or(String::new(), |ior| format!(", ior {ior:.4}"));
+        line(
+            "material",
+            format!("{}: {}{ior}", material.name, material.surface),
+        );
+    }
+    for light in &report.lights {
+        let strength = match (light.power_w, light.normal_irradiance_w_per_m2) {
+            (Some(power), _) => format!("{power:.4} W"),
+            (None, Some(irradiance)) => format!("{irradiance:.4} W/m^2"),
+            (None, None) => String::new(),
+        };
+        line("light", format!("{}: {}, {strength}", light.name, light.kind));
+    }
+    for camera in &report.cameras {
+        line("camera", camera.clone());
+    }
+    let switch = |on: bool| if on { "on" } else { "off" };
+    for effect in &report.plan.effects {
+        line(
+            "effect",
+            format!(
+                "{}: {}, {}",
+                effect.effect.name(),
+                switch(effect.on),
+                effect.reason
+            ),
+        );
+    }
+    for light in &report.plan.lights {
+        line(
+            "rays from",
+            format!("{}: {}, {}", light.light, switch(light.on), light.reason),
+        );
+    }
+    line("rays", format!("at most {}", report.estimated_rays));
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nephroid::units::RadiantIntensity;
+
+    #[test]
+    fn beam_of_a_spot_is_the_integral_of_its_falloff() {
+        let spot = LightKind::Spot {
+            position: glam::DVec3::ZERO,
+            direction: glam::DVec3::Z,
+            intensity: RadiantIntensity(1.0),
+            inner_cone_rad: 0.3,
+            outer_cone_rad: 0.7,
+        };
+        let steps = 100_000;
+        let width = 2.0 / f64::from(steps);
+        // Slices of equal solid angle between the planes cosine = constant (Archimedes).
+        let integral: f64 = (0..steps)
+            .map(|step| -1.0 + (f64::from(step) + 0.5) * width)
+            .map(|cosine| {
+                let sine = (1.0_f64 - cosine * cosine).sqrt();
+                spot.falloff(glam::DVec3::new(sine, 0.0, cosine)) * width * std::f64::consts::TAU
+            })
+            .sum();
+        assert!(
+            (integral / full_beam_sr(&spot) - 1.0).abs() < 1e-4,
+            "{integral} sr"
+        );
+    }
+}

@@ -1,0 +1,310 @@
+//! What is to be done, with everything checked that can be checked before it starts.
+
+use std::path::{Path, PathBuf};
+
+use nephroid::error::{Error, Result};
+use nephroid::eye_pass::ToneMap;
+use nephroid::settings::{BakeSettings, LayerKind};
+
+use super::args::{
+    Arguments, Backend, BakeArguments, Command, CompareArguments, InspectArguments, MapsOption,
+    PictureOptions, RenderArguments, RunOptions, SceneOptions, ViewArguments,
+};
+use super::bake_options::BakeOptions;
+use super::compare::{self, LayerChoice};
+use super::interrupt::Interrupt;
+use super::scene_input::{MissingLight, SceneInput};
+use super::terminal::Terminal;
+use super::values::Exposure;
+use super::{bake, inspect, render, view};
+
+/// Scene of `view` when none is named.
+const DEFAULT_SCENE: &str = "builtin:showroom";
+
+/// Pixels of pictures and of the window when no size is given.
+const DEFAULT_SIZE: (u32, u32) = (1280, 720);
+
+/// Most worker threads.
+const MAX_THREADS: usize = 1024;
+
+/// One command, ready to run.
+#[derive(Debug)]
+pub enum Job {
+    View(ViewJob),
+    Bake(BakeJob),
+    Render(RenderJob),
+    Inspect(InspectJob),
+    Compare(CompareJob),
+}
+
+/// `view`.
+#[derive(Debug)]
+pub struct ViewJob {
+    pub scene: SceneInput,
+    pub maps: MapSource,
+    pub picture: PictureRequest,
+    pub event_log: Option<PathBuf>,
+    pub force: bool,
+}
+
+/// `bake`.
+#[derive(Debug)]
+pub struct BakeJob {
+    pub scene: SceneInput,
+    pub settings: BakeSettings,
+    pub output: PathBuf,
+    pub force: bool,
+}
+
+/// `render`.
+#[derive(Debug)]
+pub struct RenderJob {
+    pub scene: SceneInput,
+    pub maps: MapSource,
+    pub picture: PictureRequest,
+    pub output: PathBuf,
+    pub format: PictureFormat,
+}
+
+/// `inspect`.
+#[derive(Debug)]
+pub struct InspectJob {
+    pub scene: SceneInput,
+    pub settings: BakeSettings,
+}
+
+/// `compare`.
+#[derive(Debug)]
+pub struct CompareJob {
+    pub map: PathBuf,
+    pub reference: PathBuf,
+    pub layer: Option<LayerChoice>,
+    pub difference: Option<PathBuf>,
+    /// Largest relative RMSE [1].
+    pub max_rmse: Option<f64>,
+}
+
+/// Where illumination comes from.
+#[derive(Debug)]
+pub enum MapSource {
+    /// A bake with these settings.
+    Bake(BakeSettings),
+    /// A folder that was baked before; the settings are those of a re-bake in the window.
+    Folder(PathBuf, BakeSettings),
+}
+
+impl MapSource {
+    /// Settings of the bake, or of a later one.
+    pub fn settings(&self) -> &BakeSettings {
+        match self {
+            Self::Bake(settings) | Self::Folder(_, settings) => settings,
+        }
+    }
+}
+
+/// What a picture should be.
+#[derive(Clone, Debug)]
+pub struct PictureRequest {
+    /// Name or index.
+    pub camera: Option<String>,
+    /// Across and down [pixels].
+    pub size: (u32, u32),
+    pub exposure: Exposure,
+    pub tone_map: ToneMap,
+    /// `None`: gpu where there is one, else cpu.
+    pub backend: Option<Backend>,
+}
+
+/// What a picture file holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PictureFormat {
+    /// Display colours.
+    Png,
+    /// Radiance [W/(m² sr)].
+    Exr,
+}
+
+impl Job {
+    /// Checks the arguments.
+    ///
+    /// # Errors
+    /// Values outside their ranges, options that do not apply.
+    pub fn from_arguments(arguments: Arguments) -> Result<Self> {
+        match arguments.command {
+            None => view_job(arguments.view),
+            Some(Command::View(view)) => view_job(view),
+            Some(Command::Bake(bake)) => bake_job(bake),
+            Some(Command::Render(render)) => render_job(render),
+            Some(Command::Inspect(inspect)) => inspect_job(inspect),
+            Some(Command::Compare(compare)) => compare_job(compare),
+        }
+    }
+
+    /// Does it.
+    ///
+    /// # Errors
+    /// Whatever failed, as one sentence.
+    pub fn run(self, terminal: &Terminal, interrupt: &Interrupt) -> Result<()> {
+        match self {
+            Self::View(job) => view::run(job, terminal, interrupt),
+            Self::Bake(job) => bake::run(&job, terminal, interrupt),
+            Self::Render(job) => render::run(&job, terminal, interrupt),
+            Self::Inspect(job) => inspect::run(&job, terminal),
+            Self::Compare(job) => compare::run(&job, terminal),
+        }
+    }
+}
+
+fn view_job(arguments: ViewArguments) -> Result<Job> {
+    if arguments.run.json {
+        return Err(Error::usage(
+            "--json",
+            "a window has no result to print",
+            "use bake, render or inspect with --json",
+        ));
+    }
+    let scene = arguments.scene.unwrap_or_else(|| DEFAULT_SCENE.to_string());
+    Ok(Job::View(ViewJob {
+        scene: scene_input(scene, &arguments.scene_options, MissingLight::AddAndSay),
+        maps: map_source(arguments.maps, &arguments.bake, &arguments.run)?,
+        picture: PictureRequest {
+            camera: arguments.picture.camera,
+            size: arguments.size.unwrap_or(DEFAULT_SIZE),
+            exposure: arguments.picture.exposure.unwrap_or_default(),
+            tone_map: ToneMap::default(),
+            backend: None,
+        },
+        event_log: arguments.event_log,
+        force: arguments.force,
+    }))
+}
+
+fn bake_job(arguments: BakeArguments) -> Result<Job> {
+    Ok(Job::Bake(BakeJob {
+        scene: scene_input(arguments.scene, &arguments.scene_options, MissingLight::Fail),
+        settings: arguments
+            .bake
+            .settings(&[LayerKind::Caustic], threads(&arguments.run)?)?,
+        output: arguments.output,
+        force: arguments.force,
+    }))
+}
+
+fn render_job(arguments: RenderArguments) -> Result<Job> {
+    let format = picture_format(&arguments.output)?;
+    let PictureOptions { camera, exposure } = arguments.picture;
+    if format == PictureFormat::Exr {
+        let radiance_only = |option: &str| {
+            Err(Error::usage(
+                option,
+                "an .exr picture holds radiance, which neither exposure nor tone mapping changes",
+                "leave it out or write a .png",
+            ))
+        };
+        if exposure.is_some() {
+            return radiance_only("--exposure");
+        }
+        if arguments.tone_map.is_some() {
+            return radiance_only("--tone-map");
+        }
+    }
+    Ok(Job::Render(RenderJob {
+        scene: scene_input(arguments.scene, &arguments.scene_options, MissingLight::AddAndSay),
+        maps: map_source(arguments.maps, &arguments.bake, &arguments.run)?,
+        picture: PictureRequest {
+            camera,
+            size: arguments.size.unwrap_or(DEFAULT_SIZE),
+            exposure: exposure.unwrap_or_default(),
+            tone_map: arguments.tone_map.unwrap_or_default(),
+            backend: arguments.backend,
+        },
+        output: arguments.output,
+        format,
+    }))
+}
+
+fn inspect_job(arguments: InspectArguments) -> Result<Job> {
+    Ok(Job::Inspect(InspectJob {
+        scene: scene_input(arguments.scene, &arguments.scene_options, MissingLight::Keep),
+        settings: arguments
+            .bake
+            .settings(&[LayerKind::Caustic], threads(&arguments.run)?)?,
+    }))
+}
+
+fn compare_job(arguments: CompareArguments) -> Result<Job> {
+    if let Some(percent) = arguments.max_rmse
+        && !(percent.is_finite() && percent >= 0.0)
+    {
+        return Err(Error::usage(
+            "--max-rmse",
+            format!("{percent} is no limit"),
+            "give a percentage of 0 or more",
+        ));
+    }
+    if let Some(path) = &arguments.difference
+        && picture_format(path)? != PictureFormat::Png
+    {
+        return Err(Error::usage(
+            "--difference",
+            format!("{} is no .png file", path.display()),
+            "name a file that ends in .png",
+        ));
+    }
+    Ok(Job::Compare(CompareJob {
+        map: arguments.map,
+        reference: arguments.reference,
+        layer: arguments.layer,
+        difference: arguments.difference,
+        max_rmse: arguments.max_rmse.map(|percent| percent / 100.0),
+    }))
+}
+
+fn scene_input(source: String, options: &SceneOptions, otherwise: MissingLight) -> SceneInput {
+    SceneInput {
+        source,
+        missing_light: if options.default_light {
+            MissingLight::Add
+        } else {
+            otherwise
+        },
+        solid_glass: options.solid_glass,
+    }
+}
+
+/// Pictures need both layers, since they show all light.
+fn map_source(option: MapsOption, bake: &BakeOptions, run: &RunOptions) -> Result<MapSource> {
+    let settings = bake.settings(&[LayerKind::Caustic, LayerKind::Direct], threads(run)?)?;
+    Ok(match option.maps {
+        Some(folder) => MapSource::Folder(folder, settings),
+        None => MapSource::Bake(settings),
+    })
+}
+
+/// Threads asked for; 0 = one per core.
+fn threads(run: &RunOptions) -> Result<usize> {
+    match run.threads {
+        None => Ok(0),
+        Some(threads) if (1..=MAX_THREADS).contains(&threads) => Ok(threads),
+        Some(threads) => Err(Error::usage(
+            "--threads",
+            format!("{threads} is outside 1 to {MAX_THREADS}"),
+            "give a number in that range",
+        )),
+    }
+}
+
+fn picture_format(path: &Path) -> Result<PictureFormat> {
+    let extension = path
+        .extension()
+        .map(|extension| extension.to_string_lossy().to_lowercase());
+    match extension.as_deref() {
+        Some("png") => Ok(PictureFormat::Png),
+        Some("exr") => Ok(PictureFormat::Exr),
+        _ => Err(Error::usage(
+            path.display().to_string(),
+            "a picture's name has to say its format",
+            "name a file that ends in .png or .exr",
+        )),
+    }
+}

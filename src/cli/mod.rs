@@ -1,0 +1,58 @@
+//! The command line: parse, a validated [`Job`] before any long work, run, exit code.
+
+mod args;
+mod bake;
+mod bake_options;
+mod compare;
+mod inspect;
+mod interrupt;
+mod job;
+mod picture;
+mod progress_bar;
+mod render;
+mod scene_input;
+mod terminal;
+mod values;
+mod view;
+
+use std::process::ExitCode;
+
+use interrupt::Interrupt;
+use job::Job;
+use nephroid::error::{Error, ErrorKind, Result};
+use terminal::Terminal;
+
+/// Parses, runs, and says how it went: 0 done, 1 failed, 2 bad usage, 128 + signal when a signal stopped it.
+pub fn run() -> ExitCode {
+    let (terminal, job) = match args::parse() {
+        Ok(args::Parsed::Run(terminal, job)) => (terminal, job),
+        Ok(args::Parsed::Printed) => return ExitCode::SUCCESS,
+        Err(error) => return report(&error),
+    };
+    match execute(&terminal, *job) {
+        Ok(code) => code,
+        Err(error) => report(&error),
+    }
+}
+
+/// Runs a job; a signal decides the exit code even where what there was could still be written.
+fn execute(terminal: &Terminal, job: Job) -> Result<ExitCode> {
+    let interrupt = Interrupt::install()?;
+    let outcome = job.run(terminal, &interrupt);
+    match (interrupt.exit_code(), outcome) {
+        (Some(code), Ok(())) => Ok(code),
+        (Some(code), Err(error)) => {
+            report(&error);
+            Ok(code)
+        }
+        (None, outcome) => outcome.map(|()| ExitCode::SUCCESS),
+    }
+}
+
+fn report(error: &Error) -> ExitCode {
+    terminal::print_error(error);
+    match error.kind {
+        ErrorKind::Usage => ExitCode::from(2),
+        ErrorKind::Failure | ErrorKind::Cancelled => ExitCode::FAILURE,
+    }
+}

@@ -1,0 +1,152 @@
+//! One picture of a scene with its maps, by the graphics card or by the reference ray tracer.
+
+use nephroid::error::{Error, Result};
+use nephroid::export::{exr, png};
+use nephroid::eye_pass::{Picture, View};
+use nephroid::illumination::IlluminationMap;
+use nephroid::optics::LinearSrgb;
+use nephroid::scene::{Camera, Scene};
+
+use super::args::Backend;
+use super::interrupt::Interrupt;
+use super::job::{PictureFormat, PictureRequest};
+use super::terminal::Terminal;
+use super::values::Exposure;
+
+/// A picture, and how it was made.
+pub struct MadePicture {
+    pub picture: Picture,
+    /// With the exposure that was used.
+    pub view: View,
+    /// The graphics card's name, or `cpu`.
+    pub made_by: String,
+}
+
+impl MadePicture {
+    /// The bytes of a file; `location` is named in errors.
+    ///
+    /// # Errors
+    /// A size that the format cannot hold.
+    pub fn encode(&self, format: PictureFormat, location: &str) -> Result<Vec<u8>> {
+        match format {
+            PictureFormat::Png => {
+                let rgba = vec![0; 4 * self.picture.radiance.len()];
+                png::encode(self.picture.width, self.picture.height, rgba, location)
+            }
+            PictureFormat::Exr => exr::encode(
+                exr::image_of_picture(&self.picture),
+                "radiance in W/(m^2 sr) (cd/m^2 / 683), linear sRGB; row 0 is the top",
+                location,
+            ),
+        }
+    }
+}
+
+/// Makes the picture, by the card where there is one and no other wish.
+///
+/// # Errors
+/// No such camera; a card that was asked for and is not there; a signal.
+pub fn make(
+    scene: &Scene,
+    maps: &[IlluminationMap],
+    request: &PictureRequest,
+    terminal: &Terminal,
+    interrupt: &Interrupt,
+) -> Result<MadePicture> {
+    let (width, height) = request.size;
+    let mut view = View {
+        camera: choose_camera(scene, request)?,
+        width,
+        height,
+        exposure_stops: 0.0,
+        tone_map: request.tone_map,
+        background: LinearSrgb::BLACK,
+    };
+    interrupt.check("picture")?;
+    let (picture, made_by) = match request.backend {
+        Some(Backend::Cpu) => by_cpu(scene, maps, &view, interrupt)?,
+        Some(Backend::Gpu) => by_gpu(scene, maps, &view)?,
+        None => match by_gpu(scene, maps, &view) {
+            Ok(made) => made,
+            Err(error) => {
+                terminal.print_note(&format!("{error}: the CPU makes the picture"));
+                by_cpu(scene, maps, &view, interrupt)?
+            }
+        },
+    };
+    interrupt.check("picture")?;
+    view.exposure_stops = match request.exposure {
+        Exposure::Stops(stops) => stops,
+        Exposure::Auto => 0.0,
+    };
+    Ok(MadePicture {
+        picture,
+        view,
+        made_by,
+    })
+}
+
+fn by_cpu(
+    scene: &Scene,
+    maps: &[IlluminationMap],
+    view: &View,
+    interrupt: &Interrupt,
+) -> Result<(Picture, String)> {
+    let _ = (scene, maps, view, interrupt);
+    Err(Error::failure(
+        "render",
+        "pictures cannot be made yet",
+        "use bake",
+    ))
+}
+
+#[cfg(feature = "gpu")]
+fn by_gpu(scene: &Scene, maps: &[IlluminationMap], view: &View) -> Result<(Picture, String)> {
+    let _ = (scene, maps, view);
+    Err(Error::failure(
+        "render",
+        "pictures cannot be made yet",
+        "use bake",
+    ))
+}
+
+#[cfg(not(feature = "gpu"))]
+fn by_gpu(_: &Scene, _: &[IlluminationMap], _: &View) -> Result<(Picture, String)> {
+    Err(Error::failure(
+        "--backend gpu",
+        "this program was built without the gpu feature",
+        "use --backend cpu",
+    ))
+}
+
+/// The camera of that name or index; without a wish the first, or one that frames the scene.
+pub fn choose_camera(scene: &Scene, request: &PictureRequest) -> Result<Camera> {
+    let Some(wish) = &request.camera else {
+        return Ok(scene
+            .cameras
+            .first()
+            .cloned()
+            .unwrap_or_else(|| framing_camera(scene, request.size)));
+    };
+    let by_name = scene.cameras.iter().find(|camera| camera.name == *wish);
+    let by_index = || {
+        wish.parse()
+            .ok()
+            .and_then(|index: usize| scene.cameras.get(index))
+    };
+    by_name.or_else(by_index).cloned().ok_or_else(|| {
+        let names: Vec<&str> = scene.cameras.iter().map(|camera| camera.name.as_str()).collect();
+        let remedy = if names.is_empty() {
+            "the scene has no camera: leave --camera out to see all of it".to_string()
+        } else {
+            format!("choose one of {} or an index from 0", names.join(", "))
+        };
+        Error::failure("--camera", format!("there is no camera {wish}"), remedy)
+    })
+}
+
+fn framing_camera(scene: &Scene, (width, height): (u32, u32)) -> Camera {
+    // An empty scene has nothing to frame: any box will do.
+    let bounds = scene.bounds().unwrap_or((-glam::DVec3::ONE, glam::DVec3::ONE));
+    Camera::framing("all", bounds, f64::from(width) / f64::from(height))
+}

@@ -1,0 +1,125 @@
+//! Values of options: how they are written.
+
+use nephroid::settings::{MapResolution, Sigma};
+
+/// `1.5` or `adaptive`.
+pub fn sigma(text: &str) -> Result<Sigma, String> {
+    match text {
+        "adaptive" => Ok(Sigma::Adaptive),
+        number => number
+            .parse()
+            .map(Sigma::Constant)
+            .map_err(|_| "give a number or `adaptive`".to_string()),
+    }
+}
+
+/// `auto`, `N` (square) or `WxH` [texels].
+pub fn map_resolution(text: &str) -> Result<MapResolution, String> {
+    if text == "auto" {
+        return Ok(MapResolution::Auto);
+    }
+    let fixed = match text.split_once('x') {
+        Some((width, height)) => width.parse().ok().zip(height.parse().ok()),
+        None => text.parse().ok().map(|side| (side, side)),
+    };
+    fixed
+        .map(|(width, height)| MapResolution::Fixed { width, height })
+        .ok_or_else(|| "give `auto`, N or WxH in texels, such as 512 or 512x256".to_string())
+}
+
+/// Largest side of a picture [pixels].
+const MAX_PICTURE_SIDE: u32 = 16384;
+
+/// `WxH` [pixels].
+pub fn picture_size(text: &str) -> Result<(u32, u32), String> {
+    let sides = 1..=MAX_PICTURE_SIDE;
+    text.split_once('x')
+        .and_then(|(width, height)| Some((width.parse().ok()?, height.parse().ok()?)))
+        .filter(|(width, height)| sides.contains(width) && sides.contains(height))
+        .ok_or_else(|| format!("give WxH with 1 to {MAX_PICTURE_SIDE} pixels a side, such as 1280x720"))
+}
+
+/// Least memory that a bake is run with [bytes].
+const MIN_MEMORY_BYTES: u64 = 1 << 20;
+
+/// Bytes with a binary suffix: `512M`, `2G`, `1.5G`.
+pub fn memory(text: &str) -> Result<u64, String> {
+    let (number, factor) = match text.char_indices().last() {
+        Some((at, 'k' | 'K')) => (&text[..at], 1_u64 << 10),
+        Some((at, 'm' | 'M')) => (&text[..at], 1 << 20),
+        Some((at, 'g' | 'G')) => (&text[..at], 1 << 30),
+        Some((at, 't' | 'T')) => (&text[..at], 1 << 40),
+        _ => (text, 1),
+    };
+    number
+        .parse::<f64>()
+        .ok()
+        .map(|number| number * factor as f64)
+        .filter(|bytes| (MIN_MEMORY_BYTES as f64..1e18).contains(bytes))
+        .map(|bytes| bytes as u64)
+        .ok_or_else(|| "give at least 1M, as bytes or with K, M, G or T, such as 512M or 2G".to_string())
+}
+
+/// `auto` (none) or a number of stops, −64 to 64.
+pub fn exposure(text: &str) -> Result<Exposure, String> {
+    if text == "auto" {
+        return Ok(Exposure::Auto);
+    }
+    text.parse()
+        .ok()
+        .filter(|stops| (-64.0..=64.0).contains(stops))
+        .map(Exposure::Stops)
+        .ok_or_else(|| "give `auto` or a number of stops from -64 to 64".to_string())
+}
+
+/// How bright a picture is shown.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Exposure {
+    /// Chosen from the picture.
+    #[default]
+    Auto,
+    /// Radiance is multiplied by 2^stops.
+    Stops(f64),
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes_are_read_as_they_are_written() {
+        assert_eq!(map_resolution("auto"), Ok(MapResolution::Auto));
+        let fixed = |width, height| Ok(MapResolution::Fixed { width, height });
+        assert_eq!(map_resolution("64"), fixed(64, 64));
+        assert_eq!(map_resolution("64x32"), fixed(64, 32));
+        for text in ["", "x", "64x", "-3", "1.5", "64x32x1", "big"] {
+            assert!(map_resolution(text).is_err(), "{text}");
+        }
+        assert_eq!(picture_size("640x480"), Ok((640, 480)));
+        for text in ["640", "0x480", "640x0", "99999x1", "axb"] {
+            assert!(picture_size(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn memory_has_binary_suffixes() {
+        assert_eq!(memory("2G"), Ok(2 << 30));
+        assert_eq!(memory("1.5g"), Ok(3 << 29));
+        assert_eq!(memory("1048576"), Ok(1 << 20));
+        for text in ["", "G", "0", "-2G", "1K", "nan", "infG", "1e300"] {
+            assert!(memory(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn numbers_have_their_words() {
+        assert_eq!(sigma("adaptive"), Ok(Sigma::Adaptive));
+        assert_eq!(sigma("0.5"), Ok(Sigma::Constant(0.5)));
+        assert!(sigma("wide").is_err());
+        assert_eq!(exposure("auto"), Ok(Exposure::Auto));
+        assert_eq!(exposure("-1.5"), Ok(Exposure::Stops(-1.5)));
+        for text in ["nan", "65", "bright"] {
+            assert!(exposure(text).is_err(), "{text}");
+        }
+    }
+}

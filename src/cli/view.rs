@@ -1,0 +1,124 @@
+//! `view`: a window; without a display, files instead.
+
+use std::path::Path;
+
+use nephroid::error::Result;
+use nephroid::export::map_folder::MapFolder;
+use nephroid::files;
+
+use super::bake::{self, Clock, LoadedScene};
+use super::interrupt::Interrupt;
+use super::job::{MapSource, PictureFormat, ViewJob};
+use super::terminal::{self, Terminal};
+use super::{picture, render};
+
+/// Where files go when there is no display.
+const HEADLESS_FOLDER: &str = "nephroid-out";
+
+/// The picture's name in it.
+const HEADLESS_PICTURE: &str = "picture.png";
+
+/// Opens the window on the scene; where there is no display, bakes and makes a picture instead.
+///
+/// # Errors
+/// Input that cannot be read; a window or files that failed.
+pub fn run(job: ViewJob, terminal: &Terminal, interrupt: &Interrupt) -> Result<()> {
+    let clock = Clock::start();
+    let loaded = bake::load(&job.scene, &clock, terminal)?;
+    match window(&job, &loaded, terminal)? {
+        Shown::Closed => Ok(()),
+        Shown::NoDisplay => headless(&job, &loaded, &clock, terminal, interrupt),
+    }
+}
+
+/// What became of the window.
+enum Shown {
+    /// The user closed it.
+    Closed,
+    /// There was no display to open it on.
+    NoDisplay,
+}
+
+#[cfg(feature = "viewer")]
+fn window(job: &ViewJob, loaded: &LoadedScene, terminal: &Terminal) -> Result<Shown> {
+    use super::values::Exposure;
+    use nephroid::viewer;
+
+    if !has_display() {
+        return Ok(Shown::NoDisplay);
+    }
+    let maps = match &job.maps {
+        MapSource::Bake(_) => None,
+        MapSource::Folder(folder, _) => Some(render::read_maps(folder, loaded, terminal)?),
+    };
+    let camera = match &job.picture.camera {
+        Some(_) => Some(picture::choose_camera(&loaded.scene, &job.picture)?.name),
+        None => None,
+    };
+    let options = viewer::ViewerOptions {
+        scene: loaded.scene.clone(),
+        settings: job.maps.settings().clone(),
+        maps,
+        size: job.picture.size,
+        camera,
+        exposure_stops: match job.picture.exposure {
+            Exposure::Auto => None,
+            Exposure::Stops(stops) => Some(stops),
+        },
+        event_log: job.event_log.clone(),
+    };
+    match viewer::run(options) {
+        Ok(()) => Ok(Shown::Closed),
+        Err(error) if viewer::is_no_display(&error) => Ok(Shown::NoDisplay),
+        Err(error) => Err(error),
+    }
+}
+
+#[cfg(not(feature = "viewer"))]
+fn window(_: &ViewJob, _: &LoadedScene, _: &Terminal) -> Result<Shown> {
+    Ok(Shown::NoDisplay)
+}
+
+/// Whether the session has a screen to show windows on.
+#[cfg(feature = "viewer")]
+fn has_display() -> bool {
+    if cfg!(any(target_os = "windows", target_os = "macos")) {
+        return true;
+    }
+    ["DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET"]
+        .iter()
+        .any(|name| std::env::var_os(name).is_some_and(|value| !value.is_empty()))
+}
+
+fn headless(
+    job: &ViewJob,
+    loaded: &LoadedScene,
+    clock: &Clock,
+    terminal: &Terminal,
+    interrupt: &Interrupt,
+) -> Result<()> {
+    terminal.print_note(&format!(
+        "no display: writing maps and a picture to ./{HEADLESS_FOLDER}/ instead of opening a window"
+    ));
+    let path = Path::new(HEADLESS_FOLDER);
+    let picture_path = path.join(HEADLESS_PICTURE);
+    let location = picture_path.display().to_string();
+    if let MapSource::Folder(folder, _) = &job.maps {
+        let maps = render::read_maps(folder, loaded, terminal)?;
+        let made = picture::make(&loaded.scene, &maps, &job.picture, terminal, interrupt)?;
+        let folder = files::OutputFolder::open(path)?;
+        let bytes = made.encode(PictureFormat::Png, &location)?;
+        files::write_atomically(&picture_path, |writer| writer.write_all(&bytes))?;
+        return terminal::print(&folder.path().display().to_string());
+    }
+    let folder = MapFolder::open(path, job.force)?;
+    let settings = job.maps.settings();
+    let result = bake::bake(loaded, settings, clock, terminal, interrupt)?;
+    if !result.partial {
+        let made = picture::make(&loaded.scene, &result.maps, &job.picture, terminal, interrupt)?;
+        let bytes = made.encode(PictureFormat::Png, &location)?;
+        files::write_atomically(&picture_path, |writer| writer.write_all(&bytes))?;
+    }
+    folder.write(&loaded.scene, settings, &result)?;
+    terminal::print(&format!("./{HEADLESS_FOLDER}/"))
+}

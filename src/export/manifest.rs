@@ -1,0 +1,276 @@
+//! `manifest.json`: how a folder of maps came about, and where in it each map is.
+
+use serde::{Deserialize, Serialize};
+
+use crate::error::Warning;
+use crate::illumination::{IlluminationMap, UvSet};
+use crate::light_pass::ledger::{EnergyLedger, LightLedger, Truncated};
+use crate::scene::Scene;
+use crate::session::{BakeCounts, BakeResult, StopReason, Timings};
+use crate::settings::{BakeSettings, LayerKind};
+
+/// Version of the format.
+pub const SCHEMA: u32 = 1;
+
+/// Name of the file in its folder.
+pub const FILE_NAME: &str = "manifest.json";
+
+/// Everything in `manifest.json`.
+#[derive(Clone, Debug, Serialize)]
+pub struct Manifest {
+    /// [`SCHEMA`].
+    pub schema: u32,
+    /// Version of the program that wrote it.
+    pub program_version: &'static str,
+    /// What the user set.
+    pub settings: BakeSettings,
+    /// What was baked.
+    pub scene: SceneSummary,
+    /// Stopped before it was done.
+    pub partial: bool,
+    /// Why it ended.
+    pub stop_reason: StopReason,
+    /// Of loading and of the bake.
+    pub warnings: Vec<Warning>,
+    /// Wall-clock seconds.
+    pub timings_s: Timings,
+    /// Seconds of the process's CPU clock.
+    pub cpu_s: Timings,
+    /// What it took.
+    pub counts: BakeCounts,
+    /// Of the caustic layer, over all lights.
+    pub energy_w: EnergyAccounts,
+    /// One per light and layer.
+    pub ledgers: Vec<LedgerEntry>,
+    /// How exact the whole bake is.
+    pub error: ErrorEstimate,
+    /// One per surface that received flux.
+    pub maps: Vec<MapEntry>,
+}
+
+/// The scene that maps belong to.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SceneSummary {
+    /// What the user named: a path as given or `builtin:NAME`.
+    pub source: String,
+    /// A short name.
+    pub name: String,
+    /// Primitives.
+    pub objects: usize,
+    /// Triangles over all objects.
+    pub triangles: usize,
+    /// Names of the lights.
+    pub lights: Vec<String>,
+    /// Of all geometry: maps fit a scene with the same one only.
+    pub geometry_hash: String,
+}
+
+/// Energy [W, luminous-equivalent].
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct EnergyAccounts {
+    /// Flux whose first hit is a specular surface.
+    pub emitted: f64,
+    /// Flux incident on diffuse surfaces, before their albedo.
+    pub deposited: f64,
+    /// Taken by metals, tints, volumes.
+    pub absorbed: f64,
+    /// Left the scene.
+    pub escaped: f64,
+    /// Given up, over all causes.
+    pub truncated: f64,
+    /// The same by cause.
+    pub truncated_by_cause: Truncated,
+}
+
+/// Energy of one light in one layer.
+#[derive(Clone, Debug, Serialize)]
+pub struct LedgerEntry {
+    /// The light's name.
+    pub light: String,
+    /// Which layer.
+    pub layer: LayerKind,
+    /// Its accounts.
+    pub energy_w: EnergyAccounts,
+    /// Flux of launched rays whose first hit was not specular [W].
+    pub not_emitted_w: f64,
+}
+
+/// An estimate without a reference.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct ErrorEstimate {
+    /// Of the whole bake; `None` where it was not estimated.
+    pub estimated_relative_rmse: Option<f64>,
+}
+
+/// One map.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct MapEntry {
+    /// The node's name in the scene's file.
+    pub surface: String,
+    /// glTF index of the node.
+    pub node: usize,
+    /// Index of the primitive within the node's mesh.
+    pub primitive: usize,
+    /// Which side's light it holds.
+    pub side: Side,
+    /// Path of the EXR file, relative to the manifest.
+    pub file: String,
+    /// Texels across.
+    pub width: usize,
+    /// Texels down.
+    pub height: usize,
+    /// Which texture coordinates it follows.
+    pub uv_set: UvSet,
+    /// Path of the generated coordinates, relative to the manifest.
+    pub uv_file: Option<String>,
+    /// Layers in the file.
+    pub layers: Vec<LayerKind>,
+    /// Mean area of the texels that the surface covers [m²].
+    pub texel_area_m2: f64,
+    /// Of the file's values.
+    pub units: String,
+    /// Of this map; `None` where it was not estimated.
+    pub estimated_relative_rmse: Option<f64>,
+}
+
+/// Side of a surface.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Side {
+    /// Light that falls on either side, summed.
+    Both,
+}
+
+/// Unit of the maps' values.
+pub const UNITS: &str = "W/m^2";
+
+impl Manifest {
+    /// The manifest of a bake whose maps are stored as `maps` say; `settings` are those it was run with.
+    pub fn new(scene: &Scene, settings: &BakeSettings, result: &BakeResult, maps: Vec<MapEntry>) -> Self {
+        let energy = result
+            .ledgers
+            .iter()
+            .fold(EnergyLedger::default(), |sum, ledger| add(sum, &ledger.energy_w));
+        Self {
+            schema: SCHEMA,
+            program_version: env!("CARGO_PKG_VERSION"),
+            settings: settings.clone(),
+            scene: SceneSummary::of(scene),
+            partial: result.partial,
+            stop_reason: result.stop_reason,
+            warnings: scene.warnings.iter().chain(&result.warnings).cloned().collect(),
+            timings_s: result.timings_s,
+            cpu_s: result.cpu_s,
+            counts: result.counts,
+            energy_w: energy.into(),
+            ledgers: result.ledgers.iter().map(LedgerEntry::from).collect(),
+            error: ErrorEstimate {
+                estimated_relative_rmse: None,
+            },
+            maps,
+        }
+    }
+}
+
+fn add(mut sum: EnergyLedger, other: &EnergyLedger) -> EnergyLedger {
+    sum.emitted += other.emitted;
+    sum.deposited += other.deposited;
+    sum.absorbed += other.absorbed;
+    sum.escaped += other.escaped;
+    sum.truncated.depth += other.truncated.depth;
+    sum.truncated.threshold += other.truncated.threshold;
+    sum.truncated.non_finite += other.truncated.non_finite;
+    sum.truncated.unresolved += other.truncated.unresolved;
+    sum.truncated.quadrature += other.truncated.quadrature;
+    sum
+}
+
+impl From<EnergyLedger> for EnergyAccounts {
+    fn from(ledger: EnergyLedger) -> Self {
+        Self {
+            emitted: ledger.emitted,
+            deposited: ledger.deposited,
+            absorbed: ledger.absorbed,
+            escaped: ledger.escaped,
+            truncated: ledger.truncated.total(),
+            truncated_by_cause: ledger.truncated,
+        }
+    }
+}
+
+impl From<&LightLedger> for LedgerEntry {
+    fn from(ledger: &LightLedger) -> Self {
+        Self {
+            light: ledger.light.clone(),
+            layer: LayerKind::Caustic,
+            energy_w: ledger.energy_w.into(),
+            not_emitted_w: ledger.not_emitted_w,
+        }
+    }
+}
+
+impl SceneSummary {
+    /// What identifies a scene.
+    pub fn of(scene: &Scene) -> Self {
+        Self {
+            source: scene.source.clone(),
+            name: scene.name.clone(),
+            objects: scene.objects.len(),
+            triangles: scene.triangle_count(),
+            lights: scene.lights.iter().map(|light| light.name.clone()).collect(),
+            geometry_hash: format!("{:016x}", geometry_hash(scene)),
+        }
+    }
+}
+
+impl MapEntry {
+    /// The entry of a map that is stored in `file`.
+    pub fn new(scene: &Scene, map: &IlluminationMap, file: String, uv_file: Option<String>) -> Self {
+        let object = &scene.objects[map.chart.object];
+        Self {
+            surface: object.name.clone(),
+            node: object.node,
+            primitive: object.primitive,
+            side: Side::Both,
+            file,
+            width: map.width(),
+            height: map.height(),
+            uv_set: map.chart.uv_set,
+            uv_file,
+            layers: map.layers.iter().map(|layer| layer.kind).collect(),
+            texel_area_m2: mean_texel_area_m2(map),
+            units: UNITS.into(),
+            estimated_relative_rmse: map.estimated_relative_rmse,
+        }
+    }
+}
+
+fn mean_texel_area_m2(map: &IlluminationMap) -> f64 {
+    let covered = || map.chart.texel_areas_m2.iter().filter(|area| **area > 0.0);
+    match covered().count() {
+        0 => 0.0,
+        count => covered().sum::<f64>() / count as f64,
+    }
+}
+
+/// FNV-1a over 64-bit words (Fowler, Noll, Vo): the same on every machine and in every version.
+fn geometry_hash(scene: &Scene) -> u64 {
+    const OFFSET_BASIS: u64 = 0xcbf2_9ce4_8422_2325;
+    const PRIME: u64 = 0x0000_0100_0000_01b3;
+    let mut hash = OFFSET_BASIS;
+    let mut take = |word: u64| hash = (hash ^ word).wrapping_mul(PRIME);
+    for object in &scene.objects {
+        take(object.node as u64);
+        take(object.primitive as u64);
+        for position in &object.mesh.positions {
+            position.to_array().iter().for_each(|value| take(value.to_bits()));
+        }
+        for uv in object.mesh.uv0.iter().chain(&object.mesh.uv1).flatten() {
+            uv.to_array().iter().for_each(|value| take(value.to_bits()));
+        }
+        for triangle in &object.mesh.triangles {
+            triangle.iter().for_each(|vertex| take(u64::from(*vertex)));
+        }
+    }
+    hash
+}

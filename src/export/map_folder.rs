@@ -1,0 +1,202 @@
+//! A folder of maps: `maps/NNNN_slug.exr`, their generated coordinates, and the manifest, written last.
+
+use std::path::Path;
+
+use super::manifest::{self, Manifest, MapEntry};
+use super::{exr, uv_file};
+use crate::error::{Error, Result};
+use crate::files::{self, OutputFolder};
+use crate::illumination::{IlluminationMap, UvSet};
+use crate::scene::Scene;
+use crate::session::BakeResult;
+use crate::settings::BakeSettings;
+
+/// Folder of the map files within ours.
+const MAPS: &str = "maps";
+
+/// Largest manifest that is read [bytes].
+pub(super) const MAX_MANIFEST_BYTES: u64 = 64 << 20;
+
+/// Longest part of a surface's name in a file's name [characters].
+const MAX_SLUG: usize = 40;
+
+/// A folder that a bake may write to.
+#[derive(Debug)]
+pub struct MapFolder {
+    /// Within `root`; it goes first, so that an unused one leaves `root` empty.
+    maps: OutputFolder,
+    root: OutputFolder,
+    /// Files of the bake that is replaced, relative to the folder.
+    previous: Vec<String>,
+}
+
+impl MapFolder {
+    /// Opens, or makes, the folder and tries to write there. One of ours is replaced file by file; another one that
+    /// is not empty is taken only with `force`.
+    ///
+    /// # Errors
+    /// A place that cannot be written; other people's files in it.
+    pub fn open(path: &Path, force: bool) -> Result<Self> {
+        let root = OutputFolder::open(path)?;
+        let previous = files_of_ours(path);
+        if previous.is_none() && !force && !root.is_empty()? {
+            return Err(Error::failure(
+                path.display().to_string(),
+                "the folder holds files that are not from a bake",
+                "choose another folder or add --force",
+            ));
+        }
+        let maps = OutputFolder::open(&path.join(MAPS))?;
+        Ok(Self {
+            maps,
+            root,
+            previous: previous.unwrap_or_default(),
+        })
+    }
+
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        self.root.path()
+    }
+
+    /// Writes the maps, then the manifest, then removes what the previous bake had more.
+    ///
+    /// # Errors
+    /// A disk that is full, a place that cannot be written any more.
+    pub fn write(self, scene: &Scene, settings: &BakeSettings, result: &BakeResult) -> Result<Manifest> {
+        let mut entries = Vec::new();
+        for map in &result.maps {
+            entries.push(self.write_map(scene, map)?);
+        }
+        let manifest = Manifest::new(scene, settings, result, entries);
+        let path = self.path().join(manifest::FILE_NAME);
+        let json = serde_json::to_vec_pretty(&manifest).map_err(|error| {
+            Error::failure(
+                path.display().to_string(),
+                format!("the manifest is not valid JSON ({error})"),
+                "report this",
+            )
+        })?;
+        files::write_atomically(&path, |writer| writer.write_all(&json))?;
+        for outdated in self.previous.iter().filter(|file| !manifest.names(file)) {
+            files::remove_file(&self.path().join(outdated))?;
+        }
+        Ok(manifest)
+    }
+
+    fn write_map(&self, scene: &Scene, map: &IlluminationMap) -> Result<MapEntry> {
+        let object = map.chart.object;
+        let stem = format!("{object:04}_{}", slug(&scene.objects[object].name));
+        let uv_name = (map.chart.uv_set == UvSet::Generated).then(|| format!("{stem}.uv"));
+        if let Some(name) = &uv_name {
+            let bytes = uv_file::encode(&map.chart.corner_uvs);
+            files::write_atomically(&self.maps.path().join(name), |writer| writer.write_all(&bytes))?;
+        }
+        let name = format!("{stem}.exr");
+        let path = self.maps.path().join(&name);
+        let bytes = exr::encode(
+            exr::image_of_map(map),
+            "irradiance in W/m^2 (lumens / 683 per m^2), linear sRGB; row 0 is v = 0",
+            &path.display().to_string(),
+        )?;
+        files::write_atomically(&path, |writer| writer.write_all(&bytes))?;
+        let in_maps = |name: String| format!("{MAPS}/{name}");
+        Ok(MapEntry::new(scene, map, in_maps(name), uv_name.map(in_maps)))
+    }
+}
+
+impl Manifest {
+    fn names(&self, file: &str) -> bool {
+        self.maps
+            .iter()
+            .any(|map| map.file == file || map.uv_file.as_deref() == Some(file))
+    }
+}
+
+/// Files of the bake that lies in a folder, relative to it; `None` where none of ours does.
+fn files_of_ours(path: &Path) -> Option<Vec<String>> {
+    let bytes = files::read_file(&path.join(manifest::FILE_NAME), MAX_MANIFEST_BYTES).ok()?;
+    let document: serde_json::Value = serde_json::from_slice(&bytes).ok()?;
+    if document.get("schema")?.as_u64()? != u64::from(manifest::SCHEMA) {
+        return None;
+    }
+    document.get("program_version")?;
+    let files = document
+        .get("maps")?
+        .as_array()?
+        .iter()
+        .flat_map(|map| [map.get("file"), map.get("uv_file")])
+        .filter_map(|file| file?.as_str())
+        .filter(|file| is_map_file(file))
+        .map(str::to_string)
+        .collect();
+    Some(files)
+}
+
+/// Whether a path in a manifest is one that a bake writes: `maps/NAME` with nothing that leads elsewhere.
+pub(super) fn is_map_file(file: &str) -> bool {
+    file.strip_prefix("maps/").is_some_and(|name| {
+        !name.is_empty()
+            && !name.starts_with('.')
+            && name
+                .bytes()
+                .all(|byte| byte.is_ascii_alphanumeric() || b"_-.".contains(&byte))
+    })
+}
+
+/// A surface's name as part of a file's name: lower-case ASCII letters, digits and hyphens; never empty.
+fn slug(name: &str) -> String {
+    let mut slug = String::new();
+    for character in name.chars() {
+        if character.is_ascii_alphanumeric() {
+            slug.push(character.to_ascii_lowercase());
+        } else if !slug.is_empty() && !slug.ends_with('-') {
+            slug.push('-');
+        }
+        if slug.len() == MAX_SLUG {
+            break;
+        }
+    }
+    let slug = slug.trim_end_matches('-');
+    if slug.is_empty() {
+        "surface".into()
+    } else {
+        slug.into()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_name_forms_a_path() {
+        for (name, expected) in [
+            ("Floor", "floor"),
+            ("../../etc/passwd", "etc-passwd"),
+            ("", "surface"),
+            ("床", "surface"),
+            ("a  b\0c", "a-b-c"),
+            ("C:\\x", "c-x"),
+        ] {
+            assert_eq!(slug(name), expected);
+            assert!(is_map_file(&format!("maps/0001_{}.exr", slug(name))));
+        }
+        assert_eq!(slug(&"x".repeat(500)).len(), MAX_SLUG);
+    }
+
+    #[test]
+    fn paths_that_lead_elsewhere_are_no_map_files() {
+        for file in [
+            "maps/../x",
+            "/etc/passwd",
+            "maps/",
+            "x.exr",
+            "maps/.hidden",
+            "maps/a/b",
+            "maps\\a",
+        ] {
+            assert!(!is_map_file(file), "{file}");
+        }
+    }
+}

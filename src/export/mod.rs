@@ -1,0 +1,12 @@
+//! Files that others read: maps with their manifest, pictures; and how they are read back.
+
+pub mod exr;
+pub mod float_image;
+pub mod manifest;
+pub mod map_folder;
+pub mod map_reader;
+pub mod pfm;
+pub mod png;
+pub mod uv_file;
+
+pub use float_image::FloatImage;
