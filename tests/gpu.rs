@@ -5,6 +5,8 @@
 
 mod support;
 
+#[path = "gpu/against_cpu.rs"]
+mod against_cpu;
 #[path = "gpu/builtins.rs"]
 mod builtins;
 #[path = "gpu/device.rs"]
