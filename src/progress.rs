@@ -15,6 +15,8 @@ pub enum Stage {
     Caustic,
     /// Shadow rays of the direct layer.
     Direct,
+    /// The eye pass on the CPU.
+    Picture,
 }
 
 impl Stage {
@@ -25,6 +27,7 @@ impl Stage {
             Self::Plan => "plan",
             Self::Caustic => "caustic",
             Self::Direct => "direct",
+            Self::Picture => "picture",
         }
     }
 }
