@@ -62,6 +62,8 @@ pub struct Facts<'a> {
     pub state: &'a BakeState,
     /// The bake that the picture shows.
     pub last: Option<&'a FinishedBake>,
+    /// Whether that was only a first look at the bake that runs.
+    pub is_draft: bool,
     /// Layers of the maps that the picture shows.
     pub layers: &'a [LayerKind],
     /// Flying speed [m/s].
@@ -87,6 +89,9 @@ pub fn set_style(context: &egui::Context) {
     context.all_styles_mut(|style| {
         style.animation_time = 0.0;
         style.interaction.tooltip_delay = 0.3;
+        // Labels carry units here: they are to be read, not to recede.
+        style.visuals.widgets.noninteractive.fg_stroke.color = egui::Color32::from_gray(205);
+        style.visuals.weak_text_color = Some(egui::Color32::from_gray(150));
     });
 }
 
@@ -161,10 +166,10 @@ fn title(ui: &mut Ui, facts: &Facts<'_>) {
     ui.heading(&scene.name).on_hover_text(&scene.source);
     ui.label(
         RichText::new(format!(
-            "{} objects, {} triangles, {} lights",
-            scene.objects.len(),
-            control::grouped(scene.triangle_count() as u64),
-            scene.lights.len()
+            "{}, {}, {}",
+            control::counted(scene.objects.len(), "object"),
+            control::counted(scene.triangle_count(), "triangle"),
+            control::counted(scene.lights.len(), "light")
         ))
         .weak(),
     )
