@@ -16,8 +16,10 @@ use crate::scene::Scene;
 use crate::session::BakeSession;
 use crate::settings::{BakeSettings, LayerKind};
 
-/// Rays of a bake for each of its draft.
+/// Rays of a bake for each of its draft, at least.
 const DRAFT_SHARE: f64 = 32.0;
+/// A draft of more rays would not come soon [rays/sr].
+const FINEST_DRAFT_PER_SR: f64 = 4000.0;
 /// A draft of fewer rays would show nothing; then there is none [rays/sr].
 const COARSEST_DRAFT_PER_SR: f64 = 500.0;
 
@@ -178,7 +180,7 @@ impl Model {
     fn first_bake(&mut self) {
         let wanted = self.panel.settings.clone();
         let draft = BakeSettings {
-            density_per_sr: wanted.density_per_sr / DRAFT_SHARE,
+            density_per_sr: (wanted.density_per_sr / DRAFT_SHARE).min(FINEST_DRAFT_PER_SR),
             ..wanted.clone()
         };
         let steps = if draft.density_per_sr >= COARSEST_DRAFT_PER_SR {

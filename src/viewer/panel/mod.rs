@@ -51,6 +51,7 @@ pub struct Panel {
     pub display: Display,
     /// Whether the list of keys is open.
     pub help_open: bool,
+    help_was_open: bool,
 }
 
 /// What the panel tells.
@@ -114,6 +115,7 @@ impl Panel {
             automatic: true,
             display: Display::default(),
             help_open: false,
+            help_was_open: false,
         }
     }
 
@@ -158,6 +160,13 @@ impl Panel {
         if help.header_response.on_hover_text("The keys (H).").clicked() {
             self.help_open = !self.help_open;
         }
+        if let Some(keys) = help
+            .body_response
+            .filter(|_| self.help_open && !self.help_was_open)
+        {
+            keys.scroll_to_me(Some(egui::Align::BOTTOM));
+        }
+        self.help_was_open = self.help_open;
     }
 }
 
