@@ -15,6 +15,8 @@ pub mod settings;
 pub mod units;
 
 pub mod files;
+#[cfg(feature = "gpu")]
+pub mod gpu;
 
 pub mod optics;
 

@@ -1,5 +1,8 @@
 //! From the diffuse surfaces through specular ones into the eye (DS*E).
 
+#[cfg(feature = "gpu")]
+pub mod renderer;
+pub mod tone_mapping;
 pub mod view;
 
 pub use view::{Picture, ToneMap, View};

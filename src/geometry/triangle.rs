@@ -4,6 +4,7 @@
 use glam::DVec3;
 
 use super::Ray;
+use super::ray::gamma;
 
 /// What all triangles need of a ray: the axis order and the shear that make it the z axis.
 #[derive(Clone, Copy, Debug)]
@@ -56,11 +57,29 @@ impl ShearedRay {
             return None;
         }
         let distance = self.shear.z * (u * a[kz] + v * b[kz] + w * c[kz]) / determinant;
+        let z = [a[kz], b[kz], c[kz]].map(|z| (self.shear.z * z).abs());
+        let bound =
+            distance_error(max([ax, bx, cx]), max([ay, by, cy]), max(z), max([u, v, w])) / determinant.abs();
         // Also refuses NaN.
-        if distance > 0.0 && distance.is_finite() {
+        if distance > bound && distance.is_finite() {
             Some((distance, [u / determinant, v / determinant, w / determinant]))
         } else {
             None
         }
     }
+}
+
+fn max(values: [f64; 3]) -> f64 {
+    values[0].abs().max(values[1].abs()).max(values[2].abs())
+}
+
+/// Bound of the rounding error of a hit's distance, times the determinant: a distance below it may be no distance at
+/// all, as when a ray leaves this very surface or its coplanar neighbour (Pharr, Jakob and Humphreys, Physically Based
+/// Rendering, 6.8.7). `x`, `y`, `z`: largest sheared coordinates, `edge`: largest edge function, all absolute.
+fn distance_error(x: f64, y: f64, z: f64, edge: f64) -> f64 {
+    let error_z = gamma(3.0) * z;
+    let error_x = gamma(5.0) * (x + z);
+    let error_y = gamma(5.0) * (y + z);
+    let error_edge = 2.0 * (gamma(2.0) * x * y + error_y * x + error_x * y);
+    3.0 * (gamma(3.0) * edge * z + error_edge * z + error_z * edge)
 }

@@ -3,6 +3,8 @@
 pub mod accumulator;
 pub mod chart;
 pub mod compare;
+pub mod gutter;
+pub mod lookup;
 pub mod map;
 pub mod parametrisation;
 

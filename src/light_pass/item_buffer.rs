@@ -9,6 +9,7 @@ use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use super::launch::Launch;
+use crate::geometry::cube_face::FaceMapping;
 use crate::scene::Scene;
 
 /// Cells across and down each face.
@@ -31,8 +32,8 @@ pub struct ItemBuffer {
 impl ItemBuffer {
     /// Marks the cells that may see one of the `casters` (indices of specular objects).
     pub fn build(launch: &Launch, scene: &Scene, casters: &[usize]) -> Self {
-        let faces: Vec<Vec<AtomicU64>> = (0..launch.face_count())
-            .map(|_| (0..WORDS).map(|_| AtomicU64::new(0)).collect())
+        let faces: Vec<Face> = (0..launch.face_count())
+            .map(|face| Face::new(launch, face))
             .collect();
         let mut seen = Vec::new();
         for &object in casters {
@@ -45,7 +46,7 @@ impl ItemBuffer {
                     let corners = mesh.corners(triangle);
                     for (face, cells) in faces.iter().enumerate() {
                         let projected = corners.map(|corner| launch.to_face(face, corner));
-                        if mark_triangle(cells, launch, &projected) {
+                        if cells.mark_triangle(launch, &projected) {
                             visible.store(true, Ordering::Relaxed);
                         }
                     }
@@ -54,10 +55,7 @@ impl ItemBuffer {
                 seen.push(object);
             }
         }
-        let faces = faces
-            .into_iter()
-            .map(|face| face.into_iter().map(AtomicU64::into_inner).collect())
-            .collect();
+        let faces = faces.into_iter().map(Face::into_bits).collect();
         Self { faces, casters: seen }
     }
 
@@ -131,20 +129,76 @@ fn touched(index: usize, coarse: usize, fine: usize) -> (usize, usize) {
     (first, last.min(fine - 1))
 }
 
-/// Marks all cells that a triangle in homogeneous face coordinates touches; says whether there was one.
-fn mark_triangle(cells: &[AtomicU64], launch: &Launch, corners: &[DVec3; 3]) -> bool {
-    let mut polygon = Polygon::new(corners);
-    if !polygon.clip_to_face() {
-        return false;
+/// Cells of one face while they are being marked.
+struct Face {
+    marked: Vec<AtomicU64>,
+    /// Cells that the light sends anything to: those that a spot's cone touches.
+    lit: Vec<u64>,
+}
+
+impl Face {
+    fn new(launch: &Launch, face: usize) -> Self {
+        let side = CELLS_PER_SIDE as f64;
+        let mut lit = vec![0; WORDS];
+        for bit in 0..CELLS_PER_SIDE * CELLS_PER_SIDE {
+            let low = DVec2::new((bit % CELLS_PER_SIDE) as f64, (bit / CELLS_PER_SIDE) as f64) / side;
+            if launch.may_light_cell(face, low, low + 1.0 / side) {
+                lit[bit / 64] |= 1 << (bit % 64);
+            }
+        }
+        Self {
+            marked: (0..WORDS).map(|_| AtomicU64::new(0)).collect(),
+            lit,
+        }
     }
-    let mapping = launch.mapping();
-    let Some((low, high)) = polygon.plane_bounds() else {
-        // The light touches the surface: it may see it anywhere on this face.
-        cells
-            .iter()
-            .for_each(|word| word.store(u64::MAX, Ordering::Relaxed));
-        return true;
-    };
+
+    fn into_bits(self) -> Vec<u64> {
+        self.marked.into_iter().map(AtomicU64::into_inner).collect()
+    }
+
+    /// Marks all lit cells that a triangle in homogeneous face coordinates touches; says whether there was one.
+    fn mark_triangle(&self, launch: &Launch, corners: &[DVec3; 3]) -> bool {
+        let mut polygon = Polygon::new(corners);
+        if !polygon.clip_to_face() {
+            return false;
+        }
+        let Some((low, high)) = polygon.plane_bounds() else {
+            return self.mark_all();
+        };
+        let (columns, rows) = cell_range(launch.mapping(), low, high);
+        let single = columns.0 == columns.1 && rows.0 == rows.1;
+        let mut any = false;
+        for row in rows.0..=rows.1 {
+            for column in columns.0..=columns.1 {
+                let bit = row * CELLS_PER_SIDE + column;
+                let (word, mask) = (bit / 64, 1 << (bit % 64));
+                if self.lit[word] & mask == 0 {
+                    continue;
+                }
+                let marked = self.marked[word].load(Ordering::Relaxed) & mask != 0;
+                // A cell that another triangle marked still has to say whether this one is seen.
+                if single || polygon.touches_cell(launch, column, row) {
+                    any = true;
+                    if !marked {
+                        self.marked[word].fetch_or(mask, Ordering::Relaxed);
+                    }
+                }
+            }
+        }
+        any
+    }
+
+    /// The light touches the surface: it may see it anywhere on this face.
+    fn mark_all(&self) -> bool {
+        for (word, lit) in self.marked.iter().zip(&self.lit) {
+            word.fetch_or(*lit, Ordering::Relaxed);
+        }
+        self.lit.iter().any(|lit| *lit != 0)
+    }
+}
+
+/// First and last column and row of the cells that may overlap a rectangle of the face.
+fn cell_range(mapping: FaceMapping, low: DVec2, high: DVec2) -> ((usize, usize), (usize, usize)) {
     let index = |share: f64| ((share * CELLS_PER_SIDE as f64).max(0.0) as usize).min(CELLS_PER_SIDE - 1);
     // v falls in magnitude with |x|, so that its extremes lie at the extremes of |x|.
     let nearest_x = if low.x <= 0.0 && high.x >= 0.0 {
@@ -162,19 +216,7 @@ fn mark_triangle(cells: &[AtomicU64], launch: &Launch, corners: &[DVec3; 3]) -> 
         index(v(nearest_x, low.y).min(v(farthest_x, low.y)) - MARGIN),
         index(v(nearest_x, high.y).max(v(farthest_x, high.y)) + MARGIN),
     );
-    let single = columns.0 == columns.1 && rows.0 == rows.1;
-    for row in rows.0..=rows.1 {
-        for column in columns.0..=columns.1 {
-            let bit = row * CELLS_PER_SIDE + column;
-            let (word, mask) = (&cells[bit / 64], 1 << (bit % 64));
-            if word.load(Ordering::Relaxed) & mask == 0
-                && (single || polygon.touches_cell(launch, column, row))
-            {
-                word.fetch_or(mask, Ordering::Relaxed);
-            }
-        }
-    }
-    true
+    (columns, rows)
 }
 
 /// A convex polygon in homogeneous face coordinates, at most a triangle clipped by four planes.

@@ -116,6 +116,27 @@ impl Launch {
         self.light.colour * (strength * self.light.kind.falloff(direction) * measure)
     }
 
+    /// Whether the light sends anything into the cell between two corners of the unit square; never false where it
+    /// does.
+    pub fn may_light_cell(&self, face: usize, low: DVec2, high: DVec2) -> bool {
+        let LightKind::Spot {
+            direction,
+            outer_cone_rad,
+            ..
+        } = self.light.kind
+        else {
+            return true;
+        };
+        let middle = self.ray(face, (low + high) * 0.5).direction;
+        // The cell lies within the cap around its middle that reaches its farthest corner; borders bend by less than
+        // half of that again.
+        let radius = [low, high, DVec2::new(low.x, high.y), DVec2::new(high.x, low.y)]
+            .map(|corner| middle.angle_between(self.ray(face, corner).direction))
+            .into_iter()
+            .fold(0.0, f64::max);
+        direction.angle_between(middle) <= outer_cone_rad + 1.5 * radius
+    }
+
     /// Solid angle [sr] of a cell, or its area [m²] for a sun.
     pub fn cell_measure(&self, low: DVec2, high: DVec2) -> f64 {
         match self.domain {

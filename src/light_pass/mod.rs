@@ -1,6 +1,7 @@
 //! From the lights through specular surfaces onto diffuse ones.
 
 pub mod caustic;
+pub mod direct;
 pub mod item_buffer;
 pub mod launch;
 pub mod ledger;

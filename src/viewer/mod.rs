@@ -1,11 +1,25 @@
 //! The window: fly through a scene, change a setting, see it baked anew.
 
+mod app;
+pub mod debounce;
+pub mod event_log;
+mod graphics;
+mod input;
+mod interface;
+pub mod model;
 pub mod navigation;
+mod overlay;
+pub mod panel;
+mod picture;
+mod surface;
 pub mod worker;
 
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use winit::event_loop::EventLoop;
+
+use self::app::{App, News};
 use crate::error::{Error, Result};
 use crate::illumination::IlluminationMap;
 use crate::scene::Scene;
@@ -38,11 +52,30 @@ const DISPLAY: &str = "display";
 /// # Errors
 /// No display (see [`is_no_display`]); no graphics adapter; a device that was lost and did not come back.
 pub fn run(options: ViewerOptions) -> Result<()> {
-    let _ = options;
+    let event_loop = event_loop()?;
+    let mut app = App::new(&options, event_loop.create_proxy())?;
+    event_loop.run_app(&mut app).map_err(|error| {
+        Error::failure(
+            "window",
+            format!("the system ended it ({error})"),
+            "check the display and start again",
+        )
+    })?;
+    app.failure().map_or(Ok(()), Err)
+}
+
+fn event_loop() -> Result<EventLoop<News>> {
+    // Where a library of the window system is missing, winit panics instead of telling.
+    let built = std::panic::catch_unwind(|| EventLoop::<News>::with_user_event().build());
+    let reason = match built {
+        Ok(Ok(event_loop)) => return Ok(event_loop),
+        Ok(Err(error)) => error.to_string(),
+        Err(_) => "a library of the window system is missing".into(),
+    };
     Err(Error::failure(
         DISPLAY,
-        "no window could be opened",
-        "use `bake` or `render`, which need none",
+        format!("no window can be opened on one ({reason})"),
+        "set DISPLAY or WAYLAND_DISPLAY, or use `bake` and `render`, which need no window",
     ))
 }
 

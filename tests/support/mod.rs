@@ -35,3 +35,19 @@ pub fn assert_close(actual: f64, expected: f64, tolerance: f64, what: &str) {
         "{what}: {actual} instead of {expected} within {tolerance}"
     );
 }
+
+/// A reference map of `assets/reference` by its scene's name: 256×256 values [W/m²], row 0 first. PFM as the solver
+/// writes it: little-endian, one channel, rows in the map's own order.
+pub fn reference_map(name: &str) -> Vec<f64> {
+    let path = project_file(&format!("assets/reference/{name}.pfm"));
+    let bytes = std::fs::read(path).expect("a readable reference");
+    let values = bytes.len().checked_sub(256 * 256 * 4).expect("a map of 256×256");
+    assert!(
+        bytes.starts_with(b"Pf\n256 256\n-1"),
+        "{name} is no little-endian 256×256 PFM"
+    );
+    bytes[values..]
+        .chunks_exact(4)
+        .map(|b| f64::from(f32::from_le_bytes(b.try_into().expect("four bytes"))))
+        .collect()
+}

@@ -63,6 +63,19 @@ impl Polygon {
         }
     }
 
+    /// Whether a point lies within it or on its border.
+    pub fn contains(&self, point: DVec2) -> bool {
+        let corners = self.corners();
+        let (mut left, mut right) = (false, false);
+        for (index, &corner) in corners.iter().enumerate() {
+            let next = corners[(index + 1) % corners.len()];
+            let side = (next - corner).perp_dot(point - corner);
+            left |= side > 0.0;
+            right |= side < 0.0;
+        }
+        !(left && right)
+    }
+
     /// The part with `low` ≤ coordinate ≤ `high` on an axis (0: x, 1: y).
     #[must_use]
     pub fn clipped(&self, axis: usize, low: f64, high: f64) -> Self {

@@ -1,0 +1,171 @@
+// Surfaces of the scene: radiance from the illumination maps, specular ones approximated.
+//
+// Radiance is written times frame.radiance_scale, so that it fits half floats.
+
+struct Frame {
+    clip_from_camera: mat4x4f,
+    camera_position: vec3f,
+    radiance_scale: f32,
+    sky_radiance: vec3f,
+    padding0: f32,
+    ground_radiance: vec3f,
+    padding1: f32,
+}
+
+struct ObjectUniform {
+    base_colour: vec3f,
+    irradiance_scale: f32,
+    emitted_radiance: vec3f,
+    ior: f32,
+    body_transmittance: vec3f,
+    surface: u32,
+}
+
+const SURFACE_DIFFUSE: u32 = 0u;
+const SURFACE_MIRROR: u32 = 1u;
+const SURFACE_DIELECTRIC: u32 = 2u;
+const SURFACE_THIN_WALL: u32 = 3u;
+const SURFACE_MIXED: u32 = 4u;
+
+const PI: f32 = 3.14159265358979;
+// Largest value written [scaled radiance]: half floats end at 65504, and a pane may still multiply it.
+const LARGEST: f32 = 8192.0;
+
+@group(0) @binding(0) var<uniform> frame: Frame;
+
+@group(1) @binding(0) var<uniform> object: ObjectUniform;
+@group(1) @binding(1) var illumination_map: texture_2d<f32>;
+@group(1) @binding(2) var base_colour_texture: texture_2d<f32>;
+@group(1) @binding(3) var base_colour_sampler: sampler;
+
+struct Corner {
+    @location(0) position: vec3f,
+    @location(1) normal: vec3f,
+    @location(2) uv: vec2f,
+    @location(3) map_uv: vec2f,
+}
+
+struct Fragment {
+    @builtin(position) clip: vec4f,
+    @location(0) from_camera: vec3f,
+    @location(1) normal: vec3f,
+    @location(2) uv: vec2f,
+    @location(3) map_uv: vec2f,
+}
+
+@vertex
+fn place(corner: Corner) -> Fragment {
+    // Relative to the camera first: differences of nearby numbers lose nothing.
+    let from_camera = corner.position - frame.camera_position;
+    return Fragment(
+        frame.clip_from_camera * vec4f(from_camera, 1.0),
+        from_camera,
+        corner.normal,
+        corner.uv,
+        corner.map_uv,
+    );
+}
+
+// What a surface point is, seen from its lit side.
+struct SurfacePoint {
+    base_colour: vec3f,
+    // Unit, towards the eye's side.
+    normal: vec3f,
+    // Unit, from the eye to the point.
+    view: vec3f,
+    cos_view: f32,
+}
+
+fn surface_point(fragment: Fragment, front: bool) -> SurfacePoint {
+    let texel = textureSample(base_colour_texture, base_colour_sampler, fragment.uv).rgb;
+    let view = normalize(fragment.from_camera);
+    let outward = normalize(fragment.normal);
+    let normal = select(-outward, outward, front);
+    return SurfacePoint(object.base_colour * texel, normal, view, clamp(-dot(normal, view), 0.0, 1.0));
+}
+
+// E [W/m²]: bilinear between texel centres, held at the border. Weights in full precision, since the steps of the
+// 8-bit weights that samplers use show at the edge of a caustic.
+fn irradiance(uv: vec2f) -> vec3f {
+    let size = vec2i(textureDimensions(illumination_map));
+    let texel = uv * vec2f(size) - 0.5;
+    let low = floor(texel);
+    let weight = texel - low;
+    let last = size - 1;
+    let a = clamp(vec2i(low), vec2i(0), last);
+    let b = clamp(vec2i(low) + 1, vec2i(0), last);
+    let top = mix(
+        textureLoad(illumination_map, a, 0).rgb,
+        textureLoad(illumination_map, vec2i(b.x, a.y), 0).rgb,
+        weight.x,
+    );
+    let bottom = mix(
+        textureLoad(illumination_map, vec2i(a.x, b.y), 0).rgb,
+        textureLoad(illumination_map, b, 0).rgb,
+        weight.x,
+    );
+    return mix(top, bottom, weight.y) * object.irradiance_scale;
+}
+
+fn diffuse_radiance(fragment: Fragment, base_colour: vec3f) -> vec3f {
+    return base_colour * irradiance(fragment.map_uv) / PI;
+}
+
+// Approximation of what a specular surface sees: sky above the horizon, the mean of the lit ground below it.
+fn environment_radiance(direction: vec3f) -> vec3f {
+    let above = smoothstep(-0.2, 0.2, direction.y);
+    return mix(frame.ground_radiance, frame.sky_radiance, above);
+}
+
+fn reflected_environment(point: SurfacePoint) -> vec3f {
+    return environment_radiance(reflect(point.view, point.normal));
+}
+
+fn scaled(radiance: vec3f) -> vec4f {
+    return vec4f(clamp(radiance * frame.radiance_scale, vec3f(0.0), vec3f(LARGEST)), 1.0);
+}
+
+@fragment
+fn opaque(fragment: Fragment, @builtin(front_facing) front: bool) -> @location(0) vec4f {
+    let point = surface_point(fragment, front);
+    var radiance = object.emitted_radiance;
+    if object.surface == SURFACE_MIRROR {
+        radiance += metal_reflectance(point.cos_view, point.base_colour) * reflected_environment(point);
+    } else {
+        var reflectance = 0.0;
+        if object.surface == SURFACE_MIXED {
+            reflectance = dielectric_reflectance(point.cos_view, object.ior);
+        }
+        radiance += (1.0 - reflectance) * diffuse_radiance(fragment, point.base_colour);
+        radiance += reflectance * reflected_environment(point);
+    }
+    return scaled(radiance);
+}
+
+// Share of light sent back by a clear interface as seen from outside; both faces of a body are treated alike, since
+// rays are not bent here.
+fn clear_reflectance(point: SurfacePoint) -> f32 {
+    if object.surface == SURFACE_THIN_WALL {
+        return thin_wall_reflectance(point.cos_view, object.ior);
+    }
+    return dielectric_reflectance(point.cos_view, object.ior);
+}
+
+// Factor on the radiance behind a clear surface. Radiance falls by n² into a body and grows by n² out of it.
+@fragment
+fn transmitted(fragment: Fragment, @builtin(front_facing) front: bool) -> @location(0) vec4f {
+    let point = surface_point(fragment, front);
+    var factor = (1.0 - clear_reflectance(point)) * point.base_colour;
+    if object.surface == SURFACE_DIELECTRIC {
+        let n2 = object.ior * object.ior;
+        factor *= select(vec3f(n2), object.body_transmittance / n2, front);
+    }
+    return vec4f(factor, 1.0);
+}
+
+// What a clear surface adds: reflection and its own light.
+@fragment
+fn reflected(fragment: Fragment, @builtin(front_facing) front: bool) -> @location(0) vec4f {
+    let point = surface_point(fragment, front);
+    return scaled(object.emitted_radiance + clear_reflectance(point) * reflected_environment(point));
+}

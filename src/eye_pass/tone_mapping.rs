@@ -1,0 +1,75 @@
+//! From radiance to what a display shows: exposure, tone mapping, sRGB encoding. The twin of
+//! `shaders/shared/tone_map.wgsl`.
+
+use super::{Picture, ToneMap};
+use crate::optics::LinearSrgb;
+
+/// Where auto exposure brings the log-average luminance: the 18 % grey card.
+const MIDDLE_GREY: f64 = 0.18;
+
+/// Khronos PBR Neutral, exact below its shoulder, hue kept above it.
+/// Source: <https://github.com/KhronosGroup/ToneMapping/tree/main/PBR_Neutral>.
+fn neutral(exposed: LinearSrgb) -> LinearSrgb {
+    const SHOULDER: f64 = 0.8 - 0.04;
+    const DESATURATION: f64 = 0.15;
+    let darkest = exposed.r.min(exposed.g).min(exposed.b);
+    let offset = if darkest < 0.08 {
+        darkest - 6.25 * darkest * darkest
+    } else {
+        0.04
+    };
+    let colour = exposed.map(|channel| channel - offset);
+    let peak = colour.max_channel();
+    if peak < SHOULDER {
+        return colour;
+    }
+    let span = 1.0 - SHOULDER;
+    let new_peak = 1.0 - span * span / (peak + span - SHOULDER);
+    let whiteness = 1.0 - 1.0 / (DESATURATION * (peak - new_peak) + 1.0);
+    colour * (new_peak / peak) * (1.0 - whiteness) + LinearSrgb::grey(new_peak * whiteness)
+}
+
+impl ToneMap {
+    /// Display light [0, 1] from exposed radiance, where 1 is the display's white. Negative channels count as 0.
+    pub fn apply(self, exposed: LinearSrgb) -> LinearSrgb {
+        let exposed = exposed.map(|channel| channel.max(0.0));
+        let display = match self {
+            Self::None => exposed,
+            Self::Neutral => neutral(exposed),
+        };
+        display.map(|channel| channel.clamp(0.0, 1.0))
+    }
+}
+
+/// A picture as sRGB-encoded bytes, RGBA with full alpha, row by row: radiance × 2^`exposure_stops`, tone-mapped.
+pub fn display_rgba8(picture: &Picture, exposure_stops: f64, tone_map: ToneMap) -> Vec<u8> {
+    let exposure = exposure_stops.exp2();
+    let pixel = |radiance: &[f32; 3]| {
+        let exposed = LinearSrgb::from(radiance.map(f64::from)) * exposure;
+        let code = |channel| (LinearSrgb::encode_channel(channel) * 255.0).round() as u8;
+        let display = tone_map.apply(exposed);
+        [code(display.r), code(display.g), code(display.b), u8::MAX]
+    };
+    picture.radiance.iter().flat_map(pixel).collect()
+}
+
+/// Exposure [stops] that brings the log-average luminance of the lit pixels to middle grey; 0 for a black picture.
+///
+/// Pixels below a millionth of the brightest count as unlit: a scene lit in one corner is exposed for that corner.
+pub fn auto_exposure_stops(picture: &Picture) -> f64 {
+    let luminances = || {
+        let pixels = picture.radiance.iter();
+        pixels
+            .map(|rgb| LinearSrgb::from(rgb.map(f64::from)).luminance())
+            .filter(|luminance| luminance.is_finite())
+    };
+    let brightest = luminances().fold(0.0, f64::max);
+    if brightest <= 0.0 {
+        return 0.0;
+    }
+    let lit = luminances().filter(|luminance| *luminance > 1e-6 * brightest);
+    let (sum, count) = lit.fold((0.0, 0.0), |(sum, count), luminance| {
+        (sum + luminance.log2(), count + 1.0)
+    });
+    MIDDLE_GREY.log2() - sum / count
+}

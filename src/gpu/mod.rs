@@ -1,0 +1,154 @@
+//! The graphics device: adapter, shaders, struct layouts, read-back. Knows no scene and no pass.
+
+mod faults;
+pub mod layout;
+pub mod readback;
+pub mod shader;
+
+use faults::Faults;
+
+use crate::error::{Error, Result};
+
+/// A device that is ready to draw, with what went wrong on it so far.
+///
+/// Nothing on it panics: faults of the device are kept and handed out by [`take_error`](Self::take_error).
+#[derive(Debug)]
+pub struct Gpu {
+    /// Where surfaces come from.
+    pub instance: wgpu::Instance,
+    /// The chosen adapter.
+    pub adapter: wgpu::Adapter,
+    /// Makes resources.
+    pub device: wgpu::Device,
+    /// Takes commands.
+    pub queue: wgpu::Queue,
+    faults: Faults,
+}
+
+impl Gpu {
+    /// A device without a window. Vulkan comes first, OpenGL (through EGL) where there is none.
+    ///
+    /// # Errors
+    /// No adapter, or one that refuses to give a device.
+    pub fn headless() -> Result<Self> {
+        let vulkan = instance_of(wgpu::Backends::VULKAN);
+        if let Ok(adapter) = request_adapter(&vulkan, None) {
+            return Self::from_adapter(vulkan, adapter);
+        }
+        let any = instance_of(wgpu::Backends::all());
+        let adapter = request_adapter(&any, None)?;
+        Self::from_adapter(any, adapter)
+    }
+
+    /// A device that can present to `surface`, which was made by `instance`.
+    ///
+    /// # Errors
+    /// No adapter that can present to it, or one that refuses to give a device.
+    pub fn for_surface(instance: wgpu::Instance, surface: &wgpu::Surface<'_>) -> Result<Self> {
+        let adapter = request_adapter(&instance, Some(surface))?;
+        Self::from_adapter(instance, adapter)
+    }
+
+    /// No optional feature is asked for, so that what runs here runs everywhere; the limits are the adapter's own.
+    fn from_adapter(instance: wgpu::Instance, adapter: wgpu::Adapter) -> Result<Self> {
+        let descriptor = wgpu::DeviceDescriptor {
+            label: Some("nephroid"),
+            required_features: wgpu::Features::empty(),
+            required_limits: adapter.limits(),
+            ..Default::default()
+        };
+        let (device, queue) = pollster::block_on(adapter.request_device(&descriptor)).map_err(|error| {
+            Error::failure(
+                format!("graphics adapter {}", adapter.get_info().name),
+                format!("gave no device ({error})"),
+                "update its driver, or use --backend cpu",
+            )
+        })?;
+        let faults = Faults::listen_to(&device);
+        Ok(Self {
+            instance,
+            adapter,
+            device,
+            queue,
+            faults,
+        })
+    }
+
+    /// The adapter's name and the interface it is reached by, for people.
+    pub fn adapter_name(&self) -> String {
+        let info = self.adapter.get_info();
+        format!("{} ({})", info.name, info.backend)
+    }
+
+    /// What the device can hold.
+    pub fn limits(&self) -> wgpu::Limits {
+        self.device.limits()
+    }
+
+    /// The first fault since the last call, if there was one.
+    pub fn take_error(&self) -> Option<Error> {
+        self.faults.take()
+    }
+
+    /// Whether the device is gone for good: make a new [`Gpu`] and everything on it.
+    pub fn is_lost(&self) -> bool {
+        self.faults.is_lost()
+    }
+
+    /// Waits until all work handed in is done.
+    ///
+    /// # Errors
+    /// The device was lost, or reported a fault meanwhile.
+    pub fn wait(&self) -> Result<()> {
+        let polled = self.device.poll(wgpu::PollType::wait_indefinitely());
+        if let Some(fault) = self.take_error() {
+            return Err(fault);
+        }
+        polled
+            .map(|_| ())
+            .map_err(|error| faults::device_error(&error.to_string()))
+    }
+
+    /// Refuses a picture or map that no texture of this device can hold; `location` says which.
+    ///
+    /// # Errors
+    /// A side of 0 or above the device's limit.
+    pub fn check_texture_size(&self, location: &str, width: u32, height: u32) -> Result<()> {
+        let limit = self.limits().max_texture_dimension_2d;
+        if (1..=limit).contains(&width) && (1..=limit).contains(&height) {
+            return Ok(());
+        }
+        Err(Error::failure(
+            location,
+            format!(
+                "{width}×{height} does not fit a texture of {}",
+                self.adapter_name()
+            ),
+            format!("choose 1 to {limit} in each direction"),
+        ))
+    }
+}
+
+fn instance_of(backends: wgpu::Backends) -> wgpu::Instance {
+    let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
+    descriptor.backends = backends;
+    wgpu::Instance::new(descriptor)
+}
+
+fn request_adapter(
+    instance: &wgpu::Instance,
+    compatible_surface: Option<&wgpu::Surface<'_>>,
+) -> Result<wgpu::Adapter> {
+    let options = wgpu::RequestAdapterOptions {
+        power_preference: wgpu::PowerPreference::HighPerformance,
+        compatible_surface,
+        ..Default::default()
+    };
+    pollster::block_on(instance.request_adapter(&options)).map_err(|_| {
+        Error::failure(
+            "graphics",
+            "no Vulkan or OpenGL adapter was found",
+            "install a driver (Debian and Ubuntu: apt-get install mesa-vulkan-drivers libvulkan1), or use --backend cpu",
+        )
+    })
+}

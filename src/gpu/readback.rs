@@ -1,0 +1,50 @@
+//! From a texture back to the processor.
+
+use super::{Gpu, faults};
+use crate::error::Result;
+
+/// The texels of level 0 of a 2D texture (usage `COPY_SRC`), row by row without padding.
+///
+/// # Errors
+/// The device was lost or refused the copy.
+pub fn read_texture(gpu: &Gpu, texture: &wgpu::Texture) -> Result<Vec<u8>> {
+    let texel_bytes = texture.format().block_copy_size(None).unwrap_or(0);
+    let row_bytes = texture.width() * texel_bytes;
+    // Rows of a copy start at multiples of 256 bytes.
+    let stride = row_bytes.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
+    let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some("read-back"),
+        size: u64::from(stride) * u64::from(texture.height()),
+        usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
+        mapped_at_creation: false,
+    });
+    let mut encoder = gpu
+        .device
+        .create_command_encoder(&wgpu::CommandEncoderDescriptor {
+            label: Some("read-back"),
+        });
+    encoder.copy_texture_to_buffer(
+        texture.as_image_copy(),
+        wgpu::TexelCopyBufferInfo {
+            buffer: &buffer,
+            layout: wgpu::TexelCopyBufferLayout {
+                offset: 0,
+                bytes_per_row: Some(stride),
+                rows_per_image: None,
+            },
+        },
+        texture.size(),
+    );
+    gpu.queue.submit([encoder.finish()]);
+    // The outcome of the mapping shows in whether the range can be had below.
+    buffer.map_async(wgpu::MapMode::Read, .., |_| ());
+    gpu.wait()?;
+    let padded = buffer
+        .get_mapped_range(..)
+        .map_err(|error| faults::device_error(&error.to_string()))?;
+    Ok(padded
+        .chunks_exact(stride as usize)
+        .flat_map(|row| &row[..row_bytes as usize])
+        .copied()
+        .collect())
+}

@@ -1,0 +1,253 @@
+//! Light straight from the lamps (LD), as irradiance of every texel.
+//!
+//! E = I cos θ/r² for points and spots, E⊥ cos θ for suns, θ by the interpolated normal, stopped by every surface,
+//! clear glass included: what comes through that is caustic light (LS+D). A surface takes light on its front, a
+//! double-sided one on either side, into the same map.
+
+mod facet;
+mod lighting;
+mod texel;
+
+use glam::DVec2;
+use rayon::iter::{IntoParallelIterator, ParallelIterator};
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use crate::illumination::Chart;
+use crate::illumination::gutter::{fill_gutter, neighbours};
+use crate::illumination::parametrisation::coverage::{Polygon, for_each_texel_in_row, rows};
+use crate::optics::LinearSrgb;
+use crate::progress::{Control, Progress, Stage};
+use crate::scene::Material;
+use crate::transport::Tracer;
+use facet::Facet;
+use lighting::Arriving;
+use texel::{Lit, Part, Row, Sample, Texel, TexelSum};
+
+/// Samples across and down a texel where light is all there or all away.
+const COARSE_SIDE: usize = 2;
+
+/// Samples across and down a texel at a border between light and shadow.
+const FINE_SIDE: usize = 8;
+
+/// Moves all samples by a millionth of a texel, so that none lies on the diagonal of a square of two triangles, where
+/// both would count it.
+const OFF_THE_DIAGONALS: DVec2 = DVec2::new(0.6e-6, 1.1e-6);
+
+/// The direct layer of one map.
+#[derive(Clone, Debug)]
+pub struct DirectLayer {
+    /// Mean E over the covered part of each texel [W/m²], gutters filled.
+    pub irradiance: Vec<[f32; 3]>,
+    /// Any-hit queries made for it.
+    pub shadow_rays: u64,
+    /// False where it was cancelled: rows that are missing are black.
+    pub complete: bool,
+}
+
+/// Bakes the direct light of all lights of the tracer's scene onto the charts, one layer each. The same for any
+/// number of threads. Progress counts rows over all charts.
+pub fn bake_direct(
+    tracer: &Tracer,
+    charts: &[&Chart],
+    progress: &dyn Progress,
+    control: &Control,
+) -> Vec<DirectLayer> {
+    let total: u64 = charts.iter().map(|chart| 2 * chart.height as u64).sum();
+    let done = AtomicU64::new(0);
+    let row_done = || progress.advance(Stage::Direct, done.fetch_add(1, Ordering::Relaxed) + 1, total);
+    charts
+        .iter()
+        .map(|chart| Baker::new(tracer, chart).bake(&row_done, control))
+        .collect()
+}
+
+struct Baker<'a> {
+    tracer: &'a Tracer,
+    chart: &'a Chart,
+    material: &'a Material,
+    /// Triangles that reach each row: those of row r are `triangles[first[r]..first[r + 1]]`.
+    first: Vec<usize>,
+    triangles: Vec<u32>,
+}
+
+impl<'a> Baker<'a> {
+    fn new(tracer: &'a Tracer, chart: &'a Chart) -> Self {
+        let size = DVec2::new(1.0, chart.height as f64);
+        let reach = |uvs: &[DVec2; 3]| rows(uvs.map(|uv| uv * size), chart.height);
+        let mut first = vec![0; chart.height + 1];
+        for uvs in &chart.corner_uvs {
+            for row in reach(uvs) {
+                first[row + 1] += 1;
+            }
+        }
+        for row in 0..chart.height {
+            first[row + 1] += first[row];
+        }
+        let mut next = first.clone();
+        let mut triangles = vec![0; first[chart.height]];
+        for (triangle, uvs) in chart.corner_uvs.iter().enumerate() {
+            for row in reach(uvs) {
+                triangles[next[row]] = triangle as u32;
+                next[row] += 1;
+            }
+        }
+        Self {
+            tracer,
+            chart,
+            material: tracer.scene().material_of(chart.object),
+            first,
+            triangles,
+        }
+    }
+
+    /// A coarse pass everywhere, then a fine one where light meets shadow within a texel or between neighbours.
+    fn bake(&self, row_done: &(impl Fn() + Sync), control: &Control) -> DirectLayer {
+        let (width, height) = (self.chart.width, self.chart.height);
+        let dark = Texel {
+            irradiance: [0.0; 3],
+            lit: Lit::EMPTY,
+        };
+        let mut texels = vec![dark; width * height];
+        let (mut shadow_rays, mut complete) = (0, true);
+        let mut take = |rows: Vec<Row>, texels: &mut [Texel]| {
+            for (row, content) in rows.into_iter().enumerate() {
+                shadow_rays += content.shadow_rays;
+                complete &= !content.cancelled;
+                for (column, texel) in content.texels {
+                    texels[row * width + column as usize] = texel;
+                }
+            }
+        };
+        let coarse = self.pass(row_done, control, COARSE_SIDE, |_| true);
+        take(coarse, &mut texels);
+        let fine = self.pass(row_done, control, FINE_SIDE, |texel| {
+            self.meets_shadow(&texels, texel)
+        });
+        take(fine, &mut texels);
+        let mut irradiance = texels
+            .into_iter()
+            .map(|texel| texel.irradiance)
+            .collect::<Vec<_>>();
+        fill_gutter(self.chart, &mut irradiance);
+        DirectLayer {
+            irradiance,
+            shadow_rays,
+            complete,
+        }
+    }
+
+    fn meets_shadow(&self, texels: &[Texel], texel: usize) -> bool {
+        let own = texels[texel].lit;
+        own == Lit::MIXED
+            || own != Lit::EMPTY
+                && neighbours(texel, self.chart.width, self.chart.height)
+                    .map(|other| texels[other].lit)
+                    .any(|other| other != Lit::EMPTY && other != own)
+    }
+
+    fn pass(
+        &self,
+        row_done: &(impl Fn() + Sync),
+        control: &Control,
+        side: usize,
+        wanted: impl Fn(usize) -> bool + Sync,
+    ) -> Vec<Row> {
+        (0..self.chart.height)
+            .into_par_iter()
+            .map(|row| {
+                if control.is_cancelled() {
+                    return Row {
+                        cancelled: true,
+                        ..Row::default()
+                    };
+                }
+                let content = self.row(row, side, &wanted);
+                row_done();
+                content
+            })
+            .collect()
+    }
+
+    fn row(&self, row: usize, side: usize, wanted: &impl Fn(usize) -> bool) -> Row {
+        let width = self.chart.width;
+        let mut sums = vec![TexelSum::EMPTY; width];
+        let mut content = Row::default();
+        for &triangle in &self.triangles[self.first[row]..self.first[row + 1]] {
+            let Some(facet) = self.facet(triangle) else {
+                continue;
+            };
+            for_each_texel_in_row(facet.corners_texels, row, width, |column, part| {
+                if wanted(row * width + column) {
+                    let texel = DVec2::new(column as f64, row as f64);
+                    content.shadow_rays += self.add_part(&facet, part, texel, side, &mut sums[column]);
+                }
+            });
+        }
+        for (column, sum) in sums.iter_mut().enumerate() {
+            if let (true, Some(part)) = (sum.lit == Lit::EMPTY, sum.largest)
+                && let Some(facet) = self.facet(part.triangle)
+            {
+                let sample = self.sample(&facet, part.middle);
+                content.shadow_rays += sample.shadow_rays;
+                sum.add(sample, part.area_m2);
+            }
+            if sum.lit != Lit::EMPTY {
+                content.texels.push((column as u32, sum.finished()));
+            }
+        }
+        content
+    }
+
+    /// Adds the samples of a texel that lie on its part on one triangle; returns the shadow rays that it took.
+    fn add_part(&self, facet: &Facet, part: &Polygon, texel: DVec2, side: usize, sum: &mut TexelSum) -> u64 {
+        let area_m2 = part.area() * facet.m2_per_texel2;
+        if sum.largest.is_none_or(|largest| largest.area_m2 < area_m2) {
+            sum.largest = Some(Part {
+                triangle: facet.triangle,
+                area_m2,
+                middle: part.centroid(),
+            });
+        }
+        let step = 1.0 / side as f64;
+        let mut shadow_rays = 0;
+        for index in 0..side * side {
+            let place = texel
+                + DVec2::new((index % side) as f64 + 0.5, (index / side) as f64 + 0.5) * step
+                + OFF_THE_DIAGONALS;
+            if part.contains(place) {
+                let sample = self.sample(facet, place);
+                shadow_rays += sample.shadow_rays;
+                sum.add(sample, facet.m2_per_texel2 * step * step);
+            }
+        }
+        shadow_rays
+    }
+
+    fn sample(&self, facet: &Facet, place: DVec2) -> Sample {
+        let point = facet.at(place);
+        let mut sample = Sample {
+            irradiance: LinearSrgb::BLACK,
+            mask: 0,
+            shadow_rays: 0,
+        };
+        for (index, light) in self.tracer.scene().lights.iter().enumerate() {
+            let Some(arriving) = Arriving::unshadowed(light, &point, self.material) else {
+                continue;
+            };
+            sample.shadow_rays += 1;
+            if !self
+                .tracer
+                .is_blocked(&point.spawn(arriving.to_light), arriving.distance_m)
+            {
+                sample.irradiance += arriving.irradiance;
+                sample.mask ^= 1u64.rotate_left(index as u32 % 64);
+            }
+        }
+        sample
+    }
+
+    fn facet(&self, triangle: u32) -> Option<Facet> {
+        let mesh = &self.tracer.scene().objects[self.chart.object].mesh;
+        Facet::new(mesh, self.chart, triangle)
+    }
+}

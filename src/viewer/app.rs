@@ -1,0 +1,494 @@
+//! The window's life: events in, frames out, and rest while nothing changes.
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use egui_winit::accesskit_winit;
+use glam::DVec2;
+use winit::application::ApplicationHandler;
+use winit::dpi::PhysicalPosition;
+use winit::event::{
+    DeviceEvent, DeviceId, ElementState, KeyEvent, MouseButton, MouseScrollDelta, StartCause, WindowEvent,
+};
+use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoopProxy};
+use winit::keyboard::PhysicalKey;
+use winit::window::{CursorGrabMode, WindowId};
+
+use super::ViewerOptions;
+use super::event_log::Event;
+use super::graphics::{Graphics, RETRY_AFTER, Shown};
+use super::input::{self, Shortcut};
+use super::interface::Painting;
+use super::model::Model;
+use super::overlay;
+use super::panel::{Facts, Wishes};
+use crate::error::{Error, Result};
+use crate::eye_pass::View;
+use crate::optics::LinearSrgb;
+
+/// What other threads tell the window.
+#[derive(Debug)]
+pub enum News {
+    /// The baking thread moved on.
+    Baker,
+    /// Assistive technology asks for something.
+    Accessibility(accesskit_winit::Event),
+}
+
+impl From<accesskit_winit::Event> for News {
+    fn from(event: accesskit_winit::Event) -> Self {
+        Self::Accessibility(event)
+    }
+}
+
+/// A scroll of this many pixels counts as one notch of the wheel.
+const PIXELS_PER_NOTCH: f64 = 40.0;
+/// Time between frames that only show how a bake gets on.
+const BAKING_FRAME: Duration = Duration::from_millis(100);
+/// Longest time that one frame flies: after a stall the camera is not thrown through the scene.
+const LONGEST_STEP: Duration = Duration::from_millis(500);
+/// A device that was lost this often within [`LOSSES_WITHIN`] is given up.
+const MOST_LOSSES: usize = 3;
+const LOSSES_WITHIN: Duration = Duration::from_secs(60);
+/// Radiance behind the scene [W/(m² sr)]: dark.
+const BACKGROUND: LinearSrgb = LinearSrgb::BLACK;
+
+/// The whole program behind one window.
+pub struct App {
+    model: Model,
+    graphics: Option<Graphics>,
+    proxy: EventLoopProxy<News>,
+    /// Inner size of the window to be opened [logical pixels].
+    size: (u32, u32),
+    /// Where the picture lies in the window [points].
+    picture_rect: egui::Rect,
+    /// Where the mouse was when it took the gaze [pixels].
+    looking_from: Option<PhysicalPosition<f64>>,
+    pointer: PhysicalPosition<f64>,
+    /// Until when the camera has moved.
+    moved_until: Instant,
+    /// When the next frame is due though nothing happens.
+    wake_at: Option<Instant>,
+    must_measure_exposure: bool,
+    must_set_maps: bool,
+    pressed: Wishes,
+    losses: Vec<Instant>,
+    pictures: u64,
+    frames: u64,
+    /// Pictures at the last line of the log that told of rest.
+    rested_at: u64,
+    /// Told over the picture until the next key press.
+    notice: Option<String>,
+    failure: Option<Error>,
+}
+
+impl App {
+    /// Starts baking; the window comes with the first event.
+    ///
+    /// # Errors
+    /// As [`Model::new`].
+    pub fn new(options: &ViewerOptions, proxy: EventLoopProxy<News>) -> Result<Self> {
+        let of_baker = proxy.clone();
+        let wake = move || {
+            // Fails only when the window is gone, and then nobody waits for it.
+            let _ = of_baker.send_event(News::Baker);
+        };
+        Ok(Self {
+            model: Model::new(options, wake)?,
+            graphics: None,
+            proxy,
+            size: options.size,
+            picture_rect: egui::Rect::NOTHING,
+            looking_from: None,
+            pointer: PhysicalPosition::default(),
+            moved_until: Instant::now(),
+            wake_at: None,
+            must_measure_exposure: options.exposure_stops.is_none(),
+            must_set_maps: true,
+            pressed: Wishes::default(),
+            losses: Vec::new(),
+            pictures: 0,
+            frames: 0,
+            rested_at: 0,
+            notice: None,
+            failure: None,
+        })
+    }
+
+    /// What ended the window, if it was not the user.
+    pub fn failure(self) -> Option<Error> {
+        self.failure
+    }
+
+    fn open(&mut self, event_loop: &ActiveEventLoop) {
+        match Graphics::new(event_loop, self.proxy.clone(), &self.model.scene, self.size) {
+            Ok(graphics) => {
+                let adapter = graphics.gpu().adapter_name();
+                let started = Event::Started {
+                    scene: &self.model.scene.name,
+                    adapter: &adapter,
+                };
+                self.model.log.write(&started);
+                graphics.window().request_redraw();
+                self.graphics = Some(graphics);
+                self.must_set_maps = true;
+            }
+            Err(error) => self.fail(event_loop, error),
+        }
+    }
+
+    fn fail(&mut self, event_loop: &ActiveEventLoop, error: Error) {
+        self.failure = Some(error);
+        event_loop.exit();
+    }
+
+    /// Throws window and device away and makes them anew, unless that was tried too often.
+    fn recover(&mut self, event_loop: &ActiveEventLoop) {
+        let reason = self
+            .graphics
+            .as_ref()
+            .and_then(|graphics| graphics.gpu().take_error())
+            .unwrap_or_else(|| {
+                Error::failure(
+                    "window",
+                    "its surface was lost",
+                    "update the graphics driver, or use `render`",
+                )
+            });
+        self.model.log.write(&Event::DeviceLost(&reason.to_string()));
+        log::warn!("{reason}");
+        if let Some(graphics) = self.graphics.take() {
+            let window = graphics.window();
+            let size = window.inner_size().to_logical(window.scale_factor());
+            self.size = (size.width, size.height);
+        }
+        self.stop_looking();
+        self.model.navigator.stop();
+        let now = Instant::now();
+        self.losses
+            .retain(|loss| now.duration_since(*loss) < LOSSES_WITHIN);
+        self.losses.push(now);
+        if self.losses.len() > MOST_LOSSES {
+            self.fail(event_loop, reason);
+            return;
+        }
+        self.open(event_loop);
+        if self.graphics.is_some() {
+            self.notice = Some(format!("The graphics device was lost and came back: {reason}"));
+            self.model.log.write(&Event::DeviceRecovered);
+        }
+    }
+
+    fn request_redraw(&self) {
+        if let Some(graphics) = &self.graphics {
+            graphics.window().request_redraw();
+        }
+    }
+
+    /// Flies up to now: called before keys change and before each frame.
+    fn fly(&mut self) {
+        let now = Instant::now();
+        let step = now.duration_since(self.moved_until).min(LONGEST_STEP);
+        if self.model.navigator.is_moving() {
+            self.model.navigator.advance(step.as_secs_f64());
+        }
+        self.moved_until = now;
+    }
+
+    /// One frame.
+    fn redraw(&mut self, event_loop: &ActiveEventLoop) {
+        self.fly();
+        self.must_set_maps |= self.model.poll();
+        let layer = self.model.panel.display.layer;
+        let mut wishes = std::mem::take(&mut self.pressed);
+        let Some(mut painting) = self.run_interface(&mut wishes) else {
+            return;
+        };
+        self.model.act(wishes, Instant::now());
+        self.must_set_maps |= layer != self.model.panel.display.layer;
+        self.must_measure_exposure |= wishes.measure_exposure;
+        if let Err(error) = self.draw_picture() {
+            self.notice = Some(error.to_string());
+        }
+        let Some(graphics) = &mut self.graphics else {
+            return;
+        };
+        let shown = graphics.show(&mut painting);
+        if !graphics.gpu().is_lost()
+            && let Some(error) = graphics.gpu().take_error()
+        {
+            self.notice = Some(error.to_string());
+        }
+        self.schedule(event_loop, shown, painting.repaint_after);
+    }
+
+    /// Shows panel and picture to egui.
+    fn run_interface(&mut self, wishes: &mut Wishes) -> Option<Painting> {
+        let Self {
+            model,
+            graphics,
+            picture_rect,
+            notice,
+            ..
+        } = self;
+        let graphics = graphics.as_mut()?;
+        let (state, layers, adapter) = (
+            model.state().clone(),
+            model.layers(),
+            graphics.gpu().adapter_name(),
+        );
+        let (window, picture) = (Arc::clone(graphics.window()), graphics.picture_id());
+        let speed_m_per_s = model.navigator.speed_m_per_s();
+        let Model {
+            scene, panel, last, ..
+        } = model;
+        let facts = Facts {
+            scene,
+            state: &state,
+            last: last.as_ref(),
+            layers: &layers,
+            speed_m_per_s,
+            adapter: &adapter,
+        };
+        Some(graphics.interface().run(&window, |ui| {
+            *wishes = wishes.and(panel.show(ui, &facts));
+            *picture_rect = overlay::show(ui, picture, &facts, notice.as_deref());
+        }))
+    }
+
+    /// Draws what changed of the picture: maps, exposure, view.
+    fn draw_picture(&mut self) -> Result<()> {
+        let Some(mut view) = self.view() else {
+            return Ok(());
+        };
+        let Some(graphics) = &mut self.graphics else {
+            return Ok(());
+        };
+        if std::mem::take(&mut self.must_set_maps) {
+            graphics.set_maps(&self.model.scene, &self.model.shown_maps())?;
+        }
+        if self.must_measure_exposure && !self.model.maps().is_empty() {
+            self.must_measure_exposure = false;
+            view.exposure_stops = graphics.measure_exposure(&view)?;
+            self.model.panel.display.exposure_stops = view.exposure_stops;
+            self.model.log.write(&Event::Exposure(view.exposure_stops));
+        }
+        self.pictures += u64::from(graphics.draw_picture(&view)?);
+        Ok(())
+    }
+
+    /// Decides when the next frame comes.
+    fn schedule(&mut self, event_loop: &ActiveEventLoop, shown: Shown, repaint_after: Duration) {
+        let now = Instant::now();
+        let wait = match shown {
+            Shown::Broken => {
+                self.recover(event_loop);
+                return;
+            }
+            Shown::Hidden => Duration::MAX,
+            Shown::Later => RETRY_AFTER,
+            Shown::Yes if self.model.navigator.is_moving() => Duration::ZERO,
+            Shown::Yes if self.model.state().is_baking() => repaint_after.min(BAKING_FRAME),
+            Shown::Yes => repaint_after,
+        };
+        self.frames += u64::from(shown == Shown::Yes);
+        if wait.is_zero() {
+            self.wake_at = None;
+            self.request_redraw();
+            return;
+        }
+        self.wake_at = [now.checked_add(wait), self.model.due()]
+            .into_iter()
+            .flatten()
+            .min();
+        if self.rested_at != self.pictures && !self.model.state().is_baking() {
+            self.rested_at = self.pictures;
+            let (pictures, frames) = (self.pictures, self.frames);
+            let position = self.model.navigator.camera().position.to_array();
+            self.model.log.write(&Event::AtRest {
+                pictures,
+                frames,
+                position,
+            });
+        }
+    }
+
+    /// What the picture is to show; `None` while it has no area.
+    fn view(&self) -> Option<View> {
+        let graphics = self.graphics.as_ref()?;
+        let scale = graphics.window().scale_factor() as f32;
+        let pixels = |points: f32| (points * scale).round();
+        let (width, height) = (
+            pixels(self.picture_rect.width()),
+            pixels(self.picture_rect.height()),
+        );
+        let display = self.model.panel.display;
+        (width >= 1.0 && height >= 1.0).then(|| View {
+            camera: self.model.navigator.camera(),
+            width: width as u32,
+            height: height as u32,
+            exposure_stops: display.exposure_stops,
+            tone_map: display.tone_map,
+            background: BACKGROUND,
+        })
+    }
+
+    fn on_key(&mut self, event: &KeyEvent) {
+        let is_typing = self
+            .graphics
+            .as_mut()
+            .is_some_and(|graphics| graphics.interface().context().text_edit_focused());
+        if is_typing && event.state.is_pressed() {
+            return;
+        }
+        self.fly();
+        if let PhysicalKey::Code(code) = event.physical_key
+            && input::hold(&mut self.model.navigator.keys, code, event.state)
+        {
+            return;
+        }
+        if event.state.is_pressed() && !event.repeat {
+            self.notice = None;
+            match input::shortcut(&event.logical_key) {
+                Some(Shortcut::NextCamera) => drop(self.model.navigator.next_camera().map(str::to_owned)),
+                Some(Shortcut::Frame) => {
+                    let aspect = self.picture_rect.aspect_ratio();
+                    self.model.navigator.frame(f64::from(aspect));
+                }
+                Some(Shortcut::Rebake) => self.pressed.rebake = true,
+                Some(Shortcut::Help) => self.model.panel.help_open = !self.model.panel.help_open,
+                Some(Shortcut::LetGo) if self.looking_from.is_some() => self.stop_looking(),
+                Some(Shortcut::LetGo) => self.pressed.cancel = true,
+                None => {}
+            }
+        }
+    }
+
+    fn on_mouse_button(&mut self, button: MouseButton, state: ElementState) {
+        if button == MouseButton::Right {
+            match state {
+                ElementState::Pressed if self.is_over_picture() => self.start_looking(),
+                ElementState::Pressed => {}
+                ElementState::Released => self.stop_looking(),
+            }
+        }
+    }
+
+    fn on_wheel(&mut self, delta: MouseScrollDelta) {
+        if self.is_over_picture() {
+            self.model.navigator.wheel(match delta {
+                MouseScrollDelta::LineDelta(_, lines) => f64::from(lines),
+                MouseScrollDelta::PixelDelta(pixels) => pixels.y / PIXELS_PER_NOTCH,
+            });
+        }
+    }
+
+    /// Whether the pointer is on the picture and not on a list or text that lies over it.
+    fn is_over_picture(&mut self) -> bool {
+        let Some(graphics) = &mut self.graphics else {
+            return false;
+        };
+        let scale = graphics.window().scale_factor();
+        let pointer: PhysicalPosition<f64> = self.pointer;
+        let points = egui::pos2((pointer.x / scale) as f32, (pointer.y / scale) as f32);
+        let is_background = |layer: egui::LayerId| layer.order == egui::Order::Background;
+        let layer = graphics.interface().context().layer_id_at(points);
+        self.picture_rect.contains(points) && layer.is_none_or(is_background)
+    }
+
+    fn start_looking(&mut self) {
+        self.looking_from = Some(self.pointer);
+        if let Some(graphics) = &self.graphics {
+            let window = graphics.window();
+            // Where neither is to be had, the movements still come; the pointer just leaves the window.
+            let _ = window
+                .set_cursor_grab(CursorGrabMode::Locked)
+                .or_else(|_| window.set_cursor_grab(CursorGrabMode::Confined));
+            window.set_cursor_visible(false);
+        }
+    }
+
+    fn stop_looking(&mut self) {
+        if let Some(from) = self.looking_from.take()
+            && let Some(graphics) = &self.graphics
+        {
+            let window = graphics.window();
+            // A convenience, which not every system offers: the pointer comes back to where it was.
+            let _ = window.set_cursor_position(from);
+            let _ = window.set_cursor_grab(CursorGrabMode::None);
+            window.set_cursor_visible(true);
+        }
+    }
+}
+
+impl ApplicationHandler<News> for App {
+    fn resumed(&mut self, event_loop: &ActiveEventLoop) {
+        if self.graphics.is_none() {
+            self.open(event_loop);
+        }
+    }
+
+    fn new_events(&mut self, _: &ActiveEventLoop, cause: StartCause) {
+        if matches!(cause, StartCause::ResumeTimeReached { .. }) {
+            self.wake_at = None;
+            self.request_redraw();
+        }
+    }
+
+    fn user_event(&mut self, _: &ActiveEventLoop, news: News) {
+        if let (News::Accessibility(event), Some(graphics)) = (news, &mut self.graphics)
+            && event.window_id == graphics.window().id()
+        {
+            graphics.interface().on_accessibility(event.window_event);
+        }
+        self.request_redraw();
+    }
+
+    fn window_event(&mut self, event_loop: &ActiveEventLoop, id: WindowId, event: WindowEvent) {
+        let Some(graphics) = &mut self.graphics else {
+            return;
+        };
+        let window = Arc::clone(graphics.window());
+        if window.id() != id {
+            return;
+        }
+        // Egui counts each frame as one that needs another; the schedule knows better.
+        if graphics.interface().on_event(&window, &event) && event != WindowEvent::RedrawRequested {
+            window.request_redraw();
+        }
+        match event {
+            WindowEvent::CloseRequested => {
+                self.model.log.write(&Event::Closing);
+                event_loop.exit();
+            }
+            WindowEvent::RedrawRequested => self.redraw(event_loop),
+            WindowEvent::Resized(_) | WindowEvent::ScaleFactorChanged { .. } => {
+                graphics.resize();
+                window.request_redraw();
+            }
+            WindowEvent::Occluded(false) => window.request_redraw(),
+            WindowEvent::Focused(false) => {
+                self.stop_looking();
+                self.model.navigator.stop();
+            }
+            WindowEvent::CursorMoved { position, .. } => self.pointer = position,
+            WindowEvent::MouseInput { button, state, .. } => self.on_mouse_button(button, state),
+            WindowEvent::MouseWheel { delta, .. } => self.on_wheel(delta),
+            WindowEvent::KeyboardInput { event, .. } => self.on_key(&event),
+            _ => {}
+        }
+    }
+
+    fn device_event(&mut self, _: &ActiveEventLoop, _: DeviceId, event: DeviceEvent) {
+        if let DeviceEvent::MouseMotion { delta: (x, y) } = event
+            && self.looking_from.is_some()
+        {
+            self.model.navigator.look(DVec2::new(x, y));
+            self.request_redraw();
+        }
+    }
+
+    fn about_to_wait(&mut self, event_loop: &ActiveEventLoop) {
+        event_loop.set_control_flow(self.wake_at.map_or(ControlFlow::Wait, ControlFlow::WaitUntil));
+    }
+}

@@ -1,0 +1,127 @@
+//! What the window did, one JSON object per line: for support, and for tests that cannot look inside.
+
+use std::fs::File;
+use std::io::Write;
+use std::path::Path;
+use std::time::Instant;
+
+use serde_json::{Value, json};
+
+use super::worker::FinishedBake;
+use crate::error::{Error, Result};
+use crate::settings::BakeSettings;
+
+/// Something that happened.
+#[derive(Clone, Debug)]
+pub enum Event<'a> {
+    /// The window is open.
+    Started {
+        /// Scene in it.
+        scene: &'a str,
+        /// What draws it.
+        adapter: &'a str,
+    },
+    /// A bake was asked for.
+    Baking {
+        /// With what.
+        settings: &'a BakeSettings,
+    },
+    /// A bake is complete; its maps are in the next picture.
+    Done(&'a FinishedBake),
+    /// The bake was stopped.
+    Cancelled,
+    /// The bake failed.
+    Failed(&'a str),
+    /// A setting was changed in the panel.
+    SettingsChanged(&'a BakeSettings),
+    /// The exposure was measured [stops].
+    Exposure(f64),
+    /// Pictures since the start; written when the window comes to rest.
+    AtRest {
+        /// Pictures of the scene that were drawn.
+        pictures: u64,
+        /// Frames of the window that were shown.
+        frames: u64,
+        /// Position of the camera [m].
+        position: [f64; 3],
+    },
+    /// The graphics device was lost.
+    DeviceLost(&'a str),
+    /// A new device took its place.
+    DeviceRecovered,
+    /// The window closes.
+    Closing,
+}
+
+impl Event<'_> {
+    fn to_json(&self) -> Value {
+        match self {
+            Self::Started { scene, adapter } => {
+                json!({"event": "started", "scene": scene, "adapter": adapter})
+            }
+            Self::Baking { settings } => json!({"event": "baking", "settings": settings}),
+            Self::Done(bake) => json!({
+                "event": "done",
+                "bake_s": bake.seconds,
+                "rays": bake.result.counts.rays,
+                "splats": bake.result.counts.splats,
+                "maps": bake.result.maps.len(),
+                "settings": bake.settings,
+            }),
+            Self::Cancelled => json!({"event": "cancelled"}),
+            Self::Failed(sentence) => json!({"event": "failed", "sentence": sentence}),
+            Self::SettingsChanged(settings) => json!({"event": "settings", "settings": settings}),
+            Self::Exposure(stops) => json!({"event": "exposure", "stops": stops}),
+            Self::AtRest {
+                pictures,
+                frames,
+                position,
+            } => {
+                json!({"event": "rest", "pictures": pictures, "frames": frames, "position_m": position})
+            }
+            Self::DeviceLost(reason) => json!({"event": "device_lost", "reason": reason}),
+            Self::DeviceRecovered => json!({"event": "device_recovered"}),
+            Self::Closing => json!({"event": "closing"}),
+        }
+    }
+}
+
+/// The file, or nothing where none was asked for.
+#[derive(Debug)]
+pub struct EventLog {
+    file: Option<File>,
+    start: Instant,
+}
+
+impl EventLog {
+    /// Opens the file anew; `None` keeps no log.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn open(path: Option<&Path>) -> Result<Self> {
+        let create = |path: &Path| {
+            File::create(path).map_err(|error| {
+                Error::failure(
+                    path.display().to_string(),
+                    format!("the event log cannot be written: {error}"),
+                    "name a file in a folder that you may write to",
+                )
+            })
+        };
+        Ok(Self {
+            file: path.map(create).transpose()?,
+            start: Instant::now(),
+        })
+    }
+
+    /// Writes one line. A log that can no longer be written is given up with a warning: the window matters more.
+    pub fn write(&mut self, event: &Event<'_>) {
+        let Some(file) = &mut self.file else { return };
+        let mut line = event.to_json();
+        line["seconds"] = json!(self.start.elapsed().as_secs_f64());
+        if let Err(error) = writeln!(file, "{line}") {
+            log::warn!("the event log cannot be written any more: {error}");
+            self.file = None;
+        }
+    }
+}

@@ -1,0 +1,217 @@
+//! The window with everything that draws in it; thrown away whole and made anew when its device is lost.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use winit::dpi::LogicalSize;
+use winit::event_loop::{ActiveEventLoop, EventLoopProxy};
+use winit::window::{Window, WindowAttributes};
+
+use super::app::News;
+use super::interface::{Interface, Painting};
+use super::picture::Picture;
+use super::surface::{Acquired, Screen};
+use crate::error::{Error, Result};
+use crate::eye_pass::renderer::Renderer;
+use crate::eye_pass::{View, tone_mapping};
+use crate::gpu::Gpu;
+use crate::illumination::IlluminationMap;
+use crate::scene::Scene;
+
+/// Smallest inner size of the window [logical pixels]: the panel and a picture of its width.
+const SMALLEST: LogicalSize<u32> = LogicalSize::new(700, 400);
+/// Samples per pixel of the scene's edges.
+const SAMPLES: u32 = 4;
+
+/// Whether a frame reached the window.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Shown {
+    /// It did.
+    Yes,
+    /// The window is hidden or has no area; an event will tell when it can be seen.
+    Hidden,
+    /// Not this time: try again soon.
+    Later,
+    /// Everything has to be made anew.
+    Broken,
+}
+
+/// A window and its device.
+pub struct Graphics {
+    interface: Interface,
+    picture: Picture,
+    renderer: Renderer,
+    screen: Screen,
+    gpu: Gpu,
+}
+
+impl Graphics {
+    /// Opens a window on a scene.
+    ///
+    /// # Errors
+    /// No window or no adapter is to be had.
+    pub fn new(
+        event_loop: &ActiveEventLoop,
+        proxy: EventLoopProxy<News>,
+        scene: &Scene,
+        (width, height): (u32, u32),
+    ) -> Result<Self> {
+        // Hidden until everything is ready: assistive technology has to be told first, and nothing flashes.
+        let attributes = WindowAttributes::default()
+            .with_title(format!("Nephroid – {}", scene.name))
+            .with_inner_size(LogicalSize::new(width, height))
+            .with_min_inner_size(SMALLEST)
+            .with_visible(false);
+        let window = event_loop
+            .create_window(attributes)
+            .map_err(|error| window_error(&error.to_string()))?;
+        let window = Arc::new(window);
+        let display = Box::new(event_loop.owned_display_handle());
+        let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_with_display_handle_from_env(
+            display,
+        ));
+        let surface = instance
+            .create_surface(Arc::clone(&window))
+            .map_err(|error| window_error(&error.to_string()))?;
+        let gpu = Gpu::for_surface(instance, &surface)?;
+        let screen = Screen::new(Arc::clone(&window), surface, &gpu.adapter, &gpu.device)?;
+        let mut interface = Interface::new(event_loop, &window, proxy, &gpu.device, screen.format());
+        let picture = Picture::new(&gpu.device, interface.renderer());
+        let renderer = Renderer::new(&gpu, scene, Picture::FORMAT, SAMPLES)?;
+        window.set_visible(true);
+        Ok(Self {
+            interface,
+            picture,
+            renderer,
+            screen,
+            gpu,
+        })
+    }
+
+    /// The window.
+    pub fn window(&self) -> &Arc<Window> {
+        self.screen.window()
+    }
+
+    /// The device.
+    pub fn gpu(&self) -> &Gpu {
+        &self.gpu
+    }
+
+    /// The panel's side.
+    pub fn interface(&mut self) -> &mut Interface {
+        &mut self.interface
+    }
+
+    /// The picture's name in egui.
+    pub fn picture_id(&self) -> egui::TextureId {
+        self.picture.id()
+    }
+
+    /// The window's size changed.
+    pub fn resize(&mut self) {
+        self.screen.resize(&self.gpu.device);
+    }
+
+    /// Shows other maps from the next picture on.
+    ///
+    /// # Errors
+    /// The device cannot hold them: the old ones stay.
+    pub fn set_maps(&mut self, scene: &Scene, maps: &[IlluminationMap]) -> Result<()> {
+        self.picture.invalidate();
+        self.renderer.set_maps(&self.gpu, scene, maps)
+    }
+
+    /// Exposure that suits the picture [stops].
+    ///
+    /// # Errors
+    /// The device was lost.
+    pub fn measure_exposure(&mut self, view: &View) -> Result<f64> {
+        // An eighth of the picture's pixels tells as much about its brightness as all of them.
+        let part = View {
+            width: view.width.div_ceil(8),
+            height: view.height.div_ceil(8),
+            ..view.clone()
+        };
+        let picture = self.renderer.radiance(&self.gpu, &part)?;
+        Ok(tone_mapping::auto_exposure_stops(&picture))
+    }
+
+    /// Draws the scene where the view changed since the last time; tells whether it drew.
+    ///
+    /// # Errors
+    /// The device cannot hold a picture of that size.
+    pub fn draw_picture(&mut self, view: &View) -> Result<bool> {
+        let Self {
+            interface,
+            picture,
+            renderer,
+            gpu,
+            ..
+        } = self;
+        picture.update(&gpu.device, interface.renderer(), view, |target| {
+            let mut encoder = gpu
+                .device
+                .create_command_encoder(&wgpu::CommandEncoderDescriptor {
+                    label: Some("picture"),
+                });
+            renderer.draw(gpu, &mut encoder, target, view)?;
+            gpu.queue.submit([encoder.finish()]);
+            Ok(())
+        })
+    }
+
+    /// Shows a painting of the interface.
+    pub fn show(&mut self, painting: &mut Painting) -> Shown {
+        self.interface.upload(&self.gpu.device, &self.gpu.queue, painting);
+        let shown = self.show_frame(painting);
+        self.interface.release(painting);
+        shown
+    }
+
+    fn show_frame(&mut self, painting: &Painting) -> Shown {
+        let Self {
+            interface,
+            screen,
+            gpu,
+            ..
+        } = self;
+        if gpu.is_lost() {
+            return Shown::Broken;
+        }
+        let frame = match screen.acquire(&gpu.device, &gpu.instance) {
+            Acquired::Frame(frame) => frame,
+            Acquired::Hidden => return Shown::Hidden,
+            Acquired::Later => return Shown::Later,
+            Acquired::Broken => return Shown::Broken,
+        };
+        let target = frame.texture.create_view(&wgpu::TextureViewDescriptor::default());
+        let mut encoder = gpu
+            .device
+            .create_command_encoder(&wgpu::CommandEncoderDescriptor {
+                label: Some("window"),
+            });
+        interface.paint(
+            &gpu.device,
+            &gpu.queue,
+            &mut encoder,
+            &target,
+            screen.size(),
+            painting,
+        );
+        gpu.queue.submit([encoder.finish()]);
+        screen.present(&gpu.queue, frame);
+        Shown::Yes
+    }
+}
+
+/// How long to wait before a frame that came [`Shown::Later`] is tried again.
+pub const RETRY_AFTER: Duration = Duration::from_millis(50);
+
+fn window_error(what: &str) -> Error {
+    Error::failure(
+        "window",
+        format!("the system gives none ({what})"),
+        "check the display, or use `bake` and `render`, which need no window",
+    )
+}

@@ -1,0 +1,53 @@
+//! What keys mean.
+
+use winit::event::ElementState;
+use winit::keyboard::{Key, KeyCode, NamedKey};
+
+use super::navigation::HeldKeys;
+
+/// A key that does something once.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Shortcut {
+    /// C
+    NextCamera,
+    /// F
+    Frame,
+    /// R
+    Rebake,
+    /// H
+    Help,
+    /// Esc
+    LetGo,
+}
+
+/// Holds or releases a movement key, by its place on the keyboard, so that any layout flies with the same fingers;
+/// tells whether it is one.
+pub fn hold(keys: &mut HeldKeys, key: KeyCode, state: ElementState) -> bool {
+    let held = match key {
+        KeyCode::KeyW => &mut keys.forward,
+        KeyCode::KeyS => &mut keys.backward,
+        KeyCode::KeyA => &mut keys.left,
+        KeyCode::KeyD => &mut keys.right,
+        KeyCode::KeyE => &mut keys.up,
+        KeyCode::KeyQ => &mut keys.down,
+        KeyCode::ShiftLeft | KeyCode::ShiftRight => &mut keys.run,
+        _ => return false,
+    };
+    *held = state.is_pressed();
+    true
+}
+
+/// What a key press does, if anything, by the letter on the key.
+pub fn shortcut(key: &Key) -> Option<Shortcut> {
+    match key {
+        Key::Named(NamedKey::Escape) => Some(Shortcut::LetGo),
+        Key::Character(letter) => match letter.to_lowercase().as_str() {
+            "c" => Some(Shortcut::NextCamera),
+            "f" => Some(Shortcut::Frame),
+            "r" => Some(Shortcut::Rebake),
+            "h" => Some(Shortcut::Help),
+            _ => None,
+        },
+        _ => None,
+    }
+}

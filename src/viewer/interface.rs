@@ -1,0 +1,147 @@
+//! egui on a window: events in, triangles out.
+
+use std::time::Duration;
+
+use egui_winit::accesskit_winit;
+use winit::event::WindowEvent;
+use winit::event_loop::{ActiveEventLoop, EventLoopProxy};
+use winit::window::Window;
+
+/// egui's state for one window, and what paints it.
+pub struct Interface {
+    context: egui::Context,
+    state: egui_winit::State,
+    renderer: egui_wgpu::Renderer,
+}
+
+/// What one pass of the interface gave: to be painted once.
+pub struct Painting {
+    primitives: Vec<egui::ClippedPrimitive>,
+    textures: egui::TexturesDelta,
+    pixels_per_point: f32,
+    /// When egui wants to be shown again; zero at once.
+    pub repaint_after: Duration,
+}
+
+impl Interface {
+    /// For a window that was never shown: assistive technology has to be told before.
+    pub fn new<T: From<accesskit_winit::Event> + Send>(
+        event_loop: &ActiveEventLoop,
+        window: &Window,
+        proxy: EventLoopProxy<T>,
+        device: &wgpu::Device,
+        format: wgpu::TextureFormat,
+    ) -> Self {
+        let context = egui::Context::default();
+        super::panel::set_style(&context);
+        let mut state = egui_winit::State::new(
+            context.clone(),
+            egui::ViewportId::ROOT,
+            window,
+            Some(window.scale_factor() as f32),
+            window.theme(),
+            Some(device.limits().max_texture_dimension_2d as usize),
+        );
+        state.init_accesskit(event_loop, window, proxy);
+        let renderer = egui_wgpu::Renderer::new(device, format, egui_wgpu::RendererOptions::default());
+        Self {
+            context,
+            state,
+            renderer,
+        }
+    }
+
+    /// egui's own state.
+    pub fn context(&self) -> &egui::Context {
+        &self.context
+    }
+
+    /// Paints egui's triangles and knows its textures.
+    pub fn renderer(&mut self) -> &mut egui_wgpu::Renderer {
+        &mut self.renderer
+    }
+
+    /// Passes an event on; tells whether the window should be drawn again.
+    pub fn on_event(&mut self, window: &Window, event: &WindowEvent) -> bool {
+        self.state.on_window_event(window, event).repaint
+    }
+
+    /// What assistive technology asks for.
+    pub fn on_accessibility(&mut self, event: accesskit_winit::WindowEvent) {
+        match event {
+            accesskit_winit::WindowEvent::InitialTreeRequested => self.context.enable_accesskit(),
+            accesskit_winit::WindowEvent::ActionRequested(request) => {
+                self.state.on_accesskit_action_request(request);
+            }
+            accesskit_winit::WindowEvent::AccessibilityDeactivated => self.context.disable_accesskit(),
+        }
+    }
+
+    /// Runs one pass of the interface.
+    pub fn run(&mut self, window: &Window, show: impl FnMut(&mut egui::Ui)) -> Painting {
+        let input = self.state.take_egui_input(window);
+        let output = self.context.run_ui(input, show);
+        self.state.handle_platform_output(window, output.platform_output);
+        let repaint_after = output
+            .viewport_output
+            .get(&egui::ViewportId::ROOT)
+            .map_or(Duration::MAX, |viewport| viewport.repaint_delay);
+        Painting {
+            primitives: self.context.tessellate(output.shapes, output.pixels_per_point),
+            textures: output.textures_delta,
+            pixels_per_point: output.pixels_per_point,
+            repaint_after,
+        }
+    }
+
+    /// Takes over new textures. Has to be called for every painting, shown or not: textures come only once.
+    pub fn upload(&mut self, device: &wgpu::Device, queue: &wgpu::Queue, painting: &mut Painting) {
+        for (id, deltas) in painting.textures.set.drain() {
+            for delta in &deltas {
+                self.renderer.update_texture(device, queue, id, delta);
+            }
+        }
+    }
+
+    /// Lets old textures go, once the painting was shown or could not be.
+    pub fn release(&mut self, painting: &mut Painting) {
+        for id in painting.textures.free.drain() {
+            self.renderer.free_texture(&id);
+        }
+    }
+
+    /// Paints over the whole of `target`, which is `size` pixels large.
+    pub fn paint(
+        &mut self,
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        encoder: &mut wgpu::CommandEncoder,
+        target: &wgpu::TextureView,
+        size: [u32; 2],
+        painting: &Painting,
+    ) {
+        let descriptor = egui_wgpu::ScreenDescriptor {
+            size_in_pixels: size,
+            pixels_per_point: painting.pixels_per_point,
+        };
+        let before = self
+            .renderer
+            .update_buffers(device, queue, encoder, &painting.primitives, &descriptor);
+        queue.submit(before);
+        let pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("interface"),
+            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                view: target,
+                depth_slice: None,
+                resolve_target: None,
+                ops: wgpu::Operations {
+                    load: wgpu::LoadOp::Clear(wgpu::Color::BLACK),
+                    store: wgpu::StoreOp::Store,
+                },
+            })],
+            ..wgpu::RenderPassDescriptor::default()
+        });
+        self.renderer
+            .render(&mut pass.forget_lifetime(), &painting.primitives, &descriptor);
+    }
+}

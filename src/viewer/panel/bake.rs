@@ -1,0 +1,165 @@
+//! Section *Bake*: start, stop, progress, and what the last bake came to.
+
+use egui::{Color32, Grid, ProgressBar, RichText, Ui};
+
+use super::control::grouped;
+use super::{Facts, Panel, Wishes};
+use crate::light_pass::ledger::EnergyLedger;
+use crate::viewer::worker::{BakeState, FinishedBake};
+
+/// Text of what went wrong.
+pub const FAILED: Color32 = Color32::from_rgb(255, 120, 110);
+/// Text of what needs attention.
+pub const ATTENTION: Color32 = Color32::from_rgb(250, 190, 90);
+
+/// Shows the section.
+pub fn show(ui: &mut Ui, panel: &mut Panel, facts: &Facts<'_>, wishes: &mut Wishes) {
+    let refused = panel.settings.validate().err();
+    ui.horizontal(|ui| {
+        let rebake = ui
+            .add_enabled(refused.is_none(), egui::Button::new("Re-bake"))
+            .on_hover_text(
+                "Bakes with the settings above (R). The shown maps stay until the new ones are complete.",
+            )
+            .on_disabled_hover_text("A setting is out of its range.");
+        wishes.rebake |= rebake.clicked();
+        let cancel = ui
+            .add_enabled(facts.state.is_baking(), egui::Button::new("Cancel"))
+            .on_hover_text("Stops the bake and drops its unfinished maps; the shown maps stay.")
+            .on_disabled_hover_text("No bake is running.");
+        wishes.cancel |= cancel.clicked();
+        ui.checkbox(&mut panel.automatic, "automatic")
+            .on_hover_text("Bakes 0.15 s after the last change of a setting. Default: on.");
+    });
+    match &refused {
+        Some(error) => drop(ui.colored_label(FAILED, error.to_string())),
+        None => state_line(ui, panel, facts),
+    }
+    if let Some(last) = facts.last {
+        ui.add_space(2.0);
+        last_bake(ui, last);
+    }
+}
+
+fn state_line(ui: &mut Ui, panel: &Panel, facts: &Facts<'_>) {
+    let is_stale = facts.last.is_some_and(|last| last.settings != panel.settings);
+    match facts.state {
+        BakeState::Baking {
+            stage,
+            fraction,
+            since,
+        } => {
+            let text = format!(
+                "{} {:.0} %, {:.1} s",
+                stage.name(),
+                fraction * 100.0,
+                since.elapsed().as_secs_f64()
+            );
+            ui.add(ProgressBar::new(*fraction as f32).text(text).desired_height(18.0))
+                .on_hover_text("Share of this stage that is done, and time since the bake was asked for.");
+        }
+        BakeState::Failed(sentence) => drop(ui.colored_label(FAILED, sentence)),
+        BakeState::Cancelled => {
+            drop(ui.colored_label(ATTENTION, "Cancelled; the maps are those of an earlier bake."))
+        }
+        BakeState::Done | BakeState::Idle if is_stale => {
+            ui.colored_label(ATTENTION, "Settings changed since the last bake.");
+        }
+        BakeState::Idle => drop(ui.label("Showing maps that were baked before.")),
+        BakeState::Done => drop(ui.label("Done: the maps belong to these settings.")),
+    }
+}
+
+fn last_bake(ui: &mut Ui, last: &FinishedBake) {
+    let FinishedBake { result, seconds, .. } = last;
+    let hover = format!(
+        "From request to maps. Build {:.2} s, plan {:.2} s, trace {:.2} s, deposit {:.2} s; \
+         {:.2} s of CPU over all threads.",
+        result.timings_s.build,
+        result.timings_s.plan,
+        result.timings_s.trace,
+        result.timings_s.deposit,
+        result.cpu_s.total,
+    );
+    ui.label(format!(
+        "{seconds:.2} s, {} maps, {} rays, {} splats",
+        result.maps.len(),
+        grouped(result.counts.rays),
+        grouped(result.counts.splats)
+    ))
+    .on_hover_text(hover);
+    let total = result
+        .ledgers
+        .iter()
+        .fold(EnergyLedger::default(), |sum, light| add(sum, &light.energy_w));
+    if total.emitted > 0.0 {
+        ledger(ui, &total);
+    } else {
+        ui.label(RichText::new("No light meets glass, a mirror or water.").weak());
+    }
+}
+
+fn ledger(ui: &mut Ui, total: &EnergyLedger) {
+    let lines = [
+        (
+            "Emitted",
+            total.emitted,
+            "Flux of the lamps whose first hit is glass, a mirror or water.",
+        ),
+        (
+            "Deposited",
+            total.deposited,
+            "Flux that fell on diffuse surfaces, before their albedo.",
+        ),
+        ("Escaped", total.escaped, "Flux that left the scene."),
+        (
+            "Absorbed",
+            total.absorbed,
+            "Flux taken by metals, tints and volumes.",
+        ),
+        (
+            "Truncated",
+            total.truncated.total(),
+            "Flux that the bake gave up: depth limit, branch threshold, unresolved.",
+        ),
+    ];
+    Grid::new("ledger")
+        .num_columns(3)
+        .spacing([14.0, 1.0])
+        .show(ui, |ui| {
+            for (name, watts, hover) in lines {
+                ui.label(name).on_hover_text(hover);
+                ui.label(format!("{watts:.6} W")).on_hover_text(hover);
+                ui.label(format!("{:.2} %", 100.0 * watts / total.emitted))
+                    .on_hover_text("Of what was emitted.");
+                ui.end_row();
+            }
+            let imbalance = total.relative_imbalance();
+            let text = RichText::new(format!("{imbalance:.1e}"));
+            let hover = "|emitted − sum of the others| / emitted; below 1e-6 the account is closed.";
+            ui.label("Imbalance").on_hover_text(hover);
+            ui.label(if imbalance < 1e-6 {
+                text
+            } else {
+                text.color(FAILED)
+            })
+            .on_hover_text(hover);
+            ui.end_row();
+        });
+}
+
+fn add(a: EnergyLedger, b: &EnergyLedger) -> EnergyLedger {
+    let mut truncated = a.truncated;
+    truncated.depth += b.truncated.depth;
+    truncated.threshold += b.truncated.threshold;
+    truncated.non_finite += b.truncated.non_finite;
+    truncated.unresolved += b.truncated.unresolved;
+    truncated.quadrature += b.truncated.quadrature;
+    EnergyLedger {
+        emitted: a.emitted + b.emitted,
+        deposited: a.deposited + b.deposited,
+        absorbed: a.absorbed + b.absorbed,
+        escaped: a.escaped + b.escaped,
+        truncated,
+    }
+}

@@ -1,0 +1,187 @@
+//! The side panel: settings of the bake, its state, and how the picture shows it. Knows egui, but no window.
+
+mod bake;
+pub mod control;
+mod display;
+mod effects;
+mod help;
+mod light_pass;
+
+use egui::{CollapsingHeader, Frame, Margin, RichText, ScrollArea, Ui};
+
+use super::worker::{BakeState, FinishedBake};
+use crate::error::Warning;
+use crate::eye_pass::ToneMap;
+use crate::plan::EffectPlan;
+use crate::scene::Scene;
+use crate::settings::{BakeSettings, LayerKind};
+
+/// Width of the panel [points].
+pub const WIDTH: f32 = 344.0;
+
+/// Which layer the picture shows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum LayerShown {
+    /// The sum of what was baked.
+    #[default]
+    All,
+    /// One layer alone.
+    Only(LayerKind),
+}
+
+/// How the picture shows the maps.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Display {
+    /// Radiance is multiplied by 2^stops.
+    pub exposure_stops: f64,
+    /// After the exposure.
+    pub tone_map: ToneMap,
+    /// Which light.
+    pub layer: LayerShown,
+}
+
+/// What the user can set.
+#[derive(Clone, Debug)]
+pub struct Panel {
+    /// Of the next bake.
+    pub settings: BakeSettings,
+    /// Whether a change of a setting bakes by itself.
+    pub automatic: bool,
+    /// Of the picture.
+    pub display: Display,
+    /// Whether the list of keys is open.
+    pub help_open: bool,
+}
+
+/// What the panel tells.
+#[derive(Clone, Copy, Debug)]
+pub struct Facts<'a> {
+    /// The scene in the window.
+    pub scene: &'a Scene,
+    /// Where the bake stands.
+    pub state: &'a BakeState,
+    /// The bake that the picture shows.
+    pub last: Option<&'a FinishedBake>,
+    /// Layers of the maps that the picture shows.
+    pub layers: &'a [LayerKind],
+    /// Flying speed [m/s].
+    pub speed_m_per_s: f64,
+    /// What draws the picture.
+    pub adapter: &'a str,
+}
+
+/// What the user pressed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Wishes {
+    /// Bake now.
+    pub rebake: bool,
+    /// Stop the bake.
+    pub cancel: bool,
+    /// Choose the exposure from the picture.
+    pub measure_exposure: bool,
+}
+
+/// Dark, since the picture beside it is what is to be judged; without animations, so that an idle window rests.
+pub fn set_style(context: &egui::Context) {
+    context.set_theme(egui::Theme::Dark);
+    context.all_styles_mut(|style| {
+        style.animation_time = 0.0;
+        style.interaction.tooltip_delay = 0.3;
+    });
+}
+
+impl Wishes {
+    /// What was pressed here or there.
+    pub fn and(self, other: Self) -> Self {
+        Self {
+            rebake: self.rebake || other.rebake,
+            cancel: self.cancel || other.cancel,
+            measure_exposure: self.measure_exposure || other.measure_exposure,
+        }
+    }
+}
+
+impl Panel {
+    /// A panel with these settings, everything else at its default.
+    pub fn new(settings: BakeSettings) -> Self {
+        Self {
+            settings,
+            automatic: true,
+            display: Display::default(),
+            help_open: false,
+        }
+    }
+
+    /// Shows the panel at the left and returns what was pressed.
+    pub fn show(&mut self, ui: &mut Ui, facts: &Facts<'_>) -> Wishes {
+        let mut wishes = Wishes::default();
+        let frame = Frame::side_top_panel(ui.style()).inner_margin(Margin::symmetric(10, 8));
+        egui::Panel::left("panel")
+            .exact_size(WIDTH)
+            .resizable(false)
+            .frame(frame)
+            .show(ui, |ui| {
+                ScrollArea::vertical()
+                    .auto_shrink(false)
+                    .show(ui, |ui| self.sections(ui, facts, &mut wishes));
+            });
+        wishes
+    }
+
+    fn sections(&mut self, ui: &mut Ui, facts: &Facts<'_>, wishes: &mut Wishes) {
+        ui.spacing_mut().item_spacing.y = 3.0;
+        title(ui, facts);
+        section(ui, "Light pass", true, |ui| {
+            light_pass::show(ui, &mut self.settings)
+        });
+        section(ui, "Bake", true, |ui| bake::show(ui, self, facts, wishes));
+        section(ui, "Display", true, |ui| {
+            display::show(ui, &mut self.display, facts.layers, wishes)
+        });
+        let plan: Option<&EffectPlan> = facts.last.map(|last| &last.result.plan);
+        section(ui, "Effects", false, |ui| effects::show(ui, plan));
+        let baked: &[Warning] = facts.last.map_or(&[], |last| &last.result.warnings);
+        let warnings: Vec<_> = facts.scene.warnings.iter().chain(baked).collect();
+        if !warnings.is_empty() {
+            section(ui, &format!("Warnings ({})", warnings.len()), false, |ui| {
+                list(ui, &warnings)
+            });
+        }
+        let help = CollapsingHeader::new(RichText::new("Help").strong())
+            .open(Some(self.help_open))
+            .show(ui, |ui| help::show(ui, facts.speed_m_per_s));
+        if help.header_response.on_hover_text("The keys (H).").clicked() {
+            self.help_open = !self.help_open;
+        }
+    }
+}
+
+fn title(ui: &mut Ui, facts: &Facts<'_>) {
+    let scene = facts.scene;
+    ui.heading(&scene.name).on_hover_text(&scene.source);
+    ui.label(
+        RichText::new(format!(
+            "{} objects, {} triangles, {} lights",
+            scene.objects.len(),
+            control::grouped(scene.triangle_count() as u64),
+            scene.lights.len()
+        ))
+        .weak(),
+    )
+    .on_hover_text(format!("Drawn by {}.", facts.adapter));
+}
+
+fn section(ui: &mut Ui, name: &str, open: bool, add: impl FnOnce(&mut Ui)) {
+    // The text may carry a count; the section stays the same one.
+    let id = name.split(" (").next().unwrap_or(name);
+    CollapsingHeader::new(RichText::new(name).strong())
+        .id_salt(id)
+        .default_open(open)
+        .show_unindented(ui, add);
+}
+
+fn list(ui: &mut Ui, warnings: &[&Warning]) {
+    for warning in warnings {
+        ui.colored_label(bake::ATTENTION, warning.to_string());
+    }
+}

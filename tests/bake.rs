@@ -1,0 +1,14 @@
+//! Bakes of reference scenes: against an independent solver, against the law of energy, against themselves.
+
+#[path = "bake/energy.rs"]
+mod energy;
+#[path = "bake/invariance.rs"]
+mod invariance;
+#[path = "bake/layers.rs"]
+mod layers;
+#[path = "bake/reference.rs"]
+mod reference;
+#[path = "support/mod.rs"]
+mod support;
+#[path = "bake/tools.rs"]
+mod tools;

@@ -1,0 +1,122 @@
+//! What must not change a map: threads, other things in the scene, the order of objects.
+
+use nephroid::illumination::IlluminationMap;
+use nephroid::optics::LinearSrgb;
+use nephroid::scene::{Light, LightKind};
+use nephroid::settings::{BakeSettings, MapResolution, RayPlacement};
+use nephroid::units::RadiantIntensity;
+
+use crate::tools::{bake, builtin_scene, caustic, map_of, settings};
+
+fn bits(map: &IlluminationMap) -> Vec<u32> {
+    map.layers
+        .iter()
+        .flat_map(|layer| &layer.irradiance)
+        .flatten()
+        .map(|e| e.to_bits())
+        .collect()
+}
+
+#[test]
+fn any_number_of_threads_gives_the_same_bits() {
+    for (name, rays) in [("ring", RayPlacement::Lattice), ("ball", RayPlacement::Jittered)] {
+        let with = |threads| {
+            let settings = BakeSettings {
+                threads,
+                rays,
+                map_resolution: MapResolution::Auto,
+                ..settings(2e4, 0)
+            };
+            bake(builtin_scene(name), &settings)
+        };
+        let one = with(1);
+        for threads in [2, 4, 7] {
+            let many = with(threads);
+            assert_eq!(one.counts, many.counts, "{name}, {threads} threads");
+            assert_eq!(one.ledgers, many.ledgers, "{name}, {threads} threads");
+            assert_eq!(one.maps.len(), many.maps.len());
+            for (a, b) in one.maps.iter().zip(&many.maps) {
+                assert!(bits(a) == bits(b), "{name}: {threads} threads give another map");
+            }
+        }
+    }
+}
+
+#[test]
+fn lights_that_see_nothing_specular_change_no_bit() {
+    let settings = settings(1e4, 64);
+    let alone = builtin_scene("mirror");
+    let mut with_lamps = alone.clone();
+    // Below the floor, where the mirror is not.
+    for lamp in 0..3 {
+        with_lamps.lights.push(Light {
+            name: format!("cellar {lamp}"),
+            colour: LinearSrgb::WHITE,
+            kind: LightKind::Spot {
+                position: glam::DVec3::new(0.1 * f64::from(lamp), -1.0, 0.0),
+                direction: glam::DVec3::NEG_Y,
+                intensity: RadiantIntensity(50.0),
+                inner_cone_rad: 0.2,
+                outer_cone_rad: 0.5,
+            },
+        });
+    }
+    let (a, b) = (
+        bake(alone.clone(), &settings),
+        bake(with_lamps.clone(), &settings),
+    );
+    assert!(bits(map_of(&a, &alone, "floor")) == bits(map_of(&b, &with_lamps, "floor")));
+}
+
+#[test]
+fn the_order_of_objects_changes_no_bit() {
+    let settings = settings(1e4, 64);
+    let scene = builtin_scene("slab");
+    let mut reversed = scene.clone();
+    reversed.objects.reverse();
+    let (a, b) = (bake(scene.clone(), &settings), bake(reversed.clone(), &settings));
+    assert!(bits(map_of(&a, &scene, "floor")) == bits(map_of(&b, &reversed, "floor")));
+}
+
+#[test]
+fn two_lights_give_the_sum_of_their_maps() {
+    let settings = settings(1e4, 64);
+    let scene = builtin_scene("mirror");
+    let mut other = scene.clone();
+    other.lights[0].kind = other.lights[0].kind.moved(glam::DVec3::new(-0.2, 0.3, -0.4));
+    let mut both = scene.clone();
+    both.lights.extend(other.lights.clone());
+    let maps: Vec<Vec<f64>> = [&scene, &other, &both]
+        .map(|scene| caustic(map_of(&bake(scene.clone(), &settings), scene, "floor")))
+        .to_vec();
+    let mut lit = 0;
+    for texel in 0..maps[0].len() {
+        let sum = maps[0][texel] + maps[1][texel];
+        assert!(
+            (maps[2][texel] - sum).abs() <= 1e-6 * sum.max(1e-6),
+            "texel {texel}"
+        );
+        lit += usize::from(maps[0][texel] > 0.0 && maps[1][texel] > 0.0);
+    }
+    assert!(
+        lit > 50,
+        "both lights must reach some of the same texels, only {lit} are"
+    );
+}
+
+#[test]
+fn power_of_two_changes_of_power_are_exact() {
+    let settings = settings(1e4, 64);
+    let scene = builtin_scene("mirror");
+    let mut bright = scene.clone();
+    let LightKind::Point { intensity, .. } = &mut bright.lights[0].kind else {
+        panic!("a point light")
+    };
+    *intensity = *intensity * 1024.0;
+    let (a, b) = (bake(scene.clone(), &settings), bake(bright.clone(), &settings));
+    let (a, b) = (
+        caustic(map_of(&a, &scene, "floor")),
+        caustic(map_of(&b, &bright, "floor")),
+    );
+    assert!(a.iter().zip(&b).all(|(a, b)| a * 1024.0 == *b));
+}

@@ -1,0 +1,49 @@
+//! Map sizes, and what is not baked.
+
+use nephroid::plan::Effect;
+use nephroid::session::StopReason;
+use nephroid::settings::{BakeSettings, MapResolution};
+
+use crate::tools::{bake, builtin_scene, energy_fault, map_of, settings};
+
+#[test]
+fn automatic_maps_grow_with_the_density() {
+    let scene = builtin_scene("ring");
+    let mut last = 0;
+    for density in [1e3, 1.6e4, 2.56e5] {
+        let settings = BakeSettings {
+            map_resolution: MapResolution::Auto,
+            ..settings(density, 0)
+        };
+        let result = bake(scene.clone(), &settings);
+        let map = map_of(&result, &scene, "floor");
+        assert!(
+            map.width() > last,
+            "density {density}: {} after {last} texels",
+            map.width()
+        );
+        assert_eq!(map.width(), map.height(), "the floor is square");
+        // No coarser than the footprints: a texel for every ray, about.
+        assert!((map.width() * map.height()) as u64 >= result.counts.splats / 4);
+        assert_eq!(energy_fault(&result), None);
+        last = map.width();
+    }
+}
+
+#[test]
+fn without_light_or_anything_specular_nothing_is_traced_or_allocated() {
+    let mut dark = builtin_scene("ring");
+    dark.lights.clear();
+    let mut dull = builtin_scene("ring");
+    dull.objects.retain(|object| object.name == "floor");
+    let mut nowhere = builtin_scene("ring");
+    nowhere.objects.retain(|object| object.name != "floor");
+    for (case, scene) in [("dark", dark), ("dull", dull), ("nowhere", nowhere)] {
+        let result = bake(scene, &settings(1e4, 64));
+        assert_eq!(result.counts.rays, 0, "{case}");
+        assert_eq!(result.counts.segments, 0, "{case}");
+        assert!(result.maps.is_empty(), "{case}");
+        assert_eq!(result.stop_reason, StopReason::NothingToDo, "{case}");
+        assert!(!result.plan.is_on(Effect::LightPass), "{case}");
+    }
+}

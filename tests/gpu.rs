@@ -1,0 +1,17 @@
+//! The graphics device: shaders, struct layouts, and pictures of known radiance.
+//!
+//! An adapter is required, a software one will do: with CI=true its absence is a failure, else a skip that says so.
+#![cfg(feature = "gpu")]
+
+mod support;
+
+#[path = "gpu/device.rs"]
+mod device;
+#[path = "gpu/display.rs"]
+mod display;
+#[path = "gpu/radiance.rs"]
+mod radiance;
+#[path = "gpu/scenes.rs"]
+mod scenes;
+#[path = "gpu/shaders.rs"]
+mod shaders;

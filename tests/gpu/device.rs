@@ -1,0 +1,60 @@
+//! The adapter that the tests share the need of.
+
+use nephroid::gpu::Gpu;
+
+use crate::support::skip;
+
+/// A device, or `None` after a counted skip where there is no adapter.
+pub fn gpu() -> Option<Gpu> {
+    Gpu::headless()
+        .map_err(|error| {
+            let test = std::thread::current().name().unwrap_or("?").to_owned();
+            skip(&test, &error.to_string());
+        })
+        .ok()
+}
+
+#[test]
+fn adapter_has_a_name_and_no_fault() {
+    let Some(gpu) = gpu() else { return };
+    assert!(!gpu.adapter_name().is_empty());
+    assert_eq!(gpu.take_error(), None);
+    assert!(!gpu.is_lost());
+    gpu.wait().expect("an idle device is fine");
+}
+
+#[test]
+fn faults_are_kept_and_do_not_panic() {
+    let Some(gpu) = gpu() else { return };
+    // A buffer with contradicting usages: refused by validation.
+    let _ = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+        label: None,
+        size: 16,
+        usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::VERTEX,
+        mapped_at_creation: false,
+    });
+    let error = gpu.take_error().expect("the fault was recorded");
+    assert!(!error.to_string().contains('\n'), "one sentence: {error}");
+    assert_eq!(gpu.take_error(), None, "a fault is handed out once");
+}
+
+#[test]
+fn a_destroyed_device_is_lost_and_says_so() {
+    let Some(gpu) = gpu() else { return };
+    gpu.device.destroy();
+    let _ = gpu.wait();
+    assert!(gpu.is_lost());
+}
+
+#[test]
+fn sizes_beyond_the_device_are_refused_in_one_sentence() {
+    let Some(gpu) = gpu() else { return };
+    let limit = gpu.limits().max_texture_dimension_2d;
+    assert!(gpu.check_texture_size("picture", limit, 1).is_ok());
+    for (width, height) in [(limit + 1, 1), (1, limit + 1), (0, 1), (1, 0)] {
+        let error = gpu
+            .check_texture_size("picture", width, height)
+            .expect_err("no texture is like that");
+        assert!(error.to_string().contains(&limit.to_string()), "{error}");
+    }
+}

@@ -1,0 +1,293 @@
+//! Pictures of scenes whose radiance is known.
+
+use glam::DVec2;
+use nephroid::eye_pass::renderer::{Renderer, render_offscreen};
+use nephroid::eye_pass::{Picture, View};
+use nephroid::gpu::Gpu;
+use nephroid::illumination::IlluminationMap;
+use nephroid::optics::{LinearSrgb, fresnel};
+use nephroid::scene::{Material, Scene, SurfaceKind};
+
+use crate::device::gpu;
+use crate::scenes::{
+    diffuse, floor, floor_map, floor_scene, four_colours, from_above, lambert, texture_reference,
+};
+
+/// Rounding of one half float, relative; the map and the picture are one each.
+const HALF_ROUNDING: f64 = 1.0 / 2048.0;
+
+fn render(gpu: &Gpu, scene: &Scene, maps: &[IlluminationMap], view: &View) -> Picture {
+    let picture = render_offscreen(gpu, scene, maps, view, 1).expect("it renders");
+    assert_eq!(gpu.take_error(), None);
+    assert_eq!(picture.radiance.len(), (view.width * view.height) as usize);
+    picture
+}
+
+#[track_caller]
+fn assert_close(found: [f32; 3], expected: [f64; 3], relative: f64) {
+    for channel in 0..3 {
+        let (found, expected) = (f64::from(found[channel]), expected[channel]);
+        assert!(
+            (found - expected).abs() <= relative * expected.abs(),
+            "{found} instead of {expected}"
+        );
+    }
+}
+
+#[test]
+fn an_empty_scene_shows_the_background() {
+    let Some(gpu) = gpu() else { return };
+    let background = LinearSrgb::new(0.25, 3.0, 1e5);
+    // A width whose rows are no multiple of the copy's alignment.
+    let view = View {
+        width: 7,
+        height: 3,
+        background,
+        ..from_above(1)
+    };
+    for samples in [1, 4] {
+        let picture = render_offscreen(&gpu, &Scene::default(), &[], &view, samples).expect("it renders");
+        assert_eq!(picture.radiance.len(), 21);
+        for pixel in picture.radiance {
+            assert_close(pixel, background.to_array(), HALF_ROUNDING);
+        }
+    }
+    assert_eq!(gpu.take_error(), None);
+}
+
+#[test]
+fn a_uniformly_lit_floor_sends_albedo_times_irradiance_over_pi() {
+    let Some(gpu) = gpu() else { return };
+    let albedo = LinearSrgb::new(0.8, 0.5, 0.25);
+    let scene = floor_scene(diffuse(albedo));
+    let irradiance = [3.0_f32, 1.0, 0.125];
+    let maps = [floor_map(0, 3, 5, vec![irradiance; 15])];
+    let picture = render(&gpu, &scene, &maps, &from_above(16));
+    let expected = [lambert(0.8, 3.0), lambert(0.5, 1.0), lambert(0.25, 0.125)];
+    for pixel in picture.radiance {
+        assert_close(pixel, expected, 2.0 * HALF_ROUNDING);
+    }
+}
+
+#[test]
+fn layers_of_a_map_add_up() {
+    let Some(gpu) = gpu() else { return };
+    let scene = floor_scene(diffuse(LinearSrgb::WHITE));
+    let mut map = floor_map(0, 1, 1, vec![[1.0; 3]]);
+    let mut direct = map.layers[0].clone();
+    direct.kind = nephroid::settings::LayerKind::Direct;
+    direct.irradiance = vec![[2.0; 3]];
+    map.layers.push(direct);
+    let picture = render(&gpu, &scene, &[map], &from_above(2));
+    assert_close(picture.radiance[0], [lambert(1.0, 3.0); 3], 2.0 * HALF_ROUNDING);
+}
+
+#[test]
+fn peaks_beyond_half_floats_and_what_is_dim_beside_them_both_survive() {
+    let Some(gpu) = gpu() else { return };
+    let scene = floor_scene(diffuse(LinearSrgb::WHITE));
+    let maps = [floor_map(0, 2, 1, vec![[1e6; 3], [0.5; 3]])];
+    let picture = render(&gpu, &scene, &maps, &from_above(8));
+    // Outermost pixels lie beyond the texel centres, where nothing is interpolated.
+    assert_close(picture.radiance[0], [lambert(1.0, 1e6); 3], 2.0 * HALF_ROUNDING);
+    assert_close(picture.radiance[7], [lambert(1.0, 0.5); 3], 2.0 * HALF_ROUNDING);
+}
+
+#[test]
+fn a_bright_texel_shows_where_the_chart_puts_it() {
+    let Some(gpu) = gpu() else { return };
+    let scene = floor_scene(diffuse(LinearSrgb::WHITE));
+    let (width, height, column, row) = (4, 8, 3, 1);
+    let mut irradiance = vec![[0.0; 3]; width * height];
+    irradiance[row * width + column] = [1.0; 3];
+    let view = from_above(64);
+    let picture = render(&gpu, &scene, &[floor_map(0, width, height, irradiance)], &view);
+    let (mut sum, mut weight) = (DVec2::ZERO, 0.0);
+    for (index, pixel) in picture.radiance.iter().enumerate() {
+        let uv = DVec2::new((index % 64) as f64 + 0.5, (index / 64) as f64 + 0.5) / 64.0;
+        // Bilinear between texel centres, held at the border: hats of one texel's width.
+        let texel = uv * DVec2::new(width as f64, height as f64) - 0.5;
+        let across = (1.0 - (texel.x.clamp(0.0, width as f64 - 1.0) - column as f64).abs()).max(0.0);
+        let down = (1.0 - (texel.y.clamp(0.0, height as f64 - 1.0) - row as f64).abs()).max(0.0);
+        let expected = lambert(1.0, across * down);
+        let found = f64::from(pixel[0]);
+        assert!(
+            (found - expected).abs() <= 1e-3,
+            "{uv}: {found} instead of {expected}"
+        );
+        sum += uv * found;
+        weight += found;
+    }
+    assert!(weight > 0.0);
+    let centre = sum / weight;
+    assert!(centre.x > 0.75 && centre.y > 0.1 && centre.y < 0.3, "{centre}");
+}
+
+#[test]
+fn base_colour_images_multiply_and_lie_as_gltf_says() {
+    let Some(gpu) = gpu() else { return };
+    let mut scene = floor_scene(Material {
+        base_colour_texture: Some(texture_reference()),
+        ..diffuse(LinearSrgb::grey(0.5))
+    });
+    scene.textures.push(four_colours());
+    let maps = [floor_map(0, 1, 1, vec![[1.0; 3]])];
+    let picture = render(&gpu, &scene, &maps, &from_above(8));
+    let at = |x: usize, y: usize| picture.radiance[y * 8 + x];
+    let half = lambert(0.5, 1.0);
+    for ((x, y), expected) in [
+        ((0, 0), [half, 0.0, 0.0]),
+        ((7, 0), [0.0, half, 0.0]),
+        ((0, 7), [0.0, 0.0, half]),
+        ((7, 7), [half, half, half]),
+    ] {
+        assert_close(at(x, y), expected, 2.0 * HALF_ROUNDING);
+    }
+}
+
+#[test]
+fn surfaces_without_a_map_are_black_and_emission_shows() {
+    let Some(gpu) = gpu() else { return };
+    let scene = floor_scene(diffuse(LinearSrgb::WHITE));
+    let mut view = from_above(4);
+    view.background = LinearSrgb::grey(1.0);
+    assert_eq!(render(&gpu, &scene, &[], &view).radiance, vec![[0.0; 3]; 16]);
+
+    let emitted = LinearSrgb::new(2.0, 0.0, 7.0);
+    let scene = floor_scene(Material {
+        emitted_radiance: emitted,
+        ..diffuse(LinearSrgb::WHITE)
+    });
+    for pixel in render(&gpu, &scene, &[], &view).radiance {
+        assert_close(pixel, emitted.to_array(), HALF_ROUNDING);
+    }
+}
+
+#[test]
+fn the_nearer_floor_hides_the_farther_one_whatever_their_order() {
+    let Some(gpu) = gpu() else { return };
+    for (first, second) in [(0.0, 1e-4), (1e-4, 0.0)] {
+        let mut scene = floor_scene(diffuse(LinearSrgb::WHITE));
+        scene.objects = vec![floor("first", 0, first), floor("second", 0, second)];
+        let upper = if first > second { 0 } else { 1 };
+        let map = |object| floor_map(object, 1, 1, vec![[if object == upper { 1.0 } else { 0.25 }; 3]]);
+        let picture = render(&gpu, &scene, &[map(0), map(1)], &from_above(8));
+        for pixel in picture.radiance {
+            assert_close(pixel, [lambert(1.0, 1.0); 3], 2.0 * HALF_ROUNDING);
+        }
+    }
+}
+
+#[test]
+fn a_pane_dims_what_is_behind_it_by_its_transmittance() {
+    let Some(gpu) = gpu() else { return };
+    let tint = LinearSrgb::new(1.0, 0.5, 0.25);
+    let mut scene = floor_scene(diffuse(LinearSrgb::WHITE));
+    scene.materials.push(Material {
+        surface: SurfaceKind::ThinWall,
+        base_colour: tint,
+        ior: 1.5,
+        ..Default::default()
+    });
+    scene.objects.insert(0, floor("pane", 1, 0.5));
+    // A map on the floor only; the view's background is black, and so is what the pane reflects upwards.
+    let picture = render(
+        &gpu,
+        &scene,
+        &[floor_map(1, 1, 1, vec![[1.0; 3]])],
+        &from_above(65),
+    );
+    let transmittance = 1.0 - fresnel::thin_wall_reflectance(1.0, 1.5);
+    let centre = picture.radiance[65 * 32 + 32];
+    assert_close(
+        centre,
+        tint.to_array()
+            .map(|channel| channel * transmittance * lambert(1.0, 1.0)),
+        4.0 * HALF_ROUNDING,
+    );
+}
+
+#[test]
+fn radiance_falls_by_the_square_of_the_index_into_a_body_and_rises_out_of_it() {
+    let Some(gpu) = gpu() else { return };
+    let water = Material {
+        surface: SurfaceKind::Dielectric,
+        ior: 1.33,
+        base_colour: LinearSrgb::WHITE,
+        ..Default::default()
+    };
+    let mut scene = floor_scene(diffuse(LinearSrgb::WHITE));
+    scene.materials.push(water);
+    scene.objects.push(floor("surface of water", 1, 0.5));
+    let maps = [floor_map(0, 1, 1, vec![[1.0; 3]])];
+    let centre = |scene: &Scene| render(&gpu, scene, &maps, &from_above(65)).radiance[65 * 32 + 32];
+    let transmittance = 1.0 - fresnel::dielectric_reflectance(1.0, 1.33);
+    let under_water = lambert(1.0, 1.0) * transmittance / (1.33 * 1.33);
+    assert_close(centre(&scene), [under_water; 3], 4.0 * HALF_ROUNDING);
+
+    // A second surface, facing down: the floor lies below a slab.
+    let mut lower = floor("lower face", 1, 0.25);
+    lower
+        .mesh
+        .triangles
+        .iter_mut()
+        .for_each(|triangle| triangle.swap(1, 2));
+    lower
+        .mesh
+        .normals
+        .iter_mut()
+        .for_each(|normal| *normal = -*normal);
+    scene.objects.push(lower);
+    let through_slab = lambert(1.0, 1.0) * transmittance * transmittance;
+    assert_close(centre(&scene), [through_slab; 3], 6.0 * HALF_ROUNDING);
+}
+
+#[test]
+fn maps_can_be_replaced_and_bad_ones_leave_the_old_in_place() {
+    let Some(gpu) = gpu() else { return };
+    let scene = floor_scene(diffuse(LinearSrgb::WHITE));
+    let mut renderer =
+        Renderer::new(&gpu, &scene, wgpu::TextureFormat::Rgba8Unorm, 4).expect("the scene is uploaded");
+    let mut shown = |maps: &[IlluminationMap]| {
+        let set = renderer.set_maps(&gpu, &scene, maps);
+        (
+            set,
+            renderer
+                .radiance(&gpu, &from_above(4))
+                .expect("it renders")
+                .radiance[5],
+        )
+    };
+    let (set, pixel) = shown(&[floor_map(0, 1, 1, vec![[1.0; 3]])]);
+    assert_eq!(set, Ok(()));
+    assert_close(pixel, [lambert(1.0, 1.0); 3], 2.0 * HALF_ROUNDING);
+    for wrong in [
+        floor_map(1, 1, 1, vec![[5.0; 3]]),
+        floor_map(0, 1 << 20, 1, vec![[5.0; 3]; 1 << 20]),
+    ] {
+        let (set, pixel) = shown(&[wrong]);
+        assert!(set.is_err());
+        assert_close(pixel, [lambert(1.0, 1.0); 3], 2.0 * HALF_ROUNDING);
+    }
+    let (set, pixel) = shown(&[]);
+    assert_eq!((set, pixel), (Ok(()), [0.0; 3]));
+    assert_eq!(gpu.take_error(), None);
+}
+
+#[test]
+fn pictures_that_no_device_holds_are_refused() {
+    let Some(gpu) = gpu() else { return };
+    let view = View {
+        width: 1 << 24,
+        ..from_above(1)
+    };
+    let error = render_offscreen(&gpu, &Scene::default(), &[], &view, 1).expect_err("too wide");
+    assert!(error.to_string().starts_with("picture: 16777216×1 "), "{error}");
+    let empty = View {
+        width: 0,
+        ..from_above(1)
+    };
+    assert!(render_offscreen(&gpu, &Scene::default(), &[], &empty, 1).is_err());
+    assert!(render_offscreen(&gpu, &Scene::default(), &[], &from_above(1), 3).is_err());
+    assert_eq!(gpu.take_error(), None);
+}

@@ -1,0 +1,128 @@
+//! Every shader is valid, and lays out its structs as Rust does.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+
+use naga::valid::{Capabilities, ValidationFlags, Validator};
+use nephroid::eye_pass::renderer::{programs, shared_structs};
+
+fn modules() -> Vec<(String, naga::Module)> {
+    let programs = programs();
+    assert!(!programs.is_empty(), "there are shaders to validate");
+    let parse = |program: &nephroid::gpu::shader::Program| {
+        let text = program.wgsl();
+        let module = naga::front::wgsl::parse_str(&text)
+            .unwrap_or_else(|error| panic!("{}: {}", program.name, error.emit_to_string(&text)));
+        (program.name.to_owned(), module)
+    };
+    programs.iter().map(parse).collect()
+}
+
+#[test]
+fn every_program_is_valid_without_any_optional_capability() {
+    for (name, module) in modules() {
+        let mut validator = Validator::new(ValidationFlags::all(), Capabilities::empty());
+        validator
+            .validate(&module)
+            .unwrap_or_else(|error| panic!("{name}: {error:?}"));
+        assert!(!module.entry_points.is_empty(), "{name} draws something");
+    }
+}
+
+#[test]
+fn every_shader_file_is_part_of_a_program() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("shaders");
+    let mut files = BTreeSet::new();
+    for folder in std::fs::read_dir(&root).expect("there are shaders") {
+        let folder = folder.expect("readable").path();
+        for file in std::fs::read_dir(&folder).expect("shaders/ holds folders only") {
+            let path = file.expect("readable").path();
+            let name = path.strip_prefix(&root).expect("below it").with_extension("");
+            files.insert(name.to_string_lossy().into_owned());
+        }
+    }
+    let used: BTreeSet<String> = programs()
+        .iter()
+        .flat_map(|program| program.sources)
+        .map(|source| source.name.to_owned())
+        .collect();
+    assert!(!files.is_empty());
+    assert_eq!(files, used);
+}
+
+#[test]
+fn structs_lie_the_same_in_rust_and_in_the_shaders() {
+    let mut found = BTreeMap::new();
+    for (program, module) in modules() {
+        for (_, ty) in module.types.iter() {
+            let naga::TypeInner::Struct { members, span } = &ty.inner else {
+                continue;
+            };
+            let name = ty.name.clone().unwrap_or_default();
+            let is_uniform = module.global_variables.iter().any(|(_, variable)| {
+                variable.space == naga::AddressSpace::Uniform && module.types[variable.ty].name == ty.name
+            });
+            if is_uniform {
+                let fields: Vec<_> = members
+                    .iter()
+                    .map(|m| (m.name.clone().unwrap_or_default(), m.offset as usize))
+                    .collect();
+                found.insert(name, (program.clone(), *span as usize, fields));
+            }
+        }
+    }
+    let shared = shared_structs();
+    let names: BTreeSet<&str> = shared.iter().map(|layout| layout.name).collect();
+    assert!(!names.is_empty());
+    assert_eq!(
+        names,
+        found.keys().map(String::as_str).collect(),
+        "every uniform struct is declared on both sides"
+    );
+    for layout in shared {
+        let (program, size, fields) = &found[layout.name];
+        let ours: Vec<_> = layout
+            .fields
+            .iter()
+            .map(|field| (field.name.to_owned(), field.offset))
+            .collect();
+        assert_eq!(
+            (&ours, layout.size),
+            (fields, *size),
+            "{} in {program}",
+            layout.name
+        );
+    }
+}
+
+#[test]
+fn vertex_inputs_match_the_vertex_buffers() {
+    let buffers = nephroid::eye_pass::renderer::vertex_attributes();
+    let (_, surface) = modules()
+        .into_iter()
+        .find(|(name, _)| name == "surface")
+        .expect("surfaces are drawn");
+    let vertex = surface
+        .entry_points
+        .iter()
+        .find(|entry| entry.stage == naga::ShaderStage::Vertex);
+    let arguments = &vertex.expect("it has a vertex stage").function.arguments;
+    let naga::TypeInner::Struct { members, .. } = &surface.types[arguments[0].ty].inner else {
+        panic!("corners come as a struct");
+    };
+    let mut inputs = Vec::new();
+    for member in members {
+        let Some(naga::Binding::Location { location, .. }) = member.binding else {
+            panic!("{member:?}")
+        };
+        let naga::TypeInner::Vector { size, .. } = surface.types[member.ty].inner else {
+            panic!("{member:?}")
+        };
+        inputs.push((location, 4 * size as u64));
+    }
+    let attributes: Vec<_> = buffers
+        .iter()
+        .map(|attribute| (attribute.shader_location, attribute.format.size()))
+        .collect();
+    assert_eq!(inputs, attributes);
+}

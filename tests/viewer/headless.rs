@@ -1,0 +1,215 @@
+//! The panel without a window: pointer events in, accessibility nodes out.
+
+use egui::accesskit::{Node, NodeId, Role};
+use egui::{Event, PointerButton, Pos2, RawInput, Rect, pos2, vec2};
+use nephroid::plan::EffectPlan;
+use nephroid::scene::Scene;
+use nephroid::session::{BakeCounts, BakeResult, StopReason, Timings};
+use nephroid::settings::{BakeSettings, LayerKind};
+use nephroid::viewer::panel::{Facts, Panel, WIDTH, Wishes};
+use nephroid::viewer::worker::{BakeState, FinishedBake};
+
+pub struct Headless {
+    context: egui::Context,
+    pub panel: Panel,
+    pub scene: Scene,
+    pub state: BakeState,
+    pub last: Option<FinishedBake>,
+    pub layers: Vec<LayerKind>,
+    /// What was pressed since the start.
+    pub wishes: Wishes,
+    size: egui::Vec2,
+    time_s: f64,
+    nodes: Vec<(NodeId, Node)>,
+}
+
+/// A bake that found nothing to do.
+pub fn finished(settings: &BakeSettings) -> FinishedBake {
+    FinishedBake {
+        settings: settings.clone(),
+        result: BakeResult {
+            maps: Vec::new(),
+            plan: EffectPlan::default(),
+            ledgers: Vec::new(),
+            counts: BakeCounts::default(),
+            timings_s: Timings::default(),
+            cpu_s: Timings::default(),
+            stop_reason: StopReason::NothingToDo,
+            partial: false,
+            warnings: Vec::new(),
+        },
+        seconds: 0.0,
+    }
+}
+
+impl Headless {
+    pub fn new(settings: BakeSettings, size: (f32, f32)) -> Self {
+        let context = egui::Context::default();
+        context.enable_accesskit();
+        // As in the window: no fade that a test would have to wait for.
+        nephroid::viewer::panel::set_style(&context);
+        let mut headless = Self {
+            context,
+            panel: Panel::new(settings),
+            scene: Scene {
+                name: "test".into(),
+                ..Scene::default()
+            },
+            state: BakeState::Idle,
+            last: None,
+            layers: vec![LayerKind::Caustic, LayerKind::Direct],
+            wishes: Wishes::default(),
+            size: vec2(size.0, size.1),
+            time_s: 0.0,
+            nodes: Vec::new(),
+        };
+        headless.settle();
+        headless
+    }
+
+    pub fn pass(&mut self, events: Vec<Event>) {
+        self.time_s += 0.1;
+        let input = RawInput {
+            screen_rect: Some(Rect::from_min_size(Pos2::ZERO, self.size)),
+            time: Some(self.time_s),
+            focused: true,
+            events,
+            ..RawInput::default()
+        };
+        let Self {
+            context,
+            panel,
+            scene,
+            state,
+            last,
+            layers,
+            wishes,
+            ..
+        } = self;
+        let facts = Facts {
+            scene,
+            state,
+            last: last.as_ref(),
+            layers,
+            speed_m_per_s: 1.0,
+            adapter: "no adapter",
+        };
+        let mut output = context.run_ui(input, |ui| {
+            *wishes = wishes.and(panel.show(ui, &facts));
+        });
+        output.textures_delta.clear();
+        if let Some(update) = output.platform_output.accesskit_update {
+            self.nodes = update.nodes;
+        }
+    }
+
+    /// Lets layout and animations come to rest.
+    pub fn settle(&mut self) {
+        for _ in 0..10 {
+            self.pass(Vec::new());
+        }
+    }
+
+    fn node(&self, id: NodeId) -> &Node {
+        &self
+            .nodes
+            .iter()
+            .find(|(candidate, _)| *candidate == id)
+            .expect("the node is in the tree")
+            .1
+    }
+
+    pub fn rect_of(node: &Node) -> Rect {
+        let bounds = node.bounds().expect("it has bounds");
+        Rect::from_min_max(
+            pos2(bounds.x0 as f32, bounds.y0 as f32),
+            pos2(bounds.x1 as f32, bounds.y1 as f32),
+        )
+    }
+
+    /// Every text in the panel, values of controls included.
+    pub fn texts(&self) -> Vec<String> {
+        let text = |node: &Node| node.value().or(node.label()).map(str::to_owned);
+        self.nodes.iter().filter_map(|(_, node)| text(node)).collect()
+    }
+
+    pub fn says(&self, part: &str) -> bool {
+        self.texts().iter().any(|text| text.contains(part))
+    }
+
+    /// The first node of a role whose own text is `name`.
+    pub fn named(&self, role: Role, name: &str) -> &Node {
+        let has_name = |node: &Node| node.value() == Some(name) || node.label() == Some(name);
+        let mut found = self
+            .nodes
+            .iter()
+            .filter(|(_, node)| node.role() == role && has_name(node));
+        let node = found.next();
+        &node
+            .unwrap_or_else(|| panic!("no {role:?} {name:?} in {:#?}", self.texts()))
+            .1
+    }
+
+    /// The control of a role that a label in front of it names.
+    pub fn labelled(&self, role: Role, label: &str) -> &Node {
+        let names_it = |node: &Node| {
+            node.labelled_by().iter().any(|id| {
+                let by = self.node(*id);
+                by.value() == Some(label) || by.label() == Some(label)
+            })
+        };
+        let found = self
+            .nodes
+            .iter()
+            .find(|(_, node)| node.role() == role && names_it(node));
+        &found
+            .unwrap_or_else(|| panic!("no {role:?} labelled {label:?} in {:#?}", self.nodes))
+            .1
+    }
+
+    pub fn nodes(&self) -> impl Iterator<Item = &Node> {
+        self.nodes.iter().map(|(_, node)| node)
+    }
+
+    pub fn move_to(&mut self, position: Pos2) {
+        self.pass(vec![Event::PointerMoved(position)]);
+    }
+
+    /// Rests the pointer there until a hover text shows.
+    pub fn hover(&mut self, position: Pos2) {
+        self.move_to(position);
+        self.settle();
+    }
+
+    fn press(&mut self, position: Pos2, pressed: bool) {
+        let modifiers = egui::Modifiers::default();
+        self.pass(vec![Event::PointerButton {
+            pos: position,
+            button: PointerButton::Primary,
+            pressed,
+            modifiers,
+        }]);
+    }
+
+    pub fn click(&mut self, position: Pos2) {
+        self.move_to(position);
+        self.press(position, true);
+        self.press(position, false);
+        self.settle();
+    }
+
+    pub fn drag(&mut self, from: Pos2, to: Pos2) {
+        self.move_to(from);
+        self.press(from, true);
+        for step in 1..=5 {
+            self.move_to(from + (to - from) * (step as f32 / 5.0));
+        }
+        self.press(to, false);
+        self.settle();
+    }
+
+    /// Whether a rectangle is wholly within the panel.
+    pub fn is_inside(&self, rect: Rect) -> bool {
+        Rect::from_min_size(Pos2::ZERO, vec2(WIDTH, self.size.y)).contains_rect(rect)
+    }
+}
