@@ -2,7 +2,7 @@
 
 use nephroid::error::{Error, Result};
 use nephroid::export::{exr, png};
-use nephroid::eye_pass::{Picture, View};
+use nephroid::eye_pass::{Picture, View, tone_mapping};
 use nephroid::illumination::IlluminationMap;
 use nephroid::optics::LinearSrgb;
 use nephroid::scene::{Camera, Scene};
@@ -30,7 +30,8 @@ impl MadePicture {
     pub fn encode(&self, format: PictureFormat, location: &str) -> Result<Vec<u8>> {
         match format {
             PictureFormat::Png => {
-                let rgba = vec![0; 4 * self.picture.radiance.len()];
+                let rgba =
+                    tone_mapping::display_rgba8(&self.picture, self.view.exposure_stops, self.view.tone_map);
                 png::encode(self.picture.width, self.picture.height, rgba, location)
             }
             PictureFormat::Exr => exr::encode(
@@ -77,7 +78,7 @@ pub fn make(
     interrupt.check("picture")?;
     view.exposure_stops = match request.exposure {
         Exposure::Stops(stops) => stops,
-        Exposure::Auto => 0.0,
+        Exposure::Auto => tone_mapping::auto_exposure_stops(&picture),
     };
     Ok(MadePicture {
         picture,
@@ -95,19 +96,20 @@ fn by_cpu(
     let _ = (scene, maps, view, interrupt);
     Err(Error::failure(
         "render",
-        "pictures cannot be made yet",
-        "use bake",
+        "the CPU makes no pictures yet",
+        "use --backend gpu",
     ))
 }
 
+/// Samples per pixel of the graphics card's pictures.
+#[cfg(feature = "gpu")]
+const SAMPLES: u32 = 4;
+
 #[cfg(feature = "gpu")]
 fn by_gpu(scene: &Scene, maps: &[IlluminationMap], view: &View) -> Result<(Picture, String)> {
-    let _ = (scene, maps, view);
-    Err(Error::failure(
-        "render",
-        "pictures cannot be made yet",
-        "use bake",
-    ))
+    let gpu = nephroid::gpu::Gpu::headless()?;
+    let picture = nephroid::eye_pass::renderer::render_offscreen(&gpu, scene, maps, view, SAMPLES)?;
+    Ok((picture, gpu.adapter_name()))
 }
 
 #[cfg(not(feature = "gpu"))]
