@@ -2,8 +2,12 @@
 
 #[path = "eye/charts.rs"]
 mod charts;
+#[path = "eye/direct.rs"]
+mod direct;
 #[path = "eye/meshes.rs"]
 mod meshes;
+#[path = "eye/scenes.rs"]
+mod scenes;
 #[path = "eye/texel_areas.rs"]
 mod texel_areas;
 

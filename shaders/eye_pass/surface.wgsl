@@ -2,16 +2,6 @@
 //
 // Radiance is written times frame.radiance_scale, so that it fits half floats.
 
-struct Frame {
-    clip_from_camera: mat4x4f,
-    camera_position: vec3f,
-    radiance_scale: f32,
-    sky_radiance: vec3f,
-    padding0: f32,
-    ground_radiance: vec3f,
-    padding1: f32,
-}
-
 struct ObjectUniform {
     base_colour: vec3f,
     irradiance_scale: f32,
@@ -30,8 +20,6 @@ const SURFACE_MIXED: u32 = 4u;
 const PI: f32 = 3.14159265358979;
 // Largest value written [scaled radiance]: half floats end at 65504, and a pane may still multiply it.
 const LARGEST: f32 = 8192.0;
-
-@group(0) @binding(0) var<uniform> frame: Frame;
 
 @group(1) @binding(0) var<uniform> object: ObjectUniform;
 @group(1) @binding(1) var illumination_map: texture_2d<f32>;
@@ -111,14 +99,11 @@ fn diffuse_radiance(fragment: Fragment, base_colour: vec3f) -> vec3f {
     return base_colour * irradiance(fragment.map_uv) / PI;
 }
 
-// Approximation of what a specular surface sees: sky above the horizon, the mean of the lit ground below it.
-fn environment_radiance(direction: vec3f) -> vec3f {
-    let above = smoothstep(-0.2, 0.2, direction.y);
-    return mix(frame.ground_radiance, frame.sky_radiance, above);
-}
-
-fn reflected_environment(point: SurfacePoint) -> vec3f {
-    return environment_radiance(reflect(point.view, point.normal));
+fn reflected_radiance(fragment: Fragment, point: SurfacePoint) -> vec3f {
+    let place = frame.camera_position + fragment.from_camera;
+    // Nothing nearer than this is another surface: single precision ends there.
+    let nearest = 1e-4 * length(fragment.from_camera);
+    return surrounding_radiance(place, reflect(point.view, point.normal), nearest);
 }
 
 fn scaled(radiance: vec3f) -> vec4f {
@@ -130,14 +115,14 @@ fn opaque(fragment: Fragment, @builtin(front_facing) front: bool) -> @location(0
     let point = surface_point(fragment, front);
     var radiance = object.emitted_radiance;
     if object.surface == SURFACE_MIRROR {
-        radiance += metal_reflectance(point.cos_view, point.base_colour) * reflected_environment(point);
+        radiance += metal_reflectance(point.cos_view, point.base_colour) * reflected_radiance(fragment, point);
     } else {
         var reflectance = 0.0;
         if object.surface == SURFACE_MIXED {
             reflectance = dielectric_reflectance(point.cos_view, object.ior);
         }
         radiance += (1.0 - reflectance) * diffuse_radiance(fragment, point.base_colour);
-        radiance += reflectance * reflected_environment(point);
+        radiance += reflectance * reflected_radiance(fragment, point);
     }
     return scaled(radiance);
 }
@@ -167,5 +152,5 @@ fn transmitted(fragment: Fragment, @builtin(front_facing) front: bool) -> @locat
 @fragment
 fn reflected(fragment: Fragment, @builtin(front_facing) front: bool) -> @location(0) vec4f {
     let point = surface_point(fragment, front);
-    return scaled(object.emitted_radiance + clear_reflectance(point) * reflected_environment(point));
+    return scaled(object.emitted_radiance + clear_reflectance(point) * reflected_radiance(fragment, point));
 }

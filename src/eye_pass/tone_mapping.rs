@@ -55,21 +55,23 @@ pub fn display_rgba8(picture: &Picture, exposure_stops: f64, tone_map: ToneMap) 
 
 /// Exposure [stops] that brings the log-average luminance of the lit pixels to middle grey; 0 for a black picture.
 ///
-/// Pixels below a millionth of the brightest count as unlit: a scene lit in one corner is exposed for that corner.
+/// Pixels more than 8 stops below the mean count as unlit, so that neither black surroundings nor the last traces of
+/// light decide.
 pub fn auto_exposure_stops(picture: &Picture) -> f64 {
     let luminances = || {
         let pixels = picture.radiance.iter();
         pixels
             .map(|rgb| LinearSrgb::from(rgb.map(f64::from)).luminance())
-            .filter(|luminance| luminance.is_finite())
+            .filter(|luminance| luminance.is_finite() && *luminance > 0.0)
     };
-    let brightest = luminances().fold(0.0, f64::max);
-    if brightest <= 0.0 {
-        return 0.0;
-    }
-    let lit = luminances().filter(|luminance| *luminance > 1e-6 * brightest);
+    let mean = luminances().sum::<f64>() / picture.radiance.len().max(1) as f64;
+    let lit = luminances().filter(|luminance| *luminance > mean / 256.0);
     let (sum, count) = lit.fold((0.0, 0.0), |(sum, count), luminance| {
         (sum + luminance.log2(), count + 1.0)
     });
-    MIDDLE_GREY.log2() - sum / count
+    if count > 0.0 {
+        MIDDLE_GREY.log2() - sum / count
+    } else {
+        0.0
+    }
 }

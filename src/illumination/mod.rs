@@ -4,6 +4,7 @@ pub mod accumulator;
 pub mod chart;
 pub mod compare;
 pub mod gutter;
+pub mod islands;
 pub mod lookup;
 pub mod map;
 pub mod parametrisation;

@@ -8,6 +8,7 @@ use super::caustic::path::Arrival;
 use super::caustic::splat::Coverage;
 use crate::illumination::Chart;
 use crate::illumination::accumulator::FluxAccumulator;
+use crate::illumination::islands::Islands;
 use crate::scene::Scene;
 
 /// One surface's map with its flux.
@@ -17,6 +18,8 @@ pub struct ReceiverMap {
     pub chart: Arc<Chart>,
     /// The flux so far.
     pub flux: FluxAccumulator,
+    /// Islands of the chart, where there is more than one.
+    islands: Option<Islands>,
 }
 
 /// Gives the chart of an object at a size that suits it; `None` where the object cannot take a map.
@@ -51,7 +54,8 @@ impl ReceiverMaps {
             self.slots[object] = match chart_for(object) {
                 Some(chart) => {
                     let flux = FluxAccumulator::new(chart.width, chart.height);
-                    Slot::Allocated(Box::new(ReceiverMap { chart, flux }))
+                    let islands = Islands::find(&chart);
+                    Slot::Allocated(Box::new(ReceiverMap { chart, flux, islands }))
                 }
                 None => Slot::Refused,
             };
@@ -96,16 +100,46 @@ impl ReceiverMap {
     }
 }
 
-impl Coverage for Chart {
+impl ReceiverMap {
+    /// The island that an arrival lies on.
+    pub fn island(&self, arrival: &Arrival) -> u32 {
+        self.islands
+            .as_ref()
+            .map_or(0, |islands| islands.of_triangle(arrival.triangle as usize))
+    }
+
+    /// The flux, to be added to, beside what says where it may go.
+    pub fn split(&mut self) -> (&mut FluxAccumulator, Covered<'_>) {
+        (
+            &mut self.flux,
+            Covered {
+                chart: &self.chart,
+                islands: self.islands.as_ref(),
+            },
+        )
+    }
+}
+
+/// Which texels of a map are covered, and by which island.
+#[derive(Clone, Copy, Debug)]
+pub struct Covered<'a> {
+    chart: &'a Chart,
+    islands: Option<&'a Islands>,
+}
+
+impl Coverage for Covered<'_> {
     fn size(&self) -> (usize, usize) {
-        (self.width, self.height)
+        (self.chart.width, self.chart.height)
     }
 
     fn is_full(&self) -> bool {
-        self.texel_areas_m2.len() == 1
+        self.chart.texel_areas_m2.len() == 1
     }
 
-    fn covers(&self, column: usize, row: usize, _island: u32) -> bool {
-        self.texel_area_m2(row * self.width + column) > 0.0
+    fn covers(&self, column: usize, row: usize, island: u32) -> bool {
+        self.chart.texel_area_m2(row * self.chart.width + column) > 0.0
+            && self
+                .islands
+                .is_none_or(|islands| islands.covers(column, row, island))
     }
 }

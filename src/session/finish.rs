@@ -1,13 +1,17 @@
 //! From sums of flux to finished maps.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::caustic_layer::CausticOutcome;
-use super::sizes::MapSizes;
+use super::sizes::{self, MapSizes};
 use super::{BakeResult, Clock, StopReason, Timings};
 use crate::error::{Result, Warning};
 use crate::illumination::accumulator::FluxUnit;
+use crate::illumination::gutter::fill_gutter;
 use crate::illumination::{Chart, IlluminationMap, Layer};
+use crate::light_pass::caustic::pass::Stopwatch;
+use crate::light_pass::direct::bake_direct;
 use crate::light_pass::receiver_maps::ReceiverMap;
 use crate::plan::{Effect, EffectPlan};
 use crate::progress::{Control, Progress};
@@ -32,30 +36,37 @@ impl Finish<'_> {
         control: &Control,
         clock: &mut Clock,
     ) -> Result<BakeResult> {
-        let _ = (progress, clock, self.sizes, self.settings);
-        let counts = self.caustic.counts;
-        let partial = self.caustic.cancelled || control.is_cancelled();
-        let mut maps: Vec<IlluminationMap> = Vec::new();
-        for object in 0..self.tracer.scene().objects.len() {
-            let caustic = self
-                .caustic
-                .maps
-                .as_ref()
-                .and_then(|(maps, unit)| Some((maps.get(object)?, *unit)));
+        let mut counts = self.caustic.counts;
+        let charts = self.charts()?;
+        let mut direct = BTreeMap::new();
+        if self.plan.is_on(Effect::Direct) {
+            let watch = Stopwatch::start();
+            let list: Vec<&Chart> = charts.values().map(|chart| &**chart).collect();
+            let layers = bake_direct(self.tracer, &list, progress, control);
+            counts.shadow_rays += layers.iter().map(|layer| layer.shadow_rays).sum::<u64>();
+            direct = charts.keys().copied().zip(layers).collect();
+            clock.trace.add(watch.elapsed());
+        }
+        let partial =
+            self.caustic.cancelled || control.is_cancelled() || direct.values().any(|layer| !layer.complete);
+        let mut maps = Vec::new();
+        for (object, chart) in charts {
             let mut layers = Vec::new();
-            let mut chart: Option<Arc<Chart>> = None;
-            if let Some((map, unit)) = caustic {
+            if let Some((map, unit)) = self.caustic_map(object) {
                 layers.push(caustic_layer(map, unit));
-                chart = Some(map.chart.clone());
             }
-            if let Some(chart) = chart {
-                maps.push(IlluminationMap {
-                    chart,
-                    layers,
-                    error: None,
-                    estimated_relative_rmse: None,
+            if let Some(layer) = direct.remove(&object) {
+                layers.push(Layer {
+                    kind: LayerKind::Direct,
+                    irradiance: layer.irradiance,
                 });
             }
+            maps.push(IlluminationMap {
+                chart,
+                layers,
+                error: None,
+                estimated_relative_rmse: None,
+            });
         }
         let stop_reason = if partial {
             StopReason::Cancelled
@@ -78,9 +89,40 @@ impl Finish<'_> {
     }
 }
 
-/// E = Φ/A per texel; nothing where the surface does not reach.
+impl Finish<'_> {
+    fn caustic_map(&self, object: usize) -> Option<(&ReceiverMap, FluxUnit)> {
+        let (maps, unit) = self.caustic.maps.as_ref()?;
+        Some((maps.get(object)?, *unit))
+    }
+
+    /// Charts of all maps, by object: those that received flux, and every receiver where direct light is asked for.
+    fn charts(&self) -> Result<BTreeMap<usize, Arc<Chart>>> {
+        let scene = self.tracer.scene();
+        let mut charts = BTreeMap::new();
+        let mut texels = 0;
+        for object in 0..scene.objects.len() {
+            let chart = if let Some((map, _)) = self.caustic_map(object) {
+                Some(map.chart.clone())
+            } else if self.plan.is_on(Effect::Direct) && scene.material_of(object).surface.is_receiver() {
+                let size = self.sizes.direct_size(object, self.settings);
+                texels += size.map_or(0, |(width, height)| width as u64 * height as u64);
+                sizes::check_memory(texels, self.settings)?;
+                size.and_then(|size| self.sizes.chart(object, size))
+            } else {
+                None
+            };
+            if let Some(chart) = chart {
+                texels += (chart.width * chart.height) as u64;
+                charts.insert(object, chart);
+            }
+        }
+        Ok(charts)
+    }
+}
+
+/// E = Φ/A per texel; nothing where the surface does not reach, but for the gutter.
 fn caustic_layer(map: &ReceiverMap, unit: FluxUnit) -> Layer {
-    let irradiance = map
+    let mut irradiance: Vec<[f32; 3]> = map
         .flux
         .texels()
         .iter()
@@ -96,6 +138,7 @@ fn caustic_layer(map: &ReceiverMap, unit: FluxUnit) -> Layer {
             }
         })
         .collect();
+    fill_gutter(&map.chart, &mut irradiance);
     Layer {
         kind: LayerKind::Caustic,
         irradiance,

@@ -90,13 +90,13 @@ fn two_lights_give_the_sum_of_their_maps() {
         .map(|scene| caustic(map_of(&bake(scene.clone(), &settings), scene, "floor")))
         .to_vec();
     let mut lit = 0;
-    for texel in 0..maps[0].len() {
-        let sum = maps[0][texel] + maps[1][texel];
+    for ((a, b), together) in maps[0].iter().zip(&maps[1]).zip(&maps[2]) {
+        let sum = a + b;
         assert!(
-            (maps[2][texel] - sum).abs() <= 1e-6 * sum.max(1e-6),
-            "texel {texel}"
+            (together - sum).abs() <= 1e-6 * sum.max(1e-6),
+            "{together} instead of {sum}"
         );
-        lit += usize::from(maps[0][texel] > 0.0 && maps[1][texel] > 0.0);
+        lit += usize::from(*a > 0.0 && *b > 0.0);
     }
     assert!(
         lit > 50,

@@ -87,10 +87,10 @@ pub fn cuboid(low: DVec3, high: DVec3) -> Mesh {
     let faces = [
         quad(low + y, x, z),
         quad(low + z, x, -z),
-        quad(low, z, y),
-        quad(low + x + z, -z, y),
-        quad(low + x, -x, y),
-        quad(low + z, x, y),
+        quad(low + z, -z, y),
+        quad(low + x, z, y),
+        quad(low, x, y),
+        quad(low + x + z, -x, y),
     ];
     let mut mesh = faces.into_iter().reduce(joined).expect("six faces");
     (mesh.uv0, mesh.uv1) = (None, None);

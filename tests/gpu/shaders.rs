@@ -50,6 +50,28 @@ fn every_shader_file_is_part_of_a_program() {
     assert_eq!(files, used);
 }
 
+/// Names of the structs in a module's uniform buffers, those within arrays and other structs included.
+fn uniform_structs(module: &naga::Module) -> BTreeSet<String> {
+    let uniforms = module
+        .global_variables
+        .iter()
+        .filter(|(_, variable)| variable.space == naga::AddressSpace::Uniform);
+    let mut pending: Vec<_> = uniforms.map(|(_, variable)| variable.ty).collect();
+    let mut names = BTreeSet::new();
+    while let Some(handle) = pending.pop() {
+        let ty = &module.types[handle];
+        match &ty.inner {
+            naga::TypeInner::Struct { members, .. } => {
+                names.insert(ty.name.clone().expect("structs have names"));
+                pending.extend(members.iter().map(|member| member.ty));
+            }
+            naga::TypeInner::Array { base, .. } => pending.push(*base),
+            _ => {}
+        }
+    }
+    names
+}
+
 #[test]
 fn structs_lie_the_same_in_rust_and_in_the_shaders() {
     let mut found = BTreeMap::new();
@@ -59,9 +81,7 @@ fn structs_lie_the_same_in_rust_and_in_the_shaders() {
                 continue;
             };
             let name = ty.name.clone().unwrap_or_default();
-            let is_uniform = module.global_variables.iter().any(|(_, variable)| {
-                variable.space == naga::AddressSpace::Uniform && module.types[variable.ty].name == ty.name
-            });
+            let is_uniform = uniform_structs(&module).contains(&name);
             if is_uniform {
                 let fields: Vec<_> = members
                     .iter()

@@ -1,17 +1,18 @@
 //! The eye pass on the device: depth-tested triangles, radiance from the illumination maps, then tone mapping.
 //!
-//! Diffuse surfaces show L = ρE/π. Specular ones are approximated: they reflect a sky of the view's background and a
-//! ground of the scene's mean radiance instead of their surroundings, and what is clear shows what is straight behind
-//! it, unbent, dimmed by Fresnel's equations, by the body's tint and by the square of its refractive index. The CPU
-//! eye pass follows the true paths.
+//! Diffuse surfaces show L = ρE/π. Specular ones are approximated: they reflect the scene's plane receivers, coarsely
+//! (see `surroundings`), and the view's background, but no other object, and what is clear shows what is straight
+//! behind it, unbent, dimmed by Fresnel's equations, by the body's tint and by the square of its refractive index. The
+//! CPU eye pass follows the true paths.
 
+mod bindings;
 mod camera;
-mod environment;
 mod geometry;
 mod maps;
 mod objects;
 mod pipelines;
 mod shaders;
+mod surroundings;
 mod targets;
 mod textures;
 mod uniforms;
@@ -21,16 +22,17 @@ pub use shaders::{programs, shared_structs, vertex_attributes};
 use half::f16;
 use wgpu::util::DeviceExt;
 
+use self::bindings::bind_group;
 use self::geometry::Geometry;
 use self::objects::{DeviceObject, Objects};
 use self::pipelines::{ClearPipelines, SurfacePipelines, ToneMappingPipeline};
+use self::surroundings::DeviceSurroundings;
 use self::targets::Targets;
 use self::uniforms::{Frame, ToneMapping, rgb};
 use super::{Picture, ToneMap, View};
 use crate::error::{Error, Result};
 use crate::gpu::{Gpu, readback};
 use crate::illumination::IlluminationMap;
-use crate::optics::LinearSrgb;
 use crate::scene::{Scene, SurfaceKind};
 
 /// Largest value of scaled radiance that the picture is scaled to: half floats end at 65504, and a body may still
@@ -46,7 +48,8 @@ pub struct Renderer {
     tone_mapping: ToneMappingPipeline,
     geometry: Geometry,
     objects: Objects,
-    ground_radiance: LinearSrgb,
+    surroundings: DeviceSurroundings,
+    surroundings_sampler: wgpu::Sampler,
     targets: Option<Targets>,
 }
 
@@ -77,7 +80,8 @@ impl Renderer {
             geometry: Geometry::new(gpu, scene),
             objects: Objects::new(gpu, scene, &surfaces.object_layout),
             surfaces,
-            ground_radiance: LinearSrgb::BLACK,
+            surroundings: DeviceSurroundings::new(gpu, scene, &[]),
+            surroundings_sampler: linear_sampler(gpu),
             targets: None,
         };
         gpu.take_error().map_or(Ok(renderer), Err)
@@ -94,7 +98,7 @@ impl Renderer {
         for map in maps {
             self.geometry.set_chart(gpu, &map.chart);
         }
-        self.ground_radiance = environment::mean_diffuse_radiance(scene, maps);
+        self.surroundings = DeviceSurroundings::new(gpu, scene, maps);
         gpu.take_error().map_or(Ok(()), Err)
     }
 
@@ -193,8 +197,7 @@ impl Renderer {
             clip_from_camera: camera::clip_from_camera(view),
             camera_position: camera::single(view.camera.position),
             radiance_scale: radiance_scale as f32,
-            sky_radiance: rgb(view.background),
-            ground_radiance: rgb(self.ground_radiance),
+            background: rgb(view.background),
             ..Default::default()
         };
         let buffer = gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
@@ -202,14 +205,13 @@ impl Renderer {
             contents: bytemuck::bytes_of(&frame),
             usage: wgpu::BufferUsages::UNIFORM,
         });
-        gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("frame"),
-            layout: &self.surfaces.frame_layout,
-            entries: &[wgpu::BindGroupEntry {
-                binding: 0,
-                resource: buffer.as_entire_binding(),
-            }],
-        })
+        let resources = [
+            buffer.as_entire_binding(),
+            self.surroundings.uniform.as_entire_binding(),
+            wgpu::BindingResource::TextureView(&self.surroundings.images),
+            wgpu::BindingResource::Sampler(&self.surroundings_sampler),
+        ];
+        bind_group(gpu, "frame", &self.surfaces.frame_layout, resources)
     }
 
     fn draw_opaque(&self, pass: &mut wgpu::RenderPass<'_>) {
@@ -278,6 +280,15 @@ pub fn render_offscreen(
     let mut renderer = Renderer::new(gpu, scene, wgpu::TextureFormat::Rgba8Unorm, samples)?;
     renderer.set_maps(gpu, scene, maps)?;
     renderer.radiance(gpu, view)
+}
+
+fn linear_sampler(gpu: &Gpu) -> wgpu::Sampler {
+    gpu.device.create_sampler(&wgpu::SamplerDescriptor {
+        label: Some("surroundings"),
+        mag_filter: wgpu::FilterMode::Linear,
+        min_filter: wgpu::FilterMode::Linear,
+        ..Default::default()
+    })
 }
 
 fn is_clear(surface: SurfaceKind) -> bool {

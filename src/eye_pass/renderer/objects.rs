@@ -3,6 +3,7 @@
 use glam::DVec3;
 use wgpu::util::DeviceExt;
 
+use super::bindings::bind_group;
 use super::maps::DeviceMap;
 use super::textures::BaseColour;
 use super::uniforms::{ObjectUniform, rgb};
@@ -94,7 +95,18 @@ impl Objects {
                 .map_or(&self.white, |index| &self.textures[index]);
             object.uniform.irradiance_scale = map.irradiance_scale;
             self.peak_radiance = self.peak_radiance.max(object.peak_radiance(map));
-            object.bind_group = Some(bind_group(gpu, layout, &object.uniform, map, image));
+            let uniform = gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+                label: Some("object"),
+                contents: bytemuck::bytes_of(&object.uniform),
+                usage: wgpu::BufferUsages::UNIFORM,
+            });
+            let resources = [
+                uniform.as_entire_binding(),
+                wgpu::BindingResource::TextureView(&map.view),
+                wgpu::BindingResource::TextureView(&image.view),
+                wgpu::BindingResource::Sampler(&image.sampler),
+            ];
+            object.bind_group = Some(bind_group(gpu, "object", layout, resources));
         }
     }
 }
@@ -163,33 +175,4 @@ fn check_chart(scene: &Scene, map: &IlluminationMap) -> Result<()> {
         format!("does not belong to the scene {}", scene.name),
         "bake the scene again",
     ))
-}
-
-fn bind_group(
-    gpu: &Gpu,
-    layout: &wgpu::BindGroupLayout,
-    uniform: &ObjectUniform,
-    map: &DeviceMap,
-    image: &BaseColour,
-) -> wgpu::BindGroup {
-    let uniform = gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-        label: Some("object"),
-        contents: bytemuck::bytes_of(uniform),
-        usage: wgpu::BufferUsages::UNIFORM,
-    });
-    let resources = [
-        uniform.as_entire_binding(),
-        wgpu::BindingResource::TextureView(&map.view),
-        wgpu::BindingResource::TextureView(&image.view),
-        wgpu::BindingResource::Sampler(&image.sampler),
-    ];
-    let entries: Vec<_> = (0..)
-        .zip(resources)
-        .map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource })
-        .collect();
-    gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-        label: Some("object"),
-        layout,
-        entries: &entries,
-    })
 }

@@ -2,6 +2,7 @@
 
 use wgpu::util::DeviceExt;
 
+use super::bindings::{bind_group, bind_group_layout, filtering_sampler, pipeline_layout, texture, uniform};
 use super::geometry::{CORNER_LAYOUT, MAP_UV_LAYOUT};
 use super::shaders::{SURFACE, TONE_MAPPING};
 use super::uniforms::ToneMapping;
@@ -37,14 +38,23 @@ pub(super) struct SurfacePipelines {
 impl SurfacePipelines {
     pub(super) fn new(gpu: &Gpu, sample_count: u32) -> Self {
         let module = SURFACE.module(&gpu.device);
-        let frame_layout = bind_group_layout(gpu, "frame", &[uniform(wgpu::ShaderStages::VERTEX_FRAGMENT)]);
+        let frame_layout = bind_group_layout(
+            gpu,
+            "frame",
+            &[
+                uniform(wgpu::ShaderStages::VERTEX_FRAGMENT),
+                uniform(wgpu::ShaderStages::FRAGMENT),
+                texture(true, wgpu::TextureViewDimension::D2Array),
+                filtering_sampler(),
+            ],
+        );
         let object_layout = bind_group_layout(
             gpu,
             "object",
             &[
                 uniform(wgpu::ShaderStages::FRAGMENT),
-                texture(false),
-                texture(true),
+                texture(false, wgpu::TextureViewDimension::D2),
+                texture(true, wgpu::TextureViewDimension::D2),
                 filtering_sampler(),
             ],
         );
@@ -150,7 +160,10 @@ impl ToneMappingPipeline {
         let layout = bind_group_layout(
             gpu,
             "tone mapping",
-            &[uniform(wgpu::ShaderStages::FRAGMENT), texture(false)],
+            &[
+                uniform(wgpu::ShaderStages::FRAGMENT),
+                texture(false, wgpu::TextureViewDimension::D2),
+            ],
         );
         let pipeline = gpu
             .device
@@ -194,20 +207,11 @@ impl ToneMappingPipeline {
             contents: bytemuck::bytes_of(&uniform),
             usage: wgpu::BufferUsages::UNIFORM,
         });
-        let bind_group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("tone mapping"),
-            layout: &self.layout,
-            entries: &[
-                wgpu::BindGroupEntry {
-                    binding: 0,
-                    resource: uniform.as_entire_binding(),
-                },
-                wgpu::BindGroupEntry {
-                    binding: 1,
-                    resource: wgpu::BindingResource::TextureView(radiance),
-                },
-            ],
-        });
+        let resources = [
+            uniform.as_entire_binding(),
+            wgpu::BindingResource::TextureView(radiance),
+        ];
+        let bind_group = bind_group(gpu, "tone mapping", &self.layout, resources);
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("tone mapping"),
             color_attachments: &[Some(wgpu::RenderPassColorAttachment {
@@ -225,60 +229,4 @@ impl ToneMappingPipeline {
         pass.set_bind_group(0, &bind_group, &[]);
         pass.draw(0..3, 0..1);
     }
-}
-
-/// A binding's type with the stages that see it.
-type Binding = (wgpu::ShaderStages, wgpu::BindingType);
-
-fn uniform(stages: wgpu::ShaderStages) -> Binding {
-    let buffer = wgpu::BindingType::Buffer {
-        ty: wgpu::BufferBindingType::Uniform,
-        has_dynamic_offset: false,
-        min_binding_size: None,
-    };
-    (stages, buffer)
-}
-
-fn texture(filterable: bool) -> Binding {
-    let texture = wgpu::BindingType::Texture {
-        sample_type: wgpu::TextureSampleType::Float { filterable },
-        view_dimension: wgpu::TextureViewDimension::D2,
-        multisampled: false,
-    };
-    (wgpu::ShaderStages::FRAGMENT, texture)
-}
-
-fn filtering_sampler() -> Binding {
-    (
-        wgpu::ShaderStages::FRAGMENT,
-        wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering),
-    )
-}
-
-/// A layout whose bindings are numbered in order.
-fn bind_group_layout(gpu: &Gpu, label: &str, bindings: &[Binding]) -> wgpu::BindGroupLayout {
-    let entries: Vec<_> = (0..)
-        .zip(bindings)
-        .map(|(binding, (visibility, ty))| wgpu::BindGroupLayoutEntry {
-            binding,
-            visibility: *visibility,
-            ty: *ty,
-            count: None,
-        })
-        .collect();
-    gpu.device
-        .create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-            label: Some(label),
-            entries: &entries,
-        })
-}
-
-fn pipeline_layout(gpu: &Gpu, groups: &[&wgpu::BindGroupLayout]) -> wgpu::PipelineLayout {
-    let bind_group_layouts: Vec<_> = groups.iter().map(|layout| Some(*layout)).collect();
-    gpu.device
-        .create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-            label: None,
-            bind_group_layouts: &bind_group_layouts,
-            immediate_size: 0,
-        })
 }

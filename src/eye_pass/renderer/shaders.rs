@@ -1,7 +1,7 @@
 //! The eye pass's shader modules and what they share with Rust.
 
 use super::geometry::{CORNER_LAYOUT, MAP_UV_LAYOUT};
-use super::uniforms::{Frame, ObjectUniform, ToneMapping};
+use super::uniforms::{Frame, ObjectUniform, Receiver, Surroundings, ToneMapping};
 use crate::gpu::layout::StructLayout;
 use crate::gpu::shader::{Program, shader_source};
 
@@ -10,6 +10,8 @@ pub(super) const SURFACE: Program = Program {
     name: "surface",
     sources: &[
         shader_source!("shared/fresnel"),
+        shader_source!("eye_pass/frame"),
+        shader_source!("eye_pass/surroundings"),
         shader_source!("eye_pass/surface"),
     ],
 };
@@ -31,7 +33,13 @@ pub fn programs() -> Vec<Program> {
 
 /// Every struct that the eye pass shares with its shaders, for the tests.
 pub fn shared_structs() -> Vec<StructLayout> {
-    vec![Frame::layout(), ObjectUniform::layout(), ToneMapping::layout()]
+    vec![
+        Frame::layout(),
+        ObjectUniform::layout(),
+        Receiver::layout(),
+        Surroundings::layout(),
+        ToneMapping::layout(),
+    ]
 }
 
 /// Every attribute of the surface pass's vertex buffers, for the tests.

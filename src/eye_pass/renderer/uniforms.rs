@@ -12,12 +12,44 @@ shader_struct! {
         camera_position: [f32; 3],
         /// What is written is radiance times this.
         radiance_scale: f32,
-        /// Seen by specular surfaces above the horizon [W/(m² sr)].
-        sky_radiance: [f32; 3],
+        /// Seen where nothing is hit [W/(m² sr)].
+        background: [f32; 3],
+        padding: f32,
+    }
+}
+
+/// Plane receivers that specular surfaces see; `MAX_RECEIVERS` in the shader.
+pub(super) const MAX_RECEIVERS: usize = 16;
+
+shader_struct! {
+    /// A plane receiver as specular surfaces see it. Rows are linear functions of the place: xyz · place + w.
+    Receiver {
+        /// Distance from the plane [m].
+        plane: [f32; 4],
+        /// Map coordinate across.
+        u: [f32; 4],
+        /// Map coordinate down.
+        v: [f32; 4],
+        /// Texels of its image that the whole map covers.
+        image_size: [f32; 2],
+        padding: [f32; 2],
+    }
+}
+
+shader_struct! {
+    /// What specular surfaces see.
+    Surroundings {
+        /// The first `count` are in use.
+        receivers: [Receiver; MAX_RECEIVERS],
+        /// Seen below the horizon where there are no receivers [W/(m² sr)].
+        mean_radiance: [f32; 3],
+        /// Receivers in use.
+        count: u32,
+        /// Radiance [W/(m² sr)] of an image value of 1.
+        radiance_scale: f32,
         padding0: f32,
-        /// Seen by specular surfaces below the horizon [W/(m² sr)].
-        ground_radiance: [f32; 3],
         padding1: f32,
+        padding2: f32,
     }
 }
 

@@ -7,7 +7,7 @@ use super::footprint::{Neighbours, footprint};
 use super::kernel::Profile;
 use super::lattice::{Lattice, TracedRow};
 use super::path::Arrival;
-use super::splat::{Splat, Window};
+use super::splat::{Coverage, Splat, Window};
 use super::statistics::FootprintStatistics;
 use crate::illumination::accumulator::FluxCount;
 use crate::light_pass::ledger_sum::{Account, LedgerSum};
@@ -156,7 +156,7 @@ impl Depositor<'_> {
             ellipse,
             profile: Profile::new(self.settings.kernel, sigma),
             flux,
-            island: 0,
+            island: map.island(arrival),
         })
     }
 }
@@ -171,8 +171,8 @@ struct RowSplats {
 
 /// Adds splats to one map, each task to its own rows of texels.
 fn add_splats(splats: &[(u32, Splat)], map: &mut ReceiverMap, sampling: KernelSampling) -> LedgerSum {
-    let chart = &*map.chart;
-    let size = (chart.width, chart.height);
+    let (flux, covered) = map.split();
+    let size = covered.size();
     let tasks = size.1.div_ceil(ROWS_PER_TASK);
     let mut by_task: Vec<Vec<u32>> = vec![Vec::new(); tasks];
     for (index, (_, splat)) in splats.iter().enumerate() {
@@ -180,8 +180,7 @@ fn add_splats(splats: &[(u32, Splat)], map: &mut ReceiverMap, sampling: KernelSa
             by_task[task].push(index as u32);
         }
     }
-    let parts: Vec<LedgerSum> = map
-        .flux
+    let parts: Vec<LedgerSum> = flux
         .texels_mut()
         .par_chunks_mut(ROWS_PER_TASK * size.0)
         .zip(by_task)
@@ -193,7 +192,7 @@ fn add_splats(splats: &[(u32, Splat)], map: &mut ReceiverMap, sampling: KernelSa
             for index in indices {
                 add_splat(
                     &splats[index as usize].1,
-                    chart,
+                    &covered,
                     sampling,
                     rows,
                     texels,
@@ -213,18 +212,19 @@ fn add_splats(splats: &[(u32, Splat)], map: &mut ReceiverMap, sampling: KernelSa
 
 fn add_splat(
     splat: &Splat,
-    chart: &crate::illumination::Chart,
+    coverage: &impl Coverage,
     sampling: KernelSampling,
     rows: (usize, usize),
     texels: &mut [FluxCount],
     window: &mut Window,
     ledger: &mut LedgerSum,
 ) {
-    splat.weigh(sampling, chart, window);
+    let size = coverage.size();
+    splat.weigh(sampling, coverage, window);
     if window.is_placed() {
-        let added = window.add(splat.flux, (chart.width, chart.height), rows, texels);
+        let added = window.add(splat.flux, size, rows, texels);
         ledger.book(Account::Deposited, added);
-    } else if splat.home_row(chart.height) >= rows.0 && splat.home_row(chart.height) < rows.1 {
+    } else if splat.home_row(size.1) >= rows.0 && splat.home_row(size.1) < rows.1 {
         // Exactly one task owns the row of the centre.
         ledger.book(Account::Unresolved, splat.flux);
     }

@@ -1,0 +1,93 @@
+//! The islands of a chart: pieces of a surface that touch in the map only by chance. A kernel of flux must not run
+//! over from one to the next.
+
+use std::collections::HashMap;
+
+use glam::DVec2;
+
+use super::Chart;
+use super::parametrisation::coverage;
+
+/// Mark of a texel that several islands share.
+const SHARED: u32 = u32::MAX;
+/// Mark of a texel that none covers.
+const NONE: u32 = u32::MAX - 1;
+
+/// Which island each triangle and each texel belongs to.
+#[derive(Clone, Debug)]
+pub struct Islands {
+    of_triangle: Vec<u32>,
+    of_texel: Vec<u32>,
+    width: usize,
+}
+
+impl Islands {
+    /// Finds the islands of a chart; `None` where it is one.
+    pub fn find(chart: &Chart) -> Option<Self> {
+        let of_triangle = connect(&chart.corner_uvs);
+        let first = *of_triangle.first()?;
+        if of_triangle.iter().all(|&island| island == first) {
+            return None;
+        }
+        let (width, height) = (chart.width, chart.height);
+        let size = DVec2::new(width as f64, height as f64);
+        let mut of_texel = vec![NONE; width * height];
+        for (corners, &island) in chart.corner_uvs.iter().zip(&of_triangle) {
+            let corners = corners.map(|corner| corner * size);
+            for row in coverage::rows(corners, height) {
+                coverage::for_each_texel_in_row(corners, row, width, |column, _| {
+                    let texel = &mut of_texel[row * width + column];
+                    *texel = if *texel == NONE || *texel == island {
+                        island
+                    } else {
+                        SHARED
+                    };
+                });
+            }
+        }
+        Some(Self {
+            of_triangle,
+            of_texel,
+            width,
+        })
+    }
+
+    /// The island of a triangle.
+    pub fn of_triangle(&self, triangle: usize) -> u32 {
+        self.of_triangle[triangle]
+    }
+
+    /// Whether an island reaches a texel.
+    pub fn covers(&self, column: usize, row: usize, island: u32) -> bool {
+        let owner = self.of_texel[row * self.width + column];
+        owner == island || owner == SHARED
+    }
+}
+
+/// The smallest triangle index of each triangle's island: triangles with a corner at the very same place belong
+/// together.
+fn connect(corner_uvs: &[[DVec2; 3]]) -> Vec<u32> {
+    let mut parent: Vec<u32> = (0..corner_uvs.len() as u32).collect();
+    let mut at: HashMap<(u64, u64), u32> = HashMap::new();
+    for (triangle, corners) in corner_uvs.iter().enumerate() {
+        for corner in corners {
+            // Adding zero makes both zeros alike.
+            let place = ((corner.x + 0.0).to_bits(), (corner.y + 0.0).to_bits());
+            let other = *at.entry(place).or_insert(triangle as u32);
+            let (a, b) = (root(&mut parent, triangle as u32), root(&mut parent, other));
+            parent[a.max(b) as usize] = a.min(b);
+        }
+    }
+    (0..parent.len() as u32)
+        .map(|triangle| root(&mut parent, triangle))
+        .collect()
+}
+
+fn root(parent: &mut [u32], mut triangle: u32) -> u32 {
+    while parent[triangle as usize] != triangle {
+        let above = parent[parent[triangle as usize] as usize];
+        parent[triangle as usize] = above;
+        triangle = above;
+    }
+    triangle
+}
