@@ -4,5 +4,7 @@ mod support;
 
 #[path = "scene/builtins.rs"]
 mod builtins;
+#[path = "scene/collections.rs"]
+mod collections;
 #[path = "scene/files.rs"]
 mod files;

@@ -3,8 +3,9 @@
 
 pub mod builtin;
 pub mod camera;
-pub mod gltf;
+mod gltf;
 pub mod light;
+pub mod load;
 pub mod material;
 pub mod mesh;
 pub mod texture;
@@ -13,6 +14,7 @@ use glam::DVec3;
 
 pub use camera::Camera;
 pub use light::{Light, LightKind};
+pub use load::{LoadOptions, load};
 pub use material::{Material, SurfaceKind, Volume};
 pub use mesh::Mesh;
 pub use texture::{Texture, TextureRef};

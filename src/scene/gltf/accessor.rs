@@ -1,0 +1,222 @@
+//! Arrays of numbers, each checked against its buffer before memory is taken.
+
+use gltf::json::accessor::{Accessor, ComponentType, Type, sparse::Sparse};
+use gltf::json::validation::Checked;
+use gltf::json::{Index, Root, buffer};
+
+use super::buffers::Buffers;
+use super::report::Budget;
+use crate::error::{Error, Result};
+
+/// Reads the accessors of a file.
+#[derive(Clone, Copy, Debug)]
+pub struct Reader<'a> {
+    /// The typed JSON.
+    pub root: &'a Root,
+    /// Its binary data.
+    pub buffers: &'a Buffers<'a>,
+}
+
+/// Which formats an attribute may have beside 32-bit floats.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Formats {
+    /// None.
+    Float,
+    /// 8 and 16 bits, unsigned, that stand for 0 to 1.
+    FloatOrNormalised,
+}
+
+impl Reader<'_> {
+    /// Vectors of N numbers. `owner` says whose they are.
+    ///
+    /// # Errors
+    /// No such accessor, another format, data beyond the buffer, too much memory.
+    pub fn vectors<const N: usize>(
+        &self,
+        index: Index<Accessor>,
+        formats: Formats,
+        owner: &str,
+        budget: &mut Budget,
+    ) -> Result<Vec<[f64; N]>> {
+        let accessor = self.get(index, owner)?;
+        let Some(component) = vector_component::<N>(accessor, formats) else {
+            return Err(broken(
+                owner,
+                format!(
+                    "accessor {} has a format that glTF does not allow there",
+                    index.value()
+                ),
+            ));
+        };
+        let bytes = self.packed(accessor, N * size(component), owner, budget)?;
+        budget.take((accessor.count.0).saturating_mul(8 * N as u64), owner)?;
+        let components = bytes
+            .chunks_exact(size(component))
+            .map(|bytes| match (component, bytes) {
+                (ComponentType::F32, &[a, b, c, d]) => f64::from(f32::from_le_bytes([a, b, c, d])),
+                (_, &[a, b]) => f64::from(u16::from_le_bytes([a, b])) / f64::from(u16::MAX),
+                (_, bytes) => f64::from(bytes[0]) / f64::from(u8::MAX),
+            });
+        let numbers: Vec<f64> = components.collect();
+        Ok(numbers.as_chunks().0.to_vec())
+    }
+
+    /// Vertex indices.
+    ///
+    /// # Errors
+    /// As [`vectors`](Self::vectors).
+    pub fn indices(&self, index: Index<Accessor>, owner: &str, budget: &mut Budget) -> Result<Vec<u32>> {
+        let accessor = self.get(index, owner)?;
+        let component = match (&accessor.type_, &accessor.component_type) {
+            (Checked::Valid(Type::Scalar), Checked::Valid(component)) => component.0,
+            _ => ComponentType::F32,
+        };
+        if !matches!(
+            component,
+            ComponentType::U8 | ComponentType::U16 | ComponentType::U32
+        ) {
+            return Err(broken(
+                owner,
+                format!(
+                    "accessor {} has a format that glTF does not allow for indices",
+                    index.value()
+                ),
+            ));
+        }
+        let bytes = self.packed(accessor, size(component), owner, budget)?;
+        Ok(bytes.chunks_exact(size(component)).map(unsigned).collect())
+    }
+
+    fn get(&self, index: Index<Accessor>, owner: &str) -> Result<&Accessor> {
+        let index = index.value();
+        let found = self.root.accessors.get(index);
+        found.ok_or_else(|| broken(owner, format!("refers to accessor {index}, which does not exist")))
+    }
+
+    /// The accessor's elements without gaps, sparse ones filled in.
+    fn packed(
+        &self,
+        accessor: &Accessor,
+        element: usize,
+        owner: &str,
+        budget: &mut Budget,
+    ) -> Result<Vec<u8>> {
+        budget.take(accessor.count.0.saturating_mul(element as u64), owner)?;
+        let mut packed = match accessor.buffer_view {
+            Some(view) => {
+                let offset = accessor.byte_offset.unwrap_or_default().0;
+                self.elements(view, offset, accessor.count.0, element, owner)?
+            }
+            // Without a buffer all elements are zero; the budget has bounded their number.
+            None => vec![0; accessor.count.0 as usize * element],
+        };
+        if let Some(sparse) = &accessor.sparse {
+            self.fill_in(sparse, element, &mut packed, owner)?;
+        }
+        Ok(packed)
+    }
+
+    fn fill_in(&self, sparse: &Sparse, element: usize, packed: &mut [u8], owner: &str) -> Result<()> {
+        let Checked::Valid(component) = sparse.indices.component_type else {
+            return Err(broken(owner, "has sparse indices of an unknown format"));
+        };
+        let (count, width) = (sparse.count.0, component.0.size());
+        let indices = self.elements(
+            sparse.indices.buffer_view,
+            sparse.indices.byte_offset.0,
+            count,
+            width,
+            owner,
+        )?;
+        let values = self.elements(
+            sparse.values.buffer_view,
+            sparse.values.byte_offset.0,
+            count,
+            element,
+            owner,
+        )?;
+        for (index, value) in indices
+            .chunks_exact(width)
+            .map(unsigned)
+            .zip(values.chunks_exact(element))
+        {
+            let start = (index as usize).saturating_mul(element);
+            let Some(target) = packed.get_mut(start..start.saturating_add(element)) else {
+                return Err(broken(
+                    owner,
+                    format!("has a sparse value for element {index}, which does not exist"),
+                ));
+            };
+            target.copy_from_slice(value);
+        }
+        Ok(())
+    }
+
+    /// `count` elements of a view, packed.
+    fn elements(
+        &self,
+        view: Index<buffer::View>,
+        offset: u64,
+        count: u64,
+        element: usize,
+        owner: &str,
+    ) -> Result<Vec<u8>> {
+        let index = view.value();
+        let view = self.buffers.view(view, owner)?;
+        let stride = view.stride.unwrap_or(element);
+        if stride < element {
+            return Err(broken(
+                owner,
+                format!("buffer view {index} has a stride of {stride} bytes for elements of {element}"),
+            ));
+        }
+        if count == 0 {
+            return Ok(Vec::new());
+        }
+        let end = (count - 1)
+            .checked_mul(stride as u64)
+            .and_then(|last| last.checked_add(offset)?.checked_add(element as u64));
+        if end.is_none_or(|end| end > view.data.len() as u64) {
+            return Err(broken(
+                owner,
+                format!(
+                    "{count} elements do not fit into buffer view {index}, which has {} bytes",
+                    view.data.len()
+                ),
+            ));
+        }
+        let data = &view.data[offset as usize..];
+        Ok(data
+            .chunks(stride)
+            .take(count as usize)
+            .flat_map(|bytes| &bytes[..element])
+            .copied()
+            .collect())
+    }
+}
+
+fn vector_component<const N: usize>(accessor: &Accessor, formats: Formats) -> Option<ComponentType> {
+    let (Checked::Valid(shape), Checked::Valid(component)) = (accessor.type_, accessor.component_type) else {
+        return None;
+    };
+    let normalised = accessor.normalized
+        && formats == Formats::FloatOrNormalised
+        && matches!(component.0, ComponentType::U8 | ComponentType::U16);
+    (shape.multiplicity() == N && (component.0 == ComponentType::F32 || normalised)).then_some(component.0)
+}
+
+fn size(component: ComponentType) -> usize {
+    component.size()
+}
+
+/// A little-endian number of one, two or four bytes.
+fn unsigned(bytes: &[u8]) -> u32 {
+    bytes
+        .iter()
+        .rev()
+        .fold(0, |value, byte| value << 8 | u32::from(*byte))
+}
+
+fn broken(owner: &str, what: impl Into<String>) -> Error {
+    Error::failure(owner, what, "export the file again")
+}

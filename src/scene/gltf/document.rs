@@ -1,0 +1,176 @@
+//! The JSON of a file as typed data, without the parts that are not read.
+
+use gltf::json::{Root, Value};
+use serde::Deserialize;
+use serde_json::Map;
+
+use super::report::Report;
+use super::{extensions, faults};
+use crate::error::{Error, Result};
+
+/// The typed JSON, with node transforms in double precision beside it.
+#[derive(Debug)]
+pub struct Document {
+    /// Everything else.
+    pub root: Root,
+    /// One per node.
+    pub transforms: Vec<NodeTransform>,
+}
+
+/// A node's own transform as the file states it, unchecked.
+#[derive(Clone, Debug, Default, Deserialize)]
+pub struct NodeTransform {
+    /// Column by column.
+    pub matrix: Option<[f64; 16]>,
+    /// [m].
+    pub translation: Option<[f64; 3]>,
+    /// Quaternion x, y, z, w.
+    pub rotation: Option<[f64; 4]>,
+    /// Per axis.
+    pub scale: Option<[f64; 3]>,
+}
+
+/// Reads the JSON text.
+///
+/// # Errors
+/// Text that is no JSON, another version than glTF 2, a required extension that is not supported, values of the wrong
+/// type.
+pub fn parse(json: &[u8], report: &mut Report) -> Result<Document> {
+    let mut value: Value = serde_json::from_slice(json).map_err(|error| broken_json(json, &error))?;
+    let Some(file) = value.as_object_mut() else {
+        return Err(unlike_gltf("its JSON is not an object"));
+    };
+    check_version(file, report)?;
+    let required = strings(file, "extensionsRequired")?;
+    extensions::check(&required, &strings(file, "extensionsUsed")?, report)?;
+    leave_out_what_is_not_read(file, report);
+    remove_extras(&mut value);
+
+    let transforms = match value.get("nodes") {
+        Some(nodes) => Vec::deserialize(nodes).map_err(|error| unlike_gltf(&error.to_string()))?,
+        None => Vec::new(),
+    };
+    let root: Root = serde_json::from_value(value).map_err(|error| unlike_gltf(&error.to_string()))?;
+    faults::report(&root, report);
+    Ok(Document { root, transforms })
+}
+
+fn broken_json(json: &[u8], error: &serde_json::Error) -> Error {
+    if json.trim_ascii_start().starts_with(b"{") {
+        Error::failure(
+            "JSON",
+            format!("is broken ({error})"),
+            "repair it or export it again",
+        )
+    } else {
+        Error::failure(
+            "JSON",
+            format!("this is no glTF file ({error})"),
+            "name a .glb or .gltf file",
+        )
+    }
+}
+
+fn unlike_gltf(why: &str) -> Error {
+    Error::failure(
+        "JSON",
+        format!("does not follow glTF 2.0 ({why})"),
+        "repair it or export it again",
+    )
+}
+
+fn check_version(file: &Map<String, Value>, report: &mut Report) -> Result<()> {
+    let asset = file.get("asset");
+    let text = |key: &str| asset.and_then(|asset| asset.get(key)).and_then(Value::as_str);
+    let Some(version) = text("version") else {
+        return Err(unlike_gltf("it states no version in `asset`"));
+    };
+    let parts = |version: &str| {
+        let (major, minor) = version.split_once('.')?;
+        Some((major.parse::<u32>().ok()?, minor.parse::<u32>().ok()?))
+    };
+    let needed = text("minVersion").unwrap_or(version);
+    match (parts(version), parts(needed)) {
+        (Some((2, minor)), Some((2, needed_minor))) if text("minVersion").is_none() || needed_minor == 0 => {
+            if minor > 0 {
+                report.warn(
+                    "asset",
+                    format!("is of version 2.{minor}, read as 2.0"),
+                    "check the picture",
+                );
+            }
+            Ok(())
+        }
+        _ => Err(Error::failure(
+            "asset",
+            "is not of glTF version 2.0",
+            "export the scene as glTF 2.0",
+        )),
+    }
+}
+
+fn strings(file: &Map<String, Value>, key: &str) -> Result<Vec<String>> {
+    match file.get(key) {
+        None => Ok(Vec::new()),
+        Some(list) => {
+            Vec::deserialize(list).map_err(|_| unlike_gltf(&format!("`{key}` is no list of names")))
+        }
+    }
+}
+
+/// Takes out animations, skins and morph targets, so that faults in them cannot stop a scene at rest, and fills in
+/// what the typed reader wants although glTF does not.
+fn leave_out_what_is_not_read(file: &mut Map<String, Value>, report: &mut Report) {
+    if file.remove("animations").is_some() {
+        report.warn("animations", "are not played", "the scene is read at rest");
+    }
+    file.remove("skins");
+    let (mut skinned, mut morphed) = (false, false);
+    for node in objects(file.get_mut("nodes")) {
+        skinned |= node.remove("skin").is_some();
+        morphed |= node.remove("weights").is_some();
+    }
+    for mesh in objects(file.get_mut("meshes")) {
+        morphed |= mesh.remove("weights").is_some();
+        for primitive in objects(mesh.get_mut("primitives")) {
+            morphed |= primitive.remove("targets").is_some();
+        }
+    }
+    if skinned {
+        report.warn(
+            "skins",
+            "are not applied",
+            "skinned meshes stand in their bind pose",
+        );
+    }
+    if morphed {
+        report.warn("morph targets", "are not applied", "meshes have their base shape");
+    }
+    for scene in objects(file.get_mut("scenes")) {
+        scene.entry("nodes").or_insert_with(|| Value::Array(Vec::new()));
+    }
+    let lights = file
+        .get_mut("extensions")
+        .and_then(|extensions| extensions.get_mut("KHR_lights_punctual"))
+        .and_then(|punctual| punctual.get_mut("lights"));
+    for light in objects(lights) {
+        light.remove("extensions");
+    }
+}
+
+fn objects(list: Option<&mut Value>) -> impl Iterator<Item = &mut Map<String, Value>> {
+    let items = list.and_then(Value::as_array_mut).map(|items| items.iter_mut());
+    items.into_iter().flatten().filter_map(Value::as_object_mut)
+}
+
+/// Application data of any depth: not read, and raw text that the typed reader cannot take everywhere.
+fn remove_extras(value: &mut Value) {
+    match value {
+        Value::Array(items) => items.iter_mut().for_each(remove_extras),
+        Value::Object(fields) => {
+            fields.remove("extras");
+            fields.values_mut().for_each(remove_extras);
+        }
+        _ => {}
+    }
+}

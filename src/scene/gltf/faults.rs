@@ -1,0 +1,46 @@
+//! Breaches of glTF's rules that the crate's own validation finds, as warnings: those that matter to what is read
+//! are met again, and stop the loading, where it needs the faulty thing.
+
+use gltf::json::Root;
+use gltf::json::path::Path;
+use gltf::json::validation::{Error, Validate};
+
+use super::guard;
+use super::report::Report;
+
+/// Says what is wrong with the typed JSON.
+pub fn report(root: &Root, report: &mut Report) {
+    let mut found = Vec::new();
+    // It panics on some broken references.
+    let finished = guard::without_panic(|| {
+        root.validate(root, Path::new, &mut |path, error| {
+            found.push((path().to_string(), error))
+        });
+    });
+    for (path, error) in found {
+        // Extensions were checked before, against what this program reads.
+        if path.starts_with("extensionsRequired") {
+            continue;
+        }
+        // Accessors may stand without a buffer view (all zero), textures without a plain image (WebP).
+        let may_miss = path.ends_with("bufferView") || path.ends_with("source");
+        if error == Error::Missing && may_miss {
+            continue;
+        }
+        let what = match error {
+            Error::IndexOutOfBounds => "refers to something that does not exist",
+            Error::Invalid => "has a value that glTF does not allow",
+            Error::Missing => "is missing",
+            Error::Oversize => "is too large",
+            Error::Unsupported => "is not supported",
+        };
+        report.warn(path, what, "export the file again if something is missing");
+    }
+    if finished.is_none() {
+        report.warn(
+            "JSON",
+            "has references that lead nowhere",
+            "export the file again",
+        );
+    }
+}

@@ -1,0 +1,213 @@
+//! Images: decoded by ourselves, so that one bad image costs one texture and not the scene.
+
+use std::collections::HashMap;
+use std::io::Cursor;
+use std::path::Path;
+use std::rc::Rc;
+
+use gltf::json::texture::{Sampler, WrappingMode};
+use gltf::json::validation::Checked;
+use gltf::json::{Index, Root};
+use image::{ImageFormat, ImageReader, Limits, RgbaImage};
+
+use super::buffers::Buffers;
+use super::report::{Budget, Report};
+use super::{guard, names, uri};
+use crate::error::Result;
+use crate::optics::LinearSrgb;
+use crate::scene::Texture;
+use crate::scene::texture::Wrap;
+
+/// Texels across or down that an image may have.
+const LARGEST_SIDE: u32 = 16_384;
+
+/// sRGB code of linear 0.5: stands in for an image that cannot be read.
+const GREY: u8 = 188;
+
+/// Reads the images that materials ask for, each once.
+#[derive(Debug)]
+pub struct Images<'a> {
+    root: &'a Root,
+    buffers: &'a Buffers<'a>,
+    folder: &'a Path,
+    decoded: HashMap<usize, Rc<RgbaImage>>,
+    by_source: HashMap<(usize, [u8; 2]), usize>,
+    textures: Vec<Texture>,
+}
+
+impl<'a> Images<'a> {
+    /// Nothing read yet.
+    pub fn new(root: &'a Root, buffers: &'a Buffers<'a>, folder: &'a Path) -> Self {
+        Self {
+            root,
+            buffers,
+            folder,
+            decoded: HashMap::new(),
+            by_source: HashMap::new(),
+            textures: Vec::new(),
+        }
+    }
+
+    /// The scene's textures.
+    pub fn into_textures(self) -> Vec<Texture> {
+        self.textures
+    }
+
+    /// Index among the scene's textures of a glTF texture; `None`, with a warning, where it has no image.
+    ///
+    /// # Errors
+    /// More memory than the budget has.
+    pub fn texture(
+        &mut self,
+        texture: Index<gltf::json::Texture>,
+        owner: &str,
+        budget: &mut Budget,
+        report: &mut Report,
+    ) -> Result<Option<usize>> {
+        let Some(image) = self.image_index(texture, owner, report) else {
+            return Ok(None);
+        };
+        let wrap = self.wrap(texture);
+        let key = (image, wrap.map(|wrap| wrap as u8));
+        if let Some(known) = self.by_source.get(&key) {
+            return Ok(Some(*known));
+        }
+        let pixels = self.decode(image, budget, report)?;
+        budget.take(pixels.as_raw().len() as u64, &self.name(image))?;
+        self.textures.push(Texture {
+            name: self.name(image),
+            width: pixels.width(),
+            height: pixels.height(),
+            rgba: pixels.pixels().map(|pixel| pixel.0).collect(),
+            wrap,
+        });
+        self.by_source.insert(key, self.textures.len() - 1);
+        Ok(Some(self.textures.len() - 1))
+    }
+
+    /// Mean over a texture of what `value` makes of each texel; `None` where it has no image.
+    ///
+    /// # Errors
+    /// More memory than the budget has.
+    pub fn mean(
+        &mut self,
+        texture: Index<gltf::json::Texture>,
+        value: impl Fn([u8; 4]) -> LinearSrgb,
+        owner: &str,
+        budget: &mut Budget,
+        report: &mut Report,
+    ) -> Result<Option<LinearSrgb>> {
+        let Some(image) = self.image_index(texture, owner, report) else {
+            return Ok(None);
+        };
+        let pixels = self.decode(image, budget, report)?;
+        let sum = pixels
+            .pixels()
+            .fold(LinearSrgb::BLACK, |sum, pixel| sum + value(pixel.0));
+        Ok(Some(sum / f64::from(pixels.width() * pixels.height())))
+    }
+
+    fn image_index(
+        &self,
+        texture: Index<gltf::json::Texture>,
+        owner: &str,
+        report: &mut Report,
+    ) -> Option<usize> {
+        let texture = self.root.textures.get(texture.value());
+        let webp = texture.and_then(|texture| {
+            let source = texture
+                .extensions
+                .as_ref()?
+                .others
+                .get("EXT_texture_webp")?
+                .get("source")?;
+            usize::try_from(source.as_u64()?).ok()
+        });
+        let image = webp.or(texture.map(|texture| texture.source.value()));
+        let found = image.filter(|image| *image < self.root.images.len());
+        if found.is_none() {
+            report.warn(
+                owner,
+                "refers to an image that does not exist; it was left out",
+                "add the image",
+            );
+        }
+        found
+    }
+
+    fn wrap(&self, texture: Index<gltf::json::Texture>) -> [Wrap; 2] {
+        let sampler = self
+            .root
+            .textures
+            .get(texture.value())
+            .and_then(|texture| texture.sampler);
+        let sampler: Option<&Sampler> = sampler.and_then(|sampler| self.root.samplers.get(sampler.value()));
+        let mode = |mode: &Checked<WrappingMode>| match mode {
+            Checked::Valid(WrappingMode::ClampToEdge) => Wrap::ClampToEdge,
+            Checked::Valid(WrappingMode::MirroredRepeat) => Wrap::MirroredRepeat,
+            Checked::Valid(WrappingMode::Repeat) | Checked::Invalid => Wrap::Repeat,
+        };
+        sampler.map_or([Wrap::Repeat; 2], |sampler| {
+            [mode(&sampler.wrap_s), mode(&sampler.wrap_t)]
+        })
+    }
+
+    fn name(&self, image: usize) -> String {
+        names::name(self.root.images[image].name.as_ref(), "image", image)
+    }
+
+    fn decode(&mut self, image: usize, budget: &mut Budget, report: &mut Report) -> Result<Rc<RgbaImage>> {
+        if let Some(known) = self.decoded.get(&image) {
+            return Ok(known.clone());
+        }
+        let owner = format!("image `{}`", self.name(image));
+        let pixels = match self.read(image, &owner, budget) {
+            Ok(pixels) => pixels,
+            Err(why) => {
+                report.warn(
+                    owner.clone(),
+                    format!("{why}; it was replaced by grey"),
+                    "repair the image",
+                );
+                RgbaImage::from_pixel(1, 1, image::Rgba([GREY, GREY, GREY, 255]))
+            }
+        };
+        budget.take(pixels.as_raw().len() as u64, &owner)?;
+        let pixels = Rc::new(pixels);
+        self.decoded.insert(image, pixels.clone());
+        Ok(pixels)
+    }
+
+    fn read(&self, image: usize, owner: &str, budget: &Budget) -> std::result::Result<RgbaImage, String> {
+        let image = &self.root.images[image];
+        let loaded;
+        let bytes = match (image.buffer_view, &image.uri) {
+            (Some(view), _) => self.buffers.view(view, owner).map_err(|error| error.what)?.data,
+            (None, Some(uri)) => {
+                loaded = uri::read(uri, self.folder, budget.left(), owner).map_err(|error| error.what)?;
+                &loaded
+            }
+            (None, None) => return Err("has no data".into()),
+        };
+        guard::without_panic(|| decode(bytes, budget.left())).unwrap_or_else(|| Err("is damaged".into()))
+    }
+}
+
+fn decode(bytes: &[u8], most_bytes: u64) -> std::result::Result<RgbaImage, String> {
+    let mut reader = ImageReader::new(Cursor::new(bytes))
+        .with_guessed_format()
+        .map_err(|error| format!("cannot be read ({error})"))?;
+    let known = [ImageFormat::Png, ImageFormat::Jpeg, ImageFormat::WebP];
+    if !reader.format().is_some_and(|format| known.contains(&format)) {
+        return Err("is neither PNG nor JPEG nor WebP".into());
+    }
+    let mut limits = Limits::default();
+    limits.max_image_width = Some(LARGEST_SIDE);
+    limits.max_image_height = Some(LARGEST_SIDE);
+    limits.max_alloc = Some(most_bytes);
+    reader.limits(limits);
+    let image = reader
+        .decode()
+        .map_err(|error| format!("cannot be decoded ({error})"))?;
+    Ok(image.into_rgba8())
+}

@@ -1,0 +1,420 @@
+//! Materials: glTF's factors and extensions, checked, and the class that transport treats each as.
+
+use glam::{DMat3, DVec2};
+use gltf::json::extensions::material as extension;
+use gltf::json::material::{AlphaMode, Material as Source};
+use gltf::json::texture::Info;
+use gltf::json::validation::Checked;
+use gltf::json::{Index, Root};
+
+use super::images::Images;
+use super::names;
+use super::numbers::widen;
+use super::report::{Budget, Report};
+use crate::error::Result;
+use crate::optics::LinearSrgb;
+use crate::scene::material::SPECULAR_ROUGHNESS_LIMIT;
+use crate::scene::{Material, SurfaceKind, TextureRef, Volume};
+use crate::units::LUMENS_PER_WATT;
+
+/// What a primitive without a material has: glTF's default material is a rough metal, which is taken for matte.
+pub fn default() -> Material {
+    Material {
+        name: "default".into(),
+        base_colour: LinearSrgb::WHITE,
+        double_sided: false,
+        ..Material::default()
+    }
+}
+
+/// A thin wall as clear solid glass.
+pub fn solid_twin(thin: &Material) -> Material {
+    Material {
+        name: format!("{} (solid)", thin.name),
+        surface: SurfaceKind::Dielectric,
+        volume: Some(CLEAR),
+        ..thin.clone()
+    }
+}
+
+const CLEAR: Volume = Volume {
+    attenuation_distance_m: f64::INFINITY,
+    attenuation_colour: LinearSrgb::WHITE,
+};
+
+/// glTF's refractive index where a material states none.
+const DEFAULT_IOR: f64 = 1.5;
+
+/// The least that an attenuation colour lets through: black would need an infinite absorption.
+const DARKEST_ATTENUATION: f64 = 1e-6;
+
+/// All materials, in file order.
+///
+/// # Errors
+/// Images that do not fit the memory budget.
+pub fn read_all(
+    root: &Root,
+    images: &mut Images,
+    budget: &mut Budget,
+    report: &mut Report,
+) -> Result<Vec<Material>> {
+    let sources = root.materials.iter().enumerate();
+    sources
+        .map(|(index, source)| {
+            let name = names::name(source.name.as_ref(), "material", index);
+            let mut reading = Reading {
+                owner: format!("material `{name}`"),
+                source,
+                images: &mut *images,
+                budget: &mut *budget,
+                report: &mut *report,
+            };
+            reading.read(name)
+        })
+        .collect()
+}
+
+struct Reading<'a, 'b> {
+    owner: String,
+    source: &'a Source,
+    images: &'a mut Images<'b>,
+    budget: &'a mut Budget,
+    report: &'a mut Report,
+}
+
+impl Reading<'_, '_> {
+    fn read(&mut self, name: String) -> Result<Material> {
+        let none = extension::Material::default();
+        let extensions = self.source.extensions.as_ref().unwrap_or(&none);
+        let pbr = &self.source.pbr_metallic_roughness;
+        let [red, green, blue, _] = pbr.base_color_factor.0;
+        let transmission = extensions.transmission.as_ref();
+        let mut material = Material {
+            name,
+            surface: SurfaceKind::Diffuse,
+            base_colour: self.colour([red, green, blue], "base colour"),
+            base_colour_texture: self.base_colour_texture()?,
+            metallic: self.share(pbr.metallic_factor.0, "metallic factor"),
+            roughness: self.share(pbr.roughness_factor.0, "roughness factor"),
+            transmission: self.share(
+                transmission.map_or(0.0, |transmission| transmission.transmission_factor.0),
+                "transmission factor",
+            ),
+            ior: self.ior(extensions),
+            volume: self.volume(extensions),
+            emitted_radiance: self.emission(extensions)?,
+            double_sided: self.source.double_sided,
+        };
+        self.take_means(&mut material, transmission)?;
+        material.surface = if extensions.unlit.is_some() {
+            SurfaceKind::Diffuse
+        } else {
+            self.classify(&material)
+        };
+        if material.surface != SurfaceKind::Dielectric {
+            material.volume = None;
+        }
+        self.name_what_is_ignored(extensions);
+        Ok(material)
+    }
+
+    fn warn(&mut self, what: impl Into<String>, remedy: &str) {
+        self.report.warn(self.owner.clone(), what, remedy);
+    }
+
+    /// A factor brought into [0, 1]; what is no number counts as 0.
+    fn share(&mut self, value: f32, what: &str) -> f64 {
+        let read = if value.is_nan() {
+            0.0
+        } else {
+            widen(value.clamp(0.0, 1.0))
+        };
+        if read != widen(value) {
+            self.warn(
+                format!("its {what} of {value} was read as {read}"),
+                "use a value from 0 to 1",
+            );
+        }
+        read
+    }
+
+    fn colour(&mut self, channels: [f32; 3], what: &str) -> LinearSrgb {
+        channels.map(|channel| self.share(channel, what)).into()
+    }
+
+    fn ior(&mut self, extensions: &extension::Material) -> f64 {
+        let Some(stated) = extensions.ior.as_ref().map(|ior| widen(ior.ior.0)) else {
+            return DEFAULT_IOR;
+        };
+        if stated >= 1.0 && stated.is_finite() {
+            return stated;
+        }
+        let why = if stated == 0.0 {
+            " (which only stands for full reflection)"
+        } else {
+            ""
+        };
+        self.warn(
+            format!("its refractive index of {stated}{why} was read as {DEFAULT_IOR}"),
+            "use a value of at least 1",
+        );
+        DEFAULT_IOR
+    }
+
+    fn volume(&mut self, extensions: &extension::Material) -> Option<Volume> {
+        let stated = extensions.volume.as_ref()?;
+        let thickness = stated.thickness_factor.0;
+        if thickness < 0.0 || !thickness.is_finite() {
+            self.warn(
+                format!("its thickness of {thickness} was read as 0"),
+                "use a positive thickness",
+            );
+            return None;
+        }
+        if thickness == 0.0 {
+            return None;
+        }
+        let mut distance = widen(stated.attenuation_distance.0);
+        if distance.is_nan() || distance <= 0.0 {
+            self.warn(
+                format!("its attenuation distance of {distance} was read as infinite"),
+                "use a positive distance",
+            );
+            distance = f64::INFINITY;
+        }
+        let colour = self.colour(stated.attenuation_color.0, "attenuation colour");
+        if distance.is_finite()
+            && colour
+                .to_array()
+                .iter()
+                .any(|channel| *channel < DARKEST_ATTENUATION)
+        {
+            self.warn(
+                format!("its attenuation colour was raised to at least {DARKEST_ATTENUATION:e}"),
+                "use a shorter attenuation distance for darker glass",
+            );
+        }
+        Some(Volume {
+            attenuation_distance_m: distance,
+            attenuation_colour: colour.map(|channel| channel.max(DARKEST_ATTENUATION)),
+        })
+    }
+
+    /// glTF's cd/m² as luminous-equivalent W/(m² sr).
+    fn emission(&mut self, extensions: &extension::Material) -> Result<LinearSrgb> {
+        let mut strength = extensions
+            .emissive_strength
+            .as_ref()
+            .map_or(1.0, |emission| widen(emission.emissive_strength.0));
+        if !(strength >= 0.0 && strength.is_finite()) {
+            self.warn(
+                format!("its emissive strength of {strength} was read as 0"),
+                "use a positive strength",
+            );
+            strength = 0.0;
+        }
+        let mut factor = self.colour(self.source.emissive_factor.0, "emissive factor");
+        if let Some(texture) = self
+            .source
+            .emissive_texture
+            .as_ref()
+            .filter(|_| factor.max_channel() > 0.0)
+        {
+            let linear = |[r, g, b, _]: [u8; 4]| [r, g, b].map(LinearSrgb::decode_channel).into();
+            let mean = self
+                .images
+                .mean(texture.index, linear, &self.owner, self.budget, self.report)?;
+            factor = factor * mean.unwrap_or(LinearSrgb::WHITE);
+            self.warn(
+                "its emissive texture was read as its mean",
+                "split the mesh where it glows",
+            );
+        }
+        Ok(factor * (strength / LUMENS_PER_WATT))
+    }
+
+    /// Multiplies factors by the means of their textures.
+    fn take_means(
+        &mut self,
+        material: &mut Material,
+        transmission: Option<&extension::Transmission>,
+    ) -> Result<()> {
+        let share = |code: u8| f64::from(code) / 255.0;
+        let channels = |[r, g, b, _]: [u8; 4]| LinearSrgb::new(share(r), share(g), share(b));
+        let pbr = &self.source.pbr_metallic_roughness;
+        if let Some(texture) = &pbr.metallic_roughness_texture {
+            let mean = self
+                .images
+                .mean(texture.index, channels, &self.owner, self.budget, self.report)?;
+            let mean = mean.unwrap_or(LinearSrgb::WHITE);
+            material.roughness *= mean.g;
+            material.metallic *= mean.b;
+            self.warn(
+                format!(
+                    "its metallic-roughness texture was read as its mean, metallic {:.2} and roughness {:.2}",
+                    material.metallic, material.roughness
+                ),
+                "split the mesh where the material changes",
+            );
+        }
+        if let Some(texture) =
+            transmission.and_then(|transmission| transmission.transmission_texture.as_ref())
+        {
+            let mean = self
+                .images
+                .mean(texture.index, channels, &self.owner, self.budget, self.report)?;
+            material.transmission *= mean.unwrap_or(LinearSrgb::WHITE).r;
+            self.warn(
+                format!(
+                    "its transmission texture was read as its mean, {:.2}",
+                    material.transmission
+                ),
+                "split the mesh where it is clear",
+            );
+        }
+        Ok(())
+    }
+
+    fn classify(&mut self, material: &Material) -> SurfaceKind {
+        let smooth = material.roughness <= SPECULAR_ROUGHNESS_LIMIT;
+        let as_matte = "make it smoother to have it reflect or transmit light";
+        if material.metallic >= 0.5 {
+            if smooth {
+                return SurfaceKind::Mirror;
+            }
+            // Metallic 1 with roughness 1 is what glTF assumes where a file says nothing.
+            if material.roughness < 1.0 {
+                self.warn(
+                    format!(
+                        "is a metal of roughness {:.2}, treated as matte",
+                        material.roughness
+                    ),
+                    as_matte,
+                );
+            }
+            return SurfaceKind::Diffuse;
+        }
+        if material.transmission >= 0.5 {
+            return match (smooth, material.volume) {
+                (false, _) => {
+                    let roughness = material.roughness;
+                    self.warn(
+                        format!("transmits light at a roughness of {roughness:.2}, treated as matte"),
+                        as_matte,
+                    );
+                    SurfaceKind::Diffuse
+                }
+                (true, Some(_)) => SurfaceKind::Dielectric,
+                (true, None) => {
+                    self.warn(
+                        "transmits light but has no thickness, so that it is a thin pane that does not refract",
+                        "give it a volume, or read closed meshes as solid with --solid-glass",
+                    );
+                    SurfaceKind::ThinWall
+                }
+            };
+        }
+        if smooth {
+            SurfaceKind::Mixed
+        } else {
+            SurfaceKind::Diffuse
+        }
+    }
+
+    fn base_colour_texture(&mut self) -> Result<Option<TextureRef>> {
+        let source = self.source;
+        let Some(info) = &source.pbr_metallic_roughness.base_color_texture else {
+            return Ok(None);
+        };
+        let (uv_set, uv_transform) = coordinates(info);
+        if uv_set > 1 {
+            self.warn(
+                format!("its base colour texture follows TEXCOORD_{uv_set} and was left out"),
+                "use TEXCOORD_0 or TEXCOORD_1",
+            );
+            return Ok(None);
+        }
+        let uv_transform = uv_transform
+            .filter(|transform| transform.is_finite())
+            .unwrap_or_else(|| {
+                self.warn(
+                    "its texture transform is not finite and was ignored",
+                    "export the file again",
+                );
+                DMat3::IDENTITY
+            });
+        let texture = Index::new(info.index.value() as u32);
+        let texture = self
+            .images
+            .texture(texture, &self.owner, self.budget, self.report)?;
+        Ok(texture.map(|texture| TextureRef {
+            texture,
+            uv_set,
+            uv_transform,
+        }))
+    }
+
+    fn name_what_is_ignored(&mut self, extensions: &extension::Material) {
+        match self.source.alpha_mode {
+            Checked::Valid(AlphaMode::Opaque) => {}
+            Checked::Valid(mode) => {
+                let mode = if mode == AlphaMode::Mask { "MASK" } else { "BLEND" };
+                self.warn(
+                    format!("its alpha mode {mode} was read as opaque"),
+                    "use transmission for glass",
+                );
+            }
+            Checked::Invalid => self.warn(
+                "its alpha mode is unknown and was read as opaque",
+                "export the file again",
+            ),
+        }
+        let changed_specular = extensions.specular.as_ref().is_some_and(|specular| {
+            specular.specular_factor.0 != 1.0
+                || specular.specular_color_factor.0 != [1.0; 3]
+                || specular.specular_texture.is_some()
+                || specular.specular_color_texture.is_some()
+        });
+        let mut ignored = Vec::new();
+        if changed_specular {
+            ignored.push("KHR_materials_specular".to_owned());
+        }
+        if self.source.normal_texture.is_some() {
+            ignored.push("normal texture".to_owned());
+        }
+        ignored.extend(
+            extensions
+                .others
+                .keys()
+                .map(|key| names::name(Some(key), "extension", 0)),
+        );
+        if !ignored.is_empty() {
+            self.warn(
+                format!("its {} was ignored", ignored.join(", ")),
+                "expect it to look and bake as if it were not there",
+            );
+        }
+    }
+}
+
+/// Set and transform of a texture's coordinates; no transform where it is broken.
+fn coordinates(info: &Info) -> (usize, Option<DMat3>) {
+    let transform = info
+        .extensions
+        .as_ref()
+        .and_then(|extensions| extensions.texture_transform.as_ref());
+    let Some(transform) = transform else {
+        return (info.tex_coord as usize, Some(DMat3::IDENTITY));
+    };
+    let vector = |[x, y]: [f32; 2]| DVec2::new(widen(x), widen(y));
+    // v runs downwards, so that the extension's counter-clockwise turn is a negative one in (u, v).
+    let matrix = DMat3::from_scale_angle_translation(
+        vector(transform.scale.0),
+        -widen(transform.rotation.0),
+        vector(transform.offset.0),
+    );
+    (
+        transform.tex_coord.unwrap_or(info.tex_coord) as usize,
+        Some(matrix),
+    )
+}

@@ -1,0 +1,173 @@
+//! Where each node stands: transforms composed in double precision, every node reached once.
+
+use glam::{DAffine3, DMat3, DMat4, DQuat, DVec3};
+use gltf::json::{Index, Node, Root};
+
+use super::document::{Document, NodeTransform};
+use super::names;
+use super::report::Report;
+use crate::error::{Error, Result};
+
+/// A node of the scene.
+#[derive(Clone, Debug)]
+pub struct Placed {
+    /// glTF index.
+    pub node: usize,
+    /// The file's name for it, or `nodeN`.
+    pub name: String,
+    /// From the node to the world.
+    pub world_from_node: DAffine3,
+}
+
+/// The nodes of the default scene (else the first; else all that are nobody's child), parents first.
+///
+/// # Errors
+/// A reference to a node that does not exist; a transform that is not finite.
+pub fn place(document: &Document, report: &mut Report) -> Result<Vec<Placed>> {
+    let root = &document.root;
+    let mut reached = vec![false; root.nodes.len()];
+    let mut placed = Vec::new();
+    // A stack of our own: a chain of a million nodes must not exhaust the thread's.
+    let mut waiting: Vec<(usize, DAffine3)> = Vec::new();
+    for node in top_nodes(root, report).into_iter().rev() {
+        waiting.push((node, DAffine3::IDENTITY));
+    }
+    while let Some((index, world_from_parent)) = waiting.pop() {
+        let Some(node) = root.nodes.get(index) else {
+            return Err(Error::failure(
+                format!("node {index}"),
+                "is referred to but does not exist",
+                "export the file again",
+            ));
+        };
+        let name = names::name(node.name.as_ref(), "node", index);
+        if std::mem::replace(&mut reached[index], true) {
+            report.warn(
+                format!("node `{name}`"),
+                "is its own ancestor or has several parents; it was placed once",
+                "give it one parent",
+            );
+            continue;
+        }
+        let world_from_node = world_from_parent * local(&document.transforms[index], &name, report)?;
+        if !world_from_node.is_finite() {
+            return Err(not_finite(&name));
+        }
+        let children = node.children.as_deref().unwrap_or_default();
+        waiting.extend(
+            children
+                .iter()
+                .rev()
+                .map(|child| (child.value(), world_from_node)),
+        );
+        placed.push(Placed {
+            node: index,
+            name,
+            world_from_node,
+        });
+    }
+    let unreached = reached.iter().filter(|reached| !**reached).count();
+    if root.scenes.is_empty() && unreached > 0 {
+        report.warn(
+            "nodes",
+            format!("{unreached} nodes are their own ancestors; they were left out"),
+            "give each one parent",
+        );
+    }
+    Ok(placed)
+}
+
+fn top_nodes(root: &Root, report: &mut Report) -> Vec<usize> {
+    let default = root.scene.map(|scene| scene.value());
+    let chosen = default.and_then(|scene| root.scenes.get(scene));
+    if let (Some(scene), None) = (default, chosen) {
+        report.warn(
+            "scene",
+            format!("the default scene {scene} does not exist; the first one was read"),
+            "export the file again",
+        );
+    }
+    let is_child = find_children(root);
+    let Some(scene) = chosen.or(root.scenes.first()) else {
+        return (0..root.nodes.len()).filter(|node| !is_child[*node]).collect();
+    };
+    let listed: Vec<usize> = scene.nodes.iter().map(Index::value).collect();
+    for node in &listed {
+        if is_child.get(*node) == Some(&true) {
+            report.warn(
+                format!("node {node}"),
+                "stands in the scene although it is the child of another node; it was placed by itself",
+                "list only nodes without a parent in the scene",
+            );
+        }
+    }
+    listed
+}
+
+fn find_children(root: &Root) -> Vec<bool> {
+    let mut is_child = vec![false; root.nodes.len()];
+    for child in root
+        .nodes
+        .iter()
+        .filter_map(|node: &Node| node.children.as_ref())
+        .flatten()
+    {
+        if let Some(entry) = is_child.get_mut(child.value()) {
+            *entry = true;
+        }
+    }
+    is_child
+}
+
+fn local(transform: &NodeTransform, name: &str, report: &mut Report) -> Result<DAffine3> {
+    if let Some(matrix) = transform.matrix {
+        let matrix = DMat4::from_cols_array(&matrix);
+        if !matrix.is_finite() {
+            return Err(not_finite(name));
+        }
+        if matrix.row(3) != glam::DVec4::W {
+            report.warn(
+                format!("node `{name}`"),
+                "its matrix is not affine; its last row was read as 0 0 0 1",
+                "export the file again",
+            );
+        }
+        let columns = [matrix.x_axis, matrix.y_axis, matrix.z_axis].map(|axis| axis.truncate());
+        return Ok(DAffine3 {
+            matrix3: DMat3::from_cols(columns[0], columns[1], columns[2]),
+            translation: matrix.w_axis.truncate(),
+        });
+    }
+    let scale = DVec3::from(transform.scale.unwrap_or([1.0; 3]));
+    let translation = DVec3::from(transform.translation.unwrap_or_default());
+    let rotation = DQuat::from_array(transform.rotation.unwrap_or([0.0, 0.0, 0.0, 1.0]));
+    if !scale.is_finite() || !translation.is_finite() || !rotation.is_finite() {
+        return Err(not_finite(name));
+    }
+    let length = rotation.length();
+    if (length - 1.0).abs() > 1e-3 {
+        report.warn(
+            format!("node `{name}`"),
+            format!("its rotation has the length {length} and was brought to 1"),
+            "export the file again",
+        );
+    }
+    let rotation = if length > 0.0 {
+        rotation / length
+    } else {
+        DQuat::IDENTITY
+    };
+    Ok(DAffine3::from_scale_rotation_translation(
+        scale,
+        rotation,
+        translation,
+    ))
+}
+
+fn not_finite(name: &str) -> Error {
+    Error::failure(
+        format!("node `{name}`"),
+        "its transform is infinite or not a number",
+        "repair the node or export the file again",
+    )
+}

@@ -1,0 +1,271 @@
+//! One primitive of a mesh, as triangles in world coordinates.
+
+use glam::{DAffine3, DMat3, DVec2, DVec3};
+use gltf::json::mesh::{Mode, Primitive, Semantic};
+use gltf::json::validation::Checked;
+
+use super::accessor::{Formats, Reader};
+use super::report::{Budget, Report};
+use super::{shading, triangles};
+use crate::error::{Error, Result};
+use crate::scene::Mesh;
+
+/// Beyond this [m], squares and volumes leave the range in which they are exact enough to be of use.
+const FARTHEST_M: f64 = 1e12;
+
+/// Bytes of a vertex and a triangle while they are read.
+const VERTEX_BYTES: u64 = 2 * 80;
+const TRIANGLE_BYTES: u64 = 2 * 12;
+
+/// The triangles of a primitive placed by `world_from_node`; `None`, with a warning, where it has none. Adds the
+/// number of triangles without area to `degenerate`.
+///
+/// # Errors
+/// Positions that are not finite or too far, indices of vertices that do not exist, broken accessors.
+pub fn read(
+    reader: Reader,
+    primitive: &Primitive,
+    world_from_node: &DAffine3,
+    owner: &str,
+    budget: &mut Budget,
+    report: &mut Report,
+    degenerate: &mut usize,
+) -> Result<Option<Mesh>> {
+    let Some((mut mesh, has_normals)) = read_local(reader, primitive, owner, budget, report)? else {
+        return Ok(None);
+    };
+    let lengths: Vec<f64> = mesh.normals.iter().map(|normal| normal.length()).collect();
+    place(&mut mesh, world_from_node, owner)?;
+    let before = mesh.triangles.len();
+    drop_degenerate(&mut mesh);
+    *degenerate += before - mesh.triangles.len();
+    if mesh.triangles.is_empty() {
+        report.warn(
+            owner,
+            "has no triangle with an area and was skipped",
+            "remove it from the scene",
+        );
+        return Ok(None);
+    }
+    if has_normals {
+        let kept = drop_unused_vertices(&mut mesh);
+        let lengths = kept.iter().map(|vertex| lengths[*vertex]);
+        shading::repair(&mut mesh, lengths, owner, report);
+    } else {
+        shading::shade_flat(&mut mesh);
+    }
+    Ok(Some(mesh))
+}
+
+/// The primitive in its node's coordinates, and whether the file has normals for it.
+fn read_local(
+    reader: Reader,
+    primitive: &Primitive,
+    owner: &str,
+    budget: &mut Budget,
+    report: &mut Report,
+) -> Result<Option<(Mesh, bool)>> {
+    let Checked::Valid(mode) = primitive.mode else {
+        report.warn(
+            owner,
+            "is of an unknown kind and was skipped",
+            "export the file again",
+        );
+        return Ok(None);
+    };
+    let attribute = |semantic| primitive.attributes.get(&Checked::Valid(semantic)).copied();
+    let Some(positions) = attribute(Semantic::Positions) else {
+        report.warn(owner, "has no positions and was skipped", "export the file again");
+        return Ok(None);
+    };
+    let positions: Vec<DVec3> = convert(reader.vectors(positions, Formats::Float, owner, budget)?);
+    budget.take(positions.len() as u64 * VERTEX_BYTES, owner)?;
+    let vertices = read_vertex_order(reader, primitive, positions.len(), owner, budget)?;
+    budget.take(vertices.len() as u64 * TRIANGLE_BYTES, owner)?;
+    let Some(triangles) = assemble(&vertices, mode, owner, report) else {
+        return Ok(None);
+    };
+    let normals: Option<Vec<DVec3>> = match attribute(Semantic::Normals) {
+        Some(index) => Some(convert(reader.vectors(index, Formats::Float, owner, budget)?)),
+        None => None,
+    };
+    let normals =
+        normals.filter(|normals| one_per_vertex(normals.len(), positions.len(), "normals", owner, report));
+    let mut uv_sets = [None, None];
+    for (set, uvs) in uv_sets.iter_mut().enumerate() {
+        if let Some(index) = attribute(Semantic::TexCoords(set as u32)) {
+            let read: Vec<DVec2> =
+                convert(reader.vectors(index, Formats::FloatOrNormalised, owner, budget)?);
+            let fits = one_per_vertex(read.len(), positions.len(), "texture coordinates", owner, report);
+            *uvs = fits.then(|| finite_uvs(read, owner, report));
+        }
+    }
+    if primitive
+        .attributes
+        .contains_key(&Checked::Valid(Semantic::Colors(0)))
+    {
+        report.warn(
+            owner,
+            "its vertex colours are ignored",
+            "use a base colour texture",
+        );
+    }
+    let [uv0, uv1] = uv_sets;
+    let has_normals = normals.is_some();
+    let normals = normals.unwrap_or_else(|| vec![DVec3::ZERO; positions.len()]);
+    let mesh = Mesh {
+        positions,
+        normals,
+        uv0,
+        uv1,
+        triangles,
+    };
+    Ok(Some((mesh, has_normals)))
+}
+
+fn convert<const N: usize, T: From<[f64; N]>>(vectors: Vec<[f64; N]>) -> Vec<T> {
+    vectors.into_iter().map(T::from).collect()
+}
+
+fn read_vertex_order(
+    reader: Reader,
+    primitive: &Primitive,
+    vertex_count: usize,
+    owner: &str,
+    budget: &mut Budget,
+) -> Result<Vec<u32>> {
+    let Some(indices) = primitive.indices else {
+        let count = u32::try_from(vertex_count)
+            .map_err(|_| Error::failure(owner, "has more vertices than glTF allows", "split the mesh"))?;
+        return Ok((0..count).collect());
+    };
+    let vertices = reader.indices(indices, owner, budget)?;
+    match vertices.iter().find(|vertex| **vertex as usize >= vertex_count) {
+        Some(vertex) => Err(Error::failure(
+            owner,
+            format!("refers to vertex {vertex}, but has only {vertex_count}"),
+            "repair the mesh or export the file again",
+        )),
+        None => Ok(vertices),
+    }
+}
+
+fn assemble(vertices: &[u32], mode: Mode, owner: &str, report: &mut Report) -> Option<Vec<[u32; 3]>> {
+    let triangles = triangles::assemble(vertices, mode);
+    if triangles.is_none() {
+        report.warn(
+            owner,
+            "consists of points or lines and was skipped",
+            "only triangles can be lit",
+        );
+    }
+    let left_over = triangles::left_over(vertices.len(), mode);
+    if triangles.is_some() && left_over > 0 {
+        report.warn(
+            owner,
+            format!("{left_over} vertices at its end make no triangle and were ignored"),
+            "export the file again",
+        );
+    }
+    triangles
+}
+
+fn one_per_vertex(count: usize, vertices: usize, what: &str, owner: &str, report: &mut Report) -> bool {
+    if count != vertices {
+        report.warn(
+            owner,
+            format!("has {count} {what} for {vertices} vertices; they were ignored"),
+            "export the file again",
+        );
+    }
+    count == vertices
+}
+
+fn finite_uvs(mut uvs: Vec<DVec2>, owner: &str, report: &mut Report) -> Vec<DVec2> {
+    let mut repaired = 0;
+    for uv in uvs.iter_mut().filter(|uv| !uv.is_finite()) {
+        *uv = DVec2::ZERO;
+        repaired += 1;
+    }
+    if repaired > 0 {
+        report.warn(
+            owner,
+            format!("{repaired} texture coordinates are not finite and were set to 0"),
+            "export the file again",
+        );
+    }
+    uvs
+}
+
+/// Brings positions and normals into the world; a mirroring transform turns the triangles, so that they stay wound
+/// counter-clockwise about the outside.
+fn place(mesh: &mut Mesh, world_from_node: &DAffine3, owner: &str) -> Result<()> {
+    for (vertex, position) in mesh.positions.iter_mut().enumerate() {
+        if !position.is_finite() {
+            return Err(Error::failure(
+                owner,
+                format!("the position of vertex {vertex} is infinite or not a number"),
+                "repair the mesh or export the file again",
+            ));
+        }
+        *position = world_from_node.transform_point3(*position);
+        if !position.is_finite() || position.abs().max_element() > FARTHEST_M {
+            return Err(Error::failure(
+                owner,
+                format!("vertex {vertex} lies farther than {FARTHEST_M:e} m away"),
+                "use metres, or move the scene closer to the origin",
+            ));
+        }
+    }
+    let linear = world_from_node.matrix3;
+    let mirrored = linear.determinant() < 0.0;
+    // The cofactors are the inverse transpose without its division, so that flattened nodes have normals too.
+    let cofactors = DMat3::from_cols(
+        linear.y_axis.cross(linear.z_axis),
+        linear.z_axis.cross(linear.x_axis),
+        linear.x_axis.cross(linear.y_axis),
+    );
+    let sign = if mirrored { -1.0 } else { 1.0 };
+    for normal in &mut mesh.normals {
+        *normal = cofactors * *normal * sign;
+    }
+    if mirrored {
+        for triangle in &mut mesh.triangles {
+            triangle.swap(1, 2);
+        }
+    }
+    Ok(())
+}
+
+fn drop_degenerate(mesh: &mut Mesh) {
+    let has_area: Vec<bool> = (0..mesh.triangles.len())
+        .map(|triangle| mesh.face_normal(triangle) != DVec3::ZERO)
+        .collect();
+    let mut has_area = has_area.into_iter();
+    mesh.triangles.retain(|_| has_area.next().unwrap_or(false));
+}
+
+/// Leaves only the vertices of triangles, since others would widen the bounds; returns which ones were kept.
+fn drop_unused_vertices(mesh: &mut Mesh) -> Vec<usize> {
+    let mut used = vec![false; mesh.positions.len()];
+    for vertex in mesh.triangles.iter().flatten() {
+        used[*vertex as usize] = true;
+    }
+    let kept: Vec<usize> = (0..used.len()).filter(|vertex| used[*vertex]).collect();
+    if kept.len() == used.len() {
+        return kept;
+    }
+    let mut renamed = vec![0_u32; used.len()];
+    for (new, old) in kept.iter().enumerate() {
+        renamed[*old] = new as u32;
+    }
+    mesh.positions = kept.iter().map(|vertex| mesh.positions[*vertex]).collect();
+    mesh.normals = kept.iter().map(|vertex| mesh.normals[*vertex]).collect();
+    for uvs in [&mut mesh.uv0, &mut mesh.uv1].into_iter().flatten() {
+        *uvs = kept.iter().map(|vertex| uvs[*vertex]).collect();
+    }
+    for vertex in mesh.triangles.iter_mut().flatten() {
+        *vertex = renamed[*vertex as usize];
+    }
+    kept
+}

@@ -1,0 +1,108 @@
+//! What loading has to tell, and what it may take.
+
+use crate::error::{Error, Result, Warning};
+
+/// Warnings: the same thing met at several places is said once.
+#[derive(Debug, Default)]
+pub struct Report {
+    found: Vec<Finding>,
+    left_out: usize,
+}
+
+#[derive(Debug)]
+struct Finding {
+    what: String,
+    remedy: String,
+    locations: Vec<String>,
+}
+
+/// More would bury the ones that matter.
+const MOST_FINDINGS: usize = 60;
+
+/// Places that a warning names before it only counts them.
+const MOST_LOCATIONS: usize = 4;
+
+impl Report {
+    /// Notes something repaired or ignored.
+    pub fn warn(&mut self, location: impl Into<String>, what: impl Into<String>, remedy: impl Into<String>) {
+        let (location, what, remedy) = (location.into(), what.into(), remedy.into());
+        let same = |known: &&mut Finding| known.what == what && known.remedy == remedy;
+        if let Some(known) = self.found.iter_mut().find(same) {
+            if !known.locations.contains(&location) {
+                known.locations.push(location);
+            }
+        } else if self.found.len() < MOST_FINDINGS {
+            self.found.push(Finding {
+                what,
+                remedy,
+                locations: vec![location],
+            });
+        } else {
+            self.left_out += 1;
+        }
+    }
+
+    /// All of them, in the order they were first met.
+    pub fn into_warnings(self) -> Vec<Warning> {
+        let mut warnings: Vec<Warning> = self.found.into_iter().map(Finding::into_warning).collect();
+        if self.left_out > 0 {
+            warnings.push(Warning::new(
+                "glTF",
+                format!("{} more warnings were left out", self.left_out),
+                "see to these first",
+            ));
+        }
+        warnings
+    }
+}
+
+impl Finding {
+    fn into_warning(self) -> Warning {
+        let named = self.locations.len().min(MOST_LOCATIONS);
+        let mut location = self.locations[..named].join(", ");
+        if self.locations.len() > named {
+            location += &format!(" and {} more", self.locations.len() - named);
+        }
+        Warning::new(location, self.what, self.remedy)
+    }
+}
+
+/// Memory that loading may still take [bytes].
+#[derive(Debug)]
+pub struct Budget {
+    limit: u64,
+    left: u64,
+}
+
+impl Budget {
+    /// A budget of `limit` bytes.
+    pub fn new(limit: u64) -> Self {
+        Self { limit, left: limit }
+    }
+
+    /// What may still be taken [bytes].
+    pub fn left(&self) -> u64 {
+        self.left
+    }
+
+    /// Books memory before it is allocated.
+    ///
+    /// # Errors
+    /// More than is left.
+    pub fn take(&mut self, bytes: u64, what: &str) -> Result<()> {
+        match self.left.checked_sub(bytes) {
+            Some(left) => {
+                self.left = left;
+                Ok(())
+            }
+            None => Err(Error::failure(
+                what,
+                format!(
+                    "would take more memory than the limit of {} MB",
+                    self.limit / 1_000_000
+                ),
+                "raise the limit or use a smaller scene",
+            )),
+        }
+    }
+}
