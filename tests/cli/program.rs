@@ -40,6 +40,8 @@ impl Sandbox {
         command
             .args(arguments)
             .current_dir(self.folder.path())
+            // Without it, libraries of the window system complain on stderr.
+            .env("XDG_RUNTIME_DIR", self.folder.path())
             .stdin(Stdio::null());
         for display in ["DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET"] {
             command.env_remove(display);
