@@ -13,6 +13,8 @@ pub enum Stage {
     Caustic,
     /// Shadow rays of the direct layer.
     Direct,
+    /// The eye pass on the CPU.
+    Picture,
 }
 
 impl Stage {
@@ -23,6 +25,7 @@ impl Stage {
             Self::Plan => "plan",
             Self::Caustic => "caustic",
             Self::Direct => "direct",
+            Self::Picture => "picture",
         }
     }
 }

@@ -6,6 +6,8 @@ mod charts;
 mod direct;
 #[path = "eye/meshes.rs"]
 mod meshes;
+#[path = "eye/pictures.rs"]
+mod pictures;
 #[path = "eye/scenes.rs"]
 mod scenes;
 #[path = "eye/texel_areas.rs"]

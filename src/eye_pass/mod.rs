@@ -1,5 +1,6 @@
 //! From the diffuse surfaces through specular ones into the eye (DS*E).
 
+pub mod reference;
 #[cfg(feature = "gpu")]
 pub mod renderer;
 pub mod tone_mapping;

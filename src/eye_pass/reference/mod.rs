@@ -1,0 +1,121 @@
+//! The eye pass on the CPU: a ray tracer that follows every chain of mirrors and glass, the measure for the GPU's.
+
+mod radiance;
+mod start;
+
+use rayon::iter::{IntoParallelIterator, ParallelIterator};
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use super::view::{Picture, View};
+use crate::error::{Error, Result};
+use crate::geometry::Ray;
+use crate::illumination::IlluminationMap;
+use crate::optics::LinearSrgb;
+use crate::progress::{Control, Progress, Stage};
+use crate::scene::Camera;
+use crate::transport::Tracer;
+use radiance::{LitScene, visible_hit};
+
+pub use radiance::ChainLimits;
+pub use start::media_at;
+
+/// How well a picture is made.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ReferenceSettings {
+    /// Samples across and down a pixel, > 0. One sample looks through the pixel's centre, as a raster does.
+    pub samples_per_side: u32,
+    /// How far chains are followed.
+    pub limits: ChainLimits,
+}
+
+impl Default for ReferenceSettings {
+    fn default() -> Self {
+        Self {
+            samples_per_side: 1,
+            limits: ChainLimits::default(),
+        }
+    }
+}
+
+/// Renders a view of a scene lit by its illumination maps. The same for any number of threads.
+///
+/// Surfaces without a map are black but for what they emit. An eye within a body of glass or water sees from there.
+///
+/// # Errors
+/// It was cancelled.
+pub fn render(
+    tracer: &Tracer,
+    maps: &[IlluminationMap],
+    view: &View,
+    settings: &ReferenceSettings,
+    progress: &dyn Progress,
+    control: &Control,
+) -> Result<Picture> {
+    let lit = LitScene::new(tracer, maps, view.background, settings.limits);
+    let media = media_at(tracer, view.camera.position);
+    let side = settings.samples_per_side.max(1);
+    let done = AtomicU64::new(0);
+    let rows: Vec<Vec<[f32; 3]>> = (0..view.height)
+        .into_par_iter()
+        .map(|row| {
+            if control.is_cancelled() {
+                return Vec::new();
+            }
+            let pixels = (0..view.width).map(|column| {
+                let mut sum = LinearSrgb::BLACK;
+                for sample in 0..side * side {
+                    let within =
+                        [sample % side, sample / side].map(|s| (f64::from(s) + 0.5) / f64::from(side));
+                    sum += lit.radiance(eye_ray(view, [column, row], within), media);
+                }
+                (sum / f64::from(side * side))
+                    .to_array()
+                    .map(|channel| channel as f32)
+            });
+            let pixels = pixels.collect();
+            let rows_done = done.fetch_add(1, Ordering::Relaxed) + 1;
+            progress.advance(Stage::Picture, rows_done, u64::from(view.height));
+            pixels
+        })
+        .collect();
+    if control.is_cancelled() {
+        return Err(Error::cancelled("picture"));
+    }
+    Ok(Picture {
+        width: view.width,
+        height: view.height,
+        radiance: rows.concat(),
+    })
+}
+
+/// The object that each pixel's centre sees first, row 0 at the top; `None` where it sees the background.
+pub fn first_hits(tracer: &Tracer, view: &View) -> Vec<Option<usize>> {
+    (0..view.height)
+        .into_par_iter()
+        .flat_map_iter(|row| {
+            (0..view.width).map(move |column| {
+                let ray = eye_ray(view, [column, row], [0.5, 0.5]);
+                visible_hit(tracer, ray).map(|(hit, _)| hit.object)
+            })
+        })
+        .collect()
+}
+
+/// The ray through a place of a pixel ([0, 1] from its left and top), from the near plane on.
+fn eye_ray(view: &View, [column, row]: [u32; 2], within: [f64; 2]) -> Ray {
+    let x = (f64::from(column) + within[0]) / f64::from(view.width) * 2.0 - 1.0;
+    let y = 1.0 - (f64::from(row) + within[1]) / f64::from(view.height) * 2.0;
+    let Camera {
+        position,
+        forward,
+        near_m,
+        ..
+    } = view.camera;
+    let direction = view
+        .camera
+        .direction(x, y, f64::from(view.width) / f64::from(view.height));
+    Ray {
+        origin: position + direction * (near_m / direction.dot(forward)),
+        direction,
+    }
+}

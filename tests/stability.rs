@@ -1,0 +1,8 @@
+//! Hard cases: each has a law that must hold.
+
+#[path = "stability/intersection.rs"]
+mod intersection;
+#[path = "stability/item_buffer.rs"]
+mod item_buffer;
+#[path = "stability/sums.rs"]
+mod sums;

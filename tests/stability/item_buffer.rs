@@ -1,0 +1,230 @@
+//! Item buffers never miss what a light sees.
+
+use glam::{DVec2, DVec3};
+use nephroid::geometry::cube_face::{self, FaceMapping};
+use nephroid::light_pass::item_buffer::{CELLS_PER_SIDE, ItemBuffer};
+use nephroid::light_pass::launch::Launch;
+use nephroid::optics::LinearSrgb;
+use nephroid::scene::{Light, LightKind, Material, Mesh, Object, Scene, SurfaceKind};
+use nephroid::settings::ItemBufferKind;
+use nephroid::units::RadiantIntensity;
+
+const MAPPINGS: [FaceMapping; 2] = [FaceMapping::EqualSolidAngle, FaceMapping::Plain];
+
+fn lamp(position: DVec3) -> Light {
+    Light {
+        name: "lamp".into(),
+        colour: LinearSrgb::WHITE,
+        kind: LightKind::Point {
+            position,
+            intensity: RadiantIntensity(1.0),
+        },
+    }
+}
+
+fn mirrors(triangles: &[[DVec3; 3]]) -> Scene {
+    let mesh = Mesh {
+        positions: triangles.concat(),
+        normals: vec![DVec3::Y; 3 * triangles.len()],
+        triangles: (0..triangles.len() as u32)
+            .map(|t| [3 * t, 3 * t + 1, 3 * t + 2])
+            .collect(),
+        ..Mesh::default()
+    };
+    Scene {
+        objects: vec![Object {
+            name: "mirrors".into(),
+            node: 0,
+            primitive: 0,
+            material: 0,
+            mesh,
+        }],
+        materials: vec![Material {
+            surface: SurfaceKind::Mirror,
+            ..Material::default()
+        }],
+        ..Scene::default()
+    }
+}
+
+#[test]
+fn solid_angles_of_all_cells_sum_to_the_sphere() {
+    for mapping in MAPPINGS {
+        for side in [1, 7, 128] {
+            let cell = |i: usize| i as f64 / side as f64;
+            let mut sum = 0.0;
+            for row in 0..side {
+                for column in 0..side {
+                    let low = DVec2::new(cell(column), cell(row));
+                    sum += mapping.cell_solid_angle_sr(low, DVec2::new(cell(column + 1), cell(row + 1)));
+                }
+            }
+            let sphere = 4.0 * std::f64::consts::PI;
+            assert!(
+                (6.0 * sum - sphere).abs() < 1e-12 * sphere,
+                "{mapping:?}, {side}: {}",
+                6.0 * sum - sphere
+            );
+        }
+    }
+}
+
+#[test]
+fn equal_cells_have_the_solid_angle_of_their_rectangle() {
+    // Thin columns are exact rectangles in x; within them the share of v must be the share of solid angle.
+    let mapping = FaceMapping::EqualSolidAngle;
+    let width = 1e-5;
+    for u in [0.0, 0.13, 0.5, 0.77, 1.0 - width] {
+        for (v0, v1) in [(0.0, 0.25), (0.25, 0.5), (0.4, 0.9), (0.9, 1.0)] {
+            let low = mapping.plane_from_square(DVec2::new(u, v0));
+            let high = mapping.plane_from_square(DVec2::new(u + width, v1));
+            let middle = |v: f64| mapping.plane_from_square(DVec2::new(u + 0.5 * width, v)).y;
+            let exact = cube_face::rectangle_solid_angle_sr(
+                DVec2::new(low.x, middle(v0)),
+                DVec2::new(high.x, middle(v1)),
+            );
+            let stated = mapping.cell_solid_angle_sr(DVec2::new(u, v0), DVec2::new(u + width, v1));
+            assert!(
+                (exact / stated - 1.0).abs() < 1e-6,
+                "u {u}, v {v0} to {v1}: {exact} against {stated}"
+            );
+        }
+    }
+}
+
+#[test]
+fn mappings_of_a_face_are_inverted() {
+    for mapping in MAPPINGS {
+        for i in 0..=20 {
+            for j in 0..=20 {
+                let square = DVec2::new(f64::from(i), f64::from(j)) / 20.0;
+                let plane = mapping.plane_from_square(square);
+                assert!(
+                    plane.abs().max_element() <= 1.0 + 1e-12,
+                    "{square} leaves the face at {plane}"
+                );
+                let back = mapping.square_from_plane(plane);
+                assert!(
+                    (back - square).abs().max_element() < 1e-12,
+                    "{mapping:?}: {square} comes back as {back}"
+                );
+            }
+        }
+    }
+}
+
+/// Pseudo-random numbers in [0, 1).
+fn random(state: &mut u64) -> f64 {
+    *state = state
+        .wrapping_mul(6_364_136_223_846_793_005)
+        .wrapping_add(1_442_695_040_888_963_407);
+    (*state >> 11) as f64 / (1_u64 << 53) as f64
+}
+
+#[test]
+fn every_visible_triangle_marks_the_cell_of_each_of_its_points() {
+    let mut state = 7;
+    for kind in [ItemBufferKind::Equal, ItemBufferKind::Cube] {
+        for size in [1e-4, 1e-2, 0.3, 3.0] {
+            let mut point = |scale: f64| {
+                DVec3::new(
+                    random(&mut state) - 0.5,
+                    random(&mut state) - 0.5,
+                    random(&mut state) - 0.5,
+                ) * scale
+            };
+            let triangles: Vec<[DVec3; 3]> = (0..300)
+                .map(|_| {
+                    let centre = point(2.0);
+                    [centre + point(size), centre + point(size), centre + point(size)]
+                })
+                .collect();
+            let scene = mirrors(&triangles);
+            let light = lamp(DVec3::new(0.01, 0.02, -0.015));
+            let launch = Launch::new(&light, &scene, &[0], kind).expect("a domain");
+            let buffer = ItemBuffer::build(&launch, &scene, &[0]);
+            for corners in &triangles {
+                for _ in 0..20 {
+                    let (a, b) = (random(&mut state), random(&mut state));
+                    let (a, b) = if a + b > 1.0 { (1.0 - a, 1.0 - b) } else { (a, b) };
+                    let target = corners[0] + (corners[1] - corners[0]) * a + (corners[2] - corners[0]) * b;
+                    assert!(
+                        marked_at(&launch, &buffer, target),
+                        "{kind:?}, size {size}: {target} is not marked"
+                    );
+                }
+            }
+        }
+    }
+}
+
+fn marked_at(launch: &Launch, buffer: &ItemBuffer, target: DVec3) -> bool {
+    (0..launch.face_count()).any(|face| {
+        let local = launch.to_face(face, target);
+        if local.x.abs() > local.z || local.y.abs() > local.z {
+            return false;
+        }
+        let square = launch.mapping().square_from_plane(local.truncate() / local.z) * CELLS_PER_SIDE as f64;
+        let cell = |x: f64| (x as usize).min(CELLS_PER_SIDE - 1);
+        buffer.is_marked(face, cell(square.x), cell(square.y))
+    })
+}
+
+#[test]
+fn a_small_mirror_marks_few_cells() {
+    let a = DVec3::new(1.0, 0.2, 0.3);
+    let scene = mirrors(&[[a, a + DVec3::Y * 0.01, a + DVec3::Z * 0.01]]);
+    let launch = Launch::new(&lamp(DVec3::ZERO), &scene, &[0], ItemBufferKind::Equal).expect("a domain");
+    let marked = ItemBuffer::build(&launch, &scene, &[0]).marked_cells();
+    assert!((1..=4).contains(&marked), "{marked} cells");
+}
+
+#[test]
+fn a_light_on_the_mirror_itself_still_sees_it() {
+    let corners = [DVec3::ZERO, DVec3::X, DVec3::Z];
+    let scene = mirrors(&[corners]);
+    for position in [DVec3::ZERO, DVec3::new(0.3, 0.0, 0.3), DVec3::new(0.5, 0.0, 0.0)] {
+        let launch = Launch::new(&lamp(position), &scene, &[0], ItemBufferKind::Equal).expect("a domain");
+        let buffer = ItemBuffer::build(&launch, &scene, &[0]);
+        assert!(buffer.marked_cells() > 0, "nothing marked from {position}");
+    }
+}
+
+#[test]
+fn lattice_spans_hold_every_cell_that_touches_a_marked_one() {
+    let a = DVec3::new(1.0, 0.2, 0.3);
+    let scene = mirrors(&[[a, a + DVec3::Y * 0.3, a + DVec3::Z * 0.1]]);
+    let launch = Launch::new(&lamp(DVec3::ZERO), &scene, &[0], ItemBufferKind::Equal).expect("a domain");
+    let buffer = ItemBuffer::build(&launch, &scene, &[0]);
+    for size in [(1, 1), (5, 3), (128, 128), (300, 301), (1000, 77)] {
+        for face in 0..6 {
+            for row in 0..size.1 {
+                let spans = buffer.lattice_spans(face, row, size);
+                assert!(
+                    spans.windows(2).all(|pair| pair[0].1 < pair[1].0),
+                    "spans overlap: {spans:?}"
+                );
+                for column in 0..size.0 {
+                    let listed = spans.iter().any(|span| (span.0..span.1).contains(&column));
+                    assert_eq!(
+                        listed,
+                        touches_marked(&buffer, face, (column, row), size),
+                        "{size:?} {column} {row}"
+                    );
+                }
+            }
+        }
+    }
+}
+
+fn touches_marked(buffer: &ItemBuffer, face: usize, cell: (usize, usize), size: (usize, usize)) -> bool {
+    let overlaps =
+        |i: usize, n: usize, k: usize| i * CELLS_PER_SIDE < (k + 1) * n && k * n < (i + 1) * CELLS_PER_SIDE;
+    (0..CELLS_PER_SIDE)
+        .filter(|&row| overlaps(cell.1, size.1, row))
+        .any(|row| {
+            (0..CELLS_PER_SIDE)
+                .filter(|&column| overlaps(cell.0, size.0, column))
+                .any(|column| buffer.is_marked(face, column, row))
+        })
+}

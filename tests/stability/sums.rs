@@ -1,0 +1,57 @@
+//! Exact sums of flux.
+
+use nephroid::illumination::accumulator::{FluxAccumulator, FluxUnit};
+use nephroid::optics::LinearSrgb;
+
+#[test]
+fn a_hundred_million_small_deposits_in_one_texel_add_up() {
+    let unit = FluxUnit::for_power(100.0);
+    let deposit_w = 1e-6;
+    let count = unit.count(LinearSrgb::grey(deposit_w));
+    let mut accumulator = FluxAccumulator::new(1, 1);
+    for _ in 0..100_000_000_u32 {
+        for channel in 0..3 {
+            accumulator.texels_mut()[0][channel] += count[channel];
+        }
+    }
+    let sum = unit.flux_w(accumulator.texels()[0]);
+    assert!((sum.g / 100.0 - 1.0).abs() < 1e-9, "{sum:?}");
+}
+
+#[test]
+fn units_keep_their_precision_at_any_power() {
+    for power_w in [1e-30, 1e-9, 1.0, 683.0, 1e12, 1e30] {
+        let unit = FluxUnit::for_power(power_w);
+        let half = LinearSrgb::new(power_w, 0.5 * power_w, 1e-9 * power_w);
+        let back = unit.flux_w(unit.count(half));
+        assert!((back.r / half.r - 1.0).abs() < 1e-15, "{power_w} W");
+        assert!((back.b / half.b - 1.0).abs() < 1e-8, "{power_w} W");
+    }
+}
+
+#[test]
+fn doubling_a_map_keeps_every_count() {
+    let mut accumulator = FluxAccumulator::new(3, 2);
+    for (index, texel) in accumulator.texels_mut().iter_mut().enumerate() {
+        *texel = [index as i64 * 7 + 3, -(index as i64), 1 << 58];
+    }
+    let fine = accumulator.doubled();
+    assert_eq!((fine.width(), fine.height()), (6, 4));
+    for row in 0..2 {
+        for column in 0..3 {
+            let coarse = accumulator.texels()[row * 3 + column];
+            let mut sum = [0; 3];
+            for (dx, dy) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
+                let part = fine.texels()[(2 * row + dy) * 6 + 2 * column + dx];
+                for channel in 0..3 {
+                    sum[channel] += part[channel];
+                    assert!(
+                        (part[channel] - coarse[channel] / 4).abs() <= 3,
+                        "parts are not equal"
+                    );
+                }
+            }
+            assert_eq!(sum, coarse);
+        }
+    }
+}
