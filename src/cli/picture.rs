@@ -1,17 +1,25 @@
 //! One picture of a scene with its maps, by the graphics card or by the reference ray tracer.
 
+use std::sync::Arc;
+
 use nephroid::error::{Error, Result};
 use nephroid::export::{exr, png};
+use nephroid::eye_pass::reference::{self, ReferenceSettings};
 use nephroid::eye_pass::{Picture, View, tone_mapping};
 use nephroid::illumination::IlluminationMap;
 use nephroid::optics::LinearSrgb;
 use nephroid::scene::{Camera, Scene};
+use nephroid::transport::Tracer;
 
 use super::args::Backend;
 use super::interrupt::Interrupt;
 use super::job::{PictureFormat, PictureRequest};
+use super::progress_bar::StageBar;
 use super::terminal::Terminal;
 use super::values::Exposure;
+
+/// Samples across and down each pixel.
+const SAMPLES_PER_SIDE: u32 = 2;
 
 /// A picture, and how it was made.
 pub struct MadePicture {
@@ -48,7 +56,7 @@ impl MadePicture {
 /// # Errors
 /// No such camera; a card that was asked for and is not there; a signal.
 pub fn make(
-    scene: &Scene,
+    scene: &Arc<Scene>,
     maps: &[IlluminationMap],
     request: &PictureRequest,
     terminal: &Terminal,
@@ -65,13 +73,13 @@ pub fn make(
     };
     interrupt.check("picture")?;
     let (picture, made_by) = match request.backend {
-        Some(Backend::Cpu) => by_cpu(scene, maps, &view, interrupt)?,
+        Some(Backend::Cpu) => by_cpu(scene, maps, &view, terminal, interrupt)?,
         Some(Backend::Gpu) => by_gpu(scene, maps, &view)?,
         None => match by_gpu(scene, maps, &view) {
             Ok(made) => made,
             Err(error) => {
                 terminal.print_note(&format!("{error}: the CPU makes the picture"));
-                by_cpu(scene, maps, &view, interrupt)?
+                by_cpu(scene, maps, &view, terminal, interrupt)?
             }
         },
     };
@@ -88,27 +96,27 @@ pub fn make(
 }
 
 fn by_cpu(
-    scene: &Scene,
+    scene: &Arc<Scene>,
     maps: &[IlluminationMap],
     view: &View,
+    terminal: &Terminal,
     interrupt: &Interrupt,
 ) -> Result<(Picture, String)> {
-    let _ = (scene, maps, view, interrupt);
-    Err(Error::failure(
-        "render",
-        "the CPU makes no pictures yet",
-        "use --backend gpu",
-    ))
+    let tracer = Tracer::new(scene.clone());
+    let settings = ReferenceSettings {
+        samples_per_side: SAMPLES_PER_SIDE,
+        ..ReferenceSettings::default()
+    };
+    let bar = StageBar::new(terminal);
+    let picture = reference::render(&tracer, maps, view, &settings, &bar, interrupt.control())?;
+    Ok((picture, "cpu".into()))
 }
-
-/// Samples per pixel of the graphics card's pictures.
-#[cfg(feature = "gpu")]
-const SAMPLES: u32 = 4;
 
 #[cfg(feature = "gpu")]
 fn by_gpu(scene: &Scene, maps: &[IlluminationMap], view: &View) -> Result<(Picture, String)> {
     let gpu = nephroid::gpu::Gpu::headless()?;
-    let picture = nephroid::eye_pass::renderer::render_offscreen(&gpu, scene, maps, view, SAMPLES)?;
+    let picture =
+        nephroid::eye_pass::renderer::render_offscreen(&gpu, scene, maps, view, SAMPLES_PER_SIDE.pow(2))?;
     Ok((picture, gpu.adapter_name()))
 }
 
