@@ -169,7 +169,7 @@ fn the_ledger_closes_and_agrees_with_the_maps() {
 fn maps_are_read_back_channel_by_channel() {
     let sandbox = Sandbox::new();
     sandbox.succeed(&format!(
-        "bake builtin:slab -o out {QUICK} --layers caustic,direct"
+        "bake builtin:mirror -o out {QUICK} --layers caustic,direct"
     ));
     let manifest = sandbox.manifest("out");
     let file = manifest["maps"][0]["file"].as_str().expect("a path");

@@ -112,12 +112,13 @@ fn stored_maps_are_not_trusted() {
 #[test]
 fn a_missing_card_is_a_failure_only_when_asked_for() {
     let sandbox = Sandbox::new();
-    // No driver is found where the loader is sent to an empty list, and no other interface is allowed.
+    // No driver is found where the loaders of Vulkan and OpenGL are sent to lists that are not there.
     let run = |line: &str| {
         let arguments: Vec<&str> = line.split_whitespace().collect();
         let output = sandbox
             .command(&arguments)
-            .env("WGPU_BACKEND", "vulkan")
+            .env("__EGL_VENDOR_LIBRARY_FILENAMES", "/nonexistent.json")
+            .env("__EGL_VENDOR_LIBRARY_DIRS", "/nonexistent")
             .env("VK_ICD_FILENAMES", "/nonexistent.json")
             .env("VK_DRIVER_FILES", "/nonexistent.json")
             .output()
