@@ -25,7 +25,7 @@ const HEADLESS_PICTURE: &str = "picture.png";
 pub fn run(job: ViewJob, terminal: &Terminal, interrupt: &Interrupt) -> Result<()> {
     let clock = Clock::start();
     let loaded = bake::load(&job.scene, &clock, terminal)?;
-    match window(&job, &loaded, terminal)? {
+    match window(&job, &loaded, terminal, interrupt)? {
         Shown::Closed => Ok(()),
         Shown::Not(why) => {
             terminal.print_note(&format!(
@@ -49,7 +49,7 @@ enum Shown {
 }
 
 #[cfg(feature = "viewer")]
-fn window(job: &ViewJob, loaded: &LoadedScene, terminal: &Terminal) -> Result<Shown> {
+fn window(job: &ViewJob, loaded: &LoadedScene, terminal: &Terminal, interrupt: &Interrupt) -> Result<Shown> {
     use super::values::Exposure;
     use nephroid::{gpu, viewer};
 
@@ -74,6 +74,7 @@ fn window(job: &ViewJob, loaded: &LoadedScene, terminal: &Terminal) -> Result<Sh
             Exposure::Auto => None,
             Exposure::Stops(stops) => Some(stops),
         },
+        stop: Some(interrupt.shared_control()),
         event_log: job.event_log.clone(),
     };
     match viewer::run(options) {
@@ -85,7 +86,7 @@ fn window(job: &ViewJob, loaded: &LoadedScene, terminal: &Terminal) -> Result<Sh
 }
 
 #[cfg(not(feature = "viewer"))]
-fn window(_: &ViewJob, _: &LoadedScene, _: &Terminal) -> Result<Shown> {
+fn window(_: &ViewJob, _: &LoadedScene, _: &Terminal, _: &Interrupt) -> Result<Shown> {
     Ok(Shown::Not(
         "no display: this program was built without the viewer feature",
     ))

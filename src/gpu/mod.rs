@@ -39,30 +39,45 @@ impl Gpu {
     /// # Errors
     /// No adapter, or one that refuses to give a device.
     pub fn headless() -> Result<Self> {
+        Self::headless_within(|limits| limits)
+    }
+
+    /// [`headless`](Self::headless) on a device that is made smaller than it is, to try how the program fares there.
+    ///
+    /// # Errors
+    /// No adapter, or one that refuses to give a device of these limits.
+    pub fn headless_within(limits: impl FnOnce(wgpu::Limits) -> wgpu::Limits) -> Result<Self> {
         let vulkan = instance_of(wgpu::Backends::VULKAN);
         if let Ok(adapter) = request_adapter(&vulkan, None) {
-            return Self::from_adapter(vulkan, adapter);
+            let limits = limits(adapter.limits());
+            return Self::from_adapter(vulkan, adapter, limits);
         }
         let any = instance_of(wgpu::Backends::all());
         let adapter = request_adapter(&any, None)?;
-        Self::from_adapter(any, adapter)
+        let limits = limits(adapter.limits());
+        Self::from_adapter(any, adapter, limits)
     }
 
-    /// A device that can present to `surface`, which was made by `instance`.
+    /// A device with the adapter's own limits that can present to `surface`, which was made by `instance`.
     ///
     /// # Errors
     /// No adapter that can present to it, or one that refuses to give a device.
     pub fn for_surface(instance: wgpu::Instance, surface: &wgpu::Surface<'_>) -> Result<Self> {
         let adapter = request_adapter(&instance, Some(surface))?;
-        Self::from_adapter(instance, adapter)
+        let limits = adapter.limits();
+        Self::from_adapter(instance, adapter, limits)
     }
 
-    /// No optional feature is asked for, so that what runs here runs everywhere; the limits are the adapter's own.
-    fn from_adapter(instance: wgpu::Instance, adapter: wgpu::Adapter) -> Result<Self> {
+    /// No optional feature is asked for, so that what runs here runs everywhere.
+    fn from_adapter(
+        instance: wgpu::Instance,
+        adapter: wgpu::Adapter,
+        required_limits: wgpu::Limits,
+    ) -> Result<Self> {
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("nephroid"),
             required_features: wgpu::Features::empty(),
-            required_limits: adapter.limits(),
+            required_limits,
             ..Default::default()
         };
         let (device, queue) = pollster::block_on(adapter.request_device(&descriptor)).map_err(|error| {

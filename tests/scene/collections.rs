@@ -101,7 +101,7 @@ fn validator_cases(folder: &Path) -> Vec<Case> {
 }
 
 /// A copy of a file, in a folder of its own with the files beside it, whose scene has a node for every mesh, camera
-/// and light and a material for every image, so that all of them are read. `None` where the JSON is not that whole.
+/// and light and a material for every image and texture, so that all of them are read. `None` where the JSON is not that whole.
 fn with_everything_placed(path: &Path) -> Option<(tempfile::TempDir, PathBuf)> {
     let mut file: Value = serde_json::from_slice(&std::fs::read(path).ok()?).ok()?;
     let count = |list: Option<&Value>| list.and_then(Value::as_array).map_or(0, Vec::len);
@@ -127,8 +127,9 @@ fn with_everything_placed(path: &Path) -> Option<(tempfile::TempDir, PathBuf)> {
         "textures",
         (0..images).map(|image| json!({ "source": image })).collect(),
     )?;
-    let material = |image: usize| json!({ "pbrMetallicRoughness": { "baseColorTexture": { "index": textures + image } } });
-    append("materials", (0..images).map(material).collect())?;
+    let material =
+        |texture: usize| json!({ "pbrMetallicRoughness": { "baseColorTexture": { "index": texture } } });
+    append("materials", (0..textures + images).map(material).collect())?;
     let count_added = nodes.len();
     let first = append("nodes", nodes)?;
     fields.insert(
@@ -152,7 +153,7 @@ fn with_everything_placed(path: &Path) -> Option<(tempfile::TempDir, PathBuf)> {
 }
 
 /// Faults of things that are not read, by a part of the validator's code or of the file's path.
-const NOT_READ: [(&str, &str); 13] = [
+const NOT_READ: [(&str, &str); 14] = [
     ("ALIGNMENT", "numbers are read at any offset"),
     ("VALUE_MULTIPLE_OF", "numbers are read at any stride"),
     ("EMPTY_ENTITY", "an empty list is as good as none"),
