@@ -10,7 +10,6 @@
 //! A module imports only what stands above it in this list.
 
 pub mod error;
-pub mod progress;
 pub mod settings;
 pub mod units;
 
@@ -29,6 +28,8 @@ pub mod plan;
 pub mod transport;
 
 pub mod illumination;
+
+pub mod progress;
 
 pub mod light_pass;
 

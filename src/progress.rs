@@ -2,6 +2,8 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use crate::illumination::IlluminationMap;
+
 /// What a bake is doing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Stage {
@@ -34,6 +36,9 @@ impl Stage {
 pub trait Progress: Sync {
     /// `done` of `total` of a stage; totals of different stages are not comparable.
     fn advance(&self, _stage: Stage, _done: u64, _total: u64) {}
+
+    /// A whole picture of lower quality, on the way to the final one.
+    fn preview(&self, _maps: Vec<IlluminationMap>) {}
 }
 
 /// Hears nothing.

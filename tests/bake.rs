@@ -1,5 +1,7 @@
 //! Bakes of reference scenes: against an independent solver, against the law of energy, against themselves.
 
+#[path = "bake/collection.rs"]
+mod collection;
 #[path = "bake/energy.rs"]
 mod energy;
 #[path = "bake/invariance.rs"]

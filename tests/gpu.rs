@@ -5,12 +5,18 @@
 
 mod support;
 
+#[path = "gpu/against_cpu.rs"]
+mod against_cpu;
+#[path = "gpu/builtins.rs"]
+mod builtins;
 #[path = "gpu/device.rs"]
 mod device;
 #[path = "gpu/display.rs"]
 mod display;
 #[path = "gpu/radiance.rs"]
 mod radiance;
+#[path = "gpu/reflections.rs"]
+mod reflections;
 #[path = "gpu/scenes.rs"]
 mod scenes;
 #[path = "gpu/shaders.rs"]

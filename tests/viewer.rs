@@ -3,11 +3,20 @@
 
 #[path = "viewer/debounce.rs"]
 mod debounce;
+#[cfg(target_os = "linux")]
+#[path = "viewer/desktop.rs"]
+mod desktop;
 #[path = "viewer/headless.rs"]
 mod headless;
 #[path = "viewer/navigation.rs"]
 mod navigation;
 #[path = "viewer/panel.rs"]
 mod panel;
+#[cfg(target_os = "linux")]
+#[path = "support/mod.rs"]
+mod support;
+#[cfg(target_os = "linux")]
+#[path = "viewer/window.rs"]
+mod window;
 #[path = "viewer/worker.rs"]
 mod worker;

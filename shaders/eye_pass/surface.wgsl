@@ -137,15 +137,19 @@ fn clear_reflectance(point: SurfacePoint) -> f32 {
 }
 
 // Factor on the radiance behind a clear surface. Radiance falls by n² into a body and grows by n² out of it.
+fn clear_transmittance(point: SurfacePoint, reflectance: f32, front: bool) -> vec3f {
+    let factor = (1.0 - reflectance) * point.base_colour;
+    if object.surface != SURFACE_DIELECTRIC {
+        return factor;
+    }
+    let n2 = object.ior * object.ior;
+    return factor * select(vec3f(n2), object.body_transmittance / n2, front);
+}
+
 @fragment
 fn transmitted(fragment: Fragment, @builtin(front_facing) front: bool) -> @location(0) vec4f {
     let point = surface_point(fragment, front);
-    var factor = (1.0 - clear_reflectance(point)) * point.base_colour;
-    if object.surface == SURFACE_DIELECTRIC {
-        let n2 = object.ior * object.ior;
-        factor *= select(vec3f(n2), object.body_transmittance / n2, front);
-    }
-    return vec4f(factor, 1.0);
+    return vec4f(clear_transmittance(point, clear_reflectance(point), front), 1.0);
 }
 
 // What a clear surface adds: reflection and its own light.
@@ -153,4 +157,13 @@ fn transmitted(fragment: Fragment, @builtin(front_facing) front: bool) -> @locat
 fn reflected(fragment: Fragment, @builtin(front_facing) front: bool) -> @location(0) vec4f {
     let point = surface_point(fragment, front);
     return scaled(object.emitted_radiance + clear_reflectance(point) * reflected_radiance(fragment, point));
+}
+
+// Both at once where all channels are alike: what is added, and in alpha the factor on what is behind.
+@fragment
+fn grey(fragment: Fragment, @builtin(front_facing) front: bool) -> @location(0) vec4f {
+    let point = surface_point(fragment, front);
+    let reflectance = clear_reflectance(point);
+    let added = object.emitted_radiance + reflectance * reflected_radiance(fragment, point);
+    return vec4f(scaled(added).rgb, clear_transmittance(point, reflectance, front).g);
 }

@@ -58,6 +58,12 @@ impl Interrupt {
         &self.control
     }
 
+    /// The same, for those that outlive the borrow.
+    #[cfg(feature = "viewer")]
+    pub fn shared_control(&self) -> Arc<Control> {
+        self.control.clone()
+    }
+
     /// Between two pieces of work: an error where a signal came.
     ///
     /// # Errors

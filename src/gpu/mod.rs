@@ -25,36 +25,59 @@ pub struct Gpu {
     faults: Faults,
 }
 
+/// Location of the error of a machine without an adapter.
+const GRAPHICS: &str = "graphics";
+
+/// Whether something failed because there is no graphics adapter to draw with.
+pub fn is_no_adapter(error: &Error) -> bool {
+    error.location == GRAPHICS
+}
+
 impl Gpu {
     /// A device without a window. Vulkan comes first, OpenGL (through EGL) where there is none.
     ///
     /// # Errors
     /// No adapter, or one that refuses to give a device.
     pub fn headless() -> Result<Self> {
+        Self::headless_within(|limits| limits)
+    }
+
+    /// [`headless`](Self::headless) on a device that is made smaller than it is, to try how the program fares there.
+    ///
+    /// # Errors
+    /// No adapter, or one that refuses to give a device of these limits.
+    pub fn headless_within(limits: impl FnOnce(wgpu::Limits) -> wgpu::Limits) -> Result<Self> {
         let vulkan = instance_of(wgpu::Backends::VULKAN);
         if let Ok(adapter) = request_adapter(&vulkan, None) {
-            return Self::from_adapter(vulkan, adapter);
+            let limits = limits(adapter.limits());
+            return Self::from_adapter(vulkan, adapter, limits);
         }
         let any = instance_of(wgpu::Backends::all());
         let adapter = request_adapter(&any, None)?;
-        Self::from_adapter(any, adapter)
+        let limits = limits(adapter.limits());
+        Self::from_adapter(any, adapter, limits)
     }
 
-    /// A device that can present to `surface`, which was made by `instance`.
+    /// A device with the adapter's own limits that can present to `surface`, which was made by `instance`.
     ///
     /// # Errors
     /// No adapter that can present to it, or one that refuses to give a device.
     pub fn for_surface(instance: wgpu::Instance, surface: &wgpu::Surface<'_>) -> Result<Self> {
         let adapter = request_adapter(&instance, Some(surface))?;
-        Self::from_adapter(instance, adapter)
+        let limits = adapter.limits();
+        Self::from_adapter(instance, adapter, limits)
     }
 
-    /// No optional feature is asked for, so that what runs here runs everywhere; the limits are the adapter's own.
-    fn from_adapter(instance: wgpu::Instance, adapter: wgpu::Adapter) -> Result<Self> {
+    /// No optional feature is asked for, so that what runs here runs everywhere.
+    fn from_adapter(
+        instance: wgpu::Instance,
+        adapter: wgpu::Adapter,
+        required_limits: wgpu::Limits,
+    ) -> Result<Self> {
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("nephroid"),
             required_features: wgpu::Features::empty(),
-            required_limits: adapter.limits(),
+            required_limits,
             ..Default::default()
         };
         let (device, queue) = pollster::block_on(adapter.request_device(&descriptor)).map_err(|error| {
@@ -146,7 +169,7 @@ fn request_adapter(
     };
     pollster::block_on(instance.request_adapter(&options)).map_err(|_| {
         Error::failure(
-            "graphics",
+            GRAPHICS,
             "no Vulkan or OpenGL adapter was found",
             "install a driver (Debian and Ubuntu: apt-get install mesa-vulkan-drivers libvulkan1), or use --backend cpu",
         )

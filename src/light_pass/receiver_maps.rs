@@ -88,6 +88,22 @@ impl ReceiverMaps {
 }
 
 impl ReceiverMap {
+    /// Doubles the map each way until it is as wide as `size`, in texels; each texel's flux goes in four equal parts to
+    /// those that replace it. `chart_for` gives the chart of a size.
+    pub fn grow_to(
+        &mut self,
+        size: (usize, usize),
+        chart_for: &dyn Fn((usize, usize)) -> Option<Arc<Chart>>,
+    ) {
+        while self.flux.width() < size.0 {
+            self.flux = self.flux.doubled();
+        }
+        if let Some(chart) = chart_for((self.flux.width(), self.flux.height())) {
+            self.islands = Islands::find(&chart);
+            self.chart = chart;
+        }
+    }
+
     /// Texel coordinates of an arrival, and the local map from metres to texels; `None` on a triangle without area.
     pub fn locate(&self, scene: &Scene, arrival: &Arrival) -> Option<(DVec2, TexelFromWorld)> {
         let triangle = arrival.triangle as usize;

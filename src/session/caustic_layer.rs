@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use super::finish;
 use super::sizes::{self, MapSizes};
 use super::{BakeCounts, Clock};
 use crate::error::{Error, Result};
@@ -60,7 +61,7 @@ impl CausticLayer<'_> {
         let unit = self.unit()?;
         let mut outcome = CausticOutcome::default();
         let statistics = if self.wants_statistics() {
-            let statistics = self.coarse_run(unit, control, clock, &mut outcome);
+            let statistics = self.coarse_run(unit, progress, control, clock, &mut outcome);
             Some(statistics)
         } else {
             None
@@ -155,10 +156,12 @@ impl CausticLayer<'_> {
             || self.settings.map_resolution == MapResolution::Auto
     }
 
-    /// Mean footprints at the full density, from a lattice some 64 times thinner.
+    /// Mean footprints at the full density, from a lattice some 64 times thinner. Its maps, doubled while their own
+    /// footprints are finer than texels, are the first picture.
     fn coarse_run(
         &self,
         unit: FluxUnit,
+        progress: &dyn Progress,
         control: &Control,
         clock: &mut Clock,
         outcome: &mut CausticOutcome,
@@ -193,8 +196,14 @@ impl CausticLayer<'_> {
             outcome.count(&report, clock);
             // The kernels of the coarse run are in no map.
             outcome.counts.splats -= report.splats;
+            for (object, map) in maps.iter_mut() {
+                if let Some(size) = self.automatic_size(object, &report.statistics) {
+                    map.grow_to(size, &|size| self.sizes.chart(object, size));
+                }
+            }
             statistics.merge(&report.statistics.refined(cells(fine.size) / cells(lattice.size)));
         }
+        progress.preview(finish::preview(&maps, unit));
         statistics
     }
 
@@ -204,7 +213,7 @@ impl CausticLayer<'_> {
         for object in 0..self.tracer.scene().objects.len() {
             let size = match (self.settings.map_resolution, statistics) {
                 (MapResolution::Fixed { width, height }, _) => Some((width, height)),
-                (MapResolution::Auto, Some(statistics)) => self.sizes.doubled_size(object, statistics),
+                (MapResolution::Auto, Some(statistics)) => self.automatic_size(object, statistics),
                 (MapResolution::Auto, None) => None,
             };
             if let Some(size) = size {
@@ -230,6 +239,11 @@ impl CausticLayer<'_> {
             sizes::check_memory(width as u64 * height as u64, self.settings)?;
         }
         Ok(sizes)
+    }
+
+    fn automatic_size(&self, object: usize, statistics: &FootprintStatistics) -> Option<(usize, usize)> {
+        self.sizes
+            .doubled_size(object, self.sizes.doublings(object, statistics)?)
     }
 
     /// For a surface that only the full lattice reached.

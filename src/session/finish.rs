@@ -12,7 +12,7 @@ use crate::illumination::gutter::fill_gutter;
 use crate::illumination::{Chart, IlluminationMap, Layer};
 use crate::light_pass::caustic::pass::Stopwatch;
 use crate::light_pass::direct::bake_direct;
-use crate::light_pass::receiver_maps::ReceiverMap;
+use crate::light_pass::receiver_maps::{ReceiverMap, ReceiverMaps};
 use crate::plan::{Effect, EffectPlan};
 use crate::progress::{Control, Progress};
 use crate::settings::{BakeSettings, LayerKind};
@@ -118,6 +118,18 @@ impl Finish<'_> {
         }
         Ok(charts)
     }
+}
+
+/// Unfinished maps as they stand: the caustic layer alone.
+pub(super) fn preview(maps: &ReceiverMaps, unit: FluxUnit) -> Vec<IlluminationMap> {
+    maps.iter()
+        .map(|(_, map)| IlluminationMap {
+            chart: map.chart.clone(),
+            layers: vec![caustic_layer(map, unit)],
+            error: None,
+            estimated_relative_rmse: None,
+        })
+        .collect()
 }
 
 /// E = Φ/A per texel; nothing where the surface does not reach, but for the gutter.

@@ -47,16 +47,20 @@ impl MapSizes {
         Some(Arc::new(self.parametrisation(object)?.chart(width, height)))
     }
 
-    /// The size at which doubling from [`FIRST_SIDE`] ends, because texels are no larger than the mean footprint
+    /// How often the map of an object doubles from its first size until texels are no larger than the mean footprint
     /// (section 3.1.1 of the paper). `None` where no footprint was seen.
-    pub fn doubled_size(&self, object: usize, statistics: &FootprintStatistics) -> Option<(usize, usize)> {
+    pub fn doublings(&self, object: usize, statistics: &FootprintStatistics) -> Option<u32> {
         let share = statistics.mean(object)?.map_share;
-        let aspect = self.parametrisation(object)?.suggested_aspect;
-        let (mut width, mut height) = first_size(aspect);
-        while (width * height) as f64 * share < 1.0 && width.max(height) < LARGEST_AUTOMATIC_SIDE {
-            (width, height) = (2 * width, 2 * height);
-        }
-        Some((width, height))
+        let (width, height) = first_size(self.parametrisation(object)?.suggested_aspect);
+        let coarse = |times: u32| ((width * height) << (2 * times)) as f64 * share < 1.0;
+        let small = |times: u32| width.max(height) << times < LARGEST_AUTOMATIC_SIDE;
+        (0..).find(|&times| !(coarse(times) && small(times)))
+    }
+
+    /// The size of an object's map after so many doublings.
+    pub fn doubled_size(&self, object: usize, times: u32) -> Option<(usize, usize)> {
+        let (width, height) = first_size(self.parametrisation(object)?.suggested_aspect);
+        Some((width << times, height << times))
     }
 
     /// The size of a map that holds direct light only: texels of a 400th of the scene's diagonal, or what is asked.

@@ -25,6 +25,7 @@ use super::panel::{Facts, Wishes};
 use crate::error::{Error, Result};
 use crate::eye_pass::View;
 use crate::optics::LinearSrgb;
+use crate::progress::Control;
 
 /// What other threads tell the window.
 #[derive(Debug)]
@@ -43,6 +44,8 @@ impl From<accesskit_winit::Event> for News {
 
 /// A scroll of this many pixels counts as one notch of the wheel.
 const PIXELS_PER_NOTCH: f64 = 40.0;
+/// How often a window at rest looks whether it was asked to stop.
+const LOOK_FOR_STOP: Duration = Duration::from_millis(200);
 /// Time between frames that only show how a bake gets on.
 const BAKING_FRAME: Duration = Duration::from_millis(100);
 /// Longest time that one frame flies: after a stall the camera is not thrown through the scene.
@@ -58,6 +61,7 @@ pub struct App {
     model: Model,
     graphics: Option<Graphics>,
     proxy: EventLoopProxy<News>,
+    stop: Option<Arc<Control>>,
     /// Inner size of the window to be opened [logical pixels].
     size: (u32, u32),
     /// Where the picture lies in the window [points].
@@ -97,6 +101,7 @@ impl App {
             model: Model::new(options, wake)?,
             graphics: None,
             proxy,
+            stop: options.stop.clone(),
             size: options.size,
             picture_rect: egui::Rect::NOTHING,
             looking_from: None,
@@ -135,6 +140,11 @@ impl App {
             }
             Err(error) => self.fail(event_loop, error),
         }
+    }
+
+    fn close(&mut self, event_loop: &ActiveEventLoop) {
+        self.model.log.write(&Event::Closing);
+        event_loop.exit();
     }
 
     fn fail(&mut self, event_loop: &ActiveEventLoop, error: Error) {
@@ -240,12 +250,17 @@ impl App {
         let (window, picture) = (Arc::clone(graphics.window()), graphics.picture_id());
         let speed_m_per_s = model.navigator.speed_m_per_s();
         let Model {
-            scene, panel, last, ..
+            scene,
+            panel,
+            last,
+            is_draft,
+            ..
         } = model;
         let facts = Facts {
             scene,
             state: &state,
             last: last.as_ref(),
+            is_draft: *is_draft,
             layers: &layers,
             speed_m_per_s,
             adapter: &adapter,
@@ -428,8 +443,10 @@ impl ApplicationHandler<News> for App {
         }
     }
 
-    fn new_events(&mut self, _: &ActiveEventLoop, cause: StartCause) {
-        if matches!(cause, StartCause::ResumeTimeReached { .. }) {
+    fn new_events(&mut self, event_loop: &ActiveEventLoop, _: StartCause) {
+        if self.stop.as_ref().is_some_and(|stop| stop.is_cancelled()) {
+            self.close(event_loop);
+        } else if self.wake_at.is_some_and(|due| Instant::now() >= due) {
             self.wake_at = None;
             self.request_redraw();
         }
@@ -457,10 +474,7 @@ impl ApplicationHandler<News> for App {
             window.request_redraw();
         }
         match event {
-            WindowEvent::CloseRequested => {
-                self.model.log.write(&Event::Closing);
-                event_loop.exit();
-            }
+            WindowEvent::CloseRequested | WindowEvent::Destroyed => self.close(event_loop),
             WindowEvent::RedrawRequested => self.redraw(event_loop),
             WindowEvent::Resized(_) | WindowEvent::ScaleFactorChanged { .. } => {
                 graphics.resize();
@@ -489,6 +503,8 @@ impl ApplicationHandler<News> for App {
     }
 
     fn about_to_wait(&mut self, event_loop: &ActiveEventLoop) {
-        event_loop.set_control_flow(self.wake_at.map_or(ControlFlow::Wait, ControlFlow::WaitUntil));
+        let look = self.stop.as_ref().map(|_| Instant::now() + LOOK_FOR_STOP);
+        let until = [self.wake_at, look].into_iter().flatten().min();
+        event_loop.set_control_flow(until.map_or(ControlFlow::Wait, ControlFlow::WaitUntil));
     }
 }

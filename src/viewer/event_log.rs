@@ -26,6 +26,8 @@ pub enum Event<'a> {
         /// With what.
         settings: &'a BakeSettings,
     },
+    /// The coarse maps that are shown while the first bake runs.
+    Draft(&'a FinishedBake),
     /// A bake is complete; its maps are in the next picture.
     Done(&'a FinishedBake),
     /// The bake was stopped.
@@ -60,14 +62,8 @@ impl Event<'_> {
                 json!({"event": "started", "scene": scene, "adapter": adapter})
             }
             Self::Baking { settings } => json!({"event": "baking", "settings": settings}),
-            Self::Done(bake) => json!({
-                "event": "done",
-                "bake_s": bake.seconds,
-                "rays": bake.result.counts.rays,
-                "splats": bake.result.counts.splats,
-                "maps": bake.result.maps.len(),
-                "settings": bake.settings,
-            }),
+            Self::Draft(bake) => finished("draft", bake),
+            Self::Done(bake) => finished("done", bake),
             Self::Cancelled => json!({"event": "cancelled"}),
             Self::Failed(sentence) => json!({"event": "failed", "sentence": sentence}),
             Self::SettingsChanged(settings) => json!({"event": "settings", "settings": settings}),
@@ -84,6 +80,17 @@ impl Event<'_> {
             Self::Closing => json!({"event": "closing"}),
         }
     }
+}
+
+fn finished(event: &str, bake: &FinishedBake) -> Value {
+    json!({
+        "event": event,
+        "bake_s": bake.seconds,
+        "rays": bake.result.counts.rays,
+        "splats": bake.result.counts.splats,
+        "maps": bake.result.maps.len(),
+        "settings": bake.settings,
+    })
 }
 
 /// The file, or nothing where none was asked for.

@@ -22,6 +22,7 @@ use winit::event_loop::EventLoop;
 use self::app::{App, News};
 use crate::error::{Error, Result};
 use crate::illumination::IlluminationMap;
+use crate::progress::Control;
 use crate::scene::Scene;
 use crate::settings::BakeSettings;
 
@@ -40,6 +41,8 @@ pub struct ViewerOptions {
     pub camera: Option<String>,
     /// Exposure [stops]; `None` chooses it from the first picture.
     pub exposure_stops: Option<f64>,
+    /// Closes the window soon after it is cancelled; `None` where only the user closes it.
+    pub stop: Option<Arc<Control>>,
     /// One JSON line per change of state is written here: for support and for tests.
     pub event_log: Option<PathBuf>,
 }

@@ -16,6 +16,13 @@ use crate::scene::Scene;
 use crate::session::BakeSession;
 use crate::settings::{BakeSettings, LayerKind};
 
+/// Rays of a bake for each of its draft, at least.
+const DRAFT_SHARE: f64 = 32.0;
+/// A draft of more rays would not come soon [rays/sr].
+const FINEST_DRAFT_PER_SR: f64 = 4000.0;
+/// A draft of fewer rays would show nothing; then there is none [rays/sr].
+const COARSEST_DRAFT_PER_SR: f64 = 500.0;
+
 /// The state behind the window.
 #[derive(Debug)]
 pub struct Model {
@@ -37,6 +44,8 @@ pub struct Model {
     /// As the panel had them at the last look.
     seen: BakeSettings,
     was_automatic: bool,
+    /// Whether the picture shows maps of another bake than the one that was asked for last.
+    pub is_draft: bool,
     /// As the last bake was asked for.
     asked: Option<BakeSettings>,
 }
@@ -61,12 +70,13 @@ impl Model {
             debounce: Debounce::default(),
             seen: options.settings.clone(),
             was_automatic: true,
+            is_draft: false,
             asked: options.maps.is_some().then(|| options.settings.clone()),
             scene,
         };
         model.panel.display.exposure_stops = options.exposure_stops.unwrap_or(0.0);
         if options.maps.is_none() {
-            model.rebake();
+            model.first_bake();
         }
         Ok(model)
     }
@@ -124,7 +134,12 @@ impl Model {
         let finished = self.worker.take_finished();
         let has_maps = finished.is_some();
         if let Some(finished) = finished {
-            self.log.write(&Event::Done(&finished));
+            self.is_draft = self.asked.as_ref() != Some(&finished.settings);
+            self.log.write(&if self.is_draft {
+                Event::Draft(&finished)
+            } else {
+                Event::Done(&finished)
+            });
             self.last = Some(finished);
         }
         if std::mem::discriminant(&state) != std::mem::discriminant(&self.state) {
@@ -161,17 +176,36 @@ impl Model {
         }
     }
 
+    /// Something to see soon: a draft, and then what was asked for.
+    fn first_bake(&mut self) {
+        let wanted = self.panel.settings.clone();
+        let draft = BakeSettings {
+            density_per_sr: (wanted.density_per_sr / DRAFT_SHARE).min(FINEST_DRAFT_PER_SR),
+            ..wanted.clone()
+        };
+        let steps = if draft.density_per_sr >= COARSEST_DRAFT_PER_SR {
+            vec![draft, wanted]
+        } else {
+            vec![wanted]
+        };
+        self.bake(steps);
+    }
+
     /// Bakes with the panel's settings, unless one of them is out of its range: the panel tells so.
     pub fn rebake(&mut self) {
         if self.panel.settings.validate().is_ok() {
-            self.debounce.clear();
-            self.asked = Some(self.panel.settings.clone());
-            self.log.write(&Event::Baking {
-                settings: &self.panel.settings,
-            });
-            self.worker.request(self.panel.settings.clone());
-            self.state = self.worker.state();
+            self.bake(vec![self.panel.settings.clone()]);
         }
+    }
+
+    fn bake(&mut self, steps: Vec<BakeSettings>) {
+        self.debounce.clear();
+        self.asked = steps.last().cloned();
+        self.log.write(&Event::Baking {
+            settings: &self.panel.settings,
+        });
+        self.worker.request_steps(steps);
+        self.state = self.worker.state();
     }
 
     /// Stops the bake and keeps the maps that are shown.

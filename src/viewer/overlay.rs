@@ -13,7 +13,7 @@ pub fn show(ui: &mut Ui, picture: egui::TextureId, facts: &Facts<'_>, notice: Op
     let rect = ui.available_rect_before_wrap();
     let whole = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
     ui.painter().image(picture, rect, whole, Color32::WHITE);
-    let text = notice.map(str::to_owned).or_else(|| without_maps(facts));
+    let text = notice.map(str::to_owned).or_else(|| caveat(facts));
     if let Some(text) = text {
         let width = rect.width() - 48.0;
         let galley = ui.painter().layout(text, FontId::proportional(SIZE), TEXT, width);
@@ -28,18 +28,22 @@ pub fn show(ui: &mut Ui, picture: egui::TextureId, facts: &Facts<'_>, notice: Op
     rect
 }
 
-/// Says why the picture is dark.
-fn without_maps(facts: &Facts<'_>) -> Option<String> {
-    if !facts.layers.is_empty() {
-        return None;
-    }
+/// Says why the picture is dark or coarse.
+fn caveat(facts: &Facts<'_>) -> Option<String> {
+    let is_dark = facts.layers.is_empty();
     match facts.state {
-        BakeState::Baking { stage, fraction, .. } => {
-            Some(format!("First bake: {} {:.0} %", stage.name(), 100.0 * fraction))
+        BakeState::Baking { stage, fraction, .. } if is_dark => {
+            Some(format!("First look: {} {:.0} %", stage.name(), 100.0 * fraction))
         }
-        BakeState::Failed(sentence) => Some(sentence.clone()),
-        BakeState::Cancelled => Some("No light is baked yet: press R to bake.".into()),
-        BakeState::Done => Some("No light reaches a surface that could show it.".into()),
-        BakeState::Idle => None,
+        BakeState::Baking { stage, fraction, .. } if facts.is_draft => Some(format!(
+            "Draft; the bake is at {} {:.0} %",
+            stage.name(),
+            100.0 * fraction
+        )),
+        BakeState::Failed(sentence) if is_dark => Some(sentence.clone()),
+        BakeState::Cancelled if is_dark => Some("No light is baked yet: press R to bake.".into()),
+        BakeState::Done if is_dark => Some("No light reaches a surface that could show it.".into()),
+        BakeState::Cancelled if facts.is_draft => Some("Draft: press R to bake.".into()),
+        _ => None,
     }
 }

@@ -75,7 +75,7 @@ pub struct FinishedBake {
     pub settings: BakeSettings,
     /// Maps and accounts.
     pub result: BakeResult,
-    /// From the request to the maps, wall clock [s].
+    /// From its start to the maps, wall clock [s].
     pub seconds: f64,
 }
 
@@ -125,11 +125,16 @@ impl Worker {
 
     /// Asks for a bake; replaces what was asked before and stops what is running.
     pub fn request(&self, settings: BakeSettings) {
+        self.request_steps(vec![settings]);
+    }
+
+    /// Asks for several bakes in turn, from the coarsest to the one that is wanted; the maps of each are handed out.
+    pub fn request_steps(&self, steps: Vec<BakeSettings>) {
         let mut slot = self.shared.lock();
         slot.cancel_running();
         slot.serial += 1;
         slot.request = Some(Request {
-            settings,
+            steps,
             since: Instant::now(),
             serial: slot.serial,
         });
@@ -186,7 +191,7 @@ impl Drop for Worker {
 }
 
 struct Request {
-    settings: BakeSettings,
+    steps: Vec<BakeSettings>,
     since: Instant,
     serial: u64,
 }
@@ -272,15 +277,17 @@ impl Shared {
         }
     }
 
-    fn settle(&self, serial: u64, state: BakeState, finished: Option<FinishedBake>) {
+    fn hand_out(&self, finished: FinishedBake) {
+        self.lock().finished = Some(finished);
+        (self.wake)();
+    }
+
+    fn settle(&self, serial: u64, state: BakeState) {
         let mut slot = self.lock();
         slot.running = None;
         // A bake that was complete before it noticed that a newer request came, and was itself cancelled.
         let outdated = state == BakeState::Done && serial != slot.serial;
         slot.settled = if outdated { BakeState::Cancelled } else { state };
-        if finished.is_some() {
-            slot.finished = finished;
-        }
         drop(slot);
         (self.wake)();
     }
@@ -291,44 +298,64 @@ fn serve<B: Baker>(shared: &Shared, make_baker: &impl Fn() -> Result<B>) {
     let mut baker = None;
     while let Some((request, control, meter)) = shared.next() {
         (shared.wake)();
-        let progress = Reporter {
-            meter: &meter,
-            wake: &shared.wake,
-            start: request.since,
-            next_wake_ms: AtomicU64::new(0),
-        };
-        let mut settings = request.settings.clone();
-        let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
-        settings.threads = baking_threads(settings.threads, cores);
-        let outcome = catch_unwind(AssertUnwindSafe(|| {
-            if baker.is_none() {
-                baker = Some(make_baker()?);
-            }
-            let baker = baker.as_mut().expect("it was made above");
-            baker.bake(&settings, &progress, &control)
-        }));
-        let (state, finished) = match outcome {
-            Ok(Ok(result)) if result.partial => (BakeState::Cancelled, None),
-            Ok(Ok(result)) => {
-                let seconds = request.since.elapsed().as_secs_f64();
-                (
-                    BakeState::Done,
-                    Some(FinishedBake {
-                        settings: request.settings,
+        let mut state = BakeState::Done;
+        for settings in request.steps {
+            let start = Instant::now();
+            let progress = Reporter {
+                meter: &meter,
+                wake: &shared.wake,
+                start,
+                next_wake_ms: AtomicU64::new(0),
+            };
+            match bake_once(&mut baker, make_baker, &settings, &progress, &control) {
+                Ok(result) => {
+                    let seconds = start.elapsed().as_secs_f64();
+                    shared.hand_out(FinishedBake {
+                        settings,
                         result,
                         seconds,
-                    }),
-                )
+                    });
+                }
+                Err(stopped) => {
+                    state = stopped;
+                    break;
+                }
             }
-            Ok(Err(_)) if control.is_cancelled() => (BakeState::Cancelled, None),
-            Ok(Err(error)) => (BakeState::Failed(error.to_string()), None),
-            Err(panic) => {
-                // What it left behind may be half-built.
-                baker = None;
-                (BakeState::Failed(panic_sentence(panic.as_ref())), None)
-            }
-        };
-        shared.settle(request.serial, state, finished);
+        }
+        shared.settle(request.serial, state);
+    }
+}
+
+/// One bake; where it gave no complete maps, the state that it leaves.
+fn bake_once<B: Baker>(
+    baker: &mut Option<B>,
+    make_baker: &impl Fn() -> Result<B>,
+    settings: &BakeSettings,
+    progress: &dyn Progress,
+    control: &Control,
+) -> std::result::Result<BakeResult, BakeState> {
+    let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
+    let settings = BakeSettings {
+        threads: baking_threads(settings.threads, cores),
+        ..settings.clone()
+    };
+    let outcome = catch_unwind(AssertUnwindSafe(|| {
+        if baker.is_none() {
+            *baker = Some(make_baker()?);
+        }
+        let baker = baker.as_mut().expect("it was made above");
+        baker.bake(&settings, progress, control)
+    }));
+    match outcome {
+        Ok(Ok(result)) if !result.partial => Ok(result),
+        Ok(Ok(_)) => Err(BakeState::Cancelled),
+        Ok(Err(_)) if control.is_cancelled() => Err(BakeState::Cancelled),
+        Ok(Err(error)) => Err(BakeState::Failed(error.to_string())),
+        Err(panic) => {
+            // What it left behind may be half-built.
+            *baker = None;
+            Err(BakeState::Failed(panic_sentence(panic.as_ref())))
+        }
     }
 }
 

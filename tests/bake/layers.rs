@@ -1,8 +1,10 @@
 //! Map sizes, and what is not baked.
 
+use nephroid::illumination::IlluminationMap;
 use nephroid::plan::Effect;
-use nephroid::session::StopReason;
-use nephroid::settings::{BakeSettings, MapResolution};
+use nephroid::progress::{Control, Progress};
+use nephroid::session::{BakeSession, StopReason};
+use nephroid::settings::{BakeSettings, LayerKind, MapResolution};
 
 use crate::tools::{bake, builtin_scene, energy_fault, map_of, settings};
 
@@ -46,4 +48,39 @@ fn without_light_or_anything_specular_nothing_is_traced_or_allocated() {
         assert_eq!(result.stop_reason, StopReason::NothingToDo, "{case}");
         assert!(!result.plan.is_on(Effect::LightPass), "{case}");
     }
+}
+
+/// Keeps the first picture of a bake.
+#[derive(Default)]
+struct FirstPicture(std::sync::Mutex<Option<Vec<IlluminationMap>>>);
+
+impl Progress for FirstPicture {
+    fn preview(&self, maps: Vec<IlluminationMap>) {
+        self.0.lock().expect("no other listener").get_or_insert(maps);
+    }
+}
+
+#[test]
+fn an_automatic_bake_gives_a_coarse_picture_first() {
+    let scene = std::sync::Arc::new(builtin_scene("ring"));
+    let first = FirstPicture::default();
+    let settings = BakeSettings {
+        map_resolution: MapResolution::Auto,
+        ..settings(1e5, 0)
+    };
+    let mut session = BakeSession::new(scene.clone()).expect("a session");
+    let result = session
+        .bake(&settings, &first, &Control::default())
+        .expect("a bake");
+    let preview = first.0.into_inner().expect("no panic").expect("a first picture");
+    let (coarse, fine) = (&preview[0], map_of(&result, &scene, "floor"));
+    assert!(coarse.width() < fine.width());
+    let flux = |map: &IlluminationMap| map.flux_w(LayerKind::Caustic).luminance();
+    assert!(
+        (flux(coarse) / flux(fine) - 1.0).abs() < 0.01,
+        "{} W against {} W",
+        flux(coarse),
+        flux(fine)
+    );
+    assert_eq!(coarse.width(), coarse.height());
 }

@@ -2,7 +2,7 @@
 
 use glam::{DMat3, DVec3};
 use nephroid::illumination::compare::relative_rmse;
-use nephroid::scene::Scene;
+use nephroid::scene::{LoadOptions, Scene, load};
 
 use crate::support::{self, assert_close};
 use crate::tools::{bake, builtin_scene, caustic, energy_fault, map_of, settings, transformed};
@@ -100,6 +100,18 @@ fn check(reference: &Reference, scene: &Scene, floor: &str, irradiance_scale: f6
 fn built_in_scenes_agree_with_the_independent_solver() {
     for reference in &REFERENCES {
         check(reference, &builtin_scene(reference.builtin), "floor", 1.0, 1.0);
+    }
+}
+
+#[test]
+fn the_solvers_own_files_agree_with_its_maps() {
+    for reference in &REFERENCES {
+        let Some(path) = support::shared_or_skip(&format!("oracle/{}.glb", reference.file)) else {
+            continue;
+        };
+        let path = path.to_str().expect("a readable path");
+        let scene = load(path, &LoadOptions::default()).expect("a valid file");
+        check(reference, &scene, "floor", 1.0, 1.0);
     }
 }
 

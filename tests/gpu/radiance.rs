@@ -291,3 +291,88 @@ fn pictures_that_no_device_holds_are_refused() {
     assert!(render_offscreen(&gpu, &Scene::default(), &[], &from_above(1), 3).is_err());
     assert_eq!(gpu.take_error(), None);
 }
+
+#[test]
+fn what_is_clear_looks_the_same_drawn_at_once_and_in_two_steps() {
+    let Some(gpu) = gpu() else { return };
+    let picture = |tint: LinearSrgb| {
+        let mut scene = floor_scene(diffuse(LinearSrgb::WHITE));
+        let glass = Material {
+            surface: SurfaceKind::Dielectric,
+            base_colour: tint,
+            ..Default::default()
+        };
+        scene.materials.push(glass);
+        scene.objects.push(floor("glass", 1, 0.5));
+        let mut view = from_above(33);
+        view.camera.vertical_fov_rad = 2.5;
+        view.background = LinearSrgb::grey(0.25);
+        render(&gpu, &scene, &[floor_map(0, 1, 1, vec![[1.0; 3]])], &view)
+    };
+    // Tints so close to white that only how they are drawn differs.
+    let (grey, tinted) = (
+        picture(LinearSrgb::WHITE),
+        picture(LinearSrgb::new(1.0, 1.0, 1.0 - 1e-7)),
+    );
+    for (a, b) in grey.radiance.iter().zip(&tinted.radiance) {
+        assert_close(*a, b.map(f64::from), 4.0 * HALF_ROUNDING);
+    }
+}
+
+#[test]
+fn meshes_beyond_a_small_devices_buffers_are_drawn_whole() {
+    let Some(gpu) = gpu() else { return };
+    let small = Gpu::headless_within(|limits| wgpu::Limits {
+        max_buffer_size: 1 << 16,
+        ..limits
+    })
+    .expect("less is always granted");
+    // 64 × 64 quads: 24576 corners of 32 bytes against 65536 bytes.
+    let quads = 64_u32;
+    let mut scene = floor_scene(diffuse(LinearSrgb::WHITE));
+    let mesh = &mut scene.objects[0].mesh;
+    let side = quads + 1;
+    let points = (0..side * side).map(|index| DVec2::new(f64::from(index % side), f64::from(index / side)));
+    let uvs: Vec<DVec2> = points.map(|point| point / f64::from(quads)).collect();
+    mesh.positions = uvs.iter().map(|uv| glam::DVec3::new(uv.x, 0.0, uv.y)).collect();
+    mesh.normals = vec![glam::DVec3::Y; uvs.len()];
+    mesh.triangles = (0..quads * quads)
+        .flat_map(|quad| {
+            let corner = quad / quads * side + quad % quads;
+            [
+                [corner, corner + side + 1, corner + 1],
+                [corner, corner + side, corner + side + 1],
+            ]
+        })
+        .collect();
+    let corner_uvs = mesh
+        .triangles
+        .iter()
+        .map(|triangle| triangle.map(|vertex| uvs[vertex as usize]))
+        .collect();
+    mesh.uv0 = Some(uvs);
+    // A second, clear one above it shares its corners between triangles.
+    let mut pane = scene.objects[0].clone();
+    pane.mesh
+        .positions
+        .iter_mut()
+        .for_each(|position| position.y = 0.5);
+    pane.material = 1;
+    scene.objects.push(pane);
+    scene.materials.push(Material {
+        surface: SurfaceKind::ThinWall,
+        ..Default::default()
+    });
+
+    let texels = (0..64).map(|index| [index as f32; 3]).collect();
+    let mut map = floor_map(0, 8, 8, texels);
+    let chart = nephroid::illumination::Chart {
+        corner_uvs,
+        ..(*map.chart).clone()
+    };
+    map.chart = std::sync::Arc::new(chart);
+    let whole = render(&gpu, &scene, std::slice::from_ref(&map), &from_above(48));
+    let lit = whole.radiance.iter().filter(|pixel| pixel[0] > 0.0);
+    assert!(lit.count() > 48 * 48 * 9 / 10);
+    assert_eq!(whole, render(&small, &scene, &[map], &from_above(48)));
+}

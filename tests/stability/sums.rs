@@ -10,8 +10,8 @@ fn a_hundred_million_small_deposits_in_one_texel_add_up() {
     let count = unit.count(LinearSrgb::grey(deposit_w));
     let mut accumulator = FluxAccumulator::new(1, 1);
     for _ in 0..100_000_000_u32 {
-        for channel in 0..3 {
-            accumulator.texels_mut()[0][channel] += count[channel];
+        for (sum, deposit) in accumulator.texels_mut()[0].iter_mut().zip(count) {
+            *sum += deposit;
         }
     }
     let sum = unit.flux_w(accumulator.texels()[0]);

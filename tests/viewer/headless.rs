@@ -90,6 +90,7 @@ impl Headless {
             scene,
             state,
             last: last.as_ref(),
+            is_draft: false,
             layers,
             speed_m_per_s: 1.0,
             adapter: "no adapter",

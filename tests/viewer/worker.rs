@@ -210,6 +210,31 @@ fn a_new_request_cancels_the_running_one_and_the_last_wins() {
 }
 
 #[test]
+fn steps_are_baked_in_turn_and_each_hands_out_its_maps() {
+    let bench = bench();
+    bench
+        .worker
+        .request_steps(vec![settings(AT_ONCE), settings(STUBBORN)]);
+    wait_for("the second step", || bench.started.load(Ordering::SeqCst) == 2);
+    assert!(bench.worker.state().is_baking(), "not done before the last step");
+    assert_eq!(rays(bench.worker.take_finished()), AT_ONCE as u64);
+    bench.gate.send(()).expect("the baker listens");
+    assert_eq!(settled(&bench.worker), BakeState::Done);
+    assert_eq!(rays(bench.worker.take_finished()), STUBBORN as u64);
+}
+
+#[test]
+fn a_step_that_fails_ends_the_steps() {
+    let bench = bench();
+    bench
+        .worker
+        .request_steps(vec![settings(AT_ONCE), settings(FAILING), settings(AT_ONCE)]);
+    assert!(matches!(settled(&bench.worker), BakeState::Failed(_)));
+    assert_eq!(bench.started.load(Ordering::SeqCst), 2);
+    assert_eq!(rays(bench.worker.take_finished()), AT_ONCE as u64);
+}
+
+#[test]
 fn earlier_maps_stay_until_newer_ones_are_complete() {
     let bench = bench();
     bench.worker.request(settings(AT_ONCE));

@@ -1,14 +1,16 @@
 //! The scene's triangles on the device: few large vertex buffers, each below the device's limit.
 
+use std::ops::Range;
+
 use bytemuck::{Pod, Zeroable};
 use glam::DVec2;
 use wgpu::util::DeviceExt;
 
 use crate::gpu::Gpu;
 use crate::illumination::Chart;
-use crate::scene::{Object, Scene};
+use crate::scene::{Mesh, Object, Scene, TextureRef};
 
-/// A corner of a triangle, unindexed: maps may cut a surface between any two triangles.
+/// A corner of a triangle. Surfaces with a map share none between triangles, since maps may cut them anywhere.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub(super) struct Corner {
@@ -55,34 +57,28 @@ const fn attribute(shader_location: u32, offset: usize, format: wgpu::VertexForm
     }
 }
 
-/// Largest vertex buffer [bytes]: one allocation that every driver serves.
+/// Largest buffer [bytes]: one allocation that every driver serves.
 const PAGE_BYTES: u64 = 128 << 20;
 
 /// Part of an object within one page.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Segment {
     /// Which page.
     pub(super) page: usize,
+    /// Where the page's indices draw it.
+    pub(super) indices: Range<u32>,
     /// First corner within the page.
-    pub(super) first_corner: u32,
-    /// First triangle of the object's mesh.
-    first_triangle: usize,
-    /// Triangles.
-    triangles: usize,
+    first_corner: usize,
+    /// Triangles of the object's mesh.
+    triangles: Range<usize>,
 }
 
-impl Segment {
-    /// Corners within the page.
-    pub(super) fn corners(&self) -> std::ops::Range<u32> {
-        self.first_corner..self.first_corner + 3 * self.triangles as u32
-    }
-}
-
-/// Two buffers of equally many corners.
+/// Corners with as many map coordinates, and which three of them make a triangle.
 #[derive(Debug)]
 pub(super) struct Page {
     pub(super) corners: wgpu::Buffer,
     pub(super) map_uvs: wgpu::Buffer,
+    pub(super) indices: wgpu::Buffer,
 }
 
 /// All triangles of a scene.
@@ -96,66 +92,33 @@ pub(super) struct Geometry {
 impl Geometry {
     /// Uploads a scene's triangles; map coordinates are zero at first.
     pub(super) fn new(gpu: &Gpu, scene: &Scene) -> Self {
-        let limit = gpu.limits().max_buffer_size.min(PAGE_BYTES);
-        let page_triangles = (limit / (3 * size_of::<Corner>() as u64)).max(1) as usize;
-        let mut geometry = Self {
+        let limit = gpu.limits().max_buffer_size.min(PAGE_BYTES) as usize;
+        let mut packing = Packing {
+            gpu,
+            // Indices are smaller than corners, and never more of them are allowed.
+            page_corners: (limit / size_of::<Corner>()).max(3),
             pages: Vec::new(),
-            segments: Vec::with_capacity(scene.objects.len()),
+            corners: Vec::new(),
+            indices: Vec::new(),
         };
-        let mut pending: Vec<Corner> = Vec::new();
-        for object in &scene.objects {
-            let texture = &scene.materials[object.material].base_colour_texture;
-            let mut segments = Vec::new();
-            let mut first_triangle = 0;
-            while first_triangle < object.mesh.triangles.len() {
-                if pending.len() == 3 * page_triangles {
-                    geometry.push_page(gpu, &pending);
-                    pending.clear();
-                }
-                let room = page_triangles - pending.len() / 3;
-                let triangles = room.min(object.mesh.triangles.len() - first_triangle);
-                segments.push(Segment {
-                    page: geometry.pages.len(),
-                    first_corner: pending.len() as u32,
-                    first_triangle,
-                    triangles,
-                });
-                for triangle in first_triangle..first_triangle + triangles {
-                    pending.extend(corners(object, texture.as_ref(), triangle));
-                }
-                first_triangle += triangles;
-            }
-            geometry.segments.push(segments);
+        let segments = scene
+            .objects
+            .iter()
+            .map(|object| packing.add(scene, object))
+            .collect();
+        packing.close_page();
+        Self {
+            pages: packing.pages,
+            segments,
         }
-        if !pending.is_empty() {
-            geometry.push_page(gpu, &pending);
-        }
-        geometry
     }
 
-    fn push_page(&mut self, gpu: &Gpu, corners: &[Corner]) {
-        self.pages.push(Page {
-            corners: gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-                label: Some("corners"),
-                contents: bytemuck::cast_slice(corners),
-                usage: wgpu::BufferUsages::VERTEX,
-            }),
-            map_uvs: gpu.device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some("map coordinates"),
-                size: (corners.len() * size_of::<MapUv>()) as u64,
-                usage: wgpu::BufferUsages::VERTEX | wgpu::BufferUsages::COPY_DST,
-                mapped_at_creation: false,
-            }),
-        });
-    }
-
-    /// Writes the map coordinates of one object.
+    /// Writes the map coordinates of one object, which takes light.
     pub(super) fn set_chart(&self, gpu: &Gpu, chart: &Chart) {
         for segment in &self.segments[chart.object] {
-            let triangles =
-                &chart.corner_uvs[segment.first_triangle..segment.first_triangle + segment.triangles];
+            let triangles = &chart.corner_uvs[segment.triangles.clone()];
             let uvs: Vec<MapUv> = triangles.iter().flatten().map(|uv| single(*uv)).collect();
-            let offset = u64::from(segment.first_corner) * size_of::<MapUv>() as u64;
+            let offset = (segment.first_corner * size_of::<MapUv>()) as u64;
             gpu.queue.write_buffer(
                 &self.pages[segment.page].map_uvs,
                 offset,
@@ -165,22 +128,108 @@ impl Geometry {
     }
 }
 
+/// Fills page after page.
+struct Packing<'a> {
+    gpu: &'a Gpu,
+    page_corners: usize,
+    pages: Vec<Page>,
+    corners: Vec<Corner>,
+    indices: Vec<u32>,
+}
+
+impl Packing<'_> {
+    /// Where an object ended up. Surfaces without maps share the corners of neighbouring triangles.
+    fn add(&mut self, scene: &Scene, object: &Object) -> Vec<Segment> {
+        let material = &scene.materials[object.material];
+        let image = material.base_colour_texture.as_ref();
+        let mesh = &object.mesh;
+        let largest = mesh.positions.len().max(3 * mesh.triangles.len());
+        if !material.surface.is_receiver() && largest <= self.page_corners {
+            let segment = self.segment(largest, 0..mesh.triangles.len());
+            let first = self.corners.len() as u32;
+            self.corners
+                .extend((0..mesh.positions.len()).map(|vertex| corner(mesh, image, vertex)));
+            self.indices
+                .extend(mesh.triangles.iter().flatten().map(|vertex| first + vertex));
+            return vec![segment];
+        }
+        let mut segments = Vec::new();
+        let mut triangle = 0;
+        while triangle < mesh.triangles.len() {
+            let room = (self.page_corners - self.corners.len().max(self.indices.len())) / 3;
+            let room = if room == 0 { self.page_corners / 3 } else { room };
+            let triangles = triangle..mesh.triangles.len().min(triangle + room);
+            segments.push(self.segment(3 * triangles.len(), triangles.clone()));
+            for vertex in mesh.triangles[triangles.clone()].iter().flatten() {
+                self.indices.push(self.corners.len() as u32);
+                self.corners.push(corner(mesh, image, *vertex as usize));
+            }
+            triangle = triangles.end;
+        }
+        segments
+    }
+
+    /// The segment that comes next, on a new page where this one has no room for so many corners or indices.
+    fn segment(&mut self, needed: usize, triangles: Range<usize>) -> Segment {
+        if self.corners.len().max(self.indices.len()) + needed > self.page_corners {
+            self.close_page();
+        }
+        let first_index = self.indices.len() as u32;
+        Segment {
+            page: self.pages.len(),
+            indices: first_index..first_index + 3 * triangles.len() as u32,
+            first_corner: self.corners.len(),
+            triangles,
+        }
+    }
+
+    fn close_page(&mut self) {
+        if self.indices.is_empty() {
+            return;
+        }
+        let filled = |label, contents, usage| {
+            let descriptor = wgpu::util::BufferInitDescriptor {
+                label: Some(label),
+                contents,
+                usage,
+            };
+            self.gpu.device.create_buffer_init(&descriptor)
+        };
+        self.pages.push(Page {
+            corners: filled(
+                "corners",
+                bytemuck::cast_slice(&self.corners),
+                wgpu::BufferUsages::VERTEX,
+            ),
+            indices: filled(
+                "indices",
+                bytemuck::cast_slice(&self.indices),
+                wgpu::BufferUsages::INDEX,
+            ),
+            map_uvs: self.gpu.device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some("map coordinates"),
+                size: (self.corners.len() * size_of::<MapUv>()) as u64,
+                usage: wgpu::BufferUsages::VERTEX | wgpu::BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            }),
+        });
+        self.corners.clear();
+        self.indices.clear();
+    }
+}
+
 fn single(uv: DVec2) -> [f32; 2] {
     uv.as_vec2().to_array()
 }
 
-fn corners(object: &Object, texture: Option<&crate::scene::TextureRef>, triangle: usize) -> [Corner; 3] {
-    let mesh = &object.mesh;
-    mesh.triangles[triangle].map(|vertex| {
-        let vertex = vertex as usize;
-        let uv = texture.and_then(|texture| {
-            let set = if texture.uv_set == 0 { &mesh.uv0 } else { &mesh.uv1 };
-            set.as_ref().map(|uvs| texture.transform(uvs[vertex]))
-        });
-        Corner {
-            position: mesh.positions[vertex].as_vec3().to_array(),
-            normal: mesh.normals[vertex].as_vec3().to_array(),
-            uv: single(uv.unwrap_or_default()),
-        }
-    })
+fn corner(mesh: &Mesh, image: Option<&TextureRef>, vertex: usize) -> Corner {
+    let uv = image.and_then(|image| {
+        let set = if image.uv_set == 0 { &mesh.uv0 } else { &mesh.uv1 };
+        set.as_ref().map(|uvs| image.transform(uvs[vertex]))
+    });
+    Corner {
+        position: mesh.positions[vertex].as_vec3().to_array(),
+        normal: mesh.normals[vertex].as_vec3().to_array(),
+        uv: single(uv.unwrap_or_default()),
+    }
 }

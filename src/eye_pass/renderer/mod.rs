@@ -246,7 +246,12 @@ impl Renderer {
                 _ => &[&self.surfaces.clear_back_faces, &self.surfaces.clear_front_faces],
             };
             for pipelines in faces {
-                for pipeline in [&pipelines.transmitted, &pipelines.reflected] {
+                let in_turn: &[_] = if object.is_grey {
+                    &[&pipelines.grey]
+                } else {
+                    &[&pipelines.transmitted, &pipelines.reflected]
+                };
+                for pipeline in in_turn {
                     pass.set_pipeline(pipeline);
                     self.draw_object(pass, index, object);
                 }
@@ -260,7 +265,8 @@ impl Renderer {
             let page = &self.geometry.pages[segment.page];
             pass.set_vertex_buffer(0, page.corners.slice(..));
             pass.set_vertex_buffer(1, page.map_uvs.slice(..));
-            pass.draw(segment.corners(), 0..1);
+            pass.set_index_buffer(page.indices.slice(..), wgpu::IndexFormat::Uint32);
+            pass.draw_indexed(segment.indices.clone(), 0, 0..1);
         }
     }
 }

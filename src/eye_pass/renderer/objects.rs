@@ -21,6 +21,8 @@ pub(super) struct DeviceObject {
     pub(super) double_sided: bool,
     /// Middle of its box, by which clear objects are sorted [m].
     pub(super) centre: DVec3,
+    /// Whether what it lets through keeps its colour.
+    pub(super) is_grey: bool,
     uniform: ObjectUniform,
     base_colour_texture: Option<usize>,
     /// Group 1.
@@ -115,16 +117,22 @@ impl DeviceObject {
     fn new(scene: &Scene, object: &Object) -> Self {
         let material = &scene.materials[object.material];
         let (low, high) = object.mesh.bounds().unwrap_or_default();
+        let body_transmittance = rgb(body_transmittance(material, (high - low).min_element()));
+        let base_colour = rgb(material.base_colour);
+        let is_grey = |[r, g, b]: [f32; 3]| r == g && g == b;
         Self {
             surface: material.surface,
             double_sided: material.double_sided,
             centre: 0.5 * (low + high),
+            is_grey: material.base_colour_texture.is_none()
+                && is_grey(base_colour)
+                && is_grey(body_transmittance),
             uniform: ObjectUniform {
-                base_colour: rgb(material.base_colour),
+                base_colour,
                 irradiance_scale: 1.0,
                 emitted_radiance: rgb(material.emitted_radiance),
                 ior: material.ior as f32,
-                body_transmittance: rgb(body_transmittance(material, (high - low).min_element())),
+                body_transmittance,
                 surface: surface_code(material.surface),
             },
             base_colour_texture: material.base_colour_texture.as_ref().map(|image| image.texture),
@@ -165,9 +173,11 @@ fn body_transmittance(material: &Material, thickness_m: f64) -> LinearSrgb {
 
 /// Maps come from files too: one of another scene must be refused, not drawn.
 fn check_chart(scene: &Scene, map: &IlluminationMap) -> Result<()> {
-    let object = scene.objects.get(map.chart.object);
-    let triangles = object.map(|object| object.mesh.triangles.len());
-    if triangles == Some(map.chart.corner_uvs.len()) {
+    let belongs = scene.objects.get(map.chart.object).is_some_and(|object| {
+        scene.materials[object.material].surface.is_receiver()
+            && object.mesh.triangles.len() == map.chart.corner_uvs.len()
+    });
+    if belongs {
         return Ok(());
     }
     Err(Error::failure(

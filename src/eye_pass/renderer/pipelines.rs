@@ -16,11 +16,13 @@ pub(super) const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth3
 /// Which faces are left out.
 pub(super) type Cull = Option<wgpu::Face>;
 
-/// A clear surface: what is behind is multiplied, then what it reflects is added.
+/// A clear surface: what is behind is multiplied, then what it reflects is added. Blending takes one factor for all
+/// channels, so that only what is grey does both at once.
 #[derive(Debug)]
 pub(super) struct ClearPipelines {
     pub(super) transmitted: wgpu::RenderPipeline,
     pub(super) reflected: wgpu::RenderPipeline,
+    pub(super) grey: wgpu::RenderPipeline,
 }
 
 /// All pipelines that draw surfaces.
@@ -72,6 +74,11 @@ impl SurfacePipelines {
                 "reflected",
                 cull,
                 Some(factors(wgpu::BlendFactor::One, wgpu::BlendFactor::One)),
+            ),
+            grey: pipeline(
+                "grey",
+                cull,
+                Some(factors(wgpu::BlendFactor::One, wgpu::BlendFactor::SrcAlpha)),
             ),
         };
         Self {

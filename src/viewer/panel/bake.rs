@@ -2,7 +2,7 @@
 
 use egui::{Color32, Grid, ProgressBar, RichText, Ui};
 
-use super::control::grouped;
+use super::control::{counted, grouped};
 use super::{Facts, Panel, Wishes};
 use crate::light_pass::ledger::EnergyLedger;
 use crate::viewer::worker::{BakeState, FinishedBake};
@@ -82,8 +82,8 @@ fn last_bake(ui: &mut Ui, last: &FinishedBake) {
         result.cpu_s.total,
     );
     ui.label(format!(
-        "{seconds:.2} s, {} maps, {} rays, {} splats",
-        result.maps.len(),
+        "{seconds:.2} s, {}, {} rays, {} splats",
+        counted(result.maps.len(), "map"),
         grouped(result.counts.rays),
         grouped(result.counts.splats)
     ))

@@ -108,3 +108,9 @@ pub fn grouped(count: u64) -> String {
     }
     text
 }
+
+/// A count with its noun: "1 light", "2 lights".
+pub fn counted(count: usize, noun: &str) -> String {
+    let plural = if count == 1 { "" } else { "s" };
+    format!("{} {noun}{plural}", grouped(count as u64))
+}

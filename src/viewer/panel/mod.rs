@@ -51,6 +51,7 @@ pub struct Panel {
     pub display: Display,
     /// Whether the list of keys is open.
     pub help_open: bool,
+    help_was_open: bool,
 }
 
 /// What the panel tells.
@@ -62,6 +63,8 @@ pub struct Facts<'a> {
     pub state: &'a BakeState,
     /// The bake that the picture shows.
     pub last: Option<&'a FinishedBake>,
+    /// Whether that was only a first look at the bake that runs.
+    pub is_draft: bool,
     /// Layers of the maps that the picture shows.
     pub layers: &'a [LayerKind],
     /// Flying speed [m/s].
@@ -87,6 +90,9 @@ pub fn set_style(context: &egui::Context) {
     context.all_styles_mut(|style| {
         style.animation_time = 0.0;
         style.interaction.tooltip_delay = 0.3;
+        // Labels carry units here: they are to be read, not to recede.
+        style.visuals.widgets.noninteractive.fg_stroke.color = egui::Color32::from_gray(205);
+        style.visuals.weak_text_color = Some(egui::Color32::from_gray(150));
     });
 }
 
@@ -109,6 +115,7 @@ impl Panel {
             automatic: true,
             display: Display::default(),
             help_open: false,
+            help_was_open: false,
         }
     }
 
@@ -153,6 +160,13 @@ impl Panel {
         if help.header_response.on_hover_text("The keys (H).").clicked() {
             self.help_open = !self.help_open;
         }
+        if let Some(keys) = help
+            .body_response
+            .filter(|_| self.help_open && !self.help_was_open)
+        {
+            keys.scroll_to_me(Some(egui::Align::BOTTOM));
+        }
+        self.help_was_open = self.help_open;
     }
 }
 
@@ -161,10 +175,10 @@ fn title(ui: &mut Ui, facts: &Facts<'_>) {
     ui.heading(&scene.name).on_hover_text(&scene.source);
     ui.label(
         RichText::new(format!(
-            "{} objects, {} triangles, {} lights",
-            scene.objects.len(),
-            control::grouped(scene.triangle_count() as u64),
-            scene.lights.len()
+            "{}, {}, {}",
+            control::counted(scene.objects.len(), "object"),
+            control::counted(scene.triangle_count(), "triangle"),
+            control::counted(scene.lights.len(), "light")
         ))
         .weak(),
     )

@@ -1,0 +1,271 @@
+//! A screen without a monitor, the program on it, and hands: Xvfb, xdotool and ImageMagick.
+
+use std::fs;
+use std::io::{BufRead, BufReader, Read};
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::time::{Duration, Instant};
+
+use image::RgbImage;
+use serde_json::Value;
+use x11rb::connection::Connection as _;
+use x11rb::protocol::xproto::{AtomEnum, ClientMessageEvent, ConnectionExt as _, EventMask};
+
+use super::support::skip::skip;
+
+/// Far longer than anything here takes; only a failing test waits for it.
+const PATIENCE: Duration = Duration::from_secs(120);
+/// Size of the screen and of the window [pixels].
+pub const SIZE: (u32, u32) = (1280, 720);
+
+/// An X server of its own on a display number that was free.
+pub struct Screen {
+    server: Child,
+    display: String,
+}
+
+impl Screen {
+    /// `None`, loudly counted, where a tool is missing.
+    pub fn start(test: &str) -> Option<Self> {
+        for (tool, question) in [("Xvfb", "-help"), ("xdotool", "version"), ("import", "-version")] {
+            let tried = Command::new(tool)
+                .arg(question)
+                .stdout(Stdio::null())
+                .stderr(Stdio::null())
+                .status();
+            if tried.is_err() {
+                skip(test, &format!("{tool} is not installed"));
+                return None;
+            }
+        }
+        let mut server = Command::new("Xvfb")
+            .args([
+                "-displayfd",
+                "1",
+                "-screen",
+                "0",
+                &format!("{}x{}x24", SIZE.0, SIZE.1),
+                "-nolisten",
+                "tcp",
+            ])
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()
+            .expect("Xvfb starts");
+        let mut number = String::new();
+        let output = server.stdout.as_mut().expect("it is piped");
+        BufReader::new(output)
+            .read_line(&mut number)
+            .expect("Xvfb tells its display");
+        let display = format!(":{}", number.trim());
+        assert!(
+            number.trim().parse::<u32>().is_ok(),
+            "Xvfb gave no display: {number:?}"
+        );
+        Some(Self { server, display })
+    }
+
+    fn xdotool(&self, arguments: &[&str]) -> String {
+        let output = Command::new("xdotool")
+            .args(arguments)
+            .env("DISPLAY", &self.display)
+            .output();
+        String::from_utf8(output.expect("xdotool runs").stdout).expect("xdotool writes text")
+    }
+}
+
+impl Drop for Screen {
+    fn drop(&mut self) {
+        let _ = self.server.kill();
+        let _ = self.server.wait();
+    }
+}
+
+/// The program with its window open.
+pub struct Viewer<'a> {
+    screen: &'a Screen,
+    program: Child,
+    window: String,
+    folder: tempfile::TempDir,
+    /// Events that the test has read.
+    read: usize,
+}
+
+impl<'a> Viewer<'a> {
+    /// Starts `nephroid view` with these arguments and waits for its window.
+    pub fn open(screen: &'a Screen, arguments: &[&str]) -> Self {
+        let folder = tempfile::tempdir().expect("a folder");
+        let stderr = fs::File::create(folder.path().join("stderr")).expect("a file");
+        let program = Command::new(env!("CARGO_BIN_EXE_nephroid"))
+            .arg("view")
+            .args(arguments)
+            .args(["--size", &format!("{}x{}", SIZE.0, SIZE.1), "--event-log"])
+            .arg(folder.path().join("events"))
+            .env("DISPLAY", &screen.display)
+            .env("WINIT_X11_SCALE_FACTOR", "1")
+            .env_remove("WAYLAND_DISPLAY")
+            .stdout(Stdio::null())
+            .stderr(stderr)
+            .spawn()
+            .expect("the program starts");
+        let mut viewer = Self {
+            screen,
+            program,
+            window: String::new(),
+            folder,
+            read: 0,
+        };
+        viewer.wait_for("started", |_| true);
+        viewer.window = screen
+            .xdotool(&["search", "--name", "Nephroid"])
+            .trim()
+            .to_owned();
+        assert!(
+            viewer.window.parse::<u32>().is_ok(),
+            "one window: {:?}",
+            viewer.window
+        );
+        viewer.xdotool(&["windowfocus", "--sync", &viewer.window]);
+        viewer
+    }
+
+    fn xdotool(&self, arguments: &[&str]) {
+        self.screen.xdotool(arguments);
+    }
+
+    /// Hands that do several things in a row.
+    pub fn hands(&self, what: &str) {
+        self.xdotool(&what.split_whitespace().collect::<Vec<_>>());
+    }
+
+    /// The window by its number.
+    pub fn window(&self) -> &str {
+        &self.window
+    }
+
+    fn events(&self) -> Vec<Value> {
+        let text = fs::read_to_string(self.folder.path().join("events")).unwrap_or_default();
+        // The last line may be half-written.
+        let whole = text.rfind('\n').map_or("", |end| &text[..end]);
+        whole
+            .lines()
+            .map(|line| serde_json::from_str(line).expect("a line is JSON"))
+            .collect()
+    }
+
+    /// The next event of that name that fits, after those that were waited for before.
+    pub fn wait_for(&mut self, name: &str, fits: impl Fn(&Value) -> bool) -> Value {
+        let start = Instant::now();
+        loop {
+            let events = self.events();
+            let found = (self.read..events.len()).find(|&index| {
+                let event = &events[index];
+                event["event"] == name && fits(event)
+            });
+            if let Some(index) = found {
+                self.read = index + 1;
+                return events[index].clone();
+            }
+            let ended = self.program.try_wait().expect("it can be asked");
+            assert!(
+                ended.is_none(),
+                "the program ended ({ended:?}): {}",
+                self.stderr()
+            );
+            assert!(
+                start.elapsed() < PATIENCE,
+                "no {name} after {:#?}\n{}",
+                events,
+                self.stderr()
+            );
+            std::thread::sleep(Duration::from_millis(20));
+        }
+    }
+
+    /// Forgets the events so far.
+    pub fn forget(&mut self) {
+        self.read = self.events().len();
+    }
+
+    /// What is on the screen.
+    pub fn screenshot(&self) -> RgbImage {
+        let path = self.folder.path().join("screen.png");
+        let taken = Command::new("import")
+            .args(["-window", "root", &format!("png24:{}", path.display())])
+            .env("DISPLAY", &self.screen.display)
+            .status();
+        assert!(taken.expect("import runs").success(), "import took no picture");
+        image::open(path).expect("it is a picture").to_rgb8()
+    }
+
+    /// Processor time of all its threads so far [s].
+    pub fn cpu_s(&self) -> f64 {
+        let stat = fs::read_to_string(format!("/proc/{}/stat", self.program.id())).expect("it runs");
+        // Fields 14 and 15, counted after the name in parentheses, in ticks of 1/100 s.
+        let fields: Vec<&str> = stat
+            .rsplit(')')
+            .next()
+            .expect("a name")
+            .split_whitespace()
+            .collect();
+        fields[11..13]
+            .iter()
+            .map(|ticks| ticks.parse::<f64>().expect("a number") / 100.0)
+            .sum()
+    }
+
+    pub fn stderr(&self) -> String {
+        let mut text = String::new();
+        let file = fs::File::open(self.folder.path().join("stderr"));
+        file.expect("it is there")
+            .read_to_string(&mut text)
+            .expect("it is text");
+        text
+    }
+
+    /// Asks the window to close as a window manager does, and waits for the program's end.
+    pub fn close(mut self) -> (ExitStatus, String) {
+        let (server, _) = x11rb::connect(Some(&self.screen.display)).expect("the server answers");
+        let atom = |name: &str| {
+            let asked = server.intern_atom(false, name.as_bytes()).expect("it is sent");
+            asked.reply().expect("it is answered").atom
+        };
+        let window = self.window.parse().expect("a number");
+        let data = [atom("WM_DELETE_WINDOW"), AtomEnum::NONE.into(), 0, 0, 0];
+        let message = ClientMessageEvent::new(32, window, atom("WM_PROTOCOLS"), data);
+        server
+            .send_event(false, window, EventMask::NO_EVENT, message)
+            .expect("it is sent");
+        server.flush().expect("it is sent");
+        self.wait_for("closing", |_| true);
+        let status = self.wait_for_end();
+        let stderr = self.stderr();
+        (status, stderr)
+    }
+
+    /// Sends a signal by name and waits for the program's end.
+    pub fn signal(mut self, name: &str) -> ExitStatus {
+        let sent = Command::new("kill")
+            .args(["-s", name, &self.program.id().to_string()])
+            .status();
+        assert!(sent.expect("kill runs").success());
+        self.wait_for_end()
+    }
+
+    fn wait_for_end(&mut self) -> ExitStatus {
+        let start = Instant::now();
+        loop {
+            if let Some(status) = self.program.try_wait().expect("it can be asked") {
+                return status;
+            }
+            assert!(start.elapsed() < PATIENCE, "it does not end: {}", self.stderr());
+            std::thread::sleep(Duration::from_millis(20));
+        }
+    }
+}
+
+impl Drop for Viewer<'_> {
+    fn drop(&mut self) {
+        let _ = self.program.kill();
+        let _ = self.program.wait();
+    }
+}

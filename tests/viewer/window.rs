@@ -1,0 +1,194 @@
+//! The real program in a real window on a screen without a monitor, used as a person would: seen only by screenshots
+//! and its event log.
+
+use std::time::{Duration, Instant};
+
+use egui::accesskit::Role;
+use glam::DVec3;
+use image::RgbImage;
+use nephroid::scene::builtin;
+use nephroid::settings::{BakeSettings, LayerKind};
+use nephroid::viewer::panel::WIDTH;
+
+use super::desktop::{SIZE, Screen, Viewer};
+use super::headless::Headless;
+
+/// The caustic alone, coarse enough to be baked in a second.
+const RING: [&str; 7] = [
+    "builtin:ring",
+    "--density",
+    "10000",
+    "--map-resolution",
+    "128",
+    "--layers",
+    "caustic",
+];
+
+/// Luminance of display values [0, 1], of a square of 5 pixels around a point of the floor.
+fn brightness(shot: &RgbImage, floor: DVec3) -> f64 {
+    let scene = builtin::build("ring").expect("it is built in");
+    let camera = &scene.cameras[0];
+    let d = floor - camera.position;
+    let (left, height) = (f64::from(WIDTH), f64::from(SIZE.1));
+    let width = f64::from(SIZE.0) - left;
+    let scale = 0.5 * height / (0.5 * camera.vertical_fov_rad).tan() / d.dot(camera.forward);
+    let x = left + 0.5 * width + scale * d.dot(camera.right());
+    let y = 0.5 * height - scale * d.dot(camera.up);
+    let square = (0..25).map(|index| {
+        let pixel = shot.get_pixel(x as u32 + index % 5 - 2, y as u32 + index / 5 - 2);
+        let [r, g, b] = pixel.0.map(|channel| f64::from(channel) / 255.0);
+        0.2126 * r + 0.7152 * g + 0.0722 * b
+    });
+    square.sum::<f64>() / 25.0
+}
+
+/// Share of the picture's pixels, the panel left out, that differ visibly.
+fn difference(a: &RgbImage, b: &RgbImage) -> f64 {
+    let differs = |x: u32, y: u32| {
+        let (p, q) = (a.get_pixel(x, y).0, b.get_pixel(x, y).0);
+        p.iter().zip(q).any(|(p, q)| p.abs_diff(q) > 8)
+    };
+    let left = WIDTH as u32;
+    let count = (left..SIZE.0)
+        .flat_map(|x| (0..SIZE.1).map(move |y| (x, y)))
+        .filter(|&(x, y)| differs(x, y))
+        .count();
+    count as f64 / (f64::from(SIZE.0 - left) * f64::from(SIZE.1))
+}
+
+/// Where the sigma slider is at its default and at ten times that [pixels].
+fn sigma_slider() -> ((i32, i32), (i32, i32)) {
+    let settings = BakeSettings {
+        layers: vec![LayerKind::Caustic],
+        ..BakeSettings::default()
+    };
+    let panel = Headless::new(settings, (SIZE.0 as f32, SIZE.1 as f32));
+    let rect = Headless::rect_of(panel.labelled(Role::Slider, "Sigma [radii²]"));
+    let at = |share: f32| ((rect.left() + 4.0 + share * 104.0) as i32, rect.center().y as i32);
+    (at(0.5), at(0.75))
+}
+
+/// The first screenshot that fits: what the log tells takes a moment to reach the screen.
+fn screenshot_that(viewer: &Viewer<'_>, what: &str, fits: impl Fn(&RgbImage) -> bool) -> RgbImage {
+    let start = Instant::now();
+    loop {
+        let shot = viewer.screenshot();
+        if fits(&shot) {
+            return shot;
+        }
+        assert!(start.elapsed() < Duration::from_secs(20), "no picture {what}");
+    }
+}
+
+/// A camera's place from the log.
+fn position(rest: &serde_json::Value) -> DVec3 {
+    let coordinate = |axis: usize| rest["position_m"][axis].as_f64().expect("a number");
+    DVec3::new(coordinate(0), coordinate(1), coordinate(2))
+}
+
+#[test]
+fn a_user_sees_the_caustic_drags_sigma_flies_looks_and_closes() {
+    let Some(screen) = Screen::start("viewer window") else {
+        return;
+    };
+    let mut viewer = Viewer::open(&screen, &RING);
+
+    // The caustic is there: its cusp far brighter than the floor beside it, and the rest is not blank.
+    let done = viewer.wait_for("done", |_| true);
+    assert!(
+        done["rays"].as_u64() > Some(1000) && done["splats"].as_u64() > Some(1000),
+        "{done}"
+    );
+    let rest = viewer.wait_for("rest", |_| true);
+    let baked = viewer.screenshot();
+    assert_eq!(baked.dimensions(), SIZE);
+    // A mirror of radius 1 m images the lamp's axis, 1.7 m before it, at 1/(2 − 1/1.7) = 0.708 m.
+    let cusp = brightness(&baked, DVec3::new(1.0 - 0.708, 0.0, 0.0));
+    let beside = brightness(&baked, DVec3::new(-0.4, 0.0, 0.0));
+    assert!(cusp > 0.5 && cusp > 5.0 * beside, "cusp {cusp}, beside {beside}");
+
+    // Sigma is dragged: a bake with it, and another picture.
+    let ((x0, y), (x1, _)) = sigma_slider();
+    viewer.hands(&format!(
+        "mousemove {x0} {y} sleep 0.2 mousedown 1 sleep 0.2 mousemove {} {y}",
+        (x0 + x1) / 2
+    ));
+    viewer.hands(&format!(
+        "sleep 0.2 mousemove {x1} {y} sleep 0.4 mouseup 1 sleep 0.4 mousemove 900 300"
+    ));
+    viewer.wait_for("settings", |_| true);
+    let sigma = |event: &serde_json::Value| event["settings"]["sigma"]["constant"].as_f64().unwrap_or(0.0);
+    let done = viewer.wait_for("done", |event| sigma(event) > 3.0);
+    assert!((3.0..40.0).contains(&sigma(&done)), "{done}");
+    viewer.wait_for("rest", |_| true);
+    let blurred = screenshot_that(&viewer, "is blurred", |shot| difference(&baked, shot) > 0.005);
+
+    // W flies towards what is seen.
+    viewer.forget();
+    viewer.hands("keydown w sleep 0.5 keyup w");
+    let flown = viewer.wait_for("rest", |event| position(event) != position(&rest));
+    let closer = screenshot_that(&viewer, "shows the flight", |shot| {
+        difference(&blurred, shot) > 0.05
+    });
+    let camera = &builtin::build("ring").expect("it is built in").cameras[0];
+    let path = position(&flown) - position(&rest);
+    assert!(
+        path.normalize().dot(camera.forward) > 0.999,
+        "it flew along {path}"
+    );
+
+    // The right mouse button looks around.
+    viewer.forget();
+    viewer.hands("mousemove 800 400 mousedown 3 sleep 0.2");
+    for _ in 0..4 {
+        viewer.hands("mousemove_relative 30 0 sleep 0.05");
+    }
+    viewer.hands("mouseup 3");
+    viewer.wait_for("rest", |_| true);
+    std::thread::sleep(Duration::from_millis(300));
+    assert!(
+        difference(&closer, &viewer.screenshot()) > 0.05,
+        "it looks elsewhere"
+    );
+
+    let (status, stderr) = viewer.close();
+    assert_eq!(status.code(), Some(0), "{stderr}");
+    assert!(!stderr.contains("panicked"), "{stderr}");
+}
+
+#[test]
+fn a_window_at_rest_takes_no_time_and_survives_every_size() {
+    let Some(screen) = Screen::start("viewer at rest") else {
+        return;
+    };
+    let mut viewer = Viewer::open(&screen, &RING);
+    viewer.wait_for("done", |_| true);
+    viewer.wait_for("rest", |_| true);
+    std::thread::sleep(Duration::from_millis(500));
+    let before = viewer.cpu_s();
+    std::thread::sleep(Duration::from_secs(2));
+    let spent = viewer.cpu_s() - before;
+    assert!(spent < 0.1, "{spent} s of processor time in 2 s at rest");
+
+    let whole = viewer.screenshot();
+    for size in ["1 1", "345 2", "3000 2000", "700 400", "1280 720"] {
+        viewer.forget();
+        viewer.hands(&format!("windowsize {} {size} sleep 0.3", viewer.window()));
+    }
+    screenshot_that(&viewer, "shows the same again", |again| {
+        difference(&whole, again) < 0.001
+    });
+    let (status, stderr) = viewer.close();
+    assert_eq!(status.code(), Some(0), "{stderr}");
+    assert!(!stderr.contains("panicked"), "{stderr}");
+}
+
+#[test]
+fn a_signal_closes_the_window_even_while_it_bakes() {
+    let Some(screen) = Screen::start("viewer and signals") else {
+        return;
+    };
+    let mut viewer = Viewer::open(&screen, &["builtin:ring", "--density", "3e7"]);
+    viewer.wait_for("draft", |_| true);
+    assert_eq!(viewer.signal("TERM").code(), Some(143));
+}
