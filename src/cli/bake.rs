@@ -14,7 +14,7 @@ use nephroid::settings::BakeSettings;
 
 use super::interrupt::Interrupt;
 use super::job::BakeJob;
-use super::progress_bar::BakeBar;
+use super::progress_bar::StageBar;
 use super::scene_input::SceneInput;
 use super::terminal::Terminal;
 
@@ -76,7 +76,7 @@ pub fn bake(
 ) -> Result<BakeResult> {
     interrupt.check(&loaded.scene.source)?;
     let mut session = BakeSession::new(loaded.scene.clone())?;
-    let bar = BakeBar::new(terminal);
+    let bar = StageBar::new(terminal);
     let mut result = session.bake(settings, &bar, interrupt.control())?;
     drop(bar);
     terminal.print_warnings(&result.warnings);

@@ -165,7 +165,7 @@ fn view_job(arguments: ViewArguments) -> Result<Job> {
     }
     let scene = arguments.scene.unwrap_or_else(|| DEFAULT_SCENE.to_string());
     Ok(Job::View(ViewJob {
-        scene: scene_input(scene, &arguments.scene_options, MissingLight::AddAndSay),
+        scene: scene_input(scene, &arguments.scene_options, MissingLight::Add),
         maps: map_source(arguments.maps, &arguments.bake, &arguments.run)?,
         picture: PictureRequest {
             camera: arguments.picture.camera,
@@ -209,7 +209,7 @@ fn render_job(arguments: RenderArguments) -> Result<Job> {
         }
     }
     Ok(Job::Render(RenderJob {
-        scene: scene_input(arguments.scene, &arguments.scene_options, MissingLight::AddAndSay),
+        scene: scene_input(arguments.scene, &arguments.scene_options, MissingLight::Add),
         maps: map_source(arguments.maps, &arguments.bake, &arguments.run)?,
         picture: PictureRequest {
             camera,

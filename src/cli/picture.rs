@@ -1,17 +1,25 @@
 //! One picture of a scene with its maps, by the graphics card or by the reference ray tracer.
 
+use std::sync::Arc;
+
 use nephroid::error::{Error, Result};
 use nephroid::export::{exr, png};
-use nephroid::eye_pass::{Picture, View};
+use nephroid::eye_pass::reference::{self, ReferenceSettings};
+use nephroid::eye_pass::{Picture, View, tone_mapping};
 use nephroid::illumination::IlluminationMap;
 use nephroid::optics::LinearSrgb;
 use nephroid::scene::{Camera, Scene};
+use nephroid::transport::Tracer;
 
 use super::args::Backend;
 use super::interrupt::Interrupt;
 use super::job::{PictureFormat, PictureRequest};
+use super::progress_bar::StageBar;
 use super::terminal::Terminal;
 use super::values::Exposure;
+
+/// Samples across and down each pixel.
+const SAMPLES_PER_SIDE: u32 = 2;
 
 /// A picture, and how it was made.
 pub struct MadePicture {
@@ -30,7 +38,8 @@ impl MadePicture {
     pub fn encode(&self, format: PictureFormat, location: &str) -> Result<Vec<u8>> {
         match format {
             PictureFormat::Png => {
-                let rgba = vec![0; 4 * self.picture.radiance.len()];
+                let rgba =
+                    tone_mapping::display_rgba8(&self.picture, self.view.exposure_stops, self.view.tone_map);
                 png::encode(self.picture.width, self.picture.height, rgba, location)
             }
             PictureFormat::Exr => exr::encode(
@@ -47,7 +56,7 @@ impl MadePicture {
 /// # Errors
 /// No such camera; a card that was asked for and is not there; a signal.
 pub fn make(
-    scene: &Scene,
+    scene: &Arc<Scene>,
     maps: &[IlluminationMap],
     request: &PictureRequest,
     terminal: &Terminal,
@@ -64,20 +73,20 @@ pub fn make(
     };
     interrupt.check("picture")?;
     let (picture, made_by) = match request.backend {
-        Some(Backend::Cpu) => by_cpu(scene, maps, &view, interrupt)?,
+        Some(Backend::Cpu) => by_cpu(scene, maps, &view, terminal, interrupt)?,
         Some(Backend::Gpu) => by_gpu(scene, maps, &view)?,
         None => match by_gpu(scene, maps, &view) {
             Ok(made) => made,
             Err(error) => {
                 terminal.print_note(&format!("{error}: the CPU makes the picture"));
-                by_cpu(scene, maps, &view, interrupt)?
+                by_cpu(scene, maps, &view, terminal, interrupt)?
             }
         },
     };
     interrupt.check("picture")?;
     view.exposure_stops = match request.exposure {
         Exposure::Stops(stops) => stops,
-        Exposure::Auto => 0.0,
+        Exposure::Auto => tone_mapping::auto_exposure_stops(&picture),
     };
     Ok(MadePicture {
         picture,
@@ -87,27 +96,28 @@ pub fn make(
 }
 
 fn by_cpu(
-    scene: &Scene,
+    scene: &Arc<Scene>,
     maps: &[IlluminationMap],
     view: &View,
+    terminal: &Terminal,
     interrupt: &Interrupt,
 ) -> Result<(Picture, String)> {
-    let _ = (scene, maps, view, interrupt);
-    Err(Error::failure(
-        "render",
-        "pictures cannot be made yet",
-        "use bake",
-    ))
+    let tracer = Tracer::new(scene.clone());
+    let settings = ReferenceSettings {
+        samples_per_side: SAMPLES_PER_SIDE,
+        ..ReferenceSettings::default()
+    };
+    let bar = StageBar::new(terminal);
+    let picture = reference::render(&tracer, maps, view, &settings, &bar, interrupt.control())?;
+    Ok((picture, "cpu".into()))
 }
 
 #[cfg(feature = "gpu")]
 fn by_gpu(scene: &Scene, maps: &[IlluminationMap], view: &View) -> Result<(Picture, String)> {
-    let _ = (scene, maps, view);
-    Err(Error::failure(
-        "render",
-        "pictures cannot be made yet",
-        "use bake",
-    ))
+    let gpu = nephroid::gpu::Gpu::headless()?;
+    let picture =
+        nephroid::eye_pass::renderer::render_offscreen(&gpu, scene, maps, view, SAMPLES_PER_SIDE.pow(2))?;
+    Ok((picture, gpu.adapter_name()))
 }
 
 #[cfg(not(feature = "gpu"))]

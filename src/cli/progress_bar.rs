@@ -1,4 +1,4 @@
-//! A bar on stderr while a bake runs.
+//! A bar on stderr during long work.
 
 use std::sync::Mutex;
 use std::time::Duration;
@@ -12,12 +12,12 @@ use super::terminal::Terminal;
 const REFRESH_HZ: u8 = 10;
 
 /// Shows the stage and how far it is; draws nothing where no bar is wanted.
-pub struct BakeBar {
+pub struct StageBar {
     bar: ProgressBar,
     stage: Mutex<Option<Stage>>,
 }
 
-impl BakeBar {
+impl StageBar {
     /// A bar, not yet drawn.
     pub fn new(terminal: &Terminal) -> Self {
         let target = if terminal.shows_progress() {
@@ -39,7 +39,7 @@ impl BakeBar {
     }
 }
 
-impl Progress for BakeBar {
+impl Progress for StageBar {
     fn advance(&self, stage: Stage, done: u64, total: u64) {
         if let Ok(mut current) = self.stage.lock()
             && *current != Some(stage)
@@ -53,7 +53,7 @@ impl Progress for BakeBar {
     }
 }
 
-impl Drop for BakeBar {
+impl Drop for StageBar {
     fn drop(&mut self) {
         self.bar.finish_and_clear();
     }

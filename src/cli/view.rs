@@ -27,25 +27,34 @@ pub fn run(job: ViewJob, terminal: &Terminal, interrupt: &Interrupt) -> Result<(
     let loaded = bake::load(&job.scene, &clock, terminal)?;
     match window(&job, &loaded, terminal, interrupt)? {
         Shown::Closed => Ok(()),
-        Shown::NoDisplay => headless(&job, &loaded, &clock, terminal, interrupt),
+        Shown::Not(why) => {
+            terminal.print_note(&format!(
+                "{why}: writing maps and a picture to ./{HEADLESS_FOLDER}/ instead of opening a window"
+            ));
+            headless(&job, &loaded, &clock, terminal, interrupt)
+        }
     }
 }
 
 /// What became of the window.
 enum Shown {
     /// The user closed it.
+    #[cfg_attr(
+        not(feature = "viewer"),
+        expect(dead_code, reason = "there is no window to close")
+    )]
     Closed,
-    /// There was no display to open it on.
-    NoDisplay,
+    /// It could not be opened, for this reason.
+    Not(&'static str),
 }
 
 #[cfg(feature = "viewer")]
 fn window(job: &ViewJob, loaded: &LoadedScene, terminal: &Terminal, interrupt: &Interrupt) -> Result<Shown> {
     use super::values::Exposure;
-    use nephroid::viewer;
+    use nephroid::{gpu, viewer};
 
     if !has_display() {
-        return Ok(Shown::NoDisplay);
+        return Ok(Shown::Not("no display"));
     }
     let maps = match &job.maps {
         MapSource::Bake(_) => None,
@@ -70,14 +79,17 @@ fn window(job: &ViewJob, loaded: &LoadedScene, terminal: &Terminal, interrupt: &
     };
     match viewer::run(options) {
         Ok(()) => Ok(Shown::Closed),
-        Err(error) if viewer::is_no_display(&error) => Ok(Shown::NoDisplay),
+        Err(error) if viewer::is_no_display(&error) => Ok(Shown::Not("no display")),
+        Err(error) if gpu::is_no_adapter(&error) => Ok(Shown::Not("no graphics adapter")),
         Err(error) => Err(error),
     }
 }
 
 #[cfg(not(feature = "viewer"))]
 fn window(_: &ViewJob, _: &LoadedScene, _: &Terminal, _: &Interrupt) -> Result<Shown> {
-    Ok(Shown::NoDisplay)
+    Ok(Shown::Not(
+        "no display: this program was built without the viewer feature",
+    ))
 }
 
 /// Whether the session has a screen to show windows on.
@@ -98,9 +110,6 @@ fn headless(
     terminal: &Terminal,
     interrupt: &Interrupt,
 ) -> Result<()> {
-    terminal.print_note(&format!(
-        "no display: writing maps and a picture to ./{HEADLESS_FOLDER}/ instead of opening a window"
-    ));
     let path = Path::new(HEADLESS_FOLDER);
     let picture_path = path.join(HEADLESS_PICTURE);
     let location = picture_path.display().to_string();

@@ -25,6 +25,14 @@ pub struct Gpu {
     faults: Faults,
 }
 
+/// Location of the error of a machine without an adapter.
+const GRAPHICS: &str = "graphics";
+
+/// Whether something failed because there is no graphics adapter to draw with.
+pub fn is_no_adapter(error: &Error) -> bool {
+    error.location == GRAPHICS
+}
+
 impl Gpu {
     /// A device without a window. Vulkan comes first, OpenGL (through EGL) where there is none.
     ///
@@ -161,7 +169,7 @@ fn request_adapter(
     };
     pollster::block_on(instance.request_adapter(&options)).map_err(|_| {
         Error::failure(
-            "graphics",
+            GRAPHICS,
             "no Vulkan or OpenGL adapter was found",
             "install a driver (Debian and Ubuntu: apt-get install mesa-vulkan-drivers libvulkan1), or use --backend cpu",
         )

@@ -1,0 +1,25 @@
+//! The program as a user runs it: options, streams, exit codes, files.
+
+#[path = "cli/bake.rs"]
+mod bake;
+#[path = "cli/compare.rs"]
+mod compare;
+#[path = "cli/errors.rs"]
+mod errors;
+#[path = "cli/folders.rs"]
+mod folders;
+#[path = "cli/headless.rs"]
+mod headless;
+#[path = "cli/inspect.rs"]
+mod inspect;
+#[path = "cli/program.rs"]
+mod program;
+#[path = "cli/render.rs"]
+mod render;
+#[path = "cli/scenes.rs"]
+mod scenes;
+#[cfg(unix)]
+#[path = "cli/signals.rs"]
+mod signals;
+#[path = "cli/usage.rs"]
+mod usage;

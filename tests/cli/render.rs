@@ -1,0 +1,135 @@
+//! Pictures, and maps that are read back for them.
+
+use nephroid::export::FloatImage;
+
+use crate::program::Sandbox;
+
+const QUICK: &str = "--density 1e4 --map-resolution 64";
+const SMALL: &str = "--size 40x30 --backend cpu";
+
+#[test]
+fn pictures_of_baked_and_of_stored_maps_agree() {
+    let sandbox = Sandbox::new();
+    for scene in ["mirror", "showroom"] {
+        sandbox.succeed(&format!(
+            "render builtin:{scene} -o fresh.exr {SMALL} {QUICK} --layers caustic,direct"
+        ));
+        sandbox.succeed(&format!(
+            "bake builtin:{scene} -o maps {QUICK} --layers caustic,direct"
+        ));
+        sandbox.succeed(&format!(
+            "render builtin:{scene} -o stored.exr {SMALL} --maps maps"
+        ));
+        let [fresh, stored] = ["fresh.exr", "stored.exr"].map(|file| {
+            let image = FloatImage::read(&sandbox.path(file)).expect("a picture");
+            assert_eq!((image.width, image.height), (40, 30));
+            image.rgb("").expect("R, G, B")
+        });
+        assert_eq!(fresh, stored, "{scene}");
+        assert!(
+            fresh.iter().flatten().any(|value| *value > 0.0),
+            "{scene} is dark"
+        );
+    }
+}
+
+#[test]
+fn png_and_json_say_what_was_made() {
+    let sandbox = Sandbox::new();
+    let report = sandbox
+        .succeed(&format!(
+            "render builtin:mirror -o a.png {SMALL} {QUICK} --json --camera 0"
+        ))
+        .json();
+    assert_eq!(report["picture"], "a.png");
+    assert_eq!(report["made_by"], "cpu");
+    assert_eq!((&report["width"], &report["height"]), (&40.into(), &30.into()));
+    let brightness = |file: &str| -> u64 {
+        let picture = image::open(sandbox.path(file)).expect("a PNG").to_rgb8();
+        picture.pixels().flat_map(|pixel| pixel.0).map(u64::from).sum()
+    };
+    let stops = report["exposure_stops"].as_f64().expect("a number");
+    for (file, stops) in [("same.png", stops), ("darker.png", stops - 2.0)] {
+        sandbox.succeed(&format!(
+            "render builtin:mirror -o {file} {SMALL} {QUICK} --camera 0 --exposure {stops}"
+        ));
+    }
+    assert_eq!(brightness("a.png"), brightness("same.png"));
+    assert!(brightness("darker.png") < brightness("a.png"));
+}
+
+#[test]
+fn stored_maps_are_not_trusted() {
+    let sandbox = Sandbox::new();
+    sandbox.succeed(&format!("bake builtin:mirror -o maps {QUICK}"));
+    let render = |words: &[&str]| {
+        sandbox
+            .run(&format!("render builtin:mirror -o a.png {SMALL} --maps maps"))
+            .failed_in_one_sentence(1, words);
+    };
+    sandbox
+        .run(&format!("render builtin:ring -o a.png {SMALL} --maps maps"))
+        .failed_in_one_sentence(1, &["builtin:mirror", "builtin:ring"]);
+    sandbox
+        .run(&format!("render builtin:mirror -o a.png {SMALL} --maps nowhere"))
+        .failed_in_one_sentence(1, &["nowhere"]);
+
+    let sound = sandbox.manifest("maps");
+    let file = sound["maps"][0]["file"].as_str().expect("a path").to_string();
+    let edit = |change: &dyn Fn(&mut serde_json::Value)| {
+        let mut manifest = sound.clone();
+        change(&mut manifest);
+        sandbox.write("maps/manifest.json", manifest.to_string());
+    };
+    edit(&|manifest| manifest["schema"] = 99.into());
+    render(&["version 99"]);
+    edit(&|manifest| manifest["maps"][0]["file"] = "../../secret.exr".into());
+    render(&["secret"]);
+    edit(&|manifest| manifest["maps"][0]["file"] = "/etc/passwd".into());
+    render(&["passwd"]);
+    edit(&|manifest| manifest["maps"][0]["width"] = 63.into());
+    render(&["64x64", "63x64"]);
+    edit(&|manifest| manifest["maps"][0]["node"] = 7777.into());
+    render(&["no surface"]);
+    edit(&|manifest| manifest["maps"][0]["layers"] = serde_json::json!(["direct"]));
+    render(&["direct layer"]);
+    edit(&|manifest| manifest["maps"][0]["uv_set"] = "generated".into());
+    render(&["texture coordinates"]);
+    edit(&|manifest| {
+        let map = manifest["maps"][0].clone();
+        manifest["maps"].as_array_mut().expect("maps").push(map);
+    });
+    render(&["two maps"]);
+    sandbox.write("maps/manifest.json", "{}");
+    render(&["no manifest"]);
+    edit(&|_| {});
+    sandbox.write(&format!("maps/{file}"), "no image");
+    render(&["neither"]);
+    std::fs::remove_file(sandbox.path("maps").join(&file)).expect("it was there");
+    render(&[&file]);
+}
+
+#[test]
+fn a_missing_card_is_a_failure_only_when_asked_for() {
+    let sandbox = Sandbox::new();
+    // No driver is found where the loaders of Vulkan and OpenGL are sent to lists that are not there.
+    let run = |line: &str| {
+        let arguments: Vec<&str> = line.split_whitespace().collect();
+        let output = sandbox
+            .command(&arguments)
+            .env("__EGL_VENDOR_LIBRARY_FILENAMES", "/nonexistent.json")
+            .env("__EGL_VENDOR_LIBRARY_DIRS", "/nonexistent")
+            .env("VK_ICD_FILENAMES", "/nonexistent.json")
+            .env("VK_DRIVER_FILES", "/nonexistent.json")
+            .output()
+            .expect("the program starts");
+        crate::program::Run::from(output)
+    };
+    let quick = "--size 40x30 --density 1e3 --map-resolution 16";
+    run(&format!("render builtin:mirror -o a.png --backend gpu {quick}"))
+        .failed_in_one_sentence(1, &["adapter"]);
+    let fallback = run(&format!("render builtin:mirror -o a.png {quick} --json"));
+    assert_eq!(fallback.code, 0, "{}", fallback.stderr);
+    assert_eq!(fallback.json()["made_by"], "cpu");
+    assert!(fallback.stderr.contains("CPU"), "{}", fallback.stderr);
+}
