@@ -18,6 +18,7 @@ fn is_finite(map: &IlluminationMap) -> bool {
 }
 
 #[test]
+#[allow(clippy::print_stdout, reason = "the list is what `--nocapture` is for")]
 fn real_files_bake_and_at_least_four_get_caustic_light() {
     let Some(folder) = support::shared_or_skip("scenes") else {
         return;
