@@ -8,3 +8,13 @@ mod builtins;
 mod collections;
 #[path = "scene/files.rs"]
 mod files;
+#[path = "scene/glb.rs"]
+mod glb;
+#[path = "scene/materials.rs"]
+mod materials;
+#[path = "scene/meshes.rs"]
+mod meshes;
+#[path = "scene/oracle.rs"]
+mod oracle;
+#[path = "scene/refusals.rs"]
+mod refusals;

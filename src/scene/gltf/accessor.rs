@@ -101,14 +101,18 @@ impl Reader<'_> {
         owner: &str,
         budget: &mut Budget,
     ) -> Result<Vec<u8>> {
-        budget.take(accessor.count.0.saturating_mul(element as u64), owner)?;
+        let bytes = accessor.count.0.saturating_mul(element as u64);
         let mut packed = match accessor.buffer_view {
+            // Bounded by the buffer.
             Some(view) => {
                 let offset = accessor.byte_offset.unwrap_or_default().0;
                 self.elements(view, offset, accessor.count.0, element, owner)?
             }
-            // Without a buffer all elements are zero; the budget has bounded their number.
-            None => vec![0; accessor.count.0 as usize * element],
+            // Without a buffer all elements are zero, and only the budget bounds their number.
+            None => {
+                budget.take(bytes, owner)?;
+                vec![0; bytes as usize]
+            }
         };
         if let Some(sparse) = &accessor.sparse {
             self.fill_in(sparse, element, &mut packed, owner)?;

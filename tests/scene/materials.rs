@@ -1,0 +1,337 @@
+//! Materials, images, lights and cameras from files.
+
+use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
+
+use glam::DVec3;
+use nephroid::optics::LinearSrgb;
+use nephroid::scene::{LightKind, LoadOptions, Material, Scene, SurfaceKind};
+use serde_json::{Value, json};
+
+use crate::glb::{Glb, assert_warned};
+use crate::support::assert_close;
+
+fn material(json: Value) -> (Material, Scene) {
+    let scene = Glb::triangle().with_material(json).scene();
+    (scene.materials[scene.objects[0].material].clone(), scene)
+}
+
+fn factors(metallic: f64, roughness: f64) -> Value {
+    json!({ "metallicFactor": metallic, "roughnessFactor": roughness })
+}
+
+#[test]
+fn surfaces_are_classified_by_metal_transmission_volume_and_roughness() {
+    let clear = json!({ "KHR_materials_transmission": { "transmissionFactor": 1.0 } });
+    let solid = json!({
+        "KHR_materials_transmission": { "transmissionFactor": 1.0 },
+        "KHR_materials_volume": { "thicknessFactor": 0.1 },
+    });
+    let flat = json!({
+        "KHR_materials_transmission": { "transmissionFactor": 1.0 },
+        "KHR_materials_volume": { "thicknessFactor": 0.0 },
+    });
+    let none = json!({});
+    let unlit = json!({ "KHR_materials_unlit": {} });
+    for (metallic, roughness, extensions, expected, warned) in [
+        (1.0, 0.0, &none, SurfaceKind::Mirror, None),
+        (0.5, 0.3, &none, SurfaceKind::Mirror, None),
+        (
+            1.0,
+            0.31,
+            &none,
+            SurfaceKind::Diffuse,
+            Some("is a metal of roughness 0.31"),
+        ),
+        (1.0, 1.0, &none, SurfaceKind::Diffuse, None),
+        (0.0, 1.0, &none, SurfaceKind::Diffuse, None),
+        (0.0, 0.1, &none, SurfaceKind::Mixed, None),
+        (0.0, 0.0, &unlit, SurfaceKind::Diffuse, None),
+        (0.0, 0.0, &solid, SurfaceKind::Dielectric, None),
+        (0.0, 0.0, &clear, SurfaceKind::ThinWall, Some("thin pane")),
+        (0.0, 0.0, &flat, SurfaceKind::ThinWall, Some("thin pane")),
+        (
+            0.0,
+            0.5,
+            &solid,
+            SurfaceKind::Diffuse,
+            Some("transmits light at a roughness of 0.50"),
+        ),
+    ] {
+        let json = json!({ "name": "m", "pbrMetallicRoughness": factors(metallic, roughness), "extensions": extensions });
+        let (read, scene) = material(json.clone());
+        assert_eq!(read.surface, expected, "{json}");
+        assert_eq!(
+            read.volume.is_some(),
+            expected == SurfaceKind::Dielectric,
+            "{json}"
+        );
+        match warned {
+            Some(words) => assert_warned(&scene, &["material `m`", words]),
+            None => assert!(scene.warnings.is_empty(), "{json}: {:?}", scene.warnings),
+        }
+    }
+}
+
+#[test]
+fn a_mesh_without_material_is_matte_as_gltf_has_it() {
+    let scene = Glb::triangle().scene();
+    let read = &scene.materials[scene.objects[0].material];
+    assert_eq!(
+        (read.surface, read.base_colour),
+        (SurfaceKind::Diffuse, LinearSrgb::WHITE)
+    );
+    let scene = Glb::triangle().with_material(json!({})).scene();
+    assert_eq!(scene.materials[0].surface, SurfaceKind::Diffuse);
+    assert!(scene.warnings.is_empty());
+}
+
+#[test]
+fn volumes_indices_and_emission_have_their_units() {
+    let (read, _) = material(json!({
+        "emissiveFactor": [1.0, 0.5, 0.0],
+        "pbrMetallicRoughness": factors(0.0, 0.0),
+        "extensions": {
+            "KHR_materials_transmission": { "transmissionFactor": 1.0 },
+            "KHR_materials_ior": { "ior": 1.33 },
+            "KHR_materials_emissive_strength": { "emissiveStrength": 683.0 },
+            "KHR_materials_volume": {
+                "thicknessFactor": 1.0, "attenuationDistance": 0.007, "attenuationColor": [0.9, 0.5, 0.0],
+            },
+        },
+    }));
+    assert_eq!(read.ior, 1.33);
+    assert_eq!(read.emitted_radiance.to_array(), [1.0, 0.5, 0.0]);
+    let volume = read.volume.expect("has a volume");
+    assert_eq!(volume.attenuation_distance_m, 0.007);
+    assert_eq!(volume.attenuation_colour.to_array(), [0.9, 0.5, 1e-6]);
+    for (ior, words) in [
+        (0.0, "full reflection"),
+        (0.5, "index of 0.5"),
+        (-1.0, "index of -1"),
+    ] {
+        let (read, scene) = material(json!({ "extensions": { "KHR_materials_ior": { "ior": ior } } }));
+        assert_eq!(read.ior, 1.5);
+        assert_warned(&scene, &[words, "was read as 1.5"]);
+    }
+}
+
+#[test]
+fn values_out_of_range_are_brought_back_and_named() {
+    let (read, scene) = material(json!({
+        "name": "m",
+        "pbrMetallicRoughness": { "baseColorFactor": [2.0, -1.0, 0.5, 1.0], "roughnessFactor": 7.0 },
+        "alphaMode": "BLEND",
+    }));
+    assert_eq!(read.base_colour.to_array(), [1.0, 0.0, 0.5]);
+    assert_eq!(read.roughness, 1.0);
+    assert_warned(&scene, &["material `m`", "base colour of 2 was read as 1"]);
+    assert_warned(&scene, &["material `m`", "roughness factor of 7"]);
+    assert_warned(&scene, &["material `m`", "alpha mode BLEND was read as opaque"]);
+}
+
+#[test]
+fn solid_glass_turns_closed_thin_walls_into_solids() {
+    let glass = json!({
+        "name": "glass",
+        "pbrMetallicRoughness": factors(0.0, 0.0),
+        "extensions": { "KHR_materials_transmission": { "transmissionFactor": 1.0 } },
+    });
+    let options = LoadOptions {
+        solid_glass: true,
+        ..LoadOptions::default()
+    };
+    let kind = |scene: &Scene| scene.material_of(0).surface;
+    let closed = Glb::tetrahedron().with_material(glass.clone());
+    assert_eq!(kind(&closed.scene()), SurfaceKind::ThinWall);
+    let solid = closed.load_with(&options).expect("loads");
+    assert_eq!(kind(&solid), SurfaceKind::Dielectric);
+    assert!(solid.material_of(0).volume.is_some());
+    let open = Glb::triangle()
+        .with_material(glass)
+        .load_with(&options)
+        .expect("loads");
+    assert_eq!(kind(&open), SurfaceKind::ThinWall);
+    assert_warned(&open, &["node `tri`", "is not closed"]);
+}
+
+fn png(pixels: &[[u8; 4]], width: u32) -> Vec<u8> {
+    let raw = pixels.concat();
+    let image = image::RgbaImage::from_raw(width, pixels.len() as u32 / width, raw).expect("sizes fit");
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    image
+        .write_to(&mut bytes, image::ImageFormat::Png)
+        .expect("encodes");
+    bytes.into_inner()
+}
+
+/// A textured triangle whose image holds these bytes.
+fn textured(image: &[u8], texture_info: Value) -> Glb {
+    let mut file = Glb::triangle();
+    let view = file.push_view(image);
+    file.push(
+        "images",
+        json!({ "name": "picture", "bufferView": view, "mimeType": "image/png" }),
+    );
+    file.push("textures", json!({ "source": 0, "sampler": 0 }));
+    file.push("samplers", json!({ "wrapS": 33071 }));
+    let uvs = file.push_floats(&[0.0; 6], 2);
+    file.json["meshes"][0]["primitives"][0]["attributes"]["TEXCOORD_0"] = json!(uvs);
+    file.with_material(json!({ "pbrMetallicRoughness": { "baseColorTexture": texture_info } }))
+}
+
+#[test]
+fn textures_are_decoded_and_placed() {
+    let pixels = [[255, 0, 0, 255], [0, 255, 0, 255]];
+    let transform = json!({ "offset": [0.5, 0.0], "scale": [2.0, 1.0], "rotation": FRAC_PI_2 });
+    let info = json!({ "index": 0, "extensions": { "KHR_texture_transform": transform } });
+    let scene = textured(&png(&pixels, 2), info).scene();
+    let texture = &scene.textures[0];
+    assert_eq!(
+        (texture.width, texture.height, &texture.rgba[..]),
+        (2, 1, &pixels[..])
+    );
+    let reference = scene.materials[0]
+        .base_colour_texture
+        .as_ref()
+        .expect("has a texture");
+    // KHR_texture_transform: offset · rotation · scale, with (u, v) turned by the rotation as (c s; -s c).
+    let moved = reference.transform(glam::DVec2::new(0.25, 0.1));
+    assert!(
+        (moved - glam::DVec2::new(0.5 + 0.1, -0.5)).length() < 1e-6,
+        "{moved}"
+    );
+}
+
+#[test]
+fn a_bad_image_costs_one_texture_and_not_the_scene() {
+    let mut cut = png(&[[9, 9, 9, 255]; 64], 8);
+    cut.truncate(cut.len() / 2);
+    for bytes in [&b"not an image"[..], &cut] {
+        let scene = textured(bytes, json!({ "index": 0 })).scene();
+        assert_eq!(scene.textures[0].rgba, [[188, 188, 188, 255]]);
+        assert_warned(&scene, &["image `picture`", "replaced by grey"]);
+    }
+    let mut missing = textured(b"", json!({ "index": 0 }));
+    missing.json["images"][0] = json!({ "uri": "nowhere.png" });
+    assert_warned(&missing.scene(), &["image `image0`", "there is no such file"]);
+}
+
+fn light(json: Value) -> Scene {
+    Glb::triangle().with_light("lamp", json).scene()
+}
+
+#[test]
+fn lights_have_radiant_units_and_point_along_minus_z() {
+    let point =
+        light(json!({ "type": "point", "intensity": 683.0, "color": [1.0, 0.5, 0.25], "range": 3.0 }));
+    let LightKind::Point { intensity, position } = point.lights[0].kind else {
+        panic!("is a point light");
+    };
+    assert_eq!((intensity.0, position), (1.0, DVec3::ZERO));
+    assert_eq!(point.lights[0].colour.to_array(), [1.0, 0.5, 0.25]);
+    assert_warned(&point, &["light `lamp`", "range was ignored"]);
+
+    let mut file = Glb::triangle().with_light("sun", json!({ "type": "directional", "intensity": 1366.0 }));
+    // A quarter turn about x looks down; the node's scale means nothing to a light.
+    let half = std::f64::consts::FRAC_1_SQRT_2;
+    file.json["nodes"][1]["rotation"] = json!([-half, 0.0, 0.0, half]);
+    file.json["nodes"][1]["scale"] = json!([3.0, 3.0, 3.0]);
+    let scene = file.scene();
+    let LightKind::Sun {
+        direction,
+        normal_irradiance,
+    } = scene.lights[0].kind
+    else {
+        panic!("is a sun");
+    };
+    assert_close(normal_irradiance.0, 2.0, 1e-12, "lux / 683");
+    assert!((direction - DVec3::NEG_Y).length() < 1e-12, "{direction}");
+}
+
+#[test]
+fn bad_lights_are_repaired_or_left_out_by_name() {
+    let cone = |inner: f64, outer: f64| {
+        let spot = json!({ "innerConeAngle": inner, "outerConeAngle": outer });
+        let scene = light(json!({ "type": "spot", "spot": spot }));
+        match scene.lights[0].kind {
+            LightKind::Spot {
+                inner_cone_rad,
+                outer_cone_rad,
+                ..
+            } => (inner_cone_rad, outer_cone_rad, scene),
+            _ => panic!("is a spot"),
+        }
+    };
+    assert_eq!(cone(0.2, 0.7).0, 0.2);
+    assert!(cone(0.2, 0.7).2.warnings.is_empty());
+    assert_eq!(cone(0.0, FRAC_PI_2).1, FRAC_PI_2);
+    for (inner, outer) in [(0.5, 0.5), (-0.1, 0.5), (0.1, -1.0), (0.1, 3.0), (2.0, 1.0)] {
+        let (read_inner, read_outer, scene) = cone(inner, outer);
+        assert!(
+            0.0 <= read_inner && read_inner < read_outer && read_outer <= FRAC_PI_2,
+            "{inner} {outer}"
+        );
+        assert_warned(&scene, &["light `lamp`", "cone angle of"]);
+    }
+    assert_eq!(cone(0.1, -1.0).1, FRAC_PI_4);
+    for (json, words) in [
+        (json!({ "type": "point", "intensity": -1.0 }), "intensity of -1"),
+        (json!({ "type": "point", "intensity": 1e39 }), "intensity of inf"),
+        (json!({ "type": "point", "intensity": 0.0 }), "has no power"),
+        (
+            json!({ "type": "point", "color": [0.0, 0.0, 0.0] }),
+            "has no power",
+        ),
+        (
+            json!({ "type": "point", "color": [1.0, -1.0, 0.0] }),
+            "a colour that is negative",
+        ),
+        (json!({ "type": "torch" }), "of an unknown kind"),
+    ] {
+        let scene = light(json);
+        assert!(scene.lights.is_empty());
+        assert_warned(&scene, &["light `lamp`", words, "left out"]);
+    }
+}
+
+#[test]
+fn a_default_sun_comes_only_to_a_dark_scene() {
+    let options = LoadOptions {
+        default_light: true,
+        ..LoadOptions::default()
+    };
+    let dark = Glb::triangle();
+    assert!(dark.scene().lights.is_empty());
+    let lit = dark.load_with(&options).expect("loads");
+    assert_eq!(lit.lights.len(), 1);
+    assert_eq!(lit.lights[0].name, "default sun");
+    assert_warned(&lit, &["has no light", "`default sun`"]);
+    let own = dark.with_light("lamp", json!({ "type": "point" }));
+    let own = own.load_with(&options).expect("loads");
+    assert_eq!((own.lights.len(), own.lights[0].name.as_str()), (1, "lamp"));
+    assert!(own.warnings.is_empty());
+}
+
+#[test]
+fn cameras_look_along_minus_z_and_bad_ones_are_left_out() {
+    let mut file = Glb::triangle();
+    let good = json!({ "type": "perspective", "perspective": { "yfov": 0.9, "znear": 0.01 } });
+    let wide = json!({ "type": "perspective", "perspective": { "yfov": 4.0, "znear": 0.01 } });
+    let flat = json!({ "type": "orthographic",
+        "orthographic": { "xmag": 1.0, "ymag": 1.0, "zfar": 9.0, "znear": 0.1 } });
+    for camera in [good, wide, flat] {
+        let camera = file.push("cameras", camera);
+        file.push_root(json!({ "camera": camera, "translation": [0.0, 1.0, 2.0], "scale": [2.0, 3.0, 4.0] }));
+    }
+    let scene = file.scene();
+    assert_eq!(scene.cameras.len(), 1);
+    let camera = &scene.cameras[0];
+    assert_eq!(camera.name, "camera0");
+    assert_eq!((camera.forward, camera.up), (DVec3::NEG_Z, DVec3::Y));
+    assert_eq!(
+        (camera.position, camera.vertical_fov_rad, camera.near_m),
+        (DVec3::new(0.0, 1.0, 2.0), 0.9, 0.01)
+    );
+    assert_warned(&scene, &["angle of view of 4 rad"]);
+    assert_warned(&scene, &["is orthographic"]);
+}
