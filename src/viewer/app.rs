@@ -224,7 +224,8 @@ impl App {
             return;
         };
         let shown = graphics.show(&mut painting);
-        if !graphics.gpu().is_lost()
+        // What breaks the window is told when it is mended.
+        if shown != Shown::Broken
             && let Some(error) = graphics.gpu().take_error()
         {
             self.notice = Some(error.to_string());
