@@ -53,25 +53,22 @@ pub fn display_rgba8(picture: &Picture, exposure_stops: f64, tone_map: ToneMap) 
     picture.radiance.iter().flat_map(pixel).collect()
 }
 
-/// Exposure [stops] that brings the log-average luminance of the lit pixels to middle grey; 0 for a black picture.
+/// Exposure [stops] that brings the log-average luminance of the lit pixels to middle grey, or less where their
+/// brightest tenth would go beyond white; 0 for a black picture.
 ///
 /// Pixels more than 8 stops below the mean count as unlit, so that neither black surroundings nor the last traces of
 /// light decide.
 pub fn auto_exposure_stops(picture: &Picture) -> f64 {
-    let luminances = || {
-        let pixels = picture.radiance.iter();
-        pixels
-            .map(|rgb| LinearSrgb::from(rgb.map(f64::from)).luminance())
-            .filter(|luminance| luminance.is_finite() && *luminance > 0.0)
-    };
-    let mean = luminances().sum::<f64>() / picture.radiance.len().max(1) as f64;
-    let lit = luminances().filter(|luminance| *luminance > mean / 256.0);
-    let (sum, count) = lit.fold((0.0, 0.0), |(sum, count), luminance| {
-        (sum + luminance.log2(), count + 1.0)
-    });
-    if count > 0.0 {
-        MIDDLE_GREY.log2() - sum / count
-    } else {
-        0.0
+    let luminance = |rgb: &[f32; 3]| LinearSrgb::from(rgb.map(f64::from)).luminance();
+    let mut lit: Vec<f64> = picture.radiance.iter().map(luminance).collect();
+    lit.retain(|luminance| luminance.is_finite() && *luminance > 0.0);
+    let mean = lit.iter().sum::<f64>() / picture.radiance.len().max(1) as f64;
+    lit.retain(|luminance| *luminance > mean / 256.0);
+    if lit.is_empty() {
+        return 0.0;
     }
+    let log_average = lit.iter().map(|luminance| luminance.log2()).sum::<f64>() / lit.len() as f64;
+    let tenth = lit.len() * 9 / 10;
+    let (_, bright, _) = lit.select_nth_unstable_by(tenth, f64::total_cmp);
+    (MIDDLE_GREY.log2() - log_average).min(-bright.log2())
 }

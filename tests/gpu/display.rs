@@ -162,4 +162,12 @@ fn auto_exposure_brings_a_lit_picture_to_middle_grey_and_is_blind_to_black() {
     }
     assert_eq!(auto_exposure_stops(&picture(vec![[0.0; 3]; 4])), 0.0);
     assert_eq!(auto_exposure_stops(&picture(Vec::new())), 0.0);
+
+    // A quarter of the picture is 64 times as bright as the rest: it stays below white. A lone lamp does not count.
+    let mut bright = vec![[1.0; 3]; 75];
+    bright.extend([[64.0; 3]; 25]);
+    assert!((auto_exposure_stops(&picture(bright)) + 6.0).abs() < 1e-6);
+    let mut lamp = vec![[0.18; 3]; 999];
+    lamp.push([10.0; 3]);
+    assert!(auto_exposure_stops(&picture(lamp)).abs() < 0.01);
 }
