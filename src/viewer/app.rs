@@ -340,7 +340,7 @@ impl App {
         );
         let display = self.model.panel.display;
         (width >= 1.0 && height >= 1.0).then(|| View {
-            camera: self.model.navigator.camera(),
+            camera: self.model.navigator.camera_for(f64::from(width / height)),
             width: width as u32,
             height: height as u32,
             exposure_stops: display.exposure_stops,
