@@ -8,6 +8,8 @@ mod debounce;
 mod desktop;
 #[path = "viewer/headless.rs"]
 mod headless;
+#[path = "viewer/model.rs"]
+mod model;
 #[path = "viewer/navigation.rs"]
 mod navigation;
 #[path = "viewer/panel.rs"]

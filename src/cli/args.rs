@@ -91,6 +91,9 @@ pub struct PictureOptions {
     /// Stops by which radiance is multiplied before tone mapping, or `auto` [default: auto]
     #[arg(long, value_name = "auto|STOPS", value_parser = values::exposure, allow_hyphen_values = true)]
     pub exposure: Option<Exposure>,
+    /// Size of the window or picture [default: 1280x720]
+    #[arg(long, value_name = "WxH", value_parser = values::picture_size)]
+    pub size: Option<(u32, u32)>,
 }
 
 /// Maps that were baked before, instead of baking.
@@ -105,19 +108,17 @@ pub struct MapsOption {
 pub struct ViewArguments {
     /// .glb, .gltf or builtin:NAME [default: builtin:showroom]
     pub scene: Option<String>,
-    #[command(flatten)]
-    pub maps: MapsOption,
-    #[command(flatten)]
-    pub picture: PictureOptions,
-    /// Size of the window or picture [default: 1280x720]
-    #[arg(long, value_name = "WxH", value_parser = values::picture_size)]
-    pub size: Option<(u32, u32)>,
     /// Write one JSON line per change of state of the window
+    #[cfg(feature = "viewer")]
     #[arg(long, value_name = "FILE")]
     pub event_log: Option<PathBuf>,
     /// Without a display: write into ./nephroid-out even if it holds other files
     #[arg(long)]
     pub force: bool,
+    #[command(flatten)]
+    pub maps: MapsOption,
+    #[command(flatten)]
+    pub picture: PictureOptions,
     #[command(flatten)]
     pub scene_options: SceneOptions,
     #[command(flatten)]
@@ -161,17 +162,14 @@ pub struct RenderArguments {
     pub output: PathBuf,
     #[command(flatten)]
     pub maps: MapsOption,
-    #[command(flatten)]
-    pub picture: PictureOptions,
     /// How radiance becomes display colour [default: neutral]
     #[arg(long, value_enum)]
     pub tone_map: Option<ToneMap>,
-    /// Size of the picture [default: 1280x720]
-    #[arg(long, value_name = "WxH", value_parser = values::picture_size)]
-    pub size: Option<(u32, u32)>,
     /// What makes the picture [default: gpu where there is one, else cpu]
     #[arg(long, value_enum)]
     pub backend: Option<Backend>,
+    #[command(flatten)]
+    pub picture: PictureOptions,
     #[command(flatten)]
     pub scene_options: SceneOptions,
     #[command(flatten)]

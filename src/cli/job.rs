@@ -43,6 +43,7 @@ pub struct ViewJob {
     pub scene: SceneInput,
     pub maps: MapSource,
     pub picture: PictureRequest,
+    #[cfg(feature = "viewer")]
     pub event_log: Option<PathBuf>,
     pub force: bool,
 }
@@ -169,11 +170,12 @@ fn view_job(arguments: ViewArguments) -> Result<Job> {
         maps: map_source(arguments.maps, &arguments.bake, &arguments.run)?,
         picture: PictureRequest {
             camera: arguments.picture.camera,
-            size: arguments.size.unwrap_or(DEFAULT_SIZE),
+            size: arguments.picture.size.unwrap_or(DEFAULT_SIZE),
             exposure: arguments.picture.exposure.unwrap_or_default(),
             tone_map: ToneMap::default(),
             backend: None,
         },
+        #[cfg(feature = "viewer")]
         event_log: arguments.event_log,
         force: arguments.force,
     }))
@@ -192,7 +194,11 @@ fn bake_job(arguments: BakeArguments) -> Result<Job> {
 
 fn render_job(arguments: RenderArguments) -> Result<Job> {
     let format = picture_format(&arguments.output)?;
-    let PictureOptions { camera, exposure } = arguments.picture;
+    let PictureOptions {
+        camera,
+        exposure,
+        size,
+    } = arguments.picture;
     if format == PictureFormat::Exr {
         let radiance_only = |option: &str| {
             Err(Error::usage(
@@ -213,7 +219,7 @@ fn render_job(arguments: RenderArguments) -> Result<Job> {
         maps: map_source(arguments.maps, &arguments.bake, &arguments.run)?,
         picture: PictureRequest {
             camera,
-            size: arguments.size.unwrap_or(DEFAULT_SIZE),
+            size: size.unwrap_or(DEFAULT_SIZE),
             exposure: exposure.unwrap_or_default(),
             tone_map: arguments.tone_map.unwrap_or_default(),
             backend: arguments.backend,

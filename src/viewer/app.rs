@@ -224,7 +224,8 @@ impl App {
             return;
         };
         let shown = graphics.show(&mut painting);
-        if !graphics.gpu().is_lost()
+        // What breaks the window is told when it is mended.
+        if shown != Shown::Broken
             && let Some(error) = graphics.gpu().take_error()
         {
             self.notice = Some(error.to_string());
@@ -339,7 +340,7 @@ impl App {
         );
         let display = self.model.panel.display;
         (width >= 1.0 && height >= 1.0).then(|| View {
-            camera: self.model.navigator.camera(),
+            camera: self.model.navigator.camera_for(f64::from(width / height)),
             width: width as u32,
             height: height as u32,
             exposure_stops: display.exposure_stops,

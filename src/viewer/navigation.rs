@@ -23,6 +23,9 @@ const FIRST_SPEED: f64 = 0.6;
 /// Angle of view of a camera that the file does not give: 45° [rad].
 const DEFAULT_FOV_RAD: f64 = std::f64::consts::FRAC_PI_4;
 
+/// Shape of picture (width/height) that cameras are composed for: a narrower one still shows all that this would.
+const COMPOSED_FOR: f64 = 16.0 / 9.0;
+
 /// Which movement keys are held.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct HeldKeys {
@@ -112,7 +115,7 @@ impl Navigator {
         navigator
     }
 
-    /// The camera as it stands.
+    /// The camera as the file has it, or as it was flown to.
     pub fn camera(&self) -> Camera {
         let (right, level_up, forward) = self.level_axes();
         Camera {
@@ -123,6 +126,21 @@ impl Navigator {
             vertical_fov_rad: self.vertical_fov_rad,
             near_m: self.near_m,
         }
+    }
+
+    /// The camera for a picture of that aspect (width/height). Beside the panel a picture is narrower than most cameras
+    /// are composed for: the view is widened then, so that nothing falls off its sides.
+    pub fn camera_for(&self, aspect: f64) -> Camera {
+        Camera {
+            vertical_fov_rad: self.vertical_fov_for(aspect),
+            ..self.camera()
+        }
+    }
+
+    /// Pictures higher than wide are widened no further than square ones.
+    fn vertical_fov_for(&self, aspect: f64) -> f64 {
+        let widened = (COMPOSED_FOR / aspect.max(1.0)).max(1.0);
+        2.0 * ((0.5 * self.vertical_fov_rad).tan() * widened).atan()
     }
 
     /// Flying speed without running [m/s].
@@ -177,7 +195,7 @@ impl Navigator {
 
     /// Steps back or forth along the gaze until the scene fills a picture of that aspect (width/height).
     pub fn frame(&mut self, aspect: f64) {
-        let half_height = 0.5 * self.vertical_fov_rad;
+        let half_height = 0.5 * self.vertical_fov_for(aspect);
         let half_width = (half_height.tan() * aspect).atan();
         let distance_m = self.radius_m / half_height.min(half_width).sin();
         let (_, _, forward) = self.level_axes();

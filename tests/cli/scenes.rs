@@ -1,5 +1,7 @@
 //! Scenes as files, written here.
 
+use std::f64::consts::FRAC_1_SQRT_2;
+
 use base64::encode;
 use serde_json::{Value, json};
 
@@ -17,7 +19,7 @@ pub fn lit_matte_triangle() -> String {
     scene["nodes"] = json!([
         {"mesh": 0, "name": "floor"},
         // Turned so that its −z points down.
-        {"rotation": [-0.707_106_781, 0.0, 0.0, 0.707_106_781],
+        {"rotation": [-FRAC_1_SQRT_2, 0.0, 0.0, FRAC_1_SQRT_2],
          "extensions": {"KHR_lights_punctual": {"light": 0}}},
     ]);
     scene["scenes"] = json!([{"nodes": [0, 1]}]);

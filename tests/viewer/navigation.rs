@@ -237,7 +237,7 @@ fn framing_shows_the_whole_box_and_fills_the_picture() {
         navigator.advance(3.0);
         navigator.look(DVec2::new(500.0, 200.0));
         navigator.frame(aspect);
-        let camera = navigator.camera();
+        let camera = navigator.camera_for(aspect);
         let tan = (0.5 * camera.vertical_fov_rad).tan();
         let mut largest: f64 = 0.0;
         for corner in 0..8 {
@@ -260,4 +260,23 @@ fn framing_shows_the_whole_box_and_fills_the_picture() {
 fn an_empty_scene_has_a_camera_too() {
     let camera = Navigator::new(&Scene::default(), Some("no such camera")).camera();
     assert!(camera.position.is_finite() && camera.near_m > 0.0);
+}
+
+#[test]
+fn a_narrow_picture_shows_all_that_a_wide_one_does() {
+    let navigator = Navigator::new(&cube(2.0, DVec3::ZERO, Vec::new()), None);
+    let half_width = |aspect: f64| aspect * (0.5 * navigator.camera_for(aspect).vertical_fov_rad).tan();
+    let wide = half_width(16.0 / 9.0);
+    for aspect in [1.0, 1.3, 1.7] {
+        assert!((half_width(aspect) / wide - 1.0).abs() < 1e-12, "{aspect}");
+    }
+    let composed = navigator.camera().vertical_fov_rad;
+    assert!(
+        (navigator.camera_for(2.5).vertical_fov_rad - composed).abs() < 1e-12,
+        "wider ones show more"
+    );
+    assert!(
+        navigator.camera_for(1e-4).vertical_fov_rad < 3.0,
+        "no picture is so narrow as to show everything"
+    );
 }

@@ -8,6 +8,7 @@ use glam::DVec3;
 use image::RgbImage;
 use nephroid::scene::builtin;
 use nephroid::settings::{BakeSettings, LayerKind};
+use nephroid::viewer::navigation::Navigator;
 use nephroid::viewer::panel::WIDTH;
 
 use super::desktop::{SIZE, Screen, Viewer};
@@ -27,7 +28,8 @@ const RING: [&str; 7] = [
 /// Luminance of display values [0, 1], of a square of 5 pixels around a point of the floor.
 fn brightness(shot: &RgbImage, floor: DVec3) -> f64 {
     let scene = builtin::build("ring").expect("it is built in");
-    let camera = &scene.cameras[0];
+    let camera =
+        Navigator::new(&scene, None).camera_for((f64::from(SIZE.0) - f64::from(WIDTH)) / f64::from(SIZE.1));
     let d = floor - camera.position;
     let (left, height) = (f64::from(WIDTH), f64::from(SIZE.1));
     let width = f64::from(SIZE.0) - left;

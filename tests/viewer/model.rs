@@ -1,0 +1,266 @@
+//! The window's state, with real bakes and without a window.
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use nephroid::progress::Control;
+use nephroid::scene::builtin;
+use nephroid::settings::{BakeSettings, LayerKind, MapResolution, Sigma};
+use nephroid::viewer::ViewerOptions;
+use nephroid::viewer::debounce::QUIET;
+use nephroid::viewer::model::Model;
+use nephroid::viewer::panel::{LayerShown, Wishes};
+use nephroid::viewer::worker::BakeState;
+
+const PATIENCE: Duration = Duration::from_secs(120);
+
+fn options(log: &tempfile::NamedTempFile, density_per_sr: f64) -> ViewerOptions {
+    ViewerOptions {
+        scene: Arc::new(builtin::build("ring").expect("it is built in")),
+        settings: BakeSettings {
+            density_per_sr,
+            map_resolution: MapResolution::Fixed {
+                width: 32,
+                height: 32,
+            },
+            layers: vec![LayerKind::Caustic, LayerKind::Direct],
+            ..BakeSettings::default()
+        },
+        maps: None,
+        size: (640, 480),
+        camera: None,
+        exposure_stops: None,
+        stop: Some(Arc::new(Control::default())),
+        event_log: Some(log.path().to_owned()),
+    }
+}
+
+fn model(density_per_sr: f64) -> (Model, tempfile::NamedTempFile) {
+    let log = tempfile::NamedTempFile::new().expect("a file");
+    let model = Model::new(&options(&log, density_per_sr), || ()).expect("threads are to be had");
+    (model, log)
+}
+
+/// Frames until the bake is settled.
+fn run(model: &mut Model) {
+    let start = Instant::now();
+    loop {
+        model.poll();
+        model.act(Wishes::default(), Instant::now());
+        if !model.state().is_baking() {
+            model.poll();
+            return;
+        }
+        assert!(start.elapsed() < PATIENCE, "it never ends");
+        std::thread::sleep(Duration::from_millis(2));
+    }
+}
+
+fn logged(log: &tempfile::NamedTempFile) -> Vec<String> {
+    let text = std::fs::read_to_string(log.path()).expect("it is written");
+    let event = |line: &str| {
+        let event: serde_json::Value = serde_json::from_str(line).expect("a line is JSON");
+        assert!(event["seconds"].as_f64() >= Some(0.0), "{line}");
+        event["event"].as_str().expect("it has a name").to_owned()
+    };
+    text.lines().map(event).collect()
+}
+
+#[test]
+fn it_bakes_on_start_and_shows_every_layer() {
+    let (mut model, log) = model(1000.0);
+    assert!(model.state().is_baking());
+    run(&mut model);
+    assert_eq!(*model.state(), BakeState::Done);
+    assert_eq!(model.layers(), [LayerKind::Caustic, LayerKind::Direct]);
+    assert!(!model.is_draft, "too few rays for a draft");
+    assert_eq!(logged(&log), ["baking", "done"]);
+}
+
+#[test]
+fn a_large_bake_shows_a_draft_first() {
+    let (mut model, log) = model(50_000.0);
+    run(&mut model);
+    let last = model.last.as_ref().expect("it is baked");
+    assert_eq!(
+        last.settings.density_per_sr, 50_000.0,
+        "in the end it is what was asked for"
+    );
+    assert!(!model.is_draft);
+    assert_eq!(logged(&log), ["baking", "draft", "done"]);
+}
+
+#[test]
+fn a_changed_setting_is_baked_once_it_rests() {
+    let (mut model, log) = model(1000.0);
+    run(&mut model);
+    let now = Instant::now();
+    for (step, sigma) in [2.0, 3.0, 4.0].into_iter().enumerate() {
+        model.panel.settings.sigma = Sigma::Constant(sigma);
+        model.act(Wishes::default(), now + QUIET / 2 * step as u32);
+        assert!(!model.state().is_baking(), "it waits for the last change");
+    }
+    assert_eq!(model.due(), Some(now + QUIET * 2));
+    model.act(Wishes::default(), now + QUIET * 2);
+    assert!(model.state().is_baking());
+    run(&mut model);
+    assert_eq!(
+        model.last.as_ref().map(|last| last.settings.sigma),
+        Some(Sigma::Constant(4.0))
+    );
+    assert_eq!(
+        logged(&log),
+        [
+            "baking", "done", "settings", "settings", "settings", "baking", "done"
+        ]
+    );
+}
+
+#[test]
+fn a_change_that_is_taken_back_bakes_nothing() {
+    let (mut model, log) = model(1000.0);
+    run(&mut model);
+    let now = Instant::now();
+    let before = model.panel.settings.clone();
+    model.panel.settings.seed = 5;
+    model.act(Wishes::default(), now);
+    model.panel.settings = before;
+    model.act(Wishes::default(), now);
+    model.act(Wishes::default(), now + QUIET * 2);
+    assert!(!model.state().is_baking());
+    assert_eq!(logged(&log), ["baking", "done", "settings", "settings"]);
+}
+
+#[test]
+fn without_automatic_only_the_button_bakes() {
+    let (mut model, _log) = model(1000.0);
+    run(&mut model);
+    let now = Instant::now();
+    model.panel.automatic = false;
+    model.panel.settings.seed = 5;
+    model.act(Wishes::default(), now);
+    model.act(Wishes::default(), now + QUIET * 10);
+    assert!(!model.state().is_baking() && model.due().is_none());
+    model.act(
+        Wishes {
+            rebake: true,
+            ..Wishes::default()
+        },
+        now,
+    );
+    assert!(model.state().is_baking());
+    run(&mut model);
+    model.panel.settings.seed = 6;
+    model.act(Wishes::default(), now);
+    model.panel.automatic = true;
+    model.act(Wishes::default(), now);
+    model.act(Wishes::default(), now + QUIET);
+    assert!(model.state().is_baking(), "switched on, it catches up");
+}
+
+#[test]
+fn settings_out_of_range_are_not_baked() {
+    let (mut model, log) = model(1000.0);
+    run(&mut model);
+    model.panel.settings.sigma = Sigma::Constant(-1.0);
+    let now = Instant::now();
+    model.act(
+        Wishes {
+            rebake: true,
+            ..Wishes::default()
+        },
+        now,
+    );
+    model.act(Wishes::default(), now + QUIET);
+    assert!(!model.state().is_baking());
+    assert_eq!(logged(&log), ["baking", "done", "settings"]);
+}
+
+#[test]
+fn cancelling_keeps_the_maps_that_are_shown() {
+    let (mut model, _log) = model(1000.0);
+    run(&mut model);
+    model.panel.settings.density_per_sr = 3e7;
+    model.act(
+        Wishes {
+            rebake: true,
+            ..Wishes::default()
+        },
+        Instant::now(),
+    );
+    model.act(
+        Wishes {
+            cancel: true,
+            ..Wishes::default()
+        },
+        Instant::now(),
+    );
+    run(&mut model);
+    assert_eq!(*model.state(), BakeState::Cancelled);
+    assert_eq!(
+        model.last.as_ref().map(|last| last.settings.density_per_sr),
+        Some(1000.0)
+    );
+    assert!(!model.maps().is_empty());
+}
+
+#[test]
+fn one_layer_can_be_shown_alone() {
+    let (mut model, _log) = model(1000.0);
+    run(&mut model);
+    assert!(model.shown_maps().iter().any(|map| map.layers.len() == 2));
+    for kind in [LayerKind::Caustic, LayerKind::Direct] {
+        model.panel.display.layer = LayerShown::Only(kind);
+        let shown = model.shown_maps();
+        assert!(!shown.is_empty());
+        for map in shown.iter() {
+            assert!(map.layers.len() == 1 && map.layers[0].kind == kind);
+            let whole = model
+                .maps()
+                .iter()
+                .find(|whole| Arc::ptr_eq(&whole.chart, &map.chart));
+            assert_eq!(whole.and_then(|whole| whole.layer(kind)), Some(&map.layers[0]));
+        }
+    }
+}
+
+#[test]
+fn given_maps_are_shown_without_a_bake() {
+    let (mut first, log) = model(1000.0);
+    run(&mut first);
+    let maps = first.maps().to_vec();
+    let options = ViewerOptions {
+        maps: Some(maps),
+        ..options(&log, 1000.0)
+    };
+    let mut model = Model::new(&options, || ()).expect("threads are to be had");
+    assert!(!model.poll());
+    assert_eq!(*model.state(), BakeState::Idle);
+    assert_eq!(model.maps().len(), first.maps().len());
+    let now = Instant::now();
+    model.act(Wishes::default(), now);
+    model.act(Wishes::default(), now + QUIET);
+    assert_eq!(
+        *model.state(),
+        BakeState::Idle,
+        "nothing changed, nothing is baked"
+    );
+    model.panel.settings.seed = 3;
+    model.act(Wishes::default(), now);
+    model.act(Wishes::default(), now + QUIET);
+    assert!(model.state().is_baking());
+}
+
+#[test]
+fn a_log_that_cannot_be_written_is_told_before_the_window_opens() {
+    let (_, log) = model(1000.0);
+    let options = ViewerOptions {
+        event_log: Some(log.path().join("x")),
+        ..options(&log, 1000.0)
+    };
+    let error = Model::new(&options, || ()).expect_err("a file is no folder");
+    assert!(
+        error.to_string().contains("event log cannot be written"),
+        "{error}"
+    );
+}
