@@ -9,17 +9,18 @@ use crate::optics::LinearSrgb;
 use crate::scene::{Camera, Light, Scene};
 use crate::units::{Flux, Irradiance};
 
-/// Floor of 4.8 m × 3.2 m with walls behind and to the right; sun from the front left, a lamp over the middle.
+/// Floor of 6.4 m × 3.6 m with walls behind and to the right; sun from the front left, 38 degrees high, so that the ring
+/// shows the coffee cup's cusp, and a lamp over the middle that lights the shadows.
 pub fn build() -> Scene {
     let mut scene = Scene::default();
     add_room(&mut scene);
     parts::add(
         &mut scene,
         "ring",
-        cylinder(DVec3::new(-1.3, 0.0, 0.2), 0.5, 0.25),
+        cylinder(DVec3::new(-1.05, 0.0, 0.3), 0.5, 0.3),
         parts::mirror(),
     );
-    let ball = shapes::sphere(DVec3::new(-0.1, 0.42, -0.15), 0.28, 6);
+    let ball = shapes::sphere(DVec3::new(-0.05, 0.36, -0.2), 0.27, 6);
     parts::add(&mut scene, "ball", ball, parts::dielectric("glass", 1.5));
     add_basin(&mut scene);
     scene.lights = lights();
@@ -28,7 +29,7 @@ pub fn build() -> Scene {
 }
 
 fn add_room(scene: &mut Scene) {
-    let floor = shapes::floor([-2.4, 2.4], [-1.6, 1.6], 0.0);
+    let floor = shapes::floor([-3.2, 3.2], [-1.6, 2.0], 0.0);
     parts::add(
         scene,
         "floor",
@@ -38,21 +39,21 @@ fn add_room(scene: &mut Scene) {
     parts::add(
         scene,
         "back wall",
-        shapes::rectangle(DVec3::new(0.0, 0.8, -1.6), DVec3::X * 2.4, DVec3::Y * 0.8),
+        shapes::rectangle(DVec3::new(0.0, 0.8, -1.6), DVec3::X * 3.2, DVec3::Y * 0.8),
         parts::matte("blue wall", LinearSrgb::new(0.3, 0.42, 0.55)),
     );
     parts::add(
         scene,
         "right wall",
-        shapes::rectangle(DVec3::new(2.4, 0.8, 0.0), DVec3::NEG_Z * 1.6, DVec3::Y * 0.8),
+        shapes::rectangle(DVec3::new(3.2, 0.8, 0.2), DVec3::Z * 1.8, DVec3::Y * 0.8),
         parts::matte("red wall", LinearSrgb::new(0.58, 0.32, 0.24)),
     );
 }
 
 /// Inner half width and depth of the basin [m].
-const BASIN_HALF_M: [f64; 2] = [0.6, 0.5];
+const BASIN_HALF_M: [f64; 2] = [0.52, 0.46];
 const BASIN_WALL_M: f64 = 0.05;
-const BASIN_CENTRE: DVec3 = DVec3::new(1.35, 0.0, 0.1);
+const BASIN_CENTRE: DVec3 = DVec3::new(1.15, 0.0, 0.15);
 const BASIN_RIM_M: f64 = 0.38;
 const WATER_LEVEL_M: f64 = 0.34;
 
@@ -123,8 +124,8 @@ fn add_basin_wall(
 }
 
 fn lights() -> Vec<Light> {
-    let sun = parts::sun("sun", DVec3::new(0.55, -0.72, -0.42), Irradiance(1.6));
-    let lamp = parts::point_light("lamp", DVec3::new(-0.5, 1.9, 0.6), Flux(14.0));
+    let sun = parts::sun("sun", DVec3::new(0.6, -0.62, -0.5), Irradiance(1.6));
+    let lamp = parts::point_light("lamp", DVec3::new(-0.4, 1.9, 0.8), Flux(12.0));
     vec![
         Light {
             colour: LinearSrgb::new(1.08, 0.99, 0.86),
@@ -141,21 +142,21 @@ fn cameras() -> Vec<Camera> {
     vec![
         Camera::look_at(
             "overview",
-            DVec3::new(-0.35, 2.1, 3.1),
-            DVec3::new(0.05, 0.1, -0.15),
-            0.8,
+            DVec3::new(0.05, 1.75, 2.9),
+            DVec3::new(0.08, 0.12, 0.0),
+            0.72,
         ),
         Camera::look_at(
             "ring",
-            DVec3::new(-1.9, 1.0, 1.6),
-            DVec3::new(-1.25, 0.05, 0.15),
-            0.8,
+            DVec3::new(-1.6, 1.0, 1.6),
+            DVec3::new(-1.0, 0.05, 0.25),
+            0.7,
         ),
         Camera::look_at(
             "basin",
-            DVec3::new(1.0, 1.35, 1.4),
-            DVec3::new(1.4, 0.1, 0.0),
-            0.8,
+            DVec3::new(0.8, 1.3, 1.4),
+            DVec3::new(1.18, 0.1, 0.05),
+            0.7,
         ),
     ]
 }
