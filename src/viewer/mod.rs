@@ -6,6 +6,7 @@ pub mod event_log;
 mod graphics;
 mod input;
 mod interface;
+mod meter;
 pub mod model;
 pub mod navigation;
 mod overlay;
