@@ -16,8 +16,9 @@ use crate::scene::Scene;
 pub struct ReceiverMap {
     /// How the surface lies in the map.
     pub chart: Arc<Chart>,
-    /// The flux so far.
-    pub flux: FluxAccumulator,
+    /// The flux so far: `levels[0]` at the map's size, each further one at half the size of the one before, for
+    /// kernels that are smooth there.
+    levels: Vec<FluxAccumulator>,
     /// Islands of the chart, where there is more than one.
     islands: Option<Islands>,
 }
@@ -54,8 +55,7 @@ impl ReceiverMaps {
             self.slots[object] = match chart_for(object) {
                 Some(chart) => {
                     let flux = FluxAccumulator::new(chart.width, chart.height);
-                    let islands = Islands::find(&chart);
-                    Slot::Allocated(Box::new(ReceiverMap { chart, flux, islands }))
+                    Slot::Allocated(Box::new(ReceiverMap::new(chart, flux)))
                 }
                 None => Slot::Refused,
             };
@@ -75,17 +75,21 @@ impl ReceiverMaps {
         (0..self.slots.len()).filter_map(|object| Some((object, self.get(object)?)))
     }
 
-    /// All maps with their objects, to be added to.
-    pub fn iter_mut(&mut self) -> impl Iterator<Item = (usize, &mut ReceiverMap)> {
-        self.slots
-            .iter_mut()
-            .enumerate()
-            .filter_map(|(object, slot)| match slot {
-                Slot::Allocated(map) => Some((object, &mut **map)),
-                Slot::Untouched | Slot::Refused => None,
-            })
+    /// The map of an object, to be added to.
+    pub fn get_mut(&mut self, object: usize) -> Option<&mut ReceiverMap> {
+        match &mut self.slots[object] {
+            Slot::Allocated(map) => Some(map),
+            Slot::Untouched | Slot::Refused => None,
+        }
     }
 }
+
+/// Spreads that a kernel must have at a level [texels of the level]: linear interpolation between texels then adds less
+/// than one per cent to its variance.
+const LEAST_SPREAD_TEXELS: f64 = 6.0;
+
+/// Least side of a level [texels].
+const LEAST_LEVEL_SIDE: usize = 16;
 
 impl ReceiverMap {
     /// Doubles the map each way until it is as wide as `size`, in texels; each texel's flux goes in four equal parts to
@@ -95,13 +99,51 @@ impl ReceiverMap {
         size: (usize, usize),
         chart_for: &dyn Fn((usize, usize)) -> Option<Arc<Chart>>,
     ) {
-        while self.flux.width() < size.0 {
-            self.flux = self.flux.doubled();
+        let mut flux = self.flux();
+        while flux.width() < size.0 {
+            flux = flux.doubled();
         }
-        if let Some(chart) = chart_for((self.flux.width(), self.flux.height())) {
-            self.islands = Islands::find(&chart);
-            self.chart = chart;
+        if let Some(chart) = chart_for((flux.width(), flux.height())) {
+            *self = Self::new(chart, flux);
         }
+    }
+
+    fn new(chart: Arc<Chart>, flux: FluxAccumulator) -> Self {
+        let islands = Islands::find(&chart);
+        let mut levels = vec![flux];
+        let full = chart.texel_areas_m2.len() == 1;
+        let halves = |side: usize| side.is_multiple_of(2) && side / 2 >= LEAST_LEVEL_SIDE;
+        let (mut width, mut height) = (chart.width, chart.height);
+        while full && halves(width) && halves(height) {
+            (width, height) = (width / 2, height / 2);
+            levels.push(FluxAccumulator::new(width, height));
+        }
+        Self {
+            chart,
+            levels,
+            islands,
+        }
+    }
+
+    /// The coarsest level at which a smooth kernel of the given spread [texels of the map] is still well resolved.
+    pub fn level_for(&self, spread_texels: f64) -> usize {
+        let fits = |level: &usize| spread_texels / f64::from(1_u32 << level) >= LEAST_SPREAD_TEXELS;
+        (1..self.levels.len()).take_while(fits).last().unwrap_or(0)
+    }
+
+    /// All flux at the map's size: coarser levels spread smoothly.
+    pub fn flux(&self) -> FluxAccumulator {
+        let mut levels = self.levels.iter().rev();
+        let mut sum = levels
+            .next()
+            .cloned()
+            .unwrap_or_else(|| FluxAccumulator::new(0, 0));
+        for level in levels {
+            let mut finer = level.clone();
+            sum.spread_into(&mut finer);
+            sum = finer;
+        }
+        sum
     }
 
     /// Texel coordinates of an arrival, and the local map from metres to texels; `None` on a triangle without area.
@@ -124,12 +166,17 @@ impl ReceiverMap {
             .map_or(0, |islands| islands.of_triangle(arrival.triangle as usize))
     }
 
-    /// The flux, to be added to, beside what says where it may go.
-    pub fn split(&mut self) -> (&mut FluxAccumulator, Covered<'_>) {
+    /// A level's flux, to be added to, beside what says where it may go.
+    pub fn level(&mut self, level: usize) -> (&mut FluxAccumulator, Covered<'_>) {
+        let flux = &mut self.levels[level];
+        let size = (flux.width(), flux.height());
+        // Coarser levels exist only where every texel is covered.
+        let chart = (self.chart.texel_areas_m2.len() > 1).then_some(&*self.chart);
         (
-            &mut self.flux,
+            flux,
             Covered {
-                chart: &self.chart,
+                size,
+                chart,
                 islands: self.islands.as_ref(),
             },
         )
@@ -139,21 +186,24 @@ impl ReceiverMap {
 /// Which texels of a map are covered, and by which island.
 #[derive(Clone, Copy, Debug)]
 pub struct Covered<'a> {
-    chart: &'a Chart,
+    size: (usize, usize),
+    /// `None` where all texels are covered.
+    chart: Option<&'a Chart>,
     islands: Option<&'a Islands>,
 }
 
 impl Coverage for Covered<'_> {
     fn size(&self) -> (usize, usize) {
-        (self.chart.width, self.chart.height)
+        self.size
     }
 
     fn is_full(&self) -> bool {
-        self.chart.texel_areas_m2.len() == 1
+        self.chart.is_none()
     }
 
     fn covers(&self, column: usize, row: usize, island: u32) -> bool {
-        self.chart.texel_area_m2(row * self.chart.width + column) > 0.0
+        self.chart
+            .is_none_or(|chart| chart.texel_area_m2(row * self.size.0 + column) > 0.0)
             && self
                 .islands
                 .is_none_or(|islands| islands.covers(column, row, island))

@@ -196,8 +196,11 @@ impl CausticLayer<'_> {
             outcome.count(&report, clock);
             // The kernels of the coarse run are in no map.
             outcome.counts.splats -= report.splats;
-            for (object, map) in maps.iter_mut() {
-                if let Some(size) = self.automatic_size(object, &report.statistics) {
+            for object in 0..self.tracer.scene().objects.len() {
+                if let (Some(map), Some(size)) = (
+                    maps.get_mut(object),
+                    self.automatic_size(object, &report.statistics),
+                ) {
                     map.grow_to(size, &|size| self.sizes.chart(object, size));
                 }
             }

@@ -134,8 +134,8 @@ pub(super) fn preview(maps: &ReceiverMaps, unit: FluxUnit) -> Vec<IlluminationMa
 
 /// E = Φ/A per texel; nothing where the surface does not reach, but for the gutter.
 fn caustic_layer(map: &ReceiverMap, unit: FluxUnit) -> Layer {
-    let mut irradiance: Vec<[f32; 3]> = map
-        .flux
+    let flux = map.flux();
+    let mut irradiance: Vec<[f32; 3]> = flux
         .texels()
         .iter()
         .enumerate()

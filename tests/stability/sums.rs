@@ -55,3 +55,28 @@ fn doubling_a_map_keeps_every_count() {
         }
     }
 }
+
+#[test]
+fn spreading_a_coarse_map_keeps_every_count_and_is_smooth() {
+    let mut coarse = FluxAccumulator::new(4, 4);
+    for (index, texel) in coarse.texels_mut().iter_mut().enumerate() {
+        *texel = [640_000, 1 << 58, 7 * index as i64 + 1];
+    }
+    let mut fine = FluxAccumulator::new(8, 8);
+    coarse.spread_into(&mut fine);
+    for channel in 0..3 {
+        let sum = |map: &FluxAccumulator| {
+            map.texels()
+                .iter()
+                .map(|texel| i128::from(texel[channel]))
+                .sum::<i128>()
+        };
+        assert_eq!(sum(&coarse), sum(&fine));
+    }
+    // An even field stays even, borders included.
+    assert!(
+        fine.texels().iter().all(|texel| texel[0] == 160_000),
+        "{:?}",
+        fine.texels()
+    );
+}

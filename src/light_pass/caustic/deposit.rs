@@ -2,6 +2,7 @@
 //! of texel rows. Sums are integers, so that neither order nor number of threads matters.
 
 use rayon::prelude::*;
+use std::collections::BTreeMap;
 
 use super::footprint::{Neighbours, footprint};
 use super::kernel::Profile;
@@ -57,27 +58,23 @@ impl Depositor<'_> {
     pub fn deposit(&self, rows: &[RowContext], maps: &mut ReceiverMaps) -> DepositReport {
         let parts: Vec<RowSplats> = rows.par_iter().map(|row| self.splats_of(row, maps)).collect();
         let mut report = DepositReport::default();
-        let mut by_object: Vec<(u32, Splat)> = Vec::new();
+        let mut groups: BTreeMap<(u32, usize), Vec<Splat>> = BTreeMap::new();
         for part in parts {
             report.ledger.merge(&part.ledger);
             report.statistics.merge(&part.statistics);
-            by_object.extend(part.splats);
-        }
-        report.splats = by_object.len() as u64;
-        // Stable: splats of one object keep their order, though the sums do not depend on it.
-        by_object.sort_by_key(|(object, _)| *object);
-        let mut rest = &by_object[..];
-        for (object, map) in maps.iter_mut() {
-            let count = rest.partition_point(|(o, _)| *o as usize == object);
-            let (mine, others) = rest.split_at(count);
-            rest = others;
-            if !mine.is_empty() {
-                report
-                    .ledger
-                    .merge(&add_splats(mine, map, self.settings.kernel_sampling));
+            report.splats += part.splats.len() as u64;
+            for (object, level, splat) in part.splats {
+                groups.entry((object, level)).or_default().push(splat);
             }
         }
-        debug_assert!(rest.is_empty(), "splats are made only for allocated maps");
+        for ((object, level), splats) in groups {
+            let map = maps
+                .get_mut(object as usize)
+                .expect("splats are made only for allocated maps");
+            report
+                .ledger
+                .merge(&add_splats(&splats, map, level, self.settings.kernel_sampling));
+        }
         report
     }
 
@@ -85,7 +82,7 @@ impl Depositor<'_> {
         let mut made = RowSplats::default();
         for (&column, arrival) in context.row.columns.iter().zip(&context.row.arrivals) {
             match self.splat_of(column, arrival, context, maps, &mut made.statistics) {
-                Some(splat) => made.splats.push((arrival.object, splat)),
+                Some((level, splat)) => made.splats.push((arrival.object, level, splat)),
                 None => made
                     .ledger
                     .book(Account::Unresolved, self.lattice.unit.count(arrival.flux_w)),
@@ -101,7 +98,7 @@ impl Depositor<'_> {
         context: &RowContext,
         maps: &ReceiverMaps,
         statistics: &mut FootprintStatistics,
-    ) -> Option<Splat> {
+    ) -> Option<(usize, Splat)> {
         let object = arrival.object as usize;
         let map = maps.get(object)?;
         let (centre, rows) = map.locate(self.lattice.tracer.scene(), arrival)?;
@@ -151,31 +148,41 @@ impl Depositor<'_> {
             (Kernel::Cone | Kernel::Disc | Kernel::Box, _) => 1.0,
         };
         let flux = self.lattice.unit.count(arrival.flux_w);
-        Some(Splat {
+        let splat = Splat {
             centre,
             ellipse,
             profile: Profile::new(self.settings.kernel, sigma),
             flux,
             island: map.island(arrival),
-        })
+        };
+        // Only a gaussian is smooth at every level; point samples are to be the paper's.
+        let smooth = self.settings.kernel == Kernel::Gaussian
+            && self.settings.kernel_sampling == KernelSampling::Integrated;
+        let level = if smooth {
+            map.level_for(splat.narrowest_spread())
+        } else {
+            0
+        };
+        Some((level, splat.at_level(level)))
     }
 }
 
 /// What one row gave.
 #[derive(Debug, Default)]
 struct RowSplats {
-    splats: Vec<(u32, Splat)>,
+    /// Object, level of its map, kernel.
+    splats: Vec<(u32, usize, Splat)>,
     ledger: LedgerSum,
     statistics: FootprintStatistics,
 }
 
-/// Adds splats to one map, each task to its own rows of texels.
-fn add_splats(splats: &[(u32, Splat)], map: &mut ReceiverMap, sampling: KernelSampling) -> LedgerSum {
-    let (flux, covered) = map.split();
+/// Adds splats to one level of a map, each task to its own rows of texels.
+fn add_splats(splats: &[Splat], map: &mut ReceiverMap, level: usize, sampling: KernelSampling) -> LedgerSum {
+    let (flux, covered) = map.level(level);
     let size = covered.size();
     let tasks = size.1.div_ceil(ROWS_PER_TASK);
     let mut by_task: Vec<Vec<u32>> = vec![Vec::new(); tasks];
-    for (index, (_, splat)) in splats.iter().enumerate() {
+    for (index, splat) in splats.iter().enumerate() {
         for task in tasks_of(splat, size.1) {
             by_task[task].push(index as u32);
         }
@@ -191,7 +198,7 @@ fn add_splats(splats: &[(u32, Splat)], map: &mut ReceiverMap, sampling: KernelSa
             let mut window = Window::default();
             for index in indices {
                 add_splat(
-                    &splats[index as usize].1,
+                    &splats[index as usize],
                     &covered,
                     sampling,
                     rows,

@@ -34,7 +34,9 @@ impl Ellipse {
         }
     }
 
-    fn scaled(self, factor: f64) -> Self {
+    /// Every radius times √factor.
+    #[must_use]
+    pub fn scaled(self, factor: f64) -> Self {
         Self {
             xx: self.xx * factor,
             xy: self.xy * factor,

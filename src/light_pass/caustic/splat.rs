@@ -49,6 +49,23 @@ pub struct Window {
 }
 
 impl Splat {
+    /// Spread of the kernel across its narrowest direction [texels].
+    pub fn narrowest_spread(&self) -> f64 {
+        let Ellipse { xx, xy, yy } = self.ellipse;
+        let half_difference = 0.5 * (xx - yy);
+        let least = 0.5 * (xx + yy) - (half_difference * half_difference + xy * xy).sqrt();
+        self.profile.scale() * least.max(0.0).sqrt()
+    }
+
+    /// The same kernel on a map of 2^−level times the size each way.
+    #[must_use]
+    pub fn at_level(mut self, level: usize) -> Self {
+        let scale = (-(level as f64)).exp2();
+        self.centre *= scale;
+        self.ellipse = self.ellipse.scaled(scale * scale);
+        self
+    }
+
     /// Rows that the kernel reaches, before folding: first and last.
     pub fn rows(&self) -> (i64, i64) {
         let half = self.half_height();
@@ -125,6 +142,7 @@ impl Splat {
         let frame = RowFrame::new(self.ellipse.at_least(THINNEST_TEXELS));
         let half_height = self.profile.reach() * frame.y_radius;
         let columns = window.columns;
+        let smooth = frame.is_smooth(self.profile.scale());
         for (index, weights) in window.weights.chunks_mut(columns).enumerate() {
             let row = (window.first_row + index as i64) as f64 - self.centre.y;
             let (low, high) = (row.max(-half_height), (row + 1.0).min(half_height));
@@ -133,11 +151,14 @@ impl Splat {
             }
             let parts = frame.parts(high - low, self.profile.scale());
             let part = (high - low) / f64::from(parts);
+            let first = window.first_column as f64 - self.centre.x;
+            if smooth {
+                self.integrate_row(&frame, 0.5 * (low + high), first, high - low, weights);
+                continue;
+            }
             for node in 0..2 * parts {
                 let offset = f64::from(node / 2) + if node % 2 == 0 { GAUSS_LOW } else { 1.0 - GAUSS_LOW };
-                let y = low + part * offset;
-                let first = window.first_column as f64 - self.centre.x;
-                self.integrate_row(&frame, y, first, 0.5 * part, weights);
+                self.integrate_row(&frame, low + part * offset, first, 0.5 * part, weights);
             }
         }
     }
@@ -173,6 +194,12 @@ struct RowFrame {
 }
 
 impl RowFrame {
+    /// Whether the kernel changes so little within a row that one line stands for it: the midpoint rule then errs by
+    /// less than 1/24 of the square of the row's height in spreads, below 0.3 %.
+    fn is_smooth(&self, scale: f64) -> bool {
+        scale * self.y_radius >= 4.0 && self.slope.abs() <= 0.25 * scale * self.x_radius
+    }
+
     fn new(ellipse: Ellipse) -> Self {
         let slope = ellipse.xy / ellipse.yy;
         // Not below the floor that `at_least` gave both axes, whatever cancels.
@@ -228,44 +255,65 @@ impl Window {
         rows: (usize, usize),
         texels: &mut [FluxCount],
     ) -> FluxCount {
-        let mut added = [0; 3];
+        let mut target = Target {
+            size,
+            rows,
+            texels,
+            added: [0; 3],
+        };
         let mut rest = flux;
-        let mut heaviest = 0;
+        let (mut heaviest, mut most) = (0, 0.0);
         let scale = flux.map(|channel| channel as f64 / self.sum);
-        for (index, &weight) in self.weights.iter().enumerate() {
-            if weight > self.weights[heaviest] {
-                heaviest = index;
-            }
-            if weight > 0.0 {
-                let share = scale.map(|channel| (channel * weight).round() as i64);
+        let grey = flux[0] == flux[1] && flux[1] == flux[2];
+        for (line, weights) in self.weights.chunks(self.columns).enumerate() {
+            let row = target.row(self.first_row + line as i64);
+            for (offset, &weight) in weights.iter().enumerate().filter(|(_, weight)| **weight > 0.0) {
+                if weight > most {
+                    (heaviest, most) = (line * self.columns + offset, weight);
+                }
+                let share = if grey {
+                    [nearest(scale[0] * weight); 3]
+                } else {
+                    scale.map(|channel| nearest(channel * weight))
+                };
                 for channel in 0..3 {
                     rest[channel] -= share[channel];
                 }
-                self.add_to(index, share, size, rows, texels, &mut added);
+                target.add(row, self.first_column + offset as i64, share);
             }
         }
-        self.add_to(heaviest, rest, size, rows, texels, &mut added);
-        added
+        let row = target.row(self.first_row + (heaviest / self.columns) as i64);
+        target.add(row, self.first_column + (heaviest % self.columns) as i64, rest);
+        target.added
+    }
+}
+
+/// The nearest whole number of a share of flux, which is never negative; without a call into the mathematics library.
+fn nearest(share: f64) -> i64 {
+    (share + 0.5) as i64
+}
+
+/// Some rows of a map, being added to.
+struct Target<'a> {
+    size: (usize, usize),
+    rows: (usize, usize),
+    texels: &'a mut [FluxCount],
+    added: FluxCount,
+}
+
+impl Target<'_> {
+    /// Where the texels of a row begin, if it is one of ours.
+    fn row(&self, row: i64) -> Option<usize> {
+        let row = fold(row, self.size.1);
+        (row >= self.rows.0 && row < self.rows.1).then(|| (row - self.rows.0) * self.size.0)
     }
 
-    fn add_to(
-        &self,
-        index: usize,
-        share: FluxCount,
-        size: (usize, usize),
-        rows: (usize, usize),
-        texels: &mut [FluxCount],
-        added: &mut FluxCount,
-    ) {
-        let row = fold(self.first_row + (index / self.columns) as i64, size.1);
-        if row < rows.0 || row >= rows.1 {
-            return;
-        }
-        let column = fold(self.first_column + (index % self.columns) as i64, size.0);
-        let texel = &mut texels[(row - rows.0) * size.0 + column];
+    fn add(&mut self, row: Option<usize>, column: i64, share: FluxCount) {
+        let Some(begin) = row else { return };
+        let texel = &mut self.texels[begin + fold(column, self.size.0)];
         for channel in 0..3 {
             texel[channel] += share[channel];
-            added[channel] += share[channel];
+            self.added[channel] += share[channel];
         }
     }
 }
