@@ -44,6 +44,16 @@ impl Ellipse {
         }
     }
 
+    /// With across and down exchanged.
+    #[must_use]
+    pub fn transposed(self) -> Self {
+        Self {
+            xx: self.yy,
+            xy: self.xy,
+            yy: self.xx,
+        }
+    }
+
     fn determinant(self) -> f64 {
         (self.xx * self.yy - self.xy * self.xy).max(0.0)
     }

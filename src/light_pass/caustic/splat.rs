@@ -1,6 +1,6 @@
 //! One kernel of flux, taken into the texels of a map.
 
-use glam::DVec2;
+use glam::{DVec2, Vec2Swizzles};
 
 use super::footprint::Ellipse;
 use super::kernel::Profile;
@@ -38,14 +38,28 @@ pub trait Coverage: Sync {
     fn covers(&self, column: usize, row: usize, island: u32) -> bool;
 }
 
-/// Weights of a splat over a window of texels; reused from splat to splat.
+/// Weights of a splat in the texels that it reaches; reused from splat to splat.
+///
+/// Texels are held line by line. Lines are rows, or columns where the footprint is wider than high: a line then never
+/// crosses it at more than 45°, however thin it is.
 #[derive(Debug, Default)]
 pub struct Window {
-    first_column: i64,
-    first_row: i64,
-    columns: usize,
+    /// Whether lines are columns.
+    columns: bool,
+    lines: Vec<Line>,
     weights: Vec<f64>,
     sum: f64,
+}
+
+/// Consecutive texels of one row or column.
+#[derive(Clone, Copy, Debug)]
+struct Line {
+    /// Index of the row (column), before folding.
+    index: i64,
+    /// Column (row) of the first texel, before folding.
+    first: i64,
+    /// Where its weights begin and end.
+    span: (usize, usize),
 }
 
 impl Splat {
@@ -76,47 +90,70 @@ impl Splat {
     }
 
     fn half_height(&self) -> f64 {
-        self.profile.reach() * self.ellipse.at_least(THINNEST_TEXELS).yy.sqrt()
-    }
-
-    fn half_width(&self) -> f64 {
-        // The box reaches to its slanted corners.
         let ellipse = self.ellipse.at_least(THINNEST_TEXELS);
-        let slant = ellipse.xy.abs() / ellipse.yy.sqrt();
-        let chord = (ellipse.xx - slant * slant).max(0.0).sqrt();
-        self.profile.reach() * (slant + chord)
+        if ellipse.xx <= ellipse.yy {
+            return self.profile.reach() * ellipse.yy.sqrt();
+        }
+        // Lines are columns: a box then reaches to its slanted corners.
+        let frame = LineFrame::new(ellipse.transposed());
+        self.profile.reach() * (frame.slope.abs() * frame.y_radius + frame.x_radius)
     }
 
     /// Fills `window` with the kernel's weight in each texel. The kernel is cut off one map's size beyond the borders.
     pub fn weigh(&self, sampling: KernelSampling, coverage: &impl Coverage, window: &mut Window) {
+        let ellipse = self.ellipse.at_least(THINNEST_TEXELS);
+        window.clear(ellipse.xx > ellipse.yy);
         let (width, height) = coverage.size();
-        let (half_width, half_height) = (self.half_width(), self.half_height());
-        let range = |centre: f64, half: f64, size: usize| {
-            let size = size as f64;
-            let first = (centre - half).max(-size).floor();
-            let last = (centre + half).min(2.0 * size - 0.5).floor();
-            (first as i64, (last - first) as usize + 1)
+        let (frame, centre, size) = if window.columns {
+            (
+                LineFrame::new(ellipse.transposed()),
+                self.centre.yx(),
+                (height, width),
+            )
+        } else {
+            (LineFrame::new(ellipse), self.centre, (width, height))
         };
-        let (first_column, columns) = range(self.centre.x, half_width, width);
-        let (first_row, rows) = range(self.centre.y, half_height, height);
-        (window.first_column, window.first_row, window.columns) = (first_column, first_row, columns);
-        window.weights.clear();
-        window.weights.resize(columns * rows, 0.0);
-        if columns * rows == 1 {
+        self.lay_out(&frame, centre, size, window);
+        if window.weights.len() == 1 {
             window.weights[0] = 1.0;
         } else {
-            match sampling {
-                KernelSampling::Integrated => self.integrate(window),
-                KernelSampling::Point => self.sample(window),
+            for line in 0..window.lines.len() {
+                match sampling {
+                    KernelSampling::Integrated => self.integrate(&frame, centre, line, window),
+                    KernelSampling::Point => self.sample(&frame, centre, line, window),
+                }
             }
         }
         if window.weights.iter().all(|&weight| weight <= 0.0) {
             // Between the sample points, or too thin for any: all of it goes where its centre is.
-            let column = (self.centre.x.floor() as i64 - first_column).clamp(0, columns as i64 - 1) as usize;
-            let row = (self.centre.y.floor() as i64 - first_row).clamp(0, rows as i64 - 1) as usize;
-            window.weights[row * columns + column] = 1.0;
+            let columns = window.columns;
+            window.clear(columns);
+            window.push(centre.y.floor() as i64, centre.x.floor() as i64, 1);
+            window.weights[0] = 1.0;
         }
         window.mask(self, coverage);
+    }
+
+    /// Lists the texels that the kernel reaches, line by line.
+    fn lay_out(&self, frame: &LineFrame, centre: DVec2, size: (usize, usize), window: &mut Window) {
+        let half = self.profile.reach() * frame.y_radius;
+        let limits = |size: usize| (-(size as f64), 2.0 * size as f64 - 0.5);
+        let (least_line, last_line) = limits(size.1);
+        let (least, last) = limits(size.0);
+        let first_line = (centre.y - half).max(least_line).floor() as i64;
+        let last_line = (centre.y + half).min(last_line).floor() as i64;
+        for index in first_line..=last_line {
+            let (low, high) = LineFrame::within(index as f64 - centre.y, half);
+            // The chord is longest where the line comes closest to the centre.
+            let nearest = 0.0_f64.clamp(low.min(high), high);
+            let chord = self.profile.half_chord(nearest / frame.y_radius) * frame.x_radius;
+            let (a, b) = (frame.slope * low, frame.slope * high);
+            let begin = (centre.x + a.min(b) - chord).max(least).floor();
+            let end = (centre.x + a.max(b) + chord).min(last).floor();
+            if high > low && end >= begin {
+                window.push(index, begin as i64, (end - begin) as usize + 1);
+            }
+        }
     }
 
     /// Row of the texel that holds the centre.
@@ -124,47 +161,38 @@ impl Splat {
         (self.centre.y.max(0.0) as usize).min(height - 1)
     }
 
-    /// The kernel's weight at every texel's centre (section 3.2.2 of the paper).
-    fn sample(&self, window: &mut Window) {
-        let frame = RowFrame::new(self.ellipse.at_least(THINNEST_TEXELS));
-        let columns = window.columns;
-        for (index, weight) in window.weights.iter_mut().enumerate() {
-            let x = (window.first_column + (index % columns) as i64) as f64 + 0.5 - self.centre.x;
-            let y = (window.first_row + (index / columns) as i64) as f64 + 0.5 - self.centre.y;
-            let t = y / frame.y_radius;
-            *weight = self.profile.weight((x - frame.slope * y) / frame.x_radius, t);
+    /// The kernel's weight at every texel's centre of a line (section 3.2.2 of the paper).
+    fn sample(&self, frame: &LineFrame, centre: DVec2, line: usize, window: &mut Window) {
+        let Line { index, first, span } = window.lines[line];
+        let y = index as f64 + 0.5 - centre.y;
+        for (offset, weight) in window.weights[span.0..span.1].iter_mut().enumerate() {
+            let x = (first + offset as i64) as f64 + 0.5 - centre.x;
+            *weight = self
+                .profile
+                .weight((x - frame.slope * y) / frame.x_radius, y / frame.y_radius);
         }
     }
 
-    /// The kernel's integral over every texel: exact along a row, by two-point Gauss quadrature across it, on as many
-    /// parts as the kernel's shape asks for.
-    fn integrate(&self, window: &mut Window) {
-        let frame = RowFrame::new(self.ellipse.at_least(THINNEST_TEXELS));
-        let half_height = self.profile.reach() * frame.y_radius;
-        let columns = window.columns;
-        let smooth = frame.is_smooth(self.profile.scale());
-        for (index, weights) in window.weights.chunks_mut(columns).enumerate() {
-            let row = (window.first_row + index as i64) as f64 - self.centre.y;
-            let (low, high) = (row.max(-half_height), (row + 1.0).min(half_height));
-            if high <= low {
-                continue;
-            }
-            let parts = frame.parts(high - low, self.profile.scale());
-            let part = (high - low) / f64::from(parts);
-            let first = window.first_column as f64 - self.centre.x;
-            if smooth {
-                self.integrate_row(&frame, 0.5 * (low + high), first, high - low, weights);
-                continue;
-            }
-            for node in 0..2 * parts {
-                let offset = f64::from(node / 2) + if node % 2 == 0 { GAUSS_LOW } else { 1.0 - GAUSS_LOW };
-                self.integrate_row(&frame, low + part * offset, first, 0.5 * part, weights);
-            }
+    /// The kernel's integral over every texel of a line: exact along it, by two-point Gauss quadrature across it, on as
+    /// many parts as the kernel's shape asks for.
+    fn integrate(&self, frame: &LineFrame, centre: DVec2, line: usize, window: &mut Window) {
+        let Line { index, first, span } = window.lines[line];
+        let (low, high) = LineFrame::within(index as f64 - centre.y, self.profile.reach() * frame.y_radius);
+        let first = first as f64 - centre.x;
+        let weights = &mut window.weights[span.0..span.1];
+        if frame.is_smooth(self.profile.scale()) {
+            return self.integrate_row(frame, 0.5 * (low + high), first, high - low, weights);
+        }
+        let parts = frame.parts(high - low, self.profile.scale());
+        let part = (high - low) / f64::from(parts);
+        for node in 0..2 * parts {
+            let offset = f64::from(node / 2) + if node % 2 == 0 { GAUSS_LOW } else { 1.0 - GAUSS_LOW };
+            self.integrate_row(frame, low + part * offset, first, 0.5 * part, weights);
         }
     }
 
     /// Adds the integrals along one line at height `y` to the texels from `first` on, both relative to the centre.
-    fn integrate_row(&self, frame: &RowFrame, y: f64, first: f64, factor: f64, weights: &mut [f64]) {
+    fn integrate_row(&self, frame: &LineFrame, y: f64, first: f64, factor: f64, weights: &mut [f64]) {
         let t = y / frame.y_radius;
         let half_chord = self.profile.half_chord(t);
         let middle = frame.slope * y;
@@ -185,15 +213,20 @@ impl Splat {
 /// Lower node of the two-point Gauss-Legendre rule on [0, 1]: (1 − 1/√3)/2.
 const GAUSS_LOW: f64 = 0.211_324_865_405_187_1;
 
-/// The ellipse as rows cut it: at height y the chord's middle is at slope·y, and (s, t) = ((x − slope·y)/x_radius,
+/// The ellipse as lines cut it (x along a line, y across): at height y the chord's middle is at slope·y, and (s, t) = ((x − slope·y)/x_radius,
 /// y/y_radius) makes it the unit disc.
-struct RowFrame {
+struct LineFrame {
     y_radius: f64,
     x_radius: f64,
     slope: f64,
 }
 
-impl RowFrame {
+impl LineFrame {
+    /// The part of a line from `line` to `line` + 1 that lies within `half` of the centre; empty where low ≥ high.
+    fn within(line: f64, half: f64) -> (f64, f64) {
+        (line.max(-half), (line + 1.0).min(half))
+    }
+
     /// Whether the kernel changes so little within a row that one line stands for it: the midpoint rule then errs by
     /// less than 1/24 of the square of the row's height in spreads, below 0.3 %.
     fn is_smooth(&self, scale: f64) -> bool {
@@ -220,23 +253,49 @@ impl RowFrame {
 }
 
 impl Window {
+    fn clear(&mut self, columns: bool) {
+        self.columns = columns;
+        self.lines.clear();
+        self.weights.clear();
+    }
+
+    fn push(&mut self, index: i64, first: i64, count: usize) {
+        let begin = self.weights.len();
+        self.weights.resize(begin + count, 0.0);
+        self.lines.push(Line {
+            index,
+            first,
+            span: (begin, begin + count),
+        });
+    }
+
+    /// Column and row of a texel of a line, before folding.
+    fn place(&self, line: &Line, offset: usize) -> (i64, i64) {
+        let along = line.first + offset as i64;
+        if self.columns {
+            (line.index, along)
+        } else {
+            (along, line.index)
+        }
+    }
+
     /// Takes weights off texels that the splat's island does not cover; what is left is normalised by the sum, so
     /// that no flux is lost there.
     fn mask(&mut self, splat: &Splat, coverage: &impl Coverage) {
-        if coverage.is_full() {
-            self.sum = self.weights.iter().sum();
-            return;
-        }
-        self.sum = 0.0;
-        let (width, height) = coverage.size();
-        for (index, weight) in self.weights.iter_mut().enumerate() {
-            let column = fold(self.first_column + (index % self.columns) as i64, width);
-            let row = fold(self.first_row + (index / self.columns) as i64, height);
-            if *weight > 0.0 && !coverage.covers(column, row, splat.island) {
-                *weight = 0.0;
+        if !coverage.is_full() {
+            let (width, height) = coverage.size();
+            for line in &self.lines {
+                for offset in 0..line.span.1 - line.span.0 {
+                    let (column, row) = self.place(line, offset);
+                    let weight = self.weights[line.span.0 + offset];
+                    if weight > 0.0 && !coverage.covers(fold(column, width), fold(row, height), splat.island)
+                    {
+                        self.weights[line.span.0 + offset] = 0.0;
+                    }
+                }
             }
-            self.sum += *weight;
         }
+        self.sum = self.weights.iter().sum();
     }
 
     /// Whether any texel takes part of the kernel.
@@ -262,14 +321,15 @@ impl Window {
             added: [0; 3],
         };
         let mut rest = flux;
-        let (mut heaviest, mut most) = (0, 0.0);
+        let (mut heaviest, mut most) = ((0, 0), 0.0);
         let scale = flux.map(|channel| channel as f64 / self.sum);
         let grey = flux[0] == flux[1] && flux[1] == flux[2];
-        for (line, weights) in self.weights.chunks(self.columns).enumerate() {
-            let row = target.row(self.first_row + line as i64);
+        for line in &self.lines {
+            let weights = &self.weights[line.span.0..line.span.1];
             for (offset, &weight) in weights.iter().enumerate().filter(|(_, weight)| **weight > 0.0) {
+                let place = self.place(line, offset);
                 if weight > most {
-                    (heaviest, most) = (line * self.columns + offset, weight);
+                    (heaviest, most) = (place, weight);
                 }
                 let share = if grey {
                     [nearest(scale[0] * weight); 3]
@@ -279,11 +339,10 @@ impl Window {
                 for channel in 0..3 {
                     rest[channel] -= share[channel];
                 }
-                target.add(row, self.first_column + offset as i64, share);
+                target.add(place, share);
             }
         }
-        let row = target.row(self.first_row + (heaviest / self.columns) as i64);
-        target.add(row, self.first_column + (heaviest % self.columns) as i64, rest);
+        target.add(heaviest, rest);
         target.added
     }
 }
@@ -302,15 +361,13 @@ struct Target<'a> {
 }
 
 impl Target<'_> {
-    /// Where the texels of a row begin, if it is one of ours.
-    fn row(&self, row: i64) -> Option<usize> {
+    /// Adds to a texel given before folding, if its row is one of ours.
+    fn add(&mut self, (column, row): (i64, i64), share: FluxCount) {
         let row = fold(row, self.size.1);
-        (row >= self.rows.0 && row < self.rows.1).then(|| (row - self.rows.0) * self.size.0)
-    }
-
-    fn add(&mut self, row: Option<usize>, column: i64, share: FluxCount) {
-        let Some(begin) = row else { return };
-        let texel = &mut self.texels[begin + fold(column, self.size.0)];
+        if row < self.rows.0 || row >= self.rows.1 {
+            return;
+        }
+        let texel = &mut self.texels[(row - self.rows.0) * self.size.0 + fold(column, self.size.0)];
         for channel in 0..3 {
             texel[channel] += share[channel];
             self.added[channel] += share[channel];
