@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::finish;
 use super::sizes::{self, MapSizes};
 use super::{BakeCounts, Clock};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, Warning};
 use crate::illumination::Chart;
 use crate::illumination::accumulator::FluxUnit;
 use crate::light_pass::caustic::deposit::Depositor;
@@ -46,6 +46,8 @@ pub(super) struct CausticOutcome {
     pub(super) ledgers: Vec<LightLedger>,
     /// Of this layer.
     pub(super) counts: BakeCounts,
+    /// Maps coarser than they should be.
+    pub(super) warnings: Vec<Warning>,
     /// Stopped before the end.
     pub(super) cancelled: bool,
 }
@@ -67,6 +69,9 @@ impl CausticLayer<'_> {
             None
         };
         let sizes = self.map_sizes(statistics.as_ref())?;
+        if let (MapResolution::Auto, Some(statistics)) = (self.settings.map_resolution, &statistics) {
+            outcome.warnings = self.coarse_maps(&sizes, statistics);
+        }
         let chart_for = |object: usize| -> Option<Arc<Chart>> {
             let size = sizes
                 .get(&object)
@@ -242,6 +247,28 @@ impl CausticLayer<'_> {
             sizes::check_memory(width as u64 * height as u64, self.settings)?;
         }
         Ok(sizes)
+    }
+
+    /// Says which automatic maps stay coarser than their light, for the largest automatic size or for memory.
+    fn coarse_maps(
+        &self,
+        sizes: &BTreeMap<usize, (usize, usize)>,
+        statistics: &FootprintStatistics,
+    ) -> Vec<Warning> {
+        let coarse = |(&object, &(width, height)): (&usize, &(usize, usize))| {
+            let footprint_texels = (width * height) as f64 * statistics.mean(object)?.map_share;
+            (footprint_texels < 1.0).then(|| {
+                Warning::new(
+                    &self.tracer.scene().objects[object].name,
+                    format!(
+                        "its map of {width} x {height} texels is coarser than the light it holds: a ray's mean \
+                         footprint is {footprint_texels:.2} texels"
+                    ),
+                    "ask for a larger --map-resolution, or allow more --memory",
+                )
+            })
+        };
+        sizes.iter().filter_map(coarse).collect()
     }
 
     fn automatic_size(&self, object: usize, statistics: &FootprintStatistics) -> Option<(usize, usize)> {

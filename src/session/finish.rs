@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::caustic_layer::CausticOutcome;
 use super::sizes::{self, MapSizes};
 use super::{BakeResult, Clock, StopReason, Timings};
-use crate::error::{Result, Warning};
+use crate::error::Result;
 use crate::illumination::accumulator::FluxUnit;
 use crate::illumination::gutter::fill_gutter;
 use crate::illumination::{Chart, IlluminationMap, Layer};
@@ -25,7 +25,6 @@ pub(super) struct Finish<'a> {
     pub(super) settings: &'a BakeSettings,
     pub(super) plan: EffectPlan,
     pub(super) caustic: CausticOutcome,
-    pub(super) warnings: Vec<Warning>,
 }
 
 impl Finish<'_> {
@@ -84,7 +83,7 @@ impl Finish<'_> {
             cpu_s: Timings::default(),
             stop_reason,
             partial,
-            warnings: self.warnings,
+            warnings: self.caustic.warnings,
         })
     }
 }

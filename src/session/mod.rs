@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 pub use result::{BakeCounts, BakeResult, StopReason, Timings};
 
-use crate::error::{Error, Result, Warning};
+use crate::error::{Error, Result};
 use crate::light_pass::caustic::pass::{Seconds, Stopwatch};
 use crate::light_pass::caustic::setup::Aim;
 use crate::plan::{self, Effect, EffectPlan};
@@ -45,8 +45,15 @@ impl BakeSession {
     /// A session on a scene; builds nothing yet.
     ///
     /// # Errors
-    /// A light so strong that its flux is no finite number.
+    /// More triangles than the hierarchy can count.
     pub fn new(scene: Arc<Scene>) -> Result<Self> {
+        if u32::try_from(scene.triangle_count()).is_err() {
+            return Err(Error::failure(
+                &scene.source,
+                format!("it has {} triangles, 2^32 are too many", scene.triangle_count()),
+                "simplify its meshes",
+            ));
+        }
         let sizes = MapSizes::new(scene.clone());
         Ok(Self {
             scene,
@@ -141,7 +148,6 @@ impl BakeSession {
         progress.advance(Stage::Plan, 0, 1);
         let aim = clock.time(|clock| &mut clock.plan, || self.aim(settings.item_buffer));
         let plan = plan::decide(&self.scene, settings, &aim.casters);
-        let warnings: Vec<Warning> = Vec::new();
 
         let caustic = if plan.is_on(Effect::LightPass) {
             let layer = CausticLayer {
@@ -161,7 +167,6 @@ impl BakeSession {
             settings,
             plan,
             caustic,
-            warnings,
         };
         let mut result = result.run(progress, control, &mut clock)?;
         clock.total = whole.elapsed();

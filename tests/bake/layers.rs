@@ -84,3 +84,25 @@ fn an_automatic_bake_gives_a_coarse_picture_first() {
     );
     assert_eq!(coarse.width(), coarse.height());
 }
+
+#[test]
+fn maps_made_coarser_for_memory_say_so() {
+    let scene = builtin_scene("ring");
+    let with = |memory_bytes| {
+        let settings = BakeSettings {
+            map_resolution: MapResolution::Auto,
+            memory_bytes,
+            ..settings(1e5, 0)
+        };
+        bake(scene.clone(), &settings)
+    };
+    let (ample, scarce) = (with(4 << 30), with(1 << 20));
+    assert_eq!(ample.warnings, []);
+    assert!(map_of(&scarce, &scene, "floor").width() < map_of(&ample, &scene, "floor").width());
+    assert_eq!(energy_fault(&scarce), None);
+    let [warning] = &scarce.warnings[..] else {
+        panic!("{:?}", scarce.warnings)
+    };
+    assert_eq!(warning.location, "floor");
+    assert!(warning.remedy.contains("--memory"), "{warning}");
+}

@@ -118,7 +118,8 @@ impl Depositor<'_> {
         };
         let mean = self.statistics.and_then(|statistics| statistics.mean(object));
         let fixed_area_m2 = match self.settings.footprint {
-            Footprint::Fixed => mean?.area_m2,
+            // A surface that the coarse run missed has no mean.
+            Footprint::Fixed => mean.map_or(unbent_area_m2, |mean| mean.area_m2),
             Footprint::Ellipse | Footprint::Disc | Footprint::Distance => unbent_area_m2,
         };
         let ellipse = footprint(
@@ -144,7 +145,9 @@ impl Depositor<'_> {
         let sigma = match (self.settings.kernel, self.settings.sigma) {
             (Kernel::Gaussian, Sigma::Constant(sigma)) => sigma,
             // The range of the paper's figure 5.
-            (Kernel::Gaussian, Sigma::Adaptive) => (area_m2 / mean?.area_m2).sqrt().clamp(0.5, 2.0),
+            (Kernel::Gaussian, Sigma::Adaptive) => {
+                mean.map_or(1.0, |mean| (area_m2 / mean.area_m2).sqrt().clamp(0.5, 2.0))
+            }
             (Kernel::Cone | Kernel::Disc | Kernel::Box, _) => 1.0,
         };
         let flux = self.lattice.unit.count(arrival.flux_w);
