@@ -3,7 +3,7 @@
 use glam::DVec2;
 
 use super::band::{Corner, SampleId, Workspace};
-use super::edge::{CUT_BITS, Edge, EdgeCutter, Reach, mismatch};
+use super::edge::{CUT_BITS, Edge, EdgeCutter, Reach, SUSPICION, mismatch};
 use super::strand::LightSample;
 use crate::illumination::accumulator::FluxUnit;
 use crate::light_pass::caustic::path::PathSignature;
@@ -36,6 +36,8 @@ pub enum PatchKind {
     BilinearRectangle,
     /// Three corners.
     Triangle,
+    /// The same, by its corners alone.
+    LinearTriangle,
     /// The rectangle between the second and third square, by the derivatives of a strand at the first.
     Around,
 }
@@ -46,7 +48,7 @@ impl Patch {
         let [a, b, c, _] = self.squares;
         match self.kind {
             PatchKind::Rectangle | PatchKind::BilinearRectangle => (c.x - a.x) * (c.y - a.y),
-            PatchKind::Triangle => 0.5 * (b - a).perp_dot(c - a).abs(),
+            PatchKind::Triangle | PatchKind::LinearTriangle => 0.5 * (b - a).perp_dot(c - a).abs(),
             PatchKind::Around => (c.x - b.x) * (c.y - b.y),
         }
     }
@@ -55,7 +57,7 @@ impl Patch {
     pub fn corner_count(&self) -> usize {
         match self.kind {
             PatchKind::Rectangle | PatchKind::BilinearRectangle => 4,
-            PatchKind::Triangle => 3,
+            PatchKind::Triangle | PatchKind::LinearTriangle => 3,
             PatchKind::Around => 1,
         }
     }
@@ -388,11 +390,27 @@ impl CellCutter<'_> {
             let corners = [0, 1, 2, 3].map(|index| corner(&region[index]));
             return self.rectangle(cell, corners, work, out);
         }
-        for [a, b, c] in triangles(region) {
+        for triangle in triangles(region) {
+            let [a, b, c] = triangle;
+            let corners = [a, b, c, c].map(|outline| corner(&outline));
+            let worst = (0..3)
+                .map(|i| {
+                    let strand = |i: usize| {
+                        let (id, strand) = corners[i];
+                        &work.get(id).strands[usize::from(strand)]
+                    };
+                    let next = (i + 1) % 3;
+                    mismatch(strand(i), strand(next), triangle[next].square - triangle[i].square)
+                })
+                .fold(0.0, f64::max);
             out.patches.push(Patch {
-                corners: [a, b, c, c].map(|outline| corner(&outline)),
+                corners,
                 squares: [a.square, b.square, c.square, c.square],
-                kind: PatchKind::Triangle,
+                kind: if worst > SUSPICION {
+                    PatchKind::LinearTriangle
+                } else {
+                    PatchKind::Triangle
+                },
             });
         }
     }
@@ -505,9 +523,10 @@ fn regions(
         if !there[start] || used[start] || joined[(start + 3) % 4] {
             continue;
         }
-        let mut outline = Vec::with_capacity(6);
-        if let Some(Reach::Cut { place, sample }) = behind[start] {
-            outline.push(cut(cell, (start + 3) % 4, place, sample));
+        let mut outline = Vec::with_capacity(16);
+        if let Some(reach) = behind[start] {
+            let side = (start + 3) % 4;
+            outline.extend(up_to_cut(cell, side, !BACKWARDS[side], reach).into_iter().rev());
         }
         let mut corner = start;
         loop {
@@ -518,8 +537,8 @@ fn regions(
             }
             corner = (corner + 1) % 4;
         }
-        if let Some(Reach::Cut { place, sample }) = ahead[corner] {
-            outline.push(cut(cell, corner, place, sample));
+        if let Some(reach) = ahead[corner] {
+            outline.extend(up_to_cut(cell, corner, BACKWARDS[corner], reach));
         }
         outlines.push(outline);
     }
@@ -533,24 +552,40 @@ fn outline_of(corner: Corner) -> Outline {
     }
 }
 
-fn cut(cell: &Cell, side: usize, place: f64, sample: SampleId) -> Outline {
+/// Samples along a side from a corner up to the cut, and the cut: near a silhouette the wavefront bends like a root, and
+/// bisection left samples just where they are needed.
+fn up_to_cut(cell: &Cell, side: usize, backwards: bool, reach: Reach) -> Vec<Outline> {
+    let Reach::Cut { place, sample, between } = reach else {
+        return Vec::new();
+    };
     let (from, to) = EDGE_ENDS[side];
-    Outline {
+    let at = |place: f64, sample: SampleId| Outline {
         square: cell.corners[from].square.lerp(cell.corners[to].square, place),
         sample,
-    }
+    };
+    let inner = cell.edges[side]
+        .iter()
+        .flat_map(|edge| edge.inner(between, backwards));
+    inner
+        .map(|(place, sample)| at(place, sample))
+        .chain([at(place, sample)])
+        .collect()
 }
 
-/// A convex outline as triangles that share its middle corner: for a cell with one corner cut off, the one opposite
-/// the cut.
-fn triangles(region: &[Outline]) -> impl Iterator<Item = [Outline; 3]> + '_ {
-    let count = region.len();
-    let apex = count / 2;
-    (1..count.saturating_sub(1)).map(move |step| {
-        [
-            region[apex],
-            region[(apex + step) % count],
-            region[(apex + step + 1) % count],
-        ]
-    })
+/// An outline as a strip of triangles between its two ends, always over the shorter diagonal.
+fn triangles(region: &[Outline]) -> Vec<[Outline; 3]> {
+    let (mut first, mut last) = (0, region.len().saturating_sub(1));
+    let mut strip = Vec::with_capacity(region.len());
+    while first + 1 < last {
+        let [a, b] = [region[first], region[last]];
+        let (after, before) = (region[first + 1], region[last - 1]);
+        if after.square.distance_squared(b.square) <= a.square.distance_squared(before.square) {
+            strip.push([a, after, b]);
+            first += 1;
+        } else {
+            strip.push([a, before, b]);
+            last -= 1;
+        }
+    }
+    strip
 }

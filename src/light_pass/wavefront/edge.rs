@@ -14,7 +14,7 @@ pub const CUT_BITS: i32 = 8;
 const JUMP_BITS: i32 = 6;
 
 /// Mismatch of chord and tangents, as a share of the chord, from which an edge may hide a jump.
-const SUSPICION: f64 = 0.35;
+pub const SUSPICION: f64 = 0.35;
 
 /// Samples along an edge, by their place on it [0, 1], both ends included.
 #[derive(Clone, Debug)]
@@ -34,6 +34,8 @@ pub enum Reach {
         place: f64,
         /// Sample at the bracket's end on this side.
         sample: SampleId,
+        /// How many samples lie between the end and that one.
+        between: usize,
     },
 }
 
@@ -166,10 +168,17 @@ impl Edge {
                 return Reach::Cut {
                     place: 0.5 * (here.0 + there.0),
                     sample: here.1,
+                    between: index.saturating_sub(1),
                 };
             }
         }
         Reach::Whole
+    }
+
+    /// So many samples after the first end (or, `backwards`, before the last), the nearest to that end first.
+    pub fn inner(&self, count: usize, backwards: bool) -> impl DoubleEndedIterator<Item = (f64, SampleId)> + '_ {
+        let last = self.samples.len() - 1;
+        (1..=count).map(move |step| self.samples[if backwards { last - step } else { step }])
     }
 
     /// How often a strand comes and goes along the edge.

@@ -318,6 +318,7 @@ fn shape_of(patch: &Patch, strands: &[&Strand]) -> PatchShape {
     match (patch.kind, strands) {
         (PatchKind::Rectangle, [a, b, c, d]) => PatchShape::coons([a, b, c, d], step),
         (PatchKind::BilinearRectangle, [a, b, c, d]) => PatchShape::bilinear([a, b, c, d]),
+        (PatchKind::LinearTriangle, [a, b, c]) => PatchShape::linear([a, b, c]),
         (PatchKind::Triangle, [a, b, c]) => {
             let [p, q, r, _] = patch.squares;
             PatchShape::bezier([a, b, c], [p, q, r])
