@@ -19,7 +19,7 @@ use crate::light_pass::ledger::LightLedger;
 use crate::light_pass::receiver_maps::ReceiverMaps;
 use crate::plan::{Effect, EffectPlan};
 use crate::progress::{Control, Progress};
-use crate::settings::{BakeSettings, Estimator, Footprint, Kernel, MapResolution, Sigma};
+use crate::settings::{BakeSettings, Footprint, Kernel, MapResolution, Sigma};
 use crate::transport::Tracer;
 
 /// Each side of the coarse run's lattice is this many times smaller.
@@ -60,9 +60,6 @@ impl CausticLayer<'_> {
         control: &Control,
         clock: &mut Clock,
     ) -> Result<CausticOutcome> {
-        if self.settings.estimator == Estimator::Wavefront {
-            return self.bake_wavefront(progress, control, clock);
-        }
         let unit = self.unit()?;
         let mut outcome = CausticOutcome::default();
         let statistics = if self.wants_statistics() {
@@ -261,7 +258,7 @@ impl CausticLayer<'_> {
     }
 
     /// Says which automatic maps stay coarser than their light, for the largest automatic size or for memory.
-    fn coarse_maps(
+    pub(super) fn coarse_maps(
         &self,
         sizes: &BTreeMap<usize, (usize, usize)>,
         statistics: &FootprintStatistics,

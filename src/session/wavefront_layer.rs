@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::Clock;
 use super::caustic_layer::{CausticLayer, CausticOutcome};
+use super::wavefront_cache::WavefrontCache;
 use crate::error::Result;
 use crate::illumination::Chart;
 use crate::illumination::accumulator::FluxUnit;
@@ -25,15 +26,20 @@ impl CausticLayer<'_> {
         progress: &dyn Progress,
         control: &Control,
         clock: &mut Clock,
+        cache: &mut WavefrontCache,
     ) -> Result<CausticOutcome> {
         let unit = self.unit()?;
         let mut outcome = CausticOutcome::default();
-        let statistics = if self.settings.map_resolution == MapResolution::Auto {
-            Some(self.coarse_wavefront(unit, control, clock, &mut outcome))
-        } else {
-            None
-        };
-        let sizes = self.map_sizes(statistics.as_ref())?;
+        cache.prepare(self);
+        let is_auto = self.settings.map_resolution == MapResolution::Auto;
+        if is_auto && cache.statistics.is_none() {
+            cache.statistics = Some(self.coarse_wavefront(unit, control, clock, &mut outcome));
+        }
+        let statistics = cache.statistics.as_ref().filter(|_| is_auto);
+        let sizes = self.map_sizes(statistics)?;
+        if let Some(statistics) = statistics {
+            outcome.warnings = self.coarse_maps(&sizes, statistics);
+        }
         let chart_for = |object: usize| -> Option<Arc<Chart>> {
             let size = sizes
                 .get(&object)
@@ -50,7 +56,10 @@ impl CausticLayer<'_> {
             .collect();
         let total = lattices.iter().map(WavefrontLattice::cell_count).sum();
         let receivers = Receivers::new(self.tracer, &chart_for);
-        for (light, lattice) in self.aim.lights.iter().zip(lattices) {
+        let kept = std::mem::take(&mut cache.lights);
+        let is_kept = kept.len() == lattices.len();
+        let mut keep_bytes = WavefrontCache::limit_bytes(self.settings);
+        for (index, (light, lattice)) in self.aim.lights.iter().zip(lattices).enumerate() {
             let depositor = WavefrontDepositor {
                 receivers: &receivers,
                 chart_for: &chart_for,
@@ -62,10 +71,23 @@ impl CausticLayer<'_> {
                 done: outcome.counts.rays,
                 total,
             };
-            let (report, _) = depositor.run(Some(&mut maps), &listener, 0);
+            let report = if is_kept {
+                depositor.deposit_again(&kept[index], &mut maps, &listener)
+            } else {
+                let (report, traced) = depositor.run(Some(&mut maps), &listener, keep_bytes);
+                // One light too many: none is kept, and the next bake traces all.
+                keep_bytes = traced
+                    .as_ref()
+                    .map_or(0, |light| keep_bytes.saturating_sub(light.bytes()));
+                cache.lights.extend(traced);
+                report
+            };
             outcome.count(&report, clock);
             let name = &self.tracer.scene().lights[light.light].name;
             outcome.ledgers.push(report.ledger.report(name, unit));
+        }
+        if is_kept {
+            cache.lights = kept;
         }
         outcome.maps = Some((maps, unit));
         Ok(outcome)

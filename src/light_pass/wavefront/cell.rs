@@ -400,7 +400,11 @@ impl CellCutter<'_> {
                         &work.get(id).strands[usize::from(strand)]
                     };
                     let next = (i + 1) % 3;
-                    mismatch(strand(i), strand(next), triangle[next].square - triangle[i].square)
+                    mismatch(
+                        strand(i),
+                        strand(next),
+                        triangle[next].square - triangle[i].square,
+                    )
                 })
                 .fold(0.0, f64::max);
             out.patches.push(Patch {
@@ -555,7 +559,12 @@ fn outline_of(corner: Corner) -> Outline {
 /// Samples along a side from a corner up to the cut, and the cut: near a silhouette the wavefront bends like a root, and
 /// bisection left samples just where they are needed.
 fn up_to_cut(cell: &Cell, side: usize, backwards: bool, reach: Reach) -> Vec<Outline> {
-    let Reach::Cut { place, sample, between } = reach else {
+    let Reach::Cut {
+        place,
+        sample,
+        between,
+    } = reach
+    else {
         return Vec::new();
     };
     let (from, to) = EDGE_ENDS[side];

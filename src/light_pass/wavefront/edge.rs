@@ -176,7 +176,11 @@ impl Edge {
     }
 
     /// So many samples after the first end (or, `backwards`, before the last), the nearest to that end first.
-    pub fn inner(&self, count: usize, backwards: bool) -> impl DoubleEndedIterator<Item = (f64, SampleId)> + '_ {
+    pub fn inner(
+        &self,
+        count: usize,
+        backwards: bool,
+    ) -> impl DoubleEndedIterator<Item = (f64, SampleId)> + '_ {
         let last = self.samples.len() - 1;
         (1..=count).map(move |step| self.samples[if backwards { last - step } else { step }])
     }

@@ -23,6 +23,13 @@ pub struct TracedLight {
     pub bands: Vec<TracedBand>,
 }
 
+impl TracedLight {
+    /// Memory that it holds [bytes], roughly.
+    pub fn bytes(&self) -> u64 {
+        self.bands.iter().map(TracedBand::bytes).sum()
+    }
+}
+
 /// How patches go to maps.
 #[derive(Clone, Copy)]
 pub struct WavefrontDepositor<'a> {
