@@ -184,7 +184,9 @@ impl<'a> Node<'a> {
     /// A box around all triangles of the node, a little too large, as minimum and maximum corner [m].
     pub fn bounds(&self) -> (DVec3, DVec3) {
         let aabb = self.hierarchy.bvh.nodes[self.index].aabb();
-        let metres = |local: Vec3A| self.hierarchy.centre + local.as_dvec3() / self.hierarchy.scale;
+        // Exact: the scale is a power of two.
+        let unit_m = 1.0 / self.hierarchy.scale;
+        let metres = |local: Vec3A| self.hierarchy.centre + local.as_dvec3() * unit_m;
         (metres(aabb.min), metres(aabb.max))
     }
 

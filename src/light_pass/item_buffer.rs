@@ -14,7 +14,6 @@ use glam::DVec2;
 use rayon::prelude::*;
 
 use self::bits::CellBits;
-use self::grid::Grid;
 use self::search::{Bounds, Search};
 use super::launch::Launch;
 use crate::geometry::bvh::Node;
@@ -50,24 +49,20 @@ impl ItemBuffer {
             lit,
             owners: Owners::new(tracer),
         };
-        let boxes: Vec<Option<Bounds>> = casters
-            .par_iter()
-            .map(|&object| tracer.scene().objects[object].mesh.bounds())
-            .collect();
+        let objects = &tracer.scene().objects;
+        let bounds: Vec<Option<Bounds>> = objects.par_iter().map(|object| object.mesh.bounds()).collect();
         let seen: Vec<usize> = casters
             .par_iter()
-            .zip(&boxes)
-            .filter(|&(&object, bounds)| bounds.is_some_and(|bounds| builder.sees(object, bounds)))
-            .map(|(&object, _)| object)
+            .copied()
+            .filter(|&object| bounds[object].is_some_and(|bounds| builder.sees(object, bounds)))
             .collect();
-        let mut wanted = vec![false; tracer.scene().objects.len()];
+        let mut wanted = vec![false; objects.len()];
         casters.iter().for_each(|&object| wanted[object] = true);
-        let mut boxes: Vec<Bounds> = boxes.into_iter().flatten().collect();
-        if boxes.len() > MOST_BOXES {
-            let around = |a: Bounds, b: Bounds| (a.0.min(b.0), a.1.max(b.1));
-            boxes = boxes.into_iter().reduce(around).into_iter().collect();
-        }
-        let faces = builder.mark(&boxes, &wanted);
+        let boxes = |of_wanted: bool| {
+            let chosen = (0..objects.len()).filter(|&object| wanted[object] == of_wanted);
+            few(chosen.filter_map(|object| bounds[object]).collect())
+        };
+        let faces = builder.mark(&boxes(true), &boxes(false), &wanted);
         Self { faces, casters: seen }
     }
 
@@ -158,6 +153,15 @@ fn touched(index: usize, coarse: usize, fine: usize) -> (usize, usize) {
     (first, last.min(fine - 1))
 }
 
+/// The boxes themselves, or one around all where they are many.
+fn few(boxes: Vec<Bounds>) -> Vec<Bounds> {
+    if boxes.len() <= MOST_BOXES {
+        return boxes;
+    }
+    let around = |a: Bounds, b: Bounds| (a.0.min(b.0), a.1.max(b.1));
+    boxes.into_iter().reduce(around).into_iter().collect()
+}
+
 /// What marking needs.
 struct Builder<'a> {
     launch: &'a Launch,
@@ -172,21 +176,6 @@ impl Builder<'_> {
         self.tracer.bvh().root()
     }
 
-    fn search<'a>(
-        &'a self,
-        face: usize,
-        boxes: &'a [Bounds],
-        wanted: &'a (dyn Fn(u32) -> bool + Sync),
-    ) -> Search<'a> {
-        Search {
-            launch: self.launch,
-            face,
-            grid: Grid::of(self.launch.mapping()),
-            boxes,
-            wanted,
-        }
-    }
-
     /// Whether the light sends anything towards an object.
     fn sees(&self, object: usize, bounds: Bounds) -> bool {
         let wanted = |triangle: u32| self.owners.of(triangle) == object;
@@ -195,21 +184,35 @@ impl Builder<'_> {
         let faces = || self.lit.iter().enumerate();
         let at_once = (0..mesh.triangles.len().min(TRIED_FIRST)).any(|triangle| {
             let corners = mesh.corners(triangle);
-            faces().any(|(face, lit)| self.search(face, &bounds, &wanted).touches(&corners, lit))
+            faces().any(|(face, lit)| {
+                Search::new(self.launch, face, &bounds, &[], &wanted).touches(&corners, lit)
+            })
         });
         at_once
             || self.root().is_some_and(|root| {
-                faces().any(|(face, lit)| self.search(face, &bounds, &wanted).finds(root, lit))
+                faces()
+                    .any(|(face, lit)| Search::new(self.launch, face, &bounds, &[], &wanted).finds(root, lit))
             })
     }
 
     /// The lit cells of each face that a triangle of a wanted object touches.
-    fn mark(&self, boxes: &[Bounds], objects: &[bool]) -> Vec<CellBits> {
+    fn mark(&self, boxes: &[Bounds], others: &[Bounds], objects: &[bool]) -> Vec<CellBits> {
         let wanted = |triangle: u32| objects[self.owners.of(triangle)];
         let mark = |(face, lit): (usize, &CellBits)| {
             let mut open = lit.clone();
+            let search = Search::new(self.launch, face, boxes, others, &wanted);
+            for (object, _) in self
+                .tracer
+                .scene()
+                .objects
+                .iter()
+                .zip(objects)
+                .filter(|(_, wanted)| **wanted)
+            {
+                search.close_some(&object.mesh, &mut open);
+            }
             if let Some(root) = self.root() {
-                self.search(face, boxes, &wanted).close(root, &mut open);
+                search.close(root, &mut open);
             }
             lit.without(&open)
         };

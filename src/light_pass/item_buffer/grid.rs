@@ -76,7 +76,7 @@ impl Grid {
 
     /// Cells that may overlap a rectangle of the face.
     pub(super) fn cells(&self, low: DVec2, high: DVec2) -> CellRange {
-        // Rows are farthest from the middle at the largest |x|, and nearest at the smallest.
+        // Rows are farthest from the middle at the largest |x|: at a given y, |v| falls with |x|.
         let nearest_x = if low.x <= 0.0 && high.x >= 0.0 {
             0.0
         } else {
@@ -84,18 +84,23 @@ impl Grid {
         };
         let farthest_x = low.x.abs().max(high.x.abs());
         let share = |x: f64, y: f64| self.mapping.row_share(DVec2::new(x, y));
-        let row = |share: f64| ((share * CELLS_PER_SIDE as f64).max(0.0) as usize).min(CELLS_PER_SIDE - 1);
+        let lowest = share(if low.y < 0.0 { nearest_x } else { farthest_x }, low.y);
+        let highest = share(if high.y > 0.0 { nearest_x } else { farthest_x }, high.y);
         CellRange {
             columns: (self.column(low.x - MARGIN), self.column(high.x + MARGIN)),
-            rows: (
-                row(share(nearest_x, low.y).min(share(farthest_x, low.y)) - MARGIN),
-                row(share(nearest_x, high.y).max(share(farthest_x, high.y)) + MARGIN),
-            ),
+            rows: (index(lowest - MARGIN), index(highest + MARGIN)),
         }
     }
 
     fn column(&self, x: f64) -> usize {
-        let borders = &self.x[1..CELLS_PER_SIDE];
-        borders.partition_point(|&border| border <= x)
+        match self.mapping {
+            FaceMapping::Plain => index(0.5 * (x + 1.0)),
+            FaceMapping::EqualSolidAngle => self.x[1..CELLS_PER_SIDE].partition_point(|&border| border <= x),
+        }
     }
+}
+
+/// Of the interval that a share of the side lies in.
+fn index(share: f64) -> usize {
+    ((share * CELLS_PER_SIDE as f64).max(0.0) as usize).min(CELLS_PER_SIDE - 1)
 }

@@ -10,12 +10,15 @@ pub(super) struct Polygon {
     count: usize,
 }
 
-/// Planes around the part of space that a face sees, |x| ≤ z and |y| ≤ z (a little widened): normals point inwards.
-pub(super) const SIDES: [DVec3; 4] = [
-    DVec3::new(1.0, 0.0, 1.0 + MARGIN),
-    DVec3::new(-1.0, 0.0, 1.0 + MARGIN),
-    DVec3::new(0.0, 1.0, 1.0 + MARGIN),
-    DVec3::new(0.0, -1.0, 1.0 + MARGIN),
+/// A face sees |x| ≤ z and |y| ≤ z; a little more is taken for it.
+pub(super) const WIDENED: f64 = 1.0 + MARGIN;
+
+/// Planes around the part of space that a face sees: normals point inwards.
+const SIDES: [DVec3; 4] = [
+    DVec3::new(1.0, 0.0, WIDENED),
+    DVec3::new(-1.0, 0.0, WIDENED),
+    DVec3::new(0.0, 1.0, WIDENED),
+    DVec3::new(0.0, -1.0, WIDENED),
 ];
 
 impl Polygon {

@@ -1,25 +1,30 @@
 //! Searches the scene's hierarchy for specular triangles in the cells of one face.
 
-use glam::{DVec2, DVec3};
+use glam::{DMat3, DVec2, DVec3};
 
 use super::bits::CellBits;
 use super::grid::{CellRange, Grid};
-use super::polygon::{Polygon, SIDES};
+use super::polygon::{Polygon, WIDENED};
 use crate::geometry::bvh::Node;
 use crate::light_pass::launch::Launch;
+use crate::scene::Mesh;
 
 /// A box, as minimum and maximum corner [m].
 pub(super) type Bounds = (DVec3, DVec3);
 
 /// What is looked for, and from where.
 pub(super) struct Search<'a> {
-    pub(super) launch: &'a Launch,
-    pub(super) face: usize,
-    pub(super) grid: &'static Grid,
+    launch: &'a Launch,
+    face: usize,
+    grid: &'static Grid,
     /// Boxes of the objects looked for: nodes beyond all of them are passed over.
-    pub(super) boxes: &'a [Bounds],
+    boxes: &'a [Bounds],
+    /// Boxes of all other objects: a node beyond all of these holds nothing else than what is looked for.
+    others: &'a [Bounds],
     /// Whether a triangle of the hierarchy is one of theirs.
-    pub(super) wanted: &'a (dyn Fn(u32) -> bool + Sync),
+    wanted: &'a (dyn Fn(u32) -> bool + Sync),
+    /// Absolute values of the linear part of the way from the scene to the face: what a box's half sides reach there.
+    reach: DMat3,
 }
 
 /// Where a node's box lies on a face.
@@ -32,17 +37,38 @@ enum Projection {
     Cells { cells: CellRange, inside: bool },
 }
 
-impl Search<'_> {
+impl<'a> Search<'a> {
+    /// A search on one face.
+    pub(super) fn new(
+        launch: &'a Launch,
+        face: usize,
+        boxes: &'a [Bounds],
+        others: &'a [Bounds],
+        wanted: &'a (dyn Fn(u32) -> bool + Sync),
+    ) -> Self {
+        let to_face = |point: DVec3| launch.to_face(face, point);
+        let along = |axis: DVec3| (to_face(axis) - to_face(DVec3::ZERO)).abs();
+        Self {
+            launch,
+            face,
+            grid: Grid::of(launch.mapping()),
+            boxes,
+            others,
+            wanted,
+            reach: DMat3::from_cols(along(DVec3::X), along(DVec3::Y), along(DVec3::Z)),
+        }
+    }
     /// Clears the bits of all cells in `open` that a wanted triangle touches.
     ///
     /// A node whose cells are all closed is passed over; in a node within a single cell, any wanted triangle will do.
     pub(super) fn close(&self, root: Node, open: &mut CellBits) {
         let mut waiting = vec![root];
         while let Some(node) = waiting.pop() {
-            if !self.is_near(&node) {
+            let bounds = node.bounds();
+            if !overlaps(bounds, self.boxes) {
                 continue;
             }
-            match self.project(&node) {
+            match self.project(bounds) {
                 Projection::Outside => continue,
                 Projection::Cells { cells, .. } if !open.any_in(&cells) => continue,
                 Projection::Cells { cells, inside: true } if cells.is_single() => {
@@ -66,16 +92,51 @@ impl Search<'_> {
         }
     }
 
+    /// Clears the bits of cells in `open` that some corners of a large mesh lie in, spread over it, for as long as that
+    /// closes cells faster than the search does.
+    pub(super) fn close_some(&self, mesh: &Mesh, open: &mut CellBits) {
+        const BATCH: u64 = 1024;
+        const LEAST_CLOSED: u64 = BATCH / 12;
+        let count = mesh.triangles.len() as u64;
+        for batch in 0..count / BATCH {
+            let before = open.count();
+            for sample in batch * BATCH..(batch + 1) * BATCH {
+                // Multiples of the golden ratio fill an interval evenly.
+                let share = sample.wrapping_mul(0x9e37_79b9_7f4a_7c15);
+                let triangle = (u128::from(share) * u128::from(count)) >> 64;
+                let vertex = mesh.triangles[triangle as usize][0];
+                self.close_at(mesh.positions[vertex as usize], open);
+            }
+            if before - open.count() < LEAST_CLOSED {
+                return;
+            }
+        }
+    }
+
+    /// Clears the bits of the cells that a point lies in.
+    fn close_at(&self, point: DVec3, open: &mut CellBits) {
+        let point = self.launch.to_face(self.face, point);
+        if !(point.z > 0.0 && point.truncate().abs().max_element() <= point.z) {
+            return;
+        }
+        let point = point.truncate() / point.z;
+        let cells = self.grid.cells(point, point);
+        for row in cells.rows.0..=cells.rows.1 {
+            (cells.columns.0..=cells.columns.1).for_each(|column| open.clear(column, row));
+        }
+    }
+
     /// Whether any wanted triangle touches a cell that is set in `lit`.
     pub(super) fn finds(&self, root: Node, lit: &CellBits) -> bool {
         let mut waiting = vec![root];
         while let Some(node) = waiting.pop() {
-            let beyond = match self.project(&node) {
+            let bounds = node.bounds();
+            let beyond = match self.project(bounds) {
                 Projection::Outside => true,
                 Projection::Cells { cells, .. } => !lit.any_in(&cells),
                 Projection::Unbounded => false,
             };
-            if beyond || !self.is_near(&node) {
+            if beyond || !overlaps(bounds, self.boxes) {
                 continue;
             }
             waiting.extend(node.children().into_iter().flatten());
@@ -110,18 +171,14 @@ impl Search<'_> {
         list
     }
 
-    fn is_near(&self, node: &Node) -> bool {
-        let (low, high) = node.bounds();
-        self.boxes
-            .iter()
-            .any(|(from, to)| low.cmple(*to).all() && high.cmpge(*from).all())
-    }
-
     /// Whether any triangle below a node is wanted.
     fn holds_wanted(&self, node: Node) -> bool {
+        if !overlaps(node.bounds(), self.others) {
+            return true;
+        }
         let mut waiting = vec![node];
         while let Some(node) = waiting.pop() {
-            if !self.is_near(&node) {
+            if !overlaps(node.bounds(), self.boxes) {
                 continue;
             }
             if node.triangles().any(|(triangle, _)| (self.wanted)(triangle)) {
@@ -132,41 +189,36 @@ impl Search<'_> {
         false
     }
 
-    fn project(&self, node: &Node) -> Projection {
-        let corners = self.project_box(node.bounds());
-        let beyond = |side: &DVec3| corners.iter().all(|corner| corner.dot(*side) < 0.0);
-        if SIDES.iter().any(beyond) {
+    /// Where a box lies on the face.
+    fn project(&self, (from, to): Bounds) -> Projection {
+        let half = (to - from) * 0.5;
+        let middle = self.launch.to_face(self.face, from + half);
+        let reach = self.reach * half;
+        let (low, high) = (middle - reach, middle + reach);
+        let beyond = |sides: (f64, f64)| sides.0 > WIDENED * high.z || sides.1 < -WIDENED * high.z;
+        if beyond((low.x, high.x)) || beyond((low.y, high.y)) {
             return Projection::Outside;
         }
         // Not where it is not a number, either.
-        if !corners.iter().all(|corner| corner.z > 0.0) {
+        if !(low.z > 0.0 && high.is_finite()) {
             return Projection::Unbounded;
         }
-        let mut low = DVec2::INFINITY;
-        let mut high = DVec2::NEG_INFINITY;
-        for corner in corners {
-            let point = corner.truncate() / corner.z;
-            (low, high) = (low.min(point), high.max(point));
-        }
+        let (nearest, farthest) = (1.0 / low.z, 1.0 / high.z);
+        let least = |x: f64| x * if x < 0.0 { nearest } else { farthest };
+        let most = |x: f64| x * if x > 0.0 { nearest } else { farthest };
+        let low = DVec2::new(least(low.x), least(low.y));
+        let high = DVec2::new(most(high.x), most(high.y));
         let face = |point: DVec2| point.clamp(DVec2::NEG_ONE, DVec2::ONE);
         Projection::Cells {
             cells: self.grid.cells(face(low), face(high)),
             inside: low.min_element() >= -1.0 && high.max_element() <= 1.0,
         }
     }
+}
 
-    /// Corners of a box in homogeneous face coordinates, which are linear in the point.
-    fn project_box(&self, (low, high): Bounds) -> [DVec3; 8] {
-        let to_face = |point: DVec3| self.launch.to_face(self.face, point);
-        let origin = to_face(low);
-        let sides = [
-            to_face(DVec3::new(high.x, low.y, low.z)) - origin,
-            to_face(DVec3::new(low.x, high.y, low.z)) - origin,
-            to_face(DVec3::new(low.x, low.y, high.z)) - origin,
-        ];
-        std::array::from_fn(|corner| {
-            let along = |axis: usize| sides[axis] * f64::from(u8::from(corner >> axis & 1 == 1));
-            origin + along(0) + along(1) + along(2)
-        })
-    }
+/// Whether a box overlaps any of some.
+fn overlaps((low, high): Bounds, boxes: &[Bounds]) -> bool {
+    boxes
+        .iter()
+        .any(|(from, to)| low.cmple(*to).all() && high.cmpge(*from).all())
 }
