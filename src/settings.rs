@@ -34,6 +34,8 @@ impl LayerKind {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub enum Estimator {
+    /// Patches of the wavefront between neighbouring rays, spread exactly over the texels they cover.
+    Wavefront,
     /// A kernel of flux per ray, scaled to the wavefront (Collins 1994).
     Splat,
 }

@@ -4,6 +4,7 @@ mod caustic_layer;
 mod finish;
 pub mod result;
 mod sizes;
+mod wavefront_layer;
 
 use std::sync::Arc;
 
