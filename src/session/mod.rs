@@ -133,7 +133,7 @@ impl BakeSession {
         match &self.aim {
             Some((cached, aim)) if *cached == kind => aim.clone(),
             _ => {
-                let aim = Arc::new(Aim::take(&self.scene, kind));
+                let aim = Arc::new(Aim::take(&self.tracer(), kind));
                 self.aim = Some((kind, aim.clone()));
                 aim
             }
