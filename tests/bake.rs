@@ -6,6 +6,8 @@ mod collection;
 mod energy;
 #[path = "bake/invariance.rs"]
 mod invariance;
+#[path = "bake/kept.rs"]
+mod kept;
 #[path = "bake/layers.rs"]
 mod layers;
 #[path = "bake/reference.rs"]
