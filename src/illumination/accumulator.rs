@@ -28,15 +28,25 @@ impl FluxUnit {
 
     /// The nearest count of each channel.
     pub fn count(self, flux_w: LinearSrgb) -> FluxCount {
-        flux_w
-            .to_array()
-            .map(|channel| (channel / self.watts).round() as i64)
+        let [r, g, b] = flux_w.to_array();
+        let count = |channel: f64| nearest(channel / self.watts);
+        let red = count(r);
+        // Grey light is the most common.
+        let alike = |channel: f64| if channel == r { red } else { count(channel) };
+        [red, alike(g), alike(b)]
     }
 
     /// Watts of a count.
     pub fn flux_w(self, count: FluxCount) -> LinearSrgb {
         LinearSrgb::from(count.map(|channel| channel as f64 * self.watts))
     }
+}
+
+/// The nearest whole number, halves away from zero, without a call into the mathematics library.
+fn nearest(x: f64) -> i64 {
+    let towards_zero = x as i64;
+    let rest = x - towards_zero as f64;
+    towards_zero + i64::from(rest >= 0.5) - i64::from(rest <= -0.5)
 }
 
 /// Flux per texel of one map, row 0 at v = 0.

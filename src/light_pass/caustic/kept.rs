@@ -66,14 +66,19 @@ impl KeptLight {
     /// A row as [`Lattice::trace_row`] traced it, bit by bit, without its accounts. A thinner lattice takes what its
     /// own rays brought.
     pub fn row(&self, lattice: &Lattice, face: usize, row: usize) -> TracedRow {
-        let mut unpacked = TracedRow::default();
         let fine_row = lattice.fine_row(row);
         let kept = &self.rows[face * lattice.size.1 + fine_row];
+        let most = kept.arrivals.len().div_ceil(lattice.strides.0);
+        let mut unpacked = TracedRow {
+            columns: Vec::with_capacity(most),
+            arrivals: Vec::with_capacity(most),
+            ..TracedRow::default()
+        };
         for (index, arrival) in kept.arrivals.iter().enumerate() {
             if let Some(column) = lattice.coarse_column(arrival.column as usize) {
-                unpacked.columns.push(column as u32);
                 let mut arrival = kept.unpack(index, lattice);
                 arrival.flux_w = arrival.flux_w * lattice.cells_of(column, row);
+                unpacked.columns.push(column as u32);
                 unpacked.arrivals.push(arrival);
             }
         }

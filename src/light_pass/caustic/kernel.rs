@@ -6,6 +6,7 @@
 
 use std::sync::LazyLock;
 
+use super::numeric::exp;
 use crate::settings::Kernel;
 
 /// A kernel with its spread.
@@ -15,6 +16,9 @@ pub struct Profile {
     /// √σ, footprint radii; used by the gaussian.
     spread: f64,
 }
+
+/// √(π/2), the whole of the half normal integral.
+pub(super) const SQRT_HALF_PI: f64 = 1.253_314_137_315_500_3;
 
 /// Spreads at which the gaussian is cut.
 const CUT_SPREADS: f64 = 4.0;
@@ -54,20 +58,21 @@ impl Profile {
 
     /// ∫ w ds from 0 to `s` at `t`, unnormalised; odd in s. `s` within the chord.
     pub fn chord_integral(&self, s: f64, t: f64) -> f64 {
+        self.line(t).integral(s)
+    }
+
+    /// What is the same along the line at `t`.
+    pub(super) fn line(&self, t: f64) -> Line {
         match self.kernel {
-            Kernel::Disc | Kernel::Box => s,
-            Kernel::Cone => {
-                let r = (s * s + t * t).sqrt();
-                let square_part = if t == 0.0 {
-                    0.0
-                } else {
-                    t * t * (s / t.abs()).asinh()
-                };
-                s - (s * r + square_part) / (2.0 * 3.0_f64.sqrt())
-            }
+            Kernel::Disc | Kernel::Box => Line::Constant,
+            Kernel::Cone => Line::Cone { t },
             Kernel::Gaussian => {
-                let u = t / self.spread;
-                self.spread * (-0.5 * u * u).exp() * half_normal_integral(s / self.spread)
+                let scale = 1.0 / self.spread;
+                let u = t * scale;
+                Line::Gaussian {
+                    scale,
+                    factor: self.spread * exp(-0.5 * u * u),
+                }
             }
         }
     }
@@ -90,11 +95,43 @@ impl Profile {
         }
     }
 
+    /// Standard deviation of a gaussian [footprint radii]; `None` for the others.
+    pub fn deviation(&self) -> Option<f64> {
+        (self.kernel == Kernel::Gaussian).then_some(self.spread)
+    }
+
     /// Length scale over which the weight changes [footprint radii].
     pub fn scale(&self) -> f64 {
         match self.kernel {
             Kernel::Gaussian => self.spread,
             Kernel::Cone | Kernel::Disc | Kernel::Box => 0.5,
+        }
+    }
+}
+
+/// A kernel along a line.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Line {
+    Constant,
+    Cone { t: f64 },
+    Gaussian { scale: f64, factor: f64 },
+}
+
+impl Line {
+    /// ∫ w ds from 0 to `s`.
+    pub(super) fn integral(&self, s: f64) -> f64 {
+        match *self {
+            Self::Constant => s,
+            Self::Cone { t } => {
+                let r = (s * s + t * t).sqrt();
+                let square_part = if t == 0.0 {
+                    0.0
+                } else {
+                    t * t * (s / t.abs()).asinh()
+                };
+                s - (s * r + square_part) / (2.0 * 3.0_f64.sqrt())
+            }
+            Self::Gaussian { scale, factor } => factor * half_normal_integral(s * scale),
         }
     }
 }
@@ -121,7 +158,7 @@ static HALF_NORMAL: LazyLock<Vec<[f64; 2]>> = LazyLock::new(|| {
 });
 
 /// ∫₀ˣ exp(−x²/2) dx for |x| ≤ 4, odd; beyond, the value at ±4. Cubic Hermite interpolation: within 1e-10.
-fn half_normal_integral(x: f64) -> f64 {
+pub(super) fn half_normal_integral(x: f64) -> f64 {
     let position = x.abs().min(CUT_SPREADS) * (TABLE_STEPS as f64 / CUT_SPREADS);
     let index = (position as usize).min(TABLE_STEPS - 1);
     let f = position - index as f64;
@@ -129,6 +166,12 @@ fn half_normal_integral(x: f64) -> f64 {
     let rise = y1 - y0;
     let value = y0 + f * rise + f * (1.0 - f) * ((d0 - rise) * (1.0 - f) + (rise - d1) * f);
     value.copysign(x)
+}
+
+/// Standard normal distribution function, as though all of it lay within 4.
+pub(super) fn normal_distribution(x: f64) -> f64 {
+    let whole = HALF_NORMAL[TABLE_STEPS][0];
+    0.5 + half_normal_integral(x) * (0.5 / whole)
 }
 
 #[cfg(test)]

@@ -53,9 +53,9 @@ pub struct TracedRow {
 }
 
 impl TracedRow {
-    /// The arrival from a column that took the same way to the same object as `like`.
-    pub fn matching(&self, column: u32, like: &Arrival) -> Option<&Arrival> {
-        let start = self.columns.partition_point(|&c| c < column);
+    /// What arrived from a column by the same way on the same object as `like`, among the arrivals from `start` on: the
+    /// column's first or beyond it.
+    pub fn matching_from(&self, start: usize, column: u32, like: &Arrival) -> Option<&Arrival> {
         self.columns[start..]
             .iter()
             .zip(&self.arrivals[start..])
