@@ -11,8 +11,8 @@ use super::numeric::{exp, floor};
 /// Most texels of a window each way.
 pub(super) const MOST_TEXELS: usize = 24;
 
-/// Standard deviations that a window reaches.
-const REACH: f64 = 4.0;
+/// Standard deviations that a window reaches; the outermost texels take what lies beyond, below 1e-4 on each side.
+const REACH: f64 = 3.75;
 
 /// Standard deviation [texels] from which [`Centred`] errs by less than 1e-4 of the peak.
 pub(super) const WIDE_TEXELS: f64 = 2.5;
@@ -46,8 +46,8 @@ struct Axis {
 }
 
 impl Axis {
-    /// Says whether the kernel is narrow enough.
-    fn set(&mut self, centre: f64, deviation: f64) -> bool {
+    /// `step` is 1 / `deviation`. Says whether the kernel is narrow enough.
+    fn set(&mut self, centre: f64, deviation: f64, step: f64) -> bool {
         let first = floor(centre - REACH * deviation);
         let last = floor(centre + REACH * deviation);
         let is_narrow = last - first < MOST_TEXELS as i64;
@@ -55,7 +55,6 @@ impl Axis {
             self.first = first;
             self.count = (last - first) as usize + 1;
             let first = first as f64;
-            let step = 1.0 / deviation;
             for texel in 0..self.count - 1 {
                 let border = (first + (texel + 1) as f64 - centre) * step;
                 self.border[texel] = border;
@@ -78,12 +77,13 @@ impl Cornered {
     ) -> Option<Block> {
         let Ellipse { xx, xy, yy } = covariance;
         let (x_deviation, y_deviation) = (xx.sqrt(), yy.sqrt());
-        let correlation = xy / (x_deviation * y_deviation);
+        let (x_step, y_step) = (1.0 / x_deviation, 1.0 / y_deviation);
+        let correlation = xy * (x_step * y_step);
         if correlation.is_nan() || correlation.abs() >= 1.0 {
             return None;
         }
         let Self { across, down, joint } = self;
-        if !(across.set(centre.x, x_deviation) && down.set(centre.y, y_deviation)) {
+        if !(across.set(centre.x, x_deviation, x_step) && down.set(centre.y, y_deviation, y_step)) {
             return None;
         }
         weights.clear();

@@ -6,13 +6,21 @@ pub(super) fn floor(x: f64) -> i64 {
     towards_zero - i64::from(towards_zero as f64 > x)
 }
 
+/// Adding it rounds numbers below 2⁵¹ in magnitude to whole ones, which its lowest bits then hold.
+const ROUNDING: f64 = 6_755_399_441_055_744.0;
+
+/// The nearest whole number for |x| < 2⁵¹, halves to the even one.
+pub(super) fn round(x: f64) -> (f64, i64) {
+    let shifted = x + ROUNDING;
+    let whole = shifted.to_bits().wrapping_sub(ROUNDING.to_bits()) as i64;
+    (shifted - ROUNDING, whole)
+}
+
 /// e^x to within 2e-9 of itself, without a call; 0 < result < ∞ for |x| up to 700, and x is kept to that.
 pub(super) fn exp(x: f64) -> f64 {
-    /// Adding it rounds to a whole number.
-    const ROUNDING: f64 = 6_755_399_441_055_744.0;
     let doublings = x.clamp(-700.0, 700.0) * std::f64::consts::LOG2_E;
-    let whole = (doublings + ROUNDING) - ROUNDING;
-    let f = doublings - whole;
+    let (nearest, whole) = round(doublings);
+    let f = doublings - nearest;
     // Least relative error over |f| ≤ 1/2.
     let power = 1.000_000_000_592_020_4
         + f * (0.693_147_205_600_509_9
@@ -20,7 +28,7 @@ pub(super) fn exp(x: f64) -> f64 {
                 + f * (0.055_503_289_975_187_046
                     + f * (0.009_618_519_534_387_448
                         + f * (0.001_339_986_036_269_023_6 + f * 0.000_153_375_768_201_456_85)))));
-    power * f64::from_bits(((whole as i64 + 1023) as u64) << 52)
+    power * f64::from_bits(((whole + 1023) as u64) << 52)
 }
 
 #[cfg(test)]
@@ -34,6 +42,15 @@ mod tests {
             assert!((exp(x) / x.exp() - 1.0).abs() < 3e-9, "{x}");
         }
         assert!(exp(-1e9) >= 0.0 && exp(f64::NEG_INFINITY) >= 0.0);
+    }
+
+    #[test]
+    fn roundings_are_right() {
+        let most = (1_i64 << 50) as f64;
+        for x in [0.0, 0.4, 0.6, -0.4, -0.6, 1e9 + 0.7, most, -most] {
+            let (nearest, whole) = round(x);
+            assert_eq!((nearest, whole), (x.round(), x.round() as i64), "{x}");
+        }
     }
 
     #[test]

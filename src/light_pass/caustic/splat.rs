@@ -5,7 +5,7 @@ use glam::{DVec2, Vec2Swizzles};
 use super::footprint::Ellipse;
 use super::gaussian::{Centred, Cornered, WIDE_TEXELS};
 use super::kernel::Profile;
-use super::numeric::floor;
+use super::numeric::{floor, round};
 use crate::illumination::accumulator::FluxCount;
 use crate::settings::KernelSampling;
 
@@ -99,9 +99,8 @@ impl Splat {
         if ellipse.xx <= ellipse.yy {
             return self.profile.reach() * ellipse.yy.sqrt();
         }
-        // Lines are columns: a box then reaches to its slanted corners.
-        let frame = LineFrame::new(ellipse.transposed());
-        self.profile.reach() * (frame.slope.abs() * frame.y_radius + frame.x_radius)
+        // Lines are columns: a box then reaches to its slanted corners, |xy|/√xx + √(yy − xy²/xx), at most √2 √yy.
+        self.profile.reach() * (2.0 * ellipse.yy).sqrt()
     }
 
     /// Fills `window` with the kernel's weight in each texel. The kernel is cut off one map's size beyond the borders.
@@ -388,8 +387,17 @@ impl Window {
         };
         let mut given: FluxCount = [0; 3];
         let (mut heaviest, mut most) = ((0, 0), 0.0);
-        let scale = flux.map(|channel| channel as f64 / self.sum);
+        let per_weight = 1.0 / self.sum;
+        let scale = flux.map(|channel| channel as f64 * per_weight);
         let grey = flux[0] == flux[1] && flux[1] == flux[2];
+        let is_large = flux.iter().any(|&channel| channel >= 1 << 50);
+        let part = |share: f64| {
+            if is_large {
+                (share + 0.5) as i64
+            } else {
+                round(share).1
+            }
+        };
         for line in &self.lines {
             let weights = &self.weights[line.span.0..line.span.1];
             let (offset, weight) = largest(weights);
@@ -398,9 +406,9 @@ impl Window {
             }
             let share = |weight: f64| {
                 if grey {
-                    [nearest(scale[0] * weight); 3]
+                    [part(scale[0] * weight); 3]
                 } else {
-                    scale.map(|channel| nearest(channel * weight))
+                    scale.map(|channel| part(channel * weight))
                 }
             };
             if let Some(texels) = self.inside(line, &mut target) {
@@ -454,11 +462,6 @@ fn largest(weights: &[f64]) -> (usize, f64) {
         }
     }
     largest
-}
-
-/// The nearest whole number of a share of flux, which is never negative; without a call into the mathematics library.
-fn nearest(share: f64) -> i64 {
-    (share + 0.5) as i64
 }
 
 /// Some rows of a map, being added to.
