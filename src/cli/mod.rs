@@ -11,6 +11,7 @@ mod picture;
 mod progress_bar;
 mod render;
 mod scene_input;
+mod study;
 mod terminal;
 mod values;
 mod view;

@@ -2,3 +2,7 @@
 
 pub mod agreement;
 pub mod brute_force;
+pub mod convergence;
+pub mod cost;
+pub mod plot;
+pub mod references;

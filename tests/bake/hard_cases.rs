@@ -2,9 +2,10 @@
 
 use nephroid::scene::Scene;
 use nephroid::scene::builtin::parts;
+use nephroid::session::BakeResult;
 use nephroid::settings::BakeSettings;
+use nephroid::study::agreement::{Agreement, caustic_luminance, pair_maps};
 
-use crate::brute_force::compare_with_brute_force;
 use crate::hard_scenes::{self, Shading, TinyBall};
 use crate::tools::{bake, energy_fault, settings};
 
@@ -66,6 +67,9 @@ fn figures() {
         let brute_s = start.elapsed().as_secs_f64();
         let result = bake(scene.clone(), &settings);
         let distance = crate::brute_force::distance(&result, &reference);
+        if let Ok(folder) = std::env::var("PICTURES") {
+            write_pictures(std::path::Path::new(&folder), &scene, &result, &reference);
+        }
         println!(
             "{:32} rmse {:6.2} % noise {:5.2} % flux {:.5} | {} rays, {:.2} s CPU | brute {} rays {:.2} s",
             scene.name,
@@ -77,5 +81,72 @@ fn figures() {
             reference.counts.rays,
             brute_s,
         );
+        for map in &reference.maps {
+            let name = &scene.objects[map.chart.object].name;
+            let only: Vec<_> = [&result, &reference]
+                .map(|bake| {
+                    bake.maps
+                        .iter()
+                        .filter(|m| m.chart.object == map.chart.object)
+                        .cloned()
+                        .collect()
+                })
+                .into_iter()
+                .collect::<Vec<Vec<_>>>();
+            let pairs = pair_maps(&only[0], &only[1]).expect("maps of one size");
+            let agreement = Agreement::of(&pairs).expect("light");
+            let noise = map.estimated_relative_rmse.unwrap_or(0.0);
+            println!(
+                "    {name:12} rmse with noise {:6.2} % noise {:5.2} % ard {:5.2} % peak {:.3}",
+                100.0 * agreement.relative_rmse,
+                100.0 * noise,
+                100.0 * agreement.average_relative_difference,
+                agreement.peak_ratio,
+            );
+        }
+    }
+}
+
+/// For each map of the reference, side by side: the bake, the reference (logarithmic, black at a hundredth of the mean,
+/// white at a hundred times it), and their difference (red brighter, blue darker, full at the mean).
+fn write_pictures(folder: &std::path::Path, scene: &Scene, result: &BakeResult, reference: &BakeResult) {
+    for map in &reference.maps {
+        let (width, height) = (map.width(), map.height());
+        let truth = caustic_luminance(map);
+        let mean = truth.iter().sum::<f64>() / truth.len() as f64;
+        let baked = result
+            .maps
+            .iter()
+            .find(|other| other.chart.object == map.chart.object)
+            .map_or_else(|| vec![0.0; truth.len()], caustic_luminance);
+        let grey = |e: f64| {
+            let level = (255.0 * (((e / mean).max(1e-9).log10() + 2.0) / 4.0).clamp(0.0, 1.0)) as u8;
+            [level, level, level, 255]
+        };
+        let difference = |image: f64, truth: f64| {
+            let share = ((image - truth) / mean).clamp(-1.0, 1.0);
+            let fade = (255.0 * (1.0 - share.abs())) as u8;
+            if share > 0.0 {
+                [255, fade, fade, 255]
+            } else {
+                [fade, fade, 255, 255]
+            }
+        };
+        const SCALE: usize = 6;
+        let mut rgba = Vec::new();
+        for row in 0..height * SCALE {
+            for column in 0..3 * width * SCALE {
+                let texel = row / SCALE * width + column / SCALE % width;
+                rgba.extend(match column / (width * SCALE) {
+                    0 => grey(baked[texel]),
+                    1 => grey(truth[texel]),
+                    _ => difference(baked[texel], truth[texel]),
+                });
+            }
+        }
+        let size = ((3 * width * SCALE) as u32, (height * SCALE) as u32);
+        let png = nephroid::export::png::encode(size.0, size.1, rgba, "picture").expect("a picture");
+        let name = format!("{}_{}.png", scene.name, scene.objects[map.chart.object].name);
+        std::fs::write(folder.join(name), png).expect("a writable folder");
     }
 }

@@ -21,7 +21,8 @@ pub enum Shading {
 
 /// Built-in `ring` (oracle S1) with another number of segments.
 pub fn ring(segments: u32, shading: Shading) -> Scene {
-    let mut scene = named("ring", parts::reference_scene(1.0));
+    let name = format!("ring_{segments}_{shading:?}").to_lowercase();
+    let mut scene = named(&name, parts::reference_scene(1.0));
     let smooth = shapes::sheet(segments, 1, |u, v| {
         let (sine, cosine) = (TAU * u.fract()).sin_cos();
         let outward = DVec3::new(cosine, 0.0, sine);
@@ -70,7 +71,8 @@ pub fn ball_with_blocker() -> Scene {
 
 /// A tilted torus that hides a part of itself from the lamp.
 pub fn torus(material: Material) -> Scene {
-    let mut scene = named("torus", parts::reference_scene(1.0));
+    let name = format!("{}_torus", material.name);
+    let mut scene = named(&name, parts::reference_scene(1.0));
     let tilt = DMat3::from_rotation_x(0.5) * DMat3::from_rotation_z(0.3);
     let (ring_m, tube_m) = (0.35, 0.14);
     let mesh = shapes::sheet(128, 64, |u, v| {
