@@ -23,7 +23,7 @@ use crate::settings::{BakeSettings, Footprint, Kernel, MapResolution, Sigma};
 use crate::transport::Tracer;
 
 /// Each side of the coarse run's lattice is this many times smaller.
-const COARSENING: usize = 8;
+pub(super) const COARSENING: usize = 8;
 
 /// Least side of the coarse run's lattice.
 const LEAST_COARSE_SIDE: usize = 64;
@@ -111,7 +111,7 @@ impl CausticLayer<'_> {
     }
 
     /// The unit of the sums: by the lights that take part, so that others do not change a bit.
-    fn unit(&self) -> Result<FluxUnit> {
+    pub(super) fn unit(&self) -> Result<FluxUnit> {
         let power_w: f64 = self
             .aim
             .lights
@@ -128,7 +128,12 @@ impl CausticLayer<'_> {
         ))
     }
 
-    fn lattice<'a>(&'a self, light: &'a AimedLight, coarsening: usize, unit: FluxUnit) -> Lattice<'a> {
+    pub(super) fn lattice<'a>(
+        &'a self,
+        light: &'a AimedLight,
+        coarsening: usize,
+        unit: FluxUnit,
+    ) -> Lattice<'a> {
         let (columns, rows) = light
             .launch
             .lattice_size(self.settings.density_per_sr, self.aim.reach_m);
@@ -216,7 +221,10 @@ impl CausticLayer<'_> {
     }
 
     /// Sizes of the maps that the coarse run saw lit.
-    fn map_sizes(&self, statistics: Option<&FootprintStatistics>) -> Result<BTreeMap<usize, (usize, usize)>> {
+    pub(super) fn map_sizes(
+        &self,
+        statistics: Option<&FootprintStatistics>,
+    ) -> Result<BTreeMap<usize, (usize, usize)>> {
         let mut sizes = BTreeMap::new();
         for object in 0..self.tracer.scene().objects.len() {
             let size = match (self.settings.map_resolution, statistics) {
@@ -250,7 +258,7 @@ impl CausticLayer<'_> {
     }
 
     /// Says which automatic maps stay coarser than their light, for the largest automatic size or for memory.
-    fn coarse_maps(
+    pub(super) fn coarse_maps(
         &self,
         sizes: &BTreeMap<usize, (usize, usize)>,
         statistics: &FootprintStatistics,
@@ -277,7 +285,7 @@ impl CausticLayer<'_> {
     }
 
     /// For a surface that only the full lattice reached.
-    fn default_size(&self, object: usize) -> Option<(usize, usize)> {
+    pub(super) fn default_size(&self, object: usize) -> Option<(usize, usize)> {
         Some(sizes::first_size(
             self.sizes.parametrisation(object)?.suggested_aspect,
         ))
@@ -285,10 +293,12 @@ impl CausticLayer<'_> {
 }
 
 impl CausticOutcome {
-    fn count(&mut self, report: &PassReport, clock: &mut Clock) {
+    pub(super) fn count(&mut self, report: &PassReport, clock: &mut Clock) {
         self.counts.rays += report.rays;
         self.counts.segments += report.segments;
         self.counts.splats += report.splats;
+        self.counts.cells += report.cells;
+        self.counts.receiver_queries += report.receiver_queries;
         self.cancelled |= report.cancelled;
         clock.trace.add(report.trace_s);
         clock.deposit.add(report.deposit_s);

@@ -4,6 +4,8 @@ mod caustic_layer;
 mod finish;
 pub mod result;
 mod sizes;
+mod wavefront_cache;
+mod wavefront_layer;
 
 use std::sync::Arc;
 
@@ -15,10 +17,11 @@ use crate::light_pass::caustic::setup::Aim;
 use crate::plan::{self, Effect, EffectPlan};
 use crate::progress::{Control, Progress, Stage};
 use crate::scene::Scene;
-use crate::settings::{BakeSettings, ItemBufferKind};
+use crate::settings::{BakeSettings, Estimator, ItemBufferKind};
 use crate::transport::Tracer;
 use caustic_layer::CausticLayer;
 use sizes::MapSizes;
+use wavefront_cache::WavefrontCache;
 
 /// Owns a scene with all that is derived from it, and bakes it as often as settings change. What does not depend on
 /// the settings (hierarchy, parametrisations, item buffers) is kept from bake to bake.
@@ -28,6 +31,7 @@ pub struct BakeSession {
     tracer: Option<Arc<Tracer>>,
     aim: Option<(ItemBufferKind, Arc<Aim>)>,
     sizes: MapSizes,
+    wavefront_cache: WavefrontCache,
 }
 
 /// What `inspect` says before any bake.
@@ -60,6 +64,7 @@ impl BakeSession {
             tracer: None,
             aim: None,
             sizes,
+            wavefront_cache: WavefrontCache::default(),
         })
     }
 
@@ -128,7 +133,7 @@ impl BakeSession {
         match &self.aim {
             Some((cached, aim)) if *cached == kind => aim.clone(),
             _ => {
-                let aim = Arc::new(Aim::take(&self.scene, kind));
+                let aim = Arc::new(Aim::take(&self.tracer(), kind));
                 self.aim = Some((kind, aim.clone()));
                 aim
             }
@@ -157,7 +162,12 @@ impl BakeSession {
                 sizes: &self.sizes,
                 plan: &plan,
             };
-            layer.bake(progress, control, &mut clock)?
+            match settings.estimator {
+                Estimator::Wavefront => {
+                    layer.bake_wavefront(progress, control, &mut clock, &mut self.wavefront_cache)?
+                }
+                Estimator::Splat => layer.bake(progress, control, &mut clock)?,
+            }
         } else {
             caustic_layer::CausticOutcome::default()
         };

@@ -27,6 +27,10 @@ pub struct PassReport {
     pub segments: u64,
     /// Kernels deposited.
     pub splats: u64,
+    /// Wavefront cells.
+    pub cells: u64,
+    /// Rays between traced ones that were intersected with receivers.
+    pub receiver_queries: u64,
     /// Sizes of footprints.
     pub statistics: FootprintStatistics,
     /// Wall-clock and CPU seconds of tracing.

@@ -1,0 +1,114 @@
+//! Maps with texels that the surface does not cover.
+
+use super::report::book;
+use super::row::RowShares;
+use super::shape::Shape;
+use super::{Coverage, CoverageReport, FluxTriangle};
+use crate::illumination::accumulator::FluxCount;
+
+/// How far a share goes at most to a texel that its triangle does not touch [texels, either way].
+const REACH: usize = 2;
+
+/// The shares of one triangle, reused from triangle to triangle.
+#[derive(Default)]
+struct Shares {
+    /// Column, row, counts of the texels that its island covers.
+    covered: Vec<(usize, usize, FluxCount)>,
+    /// Those of the others.
+    uncovered: Vec<(usize, usize, FluxCount)>,
+    row: RowShares,
+    line: Vec<FluxCount>,
+}
+
+/// Adds triangles to those texels that `coverage` lets grow.
+pub fn deposit(
+    triangles: &[FluxTriangle],
+    coverage: &impl Coverage,
+    texels: &mut [FluxCount],
+) -> CoverageReport {
+    let size = coverage.size();
+    let mut report = CoverageReport::default();
+    let mut shares = Shares::default();
+    for triangle in triangles {
+        let shape = Shape::new(triangle.corners, size);
+        if matches!(shape, Shape::NonFinite) {
+            book(&mut report.non_finite, triangle.flux);
+            continue;
+        }
+        let inside = shares.collect(&shape, triangle, coverage);
+        book(&mut report.outside, triangle.flux);
+        for (outside, inside) in report.outside.iter_mut().zip(inside) {
+            *outside -= inside;
+        }
+        for &(column, row, share) in &shares.uncovered {
+            match shares.home(column, row, coverage, triangle.island) {
+                Some((column, row)) => {
+                    add(&mut texels[row * size.0 + column], share);
+                    book(&mut report.deposited, share);
+                }
+                None => book(&mut report.unplaced, share),
+            }
+        }
+        for &(column, row, share) in &shares.covered {
+            add(&mut texels[row * size.0 + column], share);
+            book(&mut report.deposited, share);
+        }
+    }
+    report
+}
+
+fn add(texel: &mut FluxCount, share: FluxCount) {
+    for (sum, part) in texel.iter_mut().zip(share) {
+        *sum += part;
+    }
+}
+
+impl Shares {
+    /// Lists the shares of a triangle; returns their sum.
+    fn collect(&mut self, shape: &Shape, triangle: &FluxTriangle, coverage: &impl Coverage) -> [i128; 3] {
+        self.covered.clear();
+        self.uncovered.clear();
+        let mut inside = [0; 3];
+        for row in shape.rows() {
+            shape.fill_row(row, &mut self.row);
+            let first = std::mem::take(&mut self.row.first);
+            self.line.clear();
+            self.line.resize(self.row.ends.len(), [0; 3]);
+            book(&mut inside, self.row.add(triangle.flux, &mut self.line));
+            for (column, &share) in self.line.iter().enumerate() {
+                let place = (first + column, row, share);
+                if coverage.covers(first + column, row, triangle.island) {
+                    self.covered.push(place);
+                } else {
+                    self.uncovered.push(place);
+                }
+            }
+        }
+        inside
+    }
+
+    /// Where the share of an uncovered texel goes: to the nearest covered one that the triangle touches, else to the
+    /// nearest around; the first in the order of rows and columns where several are as near.
+    fn home(
+        &self,
+        column: usize,
+        row: usize,
+        coverage: &impl Coverage,
+        island: u32,
+    ) -> Option<(usize, usize)> {
+        let distance = |place: (usize, usize)| {
+            let (x, y) = (place.0.abs_diff(column) as u64, place.1.abs_diff(row) as u64);
+            x * x + y * y
+        };
+        let touched = self.covered.iter().map(|&(column, row, _)| (column, row));
+        if let Some(nearest) = touched.min_by_key(|&place| distance(place)) {
+            return Some(nearest);
+        }
+        let (width, height) = coverage.size();
+        let rows = row.saturating_sub(REACH)..(row + REACH + 1).min(height);
+        let columns = column.saturating_sub(REACH)..(column + REACH + 1).min(width);
+        rows.flat_map(|row| columns.clone().map(move |column| (column, row)))
+            .filter(|&(column, row)| coverage.covers(column, row, island))
+            .min_by_key(|&place| distance(place))
+    }
+}

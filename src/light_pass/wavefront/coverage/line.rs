@@ -1,0 +1,93 @@
+//! Triangles without area: their flux lies along a line, as a tent.
+
+use glam::DVec2;
+
+use super::row::RowShares;
+use super::shape::{cells, tent};
+
+/// A triangle seen along its longest side.
+#[derive(Clone, Copy, Debug)]
+pub struct Line {
+    /// Upper end.
+    from: DVec2,
+    /// To the lower end.
+    way: DVec2,
+    /// Fraction of the way at which the middle corner lies.
+    middle: f64,
+    size: (usize, usize),
+}
+
+impl Line {
+    pub fn new([a, b, c]: [DVec2; 3], size: (usize, usize)) -> Self {
+        let sides = [(a, b, c), (b, c, a), (c, a, b)];
+        let [mut longest, rest @ ..] = sides;
+        for side in rest {
+            if side.0.distance_squared(side.1) > longest.0.distance_squared(longest.1) {
+                longest = side;
+            }
+        }
+        let (mut from, mut to, middle) = longest;
+        if to.y < from.y {
+            std::mem::swap(&mut from, &mut to);
+        }
+        let way = to - from;
+        let middle = (middle - from).dot(way) / way.length_squared();
+        Self {
+            from,
+            way,
+            // Not a number for a point, where it does not matter.
+            middle: if middle.is_nan() {
+                0.0
+            } else {
+                middle.clamp(0.0, 1.0)
+            },
+            size,
+        }
+    }
+
+    pub fn rows(&self) -> std::ops::Range<usize> {
+        cells(self.from.y, self.from.y + self.way.y, self.size.1)
+    }
+
+    /// Fractions of the way at which a row begins and ends.
+    fn part_in_row(&self, row: usize) -> (f64, f64) {
+        if self.way.y == 0.0 {
+            return (0.0, 1.0);
+        }
+        let at = |y: f64| ((y - self.from.y) / self.way.y).clamp(0.0, 1.0);
+        (at(row as f64), at((row + 1) as f64))
+    }
+
+    pub fn fill_row(&self, row: usize, shares: &mut RowShares) {
+        let width = self.size.0;
+        let (from, to) = self.part_in_row(row);
+        let x_at = |t: f64| self.from.x + t * self.way.x;
+        let (left, right) = (x_at(from).min(x_at(to)), x_at(from).max(x_at(to)));
+        if right < 0.0 || left > width as f64 {
+            return;
+        }
+        let (before, after) = (tent(from, self.middle), tent(to, self.middle));
+        let columns = cells(left, right, width);
+        let up_to = |column: usize| {
+            let t = ((column as f64 - self.from.x) / self.way.x).clamp(from, to);
+            let along = tent(if t.is_nan() { to } else { t }, self.middle);
+            let share = if self.way.x < 0.0 {
+                before + (after - along)
+            } else {
+                along
+            };
+            share.clamp(before, after)
+        };
+        let first = columns.start;
+        shares.first = first;
+        shares.start = if left >= first as f64 {
+            before
+        } else {
+            up_to(first)
+        };
+        for column in columns {
+            let whole = right <= (column + 1) as f64;
+            shares.ends.push(if whole { after } else { up_to(column + 1) });
+        }
+    }
+}

@@ -1,0 +1,63 @@
+//! Flux-carrying triangles on a map, each texel getting exactly the part that covers it.
+//!
+//! Texels are taken row by row, from left to right. Each gets the difference of two rounded cumulative shares of the
+//! triangle's flux, so that the whole is exact to the last count; as the share above a row has a closed form, any
+//! row can be had without those before it, and rows are the unit that threads divide among themselves.
+
+mod area;
+mod bands;
+mod gaps;
+mod line;
+mod report;
+mod row;
+mod shape;
+
+use glam::DVec2;
+
+use super::super::caustic::splat::Coverage;
+use super::super::receiver_maps::ReceiverMap;
+use crate::illumination::accumulator::{FluxAccumulator, FluxCount};
+
+pub use report::CoverageReport;
+
+/// A piece of the wavefront on a map.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FluxTriangle {
+    /// Texel coordinates: x across, y down; texel (i, j) covers [i, i + 1] × [j, j + 1]. May lie partly or wholly
+    /// outside the map, either way round. Should be finite.
+    pub corners: [DVec2; 3],
+    /// Counts, not negative, spread evenly over the triangle's area.
+    pub flux: FluxCount,
+    /// Island of the chart that the triangle lies on (`ReceiverMap::island`), 0 where there is only one.
+    pub island: u32,
+}
+
+/// Adds triangles to a map; says what became of their flux.
+///
+/// The counts in the map depend neither on the order of the triangles, nor on how they are divided into calls, nor on
+/// the number of threads. The sums of all flux must stay below 2⁶³ counts, as [`FluxUnit`] sees to.
+///
+/// [`FluxUnit`]: crate::illumination::accumulator::FluxUnit
+pub fn deposit_triangles(triangles: &[FluxTriangle], map: &mut ReceiverMap) -> CoverageReport {
+    let (flux, covered) = map.level(0);
+    deposit_covered(triangles, flux, &covered)
+}
+
+/// [`deposit_triangles`] onto counts, of which `coverage` says where they may grow.
+///
+/// # Panics
+///
+/// If `coverage` has another size than `flux`.
+pub fn deposit_covered(
+    triangles: &[FluxTriangle],
+    flux: &mut FluxAccumulator,
+    coverage: &impl Coverage,
+) -> CoverageReport {
+    let size = (flux.width(), flux.height());
+    assert_eq!(size, coverage.size(), "one coverage for every texel");
+    if coverage.is_full() {
+        bands::deposit(triangles, size, flux.texels_mut())
+    } else {
+        gaps::deposit(triangles, coverage, flux.texels_mut())
+    }
+}
