@@ -16,6 +16,8 @@ mod invariance;
 mod layers;
 #[path = "bake/reference.rs"]
 mod reference;
+#[path = "bake/stored_references.rs"]
+mod stored_references;
 #[path = "support/mod.rs"]
 mod support;
 #[path = "bake/tools.rs"]

@@ -89,7 +89,7 @@ fn run(
     let scene = tracer.scene();
     let watch = Stopwatch::start();
     progress.advance(Stage::Plan, 0, 1);
-    let aim = Aim::take(scene, settings.item_buffer);
+    let aim = Aim::take(tracer, settings.item_buffer);
     let plan = plan::decide(scene, settings, &aim.casters);
     let lights: &[AimedLight] = if plan.is_on(Effect::LightPass) {
         &aim.lights

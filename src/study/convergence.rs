@@ -31,7 +31,7 @@ pub struct Ladder {
     pub densities: Vec<f64>,
     /// Bakes of each kind; their median CPU times count.
     pub repeats: usize,
-    /// Of all bakes, but for estimator and density.
+    /// Of all bakes, but for estimator, density, and sigma, which is the estimator's default.
     pub settings: BakeSettings,
 }
 
@@ -109,8 +109,8 @@ pub fn measure(
     Ok(measurements)
 }
 
-/// The bake that serves as reference where there is no other: the last estimator of the ladder, far above its densest
-/// lattice.
+/// The bake that serves as reference where there is no other: the first estimator of the ladder, far above its
+/// densest lattice.
 ///
 /// # Errors
 /// Those of a bake; stopped before the end.
@@ -157,9 +157,9 @@ pub enum Axis {
     CpuSeconds,
 }
 
-/// (cost, relative RMSE) of one estimator in ascending order of cost.
+/// (cost, relative RMSE) of one estimator in the order of the measurements.
 pub fn curve(measurements: &[Measurement], estimator: &str, axis: Axis) -> Vec<(f64, f64)> {
-    let mut points: Vec<(f64, f64)> = measurements
+    measurements
         .iter()
         .filter(|measurement| measurement.estimator == estimator)
         .map(|measurement| {
@@ -170,9 +170,7 @@ pub fn curve(measurements: &[Measurement], estimator: &str, axis: Axis) -> Vec<(
             (cost, measurement.relative_rmse)
         })
         .filter(|(cost, error)| *cost > 0.0 && *error > 0.0)
-        .collect();
-    points.sort_by(|a, b| a.0.total_cmp(&b.0));
-    points
+        .collect()
 }
 
 /// Names of the estimators, each once, in the order of the measurements.
@@ -198,6 +196,7 @@ impl Ladder {
         BakeSettings {
             estimator,
             density_per_sr,
+            sigma: estimator.default_sigma(),
             ..self.settings.clone()
         }
     }

@@ -37,7 +37,8 @@ fn three_digits(value: f64) -> String {
 const EXTRAPOLATION_POINTS: usize = 3;
 
 /// Cost from which on the error stays at or below `target`, by linear interpolation of logarithms. `points` are (cost,
-/// error), both above zero, in ascending order of cost. `None` where the error does not fall, or nothing was measured.
+/// error), both above zero, from the coarsest measurement to the finest. `None` where the error does not fall, or
+/// nothing was measured.
 pub fn cost_of(points: &[(f64, f64)], target: f64) -> Option<Cost> {
     let Some(above) = points.iter().rposition(|(_, error)| *error > target) else {
         return points.first().map(|(cost, _)| Cost::AtMost(*cost));

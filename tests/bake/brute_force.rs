@@ -7,50 +7,17 @@ use nephroid::progress::Control;
 use nephroid::scene::Scene;
 use nephroid::session::BakeResult;
 use nephroid::settings::BakeSettings;
-use nephroid::study::agreement::{Agreement, caustic_luminance, pair_maps};
+use nephroid::study::agreement::caustic_luminance;
 use nephroid::study::brute_force::{brute_force, relative_noise};
 use nephroid::transport::Tracer;
 
 use crate::support;
-use crate::tools::{bake, builtin_scene, energy_fault, map_of, settings};
+use crate::tools::{builtin_scene, energy_fault, map_of, settings};
 
 /// A scene's maps by brute force.
 pub fn brute(scene: &Scene, settings: &BakeSettings, rays: u64) -> BakeResult {
     let tracer = Tracer::new(Arc::new(scene.clone()));
     brute_force(&tracer, settings, rays, &(), &Control::default()).expect("a reference")
-}
-
-/// How far a bake is from brute force, as shares of the mean irradiance over all maps.
-#[derive(Clone, Copy, Debug)]
-pub struct Distance {
-    /// The bake's own error: what is left of the relative RMSE without the reference's noise, in quadrature.
-    pub relative_rmse: f64,
-    /// Noise of the reference.
-    pub noise: f64,
-    /// Deposited flux over the reference's.
-    pub flux_ratio: f64,
-    /// Light rays of the bake.
-    pub rays: u64,
-}
-
-/// Bakes a scene and compares with brute force by so many rays.
-pub fn compare_with_brute_force(scene: &Scene, settings: &BakeSettings, rays: u64) -> Distance {
-    let result = bake(scene.clone(), settings);
-    assert_eq!(energy_fault(&result), None, "{}", scene.name);
-    distance(&result, &brute(scene, settings, rays))
-}
-
-/// How far finished maps are from a reference by brute force.
-pub fn distance(result: &BakeResult, reference: &BakeResult) -> Distance {
-    let pairs = pair_maps(&result.maps, &reference.maps).expect("maps of one size");
-    let agreement = Agreement::of(&pairs).expect("a reference with light");
-    let noise = relative_noise(&reference.maps).expect("a noise");
-    Distance {
-        relative_rmse: (agreement.relative_rmse.powi(2) - noise * noise).max(0.0).sqrt(),
-        noise,
-        flux_ratio: agreement.flux_ratio,
-        rays: result.counts.rays,
-    }
 }
 
 #[test]

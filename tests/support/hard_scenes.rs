@@ -169,7 +169,12 @@ pub enum TinyBall {
 /// A glass ball 0.45 mm wide, a hundredth of a lattice cell at 10³ rays per steradian, beside a mirror of 0.4 m under
 /// one sun.
 pub fn tiny_ball(parts_of: TinyBall) -> Scene {
-    let mut scene = named("tiny_ball", parts::reference_scene(0.6));
+    let name = match parts_of {
+        TinyBall::Both => "tiny_ball_and_mirror",
+        TinyBall::Ball => "tiny_ball",
+        TinyBall::Mirror => "mirror_of_the_tiny_ball",
+    };
+    let mut scene = named(name, parts::reference_scene(0.6));
     if parts_of != TinyBall::Mirror {
         glass_ball(&mut scene, DVec3::new(-0.3, 0.3, 0.0), 0.000_225, 4);
     }
