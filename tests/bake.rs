@@ -12,6 +12,8 @@ mod hard_cases;
 mod hard_scenes;
 #[path = "bake/invariance.rs"]
 mod invariance;
+#[path = "bake/kept.rs"]
+mod kept;
 #[path = "bake/layers.rs"]
 mod layers;
 #[path = "bake/reference.rs"]

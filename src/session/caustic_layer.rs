@@ -5,13 +5,14 @@ use std::sync::Arc;
 
 use super::finish;
 use super::sizes::{self, MapSizes};
+use super::splat_cache::SplatCache;
 use super::{BakeCounts, Clock};
 use crate::error::{Error, Result, Warning};
 use crate::illumination::Chart;
 use crate::illumination::accumulator::FluxUnit;
 use crate::light_pass::caustic::deposit::Depositor;
 use crate::light_pass::caustic::lattice::Lattice;
-use crate::light_pass::caustic::pass::{self, Listener, PassReport};
+use crate::light_pass::caustic::pass::{self, Listener, PassReport, Source};
 use crate::light_pass::caustic::path::PathLimits;
 use crate::light_pass::caustic::setup::{Aim, AimedLight};
 use crate::light_pass::caustic::statistics::FootprintStatistics;
@@ -53,17 +54,19 @@ pub(super) struct CausticOutcome {
 }
 
 impl CausticLayer<'_> {
-    /// Traces and deposits all lights.
+    /// Traces and deposits all lights; deposits what the cache holds, where it does.
     pub(super) fn bake(
         &self,
         progress: &dyn Progress,
         control: &Control,
         clock: &mut Clock,
+        cache: &mut SplatCache,
     ) -> Result<CausticOutcome> {
         let unit = self.unit()?;
+        cache.prepare(self);
         let mut outcome = CausticOutcome::default();
         let statistics = if self.wants_statistics() {
-            let statistics = self.coarse_run(unit, progress, control, clock, &mut outcome);
+            let statistics = self.coarse_run(unit, progress, control, clock, cache, &mut outcome);
             Some(statistics)
         } else {
             None
@@ -80,17 +83,14 @@ impl CausticLayer<'_> {
             self.sizes.chart(object, size)
         };
         let mut maps = ReceiverMaps::new(self.tracer.scene().objects.len());
-        let total: u64 = self
-            .aim
-            .lights
-            .iter()
-            .map(|light| self.lattice(light, 1, unit).ray_count())
-            .sum();
+        let total = cache.arrivals().unwrap_or_else(|| {
+            let lights = self.aim.lights.iter();
+            lights.map(|light| self.lattice(light, 1, unit).ray_count()).sum()
+        });
         let mut done = 0;
-        for light in &self.aim.lights {
-            let lattice = self.lattice(light, 1, unit);
+        for (index, light) in self.aim.lights.iter().enumerate() {
             let depositor = Depositor {
-                lattice,
+                lattice: self.lattice(light, 1, unit),
                 settings: self.settings,
                 statistics: statistics.as_ref(),
             };
@@ -100,12 +100,18 @@ impl CausticLayer<'_> {
                 done,
                 total,
             };
-            let report = pass::run(&depositor, &mut maps, &chart_for, &listener);
-            done += report.rays;
+            let (report, kept) = pass::run(&depositor, cache.source(index), &mut maps, &chart_for, &listener);
+            cache.keep(kept);
+            done += if report.rays > 0 {
+                report.rays
+            } else {
+                report.splats
+            };
             outcome.count(&report, clock);
             let name = &self.tracer.scene().lights[light.light].name;
             outcome.ledgers.push(report.ledger.report(name, unit));
         }
+        cache.finish();
         outcome.maps = Some((maps, unit));
         Ok(outcome)
     }
@@ -148,6 +154,7 @@ impl CausticLayer<'_> {
             launch: &light.launch,
             item_buffer: &light.item_buffer,
             size,
+            strides: (1, 1),
             placement: self.settings.rays,
             seed: self.settings.seed,
             limits: PathLimits {
@@ -174,6 +181,7 @@ impl CausticLayer<'_> {
         progress: &dyn Progress,
         control: &Control,
         clock: &mut Clock,
+        cache: &SplatCache,
         outcome: &mut CausticOutcome,
     ) -> FootprintStatistics {
         let mut statistics = FootprintStatistics::default();
@@ -187,9 +195,8 @@ impl CausticLayer<'_> {
             self.sizes.chart(object, sizes::first_size(aspect))
         };
         let mut maps = ReceiverMaps::new(self.tracer.scene().objects.len());
-        for light in &self.aim.lights {
-            let fine = self.lattice(light, 1, unit);
-            let lattice = self.lattice(light, COARSENING, unit);
+        for (index, light) in self.aim.lights.iter().enumerate() {
+            let lattice = thinned(self.lattice(light, 1, unit));
             let depositor = Depositor {
                 lattice,
                 settings: &settings,
@@ -201,8 +208,11 @@ impl CausticLayer<'_> {
                 done: 0,
                 total: 0,
             };
-            let report = pass::run(&depositor, &mut maps, &chart_for, &listener);
-            let cells = |size: (usize, usize)| size.0 as f64 * size.1 as f64;
+            let source = match cache.source(index) {
+                Source::Rays { .. } => Source::Rays { keep_bytes: 0 },
+                kept @ Source::Kept(_) => kept,
+            };
+            let (report, _) = pass::run(&depositor, source, &mut maps, &chart_for, &listener);
             outcome.count(&report, clock);
             // The kernels of the coarse run are in no map.
             outcome.counts.splats -= report.splats;
@@ -214,7 +224,11 @@ impl CausticLayer<'_> {
                     map.grow_to(size, &|size| self.sizes.chart(object, size));
                 }
             }
-            statistics.merge(&report.statistics.refined(cells(fine.size) / cells(lattice.size)));
+            statistics.merge(
+                &report
+                    .statistics
+                    .refined((lattice.strides.0 * lattice.strides.1) as f64),
+            );
         }
         progress.preview(finish::preview(&maps, unit));
         statistics
@@ -289,6 +303,15 @@ impl CausticLayer<'_> {
         Some(sizes::first_size(
             self.sizes.parametrisation(object)?.suggested_aspect,
         ))
+    }
+}
+
+/// The lattice for mean footprints: every so many-th of the same rays, so that kept ones will do.
+fn thinned(lattice: Lattice) -> Lattice {
+    let stride = |side: usize| (side / LEAST_COARSE_SIDE).clamp(1, COARSENING);
+    Lattice {
+        strides: (stride(lattice.size.0), stride(lattice.size.1)),
+        ..lattice
     }
 }
 

@@ -4,6 +4,7 @@ mod caustic_layer;
 mod finish;
 pub mod result;
 mod sizes;
+mod splat_cache;
 mod wavefront_cache;
 mod wavefront_layer;
 
@@ -21,6 +22,7 @@ use crate::settings::{BakeSettings, Estimator, ItemBufferKind};
 use crate::transport::Tracer;
 use caustic_layer::CausticLayer;
 use sizes::MapSizes;
+use splat_cache::SplatCache;
 use wavefront_cache::WavefrontCache;
 
 /// Owns a scene with all that is derived from it, and bakes it as often as settings change. What does not depend on
@@ -32,6 +34,7 @@ pub struct BakeSession {
     aim: Option<(ItemBufferKind, Arc<Aim>)>,
     sizes: MapSizes,
     wavefront_cache: WavefrontCache,
+    splat_cache: SplatCache,
 }
 
 /// What `inspect` says before any bake.
@@ -65,6 +68,7 @@ impl BakeSession {
             aim: None,
             sizes,
             wavefront_cache: WavefrontCache::default(),
+            splat_cache: SplatCache::default(),
         })
     }
 
@@ -166,7 +170,7 @@ impl BakeSession {
                 Estimator::Wavefront => {
                     layer.bake_wavefront(progress, control, &mut clock, &mut self.wavefront_cache)?
                 }
-                Estimator::Splat => layer.bake(progress, control, &mut clock)?,
+                Estimator::Splat => layer.bake(progress, control, &mut clock, &mut self.splat_cache)?,
             }
         } else {
             caustic_layer::CausticOutcome::default()

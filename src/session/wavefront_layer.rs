@@ -2,6 +2,8 @@
 
 use std::sync::Arc;
 
+use glam::DVec2;
+
 use super::Clock;
 use super::caustic_layer::{CausticLayer, CausticOutcome};
 use super::wavefront_cache::WavefrontCache;
@@ -56,6 +58,7 @@ impl CausticLayer<'_> {
             .collect();
         let total = lattices.iter().map(WavefrontLattice::cell_count).sum();
         let receivers = Receivers::new(self.tracer, &chart_for);
+        let reference_w = self.reference_w();
         let kept = std::mem::take(&mut cache.lights);
         let is_kept = kept.len() == lattices.len();
         let mut keep_bytes = WavefrontCache::limit_bytes(self.settings);
@@ -64,6 +67,7 @@ impl CausticLayer<'_> {
                 receivers: &receivers,
                 chart_for: &chart_for,
                 lattice,
+                reference_w,
             };
             let listener = Listener {
                 progress,
@@ -91,6 +95,17 @@ impl CausticLayer<'_> {
         }
         outcome.maps = Some((maps, unit));
         Ok(outcome)
+    }
+
+    /// Flux that all lights send to marked cells [W, luminance].
+    fn reference_w(&self) -> f64 {
+        let marked_w = |light: &AimedLight| {
+            let whole = light.launch.cell_measure(DVec2::ZERO, DVec2::ONE) * light.launch.face_count() as f64;
+            let luminance = light.launch.power_bound_w() * light.launch.light().colour.luminance()
+                / light.launch.light().colour.max_channel();
+            luminance * light.item_buffer.marked_measure(&light.launch) / whole
+        };
+        self.aim.lights.iter().map(marked_w).sum()
     }
 
     fn wavefront_lattice<'a>(
@@ -131,6 +146,7 @@ impl CausticLayer<'_> {
                 receivers: &receivers,
                 chart_for,
                 lattice,
+                reference_w: self.reference_w(),
             };
             let listener = Listener {
                 progress: &(),

@@ -37,8 +37,10 @@ pub struct WavefrontDepositor<'a> {
     pub receivers: &'a Receivers<'a>,
     /// Gives the charts of maps that receive light.
     pub chart_for: &'a ChartFor<'a>,
-    /// Of the accounts.
+    /// Traces, or traced.
     pub lattice: WavefrontLattice<'a>,
+    /// Flux that all lights send to specular surfaces [W, luminance].
+    pub reference_w: f64,
 }
 
 impl WavefrontDepositor<'_> {
@@ -109,6 +111,7 @@ impl WavefrontDepositor<'_> {
             samples: &band.samples,
             unit: self.lattice.unit,
             absorption: self.lattice.tracer.limits.absorption,
+            reference_w: self.reference_w,
         };
         let parts: Vec<SpreadOutput> = band
             .patches

@@ -16,11 +16,14 @@ use crate::light_pass::ledger_sum::{Account, LedgerSum};
 use crate::optics::LinearSrgb;
 
 /// Deviation from straight that triangles may have [texels].
-const CHORD_TEXELS: f64 = 0.06;
+const CHORD_TEXELS: f64 = 0.03;
 
 /// Change of the lit area from one triangle to the next, as a share, that is left where triangles are larger than
 /// texels.
-const DENSITY_STEP: f64 = 0.03;
+const DENSITY_STEP: f64 = 0.005;
+
+/// How much coarser patches are divided that add next to nothing to their map.
+const COARSEST_TOLERANCE: f64 = 10.0;
 
 /// Most triangles along a patch.
 const MOST_STEPS: usize = 128;
@@ -49,6 +52,8 @@ pub struct Spreader<'a> {
     pub unit: FluxUnit,
     /// Whether any volume absorbs.
     pub absorption: bool,
+    /// Flux that all lights send to specular surfaces [W, luminance]: over a map, about its mean irradiance.
+    pub reference_w: f64,
 }
 
 /// What patches became.
@@ -248,6 +253,8 @@ impl Spreader<'_> {
                 0.0
             }
         };
+        let lit_texels = 0.5 * areas.iter().map(|area| area.abs()).sum::<f64>();
+        let tolerance = self.tolerance(object, flux_w.luminance(), lit_texels);
         let length = |a: DVec2, b: DVec2, c: DVec2| a.distance(b) + b.distance(c);
         let width = (0..3)
             .map(|j| length(texel(0, j), texel(1, j), texel(2, j)))
@@ -256,9 +263,9 @@ impl Spreader<'_> {
             .map(|i| length(texel(i, 0), texel(i, 1), texel(i, 2)))
             .fold(0.0, f64::max);
         let steps = |bend: f64, change: f64, length: f64| {
-            let straight = (bend / CHORD_TEXELS).sqrt();
+            let straight = (bend / (CHORD_TEXELS * tolerance)).sqrt();
             // Triangles below a texel cannot be told apart.
-            let even = (change / DENSITY_STEP).min(length);
+            let even = (change / (DENSITY_STEP * tolerance)).min(length);
             (straight.max(even).ceil() as usize).clamp(1, MOST_STEPS)
         };
         (
@@ -273,6 +280,22 @@ impl Spreader<'_> {
                 height,
             ),
         )
+    }
+
+    /// How much coarser than the finest a patch may be divided: where it adds little to its map, what it adds need not
+    /// be as exact.
+    fn tolerance(&self, object: u32, flux_w: f64, lit_texels: f64) -> f64 {
+        let Some(surface) = self.receivers.get(object) else {
+            return 1.0;
+        };
+        let texels = (surface.chart.width * surface.chart.height) as f64;
+        let mean_w = self.reference_w / texels;
+        let local_w = flux_w / lit_texels.max(1.0);
+        if local_w > 0.0 {
+            (mean_w / local_w).sqrt().clamp(1.0, COARSEST_TOLERANCE)
+        } else {
+            COARSEST_TOLERANCE
+        }
     }
 
     /// Notes how large an area a patch lights.
