@@ -18,8 +18,6 @@ mod kept;
 mod layers;
 #[path = "bake/reference.rs"]
 mod reference;
-#[path = "bake/stored_references.rs"]
-mod stored_references;
 #[path = "support/mod.rs"]
 mod support;
 #[path = "bake/tools.rs"]
