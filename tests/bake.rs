@@ -2,6 +2,8 @@
 
 #[path = "bake/collection.rs"]
 mod collection;
+#[path = "bake/coverage.rs"]
+mod coverage;
 #[path = "bake/energy.rs"]
 mod energy;
 #[path = "bake/invariance.rs"]

@@ -7,3 +7,4 @@ pub mod launch;
 pub mod ledger;
 pub mod ledger_sum;
 pub mod receiver_maps;
+pub mod wavefront;
