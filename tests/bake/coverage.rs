@@ -53,21 +53,31 @@ fn deposit(size: (usize, usize), triangles: &[FluxTriangle]) -> (FluxAccumulator
 
 /// What a report says must be so, to the last count; no texel gets less than nothing.
 fn check_sums(triangles: &[FluxTriangle], flux: &FluxAccumulator, report: &CoverageReport) {
-    for channel in 0..3 {
-        let given: i128 = triangles.iter().map(|t| i128::from(t.flux[channel])).sum();
-        let got: i128 = flux.texels().iter().map(|t| i128::from(t[channel])).sum();
-        let CoverageReport {
-            deposited,
-            outside,
-            unplaced,
-            non_finite,
-        } = report;
-        assert_eq!(got, deposited[channel], "deposited");
-        let sum = deposited[channel] + outside[channel] + unplaced[channel] + non_finite[channel];
-        assert_eq!(sum, given, "{report:?}");
-        assert!(outside[channel] >= 0 && unplaced[channel] >= 0);
-        assert!(flux.texels().iter().all(|texel| texel[channel] >= 0));
-    }
+    let sum = |fluxes: &mut dyn Iterator<Item = FluxCount>| {
+        fluxes.fold([0; 3], |sum: [i128; 3], flux| {
+            std::array::from_fn(|channel| sum[channel] + i128::from(flux[channel]))
+        })
+    };
+    let CoverageReport {
+        deposited,
+        outside,
+        unplaced,
+        non_finite,
+    } = report;
+    assert_eq!(sum(&mut flux.texels().iter().copied()), *deposited, "deposited");
+    let all: [i128; 3] = std::array::from_fn(|channel| {
+        deposited[channel] + outside[channel] + unplaced[channel] + non_finite[channel]
+    });
+    assert_eq!(
+        sum(&mut triangles.iter().map(|triangle| triangle.flux)),
+        all,
+        "{report:?}"
+    );
+    assert!(
+        outside.iter().chain(unplaced).all(|&count| count >= 0),
+        "{report:?}"
+    );
+    assert!(flux.texels().iter().flatten().all(|&count| count >= 0));
 }
 
 /// Sutherland and Hodgman: the part of a polygon where `distance` is not negative.
