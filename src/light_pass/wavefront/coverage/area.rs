@@ -1,15 +1,29 @@
-//! Triangles that have area: their part in each texel of a row, from the signed areas beside their borders.
+//! Triangles that have area: their part in each texel of a row, from the areas beside their sides.
 
 use glam::DVec2;
 
-use super::row::RowShares;
-use super::shape::{cells, tent};
+use super::row::{RowShares, Span};
+use super::shape::{cells, least, most};
 
 /// Sides less high than this [texels] are level: they bound no area.
 const LEVEL_TEXELS: f64 = 1e-30;
 
-/// A triangle that has area, in coordinates relative to the map's first column that it reaches, where they are more
-/// precise.
+/// Rows of up to this many texels are quicker border by border than piece by piece.
+const NARROW: usize = 4;
+
+/// The order of the corners from top to bottom, by which of a > b, b > c, a > c hold of their heights (1, 2, 4).
+const ORDERS: [[usize; 3]; 8] = [
+    [0, 1, 2],
+    [1, 0, 2],
+    [0, 2, 1],
+    [0, 1, 2],
+    [0, 1, 2],
+    [1, 2, 0],
+    [2, 0, 1],
+    [2, 1, 0],
+];
+
+/// A triangle that has area; x counts from the map's first column that it reaches, where numbers are finer.
 #[derive(Clone, Copy, Debug)]
 pub struct Area {
     /// Column that x = 0 stands for.
@@ -18,7 +32,7 @@ pub struct Area {
     width: usize,
     height: usize,
     top: f64,
-    middle: f64,
+    middle: DVec2,
     bottom: f64,
     /// From the top to the bottom corner.
     long: Side,
@@ -26,7 +40,9 @@ pub struct Area {
     upper: Side,
     /// From the middle to the bottom corner.
     lower: Side,
-    /// What an area to the right of the long side, less that to the right of the others, is of the whole.
+    /// Part of the area above the middle corner.
+    share_to_middle: f64,
+    /// Share of an area to the right of the long side that is not to the right of the others.
     share_per_area: f64,
 }
 
@@ -37,74 +53,92 @@ struct Side {
     slope: f64,
     low: f64,
     high: f64,
+    /// Part of the triangle's area per squared distance from the side's end at the top or bottom corner.
+    share_per_square: f64,
+}
+
+/// The triangle cut at one height.
+#[derive(Clone, Copy)]
+struct Cut {
+    y: f64,
+    /// x on the long side.
+    long: f64,
+    /// x on the two others.
+    short: f64,
+    /// Share above.
+    above: f64,
 }
 
 /// Part of a side within a row.
 #[derive(Clone, Copy)]
 struct Piece {
-    /// x at either end.
-    x: (f64, f64),
-    /// Height, negative for the sides opposite to the long one.
+    low: f64,
+    high: f64,
     height: f64,
 }
 
 impl Side {
-    fn new(start: DVec2, end: DVec2) -> Self {
+    fn new(start: DVec2, end: DVec2, per_height: f64) -> Self {
         let way = end - start;
+        let inverse = if way.y > LEVEL_TEXELS { 1.0 / way.y } else { 0.0 };
         Self {
             start,
-            slope: if way.y > LEVEL_TEXELS { way.x / way.y } else { 0.0 },
-            low: start.x.min(end.x),
-            high: start.x.max(end.x),
+            slope: way.x * inverse,
+            low: least(start.x, end.x),
+            high: most(start.x, end.x),
+            share_per_square: inverse * per_height,
         }
     }
 
     fn x_at(&self, y: f64) -> f64 {
-        (self.start.x + (y - self.start.y) * self.slope).clamp(self.low, self.high)
-    }
-
-    fn piece(&self, from: f64, to: f64, sign: f64) -> Piece {
-        let (a, b) = (self.x_at(from), self.x_at(to));
-        Piece {
-            x: (a.min(b), a.max(b)),
-            height: sign * (to - from),
-        }
+        let x = self.start.x + (y - self.start.y) * self.slope;
+        most(self.low, least(self.high, x))
     }
 }
 
 impl Piece {
-    /// Area to its right, up to the border `x`.
-    fn area_up_to(&self, x: f64) -> f64 {
-        let (low, high) = self.x;
-        if x >= high {
-            self.height * (x - 0.5 * (low + high))
-        } else if x <= low {
-            0.0
-        } else {
-            0.5 * self.height * (x - low) * ((x - low) / (high - low))
+    fn new(a: f64, b: f64, height: f64) -> Self {
+        Self {
+            low: least(a, b),
+            high: most(a, b),
+            height,
+        }
+    }
+
+    /// Area to its right up to each of the borders after `first`.
+    fn add_areas(&self, first: f64, sign: f64, areas: &mut [f64]) {
+        let run = self.high - self.low;
+        // No area where there is no run; anything finite will do as a factor.
+        let per_square = 0.5 * self.height / most(run, f64::MIN_POSITIVE);
+        let (per_square, height) = (sign * per_square, sign * self.height);
+        for (column, area) in areas.iter_mut().enumerate() {
+            let x = first + column as f64 - self.low;
+            let within = most(0.0, least(run, x));
+            *area += per_square * within * within + height * most(0.0, x - run);
         }
     }
 
     /// The part with x from 0 to `width`; what lies further left moves to 0.
     fn clipped(&self, width: f64, changes: &mut [f64]) -> Option<Self> {
-        let (low, high) = self.x;
+        let Self { low, high, height } = *self;
         if low >= 0.0 && high <= width {
             return Some(*self);
         }
         if high <= 0.0 {
-            changes[0] += self.height;
+            changes[0] += height;
             return None;
         }
         if low >= width {
             return None;
         }
-        let per_x = self.height / (high - low);
+        let per_x = height / (high - low);
         if low < 0.0 {
             changes[0] -= low * per_x;
         }
-        let (low, high) = (low.max(0.0), high.min(width));
+        let (low, high) = (most(low, 0.0), least(high, width));
         Some(Self {
-            x: (low, high),
+            low,
+            high,
             height: (high - low) * per_x,
         })
     }
@@ -112,15 +146,15 @@ impl Piece {
     /// Adds, for each column, by how much more of it lies to the right of the piece than of the column before; x
     /// counts from the first column.
     fn add_changes(&self, changes: &mut [f64]) {
-        let (low, high) = self.x;
-        let (first, last) = (low as usize, high as usize);
+        let Self { low, high, height } = *self;
+        let (first, last) = (low as i32 as usize, high as i32 as usize);
         if first == last {
-            let covered = self.height * ((first + 1) as f64 - 0.5 * (low + high));
+            let covered = height * ((first + 1) as f64 - 0.5 * (low + high));
             changes[first] += covered;
-            changes[first + 1] += self.height - covered;
+            changes[first + 1] += height - covered;
             return;
         }
-        let per_square = 0.5 * self.height / (high - low);
+        let per_square = 0.5 * height / (high - low);
         let (mut area, mut covered) = (0.0, 0.0);
         for (column, change) in changes[first..last].iter_mut().enumerate() {
             let reach = (first + column + 1) as f64 - low;
@@ -129,40 +163,31 @@ impl Piece {
             *change += covered_here - covered;
             (area, covered) = (area_here, covered_here);
         }
-        let covered_last = self.height * ((last + 1) as f64 - 0.5 * (low + high)) - area;
+        let covered_last = height * ((last + 1) as f64 - 0.5 * (low + high)) - area;
         changes[last] += covered_last - covered;
-        changes[last + 1] += self.height - covered_last;
+        changes[last + 1] += height - covered_last;
     }
 }
 
 impl Area {
-    pub fn new(corners: [DVec2; 3], twice_area: f64, left: f64, size: (usize, usize)) -> Self {
-        let origin = (left as usize).min(size.0);
-        let [mut a, mut b, mut c] = corners.map(|corner| DVec2::new(corner.x - origin as f64, corner.y));
-        let mut twice_area = twice_area;
-        for (first, second) in [(0, 1), (1, 2), (0, 1)] {
-            let sorted = [&mut a, &mut b, &mut c];
-            if sorted[second].y < sorted[first].y {
-                let [a, b, c] = sorted;
-                if (first, second) == (0, 1) {
-                    std::mem::swap(a, b);
-                } else {
-                    std::mem::swap(b, c);
-                }
-                twice_area = -twice_area;
-            }
-        }
+    pub fn new(corners: &[DVec2; 3], left: f64, size: (usize, usize)) -> Self {
+        let origin = most(0.0, left) as i32;
+        let [a, b, c] = corners.map(|corner| corner.y);
+        let order = ORDERS[usize::from(a > b) | usize::from(b > c) << 1 | usize::from(a > c) << 2];
+        let [a, b, c] = order.map(|corner| corners[corner] - DVec2::new(f64::from(origin), 0.0));
+        let per_height = 1.0 / (c.y - a.y);
         Self {
-            origin,
-            width: size.0 - origin,
+            origin: origin as usize,
+            width: size.0.saturating_sub(origin as usize),
             height: size.1,
             top: a.y,
-            middle: b.y,
+            middle: b,
             bottom: c.y,
-            long: Side::new(a, c),
-            upper: Side::new(a, b),
-            lower: Side::new(b, c),
-            share_per_area: 2.0 / twice_area,
+            long: Side::new(a, c, per_height),
+            upper: Side::new(a, b, per_height),
+            lower: Side::new(b, c, per_height),
+            share_to_middle: (b.y - a.y) * per_height,
+            share_per_area: 2.0 / (b - a).perp_dot(c - a),
         }
     }
 
@@ -170,89 +195,152 @@ impl Area {
         cells(self.top, self.bottom, self.height)
     }
 
-    /// The part of the triangle above a height.
-    fn share_above(&self, y: f64) -> f64 {
-        let whole = self.bottom - self.top;
-        tent((y - self.top) / whole, (self.middle - self.top) / whole)
+    fn cut(&self, y: f64) -> Cut {
+        let y = most(self.top, least(self.bottom, y));
+        let upper = y < self.middle.y;
+        let (side, distance) = if upper {
+            (&self.upper, y - self.top)
+        } else {
+            (&self.lower, self.bottom - y)
+        };
+        let share = distance * distance * side.share_per_square;
+        let above = if upper {
+            least(share, self.share_to_middle)
+        } else {
+            most(1.0 - share, self.share_to_middle)
+        };
+        Cut {
+            y,
+            long: self.long.x_at(y),
+            short: side.x_at(y),
+            // Exactly nothing is above the top, whatever rounding says.
+            above: if y > self.top { above } else { 0.0 },
+        }
     }
 
-    /// The pieces of its sides within a row: of the long side, the upper and the lower one.
-    fn pieces(&self, row: usize) -> ([Piece; 3], usize) {
-        let from = self.top.max(row as f64);
-        let to = self.bottom.min((row + 1) as f64);
-        let mut pieces = [self.long.piece(from, to, 1.0); 3];
-        let mut count = 1;
-        if from < self.middle {
-            pieces[count] = self.upper.piece(from, to.min(self.middle), -1.0);
-            count += 1;
+    /// Gives the shares of each of some rows, all within [`Area::rows`].
+    pub fn for_each_row(
+        &self,
+        rows: std::ops::Range<usize>,
+        shares: &mut RowShares,
+        mut visit: impl FnMut(usize, Span),
+    ) {
+        let mut from = self.cut(rows.start as f64);
+        for row in rows {
+            let to = self.cut((row + 1) as f64);
+            if let Some(span) = self.span(&from, &to, shares) {
+                visit(row, span);
+            }
+            from = to;
         }
-        if to > self.middle {
-            pieces[count] = self.lower.piece(from.max(self.middle), to, -1.0);
-            count += 1;
-        }
-        (pieces, count)
     }
 
-    pub fn fill_row(&self, row: usize, shares: &mut RowShares) {
-        let above = self.share_above(row as f64);
-        let below = self.share_above((row + 1) as f64);
-        let (pieces, count) = self.pieces(row);
-        let pieces = &pieces[..count];
-        let left = pieces.iter().map(|piece| piece.x.0).fold(f64::INFINITY, f64::min);
-        let right = pieces
-            .iter()
-            .map(|piece| piece.x.1)
-            .fold(f64::NEG_INFINITY, f64::max);
-        if right <= 0.0 || left >= self.width as f64 {
-            return;
+    /// The row between two cuts.
+    fn span<'a>(&self, from: &Cut, to: &Cut, shares: &'a mut RowShares) -> Option<Span<'a>> {
+        let turn = if from.y < self.middle.y && self.middle.y < to.y {
+            self.middle
+        } else {
+            DVec2::new(to.short, to.y)
+        };
+        let pieces = [
+            Piece::new(from.long, to.long, to.y - from.y),
+            Piece::new(from.short, turn.x, turn.y - from.y),
+            Piece::new(turn.x, to.short, to.y - turn.y),
+        ];
+        let left = least(least(pieces[0].low, pieces[1].low), pieces[2].low);
+        let right = most(most(pieces[0].high, pieces[1].high), pieces[2].high);
+        let width = self.width as f64;
+        if right <= 0.0 || left >= width {
+            return None;
         }
         let columns = cells(left, right, self.width);
         let (first, count) = (columns.start, columns.len());
-        shares.first = self.origin + first;
-        // The border before the first column, from which the pieces count now.
         let border = first as f64;
         let share_up_to = |x: f64| {
-            let area: f64 = pieces.iter().map(|piece| piece.area_up_to(x)).sum();
-            (above + area * self.share_per_area).clamp(above, below)
+            let mut area = [0.0];
+            for (piece, sign) in pieces.iter().zip([1.0, -1.0, -1.0]) {
+                piece.add_areas(x, sign, &mut area);
+            }
+            most(
+                from.above,
+                least(to.above, from.above + area[0] * self.share_per_area),
+            )
         };
-        shares.start = if left >= border {
-            above
+        let start = if left >= border {
+            from.above
         } else {
             share_up_to(border)
         };
-        let ends_here = right <= columns.end as f64;
-        let end = if ends_here {
-            below
+        let end = if right <= width {
+            to.above
         } else {
-            share_up_to(columns.end as f64)
+            share_up_to(width)
         };
-        if count > 1 {
-            self.fill_columns(pieces, border, count, shares, end);
-        } else {
-            shares.ends.push(end);
+        let ends = &mut shares.ends[..count];
+        if count > NARROW {
+            self.fill_wide(
+                &pieces,
+                border,
+                &mut shares.changes[..count + 2],
+                ends,
+                (start, end),
+            );
+        } else if count > 1 {
+            self.fill_narrow(&pieces, border, ends, (from.above, start, end));
+        }
+        ends[count - 1] = end;
+        Some(Span {
+            first: self.origin + first,
+            start,
+            ends,
+        })
+    }
+
+    /// Cumulative shares up to each border between a few columns.
+    fn fill_narrow(
+        &self,
+        pieces: &[Piece; 3],
+        border: f64,
+        ends: &mut [f64],
+        (above, start, end): (f64, f64, f64),
+    ) {
+        ends.fill(0.0);
+        for (piece, sign) in pieces.iter().zip([1.0, -1.0, -1.0]) {
+            piece.add_areas(border + 1.0, sign, ends);
+        }
+        let mut before = start;
+        for share in ends {
+            before = most(before, least(end, above + *share * self.share_per_area));
+            *share = before;
         }
     }
 
-    /// Cumulative shares of several columns from `border` on, the last of which ends with the share `end`.
-    fn fill_columns(&self, pieces: &[Piece], border: f64, count: usize, shares: &mut RowShares, end: f64) {
+    /// The same for many columns.
+    fn fill_wide(
+        &self,
+        pieces: &[Piece; 3],
+        border: f64,
+        changes: &mut [f64],
+        ends: &mut [f64],
+        (start, end): (f64, f64),
+    ) {
         // A piece that ends on the last border leaves its change behind it.
-        shares.changes.clear();
-        shares.changes.resize(count + 2, 0.0);
-        for piece in pieces {
+        changes.fill(0.0);
+        for (piece, sign) in pieces.iter().zip([1.0, -1.0, -1.0]) {
             let moved = Piece {
-                x: (piece.x.0 - border, piece.x.1 - border),
-                ..*piece
+                low: piece.low - border,
+                high: piece.high - border,
+                height: sign * piece.height,
             };
-            if let Some(moved) = moved.clipped(count as f64, &mut shares.changes) {
-                moved.add_changes(&mut shares.changes);
+            if let Some(moved) = moved.clipped(ends.len() as f64, changes) {
+                moved.add_changes(changes);
             }
         }
-        let (mut covered, mut share) = (0.0, shares.start);
-        for change in &shares.changes[..count - 1] {
-            covered += change;
-            share = (share + (covered * self.share_per_area).max(0.0)).min(end);
-            shares.ends.push(share);
+        let (mut covered, mut share) = (0.0, start);
+        for (end_here, change) in ends.iter_mut().zip(changes) {
+            covered += *change;
+            share = least(end, share + most(0.0, covered * self.share_per_area));
+            *end_here = share;
         }
-        shares.ends.push(end);
     }
 }

@@ -2,7 +2,7 @@
 
 use glam::DVec2;
 
-use super::row::RowShares;
+use super::row::{RowShares, Span};
 use super::shape::{cells, tent};
 
 /// A triangle seen along its longest side.
@@ -58,13 +58,14 @@ impl Line {
         (at(row as f64), at((row + 1) as f64))
     }
 
-    pub fn fill_row(&self, row: usize, shares: &mut RowShares) {
+    /// The shares of a row within [`Line::rows`].
+    pub fn span<'a>(&self, row: usize, shares: &'a mut RowShares) -> Option<Span<'a>> {
         let width = self.size.0;
         let (from, to) = self.part_in_row(row);
         let x_at = |t: f64| self.from.x + t * self.way.x;
         let (left, right) = (x_at(from).min(x_at(to)), x_at(from).max(x_at(to)));
         if right < 0.0 || left > width as f64 {
-            return;
+            return None;
         }
         let (before, after) = (tent(from, self.middle), tent(to, self.middle));
         let columns = cells(left, right, width);
@@ -79,15 +80,16 @@ impl Line {
             share.clamp(before, after)
         };
         let first = columns.start;
-        shares.first = first;
-        shares.start = if left >= first as f64 {
+        let start = if left >= first as f64 {
             before
         } else {
             up_to(first)
         };
-        for column in columns {
+        let ends = &mut shares.ends[..columns.len()];
+        for (column, end) in columns.zip(&mut *ends) {
             let whole = right <= (column + 1) as f64;
-            shares.ends.push(if whole { after } else { up_to(column + 1) });
+            *end = if whole { after } else { up_to(column + 1) };
         }
+        Some(Span { first, start, ends })
     }
 }

@@ -2,18 +2,25 @@
 
 use crate::illumination::accumulator::FluxCount;
 
-/// Cumulative shares of a triangle along one row of the map: what lies in the rows above, and in this row to the left
-/// of a texel's border. From 0 to 1, never falling.
-#[derive(Debug, Default)]
-pub struct RowShares {
+/// The texels of one row that a triangle reaches, with cumulative shares of the triangle: what lies in the rows above,
+/// and in this row to the left of a texel's border. From 0 to 1, never falling.
+#[derive(Clone, Copy, Debug)]
+pub struct Span<'a> {
     /// Column of the first texel.
     pub first: usize,
     /// Share before the first texel.
     pub start: f64,
     /// Share up to the right border of each texel; as many as texels.
+    pub ends: &'a [f64],
+}
+
+/// Room for the shares of a row, reused from row to row.
+#[derive(Debug)]
+pub struct RowShares {
+    /// What becomes [`Span::ends`].
     pub ends: Vec<f64>,
-    /// Changes of coverage from texel to texel, used while a row is made; zero in between.
-    pub(super) changes: Vec<f64>,
+    /// Changes of coverage from texel to texel.
+    pub changes: Vec<f64>,
 }
 
 /// Counts below this times a share are exact enough for the quick way of rounding.
@@ -37,6 +44,16 @@ fn careful_round(flux: i64, share: f64) -> i64 {
 }
 
 impl RowShares {
+    /// For maps of `width` texels across.
+    pub fn new(width: usize) -> Self {
+        Self {
+            ends: vec![0.0; width],
+            changes: vec![0.0; width + 2],
+        }
+    }
+}
+
+impl Span<'_> {
     /// Adds a triangle's flux to the texels of the row; returns what was added.
     ///
     /// Each texel gets the difference between the rounded cumulative fluxes at its borders, so that all texels of all
@@ -52,7 +69,7 @@ impl RowShares {
         }
         let begin = counts.map(|count| quick_round(count * self.start));
         let mut before = begin;
-        for (texel, &end) in texels.iter_mut().zip(&self.ends) {
+        for (texel, &end) in texels.iter_mut().zip(self.ends) {
             for channel in 0..3 {
                 let after = quick_round(counts[channel] * end);
                 texel[channel] += after - before[channel];
@@ -65,7 +82,7 @@ impl RowShares {
     fn add_grey(&self, count: f64, texels: &mut [FluxCount]) -> i64 {
         let begin = quick_round(count * self.start);
         let mut before = begin;
-        for (texel, &end) in texels.iter_mut().zip(&self.ends) {
+        for (texel, &end) in texels.iter_mut().zip(self.ends) {
             let after = quick_round(count * end);
             let share = after - before;
             for channel in texel {
@@ -79,7 +96,7 @@ impl RowShares {
     fn add_carefully(&self, flux: FluxCount, texels: &mut [FluxCount]) -> FluxCount {
         let begin = flux.map(|channel| careful_round(channel, self.start));
         let mut before = begin;
-        for (texel, &end) in texels.iter_mut().zip(&self.ends) {
+        for (texel, &end) in texels.iter_mut().zip(self.ends) {
             for channel in 0..3 {
                 let after = careful_round(flux[channel], end);
                 texel[channel] += after - before[channel];

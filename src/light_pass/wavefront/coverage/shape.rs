@@ -4,7 +4,7 @@ use glam::DVec2;
 
 use super::area::Area;
 use super::line::Line;
-use super::row::RowShares;
+use super::row::{RowShares, Span};
 
 /// Triangles less high than this over their longest side [texels] are lines: the rounding of their borders would be as
 /// much as 10⁻⁹ of their flux, and no texel is that fine.
@@ -37,9 +37,11 @@ struct Bounds {
 
 impl Bounds {
     fn new([a, b, c]: [DVec2; 3]) -> Self {
+        let low = |a, b, c| least(least(a, b), c);
+        let high = |a, b, c| most(most(a, b), c);
         Self {
-            low: a.min(b).min(c),
-            high: a.max(b).max(c),
+            low: DVec2::new(low(a.x, b.x, c.x), low(a.y, b.y, c.y)),
+            high: DVec2::new(high(a.x, b.x, c.x), high(a.y, b.y, c.y)),
         }
     }
 
@@ -49,11 +51,11 @@ impl Bounds {
 
     /// The only texel, if there is but one.
     fn texel(&self, (width, height): (usize, usize)) -> Option<(usize, usize)> {
-        // Negative coordinates become 0 here, and fail the test below.
-        let (column, row) = (self.low.x as usize, self.low.y as usize);
-        let (left, top) = (column as f64, row as f64);
-        let inside = self.low.x >= left
-            && self.low.y >= top
+        let (column, row) = (self.low.x as i32, self.low.y as i32);
+        let (left, top) = (f64::from(column), f64::from(row));
+        let (column, row) = (column as usize, row as usize);
+        let inside = self.low.x >= most(left, 0.0)
+            && self.low.y >= most(top, 0.0)
             && self.high.x <= left + 1.0
             && self.high.y <= top + 1.0
             && column < width
@@ -64,11 +66,11 @@ impl Bounds {
 
 impl Shape {
     /// Prepares a triangle for a map of `size` texels across and down.
-    pub fn new(corners: [DVec2; 3], size: (usize, usize)) -> Self {
+    pub fn new(corners: &[DVec2; 3], size: (usize, usize)) -> Self {
         if corners.iter().any(|corner| !corner.is_finite()) {
             return Self::NonFinite;
         }
-        let bounds = Bounds::new(corners);
+        let bounds = Bounds::new(*corners);
         if bounds.misses(size) || size.0 == 0 || size.1 == 0 {
             return Self::Outside;
         }
@@ -81,9 +83,9 @@ impl Shape {
         let twice_area = (corners[1] - corners[0]).perp_dot(corners[2] - corners[0]);
         let extent = bounds.high - bounds.low;
         if twice_area * twice_area <= LINE_HEIGHT_TEXELS * LINE_HEIGHT_TEXELS * extent.length_squared() {
-            return Self::Line(Line::new(corners, size));
+            return Self::Line(Line::new(*corners, size));
         }
-        Self::Area(Area::new(corners, twice_area, bounds.low.x, size))
+        Self::Area(Area::new(corners, bounds.low.x, size))
     }
 
     /// Rows of the map that it reaches.
@@ -96,28 +98,54 @@ impl Shape {
         }
     }
 
-    /// The shares of the texels of a row within [`Shape::rows`].
-    pub fn fill_row(&self, row: usize, shares: &mut RowShares) {
-        shares.ends.clear();
-        shares.first = 0;
+    /// Gives the shares of each of some rows, all within [`Shape::rows`].
+    pub fn for_each_row(
+        &self,
+        rows: std::ops::Range<usize>,
+        shares: &mut RowShares,
+        mut visit: impl FnMut(usize, Span),
+    ) {
         match self {
             Self::NonFinite | Self::Outside => {}
             Self::Texel(column, _) => {
-                shares.first = *column;
-                shares.start = 0.0;
-                shares.ends.push(1.0);
+                for row in rows {
+                    visit(
+                        row,
+                        Span {
+                            first: *column,
+                            start: 0.0,
+                            ends: &[1.0],
+                        },
+                    );
+                }
             }
-            Self::Area(area) => area.fill_row(row, shares),
-            Self::Line(line) => line.fill_row(row, shares),
+            Self::Area(area) => area.for_each_row(rows, shares, visit),
+            Self::Line(line) => {
+                for row in rows {
+                    if let Some(span) = line.span(row, shares) {
+                        visit(row, span);
+                    }
+                }
+            }
         }
     }
+}
+
+/// The smaller one; the second of numbers that do not compare.
+pub fn least(a: f64, b: f64) -> f64 {
+    if a < b { a } else { b }
+}
+
+/// The larger one; the second of numbers that do not compare.
+pub fn most(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
 }
 
 /// Rows (columns) of a map of `count` that the interval `low..=high` reaches; that of `low` where it is a point.
 pub fn cells(low: f64, high: f64, count: usize) -> std::ops::Range<usize> {
     // Casts cut to 0..; what lies on the last border belongs to the last cell.
-    let first = (low as usize).min(count.saturating_sub(1));
-    let last = (high as usize).min(count);
+    let first = (most(0.0, low) as i32 as usize).min(count.saturating_sub(1));
+    let last = (most(0.0, high) as i32 as usize).min(count);
     let end = if high > last as f64 { last + 1 } else { last };
     first..end.min(count).max(first + 1)
 }
