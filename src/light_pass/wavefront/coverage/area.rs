@@ -1,15 +1,15 @@
 //! Triangles that have area: their part in each texel of a row, from the areas beside their sides.
 
+use std::ops::Range;
+
 use glam::DVec2;
 
-use super::row::{RowShares, Span};
+use super::piece::Piece;
+use super::row::{RowShares, Sink, Span};
 use super::shape::{cells, least, most};
 
 /// Sides less high than this [texels] are level: they bound no area.
 const LEVEL_TEXELS: f64 = 1e-30;
-
-/// Rows of up to this many texels are quicker border by border than piece by piece.
-const NARROW: usize = 4;
 
 /// The order of the corners from top to bottom, by which of a > b, b > c, a > c hold of their heights (1, 2, 4).
 const ORDERS: [[usize; 3]; 8] = [
@@ -28,9 +28,9 @@ const ORDERS: [[usize; 3]; 8] = [
 pub struct Area {
     /// Column that x = 0 stands for.
     origin: usize,
-    /// Columns from there to the map's right border.
-    width: usize,
-    height: usize,
+    /// Columns that it reaches from there on, and whether it leaves the map on either side.
+    columns: usize,
+    crosses_border: bool,
     top: f64,
     middle: DVec2,
     bottom: f64,
@@ -69,15 +69,8 @@ struct Cut {
     above: f64,
 }
 
-/// Part of a side within a row.
-#[derive(Clone, Copy)]
-struct Piece {
-    low: f64,
-    high: f64,
-    height: f64,
-}
-
 impl Side {
+    #[inline(always)]
     fn new(start: DVec2, end: DVec2, per_height: f64) -> Self {
         let way = end - start;
         let inverse = if way.y > LEVEL_TEXELS { 1.0 / way.y } else { 0.0 };
@@ -90,96 +83,26 @@ impl Side {
         }
     }
 
+    #[inline(always)]
     fn x_at(&self, y: f64) -> f64 {
         let x = self.start.x + (y - self.start.y) * self.slope;
         most(self.low, least(self.high, x))
     }
 }
 
-impl Piece {
-    fn new(a: f64, b: f64, height: f64) -> Self {
-        Self {
-            low: least(a, b),
-            high: most(a, b),
-            height,
-        }
-    }
-
-    /// Area to its right up to each of the borders after `first`.
-    fn add_areas(&self, first: f64, sign: f64, areas: &mut [f64]) {
-        let run = self.high - self.low;
-        // No area where there is no run; anything finite will do as a factor.
-        let per_square = 0.5 * self.height / most(run, f64::MIN_POSITIVE);
-        let (per_square, height) = (sign * per_square, sign * self.height);
-        for (column, area) in areas.iter_mut().enumerate() {
-            let x = first + column as f64 - self.low;
-            let within = most(0.0, least(run, x));
-            *area += per_square * within * within + height * most(0.0, x - run);
-        }
-    }
-
-    /// The part with x from 0 to `width`; what lies further left moves to 0.
-    fn clipped(&self, width: f64, changes: &mut [f64]) -> Option<Self> {
-        let Self { low, high, height } = *self;
-        if low >= 0.0 && high <= width {
-            return Some(*self);
-        }
-        if high <= 0.0 {
-            changes[0] += height;
-            return None;
-        }
-        if low >= width {
-            return None;
-        }
-        let per_x = height / (high - low);
-        if low < 0.0 {
-            changes[0] -= low * per_x;
-        }
-        let (low, high) = (most(low, 0.0), least(high, width));
-        Some(Self {
-            low,
-            high,
-            height: (high - low) * per_x,
-        })
-    }
-
-    /// Adds, for each column, by how much more of it lies to the right of the piece than of the column before; x
-    /// counts from the first column.
-    fn add_changes(&self, changes: &mut [f64]) {
-        let Self { low, high, height } = *self;
-        let (first, last) = (low as i32 as usize, high as i32 as usize);
-        if first == last {
-            let covered = height * ((first + 1) as f64 - 0.5 * (low + high));
-            changes[first] += covered;
-            changes[first + 1] += height - covered;
-            return;
-        }
-        let per_square = 0.5 * height / (high - low);
-        let (mut area, mut covered) = (0.0, 0.0);
-        for (column, change) in changes[first..last].iter_mut().enumerate() {
-            let reach = (first + column + 1) as f64 - low;
-            let area_here = per_square * reach * reach;
-            let covered_here = area_here - area;
-            *change += covered_here - covered;
-            (area, covered) = (area_here, covered_here);
-        }
-        let covered_last = height * ((last + 1) as f64 - 0.5 * (low + high)) - area;
-        changes[last] += covered_last - covered;
-        changes[last + 1] += height - covered_last;
-    }
-}
-
 impl Area {
-    pub fn new(corners: &[DVec2; 3], left: f64, size: (usize, usize)) -> Self {
-        let origin = most(0.0, left) as i32;
+    /// `columns` are those of the map's `width` that the triangle reaches.
+    #[inline(always)]
+    pub fn new(corners: &[DVec2; 3], columns: Range<usize>, crosses_border: bool) -> Self {
         let [a, b, c] = corners.map(|corner| corner.y);
         let order = ORDERS[usize::from(a > b) | usize::from(b > c) << 1 | usize::from(a > c) << 2];
-        let [a, b, c] = order.map(|corner| corners[corner] - DVec2::new(f64::from(origin), 0.0));
+        let origin = DVec2::new(columns.start as f64, 0.0);
+        let [a, b, c] = order.map(|corner| corners[corner] - origin);
         let per_height = 1.0 / (c.y - a.y);
         Self {
-            origin: origin as usize,
-            width: size.0.saturating_sub(origin as usize),
-            height: size.1,
+            origin: columns.start,
+            columns: columns.len(),
+            crosses_border,
             top: a.y,
             middle: b,
             bottom: c.y,
@@ -191,10 +114,7 @@ impl Area {
         }
     }
 
-    pub fn rows(&self) -> std::ops::Range<usize> {
-        cells(self.top, self.bottom, self.height)
-    }
-
+    #[inline(always)]
     fn cut(&self, y: f64) -> Cut {
         let y = most(self.top, least(self.bottom, y));
         let upper = y < self.middle.y;
@@ -218,123 +138,113 @@ impl Area {
         }
     }
 
-    /// Gives the shares of each of some rows, all within [`Area::rows`].
-    pub fn for_each_row(
+    /// The sides between two cuts: the long one, and the others as far as the middle corner and from there on.
+    #[inline(always)]
+    fn pieces(&self, from: &Cut, to: &Cut) -> [Piece; 3] {
+        let turns = from.y < self.middle.y && self.middle.y < to.y;
+        let turn_x = if turns { self.middle.x } else { to.short };
+        let turn_y = if turns { self.middle.y } else { to.y };
+        [
+            Piece::new(from.long, to.long, to.y - from.y),
+            Piece::new(from.short, turn_x, from.y - turn_y),
+            Piece::new(turn_x, to.short, turn_y - to.y),
+        ]
+    }
+
+    /// Gives the shares of each of some rows that the triangle reaches.
+    #[inline(always)]
+    pub fn for_each_row(&self, rows: Range<usize>, shares: &mut RowShares, sink: &mut impl Sink) {
+        match self.columns {
+            _ if self.crosses_border => self.for_each_wide_row(rows, shares, sink),
+            0..=3 => self.for_each_narrow_row::<3, 2>(rows, sink),
+            4..=5 => self.for_each_narrow_row::<5, 4>(rows, sink),
+            6..=9 => self.for_each_narrow_row::<9, 8>(rows, sink),
+            _ => self.for_each_wide_row(rows, shares, sink),
+        }
+    }
+
+    /// For triangles of up to `N` columns = `BORDERS` + 1: without any decision that depends on the triangle's shape,
+    /// as mistaken guesses of the processor would cost more than texels that get nothing.
+    #[inline(always)]
+    fn for_each_narrow_row<const N: usize, const BORDERS: usize>(
         &self,
-        rows: std::ops::Range<usize>,
-        shares: &mut RowShares,
-        mut visit: impl FnMut(usize, Span),
+        rows: Range<usize>,
+        sink: &mut impl Sink,
     ) {
         let mut from = self.cut(rows.start as f64);
         for row in rows {
             let to = self.cut((row + 1) as f64);
-            if let Some(span) = self.span(&from, &to, shares) {
-                visit(row, span);
+            let mut areas = [0.0; BORDERS];
+            for piece in self.pieces(&from, &to) {
+                piece.add_areas(1.0, &mut areas);
+            }
+            let mut ends = [to.above; N];
+            let mut before = from.above;
+            for (end, area) in ends.iter_mut().zip(areas) {
+                before = most(before, least(to.above, from.above + area * self.share_per_area));
+                *end = before;
+            }
+            sink.add(
+                row,
+                Span {
+                    first: self.origin,
+                    start: from.above,
+                    ends: &ends[..self.columns],
+                },
+            );
+            from = to;
+        }
+    }
+
+    fn for_each_wide_row(&self, rows: Range<usize>, shares: &mut RowShares, sink: &mut impl Sink) {
+        let mut from = self.cut(rows.start as f64);
+        for row in rows {
+            let to = self.cut((row + 1) as f64);
+            if let Some(span) = self.wide_span(&from, &to, shares) {
+                sink.add(row, span);
             }
             from = to;
         }
     }
 
-    /// The row between two cuts.
-    fn span<'a>(&self, from: &Cut, to: &Cut, shares: &'a mut RowShares) -> Option<Span<'a>> {
-        let turn = if from.y < self.middle.y && self.middle.y < to.y {
-            self.middle
-        } else {
-            DVec2::new(to.short, to.y)
-        };
-        let pieces = [
-            Piece::new(from.long, to.long, to.y - from.y),
-            Piece::new(from.short, turn.x, turn.y - from.y),
-            Piece::new(turn.x, to.short, to.y - turn.y),
-        ];
+    /// The row between two cuts: texel by texel.
+    fn wide_span<'a>(&self, from: &Cut, to: &Cut, shares: &'a mut RowShares) -> Option<Span<'a>> {
+        let pieces = self.pieces(from, to);
         let left = least(least(pieces[0].low, pieces[1].low), pieces[2].low);
         let right = most(most(pieces[0].high, pieces[1].high), pieces[2].high);
-        let width = self.width as f64;
+        let width = self.columns as f64;
         if right <= 0.0 || left >= width {
             return None;
         }
-        let columns = cells(left, right, self.width);
+        let columns = cells(left, right, self.columns);
         let (first, count) = (columns.start, columns.len());
-        let border = first as f64;
         let share_up_to = |x: f64| {
             let mut area = [0.0];
-            for (piece, sign) in pieces.iter().zip([1.0, -1.0, -1.0]) {
-                piece.add_areas(x, sign, &mut area);
+            for piece in &pieces {
+                piece.add_areas(x, &mut area);
             }
             most(
                 from.above,
                 least(to.above, from.above + area[0] * self.share_per_area),
             )
         };
-        let start = if left >= border {
-            from.above
-        } else {
-            share_up_to(border)
-        };
+        let start = if left >= 0.0 { from.above } else { share_up_to(0.0) };
         let end = if right <= width {
             to.above
         } else {
             share_up_to(width)
         };
         let ends = &mut shares.ends[..count];
-        if count > NARROW {
-            self.fill_wide(
-                &pieces,
-                border,
-                &mut shares.changes[..count + 2],
-                ends,
-                (start, end),
-            );
-        } else if count > 1 {
-            self.fill_narrow(&pieces, border, ends, (from.above, start, end));
-        }
-        ends[count - 1] = end;
-        Some(Span {
-            first: self.origin + first,
-            start,
-            ends,
-        })
-    }
-
-    /// Cumulative shares up to each border between a few columns.
-    fn fill_narrow(
-        &self,
-        pieces: &[Piece; 3],
-        border: f64,
-        ends: &mut [f64],
-        (above, start, end): (f64, f64, f64),
-    ) {
-        ends.fill(0.0);
-        for (piece, sign) in pieces.iter().zip([1.0, -1.0, -1.0]) {
-            piece.add_areas(border + 1.0, sign, ends);
-        }
-        let mut before = start;
-        for share in ends {
-            before = most(before, least(end, above + *share * self.share_per_area));
-            *share = before;
-        }
-    }
-
-    /// The same for many columns.
-    fn fill_wide(
-        &self,
-        pieces: &[Piece; 3],
-        border: f64,
-        changes: &mut [f64],
-        ends: &mut [f64],
-        (start, end): (f64, f64),
-    ) {
-        // A piece that ends on the last border leaves its change behind it.
+        let changes = &mut shares.changes[..count + 2];
         changes.fill(0.0);
-        for (piece, sign) in pieces.iter().zip([1.0, -1.0, -1.0]) {
-            let moved = Piece {
+        let border = first as f64;
+        for piece in &pieces {
+            Piece {
                 low: piece.low - border,
                 high: piece.high - border,
-                height: sign * piece.height,
-            };
-            if let Some(moved) = moved.clipped(ends.len() as f64, changes) {
-                moved.add_changes(changes);
+                ..*piece
             }
+            .add_changes(changes);
         }
         let (mut covered, mut share) = (0.0, start);
         for (end_here, change) in ends.iter_mut().zip(changes) {
@@ -342,5 +252,11 @@ impl Area {
             share = least(end, share + most(0.0, covered * self.share_per_area));
             *end_here = share;
         }
+        ends[count - 1] = end;
+        Some(Span {
+            first: self.origin + first,
+            start,
+            ends,
+        })
     }
 }

@@ -1,7 +1,7 @@
 //! Maps with texels that the surface does not cover.
 
 use super::report::book;
-use super::row::{RowShares, Span};
+use super::row::{Divided, RowShares, Sink, Span};
 use super::shape::Shape;
 use super::{Coverage, CoverageReport, FluxTriangle};
 use crate::illumination::accumulator::FluxCount;
@@ -77,26 +77,19 @@ impl Shares {
         self.covered.clear();
         self.uncovered.clear();
         let mut inside = [0; 3];
-        let Self {
-            covered,
-            uncovered,
-            row,
-            line,
-        } = self;
-        shape.for_each_row(shape.rows(), row, |row, span| {
-            line.clear();
-            line.resize(span.ends.len(), [0; 3]);
-            book(&mut inside, Span { first: 0, ..span }.add(triangle.flux, line));
-            for (offset, &share) in line.iter().enumerate() {
-                let column = span.first + offset;
-                let list = if coverage.covers(column, row, triangle.island) {
-                    &mut *covered
-                } else {
-                    &mut *uncovered
-                };
-                list.push((column, row, share));
-            }
-        });
+        shape.for_each_row(
+            shape.rows(),
+            &mut self.row,
+            &mut Places {
+                flux: Divided::new(triangle.flux),
+                island: triangle.island,
+                coverage,
+                covered: &mut self.covered,
+                uncovered: &mut self.uncovered,
+                line: &mut self.line,
+                inside: &mut inside,
+            },
+        );
         inside
     }
 
@@ -123,5 +116,33 @@ impl Shares {
         rows.flat_map(|row| columns.clone().map(move |column| (column, row)))
             .filter(|&(column, row)| coverage.covers(column, row, island))
             .min_by_key(|&place| distance(place))
+    }
+}
+
+/// Sorts the texels of one triangle.
+struct Places<'a, C> {
+    flux: Divided,
+    island: u32,
+    coverage: &'a C,
+    covered: &'a mut Vec<(usize, usize, FluxCount)>,
+    uncovered: &'a mut Vec<(usize, usize, FluxCount)>,
+    line: &'a mut Vec<FluxCount>,
+    inside: &'a mut [i128; 3],
+}
+
+impl<C: Coverage> Sink for Places<'_, C> {
+    fn add(&mut self, row: usize, span: Span) {
+        self.line.clear();
+        self.line.resize(span.ends.len(), [0; 3]);
+        book(self.inside, self.flux.add(Span { first: 0, ..span }, self.line));
+        for (offset, &share) in self.line.iter().enumerate() {
+            let column = span.first + offset;
+            let list = if self.coverage.covers(column, row, self.island) {
+                &mut *self.covered
+            } else {
+                &mut *self.uncovered
+            };
+            list.push((column, row, share));
+        }
     }
 }

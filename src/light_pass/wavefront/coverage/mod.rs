@@ -8,6 +8,7 @@ mod area;
 mod bands;
 mod gaps;
 mod line;
+mod piece;
 mod report;
 mod row;
 mod shape;

@@ -1,10 +1,12 @@
 //! How a triangle meets the map.
 
+use std::ops::Range;
+
 use glam::DVec2;
 
 use super::area::Area;
 use super::line::Line;
-use super::row::{RowShares, Span};
+use super::row::{RowShares, Sink, Span};
 
 /// Triangles less high than this over their longest side [texels] are lines: the rounding of their borders would be as
 /// much as 10⁻⁹ of their flux, and no texel is that fine.
@@ -14,7 +16,7 @@ const LINE_HEIGHT_TEXELS: f64 = 1e-6;
 const FARTHEST_TEXELS: f64 = 1e18;
 
 /// A triangle, made ready for one map.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub enum Shape {
     /// A corner is not finite.
     NonFinite,
@@ -22,8 +24,8 @@ pub enum Shape {
     Outside,
     /// Wholly within one texel: column, row.
     Texel(usize, usize),
-    /// A triangle that has area.
-    Area(Area),
+    /// A triangle that has area, and its rows on the map.
+    Area(Area, Range<usize>),
     /// A triangle without.
     Line(Line),
 }
@@ -36,6 +38,7 @@ struct Bounds {
 }
 
 impl Bounds {
+    #[inline(always)]
     fn new([a, b, c]: [DVec2; 3]) -> Self {
         let low = |a, b, c| least(least(a, b), c);
         let high = |a, b, c| most(most(a, b), c);
@@ -66,6 +69,7 @@ impl Bounds {
 
 impl Shape {
     /// Prepares a triangle for a map of `size` texels across and down.
+    #[inline(always)]
     pub fn new(corners: &[DVec2; 3], size: (usize, usize)) -> Self {
         if corners.iter().any(|corner| !corner.is_finite()) {
             return Self::NonFinite;
@@ -85,45 +89,40 @@ impl Shape {
         if twice_area * twice_area <= LINE_HEIGHT_TEXELS * LINE_HEIGHT_TEXELS * extent.length_squared() {
             return Self::Line(Line::new(*corners, size));
         }
-        Self::Area(Area::new(corners, bounds.low.x, size))
+        let columns = cells(bounds.low.x, bounds.high.x, size.0);
+        let crosses_border = bounds.low.x < 0.0 || bounds.high.x > size.0 as f64;
+        let rows = cells(bounds.low.y, bounds.high.y, size.1);
+        Self::Area(Area::new(corners, columns, crosses_border), rows)
     }
 
     /// Rows of the map that it reaches.
-    pub fn rows(&self) -> std::ops::Range<usize> {
+    pub fn rows(&self) -> Range<usize> {
         match self {
             Self::NonFinite | Self::Outside => 0..0,
             Self::Texel(_, row) => *row..*row + 1,
-            Self::Area(area) => area.rows(),
+            Self::Area(_, rows) => rows.clone(),
             Self::Line(line) => line.rows(),
         }
     }
 
     /// Gives the shares of each of some rows, all within [`Shape::rows`].
-    pub fn for_each_row(
-        &self,
-        rows: std::ops::Range<usize>,
-        shares: &mut RowShares,
-        mut visit: impl FnMut(usize, Span),
-    ) {
+    #[inline(always)]
+    pub fn for_each_row(&self, rows: Range<usize>, shares: &mut RowShares, sink: &mut impl Sink) {
         match self {
             Self::NonFinite | Self::Outside => {}
             Self::Texel(column, _) => {
-                for row in rows {
-                    visit(
-                        row,
-                        Span {
-                            first: *column,
-                            start: 0.0,
-                            ends: &[1.0],
-                        },
-                    );
-                }
+                let whole = Span {
+                    first: *column,
+                    start: 0.0,
+                    ends: &[1.0],
+                };
+                rows.for_each(|row| sink.add(row, whole));
             }
-            Self::Area(area) => area.for_each_row(rows, shares, visit),
+            Self::Area(area, _) => area.for_each_row(rows, shares, sink),
             Self::Line(line) => {
                 for row in rows {
                     if let Some(span) = line.span(row, shares) {
-                        visit(row, span);
+                        sink.add(row, span);
                     }
                 }
             }
@@ -142,7 +141,7 @@ pub fn most(a: f64, b: f64) -> f64 {
 }
 
 /// Rows (columns) of a map of `count` that the interval `low..=high` reaches; that of `low` where it is a point.
-pub fn cells(low: f64, high: f64, count: usize) -> std::ops::Range<usize> {
+pub fn cells(low: f64, high: f64, count: usize) -> Range<usize> {
     // Casts cut to 0..; what lies on the last border belongs to the last cell.
     let first = (most(0.0, low) as i32 as usize).min(count.saturating_sub(1));
     let last = (most(0.0, high) as i32 as usize).min(count);
