@@ -4,12 +4,9 @@ use std::ops::Range;
 
 use glam::DVec2;
 
-use super::piece::Piece;
 use super::row::{RowShares, Sink, Span};
 use super::shape::{cells, least, most};
-
-/// Sides less high than this [texels] are level: they bound no area.
-const LEVEL_TEXELS: f64 = 1e-30;
+use super::sides::{Cut, Reach, Sides};
 
 /// The order of the corners from top to bottom, by which of a > b, b > c, a > c hold of their heights (1, 2, 4).
 const ORDERS: [[usize; 3]; 8] = [
@@ -31,124 +28,22 @@ pub struct Area {
     /// Columns that it reaches from there on, and whether it leaves the map on either side.
     columns: usize,
     crosses_border: bool,
-    top: f64,
-    middle: DVec2,
-    bottom: f64,
-    /// From the top to the bottom corner.
-    long: Side,
-    /// From the top to the middle corner.
-    upper: Side,
-    /// From the middle to the bottom corner.
-    lower: Side,
-    /// Part of the area above the middle corner.
-    share_to_middle: f64,
-    /// Share of an area to the right of the long side that is not to the right of the others.
-    share_per_area: f64,
-}
-
-/// A side of the triangle: x as a function of y.
-#[derive(Clone, Copy, Debug)]
-struct Side {
-    start: DVec2,
-    slope: f64,
-    low: f64,
-    high: f64,
-    /// Part of the triangle's area per squared distance from the side's end at the top or bottom corner.
-    share_per_square: f64,
-}
-
-/// The triangle cut at one height.
-#[derive(Clone, Copy)]
-struct Cut {
-    y: f64,
-    /// x on the long side.
-    long: f64,
-    /// x on the two others.
-    short: f64,
-    /// Share above.
-    above: f64,
-}
-
-impl Side {
-    #[inline(always)]
-    fn new(start: DVec2, end: DVec2, per_height: f64) -> Self {
-        let way = end - start;
-        let inverse = if way.y > LEVEL_TEXELS { 1.0 / way.y } else { 0.0 };
-        Self {
-            start,
-            slope: way.x * inverse,
-            low: least(start.x, end.x),
-            high: most(start.x, end.x),
-            share_per_square: inverse * per_height,
-        }
-    }
-
-    #[inline(always)]
-    fn x_at(&self, y: f64) -> f64 {
-        let x = self.start.x + (y - self.start.y) * self.slope;
-        most(self.low, least(self.high, x))
-    }
+    sides: Sides,
 }
 
 impl Area {
-    /// `columns` are those of the map's `width` that the triangle reaches.
+    /// A triangle that reaches `columns` of the map.
     #[inline(always)]
     pub fn new(corners: &[DVec2; 3], columns: Range<usize>, crosses_border: bool) -> Self {
         let [a, b, c] = corners.map(|corner| corner.y);
         let order = ORDERS[usize::from(a > b) | usize::from(b > c) << 1 | usize::from(a > c) << 2];
         let origin = DVec2::new(columns.start as f64, 0.0);
-        let [a, b, c] = order.map(|corner| corners[corner] - origin);
-        let per_height = 1.0 / (c.y - a.y);
         Self {
             origin: columns.start,
             columns: columns.len(),
             crosses_border,
-            top: a.y,
-            middle: b,
-            bottom: c.y,
-            long: Side::new(a, c, per_height),
-            upper: Side::new(a, b, per_height),
-            lower: Side::new(b, c, per_height),
-            share_to_middle: (b.y - a.y) * per_height,
-            share_per_area: 2.0 / (b - a).perp_dot(c - a),
+            sides: Sides::new(order.map(|corner| corners[corner] - origin)),
         }
-    }
-
-    #[inline(always)]
-    fn cut(&self, y: f64) -> Cut {
-        let y = most(self.top, least(self.bottom, y));
-        let upper = y < self.middle.y;
-        let (side, distance) = if upper {
-            (&self.upper, y - self.top)
-        } else {
-            (&self.lower, self.bottom - y)
-        };
-        let share = distance * distance * side.share_per_square;
-        let above = if upper {
-            least(share, self.share_to_middle)
-        } else {
-            most(1.0 - share, self.share_to_middle)
-        };
-        Cut {
-            y,
-            long: self.long.x_at(y),
-            short: side.x_at(y),
-            // Exactly nothing is above the top, whatever rounding says.
-            above: if y > self.top { above } else { 0.0 },
-        }
-    }
-
-    /// The sides between two cuts: the long one, and the others as far as the middle corner and from there on.
-    #[inline(always)]
-    fn pieces(&self, from: &Cut, to: &Cut) -> [Piece; 3] {
-        let turns = from.y < self.middle.y && self.middle.y < to.y;
-        let turn_x = if turns { self.middle.x } else { to.short };
-        let turn_y = if turns { self.middle.y } else { to.y };
-        [
-            Piece::new(from.long, to.long, to.y - from.y),
-            Piece::new(from.short, turn_x, from.y - turn_y),
-            Piece::new(turn_x, to.short, turn_y - to.y),
-        ]
     }
 
     /// Gives the shares of each of some rows that the triangle reaches.
@@ -156,40 +51,41 @@ impl Area {
     pub fn for_each_row(&self, rows: Range<usize>, shares: &mut RowShares, sink: &mut impl Sink) {
         match self.columns {
             _ if self.crosses_border => self.for_each_wide_row(rows, shares, sink),
-            0..=3 => self.for_each_narrow_row::<3, 2>(rows, sink),
-            4..=5 => self.for_each_narrow_row::<5, 4>(rows, sink),
-            6..=9 => self.for_each_narrow_row::<9, 8>(rows, sink),
+            1 => self.for_each_narrow_row::<1, 0>(rows, sink),
+            2 => self.for_each_narrow_row::<2, 1>(rows, sink),
+            3 => self.for_each_narrow_row::<3, 2>(rows, sink),
+            4 => self.for_each_narrow_row::<4, 3>(rows, sink),
             _ => self.for_each_wide_row(rows, shares, sink),
         }
     }
 
-    /// For triangles of up to `N` columns = `BORDERS` + 1: without any decision that depends on the triangle's shape,
-    /// as mistaken guesses of the processor would cost more than texels that get nothing.
+    /// For triangles of `N` columns, with `N` − 1 = `BORDERS` between them: without any decision that depends on the
+    /// triangle's shape, as mistaken guesses of the processor would cost more than texels that get nothing.
     #[inline(always)]
     fn for_each_narrow_row<const N: usize, const BORDERS: usize>(
         &self,
         rows: Range<usize>,
         sink: &mut impl Sink,
     ) {
-        let mut from = self.cut(rows.start as f64);
+        let mut from = self.sides.cut(rows.start as f64);
         for row in rows {
-            let to = self.cut((row + 1) as f64);
-            let mut areas = [0.0; BORDERS];
-            for piece in self.pieces(&from, &to) {
-                piece.add_areas(1.0, &mut areas);
-            }
+            let to = self.sides.cut((row + 1) as f64);
+            let pieces = self.sides.between(&from, &to);
             let mut ends = [to.above; N];
+            for border in 0..BORDERS {
+                ends[border] = least(to.above, from.above + pieces.share_up_to((border + 1) as f64));
+            }
             let mut before = from.above;
-            for (end, area) in ends.iter_mut().zip(areas) {
-                before = most(before, least(to.above, from.above + area * self.share_per_area));
-                *end = before;
+            for end in &mut ends {
+                *end = most(before, *end);
+                before = *end;
             }
             sink.add(
                 row,
                 Span {
                     first: self.origin,
                     start: from.above,
-                    ends: &ends[..self.columns],
+                    ends: &ends,
                 },
             );
             from = to;
@@ -197,9 +93,9 @@ impl Area {
     }
 
     fn for_each_wide_row(&self, rows: Range<usize>, shares: &mut RowShares, sink: &mut impl Sink) {
-        let mut from = self.cut(rows.start as f64);
+        let mut from = self.sides.cut(rows.start as f64);
         for row in rows {
-            let to = self.cut((row + 1) as f64);
+            let to = self.sides.cut((row + 1) as f64);
             if let Some(span) = self.wide_span(&from, &to, shares) {
                 sink.add(row, span);
             }
@@ -207,56 +103,77 @@ impl Area {
         }
     }
 
-    /// The row between two cuts: texel by texel.
+    /// The row between two cuts: border by border where sides are, in even steps between them.
     fn wide_span<'a>(&self, from: &Cut, to: &Cut, shares: &'a mut RowShares) -> Option<Span<'a>> {
-        let pieces = self.pieces(from, to);
-        let left = least(least(pieces[0].low, pieces[1].low), pieces[2].low);
-        let right = most(most(pieces[0].high, pieces[1].high), pieces[2].high);
+        let pieces = self.sides.between(from, to);
+        let reach = self.sides.reach(&pieces);
         let width = self.columns as f64;
-        if right <= 0.0 || left >= width {
+        if reach.right <= 0.0 || reach.left >= width {
             return None;
         }
-        let columns = cells(left, right, self.columns);
-        let (first, count) = (columns.start, columns.len());
-        let share_up_to = |x: f64| {
-            let mut area = [0.0];
-            for piece in &pieces {
-                piece.add_areas(x, &mut area);
-            }
-            most(
-                from.above,
-                least(to.above, from.above + area[0] * self.share_per_area),
-            )
+        let columns = cells(reach.left, reach.right, self.columns);
+        let share_up_to = |x: f64| most(from.above, least(to.above, from.above + pieces.share_up_to(x)));
+        let start = if reach.left >= 0.0 {
+            from.above
+        } else {
+            share_up_to(0.0)
         };
-        let start = if left >= 0.0 { from.above } else { share_up_to(0.0) };
-        let end = if right <= width {
+        let end = if reach.right <= width {
             to.above
         } else {
             share_up_to(width)
         };
-        let ends = &mut shares.ends[..count];
-        let changes = &mut shares.changes[..count + 2];
-        changes.fill(0.0);
-        let border = first as f64;
-        for piece in &pieces {
-            Piece {
-                low: piece.low - border,
-                high: piece.high - border,
-                ..*piece
-            }
-            .add_changes(changes);
-        }
-        let (mut covered, mut share) = (0.0, start);
-        for (end_here, change) in ends.iter_mut().zip(changes) {
-            covered += *change;
-            share = least(end, share + most(0.0, covered * self.share_per_area));
-            *end_here = share;
-        }
-        ends[count - 1] = end;
+        let ends = &mut shares.ends[..columns.len()];
+        fill(
+            ends,
+            columns.start,
+            &reach,
+            (start, end),
+            pieces.full,
+            share_up_to,
+        );
         Some(Span {
-            first: self.origin + first,
+            first: self.origin + columns.start,
             start,
             ends,
         })
     }
+}
+
+/// Fills the shares `ends` of columns from `first` on, which begin with the share `start` and end with `end`.
+fn fill(
+    ends: &mut [f64],
+    first: usize,
+    reach: &Reach,
+    (start, end): (f64, f64),
+    full: f64,
+    share_up_to: impl Fn(f64) -> f64,
+) {
+    let Some(last) = ends.len().checked_sub(1) else {
+        return;
+    };
+    // Whole columns from the border after the first one on.
+    let columns_to = |x: f64| (most(0.0, x - (first + 1) as f64) as i32 as usize).min(last);
+    // The border at or after the beginning of the gap gets its own share, and even steps follow to the gap's end.
+    let before_gap = columns_to(reach.gap_from);
+    let rest = usize::from(reach.gap_from > (first + 1 + before_gap) as f64);
+    let even_from = (before_gap + rest + 1).min(last);
+    let even_to = columns_to(reach.gap_to + 1.0).max(even_from);
+    let border = |index: usize| (first + 1 + index) as f64;
+    let mut before = start;
+    for (index, share) in ends[..even_from].iter_mut().enumerate() {
+        before = least(end, most(before, share_up_to(border(index))));
+        *share = before;
+    }
+    let mut steps = 0.0;
+    for share in &mut ends[even_from..even_to] {
+        steps += 1.0;
+        *share = least(end, before + steps * full);
+    }
+    before = least(end, before + steps * full);
+    for (index, share) in ends[..last].iter_mut().enumerate().skip(even_to) {
+        before = least(end, most(before, share_up_to(border(index))));
+        *share = before;
+    }
+    ends[last] = end;
 }

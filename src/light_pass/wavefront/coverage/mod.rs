@@ -8,10 +8,10 @@ mod area;
 mod bands;
 mod gaps;
 mod line;
-mod piece;
 mod report;
 mod row;
 mod shape;
+mod sides;
 
 use glam::DVec2;
 

@@ -25,8 +25,6 @@ pub trait Sink {
 pub struct RowShares {
     /// What becomes [`Span::ends`].
     pub ends: Vec<f64>,
-    /// Changes of coverage from texel to texel.
-    pub changes: Vec<f64>,
 }
 
 impl RowShares {
@@ -34,7 +32,6 @@ impl RowShares {
     pub fn new(width: usize) -> Self {
         Self {
             ends: vec![0.0; width],
-            changes: vec![0.0; width + 2],
         }
     }
 }
@@ -68,9 +65,12 @@ fn quick_round(value: f64) -> i64 {
     (value + ROUNDER).to_bits() as i64
 }
 
+/// Cumulative shares from here on are all, but for rounding.
+const NEARLY_ALL: f64 = 1.0 - 1e-15;
+
 /// Counts of a cumulative share; any flux.
 fn careful_round(flux: i64, share: f64) -> i64 {
-    if share >= 1.0 {
+    if share >= NEARLY_ALL {
         flux
     } else {
         ((flux as f64 * share).round() as i64).clamp(flux.min(0), flux.max(0))
