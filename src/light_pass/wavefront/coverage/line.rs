@@ -14,11 +14,12 @@ pub struct Line {
     way: DVec2,
     /// Fraction of the way at which the middle corner lies.
     middle: f64,
-    size: (usize, usize),
+    /// Columns of the map.
+    width: usize,
 }
 
 impl Line {
-    pub fn new([a, b, c]: [DVec2; 3], size: (usize, usize)) -> Self {
+    pub fn new([a, b, c]: [DVec2; 3], width: usize) -> Self {
         let sides = [(a, b, c), (b, c, a), (c, a, b)];
         let [mut longest, rest @ ..] = sides;
         for side in rest {
@@ -41,12 +42,8 @@ impl Line {
             } else {
                 middle.clamp(0.0, 1.0)
             },
-            size,
+            width,
         }
-    }
-
-    pub fn rows(&self) -> std::ops::Range<usize> {
-        cells(self.from.y, self.from.y + self.way.y, self.size.1)
     }
 
     /// Fractions of the way at which a row begins and ends.
@@ -58,9 +55,9 @@ impl Line {
         (at(row as f64), at((row + 1) as f64))
     }
 
-    /// The shares of a row within [`Line::rows`].
+    /// The shares of a row within its rows.
     pub fn span<'a>(&self, row: usize, shares: &'a mut RowShares) -> Option<Span<'a>> {
-        let width = self.size.0;
+        let width = self.width;
         let (from, to) = self.part_in_row(row);
         let x_at = |t: f64| self.from.x + t * self.way.x;
         let (left, right) = (x_at(from).min(x_at(to)), x_at(from).max(x_at(to)));

@@ -6,6 +6,7 @@
 
 mod area;
 mod bands;
+mod bins;
 mod gaps;
 mod line;
 mod report;

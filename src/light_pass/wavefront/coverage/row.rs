@@ -54,7 +54,7 @@ enum Way {
 }
 
 /// Counts up to this can be rounded the quick way.
-const QUICK: i64 = 1 << 50;
+const QUICK: i64 = 1 << 48;
 
 /// Adding it leaves the nearest whole number of a value of up to 2⁵⁰ in the lowest bits.
 const ROUNDER: f64 = (3_u64 << 51) as f64;
@@ -66,7 +66,7 @@ fn quick_round(value: f64) -> i64 {
 }
 
 /// Cumulative shares from here on are all, but for rounding.
-const NEARLY_ALL: f64 = 1.0 - 1e-15;
+const NEARLY_ALL: f64 = 1.0 - 2e-15;
 
 /// Counts of a cumulative share; any flux.
 fn careful_round(flux: i64, share: f64) -> i64 {

@@ -27,7 +27,7 @@ pub enum Shape {
     /// A triangle that has area, and its rows on the map.
     Area(Area, Range<usize>),
     /// A triangle without.
-    Line(Line),
+    Line(Line, Range<usize>),
 }
 
 /// Borders of a triangle, and those rows of the map that it reaches.
@@ -71,7 +71,7 @@ impl Shape {
     /// Prepares a triangle for a map of `size` texels across and down.
     #[inline(always)]
     pub fn new(corners: &[DVec2; 3], size: (usize, usize)) -> Self {
-        if corners.iter().any(|corner| !corner.is_finite()) {
+        if !is_finite(corners) {
             return Self::NonFinite;
         }
         let bounds = Bounds::new(*corners);
@@ -87,7 +87,10 @@ impl Shape {
         let twice_area = (corners[1] - corners[0]).perp_dot(corners[2] - corners[0]);
         let extent = bounds.high - bounds.low;
         if twice_area * twice_area <= LINE_HEIGHT_TEXELS * LINE_HEIGHT_TEXELS * extent.length_squared() {
-            return Self::Line(Line::new(*corners, size));
+            return Self::Line(
+                Line::new(*corners, size.0),
+                cells(bounds.low.y, bounds.high.y, size.1),
+            );
         }
         let columns = cells(bounds.low.x, bounds.high.x, size.0);
         let crosses_border = bounds.low.x < 0.0 || bounds.high.x > size.0 as f64;
@@ -100,8 +103,7 @@ impl Shape {
         match self {
             Self::NonFinite | Self::Outside => 0..0,
             Self::Texel(_, row) => *row..*row + 1,
-            Self::Area(_, rows) => rows.clone(),
-            Self::Line(line) => line.rows(),
+            Self::Area(_, rows) | Self::Line(_, rows) => rows.clone(),
         }
     }
 
@@ -119,7 +121,7 @@ impl Shape {
                 rows.for_each(|row| sink.add(row, whole));
             }
             Self::Area(area, _) => area.for_each_row(rows, shares, sink),
-            Self::Line(line) => {
+            Self::Line(line, _) => {
                 for row in rows {
                     if let Some(span) = line.span(row, shares) {
                         sink.add(row, span);
@@ -128,6 +130,26 @@ impl Shape {
             }
         }
     }
+}
+
+/// Whether all corners are finite numbers.
+#[inline(always)]
+pub fn is_finite([a, b, c]: &[DVec2; 3]) -> bool {
+    // Zero times anything that is not finite is not a number, and neither is a sum with one.
+    let sum = *a * 0.0 + *b * 0.0 + *c * 0.0;
+    sum.x + sum.y == 0.0
+}
+
+/// Rows and columns that a triangle may reach on a map: at least [`Shape::rows`].
+pub fn rows_and_columns(corners: &[DVec2; 3], size: (usize, usize)) -> (Range<usize>, Range<usize>) {
+    let bounds = Bounds::new(*corners);
+    if bounds.misses(size) || size.0 == 0 || size.1 == 0 {
+        return (0..0, 0..0);
+    }
+    (
+        cells(bounds.low.y, bounds.high.y, size.1),
+        cells(bounds.low.x, bounds.high.x, size.0),
+    )
 }
 
 /// The smaller one; the second of numbers that do not compare.
