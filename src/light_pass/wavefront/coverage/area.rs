@@ -51,29 +51,26 @@ impl Area {
     pub fn for_each_row(&self, rows: Range<usize>, shares: &mut RowShares, sink: &mut impl Sink) {
         match self.columns {
             _ if self.crosses_border => self.for_each_wide_row(rows, shares, sink),
-            1 => self.for_each_narrow_row::<1, 0>(rows, sink),
-            2 => self.for_each_narrow_row::<2, 1>(rows, sink),
-            3 => self.for_each_narrow_row::<3, 2>(rows, sink),
-            4 => self.for_each_narrow_row::<4, 3>(rows, sink),
+            1 => self.for_each_narrow_row::<1>(rows, sink),
+            2 => self.for_each_narrow_row::<2>(rows, sink),
+            3 => self.for_each_narrow_row::<3>(rows, sink),
+            4 => self.for_each_narrow_row::<4>(rows, sink),
             _ => self.for_each_wide_row(rows, shares, sink),
         }
     }
 
-    /// For triangles of `N` columns, with `N` − 1 = `BORDERS` between them: without any decision that depends on the
+    /// For triangles of `N` columns, without any decision that depends on the
     /// triangle's shape, as mistaken guesses of the processor would cost more than texels that get nothing.
     #[inline(always)]
-    fn for_each_narrow_row<const N: usize, const BORDERS: usize>(
-        &self,
-        rows: Range<usize>,
-        sink: &mut impl Sink,
-    ) {
+    fn for_each_narrow_row<const N: usize>(&self, rows: Range<usize>, sink: &mut impl Sink) {
         let mut from = self.sides.cut(rows.start as f64);
         for row in rows {
             let to = self.sides.cut((row + 1) as f64);
             let pieces = self.sides.between(&from, &to);
             let mut ends = [to.above; N];
-            for border in 0..BORDERS {
-                ends[border] = least(to.above, from.above + pieces.share_up_to((border + 1) as f64));
+            for (border, end) in ends.iter_mut().take(N - 1).enumerate() {
+                let here = pieces.share_up_to((border + 1) as f64);
+                *end = least(to.above, from.above + here);
             }
             let mut before = from.above;
             for end in &mut ends {
