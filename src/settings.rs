@@ -34,6 +34,8 @@ impl LayerKind {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub enum Estimator {
+    /// Patches of the wavefront between neighbouring rays, spread exactly over the texels they cover.
+    Wavefront,
     /// A kernel of flux per ray, scaled to the wavefront (Collins 1994).
     Splat,
 }
@@ -97,7 +99,8 @@ pub enum ItemBufferKind {
     Cube,
 }
 
-/// Spread of the gaussian in squared footprint radii (eq. 4.4).
+/// Spread of the gaussian in squared footprint radii (eq. 4.4). The wavefront estimator deposits exactly and smooths
+/// afterwards, each texel as a footprint of its own area; 0 leaves that out.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Sigma {
@@ -174,12 +177,13 @@ pub struct BakeSettings {
 pub const MAX_MAP_SIDE: usize = 16384;
 
 impl Default for BakeSettings {
+    /// The wavefront estimator at its preview density, without smoothing.
     fn default() -> Self {
         Self {
-            estimator: Estimator::Splat,
-            density_per_sr: 100_000.0,
+            estimator: Estimator::Wavefront,
+            density_per_sr: Estimator::Wavefront.preview_density_per_sr(),
             rays: RayPlacement::Lattice,
-            sigma: Sigma::Constant(1.0),
+            sigma: Estimator::Wavefront.default_sigma(),
             kernel: Kernel::Gaussian,
             kernel_sampling: KernelSampling::Integrated,
             footprint: Footprint::Ellipse,
@@ -195,7 +199,35 @@ impl Default for BakeSettings {
     }
 }
 
+impl Estimator {
+    /// Light rays per steradian of a preview [1/sr]: patches need fewer than splats.
+    pub fn preview_density_per_sr(self) -> f64 {
+        match self {
+            Self::Wavefront => 25_000.0,
+            Self::Splat => 100_000.0,
+        }
+    }
+
+    /// Patches are exact without smoothing; splats are one footprint wide.
+    pub fn default_sigma(self) -> Sigma {
+        match self {
+            Self::Wavefront => Sigma::Constant(0.0),
+            Self::Splat => Sigma::Constant(1.0),
+        }
+    }
+}
+
 impl BakeSettings {
+    /// The paper's estimator with its defaults.
+    pub fn splat() -> Self {
+        Self {
+            estimator: Estimator::Splat,
+            density_per_sr: Estimator::Splat.preview_density_per_sr(),
+            sigma: Estimator::Splat.default_sigma(),
+            ..Self::default()
+        }
+    }
+
     /// Refuses settings outside their ranges.
     ///
     /// # Errors
@@ -213,8 +245,17 @@ impl BakeSettings {
             }
         };
         finite_in("--density", self.density_per_sr, 1.0, 1e12)?;
-        if let Sigma::Constant(sigma) = self.sigma {
-            finite_in("--sigma", sigma, 1e-6, 1e4)?;
+        match (self.estimator, self.sigma) {
+            (Estimator::Wavefront, Sigma::Constant(sigma)) => finite_in("--sigma", sigma, 0.0, 1e4)?,
+            (Estimator::Splat, Sigma::Constant(sigma)) => finite_in("--sigma", sigma, 1e-6, 1e4)?,
+            (Estimator::Splat, Sigma::Adaptive) => {}
+            (Estimator::Wavefront, Sigma::Adaptive) => {
+                return Err(Error::usage(
+                    "--sigma",
+                    "only splats have footprints to adapt a sigma to",
+                    "give a number from 0, or use --estimator splat",
+                ));
+            }
         }
         finite_in("--branch-threshold", self.branch_threshold, 0.0, 0.5)?;
         if let MapResolution::Fixed { width, height } = self.map_resolution {

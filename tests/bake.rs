@@ -8,6 +8,8 @@ mod coverage;
 mod energy;
 #[path = "bake/invariance.rs"]
 mod invariance;
+#[path = "bake/kept.rs"]
+mod kept;
 #[path = "bake/layers.rs"]
 mod layers;
 #[path = "bake/reference.rs"]

@@ -12,22 +12,23 @@ use super::values;
 /// How carefully to bake.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum Preset {
-    /// 10,000 rays per steradian.
+    /// 3,125 rays per steradian (splat: 12,500).
     Draft,
-    /// 100,000 rays per steradian.
+    /// 25,000 rays per steradian (splat: 100,000).
     #[default]
     Preview,
-    /// 1,000,000 rays per steradian.
+    /// 200,000 rays per steradian (splat: 800,000).
     Final,
 }
 
 impl Preset {
-    fn density_per_sr(self) -> f64 {
-        match self {
-            Self::Draft => 1e4,
-            Self::Preview => 1e5,
-            Self::Final => 1e6,
-        }
+    fn density_per_sr(self, estimator: Estimator) -> f64 {
+        let times = match self {
+            Self::Draft => 0.125,
+            Self::Preview => 1.0,
+            Self::Final => 8.0,
+        };
+        estimator.preview_density_per_sr() * times
     }
 }
 
@@ -38,26 +39,27 @@ pub struct BakeOptions {
     /// Ray density by name [default: preview]
     #[arg(long, value_enum)]
     preset: Option<Preset>,
-    /// How light rays become irradiance [default: splat]
+    /// How light rays become irradiance [default: wavefront]
     #[arg(long, value_enum)]
     estimator: Option<Estimator>,
     /// Light rays per steradian, exactly; for suns density/D² rays per m², D from the casters' centre to their
     /// farthest receiver
     #[arg(long, value_name = "RAYS_PER_SR", allow_negative_numbers = true)]
     density: Option<f64>,
-    /// Where in its lattice cell a light ray starts [default: lattice]
+    /// Where in its lattice cell a light ray starts (splat) [default: lattice]
     #[arg(long, value_enum, value_name = "PLACEMENT")]
     rays: Option<RayPlacement>,
-    /// Spread of the gaussian kernel in squared footprint radii, or `adaptive` [default: 1]
+    /// Spread of the gaussian kernel in squared footprint radii, or `adaptive` (splat) [default: 1]; for the wavefront,
+    /// smoothing of the map in squared texel radii [default: 0, none]
     #[arg(long, value_name = "S|adaptive", value_parser = values::sigma, allow_negative_numbers = true)]
     sigma: Option<Sigma>,
-    /// Shape of a splat [default: gaussian]
+    /// Shape of a splat (splat) [default: gaussian]
     #[arg(long, value_enum)]
     kernel: Option<Kernel>,
-    /// How a kernel is taken into texels [default: integrated]
+    /// How a kernel is taken into texels (splat) [default: integrated]
     #[arg(long, value_enum, value_name = "SAMPLING")]
     kernel_sampling: Option<KernelSampling>,
-    /// What sets the size and shape of a splat [default: ellipse]
+    /// What sets the size and shape of a splat (splat) [default: ellipse]
     #[arg(long, value_enum)]
     footprint: Option<Footprint>,
     /// How the sphere of directions around a light is divided [default: equal]
@@ -90,16 +92,20 @@ impl BakeOptions {
     /// # Errors
     /// A value outside its range; an option that does not apply to the others given.
     pub fn settings(&self, default_layers: &[LayerKind], threads: usize) -> Result<BakeSettings> {
-        self.refuse_what_does_not_apply()?;
-        let defaults = BakeSettings::default();
+        let estimator = self.estimator.unwrap_or(BakeSettings::default().estimator);
+        self.refuse_what_does_not_apply(estimator)?;
+        let defaults = match estimator {
+            Estimator::Wavefront => BakeSettings::default(),
+            Estimator::Splat => BakeSettings::splat(),
+        };
         let mut layers = self.layers.clone().unwrap_or_else(|| default_layers.to_vec());
         layers.sort_unstable();
         layers.dedup();
         let settings = BakeSettings {
-            estimator: self.estimator.unwrap_or(defaults.estimator),
+            estimator,
             density_per_sr: self
                 .density
-                .unwrap_or_else(|| self.preset.unwrap_or_default().density_per_sr()),
+                .unwrap_or_else(|| self.preset.unwrap_or_default().density_per_sr(estimator)),
             rays: self.rays.unwrap_or(defaults.rays),
             sigma: self.sigma.unwrap_or(defaults.sigma),
             kernel: self.kernel.unwrap_or(defaults.kernel),
@@ -118,7 +124,21 @@ impl BakeOptions {
         Ok(settings)
     }
 
-    fn refuse_what_does_not_apply(&self) -> Result<()> {
+    fn refuse_what_does_not_apply(&self, estimator: Estimator) -> Result<()> {
+        let of_splats = [
+            ("--rays", self.rays.is_some()),
+            ("--kernel", self.kernel.is_some()),
+            ("--kernel-sampling", self.kernel_sampling.is_some()),
+            ("--footprint", self.footprint.is_some()),
+        ];
+        let given = of_splats.iter().find(|(_, is_given)| *is_given);
+        if let (Estimator::Wavefront, Some((option, _))) = (estimator, given) {
+            return Err(Error::usage(
+                *option,
+                "only the splat estimator has it",
+                format!("leave {option} out or add --estimator splat"),
+            ));
+        }
         let kernel = self.kernel.unwrap_or(BakeSettings::default().kernel);
         if self.sigma.is_some() && kernel != Kernel::Gaussian {
             return Err(Error::usage(

@@ -131,6 +131,14 @@ impl TriangleBvh {
             })
     }
 
+    /// The node around all triangles; `None` without any.
+    pub fn root(&self) -> Option<Node<'_>> {
+        (!self.corners.is_empty()).then_some(Node {
+            hierarchy: self,
+            index: 0,
+        })
+    }
+
     /// Number of triangles.
     pub fn triangle_count(&self) -> usize {
         self.corners.len()
@@ -162,6 +170,42 @@ impl TriangleBvh {
     /// A distance [m] along the ray in single-precision units, rounded up so that it never cuts off what it bounds.
     fn local_distance(&self, distance_m: f64, advanced_m: f64) -> f32 {
         (((distance_m - advanced_m) * self.scale).max(0.0) as f32).next_up() + BOX_MARGIN
+    }
+}
+
+/// A node of the hierarchy, for searches other than along rays.
+#[derive(Clone, Copy, Debug)]
+pub struct Node<'a> {
+    hierarchy: &'a TriangleBvh,
+    index: usize,
+}
+
+impl<'a> Node<'a> {
+    /// A box around all triangles of the node, a little too large, as minimum and maximum corner [m].
+    pub fn bounds(&self) -> (DVec3, DVec3) {
+        let aabb = self.hierarchy.bvh.nodes[self.index].aabb();
+        // Exact: the scale is a power of two.
+        let unit_m = 1.0 / self.hierarchy.scale;
+        let metres = |local: Vec3A| self.hierarchy.centre + local.as_dvec3() * unit_m;
+        (metres(aabb.min), metres(aabb.max))
+    }
+
+    /// The two nodes that share out its triangles; `None` for a leaf.
+    pub fn children(&self) -> Option<[Node<'a>; 2]> {
+        let node = &self.hierarchy.bvh.nodes[self.index];
+        let child = |index: u32| Node {
+            hierarchy: self.hierarchy,
+            index: index as usize,
+        };
+        (!node.is_leaf()).then(|| [child(node.first_index), child(node.first_index + 1)])
+    }
+
+    /// Index and corners of each triangle of a leaf; nothing for other nodes.
+    pub fn triangles(&self) -> impl Iterator<Item = (u32, &'a [DVec3; 3])> {
+        let TriangleBvh { bvh, corners, .. } = self.hierarchy;
+        let node = &bvh.nodes[self.index];
+        let first = node.first_index as usize;
+        (first..first + node.prim_count as usize).map(|slot| (bvh.primitive_indices[slot], &corners[slot]))
     }
 }
 

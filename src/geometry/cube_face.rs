@@ -74,6 +74,17 @@ impl FaceMapping {
         }
     }
 
+    /// The `y` of [`Self::square_from_plane`] alone, without the arc tangent of its `x`.
+    pub fn row_share(self, plane: DVec2) -> f64 {
+        match self {
+            Self::Plain => (plane.y + 1.0) * 0.5,
+            Self::EqualSolidAngle => {
+                let d2 = 1.0 + plane.x * plane.x;
+                0.5 * (plane.y * ((d2 + 1.0) / (d2 + plane.y * plane.y)).sqrt() + 1.0)
+            }
+        }
+    }
+
     /// Solid angle [sr] of the cell between two corners of the unit square.
     pub fn cell_solid_angle_sr(self, low: DVec2, high: DVec2) -> f64 {
         match self {

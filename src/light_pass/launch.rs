@@ -116,6 +116,27 @@ impl Launch {
         self.light.colour * (strength * self.light.kind.falloff(direction) * measure)
     }
 
+    /// Flux per unit area of the unit square [W per channel] at a point of it, whose ray has the given direction.
+    pub fn flux_density_w(&self, square: DVec2, direction: DVec3) -> LinearSrgb {
+        let measure = match self.domain {
+            Domain::Sphere {
+                mapping: FaceMapping::Plain,
+                ..
+            } => {
+                let plane = FaceMapping::Plain.plane_from_square(square);
+                4.0 * (1.0 + plane.length_squared()).powf(-1.5)
+            }
+            Domain::Sphere { .. } | Domain::Plane { .. } => self.cell_measure(DVec2::ZERO, DVec2::ONE),
+        };
+        let strength = match self.light.kind {
+            LightKind::Point { intensity, .. } | LightKind::Spot { intensity, .. } => intensity.0,
+            LightKind::Sun {
+                normal_irradiance, ..
+            } => normal_irradiance.0,
+        };
+        self.light.colour * (strength * self.light.kind.falloff(direction) * measure)
+    }
+
     /// Whether the light sends anything into the cell between two corners of the unit square; never false where it
     /// does.
     pub fn may_light_cell(&self, face: usize, low: DVec2, high: DVec2) -> bool {

@@ -25,9 +25,11 @@ pub enum Account {
     NonFinite,
     /// No deposit could place it.
     Unresolved,
+    /// What surfaces passed on, less what the paths refined on their own took up; of either sign.
+    Quadrature,
 }
 
-const ACCOUNTS: usize = Account::Unresolved as usize + 1;
+const ACCOUNTS: usize = Account::Quadrature as usize + 1;
 
 /// All accounts of one light, exact.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -40,6 +42,13 @@ impl LedgerSum {
     pub fn book(&mut self, account: Account, count: FluxCount) {
         for (sum, channel) in self.counts[account as usize].iter_mut().zip(count) {
             *sum += i128::from(channel);
+        }
+    }
+
+    /// Books a sum of counts.
+    pub fn book_sum(&mut self, account: Account, counts: [i128; 3]) {
+        for (sum, channel) in self.counts[account as usize].iter_mut().zip(counts) {
+            *sum += channel;
         }
     }
 
@@ -73,7 +82,7 @@ impl LedgerSum {
                     threshold: watts(Account::Threshold),
                     non_finite: watts(Account::NonFinite),
                     unresolved: watts(Account::Unresolved),
-                    quadrature: 0.0,
+                    quadrature: watts(Account::Quadrature),
                 },
             },
             not_emitted_w: watts(Account::NotEmitted),

@@ -5,13 +5,14 @@ use std::sync::Arc;
 
 use super::finish;
 use super::sizes::{self, MapSizes};
+use super::splat_cache::SplatCache;
 use super::{BakeCounts, Clock};
 use crate::error::{Error, Result, Warning};
 use crate::illumination::Chart;
 use crate::illumination::accumulator::FluxUnit;
 use crate::light_pass::caustic::deposit::Depositor;
 use crate::light_pass::caustic::lattice::Lattice;
-use crate::light_pass::caustic::pass::{self, Listener, PassReport};
+use crate::light_pass::caustic::pass::{self, Listener, PassReport, Source};
 use crate::light_pass::caustic::path::PathLimits;
 use crate::light_pass::caustic::setup::{Aim, AimedLight};
 use crate::light_pass::caustic::statistics::FootprintStatistics;
@@ -23,7 +24,7 @@ use crate::settings::{BakeSettings, Footprint, Kernel, MapResolution, Sigma};
 use crate::transport::Tracer;
 
 /// Each side of the coarse run's lattice is this many times smaller.
-const COARSENING: usize = 8;
+pub(super) const COARSENING: usize = 8;
 
 /// Least side of the coarse run's lattice.
 const LEAST_COARSE_SIDE: usize = 64;
@@ -53,17 +54,19 @@ pub(super) struct CausticOutcome {
 }
 
 impl CausticLayer<'_> {
-    /// Traces and deposits all lights.
+    /// Traces and deposits all lights; deposits what the cache holds, where it does.
     pub(super) fn bake(
         &self,
         progress: &dyn Progress,
         control: &Control,
         clock: &mut Clock,
+        cache: &mut SplatCache,
     ) -> Result<CausticOutcome> {
         let unit = self.unit()?;
+        cache.prepare(self);
         let mut outcome = CausticOutcome::default();
         let statistics = if self.wants_statistics() {
-            let statistics = self.coarse_run(unit, progress, control, clock, &mut outcome);
+            let statistics = self.coarse_run(unit, progress, control, clock, cache, &mut outcome);
             Some(statistics)
         } else {
             None
@@ -80,17 +83,14 @@ impl CausticLayer<'_> {
             self.sizes.chart(object, size)
         };
         let mut maps = ReceiverMaps::new(self.tracer.scene().objects.len());
-        let total: u64 = self
-            .aim
-            .lights
-            .iter()
-            .map(|light| self.lattice(light, 1, unit).ray_count())
-            .sum();
+        let total = cache.arrivals().unwrap_or_else(|| {
+            let lights = self.aim.lights.iter();
+            lights.map(|light| self.lattice(light, 1, unit).ray_count()).sum()
+        });
         let mut done = 0;
-        for light in &self.aim.lights {
-            let lattice = self.lattice(light, 1, unit);
+        for (index, light) in self.aim.lights.iter().enumerate() {
             let depositor = Depositor {
-                lattice,
+                lattice: self.lattice(light, 1, unit),
                 settings: self.settings,
                 statistics: statistics.as_ref(),
             };
@@ -100,18 +100,24 @@ impl CausticLayer<'_> {
                 done,
                 total,
             };
-            let report = pass::run(&depositor, &mut maps, &chart_for, &listener);
-            done += report.rays;
+            let (report, kept) = pass::run(&depositor, cache.source(index), &mut maps, &chart_for, &listener);
+            cache.keep(kept);
+            done += if report.rays > 0 {
+                report.rays
+            } else {
+                report.splats
+            };
             outcome.count(&report, clock);
             let name = &self.tracer.scene().lights[light.light].name;
             outcome.ledgers.push(report.ledger.report(name, unit));
         }
+        cache.finish();
         outcome.maps = Some((maps, unit));
         Ok(outcome)
     }
 
     /// The unit of the sums: by the lights that take part, so that others do not change a bit.
-    fn unit(&self) -> Result<FluxUnit> {
+    pub(super) fn unit(&self) -> Result<FluxUnit> {
         let power_w: f64 = self
             .aim
             .lights
@@ -128,7 +134,12 @@ impl CausticLayer<'_> {
         ))
     }
 
-    fn lattice<'a>(&'a self, light: &'a AimedLight, coarsening: usize, unit: FluxUnit) -> Lattice<'a> {
+    pub(super) fn lattice<'a>(
+        &'a self,
+        light: &'a AimedLight,
+        coarsening: usize,
+        unit: FluxUnit,
+    ) -> Lattice<'a> {
         let (columns, rows) = light
             .launch
             .lattice_size(self.settings.density_per_sr, self.aim.reach_m);
@@ -143,6 +154,7 @@ impl CausticLayer<'_> {
             launch: &light.launch,
             item_buffer: &light.item_buffer,
             size,
+            strides: (1, 1),
             placement: self.settings.rays,
             seed: self.settings.seed,
             limits: PathLimits {
@@ -169,6 +181,7 @@ impl CausticLayer<'_> {
         progress: &dyn Progress,
         control: &Control,
         clock: &mut Clock,
+        cache: &SplatCache,
         outcome: &mut CausticOutcome,
     ) -> FootprintStatistics {
         let mut statistics = FootprintStatistics::default();
@@ -182,9 +195,8 @@ impl CausticLayer<'_> {
             self.sizes.chart(object, sizes::first_size(aspect))
         };
         let mut maps = ReceiverMaps::new(self.tracer.scene().objects.len());
-        for light in &self.aim.lights {
-            let fine = self.lattice(light, 1, unit);
-            let lattice = self.lattice(light, COARSENING, unit);
+        for (index, light) in self.aim.lights.iter().enumerate() {
+            let lattice = thinned(self.lattice(light, 1, unit));
             let depositor = Depositor {
                 lattice,
                 settings: &settings,
@@ -196,8 +208,11 @@ impl CausticLayer<'_> {
                 done: 0,
                 total: 0,
             };
-            let report = pass::run(&depositor, &mut maps, &chart_for, &listener);
-            let cells = |size: (usize, usize)| size.0 as f64 * size.1 as f64;
+            let source = match cache.source(index) {
+                Source::Rays { .. } => Source::Rays { keep_bytes: 0 },
+                kept @ Source::Kept(_) => kept,
+            };
+            let (report, _) = pass::run(&depositor, source, &mut maps, &chart_for, &listener);
             outcome.count(&report, clock);
             // The kernels of the coarse run are in no map.
             outcome.counts.splats -= report.splats;
@@ -209,14 +224,21 @@ impl CausticLayer<'_> {
                     map.grow_to(size, &|size| self.sizes.chart(object, size));
                 }
             }
-            statistics.merge(&report.statistics.refined(cells(fine.size) / cells(lattice.size)));
+            statistics.merge(
+                &report
+                    .statistics
+                    .refined((lattice.strides.0 * lattice.strides.1) as f64),
+            );
         }
         progress.preview(finish::preview(&maps, unit));
         statistics
     }
 
     /// Sizes of the maps that the coarse run saw lit.
-    fn map_sizes(&self, statistics: Option<&FootprintStatistics>) -> Result<BTreeMap<usize, (usize, usize)>> {
+    pub(super) fn map_sizes(
+        &self,
+        statistics: Option<&FootprintStatistics>,
+    ) -> Result<BTreeMap<usize, (usize, usize)>> {
         let mut sizes = BTreeMap::new();
         for object in 0..self.tracer.scene().objects.len() {
             let size = match (self.settings.map_resolution, statistics) {
@@ -250,7 +272,7 @@ impl CausticLayer<'_> {
     }
 
     /// Says which automatic maps stay coarser than their light, for the largest automatic size or for memory.
-    fn coarse_maps(
+    pub(super) fn coarse_maps(
         &self,
         sizes: &BTreeMap<usize, (usize, usize)>,
         statistics: &FootprintStatistics,
@@ -277,18 +299,29 @@ impl CausticLayer<'_> {
     }
 
     /// For a surface that only the full lattice reached.
-    fn default_size(&self, object: usize) -> Option<(usize, usize)> {
+    pub(super) fn default_size(&self, object: usize) -> Option<(usize, usize)> {
         Some(sizes::first_size(
             self.sizes.parametrisation(object)?.suggested_aspect,
         ))
     }
 }
 
+/// The lattice for mean footprints: every so many-th of the same rays, so that kept ones will do.
+fn thinned(lattice: Lattice) -> Lattice {
+    let stride = |side: usize| (side / LEAST_COARSE_SIDE).clamp(1, COARSENING);
+    Lattice {
+        strides: (stride(lattice.size.0), stride(lattice.size.1)),
+        ..lattice
+    }
+}
+
 impl CausticOutcome {
-    fn count(&mut self, report: &PassReport, clock: &mut Clock) {
+    pub(super) fn count(&mut self, report: &PassReport, clock: &mut Clock) {
         self.counts.rays += report.rays;
         self.counts.segments += report.segments;
         self.counts.splats += report.splats;
+        self.counts.cells += report.cells;
+        self.counts.receiver_queries += report.receiver_queries;
         self.cancelled |= report.cancelled;
         clock.trace.add(report.trace_s);
         clock.deposit.add(report.deposit_s);

@@ -4,6 +4,9 @@ mod caustic_layer;
 mod finish;
 pub mod result;
 mod sizes;
+mod splat_cache;
+mod wavefront_cache;
+mod wavefront_layer;
 
 use std::sync::Arc;
 
@@ -15,10 +18,12 @@ use crate::light_pass::caustic::setup::Aim;
 use crate::plan::{self, Effect, EffectPlan};
 use crate::progress::{Control, Progress, Stage};
 use crate::scene::Scene;
-use crate::settings::{BakeSettings, ItemBufferKind};
+use crate::settings::{BakeSettings, Estimator, ItemBufferKind};
 use crate::transport::Tracer;
 use caustic_layer::CausticLayer;
 use sizes::MapSizes;
+use splat_cache::SplatCache;
+use wavefront_cache::WavefrontCache;
 
 /// Owns a scene with all that is derived from it, and bakes it as often as settings change. What does not depend on
 /// the settings (hierarchy, parametrisations, item buffers) is kept from bake to bake.
@@ -28,6 +33,8 @@ pub struct BakeSession {
     tracer: Option<Arc<Tracer>>,
     aim: Option<(ItemBufferKind, Arc<Aim>)>,
     sizes: MapSizes,
+    wavefront_cache: WavefrontCache,
+    splat_cache: SplatCache,
 }
 
 /// What `inspect` says before any bake.
@@ -60,6 +67,8 @@ impl BakeSession {
             tracer: None,
             aim: None,
             sizes,
+            wavefront_cache: WavefrontCache::default(),
+            splat_cache: SplatCache::default(),
         })
     }
 
@@ -128,7 +137,7 @@ impl BakeSession {
         match &self.aim {
             Some((cached, aim)) if *cached == kind => aim.clone(),
             _ => {
-                let aim = Arc::new(Aim::take(&self.scene, kind));
+                let aim = Arc::new(Aim::take(&self.tracer(), kind));
                 self.aim = Some((kind, aim.clone()));
                 aim
             }
@@ -157,7 +166,12 @@ impl BakeSession {
                 sizes: &self.sizes,
                 plan: &plan,
             };
-            layer.bake(progress, control, &mut clock)?
+            match settings.estimator {
+                Estimator::Wavefront => {
+                    layer.bake_wavefront(progress, control, &mut clock, &mut self.wavefront_cache)?
+                }
+                Estimator::Splat => layer.bake(progress, control, &mut clock, &mut self.splat_cache)?,
+            }
         } else {
             caustic_layer::CausticOutcome::default()
         };

@@ -35,6 +35,11 @@ pub struct Branch {
     /// n of the side it leaves over n of the side it enters; 1 for reflections. Radiance that comes back along the
     /// branch is scaled by its square, flux is not.
     pub ior_ratio: f64,
+    /// Unit normal on the side of the incoming ray that gave the direction.
+    pub normal: DVec3,
+    /// Whether that is the surface's shading normal; the geometric one stands in where the former would send light
+    /// through the facet.
+    pub by_shading: bool,
 }
 
 /// The shares of the light at one hit.
@@ -57,6 +62,15 @@ struct Facing {
     geometric: DVec3,
     /// Shading normal, or the geometric one where the shading normal faces away from the ray.
     shading: DVec3,
+    /// Whether `shading` is the shading normal.
+    is_smooth: bool,
+}
+
+/// A direction with the normal that gave it.
+struct Turned {
+    direction: DVec3,
+    normal: DVec3,
+    by_shading: bool,
 }
 
 impl Facing {
@@ -70,34 +84,49 @@ impl Facing {
             } else {
                 1.0
             };
+        let is_smooth = incident.dot(shading) < 0.0;
         Self {
             front,
             geometric,
-            shading: if incident.dot(shading) < 0.0 {
-                shading
-            } else {
-                geometric
-            },
+            shading: if is_smooth { shading } else { geometric },
+            is_smooth,
         }
     }
 
     /// Mirror direction by the shading normal; by the geometric one where the former would end below the surface.
-    fn reflected(&self, incident: DVec3) -> DVec3 {
+    fn reflected(&self, incident: DVec3) -> Turned {
         let direction = refraction::reflect(incident, self.shading);
         if direction.dot(self.geometric) > 0.0 {
-            direction
+            self.turned(direction)
         } else {
-            refraction::reflect(incident, self.geometric)
+            Turned {
+                direction: refraction::reflect(incident, self.geometric),
+                normal: self.geometric,
+                by_shading: false,
+            }
         }
     }
 
     /// Refracted direction by the shading normal; by the geometric one where the former would stay above the surface.
-    fn refracted(&self, incident: DVec3, eta: f64) -> Option<DVec3> {
+    fn refracted(&self, incident: DVec3, eta: f64) -> Option<Turned> {
         let direction = refraction::refract(incident, self.shading, eta)?;
         if direction.dot(self.geometric) < 0.0 {
-            Some(direction)
+            Some(self.turned(direction))
         } else {
-            refraction::refract(incident, self.geometric, eta)
+            Some(Turned {
+                direction: refraction::refract(incident, self.geometric, eta)?,
+                normal: self.geometric,
+                by_shading: false,
+            })
+        }
+    }
+
+    /// A direction that came by the shading normal.
+    fn turned(&self, direction: DVec3) -> Turned {
+        Turned {
+            direction,
+            normal: self.shading,
+            by_shading: self.is_smooth,
         }
     }
 }
@@ -159,6 +188,8 @@ impl Tracer {
             event: Event::ThinTransmission,
             media: *media,
             ior_ratio: 1.0,
+            normal: facing.shading,
+            by_shading: facing.is_smooth,
         };
         Interaction {
             reflection: Some(reflection(
@@ -193,7 +224,7 @@ impl Tracer {
             (material.ior, beyond.ior(self.scene()))
         };
         let eta = ior_far / ior_near;
-        let Some(direction) = facing.refracted(incident, eta) else {
+        let Some(turned) = facing.refracted(incident, eta) else {
             let mut total = reflection(hit, facing, incident, media, LinearSrgb::WHITE);
             total.event = Event::TotalInternalReflection;
             return Interaction {
@@ -206,11 +237,13 @@ impl Tracer {
         let reflectance = fresnel::dielectric_reflectance(-incident.dot(facing.shading), eta);
         let transmitted = self.base_colour(hit) * (1.0 - reflectance);
         let transmission = Branch {
-            ray: hit.spawn(direction),
+            ray: hit.spawn(turned.direction),
             share: transmitted,
             event: Event::Refraction,
             media: beyond,
             ior_ratio: ior_near / ior_far,
+            normal: turned.normal,
+            by_shading: turned.by_shading,
         };
         Interaction {
             reflection: (reflectance > 0.0)
@@ -229,11 +262,14 @@ fn reflection(
     media: &MediumStack,
     share: LinearSrgb,
 ) -> Branch {
+    let turned = facing.reflected(incident);
     Branch {
-        ray: hit.spawn(facing.reflected(incident)),
+        ray: hit.spawn(turned.direction),
         share,
         event: Event::Reflection,
         media: *media,
         ior_ratio: 1.0,
+        normal: turned.normal,
+        by_shading: turned.by_shading,
     }
 }

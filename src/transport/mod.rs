@@ -1,9 +1,13 @@
 //! One step of light at a surface: shared by the light pass, the direct layer and the CPU eye pass.
 
+pub mod curvature;
+pub mod differential;
 pub mod interaction;
 pub mod medium;
+pub mod smoothing;
 pub mod tracer;
 
+pub use differential::{RayDerivative, RayDifferential, SurfaceScale};
 pub use interaction::{Branch, Event, Interaction};
 pub use medium::MediumStack;
 pub use tracer::{SurfaceHit, Tracer};

@@ -3,7 +3,10 @@
 use std::sync::Arc;
 
 use glam::{DVec2, DVec3};
+use rayon::prelude::*;
 
+use super::curvature::NormalField;
+use super::smoothing::smoothing_groups;
 use crate::geometry::{Ray, TriangleBvh, ray};
 use crate::optics::LinearSrgb;
 use crate::scene::Scene;
@@ -15,6 +18,10 @@ pub struct Tracer {
     bvh: TriangleBvh,
     /// Object and triangle within it, by the hierarchy's triangle index.
     triangles: Vec<(u32, u32)>,
+    /// How the normals of specular objects turn; `None` for the others.
+    normal_fields: Vec<Option<NormalField>>,
+    /// Smoothing group of each triangle, by specular object; empty for the others.
+    groups: Vec<Vec<u32>>,
 }
 
 /// A point of a surface that a ray met.
@@ -60,11 +67,41 @@ impl Tracer {
             }
         }
         let bvh = TriangleBvh::build(&corners);
+        let normal_fields = (0..scene.objects.len())
+            .into_par_iter()
+            .map(|object| {
+                let specular = scene.material_of(object).surface.is_specular();
+                specular.then(|| NormalField::new(&scene.objects[object].mesh))
+            })
+            .collect();
+        let groups = (0..scene.objects.len())
+            .into_par_iter()
+            .map(|object| {
+                let specular = scene.material_of(object).surface.is_specular();
+                if specular {
+                    smoothing_groups(&scene.objects[object].mesh)
+                } else {
+                    Vec::new()
+                }
+            })
+            .collect();
         Self {
             scene,
             bvh,
             triangles,
+            normal_fields,
+            groups,
         }
+    }
+
+    /// How the normals of an object turn; `None` where it is not specular.
+    pub fn normal_field(&self, object: usize) -> Option<&NormalField> {
+        self.normal_fields[object].as_ref()
+    }
+
+    /// Smoothing group of a triangle within its object; 0 where the object is not specular.
+    pub fn smoothing_group(&self, object: usize, triangle: usize) -> u32 {
+        self.groups[object].get(triangle).copied().unwrap_or(0)
     }
 
     /// The scene.

@@ -41,7 +41,7 @@ fn real_files_bake_and_at_least_four_get_caustic_light() {
             height: 128,
         },
         layers: vec![LayerKind::Caustic],
-        ..BakeSettings::default()
+        ..BakeSettings::splat()
     };
     let mut lit = 0;
     for file in files {

@@ -130,13 +130,12 @@ fn check_against_reference(size: (usize, usize), triangle: FluxTriangle, toleran
     let (flux, _) = deposit(size, &[triangle]);
     let shares = reference(size, triangle.corners);
     for (texel, (got, share)) in flux.texels().iter().zip(&shares).enumerate() {
-        for channel in 0..3 {
-            let expected = triangle.flux[channel] as f64 * share;
-            let error = (got[channel] as f64 - expected).abs();
+        for (flux, &got) in triangle.flux.iter().zip(got) {
+            let expected = *flux as f64 * share;
+            let error = (got as f64 - expected).abs();
             assert!(
-                error <= tolerance * triangle.flux[channel] as f64 + 1.0,
-                "texel {texel} of {size:?}: {} instead of {expected} in {triangle:?}",
-                got[channel]
+                error <= tolerance * *flux as f64 + 1.0,
+                "texel {texel} of {size:?}: {got} instead of {expected} in {triangle:?}"
             );
         }
     }

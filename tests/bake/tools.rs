@@ -22,7 +22,7 @@ pub fn settings(density_per_sr: f64, side: usize) -> BakeSettings {
             width: side,
             height: side,
         },
-        ..BakeSettings::default()
+        ..BakeSettings::splat()
     }
 }
 

@@ -1,5 +1,7 @@
 //! Item buffers never miss what a light sees.
 
+use std::sync::Arc;
+
 use glam::{DVec2, DVec3};
 use nephroid::geometry::cube_face::{self, FaceMapping};
 use nephroid::light_pass::item_buffer::{CELLS_PER_SIDE, ItemBuffer};
@@ -7,6 +9,7 @@ use nephroid::light_pass::launch::Launch;
 use nephroid::optics::LinearSrgb;
 use nephroid::scene::{Light, LightKind, Material, Mesh, Object, Scene, SurfaceKind};
 use nephroid::settings::ItemBufferKind;
+use nephroid::transport::Tracer;
 use nephroid::units::RadiantIntensity;
 
 const MAPPINGS: [FaceMapping; 2] = [FaceMapping::EqualSolidAngle, FaceMapping::Plain];
@@ -45,6 +48,10 @@ fn mirrors(triangles: &[[DVec3; 3]]) -> Scene {
         }],
         ..Scene::default()
     }
+}
+
+fn build(launch: &Launch, scene: &Scene) -> ItemBuffer {
+    ItemBuffer::build(launch, &Tracer::new(Arc::new(scene.clone())), &[0])
 }
 
 #[test]
@@ -142,7 +149,7 @@ fn every_visible_triangle_marks_the_cell_of_each_of_its_points() {
             let scene = mirrors(&triangles);
             let light = lamp(DVec3::new(0.01, 0.02, -0.015));
             let launch = Launch::new(&light, &scene, &[0], kind).expect("a domain");
-            let buffer = ItemBuffer::build(&launch, &scene, &[0]);
+            let buffer = build(&launch, &scene);
             for corners in &triangles {
                 for _ in 0..20 {
                     let (a, b) = (random(&mut state), random(&mut state));
@@ -175,7 +182,7 @@ fn a_small_mirror_marks_few_cells() {
     let a = DVec3::new(1.0, 0.2, 0.3);
     let scene = mirrors(&[[a, a + DVec3::Y * 0.01, a + DVec3::Z * 0.01]]);
     let launch = Launch::new(&lamp(DVec3::ZERO), &scene, &[0], ItemBufferKind::Equal).expect("a domain");
-    let marked = ItemBuffer::build(&launch, &scene, &[0]).marked_cells();
+    let marked = build(&launch, &scene).marked_cells();
     assert!((1..=4).contains(&marked), "{marked} cells");
 }
 
@@ -185,7 +192,7 @@ fn a_light_on_the_mirror_itself_still_sees_it() {
     let scene = mirrors(&[corners]);
     for position in [DVec3::ZERO, DVec3::new(0.3, 0.0, 0.3), DVec3::new(0.5, 0.0, 0.0)] {
         let launch = Launch::new(&lamp(position), &scene, &[0], ItemBufferKind::Equal).expect("a domain");
-        let buffer = ItemBuffer::build(&launch, &scene, &[0]);
+        let buffer = build(&launch, &scene);
         assert!(buffer.marked_cells() > 0, "nothing marked from {position}");
     }
 }
@@ -195,7 +202,7 @@ fn lattice_spans_hold_every_cell_that_touches_a_marked_one() {
     let a = DVec3::new(1.0, 0.2, 0.3);
     let scene = mirrors(&[[a, a + DVec3::Y * 0.3, a + DVec3::Z * 0.1]]);
     let launch = Launch::new(&lamp(DVec3::ZERO), &scene, &[0], ItemBufferKind::Equal).expect("a domain");
-    let buffer = ItemBuffer::build(&launch, &scene, &[0]);
+    let buffer = build(&launch, &scene);
     for size in [(1, 1), (5, 3), (128, 128), (300, 301), (1000, 77)] {
         for face in 0..6 {
             for row in 0..size.1 {
@@ -227,4 +234,127 @@ fn touches_marked(buffer: &ItemBuffer, face: usize, cell: (usize, usize), size: 
                 .filter(|&column| overlaps(cell.0, size.0, column))
                 .any(|column| buffer.is_marked(face, column, row))
         })
+}
+
+/// Cells of all faces that are marked.
+fn marks(buffer: &ItemBuffer, faces: usize) -> Vec<(usize, usize, usize)> {
+    (0..faces)
+        .flat_map(|face| (0..CELLS_PER_SIDE).map(move |row| (face, row)))
+        .flat_map(|(face, row)| (0..CELLS_PER_SIDE).map(move |column| (face, column, row)))
+        .filter(|&(face, column, row)| buffer.is_marked(face, column, row))
+        .collect()
+}
+
+fn lights() -> Vec<Light> {
+    let spot = |outer_cone_rad| Light {
+        kind: LightKind::Spot {
+            position: DVec3::new(0.1, -0.2, 0.05),
+            direction: DVec3::new(0.5, 0.7, -0.3).normalize(),
+            intensity: RadiantIntensity(1.0),
+            inner_cone_rad: 0.1,
+            outer_cone_rad,
+        },
+        ..lamp(DVec3::ZERO)
+    };
+    let sun = LightKind::Sun {
+        direction: DVec3::new(0.2, -0.9, 0.3).normalize(),
+        normal_irradiance: nephroid::units::Irradiance(1.0),
+    };
+    vec![
+        lamp(DVec3::new(0.01, 0.02, -0.015)),
+        lamp(DVec3::new(5.0, 0.3, 0.2)),
+        spot(0.4),
+        spot(1.2),
+        Light {
+            kind: sun,
+            ..lamp(DVec3::ZERO)
+        },
+    ]
+}
+
+/// A cloud of triangles, seeded.
+fn cloud(seed: u64, count: usize, size: f64) -> Vec<[DVec3; 3]> {
+    let mut state = seed;
+    let mut point =
+        |scale: f64| DVec3::from_array(std::array::from_fn(|_| (random(&mut state) - 0.5) * scale));
+    (0..count)
+        .map(|_| {
+            let centre = point(2.0);
+            [centre + point(size), centre + point(size), centre + point(size)]
+        })
+        .collect()
+}
+
+#[test]
+fn the_whole_marks_what_its_triangles_mark_one_by_one() {
+    for light in lights() {
+        for (seed, count, size) in [(1, 1100, 1e-3), (2, 200, 0.05), (3, 200, 0.6)] {
+            let triangles = cloud(seed, count, size);
+            let scene = mirrors(&triangles);
+            // One frame for all: a sun's follows the casters.
+            let launch = Launch::new(&light, &scene, &[0], ItemBufferKind::Equal).expect("a domain");
+            let whole = marks(&build(&launch, &scene), launch.face_count());
+            let mut apart: Vec<_> = triangles
+                .iter()
+                .flat_map(|triangle| marks(&build(&launch, &mirrors(&[*triangle])), launch.face_count()))
+                .collect();
+            apart.sort_unstable_by_key(|&(face, column, row)| (face, row, column));
+            apart.dedup();
+            assert!(!whole.is_empty(), "{light:?}, size {size}: nothing is marked");
+            assert_eq!(whole, apart, "{light:?}, size {size}");
+        }
+    }
+}
+
+#[test]
+fn diffuse_surfaces_among_the_casters_mark_nothing() {
+    let mut scene = mirrors(&cloud(4, 60, 0.05));
+    let alone = scene.clone();
+    let mut dust = mirrors(&cloud(5, 3000, 0.1)).objects.remove(0);
+    dust.material = 1;
+    // Before the mirrors, so that their triangles are not the hierarchy's first.
+    scene.objects.insert(0, dust);
+    scene.materials.push(Material::default());
+    for light in lights() {
+        let launch = Launch::new(&light, &alone, &[0], ItemBufferKind::Equal).expect("a domain");
+        let among = ItemBuffer::build(&launch, &Tracer::new(Arc::new(scene.clone())), &[1]);
+        let faces = launch.face_count();
+        assert_eq!(marks(&among, faces), marks(&build(&launch, &alone), faces));
+    }
+}
+
+#[test]
+fn objects_beside_a_cone_are_no_casters() {
+    let object = |triangles: &[[DVec3; 3]]| mirrors(triangles).objects.remove(0);
+    let small = |at: DVec3| {
+        cloud(6, 50, 0.1)
+            .into_iter()
+            .map(move |t| t.map(|p| p * 0.1 + at))
+    };
+    let ahead = DVec3::new(3.0, 0.2, 0.1);
+    let scene = Scene {
+        objects: vec![
+            object(&small(-ahead).collect::<Vec<_>>()),
+            object(&small(ahead).collect::<Vec<_>>()),
+            // Seen by its last triangle alone.
+            object(&small(-ahead).chain(small(ahead).take(1)).collect::<Vec<_>>()),
+            // A box around the cone, but nothing in it.
+            object(&[[-ahead, DVec3::new(3.0, 4.0, 0.1), DVec3::new(-3.0, 4.0, 0.1)]]),
+        ],
+        ..mirrors(&[])
+    };
+    let light = Light {
+        kind: LightKind::Spot {
+            position: DVec3::ZERO,
+            direction: DVec3::X,
+            intensity: RadiantIntensity(1.0),
+            inner_cone_rad: 0.1,
+            outer_cone_rad: 0.3,
+        },
+        ..lamp(DVec3::ZERO)
+    };
+    let casters = [0, 1, 2, 3];
+    let launch = Launch::new(&light, &scene, &casters, ItemBufferKind::Equal).expect("a domain");
+    let buffer = ItemBuffer::build(&launch, &Tracer::new(Arc::new(scene)), &casters);
+    assert_eq!(buffer.casters, [1, 2]);
 }

@@ -24,7 +24,7 @@ fn options(log: &tempfile::NamedTempFile, density_per_sr: f64) -> ViewerOptions 
                 height: 32,
             },
             layers: vec![LayerKind::Caustic, LayerKind::Direct],
-            ..BakeSettings::default()
+            ..BakeSettings::splat()
         },
         maps: None,
         size: (640, 480),

@@ -18,7 +18,7 @@ const SIZE: (f32, f32) = (1280.0, 720.0);
 fn settings() -> BakeSettings {
     BakeSettings {
         layers: vec![LayerKind::Caustic, LayerKind::Direct],
-        ..BakeSettings::default()
+        ..BakeSettings::splat()
     }
 }
 

@@ -62,7 +62,7 @@ fn difference(a: &RgbImage, b: &RgbImage) -> f64 {
 fn sigma_slider() -> ((i32, i32), (i32, i32)) {
     let settings = BakeSettings {
         layers: vec![LayerKind::Caustic],
-        ..BakeSettings::default()
+        ..BakeSettings::splat()
     };
     let panel = Headless::new(settings, (SIZE.0 as f32, SIZE.1 as f32));
     let rect = Headless::rect_of(panel.labelled(Role::Slider, "Sigma [radii²]"));

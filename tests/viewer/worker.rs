@@ -39,7 +39,7 @@ fn result(rays: u64, partial: bool) -> BakeResult {
 fn settings(density_per_sr: f64) -> BakeSettings {
     BakeSettings {
         density_per_sr,
-        ..BakeSettings::default()
+        ..BakeSettings::splat()
     }
 }
 

@@ -1,7 +1,7 @@
 //! The lattice of light rays over a launch domain, traced a band of rows at a time, so that memory does not grow with
 //! the number of rays.
 
-use glam::DVec2;
+use glam::{DVec2, DVec3};
 use rand_pcg::Pcg64Mcg;
 use rand_pcg::rand_core::{Rng, SeedableRng};
 
@@ -24,6 +24,9 @@ pub struct Lattice<'a> {
     pub item_buffer: &'a ItemBuffer,
     /// Columns and rows of each face.
     pub size: (usize, usize),
+    /// Every so many-th column and row alone is traced, its arrivals for as many cells; 1 for the whole lattice. Accounts
+    /// of a thinner lattice are those of its rays alone.
+    pub strides: (usize, usize),
     /// Where in its cell a ray starts.
     pub placement: RayPlacement,
     /// Of the jitter.
@@ -62,13 +65,57 @@ impl TracedRow {
     }
 }
 
+/// First of the columns (rows) of the whole lattice that a traced one stands for, and the one after the last.
+fn group(index: usize, stride: usize, size: usize) -> (usize, usize) {
+    (index * stride, ((index + 1) * stride).min(size))
+}
+
 impl Lattice<'_> {
-    /// Corners of a cell in the unit square of its face.
+    /// Traced columns and rows of each face.
+    pub fn traced_size(&self) -> (usize, usize) {
+        (
+            self.size.0.div_ceil(self.strides.0),
+            self.size.1.div_ceil(self.strides.1),
+        )
+    }
+
+    /// Corners of the part of the unit square of its face that a traced ray stands for.
     pub fn cell(&self, column: usize, row: usize) -> (DVec2, DVec2) {
-        let (columns, rows) = (self.size.0 as f64, self.size.1 as f64);
-        let low = DVec2::new(column as f64 / columns, row as f64 / rows);
-        let high = DVec2::new((column + 1) as f64 / columns, (row + 1) as f64 / rows);
-        (low, high)
+        let size = DVec2::new(self.size.0 as f64, self.size.1 as f64);
+        let (left, right) = group(column, self.strides.0, self.size.0);
+        let (top, bottom) = group(row, self.strides.1, self.size.1);
+        (
+            DVec2::new(left as f64, top as f64) / size,
+            DVec2::new(right as f64, bottom as f64) / size,
+        )
+    }
+
+    /// Cells of the whole lattice that a traced ray stands for.
+    pub fn cells_of(&self, column: usize, row: usize) -> f64 {
+        let (left, right) = group(column, self.strides.0, self.size.0);
+        let (top, bottom) = group(row, self.strides.1, self.size.1);
+        ((right - left) * (bottom - top)) as f64
+    }
+
+    /// Row of the whole lattice that is traced as row `row`.
+    pub fn fine_row(&self, row: usize) -> usize {
+        let (top, bottom) = group(row, self.strides.1, self.size.1);
+        (top + bottom) / 2
+    }
+
+    /// The traced column that a column of the whole lattice is; `None` where it is left out.
+    pub fn coarse_column(&self, column: usize) -> Option<usize> {
+        let coarse = column / self.strides.0;
+        let (left, right) = group(coarse, self.strides.0, self.size.0);
+        (column == (left + right) / 2).then_some(coarse)
+    }
+
+    /// Where an arrival is [m], by nothing but its triangle and barycentric coordinates.
+    pub fn point_of(&self, arrival: &Arrival) -> DVec3 {
+        let mesh = &self.tracer.scene().objects[arrival.object as usize].mesh;
+        let [a, b, c] = mesh.corners(arrival.triangle as usize);
+        let DVec2 { x: wb, y: wc } = arrival.barycentric;
+        a * (1.0 - wb - wc) + b * wb + c * wc
     }
 
     /// Upper bound of the rays: lattice cells that touch a marked cell of the item buffer.
@@ -80,18 +127,31 @@ impl Lattice<'_> {
     /// Traces one row of one face.
     pub fn trace_row(&self, face: usize, row: usize) -> TracedRow {
         let mut traced = TracedRow::default();
+        let fine_row = self.fine_row(row);
+        if fine_row >= self.size.1 {
+            return traced;
+        }
+        let whole = Self {
+            strides: (1, 1),
+            ..*self
+        };
         let mut paths = PathTracer::new(self.tracer, self.limits, self.unit);
-        for (start, end) in self.item_buffer.lattice_spans(face, row, self.size) {
-            for column in start..end {
-                let (low, high) = self.cell(column, row);
-                let square = low + (high - low) * self.place(face, column, row);
+        for (start, end) in self.item_buffer.lattice_spans(face, fine_row, self.size) {
+            for fine_column in start..end {
+                let Some(column) = self.coarse_column(fine_column) else {
+                    continue;
+                };
+                let (low, high) = whole.cell(fine_column, fine_row);
+                let square = low + (high - low) * self.place(face, fine_column, fine_row);
                 let ray = self.launch.ray(face, square);
                 let flux_w = self.launch.cell_flux_w(low, high, ray.direction);
                 if flux_w.max_channel() <= 0.0 {
                     continue;
                 }
                 traced.rays += 1;
-                paths.trace(ray, flux_w, |arrival| {
+                paths.trace(ray, flux_w, |mut arrival| {
+                    arrival.point = self.point_of(&arrival);
+                    arrival.flux_w = arrival.flux_w * self.cells_of(column, row);
                     traced.columns.push(column as u32);
                     traced.arrivals.push(arrival);
                 });

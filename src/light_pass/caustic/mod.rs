@@ -2,6 +2,7 @@
 
 pub mod deposit;
 pub mod footprint;
+pub mod kept;
 pub mod kernel;
 pub mod lattice;
 pub mod pass;

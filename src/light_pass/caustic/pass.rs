@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use std::time::Instant;
 
 use super::deposit::{DepositReport, Depositor, RowContext};
+use super::kept::KeptLight;
 use super::lattice::TracedRow;
 use super::statistics::FootprintStatistics;
 use crate::light_pass::ledger_sum::LedgerSum;
@@ -27,6 +28,10 @@ pub struct PassReport {
     pub segments: u64,
     /// Kernels deposited.
     pub splats: u64,
+    /// Wavefront cells.
+    pub cells: u64,
+    /// Rays between traced ones that were intersected with receivers.
+    pub receiver_queries: u64,
     /// Sizes of footprints.
     pub statistics: FootprintStatistics,
     /// Wall-clock and CPU seconds of tracing.
@@ -90,37 +95,60 @@ pub struct Listener<'a> {
     pub progress: &'a dyn Progress,
     /// Asks it to stop.
     pub control: &'a Control,
-    /// Rays of passes before this one.
+    /// Rays (arrivals, where they were kept) of passes before this one.
     pub done: u64,
-    /// Rays of all passes.
+    /// Rays (arrivals) of all passes.
     pub total: u64,
 }
 
-/// Traces and deposits the whole lattice of one light.
+/// Where the light of a pass comes from.
+#[derive(Clone, Copy, Debug)]
+pub enum Source<'a> {
+    /// From rays; what arrives is kept while it takes no more than so many bytes.
+    Rays {
+        /// Most memory to keep [bytes].
+        keep_bytes: u64,
+    },
+    /// From rays of an earlier pass over the same lattice, or one with strides of 1.
+    Kept(&'a KeptLight),
+}
+
+/// Traces, or takes as traced before, and deposits the whole lattice of one light. Gives what arrived, where it was
+/// traced to the end and may be kept.
 pub fn run(
     depositor: &Depositor,
+    source: Source,
     maps: &mut ReceiverMaps,
     chart_for: &ChartFor,
     listener: &Listener,
-) -> PassReport {
+) -> (PassReport, Option<KeptLight>) {
     let mut report = PassReport::default();
-    let (columns, rows) = depositor.lattice.size;
+    let mut recorder = Recorder::new(source);
+    let lattice = &depositor.lattice;
+    let (columns, rows) = lattice.traced_size();
     let rows_per_band = (RAYS_PER_BAND / columns).clamp(4, 1024);
-    for face in 0..depositor.lattice.launch.face_count() {
+    for face in 0..lattice.launch.face_count() {
         let mut carried: Vec<TracedRow> = Vec::new();
         let mut first_row = 0;
         while first_row < rows {
             if listener.control.is_cancelled() {
                 report.cancelled = true;
-                return report;
+                return (report, None);
             }
             let end = (first_row + rows_per_band).min(rows);
             let watch = Stopwatch::start();
             let traced: Vec<TracedRow> = (first_row..end)
                 .into_par_iter()
-                .map(|row| depositor.lattice.trace_row(face, row))
+                .map(|row| match source {
+                    Source::Rays { .. } => lattice.trace_row(face, row),
+                    Source::Kept(light) => light.row(lattice, face, row),
+                })
                 .collect();
-            report.trace_s.add(watch.elapsed());
+            recorder.take(&traced);
+            match source {
+                Source::Rays { .. } => report.trace_s.add(watch.elapsed()),
+                Source::Kept(_) => report.deposit_s.add(watch.elapsed()),
+            }
             report.count(&traced);
             let watch = Stopwatch::start();
             carried = deposit_band(
@@ -134,13 +162,48 @@ pub fn run(
                 &mut report,
             );
             report.deposit_s.add(watch.elapsed());
+            let done = match source {
+                Source::Rays { .. } => report.rays,
+                Source::Kept(_) => report.splats,
+            };
             listener
                 .progress
-                .advance(Stage::Caustic, listener.done + report.rays, listener.total);
+                .advance(Stage::Caustic, listener.done + done, listener.total);
             first_row = end;
         }
     }
-    report
+    if let Source::Kept(light) = source {
+        report.ledger.merge(light.ledger());
+    }
+    (report, recorder.light)
+}
+
+/// Keeps what arrives, until it is too much.
+struct Recorder {
+    light: Option<KeptLight>,
+    most_bytes: u64,
+}
+
+impl Recorder {
+    fn new(source: Source) -> Self {
+        let most_bytes = match source {
+            Source::Rays { keep_bytes } => keep_bytes,
+            Source::Kept(_) => 0,
+        };
+        Self {
+            light: (most_bytes > 0).then(KeptLight::default),
+            most_bytes,
+        }
+    }
+
+    fn take(&mut self, traced: &[TracedRow]) {
+        if let Some(light) = &mut self.light {
+            light.push(traced);
+            if light.bytes() > self.most_bytes {
+                self.light = None;
+            }
+        }
+    }
 }
 
 /// Deposits all rows that have a row after them (all at the end of a face); returns the last two rows, which the next

@@ -16,8 +16,24 @@ impl PathSignature {
     /// After one more event at an object.
     #[must_use]
     pub fn with(self, object: usize, event: Event) -> Self {
+        self.mixed((object as u64) << 3 | event as u64)
+    }
+
+    /// At a surface: an object and the smoothing group of it that was met.
+    #[must_use]
+    pub fn at(self, object: usize, group: u32) -> Self {
+        self.mixed((object as u64) << 32 | u64::from(group))
+    }
+
+    /// After an event at the surface of [`Self::at`].
+    #[must_use]
+    pub fn event(self, event: Event) -> Self {
+        self.mixed(event as u64 + 1)
+    }
+
+    fn mixed(self, word: u64) -> Self {
         // Steele, Lea and Flood's SplitMix64 finaliser: distinct sequences collide with probability 2⁻⁶⁴.
-        let mut z = (self.0 ^ ((object as u64) << 3 | event as u64)).wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = (self.0 ^ word).wrapping_add(0x9e37_79b9_7f4a_7c15);
         z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
         z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
         Self(z ^ (z >> 31))

@@ -6,6 +6,7 @@ use crate::light_pass::item_buffer::ItemBuffer;
 use crate::light_pass::launch::Launch;
 use crate::scene::Scene;
 use crate::settings::ItemBufferKind;
+use crate::transport::Tracer;
 
 /// A light that sees something specular.
 #[derive(Debug)]
@@ -31,7 +32,8 @@ pub struct Aim {
 
 impl Aim {
     /// Builds the item buffers of all lights. Nothing is looked for where no surface can receive light.
-    pub fn take(scene: &Scene, item_buffer: ItemBufferKind) -> Self {
+    pub fn take(tracer: &Tracer, item_buffer: ItemBufferKind) -> Self {
+        let scene = tracer.scene();
         let of_kind = |wanted: fn(crate::scene::SurfaceKind) -> bool| -> Vec<usize> {
             (0..scene.objects.len())
                 .filter(|&object| wanted(scene.material_of(object).surface))
@@ -53,7 +55,7 @@ impl Aim {
                 aim.casters[light] = Some(Vec::new());
                 continue;
             };
-            let item_buffer = ItemBuffer::build(&launch, scene, &casters);
+            let item_buffer = ItemBuffer::build(&launch, tracer, &casters);
             aim.casters[light] = Some(item_buffer.casters.clone());
             if !item_buffer.casters.is_empty() {
                 aim.lights.push(AimedLight {

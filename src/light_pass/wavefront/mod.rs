@@ -1,3 +1,15 @@
-//! The wavefront estimator: neighbouring rays span pieces of the wavefront, whose flux is laid out on the receivers.
+//! The caustic layer by pieces of the wavefront: cells of neighbouring light rays that went the same way become smooth
+//! patches, and their light is spread exactly over the texels they cover.
 
+pub mod band;
+pub mod cell;
 pub mod coverage;
+pub mod edge;
+pub mod lattice;
+pub mod pass;
+pub mod patch;
+pub mod receivers;
+pub mod spread;
+pub mod strand;
+pub mod trace;
+pub mod virtual_vertex;

@@ -15,10 +15,11 @@ const SIGMA_RANGE: std::ops::RangeInclusive<f64> = 0.01..=100.0;
 
 const ESTIMATOR: About = About {
     label: "Estimator",
-    what: "How light rays become irradiance. Splat: every ray spreads its flux over its footprint by a kernel.",
-    range: "splat",
-    accuracy: "set by ray density and sigma below",
-    cost: "grows with the number of rays",
+    what: "How light rays become irradiance. Wavefront: smooth patches between neighbouring rays, spread exactly over \
+           the texels they cover. Splat: every ray spreads its flux over its footprint by a kernel (Collins).",
+    range: "wavefront, splat; default wavefront",
+    accuracy: "wavefront needs some hundred times fewer rays for the same error",
+    cost: "grows with the number of rays; a wavefront ray costs a few times more than a splat",
 };
 const LAYERS: About = About {
     label: "Layers",
@@ -30,16 +31,17 @@ const LAYERS: About = About {
 const DENSITY: About = About {
     label: "Ray density [rays/sr]",
     what: "Light rays per steradian around each lamp; for a sun the same density over the casters.",
-    range: "781 to 102,400,000 in steps of ×2; default 100,000",
+    range: "781 to 102,400,000 in steps of ×2; default 25,000 (splat: 100,000)",
     accuracy: "finer caustics and less noise with more rays",
     cost: "time grows in proportion to it",
 };
 const SIGMA: About = About {
     label: "Sigma [radii²]",
-    what: "Spread of the gaussian kernel in squared footprint radii: weight exp(−r²/2σ).",
-    range: "0.01 to 100, logarithmic; default 1",
-    accuracy: "small shows single rays, large blurs the caustic",
-    cost: "time per ray grows in proportion to it",
+    what: "Splat: spread of the gaussian kernel in squared footprint radii, weight exp(−r²/2σ). Wavefront: smoothing of \
+           the finished map in squared texel radii.",
+    range: "splat 0.01 to 100, default 1; wavefront 0 to 100, default 0; logarithmic",
+    accuracy: "small shows single rays (splat) or is exact (wavefront), large blurs the caustic",
+    cost: "splat: time per ray grows in proportion to it; wavefront: little",
 };
 const ADAPTIVE: About = About {
     label: "Adaptive sigma",
@@ -84,6 +86,18 @@ const MAP_RESOLUTION: About = About {
     cost: "memory and the direct layer's time grow with its square",
 };
 
+const ESTIMATORS: [(Estimator, &str, &str); 2] = [
+    (
+        Estimator::Wavefront,
+        "wavefront",
+        "patches between neighbouring rays, spread exactly over texels",
+    ),
+    (
+        Estimator::Splat,
+        "splat",
+        "a kernel of flux per ray, scaled to the wavefront",
+    ),
+];
 const KERNELS: [(Kernel, &str, &str); 4] = [
     (Kernel::Gaussian, "gaussian", "exp(−r²/2σ), cut at four spreads"),
     (Kernel::Cone, "cone", "falls linearly to 0 at 1.73 radii"),
@@ -126,40 +140,43 @@ const ITEM_BUFFERS: [(ItemBufferKind, &str, &str); 2] = [
 ];
 
 const NO_CAUSTIC: &str = "The caustic layer is off: nothing here applies to the direct layer.";
+const NO_SPLATS: &str = "Only the splat estimator has it.";
 const NOT_GAUSSIAN: &str = "Sigma is the spread of the gaussian kernel; the chosen kernel has none.";
 
 /// Shows the section; `settings` holds what the user chose.
 pub fn show(ui: &mut Ui, settings: &mut BakeSettings) {
     let no_caustic = (!settings.layers.contains(&LayerKind::Caustic)).then_some(NO_CAUSTIC);
-    let no_sigma = no_caustic.or((settings.kernel != Kernel::Gaussian).then_some(NOT_GAUSSIAN));
+    let is_wavefront = settings.estimator == Estimator::Wavefront;
+    let no_splats = no_caustic.or(is_wavefront.then_some(NO_SPLATS));
+    let not_gaussian = !is_wavefront && settings.kernel != Kernel::Gaussian;
+    let no_sigma = no_caustic.or(not_gaussian.then_some(NOT_GAUSSIAN));
     rows(ui, "light pass", |ui| {
-        row(
-            ui,
-            &ESTIMATOR,
-            Some("Splat is the only estimator of this version."),
-            |ui| {
-                choice(
-                    ui,
-                    "estimator",
-                    &mut settings.estimator,
-                    "splat",
-                    &[(Estimator::Splat, "splat", "")],
-                )
-            },
-        );
+        let before = settings.estimator;
+        row(ui, &ESTIMATOR, no_caustic, |ui| {
+            listed(ui, "estimator", &mut settings.estimator, &ESTIMATORS)
+        });
+        if settings.estimator != before {
+            settings.density_per_sr *=
+                settings.estimator.preview_density_per_sr() / before.preview_density_per_sr();
+            settings.sigma = settings.estimator.default_sigma();
+        }
         row(ui, &LAYERS, None, |ui| layers(ui, &mut settings.layers));
         row(ui, &DENSITY, no_caustic, |ui| {
             density(ui, &mut settings.density_per_sr)
         });
-        row(ui, &SIGMA, no_sigma, |ui| sigma(ui, &mut settings.sigma));
-        row(ui, &ADAPTIVE, no_sigma, |ui| adaptive(ui, &mut settings.sigma));
-        row(ui, &KERNEL, no_caustic, |ui| {
+        row(ui, &SIGMA, no_sigma, |ui| {
+            sigma(ui, &mut settings.sigma, is_wavefront)
+        });
+        row(ui, &ADAPTIVE, no_splats.or(no_sigma), |ui| {
+            adaptive(ui, &mut settings.sigma)
+        });
+        row(ui, &KERNEL, no_splats, |ui| {
             listed(ui, "kernel", &mut settings.kernel, &KERNELS)
         });
-        row(ui, &FOOTPRINT, no_caustic, |ui| {
+        row(ui, &FOOTPRINT, no_splats, |ui| {
             listed(ui, "footprint", &mut settings.footprint, &FOOTPRINTS)
         });
-        row(ui, &RAYS, no_caustic, |ui| {
+        row(ui, &RAYS, no_splats, |ui| {
             listed(ui, "rays", &mut settings.rays, &PLACEMENTS)
         });
         row(ui, &ITEM_BUFFER, no_caustic, |ui| {
@@ -223,11 +240,17 @@ fn density(ui: &mut Ui, density_per_sr: &mut f64) -> Response {
     )
 }
 
-fn sigma(ui: &mut Ui, sigma: &mut Sigma) -> Response {
+fn sigma(ui: &mut Ui, sigma: &mut Sigma, from_zero: bool) -> Response {
+    let range = if from_zero {
+        0.0..=*SIGMA_RANGE.end()
+    } else {
+        SIGMA_RANGE
+    };
     match sigma {
         Sigma::Constant(value) => ui.add(
-            Slider::new(value, SIGMA_RANGE)
+            Slider::new(value, range)
                 .logarithmic(true)
+                .smallest_positive(*SIGMA_RANGE.start())
                 .clamping(SliderClamping::Edits)
                 .custom_formatter(|value, _| format!("{value:.3}")),
         ),

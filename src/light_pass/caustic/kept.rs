@@ -1,0 +1,137 @@
+//! What arrived from one light, packed to be kept: other kernels and maps are deposited from it without a light ray.
+
+use glam::DVec2;
+use rayon::prelude::*;
+
+use super::lattice::{Lattice, TracedRow};
+use super::path::{Arrival, PathSignature};
+use crate::light_pass::ledger_sum::LedgerSum;
+use crate::optics::LinearSrgb;
+
+/// All that one light sent to diffuse surfaces, row by row of its lattice.
+#[derive(Debug, Default)]
+pub struct KeptLight {
+    /// Rows of all faces, face by face.
+    rows: Vec<KeptRow>,
+    /// Accounts of the paths; `Deposited` is not among them.
+    ledger: LedgerSum,
+    bytes: u64,
+}
+
+/// Arrivals of one row, in their order.
+#[derive(Debug)]
+struct KeptRow {
+    arrivals: Box<[Kept]>,
+    /// Second and third channel of each arrival's flux [W]; empty where all are grey.
+    colours: Box<[[f64; 2]]>,
+}
+
+/// An arrival without what follows from the rest: 56 bytes.
+#[derive(Clone, Copy, Debug)]
+struct Kept {
+    signature: u64,
+    barycentric: [f64; 2],
+    path_m: f64,
+    /// First channel of the flux [W].
+    flux_w: f64,
+    column: u32,
+    object: u32,
+    triangle: u32,
+}
+
+impl KeptLight {
+    /// Memory taken [bytes].
+    pub fn bytes(&self) -> u64 {
+        self.bytes
+    }
+
+    /// Number of arrivals.
+    pub fn arrivals(&self) -> u64 {
+        self.rows.iter().map(|row| row.arrivals.len() as u64).sum()
+    }
+
+    /// Accounts of the paths.
+    pub fn ledger(&self) -> &LedgerSum {
+        &self.ledger
+    }
+
+    /// Adds the next rows that were traced.
+    pub fn push(&mut self, traced: &[TracedRow]) {
+        let rows: Vec<KeptRow> = traced.par_iter().map(KeptRow::pack).collect();
+        self.bytes += rows.iter().map(KeptRow::bytes).sum::<u64>();
+        self.rows.extend(rows);
+        traced.iter().for_each(|row| self.ledger.merge(&row.ledger));
+    }
+
+    /// A row as [`Lattice::trace_row`] traced it, bit by bit, without its accounts. A thinner lattice takes what its
+    /// own rays brought.
+    pub fn row(&self, lattice: &Lattice, face: usize, row: usize) -> TracedRow {
+        let mut unpacked = TracedRow::default();
+        let fine_row = lattice.fine_row(row);
+        let kept = &self.rows[face * lattice.size.1 + fine_row];
+        for (index, arrival) in kept.arrivals.iter().enumerate() {
+            if let Some(column) = lattice.coarse_column(arrival.column as usize) {
+                unpacked.columns.push(column as u32);
+                let mut arrival = kept.unpack(index, lattice);
+                arrival.flux_w = arrival.flux_w * lattice.cells_of(column, row);
+                unpacked.arrivals.push(arrival);
+            }
+        }
+        unpacked
+    }
+}
+
+impl KeptRow {
+    fn pack(row: &TracedRow) -> Self {
+        let pack = |(&column, arrival): (&u32, &Arrival)| Kept {
+            signature: arrival.signature.0,
+            barycentric: arrival.barycentric.to_array(),
+            path_m: arrival.path_m,
+            flux_w: arrival.flux_w.to_array()[0],
+            column,
+            object: arrival.object,
+            triangle: arrival.triangle,
+        };
+        let is_grey = |arrival: &Arrival| {
+            let [r, g, b] = arrival.flux_w.to_array().map(f64::to_bits);
+            r == g && g == b
+        };
+        let colours = if row.arrivals.iter().all(is_grey) {
+            Box::default()
+        } else {
+            let rest = |arrival: &Arrival| {
+                let [_, g, b] = arrival.flux_w.to_array();
+                [g, b]
+            };
+            row.arrivals.iter().map(rest).collect()
+        };
+        Self {
+            arrivals: row.columns.iter().zip(&row.arrivals).map(pack).collect(),
+            colours,
+        }
+    }
+
+    fn unpack(&self, index: usize, lattice: &Lattice) -> Arrival {
+        let kept = &self.arrivals[index];
+        let [g, b] = self
+            .colours
+            .get(index)
+            .copied()
+            .unwrap_or([kept.flux_w, kept.flux_w]);
+        let mut arrival = Arrival {
+            object: kept.object,
+            triangle: kept.triangle,
+            signature: PathSignature(kept.signature),
+            barycentric: DVec2::from_array(kept.barycentric),
+            point: glam::DVec3::ZERO,
+            flux_w: LinearSrgb::new(kept.flux_w, g, b),
+            path_m: kept.path_m,
+        };
+        arrival.point = lattice.point_of(&arrival);
+        arrival
+    }
+
+    fn bytes(&self) -> u64 {
+        (size_of::<Self>() + size_of_val(&*self.arrivals) + size_of_val(&*self.colours)) as u64
+    }
+}

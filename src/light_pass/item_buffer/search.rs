@@ -1,0 +1,224 @@
+//! Searches the scene's hierarchy for specular triangles in the cells of one face.
+
+use glam::{DMat3, DVec2, DVec3};
+
+use super::bits::CellBits;
+use super::grid::{CellRange, Grid};
+use super::polygon::{Polygon, WIDENED};
+use crate::geometry::bvh::Node;
+use crate::light_pass::launch::Launch;
+use crate::scene::Mesh;
+
+/// A box, as minimum and maximum corner [m].
+pub(super) type Bounds = (DVec3, DVec3);
+
+/// What is looked for, and from where.
+pub(super) struct Search<'a> {
+    launch: &'a Launch,
+    face: usize,
+    grid: &'static Grid,
+    /// Boxes of the objects looked for: nodes beyond all of them are passed over.
+    boxes: &'a [Bounds],
+    /// Boxes of all other objects: a node beyond all of these holds nothing else than what is looked for.
+    others: &'a [Bounds],
+    /// Whether a triangle of the hierarchy is one of theirs.
+    wanted: &'a (dyn Fn(u32) -> bool + Sync),
+    /// Absolute values of the linear part of the way from the scene to the face: what a box's half sides reach there.
+    reach: DMat3,
+}
+
+/// Where a node's box lies on a face.
+enum Projection {
+    /// Nowhere.
+    Outside,
+    /// Around the light, or beside it.
+    Unbounded,
+    /// Within these cells; `inside` where no part of it leaves the face.
+    Cells { cells: CellRange, inside: bool },
+}
+
+impl<'a> Search<'a> {
+    /// A search on one face.
+    pub(super) fn new(
+        launch: &'a Launch,
+        face: usize,
+        boxes: &'a [Bounds],
+        others: &'a [Bounds],
+        wanted: &'a (dyn Fn(u32) -> bool + Sync),
+    ) -> Self {
+        let to_face = |point: DVec3| launch.to_face(face, point);
+        let along = |axis: DVec3| (to_face(axis) - to_face(DVec3::ZERO)).abs();
+        Self {
+            launch,
+            face,
+            grid: Grid::of(launch.mapping()),
+            boxes,
+            others,
+            wanted,
+            reach: DMat3::from_cols(along(DVec3::X), along(DVec3::Y), along(DVec3::Z)),
+        }
+    }
+    /// Clears the bits of all cells in `open` that a wanted triangle touches.
+    ///
+    /// A node whose cells are all closed is passed over; in a node within a single cell, any wanted triangle will do.
+    pub(super) fn close(&self, root: Node, open: &mut CellBits) {
+        let mut waiting = vec![root];
+        while let Some(node) = waiting.pop() {
+            let bounds = node.bounds();
+            if !overlaps(bounds, self.boxes) {
+                continue;
+            }
+            match self.project(bounds) {
+                Projection::Outside => continue,
+                Projection::Cells { cells, .. } if !open.any_in(&cells) => continue,
+                Projection::Cells { cells, inside: true } if cells.is_single() => {
+                    if self.holds_wanted(node) {
+                        open.clear(cells.columns.0, cells.rows.0);
+                    }
+                    continue;
+                }
+                Projection::Cells { .. } | Projection::Unbounded => {}
+            }
+            match node.children() {
+                Some(children) => waiting.extend(children),
+                None => {
+                    for (_, corners) in node.triangles().filter(|(triangle, _)| (self.wanted)(*triangle)) {
+                        for (column, row) in self.touched(corners, open) {
+                            open.clear(column, row);
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    /// Clears the bits of cells in `open` that some corners of a large mesh lie in, spread over it, for as long as that
+    /// closes cells faster than the search does.
+    pub(super) fn close_some(&self, mesh: &Mesh, open: &mut CellBits) {
+        const BATCH: u64 = 1024;
+        const LEAST_CLOSED: u64 = BATCH / 12;
+        let count = mesh.triangles.len() as u64;
+        for batch in 0..count / BATCH {
+            let before = open.count();
+            for sample in batch * BATCH..(batch + 1) * BATCH {
+                // Multiples of the golden ratio fill an interval evenly.
+                let share = sample.wrapping_mul(0x9e37_79b9_7f4a_7c15);
+                let triangle = (u128::from(share) * u128::from(count)) >> 64;
+                let vertex = mesh.triangles[triangle as usize][0];
+                self.close_at(mesh.positions[vertex as usize], open);
+            }
+            if before - open.count() < LEAST_CLOSED {
+                return;
+            }
+        }
+    }
+
+    /// Clears the bits of the cells that a point lies in.
+    fn close_at(&self, point: DVec3, open: &mut CellBits) {
+        let point = self.launch.to_face(self.face, point);
+        if !(point.z > 0.0 && point.truncate().abs().max_element() <= point.z) {
+            return;
+        }
+        let point = point.truncate() / point.z;
+        let cells = self.grid.cells(point, point);
+        for row in cells.rows.0..=cells.rows.1 {
+            (cells.columns.0..=cells.columns.1).for_each(|column| open.clear(column, row));
+        }
+    }
+
+    /// Whether any wanted triangle touches a cell that is set in `lit`.
+    pub(super) fn finds(&self, root: Node, lit: &CellBits) -> bool {
+        let mut waiting = vec![root];
+        while let Some(node) = waiting.pop() {
+            let bounds = node.bounds();
+            let beyond = match self.project(bounds) {
+                Projection::Outside => true,
+                Projection::Cells { cells, .. } => !lit.any_in(&cells),
+                Projection::Unbounded => false,
+            };
+            if beyond || !overlaps(bounds, self.boxes) {
+                continue;
+            }
+            waiting.extend(node.children().into_iter().flatten());
+            let mut wanted = node.triangles().filter(|(triangle, _)| (self.wanted)(*triangle));
+            if wanted.any(|(_, corners)| self.touches(corners, lit)) {
+                return true;
+            }
+        }
+        false
+    }
+
+    /// Whether a triangle touches a cell that is set.
+    pub(super) fn touches(&self, corners: &[DVec3; 3], cells: &CellBits) -> bool {
+        !self.touched(corners, cells).is_empty()
+    }
+
+    /// Set cells that a triangle touches; all of them where it reaches the light.
+    fn touched(&self, corners: &[DVec3; 3], set: &CellBits) -> Vec<(usize, usize)> {
+        let projected = corners.map(|corner| self.launch.to_face(self.face, corner));
+        let Some(polygon) = Polygon::seen(&projected) else {
+            return Vec::new();
+        };
+        let Some((low, high)) = polygon.plane_bounds() else {
+            return set.list(&CellRange::ALL);
+        };
+        let cells = self.grid.cells(low, high);
+        let mut list = set.list(&cells);
+        if !cells.is_single() && !list.is_empty() {
+            let edges = polygon.edges();
+            list.retain(|&(column, row)| edges.touch(self.grid.cell(column, row)));
+        }
+        list
+    }
+
+    /// Whether any triangle below a node is wanted.
+    fn holds_wanted(&self, node: Node) -> bool {
+        if !overlaps(node.bounds(), self.others) {
+            return true;
+        }
+        let mut waiting = vec![node];
+        while let Some(node) = waiting.pop() {
+            if !overlaps(node.bounds(), self.boxes) {
+                continue;
+            }
+            if node.triangles().any(|(triangle, _)| (self.wanted)(triangle)) {
+                return true;
+            }
+            waiting.extend(node.children().into_iter().flatten());
+        }
+        false
+    }
+
+    /// Where a box lies on the face.
+    fn project(&self, (from, to): Bounds) -> Projection {
+        let half = (to - from) * 0.5;
+        let middle = self.launch.to_face(self.face, from + half);
+        let reach = self.reach * half;
+        let (low, high) = (middle - reach, middle + reach);
+        let beyond = |sides: (f64, f64)| sides.0 > WIDENED * high.z || sides.1 < -WIDENED * high.z;
+        if beyond((low.x, high.x)) || beyond((low.y, high.y)) {
+            return Projection::Outside;
+        }
+        // Not where it is not a number, either.
+        if !(low.z > 0.0 && high.is_finite()) {
+            return Projection::Unbounded;
+        }
+        let (nearest, farthest) = (1.0 / low.z, 1.0 / high.z);
+        let least = |x: f64| x * if x < 0.0 { nearest } else { farthest };
+        let most = |x: f64| x * if x > 0.0 { nearest } else { farthest };
+        let low = DVec2::new(least(low.x), least(low.y));
+        let high = DVec2::new(most(high.x), most(high.y));
+        let face = |point: DVec2| point.clamp(DVec2::NEG_ONE, DVec2::ONE);
+        Projection::Cells {
+            cells: self.grid.cells(face(low), face(high)),
+            inside: low.min_element() >= -1.0 && high.max_element() <= 1.0,
+        }
+    }
+}
+
+/// Whether a box overlaps any of some.
+fn overlaps((low, high): Bounds, boxes: &[Bounds]) -> bool {
+    boxes
+        .iter()
+        .any(|(from, to)| low.cmple(*to).all() && high.cmpge(*from).all())
+}

@@ -1,0 +1,82 @@
+//! The traced samples of some rows of cells, in chunks that parallel tasks fill on their own.
+
+use glam::DVec2;
+
+use super::strand::{LightSample, Strand};
+
+/// Where a sample is kept.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SampleId {
+    /// Chunk of the band.
+    pub chunk: u32,
+    /// Place in the chunk.
+    pub index: u32,
+}
+
+/// A sample with its place in the unit square of its face.
+#[derive(Clone, Copy, Debug)]
+pub struct Corner {
+    /// In the unit square.
+    pub square: DVec2,
+    /// The sample there.
+    pub sample: SampleId,
+}
+
+/// Samples by chunk.
+#[derive(Clone, Debug, Default)]
+pub struct Samples {
+    /// Filled in the order of the chunks.
+    pub chunks: Vec<Vec<LightSample>>,
+}
+
+impl Samples {
+    /// A sample.
+    pub fn get(&self, id: SampleId) -> &LightSample {
+        &self.chunks[id.chunk as usize][id.index as usize]
+    }
+
+    /// A strand of a sample.
+    pub fn strand(&self, id: SampleId, strand: u16) -> &Strand {
+        &self.get(id).strands[usize::from(strand)]
+    }
+}
+
+/// Samples that tasks may read, and the one chunk that this task adds to.
+#[derive(Debug)]
+pub struct Workspace<'a> {
+    /// What was traced before.
+    pub shared: &'a Samples,
+    /// Number of the own chunk.
+    pub chunk: u32,
+    /// Traced by this task.
+    pub own: Vec<LightSample>,
+}
+
+impl<'a> Workspace<'a> {
+    /// An empty own chunk.
+    pub fn new(shared: &'a Samples, chunk: usize) -> Self {
+        Self {
+            shared,
+            chunk: chunk as u32,
+            own: Vec::new(),
+        }
+    }
+
+    /// A sample, shared or own.
+    pub fn get(&self, id: SampleId) -> &LightSample {
+        if id.chunk == self.chunk {
+            &self.own[id.index as usize]
+        } else {
+            self.shared.get(id)
+        }
+    }
+
+    /// Keeps a sample.
+    pub fn add(&mut self, sample: LightSample) -> SampleId {
+        self.own.push(sample);
+        SampleId {
+            chunk: self.chunk,
+            index: (self.own.len() - 1) as u32,
+        }
+    }
+}

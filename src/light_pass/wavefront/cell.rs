@@ -1,0 +1,600 @@
+//! Cells of the lattice: their corners' light cut into patches along the lines where its way changes.
+
+use glam::DVec2;
+
+use super::band::{Corner, SampleId, Workspace};
+use super::edge::{CUT_BITS, Edge, EdgeCutter, Reach, SUSPICION, mismatch};
+use super::strand::LightSample;
+use crate::illumination::accumulator::FluxUnit;
+use crate::light_pass::caustic::path::PathSignature;
+use crate::light_pass::ledger_sum::{Account, LedgerSum};
+use crate::optics::LinearSrgb;
+
+/// How often a cell is split whose cuts are ambiguous; what is then left goes on as one small patch per ray.
+const DEEPEST_SPLIT: u32 = 3;
+
+/// Mismatch along an edge from which a check ray decides between the cubic and the bilinear patch.
+const CHECK_MISMATCH: f64 = 0.08;
+
+/// A piece of the wavefront between traced strands.
+#[derive(Clone, Copy, Debug)]
+pub struct Patch {
+    /// Samples and which of their strands; as many as the shape has corners.
+    pub corners: [(SampleId, u16); 4],
+    /// Where they lie in the unit square.
+    pub squares: [DVec2; 4],
+    /// What it is.
+    pub kind: PatchKind,
+}
+
+/// Shape of a patch in the unit square.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PatchKind {
+    /// Four corners of a rectangle, from its low corner around.
+    Rectangle,
+    /// The same, by its corners alone.
+    BilinearRectangle,
+    /// Three corners.
+    Triangle,
+    /// The same, by its corners alone.
+    LinearTriangle,
+    /// The rectangle between the second and third square, by the derivatives of a strand at the first.
+    Around,
+}
+
+impl Patch {
+    /// Area in the unit square.
+    pub fn area(&self) -> f64 {
+        let [a, b, c, _] = self.squares;
+        match self.kind {
+            PatchKind::Rectangle | PatchKind::BilinearRectangle => (c.x - a.x) * (c.y - a.y),
+            PatchKind::Triangle | PatchKind::LinearTriangle => 0.5 * (b - a).perp_dot(c - a).abs(),
+            PatchKind::Around => (c.x - b.x) * (c.y - b.y),
+        }
+    }
+
+    /// Traced corners.
+    pub fn corner_count(&self) -> usize {
+        match self.kind {
+            PatchKind::Rectangle | PatchKind::BilinearRectangle => 4,
+            PatchKind::Triangle | PatchKind::LinearTriangle => 3,
+            PatchKind::Around => 1,
+        }
+    }
+}
+
+/// What cells gave.
+#[derive(Clone, Debug, Default)]
+pub struct CellOutput {
+    /// All patches.
+    pub patches: Vec<Patch>,
+    /// What surfaces on the way took, and the quadrature of what they sent on.
+    pub ledger: LedgerSum,
+    /// Cells, splits included.
+    pub cells: u64,
+    /// Patches that stand for a single ray.
+    pub splats: u64,
+}
+
+/// Cuts cells of one face.
+#[derive(Clone, Copy, Debug)]
+pub struct CellCutter<'a> {
+    /// Traces further rays.
+    pub edges: EdgeCutter<'a>,
+    /// Of the accounts.
+    pub unit: FluxUnit,
+}
+
+/// A cell with its corners (0,0), (1,0), (1,1), (0,1) and the edges between them, each in the direction of its growing
+/// coordinate; `None` where light goes the same ways at both ends.
+#[derive(Clone, Debug)]
+pub struct Cell {
+    /// Corners.
+    pub corners: [Corner; 4],
+    /// Bottom (0→1), right (1→2), top (3→2), left (0→3).
+    pub edges: [Option<Edge>; 4],
+}
+
+/// Ends of the four edges among the corners.
+const EDGE_ENDS: [(usize, usize); 4] = [(0, 1), (1, 2), (3, 2), (0, 3)];
+
+/// One corner of a region of a cell.
+#[derive(Clone, Copy, Debug)]
+struct Outline {
+    square: DVec2,
+    sample: SampleId,
+}
+
+impl Cell {
+    fn step(&self) -> DVec2 {
+        self.corners[2].square - self.corners[0].square
+    }
+
+    fn edge_step(&self, edge: usize) -> DVec2 {
+        let (from, to) = EDGE_ENDS[edge];
+        self.corners[to].square - self.corners[from].square
+    }
+}
+
+impl CellCutter<'_> {
+    /// Cuts a cell into patches.
+    pub fn cut(&self, cell: &Cell, work: &mut Workspace, out: &mut CellOutput) {
+        self.cut_at(cell, 0, work, out);
+    }
+
+    fn cut_at(&self, cell: &Cell, depth: u32, work: &mut Workspace, out: &mut CellOutput) {
+        out.cells += 1;
+        if cell.edges.iter().all(Option::is_none) {
+            return self.whole(cell, work, out);
+        }
+        if self.is_ambiguous(cell, work) {
+            return if depth < DEEPEST_SPLIT {
+                self.split(cell, depth, work, out)
+            } else {
+                self.scatter(cell, work, out)
+            };
+        }
+        let strands = signatures(cell, work, |sample, found| {
+            found.extend(sample.strands.iter().map(|strand| strand.signature));
+        });
+        for signature in strands {
+            for region in regions(
+                cell,
+                &|edge, backwards| reach_of(cell, edge, work, signature, backwards),
+                &|corner| work.get(cell.corners[corner].sample).find(signature).is_some(),
+            ) {
+                self.emit(cell, &region, signature, work, out);
+            }
+        }
+        let nodes = signatures(cell, work, |sample, found| {
+            found.extend(sample.nodes.iter().map(|node| node.signature));
+        });
+        for signature in nodes {
+            let is_there = |corner: usize| {
+                work.get(cell.corners[corner].sample)
+                    .find_node(signature)
+                    .is_some()
+            };
+            for region in regions(
+                cell,
+                &|edge, backwards| match &cell.edges[edge] {
+                    Some(edge) => edge.reach_of_node(work, signature, backwards),
+                    None => Reach::Whole,
+                },
+                &is_there,
+            ) {
+                self.book_region(&region, signature, work, out);
+            }
+        }
+    }
+
+    /// All corners agree in everything.
+    fn whole(&self, cell: &Cell, work: &mut Workspace, out: &mut CellOutput) {
+        let ids = cell.corners.map(|corner| corner.sample);
+        let count = work.get(ids[0]).strands.len();
+        for strand in 0..count {
+            let corners = ids.map(|id| (id, strand as u16));
+            self.rectangle(cell, corners, work, out);
+        }
+        let area = cell.step().x * cell.step().y;
+        for node in 0..work.get(ids[0]).nodes.len() {
+            let weighted = ids.map(|id| (id, node, 0.25 * area));
+            self.book(&weighted, work, out);
+        }
+    }
+
+    fn rectangle(
+        &self,
+        cell: &Cell,
+        corners: [(SampleId, u16); 4],
+        work: &mut Workspace,
+        out: &mut CellOutput,
+    ) {
+        let step = cell.step();
+        let mut worst: f64 = 0.0;
+        for (edge, (from, to)) in EDGE_ENDS.into_iter().enumerate() {
+            let strand = |corner: usize| {
+                let (id, strand) = corners[corner];
+                &work.get(id).strands[usize::from(strand)]
+            };
+            worst = worst.max(mismatch(strand(from), strand(to), cell.edge_step(edge)));
+        }
+        let mut kind = PatchKind::Rectangle;
+        if worst > CHECK_MISMATCH && self.is_bilinear_better(cell, corners, step, work) {
+            kind = PatchKind::BilinearRectangle;
+        }
+        out.patches.push(Patch {
+            corners,
+            squares: cell.corners.map(|corner| corner.square),
+            kind,
+        });
+    }
+
+    /// A check ray through the middle of the cell decides.
+    fn is_bilinear_better(
+        &self,
+        cell: &Cell,
+        corners: [(SampleId, u16); 4],
+        step: DVec2,
+        work: &mut Workspace,
+    ) -> bool {
+        use super::patch::PatchShape;
+        let middle = cell.corners[0].square + step * 0.5;
+        let check = self.edges.corner(middle, work);
+        let strands = corners.map(|(id, strand)| &work.get(id).strands[usize::from(strand)]);
+        let check = work.get(check.sample);
+        let Some(found) = check.find(strands[0].signature) else {
+            return true;
+        };
+        let found = &check.strands[found];
+        let reach_m = found.landing.distance_m();
+        let reach_m = if reach_m.is_finite() { reach_m } else { 1.0 };
+        let error = |shape: &PatchShape| {
+            let ray = shape.ray(DVec2::splat(0.5));
+            let direction = ray.direction.normalize_or_zero();
+            ray.origin.distance(found.ray.origin) + reach_m * direction.distance(found.ray.direction)
+        };
+        let (cubic, bilinear) = (
+            error(&PatchShape::coons(strands, step)),
+            error(&PatchShape::bilinear(strands)),
+        );
+        // Also where the cubic is not a number.
+        !(cubic <= bilinear)
+    }
+
+    /// Whether cuts along the edges do not tell what lies between them.
+    fn is_ambiguous(&self, cell: &Cell, work: &Workspace) -> bool {
+        let samples = cell.corners.map(|corner| work.get(corner.sample));
+        let brightest_w = samples
+            .iter()
+            .map(|sample| sample.brightest_w)
+            .fold(0.0, f64::max);
+        let least_w = brightest_w * (-f64::from(CUT_BITS - 2)).exp2();
+        let bright = |sample: &LightSample| -> Vec<PathSignature> {
+            sample
+                .strands
+                .iter()
+                .filter(|strand| strand.flux_w.luminance() > least_w)
+                .map(|strand| strand.signature)
+                .collect()
+        };
+        let mut kinds: Vec<Vec<PathSignature>> = samples.iter().map(|sample| bright(sample)).collect();
+        let all: Vec<PathSignature> = {
+            let mut all: Vec<_> = kinds.iter().flatten().copied().collect();
+            all.sort_unstable();
+            all.dedup();
+            all
+        };
+        // A strand that is bright at one corner counts at all where it is.
+        for (kind, sample) in kinds.iter_mut().zip(samples) {
+            *kind = all
+                .iter()
+                .copied()
+                .filter(|s| sample.find(*s).is_some())
+                .collect();
+        }
+        kinds.sort_unstable();
+        kinds.dedup();
+        if kinds.len() > 2 {
+            return true;
+        }
+        all.iter().any(|&signature| {
+            let there = samples.map(|sample| sample.find(signature).is_some());
+            let diagonal = there == [true, false, true, false] || there == [false, true, false, true];
+            let crossed_twice = cell
+                .edges
+                .iter()
+                .flatten()
+                .any(|edge| edge.changes(work, signature) > 1);
+            let torn = there == [true; 4]
+                && (0..4).any(|edge| reach_of(cell, edge, work, signature, false) != Reach::Whole);
+            diagonal || crossed_twice || torn
+        })
+    }
+
+    /// Four cells in place of one.
+    fn split(&self, cell: &Cell, depth: u32, work: &mut Workspace, out: &mut CellOutput) {
+        let [a, b, c, d] = cell.corners;
+        let middles: [Corner; 4] = std::array::from_fn(|edge| {
+            let (from, to) = EDGE_ENDS[edge];
+            let square = cell.corners[from].square.lerp(cell.corners[to].square, 0.5);
+            match cell.edges[edge].as_ref().and_then(|edge| edge.at(0.5)) {
+                Some(sample) => Corner { square, sample },
+                None => self.edges.corner(square, work),
+            }
+        });
+        let [bottom, right, top, left] = middles;
+        let centre = self.edges.corner(a.square.lerp(c.square, 0.5), work);
+        let mut half = |edge: usize, second: bool, from: Corner, to: Corner| {
+            let (low, high) = if second { (0.5, 1.0) } else { (0.0, 0.5) };
+            let known = match &cell.edges[edge] {
+                Some(edge) if edge.at(0.5).is_some() => edge.part(low, high),
+                _ => Edge::plain(from.sample, to.sample),
+            };
+            self.finish_edge(known, from, to, work)
+        };
+        let halves = [
+            [half(0, false, a, bottom), half(0, true, bottom, b)],
+            [half(1, false, b, right), half(1, true, right, c)],
+            [half(2, false, d, top), half(2, true, top, c)],
+            [half(3, false, a, left), half(3, true, left, d)],
+        ];
+        let mut inner =
+            |from: Corner, to: Corner| self.finish_edge(Edge::plain(from.sample, to.sample), from, to, work);
+        let (down, up) = (inner(bottom, centre), inner(centre, top));
+        let (west, east) = (inner(left, centre), inner(centre, right));
+        let [[b0, b1], [r0, r1], [t0, t1], [l0, l1]] = halves;
+        let children = [
+            ([a, bottom, centre, left], [b0, down.clone(), west.clone(), l0]),
+            ([bottom, b, right, centre], [b1, r0, east.clone(), down]),
+            ([left, centre, top, d], [west, up.clone(), t0, l1]),
+            ([centre, right, c, top], [east, r1, t1, up]),
+        ];
+        for (corners, edges) in children {
+            self.cut_at(&Cell { corners, edges }, depth + 1, work, out);
+        }
+    }
+
+    fn finish_edge(&self, mut edge: Edge, from: Corner, to: Corner, work: &mut Workspace) -> Option<Edge> {
+        let step = to.square - from.square;
+        if edge.samples.len() == 2 && Edge::is_plain(work.get(from.sample), work.get(to.sample), step) {
+            return None;
+        }
+        self.edges.resolve(&mut edge, [from.square, to.square], work);
+        Some(edge)
+    }
+
+    /// Each corner stands for its quarter of the cell.
+    fn scatter(&self, cell: &Cell, work: &Workspace, out: &mut CellOutput) {
+        let centre = cell.corners[0].square.lerp(cell.corners[2].square, 0.5);
+        for corner in cell.corners {
+            let (low, high) = (corner.square.min(centre), corner.square.max(centre));
+            let area = (high.x - low.x) * (high.y - low.y);
+            let sample = work.get(corner.sample);
+            for strand in 0..sample.strands.len() {
+                out.splats += 1;
+                out.patches.push(Patch {
+                    corners: [(corner.sample, strand as u16); 4],
+                    squares: [corner.square, low, high, high],
+                    kind: PatchKind::Around,
+                });
+            }
+            for node in 0..sample.nodes.len() {
+                self.book(&[(corner.sample, node, area)], work, out);
+            }
+        }
+    }
+
+    /// A region's patches.
+    fn emit(
+        &self,
+        cell: &Cell,
+        region: &[Outline],
+        signature: PathSignature,
+        work: &mut Workspace,
+        out: &mut CellOutput,
+    ) {
+        let corner = |outline: &Outline| {
+            let strand = work.get(outline.sample).find(signature);
+            (
+                outline.sample,
+                strand.expect("regions are made of samples that have the strand") as u16,
+            )
+        };
+        if region.len() == 4
+            && region
+                .iter()
+                .zip(&cell.corners)
+                .all(|(a, b)| a.square == b.square)
+        {
+            let corners = [0, 1, 2, 3].map(|index| corner(&region[index]));
+            return self.rectangle(cell, corners, work, out);
+        }
+        for triangle in triangles(region) {
+            let [a, b, c] = triangle;
+            let corners = [a, b, c, c].map(|outline| corner(&outline));
+            let worst = (0..3)
+                .map(|i| {
+                    let strand = |i: usize| {
+                        let (id, strand) = corners[i];
+                        &work.get(id).strands[usize::from(strand)]
+                    };
+                    let next = (i + 1) % 3;
+                    mismatch(
+                        strand(i),
+                        strand(next),
+                        triangle[next].square - triangle[i].square,
+                    )
+                })
+                .fold(0.0, f64::max);
+            out.patches.push(Patch {
+                corners,
+                squares: [a.square, b.square, c.square, c.square],
+                kind: if worst > SUSPICION {
+                    PatchKind::LinearTriangle
+                } else {
+                    PatchKind::Triangle
+                },
+            });
+        }
+    }
+
+    fn book_region(
+        &self,
+        region: &[Outline],
+        signature: PathSignature,
+        work: &Workspace,
+        out: &mut CellOutput,
+    ) {
+        for triangle in triangles(region) {
+            let [a, b, c] = triangle.map(|outline| outline.square);
+            let area = 0.5 * (b - a).perp_dot(c - a).abs();
+            let weighted = triangle.map(|outline| {
+                let node = work.get(outline.sample).find_node(signature);
+                (
+                    outline.sample,
+                    node.expect("regions are made of samples that met the surface"),
+                    area / 3.0,
+                )
+            });
+            self.book(&weighted, work, out);
+        }
+    }
+
+    /// Books what a surface did with the light of some samples, each by its area of the unit square. What it passed on
+    /// is booked against what the strands carry.
+    fn book(&self, weighted: &[(SampleId, usize, f64)], work: &Workspace, out: &mut CellOutput) {
+        let sum = |of: fn(&super::strand::SurfaceNode) -> LinearSrgb| {
+            weighted.iter().fold(LinearSrgb::BLACK, |sum, &(id, node, area)| {
+                sum + of(&work.get(id).nodes[node]) * area
+            })
+        };
+        let first = work.get(weighted[0].0).nodes[weighted[0].1].first;
+        let incident = self.unit.count(sum(|node| node.incident));
+        let taken = self.unit.count(sum(|node| node.taken));
+        let kept = [
+            (Account::Absorbed, self.unit.count(sum(|node| node.absorbed))),
+            (Account::Depth, self.unit.count(sum(|node| node.depth))),
+            (Account::Threshold, self.unit.count(sum(|node| node.threshold))),
+            (Account::NonFinite, self.unit.count(sum(|node| node.non_finite))),
+        ];
+        // Incident flux comes out of the strands that lead here (or out of the light), the rest goes into others.
+        let mut passed: [i64; 3] = std::array::from_fn(|channel| incident[channel] - taken[channel]);
+        if first {
+            out.ledger.book(Account::Emitted, passed);
+            out.ledger.book(Account::NotEmitted, taken);
+        } else {
+            out.ledger.book(Account::Quadrature, passed.map(|count| -count));
+        }
+        for (account, count) in kept {
+            out.ledger.book(account, count);
+            for channel in 0..3 {
+                passed[channel] -= count[channel];
+            }
+        }
+        out.ledger.book(Account::Quadrature, passed);
+    }
+}
+
+fn reach_of(cell: &Cell, edge: usize, work: &Workspace, signature: PathSignature, backwards: bool) -> Reach {
+    match &cell.edges[edge] {
+        Some(samples) => samples.reach(work, signature, cell.edge_step(edge), backwards),
+        None => Reach::Whole,
+    }
+}
+
+/// All signatures at the corners, ascending.
+fn signatures(
+    cell: &Cell,
+    work: &Workspace,
+    collect: impl Fn(&LightSample, &mut Vec<PathSignature>),
+) -> Vec<PathSignature> {
+    let mut found = Vec::new();
+    for corner in &cell.corners {
+        collect(work.get(corner.sample), &mut found);
+    }
+    found.sort_unstable();
+    found.dedup();
+    found
+}
+
+/// Outlines of the parts of a cell that a signature fills: its corners, joined along edges that it reaches from end to
+/// end, with the cuts between.
+fn regions(
+    cell: &Cell,
+    reach: &impl Fn(usize, bool) -> Reach,
+    is_there: &impl Fn(usize) -> bool,
+) -> Vec<Vec<Outline>> {
+    let there: [bool; 4] = std::array::from_fn(is_there);
+    // Side i of the outline runs from corner i to corner i + 1.
+    const BACKWARDS: [bool; 4] = [false, false, true, true];
+    let ahead: [Option<Reach>; 4] =
+        std::array::from_fn(|side| there[side].then(|| reach(side, BACKWARDS[side])));
+    let behind: [Option<Reach>; 4] = std::array::from_fn(|corner| {
+        let side = (corner + 3) % 4;
+        there[corner].then(|| reach(side, !BACKWARDS[side]))
+    });
+    let joined: [bool; 4] =
+        std::array::from_fn(|side| there[side] && there[(side + 1) % 4] && ahead[side] == Some(Reach::Whole));
+    let mut outlines = Vec::new();
+    if there == [true; 4] && joined.iter().filter(|joined| **joined).count() >= 3 {
+        outlines.push(cell.corners.map(outline_of).to_vec());
+        return outlines;
+    }
+    let mut used = [false; 4];
+    for start in 0..4 {
+        // A region starts at a corner that is not joined to the one before.
+        if !there[start] || used[start] || joined[(start + 3) % 4] {
+            continue;
+        }
+        let mut outline = Vec::with_capacity(16);
+        if let Some(reach) = behind[start] {
+            let side = (start + 3) % 4;
+            outline.extend(up_to_cut(cell, side, !BACKWARDS[side], reach).into_iter().rev());
+        }
+        let mut corner = start;
+        loop {
+            used[corner] = true;
+            outline.push(outline_of(cell.corners[corner]));
+            if !joined[corner] {
+                break;
+            }
+            corner = (corner + 1) % 4;
+        }
+        if let Some(reach) = ahead[corner] {
+            outline.extend(up_to_cut(cell, corner, BACKWARDS[corner], reach));
+        }
+        outlines.push(outline);
+    }
+    outlines
+}
+
+fn outline_of(corner: Corner) -> Outline {
+    Outline {
+        square: corner.square,
+        sample: corner.sample,
+    }
+}
+
+/// Samples along a side from a corner up to the cut, and the cut: near a silhouette the wavefront bends like a root, and
+/// bisection left samples just where they are needed.
+fn up_to_cut(cell: &Cell, side: usize, backwards: bool, reach: Reach) -> Vec<Outline> {
+    let Reach::Cut {
+        place,
+        sample,
+        between,
+    } = reach
+    else {
+        return Vec::new();
+    };
+    let (from, to) = EDGE_ENDS[side];
+    let at = |place: f64, sample: SampleId| Outline {
+        square: cell.corners[from].square.lerp(cell.corners[to].square, place),
+        sample,
+    };
+    let inner = cell.edges[side]
+        .iter()
+        .flat_map(|edge| edge.inner(between, backwards));
+    inner
+        .map(|(place, sample)| at(place, sample))
+        .chain([at(place, sample)])
+        .collect()
+}
+
+/// An outline as a strip of triangles between its two ends, always over the shorter diagonal.
+fn triangles(region: &[Outline]) -> Vec<[Outline; 3]> {
+    let (mut first, mut last) = (0, region.len().saturating_sub(1));
+    let mut strip = Vec::with_capacity(region.len());
+    while first + 1 < last {
+        let [a, b] = [region[first], region[last]];
+        let (after, before) = (region[first + 1], region[last - 1]);
+        if after.square.distance_squared(b.square) <= a.square.distance_squared(before.square) {
+            strip.push([a, after, b]);
+            first += 1;
+        } else {
+            strip.push([a, before, b]);
+            last -= 1;
+        }
+    }
+    strip
+}

@@ -1,0 +1,311 @@
+//! Edges of cells: where along one the way of the light changes, found by bisection with light rays.
+
+use glam::DVec2;
+
+use super::band::{Corner, SampleId, Workspace};
+use super::strand::{LightSample, Strand};
+use super::trace::StrandTracer;
+use crate::light_pass::caustic::path::PathSignature;
+
+/// Bisections of an edge on which the brightest light changes its way; dimmer light is cut as much more coarsely.
+pub const CUT_BITS: i32 = 8;
+
+/// Bisections that decide whether two ends of one signature lie on one sheet of the wavefront.
+const JUMP_BITS: i32 = 6;
+
+/// Mismatch of chord and tangents, as a share of the chord, from which an edge may hide a jump.
+pub const SUSPICION: f64 = 0.35;
+
+/// Samples along an edge, by their place on it [0, 1], both ends included.
+#[derive(Clone, Debug)]
+pub struct Edge {
+    /// In ascending order.
+    pub samples: Vec<(f64, SampleId)>,
+}
+
+/// How far a strand reaches along an edge from one of its ends.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Reach {
+    /// To the other end, on one sheet.
+    Whole,
+    /// Up to a cut: its place on the edge, and the last sample before it.
+    Cut {
+        /// Middle of the bracket.
+        place: f64,
+        /// Sample at the bracket's end on this side.
+        sample: SampleId,
+        /// How many samples lie between the end and that one.
+        between: usize,
+    },
+}
+
+/// Relative mismatch between what two strands' derivatives say about the step between them and the step itself;
+/// `step` is the vector between them in the unit square. 0 where the wavefront is a parabola between them.
+pub fn mismatch(a: &Strand, b: &Strand, step: DVec2) -> f64 {
+    let reach_m = [a, b]
+        .map(|strand| strand.landing.distance_m())
+        .into_iter()
+        .filter(|distance| distance.is_finite())
+        .fold(0.0, f64::max);
+    let reach_m = if reach_m > 0.0 { reach_m } else { 1.0 };
+    let (origin, direction) = (b.ray.origin - a.ray.origin, b.ray.direction - a.ray.direction);
+    let mean = |strand: &Strand| {
+        let d = &strand.differential;
+        (
+            d.across.origin * step.x + d.down.origin * step.y,
+            d.across.direction * step.x + d.down.direction * step.y,
+        )
+    };
+    let ((oa, da), (ob, db)) = (mean(a), mean(b));
+    let error = (origin - (oa + ob) * 0.5).length() + reach_m * (direction - (da + db) * 0.5).length();
+    let scale = origin.length() + reach_m * direction.length();
+    // NaN counts as a mismatch.
+    if error <= scale * 1e-12 {
+        0.0
+    } else if scale > 0.0 && error.is_finite() {
+        error / scale
+    } else {
+        f64::INFINITY
+    }
+}
+
+fn is_suspicious(a: &LightSample, b: &LightSample, signature: PathSignature, step: DVec2) -> bool {
+    match (a.find(signature), b.find(signature)) {
+        (Some(i), Some(j)) => mismatch(&a.strands[i], &b.strands[j], step) > SUSPICION,
+        _ => false,
+    }
+}
+
+/// Whether two samples saw light go the same ways.
+fn same_ways(a: &LightSample, b: &LightSample) -> bool {
+    a.strands.len() == b.strands.len()
+        && a.nodes.len() == b.nodes.len()
+        && a.strands
+            .iter()
+            .zip(&b.strands)
+            .all(|(a, b)| a.signature == b.signature)
+        && a.nodes
+            .iter()
+            .zip(&b.nodes)
+            .all(|(a, b)| a.signature == b.signature)
+}
+
+impl Edge {
+    /// An edge without samples between its ends.
+    pub fn plain(a: SampleId, b: SampleId) -> Self {
+        Self {
+            samples: vec![(0.0, a), (1.0, b)],
+        }
+    }
+
+    /// Whether light goes the same ways at both ends, on one sheet.
+    pub fn is_plain(a: &LightSample, b: &LightSample, step: DVec2) -> bool {
+        same_ways(a, b)
+            && a.strands
+                .iter()
+                .zip(&b.strands)
+                .all(|(a, b)| mismatch(a, b, step) <= SUSPICION)
+    }
+
+    /// Part of an edge between two places that are samples of it, as an edge of its own.
+    pub fn part(&self, from: f64, to: f64) -> Self {
+        let width = to - from;
+        Self {
+            samples: self
+                .samples
+                .iter()
+                .filter(|(place, _)| *place >= from && *place <= to)
+                .map(|(place, sample)| ((place - from) / width, *sample))
+                .collect(),
+        }
+    }
+
+    /// Sample at a place, where there is one.
+    pub fn at(&self, place: f64) -> Option<SampleId> {
+        self.samples
+            .iter()
+            .find(|(p, _)| *p == place)
+            .map(|(_, sample)| *sample)
+    }
+
+    /// How far a strand reaches from the first end (or, `backwards`, from the last); the strand must be there.
+    pub fn reach(&self, work: &Workspace, signature: PathSignature, step: DVec2, backwards: bool) -> Reach {
+        self.reach_where(
+            work,
+            backwards,
+            |sample| sample.find(signature).is_some(),
+            |a, b, width| {
+                width <= (-f64::from(JUMP_BITS)).exp2() && is_suspicious(a, b, signature, step * width)
+            },
+        )
+    }
+
+    /// How far a surface reaches that light meets.
+    pub fn reach_of_node(&self, work: &Workspace, signature: PathSignature, backwards: bool) -> Reach {
+        self.reach_where(
+            work,
+            backwards,
+            |sample| sample.find_node(signature).is_some(),
+            |_, _, _| false,
+        )
+    }
+
+    fn reach_where(
+        &self,
+        work: &Workspace,
+        backwards: bool,
+        is_there: impl Fn(&LightSample) -> bool,
+        is_jump: impl Fn(&LightSample, &LightSample, f64) -> bool,
+    ) -> Reach {
+        let last = self.samples.len() - 1;
+        let at = |index: usize| self.samples[if backwards { last - index } else { index }];
+        for index in 0..last {
+            let (here, there) = (at(index), at(index + 1));
+            let ordered = if backwards { (there, here) } else { (here, there) };
+            let (a, b) = (work.get(ordered.0.1), work.get(ordered.1.1));
+            let next = work.get(there.1);
+            if !is_there(next) || is_jump(a, b, ordered.1.0 - ordered.0.0) {
+                return Reach::Cut {
+                    place: 0.5 * (here.0 + there.0),
+                    sample: here.1,
+                    between: index.saturating_sub(1),
+                };
+            }
+        }
+        Reach::Whole
+    }
+
+    /// So many samples after the first end (or, `backwards`, before the last), the nearest to that end first.
+    pub fn inner(
+        &self,
+        count: usize,
+        backwards: bool,
+    ) -> impl DoubleEndedIterator<Item = (f64, SampleId)> + '_ {
+        let last = self.samples.len() - 1;
+        (1..=count).map(move |step| self.samples[if backwards { last - step } else { step }])
+    }
+
+    /// How often a strand comes and goes along the edge.
+    pub fn changes(&self, work: &Workspace, signature: PathSignature) -> usize {
+        self.samples
+            .windows(2)
+            .filter(|pair| {
+                work.get(pair[0].1).find(signature).is_some() != work.get(pair[1].1).find(signature).is_some()
+            })
+            .count()
+    }
+}
+
+/// Bisects edges of one face.
+#[derive(Clone, Copy, Debug)]
+pub struct EdgeCutter<'a> {
+    /// Traces the rays.
+    pub tracer: &'a StrandTracer<'a>,
+    /// Of the cells.
+    pub face: usize,
+}
+
+impl EdgeCutter<'_> {
+    /// Adds samples until every change of way along an edge between two places of the unit square is bracketed.
+    pub fn resolve(&self, edge: &mut Edge, ends: [DVec2; 2], work: &mut Workspace) {
+        let first = work.get(edge.samples[0].1);
+        let last = work.get(edge.samples[edge.samples.len() - 1].1);
+        let brightest_w = first.brightest_w.max(last.brightest_w);
+        let mut changes: Vec<(PathSignature, i32, bool)> = Vec::new();
+        for (sample, other) in [(first, last), (last, first)] {
+            for strand in &sample.strands {
+                let share = strand.flux_w.luminance() / brightest_w;
+                let bits = (CUT_BITS + share.log2().floor().max(-60.0) as i32).clamp(0, CUT_BITS);
+                match other.find(strand.signature) {
+                    None => changes.push((strand.signature, bits, false)),
+                    Some(_) if std::ptr::eq(sample, first) => changes.push((strand.signature, bits, true)),
+                    Some(_) => {}
+                }
+            }
+            for node in sample.nodes.iter().filter(|node| node.first) {
+                if other.find_node(node.signature).is_none() {
+                    changes.push((node.signature, CUT_BITS, false));
+                }
+            }
+        }
+        // The brightest first: their samples serve the others.
+        changes.sort_by_key(|(signature, bits, _)| (std::cmp::Reverse(*bits), *signature));
+        let step = ends[1] - ends[0];
+        for (signature, bits, both) in changes {
+            if both {
+                self.bracket_jump(edge, ends, signature, bits.min(JUMP_BITS), step, work);
+            } else {
+                self.bracket_change(edge, ends, signature, bits, work);
+            }
+        }
+    }
+
+    fn has(sample: &LightSample, signature: PathSignature) -> bool {
+        sample.find(signature).is_some() || sample.find_node(signature).is_some()
+    }
+
+    /// Narrows the first change of a signature's presence down to 2^−bits of the edge.
+    fn bracket_change(
+        &self,
+        edge: &mut Edge,
+        ends: [DVec2; 2],
+        signature: PathSignature,
+        bits: i32,
+        work: &mut Workspace,
+    ) {
+        let width = (-f64::from(bits)).exp2();
+        loop {
+            let change = edge.samples.windows(2).position(|pair| {
+                Self::has(work.get(pair[0].1), signature) != Self::has(work.get(pair[1].1), signature)
+            });
+            match change {
+                Some(index) if edge.samples[index + 1].0 - edge.samples[index].0 > width => {
+                    self.insert(edge, ends, index, work);
+                }
+                _ => return,
+            }
+        }
+    }
+
+    /// Narrows the worst mismatch of a strand that both ends have, until it is smooth or 2^−bits wide.
+    fn bracket_jump(
+        &self,
+        edge: &mut Edge,
+        ends: [DVec2; 2],
+        signature: PathSignature,
+        bits: i32,
+        step: DVec2,
+        work: &mut Workspace,
+    ) {
+        let width = (-f64::from(bits)).exp2();
+        loop {
+            let gap = |pair: &[(f64, SampleId)]| pair[1].0 - pair[0].0;
+            let worst = edge.samples.windows(2).position(|pair| {
+                gap(pair) > width
+                    && is_suspicious(
+                        work.get(pair[0].1),
+                        work.get(pair[1].1),
+                        signature,
+                        step * gap(pair),
+                    )
+            });
+            let Some(index) = worst else { return };
+            self.insert(edge, ends, index, work);
+        }
+    }
+
+    fn insert(&self, edge: &mut Edge, ends: [DVec2; 2], index: usize, work: &mut Workspace) {
+        let place = 0.5 * (edge.samples[index].0 + edge.samples[index + 1].0);
+        let square = ends[0].lerp(ends[1], place);
+        let id = work.add(self.tracer.trace(self.face, square));
+        edge.samples.insert(index + 1, (place, id));
+    }
+
+    /// A corner at a place of the unit square.
+    pub fn corner(&self, square: DVec2, work: &mut Workspace) -> Corner {
+        Corner {
+            square,
+            sample: work.add(self.tracer.trace(self.face, square)),
+        }
+    }
+}

@@ -1,0 +1,297 @@
+//! The lattice of light rays over one light's domain: rows of cells traced and cut into patches, a band at a time.
+
+use glam::DVec2;
+use rayon::prelude::*;
+
+use super::band::{Corner, SampleId, Samples, Workspace};
+use super::cell::{Cell, CellCutter, CellOutput, Patch};
+use super::edge::{Edge, EdgeCutter};
+use super::strand::LightSample;
+use super::trace::StrandTracer;
+use crate::illumination::accumulator::FluxUnit;
+use crate::light_pass::item_buffer::ItemBuffer;
+use crate::light_pass::ledger_sum::{Account, LedgerSum};
+
+/// Cells that a band aims at: enough for all cores, and no more memory than some ten megabytes.
+const CELLS_PER_BAND: usize = 1 << 14;
+
+/// The lattice of one light.
+#[derive(Clone, Copy, Debug)]
+pub struct WavefrontLattice<'a> {
+    /// Traces its rays.
+    pub tracer: StrandTracer<'a>,
+    /// Which cells are worth looking at.
+    pub item_buffer: &'a ItemBuffer,
+    /// Columns and rows of cells of each face.
+    pub size: (usize, usize),
+    /// Of the accounts.
+    pub unit: FluxUnit,
+}
+
+/// Some traced rows of cells of one face.
+#[derive(Clone, Debug, Default)]
+pub struct TracedBand {
+    /// All samples that patches refer to.
+    pub samples: Samples,
+    /// Patches, row by row.
+    pub patches: Vec<Vec<Patch>>,
+    /// What surfaces did with the light on its way.
+    pub ledger: LedgerSum,
+    /// Light rays.
+    pub rays: u64,
+    /// Closest-hit queries.
+    pub segments: u64,
+    /// Cells.
+    pub cells: u64,
+    /// Patches that stand for a single ray.
+    pub splats: u64,
+}
+
+/// A row of corners.
+#[derive(Clone, Debug, Default)]
+struct CornerRow {
+    /// Index of each column's sample; `NONE` where there is none.
+    index: Vec<u32>,
+    samples: Vec<LightSample>,
+}
+
+const NONE: u32 = u32::MAX;
+
+impl TracedBand {
+    /// Memory that it holds [bytes], roughly.
+    pub fn bytes(&self) -> u64 {
+        let strands: usize = self
+            .samples
+            .chunks
+            .iter()
+            .flatten()
+            .map(|sample| {
+                size_of::<LightSample>() + size_of_val(&sample.strands[..]) + size_of_val(&sample.nodes[..])
+            })
+            .sum();
+        let patches: usize = self.patches.iter().map(|row| size_of_val(&row[..])).sum();
+        (strands + patches) as u64
+    }
+}
+
+impl WavefrontLattice<'_> {
+    /// Lattice cells that touch a marked cell of the item buffer.
+    pub fn cell_count(&self) -> u64 {
+        self.item_buffer
+            .lattice_cells(self.tracer.launch.face_count(), self.size)
+    }
+
+    /// Rows of the bands of one face: half-open ranges that cover it.
+    pub fn bands(&self, face: usize) -> Vec<(usize, usize)> {
+        let rows = self.size.1;
+        let mut bands = Vec::new();
+        let (mut start, mut cells) = (0, 0);
+        for row in 0..rows {
+            cells += self.spans(face, row).iter().map(|(a, b)| b - a).sum::<usize>();
+            if cells >= CELLS_PER_BAND || (row + 1 == rows && cells > 0) {
+                bands.push((start, row + 1));
+                (start, cells) = (row + 1, 0);
+            }
+        }
+        bands
+    }
+
+    fn spans(&self, face: usize, row: usize) -> Vec<(usize, usize)> {
+        self.item_buffer.lattice_spans(face, row, self.size)
+    }
+
+    fn square(&self, column: usize, row: usize) -> DVec2 {
+        DVec2::new(
+            column as f64 / self.size.0 as f64,
+            row as f64 / self.size.1 as f64,
+        )
+    }
+
+    /// Traces rows `band` of a face and cuts their cells into patches.
+    ///
+    /// A row of corners between two bands is traced for each: the rays are few, and bands stay independent.
+    pub fn trace(&self, face: usize, band: (usize, usize)) -> TracedBand {
+        let rows = band.1 - band.0;
+        let corner_rows: Vec<CornerRow> = (band.0..=band.1)
+            .into_par_iter()
+            .map(|row| self.trace_corners(face, row, band))
+            .collect();
+        let mut samples = Samples::default();
+        let mut index = Vec::with_capacity(rows + 1);
+        for row in corner_rows {
+            samples.chunks.push(row.samples);
+            index.push(row.index);
+        }
+        let edges_of_rows: Vec<(Vec<Option<Edge>>, Vec<LightSample>)> = (0..=rows)
+            .into_par_iter()
+            .map(|row| {
+                let mut work = Workspace::new(&samples, rows + 1 + row);
+                let edges = self.edges_across(face, band.0 + row, row, &index[row], &mut work);
+                (edges, work.own)
+            })
+            .collect();
+        let mut edges = Vec::with_capacity(rows + 1);
+        for (row_edges, own) in edges_of_rows {
+            samples.chunks.push(own);
+            edges.push(row_edges);
+        }
+        let cut: Vec<(CellOutput, Vec<LightSample>)> = (0..rows)
+            .into_par_iter()
+            .map(|row| {
+                let mut work = Workspace::new(&samples, 2 * (rows + 1) + row);
+                let output = self.cut_row(
+                    face,
+                    (band.0 + row, row),
+                    [&index[row], &index[row + 1]],
+                    [&edges[row], &edges[row + 1]],
+                    &mut work,
+                );
+                (output, work.own)
+            })
+            .collect();
+        let mut traced = TracedBand::default();
+        for (output, own) in cut {
+            samples.chunks.push(own);
+            traced.ledger.merge(&output.ledger);
+            traced.cells += output.cells;
+            traced.splats += output.splats;
+            traced.patches.push(output.patches);
+        }
+        for sample in samples.chunks.iter().flatten() {
+            traced.rays += 1;
+            traced.segments += u64::from(sample.segments);
+        }
+        traced.samples = samples;
+        traced
+    }
+
+    /// Corners of the cells above and below a row of corners, as far as they belong to the band.
+    fn trace_corners(&self, face: usize, row: usize, band: (usize, usize)) -> CornerRow {
+        let mut traced = CornerRow {
+            index: vec![NONE; self.size.0 + 1],
+            samples: Vec::new(),
+        };
+        let mut wanted = vec![false; self.size.0 + 1];
+        for cell_row in [row.wrapping_sub(1), row] {
+            if cell_row >= band.0 && cell_row < band.1 {
+                for (start, end) in self.spans(face, cell_row) {
+                    wanted[start..=end].fill(true);
+                }
+            }
+        }
+        for (column, _) in wanted.iter().enumerate().filter(|(_, wanted)| **wanted) {
+            traced.index[column] = traced.samples.len() as u32;
+            traced
+                .samples
+                .push(self.tracer.trace(face, self.square(column, row)));
+        }
+        traced
+    }
+
+    /// Edges along a row of corners; `None` where nothing changes along one.
+    fn edges_across(
+        &self,
+        face: usize,
+        row: usize,
+        chunk: usize,
+        index: &[u32],
+        work: &mut Workspace,
+    ) -> Vec<Option<Edge>> {
+        (0..self.size.0)
+            .map(|column| {
+                let (a, b) = (index[column], index[column + 1]);
+                if a == NONE || b == NONE {
+                    return None;
+                }
+                let id = |index: u32| SampleId {
+                    chunk: chunk as u32,
+                    index,
+                };
+                let ends = [self.square(column, row), self.square(column + 1, row)];
+                self.edge(face, [id(a), id(b)], ends, work)
+            })
+            .collect()
+    }
+
+    fn edge(
+        &self,
+        face: usize,
+        [a, b]: [SampleId; 2],
+        ends: [DVec2; 2],
+        work: &mut Workspace,
+    ) -> Option<Edge> {
+        if Edge::is_plain(work.get(a), work.get(b), ends[1] - ends[0]) {
+            return None;
+        }
+        let mut edge = Edge::plain(a, b);
+        let cutter = EdgeCutter {
+            tracer: &self.tracer,
+            face,
+        };
+        cutter.resolve(&mut edge, ends, work);
+        Some(edge)
+    }
+
+    fn cut_row(
+        &self,
+        face: usize,
+        (row, chunk): (usize, usize),
+        index: [&[u32]; 2],
+        across: [&[Option<Edge>]; 2],
+        work: &mut Workspace,
+    ) -> CellOutput {
+        let mut output = CellOutput::default();
+        let cutter = CellCutter {
+            edges: EdgeCutter {
+                tracer: &self.tracer,
+                face,
+            },
+            unit: self.unit,
+        };
+        for (start, end) in self.spans(face, row) {
+            let corner = |column: usize, upper: usize| Corner {
+                square: self.square(column, row + upper),
+                sample: SampleId {
+                    chunk: (chunk + upper) as u32,
+                    index: index[upper][column],
+                },
+            };
+            let down = |column: usize, work: &mut Workspace| {
+                let (a, b) = (corner(column, 0), corner(column, 1));
+                self.edge(face, [a.sample, b.sample], [a.square, b.square], work)
+            };
+            let mut left = down(start, work);
+            for column in start..end {
+                let right = down(column + 1, work);
+                let cell = Cell {
+                    corners: [
+                        corner(column, 0),
+                        corner(column + 1, 0),
+                        corner(column + 1, 1),
+                        corner(column, 1),
+                    ],
+                    edges: [
+                        across[0][column].clone(),
+                        right.clone(),
+                        across[1][column].clone(),
+                        left,
+                    ],
+                };
+                self.book_not_emitted(&cell, work, &mut output);
+                cutter.cut(&cell, work, &mut output);
+                left = right;
+            }
+        }
+        output
+    }
+
+    /// Flux of a cell that meets nothing specular first.
+    fn book_not_emitted(&self, cell: &Cell, work: &Workspace, output: &mut CellOutput) {
+        let step = cell.corners[2].square - cell.corners[0].square;
+        let quarter = 0.25 * step.x * step.y;
+        for corner in &cell.corners {
+            let missed_w = work.get(corner.sample).not_emitted * quarter;
+            output.ledger.book(Account::NotEmitted, self.unit.count(missed_w));
+        }
+    }
+}

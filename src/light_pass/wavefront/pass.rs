@@ -1,0 +1,167 @@
+//! Runs the lattice of one light: traces bands of cells, spreads their patches over the receivers, and deposits them.
+
+use std::collections::BTreeMap;
+
+use rayon::prelude::*;
+
+use super::coverage::{FluxTriangle, deposit_triangles};
+use super::lattice::{TracedBand, WavefrontLattice};
+use super::receivers::Receivers;
+use super::spread::{SpreadOutput, Spreader};
+use crate::light_pass::caustic::pass::{Listener, PassReport, Stopwatch};
+use crate::light_pass::ledger_sum::Account;
+use crate::light_pass::receiver_maps::{ChartFor, ReceiverMaps};
+use crate::progress::Stage;
+
+/// Patches that one task spreads.
+const PATCHES_PER_TASK: usize = 256;
+
+/// Traced bands of one light, to be deposited again without a ray.
+#[derive(Clone, Debug, Default)]
+pub struct TracedLight {
+    /// All bands, face by face.
+    pub bands: Vec<TracedBand>,
+}
+
+impl TracedLight {
+    /// Memory that it holds [bytes], roughly.
+    pub fn bytes(&self) -> u64 {
+        self.bands.iter().map(TracedBand::bytes).sum()
+    }
+}
+
+/// How patches go to maps.
+#[derive(Clone, Copy)]
+pub struct WavefrontDepositor<'a> {
+    /// Who is lit.
+    pub receivers: &'a Receivers<'a>,
+    /// Gives the charts of maps that receive light.
+    pub chart_for: &'a ChartFor<'a>,
+    /// Traces, or traced.
+    pub lattice: WavefrontLattice<'a>,
+    /// Flux that all lights send to specular surfaces [W, luminance].
+    pub reference_w: f64,
+}
+
+impl WavefrontDepositor<'_> {
+    /// Traces and deposits a whole lattice. Bands are kept in `kept` while they take less than `keep_bytes`; beyond
+    /// that all are dropped, and `kept` is `None`.
+    pub fn run(
+        &self,
+        maps: Option<&mut ReceiverMaps>,
+        listener: &Listener,
+        keep_bytes: u64,
+    ) -> (PassReport, Option<TracedLight>) {
+        let mut report = PassReport::default();
+        let mut kept = Some(TracedLight::default());
+        let mut kept_bytes = 0;
+        let mut maps = maps;
+        for face in 0..self.lattice.tracer.launch.face_count() {
+            for rows in self.lattice.bands(face) {
+                if listener.control.is_cancelled() {
+                    report.cancelled = true;
+                    return (report, None);
+                }
+                let watch = Stopwatch::start();
+                let band = self.lattice.trace(face, rows);
+                report.trace_s.add(watch.elapsed());
+                report.count_traced(&band);
+                self.deposit(&band, maps.as_deref_mut(), &mut report);
+                listener
+                    .progress
+                    .advance(Stage::Caustic, listener.done + report.rays, listener.total);
+                kept_bytes += band.bytes();
+                if kept_bytes > keep_bytes {
+                    kept = None;
+                }
+                if let Some(kept) = &mut kept {
+                    kept.bands.push(band);
+                }
+            }
+        }
+        (report, kept)
+    }
+
+    /// Deposits kept bands: no light ray is traced.
+    pub fn deposit_again(
+        &self,
+        traced: &TracedLight,
+        maps: &mut ReceiverMaps,
+        listener: &Listener,
+    ) -> PassReport {
+        let mut report = PassReport::default();
+        for band in &traced.bands {
+            if listener.control.is_cancelled() {
+                report.cancelled = true;
+                return report;
+            }
+            report.ledger.merge(&band.ledger);
+            report.cells += band.cells;
+            report.splats += band.splats;
+            self.deposit(band, Some(&mut *maps), &mut report);
+        }
+        report
+    }
+
+    /// Spreads a band's patches and adds them to the maps; without maps, only counts.
+    fn deposit(&self, band: &TracedBand, maps: Option<&mut ReceiverMaps>, report: &mut PassReport) {
+        let watch = Stopwatch::start();
+        let spreader = Spreader {
+            receivers: self.receivers,
+            samples: &band.samples,
+            unit: self.lattice.unit,
+            absorption: self.lattice.tracer.limits.absorption,
+            reference_w: self.reference_w,
+        };
+        let parts: Vec<SpreadOutput> = band
+            .patches
+            .iter()
+            .flat_map(|row| row.chunks(PATCHES_PER_TASK))
+            .collect::<Vec<_>>()
+            .into_par_iter()
+            .map(|patches| {
+                let mut output = SpreadOutput::default();
+                for patch in patches {
+                    spreader.spread(patch, &mut output);
+                }
+                output
+            })
+            .collect();
+        let mut by_object: BTreeMap<u32, Vec<FluxTriangle>> = BTreeMap::new();
+        for part in parts {
+            report.ledger.merge(&part.ledger);
+            report.receiver_queries += part.queries;
+            report.statistics.merge(&part.statistics);
+            for (object, triangle) in part.triangles {
+                by_object.entry(object).or_default().push(triangle);
+            }
+        }
+        if let Some(maps) = maps {
+            for (object, triangles) in by_object {
+                maps.touch(object as usize, self.chart_for);
+                if let Some(map) = maps.get_mut(object as usize) {
+                    let placed = deposit_triangles(&triangles, map);
+                    for (account, counts) in [
+                        (Account::Deposited, placed.deposited),
+                        (Account::Escaped, placed.outside),
+                        (Account::Unresolved, placed.unplaced),
+                        (Account::NonFinite, placed.non_finite),
+                    ] {
+                        report.ledger.book_sum(account, counts);
+                    }
+                }
+            }
+        }
+        report.deposit_s.add(watch.elapsed());
+    }
+}
+
+impl PassReport {
+    fn count_traced(&mut self, band: &TracedBand) {
+        self.ledger.merge(&band.ledger);
+        self.rays += band.rays;
+        self.segments += band.segments;
+        self.cells += band.cells;
+        self.splats += band.splats;
+    }
+}

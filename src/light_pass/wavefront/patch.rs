@@ -1,0 +1,224 @@
+//! Pieces of the wavefront between traced rays: cubic in the ray's origin and direction, bilinear in its flux.
+
+use glam::{DVec2, DVec3};
+
+use super::strand::Strand;
+use crate::geometry::Ray;
+
+/// A ray with its derivatives along the patch's own coordinates.
+#[derive(Clone, Copy, Debug, Default)]
+struct Node {
+    origin: DVec3,
+    direction: DVec3,
+}
+
+impl Node {
+    fn of(strand: &Strand) -> Self {
+        Self {
+            origin: strand.ray.origin,
+            direction: strand.ray.direction,
+        }
+    }
+
+    /// Derivative of a strand along a step in the unit square.
+    fn slope(strand: &Strand, step: DVec2) -> Self {
+        let d = &strand.differential;
+        Self {
+            origin: d.across.origin * step.x + d.down.origin * step.y,
+            direction: d.across.direction * step.x + d.down.direction * step.y,
+        }
+    }
+
+    fn times(self, factor: f64) -> Self {
+        Self {
+            origin: self.origin * factor,
+            direction: self.direction * factor,
+        }
+    }
+
+    fn plus(self, other: Self) -> Self {
+        Self {
+            origin: self.origin + other.origin,
+            direction: self.direction + other.direction,
+        }
+    }
+
+    fn ray(self) -> Ray {
+        Ray {
+            origin: self.origin,
+            direction: self.direction,
+        }
+    }
+}
+
+/// How rays between the traced ones are made. Directions are not normalised: the plane or surface they meet does not
+/// depend on their length.
+#[derive(Clone, Debug)]
+pub enum PatchShape {
+    /// Over a rectangle: the linearly blended Coons patch of four cubic Hermite edges, which is the rectangle of Adini,
+    /// Clough and Melosh (12 degrees of freedom per coordinate), exact for cubics.
+    Coons(Box<CoonsPatch>),
+    /// Over a rectangle, by its corners alone.
+    Bilinear(Box<[Ray; 4]>),
+    /// Over a triangle: cubic Bézier with Hermite edges, exact for quadratics.
+    Bezier(Box<BezierTriangle>),
+    /// Over a triangle, by its corners alone.
+    Linear(Box<[Ray; 3]>),
+}
+
+/// Corner order: (0,0), (1,0), (1,1), (0,1).
+#[derive(Clone, Debug)]
+pub struct CoonsPatch {
+    corners: [Node; 4],
+    across: [Node; 4],
+    down: [Node; 4],
+}
+
+/// Control points in the order 300, 030, 003, 210, 120, 021, 012, 102, 201, 111.
+#[derive(Clone, Debug)]
+pub struct BezierTriangle {
+    control: [Node; 10],
+}
+
+impl PatchShape {
+    /// The patch over the rectangle of size `step` between four strands.
+    pub fn coons(strands: [&Strand; 4], step: DVec2) -> Self {
+        Self::Coons(Box::new(CoonsPatch {
+            corners: strands.map(Node::of),
+            across: strands.map(|strand| Node::slope(strand, DVec2::new(step.x, 0.0))),
+            down: strands.map(|strand| Node::slope(strand, DVec2::new(0.0, step.y))),
+        }))
+    }
+
+    /// The same without derivatives.
+    pub fn bilinear(strands: [&Strand; 4]) -> Self {
+        Self::Bilinear(Box::new(strands.map(|strand| strand.ray)))
+    }
+
+    /// The patch over a triangle of the unit square.
+    pub fn bezier(strands: [&Strand; 3], squares: [DVec2; 3]) -> Self {
+        let corners = strands.map(Node::of);
+        // Control point a third of the way from corner i to corner j.
+        let towards = |i: usize, j: usize| {
+            corners[i].plus(Node::slope(strands[i], squares[j] - squares[i]).times(1.0 / 3.0))
+        };
+        let edges = [
+            towards(0, 1),
+            towards(1, 0),
+            towards(1, 2),
+            towards(2, 1),
+            towards(2, 0),
+            towards(0, 2),
+        ];
+        let sum = |nodes: &[Node]| nodes.iter().fold(Node::default(), |sum, node| sum.plus(*node));
+        let centre = sum(&edges).times(0.25).plus(sum(&corners).times(-1.0 / 6.0));
+        let [a, b, c] = corners;
+        let [ab, ba, bc, cb, ca, ac] = edges;
+        Self::Bezier(Box::new(BezierTriangle {
+            control: [a, b, c, ab, ba, bc, cb, ca, ac, centre],
+        }))
+    }
+
+    /// The same without derivatives.
+    pub fn linear(strands: [&Strand; 3]) -> Self {
+        Self::Linear(Box::new(strands.map(|strand| strand.ray)))
+    }
+
+    /// The rectangle of size `step` around one strand's own place, by its derivatives alone; `low` is the rectangle's
+    /// corner relative to the strand.
+    pub fn around(strand: &Strand, low: DVec2, step: DVec2) -> Self {
+        let at = |offset: DVec2| Node::of(strand).plus(Node::slope(strand, offset)).ray();
+        Self::Bilinear(Box::new([
+            at(low),
+            at(low + DVec2::new(step.x, 0.0)),
+            at(low + step),
+            at(low + DVec2::new(0.0, step.y)),
+        ]))
+    }
+
+    /// Whether its coordinates run over the unit square; else over the triangle below its diagonal.
+    pub fn is_rectangle(&self) -> bool {
+        matches!(self, Self::Coons(_) | Self::Bilinear(_))
+    }
+
+    /// The ray at a place of the patch.
+    pub fn ray(&self, place: DVec2) -> Ray {
+        let (s, t) = (place.x, place.y);
+        match self {
+            Self::Coons(patch) => patch.node(s, t).ray(),
+            Self::Bilinear(rays) => mix(&rays[..], &bilinear_weights(s, t)),
+            Self::Bezier(patch) => patch.node(s, t).ray(),
+            Self::Linear(rays) => mix(&rays[..], &[1.0 - s - t, s, t]),
+        }
+    }
+
+    /// Weights of the corners' flux at a place.
+    pub fn weights(&self, place: DVec2) -> [f64; 4] {
+        let (s, t) = (place.x, place.y);
+        if self.is_rectangle() {
+            bilinear_weights(s, t)
+        } else {
+            [1.0 - s - t, s, t, 0.0]
+        }
+    }
+}
+
+fn bilinear_weights(s: f64, t: f64) -> [f64; 4] {
+    [(1.0 - s) * (1.0 - t), s * (1.0 - t), s * t, (1.0 - s) * t]
+}
+
+fn mix(rays: &[Ray], weights: &[f64]) -> Ray {
+    let mut sum = Node::default();
+    for (ray, weight) in rays.iter().zip(weights) {
+        sum.origin += ray.origin * *weight;
+        sum.direction += ray.direction * *weight;
+    }
+    sum.ray()
+}
+
+impl CoonsPatch {
+    fn node(&self, s: f64, t: f64) -> Node {
+        let value = |s: f64, t: f64| (1.0 - s) * (1.0 - t) * (1.0 + s + t - 2.0 * (s * s + t * t));
+        let slope = |s: f64, t: f64| s * (1.0 - s) * (1.0 - s) * (1.0 - t);
+        let (u, v) = (1.0 - s, 1.0 - t);
+        let values = [value(s, t), value(u, t), value(u, v), value(s, v)];
+        let across = [slope(s, t), -slope(u, t), -slope(u, v), slope(s, v)];
+        let down = [slope(t, s), slope(t, u), -slope(v, u), -slope(v, s)];
+        let mut sum = Node::default();
+        for corner in 0..4 {
+            for (node, weight) in [
+                (&self.corners[corner], values[corner]),
+                (&self.across[corner], across[corner]),
+                (&self.down[corner], down[corner]),
+            ] {
+                sum.origin += node.origin * weight;
+                sum.direction += node.direction * weight;
+            }
+        }
+        sum
+    }
+}
+
+impl BezierTriangle {
+    fn node(&self, s: f64, t: f64) -> Node {
+        let (a, b, c) = (1.0 - s - t, s, t);
+        let weights = [
+            a * a * a,
+            b * b * b,
+            c * c * c,
+            3.0 * a * a * b,
+            3.0 * a * b * b,
+            3.0 * b * b * c,
+            3.0 * b * c * c,
+            3.0 * c * c * a,
+            3.0 * c * a * a,
+            6.0 * a * b * c,
+        ];
+        let mut sum = Node::default();
+        for (node, weight) in self.control.iter().zip(weights) {
+            sum.origin += node.origin * weight;
+            sum.direction += node.direction * weight;
+        }
+        sum
+    }
+}

@@ -1,0 +1,194 @@
+//! Surfaces that take light into maps, as the wavefront meets them: planes by one equation, others by the hierarchy.
+
+use std::sync::{Arc, OnceLock};
+
+use glam::{DVec2, DVec3};
+
+use crate::geometry::Ray;
+use crate::illumination::Chart;
+use crate::illumination::islands::Islands;
+use crate::light_pass::receiver_maps::ChartFor;
+use crate::scene::{Mesh, SurfaceKind};
+use crate::transport::Tracer;
+
+/// How far from the map's middle light is followed on the extended plane [map sides].
+const FARTHEST_SIDES: f64 = 8.0;
+
+/// Deviation from one plane and one affine parametrisation, relative to the mesh, that counts as rounding.
+const FLATNESS: f64 = 1e-7;
+
+/// A receiver that lies in one plane, with affine map coordinates.
+#[derive(Clone, Copy, Debug)]
+pub struct PlaneChart {
+    normal: DVec3,
+    offset_m: f64,
+    /// Texel coordinates are `rows·p + origin`.
+    rows: [DVec3; 2],
+    origin: DVec2,
+    middle: DVec2,
+    farthest_texels: f64,
+    /// Whether the surface fills its map to the borders, so that the map's border is the surface's.
+    pub fills_map: bool,
+}
+
+impl PlaneChart {
+    /// Texel coordinates where a ray (of any length) meets the extended plane, and the distance in units of the
+    /// direction; `None` where it does not, or too far off the map to matter.
+    pub fn meet(&self, ray: &Ray) -> Option<(DVec2, f64)> {
+        let slope = ray.direction.dot(self.normal);
+        let distance = (self.offset_m - ray.origin.dot(self.normal)) / slope;
+        let point = ray.origin + ray.direction * distance;
+        let texel = DVec2::new(self.rows[0].dot(point), self.rows[1].dot(point)) + self.origin;
+        let near = (texel - self.middle).abs().max_element() <= self.farthest_texels;
+        // Also false for NaN.
+        (distance > 0.0 && near).then_some((texel, distance))
+    }
+
+    fn of(mesh: &Mesh, chart: &Chart) -> Option<Self> {
+        let largest = (0..mesh.triangles.len())
+            .map(|triangle| {
+                let [a, b, c] = mesh.corners(triangle);
+                ((b - a).cross(c - a).length_squared(), triangle)
+            })
+            .reduce(|a, b| if b.0 > a.0 { b } else { a })?
+            .1;
+        let corners = mesh.corners(largest);
+        let normal = mesh.face_normal(largest);
+        let rows = chart.texel_from_world(largest, corners)?;
+        let size = DVec2::new(chart.width as f64, chart.height as f64);
+        let origin = chart.corner_uvs[largest][0] * size
+            - DVec2::new(rows[0].dot(corners[0]), rows[1].dot(corners[0]));
+        let offset_m = normal.dot(corners[0]);
+        let (low, high) = mesh.bounds()?;
+        let tolerance_m = FLATNESS * (high - low).length();
+        let tolerance_texels = FLATNESS * size.max_element();
+        for (triangle, uvs) in chart.corner_uvs.iter().enumerate() {
+            for (corner, uv) in mesh.corners(triangle).into_iter().zip(uvs) {
+                let texel = DVec2::new(rows[0].dot(corner), rows[1].dot(corner)) + origin;
+                let off_plane = (normal.dot(corner) - offset_m).abs() > tolerance_m;
+                if off_plane || (texel - *uv * size).abs().max_element() > tolerance_texels {
+                    return None;
+                }
+            }
+        }
+        Some(Self {
+            normal,
+            offset_m,
+            rows,
+            origin,
+            middle: size * 0.5,
+            farthest_texels: FARTHEST_SIDES * size.max_element(),
+            fills_map: chart.texel_areas_m2.len() == 1,
+        })
+    }
+}
+
+/// A receiver with its parametrisation.
+#[derive(Debug)]
+pub struct ReceiverSurface {
+    /// Of the object.
+    pub chart: Arc<Chart>,
+    islands: Option<Islands>,
+    /// Where it is flat.
+    pub plane: Option<PlaneChart>,
+    /// Whether it takes all light that arrives.
+    pub is_diffuse: bool,
+    /// Of the whole surface [m²].
+    pub area_m2: f64,
+}
+
+impl ReceiverSurface {
+    /// Island of a triangle.
+    pub fn island(&self, triangle: u32) -> u32 {
+        self.islands
+            .as_ref()
+            .map_or(0, |islands| islands.of_triangle(triangle as usize))
+    }
+
+    /// Texel coordinates of a point of a triangle, from its second and third barycentric coordinate.
+    pub fn texel(&self, triangle: u32, barycentric: DVec2) -> DVec2 {
+        let [b, c] = barycentric.to_array();
+        let size = DVec2::new(self.chart.width as f64, self.chart.height as f64);
+        self.chart.uv(triangle as usize, [1.0 - b - c, b, c]) * size
+    }
+}
+
+/// All receivers of a scene, prepared when light first looks for them.
+pub struct Receivers<'a> {
+    /// The scene.
+    pub tracer: &'a Tracer,
+    chart_for: &'a ChartFor<'a>,
+    slots: Vec<OnceLock<Option<ReceiverSurface>>>,
+    bounds: Vec<(DVec3, DVec3)>,
+    scene_bounds: (DVec3, DVec3),
+}
+
+impl std::fmt::Debug for Receivers<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Receivers").finish_non_exhaustive()
+    }
+}
+
+impl<'a> Receivers<'a> {
+    /// None prepared yet.
+    pub fn new(tracer: &'a Tracer, chart_for: &'a ChartFor<'a>) -> Self {
+        let scene = tracer.scene();
+        let empty = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        Self {
+            tracer,
+            chart_for,
+            slots: scene.objects.iter().map(|_| OnceLock::new()).collect(),
+            bounds: scene
+                .objects
+                .iter()
+                .map(|object| object.mesh.bounds().unwrap_or(empty))
+                .collect(),
+            scene_bounds: scene.bounds().unwrap_or(empty),
+        }
+    }
+
+    /// A receiver; `None` where the object cannot take a map.
+    pub fn get(&self, object: u32) -> Option<&ReceiverSurface> {
+        self.slots[object as usize]
+            .get_or_init(|| self.prepare(object as usize))
+            .as_ref()
+    }
+
+    fn prepare(&self, object: usize) -> Option<ReceiverSurface> {
+        let scene = self.tracer.scene();
+        let chart = (self.chart_for)(object)?;
+        let mesh = &scene.objects[object].mesh;
+        Some(ReceiverSurface {
+            islands: Islands::find(&chart),
+            plane: PlaneChart::of(mesh, &chart),
+            is_diffuse: scene.material_of(object).surface == SurfaceKind::Diffuse,
+            area_m2: mesh.area_m2(),
+            chart,
+        })
+    }
+
+    /// Whether the box around some beam meets the box of any object but the given ones.
+    pub fn meets_others(&self, low: DVec3, high: DVec3, except: [u32; 2]) -> bool {
+        self.bounds.iter().enumerate().any(|(object, bounds)| {
+            !except.contains(&(object as u32)) && low.cmple(bounds.1).all() && high.cmpge(bounds.0).all()
+        })
+    }
+
+    /// Where a ray leaves the scene's box; its origin where it is already outside [m].
+    pub fn exit_point(&self, ray: &Ray) -> DVec3 {
+        let (low, high) = self.scene_bounds;
+        let mut distance_m = f64::INFINITY;
+        for axis in 0..3 {
+            let d = ray.direction[axis];
+            let wall = if d > 0.0 { high[axis] } else { low[axis] };
+            if d != 0.0 {
+                distance_m = distance_m.min((wall - ray.origin[axis]) / d);
+            }
+        }
+        if distance_m > 0.0 && distance_m.is_finite() {
+            ray.at(distance_m)
+        } else {
+            ray.origin
+        }
+    }
+}

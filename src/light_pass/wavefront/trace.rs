@@ -1,0 +1,245 @@
+//! Traces one light ray with its derivatives through every specular surface that matters.
+
+use glam::DVec2;
+
+use super::strand::{Landing, LightSample, Strand, SurfaceNode};
+use crate::geometry::Ray;
+use crate::light_pass::caustic::path::{PathLimits, PathSignature};
+use crate::light_pass::launch::Launch;
+use crate::optics::LinearSrgb;
+use crate::transport::{
+    Branch, Interaction, MediumStack, RayDerivative, RayDifferential, SurfaceHit, SurfaceScale, Tracer,
+};
+
+/// Strands that one light ray may have waiting: a closed mirror box with glass in it doubles them without end.
+const MOST_BRANCHES: usize = 4096;
+
+/// Rays start this far within the border of the domain's unit square.
+const DOMAIN_MARGIN: f64 = 1e-9;
+
+/// Traces light rays of one light.
+#[derive(Clone, Copy, Debug)]
+pub struct StrandTracer<'a> {
+    /// The scene.
+    pub tracer: &'a Tracer,
+    /// Where rays start.
+    pub launch: &'a Launch,
+    /// Of the paths.
+    pub limits: PathLimits,
+    /// Distance between neighbouring rays, in units of the unit square.
+    pub steps: [f64; 2],
+}
+
+/// A ray that waits to be followed.
+#[derive(Clone, Copy, Debug)]
+struct Waiting {
+    ray: Ray,
+    differential: RayDifferential,
+    flux_w: LinearSrgb,
+    media: MediumStack,
+    signature: PathSignature,
+    depth: u32,
+    /// Index of its strand; none for the light's own ray.
+    strand: Option<usize>,
+}
+
+impl StrandTracer<'_> {
+    /// Traces the ray that starts at a point of the unit square of a face.
+    pub fn trace(&self, face: usize, square: DVec2) -> LightSample {
+        // Just within the domain: its border may be the very border of a surface.
+        let square = square.clamp(DVec2::splat(DOMAIN_MARGIN), DVec2::splat(1.0 - DOMAIN_MARGIN));
+        let mut sample = LightSample::default();
+        let (ray, differential) = self.launch.ray_with_differential(face, square);
+        let flux_w = self.launch.flux_density_w(square, ray.direction);
+        if !(flux_w.is_finite() && flux_w.max_channel() > 0.0) {
+            return sample;
+        }
+        let floor_w = flux_w.luminance() * self.limits.branch_threshold;
+        let mut waiting = vec![Waiting {
+            ray,
+            differential,
+            flux_w,
+            media: MediumStack::default(),
+            signature: PathSignature::default(),
+            depth: 0,
+            strand: None,
+        }];
+        while let Some(next) = waiting.pop() {
+            self.step(&next, floor_w, &mut sample, &mut waiting);
+        }
+        sample.strands.sort_by_key(|strand| strand.signature);
+        sample.nodes.sort_by_key(|node| node.signature);
+        sample.brightest_w = sample
+            .strands
+            .iter()
+            .map(|strand| strand.flux_w.luminance())
+            .fold(0.0, f64::max);
+        sample
+    }
+
+    fn step(&self, from: &Waiting, floor_w: f64, sample: &mut LightSample, waiting: &mut Vec<Waiting>) {
+        sample.segments += 1;
+        let Some(hit) = self.tracer.closest_hit(&from.ray) else {
+            if from.strand.is_none() {
+                sample.not_emitted = from.flux_w;
+            }
+            return;
+        };
+        let material = self.tracer.scene().material_of(hit.object);
+        if let Some(strand) = from.strand {
+            sample.strands[strand].landing = landing(&hit, material.surface.is_receiver());
+        }
+        if !material.surface.is_specular() {
+            if from.strand.is_none() {
+                sample.not_emitted = from.flux_w;
+            }
+            return;
+        }
+        let mut incident = from.flux_w;
+        if self.limits.absorption {
+            incident = incident * from.media.transmittance(self.tracer.scene(), hit.distance_m);
+        }
+        let interaction = self.tracer.interact(&hit, from.ray.direction, &from.media);
+        self.scatter(from, &hit, incident, &interaction, floor_w, sample, waiting);
+    }
+
+    #[allow(clippy::too_many_arguments, reason = "one call site; a hit is made of this")]
+    fn scatter(
+        &self,
+        from: &Waiting,
+        hit: &SurfaceHit,
+        incident: LinearSrgb,
+        interaction: &Interaction,
+        floor_w: f64,
+        sample: &mut LightSample,
+        waiting: &mut Vec<Waiting>,
+    ) {
+        let moved_smooth = self
+            .tracer
+            .transfer(&from.ray, hit, &from.differential, SurfaceScale::Smooth);
+        let scale = self.tracer.surface_scale(hit, &moved_smooth, self.steps);
+        let at_hit = match scale {
+            SurfaceScale::Smooth => moved_smooth,
+            SurfaceScale::Facet => {
+                self.tracer
+                    .transfer(&from.ray, hit, &from.differential, SurfaceScale::Facet)
+            }
+        };
+        let group = self.tracer.smoothing_group(hit.object, hit.triangle);
+        let at_surface = from.signature.at(hit.object, group);
+        let mut node = SurfaceNode {
+            signature: at_surface,
+            first: from.strand.is_none(),
+            incident,
+            absorbed: incident * interaction.absorbed,
+            depth: LinearSrgb::BLACK,
+            threshold: LinearSrgb::BLACK,
+            non_finite: LinearSrgb::BLACK,
+            taken: incident * interaction.deposit,
+        };
+        for branch in [interaction.reflection, interaction.transmission]
+            .into_iter()
+            .flatten()
+        {
+            let flux_w = incident * branch.share;
+            if flux_w.max_channel() <= 0.0 {
+                continue;
+            }
+            let ray = branch.ray;
+            if !(flux_w.is_finite() && ray.direction.is_finite() && ray.origin.is_finite()) {
+                let finite = flux_w.map(|w| if w.is_finite() { w } else { 0.0 });
+                node.non_finite = node.non_finite + finite;
+            } else if from.depth + 1 > self.limits.max_depth {
+                node.depth = node.depth + flux_w;
+            } else if flux_w.luminance() < floor_w || sample.strands.len() >= MOST_BRANCHES {
+                node.threshold = node.threshold + flux_w;
+            } else {
+                let differential =
+                    self.tracer
+                        .differential_after(from.ray.direction, hit, &at_hit, &branch, scale);
+                let signature = at_surface.event(branch.event);
+                push(
+                    from,
+                    hit,
+                    &branch,
+                    flux_w,
+                    differential,
+                    signature,
+                    sample,
+                    waiting,
+                );
+            }
+        }
+        sample.nodes.push(node);
+    }
+}
+
+#[allow(
+    clippy::too_many_arguments,
+    reason = "one call site; a strand is made of this"
+)]
+fn push(
+    from: &Waiting,
+    hit: &SurfaceHit,
+    branch: &Branch,
+    flux_w: LinearSrgb,
+    differential: RayDifferential,
+    signature: PathSignature,
+    sample: &mut LightSample,
+    waiting: &mut Vec<Waiting>,
+) {
+    waiting.push(Waiting {
+        ray: branch.ray,
+        differential,
+        flux_w,
+        media: branch.media,
+        signature,
+        depth: from.depth + 1,
+        strand: Some(sample.strands.len()),
+    });
+    sample.strands.push(Strand {
+        signature,
+        ray: branch.ray,
+        differential,
+        flux_w,
+        media: branch.media,
+        from: hit.object as u32,
+        landing: Landing::Escaped,
+    });
+}
+
+fn landing(hit: &SurfaceHit, is_receiver: bool) -> Landing {
+    if is_receiver {
+        Landing::Receiver {
+            object: hit.object as u32,
+            triangle: hit.triangle as u32,
+            barycentric: DVec2::new(hit.barycentric[1], hit.barycentric[2]),
+            distance_m: hit.distance_m,
+        }
+    } else {
+        Landing::Specular {
+            object: hit.object as u32,
+            distance_m: hit.distance_m,
+        }
+    }
+}
+
+impl Launch {
+    /// The ray of a point of the domain with its derivatives by the coordinates of the unit square, from central
+    /// differences: in double precision they are good to some 1e-9, far below any surface's.
+    fn ray_with_differential(&self, face: usize, square: DVec2) -> (Ray, RayDifferential) {
+        const STEP: f64 = 1e-5;
+        let derivative = |step: DVec2| {
+            let (before, after) = (self.ray(face, square - step), self.ray(face, square + step));
+            RayDerivative {
+                origin: (after.origin - before.origin) / (2.0 * STEP),
+                direction: (after.direction - before.direction) / (2.0 * STEP),
+            }
+        };
+        let differential = RayDifferential {
+            across: derivative(DVec2::new(STEP, 0.0)),
+            down: derivative(DVec2::new(0.0, STEP)),
+        };
+        (self.ray(face, square), differential)
+    }
+}

@@ -1,0 +1,230 @@
+//! Rays between the traced ones, and where they land.
+
+use glam::DVec2;
+
+use super::patch::PatchShape;
+use super::receivers::Receivers;
+use super::spread::Spreader;
+use super::strand::{Landing, Strand};
+use crate::geometry::Ray;
+use crate::optics::LinearSrgb;
+use crate::scene::SurfaceKind;
+use crate::transport::{MediumStack, SurfaceHit};
+
+/// Where a ray lands.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Place {
+    /// Outside the scene, or off the map by far.
+    Nowhere,
+    /// On a surface that only sends on or absorbs.
+    Onward,
+    /// On a receiver that cannot take a map.
+    Refused,
+    /// On a map.
+    On {
+        /// Index into `Scene::objects`.
+        object: u32,
+        /// Of the chart.
+        island: u32,
+        /// Texel coordinates.
+        texel: DVec2,
+    },
+}
+
+impl Place {
+    /// Whether two rays land on the same piece of a map, or share another fate.
+    pub fn is_same(&self, other: &Self) -> bool {
+        match (self, other) {
+            (
+                Self::On { object, island, .. },
+                Self::On {
+                    object: other_object,
+                    island: other_island,
+                    ..
+                },
+            ) => object == other_object && island == other_island,
+            _ => std::mem::discriminant(self) == std::mem::discriminant(other),
+        }
+    }
+
+    /// Texel coordinates; zero off the maps.
+    pub fn texel(&self) -> DVec2 {
+        match self {
+            Self::On { texel, .. } => *texel,
+            _ => DVec2::ZERO,
+        }
+    }
+
+    /// The object whose map it is.
+    pub fn object(&self) -> Option<u32> {
+        match self {
+            Self::On { object, .. } => Some(*object),
+            _ => None,
+        }
+    }
+}
+
+/// A virtual ray's end.
+#[derive(Clone, Copy, Debug)]
+pub struct VirtualVertex {
+    /// Where it lands.
+    pub place: Place,
+    /// Share of the light that is left on arrival [0, 1].
+    pub transmittance: LinearSrgb,
+    /// Share that the surface takes into its map [0, 1].
+    pub deposit: f64,
+}
+
+/// Makes rays of one patch and lets them land.
+pub struct VirtualRays<'a> {
+    receivers: &'a Receivers<'a>,
+    shape: &'a PatchShape,
+    /// Object whose extended plane all rays are for.
+    plane: Option<u32>,
+    media: MediumStack,
+    absorption: bool,
+    from: u32,
+    /// Within this distance of its origin a ray may meet the surface it leaves, since its origin is interpolated [m].
+    skin_m: f64,
+    /// Rays so far.
+    pub queries: u64,
+}
+
+impl<'a> VirtualRays<'a> {
+    /// For one patch between strands of one signature.
+    pub fn new(
+        spreader: &Spreader<'a>,
+        shape: &'a PatchShape,
+        strands: &[&Strand],
+        plane: Option<u32>,
+    ) -> Self {
+        let first = strands[0];
+        let spread_m = strands
+            .iter()
+            .map(|strand| strand.ray.origin.distance(first.ray.origin))
+            .fold(0.0, f64::max);
+        // A traced ray that comes back sooner is no artefact.
+        let nearest_own_m = strands
+            .iter()
+            .filter_map(|strand| match strand.landing {
+                Landing::Specular { object, distance_m } if object == first.from => Some(distance_m),
+                _ => None,
+            })
+            .fold(f64::INFINITY, f64::min);
+        Self {
+            receivers: spreader.receivers,
+            shape,
+            plane,
+            media: first.media,
+            absorption: spreader.absorption,
+            from: first.from,
+            skin_m: spread_m.min(0.5 * nearest_own_m),
+            queries: 0,
+        }
+    }
+
+    /// The ray at a place of the patch, landed.
+    pub fn vertex(&mut self, at: DVec2) -> VirtualVertex {
+        self.queries += 1;
+        let ray = self.shape.ray(at);
+        match self.plane {
+            Some(object) => self.on_plane(object, &ray),
+            None => self.anywhere(ray),
+        }
+    }
+
+    fn on_plane(&self, object: u32, ray: &Ray) -> VirtualVertex {
+        let met = self
+            .receivers
+            .get(object)
+            .and_then(|surface| surface.plane)
+            .and_then(|plane| plane.meet(ray));
+        match met {
+            Some((texel, distance)) => VirtualVertex {
+                place: Place::On {
+                    object,
+                    island: 0,
+                    texel,
+                },
+                transmittance: self.transmittance(distance * ray.direction.length()),
+                deposit: 1.0,
+            },
+            None => nowhere(),
+        }
+    }
+
+    fn transmittance(&self, distance_m: f64) -> LinearSrgb {
+        if self.absorption {
+            self.media
+                .transmittance(self.receivers.tracer.scene(), distance_m)
+        } else {
+            LinearSrgb::WHITE
+        }
+    }
+
+    fn anywhere(&self, ray: Ray) -> VirtualVertex {
+        let Some(direction) = ray.direction.try_normalize() else {
+            return nowhere();
+        };
+        let ray = Ray { direction, ..ray };
+        let Some((hit, distance_m)) = self.closest_hit(ray) else {
+            return nowhere();
+        };
+        let tracer = self.receivers.tracer;
+        let kind = tracer.scene().material_of(hit.object).surface;
+        let deposit = match kind {
+            SurfaceKind::Diffuse => 1.0,
+            SurfaceKind::Mixed => tracer.interact(&hit, direction, &self.media).deposit.luminance(),
+            _ => 0.0,
+        };
+        let place = if kind.is_receiver() {
+            self.place_on(&hit)
+        } else {
+            Place::Onward
+        };
+        VirtualVertex {
+            place,
+            transmittance: self.transmittance(distance_m),
+            deposit,
+        }
+    }
+
+    /// The nearest surface, but for the one that the ray leaves, which its interpolated origin may lie behind.
+    fn closest_hit(&self, mut ray: Ray) -> Option<(SurfaceHit, f64)> {
+        let mut before_m = 0.0;
+        for _ in 0..4 {
+            let hit = self.receivers.tracer.closest_hit(&ray)?;
+            let distance_m = before_m + hit.distance_m;
+            if hit.object as u32 != self.from || distance_m > self.skin_m {
+                return Some((hit, distance_m));
+            }
+            ray = hit.spawn(ray.direction);
+            before_m = distance_m;
+        }
+        let hit = self.receivers.tracer.closest_hit(&ray)?;
+        Some((hit, before_m + hit.distance_m))
+    }
+
+    fn place_on(&self, hit: &SurfaceHit) -> Place {
+        let object = hit.object as u32;
+        match self.receivers.get(object) {
+            Some(surface) => Place::On {
+                object,
+                island: surface.island(hit.triangle as u32),
+                texel: surface.texel(
+                    hit.triangle as u32,
+                    DVec2::new(hit.barycentric[1], hit.barycentric[2]),
+                ),
+            },
+            None => Place::Refused,
+        }
+    }
+}
+
+fn nowhere() -> VirtualVertex {
+    VirtualVertex {
+        place: Place::Nowhere,
+        transmittance: LinearSrgb::WHITE,
+        deposit: 0.0,
+    }
+}

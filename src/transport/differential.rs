@@ -1,0 +1,155 @@
+//! Ray differentials: how a ray changes as its start in the light's domain does (Igehy, "Tracing Ray Differentials",
+//! SIGGRAPH 1999), through every reflection and refraction.
+
+use glam::DVec3;
+
+use super::curvature;
+use super::interaction::{Branch, Event};
+use super::{SurfaceHit, Tracer};
+use crate::geometry::Ray;
+
+/// Derivatives of a ray's origin [m] and unit direction [1] by one coordinate of the unit square it starts from.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct RayDerivative {
+    /// Of the origin [m].
+    pub origin: DVec3,
+    /// Of the direction, perpendicular to it [1].
+    pub direction: DVec3,
+}
+
+/// Derivatives by both coordinates.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct RayDifferential {
+    /// By the first coordinate.
+    pub across: RayDerivative,
+    /// By the second.
+    pub down: RayDerivative,
+}
+
+impl RayDifferential {
+    /// Both derivatives through the same function.
+    #[must_use]
+    pub fn map(self, f: impl Fn(RayDerivative) -> RayDerivative) -> Self {
+        Self {
+            across: f(self.across),
+            down: f(self.down),
+        }
+    }
+
+    /// Whether all numbers are finite.
+    pub fn is_finite(&self) -> bool {
+        [self.across, self.down]
+            .iter()
+            .all(|derivative| derivative.origin.is_finite() && derivative.direction.is_finite())
+    }
+}
+
+/// What the derivatives of a surface are taken from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SurfaceScale {
+    /// The smooth surface that the mesh stands for: steps are longer than its triangles.
+    Smooth,
+    /// The triangle itself: steps stay within it.
+    Facet,
+}
+
+impl Tracer {
+    /// Whether steps of a ray's differential [m, at the hit] leave the triangle that was hit: then the surface's
+    /// derivatives are those of the smooth surface around it. `steps` are in units of the differential's coordinates.
+    pub fn surface_scale(&self, hit: &SurfaceHit, moved: &RayDifferential, steps: [f64; 2]) -> SurfaceScale {
+        let [a, b, c] = self.scene().objects[hit.object].mesh.corners(hit.triangle);
+        let shortest = a
+            .distance_squared(b)
+            .min(b.distance_squared(c))
+            .min(c.distance_squared(a));
+        let longest_step = (moved.across.origin.length_squared() * steps[0] * steps[0])
+            .max(moved.down.origin.length_squared() * steps[1] * steps[1]);
+        if 4.0 * longest_step < shortest {
+            SurfaceScale::Facet
+        } else {
+            SurfaceScale::Smooth
+        }
+    }
+
+    /// The differential of a ray carried on to its hit: the origin's derivatives are then those of the hit point,
+    /// along the tangent plane of the surface at the given scale.
+    pub fn transfer(
+        &self,
+        ray: &Ray,
+        hit: &SurfaceHit,
+        differential: &RayDifferential,
+        scale: SurfaceScale,
+    ) -> RayDifferential {
+        let normal = match scale {
+            SurfaceScale::Facet => hit.geometric_normal,
+            SurfaceScale::Smooth => hit.shading_normal,
+        };
+        let slope = ray.direction.dot(normal);
+        differential.map(|derivative| {
+            let free = derivative.origin + derivative.direction * hit.distance_m;
+            RayDerivative {
+                origin: free - ray.direction * (free.dot(normal) / slope),
+                direction: derivative.direction,
+            }
+        })
+    }
+
+    /// The differential of a branch that leaves a hit, from that of the incoming ray at the hit.
+    pub fn differential_after(
+        &self,
+        incident: DVec3,
+        hit: &SurfaceHit,
+        at_hit: &RayDifferential,
+        branch: &Branch,
+        scale: SurfaceScale,
+    ) -> RayDifferential {
+        if branch.event == Event::ThinTransmission {
+            return *at_hit;
+        }
+        at_hit.map(|derivative| {
+            let normal_change = if branch.by_shading {
+                self.normal_change(hit, branch.normal, derivative.origin, scale)
+            } else {
+                DVec3::ZERO
+            };
+            let cos_change = -(derivative.direction.dot(branch.normal) + incident.dot(normal_change));
+            let cos_incident = -incident.dot(branch.normal);
+            let direction = match branch.event {
+                Event::Refraction => {
+                    // d' = (d + n·c)/η − n·cos θt, with cos²θt = (η² − 1 + c²)/η².
+                    let inverse_eta = branch.ior_ratio;
+                    let cos_transmitted = -branch.ray.direction.dot(branch.normal);
+                    let cos_transmitted_change =
+                        cos_incident * cos_change * inverse_eta * inverse_eta / cos_transmitted;
+                    (derivative.direction + normal_change * cos_incident + branch.normal * cos_change)
+                        * inverse_eta
+                        - normal_change * cos_transmitted
+                        - branch.normal * cos_transmitted_change
+                }
+                // d' = d + 2·n·c.
+                _ => derivative.direction + (normal_change * cos_incident + branch.normal * cos_change) * 2.0,
+            };
+            RayDerivative {
+                origin: derivative.origin,
+                direction,
+            }
+        })
+    }
+
+    /// Change of the normal, as oriented in `normal`, for a step along the surface [m].
+    fn normal_change(&self, hit: &SurfaceHit, normal: DVec3, step: DVec3, scale: SurfaceScale) -> DVec3 {
+        let mesh = &self.scene().objects[hit.object].mesh;
+        let change = match (scale, self.normal_field(hit.object)) {
+            (SurfaceScale::Smooth, Some(field)) => {
+                let change = field.turn(mesh, hit.triangle, hit.barycentric, step);
+                change - normal * normal.dot(change)
+            }
+            _ => curvature::turn_within(mesh, hit.triangle, hit.barycentric, step),
+        };
+        if normal.dot(hit.shading_normal) < 0.0 {
+            -change
+        } else {
+            change
+        }
+    }
+}

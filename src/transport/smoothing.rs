@@ -1,0 +1,78 @@
+//! Smoothing groups: regions of a mesh over which the shading normal is continuous. Creases, flat facets and separate
+//! pieces divide them.
+
+use std::collections::HashMap;
+
+use glam::DVec3;
+
+use crate::scene::Mesh;
+
+/// Normals at a shared position count as one up to this much per coordinate [1].
+const NORMAL_STEP: f64 = 1e-4;
+
+/// The group of every triangle, numbered from 0 in the order of their first triangles.
+pub fn smoothing_groups(mesh: &Mesh) -> Vec<u32> {
+    let mut groups = Groups::new(mesh.positions.len());
+    for &[a, b, c] in &mesh.triangles {
+        groups.join(a, b);
+        groups.join(b, c);
+    }
+    join_split_vertices(mesh, &mut groups);
+    let mut numbers = HashMap::new();
+    mesh.triangles
+        .iter()
+        .map(|&[a, ..]| {
+            let next = numbers.len() as u32;
+            *numbers.entry(groups.root(a)).or_insert(next)
+        })
+        .collect()
+}
+
+/// Vertices that lie in one place with one normal are one, whatever else (texture coordinates) divides them. Only
+/// vertices at the border of a group can be such.
+fn join_split_vertices(mesh: &Mesh, groups: &mut Groups) {
+    let first = groups.root(0);
+    if (0..mesh.positions.len() as u32).all(|vertex| groups.root(vertex) == first) {
+        return;
+    }
+    let bits = |v: DVec3| (v + DVec3::ZERO).to_array().map(f64::to_bits);
+    let rounded = |v: DVec3| v.to_array().map(|x| (x / NORMAL_STEP).round() as i64);
+    let mut seen = HashMap::new();
+    for (vertex, (position, normal)) in mesh.positions.iter().zip(&mesh.normals).enumerate() {
+        let twin = *seen
+            .entry((bits(*position), rounded(*normal)))
+            .or_insert(vertex as u32);
+        groups.join(twin, vertex as u32);
+    }
+}
+
+/// Disjoint sets of vertices.
+struct Groups {
+    parents: Vec<u32>,
+}
+
+impl Groups {
+    fn new(count: usize) -> Self {
+        Self {
+            parents: (0..count as u32).collect(),
+        }
+    }
+
+    fn root(&mut self, mut vertex: u32) -> u32 {
+        if self.parents.is_empty() {
+            return vertex;
+        }
+        while self.parents[vertex as usize] != vertex {
+            let above = self.parents[self.parents[vertex as usize] as usize];
+            self.parents[vertex as usize] = above;
+            vertex = above;
+        }
+        vertex
+    }
+
+    fn join(&mut self, a: u32, b: u32) {
+        let (a, b) = (self.root(a), self.root(b));
+        // The lower number leads, so that the order of the triangles alone decides.
+        self.parents[a.max(b) as usize] = a.min(b);
+    }
+}
