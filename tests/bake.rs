@@ -14,6 +14,8 @@ mod kept;
 mod layers;
 #[path = "bake/reference.rs"]
 mod reference;
+#[path = "bake/smoothing.rs"]
+mod smoothing;
 #[path = "support/mod.rs"]
 mod support;
 #[path = "bake/tools.rs"]
