@@ -4,6 +4,8 @@
 mod brute_force;
 #[path = "bake/collection.rs"]
 mod collection;
+#[path = "bake/coverage.rs"]
+mod coverage;
 #[path = "bake/energy.rs"]
 mod energy;
 #[path = "bake/hard_cases.rs"]
@@ -18,6 +20,8 @@ mod kept;
 mod layers;
 #[path = "bake/reference.rs"]
 mod reference;
+#[path = "bake/smoothing.rs"]
+mod smoothing;
 #[path = "support/mod.rs"]
 mod support;
 #[path = "bake/tools.rs"]

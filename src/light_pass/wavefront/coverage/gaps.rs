@@ -1,7 +1,7 @@
 //! Maps with texels that the surface does not cover.
 
 use super::report::book;
-use super::row::RowShares;
+use super::row::{Divided, RowShares, Sink, Span};
 use super::shape::Shape;
 use super::{Coverage, CoverageReport, FluxTriangle};
 use crate::illumination::accumulator::FluxCount;
@@ -10,7 +10,6 @@ use crate::illumination::accumulator::FluxCount;
 const REACH: usize = 2;
 
 /// The shares of one triangle, reused from triangle to triangle.
-#[derive(Default)]
 struct Shares {
     /// Column, row, counts of the texels that its island covers.
     covered: Vec<(usize, usize, FluxCount)>,
@@ -28,9 +27,9 @@ pub fn deposit(
 ) -> CoverageReport {
     let size = coverage.size();
     let mut report = CoverageReport::default();
-    let mut shares = Shares::default();
+    let mut shares = Shares::new(size.0);
     for triangle in triangles {
-        let shape = Shape::new(triangle.corners, size);
+        let shape = Shape::new(&triangle.corners, size);
         if matches!(shape, Shape::NonFinite) {
             book(&mut report.non_finite, triangle.flux);
             continue;
@@ -64,26 +63,33 @@ fn add(texel: &mut FluxCount, share: FluxCount) {
 }
 
 impl Shares {
+    fn new(width: usize) -> Self {
+        Self {
+            covered: Vec::new(),
+            uncovered: Vec::new(),
+            row: RowShares::new(width),
+            line: Vec::new(),
+        }
+    }
+
     /// Lists the shares of a triangle; returns their sum.
     fn collect(&mut self, shape: &Shape, triangle: &FluxTriangle, coverage: &impl Coverage) -> [i128; 3] {
         self.covered.clear();
         self.uncovered.clear();
         let mut inside = [0; 3];
-        for row in shape.rows() {
-            shape.fill_row(row, &mut self.row);
-            let first = std::mem::take(&mut self.row.first);
-            self.line.clear();
-            self.line.resize(self.row.ends.len(), [0; 3]);
-            book(&mut inside, self.row.add(triangle.flux, &mut self.line));
-            for (column, &share) in self.line.iter().enumerate() {
-                let place = (first + column, row, share);
-                if coverage.covers(first + column, row, triangle.island) {
-                    self.covered.push(place);
-                } else {
-                    self.uncovered.push(place);
-                }
-            }
-        }
+        shape.for_each_row(
+            shape.rows(),
+            &mut self.row,
+            &mut Places {
+                flux: Divided::new(triangle.flux),
+                island: triangle.island,
+                coverage,
+                covered: &mut self.covered,
+                uncovered: &mut self.uncovered,
+                line: &mut self.line,
+                inside: &mut inside,
+            },
+        );
         inside
     }
 
@@ -110,5 +116,33 @@ impl Shares {
         rows.flat_map(|row| columns.clone().map(move |column| (column, row)))
             .filter(|&(column, row)| coverage.covers(column, row, island))
             .min_by_key(|&place| distance(place))
+    }
+}
+
+/// Sorts the texels of one triangle.
+struct Places<'a, C> {
+    flux: Divided,
+    island: u32,
+    coverage: &'a C,
+    covered: &'a mut Vec<(usize, usize, FluxCount)>,
+    uncovered: &'a mut Vec<(usize, usize, FluxCount)>,
+    line: &'a mut Vec<FluxCount>,
+    inside: &'a mut [i128; 3],
+}
+
+impl<C: Coverage> Sink for Places<'_, C> {
+    fn add(&mut self, row: usize, span: Span) {
+        self.line.clear();
+        self.line.resize(span.ends.len(), [0; 3]);
+        book(self.inside, self.flux.add(Span { first: 0, ..span }, self.line));
+        for (offset, &share) in self.line.iter().enumerate() {
+            let column = span.first + offset;
+            let list = if self.coverage.covers(column, row, self.island) {
+                &mut *self.covered
+            } else {
+                &mut *self.uncovered
+            };
+            list.push((column, row, share));
+        }
     }
 }

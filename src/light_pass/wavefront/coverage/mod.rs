@@ -6,11 +6,13 @@
 
 mod area;
 mod bands;
+mod bins;
 mod gaps;
 mod line;
 mod report;
 mod row;
 mod shape;
+mod sides;
 
 use glam::DVec2;
 
