@@ -501,3 +501,16 @@ fn an_island_gets_nothing_of_another() {
     assert!(sums[..8].iter().all(|&sum| sum == 0), "{sums:?}");
     assert_eq!(report.deposited[0], i128::from(FLUX));
 }
+
+#[test]
+fn a_triangle_over_wide_gaps_keeps_all_its_flux_on_its_island() {
+    let size = (300, 200);
+    let corners = [[-300.0, -1.0], [900.0, -1.0], [300.0, 700.0]];
+    let (_, full) = deposit(size, &[grey(corners)]);
+    let (flux, report) = deposit_on(gappy_chart(size), &[grey(corners)]);
+    assert_eq!((report.deposited, report.unplaced), (full.deposited, [0; 3]));
+    let sums = columns(&flux);
+    assert!(sums[100..].iter().all(|&sum| sum == 0));
+    // What would have lain beside the island is on its border.
+    assert!(sums[99] > 190 * sums[50], "{sums:?}");
+}

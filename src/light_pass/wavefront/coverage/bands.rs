@@ -1,4 +1,4 @@
-//! Maps that are covered everywhere: tasks own bands of rows.
+//! Triangles are divided among tasks that own bands of rows.
 
 use std::ops::Range;
 
@@ -20,19 +20,66 @@ const LEAST_TRIANGLES: usize = 1024;
 /// Bands per thread, so that none waits long for the last.
 const BANDS_PER_THREAD: usize = 4;
 
-/// Adds triangles to all texels of a map of `size`.
-pub fn deposit(triangles: &[FluxTriangle], size: (usize, usize), texels: &mut [FluxCount]) -> CoverageReport {
+/// Where flux may go.
+pub trait Ground: Sync {
+    /// Adds a span of a triangle's flux to the texels of its row, where that may be; returns what was added, and
+    /// whether it was all.
+    fn add(
+        &self,
+        flux: &Divided,
+        island: u32,
+        row: usize,
+        span: Span,
+        texels: &mut [FluxCount],
+    ) -> (FluxCount, bool);
+}
+
+/// All texels may grow.
+pub struct Everywhere;
+
+impl Ground for Everywhere {
+    #[inline(always)]
+    fn add(
+        &self,
+        flux: &Divided,
+        _: u32,
+        _: usize,
+        span: Span,
+        texels: &mut [FluxCount],
+    ) -> (FluxCount, bool) {
+        (flux.add(span, texels), true)
+    }
+}
+
+/// What one task did.
+#[derive(Debug, Default)]
+struct Done {
+    added: [i128; 3],
+    /// Triangles of which not all could be added.
+    incomplete: Vec<usize>,
+}
+
+/// Adds triangles to the texels of a map of `size`; says what went where, all that was not added counting as outside,
+/// and of which triangles not all could be added, in ascending order.
+pub fn deposit(
+    triangles: &[FluxTriangle],
+    size: (usize, usize),
+    texels: &mut [FluxCount],
+    ground: &impl Ground,
+) -> (CoverageReport, Vec<usize>) {
     let mut report = CoverageReport::default();
+    let mut done = Done::default();
     if triangles.len() < LEAST_TRIANGLES || rayon::current_num_threads() == 1 {
         book_outside(triangles, &mut report);
-        report.deposited = add(triangles.iter(), size, 0..size.1, texels);
+        done = add(triangles.iter().enumerate(), size, 0..size.1, texels, ground);
     } else {
-        add_in_bands(triangles, size, texels, &mut report);
+        add_in_bands(triangles, size, texels, ground, &mut report, &mut done);
     }
+    report.deposited = done.added;
     for (outside, deposited) in report.outside.iter_mut().zip(report.deposited) {
         *outside -= deposited;
     }
-    report
+    (report, done.incomplete)
 }
 
 /// Books all flux as outside, but for that of triangles without place.
@@ -52,7 +99,9 @@ fn add_in_bands(
     triangles: &[FluxTriangle],
     size: (usize, usize),
     texels: &mut [FluxCount],
+    ground: &impl Ground,
     report: &mut CoverageReport,
+    done: &mut Done,
 ) {
     let chunks: Vec<&[FluxTriangle]> = triangles.chunks(TRIANGLES_PER_CHUNK).collect();
     let prepare = |chunk: &&[FluxTriangle]| {
@@ -66,23 +115,27 @@ fn add_in_bands(
     bins.iter().for_each(|part| part.add_work(&mut work));
     let bands = split_rows(&work, BANDS_PER_THREAD * rayon::current_num_threads());
     bins.par_iter_mut().for_each(|part| part.sort(&bands));
-    let parts: Vec<[i128; 3]> = split_texels(texels, size.0, &bands)
+    let parts: Vec<Done> = split_texels(texels, size.0, &bands)
         .into_par_iter()
         .zip(bands)
         .enumerate()
         .map(|(band, (texels, rows))| {
-            let ours = chunks.iter().zip(&bins).flat_map(|(chunk, part)| {
-                let indices = part.band(band).iter();
-                indices.map(|&index| &chunk[index as usize])
+            let ours = bins.iter().enumerate().flat_map(|(chunk, part)| {
+                let first = chunk * TRIANGLES_PER_CHUNK;
+                part.band(band).iter().map(move |&index| first + index as usize)
             });
-            add(ours, size, rows, texels)
+            let ours = ours.map(|index| (index, &triangles[index]));
+            add(ours, size, rows, texels, ground)
         })
         .collect();
     for part in parts {
-        for (sum, channel) in report.deposited.iter_mut().zip(part) {
+        for (sum, channel) in done.added.iter_mut().zip(part.added) {
             *sum += channel;
         }
+        done.incomplete.extend(part.incomplete);
     }
+    done.incomplete.sort_unstable();
+    done.incomplete.dedup();
 }
 
 /// The texels of each band.
@@ -100,16 +153,17 @@ fn split_texels<'a>(
     parts
 }
 
-/// Adds triangles to the texels of some rows; returns what was added.
+/// Adds triangles, given with their indices, to the texels of some rows.
 fn add<'a>(
-    triangles: impl Iterator<Item = &'a FluxTriangle>,
+    triangles: impl Iterator<Item = (usize, &'a FluxTriangle)>,
     size: (usize, usize),
     rows: Range<usize>,
     texels: &mut [FluxCount],
-) -> [i128; 3] {
-    let mut added = [0; 3];
+    ground: &impl Ground,
+) -> Done {
+    let mut done = Done::default();
     let mut shares = RowShares::new(size.0);
-    for triangle in triangles {
+    for (index, triangle) in triangles {
         let shape = Shape::new(&triangle.corners, size);
         let reached = shape.rows();
         let ours = reached.start.max(rows.start)..reached.end.min(rows.end);
@@ -117,32 +171,43 @@ fn add<'a>(
             width: size.0,
             first: rows.start,
             texels,
+            ground,
             flux: Divided::new(triangle.flux),
+            island: triangle.island,
             added: [0; 3],
+            complete: true,
         };
         shape.for_each_row(ours, &mut shares, &mut target);
-        book(&mut added, target.added);
+        book(&mut done.added, target.added);
+        if !target.complete {
+            done.incomplete.push(index);
+        }
     }
-    added
+    done
 }
 
 /// Texels of some rows, to which one triangle is added.
-struct Rows<'a> {
+struct Rows<'a, G> {
     width: usize,
     /// The first of the rows.
     first: usize,
     texels: &'a mut [FluxCount],
+    ground: &'a G,
     flux: Divided,
+    island: u32,
     added: FluxCount,
+    complete: bool,
 }
 
-impl Sink for Rows<'_> {
+impl<G: Ground> Sink for Rows<'_, G> {
     #[inline(always)]
     fn add(&mut self, row: usize, span: Span) {
         let begin = (row - self.first) * self.width;
-        let here = self.flux.add(span, &mut self.texels[begin..begin + self.width]);
+        let texels = &mut self.texels[begin..begin + self.width];
+        let (here, complete) = self.ground.add(&self.flux, self.island, row, span, texels);
         for (sum, part) in self.added.iter_mut().zip(here) {
             *sum += part;
         }
+        self.complete &= complete;
     }
 }
