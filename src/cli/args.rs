@@ -11,6 +11,7 @@ use nephroid::settings::{Estimator, MapResolution};
 use super::bake_options::BakeOptions;
 use super::compare::LayerChoice;
 use super::job::Job;
+use super::study_values;
 use super::terminal::{self, Terminal};
 use super::values::{self, Exposure};
 
@@ -260,7 +261,7 @@ pub struct ConvergenceArguments {
     #[arg(long, value_name = "NAME", requires = "reference")]
     pub surface: Option<String>,
     /// Texels of every map: N by N, or W by H [default: 256]
-    #[arg(long, value_name = "N|WxH", value_parser = values::fixed_map_resolution, allow_hyphen_values = true)]
+    #[arg(long, value_name = "N|WxH", value_parser = study_values::fixed_map_resolution, allow_hyphen_values = true)]
     pub map_resolution: Option<MapResolution>,
     /// Bakes of each kind, whose median CPU time counts [default: 5]
     #[arg(long, value_name = "N", conflicts_with = "quick")]
@@ -285,10 +286,10 @@ pub struct ReferenceArguments {
     #[arg(long)]
     pub force: bool,
     /// Light rays, such as 1e8
-    #[arg(long, value_name = "N", value_parser = values::ray_count, allow_hyphen_values = true)]
+    #[arg(long, value_name = "N", value_parser = study_values::ray_count, allow_hyphen_values = true)]
     pub rays: u64,
     /// Texels of every map: N by N, or W by H [default: 256]
-    #[arg(long, value_name = "N|WxH", value_parser = values::fixed_map_resolution, allow_hyphen_values = true)]
+    #[arg(long, value_name = "N|WxH", value_parser = study_values::fixed_map_resolution, allow_hyphen_values = true)]
     pub map_resolution: Option<MapResolution>,
     /// Seed of the rays [default: 0]
     #[arg(long, value_name = "N")]
