@@ -8,6 +8,7 @@ pub mod islands;
 pub mod lookup;
 pub mod map;
 pub mod parametrisation;
+pub mod smoothing;
 
 pub use chart::{Chart, UvSet};
 pub use map::{IlluminationMap, Layer};

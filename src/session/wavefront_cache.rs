@@ -4,7 +4,7 @@ use super::caustic_layer::CausticLayer;
 use crate::light_pass::caustic::statistics::FootprintStatistics;
 use crate::light_pass::wavefront::pass::TracedLight;
 use crate::plan::Effect;
-use crate::settings::{BakeSettings, Estimator, ItemBufferKind};
+use crate::settings::{BakeSettings, Estimator, ItemBufferKind, MapResolution};
 
 /// Share of the memory limit that traced light may take.
 const SHARE_OF_MEMORY: u64 = 4;
@@ -13,6 +13,8 @@ const SHARE_OF_MEMORY: u64 = 4;
 #[derive(Clone, Debug, PartialEq)]
 struct TraceKey {
     density_per_sr: f64,
+    /// With the map size that the target is meant at.
+    target: Option<(f64, MapResolution)>,
     max_depth: u32,
     branch_threshold: f64,
     item_buffer: ItemBufferKind,
@@ -34,6 +36,8 @@ impl WavefrontCache {
     pub(super) fn prepare(&mut self, layer: &CausticLayer) {
         let BakeSettings {
             density_per_sr,
+            max_error,
+            map_resolution,
             max_depth,
             branch_threshold,
             item_buffer,
@@ -41,6 +45,7 @@ impl WavefrontCache {
         } = *layer.settings;
         let key = TraceKey {
             density_per_sr,
+            target: max_error.map(|target| (target, map_resolution)),
             max_depth,
             branch_threshold,
             item_buffer,

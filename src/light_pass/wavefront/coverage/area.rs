@@ -1,258 +1,176 @@
-//! Triangles that have area: their part in each texel of a row, from the signed areas beside their borders.
+//! Triangles that have area: their part in each texel of a row, from the areas beside their sides.
+
+use std::ops::Range;
 
 use glam::DVec2;
 
-use super::row::RowShares;
-use super::shape::{cells, tent};
+use super::row::{RowShares, Sink, Span};
+use super::shape::{cells, least, most};
+use super::sides::{Cut, Reach, Sides};
 
-/// Sides less high than this [texels] are level: they bound no area.
-const LEVEL_TEXELS: f64 = 1e-30;
+/// The order of the corners from top to bottom, by which of a > b, b > c, a > c hold of their heights (1, 2, 4).
+const ORDERS: [[usize; 3]; 8] = [
+    [0, 1, 2],
+    [1, 0, 2],
+    [0, 2, 1],
+    [0, 1, 2],
+    [0, 1, 2],
+    [1, 2, 0],
+    [2, 0, 1],
+    [2, 1, 0],
+];
 
-/// A triangle that has area, in coordinates relative to the map's first column that it reaches, where they are more
-/// precise.
+/// A triangle that has area; x counts from the map's first column that it reaches, where numbers are finer.
 #[derive(Clone, Copy, Debug)]
 pub struct Area {
     /// Column that x = 0 stands for.
     origin: usize,
-    /// Columns from there to the map's right border.
-    width: usize,
-    height: usize,
-    top: f64,
-    middle: f64,
-    bottom: f64,
-    /// From the top to the bottom corner.
-    long: Side,
-    /// From the top to the middle corner.
-    upper: Side,
-    /// From the middle to the bottom corner.
-    lower: Side,
-    /// What an area to the right of the long side, less that to the right of the others, is of the whole.
-    share_per_area: f64,
-}
-
-/// A side of the triangle: x as a function of y.
-#[derive(Clone, Copy, Debug)]
-struct Side {
-    start: DVec2,
-    slope: f64,
-    low: f64,
-    high: f64,
-}
-
-/// Part of a side within a row.
-#[derive(Clone, Copy)]
-struct Piece {
-    /// x at either end.
-    x: (f64, f64),
-    /// Height, negative for the sides opposite to the long one.
-    height: f64,
-}
-
-impl Side {
-    fn new(start: DVec2, end: DVec2) -> Self {
-        let way = end - start;
-        Self {
-            start,
-            slope: if way.y > LEVEL_TEXELS { way.x / way.y } else { 0.0 },
-            low: start.x.min(end.x),
-            high: start.x.max(end.x),
-        }
-    }
-
-    fn x_at(&self, y: f64) -> f64 {
-        (self.start.x + (y - self.start.y) * self.slope).clamp(self.low, self.high)
-    }
-
-    fn piece(&self, from: f64, to: f64, sign: f64) -> Piece {
-        let (a, b) = (self.x_at(from), self.x_at(to));
-        Piece {
-            x: (a.min(b), a.max(b)),
-            height: sign * (to - from),
-        }
-    }
-}
-
-impl Piece {
-    /// Area to its right, up to the border `x`.
-    fn area_up_to(&self, x: f64) -> f64 {
-        let (low, high) = self.x;
-        if x >= high {
-            self.height * (x - 0.5 * (low + high))
-        } else if x <= low {
-            0.0
-        } else {
-            0.5 * self.height * (x - low) * ((x - low) / (high - low))
-        }
-    }
-
-    /// The part with x from 0 to `width`; what lies further left moves to 0.
-    fn clipped(&self, width: f64, changes: &mut [f64]) -> Option<Self> {
-        let (low, high) = self.x;
-        if low >= 0.0 && high <= width {
-            return Some(*self);
-        }
-        if high <= 0.0 {
-            changes[0] += self.height;
-            return None;
-        }
-        if low >= width {
-            return None;
-        }
-        let per_x = self.height / (high - low);
-        if low < 0.0 {
-            changes[0] -= low * per_x;
-        }
-        let (low, high) = (low.max(0.0), high.min(width));
-        Some(Self {
-            x: (low, high),
-            height: (high - low) * per_x,
-        })
-    }
-
-    /// Adds, for each column, by how much more of it lies to the right of the piece than of the column before; x
-    /// counts from the first column.
-    fn add_changes(&self, changes: &mut [f64]) {
-        let (low, high) = self.x;
-        let (first, last) = (low as usize, high as usize);
-        if first == last {
-            let covered = self.height * ((first + 1) as f64 - 0.5 * (low + high));
-            changes[first] += covered;
-            changes[first + 1] += self.height - covered;
-            return;
-        }
-        let per_square = 0.5 * self.height / (high - low);
-        let (mut area, mut covered) = (0.0, 0.0);
-        for (column, change) in changes[first..last].iter_mut().enumerate() {
-            let reach = (first + column + 1) as f64 - low;
-            let area_here = per_square * reach * reach;
-            let covered_here = area_here - area;
-            *change += covered_here - covered;
-            (area, covered) = (area_here, covered_here);
-        }
-        let covered_last = self.height * ((last + 1) as f64 - 0.5 * (low + high)) - area;
-        changes[last] += covered_last - covered;
-        changes[last + 1] += self.height - covered_last;
-    }
+    /// Columns that it reaches from there on, and whether it leaves the map on either side.
+    columns: usize,
+    crosses_border: bool,
+    sides: Sides,
 }
 
 impl Area {
-    pub fn new(corners: [DVec2; 3], twice_area: f64, left: f64, size: (usize, usize)) -> Self {
-        let origin = (left as usize).min(size.0);
-        let [mut a, mut b, mut c] = corners.map(|corner| DVec2::new(corner.x - origin as f64, corner.y));
-        let mut twice_area = twice_area;
-        for (first, second) in [(0, 1), (1, 2), (0, 1)] {
-            let sorted = [&mut a, &mut b, &mut c];
-            if sorted[second].y < sorted[first].y {
-                let [a, b, c] = sorted;
-                if (first, second) == (0, 1) {
-                    std::mem::swap(a, b);
-                } else {
-                    std::mem::swap(b, c);
-                }
-                twice_area = -twice_area;
-            }
-        }
+    /// A triangle that reaches `columns` of the map.
+    #[inline(always)]
+    pub fn new(corners: &[DVec2; 3], columns: Range<usize>, crosses_border: bool) -> Self {
+        let [a, b, c] = corners.map(|corner| corner.y);
+        let order = ORDERS[usize::from(a > b) | usize::from(b > c) << 1 | usize::from(a > c) << 2];
+        let origin = DVec2::new(columns.start as f64, 0.0);
         Self {
-            origin,
-            width: size.0 - origin,
-            height: size.1,
-            top: a.y,
-            middle: b.y,
-            bottom: c.y,
-            long: Side::new(a, c),
-            upper: Side::new(a, b),
-            lower: Side::new(b, c),
-            share_per_area: 2.0 / twice_area,
+            origin: columns.start,
+            columns: columns.len(),
+            crosses_border,
+            sides: Sides::new(order.map(|corner| corners[corner] - origin)),
         }
     }
 
-    pub fn rows(&self) -> std::ops::Range<usize> {
-        cells(self.top, self.bottom, self.height)
-    }
-
-    /// The part of the triangle above a height.
-    fn share_above(&self, y: f64) -> f64 {
-        let whole = self.bottom - self.top;
-        tent((y - self.top) / whole, (self.middle - self.top) / whole)
-    }
-
-    /// The pieces of its sides within a row: of the long side, the upper and the lower one.
-    fn pieces(&self, row: usize) -> ([Piece; 3], usize) {
-        let from = self.top.max(row as f64);
-        let to = self.bottom.min((row + 1) as f64);
-        let mut pieces = [self.long.piece(from, to, 1.0); 3];
-        let mut count = 1;
-        if from < self.middle {
-            pieces[count] = self.upper.piece(from, to.min(self.middle), -1.0);
-            count += 1;
-        }
-        if to > self.middle {
-            pieces[count] = self.lower.piece(from.max(self.middle), to, -1.0);
-            count += 1;
-        }
-        (pieces, count)
-    }
-
-    pub fn fill_row(&self, row: usize, shares: &mut RowShares) {
-        let above = self.share_above(row as f64);
-        let below = self.share_above((row + 1) as f64);
-        let (pieces, count) = self.pieces(row);
-        let pieces = &pieces[..count];
-        let left = pieces.iter().map(|piece| piece.x.0).fold(f64::INFINITY, f64::min);
-        let right = pieces
-            .iter()
-            .map(|piece| piece.x.1)
-            .fold(f64::NEG_INFINITY, f64::max);
-        if right <= 0.0 || left >= self.width as f64 {
-            return;
-        }
-        let columns = cells(left, right, self.width);
-        let (first, count) = (columns.start, columns.len());
-        shares.first = self.origin + first;
-        // The border before the first column, from which the pieces count now.
-        let border = first as f64;
-        let share_up_to = |x: f64| {
-            let area: f64 = pieces.iter().map(|piece| piece.area_up_to(x)).sum();
-            (above + area * self.share_per_area).clamp(above, below)
-        };
-        shares.start = if left >= border {
-            above
-        } else {
-            share_up_to(border)
-        };
-        let ends_here = right <= columns.end as f64;
-        let end = if ends_here {
-            below
-        } else {
-            share_up_to(columns.end as f64)
-        };
-        if count > 1 {
-            self.fill_columns(pieces, border, count, shares, end);
-        } else {
-            shares.ends.push(end);
+    /// Gives the shares of each of some rows that the triangle reaches.
+    #[inline(always)]
+    pub fn for_each_row(&self, rows: Range<usize>, shares: &mut RowShares, sink: &mut impl Sink) {
+        match self.columns {
+            _ if self.crosses_border => self.for_each_wide_row(rows, shares, sink),
+            1 => self.for_each_narrow_row::<1>(rows, sink),
+            2 => self.for_each_narrow_row::<2>(rows, sink),
+            3 => self.for_each_narrow_row::<3>(rows, sink),
+            4 => self.for_each_narrow_row::<4>(rows, sink),
+            _ => self.for_each_wide_row(rows, shares, sink),
         }
     }
 
-    /// Cumulative shares of several columns from `border` on, the last of which ends with the share `end`.
-    fn fill_columns(&self, pieces: &[Piece], border: f64, count: usize, shares: &mut RowShares, end: f64) {
-        // A piece that ends on the last border leaves its change behind it.
-        shares.changes.clear();
-        shares.changes.resize(count + 2, 0.0);
-        for piece in pieces {
-            let moved = Piece {
-                x: (piece.x.0 - border, piece.x.1 - border),
-                ..*piece
-            };
-            if let Some(moved) = moved.clipped(count as f64, &mut shares.changes) {
-                moved.add_changes(&mut shares.changes);
+    /// For triangles of `N` columns, without any decision that depends on the
+    /// triangle's shape, as mistaken guesses of the processor would cost more than texels that get nothing.
+    #[inline(always)]
+    fn for_each_narrow_row<const N: usize>(&self, rows: Range<usize>, sink: &mut impl Sink) {
+        let mut from = self.sides.cut(rows.start as f64);
+        for row in rows {
+            let to = self.sides.cut((row + 1) as f64);
+            let pieces = self.sides.between(&from, &to);
+            let mut ends = [to.above; N];
+            for (border, end) in ends.iter_mut().take(N - 1).enumerate() {
+                let here = pieces.share_up_to((border + 1) as f64);
+                *end = least(to.above, from.above + here);
             }
+            let mut before = from.above;
+            for end in &mut ends {
+                *end = most(before, *end);
+                before = *end;
+            }
+            sink.add(
+                row,
+                Span {
+                    first: self.origin,
+                    start: from.above,
+                    ends: &ends,
+                },
+            );
+            from = to;
         }
-        let (mut covered, mut share) = (0.0, shares.start);
-        for change in &shares.changes[..count - 1] {
-            covered += change;
-            share = (share + (covered * self.share_per_area).max(0.0)).min(end);
-            shares.ends.push(share);
-        }
-        shares.ends.push(end);
     }
+
+    fn for_each_wide_row(&self, rows: Range<usize>, shares: &mut RowShares, sink: &mut impl Sink) {
+        let mut from = self.sides.cut(rows.start as f64);
+        for row in rows {
+            let to = self.sides.cut((row + 1) as f64);
+            if let Some(span) = self.wide_span(&from, &to, shares) {
+                sink.add(row, span);
+            }
+            from = to;
+        }
+    }
+
+    /// The row between two cuts: border by border where sides are, in even steps between them.
+    fn wide_span<'a>(&self, from: &Cut, to: &Cut, shares: &'a mut RowShares) -> Option<Span<'a>> {
+        let pieces = self.sides.between(from, to);
+        let reach = self.sides.reach(&pieces);
+        let width = self.columns as f64;
+        if reach.right <= 0.0 || reach.left >= width {
+            return None;
+        }
+        let columns = cells(reach.left, reach.right, self.columns);
+        let share_up_to = |x: f64| most(from.above, least(to.above, from.above + pieces.share_up_to(x)));
+        let start = if reach.left >= 0.0 {
+            from.above
+        } else {
+            share_up_to(0.0)
+        };
+        let end = if reach.right <= width {
+            to.above
+        } else {
+            share_up_to(width)
+        };
+        let ends = &mut shares.ends[..columns.len()];
+        fill(
+            ends,
+            columns.start,
+            &reach,
+            (start, end),
+            pieces.full,
+            share_up_to,
+        );
+        Some(Span {
+            first: self.origin + columns.start,
+            start,
+            ends,
+        })
+    }
+}
+
+/// Fills the shares `ends` of columns from `first` on, which begin with the share `start` and end with `end`.
+fn fill(
+    ends: &mut [f64],
+    first: usize,
+    reach: &Reach,
+    (start, end): (f64, f64),
+    full: f64,
+    share_up_to: impl Fn(f64) -> f64,
+) {
+    let Some(last) = ends.len().checked_sub(1) else {
+        return;
+    };
+    // Whole columns from the border after the first one on.
+    let columns_to = |x: f64| (most(0.0, x - (first + 1) as f64) as i32 as usize).min(last);
+    // The border at or after the beginning of the gap gets its own share, and even steps follow to the gap's end.
+    let before_gap = columns_to(reach.gap_from);
+    let rest = usize::from(reach.gap_from > (first + 1 + before_gap) as f64);
+    let even_from = (before_gap + rest + 1).min(last);
+    let even_to = columns_to(reach.gap_to + 1.0).max(even_from);
+    let border = |index: usize| (first + 1 + index) as f64;
+    let mut before = start;
+    for (index, share) in ends[..even_from].iter_mut().enumerate() {
+        before = least(end, most(before, share_up_to(border(index))));
+        *share = before;
+    }
+    let mut steps = 0.0;
+    for share in &mut ends[even_from..even_to] {
+        steps += 1.0;
+        *share = least(end, before + steps * full);
+    }
+    before = least(end, before + steps * full);
+    for (index, share) in ends[..last].iter_mut().enumerate().skip(even_to) {
+        before = least(end, most(before, share_up_to(border(index))));
+        *share = before;
+    }
+    ends[last] = end;
 }

@@ -1,31 +1,213 @@
-//! Maps that are covered everywhere: threads own bands of rows.
+//! Triangles are divided among tasks that own bands of rows.
 
+use std::ops::Range;
+
+use rayon::prelude::*;
+
+use super::bins::{Bins, split_rows};
 use super::report::book;
-use super::row::RowShares;
-use super::shape::Shape;
+use super::row::{Divided, RowShares, Sink, Span};
+use super::shape::{Shape, is_finite};
 use super::{CoverageReport, FluxTriangle};
 use crate::illumination::accumulator::FluxCount;
 
-/// Adds triangles to all texels of a map of `size`.
-pub fn deposit(triangles: &[FluxTriangle], size: (usize, usize), texels: &mut [FluxCount]) -> CoverageReport {
-    let mut report = CoverageReport::default();
-    let mut shares = RowShares::default();
-    for triangle in triangles {
-        let shape = Shape::new(triangle.corners, size);
-        if matches!(shape, Shape::NonFinite) {
-            book(&mut report.non_finite, triangle.flux);
-            continue;
-        }
-        book(&mut report.outside, triangle.flux);
-        for row in shape.rows() {
-            shape.fill_row(row, &mut shares);
-            let texels = &mut texels[row * size.0..(row + 1) * size.0];
-            let added = shares.add(triangle.flux, texels);
-            book(&mut report.deposited, added);
-        }
+/// Triangles that are sorted by bands in one go.
+const TRIANGLES_PER_CHUNK: usize = 8192;
+
+/// Fewer triangles are not worth dividing.
+const LEAST_TRIANGLES: usize = 1024;
+
+/// Bands per thread, so that none waits long for the last.
+const BANDS_PER_THREAD: usize = 4;
+
+/// Where flux may go.
+pub trait Ground: Sync {
+    /// Adds a span of a triangle's flux to the texels of its row, where that may be; returns what was added, and
+    /// whether it was all.
+    fn add(
+        &self,
+        flux: &Divided,
+        island: u32,
+        row: usize,
+        span: Span,
+        texels: &mut [FluxCount],
+    ) -> (FluxCount, bool);
+}
+
+/// All texels may grow.
+pub struct Everywhere;
+
+impl Ground for Everywhere {
+    #[inline(always)]
+    fn add(
+        &self,
+        flux: &Divided,
+        _: u32,
+        _: usize,
+        span: Span,
+        texels: &mut [FluxCount],
+    ) -> (FluxCount, bool) {
+        (flux.add(span, texels), true)
     }
+}
+
+/// What one task did.
+#[derive(Debug, Default)]
+struct Done {
+    added: [i128; 3],
+    /// Triangles of which not all could be added.
+    incomplete: Vec<usize>,
+}
+
+/// Adds triangles to the texels of a map of `size`; says what went where, all that was not added counting as outside,
+/// and of which triangles not all could be added, in ascending order.
+pub fn deposit(
+    triangles: &[FluxTriangle],
+    size: (usize, usize),
+    texels: &mut [FluxCount],
+    ground: &impl Ground,
+) -> (CoverageReport, Vec<usize>) {
+    let mut report = CoverageReport::default();
+    let mut done = Done::default();
+    if triangles.len() < LEAST_TRIANGLES || rayon::current_num_threads() == 1 {
+        book_outside(triangles, &mut report);
+        done = add(triangles.iter().enumerate(), size, 0..size.1, texels, ground);
+    } else {
+        add_in_bands(triangles, size, texels, ground, &mut report, &mut done);
+    }
+    report.deposited = done.added;
     for (outside, deposited) in report.outside.iter_mut().zip(report.deposited) {
         *outside -= deposited;
     }
-    report
+    (report, done.incomplete)
+}
+
+/// Books all flux as outside, but for that of triangles without place.
+fn book_outside(triangles: &[FluxTriangle], report: &mut CoverageReport) {
+    for triangle in triangles {
+        let account = if is_finite(&triangle.corners) {
+            &mut report.outside
+        } else {
+            &mut report.non_finite
+        };
+        book(account, triangle.flux);
+    }
+}
+
+/// Adds triangles, each band of rows in a task of its own.
+fn add_in_bands(
+    triangles: &[FluxTriangle],
+    size: (usize, usize),
+    texels: &mut [FluxCount],
+    ground: &impl Ground,
+    report: &mut CoverageReport,
+    done: &mut Done,
+) {
+    let chunks: Vec<&[FluxTriangle]> = triangles.chunks(TRIANGLES_PER_CHUNK).collect();
+    let prepare = |chunk: &&[FluxTriangle]| {
+        let mut report = CoverageReport::default();
+        book_outside(chunk, &mut report);
+        (Bins::new(chunk, size), report)
+    };
+    let (mut bins, reports): (Vec<Bins>, Vec<CoverageReport>) = chunks.par_iter().map(prepare).unzip();
+    reports.iter().for_each(|part| report.merge(part));
+    let mut work = vec![0; size.1];
+    bins.iter().for_each(|part| part.add_work(&mut work));
+    let bands = split_rows(&work, BANDS_PER_THREAD * rayon::current_num_threads());
+    bins.par_iter_mut().for_each(|part| part.sort(&bands));
+    let parts: Vec<Done> = split_texels(texels, size.0, &bands)
+        .into_par_iter()
+        .zip(bands)
+        .enumerate()
+        .map(|(band, (texels, rows))| {
+            let ours = bins.iter().enumerate().flat_map(|(chunk, part)| {
+                let first = chunk * TRIANGLES_PER_CHUNK;
+                part.band(band).iter().map(move |&index| first + index as usize)
+            });
+            let ours = ours.map(|index| (index, &triangles[index]));
+            add(ours, size, rows, texels, ground)
+        })
+        .collect();
+    for part in parts {
+        for (sum, channel) in done.added.iter_mut().zip(part.added) {
+            *sum += channel;
+        }
+        done.incomplete.extend(part.incomplete);
+    }
+    done.incomplete.sort_unstable();
+    done.incomplete.dedup();
+}
+
+/// The texels of each band.
+fn split_texels<'a>(
+    mut texels: &'a mut [FluxCount],
+    width: usize,
+    bands: &[Range<usize>],
+) -> Vec<&'a mut [FluxCount]> {
+    let mut parts = Vec::new();
+    for rows in bands {
+        let (ours, others) = texels.split_at_mut(rows.len() * width);
+        parts.push(ours);
+        texels = others;
+    }
+    parts
+}
+
+/// Adds triangles, given with their indices, to the texels of some rows.
+fn add<'a>(
+    triangles: impl Iterator<Item = (usize, &'a FluxTriangle)>,
+    size: (usize, usize),
+    rows: Range<usize>,
+    texels: &mut [FluxCount],
+    ground: &impl Ground,
+) -> Done {
+    let mut done = Done::default();
+    let mut shares = RowShares::new(size.0);
+    for (index, triangle) in triangles {
+        let shape = Shape::new(&triangle.corners, size);
+        let reached = shape.rows();
+        let ours = reached.start.max(rows.start)..reached.end.min(rows.end);
+        let mut target = Rows {
+            width: size.0,
+            first: rows.start,
+            texels,
+            ground,
+            flux: Divided::new(triangle.flux),
+            island: triangle.island,
+            added: [0; 3],
+            complete: true,
+        };
+        shape.for_each_row(ours, &mut shares, &mut target);
+        book(&mut done.added, target.added);
+        if !target.complete {
+            done.incomplete.push(index);
+        }
+    }
+    done
+}
+
+/// Texels of some rows, to which one triangle is added.
+struct Rows<'a, G> {
+    width: usize,
+    /// The first of the rows.
+    first: usize,
+    texels: &'a mut [FluxCount],
+    ground: &'a G,
+    flux: Divided,
+    island: u32,
+    added: FluxCount,
+    complete: bool,
+}
+
+impl<G: Ground> Sink for Rows<'_, G> {
+    #[inline(always)]
+    fn add(&mut self, row: usize, span: Span) {
+        let begin = (row - self.first) * self.width;
+        let texels = &mut self.texels[begin..begin + self.width];
+        let (here, complete) = self.ground.add(&self.flux, self.island, row, span, texels);
+        for (sum, part) in self.added.iter_mut().zip(here) {
+            *sum += part;
+        }
+        self.complete &= complete;
+    }
 }

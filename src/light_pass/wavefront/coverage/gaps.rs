@@ -1,7 +1,12 @@
-//! Maps with texels that the surface does not cover.
+//! Maps with texels that the surface does not cover: their shares go to covered ones nearby.
 
+use std::collections::VecDeque;
+
+use rayon::prelude::*;
+
+use super::bands::{self, Ground};
 use super::report::book;
-use super::row::RowShares;
+use super::row::{Divided, RowShares, Sink, Span};
 use super::shape::Shape;
 use super::{Coverage, CoverageReport, FluxTriangle};
 use crate::illumination::accumulator::FluxCount;
@@ -9,15 +14,33 @@ use crate::illumination::accumulator::FluxCount;
 /// How far a share goes at most to a texel that its triangle does not touch [texels, either way].
 const REACH: usize = 2;
 
-/// The shares of one triangle, reused from triangle to triangle.
-#[derive(Default)]
-struct Shares {
-    /// Column, row, counts of the texels that its island covers.
-    covered: Vec<(usize, usize, FluxCount)>,
-    /// Those of the others.
-    uncovered: Vec<(usize, usize, FluxCount)>,
-    row: RowShares,
-    line: Vec<FluxCount>,
+/// Texels of a chart may grow where the triangle's island covers them.
+struct Covered<'a, C>(&'a C);
+
+impl<C: Coverage> Ground for Covered<'_, C> {
+    fn add(
+        &self,
+        flux: &Divided,
+        island: u32,
+        row: usize,
+        span: Span,
+        texels: &mut [FluxCount],
+    ) -> (FluxCount, bool) {
+        let covers = |column: usize| self.0.covers(column, row, island);
+        if (span.first..span.first + span.ends.len()).all(covers) {
+            return (flux.add(span, texels), true);
+        }
+        let mut shares = vec![[0; 3]; span.ends.len()];
+        flux.add(Span { first: 0, ..span }, &mut shares);
+        let mut added = [0; 3];
+        for (offset, share) in shares.iter().enumerate() {
+            if covers(span.first + offset) {
+                add(&mut texels[span.first + offset], share);
+                add(&mut added, share);
+            }
+        }
+        (added, false)
+    }
 }
 
 /// Adds triangles to those texels that `coverage` lets grow.
@@ -27,88 +50,148 @@ pub fn deposit(
     texels: &mut [FluxCount],
 ) -> CoverageReport {
     let size = coverage.size();
-    let mut report = CoverageReport::default();
-    let mut shares = Shares::default();
-    for triangle in triangles {
-        let shape = Shape::new(triangle.corners, size);
-        if matches!(shape, Shape::NonFinite) {
-            book(&mut report.non_finite, triangle.flux);
-            continue;
-        }
-        let inside = shares.collect(&shape, triangle, coverage);
-        book(&mut report.outside, triangle.flux);
-        for (outside, inside) in report.outside.iter_mut().zip(inside) {
-            *outside -= inside;
-        }
-        for &(column, row, share) in &shares.uncovered {
-            match shares.home(column, row, coverage, triangle.island) {
-                Some((column, row)) => {
-                    add(&mut texels[row * size.0 + column], share);
-                    book(&mut report.deposited, share);
-                }
-                None => book(&mut report.unplaced, share),
+    let (mut report, incomplete) = bands::deposit(triangles, size, texels, &Covered(coverage));
+    let moves: Vec<Vec<Move>> = incomplete
+        .into_par_iter()
+        .map(|index| moves(&triangles[index], coverage))
+        .collect();
+    for Move { to, share } in moves.into_iter().flatten() {
+        match to {
+            Some(texel) => {
+                add(&mut texels[texel], &share);
+                book(&mut report.deposited, share);
             }
+            None => book(&mut report.unplaced, share),
         }
-        for &(column, row, share) in &shares.covered {
-            add(&mut texels[row * size.0 + column], share);
-            book(&mut report.deposited, share);
+        for (outside, channel) in report.outside.iter_mut().zip(share) {
+            *outside -= i128::from(channel);
         }
     }
     report
 }
 
-fn add(texel: &mut FluxCount, share: FluxCount) {
+fn add(texel: &mut FluxCount, share: &FluxCount) {
     for (sum, part) in texel.iter_mut().zip(share) {
         *sum += part;
     }
 }
 
-impl Shares {
-    /// Lists the shares of a triangle; returns their sum.
-    fn collect(&mut self, shape: &Shape, triangle: &FluxTriangle, coverage: &impl Coverage) -> [i128; 3] {
-        self.covered.clear();
-        self.uncovered.clear();
-        let mut inside = [0; 3];
-        for row in shape.rows() {
-            shape.fill_row(row, &mut self.row);
-            let first = std::mem::take(&mut self.row.first);
-            self.line.clear();
-            self.line.resize(self.row.ends.len(), [0; 3]);
-            book(&mut inside, self.row.add(triangle.flux, &mut self.line));
-            for (column, &share) in self.line.iter().enumerate() {
-                let place = (first + column, row, share);
-                if coverage.covers(first + column, row, triangle.island) {
-                    self.covered.push(place);
-                } else {
-                    self.uncovered.push(place);
+/// The share of a texel that is not covered, and the texel that takes it.
+struct Move {
+    to: Option<usize>,
+    share: FluxCount,
+}
+
+/// Where the shares of the uncovered texels of a triangle go: to a nearest covered one that the triangle touches, counted
+/// in steps to any of the eight texels around; else to the nearest around.
+fn moves(triangle: &FluxTriangle, coverage: &impl Coverage) -> Vec<Move> {
+    let width = coverage.size().0;
+    let mut touched = Touched::new(triangle, coverage.size());
+    let covered = |texel: usize| coverage.covers(texel % width, texel / width, triangle.island);
+    touched.spread(covered);
+    let mut moves = Vec::new();
+    for row in &touched.rows {
+        for (offset, &share) in row.shares.iter().enumerate() {
+            let texel = row.texel + offset;
+            if share != [0; 3] && !covered(texel) {
+                let to = row.homes[offset].or_else(|| nearest(texel, coverage, triangle.island));
+                moves.push(Move { to, share });
+            }
+        }
+    }
+    moves
+}
+
+/// The nearest texel around an uncovered one that an island covers, the first in the order of rows and columns where
+/// several are as near.
+fn nearest(texel: usize, coverage: &impl Coverage, island: u32) -> Option<usize> {
+    let (width, height) = coverage.size();
+    let (column, row) = (texel % width, texel / width);
+    let rows = row.saturating_sub(REACH)..(row + REACH + 1).min(height);
+    let columns = column.saturating_sub(REACH)..(column + REACH + 1).min(width);
+    let distance = |&(x, y): &(usize, usize)| x.abs_diff(column).pow(2) + y.abs_diff(row).pow(2);
+    rows.flat_map(|row| columns.clone().map(move |column| (column, row)))
+        .filter(|&(column, row)| coverage.covers(column, row, island))
+        .min_by_key(distance)
+        .map(|(column, row)| row * width + column)
+}
+
+/// All texels that a triangle touches.
+struct Touched {
+    width: usize,
+    flux: Divided,
+    /// The map's row that is the first.
+    first: usize,
+    rows: Vec<TouchedRow>,
+}
+
+/// Those of one row.
+#[derive(Default)]
+struct TouchedRow {
+    /// The first texel.
+    texel: usize,
+    shares: Vec<FluxCount>,
+    /// The covered texel that is nearest, once it is known.
+    homes: Vec<Option<usize>>,
+}
+
+impl Sink for Touched {
+    fn add(&mut self, row: usize, span: Span) {
+        let mut shares = vec![[0; 3]; span.ends.len()];
+        self.flux.add(Span { first: 0, ..span }, &mut shares);
+        self.rows.resize_with(row - self.first, TouchedRow::default);
+        self.rows.push(TouchedRow {
+            texel: row * self.width + span.first,
+            homes: vec![None; shares.len()],
+            shares,
+        });
+    }
+}
+
+impl Touched {
+    fn new(triangle: &FluxTriangle, size: (usize, usize)) -> Self {
+        let shape = Shape::new(&triangle.corners, size);
+        let rows = shape.rows();
+        let mut touched = Self {
+            width: size.0,
+            flux: Divided::new(triangle.flux),
+            first: rows.start,
+            rows: Vec::new(),
+        };
+        shape.for_each_row(rows, &mut RowShares::new(size.0), &mut touched);
+        touched
+    }
+
+    /// Finds the homes of all texels, outwards from the covered ones that got a share.
+    fn spread(&mut self, covered: impl Fn(usize) -> bool) {
+        let mut queue = VecDeque::new();
+        for (row, texels) in self.rows.iter_mut().enumerate() {
+            for (offset, share) in texels.shares.iter().enumerate() {
+                let texel = texels.texel + offset;
+                if *share != [0; 3] && covered(texel) {
+                    texels.homes[offset] = Some(texel);
+                    queue.push_back((row, texel));
                 }
             }
         }
-        inside
+        while let Some((row, texel)) = queue.pop_front() {
+            let home = self.home(row, texel).and_then(|home| *home);
+            for beside in row.saturating_sub(1)..(row + 2).min(self.rows.len()) {
+                // The texel of that row in the same column, and those left and right of it.
+                let middle = texel + beside * self.width - row * self.width;
+                for place in [middle, middle.wrapping_sub(1), middle + 1] {
+                    if let Some(unknown @ None) = self.home(beside, place) {
+                        *unknown = home;
+                        queue.push_back((beside, place));
+                    }
+                }
+            }
+        }
     }
 
-    /// Where the share of an uncovered texel goes: to the nearest covered one that the triangle touches, else to the
-    /// nearest around; the first in the order of rows and columns where several are as near.
-    fn home(
-        &self,
-        column: usize,
-        row: usize,
-        coverage: &impl Coverage,
-        island: u32,
-    ) -> Option<(usize, usize)> {
-        let distance = |place: (usize, usize)| {
-            let (x, y) = (place.0.abs_diff(column) as u64, place.1.abs_diff(row) as u64);
-            x * x + y * y
-        };
-        let touched = self.covered.iter().map(|&(column, row, _)| (column, row));
-        if let Some(nearest) = touched.min_by_key(|&place| distance(place)) {
-            return Some(nearest);
-        }
-        let (width, height) = coverage.size();
-        let rows = row.saturating_sub(REACH)..(row + REACH + 1).min(height);
-        let columns = column.saturating_sub(REACH)..(column + REACH + 1).min(width);
-        rows.flat_map(|row| columns.clone().map(move |column| (column, row)))
-            .filter(|&(column, row)| coverage.covers(column, row, island))
-            .min_by_key(|&place| distance(place))
+    /// The home of a texel of a row, if the triangle touches it.
+    fn home(&mut self, row: usize, texel: usize) -> Option<&mut Option<usize>> {
+        let row = &mut self.rows[row];
+        row.homes.get_mut(texel.checked_sub(row.texel)?)
     }
 }

@@ -2,7 +2,7 @@
 
 use glam::DVec2;
 
-use super::row::RowShares;
+use super::row::{RowShares, Span};
 use super::shape::{cells, tent};
 
 /// A triangle seen along its longest side.
@@ -14,11 +14,12 @@ pub struct Line {
     way: DVec2,
     /// Fraction of the way at which the middle corner lies.
     middle: f64,
-    size: (usize, usize),
+    /// Columns of the map.
+    width: usize,
 }
 
 impl Line {
-    pub fn new([a, b, c]: [DVec2; 3], size: (usize, usize)) -> Self {
+    pub fn new([a, b, c]: [DVec2; 3], width: usize) -> Self {
         let sides = [(a, b, c), (b, c, a), (c, a, b)];
         let [mut longest, rest @ ..] = sides;
         for side in rest {
@@ -41,12 +42,8 @@ impl Line {
             } else {
                 middle.clamp(0.0, 1.0)
             },
-            size,
+            width,
         }
-    }
-
-    pub fn rows(&self) -> std::ops::Range<usize> {
-        cells(self.from.y, self.from.y + self.way.y, self.size.1)
     }
 
     /// Fractions of the way at which a row begins and ends.
@@ -58,13 +55,14 @@ impl Line {
         (at(row as f64), at((row + 1) as f64))
     }
 
-    pub fn fill_row(&self, row: usize, shares: &mut RowShares) {
-        let width = self.size.0;
+    /// The shares of a row within its rows.
+    pub fn span<'a>(&self, row: usize, shares: &'a mut RowShares) -> Option<Span<'a>> {
+        let width = self.width;
         let (from, to) = self.part_in_row(row);
         let x_at = |t: f64| self.from.x + t * self.way.x;
         let (left, right) = (x_at(from).min(x_at(to)), x_at(from).max(x_at(to)));
         if right < 0.0 || left > width as f64 {
-            return;
+            return None;
         }
         let (before, after) = (tent(from, self.middle), tent(to, self.middle));
         let columns = cells(left, right, width);
@@ -79,15 +77,16 @@ impl Line {
             share.clamp(before, after)
         };
         let first = columns.start;
-        shares.first = first;
-        shares.start = if left >= first as f64 {
+        let start = if left >= first as f64 {
             before
         } else {
             up_to(first)
         };
-        for column in columns {
+        let ends = &mut shares.ends[..columns.len()];
+        for (column, end) in columns.zip(&mut *ends) {
             let whole = right <= (column + 1) as f64;
-            shares.ends.push(if whole { after } else { up_to(column + 1) });
+            *end = if whole { after } else { up_to(column + 1) };
         }
+        Some(Span { first, start, ends })
     }
 }

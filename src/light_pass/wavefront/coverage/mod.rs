@@ -6,11 +6,13 @@
 
 mod area;
 mod bands;
+mod bins;
 mod gaps;
 mod line;
 mod report;
 mod row;
 mod shape;
+mod sides;
 
 use glam::DVec2;
 
@@ -56,7 +58,7 @@ pub fn deposit_covered(
     let size = (flux.width(), flux.height());
     assert_eq!(size, coverage.size(), "one coverage for every texel");
     if coverage.is_full() {
-        bands::deposit(triangles, size, flux.texels_mut())
+        bands::deposit(triangles, size, flux.texels_mut(), &bands::Everywhere).0
     } else {
         gaps::deposit(triangles, coverage, flux.texels_mut())
     }

@@ -2,70 +2,118 @@
 
 use crate::illumination::accumulator::FluxCount;
 
-/// Cumulative shares of a triangle along one row of the map: what lies in the rows above, and in this row to the left
-/// of a texel's border. From 0 to 1, never falling.
-#[derive(Debug, Default)]
-pub struct RowShares {
+/// The texels of one row that a triangle reaches, with cumulative shares of the triangle: what lies in the rows above,
+/// and in this row to the left of a texel's border. From 0 to 1, never falling.
+#[derive(Clone, Copy, Debug)]
+pub struct Span<'a> {
     /// Column of the first texel.
     pub first: usize,
     /// Share before the first texel.
     pub start: f64,
     /// Share up to the right border of each texel; as many as texels.
-    pub ends: Vec<f64>,
-    /// Changes of coverage from texel to texel, used while a row is made; zero in between.
-    pub(super) changes: Vec<f64>,
+    pub ends: &'a [f64],
 }
 
-/// Counts below this times a share are exact enough for the quick way of rounding.
-const QUICK: i64 = 1 << 50;
+/// Takes the rows of a triangle.
+pub trait Sink {
+    /// Takes a row.
+    fn add(&mut self, row: usize, span: Span);
+}
 
-/// Adding it leaves the nearest whole number of a value of up to ±2⁵⁰ in the lowest bits.
+/// Room for the shares of a row, reused from row to row.
+#[derive(Debug)]
+pub struct RowShares {
+    /// What becomes [`Span::ends`].
+    pub ends: Vec<f64>,
+}
+
+impl RowShares {
+    /// For maps of `width` texels across.
+    pub fn new(width: usize) -> Self {
+        Self {
+            ends: vec![0.0; width],
+        }
+    }
+}
+
+/// A triangle's flux, made ready to be divided.
+#[derive(Clone, Copy, Debug)]
+pub struct Divided {
+    flux: FluxCount,
+    counts: [f64; 3],
+    way: Way,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Way {
+    /// All channels alike.
+    Grey,
+    Colour,
+    /// More counts than the quick rounding can tell apart.
+    Careful,
+}
+
+/// Counts up to this can be rounded the quick way.
+const QUICK: i64 = 1 << 48;
+
+/// Adding it leaves the nearest whole number of a value of up to 2⁵⁰ in the lowest bits.
 const ROUNDER: f64 = (3_u64 << 51) as f64;
 
 /// The nearest whole number, as bits above those of [`ROUNDER`]: only differences make sense.
+#[inline(always)]
 fn quick_round(value: f64) -> i64 {
     (value + ROUNDER).to_bits() as i64
 }
 
+/// Cumulative shares from here on are all, but for rounding.
+const NEARLY_ALL: f64 = 1.0 - 2e-15;
+
 /// Counts of a cumulative share; any flux.
 fn careful_round(flux: i64, share: f64) -> i64 {
-    if share >= 1.0 {
+    if share >= NEARLY_ALL {
         flux
     } else {
         ((flux as f64 * share).round() as i64).clamp(flux.min(0), flux.max(0))
     }
 }
 
-impl RowShares {
-    /// Adds a triangle's flux to the texels of the row; returns what was added.
+impl Divided {
+    /// Any flux.
+    #[inline(always)]
+    pub fn new(flux: FluxCount) -> Self {
+        let quick = flux.iter().all(|channel| (0..QUICK).contains(channel));
+        let grey = flux[0] == flux[1] && flux[1] == flux[2];
+        Self {
+            flux,
+            counts: flux.map(|channel| channel as f64),
+            way: match (quick, grey) {
+                (true, true) => Way::Grey,
+                (true, false) => Way::Colour,
+                (false, _) => Way::Careful,
+            },
+        }
+    }
+
+    /// Adds the flux of a span to the texels of its row; returns what was added.
     ///
     /// Each texel gets the difference between the rounded cumulative fluxes at its borders, so that all texels of all
     /// rows together get exactly the triangle's flux.
-    pub fn add(&self, flux: FluxCount, row: &mut [FluxCount]) -> FluxCount {
-        let texels = &mut row[self.first..self.first + self.ends.len()];
-        if flux.iter().any(|&channel| !(0..QUICK).contains(&channel)) {
-            return self.add_carefully(flux, texels);
+    #[inline(always)]
+    pub fn add(&self, span: Span, row: &mut [FluxCount]) -> FluxCount {
+        let texels = &mut row[span.first..span.first + span.ends.len()];
+        match self.way {
+            Way::Grey => [self.add_grey(span, texels); 3],
+            Way::Colour => self.add_colour(span, texels),
+            Way::Careful => self.add_carefully(span, texels),
         }
-        let counts = flux.map(|channel| channel as f64);
-        if flux[0] == flux[1] && flux[1] == flux[2] {
-            return [self.add_grey(counts[0], texels); 3];
-        }
-        let begin = counts.map(|count| quick_round(count * self.start));
-        let mut before = begin;
-        for (texel, &end) in texels.iter_mut().zip(&self.ends) {
-            for channel in 0..3 {
-                let after = quick_round(counts[channel] * end);
-                texel[channel] += after - before[channel];
-                before[channel] = after;
-            }
-        }
-        std::array::from_fn(|channel| before[channel] - begin[channel])
     }
 
-    fn add_grey(&self, count: f64, texels: &mut [FluxCount]) -> i64 {
-        let begin = quick_round(count * self.start);
+    #[inline(always)]
+    fn add_grey(&self, span: Span, texels: &mut [FluxCount]) -> i64 {
+        let count = self.counts[0];
+        let begin = quick_round(count * span.start);
         let mut before = begin;
-        for (texel, &end) in texels.iter_mut().zip(&self.ends) {
+        for (texel, &end) in texels.iter_mut().zip(span.ends) {
             let after = quick_round(count * end);
             let share = after - before;
             for channel in texel {
@@ -76,12 +124,26 @@ impl RowShares {
         before - begin
     }
 
-    fn add_carefully(&self, flux: FluxCount, texels: &mut [FluxCount]) -> FluxCount {
-        let begin = flux.map(|channel| careful_round(channel, self.start));
+    fn add_colour(&self, span: Span, texels: &mut [FluxCount]) -> FluxCount {
+        let begin = self.counts.map(|count| quick_round(count * span.start));
         let mut before = begin;
-        for (texel, &end) in texels.iter_mut().zip(&self.ends) {
+        for (texel, &end) in texels.iter_mut().zip(span.ends) {
             for channel in 0..3 {
-                let after = careful_round(flux[channel], end);
+                let after = quick_round(self.counts[channel] * end);
+                texel[channel] += after - before[channel];
+                before[channel] = after;
+            }
+        }
+        std::array::from_fn(|channel| before[channel] - begin[channel])
+    }
+
+    #[cold]
+    fn add_carefully(&self, span: Span, texels: &mut [FluxCount]) -> FluxCount {
+        let begin = self.flux.map(|channel| careful_round(channel, span.start));
+        let mut before = begin;
+        for (texel, &end) in texels.iter_mut().zip(span.ends) {
+            for channel in 0..3 {
+                let after = careful_round(self.flux[channel], end);
                 texel[channel] += after - before[channel];
                 before[channel] = after;
             }

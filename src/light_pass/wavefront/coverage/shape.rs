@@ -1,10 +1,12 @@
 //! How a triangle meets the map.
 
+use std::ops::Range;
+
 use glam::DVec2;
 
 use super::area::Area;
 use super::line::Line;
-use super::row::RowShares;
+use super::row::{RowShares, Sink, Span};
 
 /// Triangles less high than this over their longest side [texels] are lines: the rounding of their borders would be as
 /// much as 10⁻⁹ of their flux, and no texel is that fine.
@@ -14,7 +16,7 @@ const LINE_HEIGHT_TEXELS: f64 = 1e-6;
 const FARTHEST_TEXELS: f64 = 1e18;
 
 /// A triangle, made ready for one map.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub enum Shape {
     /// A corner is not finite.
     NonFinite,
@@ -22,10 +24,10 @@ pub enum Shape {
     Outside,
     /// Wholly within one texel: column, row.
     Texel(usize, usize),
-    /// A triangle that has area.
-    Area(Area),
+    /// A triangle that has area, and its rows on the map.
+    Area(Area, Range<usize>),
     /// A triangle without.
-    Line(Line),
+    Line(Line, Range<usize>),
 }
 
 /// Borders of a triangle, and those rows of the map that it reaches.
@@ -36,10 +38,13 @@ struct Bounds {
 }
 
 impl Bounds {
+    #[inline(always)]
     fn new([a, b, c]: [DVec2; 3]) -> Self {
+        let low = |a, b, c| least(least(a, b), c);
+        let high = |a, b, c| most(most(a, b), c);
         Self {
-            low: a.min(b).min(c),
-            high: a.max(b).max(c),
+            low: DVec2::new(low(a.x, b.x, c.x), low(a.y, b.y, c.y)),
+            high: DVec2::new(high(a.x, b.x, c.x), high(a.y, b.y, c.y)),
         }
     }
 
@@ -49,11 +54,11 @@ impl Bounds {
 
     /// The only texel, if there is but one.
     fn texel(&self, (width, height): (usize, usize)) -> Option<(usize, usize)> {
-        // Negative coordinates become 0 here, and fail the test below.
-        let (column, row) = (self.low.x as usize, self.low.y as usize);
-        let (left, top) = (column as f64, row as f64);
-        let inside = self.low.x >= left
-            && self.low.y >= top
+        let (column, row) = (self.low.x as i32, self.low.y as i32);
+        let (left, top) = (f64::from(column), f64::from(row));
+        let (column, row) = (column as usize, row as usize);
+        let inside = self.low.x >= most(left, 0.0)
+            && self.low.y >= most(top, 0.0)
             && self.high.x <= left + 1.0
             && self.high.y <= top + 1.0
             && column < width
@@ -64,11 +69,12 @@ impl Bounds {
 
 impl Shape {
     /// Prepares a triangle for a map of `size` texels across and down.
-    pub fn new(corners: [DVec2; 3], size: (usize, usize)) -> Self {
-        if corners.iter().any(|corner| !corner.is_finite()) {
+    #[inline(always)]
+    pub fn new(corners: &[DVec2; 3], size: (usize, usize)) -> Self {
+        if !is_finite(corners) {
             return Self::NonFinite;
         }
-        let bounds = Bounds::new(corners);
+        let bounds = Bounds::new(*corners);
         if bounds.misses(size) || size.0 == 0 || size.1 == 0 {
             return Self::Outside;
         }
@@ -81,43 +87,86 @@ impl Shape {
         let twice_area = (corners[1] - corners[0]).perp_dot(corners[2] - corners[0]);
         let extent = bounds.high - bounds.low;
         if twice_area * twice_area <= LINE_HEIGHT_TEXELS * LINE_HEIGHT_TEXELS * extent.length_squared() {
-            return Self::Line(Line::new(corners, size));
+            return Self::Line(
+                Line::new(*corners, size.0),
+                cells(bounds.low.y, bounds.high.y, size.1),
+            );
         }
-        Self::Area(Area::new(corners, twice_area, bounds.low.x, size))
+        let columns = cells(bounds.low.x, bounds.high.x, size.0);
+        let crosses_border = bounds.low.x < 0.0 || bounds.high.x > size.0 as f64;
+        let rows = cells(bounds.low.y, bounds.high.y, size.1);
+        Self::Area(Area::new(corners, columns, crosses_border), rows)
     }
 
     /// Rows of the map that it reaches.
-    pub fn rows(&self) -> std::ops::Range<usize> {
+    pub fn rows(&self) -> Range<usize> {
         match self {
             Self::NonFinite | Self::Outside => 0..0,
             Self::Texel(_, row) => *row..*row + 1,
-            Self::Area(area) => area.rows(),
-            Self::Line(line) => line.rows(),
+            Self::Area(_, rows) | Self::Line(_, rows) => rows.clone(),
         }
     }
 
-    /// The shares of the texels of a row within [`Shape::rows`].
-    pub fn fill_row(&self, row: usize, shares: &mut RowShares) {
-        shares.ends.clear();
-        shares.first = 0;
+    /// Gives the shares of each of some rows, all within [`Shape::rows`].
+    #[inline(always)]
+    pub fn for_each_row(&self, rows: Range<usize>, shares: &mut RowShares, sink: &mut impl Sink) {
         match self {
             Self::NonFinite | Self::Outside => {}
             Self::Texel(column, _) => {
-                shares.first = *column;
-                shares.start = 0.0;
-                shares.ends.push(1.0);
+                let whole = Span {
+                    first: *column,
+                    start: 0.0,
+                    ends: &[1.0],
+                };
+                rows.for_each(|row| sink.add(row, whole));
             }
-            Self::Area(area) => area.fill_row(row, shares),
-            Self::Line(line) => line.fill_row(row, shares),
+            Self::Area(area, _) => area.for_each_row(rows, shares, sink),
+            Self::Line(line, _) => {
+                for row in rows {
+                    if let Some(span) = line.span(row, shares) {
+                        sink.add(row, span);
+                    }
+                }
+            }
         }
     }
 }
 
+/// Whether all corners are finite numbers.
+#[inline(always)]
+pub fn is_finite([a, b, c]: &[DVec2; 3]) -> bool {
+    // Zero times anything that is not finite is not a number, and neither is a sum with one.
+    let sum = *a * 0.0 + *b * 0.0 + *c * 0.0;
+    sum.x + sum.y == 0.0
+}
+
+/// Rows and columns that a triangle may reach on a map: at least [`Shape::rows`].
+pub fn rows_and_columns(corners: &[DVec2; 3], size: (usize, usize)) -> (Range<usize>, Range<usize>) {
+    let bounds = Bounds::new(*corners);
+    if bounds.misses(size) || size.0 == 0 || size.1 == 0 {
+        return (0..0, 0..0);
+    }
+    (
+        cells(bounds.low.y, bounds.high.y, size.1),
+        cells(bounds.low.x, bounds.high.x, size.0),
+    )
+}
+
+/// The smaller one; the second of numbers that do not compare.
+pub fn least(a: f64, b: f64) -> f64 {
+    if a < b { a } else { b }
+}
+
+/// The larger one; the second of numbers that do not compare.
+pub fn most(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
+}
+
 /// Rows (columns) of a map of `count` that the interval `low..=high` reaches; that of `low` where it is a point.
-pub fn cells(low: f64, high: f64, count: usize) -> std::ops::Range<usize> {
+pub fn cells(low: f64, high: f64, count: usize) -> Range<usize> {
     // Casts cut to 0..; what lies on the last border belongs to the last cell.
-    let first = (low as usize).min(count.saturating_sub(1));
-    let last = (high as usize).min(count);
+    let first = (most(0.0, low) as i32 as usize).min(count.saturating_sub(1));
+    let last = (most(0.0, high) as i32 as usize).min(count);
     let end = if high > last as f64 { last + 1 } else { last };
     first..end.min(count).max(first + 1)
 }

@@ -1,0 +1,117 @@
+//! Which triangles reach which bands of rows.
+
+use std::ops::Range;
+
+use super::FluxTriangle;
+use super::shape::rows_and_columns;
+
+/// Work of making a triangle ready, in that of a texel.
+const TRIANGLE_WORK: u64 = 8;
+
+/// Work of beginning a row, in that of a texel.
+const ROW_WORK: u64 = 4;
+
+/// Some triangles, sorted by the bands that they reach.
+#[derive(Debug)]
+pub struct Bins {
+    /// First row and row after the last, by triangle.
+    rows: Vec<(u32, u32)>,
+    /// How much work each row adds to that of the row before: one more than there are rows.
+    changes: Vec<i64>,
+    /// Where the triangles of each band begin, and end.
+    begins: Vec<usize>,
+    /// Triangles, band by band.
+    indices: Vec<u32>,
+}
+
+impl Bins {
+    /// Finds the rows of triangles.
+    pub fn new(triangles: &[FluxTriangle], size: (usize, usize)) -> Self {
+        let mut changes = vec![0; size.1 + 1];
+        let rows = triangles
+            .iter()
+            .map(|triangle| {
+                let (rows, columns) = rows_and_columns(&triangle.corners, size);
+                if !rows.is_empty() {
+                    // At most half of the texels between the borders are inside.
+                    let row_work = ROW_WORK + columns.len() as u64 / 2 + TRIANGLE_WORK / rows.len() as u64;
+                    changes[rows.start] += row_work as i64;
+                    changes[rows.end] -= row_work as i64;
+                }
+                (rows.start as u32, rows.end as u32)
+            })
+            .collect();
+        Self {
+            rows,
+            changes,
+            begins: Vec::new(),
+            indices: Vec::new(),
+        }
+    }
+
+    /// Adds the work in each row.
+    pub fn add_work(&self, work: &mut [u64]) {
+        let mut here = 0;
+        for (sum, change) in work.iter_mut().zip(&self.changes) {
+            here += change;
+            // Never negative: what ends began before.
+            *sum += here as u64;
+        }
+    }
+
+    /// Sorts the triangles by bands.
+    pub fn sort(&mut self, bands: &[Range<usize>]) {
+        let mut band_of_row = Vec::new();
+        for (band, rows) in bands.iter().enumerate() {
+            band_of_row.resize(rows.end, band);
+        }
+        let bands_of = |&(start, end): &(u32, u32)| {
+            if start < end {
+                band_of_row[start as usize]..band_of_row[end as usize - 1] + 1
+            } else {
+                0..0
+            }
+        };
+        self.begins = vec![0; bands.len() + 1];
+        for rows in &self.rows {
+            for band in bands_of(rows) {
+                self.begins[band + 1] += 1;
+            }
+        }
+        for band in 0..bands.len() {
+            self.begins[band + 1] += self.begins[band];
+        }
+        let mut next = self.begins.clone();
+        self.indices = vec![0; self.begins[bands.len()]];
+        for (index, rows) in self.rows.iter().enumerate() {
+            for band in bands_of(rows) {
+                self.indices[next[band]] = index as u32;
+                next[band] += 1;
+            }
+        }
+    }
+
+    /// The triangles of a band, after [`Bins::sort`].
+    pub fn band(&self, band: usize) -> &[u32] {
+        &self.indices[self.begins[band]..self.begins[band + 1]]
+    }
+}
+
+/// Divides all rows into at most `count` bands of about the same work.
+pub fn split_rows(work: &[u64], count: usize) -> Vec<Range<usize>> {
+    let total: u64 = work.iter().sum();
+    let mut bands = Vec::new();
+    let (mut start, mut done) = (0, 0);
+    for (row, here) in work.iter().enumerate() {
+        done += here;
+        let share = total * (bands.len() as u64 + 1) / count as u64;
+        if done >= share && bands.len() + 1 < count {
+            bands.push(start..row + 1);
+            start = row + 1;
+        }
+    }
+    if start < work.len() {
+        bands.push(start..work.len());
+    }
+    bands
+}

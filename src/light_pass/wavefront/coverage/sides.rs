@@ -1,0 +1,173 @@
+//! The sides of a triangle, and what lies beside them within a row.
+//!
+//! Numbers come in fours: the long side from the top to the bottom corner, the upper and the lower of the others, and
+//! nothing. Each step is then the same for all of them, and the processor takes several at once.
+
+use glam::DVec2;
+
+use super::shape::{least, most};
+
+/// Sides less high than this [texels] are level: they bound no area.
+const LEVEL_TEXELS: f64 = 1e-30;
+
+/// The sides of a triangle: x as functions of y.
+#[derive(Clone, Copy, Debug)]
+pub struct Sides {
+    top: f64,
+    middle: f64,
+    bottom: f64,
+    start_x: [f64; 4],
+    start_y: [f64; 4],
+    slope: [f64; 4],
+    /// What the areas to their right count, as shares of the triangle per area.
+    sign: [f64; 4],
+    /// Share of the triangle above y, per squared distance from the top, and below, from the bottom.
+    upper_square: f64,
+    lower_square: f64,
+    /// Share below the middle corner.
+    lower_share: f64,
+}
+
+/// The triangle cut at one height.
+#[derive(Clone, Copy, Debug)]
+pub struct Cut {
+    /// Height of the cut on each side, held within the side.
+    y: [f64; 4],
+    x: [f64; 4],
+    /// Share of the triangle above, from 0 to 1 but for rounding.
+    pub above: f64,
+}
+
+/// The sides between two cuts.
+#[derive(Clone, Copy, Debug)]
+pub struct Pieces {
+    low: [f64; 4],
+    high: [f64; 4],
+    run: [f64; 4],
+    height: [f64; 4],
+    /// Share of the triangle per squared distance into a piece.
+    per_square: [f64; 4],
+    /// Share of a texel between the sides.
+    pub full: f64,
+}
+
+/// Where the pieces lie.
+#[derive(Clone, Copy, Debug)]
+pub struct Reach {
+    /// Smallest x of all.
+    pub left: f64,
+    /// Largest x of those on the left.
+    pub gap_from: f64,
+    /// Smallest x of those on the right.
+    pub gap_to: f64,
+    /// Largest x of all.
+    pub right: f64,
+}
+
+/// Runs below this [texels] count as this: the factor stays finite, and no area is lost that a number could hold.
+const LEAST_RUN: f64 = 1e-100;
+
+fn four(f: impl Fn(usize) -> f64) -> [f64; 4] {
+    [f(0), f(1), f(2), f(3)]
+}
+
+impl Sides {
+    /// The sides of a triangle whose corners go from top to bottom.
+    #[inline(always)]
+    pub fn new([a, b, c]: [DVec2; 3]) -> Self {
+        let start_x = [a.x, a.x, b.x, 0.0];
+        let start_y = [a.y, a.y, b.y, 0.0];
+        let end_x = [c.x, b.x, c.x, 0.0];
+        let end_y = [c.y, b.y, c.y, 0.0];
+        let inverse = four(|side| {
+            let height = end_y[side] - start_y[side];
+            let inverse = 1.0 / height;
+            if height > LEVEL_TEXELS { inverse } else { 0.0 }
+        });
+        let slope = four(|side| (end_x[side] - start_x[side]) * inverse[side]);
+        let share_per_area = 2.0 / (b - a).perp_dot(c - a);
+        let upper_square = inverse[1] * inverse[0];
+        let lower_square = inverse[2] * inverse[0];
+        Self {
+            top: a.y,
+            middle: b.y,
+            bottom: c.y,
+            start_x,
+            start_y,
+            slope,
+            sign: [share_per_area, -share_per_area, -share_per_area, 0.0],
+            upper_square,
+            lower_square,
+            lower_share: (c.y - b.y) * (c.y - b.y) * lower_square,
+        }
+    }
+
+    /// Cuts at a height, or at the end that is nearest to it.
+    #[inline(always)]
+    pub fn cut(&self, y: f64) -> Cut {
+        let y = most(self.top, least(self.bottom, y));
+        let y = [y, least(y, self.middle), most(y, self.middle), y];
+        let (down, up) = (y[1] - self.top, self.bottom - y[2]);
+        Cut {
+            y,
+            x: four(|side| self.start_x[side] + (y[side] - self.start_y[side]) * self.slope[side]),
+            above: down * down * self.upper_square + (self.lower_share - up * up * self.lower_square),
+        }
+    }
+
+    /// The sides between two cuts.
+    #[inline(always)]
+    pub fn between(&self, from: &Cut, to: &Cut) -> Pieces {
+        let low = four(|side| least(from.x[side], to.x[side]));
+        let high = four(|side| most(from.x[side], to.x[side]));
+        let run = four(|side| high[side] - low[side]);
+        let height = four(|side| (to.y[side] - from.y[side]) * self.sign[side]);
+        Pieces {
+            low,
+            high,
+            run,
+            height,
+            // Without a run there is no area along it: anything finite will do as a factor.
+            per_square: four(|side| 0.5 * height[side] / most(run[side], LEAST_RUN)),
+            full: height[0].abs(),
+        }
+    }
+
+    /// Where the pieces lie; those without height do not count.
+    pub fn reach(&self, pieces: &Pieces) -> Reach {
+        let Pieces {
+            low, high, height, ..
+        } = pieces;
+        let (upper, lower) = match (height[1] != 0.0, height[2] != 0.0) {
+            (true, false) => (1, 1),
+            (false, true) => (2, 2),
+            _ => (1, 2),
+        };
+        let short = (least(low[upper], low[lower]), most(high[upper], high[lower]));
+        let long = (low[0], high[0]);
+        let (left, right) = if self.sign[0] > 0.0 {
+            (long, short)
+        } else {
+            (short, long)
+        };
+        Reach {
+            left: least(left.0, right.0),
+            gap_from: left.1,
+            gap_to: right.0,
+            right: most(left.1, right.1),
+        }
+    }
+}
+
+impl Pieces {
+    /// Share of the triangle between the cuts, to the left of `x`.
+    #[inline(always)]
+    pub fn share_up_to(&self, x: f64) -> f64 {
+        let shares = four(|side| {
+            let x = x - self.low[side];
+            let within = most(0.0, least(self.run[side], x));
+            self.per_square[side] * (within * within) + self.height[side] * most(0.0, x - self.run[side])
+        });
+        (shares[0] + shares[2]) + (shares[1] + shares[3])
+    }
+}
