@@ -39,5 +39,7 @@ pub mod session;
 
 pub mod export;
 
+pub mod study;
+
 #[cfg(feature = "viewer")]
 pub mod viewer;

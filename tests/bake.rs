@@ -1,11 +1,17 @@
 //! Bakes of reference scenes: against an independent solver, against the law of energy, against themselves.
 
+#[path = "bake/brute_force.rs"]
+mod brute_force;
 #[path = "bake/collection.rs"]
 mod collection;
 #[path = "bake/coverage.rs"]
 mod coverage;
 #[path = "bake/energy.rs"]
 mod energy;
+#[path = "bake/hard_cases.rs"]
+mod hard_cases;
+#[path = "support/hard_scenes.rs"]
+mod hard_scenes;
 #[path = "bake/invariance.rs"]
 mod invariance;
 #[path = "bake/kept.rs"]

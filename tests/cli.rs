@@ -21,5 +21,7 @@ mod scenes;
 #[cfg(unix)]
 #[path = "cli/signals.rs"]
 mod signals;
+#[path = "cli/study.rs"]
+mod study;
 #[path = "cli/usage.rs"]
 mod usage;

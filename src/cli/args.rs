@@ -6,10 +6,12 @@ use clap::error::ErrorKind as ClapErrorKind;
 use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand, ValueEnum};
 use nephroid::error::{Error, Result};
 use nephroid::eye_pass::ToneMap;
+use nephroid::settings::{Estimator, MapResolution};
 
 use super::bake_options::BakeOptions;
 use super::compare::LayerChoice;
 use super::job::Job;
+use super::study_values;
 use super::terminal::{self, Terminal};
 use super::values::{self, Exposure};
 
@@ -42,6 +44,8 @@ pub enum Command {
     Inspect(InspectArguments),
     /// Measure a map against a reference: relative RMSE, ARD, peak, flux
     Compare(CompareArguments),
+    /// Study what accuracy costs
+    Study(StudyArguments),
 }
 
 #[derive(Debug, Args)]
@@ -209,6 +213,93 @@ pub struct CompareArguments {
     pub run: RunOptions,
 }
 
+#[derive(Debug, Args)]
+#[command(args_conflicts_with_subcommands = true)]
+pub struct StudyArguments {
+    /// Name all studies
+    #[arg(long)]
+    pub list: bool,
+    #[command(subcommand)]
+    pub study: Option<Study>,
+    #[command(flatten)]
+    pub run: RunOptions,
+}
+
+#[derive(Debug, Subcommand)]
+pub enum Study {
+    /// Error against light rays and CPU time, for every estimator
+    Convergence(ConvergenceArguments),
+    /// Maps by brute force, one texel per ray, with their noise
+    Reference(ReferenceArguments),
+}
+
+#[derive(Debug, Args)]
+pub struct ConvergenceArguments {
+    /// .glb, .gltf or builtin:NAME [default: builtin:ring]
+    pub scene: Option<String>,
+    /// Folder for convergence.csv and convergence.svg
+    #[arg(short, long, value_name = "DIR")]
+    pub output: PathBuf,
+    /// Write into the folder even if it holds other files
+    #[arg(long)]
+    pub force: bool,
+    /// Estimators to measure [default: all]
+    #[arg(long, value_enum, value_delimiter = ',', value_name = "ESTIMATOR,...")]
+    pub estimators: Option<Vec<Estimator>>,
+    /// Ascending light rays per steradian [default: 1e2 to 1e6, two a decade]
+    #[arg(
+        long,
+        value_delimiter = ',',
+        value_name = "RAYS_PER_SR,...",
+        allow_negative_numbers = true
+    )]
+    pub densities: Option<Vec<f64>>,
+    /// Map to measure against, .exr or .pfm [default: the shipped one of a built-in scene, else a much denser bake]
+    #[arg(long, value_name = "FILE")]
+    pub reference: Option<PathBuf>,
+    /// Surface of the reference [default: floor, or the only one that takes light]
+    #[arg(long, value_name = "NAME", requires = "reference")]
+    pub surface: Option<String>,
+    /// Texels of every map: N by N, or W by H [default: 256]
+    #[arg(long, value_name = "N|WxH", value_parser = study_values::fixed_map_resolution, allow_hyphen_values = true)]
+    pub map_resolution: Option<MapResolution>,
+    /// Bakes of each kind, whose median CPU time counts [default: 5]
+    #[arg(long, value_name = "N", conflicts_with = "quick")]
+    pub repeat: Option<usize>,
+    /// One bake of each kind, densities up to 1e5
+    #[arg(long)]
+    pub quick: bool,
+    #[command(flatten)]
+    pub scene_options: SceneOptions,
+    #[command(flatten)]
+    pub run: RunOptions,
+}
+
+#[derive(Debug, Args)]
+pub struct ReferenceArguments {
+    /// .glb, .gltf or builtin:NAME
+    pub scene: String,
+    /// Folder for the maps, manifest.json and reference.json
+    #[arg(short, long, value_name = "DIR")]
+    pub output: PathBuf,
+    /// Write into the folder even if it holds other files
+    #[arg(long)]
+    pub force: bool,
+    /// Light rays, such as 1e8
+    #[arg(long, value_name = "N", value_parser = study_values::ray_count, allow_hyphen_values = true)]
+    pub rays: u64,
+    /// Texels of every map: N by N, or W by H [default: 256]
+    #[arg(long, value_name = "N|WxH", value_parser = study_values::fixed_map_resolution, allow_hyphen_values = true)]
+    pub map_resolution: Option<MapResolution>,
+    /// Seed of the rays [default: 0]
+    #[arg(long, value_name = "N")]
+    pub seed: Option<u64>,
+    #[command(flatten)]
+    pub scene_options: SceneOptions,
+    #[command(flatten)]
+    pub run: RunOptions,
+}
+
 /// What the arguments ask for.
 pub enum Parsed {
     /// A job to run.
@@ -254,6 +345,11 @@ impl Arguments {
             Some(Command::Render(render)) => &render.run,
             Some(Command::Inspect(inspect)) => &inspect.run,
             Some(Command::Compare(compare)) => &compare.run,
+            Some(Command::Study(study)) => match &study.study {
+                None => &study.run,
+                Some(Study::Convergence(convergence)) => &convergence.run,
+                Some(Study::Reference(reference)) => &reference.run,
+            },
         }
     }
 }

@@ -163,7 +163,7 @@ fn text(report: &Report, measures: &Comparison) -> String {
 }
 
 /// The luminance of the wanted layer; without a wish the caustic layer where there is one, else the sum.
-fn read_luminance(path: &Path, wish: Option<LayerChoice>) -> Result<(Grid, LayerChoice)> {
+pub fn read_luminance(path: &Path, wish: Option<LayerChoice>) -> Result<(Grid, LayerChoice)> {
     let image = FloatImage::read(path)?;
     let has_layers = image.channels.iter().any(|channel| channel.name.contains('.'));
     let layer = match wish {

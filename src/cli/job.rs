@@ -2,13 +2,17 @@
 
 use std::path::{Path, PathBuf};
 
+use clap::ValueEnum;
 use nephroid::error::{Error, Result};
 use nephroid::eye_pass::ToneMap;
-use nephroid::settings::{BakeSettings, LayerKind};
+use nephroid::settings::{BakeSettings, Estimator, LayerKind, MapResolution};
+use nephroid::study::brute_force;
+use nephroid::study::convergence::{DEFAULT_DENSITIES, Ladder};
 
 use super::args::{
-    Arguments, Backend, BakeArguments, Command, CompareArguments, InspectArguments, MapsOption,
-    PictureOptions, RenderArguments, RunOptions, SceneOptions, ViewArguments,
+    Arguments, Backend, BakeArguments, Command, CompareArguments, ConvergenceArguments, InspectArguments,
+    MapsOption, PictureOptions, ReferenceArguments, RenderArguments, RunOptions, SceneOptions, Study,
+    StudyArguments, ViewArguments,
 };
 use super::bake_options::BakeOptions;
 use super::compare::{self, LayerChoice};
@@ -16,7 +20,7 @@ use super::interrupt::Interrupt;
 use super::scene_input::{MissingLight, SceneInput};
 use super::terminal::Terminal;
 use super::values::Exposure;
-use super::{bake, inspect, render, view};
+use super::{bake, inspect, render, study, view};
 
 /// Scene of `view` when none is named.
 const DEFAULT_SCENE: &str = "builtin:showroom";
@@ -35,6 +39,9 @@ pub enum Job {
     Render(RenderJob),
     Inspect(InspectJob),
     Compare(CompareJob),
+    ListStudies,
+    Convergence(ConvergenceJob),
+    Reference(ReferenceJob),
 }
 
 /// `view`.
@@ -83,6 +90,27 @@ pub struct CompareJob {
     pub difference: Option<PathBuf>,
     /// Largest relative RMSE [1].
     pub max_rmse: Option<f64>,
+}
+
+/// `study convergence`.
+#[derive(Debug)]
+pub struct ConvergenceJob {
+    pub scene: SceneInput,
+    pub ladder: Ladder,
+    pub reference: Option<PathBuf>,
+    pub surface: Option<String>,
+    pub output: PathBuf,
+    pub force: bool,
+}
+
+/// `study reference`.
+#[derive(Debug)]
+pub struct ReferenceJob {
+    pub scene: SceneInput,
+    pub settings: BakeSettings,
+    pub rays: u64,
+    pub output: PathBuf,
+    pub force: bool,
 }
 
 /// Where illumination comes from.
@@ -138,6 +166,7 @@ impl Job {
             Some(Command::Render(render)) => render_job(render),
             Some(Command::Inspect(inspect)) => inspect_job(inspect),
             Some(Command::Compare(compare)) => compare_job(compare),
+            Some(Command::Study(study)) => study_job(study),
         }
     }
 
@@ -152,6 +181,9 @@ impl Job {
             Self::Render(job) => render::run(&job, terminal, interrupt),
             Self::Inspect(job) => inspect::run(&job, terminal),
             Self::Compare(job) => compare::run(&job, terminal),
+            Self::ListStudies => study::list(terminal),
+            Self::Convergence(job) => study::convergence(&job, terminal, interrupt),
+            Self::Reference(job) => study::reference(&job, terminal, interrupt),
         }
     }
 }
@@ -263,6 +295,121 @@ fn compare_job(arguments: CompareArguments) -> Result<Job> {
         layer: arguments.layer,
         difference: arguments.difference,
         max_rmse: arguments.max_rmse.map(|percent| percent / 100.0),
+    }))
+}
+
+fn study_job(arguments: StudyArguments) -> Result<Job> {
+    match arguments.study {
+        Some(Study::Convergence(convergence)) => convergence_job(convergence),
+        Some(Study::Reference(reference)) => reference_job(reference),
+        None if arguments.list => Ok(Job::ListStudies),
+        None => Err(Error::usage(
+            "study",
+            "no study is named",
+            "name one, or use --list to see which there are",
+        )),
+    }
+}
+
+/// Texels across and down of a study's maps where none are asked for.
+const STUDY_RESOLUTION: MapResolution = MapResolution::Fixed {
+    width: 256,
+    height: 256,
+};
+
+/// Bakes of each kind where no number is asked for.
+const DEFAULT_REPEATS: usize = 5;
+
+/// Most bakes of each kind.
+const MAX_REPEATS: usize = 1000;
+
+/// Densest lattice of `--quick` [1/sr].
+const QUICK_DENSITY: f64 = 1e5;
+
+fn convergence_job(arguments: ConvergenceArguments) -> Result<Job> {
+    let settings = BakeSettings {
+        map_resolution: arguments.map_resolution.unwrap_or(STUDY_RESOLUTION),
+        threads: threads(&arguments.run)?,
+        ..BakeSettings::default()
+    };
+    let densities = arguments.densities.unwrap_or_else(|| {
+        let wanted = |density: &f64| !arguments.quick || *density <= QUICK_DENSITY;
+        DEFAULT_DENSITIES.into_iter().filter(wanted).collect()
+    });
+    check_ladder(&densities, &settings)?;
+    let mut estimators: Vec<Estimator> = Vec::new();
+    for estimator in arguments
+        .estimators
+        .unwrap_or_else(|| Estimator::value_variants().to_vec())
+    {
+        if !estimators.contains(&estimator) {
+            estimators.push(estimator);
+        }
+    }
+    let repeats = match arguments.repeat {
+        Some(repeats) if (1..=MAX_REPEATS).contains(&repeats) => repeats,
+        Some(repeats) => {
+            return Err(Error::usage(
+                "--repeat",
+                format!("{repeats} is outside 1 to {MAX_REPEATS}"),
+                "give a number in that range",
+            ));
+        }
+        None if arguments.quick => 1,
+        None => DEFAULT_REPEATS,
+    };
+    let scene = arguments.scene.unwrap_or_else(|| "builtin:ring".to_string());
+    Ok(Job::Convergence(ConvergenceJob {
+        scene: scene_input(scene, &arguments.scene_options, MissingLight::Fail),
+        ladder: Ladder {
+            estimators,
+            densities,
+            repeats,
+            settings,
+        },
+        reference: arguments.reference,
+        surface: arguments.surface,
+        output: arguments.output,
+        force: arguments.force,
+    }))
+}
+
+fn check_ladder(densities: &[f64], settings: &BakeSettings) -> Result<()> {
+    if densities.is_empty() || !densities.is_sorted_by(|a, b| a < b) {
+        return Err(Error::usage(
+            "--densities",
+            "they have to be in ascending order, each once",
+            "give numbers such as 1e3,1e4,1e5",
+        ));
+    }
+    for &density_per_sr in densities {
+        let rung = BakeSettings {
+            density_per_sr,
+            ..settings.clone()
+        };
+        rung.validate().map_err(|error| Error {
+            location: "--densities".into(),
+            ..error
+        })?;
+    }
+    Ok(())
+}
+
+fn reference_job(arguments: ReferenceArguments) -> Result<Job> {
+    let settings = BakeSettings {
+        map_resolution: arguments.map_resolution.unwrap_or(STUDY_RESOLUTION),
+        seed: arguments.seed.unwrap_or(0),
+        threads: threads(&arguments.run)?,
+        ..BakeSettings::default()
+    };
+    settings.validate()?;
+    brute_force::check_rays(arguments.rays)?;
+    Ok(Job::Reference(ReferenceJob {
+        scene: scene_input(arguments.scene, &arguments.scene_options, MissingLight::Fail),
+        settings,
+        rays: arguments.rays,
+        output: arguments.output,
+        force: arguments.force,
     }))
 }
 

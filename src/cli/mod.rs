@@ -11,6 +11,8 @@ mod picture;
 mod progress_bar;
 mod render;
 mod scene_input;
+mod study;
+mod study_values;
 mod terminal;
 mod values;
 mod view;

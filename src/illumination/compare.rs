@@ -1,7 +1,7 @@
 //! How far two maps are apart: measures over texels of equal area, on any quantity (irradiance luminance [W/m²] here).
 
 /// Share of the reference's mean from which on a texel counts in [`average_relative_difference`].
-const SIGNIFICANT_SHARE_OF_MEAN: f64 = 0.01;
+pub const SIGNIFICANT_SHARE_OF_MEAN: f64 = 0.01;
 
 /// Values on a rectangle of texels, row by row.
 #[derive(Clone, Debug, PartialEq)]

@@ -2,7 +2,7 @@
 
 use crate::program::Sandbox;
 
-const COMMANDS: [&str; 5] = ["view", "bake", "render", "inspect", "compare"];
+const COMMANDS: [&str; 6] = ["view", "bake", "render", "inspect", "compare", "study"];
 
 #[test]
 fn help_goes_to_stdout_and_names_what_there_is() {
@@ -14,7 +14,7 @@ fn help_goes_to_stdout_and_names_what_there_is() {
         let own = sandbox.succeed(&format!("{command} --help"));
         assert!(own.stdout.contains("--json"), "{}", own.stdout);
     }
-    for absent in ["  export", "  study", "  merge"] {
+    for absent in ["  export", "  merge"] {
         assert!(!help.stdout.contains(absent), "{absent}");
     }
     let version = sandbox.succeed("--version");

@@ -16,11 +16,11 @@ use crate::light_pass::ledger_sum::{Account, LedgerSum};
 use crate::optics::LinearSrgb;
 
 /// Deviation from straight that triangles may have [texels].
-const CHORD_TEXELS: f64 = 0.03;
+const CHORD_TEXELS: f64 = 0.02;
 
 /// Change of the lit area from one triangle to the next, as a share, that is left where triangles are larger than
 /// texels.
-const DENSITY_STEP: f64 = 0.005;
+const DENSITY_STEP: f64 = 0.01;
 
 /// How much coarser patches are divided that add next to nothing to their map.
 const COARSEST_TOLERANCE: f64 = 10.0;
@@ -264,8 +264,9 @@ impl Spreader<'_> {
             .fold(0.0, f64::max);
         let steps = |bend: f64, change: f64, length: f64| {
             let straight = (bend / (CHORD_TEXELS * tolerance)).sqrt();
-            // Triangles below a texel cannot be told apart.
-            let even = (change / (DENSITY_STEP * tolerance)).min(length);
+            let even = change / (DENSITY_STEP * tolerance);
+            // Of triangles below a texel only those at its border are seen.
+            let even = even.min((even * length).sqrt());
             (straight.max(even).ceil() as usize).clamp(1, MOST_STEPS)
         };
         (

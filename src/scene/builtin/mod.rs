@@ -4,7 +4,7 @@
 mod ball;
 mod mirror;
 mod paraboloid;
-mod parts;
+pub mod parts;
 mod pool;
 mod ring;
 pub mod shapes;

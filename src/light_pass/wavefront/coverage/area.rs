@@ -110,13 +110,19 @@ impl Area {
         let columns = cells(left, right, self.columns);
         let share_up_to = |x: f64| most(from.above, least(to.above, from.above + pieces.share_up_to(x)));
         let start = if left >= 0.0 { from.above } else { share_up_to(0.0) };
-        let end = if right <= width { to.above } else { share_up_to(width) };
+        let end = if right <= width {
+            to.above
+        } else {
+            share_up_to(width)
+        };
         let borders = (columns.start + 1) as f64;
         let (fours, _) = shares.ends[..columns.len().next_multiple_of(4)].as_chunks_mut();
         match pieces.only_short() {
             Some(short) => {
                 let (long, short) = (pieces.piece(0), pieces.piece(short));
-                fill(fours, borders, |x| least(end, from.above + (long.share_up_to(x) + short.share_up_to(x))));
+                fill(fours, borders, |x| {
+                    least(end, from.above + (long.share_up_to(x) + short.share_up_to(x)))
+                });
             }
             None => fill(fours, borders, |x| least(end, from.above + pieces.share_up_to(x))),
         }

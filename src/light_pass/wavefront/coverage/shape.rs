@@ -170,7 +170,11 @@ pub fn cells(low: f64, high: f64, count: usize) -> Range<usize> {
     let count = i32::try_from(count).unwrap_or(i32::MAX);
     let first = (most(0.0, low) as i32).min(count - 1);
     let last = most(0.0, high) as i32;
-    let end = if high > f64::from(last) { last.saturating_add(1) } else { last };
+    let end = if high > f64::from(last) {
+        last.saturating_add(1)
+    } else {
+        last
+    };
     first as usize..end.min(count).max(first + 1) as usize
 }
 

@@ -1,0 +1,371 @@
+//! Light tracing into texels, as a reference for the estimators: random rays, each arrival's whole flux into the texel
+//! that it hits. Nothing but transport and aiming is shared with what it judges.
+//!
+//! Rays are stratified, one at a random place in each cell of a lattice. Two such lattices, each with half of the
+//! rays, tell the noise: each carries half of the flux, so that their sum is the map, and their difference A − B has
+//! the same variance as the sum.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicI64, AtomicU64, Ordering};
+
+use glam::DVec2;
+use rand_pcg::Pcg64Mcg;
+use rand_pcg::rand_core::{Rng, SeedableRng};
+use rayon::prelude::*;
+
+use crate::error::{Error, Result};
+use crate::illumination::accumulator::{FluxCount, FluxUnit};
+use crate::illumination::gutter::fill_gutter;
+use crate::illumination::parametrisation::{DEFAULT_NOMINAL_SIDE, parametrise};
+use crate::illumination::{Chart, IlluminationMap, Layer};
+use crate::light_pass::caustic::pass::Stopwatch;
+use crate::light_pass::caustic::path::{Arrival, PathLimits, PathTracer};
+use crate::light_pass::caustic::setup::{Aim, AimedLight};
+use crate::light_pass::ledger_sum::{Account, LedgerSum};
+use crate::plan::{self, Effect, EffectPlan};
+use crate::progress::{Control, Progress, Stage};
+use crate::scene::Scene;
+use crate::session::{BakeCounts, BakeResult, StopReason, Timings};
+use crate::settings::{BakeSettings, LayerKind, MapResolution};
+use crate::transport::Tracer;
+
+/// Least and most rays of a run.
+pub const RAYS: std::ops::RangeInclusive<u64> = 1_000..=1_000_000_000_000;
+
+/// The caustic layer of a scene by about `rays` rays ([`RAYS`]), shared evenly among the lights. Of the settings, map
+/// resolution (which has to be fixed), seed, item buffer, depth, branch threshold and threads apply. Each map's
+/// `error` is the texel's standard error [W/m²], and its `estimated_relative_rmse` is the noise: the root mean square
+/// of these over the mean. The same bytes for any number of threads.
+///
+/// # Errors
+/// Settings or rays outside their ranges; an automatic map resolution; lights of no finite power; no threads; stopped
+/// before the end.
+pub fn brute_force(
+    tracer: &Tracer,
+    settings: &BakeSettings,
+    rays: u64,
+    progress: &dyn Progress,
+    control: &Control,
+) -> Result<BakeResult> {
+    settings.validate()?;
+    check_rays(rays)?;
+    let MapResolution::Fixed { width, height } = settings.map_resolution else {
+        return Err(Error::usage(
+            "--map-resolution",
+            "brute force has no footprints to choose a size by",
+            "give N or WxH in texels",
+        ));
+    };
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(settings.threads)
+        .build()
+        .map_err(|error| Error::failure("--threads", error.to_string(), "ask for fewer threads"))?;
+    pool.install(|| run(tracer, settings, rays, (width, height), progress, control))
+}
+
+/// Refuses a number of rays outside [`RAYS`].
+///
+/// # Errors
+/// Names the number and the range.
+pub fn check_rays(rays: u64) -> Result<()> {
+    if RAYS.contains(&rays) {
+        return Ok(());
+    }
+    Err(Error::usage(
+        "--rays",
+        format!("{rays} is outside {} to {:e}", RAYS.start(), *RAYS.end() as f64),
+        "give a number in that range",
+    ))
+}
+
+fn run(
+    tracer: &Tracer,
+    settings: &BakeSettings,
+    rays: u64,
+    size: (usize, usize),
+    progress: &dyn Progress,
+    control: &Control,
+) -> Result<BakeResult> {
+    let scene = tracer.scene();
+    let watch = Stopwatch::start();
+    progress.advance(Stage::Plan, 0, 1);
+    let aim = Aim::take(tracer, settings.item_buffer);
+    let plan = plan::decide(scene, settings, &aim.casters);
+    let lights: &[AimedLight] = if plan.is_on(Effect::LightPass) {
+        &aim.lights
+    } else {
+        &[]
+    };
+    let run = Run {
+        tracer,
+        limits: PathLimits {
+            max_depth: settings.max_depth,
+            branch_threshold: settings.branch_threshold,
+            absorption: plan.is_on(Effect::Absorption),
+        },
+        unit: unit(scene, lights)?,
+        targets: targets(scene, size),
+        seed: settings.seed,
+        rays_per_half: (rays as f64 / (2 * lights.len().max(1)) as f64).max(1.0),
+    };
+    let mut result = empty_result(plan, lights.is_empty());
+    for (done, light) in lights.iter().enumerate() {
+        let heard = Heard {
+            progress,
+            control,
+            done: done as u64 * HALVES as u64,
+            total: (lights.len() * HALVES) as u64,
+        };
+        let tally = run.light(light, &heard);
+        if control.is_cancelled() {
+            return Err(Error::cancelled(&scene.source));
+        }
+        result.counts.rays += tally.rays;
+        result.counts.segments += tally.segments;
+        let name = &scene.lights[light.light].name;
+        result.ledgers.push(tally.ledger.report(name, run.unit));
+    }
+    result.maps = run
+        .targets
+        .iter()
+        .flatten()
+        .filter_map(|target| target.map(run.unit))
+        .collect();
+    let seconds = watch.elapsed();
+    (result.timings_s.total, result.cpu_s.total) = (seconds.wall, seconds.cpu);
+    Ok(result)
+}
+
+/// Independent sets of rays.
+const HALVES: usize = 2;
+
+/// What all lights share.
+struct Run<'a> {
+    tracer: &'a Tracer,
+    limits: PathLimits,
+    unit: FluxUnit,
+    targets: Vec<Option<Target>>,
+    seed: u64,
+    /// Of each light, about.
+    rays_per_half: f64,
+}
+
+/// Who listens, with the half sets that are done and all.
+struct Heard<'a> {
+    progress: &'a dyn Progress,
+    control: &'a Control,
+    done: u64,
+    total: u64,
+}
+
+/// What became of a part of the rays.
+#[derive(Clone, Copy, Debug, Default)]
+struct Tally {
+    ledger: LedgerSum,
+    rays: u64,
+    segments: u64,
+}
+
+impl Tally {
+    fn merged(mut self, other: Self) -> Self {
+        self.ledger.merge(&other.ledger);
+        self.rays += other.rays;
+        self.segments += other.segments;
+        self
+    }
+}
+
+impl Run<'_> {
+    /// Both half sets of one light.
+    fn light(&self, light: &AimedLight, heard: &Heard) -> Tally {
+        let measure = light.item_buffer.marked_measure(&light.launch);
+        // Rays per steradian, or per square metre for a sun.
+        let density = self.rays_per_half / measure;
+        let size = light.launch.lattice_size(density, 1.0);
+        let faces = light.launch.face_count();
+        let rows_done = AtomicU64::new(0);
+        let rows = (faces * size.1 * HALVES) as u64;
+        (0..HALVES * faces)
+            .into_par_iter()
+            .flat_map(|face| (0..size.1).into_par_iter().map(move |row| (face, row)))
+            .map(|(half_face, row)| {
+                if heard.control.is_cancelled() {
+                    return Tally::default();
+                }
+                let (half, face) = (half_face / faces, half_face % faces);
+                let tally = self.row(light, size, (half, face, row));
+                let done = rows_done.fetch_add(1, Ordering::Relaxed) + 1;
+                let share = heard.done * rows + done * HALVES as u64;
+                heard.progress.advance(Stage::Caustic, share, heard.total * rows);
+                tally
+            })
+            .reduce(Tally::default, Tally::merged)
+    }
+
+    /// One ray, with half of its cell's flux, for each cell of a row that may see something specular.
+    fn row(&self, light: &AimedLight, size: (usize, usize), place: (usize, usize, usize)) -> Tally {
+        let (half, face, row) = place;
+        let mut paths = PathTracer::new(self.tracer, self.limits, self.unit);
+        let mut random = self.generator(light.light, place);
+        let mut tally = Tally::default();
+        let mut deposited = LedgerSum::default();
+        let cell_size = DVec2::new(1.0 / size.0 as f64, 1.0 / size.1 as f64);
+        for (start, end) in light.item_buffer.lattice_spans(face, row, size) {
+            for column in start..end {
+                let low = DVec2::new(column as f64, row as f64) * cell_size;
+                let high = DVec2::new((column + 1) as f64, (row + 1) as f64) * cell_size;
+                let square = low + (high - low) * DVec2::new(random(), random());
+                let ray = light.launch.ray(face, square);
+                let flux_w = light.launch.cell_flux_w(low, high, ray.direction) * (1.0 / HALVES as f64);
+                tally.rays += 1;
+                paths.trace(ray, flux_w, |arrival| {
+                    let count = self.unit.count(arrival.flux_w);
+                    deposited.book(self.deposit(half, &arrival, count), count);
+                });
+            }
+        }
+        tally.ledger = paths.ledger;
+        tally.ledger.merge(&deposited);
+        tally.segments = paths.segments;
+        tally
+    }
+
+    /// Uniform numbers in [0, 1): a generator per row, so that the order of the rows does not matter.
+    fn generator(&self, light: usize, (half, face, row): (usize, usize, usize)) -> impl FnMut() -> f64 {
+        let stream = (light as u64) << 40 ^ (half as u64) << 36 ^ (face as u64) << 32 ^ row as u64;
+        let mut generator = Pcg64Mcg::seed_from_u64(self.seed.rotate_left(29) ^ stream);
+        move || (generator.next_u64() >> 11) as f64 * (-53_f64).exp2()
+    }
+
+    /// Adds flux to the texel that an arrival hits; the account that it belongs to.
+    fn deposit(&self, half: usize, arrival: &Arrival, count: FluxCount) -> Account {
+        match &self.targets[arrival.object as usize] {
+            Some(target) if target.add(half, arrival, count) => Account::Deposited,
+            _ => Account::Unresolved,
+        }
+    }
+}
+
+/// The map of one surface while it is filled: flux per texel of each half set. Sums of integers do not depend on their
+/// order.
+struct Target {
+    chart: Arc<Chart>,
+    halves: [Vec<[AtomicI64; 3]>; HALVES],
+}
+
+impl Target {
+    /// Whether there was a texel to take it.
+    fn add(&self, half: usize, arrival: &Arrival, count: FluxCount) -> bool {
+        let [b, c] = arrival.barycentric.to_array();
+        let uv = self.chart.uv(arrival.triangle as usize, [1.0 - b - c, b, c]);
+        let index = |share: f64, side: usize| ((share * side as f64).max(0.0) as usize).min(side - 1);
+        let texel = index(uv.y, self.chart.height) * self.chart.width + index(uv.x, self.chart.width);
+        let covered = self.chart.texel_area_m2(texel) > 0.0;
+        if covered {
+            for (sum, channel) in self.halves[half][texel].iter().zip(count) {
+                sum.fetch_add(channel, Ordering::Relaxed);
+            }
+        }
+        covered
+    }
+
+    /// The mean of both half sets with its noise; `None` where nothing arrived.
+    fn map(&self, unit: FluxUnit) -> Option<IlluminationMap> {
+        let (mut irradiance, mut error) = (Vec::new(), Vec::new());
+        for (texel, (a, b)) in self.halves[0].iter().zip(&self.halves[1]).enumerate() {
+            let texel_area_m2 = self.chart.texel_area_m2(texel);
+            let watts = |half: &[AtomicI64; 3]| {
+                unit.flux_w(std::array::from_fn(|channel| {
+                    half[channel].load(Ordering::Relaxed)
+                }))
+            };
+            let (a, b) = (watts(a), watts(b));
+            let per_area = if texel_area_m2 > 0.0 {
+                1.0 / texel_area_m2
+            } else {
+                0.0
+            };
+            irradiance.push(((a + b) * per_area).to_array().map(|channel| channel as f32));
+            error.push(((a - b).luminance().abs() * per_area) as f32);
+        }
+        fill_gutter(&self.chart, &mut irradiance);
+        let mut map = IlluminationMap {
+            chart: self.chart.clone(),
+            layers: vec![Layer {
+                kind: LayerKind::Caustic,
+                irradiance,
+            }],
+            error: Some(error),
+            estimated_relative_rmse: None,
+        };
+        map.estimated_relative_rmse = Some(relative_noise(std::slice::from_ref(&map))?);
+        Some(map)
+    }
+}
+
+/// Empty maps of all surfaces that take light.
+fn targets(scene: &Scene, (width, height): (usize, usize)) -> Vec<Option<Target>> {
+    (0..scene.objects.len())
+        .into_par_iter()
+        .map(|object| {
+            if !scene.material_of(object).surface.is_receiver() {
+                return None;
+            }
+            let parametrisation = parametrise(object, &scene.objects[object].mesh, DEFAULT_NOMINAL_SIDE)?;
+            let empty = || (0..width * height).map(|_| Default::default()).collect();
+            Some(Target {
+                chart: Arc::new(parametrisation.chart(width, height)),
+                halves: [empty(), empty()],
+            })
+        })
+        .collect()
+}
+
+fn unit(scene: &Scene, lights: &[AimedLight]) -> Result<FluxUnit> {
+    let power_w: f64 = lights.iter().map(|light| light.launch.power_bound_w()).sum();
+    if lights.is_empty() {
+        return Ok(FluxUnit::for_power(1.0));
+    }
+    if power_w.is_finite() && power_w > 0.0 {
+        return Ok(FluxUnit::for_power(power_w));
+    }
+    Err(Error::failure(
+        &scene.source,
+        format!("its lights send {power_w:e} W together"),
+        "give them intensities whose sum is a finite number above zero",
+    ))
+}
+
+fn empty_result(plan: EffectPlan, nothing_to_do: bool) -> BakeResult {
+    BakeResult {
+        maps: Vec::new(),
+        plan,
+        ledgers: Vec::new(),
+        counts: BakeCounts::default(),
+        timings_s: Timings::default(),
+        cpu_s: Timings::default(),
+        stop_reason: if nothing_to_do {
+            StopReason::NothingToDo
+        } else {
+            StopReason::Density
+        },
+        partial: false,
+        warnings: Vec::new(),
+    }
+}
+
+/// Noise of all maps together: the root mean square of their standard errors over their mean, by area; `None` where
+/// nothing was lit, or a map has no error.
+pub fn relative_noise(maps: &[IlluminationMap]) -> Option<f64> {
+    let (mut area_m2, mut flux_w, mut squares) = (0.0, 0.0, 0.0);
+    for map in maps {
+        let error = map.error.as_ref()?;
+        for (texel, deviation) in error.iter().enumerate() {
+            let texel_area_m2 = map.chart.texel_area_m2(texel);
+            area_m2 += texel_area_m2;
+            squares += f64::from(*deviation).powi(2) * texel_area_m2;
+        }
+        flux_w += map.flux_w(LayerKind::Caustic).luminance();
+    }
+    (flux_w > 0.0).then(|| (squares / area_m2).sqrt() * area_m2 / flux_w)
+}

@@ -1,0 +1,226 @@
+//! Studies: tables and plots that say what they hold, references with their noise, nothing half-written.
+
+use crate::program::{Run, Sandbox};
+
+const TINY: &str =
+    "study convergence builtin:mirror -o out --densities 1e3,1e4 --repeat 1 --map-resolution 32";
+
+/// Columns of a table and its rows, by name.
+fn read_table(sandbox: &Sandbox, file: &str) -> (Vec<String>, Vec<Vec<String>>) {
+    let text = std::fs::read_to_string(sandbox.path(file)).expect("a table");
+    let mut lines = text
+        .lines()
+        .map(|line| line.split(',').map(str::to_string).collect::<Vec<String>>());
+    (lines.next().expect("a header"), lines.collect())
+}
+
+fn column(table: &(Vec<String>, Vec<Vec<String>>), name: &str) -> Vec<String> {
+    let index = table.0.iter().position(|column| column == name);
+    let index = index.unwrap_or_else(|| panic!("no column {name} in {:?}", table.0));
+    table.1.iter().map(|row| row[index].clone()).collect()
+}
+
+fn numbers(table: &(Vec<String>, Vec<Vec<String>>), name: &str) -> Vec<f64> {
+    let parse = |text: String| text.parse().unwrap_or_else(|_| panic!("{name} is {text}"));
+    column(table, name).into_iter().map(parse).collect()
+}
+
+fn rmse(run: &Run) -> f64 {
+    run.json()["relative_rmse"].as_f64().expect("an error")
+}
+
+#[test]
+fn studies_are_listed_and_have_to_be_named() {
+    let sandbox = Sandbox::new();
+    let list = sandbox.succeed("study --list");
+    for study in ["convergence", "reference"] {
+        assert!(list.stdout.contains(study), "{}", list.stdout);
+    }
+    assert_eq!(
+        sandbox.succeed("study --list --json").json()[0]["name"],
+        "convergence"
+    );
+    for (line, word) in [
+        ("study", "--list"),
+        ("study rainbows -o out", "rainbows"),
+        ("study convergence", "--output"),
+        ("study convergence -o out --densities 1e4,1e3", "ascending"),
+        ("study convergence -o out --densities 0", "--densities"),
+        ("study convergence -o out --densities few", "--densities"),
+        ("study convergence -o out --repeat 0", "--repeat"),
+        ("study convergence -o out --quick --repeat 3", "--quick"),
+        ("study convergence -o out --surface floor", "--reference"),
+        (
+            "study convergence -o out --map-resolution auto",
+            "--map-resolution",
+        ),
+        ("study convergence -o out --estimators guess", "guess"),
+        ("study reference builtin:ring -o out", "--rays"),
+        ("study reference builtin:ring -o out --rays 10", "--rays"),
+        ("study reference builtin:ring -o out --rays -1", "--rays"),
+        (
+            "study reference builtin:ring -o out --rays 1e4 --map-resolution auto",
+            "--map-resolution",
+        ),
+    ] {
+        sandbox.run(line).failed_in_one_sentence(2, &[word]);
+    }
+    assert!(sandbox.files(".").is_empty(), "bad usage writes nothing");
+}
+
+#[test]
+fn convergence_writes_a_row_per_estimator_and_density() {
+    let sandbox = Sandbox::new();
+    let run = sandbox.succeed(TINY);
+    assert_eq!(sandbox.files("out"), ["convergence.csv", "convergence.svg"]);
+    let table = read_table(&sandbox, "out/convergence.csv");
+    let estimators = column(&table, "estimator");
+    for estimator in ["splat", "wavefront"] {
+        let rows = estimators.iter().filter(|name| *name == estimator).count();
+        assert_eq!(rows, 2, "{estimator} at two densities");
+        assert!(run.stdout.contains(estimator), "{}", run.stdout);
+    }
+    assert!(
+        column(&table, "reference")
+            .iter()
+            .all(|kind| kind == "analytic S5")
+    );
+    for (name, low, high) in [
+        ("rays", 1.0, 1e6),
+        ("cpu_light_pass_s", 1e-9, 1e3),
+        ("relative_rmse", 1e-9, 1.0),
+        ("ard", 1e-9, 1.0),
+        ("peak_ratio", 0.3, 3.0),
+        ("flux_ratio", 0.9, 1.1),
+    ] {
+        for value in numbers(&table, name) {
+            assert!((low..high).contains(&value), "{name} is {value}");
+        }
+    }
+    let plot = std::fs::read_to_string(sandbox.path("out/convergence.svg")).expect("a plot");
+    assert!(plot.starts_with("<svg") && plot.trim_end().ends_with("</svg>"));
+    for word in ["splat", "wavefront", "light rays", "relative RMSE", "analytic S5"] {
+        assert!(plot.contains(word), "no {word} in the plot");
+    }
+}
+
+#[test]
+fn its_errors_are_those_that_compare_prints() {
+    let sandbox = Sandbox::new();
+    sandbox.succeed(TINY);
+    let table = read_table(&sandbox, "out/convergence.csv");
+    let row = column(&table, "estimator")
+        .iter()
+        .zip(numbers(&table, "density"))
+        .position(|(name, density)| name == "splat" && density > 5e3)
+        .expect("a row");
+    sandbox.succeed("bake builtin:mirror -o maps --estimator splat --density 1e4 --map-resolution 32");
+    let reference = concat!(env!("CARGO_MANIFEST_DIR"), "/assets/reference/S5.pfm");
+    let manifest = sandbox.manifest("maps");
+    let file = manifest["maps"][0]["file"].as_str().expect("a path").to_string();
+    let expected = rmse(&sandbox.succeed(&format!("compare maps/{file} {reference} --json")));
+    let measured = numbers(&table, "relative_rmse")[row];
+    assert!(
+        (measured / expected - 1.0).abs() < 1e-6,
+        "{measured}, not {expected}"
+    );
+    // The same from a reference that is given.
+    sandbox.succeed(&format!(
+        "study convergence builtin:mirror -o given --densities 1e4 --estimators splat --quick --map-resolution 32 \
+         --reference {reference} --surface floor"
+    ));
+    let given = numbers(&read_table(&sandbox, "given/convergence.csv"), "relative_rmse");
+    assert!(
+        (given[0] / expected - 1.0).abs() < 1e-6,
+        "{given:?}, not {expected}"
+    );
+}
+
+#[test]
+fn a_scene_without_reference_is_measured_against_a_finer_bake() {
+    let sandbox = Sandbox::new();
+    let run = sandbox.succeed(
+        "study convergence builtin:showroom -o out --densities 1e2,1e3 --estimators splat --quick \
+         --map-resolution 16 --json",
+    );
+    let document = run.json();
+    let reference = document["reference"].as_str().expect("a reference");
+    assert!(reference.starts_with("self splat"), "{reference}");
+    assert_eq!(document["costs"].as_array().map(Vec::len), Some(3));
+    let error = |row: usize| {
+        document["measurements"][row]["relative_rmse"]
+            .as_f64()
+            .expect("an error")
+    };
+    assert!(error(1) < error(0), "{} then {}", error(0), error(1));
+}
+
+#[test]
+fn what_cannot_be_studied_is_said_and_writes_nothing() {
+    let sandbox = Sandbox::new();
+    std::fs::create_dir(sandbox.path("photos")).expect("writable");
+    sandbox.write("photos/cat.jpg", "a cat");
+    sandbox.write("odd.pfm", "Pf\n3 3\n-1.0\nabcdabcdabcdabcdabcdabcdabcdabcdabcd");
+    for (line, words) in [
+        (
+            "study convergence builtin:mirror -o photos --quick",
+            vec!["photos", "--force"],
+        ),
+        (
+            "study convergence missing.glb -o new --quick",
+            vec!["missing.glb"],
+        ),
+        (
+            "study convergence builtin:mirror -o new --reference missing.pfm",
+            vec!["missing.pfm"],
+        ),
+        (
+            "study convergence builtin:mirror -o new --densities 1e2 --quick --reference odd.pfm",
+            vec!["odd.pfm", "multiples"],
+        ),
+        (
+            "study convergence builtin:mirror -o new --reference odd.pfm --surface cellar",
+            vec!["cellar", "--surface"],
+        ),
+        (
+            "study reference builtin:mirror -o photos --rays 1e4",
+            vec!["photos", "--force"],
+        ),
+    ] {
+        sandbox.run(line).failed_in_one_sentence(1, &words);
+    }
+    assert_eq!(sandbox.files("."), ["odd.pfm", "photos"]);
+    assert_eq!(sandbox.files("photos"), ["cat.jpg"]);
+}
+
+#[test]
+fn an_earlier_study_is_replaced() {
+    let sandbox = Sandbox::new();
+    let line = "study convergence builtin:mirror -o out --estimators splat --quick --map-resolution 16";
+    sandbox.succeed(&format!("{line} --densities 1e2"));
+    sandbox.write("out/notes.txt", "keep me");
+    sandbox.succeed(&format!("{line} --densities 1e2,1e3"));
+    assert_eq!(read_table(&sandbox, "out/convergence.csv").1.len(), 2);
+    assert_eq!(
+        sandbox.files("out"),
+        ["convergence.csv", "convergence.svg", "notes.txt"]
+    );
+}
+
+#[test]
+fn references_are_maps_that_know_their_noise() {
+    let sandbox = Sandbox::new();
+    let run = sandbox.succeed("study reference builtin:mirror -o out --rays 2e5 --map-resolution 32 --json");
+    assert_eq!(sandbox.files("out"), ["manifest.json", "maps", "reference.json"]);
+    let noise = run.json()["noise"].as_f64().expect("a noise");
+    let manifest = sandbox.manifest("out");
+    let file = manifest["maps"][0]["file"].as_str().expect("a path").to_string();
+    let analytic = concat!(env!("CARGO_MANIFEST_DIR"), "/assets/reference/S5.pfm");
+    let error = rmse(&sandbox.succeed(&format!("compare out/{file} {analytic} --json")));
+    assert!(
+        (0.75..1.33).contains(&(error / noise)),
+        "off by {error}, but the noise is said to be {noise}"
+    );
+    // A folder of maps as any other.
+    sandbox.succeed("render builtin:mirror -o picture.png --maps out --backend cpu --size 32x18");
+}

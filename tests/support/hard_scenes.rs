@@ -1,0 +1,303 @@
+//! Scenes that estimators find hard: coarse and faceted meshes, blockers, silhouettes within one surface, grazing
+//! light, small casters, several receivers. Metres, watts, y up; each has one light, and receivers named `floor`,
+//! `wall`, `blocker`, …
+
+use std::f64::consts::{PI, TAU};
+
+use glam::{DMat3, DVec3};
+use nephroid::optics::LinearSrgb;
+use nephroid::scene::builtin::{parts, shapes};
+use nephroid::scene::{Material, Mesh, Scene};
+use nephroid::units::{Flux, Irradiance};
+
+/// How normals run over a mesh.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Shading {
+    /// The exact surface's.
+    Smooth,
+    /// Each triangle's own.
+    Flat,
+}
+
+/// Built-in `ring` (oracle S1) with another number of segments.
+pub fn ring(segments: u32, shading: Shading) -> Scene {
+    let name = format!("ring_{segments}_{shading:?}").to_lowercase();
+    let mut scene = named(&name, parts::reference_scene(1.0));
+    let smooth = shapes::sheet(segments, 1, |u, v| {
+        let (sine, cosine) = (TAU * u.fract()).sin_cos();
+        let outward = DVec3::new(cosine, 0.0, sine);
+        (outward + DVec3::Y * (0.5 * v), -outward)
+    });
+    let mesh = match shading {
+        Shading::Smooth => smooth,
+        Shading::Flat => flat(&smooth),
+    };
+    parts::add(&mut scene, "ring", mesh, parts::mirror());
+    lamp(&mut scene, DVec3::new(-0.7, 1.2, 0.0));
+    scene
+}
+
+/// The ring with a box in the light's way to its far wall.
+pub fn ring_with_blocker() -> Scene {
+    let mut scene = ring(256, Shading::Smooth);
+    blocker(
+        &mut scene,
+        DVec3::new(0.05, 0.6, -0.15),
+        DVec3::new(0.2, 0.8, 0.1),
+    );
+    scene.name = "ring_with_blocker".into();
+    scene
+}
+
+/// Built-in `ball` (oracle S2) of 20,480 triangles.
+pub fn ball() -> Scene {
+    let mut scene = named("ball", parts::reference_scene(0.6));
+    glass_ball(&mut scene, DVec3::new(0.0, 0.8, 0.0), 0.5, 5);
+    lamp(&mut scene, DVec3::new(0.0, 3.0, 0.0));
+    scene
+}
+
+/// The ball with a box in its converging light, off the axis.
+pub fn ball_with_blocker() -> Scene {
+    let mut scene = ball();
+    blocker(
+        &mut scene,
+        DVec3::new(0.03, 0.1, -0.06),
+        DVec3::new(0.15, 0.14, 0.05),
+    );
+    scene.name = "ball_with_blocker".into();
+    scene
+}
+
+/// A tilted torus that hides a part of itself from the lamp.
+pub fn torus(material: Material) -> Scene {
+    let name = format!("{}_torus", material.name);
+    let mut scene = named(&name, parts::reference_scene(1.0));
+    let tilt = DMat3::from_rotation_x(0.5) * DMat3::from_rotation_z(0.3);
+    let (ring_m, tube_m) = (0.35, 0.14);
+    let mesh = shapes::sheet(128, 64, |u, v| {
+        let ((sine_u, cosine_u), (sine_v, cosine_v)) =
+            ((TAU * u.fract()).sin_cos(), (TAU * v.fract()).sin_cos());
+        let outward = DVec3::new(cosine_u, 0.0, sine_u);
+        let normal = outward * cosine_v + DVec3::Y * sine_v;
+        let point = outward * ring_m + normal * tube_m;
+        (DVec3::new(0.0, 0.6, 0.0) + tilt * point, tilt * normal)
+    });
+    parts::add(&mut scene, "torus", mesh, material);
+    lamp(&mut scene, DVec3::new(0.5, 2.0, 0.3));
+    scene
+}
+
+/// Waves under a sun 10 degrees above the horizon, which hide parts of one another.
+pub fn grazing_pool() -> Scene {
+    let mut scene = named("grazing_pool", parts::reference_scene(1.0));
+    // (kx, kz, phase) of waves of 2 cm.
+    let waves = [(9.0, 0.0, 1.0), (0.0, 7.0, 2.0), (6.0, 5.0, 0.0)];
+    let water = shapes::sheet(320, 192, |u, v| {
+        let (x, z) = (-3.0 + 5.0 * u, -1.5 + 3.0 * v);
+        let (mut height, mut slope_x, mut slope_z) = (1.0, 0.0, 0.0);
+        for (kx, kz, phase) in waves {
+            let (sine, cosine) = f64::sin_cos(kx * x + kz * z + phase);
+            height += 0.02 * cosine;
+            slope_x -= 0.02 * kx * sine;
+            slope_z -= 0.02 * kz * sine;
+        }
+        (
+            DVec3::new(x, height, z),
+            DVec3::new(-slope_x, 1.0, -slope_z).normalize(),
+        )
+    });
+    parts::add(&mut scene, "water", water, parts::dielectric("water", 1.333));
+    let (sine, cosine) = 10.0_f64.to_radians().sin_cos();
+    sun(&mut scene, DVec3::new(cosine, -sine, 0.0));
+    scene
+}
+
+/// A mirror bowl on its side with the lamp within: light leaves it after one reflection or several.
+pub fn mirror_bowl() -> Scene {
+    let mut scene = named("mirror_bowl", parts::reference_scene(1.0));
+    let tilt = DMat3::from_rotation_z(2.2);
+    let centre = DVec3::new(-0.2, 0.8, 0.0);
+    let inside = cap(96, 48, |direction| {
+        (centre + tilt * direction * 0.5, -(tilt * direction))
+    });
+    parts::add(&mut scene, "bowl", inside, parts::mirror());
+    lamp(&mut scene, centre + DVec3::new(0.1, -0.05, 0.07));
+    scene
+}
+
+/// A glass bowl, open above, with the lamp over its rim.
+pub fn glass_bowl() -> Scene {
+    let mut scene = named("glass_bowl", parts::reference_scene(1.0));
+    let (centre, outer_m, inner_m) = (DVec3::new(0.0, 0.65, 0.0), 0.5, 0.44);
+    let mut bowl = cap(96, 48, |direction| (centre + direction * outer_m, direction));
+    append(
+        &mut bowl,
+        &cap(96, 48, |direction| (centre + direction * inner_m, -direction)),
+    );
+    let rim = shapes::sheet(96, 1, |u, v| {
+        let (sine, cosine) = (TAU * u.fract()).sin_cos();
+        let radius = inner_m + (outer_m - inner_m) * v;
+        (centre + DVec3::new(cosine, 0.0, sine) * radius, DVec3::Y)
+    });
+    append(&mut bowl, &rim);
+    parts::add(&mut scene, "bowl", bowl, parts::dielectric("glass", 1.5));
+    lamp(&mut scene, centre + DVec3::new(0.15, 0.6, 0.1));
+    scene
+}
+
+/// A glass ball ground to 320 flat facets.
+pub fn cut_glass() -> Scene {
+    let mut scene = named("cut_glass", parts::reference_scene(1.0));
+    let facets = flat(&shapes::sphere(DVec3::new(0.0, 0.7, 0.0), 0.4, 2));
+    parts::add(&mut scene, "gem", facets, parts::dielectric("glass", 1.5));
+    lamp(&mut scene, DVec3::new(0.3, 2.5, 0.1));
+    scene
+}
+
+/// Parts of [`tiny_ball`]; neither's light meets the other.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TinyBall {
+    /// A ball and a mirror.
+    Both,
+    /// The ball alone.
+    Ball,
+    /// The mirror alone.
+    Mirror,
+}
+
+/// A glass ball 0.45 mm wide, a hundredth of a lattice cell at 10³ rays per steradian, beside a mirror of 0.4 m under
+/// one sun.
+pub fn tiny_ball(parts_of: TinyBall) -> Scene {
+    let name = match parts_of {
+        TinyBall::Both => "tiny_ball_and_mirror",
+        TinyBall::Ball => "tiny_ball",
+        TinyBall::Mirror => "mirror_of_the_tiny_ball",
+    };
+    let mut scene = named(name, parts::reference_scene(0.6));
+    if parts_of != TinyBall::Mirror {
+        glass_ball(&mut scene, DVec3::new(-0.3, 0.3, 0.0), 0.000_225, 4);
+    }
+    if parts_of != TinyBall::Ball {
+        let mirror = shapes::rectangle(
+            DVec3::new(0.55, 0.35, 0.0),
+            DVec3::new(0.03, 0.2, 0.0),
+            DVec3::Z * 0.2,
+        );
+        parts::add(&mut scene, "mirror", mirror, parts::mirror());
+    }
+    sun(&mut scene, DVec3::new(0.5, -1.0, 0.05));
+    scene
+}
+
+/// A ball that lights another.
+pub fn balls_in_series() -> Scene {
+    let mut scene = named("balls_in_series", parts::reference_scene(0.6));
+    glass_ball(&mut scene, DVec3::new(0.02, 1.4, 0.0), 0.3, 4);
+    glass_ball(&mut scene, DVec3::new(-0.03, 0.6, 0.02), 0.25, 4);
+    lamp(&mut scene, DVec3::new(0.1, 3.0, 0.05));
+    scene
+}
+
+/// The ball over a floor, before a wall and over a table of two colours.
+pub fn ball_in_a_room() -> Scene {
+    let mut scene = ball();
+    let wall = shapes::rectangle(DVec3::new(-0.6, 0.6, 0.0), DVec3::Z * -0.6, DVec3::Y * 0.6);
+    let matte = |name| parts::matte(name, LinearSrgb::grey(0.5));
+    parts::add(&mut scene, "wall", wall, matte("wall"));
+    let table = shapes::cuboid(DVec3::new(0.05, 0.15, -0.4), DVec3::new(0.5, 0.19, 0.3));
+    parts::add(&mut scene, "table", table, matte("table"));
+    scene.name = "ball_in_a_room".into();
+    scene
+}
+
+/// The scene with its floor turned by 30 degrees about an axis through its middle.
+pub fn with_tilted_floor(mut scene: Scene) -> Scene {
+    let tilt = DMat3::from_axis_angle(DVec3::new(0.6, 0.0, 0.8), PI / 6.0);
+    for object in scene.objects.iter_mut().filter(|object| object.name == "floor") {
+        let mesh = &mut object.mesh;
+        mesh.positions.iter_mut().for_each(|p| *p = tilt * *p);
+        mesh.normals.iter_mut().for_each(|n| *n = tilt * *n);
+    }
+    scene.name += "_over_a_tilted_floor";
+    scene
+}
+
+/// The scene with its floor cut in two objects along x = 7 % of its half width.
+pub fn with_cut_floor(mut scene: Scene) -> Scene {
+    let floor = scene
+        .objects
+        .iter()
+        .position(|object| object.name == "floor")
+        .expect("a floor");
+    let half = scene.objects[floor].mesh.positions[2].x.abs();
+    let (cut, z) = (0.07 * half, [-half, half]);
+    scene.objects[floor].mesh = shapes::floor([-half, cut], z, 0.0);
+    let material = scene.objects[floor].material;
+    parts::add_with(
+        &mut scene,
+        "other floor",
+        shapes::floor([cut, half], z, 0.0),
+        material,
+    );
+    scene.name += "_over_a_cut_floor";
+    scene
+}
+
+/// The mesh with corners of its own for each triangle, and the triangle's normal at each.
+pub fn flat(mesh: &Mesh) -> Mesh {
+    let mut facets = Mesh::default();
+    for triangle in 0..mesh.triangles.len() {
+        let first = facets.positions.len() as u32;
+        facets.positions.extend(mesh.corners(triangle));
+        facets.normals.extend([mesh.face_normal(triangle); 3]);
+        facets.triangles.push([first, first + 1, first + 2]);
+    }
+    facets
+}
+
+fn named(name: &str, mut scene: Scene) -> Scene {
+    scene.name = name.into();
+    scene.source = format!("test:{name}");
+    scene
+}
+
+/// A point light of 100 W.
+fn lamp(scene: &mut Scene, position: DVec3) {
+    scene
+        .lights
+        .push(parts::point_light("light", position, Flux(100.0)));
+}
+
+/// A sun of 1 W/m².
+fn sun(scene: &mut Scene, direction: DVec3) {
+    scene.lights.push(parts::sun("light", direction, Irradiance(1.0)));
+}
+
+fn glass_ball(scene: &mut Scene, centre: DVec3, radius: f64, levels: u32) {
+    let name = format!("ball {}", scene.objects.len());
+    let mesh = shapes::sphere(centre, radius, levels);
+    parts::add(scene, &name, mesh, parts::dielectric("glass", 1.5));
+}
+
+fn blocker(scene: &mut Scene, low: DVec3, high: DVec3) {
+    let material = parts::matte("blocker", LinearSrgb::grey(0.5));
+    parts::add(scene, "blocker", shapes::cuboid(low, high), material);
+}
+
+/// The lower half of a sphere: `surface` gives position and normal of a direction.
+fn cap(columns: u32, rows: u32, surface: impl Fn(DVec3) -> (DVec3, DVec3)) -> Mesh {
+    shapes::sheet(columns, rows, |u, v| {
+        let (sine_u, cosine_u) = (TAU * u.fract()).sin_cos();
+        let (sine_v, cosine_v) = (0.5 * PI * v).sin_cos();
+        surface(DVec3::new(sine_v * cosine_u, -cosine_v, sine_v * sine_u))
+    })
+}
+
+fn append(mesh: &mut Mesh, part: &Mesh) {
+    let offset = mesh.positions.len() as u32;
+    mesh.positions.extend(&part.positions);
+    mesh.normals.extend(&part.normals);
+    mesh.triangles
+        .extend(part.triangles.iter().map(|t| t.map(|vertex| vertex + offset)));
+}
