@@ -60,6 +60,7 @@ impl CausticLayer<'_> {
         let total = lattices.iter().map(WavefrontLattice::cell_count).sum();
         let receivers = Receivers::new(self.tracer, &chart_for);
         let reference_w = self.reference_w();
+        let coarseness = self.settings.max_error.map_or(1.0, Refinement::coarseness);
         let refinement = self
             .settings
             .max_error
@@ -76,6 +77,7 @@ impl CausticLayer<'_> {
                     ..lattice
                 },
                 reference_w,
+                coarseness,
             };
             let listener = Listener {
                 progress,
@@ -161,6 +163,7 @@ impl CausticLayer<'_> {
                 chart_for,
                 lattice,
                 reference_w: self.reference_w(),
+                coarseness: 1.0,
             };
             let listener = Listener {
                 progress: &(),

@@ -52,6 +52,11 @@ impl<'a> Refinement<'a> {
         (40.0 / target).clamp(400.0, 40_000.0)
     }
 
+    /// How coarse triangles may be for a target, relative to those of a bake without one.
+    pub fn coarseness(target: f64) -> f64 {
+        (target / 0.04).clamp(0.1, 2.0)
+    }
+
     /// Whether a cell has to be divided. Per strand: those of its corners that have it, in the cell's order around,
     /// and their places in the unit square; `area` of the cell in the unit square; `level` how often it was divided.
     pub fn is_too_coarse<'s>(

@@ -54,19 +54,36 @@ pub struct Spreader<'a> {
     pub absorption: bool,
     /// Flux that all lights send to specular surfaces [W, luminance]: over a map, about its mean irradiance.
     pub reference_w: f64,
+    /// How much coarser (> 1) or finer triangles may be than is usual.
+    pub coarseness: f64,
 }
 
 /// What patches became.
 #[derive(Clone, Debug, Default)]
 pub struct SpreadOutput {
-    /// Object and triangle on its map.
-    pub triangles: Vec<(u32, FluxTriangle)>,
+    /// By object: triangles on its map.
+    pub triangles: Vec<(u32, Vec<FluxTriangle>)>,
     /// Escaped, absorbed on the way, passed on.
     pub ledger: LedgerSum,
     /// Rays between traced ones that were intersected with receivers.
     pub queries: u64,
     /// Sizes of lit areas.
     pub statistics: FootprintStatistics,
+}
+
+impl SpreadOutput {
+    fn push(&mut self, object: u32, triangle: FluxTriangle) {
+        // A handful of objects, most often the last one.
+        let list = match self.triangles.iter().rposition(|(of, _)| *of == object) {
+            Some(index) => &mut self.triangles[index].1,
+            None => {
+                self.triangles.push((object, Vec::new()));
+                let last = self.triangles.len() - 1;
+                &mut self.triangles[last].1
+            }
+        };
+        list.push(triangle);
+    }
 }
 
 /// Where all of a patch goes, as its traced corners say.
@@ -293,9 +310,9 @@ impl Spreader<'_> {
         let mean_w = self.reference_w / texels;
         let local_w = flux_w / lit_texels.max(1.0);
         if local_w > 0.0 {
-            (mean_w / local_w).sqrt().clamp(1.0, COARSEST_TOLERANCE)
+            self.coarseness * (mean_w / local_w).sqrt().clamp(1.0, COARSEST_TOLERANCE)
         } else {
-            COARSEST_TOLERANCE
+            self.coarseness * COARSEST_TOLERANCE
         }
     }
 
@@ -526,7 +543,7 @@ impl Spread<'_, '_> {
                     flux: deposit,
                     island,
                 };
-                self.out.triangles.push((object, triangle));
+                self.out.push(object, triangle);
             }
         }
     }
