@@ -10,6 +10,8 @@ mod coverage;
 mod energy;
 #[path = "bake/hard_cases.rs"]
 mod hard_cases;
+#[path = "bake/hard_cases_open.rs"]
+mod hard_cases_open;
 #[path = "support/hard_scenes.rs"]
 mod hard_scenes;
 #[path = "bake/invariance.rs"]
@@ -22,6 +24,8 @@ mod layers;
 mod reference;
 #[path = "bake/smoothing.rs"]
 mod smoothing;
+#[path = "bake/stored_references.rs"]
+mod stored_references;
 #[path = "support/mod.rs"]
 mod support;
 #[path = "bake/tools.rs"]
