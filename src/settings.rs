@@ -145,6 +145,9 @@ pub struct BakeSettings {
     pub estimator: Estimator,
     /// Light rays per steradian [1/sr]; for suns density/D² rays per m².
     pub density_per_sr: f64,
+    /// Target for the relative RMSE of maps, > 0: the lattice of `density_per_sr` is refined where that needs it
+    /// (wavefront). `None`: exactly that lattice.
+    pub max_error: Option<f64>,
     /// Lattice or jittered.
     pub rays: RayPlacement,
     /// Spread of the gaussian.
@@ -182,6 +185,7 @@ impl Default for BakeSettings {
         Self {
             estimator: Estimator::Wavefront,
             density_per_sr: Estimator::Wavefront.preview_density_per_sr(),
+            max_error: None,
             rays: RayPlacement::Lattice,
             sigma: Estimator::Wavefront.default_sigma(),
             kernel: Kernel::Gaussian,
@@ -245,6 +249,9 @@ impl BakeSettings {
             }
         };
         finite_in("--density", self.density_per_sr, 1.0, 1e12)?;
+        if let Some(target) = self.max_error {
+            finite_in("--max-error", target, 1e-4, 1.0)?;
+        }
         match (self.estimator, self.sigma) {
             (Estimator::Wavefront, Sigma::Constant(sigma)) => finite_in("--sigma", sigma, 0.0, 1e4)?,
             (Estimator::Splat, Sigma::Constant(sigma)) => finite_in("--sigma", sigma, 1e-6, 1e4)?,

@@ -2,6 +2,7 @@
 
 use clap::{Args, ValueEnum};
 use nephroid::error::{Error, Result};
+use nephroid::light_pass::wavefront::refine::Refinement;
 use nephroid::settings::{
     BakeSettings, Estimator, Footprint, ItemBufferKind, Kernel, KernelSampling, LayerKind, MapResolution,
     RayPlacement, Sigma,
@@ -46,6 +47,10 @@ pub struct BakeOptions {
     /// farthest receiver
     #[arg(long, value_name = "RAYS_PER_SR", allow_negative_numbers = true)]
     density: Option<f64>,
+    /// Target for the relative RMSE of the maps: refines the lattice where that needs it (wavefront); without
+    /// --density, from a coarse one
+    #[arg(long, value_name = "SHARE", value_parser = values::share, allow_hyphen_values = true)]
+    max_error: Option<f64>,
     /// Where in its lattice cell a light ray starts (splat) [default: lattice]
     #[arg(long, value_enum, value_name = "PLACEMENT")]
     rays: Option<RayPlacement>,
@@ -103,8 +108,10 @@ impl BakeOptions {
         layers.dedup();
         let settings = BakeSettings {
             estimator,
+            max_error: self.max_error,
             density_per_sr: self
                 .density
+                .or(self.max_error.map(Refinement::starting_density_per_sr))
                 .unwrap_or_else(|| self.preset.unwrap_or_default().density_per_sr(estimator)),
             rays: self.rays.unwrap_or(defaults.rays),
             sigma: self.sigma.unwrap_or(defaults.sigma),
@@ -137,6 +144,13 @@ impl BakeOptions {
                 *option,
                 "only the splat estimator has it",
                 format!("leave {option} out or add --estimator splat"),
+            ));
+        }
+        if let (Estimator::Splat, Some(_)) = (estimator, self.max_error) {
+            return Err(Error::usage(
+                "--max-error",
+                "only the wavefront estimator refines towards a target",
+                "leave --max-error out or use --estimator wavefront",
             ));
         }
         let kernel = self.kernel.unwrap_or(BakeSettings::default().kernel);

@@ -13,6 +13,15 @@ pub fn sigma(text: &str) -> Result<Sigma, String> {
     }
 }
 
+/// `2%` or `0.02`.
+pub fn share(text: &str) -> Result<f64, String> {
+    let number = match text.strip_suffix('%') {
+        Some(percent) => percent.trim().parse::<f64>().map(|percent| percent / 100.0),
+        None => text.parse(),
+    };
+    number.map_err(|_| "give a share such as 2% or 0.02".to_string())
+}
+
 /// `auto`, `N` (square) or `WxH` [texels].
 pub fn map_resolution(text: &str) -> Result<MapResolution, String> {
     if text == "auto" {

@@ -9,6 +9,7 @@ use super::caustic::splat::Coverage;
 use crate::illumination::Chart;
 use crate::illumination::accumulator::FluxAccumulator;
 use crate::illumination::islands::Islands;
+use crate::illumination::smoothing::smooth;
 use crate::scene::Scene;
 
 /// One surface's map with its flux.
@@ -67,6 +68,18 @@ impl ReceiverMaps {
         match &self.slots[object] {
             Slot::Allocated(map) => Some(map),
             Slot::Untouched | Slot::Refused => None,
+        }
+    }
+
+    /// Smooths all maps by a gaussian [texels, standard deviation]; nothing at 0. Maps with gaps are left as they are:
+    /// their borders are no mirrors.
+    pub fn smooth(&mut self, spread_texels: f64) {
+        for slot in &mut self.slots {
+            if let Slot::Allocated(map) = slot
+                && map.chart.texel_areas_m2.len() == 1
+            {
+                smooth(&mut map.levels[0], spread_texels);
+            }
         }
     }
 

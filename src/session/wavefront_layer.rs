@@ -17,9 +17,10 @@ use crate::light_pass::receiver_maps::{ChartFor, ReceiverMaps};
 use crate::light_pass::wavefront::lattice::WavefrontLattice;
 use crate::light_pass::wavefront::pass::WavefrontDepositor;
 use crate::light_pass::wavefront::receivers::Receivers;
+use crate::light_pass::wavefront::refine::Refinement;
 use crate::light_pass::wavefront::trace::StrandTracer;
 use crate::progress::{Control, Progress};
-use crate::settings::MapResolution;
+use crate::settings::{MapResolution, Sigma};
 
 impl CausticLayer<'_> {
     /// Traces and deposits all lights.
@@ -59,6 +60,11 @@ impl CausticLayer<'_> {
         let total = lattices.iter().map(WavefrontLattice::cell_count).sum();
         let receivers = Receivers::new(self.tracer, &chart_for);
         let reference_w = self.reference_w();
+        let coarseness = self.settings.max_error.map_or(1.0, Refinement::coarseness);
+        let refinement = self
+            .settings
+            .max_error
+            .map(|target| Refinement::new(&receivers, reference_w, target, total));
         let kept = std::mem::take(&mut cache.lights);
         let is_kept = kept.len() == lattices.len();
         let mut keep_bytes = WavefrontCache::limit_bytes(self.settings);
@@ -66,8 +72,12 @@ impl CausticLayer<'_> {
             let depositor = WavefrontDepositor {
                 receivers: &receivers,
                 chart_for: &chart_for,
-                lattice,
+                lattice: WavefrontLattice {
+                    refinement: refinement.as_ref(),
+                    ..lattice
+                },
                 reference_w,
+                coarseness,
             };
             let listener = Listener {
                 progress,
@@ -92,6 +102,11 @@ impl CausticLayer<'_> {
         }
         if is_kept {
             cache.lights = kept;
+        }
+        if let Sigma::Constant(sigma) = self.settings.sigma {
+            // A texel is a footprint of its own area: a disc of radius 1/√π.
+            let spread_texels = (sigma / std::f64::consts::PI).sqrt();
+            clock.time(|clock| &mut clock.deposit, || maps.smooth(spread_texels));
         }
         outcome.maps = Some((maps, unit));
         Ok(outcome)
@@ -125,6 +140,7 @@ impl CausticLayer<'_> {
             item_buffer: &light.item_buffer,
             size: lattice.size,
             unit,
+            refinement: None,
         }
     }
 
@@ -147,6 +163,7 @@ impl CausticLayer<'_> {
                 chart_for,
                 lattice,
                 reference_w: self.reference_w(),
+                coarseness: 1.0,
             };
             let listener = Listener {
                 progress: &(),

@@ -1,5 +1,7 @@
 //! The traced samples of some rows of cells, in chunks that parallel tasks fill on their own.
 
+use std::collections::HashMap;
+
 use glam::DVec2;
 
 use super::strand::{LightSample, Strand};
@@ -50,6 +52,8 @@ pub struct Workspace<'a> {
     pub chunk: u32,
     /// Traced by this task.
     pub own: Vec<LightSample>,
+    /// Where this task traced already: cells share corners and edges.
+    known: HashMap<[u64; 2], SampleId>,
 }
 
 impl<'a> Workspace<'a> {
@@ -59,7 +63,19 @@ impl<'a> Workspace<'a> {
             shared,
             chunk: chunk as u32,
             own: Vec::new(),
+            known: HashMap::new(),
         }
+    }
+
+    /// The sample at a place of the unit square; traced unless this task did so before.
+    pub fn sample_at(&mut self, square: DVec2, trace: impl FnOnce() -> LightSample) -> SampleId {
+        let key = square.to_array().map(f64::to_bits);
+        if let Some(id) = self.known.get(&key) {
+            return *id;
+        }
+        let id = self.add(trace());
+        self.known.insert(key, id);
+        id
     }
 
     /// A sample, shared or own.
@@ -71,8 +87,7 @@ impl<'a> Workspace<'a> {
         }
     }
 
-    /// Keeps a sample.
-    pub fn add(&mut self, sample: LightSample) -> SampleId {
+    fn add(&mut self, sample: LightSample) -> SampleId {
         self.own.push(sample);
         SampleId {
             chunk: self.chunk,

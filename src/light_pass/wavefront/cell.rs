@@ -4,6 +4,7 @@ use glam::DVec2;
 
 use super::band::{Corner, SampleId, Workspace};
 use super::edge::{CUT_BITS, Edge, EdgeCutter, Reach, SUSPICION, mismatch};
+use super::refine::Refinement;
 use super::strand::LightSample;
 use crate::illumination::accumulator::FluxUnit;
 use crate::light_pass::caustic::path::PathSignature;
@@ -83,6 +84,17 @@ pub struct CellCutter<'a> {
     pub edges: EdgeCutter<'a>,
     /// Of the accounts.
     pub unit: FluxUnit,
+    /// Towards a target error, if there is one.
+    pub refinement: Option<&'a Refinement<'a>>,
+}
+
+/// How often a cell was divided.
+#[derive(Clone, Copy, Debug, Default)]
+struct Depth {
+    /// In all.
+    level: u32,
+    /// Because its cuts were ambiguous.
+    ambiguous: u32,
 }
 
 /// A cell with its corners (0,0), (1,0), (1,1), (0,1) and the edges between them, each in the direction of its growing
@@ -119,17 +131,22 @@ impl Cell {
 impl CellCutter<'_> {
     /// Cuts a cell into patches.
     pub fn cut(&self, cell: &Cell, work: &mut Workspace, out: &mut CellOutput) {
-        self.cut_at(cell, 0, work, out);
+        self.cut_at(cell, Depth::default(), work, out);
     }
 
-    fn cut_at(&self, cell: &Cell, depth: u32, work: &mut Workspace, out: &mut CellOutput) {
+    fn cut_at(&self, cell: &Cell, depth: Depth, work: &mut Workspace, out: &mut CellOutput) {
         out.cells += 1;
+        let level = depth.level + 1;
+        if self.is_too_coarse(cell, depth.level, work) {
+            return self.split(cell, Depth { level, ..depth }, work, out);
+        }
         if cell.edges.iter().all(Option::is_none) {
             return self.whole(cell, work, out);
         }
         if self.is_ambiguous(cell, work) {
-            return if depth < DEEPEST_SPLIT {
-                self.split(cell, depth, work, out)
+            return if depth.ambiguous < DEEPEST_SPLIT {
+                let ambiguous = depth.ambiguous + 1;
+                self.split(cell, Depth { level, ambiguous }, work, out)
             } else {
                 self.scatter(cell, work, out)
             };
@@ -166,6 +183,26 @@ impl CellCutter<'_> {
                 self.book_region(&region, signature, work, out);
             }
         }
+    }
+
+    fn is_too_coarse(&self, cell: &Cell, level: u32, work: &Workspace) -> bool {
+        let Some(refinement) = self.refinement else {
+            return false;
+        };
+        let found = signatures(cell, work, |sample, found| {
+            found.extend(sample.strands.iter().map(|strand| strand.signature));
+        });
+        let strands = found.into_iter().map(|signature| {
+            cell.corners
+                .iter()
+                .filter_map(|corner| {
+                    let sample = work.get(corner.sample);
+                    Some((corner.square, &sample.strands[sample.find(signature)?]))
+                })
+                .collect()
+        });
+        let step = cell.step();
+        refinement.is_too_coarse(strands, step.x * step.y, level)
     }
 
     /// All corners agree in everything.
@@ -292,8 +329,8 @@ impl CellCutter<'_> {
         })
     }
 
-    /// Four cells in place of one.
-    fn split(&self, cell: &Cell, depth: u32, work: &mut Workspace, out: &mut CellOutput) {
+    /// Four cells of the given depth in place of one.
+    fn split(&self, cell: &Cell, depth: Depth, work: &mut Workspace, out: &mut CellOutput) {
         let [a, b, c, d] = cell.corners;
         let middles: [Corner; 4] = std::array::from_fn(|edge| {
             let (from, to) = EDGE_ENDS[edge];
@@ -331,7 +368,7 @@ impl CellCutter<'_> {
             ([centre, right, c, top], [east, r1, t1, up]),
         ];
         for (corners, edges) in children {
-            self.cut_at(&Cell { corners, edges }, depth + 1, work, out);
+            self.cut_at(&Cell { corners, edges }, depth, work, out);
         }
     }
 

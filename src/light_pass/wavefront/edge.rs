@@ -297,7 +297,7 @@ impl EdgeCutter<'_> {
     fn insert(&self, edge: &mut Edge, ends: [DVec2; 2], index: usize, work: &mut Workspace) {
         let place = 0.5 * (edge.samples[index].0 + edge.samples[index + 1].0);
         let square = ends[0].lerp(ends[1], place);
-        let id = work.add(self.tracer.trace(self.face, square));
+        let id = work.sample_at(square, || self.tracer.trace(self.face, square));
         edge.samples.insert(index + 1, (place, id));
     }
 
@@ -305,7 +305,7 @@ impl EdgeCutter<'_> {
     pub fn corner(&self, square: DVec2, work: &mut Workspace) -> Corner {
         Corner {
             square,
-            sample: work.add(self.tracer.trace(self.face, square)),
+            sample: work.sample_at(square, || self.tracer.trace(self.face, square)),
         }
     }
 }

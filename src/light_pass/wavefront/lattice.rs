@@ -6,6 +6,7 @@ use rayon::prelude::*;
 use super::band::{Corner, SampleId, Samples, Workspace};
 use super::cell::{Cell, CellCutter, CellOutput, Patch};
 use super::edge::{Edge, EdgeCutter};
+use super::refine::Refinement;
 use super::strand::LightSample;
 use super::trace::StrandTracer;
 use crate::illumination::accumulator::FluxUnit;
@@ -26,6 +27,8 @@ pub struct WavefrontLattice<'a> {
     pub size: (usize, usize),
     /// Of the accounts.
     pub unit: FluxUnit,
+    /// Towards a target error, if there is one.
+    pub refinement: Option<&'a Refinement<'a>>,
 }
 
 /// Some traced rows of cells of one face.
@@ -247,6 +250,7 @@ impl WavefrontLattice<'_> {
                 face,
             },
             unit: self.unit,
+            refinement: self.refinement,
         };
         for (start, end) in self.spans(face, row) {
             let corner = |column: usize, upper: usize| Corner {

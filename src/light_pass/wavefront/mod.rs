@@ -9,6 +9,7 @@ pub mod lattice;
 pub mod pass;
 pub mod patch;
 pub mod receivers;
+pub mod refine;
 pub mod spread;
 pub mod strand;
 pub mod trace;

@@ -1,7 +1,5 @@
 //! Runs the lattice of one light: traces bands of cells, spreads their patches over the receivers, and deposits them.
 
-use std::collections::BTreeMap;
-
 use rayon::prelude::*;
 
 use super::coverage::{FluxTriangle, deposit_triangles};
@@ -41,6 +39,8 @@ pub struct WavefrontDepositor<'a> {
     pub lattice: WavefrontLattice<'a>,
     /// Flux that all lights send to specular surfaces [W, luminance].
     pub reference_w: f64,
+    /// How much coarser (> 1) or finer triangles may be than is usual.
+    pub coarseness: f64,
 }
 
 impl WavefrontDepositor<'_> {
@@ -112,6 +112,7 @@ impl WavefrontDepositor<'_> {
             unit: self.lattice.unit,
             absorption: self.lattice.tracer.limits.absorption,
             reference_w: self.reference_w,
+            coarseness: self.coarseness,
         };
         let parts: Vec<SpreadOutput> = band
             .patches
@@ -127,32 +128,42 @@ impl WavefrontDepositor<'_> {
                 output
             })
             .collect();
-        let mut by_object: BTreeMap<u32, Vec<FluxTriangle>> = BTreeMap::new();
-        for part in parts {
+        for part in &parts {
             report.ledger.merge(&part.ledger);
             report.receiver_queries += part.queries;
             report.statistics.merge(&part.statistics);
-            for (object, triangle) in part.triangles {
-                by_object.entry(object).or_default().push(triangle);
-            }
         }
         if let Some(maps) = maps {
-            for (object, triangles) in by_object {
-                maps.touch(object as usize, self.chart_for);
-                if let Some(map) = maps.get_mut(object as usize) {
-                    let placed = deposit_triangles(&triangles, map);
-                    for (account, counts) in [
-                        (Account::Deposited, placed.deposited),
-                        (Account::Escaped, placed.outside),
-                        (Account::Unresolved, placed.unplaced),
-                        (Account::NonFinite, placed.non_finite),
-                    ] {
-                        report.ledger.book_sum(account, counts);
-                    }
-                }
+            for (object, triangles) in parts.iter().flat_map(|part| &part.triangles) {
+                self.place(*object, triangles, maps, report);
             }
         }
         report.deposit_s.add(watch.elapsed());
+    }
+}
+
+impl WavefrontDepositor<'_> {
+    /// Adds triangles to a map.
+    fn place(
+        &self,
+        object: u32,
+        triangles: &[FluxTriangle],
+        maps: &mut ReceiverMaps,
+        report: &mut PassReport,
+    ) {
+        maps.touch(object as usize, self.chart_for);
+        let Some(map) = maps.get_mut(object as usize) else {
+            return;
+        };
+        let placed = deposit_triangles(triangles, map);
+        for (account, counts) in [
+            (Account::Deposited, placed.deposited),
+            (Account::Escaped, placed.outside),
+            (Account::Unresolved, placed.unplaced),
+            (Account::NonFinite, placed.non_finite),
+        ] {
+            report.ledger.book_sum(account, counts);
+        }
     }
 }
 

@@ -16,11 +16,11 @@ use crate::light_pass::ledger_sum::{Account, LedgerSum};
 use crate::optics::LinearSrgb;
 
 /// Deviation from straight that triangles may have [texels].
-const CHORD_TEXELS: f64 = 0.03;
+const CHORD_TEXELS: f64 = 0.02;
 
 /// Change of the lit area from one triangle to the next, as a share, that is left where triangles are larger than
 /// texels.
-const DENSITY_STEP: f64 = 0.005;
+const DENSITY_STEP: f64 = 0.01;
 
 /// How much coarser patches are divided that add next to nothing to their map.
 const COARSEST_TOLERANCE: f64 = 10.0;
@@ -54,19 +54,36 @@ pub struct Spreader<'a> {
     pub absorption: bool,
     /// Flux that all lights send to specular surfaces [W, luminance]: over a map, about its mean irradiance.
     pub reference_w: f64,
+    /// How much coarser (> 1) or finer triangles may be than is usual.
+    pub coarseness: f64,
 }
 
 /// What patches became.
 #[derive(Clone, Debug, Default)]
 pub struct SpreadOutput {
-    /// Object and triangle on its map.
-    pub triangles: Vec<(u32, FluxTriangle)>,
+    /// By object: triangles on its map.
+    pub triangles: Vec<(u32, Vec<FluxTriangle>)>,
     /// Escaped, absorbed on the way, passed on.
     pub ledger: LedgerSum,
     /// Rays between traced ones that were intersected with receivers.
     pub queries: u64,
     /// Sizes of lit areas.
     pub statistics: FootprintStatistics,
+}
+
+impl SpreadOutput {
+    fn push(&mut self, object: u32, triangle: FluxTriangle) {
+        // A handful of objects, most often the last one.
+        let list = match self.triangles.iter().rposition(|(of, _)| *of == object) {
+            Some(index) => &mut self.triangles[index].1,
+            None => {
+                self.triangles.push((object, Vec::new()));
+                let last = self.triangles.len() - 1;
+                &mut self.triangles[last].1
+            }
+        };
+        list.push(triangle);
+    }
 }
 
 /// Where all of a patch goes, as its traced corners say.
@@ -264,8 +281,9 @@ impl Spreader<'_> {
             .fold(0.0, f64::max);
         let steps = |bend: f64, change: f64, length: f64| {
             let straight = (bend / (CHORD_TEXELS * tolerance)).sqrt();
-            // Triangles below a texel cannot be told apart.
-            let even = (change / (DENSITY_STEP * tolerance)).min(length);
+            let even = change / (DENSITY_STEP * tolerance);
+            // Of triangles below a texel only those at its border are seen.
+            let even = even.min((even * length).sqrt());
             (straight.max(even).ceil() as usize).clamp(1, MOST_STEPS)
         };
         (
@@ -292,9 +310,9 @@ impl Spreader<'_> {
         let mean_w = self.reference_w / texels;
         let local_w = flux_w / lit_texels.max(1.0);
         if local_w > 0.0 {
-            (mean_w / local_w).sqrt().clamp(1.0, COARSEST_TOLERANCE)
+            self.coarseness * (mean_w / local_w).sqrt().clamp(1.0, COARSEST_TOLERANCE)
         } else {
-            COARSEST_TOLERANCE
+            self.coarseness * COARSEST_TOLERANCE
         }
     }
 
@@ -525,7 +543,7 @@ impl Spread<'_, '_> {
                     flux: deposit,
                     island,
                 };
-                self.out.triangles.push((object, triangle));
+                self.out.push(object, triangle);
             }
         }
     }
