@@ -10,8 +10,6 @@ mod coverage;
 mod energy;
 #[path = "bake/hard_cases.rs"]
 mod hard_cases;
-#[path = "bake/hard_cases_open.rs"]
-mod hard_cases_open;
 #[path = "support/hard_scenes.rs"]
 mod hard_scenes;
 #[path = "bake/invariance.rs"]

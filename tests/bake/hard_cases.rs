@@ -171,7 +171,8 @@ fn flat_rings_of_some_segments() {
 
 #[test]
 fn splats_lose_no_watt_on_hard_scenes() {
-    for Case { scene, .. } in cases() {
+    let both = hard_scenes::tiny_ball(TinyBall::Both);
+    for scene in cases().into_iter().map(|case| case.scene).chain([both]) {
         let result = bake(scene.clone(), &settings(2e3, SIDE));
         assert_eq!(energy_fault(&result), None, "{}", scene.name);
         let deposited = result.ledgers[0].energy_w.deposited;
@@ -232,9 +233,9 @@ fn print_distances() {
             },
             _ => estimator_settings(),
         };
-        if let Some(density) = variable("DENSITY").and_then(|text| text.parse().ok()) {
-            settings.density_per_sr = density;
-        }
+        let number = |name: &str| variable(name).and_then(|text| text.parse().ok());
+        settings.density_per_sr = number("DENSITY").unwrap_or(settings.density_per_sr);
+        settings.max_error = number("MAX_ERROR").or(settings.max_error);
         if stored_references::stored_noise(&scene).is_none() {
             println!("{:32} has no reference", scene.name);
             continue;
