@@ -22,8 +22,6 @@ mod layers;
 mod reference;
 #[path = "bake/smoothing.rs"]
 mod smoothing;
-#[path = "bake/stored_references.rs"]
-mod stored_references;
 #[path = "support/mod.rs"]
 mod support;
 #[path = "bake/tools.rs"]

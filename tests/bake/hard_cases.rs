@@ -1,5 +1,8 @@
 //! Scenes that estimators find hard, against brute force on the same meshes.
 
+#[path = "stored_references.rs"]
+pub mod stored_references;
+
 use nephroid::illumination::IlluminationMap;
 use nephroid::scene::Scene;
 use nephroid::scene::builtin::parts;
@@ -9,8 +12,8 @@ use nephroid::study::agreement::{Agreement, TexelPair, caustic_luminance, pair_m
 
 use crate::brute_force::brute;
 use crate::hard_scenes::{self, Shading, TinyBall};
-use crate::stored_references::{self, SIDE, StoredReference, stored};
 use crate::tools::{bake, energy_fault, settings};
+use stored_references::{SIDE, StoredReference, stored};
 
 /// Largest relative RMSE of a bake, over all maps and by area, without the reference's noise.
 pub const LARGEST_ERROR: f64 = 0.02;
