@@ -165,6 +165,22 @@ proptest! {
     }
 
     #[test]
+    fn small_triangles_with_upright_and_level_sides_cover_what_clipping_says(
+        at in [0..8i32, 0..8i32],
+        off in point(-1.0, 1.0),
+        far in point(-1.0, 1.0),
+        size in -3.0..0.5,
+        beside in -14.0..0.0,
+    ) {
+        let (size, beside) = (10f64.powf(size), 10f64.powf(beside));
+        let corner = [0, 1].map(|axis| f64::from(at[axis]) + size * beside * off[axis]);
+        let [x, y] = [0, 1].map(|axis| corner[axis] + size * far[axis]);
+        prop_assume!(far.iter().all(|way| way.abs() > 0.05));
+        check_against_reference((8, 8), grey([corner, [x, corner[1]], [corner[0], y]]), 1e-9);
+        check_against_reference((8, 8), grey([corner, [x, y], [corner[0], y]]), 1e-9);
+    }
+
+    #[test]
     fn corners_on_borders_of_texels_are_no_special_case(corners in prop::array::uniform3([-2..10i32, -2..10i32])) {
         let corners = corners.map(|corner| corner.map(f64::from));
         let [a, b, c] = corners.map(DVec2::from);

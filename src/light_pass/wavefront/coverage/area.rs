@@ -6,7 +6,7 @@ use glam::DVec2;
 
 use super::row::{RowShares, Sink, Span};
 use super::shape::{cells, least, most};
-use super::sides::{Cut, Reach, Sides};
+use super::sides::{Cut, Sides};
 
 /// The order of the corners from top to bottom, by which of a > b, b > c, a > c hold of their heights (1, 2, 4).
 const ORDERS: [[usize; 3]; 8] = [
@@ -63,19 +63,16 @@ impl Area {
     /// triangle's shape, as mistaken guesses of the processor would cost more than texels that get nothing.
     #[inline(always)]
     fn for_each_narrow_row<const N: usize>(&self, rows: Range<usize>, sink: &mut impl Sink) {
-        let mut from = self.sides.cut(rows.start as f64);
+        let mut y = rows.start as f64;
+        let mut from = self.sides.cut(y);
         for row in rows {
-            let to = self.sides.cut((row + 1) as f64);
+            y += 1.0;
+            let to = self.sides.cut(y);
             let pieces = self.sides.between(&from, &to);
             let mut ends = [to.above; N];
             for (border, end) in ends.iter_mut().take(N - 1).enumerate() {
                 let here = pieces.share_up_to((border + 1) as f64);
                 *end = least(to.above, from.above + here);
-            }
-            let mut before = from.above;
-            for end in &mut ends {
-                *end = most(before, *end);
-                before = *end;
             }
             sink.add(
                 row,
@@ -90,9 +87,11 @@ impl Area {
     }
 
     fn for_each_wide_row(&self, rows: Range<usize>, shares: &mut RowShares, sink: &mut impl Sink) {
-        let mut from = self.sides.cut(rows.start as f64);
+        let mut y = rows.start as f64;
+        let mut from = self.sides.cut(y);
         for row in rows {
-            let to = self.sides.cut((row + 1) as f64);
+            y += 1.0;
+            let to = self.sides.cut(y);
             if let Some(span) = self.wide_span(&from, &to, shares) {
                 sink.add(row, span);
             }
@@ -100,35 +99,35 @@ impl Area {
         }
     }
 
-    /// The row between two cuts: border by border where sides are, in even steps between them.
+    /// The row between two cuts, on those texels only that it reaches.
     fn wide_span<'a>(&self, from: &Cut, to: &Cut, shares: &'a mut RowShares) -> Option<Span<'a>> {
         let pieces = self.sides.between(from, to);
-        let reach = self.sides.reach(&pieces);
+        let (left, right) = pieces.extent();
         let width = self.columns as f64;
-        if reach.right <= 0.0 || reach.left >= width {
+        if right <= 0.0 || left >= width {
             return None;
         }
-        let columns = cells(reach.left, reach.right, self.columns);
+        let columns = cells(left, right, self.columns);
         let share_up_to = |x: f64| most(from.above, least(to.above, from.above + pieces.share_up_to(x)));
-        let start = if reach.left >= 0.0 {
-            from.above
-        } else {
-            share_up_to(0.0)
-        };
-        let end = if reach.right <= width {
+        let start = if left >= 0.0 { from.above } else { share_up_to(0.0) };
+        let end = if right <= width {
             to.above
         } else {
             share_up_to(width)
         };
+        let borders = (columns.start + 1) as f64;
+        let (fours, _) = shares.ends[..columns.len().next_multiple_of(4)].as_chunks_mut();
+        match pieces.only_short() {
+            Some(short) => {
+                let (long, short) = (pieces.piece(0), pieces.piece(short));
+                fill(fours, borders, |x| {
+                    least(end, from.above + (long.share_up_to(x) + short.share_up_to(x)))
+                });
+            }
+            None => fill(fours, borders, |x| least(end, from.above + pieces.share_up_to(x))),
+        }
         let ends = &mut shares.ends[..columns.len()];
-        fill(
-            ends,
-            columns.start,
-            &reach,
-            (start, end),
-            pieces.full,
-            share_up_to,
-        );
+        *ends.last_mut()? = end;
         Some(Span {
             first: self.origin + columns.start,
             start,
@@ -137,40 +136,14 @@ impl Area {
     }
 }
 
-/// Fills the shares `ends` of columns from `first` on, which begin with the share `start` and end with `end`.
-fn fill(
-    ends: &mut [f64],
-    first: usize,
-    reach: &Reach,
-    (start, end): (f64, f64),
-    full: f64,
-    share_up_to: impl Fn(f64) -> f64,
-) {
-    let Some(last) = ends.len().checked_sub(1) else {
-        return;
-    };
-    // Whole columns from the border after the first one on.
-    let columns_to = |x: f64| (most(0.0, x - (first + 1) as f64) as i32 as usize).min(last);
-    // The border at or after the beginning of the gap gets its own share, and even steps follow to the gap's end.
-    let before_gap = columns_to(reach.gap_from);
-    let rest = usize::from(reach.gap_from > (first + 1 + before_gap) as f64);
-    let even_from = (before_gap + rest + 1).min(last);
-    let even_to = columns_to(reach.gap_to + 1.0).max(even_from);
-    let border = |index: usize| (first + 1 + index) as f64;
-    let mut before = start;
-    for (index, share) in ends[..even_from].iter_mut().enumerate() {
-        before = least(end, most(before, share_up_to(border(index))));
-        *share = before;
+/// Shares up to borders from `x` on, four at a time.
+#[inline(always)]
+fn fill(fours: &mut [[f64; 4]], x: f64, share_up_to: impl Fn(f64) -> f64) {
+    let mut x = [x, x + 1.0, x + 2.0, x + 3.0];
+    for shares in fours {
+        for (share, x) in shares.iter_mut().zip(&mut x) {
+            *share = share_up_to(*x);
+            *x += 4.0;
+        }
     }
-    let mut steps = 0.0;
-    for share in &mut ends[even_from..even_to] {
-        steps += 1.0;
-        *share = least(end, before + steps * full);
-    }
-    before = least(end, before + steps * full);
-    for (index, share) in ends[..last].iter_mut().enumerate().skip(even_to) {
-        before = least(end, most(before, share_up_to(border(index))));
-        *share = before;
-    }
-    ends[last] = end;
 }

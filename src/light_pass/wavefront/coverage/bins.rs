@@ -6,10 +6,10 @@ use super::FluxTriangle;
 use super::shape::rows_and_columns;
 
 /// Work of making a triangle ready, in that of a texel.
-const TRIANGLE_WORK: u64 = 8;
+const TRIANGLE_WORK: i64 = 8;
 
 /// Work of beginning a row, in that of a texel.
-const ROW_WORK: u64 = 4;
+const ROW_WORK: i64 = 4;
 
 /// Some triangles, sorted by the bands that they reach.
 #[derive(Debug)]
@@ -27,16 +27,17 @@ pub struct Bins {
 impl Bins {
     /// Finds the rows of triangles.
     pub fn new(triangles: &[FluxTriangle], size: (usize, usize)) -> Self {
-        let mut changes = vec![0; size.1 + 1];
+        let mut changes = vec![0_i64; size.1 + 1];
         let rows = triangles
             .iter()
             .map(|triangle| {
                 let (rows, columns) = rows_and_columns(&triangle.corners, size);
                 if !rows.is_empty() {
                     // At most half of the texels between the borders are inside.
-                    let row_work = ROW_WORK + columns.len() as u64 / 2 + TRIANGLE_WORK / rows.len() as u64;
-                    changes[rows.start] += row_work as i64;
-                    changes[rows.end] -= row_work as i64;
+                    let row_work = ROW_WORK + columns.len() as i64 / 2;
+                    changes[rows.start] += row_work + TRIANGLE_WORK;
+                    changes[rows.start + 1] -= TRIANGLE_WORK;
+                    changes[rows.end] -= row_work;
                 }
                 (rows.start as u32, rows.end as u32)
             })

@@ -1,9 +1,10 @@
 //! The texels of one row that a triangle reaches, and their flux.
 
+use super::shape::most;
 use crate::illumination::accumulator::FluxCount;
 
 /// The texels of one row that a triangle reaches, with cumulative shares of the triangle: what lies in the rows above,
-/// and in this row to the left of a texel's border. From 0 to 1, never falling.
+/// and in this row to the left of a texel's border. From 0 to 1; they may fall by as much as rounding.
 #[derive(Clone, Copy, Debug)]
 pub struct Span<'a> {
     /// Column of the first texel.
@@ -23,7 +24,7 @@ pub trait Sink {
 /// Room for the shares of a row, reused from row to row.
 #[derive(Debug)]
 pub struct RowShares {
-    /// What becomes [`Span::ends`].
+    /// What becomes [`Span::ends`], in whole fours.
     pub ends: Vec<f64>,
 }
 
@@ -31,7 +32,7 @@ impl RowShares {
     /// For maps of `width` texels across.
     pub fn new(width: usize) -> Self {
         Self {
-            ends: vec![0.0; width],
+            ends: vec![0.0; width.next_multiple_of(4)],
         }
     }
 }
@@ -112,9 +113,10 @@ impl Divided {
     fn add_grey(&self, span: Span, texels: &mut [FluxCount]) -> i64 {
         let count = self.counts[0];
         let begin = quick_round(count * span.start);
-        let mut before = begin;
+        let (mut before, mut share_before) = (begin, span.start);
         for (texel, &end) in texels.iter_mut().zip(span.ends) {
-            let after = quick_round(count * end);
+            share_before = most(end, share_before);
+            let after = quick_round(count * share_before);
             let share = after - before;
             for channel in texel {
                 *channel += share;
@@ -126,10 +128,11 @@ impl Divided {
 
     fn add_colour(&self, span: Span, texels: &mut [FluxCount]) -> FluxCount {
         let begin = self.counts.map(|count| quick_round(count * span.start));
-        let mut before = begin;
+        let (mut before, mut share_before) = (begin, span.start);
         for (texel, &end) in texels.iter_mut().zip(span.ends) {
+            share_before = most(end, share_before);
             for channel in 0..3 {
-                let after = quick_round(self.counts[channel] * end);
+                let after = quick_round(self.counts[channel] * share_before);
                 texel[channel] += after - before[channel];
                 before[channel] = after;
             }
@@ -140,10 +143,11 @@ impl Divided {
     #[cold]
     fn add_carefully(&self, span: Span, texels: &mut [FluxCount]) -> FluxCount {
         let begin = self.flux.map(|channel| careful_round(channel, span.start));
-        let mut before = begin;
+        let (mut before, mut share_before) = (begin, span.start);
         for (texel, &end) in texels.iter_mut().zip(span.ends) {
+            share_before = most(end, share_before);
             for channel in 0..3 {
-                let after = careful_round(self.flux[channel], end);
+                let after = careful_round(self.flux[channel], share_before);
                 texel[channel] += after - before[channel];
                 before[channel] = after;
             }

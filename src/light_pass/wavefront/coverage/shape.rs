@@ -141,6 +141,7 @@ pub fn is_finite([a, b, c]: &[DVec2; 3]) -> bool {
 }
 
 /// Rows and columns that a triangle may reach on a map: at least [`Shape::rows`].
+#[inline(always)]
 pub fn rows_and_columns(corners: &[DVec2; 3], size: (usize, usize)) -> (Range<usize>, Range<usize>) {
     let bounds = Bounds::new(*corners);
     if bounds.misses(size) || size.0 == 0 || size.1 == 0 {
@@ -163,12 +164,18 @@ pub fn most(a: f64, b: f64) -> f64 {
 }
 
 /// Rows (columns) of a map of `count` that the interval `low..=high` reaches; that of `low` where it is a point.
+#[inline(always)]
 pub fn cells(low: f64, high: f64, count: usize) -> Range<usize> {
-    // Casts cut to 0..; what lies on the last border belongs to the last cell.
-    let first = (most(0.0, low) as i32 as usize).min(count.saturating_sub(1));
-    let last = (most(0.0, high) as i32 as usize).min(count);
-    let end = if high > last as f64 { last + 1 } else { last };
-    first..end.min(count).max(first + 1)
+    // Casts of doubles end at 2³¹; what lies on the last border belongs to the last cell.
+    let count = i32::try_from(count).unwrap_or(i32::MAX);
+    let first = (most(0.0, low) as i32).min(count - 1);
+    let last = most(0.0, high) as i32;
+    let end = if high > f64::from(last) {
+        last.saturating_add(1)
+    } else {
+        last
+    };
+    first as usize..end.min(count).max(first + 1) as usize
 }
 
 /// The part of a triangle's flux below a fraction `t` of its extent along a direction, where the middle corner is at

@@ -47,21 +47,15 @@ pub struct Pieces {
     height: [f64; 4],
     /// Share of the triangle per squared distance into a piece.
     per_square: [f64; 4],
-    /// Share of a texel between the sides.
-    pub full: f64,
 }
 
-/// Where the pieces lie.
+/// One of them.
 #[derive(Clone, Copy, Debug)]
-pub struct Reach {
-    /// Smallest x of all.
-    pub left: f64,
-    /// Largest x of those on the left.
-    pub gap_from: f64,
-    /// Smallest x of those on the right.
-    pub gap_to: f64,
-    /// Largest x of all.
-    pub right: f64,
+pub struct Piece {
+    low: f64,
+    run: f64,
+    height: f64,
+    per_square: f64,
 }
 
 /// Runs below this [texels] count as this: the factor stays finite, and no area is lost that a number could hold.
@@ -129,45 +123,57 @@ impl Sides {
             height,
             // Without a run there is no area along it: anything finite will do as a factor.
             per_square: four(|side| 0.5 * height[side] / most(run[side], LEAST_RUN)),
-            full: height[0].abs(),
-        }
-    }
-
-    /// Where the pieces lie; those without height do not count.
-    pub fn reach(&self, pieces: &Pieces) -> Reach {
-        let Pieces {
-            low, high, height, ..
-        } = pieces;
-        let (upper, lower) = match (height[1] != 0.0, height[2] != 0.0) {
-            (true, false) => (1, 1),
-            (false, true) => (2, 2),
-            _ => (1, 2),
-        };
-        let short = (least(low[upper], low[lower]), most(high[upper], high[lower]));
-        let long = (low[0], high[0]);
-        let (left, right) = if self.sign[0] > 0.0 {
-            (long, short)
-        } else {
-            (short, long)
-        };
-        Reach {
-            left: least(left.0, right.0),
-            gap_from: left.1,
-            gap_to: right.0,
-            right: most(left.1, right.1),
         }
     }
 }
 
 impl Pieces {
-    /// Share of the triangle between the cuts, to the left of `x`.
+    /// One piece.
+    #[inline(always)]
+    pub fn piece(&self, index: usize) -> Piece {
+        Piece {
+            low: self.low[index],
+            run: self.run[index],
+            height: self.height[index],
+            per_square: self.per_square[index],
+        }
+    }
+
+    /// Which of the two short sides there is, if but one.
+    pub fn only_short(&self) -> Option<usize> {
+        match (self.height[1] != 0.0, self.height[2] != 0.0) {
+            (true, false) => Some(1),
+            (false, true) => Some(2),
+            _ => None,
+        }
+    }
+
+    /// Smallest and largest x of what has height.
+    #[inline(always)]
+    pub fn extent(&self) -> (f64, f64) {
+        let [mut low, mut high] = [self.low[0], self.high[0]];
+        for short in [1, 2] {
+            let here = self.height[short] != 0.0;
+            low = least(low, if here { self.low[short] } else { low });
+            high = most(high, if here { self.high[short] } else { high });
+        }
+        (low, high)
+    }
+
+    /// Share of the triangle between the cuts, to the left of `x`; but for rounding.
     #[inline(always)]
     pub fn share_up_to(&self, x: f64) -> f64 {
-        let shares = four(|side| {
-            let x = x - self.low[side];
-            let within = most(0.0, least(self.run[side], x));
-            self.per_square[side] * (within * within) + self.height[side] * most(0.0, x - self.run[side])
-        });
+        let shares = four(|piece| self.piece(piece).share_up_to(x));
         (shares[0] + shares[2]) + (shares[1] + shares[3])
+    }
+}
+
+impl Piece {
+    /// What it adds to the share to the left of `x`.
+    #[inline(always)]
+    pub fn share_up_to(&self, x: f64) -> f64 {
+        let x = x - self.low;
+        let within = most(0.0, least(self.run, x));
+        self.per_square * (within * within) + self.height * most(0.0, x - self.run)
     }
 }
