@@ -15,8 +15,9 @@ const TALL_SHARE: usize = 8;
 /// Texel rows of a task for such splats.
 const ROWS_PER_TASK: usize = 32;
 
-/// Least rows of a task for the others.
-const LEAST_ROWS: usize = 4;
+/// Rows of the bands for the others: the least that hold a splat, so that wide ones do not make large tasks of many
+/// narrow ones.
+const HEIGHTS: [usize; 4] = [4, 16, 64, 256];
 
 /// Adds splats to one level of a map.
 pub(super) fn add(
@@ -26,17 +27,27 @@ pub(super) fn add(
     sampling: KernelSampling,
 ) -> LedgerSum {
     let size = coverage.size();
-    let tallest = size.1 / TALL_SHARE;
-    let extent = |placed: &Placed| (placed.rows.1 - placed.rows.0) as usize + 1;
-    let (short, tall): (Vec<&Placed>, Vec<&Placed>) =
-        splats.iter().partition(|placed| extent(placed) <= tallest);
-    let highest = short.iter().map(|placed| extent(placed)).max().unwrap_or(0);
+    let mut by_band = HEIGHTS.map(|height| vec![Vec::new(); size.1.div_ceil(height)]);
+    let mut tall = Vec::new();
+    for placed in splats {
+        let rows = (placed.rows.1 - placed.rows.0) as usize + 1;
+        let fits = |height: &usize| rows <= *height && rows <= (size.1 / TALL_SHARE).max(1);
+        match HEIGHTS.iter().position(fits) {
+            Some(class) => by_band[class][placed.rows.0 as usize / HEIGHTS[class]].push(&placed.splat),
+            None => tall.push(*placed),
+        }
+    }
     let adder = Adder {
         coverage,
         sampling,
         size,
     };
-    let mut ledger = adder.add_short(&short, highest.max(LEAST_ROWS), flux.texels_mut());
+    let mut ledger = LedgerSum::default();
+    for (height, by_band) in HEIGHTS.into_iter().zip(&by_band) {
+        if by_band.iter().any(|splats| !splats.is_empty()) {
+            ledger.merge(&adder.add_short(by_band, height, flux.texels_mut()));
+        }
+    }
     ledger.merge(&adder.add_tall(&tall, flux.texels_mut()));
     ledger
 }
@@ -49,13 +60,9 @@ struct Adder<'a, C> {
 }
 
 impl<C: Coverage> Adder<'_, C> {
-    /// Each splat spans at most two bands of `height` rows: those that begin in an even band and then those that begin
-    /// in an odd one are added by tasks that own both bands.
-    fn add_short(&self, splats: &[&Placed], height: usize, texels: &mut [FluxCount]) -> LedgerSum {
-        let mut by_band: Vec<Vec<&Splat>> = vec![Vec::new(); self.size.1.div_ceil(height)];
-        for placed in splats {
-            by_band[placed.rows.0 as usize / height].push(&placed.splat);
-        }
+    /// Splats by the band of `height` rows that they begin in. Each spans at most two bands: those that begin in an even
+    /// band, and then those that begin in an odd one, are added by tasks that own both bands.
+    fn add_short(&self, by_band: &[Vec<&Splat>], height: usize, texels: &mut [FluxCount]) -> LedgerSum {
         let mut ledger = LedgerSum::default();
         for parity in 0..2 {
             let begin = (parity * height * self.size.0).min(texels.len());

@@ -237,8 +237,8 @@ fn deposit_band(
         .collect();
     let objects: BTreeSet<u32> = contexts
         .iter()
-        .flat_map(|context| &context.row.arrivals)
-        .map(|arrival| arrival.object)
+        .flat_map(|context| context.row.arrivals.chunk_by(|a, b| a.object == b.object))
+        .map(|run| run[0].object)
         .collect();
     for object in objects {
         maps.touch(object as usize, chart_for);
