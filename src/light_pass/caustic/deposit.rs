@@ -1,10 +1,9 @@
-//! Takes traced rows to the maps: footprints from the neighbouring rows, then kernels of flux, in parallel over bands
-//! of texel rows. Sums are integers, so that neither order nor number of threads matters.
+//! Takes traced rows to the maps: footprints from the neighbouring rows, then kernels of flux.
 
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
-use super::bands;
+use super::blocks::{self, Reach};
 use super::footprint::{Neighbours, footprint};
 use super::kernel::Profile;
 use super::lattice::{Lattice, TracedRow};
@@ -78,7 +77,7 @@ impl Depositor<'_> {
                 .get_mut(object as usize)
                 .expect("splats are made only for allocated maps");
             let (flux, covered) = map.level(level as usize);
-            let ledger = bands::add(&splats, flux, &covered, self.settings.kernel_sampling);
+            let ledger = blocks::add(&splats, flux, &covered, self.settings.kernel_sampling);
             report.ledger.merge(&ledger);
         }
         report
@@ -168,11 +167,11 @@ impl Depositor<'_> {
             0
         };
         let splat = if level > 0 { splat.at_level(level) } else { splat };
-        let rows = bands::rows_of(&splat, map.chart.height >> level);
+        let reach = Reach::of(&splat, (map.chart.width >> level, map.chart.height >> level));
         Some(Placed {
             object: arrival.object,
             level: level as u32,
-            rows,
+            reach,
             splat,
         })
     }
@@ -184,8 +183,8 @@ pub(super) struct Placed {
     object: u32,
     /// Of the object's map.
     level: u32,
-    /// First and last row of texels that it may add to.
-    pub(super) rows: (u32, u32),
+    /// Where it may add.
+    pub(super) reach: Reach,
     pub(super) splat: Splat,
 }
 

@@ -1,6 +1,6 @@
 //! The caustic layer: light that met at least one specular surface (LS+D), by the paper's method.
 
-mod bands;
+mod blocks;
 pub mod deposit;
 pub mod footprint;
 mod gaussian;

@@ -2,6 +2,7 @@
 
 use glam::{DVec2, Vec2Swizzles};
 
+use super::blocks::Block;
 use super::footprint::Ellipse;
 use super::gaussian::{Centred, Cornered, WIDE_TEXELS};
 use super::kernel::Profile;
@@ -88,19 +89,21 @@ impl Splat {
         self
     }
 
-    /// Rows that the kernel reaches, before folding: first and last.
-    pub fn rows(&self) -> (i64, i64) {
-        let half = self.half_height();
-        (floor(self.centre.y - half), floor(self.centre.y + half))
-    }
-
-    fn half_height(&self) -> f64 {
+    /// Columns and rows that the kernel reaches at most, before folding: first and last. It is cut off one map's size
+    /// beyond the borders.
+    pub fn columns_and_rows(&self) -> ((i64, i64), (i64, i64)) {
         let ellipse = self.ellipse.at_least(THINNEST_TEXELS);
-        if ellipse.xx <= ellipse.yy {
-            return self.profile.reach() * ellipse.yy.sqrt();
-        }
-        // Lines are columns: a box then reaches to its slanted corners, |xy|/√xx + √(yy − xy²/xx), at most √2 √yy.
-        self.profile.reach() * (2.0 * ellipse.yy).sqrt()
+        let range = |centre: f64, along: f64, across: f64| {
+            // Where lines lie across, a box reaches to its slanted corners: with a = |xy|/√across, to
+            // a + √(along − a²), at most √2 √along.
+            let slant = if along < across { 2.0 } else { 1.0 };
+            let half = self.profile.reach() * (slant * along).sqrt();
+            (floor(centre - half) - 1, floor(centre + half) + 1)
+        };
+        (
+            range(self.centre.x, ellipse.xx, ellipse.yy),
+            range(self.centre.y, ellipse.yy, ellipse.xx),
+        )
     }
 
     /// Fills `window` with the kernel's weight in each texel. The kernel is cut off one map's size beyond the borders.
@@ -185,11 +188,6 @@ impl Splat {
                 window.push(index, begin, (end - begin) as usize + 1);
             }
         }
-    }
-
-    /// Row of the texel that holds the centre.
-    pub fn home_row(&self, height: usize) -> usize {
-        (self.centre.y.max(0.0) as usize).min(height - 1)
     }
 
     /// The kernel's weight at every texel's centre of a line (section 3.2.2 of the paper).
@@ -368,25 +366,13 @@ impl Window {
         self.sum > 0.0
     }
 
-    /// Adds the splat's flux to the texels of the rows `rows.0..rows.1`, which `texels` holds; returns what was added.
+    /// Adds the splat's flux to the texels of a map of the given size, of which `block` holds all that the kernel reaches.
     ///
     /// Each texel gets the nearest count of its share, and the heaviest one the rest, so that the whole is exact. What
     /// reaches beyond the map's border is folded back: the ray landed on the surface, and so does its light.
-    pub fn add(
-        &self,
-        flux: FluxCount,
-        size: (usize, usize),
-        rows: (usize, usize),
-        texels: &mut [FluxCount],
-    ) -> FluxCount {
-        let mut target = Target {
-            size,
-            rows,
-            texels,
-            added: [0; 3],
-        };
-        let mut given: FluxCount = [0; 3];
-        let (mut heaviest, mut most) = ((0, 0), 0.0);
+    pub fn add(&self, flux: FluxCount, size: (usize, usize), block: &mut Block) {
+        let mut rest = flux;
+        let (mut heaviest, mut most) = ((0, 0), -1.0);
         let per_weight = 1.0 / self.sum;
         let scale = flux.map(|channel| channel as f64 * per_weight);
         let grey = flux[0] == flux[1] && flux[1] == flux[2];
@@ -398,59 +384,55 @@ impl Window {
                 round(share).1
             }
         };
+        let share = |weight: f64| {
+            if grey {
+                [part(scale[0] * weight); 3]
+            } else {
+                scale.map(|channel| part(channel * weight))
+            }
+        };
         for line in &self.lines {
             let weights = &self.weights[line.span.0..line.span.1];
             let (offset, weight) = largest(weights);
             if weight > most {
                 (heaviest, most) = (self.place(line, offset), weight);
             }
-            let share = |weight: f64| {
-                if grey {
-                    [part(scale[0] * weight); 3]
-                } else {
-                    scale.map(|channel| part(channel * weight))
+            let mut add = |texel: &mut FluxCount, weight: f64| {
+                let share = share(weight);
+                for channel in 0..3 {
+                    texel[channel] += share[channel];
+                    rest[channel] -= share[channel];
                 }
             };
-            if let Some(texels) = self.inside(line, &mut target) {
-                let mut sum: FluxCount = [0; 3];
-                for (texel, &weight) in texels.iter_mut().zip(weights) {
-                    let share = share(weight);
-                    for channel in 0..3 {
-                        texel[channel] += share[channel];
-                        sum[channel] += share[channel];
-                    }
-                }
-                for channel in 0..3 {
-                    given[channel] += sum[channel];
-                    target.added[channel] += sum[channel];
-                }
+            if let Some((column, row)) = self.inside(line, size) {
+                let texels = block.row_mut(column, row, weights.len());
+                texels
+                    .iter_mut()
+                    .zip(weights)
+                    .for_each(|(texel, &weight)| add(texel, weight));
             } else {
-                for (offset, &weight) in weights.iter().enumerate().filter(|(_, weight)| **weight > 0.0) {
-                    let share = share(weight);
-                    for channel in 0..3 {
-                        given[channel] += share[channel];
-                    }
-                    target.add(self.place(line, offset), share);
+                for (offset, &weight) in weights.iter().enumerate() {
+                    add(texel_mut(block, self.place(line, offset), size), weight);
                 }
             }
         }
-        let rest = std::array::from_fn(|channel| flux[channel] - given[channel]);
-        target.add(heaviest, rest);
-        target.added
+        let texel = texel_mut(block, heaviest, size);
+        for channel in 0..3 {
+            texel[channel] += rest[channel];
+        }
     }
 
-    /// The texels of a line that lies along a row, between the map's borders and within the target's rows.
-    fn inside<'a>(&self, line: &Line, target: &'a mut Target) -> Option<&'a mut [FluxCount]> {
-        let (width, _) = target.size;
-        let first = usize::try_from(line.first).ok().filter(|_| !self.columns)?;
-        let row = usize::try_from(line.index).ok()?;
-        let count = line.span.1 - line.span.0;
-        if row < target.rows.0 || row >= target.rows.1 || first + count > width {
-            return None;
-        }
-        let begin = (row - target.rows.0) * width + first;
-        target.texels.get_mut(begin..begin + count)
+    /// Column and row of the first texel of a line that lies along a row, wholly between the map's borders.
+    fn inside(&self, line: &Line, (width, height): (usize, usize)) -> Option<(usize, usize)> {
+        let column = usize::try_from(line.first).ok().filter(|_| !self.columns)?;
+        let row = usize::try_from(line.index).ok().filter(|&row| row < height)?;
+        (column + line.span.1 - line.span.0 <= width).then_some((column, row))
     }
+}
+
+/// A texel given before folding.
+fn texel_mut(block: &mut Block, (column, row): (i64, i64), size: (usize, usize)) -> &mut FluxCount {
+    &mut block.row_mut(fold(column, size.0), fold(row, size.1), 1)[0]
 }
 
 /// Place and value of the first of the largest weights; weights are not negative.
@@ -462,29 +444,6 @@ fn largest(weights: &[f64]) -> (usize, f64) {
         }
     }
     largest
-}
-
-/// Some rows of a map, being added to.
-struct Target<'a> {
-    size: (usize, usize),
-    rows: (usize, usize),
-    texels: &'a mut [FluxCount],
-    added: FluxCount,
-}
-
-impl Target<'_> {
-    /// Adds to a texel given before folding, if its row is one of ours.
-    fn add(&mut self, (column, row): (i64, i64), share: FluxCount) {
-        let row = fold(row, self.size.1);
-        if row < self.rows.0 || row >= self.rows.1 {
-            return;
-        }
-        let texel = &mut self.texels[(row - self.rows.0) * self.size.0 + fold(column, self.size.0)];
-        for channel in 0..3 {
-            texel[channel] += share[channel];
-            self.added[channel] += share[channel];
-        }
-    }
 }
 
 /// Index in 0..size of an index up to one size beyond either border, mirrored at the border.
