@@ -1,5 +1,7 @@
 //! Bakes of reference scenes: against an independent solver, against the law of energy, against themselves.
 
+#![allow(clippy::print_stdout, reason = "figures, for those who ask by --nocapture")]
+
 #[path = "bake/brute_force.rs"]
 mod brute_force;
 #[path = "bake/collection.rs"]
@@ -26,3 +28,5 @@ mod smoothing;
 mod support;
 #[path = "bake/tools.rs"]
 mod tools;
+#[path = "bake/wavefront.rs"]
+mod wavefront;

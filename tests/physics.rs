@@ -1,7 +1,11 @@
 //! The laws of `nephroid::optics`, of lights and of units, tested as laws.
 
+#![allow(clippy::print_stdout, reason = "figures, for those who ask by --nocapture")]
+
 #[path = "physics/colour.rs"]
 mod colour;
+#[path = "physics/differentials.rs"]
+mod differentials;
 #[path = "physics/fresnel.rs"]
 mod fresnel;
 #[path = "physics/lights.rs"]

@@ -7,6 +7,8 @@ use crate::optics::LinearSrgb;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FluxUnit {
     watts: f64,
+    /// Exact, as `watts` is a power of two.
+    counts_per_watt: f64,
 }
 
 /// Flux per channel, counted in a [`FluxUnit`].
@@ -16,8 +18,10 @@ impl FluxUnit {
     /// The unit for sums of up to `power_w` [W per channel, > 0]; they stay below 2⁶⁰, so that no sum overflows.
     pub fn for_power(power_w: f64) -> Self {
         // Denormal powers keep a unit above zero.
+        let exponent = (power_w.log2().ceil() - 60.0).clamp(-1022.0, 960.0);
         Self {
-            watts: (power_w.log2().ceil() - 60.0).clamp(-1022.0, 960.0).exp2(),
+            watts: exponent.exp2(),
+            counts_per_watt: (-exponent).exp2(),
         }
     }
 
@@ -28,15 +32,25 @@ impl FluxUnit {
 
     /// The nearest count of each channel.
     pub fn count(self, flux_w: LinearSrgb) -> FluxCount {
-        flux_w
-            .to_array()
-            .map(|channel| (channel / self.watts).round() as i64)
+        let [r, g, b] = flux_w.to_array();
+        let count = |channel: f64| nearest(channel * self.counts_per_watt);
+        let red = count(r);
+        // Grey light is the most common.
+        let alike = |channel: f64| if channel == r { red } else { count(channel) };
+        [red, alike(g), alike(b)]
     }
 
     /// Watts of a count.
     pub fn flux_w(self, count: FluxCount) -> LinearSrgb {
         LinearSrgb::from(count.map(|channel| channel as f64 * self.watts))
     }
+}
+
+/// The nearest whole number, halves away from zero, without a call into the mathematics library.
+fn nearest(x: f64) -> i64 {
+    let towards_zero = x as i64;
+    let rest = x - towards_zero as f64;
+    towards_zero + i64::from(rest >= 0.5) - i64::from(rest <= -0.5)
 }
 
 /// Flux per texel of one map, row 0 at v = 0.

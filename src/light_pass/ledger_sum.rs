@@ -52,6 +52,13 @@ impl LedgerSum {
         }
     }
 
+    /// Books a sum of counts.
+    pub fn book_many(&mut self, account: Account, counts: [i128; 3]) {
+        for (sum, channel) in self.counts[account as usize].iter_mut().zip(counts) {
+            *sum += channel;
+        }
+    }
+
     /// Adds another part of the same light's ledger.
     pub fn merge(&mut self, other: &Self) {
         for (sums, parts) in self.counts.iter_mut().zip(other.counts) {

@@ -93,6 +93,7 @@ impl CausticLayer<'_> {
                 lattice: self.lattice(light, 1, unit),
                 settings: self.settings,
                 statistics: statistics.as_ref(),
+                gathers: false,
             };
             let listener = Listener {
                 progress,
@@ -201,6 +202,7 @@ impl CausticLayer<'_> {
                 lattice,
                 settings: &settings,
                 statistics: None,
+                gathers: true,
             };
             let listener = Listener {
                 progress: &(),

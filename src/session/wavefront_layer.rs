@@ -14,6 +14,7 @@ use crate::light_pass::caustic::pass::Listener;
 use crate::light_pass::caustic::setup::AimedLight;
 use crate::light_pass::caustic::statistics::FootprintStatistics;
 use crate::light_pass::receiver_maps::{ChartFor, ReceiverMaps};
+use crate::light_pass::wavefront::bodies::SmallBodies;
 use crate::light_pass::wavefront::lattice::WavefrontLattice;
 use crate::light_pass::wavefront::pass::WavefrontDepositor;
 use crate::light_pass::wavefront::receivers::Receivers;
@@ -51,11 +52,18 @@ impl CausticLayer<'_> {
             self.sizes.chart(object, size)
         };
         let mut maps = ReceiverMaps::new(self.tracer.scene().objects.len());
+        let bodies: Vec<SmallBodies> = self
+            .aim
+            .lights
+            .iter()
+            .map(|light| self.small_bodies(light, unit))
+            .collect();
         let lattices: Vec<WavefrontLattice> = self
             .aim
             .lights
             .iter()
-            .map(|light| self.wavefront_lattice(light, 1, unit))
+            .zip(&bodies)
+            .map(|(light, bodies)| self.wavefront_lattice(light, bodies, 1, unit))
             .collect();
         let total = lattices.iter().map(WavefrontLattice::cell_count).sum();
         let receivers = Receivers::new(self.tracer, &chart_for);
@@ -123,9 +131,17 @@ impl CausticLayer<'_> {
         self.aim.lights.iter().map(marked_w).sum()
     }
 
+    /// Bodies that are small beside the cells of the whole lattice.
+    fn small_bodies(&self, light: &AimedLight, unit: FluxUnit) -> SmallBodies {
+        let (columns, rows) = self.lattice(light, 1, unit).size;
+        let cell = DVec2::new(1.0 / columns as f64, 1.0 / rows as f64);
+        SmallBodies::find(self.tracer.scene(), &light.launch, cell)
+    }
+
     fn wavefront_lattice<'a>(
         &'a self,
         light: &'a AimedLight,
+        bodies: &'a SmallBodies,
         coarsening: usize,
         unit: FluxUnit,
     ) -> WavefrontLattice<'a> {
@@ -141,6 +157,7 @@ impl CausticLayer<'_> {
             size: lattice.size,
             unit,
             refinement: None,
+            bodies,
         }
     }
 
@@ -155,9 +172,10 @@ impl CausticLayer<'_> {
         let chart_for: &ChartFor = &|object: usize| self.sizes.chart(object, self.default_size(object)?);
         let receivers = Receivers::new(self.tracer, chart_for);
         let mut statistics = FootprintStatistics::default();
+        let none = SmallBodies::default();
         for light in &self.aim.lights {
             let fine = self.lattice(light, 1, unit).size;
-            let lattice = self.wavefront_lattice(light, super::caustic_layer::COARSENING, unit);
+            let lattice = self.wavefront_lattice(light, &none, super::caustic_layer::COARSENING, unit);
             let depositor = WavefrontDepositor {
                 receivers: &receivers,
                 chart_for,

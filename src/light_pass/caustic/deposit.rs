@@ -4,19 +4,18 @@
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
+use super::bands;
 use super::footprint::{Neighbours, footprint};
 use super::kernel::Profile;
 use super::lattice::{Lattice, TracedRow};
+use super::neighbourhood::Neighbourhood;
 use super::path::Arrival;
-use super::splat::{Coverage, Splat, Window};
+use super::splat::Splat;
 use super::statistics::FootprintStatistics;
-use crate::illumination::accumulator::FluxCount;
+use super::surface::{Surface, Surfaces};
 use crate::light_pass::ledger_sum::{Account, LedgerSum};
-use crate::light_pass::receiver_maps::{ReceiverMap, ReceiverMaps};
-use crate::settings::{BakeSettings, Footprint, Kernel, KernelSampling, Sigma};
-
-/// Texel rows that one task adds to.
-const ROWS_PER_TASK: usize = 32;
+use crate::light_pass::receiver_maps::ReceiverMaps;
+use crate::settings::{BakeSettings, Kernel, KernelSampling, Sigma};
 
 /// How kernels are made from arrivals.
 #[derive(Clone, Copy, Debug)]
@@ -27,6 +26,8 @@ pub struct Depositor<'a> {
     pub settings: &'a BakeSettings,
     /// Mean footprints of a coarser run, where the settings ask for them.
     pub statistics: Option<&'a FootprintStatistics>,
+    /// Whether sizes of footprints are wanted.
+    pub gathers: bool,
 }
 
 /// A traced row with those before and after it.
@@ -58,31 +59,49 @@ impl Depositor<'_> {
     pub fn deposit(&self, rows: &[RowContext], maps: &mut ReceiverMaps) -> DepositReport {
         let parts: Vec<RowSplats> = rows.par_iter().map(|row| self.splats_of(row, maps)).collect();
         let mut report = DepositReport::default();
-        let mut groups: BTreeMap<(u32, usize), Vec<Splat>> = BTreeMap::new();
-        for part in parts {
+        let mut groups: BTreeMap<(u32, u32), Vec<&Placed>> = BTreeMap::new();
+        for part in &parts {
             report.ledger.merge(&part.ledger);
             report.statistics.merge(&part.statistics);
             report.splats += part.splats.len() as u64;
-            for (object, level, splat) in part.splats {
-                groups.entry((object, level)).or_default().push(splat);
+            // Neighbours mostly go to the same map.
+            for run in part
+                .splats
+                .chunk_by(|a, b| (a.object, a.level) == (b.object, b.level))
+            {
+                let group = groups.entry((run[0].object, run[0].level)).or_default();
+                group.extend(run);
             }
         }
         for ((object, level), splats) in groups {
             let map = maps
                 .get_mut(object as usize)
                 .expect("splats are made only for allocated maps");
-            report
-                .ledger
-                .merge(&add_splats(&splats, map, level, self.settings.kernel_sampling));
+            let (flux, covered) = map.level(level as usize);
+            let ledger = bands::add(&splats, flux, &covered, self.settings.kernel_sampling);
+            report.ledger.merge(&ledger);
         }
         report
     }
 
     fn splats_of(&self, context: &RowContext, maps: &ReceiverMaps) -> RowSplats {
         let mut made = RowSplats::default();
-        for (&column, arrival) in context.row.columns.iter().zip(&context.row.arrivals) {
-            match self.splat_of(column, arrival, context, maps, &mut made.statistics) {
-                Some((level, splat)) => made.splats.push((arrival.object, level, splat)),
+        made.splats.reserve_exact(context.row.arrivals.len());
+        let mut surfaces = Surfaces::new(self.lattice.tracer.scene(), maps);
+        let mut neighbourhood = Neighbourhood::new(context);
+        for index in 0..context.row.arrivals.len() {
+            let arrival = &context.row.arrivals[index];
+            let neighbours = neighbourhood.of(index);
+            let column = context.row.columns[index] as usize;
+            let unbent_area_m2 = || {
+                let (low, high) = self.lattice.cell(column, context.index);
+                self.lattice.launch.cell_area_at_m2(low, high, arrival.path_m)
+            };
+            let placed = surfaces
+                .of(arrival)
+                .and_then(|surface| self.place(arrival, &neighbours, surface, &unbent_area_m2, &mut made));
+            match placed {
+                Some(placed) => made.splats.push(placed),
                 None => made
                     .ledger
                     .book(Account::Unresolved, self.lattice.unit.count(arrival.flux_w)),
@@ -91,172 +110,89 @@ impl Depositor<'_> {
         made
     }
 
-    fn splat_of(
+    fn place(
         &self,
-        column: u32,
         arrival: &Arrival,
-        context: &RowContext,
-        maps: &ReceiverMaps,
-        statistics: &mut FootprintStatistics,
-    ) -> Option<(usize, Splat)> {
+        neighbours: &Neighbours,
+        surface: &Surface,
+        unbent_area_m2: &dyn Fn() -> f64,
+        made: &mut RowSplats,
+    ) -> Option<Placed> {
         let object = arrival.object as usize;
-        let map = maps.get(object)?;
-        let (centre, rows) = map.locate(self.lattice.tracer.scene(), arrival)?;
-        let (low, high) = self.lattice.cell(column as usize, context.index);
-        let unbent_area_m2 = self.lattice.launch.cell_area_at_m2(low, high, arrival.path_m);
-        let neighbours = Neighbours {
-            across: [
-                column
-                    .checked_sub(1)
-                    .and_then(|before| context.row.matching(before, arrival)),
-                context.row.matching(column + 1, arrival),
-            ],
-            down: [
-                context.before.and_then(|row| row.matching(column, arrival)),
-                context.after.and_then(|row| row.matching(column, arrival)),
-            ],
-        };
+        let map = surface.map;
         let mean = self.statistics.and_then(|statistics| statistics.mean(object));
-        let fixed_area_m2 = match self.settings.footprint {
-            // A surface that the coarse run missed has no mean.
-            Footprint::Fixed => mean.map_or(unbent_area_m2, |mean| mean.area_m2),
-            Footprint::Ellipse | Footprint::Disc | Footprint::Distance => unbent_area_m2,
+        let fixed_area_m2 = || match mean {
+            Some(mean) => mean.area_m2,
+            // A surface that the coarse run missed.
+            None => unbent_area_m2(),
         };
         let ellipse = footprint(
             self.settings.footprint,
             arrival,
-            &neighbours,
-            &rows,
+            neighbours,
+            &surface.texel_from_world,
             unbent_area_m2,
-            fixed_area_m2,
+            &fixed_area_m2,
         );
         if !ellipse.is_finite() {
             return None;
         }
-        let texels_per_m2 = rows[0].cross(rows[1]).length();
-        let area_m2 = ellipse.area_texels() / texels_per_m2;
-        let texels = (map.chart.width * map.chart.height) as f64;
-        statistics.add(
-            object,
-            arrival.flux_w.luminance(),
-            area_m2,
-            ellipse.area_texels() / texels,
-        );
+        let area_m2 = || ellipse.area_texels() / surface.texels_per_m2;
+        if self.gathers {
+            let texels = (map.chart.width * map.chart.height) as f64;
+            let share = ellipse.area_texels() / texels;
+            made.statistics
+                .add(object, arrival.flux_w.luminance(), area_m2(), share);
+        }
         let sigma = match (self.settings.kernel, self.settings.sigma) {
             (Kernel::Gaussian, Sigma::Constant(sigma)) => sigma,
             // The range of the paper's figure 5.
             (Kernel::Gaussian, Sigma::Adaptive) => {
-                mean.map_or(1.0, |mean| (area_m2 / mean.area_m2).sqrt().clamp(0.5, 2.0))
+                mean.map_or(1.0, |mean| (area_m2() / mean.area_m2).sqrt().clamp(0.5, 2.0))
             }
             (Kernel::Cone | Kernel::Disc | Kernel::Box, _) => 1.0,
         };
-        let flux = self.lattice.unit.count(arrival.flux_w);
         let splat = Splat {
-            centre,
+            centre: surface.centre(arrival),
             ellipse,
             profile: Profile::new(self.settings.kernel, sigma),
-            flux,
+            flux: self.lattice.unit.count(arrival.flux_w),
             island: map.island(arrival),
         };
         // Only a gaussian is smooth at every level; point samples are to be the paper's.
         let smooth = self.settings.kernel == Kernel::Gaussian
             && self.settings.kernel_sampling == KernelSampling::Integrated;
-        let level = if smooth {
+        let level = if smooth && map.level_for(splat.narrower_spread()) > 0 {
             map.level_for(splat.narrowest_spread())
         } else {
             0
         };
-        Some((level, splat.at_level(level)))
+        let splat = if level > 0 { splat.at_level(level) } else { splat };
+        let rows = bands::rows_of(&splat, map.chart.height >> level);
+        Some(Placed {
+            object: arrival.object,
+            level: level as u32,
+            rows,
+            splat,
+        })
     }
+}
+
+/// A splat with where it goes.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Placed {
+    object: u32,
+    /// Of the object's map.
+    level: u32,
+    /// First and last row of texels that it may add to.
+    pub(super) rows: (u32, u32),
+    pub(super) splat: Splat,
 }
 
 /// What one row gave.
 #[derive(Debug, Default)]
 struct RowSplats {
-    /// Object, level of its map, kernel.
-    splats: Vec<(u32, usize, Splat)>,
+    splats: Vec<Placed>,
     ledger: LedgerSum,
     statistics: FootprintStatistics,
-}
-
-/// Adds splats to one level of a map, each task to its own rows of texels.
-fn add_splats(splats: &[Splat], map: &mut ReceiverMap, level: usize, sampling: KernelSampling) -> LedgerSum {
-    let (flux, covered) = map.level(level);
-    let size = covered.size();
-    let tasks = size.1.div_ceil(ROWS_PER_TASK);
-    let mut by_task: Vec<Vec<u32>> = vec![Vec::new(); tasks];
-    for (index, splat) in splats.iter().enumerate() {
-        for task in tasks_of(splat, size.1) {
-            by_task[task].push(index as u32);
-        }
-    }
-    let parts: Vec<LedgerSum> = flux
-        .texels_mut()
-        .par_chunks_mut(ROWS_PER_TASK * size.0)
-        .zip(by_task)
-        .enumerate()
-        .map(|(task, (texels, indices))| {
-            let rows = (task * ROWS_PER_TASK, task * ROWS_PER_TASK + texels.len() / size.0);
-            let mut ledger = LedgerSum::default();
-            let mut window = Window::default();
-            for index in indices {
-                add_splat(
-                    &splats[index as usize],
-                    &covered,
-                    sampling,
-                    rows,
-                    texels,
-                    &mut window,
-                    &mut ledger,
-                );
-            }
-            ledger
-        })
-        .collect();
-    let mut ledger = LedgerSum::default();
-    for part in &parts {
-        ledger.merge(part);
-    }
-    ledger
-}
-
-fn add_splat(
-    splat: &Splat,
-    coverage: &impl Coverage,
-    sampling: KernelSampling,
-    rows: (usize, usize),
-    texels: &mut [FluxCount],
-    window: &mut Window,
-    ledger: &mut LedgerSum,
-) {
-    let size = coverage.size();
-    splat.weigh(sampling, coverage, window);
-    if window.is_placed() {
-        let added = window.add(splat.flux, size, rows, texels);
-        ledger.book(Account::Deposited, added);
-    } else if splat.home_row(size.1) >= rows.0 && splat.home_row(size.1) < rows.1 {
-        // Exactly one task owns the row of the centre.
-        ledger.book(Account::Unresolved, splat.flux);
-    }
-}
-
-/// Tasks whose rows a splat may reach, after folding at the map's borders; always that of its centre.
-fn tasks_of(splat: &Splat, height: usize) -> std::ops::RangeInclusive<usize> {
-    let (first, last) = splat.rows();
-    let height = height as i64;
-    // A kernel that crosses a border comes back at most to that border's mirror image of its far end.
-    let low = if first < 0 { 0 } else { first };
-    let high = if last >= height { height - 1 } else { last };
-    let low = if last >= height {
-        low.min((2 * height - 1 - last).max(0))
-    } else {
-        low
-    };
-    let high = if first < 0 {
-        high.max((-1 - first).min(height - 1))
-    } else {
-        high
-    };
-    let home = splat.home_row(height as usize) as i64;
-    (low.min(home) as usize / ROWS_PER_TASK)..=(high.max(home) as usize / ROWS_PER_TASK)
 }

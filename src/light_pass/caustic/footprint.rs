@@ -99,8 +99,8 @@ pub fn footprint(
     arrival: &Arrival,
     neighbours: &Neighbours,
     texel_from_world: &TexelFromWorld,
-    unbent_area_m2: f64,
-    fixed_area_m2: f64,
+    unbent_area_m2: &dyn Fn() -> f64,
+    fixed_area_m2: &dyn Fn() -> f64,
 ) -> Ellipse {
     let round = |area_m2: f64| {
         let [across, down] = texel_from_world;
@@ -112,10 +112,10 @@ pub fn footprint(
         .scaled(area_m2 / std::f64::consts::PI)
     };
     match kind {
-        Footprint::Fixed => round(fixed_area_m2),
-        Footprint::Distance => round(unbent_area_m2),
+        Footprint::Fixed => round(fixed_area_m2()),
+        Footprint::Distance => round(unbent_area_m2()),
         Footprint::Ellipse => {
-            spanned(arrival, neighbours, texel_from_world).unwrap_or_else(|| round(unbent_area_m2))
+            spanned(arrival, neighbours, texel_from_world).unwrap_or_else(|| round(unbent_area_m2()))
         }
         Footprint::Disc => match spanned(arrival, neighbours, texel_from_world) {
             Some(ellipse) => {
@@ -123,7 +123,7 @@ pub fn footprint(
                 let texels_per_m2 = across.cross(*down).length();
                 round(ellipse.area_texels() / texels_per_m2)
             }
-            None => round(unbent_area_m2),
+            None => round(unbent_area_m2()),
         },
     }
 }

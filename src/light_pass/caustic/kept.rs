@@ -3,7 +3,7 @@
 use glam::DVec2;
 use rayon::prelude::*;
 
-use super::lattice::{Lattice, TracedRow};
+use super::lattice::{Lattice, Points, TracedRow};
 use super::path::{Arrival, PathSignature};
 use crate::light_pass::ledger_sum::LedgerSum;
 use crate::optics::LinearSrgb;
@@ -66,14 +66,21 @@ impl KeptLight {
     /// A row as [`Lattice::trace_row`] traced it, bit by bit, without its accounts. A thinner lattice takes what its
     /// own rays brought.
     pub fn row(&self, lattice: &Lattice, face: usize, row: usize) -> TracedRow {
-        let mut unpacked = TracedRow::default();
         let fine_row = lattice.fine_row(row);
         let kept = &self.rows[face * lattice.size.1 + fine_row];
+        let most = kept.arrivals.len().div_ceil(lattice.strides.0);
+        let mut unpacked = TracedRow {
+            columns: Vec::with_capacity(most),
+            arrivals: Vec::with_capacity(most),
+            ..TracedRow::default()
+        };
+        let mut points = Points::new(lattice.tracer.scene());
         for (index, arrival) in kept.arrivals.iter().enumerate() {
             if let Some(column) = lattice.coarse_column(arrival.column as usize) {
-                unpacked.columns.push(column as u32);
-                let mut arrival = kept.unpack(index, lattice);
+                let mut arrival = kept.unpack(index);
+                arrival.point = points.of(&arrival);
                 arrival.flux_w = arrival.flux_w * lattice.cells_of(column, row);
+                unpacked.columns.push(column as u32);
                 unpacked.arrivals.push(arrival);
             }
         }
@@ -111,14 +118,15 @@ impl KeptRow {
         }
     }
 
-    fn unpack(&self, index: usize, lattice: &Lattice) -> Arrival {
+    /// All but its point.
+    fn unpack(&self, index: usize) -> Arrival {
         let kept = &self.arrivals[index];
         let [g, b] = self
             .colours
             .get(index)
             .copied()
             .unwrap_or([kept.flux_w, kept.flux_w]);
-        let mut arrival = Arrival {
+        Arrival {
             object: kept.object,
             triangle: kept.triangle,
             signature: PathSignature(kept.signature),
@@ -126,9 +134,7 @@ impl KeptRow {
             point: glam::DVec3::ZERO,
             flux_w: LinearSrgb::new(kept.flux_w, g, b),
             path_m: kept.path_m,
-        };
-        arrival.point = lattice.point_of(&arrival);
-        arrival
+        }
     }
 
     fn bytes(&self) -> u64 {

@@ -6,6 +6,7 @@
 
 use std::sync::LazyLock;
 
+use super::numeric::{exp, round};
 use crate::settings::Kernel;
 
 /// A kernel with its spread.
@@ -15,6 +16,9 @@ pub struct Profile {
     /// √σ, footprint radii; used by the gaussian.
     spread: f64,
 }
+
+/// √(π/2), the whole of the half normal integral.
+pub(super) const SQRT_HALF_PI: f64 = 1.253_314_137_315_500_3;
 
 /// Spreads at which the gaussian is cut.
 const CUT_SPREADS: f64 = 4.0;
@@ -54,20 +58,21 @@ impl Profile {
 
     /// ∫ w ds from 0 to `s` at `t`, unnormalised; odd in s. `s` within the chord.
     pub fn chord_integral(&self, s: f64, t: f64) -> f64 {
+        self.line(t).integral(s)
+    }
+
+    /// What is the same along the line at `t`.
+    pub(super) fn line(&self, t: f64) -> Line {
         match self.kernel {
-            Kernel::Disc | Kernel::Box => s,
-            Kernel::Cone => {
-                let r = (s * s + t * t).sqrt();
-                let square_part = if t == 0.0 {
-                    0.0
-                } else {
-                    t * t * (s / t.abs()).asinh()
-                };
-                s - (s * r + square_part) / (2.0 * 3.0_f64.sqrt())
-            }
+            Kernel::Disc | Kernel::Box => Line::Constant,
+            Kernel::Cone => Line::Cone { t },
             Kernel::Gaussian => {
-                let u = t / self.spread;
-                self.spread * (-0.5 * u * u).exp() * half_normal_integral(s / self.spread)
+                let scale = 1.0 / self.spread;
+                let u = t * scale;
+                Line::Gaussian {
+                    scale,
+                    factor: self.spread * exp(-0.5 * u * u),
+                }
             }
         }
     }
@@ -90,6 +95,11 @@ impl Profile {
         }
     }
 
+    /// Standard deviation of a gaussian [footprint radii]; `None` for the others.
+    pub fn deviation(&self) -> Option<f64> {
+        (self.kernel == Kernel::Gaussian).then_some(self.spread)
+    }
+
     /// Length scale over which the weight changes [footprint radii].
     pub fn scale(&self) -> f64 {
         match self.kernel {
@@ -99,15 +109,42 @@ impl Profile {
     }
 }
 
+/// A kernel along a line.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Line {
+    Constant,
+    Cone { t: f64 },
+    Gaussian { scale: f64, factor: f64 },
+}
+
+impl Line {
+    /// ∫ w ds from 0 to `s`.
+    pub(super) fn integral(&self, s: f64) -> f64 {
+        match *self {
+            Self::Constant => s,
+            Self::Cone { t } => {
+                let r = (s * s + t * t).sqrt();
+                let square_part = if t == 0.0 {
+                    0.0
+                } else {
+                    t * t * (s / t.abs()).asinh()
+                };
+                s - (s * r + square_part) / (2.0 * 3.0_f64.sqrt())
+            }
+            Self::Gaussian { scale, factor } => factor * half_normal_integral(s * scale),
+        }
+    }
+}
+
+/// Steps of the table on each side of zero.
 const TABLE_STEPS: usize = 512;
 
-/// ∫₀ˣ exp(−x²/2) dx and its slope per step, at TABLE_STEPS + 1 equal steps of [0, 4]; by Simpson's rule on 16 parts a
-/// step.
-static HALF_NORMAL: LazyLock<Vec<[f64; 2]>> = LazyLock::new(|| {
+/// ∫₀ˣ exp(−x²/2) dx and exp(−x²/2) at equal steps of [−4, 4]; by Simpson's rule on 16 parts a step.
+static HALF_NORMAL: LazyLock<Box<[[f64; 2]; 2 * TABLE_STEPS + 1]>> = LazyLock::new(|| {
     let density = |x: f64| (-0.5 * x * x).exp();
     let step = CUT_SPREADS / TABLE_STEPS as f64;
     let mut sum = 0.0;
-    let mut table = vec![[0.0, step]];
+    let mut table = Box::new([[0.0, 1.0]; 2 * TABLE_STEPS + 1]);
     for index in 0..TABLE_STEPS {
         let parts = 16;
         let h = step / parts as f64;
@@ -115,20 +152,31 @@ static HALF_NORMAL: LazyLock<Vec<[f64; 2]>> = LazyLock::new(|| {
             let x = index as f64 * step + part as f64 * h;
             sum += h / 6.0 * (density(x) + 4.0 * density(x + 0.5 * h) + density(x + h));
         }
-        table.push([sum, step * density((index + 1) as f64 * step)]);
+        let here = density((index + 1) as f64 * step);
+        table[TABLE_STEPS + index + 1] = [sum, here];
+        table[TABLE_STEPS - index - 1] = [-sum, here];
     }
     table
 });
 
-/// ∫₀ˣ exp(−x²/2) dx for |x| ≤ 4, odd; beyond, the value at ±4. Cubic Hermite interpolation: within 1e-10.
-fn half_normal_integral(x: f64) -> f64 {
-    let position = x.abs().min(CUT_SPREADS) * (TABLE_STEPS as f64 / CUT_SPREADS);
-    let index = (position as usize).min(TABLE_STEPS - 1);
-    let f = position - index as f64;
-    let ([y0, d0], [y1, d1]) = (HALF_NORMAL[index], HALF_NORMAL[index + 1]);
-    let rise = y1 - y0;
-    let value = y0 + f * rise + f * (1.0 - f) * ((d0 - rise) * (1.0 - f) + (rise - d1) * f);
-    value.copysign(x)
+/// ∫₀ˣ exp(−x²/2) dx for |x| ≤ 4, odd; beyond, the value at ±4. Taylor's series to third order about the nearest
+/// step: within 1e-10.
+pub(super) fn half_normal_integral(x: f64) -> f64 {
+    const STEPS_PER_SPREAD: f64 = TABLE_STEPS as f64 / CUT_SPREADS;
+    let x = x.clamp(-CUT_SPREADS, CUT_SPREADS);
+    let (nearest, index) = round(x * STEPS_PER_SPREAD);
+    let place = nearest * (1.0 / STEPS_PER_SPREAD);
+    let d = x - place;
+    let [value, density] = HALF_NORMAL[((index + TABLE_STEPS as i64) as usize).min(2 * TABLE_STEPS)];
+    let curve = 1.0 - 0.5 * d * place + d * d * (place * place - 1.0) * (1.0 / 6.0);
+    value + density * d * curve
+}
+
+/// Standard normal distribution function, as though all of it lay within 4.
+pub(super) fn normal_distribution(x: f64) -> f64 {
+    /// At 4.
+    const WHOLE: f64 = 1.253_234_749_285_228_5;
+    0.5 + half_normal_integral(x) * (0.5 / WHOLE)
 }
 
 #[cfg(test)]

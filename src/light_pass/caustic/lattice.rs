@@ -10,6 +10,7 @@ use crate::illumination::accumulator::FluxUnit;
 use crate::light_pass::item_buffer::ItemBuffer;
 use crate::light_pass::launch::Launch;
 use crate::light_pass::ledger_sum::LedgerSum;
+use crate::scene::Scene;
 use crate::settings::RayPlacement;
 use crate::transport::Tracer;
 
@@ -53,15 +54,44 @@ pub struct TracedRow {
 }
 
 impl TracedRow {
-    /// The arrival from a column that took the same way to the same object as `like`.
-    pub fn matching(&self, column: u32, like: &Arrival) -> Option<&Arrival> {
-        let start = self.columns.partition_point(|&c| c < column);
+    /// What arrived from a column by the same way on the same object as `like`, among the arrivals from `start` on: the
+    /// column's first or beyond it.
+    pub fn matching_from(&self, start: usize, column: u32, like: &Arrival) -> Option<&Arrival> {
         self.columns[start..]
             .iter()
             .zip(&self.arrivals[start..])
             .take_while(|(c, _)| **c == column)
             .map(|(_, arrival)| arrival)
             .find(|arrival| arrival.object == like.object && arrival.signature == like.signature)
+    }
+}
+
+/// Says where arrivals are; remembers the last triangle.
+pub(super) struct Points<'a> {
+    scene: &'a Scene,
+    /// Object, triangle, its corners.
+    last: Option<(u32, u32, [DVec3; 3])>,
+}
+
+impl<'a> Points<'a> {
+    pub(super) fn new(scene: &'a Scene) -> Self {
+        Self { scene, last: None }
+    }
+
+    /// Where an arrival is [m], by nothing but its triangle and barycentric coordinates.
+    pub(super) fn of(&mut self, arrival: &Arrival) -> DVec3 {
+        let (object, triangle) = (arrival.object, arrival.triangle);
+        let [a, b, c] = match self.last {
+            Some((o, t, corners)) if o == object && t == triangle => corners,
+            _ => {
+                let mesh = &self.scene.objects[object as usize].mesh;
+                let corners = mesh.corners(triangle as usize);
+                self.last = Some((object, triangle, corners));
+                corners
+            }
+        };
+        let DVec2 { x: wb, y: wc } = arrival.barycentric;
+        a * (1.0 - wb - wc) + b * wb + c * wc
     }
 }
 
@@ -110,14 +140,6 @@ impl Lattice<'_> {
         (column == (left + right) / 2).then_some(coarse)
     }
 
-    /// Where an arrival is [m], by nothing but its triangle and barycentric coordinates.
-    pub fn point_of(&self, arrival: &Arrival) -> DVec3 {
-        let mesh = &self.tracer.scene().objects[arrival.object as usize].mesh;
-        let [a, b, c] = mesh.corners(arrival.triangle as usize);
-        let DVec2 { x: wb, y: wc } = arrival.barycentric;
-        a * (1.0 - wb - wc) + b * wb + c * wc
-    }
-
     /// Upper bound of the rays: lattice cells that touch a marked cell of the item buffer.
     pub fn ray_count(&self) -> u64 {
         self.item_buffer
@@ -131,6 +153,7 @@ impl Lattice<'_> {
         if fine_row >= self.size.1 {
             return traced;
         }
+        let mut points = Points::new(self.tracer.scene());
         let whole = Self {
             strides: (1, 1),
             ..*self
@@ -150,7 +173,7 @@ impl Lattice<'_> {
                 }
                 traced.rays += 1;
                 paths.trace(ray, flux_w, |mut arrival| {
-                    arrival.point = self.point_of(&arrival);
+                    arrival.point = points.of(&arrival);
                     arrival.flux_w = arrival.flux_w * self.cells_of(column, row);
                     traced.columns.push(column as u32);
                     traced.arrivals.push(arrival);

@@ -3,7 +3,9 @@
 use glam::{DVec2, Vec2Swizzles};
 
 use super::footprint::Ellipse;
+use super::gaussian::{Centred, Cornered, WIDE_TEXELS};
 use super::kernel::Profile;
+use super::numeric::{floor, round};
 use crate::illumination::accumulator::FluxCount;
 use crate::settings::KernelSampling;
 
@@ -49,6 +51,7 @@ pub struct Window {
     lines: Vec<Line>,
     weights: Vec<f64>,
     sum: f64,
+    cornered: Cornered,
 }
 
 /// Consecutive texels of one row or column.
@@ -71,6 +74,11 @@ impl Splat {
         self.profile.scale() * least.max(0.0).sqrt()
     }
 
+    /// At least [`Self::narrowest_spread`], and quicker to have.
+    pub fn narrower_spread(&self) -> f64 {
+        self.profile.scale() * self.ellipse.xx.min(self.ellipse.yy).max(0.0).sqrt()
+    }
+
     /// The same kernel on a map of 2^−level times the size each way.
     #[must_use]
     pub fn at_level(mut self, level: usize) -> Self {
@@ -83,10 +91,7 @@ impl Splat {
     /// Rows that the kernel reaches, before folding: first and last.
     pub fn rows(&self) -> (i64, i64) {
         let half = self.half_height();
-        (
-            (self.centre.y - half).floor() as i64,
-            (self.centre.y + half).floor() as i64,
-        )
+        (floor(self.centre.y - half), floor(self.centre.y + half))
     }
 
     fn half_height(&self) -> f64 {
@@ -94,28 +99,55 @@ impl Splat {
         if ellipse.xx <= ellipse.yy {
             return self.profile.reach() * ellipse.yy.sqrt();
         }
-        // Lines are columns: a box then reaches to its slanted corners.
-        let frame = LineFrame::new(ellipse.transposed());
-        self.profile.reach() * (frame.slope.abs() * frame.y_radius + frame.x_radius)
+        // Lines are columns: a box then reaches to its slanted corners, |xy|/√xx + √(yy − xy²/xx), at most √2 √yy.
+        self.profile.reach() * (2.0 * ellipse.yy).sqrt()
     }
 
     /// Fills `window` with the kernel's weight in each texel. The kernel is cut off one map's size beyond the borders.
     pub fn weigh(&self, sampling: KernelSampling, coverage: &impl Coverage, window: &mut Window) {
         let ellipse = self.ellipse.at_least(THINNEST_TEXELS);
+        let smooth = self
+            .profile
+            .deviation()
+            .filter(|_| sampling == KernelSampling::Integrated);
+        let covariance = smooth.map(|deviation| ellipse.scaled(deviation * deviation));
+        let is_wide = covariance.is_some()
+            && self.narrower_spread() >= WIDE_TEXELS
+            && self.narrowest_spread() >= WIDE_TEXELS;
+        let small = covariance.filter(|_| !is_wide);
+        if small.is_none_or(|covariance| !window.integrate(self.centre, covariance, coverage.size())) {
+            let wide = covariance.filter(|_| is_wide);
+            self.weigh_by_lines(sampling, ellipse, wide, coverage.size(), window);
+        }
+        window.mask(self, coverage);
+    }
+
+    /// Fills `window` line by line; with the covariance [texels²] of a wide gaussian, from its values at the texels'
+    /// centres.
+    fn weigh_by_lines(
+        &self,
+        sampling: KernelSampling,
+        ellipse: Ellipse,
+        wide: Option<Ellipse>,
+        (width, height): (usize, usize),
+        window: &mut Window,
+    ) {
         window.clear(ellipse.xx > ellipse.yy);
-        let (width, height) = coverage.size();
-        let (frame, centre, size) = if window.columns {
+        let (frame, centre, size, wide) = if window.columns {
             (
                 LineFrame::new(ellipse.transposed()),
                 self.centre.yx(),
                 (height, width),
+                wide.map(Ellipse::transposed),
             )
         } else {
-            (LineFrame::new(ellipse), self.centre, (width, height))
+            (LineFrame::new(ellipse), self.centre, (width, height), wide)
         };
         self.lay_out(&frame, centre, size, window);
         if window.weights.len() == 1 {
             window.weights[0] = 1.0;
+        } else if let Some(covariance) = wide {
+            window.fill(&Centred::new(covariance), centre);
         } else {
             for line in 0..window.lines.len() {
                 match sampling {
@@ -131,7 +163,6 @@ impl Splat {
             window.push(centre.y.floor() as i64, centre.x.floor() as i64, 1);
             window.weights[0] = 1.0;
         }
-        window.mask(self, coverage);
     }
 
     /// Lists the texels that the kernel reaches, line by line.
@@ -140,18 +171,18 @@ impl Splat {
         let limits = |size: usize| (-(size as f64), 2.0 * size as f64 - 0.5);
         let (least_line, last_line) = limits(size.1);
         let (least, last) = limits(size.0);
-        let first_line = (centre.y - half).max(least_line).floor() as i64;
-        let last_line = (centre.y + half).min(last_line).floor() as i64;
+        let first_line = floor((centre.y - half).max(least_line));
+        let last_line = floor((centre.y + half).min(last_line));
         for index in first_line..=last_line {
             let (low, high) = LineFrame::within(index as f64 - centre.y, half);
             // The chord is longest where the line comes closest to the centre.
             let nearest = 0.0_f64.clamp(low.min(high), high);
             let chord = self.profile.half_chord(nearest / frame.y_radius) * frame.x_radius;
             let (a, b) = (frame.slope * low, frame.slope * high);
-            let begin = (centre.x + a.min(b) - chord).max(least).floor();
-            let end = (centre.x + a.max(b) + chord).min(last).floor();
+            let begin = floor((centre.x + a.min(b) - chord).max(least));
+            let end = floor((centre.x + a.max(b) + chord).min(last));
             if high > low && end >= begin {
-                window.push(index, begin as i64, (end - begin) as usize + 1);
+                window.push(index, begin, (end - begin) as usize + 1);
             }
         }
     }
@@ -196,14 +227,17 @@ impl Splat {
         let t = y / frame.y_radius;
         let half_chord = self.profile.half_chord(t);
         let middle = frame.slope * y;
-        let begin = (middle - half_chord * frame.x_radius - first).floor().max(0.0) as usize;
-        let end = (middle + half_chord * frame.x_radius - first).ceil().max(0.0) as usize;
-        let end = end.min(weights.len());
-        let along = |x: f64| ((x - middle) / frame.x_radius).clamp(-half_chord, half_chord);
-        let mut before = self.profile.chord_integral(along(first + begin as f64), t);
+        let reach = half_chord * frame.x_radius;
+        // Casts round towards zero, and are kept to indices.
+        let begin = (middle - reach - first).max(0.0) as usize;
+        let end = ((middle + reach - first).max(0.0) as usize + 1).min(weights.len());
         let factor = factor * frame.x_radius;
+        let line = self.profile.line(t);
+        let scale = 1.0 / frame.x_radius;
+        let along = |x: f64| line.integral(((x - middle) * scale).clamp(-half_chord, half_chord));
+        let mut before = along(first + begin as f64);
         for (column, weight) in weights.iter_mut().enumerate().take(end).skip(begin) {
-            let after = self.profile.chord_integral(along(first + (column + 1) as f64), t);
+            let after = along(first + (column + 1) as f64);
             *weight += factor * (after - before);
             before = after;
         }
@@ -269,6 +303,37 @@ impl Window {
         });
     }
 
+    /// Takes the integrals of a small gaussian over its texels; says whether that could be done.
+    fn integrate(&mut self, centre: DVec2, covariance: Ellipse, (width, height): (usize, usize)) -> bool {
+        let Some(block) = self.cornered.integrate(centre, covariance, &mut self.weights) else {
+            return false;
+        };
+        let fits = |first: i64, count: usize, size: usize| {
+            first >= -(size as i64) && first + count as i64 <= 2 * size as i64
+        };
+        let (columns, rows) = block.size;
+        if !(fits(block.first.0, columns, width) && fits(block.first.1, rows, height)) {
+            return false;
+        }
+        self.columns = false;
+        self.lines.clear();
+        self.lines.extend((0..rows).map(|row| Line {
+            index: block.first.1 + row as i64,
+            first: block.first.0,
+            span: (row * columns, (row + 1) * columns),
+        }));
+        true
+    }
+
+    /// Takes the values of a wide gaussian at the texels' centres.
+    fn fill(&mut self, kernel: &Centred, centre: DVec2) {
+        for Line { index, first, span } in &self.lines {
+            let x = *first as f64 + 0.5 - centre.x;
+            let y = *index as f64 + 0.5 - centre.y;
+            kernel.fill_row(x, y, &mut self.weights[span.0..span.1]);
+        }
+    }
+
     /// Column and row of a texel of a line, before folding.
     fn place(&self, line: &Line, offset: usize) -> (i64, i64) {
         let along = line.first + offset as i64;
@@ -320,36 +385,83 @@ impl Window {
             texels,
             added: [0; 3],
         };
-        let mut rest = flux;
+        let mut given: FluxCount = [0; 3];
         let (mut heaviest, mut most) = ((0, 0), 0.0);
-        let scale = flux.map(|channel| channel as f64 / self.sum);
+        let per_weight = 1.0 / self.sum;
+        let scale = flux.map(|channel| channel as f64 * per_weight);
         let grey = flux[0] == flux[1] && flux[1] == flux[2];
+        let is_large = flux.iter().any(|&channel| channel >= 1 << 50);
+        let part = |share: f64| {
+            if is_large {
+                (share + 0.5) as i64
+            } else {
+                round(share).1
+            }
+        };
         for line in &self.lines {
             let weights = &self.weights[line.span.0..line.span.1];
-            for (offset, &weight) in weights.iter().enumerate().filter(|(_, weight)| **weight > 0.0) {
-                let place = self.place(line, offset);
-                if weight > most {
-                    (heaviest, most) = (place, weight);
-                }
-                let share = if grey {
-                    [nearest(scale[0] * weight); 3]
+            let (offset, weight) = largest(weights);
+            if weight > most {
+                (heaviest, most) = (self.place(line, offset), weight);
+            }
+            let share = |weight: f64| {
+                if grey {
+                    [part(scale[0] * weight); 3]
                 } else {
-                    scale.map(|channel| nearest(channel * weight))
-                };
-                for channel in 0..3 {
-                    rest[channel] -= share[channel];
+                    scale.map(|channel| part(channel * weight))
                 }
-                target.add(place, share);
+            };
+            if let Some(texels) = self.inside(line, &mut target) {
+                let mut sum: FluxCount = [0; 3];
+                for (texel, &weight) in texels.iter_mut().zip(weights) {
+                    let share = share(weight);
+                    for channel in 0..3 {
+                        texel[channel] += share[channel];
+                        sum[channel] += share[channel];
+                    }
+                }
+                for channel in 0..3 {
+                    given[channel] += sum[channel];
+                    target.added[channel] += sum[channel];
+                }
+            } else {
+                for (offset, &weight) in weights.iter().enumerate().filter(|(_, weight)| **weight > 0.0) {
+                    let share = share(weight);
+                    for channel in 0..3 {
+                        given[channel] += share[channel];
+                    }
+                    target.add(self.place(line, offset), share);
+                }
             }
         }
+        let rest = std::array::from_fn(|channel| flux[channel] - given[channel]);
         target.add(heaviest, rest);
         target.added
     }
+
+    /// The texels of a line that lies along a row, between the map's borders and within the target's rows.
+    fn inside<'a>(&self, line: &Line, target: &'a mut Target) -> Option<&'a mut [FluxCount]> {
+        let (width, _) = target.size;
+        let first = usize::try_from(line.first).ok().filter(|_| !self.columns)?;
+        let row = usize::try_from(line.index).ok()?;
+        let count = line.span.1 - line.span.0;
+        if row < target.rows.0 || row >= target.rows.1 || first + count > width {
+            return None;
+        }
+        let begin = (row - target.rows.0) * width + first;
+        target.texels.get_mut(begin..begin + count)
+    }
 }
 
-/// The nearest whole number of a share of flux, which is never negative; without a call into the mathematics library.
-fn nearest(share: f64) -> i64 {
-    (share + 0.5) as i64
+/// Place and value of the first of the largest weights; weights are not negative.
+fn largest(weights: &[f64]) -> (usize, f64) {
+    let mut largest = (0, 0.0);
+    for (offset, &weight) in weights.iter().enumerate() {
+        if weight > largest.1 {
+            largest = (offset, weight);
+        }
+    }
+    largest
 }
 
 /// Some rows of a map, being added to.

@@ -3,8 +3,9 @@
 use glam::DVec2;
 
 use super::band::{Corner, SampleId, Workspace};
+use super::bodies::SmallBodies;
 use super::edge::{CUT_BITS, Edge, EdgeCutter, Reach, SUSPICION, mismatch};
-use super::refine::Refinement;
+use super::refine::{DEEPEST_LEVEL, Refinement};
 use super::strand::LightSample;
 use crate::illumination::accumulator::FluxUnit;
 use crate::light_pass::caustic::path::PathSignature;
@@ -86,6 +87,8 @@ pub struct CellCutter<'a> {
     pub unit: FluxUnit,
     /// Towards a target error, if there is one.
     pub refinement: Option<&'a Refinement<'a>>,
+    /// What corners alone would miss.
+    pub bodies: &'a SmallBodies,
 }
 
 /// How often a cell was divided.
@@ -186,6 +189,11 @@ impl CellCutter<'_> {
     }
 
     fn is_too_coarse(&self, cell: &Cell, level: u32, work: &Workspace) -> bool {
+        let [low, _, high, _] = cell.corners.map(|corner| corner.square);
+        let launch = self.edges.tracer.launch;
+        if level < DEEPEST_LEVEL && self.bodies.ask_for_finer(launch, self.edges.face, low, high) {
+            return true;
+        }
         let Some(refinement) = self.refinement else {
             return false;
         };

@@ -211,11 +211,15 @@ impl EdgeCutter<'_> {
         let first = work.get(edge.samples[0].1);
         let last = work.get(edge.samples[edge.samples.len() - 1].1);
         let brightest_w = first.brightest_w.max(last.brightest_w);
+        let step = ends[1] - ends[0];
+        // As fine as on an edge of the lattice itself, in the unit square.
+        let whole = DVec2::from(self.tracer.steps).dot(step.abs()) / step.length_squared();
+        let most_bits = (CUT_BITS - whole.log2().round() as i32).clamp(2, CUT_BITS);
         let mut changes: Vec<(PathSignature, i32, bool)> = Vec::new();
         for (sample, other) in [(first, last), (last, first)] {
             for strand in &sample.strands {
                 let share = strand.flux_w.luminance() / brightest_w;
-                let bits = (CUT_BITS + share.log2().floor().max(-60.0) as i32).clamp(0, CUT_BITS);
+                let bits = (most_bits + share.log2().floor().max(-60.0) as i32).clamp(0, most_bits);
                 match other.find(strand.signature) {
                     None => changes.push((strand.signature, bits, false)),
                     Some(_) if std::ptr::eq(sample, first) => changes.push((strand.signature, bits, true)),
@@ -224,16 +228,15 @@ impl EdgeCutter<'_> {
             }
             for node in sample.nodes.iter().filter(|node| node.first) {
                 if other.find_node(node.signature).is_none() {
-                    changes.push((node.signature, CUT_BITS, false));
+                    changes.push((node.signature, most_bits, false));
                 }
             }
         }
         // The brightest first: their samples serve the others.
         changes.sort_by_key(|(signature, bits, _)| (std::cmp::Reverse(*bits), *signature));
-        let step = ends[1] - ends[0];
         for (signature, bits, both) in changes {
             if both {
-                self.bracket_jump(edge, ends, signature, bits.min(JUMP_BITS), step, work);
+                self.bracket_jump(edge, ends, signature, step, work);
             } else {
                 self.bracket_change(edge, ends, signature, bits, work);
             }
@@ -267,17 +270,16 @@ impl EdgeCutter<'_> {
         }
     }
 
-    /// Narrows the worst mismatch of a strand that both ends have, until it is smooth or 2^−bits wide.
+    /// Narrows the worst mismatch of a strand that both ends have, until it is smooth or 2^−[`JUMP_BITS`] wide.
     fn bracket_jump(
         &self,
         edge: &mut Edge,
         ends: [DVec2; 2],
         signature: PathSignature,
-        bits: i32,
         step: DVec2,
         work: &mut Workspace,
     ) {
-        let width = (-f64::from(bits)).exp2();
+        let width = (-f64::from(JUMP_BITS)).exp2();
         loop {
             let gap = |pair: &[(f64, SampleId)]| pair[1].0 - pair[0].0;
             let worst = edge.samples.windows(2).position(|pair| {

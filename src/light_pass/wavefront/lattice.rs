@@ -4,6 +4,7 @@ use glam::DVec2;
 use rayon::prelude::*;
 
 use super::band::{Corner, SampleId, Samples, Workspace};
+use super::bodies::SmallBodies;
 use super::cell::{Cell, CellCutter, CellOutput, Patch};
 use super::edge::{Edge, EdgeCutter};
 use super::refine::Refinement;
@@ -29,6 +30,8 @@ pub struct WavefrontLattice<'a> {
     pub unit: FluxUnit,
     /// Towards a target error, if there is one.
     pub refinement: Option<&'a Refinement<'a>>,
+    /// What corners alone would miss.
+    pub bodies: &'a SmallBodies,
 }
 
 /// Some traced rows of cells of one face.
@@ -251,6 +254,7 @@ impl WavefrontLattice<'_> {
             },
             unit: self.unit,
             refinement: self.refinement,
+            bodies: self.bodies,
         };
         for (start, end) in self.spans(face, row) {
             let corner = |column: usize, upper: usize| Corner {

@@ -2,6 +2,7 @@
 //! patches, and their light is spread exactly over the texels they cover.
 
 pub mod band;
+pub mod bodies;
 pub mod cell;
 pub mod coverage;
 pub mod edge;

@@ -199,6 +199,54 @@ impl CoonsPatch {
     }
 }
 
+impl CoonsPatch {
+    /// Rays over a grid of so many steps, row by row; the curves along rows are made once.
+    pub fn for_each_row(&self, (across, down): (usize, usize), mut take: impl FnMut(usize, &[Ray])) {
+        let share = |index: usize, steps: usize| index as f64 / steps as f64;
+        let [a, b, c, d] = self.corners;
+        let along: Vec<(f64, Node, Node)> = (0..=across)
+            .map(|i| {
+                let s = share(i, across);
+                let bottom = hermite(a, self.across[0], b, self.across[1], s);
+                let top = hermite(d, self.across[3], c, self.across[2], s);
+                (s, bottom, top)
+            })
+            .collect();
+        let mut row = Vec::with_capacity(across + 1);
+        for j in 0..=down {
+            let t = share(j, down);
+            // The side curves, less what the rows' curves already have of them.
+            let left = hermite(a, self.down[0], d, self.down[3], t)
+                .plus(a.times(t - 1.0))
+                .plus(d.times(-t));
+            let right = hermite(b, self.down[1], c, self.down[2], t)
+                .plus(b.times(t - 1.0))
+                .plus(c.times(-t));
+            row.clear();
+            row.extend(along.iter().map(|&(s, bottom, top)| Ray {
+                origin: bottom.origin * (1.0 - t)
+                    + top.origin * t
+                    + left.origin * (1.0 - s)
+                    + right.origin * s,
+                direction: bottom.direction * (1.0 - t)
+                    + top.direction * t
+                    + left.direction * (1.0 - s)
+                    + right.direction * s,
+            }));
+            take(j, &row);
+        }
+    }
+}
+
+/// The cubic between two nodes with given slopes.
+fn hermite(from: Node, from_slope: Node, to: Node, to_slope: Node, s: f64) -> Node {
+    let u = 1.0 - s;
+    from.times(u * u * (1.0 + 2.0 * s))
+        .plus(to.times(s * s * (1.0 + 2.0 * u)))
+        .plus(from_slope.times(s * u * u))
+        .plus(to_slope.times(-s * s * u))
+}
+
 impl BezierTriangle {
     fn node(&self, s: f64, t: f64) -> Node {
         let (a, b, c) = (1.0 - s - t, s, t);

@@ -6,7 +6,7 @@ use glam::{DVec2, DVec3};
 use super::band::Samples;
 use super::cell::{Patch, PatchKind};
 use super::coverage::FluxTriangle;
-use super::patch::PatchShape;
+use super::patch::{CoonsPatch, PatchShape};
 use super::receivers::Receivers;
 use super::strand::{Landing, Strand};
 use super::virtual_vertex::{Place, VirtualRays, VirtualVertex};
@@ -72,17 +72,17 @@ pub struct SpreadOutput {
 }
 
 impl SpreadOutput {
-    fn push(&mut self, object: u32, triangle: FluxTriangle) {
+    /// Triangles on the map of an object.
+    fn list(&mut self, object: u32) -> &mut Vec<FluxTriangle> {
         // A handful of objects, most often the last one.
-        let list = match self.triangles.iter().rposition(|(of, _)| *of == object) {
+        match self.triangles.iter().rposition(|(of, _)| *of == object) {
             Some(index) => &mut self.triangles[index].1,
             None => {
                 self.triangles.push((object, Vec::new()));
                 let last = self.triangles.len() - 1;
                 &mut self.triangles[last].1
             }
-        };
-        list.push(triangle);
+        }
     }
 }
 
@@ -200,6 +200,12 @@ impl Spreader<'_> {
         let colours: Vec<LinearSrgb> = strands.iter().map(|strand| strand.flux_w).collect();
         let mut rays = VirtualRays::new(self, &shape, strands, plane);
         let steps = self.steps(&shape, &mut rays, plane.is_some(), flux_w, out);
+        if let (PatchShape::Coons(coons), Some(object)) = (&shape, plane)
+            && let Some(grid) = self.plane_grid(coons, object, steps)
+        {
+            out.queries += rays.queries + grid.len() as u64;
+            return even_grid(object, &grid, steps, &colours, flux, out);
+        }
         let mut mesh = Spread {
             shape: &shape,
             rays,
@@ -214,6 +220,25 @@ impl Spreader<'_> {
         }
         let queries = mesh.rays.queries;
         out.queries += queries;
+    }
+
+    /// Texel coordinates of a grid of rays, row by row, where all of them meet one plane and nothing is absorbed.
+    fn plane_grid(&self, coons: &CoonsPatch, object: u32, steps: (usize, usize)) -> Option<Vec<DVec2>> {
+        let plane = self.receivers.get(object)?.plane?;
+        if self.absorption {
+            return None;
+        }
+        let mut grid = Vec::with_capacity((steps.0 + 1) * (steps.1 + 1));
+        let mut all = true;
+        coons.for_each_row(steps, |_, rays| {
+            for ray in rays {
+                match plane.meet(ray) {
+                    Some((texel, _)) => grid.push(texel),
+                    None => all = false,
+                }
+            }
+        });
+        all.then_some(grid)
     }
 
     /// How finely a patch has to be divided, from nine of its rays.
@@ -384,6 +409,46 @@ fn difference(a: FluxCount, b: FluxCount) -> FluxCount {
     std::array::from_fn(|channel| a[channel] - b[channel])
 }
 
+/// The triangles of a whole grid on one plane.
+fn even_grid(
+    object: u32,
+    grid: &[DVec2],
+    (across, down): (usize, usize),
+    colours: &[LinearSrgb],
+    flux: FluxCount,
+    out: &mut SpreadOutput,
+) {
+    let (width, height) = ((across as f64).recip(), (down as f64).recip());
+    let total = colours
+        .iter()
+        .fold(LinearSrgb::BLACK, |sum, colour| sum + *colour)
+        * 0.25;
+    let mut share = Shares::new(flux, 2 * across * down, total);
+    let list = out.list(object);
+    list.reserve(2 * across * down);
+    for j in 0..down {
+        let t = (j as f64 + 0.5) * height;
+        let left = colours[0] * (1.0 - t) + colours[3] * t;
+        let right = colours[1] * (1.0 - t) + colours[2] * t;
+        let rows = [&grid[j * (across + 1)..], &grid[(j + 1) * (across + 1)..]];
+        for i in 0..across {
+            let s = (i as f64 + 0.5) * width;
+            let colour = left * (1.0 - s) + right * s;
+            let (a, b, c, d) = (rows[0][i], rows[0][i + 1], rows[1][i + 1], rows[1][i]);
+            for corners in [[a, b, c], [a, c, d]] {
+                let flux = share.next(colour);
+                if flux != [0; 3] {
+                    list.push(FluxTriangle {
+                        corners,
+                        flux,
+                        island: 0,
+                    });
+                }
+            }
+        }
+    }
+}
+
 /// One patch while it is spread.
 struct Spread<'a, 'b> {
     shape: &'a PatchShape,
@@ -543,7 +608,7 @@ impl Spread<'_, '_> {
                     flux: deposit,
                     island,
                 };
-                self.out.push(object, triangle);
+                self.out.list(object).push(triangle);
             }
         }
     }
@@ -558,6 +623,8 @@ struct Shares {
     /// Per channel: share of the whole of a part of unit colour.
     scale: [f64; 3],
     left: usize,
+    /// Whether all channels were alike so far.
+    is_grey: bool,
 }
 
 impl Shares {
@@ -577,24 +644,36 @@ impl Shares {
             sum: [0.0; 3],
             scale,
             left: parts,
+            is_grey: flux[0] == flux[1] && flux[1] == flux[2] && scale[0] == scale[1] && scale[1] == scale[2],
         }
     }
 
     fn next(&mut self, colour: LinearSrgb) -> FluxCount {
         self.left -= 1;
         let colour = colour.to_array();
-        std::array::from_fn(|channel| {
-            self.sum[channel] += colour[channel] * self.scale[channel];
-            let upto = if self.left == 0 {
-                self.flux[channel]
-            } else {
-                // Cumulative: no rounding adds up.
-                ((self.flux[channel] as f64 * self.sum[channel].min(1.0)).round() as i64)
-                    .min(self.flux[channel])
-            };
-            let part = upto - self.given[channel];
-            self.given[channel] = upto;
-            part
-        })
+        let is_grey = self.is_grey && colour[0] == colour[1] && colour[1] == colour[2];
+        if is_grey {
+            return [self.next_of(0, colour[0]); 3];
+        }
+        // Greys are summed in the first channel alone.
+        if self.is_grey {
+            self.is_grey = false;
+            self.sum = [self.sum[0]; 3];
+            self.given = [self.given[0]; 3];
+        }
+        std::array::from_fn(|channel| self.next_of(channel, colour[channel]))
+    }
+
+    fn next_of(&mut self, channel: usize, colour: f64) -> i64 {
+        self.sum[channel] += colour * self.scale[channel];
+        let upto = if self.left == 0 {
+            self.flux[channel]
+        } else {
+            // Cumulative: no rounding adds up. Not negative, so that cutting rounds down.
+            ((self.flux[channel] as f64 * self.sum[channel].min(1.0) + 0.5) as i64).min(self.flux[channel])
+        };
+        let part = upto - self.given[channel];
+        self.given[channel] = upto;
+        part
     }
 }

@@ -1,0 +1,81 @@
+//! Bodies that are smaller than the cells of a lattice: corners alone would miss them.
+
+use glam::{DVec2, DVec3};
+
+use crate::light_pass::launch::Launch;
+use crate::scene::Scene;
+
+/// A body counts as small while it is less than this many cells across.
+const SMALL_CELLS: f64 = 2.0;
+
+/// Cells across a body once they are fine enough.
+const CELLS_ACROSS: f64 = 6.0;
+
+/// More small bodies than this are a texture of the scene that the lattice has to resolve by itself.
+const MOST_BODIES: usize = 256;
+
+/// The sphere around an object.
+#[derive(Clone, Copy, Debug)]
+struct Body {
+    centre: DVec3,
+    radius_m: f64,
+}
+
+/// Small bodies as one light sees them.
+#[derive(Clone, Debug, Default)]
+pub struct SmallBodies {
+    bodies: Vec<Body>,
+}
+
+impl SmallBodies {
+    /// The objects that are small beside cells of the given size in the unit square.
+    pub fn find(scene: &Scene, launch: &Launch, cell: DVec2) -> Self {
+        let mut bodies: Vec<Body> = scene
+            .objects
+            .iter()
+            .filter_map(|object| {
+                let (low, high) = object.mesh.bounds()?;
+                Some(Body {
+                    centre: low * 0.5 + high * 0.5,
+                    radius_m: 0.5 * (high - low).length(),
+                })
+            })
+            .collect();
+        let middle = DVec2::splat(0.5);
+        bodies.retain(|body| {
+            let origin = launch.ray(0, middle).origin;
+            let width_m = launch
+                .cell_area_at_m2(middle, middle + cell, origin.distance(body.centre))
+                .sqrt();
+            body.radius_m > 0.0 && 2.0 * body.radius_m < SMALL_CELLS * width_m
+        });
+        if bodies.len() > MOST_BODIES {
+            bodies.clear();
+        }
+        Self { bodies }
+    }
+
+    /// Whether a cell of a face, between two corners of the unit square, may hold a body that is small beside it.
+    pub fn ask_for_finer(&self, launch: &Launch, face: usize, low: DVec2, high: DVec2) -> bool {
+        if self.bodies.is_empty() {
+            return false;
+        }
+        let middle = launch.ray(face, (low + high) * 0.5);
+        let corners = [low, high, DVec2::new(low.x, high.y), DVec2::new(high.x, low.y)]
+            .map(|corner| launch.ray(face, corner));
+        self.bodies.iter().any(|body| {
+            let along_m = (body.centre - middle.origin).dot(middle.direction);
+            if along_m <= -body.radius_m {
+                return false;
+            }
+            let along_m = along_m.max(0.0);
+            let centre = middle.at(along_m);
+            let reach_m = corners
+                .iter()
+                .map(|corner| corner.at(along_m).distance(centre))
+                .fold(0.0, f64::max);
+            centre.distance(body.centre) <= body.radius_m + 1.5 * reach_m
+                && CELLS_ACROSS * reach_m > 2.0 * body.radius_m
+        })
+    }
+}
