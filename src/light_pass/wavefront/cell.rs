@@ -4,7 +4,7 @@ use glam::DVec2;
 
 use super::band::{Corner, SampleId, Workspace};
 use super::bodies::SmallBodies;
-use super::edge::{CUT_BITS, Edge, EdgeCutter, Reach, SUSPICION, mismatch};
+use super::edge::{Edge, EdgeCutter, Reach, SUSPICION, mismatch};
 use super::refine::{DEEPEST_LEVEL, Refinement};
 use super::strand::LightSample;
 use crate::illumination::accumulator::FluxUnit;
@@ -13,7 +13,10 @@ use crate::light_pass::ledger_sum::{Account, LedgerSum};
 use crate::optics::LinearSrgb;
 
 /// How often a cell is split whose cuts are ambiguous; what is then left goes on as one small patch per ray.
-const DEEPEST_SPLIT: u32 = 3;
+const DEEPEST_SPLIT: u32 = 2;
+
+/// Light below this share of the brightest is cut as it comes; what its cuts leave open is booked.
+const BRIGHT_SHARE: f64 = 0.1;
 
 /// Mismatch along an edge from which a check ray decides between the cubic and the bilinear patch.
 const CHECK_MISMATCH: f64 = 0.08;
@@ -284,7 +287,7 @@ impl CellCutter<'_> {
             error(&PatchShape::bilinear(strands)),
         );
         // Also where the cubic is not a number.
-        !(cubic <= bilinear)
+        cubic > bilinear || cubic.is_nan()
     }
 
     /// Whether cuts along the edges do not tell what lies between them.
@@ -294,7 +297,7 @@ impl CellCutter<'_> {
             .iter()
             .map(|sample| sample.brightest_w)
             .fold(0.0, f64::max);
-        let least_w = brightest_w * (-f64::from(CUT_BITS - 2)).exp2();
+        let least_w = brightest_w * BRIGHT_SHARE;
         let bright = |sample: &LightSample| -> Vec<PathSignature> {
             sample
                 .strands
@@ -320,7 +323,15 @@ impl CellCutter<'_> {
         }
         kinds.sort_unstable();
         kinds.dedup();
-        if kinds.len() > 2 {
+        // Light that only the samples along the edges met lies between the corners.
+        let is_between = |sample: SampleId| {
+            let inner = bright(work.get(sample));
+            inner
+                .iter()
+                .any(|signature| all.binary_search(signature).is_err())
+        };
+        let mut inner = cell.edges.iter().flatten().flat_map(|edge| &edge.samples);
+        if kinds.len() > 2 || inner.any(|(_, sample)| is_between(*sample)) {
             return true;
         }
         all.iter().any(|&signature| {

@@ -1,6 +1,6 @@
 //! Edges of cells: where along one the way of the light changes, found by bisection with light rays.
 
-use glam::DVec2;
+use glam::{DVec2, DVec3};
 
 use super::band::{Corner, SampleId, Workspace};
 use super::strand::{LightSample, Strand};
@@ -10,11 +10,24 @@ use crate::light_pass::caustic::path::PathSignature;
 /// Bisections of an edge on which the brightest light changes its way; dimmer light is cut as much more coarsely.
 pub const CUT_BITS: i32 = 8;
 
+/// Changes of way along one edge from which on each is cut more coarsely.
+const MANY_CHANGES: usize = 12;
+
+/// Bisections then.
+const SHATTERED_BITS: i32 = 3;
+
 /// Bisections that decide whether two ends of one signature lie on one sheet of the wavefront.
 const JUMP_BITS: i32 = 6;
 
-/// Mismatch of chord and tangents, as a share of the chord, from which an edge may hide a jump.
+/// Mismatch of chord and tangents, as a share of the chord, from which derivatives are not to be trusted.
 pub const SUSPICION: f64 = 0.35;
+
+/// How many times longer a step may be than both derivatives say before an edge may hide a jump. Kinks, folds and the
+/// roots at silhouettes stay below.
+const SUSPICIOUS_STRETCH: f64 = 1.5;
+
+/// The same over the narrowest bracket: the sheet is torn.
+const TORN_STRETCH: f64 = 3.0;
 
 /// Samples along an edge, by their place on it [0, 1], both ends included.
 #[derive(Clone, Debug)]
@@ -39,39 +52,67 @@ pub enum Reach {
     },
 }
 
+/// The step between two strands, and what each one's derivatives say of it: lengths and differences of origins [m] with
+/// those of directions over the way to where they land.
+struct Step {
+    chord: f64,
+    tangents: [f64; 2],
+    /// From the mean of both tangents.
+    off_mean: f64,
+}
+
+impl Step {
+    /// `step` is the vector between the strands in the unit square.
+    fn between(a: &Strand, b: &Strand, step: DVec2) -> Self {
+        let reach_m = [a, b]
+            .map(|strand| strand.landing.distance_m())
+            .into_iter()
+            .filter(|distance| distance.is_finite())
+            .fold(0.0, f64::max);
+        let reach_m = if reach_m > 0.0 { reach_m } else { 1.0 };
+        let length = |origin: DVec3, direction: DVec3| origin.length() + reach_m * direction.length();
+        let tangent = |strand: &Strand| {
+            let d = &strand.differential;
+            (
+                d.across.origin * step.x + d.down.origin * step.y,
+                d.across.direction * step.x + d.down.direction * step.y,
+            )
+        };
+        let (origin, direction) = (b.ray.origin - a.ray.origin, b.ray.direction - a.ray.direction);
+        let ((oa, da), (ob, db)) = (tangent(a), tangent(b));
+        Self {
+            chord: length(origin, direction),
+            tangents: [length(oa, da), length(ob, db)],
+            off_mean: length(origin - (oa + ob) * 0.5, direction - (da + db) * 0.5),
+        }
+    }
+}
+
 /// Relative mismatch between what two strands' derivatives say about the step between them and the step itself;
 /// `step` is the vector between them in the unit square. 0 where the wavefront is a parabola between them.
 pub fn mismatch(a: &Strand, b: &Strand, step: DVec2) -> f64 {
-    let reach_m = [a, b]
-        .map(|strand| strand.landing.distance_m())
-        .into_iter()
-        .filter(|distance| distance.is_finite())
-        .fold(0.0, f64::max);
-    let reach_m = if reach_m > 0.0 { reach_m } else { 1.0 };
-    let (origin, direction) = (b.ray.origin - a.ray.origin, b.ray.direction - a.ray.direction);
-    let mean = |strand: &Strand| {
-        let d = &strand.differential;
-        (
-            d.across.origin * step.x + d.down.origin * step.y,
-            d.across.direction * step.x + d.down.direction * step.y,
-        )
-    };
-    let ((oa, da), (ob, db)) = (mean(a), mean(b));
-    let error = (origin - (oa + ob) * 0.5).length() + reach_m * (direction - (da + db) * 0.5).length();
-    let scale = origin.length() + reach_m * direction.length();
-    // NaN counts as a mismatch.
-    if error <= scale * 1e-12 {
+    let Step { chord, off_mean, .. } = Step::between(a, b, step);
+    if off_mean <= chord * 1e-12 {
         0.0
-    } else if scale > 0.0 && error.is_finite() {
-        error / scale
+    } else if chord > 0.0 && off_mean.is_finite() {
+        off_mean / chord
     } else {
+        // Also where derivatives are not finite.
         f64::INFINITY
     }
 }
 
-fn is_suspicious(a: &LightSample, b: &LightSample, signature: PathSignature, step: DVec2) -> bool {
+/// How many times longer the step between two strands is than either one's derivatives say.
+fn stretch(a: &Strand, b: &Strand, step: DVec2) -> f64 {
+    let Step { chord, tangents, .. } = Step::between(a, b, step);
+    let longest = tangents[0].max(tangents[1]);
+    // Parallel light does not move at all.
+    if chord <= longest { 0.0 } else { chord / longest }
+}
+
+fn is_stretched(a: &LightSample, b: &LightSample, signature: PathSignature, step: DVec2, most: f64) -> bool {
     match (a.find(signature), b.find(signature)) {
-        (Some(i), Some(j)) => mismatch(&a.strands[i], &b.strands[j], step) > SUSPICION,
+        (Some(i), Some(j)) => stretch(&a.strands[i], &b.strands[j], step) > most,
         _ => false,
     }
 }
@@ -104,7 +145,7 @@ impl Edge {
             && a.strands
                 .iter()
                 .zip(&b.strands)
-                .all(|(a, b)| mismatch(a, b, step) <= SUSPICION)
+                .all(|(a, b)| stretch(a, b, step) <= SUSPICIOUS_STRETCH)
     }
 
     /// Part of an edge between two places that are samples of it, as an edge of its own.
@@ -135,7 +176,8 @@ impl Edge {
             backwards,
             |sample| sample.find(signature).is_some(),
             |a, b, width| {
-                width <= (-f64::from(JUMP_BITS)).exp2() && is_suspicious(a, b, signature, step * width)
+                width <= (-f64::from(JUMP_BITS)).exp2()
+                    && is_stretched(a, b, signature, step * width, TORN_STRETCH)
             },
         )
     }
@@ -232,6 +274,12 @@ impl EdgeCutter<'_> {
                 }
             }
         }
+        if changes.len() > MANY_CHANGES {
+            // Shattered light: no single cut tells much.
+            changes
+                .iter_mut()
+                .for_each(|(_, bits, _)| *bits = (*bits).min(SHATTERED_BITS));
+        }
         // The brightest first: their samples serve the others.
         changes.sort_by_key(|(signature, bits, _)| (std::cmp::Reverse(*bits), *signature));
         for (signature, bits, both) in changes {
@@ -284,11 +332,12 @@ impl EdgeCutter<'_> {
             let gap = |pair: &[(f64, SampleId)]| pair[1].0 - pair[0].0;
             let worst = edge.samples.windows(2).position(|pair| {
                 gap(pair) > width
-                    && is_suspicious(
+                    && is_stretched(
                         work.get(pair[0].1),
                         work.get(pair[1].1),
                         signature,
                         step * gap(pair),
+                        SUSPICIOUS_STRETCH,
                     )
             });
             let Some(index) = worst else { return };

@@ -15,7 +15,7 @@ use crate::light_pass::item_buffer::ItemBuffer;
 use crate::light_pass::ledger_sum::{Account, LedgerSum};
 
 /// Cells that a band aims at: enough for all cores, and no more memory than some ten megabytes.
-const CELLS_PER_BAND: usize = 1 << 14;
+const CELLS_PER_BAND: usize = 1 << 12;
 
 /// The lattice of one light.
 #[derive(Clone, Copy, Debug)]
@@ -269,6 +269,7 @@ impl WavefrontLattice<'_> {
                 self.edge(face, [a.sample, b.sample], [a.square, b.square], work)
             };
             let mut left = down(start, work);
+            #[allow(clippy::needless_range_loop, reason = "columns name corners of four slices")]
             for column in start..end {
                 let right = down(column + 1, work);
                 let cell = Cell {

@@ -12,7 +12,10 @@ use crate::light_pass::receiver_maps::{ChartFor, ReceiverMaps};
 use crate::progress::Stage;
 
 /// Patches that one task spreads.
-const PATCHES_PER_TASK: usize = 256;
+const PATCHES_PER_TASK: usize = 128;
+
+/// Tasks whose triangles wait together to be deposited: memory does not grow with the light.
+const TASKS_AT_ONCE: usize = 64;
 
 /// Traced bands of one light, to be deposited again without a ray.
 #[derive(Clone, Debug, Default)]
@@ -114,28 +117,32 @@ impl WavefrontDepositor<'_> {
             reference_w: self.reference_w,
             coarseness: self.coarseness,
         };
-        let parts: Vec<SpreadOutput> = band
+        let tasks: Vec<_> = band
             .patches
             .iter()
             .flat_map(|row| row.chunks(PATCHES_PER_TASK))
-            .collect::<Vec<_>>()
-            .into_par_iter()
-            .map(|patches| {
-                let mut output = SpreadOutput::default();
-                for patch in patches {
-                    spreader.spread(patch, &mut output);
-                }
-                output
-            })
             .collect();
-        for part in &parts {
-            report.ledger.merge(&part.ledger);
-            report.receiver_queries += part.queries;
-            report.statistics.merge(&part.statistics);
-        }
-        if let Some(maps) = maps {
-            for (object, triangles) in parts.iter().flat_map(|part| &part.triangles) {
-                self.place(*object, triangles, maps, report);
+        let mut maps = maps;
+        for tasks in tasks.chunks(TASKS_AT_ONCE) {
+            let parts: Vec<SpreadOutput> = tasks
+                .par_iter()
+                .map(|patches| {
+                    let mut output = SpreadOutput::default();
+                    for patch in *patches {
+                        spreader.spread(patch, &mut output);
+                    }
+                    output
+                })
+                .collect();
+            for part in &parts {
+                report.ledger.merge(&part.ledger);
+                report.receiver_queries += part.queries;
+                report.statistics.merge(&part.statistics);
+            }
+            if let Some(maps) = maps.as_deref_mut() {
+                for (object, triangles) in parts.iter().flat_map(|part| &part.triangles) {
+                    self.place(*object, triangles, maps, report);
+                }
             }
         }
         report.deposit_s.add(watch.elapsed());

@@ -31,6 +31,9 @@ const MOST_STEPS: usize = 128;
 /// Steps along a patch whose rays do not all go to one surface.
 const MIXED_STEPS: usize = 6;
 
+/// Texels that such a patch is taken to light.
+const MIXED_TEXELS: f64 = 16.0;
+
 /// Bisections of a virtual edge between rays that go to different surfaces.
 const CUT_STEPS: u32 = 10;
 
@@ -263,16 +266,14 @@ impl Spreader<'_> {
         let probes: [[VirtualVertex; 3]; 3] =
             std::array::from_fn(|j| std::array::from_fn(|i| rays.vertex(place(i, j))));
         let first = probes[0][0].place;
-        let Some(object) = first.object() else {
-            return mixed_steps(&probes, is_plane);
+        let is_one = probes.iter().flatten().all(|vertex| vertex.place.is_same(&first));
+        let Some(object) = first.object().filter(|_| is_one) else {
+            let lit = probes.iter().flatten().find_map(|vertex| vertex.place.object());
+            let tolerance = lit.map_or(1.0, |object| {
+                self.tolerance(object, flux_w.luminance(), MIXED_TEXELS)
+            });
+            return mixed_steps(&probes, is_plane, tolerance);
         };
-        if probes
-            .iter()
-            .flatten()
-            .any(|vertex| !vertex.place.is_same(&first))
-        {
-            return mixed_steps(&probes, is_plane);
-        }
         let texel = |i: usize, j: usize| probes[j][i].place.texel();
         self.count_area(object, &texel, flux_w, out);
         let bend = |a: DVec2, b: DVec2, c: DVec2| (a - b * 2.0 + c).length() * 0.25;
@@ -365,7 +366,7 @@ impl Spreader<'_> {
 }
 
 /// Rays that do not all meet one surface: enough to see the border between.
-fn mixed_steps(probes: &[[VirtualVertex; 3]; 3], is_plane: bool) -> (usize, usize) {
+fn mixed_steps(probes: &[[VirtualVertex; 3]; 3], is_plane: bool, tolerance: f64) -> (usize, usize) {
     let lost = probes
         .iter()
         .flatten()
@@ -376,6 +377,7 @@ fn mixed_steps(probes: &[[VirtualVertex; 3]; 3], is_plane: bool) -> (usize, usiz
         (true, false) => 2 * MIXED_STEPS,
         (false, _) => MIXED_STEPS,
     };
+    let steps = (steps as f64 / tolerance.sqrt()).ceil().max(2.0) as usize;
     (steps, steps)
 }
 

@@ -12,7 +12,7 @@ use crate::transport::{
 };
 
 /// Strands that one light ray may have waiting: a closed mirror box with glass in it doubles them without end.
-const MOST_BRANCHES: usize = 4096;
+const MOST_BRANCHES: usize = 512;
 
 /// Rays start this far within the border of the domain's unit square.
 const DOMAIN_MARGIN: f64 = 1e-9;
@@ -148,11 +148,11 @@ impl StrandTracer<'_> {
             let ray = branch.ray;
             if !(flux_w.is_finite() && ray.direction.is_finite() && ray.origin.is_finite()) {
                 let finite = flux_w.map(|w| if w.is_finite() { w } else { 0.0 });
-                node.non_finite = node.non_finite + finite;
+                node.non_finite += finite;
             } else if from.depth + 1 > self.limits.max_depth {
-                node.depth = node.depth + flux_w;
+                node.depth += flux_w;
             } else if flux_w.luminance() < floor_w || sample.strands.len() >= MOST_BRANCHES {
-                node.threshold = node.threshold + flux_w;
+                node.threshold += flux_w;
             } else {
                 let differential =
                     self.tracer

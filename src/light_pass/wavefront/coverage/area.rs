@@ -100,6 +100,7 @@ impl Area {
     }
 
     /// The row between two cuts, on those texels only that it reaches.
+    #[inline(always)]
     fn wide_span<'a>(&self, from: &Cut, to: &Cut, shares: &'a mut RowShares) -> Option<Span<'a>> {
         let pieces = self.sides.between(from, to);
         let (left, right) = pieces.extent();

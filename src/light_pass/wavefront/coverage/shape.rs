@@ -154,11 +154,13 @@ pub fn rows_and_columns(corners: &[DVec2; 3], size: (usize, usize)) -> (Range<us
 }
 
 /// The smaller one; the second of numbers that do not compare.
+#[inline(always)]
 pub fn least(a: f64, b: f64) -> f64 {
     if a < b { a } else { b }
 }
 
 /// The larger one; the second of numbers that do not compare.
+#[inline(always)]
 pub fn most(a: f64, b: f64) -> f64 {
     if a > b { a } else { b }
 }

@@ -140,6 +140,7 @@ impl Pieces {
     }
 
     /// Which of the two short sides there is, if but one.
+    #[inline(always)]
     pub fn only_short(&self) -> Option<usize> {
         match (self.height[1] != 0.0, self.height[2] != 0.0) {
             (true, false) => Some(1),
