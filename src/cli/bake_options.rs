@@ -176,7 +176,7 @@ mod tests {
             ..Default::default()
         };
         let settings = options.settings(&[LayerKind::Caustic], 0).expect("valid");
-        assert!((settings.density_per_sr - 1e4).abs() < 1e-9);
+        assert!((settings.density_per_sr - 3125.0).abs() < 1e-9);
         let options = BakeOptions {
             density: Some(123.0),
             ..options

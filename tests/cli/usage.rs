@@ -68,7 +68,6 @@ fn bad_usage_is_one_sentence_and_exit_2() {
             "--sigma",
         ),
         // Options whose feature is not there are no options.
-        ("bake builtin:ring -o out --max-error 2%", "--max-error"),
         ("bake builtin:ring -o out --wavelengths 8", "--wavelengths"),
         ("bake builtin:ring -o out --shard 1/2", "--shard"),
         ("render builtin:ring -o picture", ".png"),
@@ -107,7 +106,7 @@ fn values_at_the_ends_of_their_ranges_are_taken() {
         "--branch-threshold 0",
         "--memory 1M",
         "--layers caustic,direct",
-        "--rays jittered --seed 18446744073709551615",
+        "--estimator splat --rays jittered --seed 18446744073709551615",
         "--estimator splat --kernel cone --kernel-sampling point --footprint fixed --item-buffer cube",
         "--estimator splat --preset final",
     ] {
