@@ -115,7 +115,11 @@ fn summary(manifest: &Manifest, result: &BakeResult, folder: &str) -> String {
         line("maps", format!("none: {}", why_nothing(result)));
     }
     let counts = &manifest.counts;
-    line("rays", format!("{}, {} splats", counts.rays, counts.splats));
+    let pieces = match result.counts.cells {
+        0 => format!("{} splats", counts.splats),
+        cells => format!("{cells} cells, {} splats", counts.splats),
+    };
+    line("rays", format!("{}, {pieces}", counts.rays));
     let energy = &manifest.energy_w;
     line(
         "watts",

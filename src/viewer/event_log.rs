@@ -88,6 +88,7 @@ fn finished(event: &str, bake: &FinishedBake) -> Value {
         "bake_s": bake.seconds,
         "rays": bake.result.counts.rays,
         "splats": bake.result.counts.splats,
+        "cells": bake.result.counts.cells,
         "maps": bake.result.maps.len(),
         "settings": bake.settings,
     })

@@ -34,7 +34,16 @@ fn bad_usage_is_one_sentence_and_exit_2() {
         ("bake builtin:ring -o out --density nan", "--density"),
         ("bake builtin:ring -o out --density many", "--density"),
         ("bake builtin:ring -o out --sigma -1", "--sigma"),
-        ("bake builtin:ring -o out --sigma 0", "--sigma"),
+        ("bake builtin:ring -o out --estimator splat --sigma 0", "--sigma"),
+        ("bake builtin:ring -o out --sigma adaptive", "--sigma"),
+        ("bake builtin:ring -o out --footprint disc", "--footprint"),
+        ("bake builtin:ring -o out --rays jittered", "--rays"),
+        ("bake builtin:ring -o out --max-error 0", "--max-error"),
+        ("bake builtin:ring -o out --max-error many", "--max-error"),
+        (
+            "bake builtin:ring -o out --estimator splat --max-error 2%",
+            "--max-error",
+        ),
         ("bake builtin:ring -o out --map-resolution 0", "--map-resolution"),
         ("bake builtin:ring -o out --map-resolution -4", "--map-resolution"),
         (
@@ -54,7 +63,10 @@ fn bad_usage_is_one_sentence_and_exit_2() {
         ("bake builtin:ring -o out --memory 0", "--memory"),
         ("bake builtin:ring -o out --layers indirect", "--layers"),
         ("bake builtin:ring -o out --kernel round", "--kernel"),
-        ("bake builtin:ring -o out --kernel box --sigma 2", "--sigma"),
+        (
+            "bake builtin:ring -o out --estimator splat --kernel box --sigma 2",
+            "--sigma",
+        ),
         // Options whose feature is not there are no options.
         ("bake builtin:ring -o out --max-error 2%", "--max-error"),
         ("bake builtin:ring -o out --wavelengths 8", "--wavelengths"),
@@ -84,8 +96,11 @@ fn values_at_the_ends_of_their_ranges_are_taken() {
     for options in [
         "--density 1",
         "--density 1e12",
-        "--sigma adaptive",
+        "--estimator splat --sigma adaptive",
         "--sigma 0.25",
+        "--sigma 0",
+        "--max-error 5%",
+        "--max-error 0.02 --density 2000",
         "--map-resolution auto",
         "--map-resolution 16384x1",
         "--max-depth 1",
@@ -93,7 +108,7 @@ fn values_at_the_ends_of_their_ranges_are_taken() {
         "--memory 1M",
         "--layers caustic,direct",
         "--rays jittered --seed 18446744073709551615",
-        "--kernel cone --kernel-sampling point --footprint fixed --item-buffer cube",
+        "--estimator splat --kernel cone --kernel-sampling point --footprint fixed --item-buffer cube",
         "--estimator splat --preset final",
     ] {
         sandbox.succeed(&format!("inspect builtin:mirror {options}"));

@@ -15,8 +15,11 @@ use super::desktop::{SIZE, Screen, Viewer};
 use super::headless::Headless;
 
 /// The caustic alone, coarse enough to be baked in a second.
-const RING: [&str; 7] = [
+const RING: [&str; 9] = [
     "builtin:ring",
+    // Its sigma changes the picture most.
+    "--estimator",
+    "splat",
     "--density",
     "10000",
     "--map-resolution",

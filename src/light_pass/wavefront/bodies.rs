@@ -9,7 +9,10 @@ use crate::scene::Scene;
 const SMALL_CELLS: f64 = 2.0;
 
 /// Cells across a body once they are fine enough.
-const CELLS_ACROSS: f64 = 6.0;
+const CELLS_ACROSS: f64 = 160.0;
+
+/// How often a cell is divided at most for a body in it.
+pub const DEEPEST_BODY_LEVEL: u32 = 18;
 
 /// More small bodies than this are a texture of the scene that the lattice has to resolve by itself.
 const MOST_BODIES: usize = 256;

@@ -3,9 +3,9 @@
 use glam::DVec2;
 
 use super::band::{Corner, SampleId, Workspace};
-use super::bodies::SmallBodies;
+use super::bodies::{DEEPEST_BODY_LEVEL, SmallBodies};
 use super::edge::{Edge, EdgeCutter, Reach, SUSPICION, mismatch};
-use super::refine::{DEEPEST_LEVEL, Refinement};
+use super::refine::Refinement;
 use super::strand::LightSample;
 use crate::illumination::accumulator::FluxUnit;
 use crate::light_pass::caustic::path::PathSignature;
@@ -194,7 +194,7 @@ impl CellCutter<'_> {
     fn is_too_coarse(&self, cell: &Cell, level: u32, work: &Workspace) -> bool {
         let [low, _, high, _] = cell.corners.map(|corner| corner.square);
         let launch = self.edges.tracer.launch;
-        if level < DEEPEST_LEVEL && self.bodies.ask_for_finer(launch, self.edges.face, low, high) {
+        if level < DEEPEST_BODY_LEVEL && self.bodies.ask_for_finer(launch, self.edges.face, low, high) {
             return true;
         }
         let Some(refinement) = self.refinement else {

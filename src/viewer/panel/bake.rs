@@ -82,10 +82,15 @@ fn last_bake(ui: &mut Ui, last: &FinishedBake) {
         result.cpu_s.total,
     );
     ui.label(format!(
-        "{seconds:.2} s, {}, {} rays, {} splats",
+        "{seconds:.2} s, {}, {} rays, {} {}",
         counted(result.maps.len(), "map"),
         grouped(result.counts.rays),
-        grouped(result.counts.splats)
+        grouped(result.counts.cells.max(result.counts.splats)),
+        if result.counts.cells > 0 {
+            "cells"
+        } else {
+            "splats"
+        },
     ))
     .on_hover_text(hover);
     let total = result
