@@ -146,6 +146,17 @@ impl Lattice<'_> {
             .lattice_cells(self.launch.face_count(), self.size)
     }
 
+    /// Upper bound of the rays of a traced row.
+    pub fn row_ray_count(&self, face: usize, row: usize) -> usize {
+        let spans = self
+            .item_buffer
+            .lattice_spans(face, self.fine_row(row), self.size);
+        spans
+            .iter()
+            .map(|(start, end)| (end - start).div_ceil(self.strides.0))
+            .sum()
+    }
+
     /// Traces one row of one face.
     pub fn trace_row(&self, face: usize, row: usize) -> TracedRow {
         let mut traced = TracedRow::default();

@@ -8,14 +8,18 @@ use std::time::Instant;
 
 use super::deposit::{DepositReport, Depositor, RowContext};
 use super::kept::KeptLight;
-use super::lattice::TracedRow;
+use super::lattice::{Lattice, TracedRow};
 use super::statistics::FootprintStatistics;
 use crate::light_pass::ledger_sum::LedgerSum;
 use crate::light_pass::receiver_maps::{ChartFor, ReceiverMaps};
 use crate::progress::{Control, Progress, Stage};
 
-/// Rays that a band aims at: enough for all cores, and no more memory than some ten megabytes.
-const RAYS_PER_BAND: usize = 1 << 16;
+/// Rays that a band aims at: enough for all cores, and few enough that what they bring stays in their caches.
+const RAYS_PER_BAND: usize = 1 << 14;
+
+/// Rows of a band, however few or many rays they hold.
+const LEAST_ROWS: usize = 4;
+const MOST_ROWS: usize = 4096;
 
 /// What the pass of one light did.
 #[derive(Clone, Debug, Default)]
@@ -125,8 +129,7 @@ pub fn run(
     let mut report = PassReport::default();
     let mut recorder = Recorder::new(source);
     let lattice = &depositor.lattice;
-    let (columns, rows) = lattice.traced_size();
-    let rows_per_band = (RAYS_PER_BAND / columns).clamp(4, 1024);
+    let (_, rows) = lattice.traced_size();
     for face in 0..lattice.launch.face_count() {
         let mut carried: Vec<TracedRow> = Vec::new();
         let mut first_row = 0;
@@ -135,7 +138,7 @@ pub fn run(
                 report.cancelled = true;
                 return (report, None);
             }
-            let end = (first_row + rows_per_band).min(rows);
+            let end = band_end(lattice, face, first_row);
             let watch = Stopwatch::start();
             let traced: Vec<TracedRow> = (first_row..end)
                 .into_par_iter()
@@ -204,6 +207,17 @@ impl Recorder {
             }
         }
     }
+}
+
+/// The row after a band's last.
+fn band_end(lattice: &Lattice, face: usize, first_row: usize) -> usize {
+    let rows = lattice.traced_size().1.min(first_row + MOST_ROWS);
+    let (mut end, mut rays) = (first_row, 0);
+    while end < rows && (rays < RAYS_PER_BAND || end < first_row + LEAST_ROWS) {
+        rays += lattice.row_ray_count(face, end);
+        end += 1;
+    }
+    end
 }
 
 /// Deposits all rows that have a row after them (all at the end of a face); returns the last two rows, which the next
