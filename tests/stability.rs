@@ -6,3 +6,5 @@ mod intersection;
 mod item_buffer;
 #[path = "stability/sums.rs"]
 mod sums;
+#[path = "stability/wavefront.rs"]
+mod wavefront;

@@ -200,6 +200,11 @@ impl Spreader<'_> {
         out: &mut SpreadOutput,
     ) {
         let shape = shape_of(patch, strands);
+        // Light past the border of a plane goes out only where traced light does.
+        let goes_out = strands
+            .iter()
+            .any(|strand| matches!(strand.landing, Landing::Escaped));
+        let plane = plane.filter(|&object| goes_out || self.stays_on_map(&shape, object));
         let colours: Vec<LinearSrgb> = strands.iter().map(|strand| strand.flux_w).collect();
         let mut rays = VirtualRays::new(self, &shape, strands, plane);
         let steps = self.steps(&shape, &mut rays, plane.is_some(), flux_w, out);
@@ -215,6 +220,7 @@ impl Spreader<'_> {
             colours: &colours,
             out,
             absorption: self.absorption,
+            goes_out,
         };
         if shape.is_rectangle() {
             mesh.rectangle(steps, flux);
@@ -223,6 +229,23 @@ impl Spreader<'_> {
         }
         let queries = mesh.rays.queries;
         out.queries += queries;
+    }
+
+    /// Whether nine rays of a patch meet a plane within its map.
+    fn stays_on_map(&self, shape: &PatchShape, object: u32) -> bool {
+        let Some(surface) = self.receivers.get(object) else {
+            return false;
+        };
+        let Some(plane) = surface.plane else {
+            return false;
+        };
+        let size = DVec2::new(surface.chart.width as f64, surface.chart.height as f64);
+        (0..9).all(|index| {
+            let at = probe_place(shape, index % 3, index / 3);
+            plane
+                .meet(&shape.ray(at))
+                .is_some_and(|(texel, _)| texel.cmpge(DVec2::ZERO).all() && texel.cmple(size).all())
+        })
     }
 
     /// Texel coordinates of a grid of rays, row by row, where all of them meet one plane and nothing is absorbed.
@@ -253,18 +276,8 @@ impl Spreader<'_> {
         flux_w: LinearSrgb,
         out: &mut SpreadOutput,
     ) -> (usize, usize) {
-        let rectangle = shape.is_rectangle();
-        let place = |i: usize, j: usize| {
-            let at = DVec2::new(i as f64, j as f64) * 0.5;
-            // The triangle below the diagonal, its hypotenuse drawn together at the far corner.
-            if rectangle {
-                at
-            } else {
-                DVec2::new(at.x * (1.0 - at.y), at.y)
-            }
-        };
         let probes: [[VirtualVertex; 3]; 3] =
-            std::array::from_fn(|j| std::array::from_fn(|i| rays.vertex(place(i, j))));
+            std::array::from_fn(|j| std::array::from_fn(|i| rays.vertex(probe_place(shape, i, j))));
         let first = probes[0][0].place;
         let is_one = probes.iter().flatten().all(|vertex| vertex.place.is_same(&first));
         let Some(object) = first.object().filter(|_| is_one) else {
@@ -365,6 +378,16 @@ impl Spreader<'_> {
     }
 }
 
+/// One of nine places over a patch; those of a triangle are drawn together at its last corner.
+fn probe_place(shape: &PatchShape, i: usize, j: usize) -> DVec2 {
+    let at = DVec2::new(i as f64, j as f64) * 0.5;
+    if shape.is_rectangle() {
+        at
+    } else {
+        DVec2::new(at.x * (1.0 - at.y), at.y)
+    }
+}
+
 /// Rays that do not all meet one surface: enough to see the border between.
 fn mixed_steps(probes: &[[VirtualVertex; 3]; 3], is_plane: bool, tolerance: f64) -> (usize, usize) {
     let lost = probes
@@ -459,6 +482,8 @@ struct Spread<'a, 'b> {
     colours: &'a [LinearSrgb],
     out: &'b mut SpreadOutput,
     absorption: bool,
+    /// Whether any traced ray of the patch leaves the scene.
+    goes_out: bool,
 }
 
 /// A virtual ray with its place on the patch.
@@ -592,7 +617,9 @@ impl Spread<'_, '_> {
             self.out.ledger.book(Account::Absorbed, difference(flux, arrived));
         }
         match knots[0].vertex.place {
-            Place::Nowhere => self.out.ledger.book(Account::Escaped, arrived),
+            Place::Nowhere if self.goes_out => self.out.ledger.book(Account::Escaped, arrived),
+            // No traced ray of the patch left the scene: a ray that was continued too far did.
+            Place::Nowhere => self.out.ledger.book(Account::Unresolved, arrived),
             Place::Onward => self.out.ledger.book(Account::Quadrature, arrived),
             Place::Refused => self.out.ledger.book(Account::Unresolved, arrived),
             Place::On { object, island, .. } => {

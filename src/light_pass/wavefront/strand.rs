@@ -22,6 +22,8 @@ pub struct Strand {
     pub media: MediumStack,
     /// Object that it leaves.
     pub from: u32,
+    /// Smoothing group of the object that it leaves.
+    pub from_group: u32,
     /// Where it goes.
     pub landing: Landing,
 }

@@ -160,7 +160,7 @@ impl StrandTracer<'_> {
                 let signature = at_surface.event(branch.event);
                 push(
                     from,
-                    hit,
+                    (hit.object as u32, group),
                     &branch,
                     flux_w,
                     differential,
@@ -180,7 +180,7 @@ impl StrandTracer<'_> {
 )]
 fn push(
     from: &Waiting,
-    hit: &SurfaceHit,
+    surface: (u32, u32),
     branch: &Branch,
     flux_w: LinearSrgb,
     differential: RayDifferential,
@@ -203,7 +203,8 @@ fn push(
         differential,
         flux_w,
         media: branch.media,
-        from: hit.object as u32,
+        from: surface.0,
+        from_group: surface.1,
         landing: Landing::Escaped,
     });
 }

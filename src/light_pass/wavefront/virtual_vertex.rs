@@ -83,7 +83,8 @@ pub struct VirtualRays<'a> {
     plane: Option<u32>,
     media: MediumStack,
     absorption: bool,
-    from: u32,
+    /// Object and smoothing group that the rays leave.
+    from: (u32, u32),
     /// Within this distance of its origin a ray may meet the surface it leaves, since its origin is interpolated [m].
     skin_m: f64,
     /// Rays so far.
@@ -117,7 +118,7 @@ impl<'a> VirtualRays<'a> {
             plane,
             media: first.media,
             absorption: spreader.absorption,
-            from: first.from,
+            from: (first.from, first.from_group),
             skin_m: spread_m.min(0.5 * nearest_own_m),
             queries: 0,
         }
@@ -195,7 +196,8 @@ impl<'a> VirtualRays<'a> {
         for _ in 0..4 {
             let hit = self.receivers.tracer.closest_hit(&ray)?;
             let distance_m = before_m + hit.distance_m;
-            if hit.object as u32 != self.from || distance_m > self.skin_m {
+            let group = self.receivers.tracer.smoothing_group(hit.object, hit.triangle);
+            if (hit.object as u32, group) != self.from || distance_m > self.skin_m {
                 return Some((hit, distance_m));
             }
             ray = hit.spawn(ray.direction);
