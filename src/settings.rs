@@ -232,6 +232,11 @@ impl BakeSettings {
         }
     }
 
+    /// Memory that traced light may take until the next bake [bytes]: a quarter of all.
+    pub fn kept_light_bytes(&self) -> u64 {
+        self.memory_bytes / 4
+    }
+
     /// Refuses settings outside their ranges.
     ///
     /// # Errors

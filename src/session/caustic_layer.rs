@@ -75,13 +75,7 @@ impl CausticLayer<'_> {
         if let (MapResolution::Auto, Some(statistics)) = (self.settings.map_resolution, &statistics) {
             outcome.warnings = self.coarse_maps(&sizes, statistics);
         }
-        let chart_for = |object: usize| -> Option<Arc<Chart>> {
-            let size = sizes
-                .get(&object)
-                .copied()
-                .or_else(|| self.default_size(object))?;
-            self.sizes.chart(object, size)
-        };
+        let chart_for = |object: usize| self.chart(object, &sizes);
         let mut maps = ReceiverMaps::new(self.tracer.scene().objects.len());
         let total = cache.arrivals().unwrap_or_else(|| {
             let lights = self.aim.lights.iter();
@@ -298,6 +292,15 @@ impl CausticLayer<'_> {
     fn automatic_size(&self, object: usize, statistics: &FootprintStatistics) -> Option<(usize, usize)> {
         self.sizes
             .doubled_size(object, self.sizes.doublings(object, statistics)?)
+    }
+
+    /// The chart of an object at its size among `sizes`.
+    pub(super) fn chart(&self, object: usize, sizes: &BTreeMap<usize, (usize, usize)>) -> Option<Arc<Chart>> {
+        let size = sizes
+            .get(&object)
+            .copied()
+            .or_else(|| self.default_size(object))?;
+        self.sizes.chart(object, size)
     }
 
     /// For a surface that only the full lattice reached.

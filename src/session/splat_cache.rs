@@ -7,9 +7,6 @@ use crate::light_pass::caustic::pass::Source;
 use crate::plan::Effect;
 use crate::settings::{ItemBufferKind, RayPlacement};
 
-/// Share of the memory limit that kept light may take.
-const SHARE_OF_MEMORY: u64 = 4;
-
 /// All that tracing depends on, beside the scene.
 #[derive(Clone, Debug, PartialEq)]
 struct TraceKey {
@@ -47,7 +44,7 @@ impl SplatCache {
             item_buffer: settings.item_buffer,
             absorption: layer.plan.is_on(Effect::Absorption),
         };
-        self.left_bytes = settings.memory_bytes / SHARE_OF_MEMORY;
+        self.left_bytes = settings.kept_light_bytes();
         let held: u64 = self.lights.iter().map(KeptLight::bytes).sum();
         if self.key.as_ref() != Some(&key) || held > self.left_bytes {
             self.lights.clear();

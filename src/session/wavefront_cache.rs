@@ -4,10 +4,7 @@ use super::caustic_layer::CausticLayer;
 use crate::light_pass::caustic::statistics::FootprintStatistics;
 use crate::light_pass::wavefront::pass::TracedLight;
 use crate::plan::Effect;
-use crate::settings::{BakeSettings, Estimator, ItemBufferKind, MapResolution};
-
-/// Share of the memory limit that traced light may take.
-const SHARE_OF_MEMORY: u64 = 4;
+use crate::settings::{BakeSettings, ItemBufferKind, MapResolution};
 
 /// All that tracing depends on, beside the scene.
 #[derive(Clone, Debug, PartialEq)]
@@ -57,15 +54,5 @@ impl WavefrontCache {
                 ..Self::default()
             };
         }
-    }
-
-    /// Memory that traced light may take under these settings [bytes].
-    pub(super) fn limit_bytes(settings: &BakeSettings) -> u64 {
-        debug_assert_eq!(
-            settings.estimator,
-            Estimator::Wavefront,
-            "only its bakes are kept here"
-        );
-        settings.memory_bytes / SHARE_OF_MEMORY
     }
 }

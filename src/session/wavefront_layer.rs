@@ -1,14 +1,11 @@
 //! The caustic layer by the wavefront estimator.
 
-use std::sync::Arc;
-
 use glam::DVec2;
 
 use super::Clock;
 use super::caustic_layer::{CausticLayer, CausticOutcome};
 use super::wavefront_cache::WavefrontCache;
 use crate::error::Result;
-use crate::illumination::Chart;
 use crate::illumination::accumulator::FluxUnit;
 use crate::light_pass::caustic::pass::Listener;
 use crate::light_pass::caustic::setup::AimedLight;
@@ -44,13 +41,7 @@ impl CausticLayer<'_> {
         if let Some(statistics) = statistics {
             outcome.warnings = self.coarse_maps(&sizes, statistics);
         }
-        let chart_for = |object: usize| -> Option<Arc<Chart>> {
-            let size = sizes
-                .get(&object)
-                .copied()
-                .or_else(|| self.default_size(object))?;
-            self.sizes.chart(object, size)
-        };
+        let chart_for = |object: usize| self.chart(object, &sizes);
         let mut maps = ReceiverMaps::new(self.tracer.scene().objects.len());
         let bodies: Vec<SmallBodies> = self
             .aim
@@ -75,7 +66,7 @@ impl CausticLayer<'_> {
             .map(|target| Refinement::new(&receivers, reference_w, target, total));
         let kept = std::mem::take(&mut cache.lights);
         let is_kept = kept.len() == lattices.len();
-        let mut keep_bytes = WavefrontCache::limit_bytes(self.settings);
+        let mut keep_bytes = self.settings.kept_light_bytes();
         for (index, (light, lattice)) in self.aim.lights.iter().zip(lattices).enumerate() {
             let depositor = WavefrontDepositor {
                 receivers: &receivers,

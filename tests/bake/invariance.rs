@@ -1,21 +1,11 @@
 //! What must not change a map: threads, other things in the scene, the order of objects.
 
-use nephroid::illumination::IlluminationMap;
 use nephroid::optics::LinearSrgb;
 use nephroid::scene::{Light, LightKind};
 use nephroid::settings::{BakeSettings, MapResolution, RayPlacement};
 use nephroid::units::RadiantIntensity;
 
-use crate::tools::{bake, builtin_scene, caustic, map_of, settings};
-
-fn bits(map: &IlluminationMap) -> Vec<u32> {
-    map.layers
-        .iter()
-        .flat_map(|layer| &layer.irradiance)
-        .flatten()
-        .map(|e| e.to_bits())
-        .collect()
-}
+use crate::tools::{bake, bits, builtin_scene, caustic, map_of, settings};
 
 #[test]
 fn any_number_of_threads_gives_the_same_bits() {

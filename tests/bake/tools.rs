@@ -113,3 +113,13 @@ pub fn transformed(mut scene: Scene, rotation: DMat3, scale: f64, offset: DVec3)
     }
     scene
 }
+
+/// The bits of all layers of a map: maps are the same only where these are.
+pub fn bits(map: &IlluminationMap) -> Vec<u32> {
+    map.layers
+        .iter()
+        .flat_map(|layer| &layer.irradiance)
+        .flatten()
+        .map(|e| e.to_bits())
+        .collect()
+}

@@ -347,9 +347,8 @@ impl EdgeCutter<'_> {
 
     fn insert(&self, edge: &mut Edge, ends: [DVec2; 2], index: usize, work: &mut Workspace) {
         let place = 0.5 * (edge.samples[index].0 + edge.samples[index + 1].0);
-        let square = ends[0].lerp(ends[1], place);
-        let id = work.sample_at(square, || self.tracer.trace(self.face, square));
-        edge.samples.insert(index + 1, (place, id));
+        let corner = self.corner(ends[0].lerp(ends[1], place), work);
+        edge.samples.insert(index + 1, (place, corner.sample));
     }
 
     /// A corner at a place of the unit square.
