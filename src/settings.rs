@@ -148,6 +148,8 @@ pub struct BakeSettings {
     /// Target for the relative RMSE of maps, > 0: the lattice of `density_per_sr` is refined where that needs it
     /// (wavefront). `None`: exactly that lattice.
     pub max_error: Option<f64>,
+    /// Ends the light pass after so many seconds of wall-clock time, > 0, with the finest maps that were complete.
+    pub max_time_s: Option<f64>,
     /// Lattice or jittered.
     pub rays: RayPlacement,
     /// Spread of the gaussian.
@@ -186,6 +188,7 @@ impl Default for BakeSettings {
             estimator: Estimator::Wavefront,
             density_per_sr: Estimator::Wavefront.preview_density_per_sr(),
             max_error: None,
+            max_time_s: None,
             rays: RayPlacement::Lattice,
             sigma: Estimator::Wavefront.default_sigma(),
             kernel: Kernel::Gaussian,
@@ -256,6 +259,9 @@ impl BakeSettings {
         finite_in("--density", self.density_per_sr, 1.0, 1e12)?;
         if let Some(target) = self.max_error {
             finite_in("--max-error", target, 1e-4, 1.0)?;
+        }
+        if let Some(limit_s) = self.max_time_s {
+            finite_in("--max-time", limit_s, 1e-3, 1e7)?;
         }
         match (self.estimator, self.sigma) {
             (Estimator::Wavefront, Sigma::Constant(sigma)) => finite_in("--sigma", sigma, 0.0, 1e4)?,

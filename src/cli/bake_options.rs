@@ -109,6 +109,7 @@ impl BakeOptions {
         let settings = BakeSettings {
             estimator,
             max_error: self.max_error,
+            max_time_s: None,
             density_per_sr: self
                 .density
                 .or(self.max_error.map(Refinement::starting_density_per_sr))

@@ -10,6 +10,8 @@ pub mod material;
 pub mod mesh;
 pub mod texture;
 
+use std::sync::Arc;
+
 use glam::DVec3;
 
 pub use camera::Camera;
@@ -32,8 +34,8 @@ pub struct Object {
     pub primitive: usize,
     /// Index into [`Scene::materials`].
     pub material: usize,
-    /// Geometry in scene coordinates.
-    pub mesh: Mesh,
+    /// Geometry in scene coordinates; shared between a scene and its edited copies.
+    pub mesh: Arc<Mesh>,
 }
 
 /// A whole scene, sanitised: every number in it is finite and every index valid.

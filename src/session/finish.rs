@@ -81,6 +81,7 @@ impl Finish<'_> {
             counts,
             timings_s: Timings::default(),
             cpu_s: Timings::default(),
+            estimated_relative_rmse: None,
             stop_reason,
             partial,
             warnings: self.caustic.warnings,

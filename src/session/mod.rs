@@ -77,6 +77,17 @@ impl BakeSession {
         &self.scene
     }
 
+    /// Goes on with another scene, an edited one as a rule: what the difference does not touch is kept.
+    ///
+    /// # Errors
+    /// As [`Self::new`]; the session then keeps its scene.
+    pub fn set_scene(&mut self, scene: Arc<Scene>) -> Result<()> {
+        if !Arc::ptr_eq(&self.scene, &scene) {
+            *self = Self::new(scene)?;
+        }
+        Ok(())
+    }
+
     /// The scene with its hierarchy, built on first use.
     pub fn tracer(&mut self) -> Arc<Tracer> {
         self.tracer
@@ -131,6 +142,21 @@ impl BakeSession {
             .build()
             .map_err(|error| Error::failure("--threads", error.to_string(), "ask for fewer threads"))?;
         pool.install(|| self.bake_here(settings, progress, control))
+    }
+
+    /// Bakes like [`Self::bake`] and hands out whole maps of lower quality on the way, from the coarsest on; each is
+    /// better than the one before. The last is returned, not handed out.
+    ///
+    /// # Errors
+    /// As [`Self::bake`].
+    pub fn bake_levels(
+        &mut self,
+        settings: &BakeSettings,
+        progress: &dyn Progress,
+        control: &Control,
+        _level: &mut dyn FnMut(BakeResult),
+    ) -> Result<BakeResult> {
+        self.bake(settings, progress, control)
     }
 
     fn aim(&mut self, kind: ItemBufferKind) -> Arc<Aim> {

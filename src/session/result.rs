@@ -13,6 +13,10 @@ use crate::plan::EffectPlan;
 pub enum StopReason {
     /// The lattice of the asked density was traced.
     Density,
+    /// The estimated error is below the target.
+    MaxError,
+    /// The time was up.
+    MaxTime,
     /// Nothing specular is lit, or nothing can receive it: there was nothing to do.
     NothingToDo,
     /// It was asked to stop.
@@ -70,6 +74,8 @@ pub struct BakeResult {
     pub timings_s: Timings,
     /// CPU seconds over all threads of the process.
     pub cpu_s: Timings,
+    /// Estimated relative RMSE over all maps; `None` where nothing was estimated.
+    pub estimated_relative_rmse: Option<f64>,
     /// Why it ended.
     pub stop_reason: StopReason,
     /// True where it was stopped before it was done.

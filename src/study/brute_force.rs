@@ -344,6 +344,7 @@ fn empty_result(plan: EffectPlan, nothing_to_do: bool) -> BakeResult {
         counts: BakeCounts::default(),
         timings_s: Timings::default(),
         cpu_s: Timings::default(),
+        estimated_relative_rmse: None,
         stop_reason: if nothing_to_do {
             StopReason::NothingToDo
         } else {

@@ -84,10 +84,9 @@ pub fn energy_fault(result: &BakeResult) -> Option<String> {
 pub fn transformed(mut scene: Scene, rotation: DMat3, scale: f64, offset: DVec3) -> Scene {
     let place = |p: DVec3| rotation * p * scale + offset;
     for object in &mut scene.objects {
-        object.mesh.positions.iter_mut().for_each(|p| *p = place(*p));
-        object
-            .mesh
-            .normals
+        let mesh = Arc::make_mut(&mut object.mesh);
+        mesh.positions.iter_mut().for_each(|p| *p = place(*p));
+        mesh.normals
             .iter_mut()
             .for_each(|n| *n = (rotation * *n).normalize());
     }

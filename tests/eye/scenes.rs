@@ -25,7 +25,7 @@ pub fn scene(parts: Vec<(Mesh, Material)>, lights: Vec<Light>) -> Scene {
             node: index,
             primitive: 0,
             material: index,
-            mesh,
+            mesh: mesh.into(),
         });
         scene.materials.push(material);
     }

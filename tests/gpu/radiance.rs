@@ -1,5 +1,7 @@
 //! Pictures of scenes whose radiance is known.
 
+use std::sync::Arc;
+
 use glam::DVec2;
 use nephroid::eye_pass::renderer::{Renderer, render_offscreen};
 use nephroid::eye_pass::{Picture, View};
@@ -227,16 +229,9 @@ fn radiance_falls_by_the_square_of_the_index_into_a_body_and_rises_out_of_it() {
 
     // A second surface, facing down: the floor lies below a slab.
     let mut lower = floor("lower face", 1, 0.25);
-    lower
-        .mesh
-        .triangles
-        .iter_mut()
-        .for_each(|triangle| triangle.swap(1, 2));
-    lower
-        .mesh
-        .normals
-        .iter_mut()
-        .for_each(|normal| *normal = -*normal);
+    let mesh = Arc::make_mut(&mut lower.mesh);
+    mesh.triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
+    mesh.normals.iter_mut().for_each(|normal| *normal = -*normal);
     scene.objects.push(lower);
     let through_slab = lambert(1.0, 1.0) * transmittance * transmittance;
     assert_close(centre(&scene), [through_slab; 3], 6.0 * HALF_ROUNDING);
@@ -330,7 +325,7 @@ fn meshes_beyond_a_small_devices_buffers_are_drawn_whole() {
     // 64 × 64 quads: 24576 corners of 32 bytes against 65536 bytes.
     let quads = 64_u32;
     let mut scene = floor_scene(diffuse(LinearSrgb::WHITE));
-    let mesh = &mut scene.objects[0].mesh;
+    let mesh = Arc::make_mut(&mut scene.objects[0].mesh);
     let side = quads + 1;
     let points = (0..side * side).map(|index| DVec2::new(f64::from(index % side), f64::from(index / side)));
     let uvs: Vec<DVec2> = points.map(|point| point / f64::from(quads)).collect();
@@ -353,7 +348,7 @@ fn meshes_beyond_a_small_devices_buffers_are_drawn_whole() {
     mesh.uv0 = Some(uvs);
     // A second, clear one above it shares its corners between triangles.
     let mut pane = scene.objects[0].clone();
-    pane.mesh
+    Arc::make_mut(&mut pane.mesh)
         .positions
         .iter_mut()
         .for_each(|position| position.y = 0.5);

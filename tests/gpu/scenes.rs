@@ -27,7 +27,7 @@ pub fn floor(name: &str, material: usize, height_m: f64) -> Object {
         node: 0,
         primitive: 0,
         material,
-        mesh: Mesh {
+        mesh: Arc::new(Mesh {
             positions: CORNERS
                 .map(|corner| DVec3::new(corner.x, height_m, corner.y))
                 .to_vec(),
@@ -35,7 +35,7 @@ pub fn floor(name: &str, material: usize, height_m: f64) -> Object {
             uv0: Some(CORNERS.to_vec()),
             uv1: None,
             triangles: TRIANGLES.to_vec(),
-        },
+        }),
     }
 }
 

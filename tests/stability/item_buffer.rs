@@ -40,7 +40,7 @@ fn mirrors(triangles: &[[DVec3; 3]]) -> Scene {
             node: 0,
             primitive: 0,
             material: 0,
-            mesh,
+            mesh: mesh.into(),
         }],
         materials: vec![Material {
             surface: SurfaceKind::Mirror,

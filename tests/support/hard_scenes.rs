@@ -3,6 +3,7 @@
 //! `wall`, `blocker`, …
 
 use std::f64::consts::{PI, TAU};
+use std::sync::Arc;
 
 use glam::{DMat3, DVec3};
 use nephroid::optics::LinearSrgb;
@@ -215,7 +216,7 @@ pub fn ball_in_a_room() -> Scene {
 pub fn with_tilted_floor(mut scene: Scene) -> Scene {
     let tilt = DMat3::from_axis_angle(DVec3::new(0.6, 0.0, 0.8), PI / 6.0);
     for object in scene.objects.iter_mut().filter(|object| object.name == "floor") {
-        let mesh = &mut object.mesh;
+        let mesh = Arc::make_mut(&mut object.mesh);
         mesh.positions.iter_mut().for_each(|p| *p = tilt * *p);
         mesh.normals.iter_mut().for_each(|n| *n = tilt * *n);
     }
@@ -232,7 +233,7 @@ pub fn with_cut_floor(mut scene: Scene) -> Scene {
         .expect("a floor");
     let half = scene.objects[floor].mesh.positions[2].x.abs();
     let (cut, z) = (0.07 * half, [-half, half]);
-    scene.objects[floor].mesh = shapes::floor([-half, cut], z, 0.0);
+    scene.objects[floor].mesh = Arc::new(shapes::floor([-half, cut], z, 0.0));
     let material = scene.objects[floor].material;
     parts::add_with(
         &mut scene,

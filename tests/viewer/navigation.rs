@@ -18,7 +18,7 @@ fn cube(side_m: f64, centre: DVec3, cameras: Vec<Camera>) -> Scene {
             node: 0,
             primitive: 0,
             material: 0,
-            mesh,
+            mesh: mesh.into(),
         }],
         materials: vec![Material::default()],
         cameras,

@@ -82,7 +82,7 @@ pub fn add_with(scene: &mut Scene, name: &str, mesh: Mesh, material: usize) {
         node: scene.objects.len(),
         primitive: 0,
         material,
-        mesh,
+        mesh: mesh.into(),
     });
 }
 

@@ -1,5 +1,7 @@
 //! A scene far from the world's origin, moved to its own.
 
+use std::sync::Arc;
+
 use crate::scene::Scene;
 
 /// A scene whose middle is farther away than this many of its own extents would lose digits.
@@ -18,7 +20,7 @@ pub fn rebase(scene: &mut Scene) {
     for position in scene
         .objects
         .iter_mut()
-        .flat_map(|object| &mut object.mesh.positions)
+        .flat_map(|object| &mut Arc::make_mut(&mut object.mesh).positions)
     {
         *position -= centre;
     }

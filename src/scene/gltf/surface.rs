@@ -76,7 +76,7 @@ pub fn add_objects(
                 node: placed.node,
                 primitive: index,
                 material,
-                mesh,
+                mesh: mesh.into(),
             });
         }
     }
