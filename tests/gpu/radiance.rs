@@ -365,7 +365,7 @@ fn meshes_beyond_a_small_devices_buffers_are_drawn_whole() {
         corner_uvs,
         ..(*map.chart).clone()
     };
-    map.chart = std::sync::Arc::new(chart);
+    map.chart = Arc::new(chart);
     let whole = render(&gpu, &scene, std::slice::from_ref(&map), &from_above(48));
     let lit = whole.radiance.iter().filter(|pixel| pixel[0] > 0.0);
     assert!(lit.count() > 48 * 48 * 9 / 10);

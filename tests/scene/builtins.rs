@@ -161,7 +161,7 @@ fn ball_and_slab_are_closed_and_have_their_volume() {
 #[test]
 fn the_closedness_check_sees_a_missing_and_a_turned_triangle() {
     let ball = scene("ball");
-    let mut mesh = object(&ball, "ball").mesh.clone();
+    let mut mesh = object(&ball, "ball").mesh.as_ref().clone();
     mesh.triangles[17].swap(0, 1);
     assert_ne!(open_edges(&mesh), 0);
     mesh.triangles.remove(17);
