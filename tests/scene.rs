@@ -6,6 +6,8 @@ mod support;
 mod builtins;
 #[path = "scene/collections.rs"]
 mod collections;
+#[path = "scene/edits.rs"]
+mod edits;
 #[path = "scene/files.rs"]
 mod files;
 #[path = "scene/glb.rs"]

@@ -70,6 +70,26 @@ pub struct Material {
     pub double_sided: bool,
 }
 
+impl Material {
+    /// The class that its factors make it: how a file's material is read unless the file says otherwise (unlit).
+    pub fn classified(&self) -> SurfaceKind {
+        let smooth = self.roughness <= SPECULAR_ROUGHNESS_LIMIT;
+        if self.metallic >= 0.5 {
+            return if smooth {
+                SurfaceKind::Mirror
+            } else {
+                SurfaceKind::Diffuse
+            };
+        }
+        match (smooth, self.transmission >= 0.5, self.volume) {
+            (false, ..) => SurfaceKind::Diffuse,
+            (true, true, Some(_)) => SurfaceKind::Dielectric,
+            (true, true, None) => SurfaceKind::ThinWall,
+            (true, false, _) => SurfaceKind::Mixed,
+        }
+    }
+}
+
 impl Default for Material {
     /// White Lambert, albedo 0.8.
     fn default() -> Self {

@@ -4,7 +4,7 @@ use glam::{DVec2, DVec3};
 
 /// Indexed triangles in scene coordinates. Counter-clockwise corners face outwards; vertex normals are unit and kept
 /// as the file has them, since smooth normals carry the shape between the vertices.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Mesh {
     /// Vertex positions [m].
     pub positions: Vec<DVec3>,

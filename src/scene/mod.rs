@@ -3,6 +3,7 @@
 
 pub mod builtin;
 pub mod camera;
+pub mod edit;
 mod gltf;
 pub mod light;
 pub mod load;
@@ -15,6 +16,7 @@ use std::sync::Arc;
 use glam::DVec3;
 
 pub use camera::Camera;
+pub use edit::{Edit, EditTarget};
 pub use light::{Light, LightKind};
 pub use load::{LoadOptions, load};
 pub use material::{Material, SurfaceKind, Volume};
@@ -51,8 +53,8 @@ pub struct Scene {
     pub objects: Vec<Object>,
     /// Materials; never empty when there are objects.
     pub materials: Vec<Material>,
-    /// Images that materials refer to.
-    pub textures: Vec<Texture>,
+    /// Images that materials refer to; shared between a scene and its edited copies.
+    pub textures: Vec<Arc<Texture>>,
     /// Lights with some power.
     pub lights: Vec<Light>,
     /// Cameras, in file order.

@@ -375,7 +375,7 @@ fn maps_are_read_bilinearly() {
 #[test]
 fn textures_tint_and_emission_adds() {
     let mut scene = scene(vec![(floor(1.0, 0.0), diffuse(0.5))], vec![]);
-    scene.textures.push(Texture {
+    scene.textures.push(Arc::new(Texture {
         name: "two by two".into(),
         width: 2,
         height: 2,
@@ -386,7 +386,7 @@ fn textures_tint_and_emission_adds() {
             [188, 188, 188, 255],
         ],
         wrap: [Wrap::ClampToEdge; 2],
-    });
+    }));
     scene.materials[0].base_colour_texture = Some(TextureRef {
         texture: 0,
         uv_set: 0,

@@ -132,7 +132,7 @@ fn base_colour_images_multiply_and_lie_as_gltf_says() {
         base_colour_texture: Some(texture_reference()),
         ..diffuse(LinearSrgb::grey(0.5))
     });
-    scene.textures.push(four_colours());
+    scene.textures.push(four_colours().into());
     let maps = [floor_map(0, 1, 1, vec![[1.0; 3]])];
     let picture = render(&gpu, &scene, &maps, &from_above(8));
     let at = |x: usize, y: usize| picture.radiance[y * 8 + x];

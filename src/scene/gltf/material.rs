@@ -13,7 +13,6 @@ use super::numbers::widen;
 use super::report::{Budget, Report};
 use crate::error::Result;
 use crate::optics::LinearSrgb;
-use crate::scene::material::SPECULAR_ROUGHNESS_LIMIT;
 use crate::scene::{Material, SurfaceKind, TextureRef, Volume};
 use crate::units::LUMENS_PER_WATT;
 
@@ -275,50 +274,29 @@ impl Reading<'_, '_> {
         Ok(())
     }
 
+    /// The material's class, with a word on what is not as the file has it.
     fn classify(&mut self, material: &Material) -> SurfaceKind {
-        let smooth = material.roughness <= SPECULAR_ROUGHNESS_LIMIT;
+        let surface = material.classified();
+        let roughness = material.roughness;
         let as_matte = "make it smoother to have it reflect or transmit light";
-        if material.metallic >= 0.5 {
-            if smooth {
-                return SurfaceKind::Mirror;
-            }
+        let is_metal = material.metallic >= 0.5;
+        match surface {
             // Metallic 1 with roughness 1 is what glTF assumes where a file says nothing.
-            if material.roughness < 1.0 {
-                self.warn(
-                    format!(
-                        "is a metal of roughness {:.2}, treated as matte",
-                        material.roughness
-                    ),
-                    as_matte,
-                );
-            }
-            return SurfaceKind::Diffuse;
+            SurfaceKind::Diffuse if is_metal && roughness < 1.0 => self.warn(
+                format!("is a metal of roughness {roughness:.2}, treated as matte"),
+                as_matte,
+            ),
+            SurfaceKind::Diffuse if !is_metal && material.transmission >= 0.5 => self.warn(
+                format!("transmits light at a roughness of {roughness:.2}, treated as matte"),
+                as_matte,
+            ),
+            SurfaceKind::ThinWall => self.warn(
+                "transmits light but has no thickness, so that it is a thin pane that does not refract",
+                "give it a volume, or read closed meshes as solid with --solid-glass",
+            ),
+            _ => {}
         }
-        if material.transmission >= 0.5 {
-            return match (smooth, material.volume) {
-                (false, _) => {
-                    let roughness = material.roughness;
-                    self.warn(
-                        format!("transmits light at a roughness of {roughness:.2}, treated as matte"),
-                        as_matte,
-                    );
-                    SurfaceKind::Diffuse
-                }
-                (true, Some(_)) => SurfaceKind::Dielectric,
-                (true, None) => {
-                    self.warn(
-                        "transmits light but has no thickness, so that it is a thin pane that does not refract",
-                        "give it a volume, or read closed meshes as solid with --solid-glass",
-                    );
-                    SurfaceKind::ThinWall
-                }
-            };
-        }
-        if smooth {
-            SurfaceKind::Mixed
-        } else {
-            SurfaceKind::Diffuse
-        }
+        surface
     }
 
     fn base_colour_texture(&mut self) -> Result<Option<TextureRef>> {

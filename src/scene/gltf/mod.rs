@@ -28,6 +28,7 @@ mod uri;
 mod viewpoint;
 
 use std::path::Path;
+use std::sync::Arc;
 
 use super::{LoadOptions, Scene};
 use crate::error::{Error, Result};
@@ -94,7 +95,7 @@ fn read_scene(bytes: &[u8], path: &Path, options: &LoadOptions) -> Result<Scene>
         &mut report,
     )?;
     scene.materials = materials.into_all();
-    scene.textures = images.into_textures();
+    scene.textures = images.into_textures().into_iter().map(Arc::new).collect();
     scene.lights = light::read_all(&document.root, &placed, &mut report);
     scene.cameras = viewpoint::read_all(&document.root, &placed, &mut report);
     rebase::rebase(&mut scene);
