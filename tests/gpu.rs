@@ -21,3 +21,5 @@ mod reflections;
 mod scenes;
 #[path = "gpu/shaders.rs"]
 mod shaders;
+#[path = "gpu/uploads.rs"]
+mod uploads;

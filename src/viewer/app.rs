@@ -126,14 +126,14 @@ impl App {
     }
 
     fn open(&mut self, event_loop: &ActiveEventLoop) {
-        match Graphics::new(event_loop, self.proxy.clone(), &self.model.scene, self.size) {
+        match Graphics::new(event_loop, self.proxy.clone(), self.model.scene(), self.size) {
             Ok(graphics) => {
                 let adapter = graphics.gpu().adapter_name();
-                let started = Event::Started {
-                    scene: &self.model.scene.name,
+                let scene = Arc::clone(self.model.scene());
+                self.model.log.write(&Event::Started {
+                    scene: &scene.name,
                     adapter: &adapter,
-                };
-                self.model.log.write(&started);
+                });
                 graphics.window().request_redraw();
                 self.graphics = Some(graphics);
                 self.must_set_maps = true;
@@ -214,8 +214,10 @@ impl App {
         let Some(mut painting) = self.run_interface(&mut wishes) else {
             return;
         };
-        self.model.act(wishes, Instant::now());
+        let scene = Arc::clone(self.model.scene());
+        self.model.act(&wishes, Instant::now());
         self.must_set_maps |= layer != self.model.panel.display.layer;
+        self.must_set_maps |= !Arc::ptr_eq(&scene, self.model.scene());
         self.must_measure_exposure |= wishes.measure_exposure;
         if let Err(error) = self.draw_picture() {
             self.notice = Some(error.to_string());
@@ -250,24 +252,25 @@ impl App {
         );
         let (window, picture) = (Arc::clone(graphics.window()), graphics.picture_id());
         let speed_m_per_s = model.navigator.speed_m_per_s();
+        let edits = model.edits();
+        let (scene, loaded) = (Arc::clone(edits.scene()), Arc::clone(edits.loaded()));
+        let undoable = edits.undoable();
         let Model {
-            scene,
-            panel,
-            last,
-            is_draft,
-            ..
+            panel, last, refusal, ..
         } = model;
         let facts = Facts {
-            scene,
+            scene: &scene,
+            loaded: &loaded,
+            undoable,
+            refusal: refusal.as_deref(),
             state: &state,
             last: last.as_ref(),
-            is_draft: *is_draft,
             layers: &layers,
             speed_m_per_s,
             adapter: &adapter,
         };
         Some(graphics.interface().run(&window, |ui| {
-            *wishes = wishes.and(panel.show(ui, &facts));
+            *wishes = std::mem::take(wishes).and(panel.show(ui, &facts));
             *picture_rect = overlay::show(ui, picture, &facts, notice.as_deref());
         }))
     }
@@ -281,7 +284,8 @@ impl App {
             return Ok(());
         };
         if std::mem::take(&mut self.must_set_maps) {
-            graphics.set_maps(&self.model.scene, &self.model.shown_maps())?;
+            let uploaded = graphics.set_maps(self.model.scene(), &self.model.shown_maps())?;
+            self.model.log.write(&Event::Uploaded(uploaded));
         }
         if self.must_measure_exposure && !self.model.maps().is_empty() {
             self.must_measure_exposure = false;

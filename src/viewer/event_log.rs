@@ -7,8 +7,10 @@ use std::time::Instant;
 
 use serde_json::{Value, json};
 
-use super::worker::FinishedBake;
+use super::worker::BakedLevel;
 use crate::error::{Error, Result};
+use crate::eye_pass::renderer::Uploaded;
+use crate::scene::Edit;
 use crate::settings::BakeSettings;
 
 /// Something that happened.
@@ -26,10 +28,23 @@ pub enum Event<'a> {
         /// With what.
         settings: &'a BakeSettings,
     },
-    /// The coarse maps that are shown while the first bake runs.
-    Draft(&'a FinishedBake),
+    /// Whole maps came on the way to what was asked for.
+    Level {
+        /// The maps.
+        level: &'a BakedLevel,
+        /// Whether the next picture shows them: false where better ones of the same light are there.
+        shown: bool,
+    },
     /// A bake is complete; its maps are in the next picture.
-    Done(&'a FinishedBake),
+    Done(&'a BakedLevel),
+    /// Maps or a scene went to the device: what of them had changed.
+    Uploaded(Uploaded),
+    /// The scene was edited.
+    Edited(&'a Edit),
+    /// The last edit was taken back.
+    Undone,
+    /// The picture shows the light, or how far it may be off.
+    Shows(&'a str),
     /// The bake was stopped.
     Cancelled,
     /// The bake failed.
@@ -62,8 +77,23 @@ impl Event<'_> {
                 json!({"event": "started", "scene": scene, "adapter": adapter})
             }
             Self::Baking { settings } => json!({"event": "baking", "settings": settings}),
-            Self::Draft(bake) => finished("draft", bake),
-            Self::Done(bake) => finished("done", bake),
+            Self::Level { level, shown } => {
+                let mut line = baked("level", level);
+                line["shown"] = json!(shown);
+                line
+            }
+            Self::Done(level) => baked("done", level),
+            Self::Uploaded(uploaded) => {
+                json!({
+                    "event": "upload",
+                    "tiles": uploaded.tiles,
+                    "tile_bytes": uploaded.tile_bytes,
+                    "other_bytes": uploaded.other_bytes,
+                })
+            }
+            Self::Edited(edit) => json!({"event": "edit", "target": format!("{:?}", edit.target())}),
+            Self::Undone => json!({"event": "undo"}),
+            Self::Shows(what) => json!({"event": "shows", "what": what}),
             Self::Cancelled => json!({"event": "cancelled"}),
             Self::Failed(sentence) => json!({"event": "failed", "sentence": sentence}),
             Self::SettingsChanged(settings) => json!({"event": "settings", "settings": settings}),
@@ -82,15 +112,19 @@ impl Event<'_> {
     }
 }
 
-fn finished(event: &str, bake: &FinishedBake) -> Value {
+fn baked(event: &str, baked: &BakedLevel) -> Value {
     json!({
         "event": event,
-        "bake_s": bake.seconds,
-        "rays": bake.result.counts.rays,
-        "splats": bake.result.counts.splats,
-        "cells": bake.result.counts.cells,
-        "maps": bake.result.maps.len(),
-        "settings": bake.settings,
+        "request": baked.serial,
+        "level": baked.level,
+        "bake_s": baked.seconds,
+        "error": baked.result.estimated_relative_rmse,
+        "stop_reason": baked.result.stop_reason,
+        "rays": baked.result.counts.rays,
+        "splats": baked.result.counts.splats,
+        "cells": baked.result.counts.cells,
+        "maps": baked.result.maps.len(),
+        "settings": baked.request.settings,
     })
 }
 

@@ -12,7 +12,7 @@ use super::interface::{Interface, Painting};
 use super::picture::Picture;
 use super::surface::{Acquired, Screen};
 use crate::error::{Error, Result};
-use crate::eye_pass::renderer::Renderer;
+use crate::eye_pass::renderer::{Renderer, Uploaded};
 use crate::eye_pass::{View, tone_mapping};
 use crate::gpu::Gpu;
 use crate::illumination::IlluminationMap;
@@ -41,6 +41,8 @@ pub struct Graphics {
     interface: Interface,
     picture: Picture,
     renderer: Renderer,
+    /// As the renderer shows it.
+    scene: Arc<Scene>,
     screen: Screen,
     gpu: Gpu,
 }
@@ -53,7 +55,7 @@ impl Graphics {
     pub fn new(
         event_loop: &ActiveEventLoop,
         proxy: EventLoopProxy<News>,
-        scene: &Scene,
+        scene: &Arc<Scene>,
         (width, height): (u32, u32),
     ) -> Result<Self> {
         // Hidden until everything is ready: assistive technology has to be told first, and nothing flashes.
@@ -83,6 +85,7 @@ impl Graphics {
             interface,
             picture,
             renderer,
+            scene: Arc::clone(scene),
             screen,
             gpu,
         })
@@ -113,13 +116,19 @@ impl Graphics {
         self.screen.resize(&self.gpu.device);
     }
 
-    /// Shows other maps from the next picture on.
+    /// Shows a scene with other maps from the next picture on; tells what of them had changed.
     ///
     /// # Errors
-    /// The device cannot hold them: the old ones stay.
-    pub fn set_maps(&mut self, scene: &Scene, maps: &[IlluminationMap]) -> Result<()> {
+    /// The device cannot hold them: what was shown stays.
+    pub fn set_maps(&mut self, scene: &Arc<Scene>, maps: &[IlluminationMap]) -> Result<Uploaded> {
         self.picture.invalidate();
-        self.renderer.set_maps(&self.gpu, scene, maps)
+        let mut uploaded = Uploaded::default();
+        if !Arc::ptr_eq(&self.scene, scene) {
+            self.scene = Arc::clone(scene);
+            uploaded += self.renderer.set_scene(&self.gpu, scene)?;
+        }
+        uploaded += self.renderer.set_maps(&self.gpu, scene, maps)?;
+        Ok(uploaded)
     }
 
     /// Exposure that suits the picture [stops].

@@ -2,6 +2,7 @@
 
 mod app;
 pub mod debounce;
+pub mod edits;
 pub mod event_log;
 mod graphics;
 mod input;

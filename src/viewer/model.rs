@@ -6,28 +6,22 @@ use std::time::Instant;
 
 use super::ViewerOptions;
 use super::debounce::Debounce;
+use super::edits::EditedScene;
 use super::event_log::{Event, EventLog};
 use super::navigation::Navigator;
 use super::panel::{LayerShown, Panel, Wishes};
-use super::worker::{BakeState, FinishedBake, Worker};
+use super::worker::{BakeRequest, BakeState, BakedLevel, Worker};
 use crate::error::Result;
 use crate::illumination::IlluminationMap;
 use crate::scene::Scene;
 use crate::session::BakeSession;
-use crate::settings::{BakeSettings, LayerKind};
-
-/// Rays of a bake for each of its draft, at least.
-const DRAFT_SHARE: f64 = 32.0;
-/// A draft of more rays would not come soon [rays/sr].
-const FINEST_DRAFT_PER_SR: f64 = 4000.0;
-/// A draft of fewer rays would show nothing; then there is none [rays/sr].
-const COARSEST_DRAFT_PER_SR: f64 = 500.0;
+use crate::settings::LayerKind;
 
 /// The state behind the window.
 #[derive(Debug)]
 pub struct Model {
-    /// What is shown.
-    pub scene: Arc<Scene>,
+    /// What is shown, with its history.
+    edits: EditedScene,
     /// What the user can set.
     pub panel: Panel,
     /// From where it is seen.
@@ -36,18 +30,18 @@ pub struct Model {
     pub log: EventLog,
     worker: Worker,
     state: BakeState,
-    /// The bake that the picture shows.
-    pub last: Option<FinishedBake>,
+    /// The maps that the picture shows.
+    pub last: Option<BakedLevel>,
     /// Maps that were baked before the start; until the first bake.
     given: Vec<IlluminationMap>,
     debounce: Debounce,
-    /// As the panel had them at the last look.
-    seen: BakeSettings,
+    /// As they were at the last look.
+    seen: BakeRequest,
     was_automatic: bool,
-    /// Whether the picture shows maps of another bake than the one that was asked for last.
-    pub is_draft: bool,
-    /// As the last bake was asked for.
-    asked: Option<BakeSettings>,
+    /// The last request with its number; before the first one what the given maps are taken to be baked with.
+    asked: Option<(u64, BakeRequest)>,
+    /// Why the last edit was refused.
+    pub refusal: Option<String>,
 }
 
 impl Model {
@@ -57,8 +51,11 @@ impl Model {
     /// The event log cannot be written; the system gives no thread.
     pub fn new(options: &ViewerOptions, wake: impl Fn() + Send + Sync + 'static) -> Result<Self> {
         let scene = Arc::clone(&options.scene);
-        let of_worker = Arc::clone(&scene);
-        let worker = Worker::spawn(move || BakeSession::new(Arc::clone(&of_worker)), wake)?;
+        let worker = Worker::spawn(BakeSession::new, wake)?;
+        let wanted = BakeRequest {
+            scene: Arc::clone(&scene),
+            settings: options.settings.clone(),
+        };
         let mut model = Self {
             navigator: Navigator::new(&scene, options.camera.as_deref()),
             panel: Panel::new(options.settings.clone()),
@@ -68,17 +65,27 @@ impl Model {
             last: None,
             given: options.maps.clone().unwrap_or_default(),
             debounce: Debounce::default(),
-            seen: options.settings.clone(),
+            seen: wanted.clone(),
             was_automatic: true,
-            is_draft: false,
-            asked: options.maps.is_some().then(|| options.settings.clone()),
-            scene,
+            asked: options.maps.is_some().then_some((0, wanted)),
+            refusal: None,
+            edits: EditedScene::new(scene),
         };
         model.panel.display.exposure_stops = options.exposure_stops.unwrap_or(0.0);
         if options.maps.is_none() {
-            model.first_bake();
+            model.rebake();
         }
         Ok(model)
+    }
+
+    /// What is shown, as it is now.
+    pub fn scene(&self) -> &Arc<Scene> {
+        self.edits.scene()
+    }
+
+    /// The scene with its history.
+    pub fn edits(&self) -> &EditedScene {
+        &self.edits
     }
 
     /// Where the bake stood at the last [`poll`](Self::poll).
@@ -111,10 +118,20 @@ impl Model {
 
     /// The maps with the layers that the panel asks to be shown.
     pub fn shown_maps(&self) -> Cow<'_, [IlluminationMap]> {
-        let LayerShown::Only(kind) = self.panel.display.layer else {
-            return Cow::Borrowed(self.maps());
+        // Until the next maps come, an edit may have made a receiver clear, or a mirror.
+        let receives = |map: &&IlluminationMap| {
+            let scene = self.scene();
+            let object = scene.objects.get(map.chart.object);
+            object.is_none_or(|object| scene.materials[object.material].surface.is_receiver())
         };
-        let with_kind = self.maps().iter().filter_map(|map| {
+        let LayerShown::Only(kind) = self.panel.display.layer else {
+            return if self.maps().iter().all(|map| receives(&map)) {
+                Cow::Borrowed(self.maps())
+            } else {
+                Cow::Owned(self.maps().iter().filter(receives).cloned().collect())
+            };
+        };
+        let with_kind = self.maps().iter().filter(receives).filter_map(|map| {
             let layer = map.layer(kind)?.clone();
             let chart = Arc::clone(&map.chart);
             Some(IlluminationMap {
@@ -127,20 +144,24 @@ impl Model {
         Cow::Owned(with_kind.collect())
     }
 
-    /// Looks what the baking thread did; tells whether there are new maps.
+    /// Looks what the baking thread did; tells whether there are new maps to be shown.
     pub fn poll(&mut self) -> bool {
         // The state first: maps that come in between are taken by the next call, which the thread wakes.
         let state = self.worker.state();
-        let finished = self.worker.take_finished();
-        let has_maps = finished.is_some();
-        if let Some(finished) = finished {
-            self.is_draft = self.asked.as_ref() != Some(&finished.settings);
-            self.log.write(&if self.is_draft {
-                Event::Draft(&finished)
+        let mut has_maps = false;
+        if let Some(level) = self.worker.take_level() {
+            has_maps = self.improves_on_what_is_shown(&level);
+            self.log.write(&if level.is_final {
+                Event::Done(&level)
             } else {
-                Event::Done(&finished)
+                Event::Level {
+                    level: &level,
+                    shown: has_maps,
+                }
             });
-            self.last = Some(finished);
+            if has_maps {
+                self.last = Some(level);
+            }
         }
         if std::mem::discriminant(&state) != std::mem::discriminant(&self.state) {
             match &state {
@@ -153,16 +174,47 @@ impl Model {
         has_maps
     }
 
-    /// Does what was pressed, and bakes changed settings once they have come to rest.
-    pub fn act(&mut self, wishes: Wishes, now: Instant) {
-        if self.panel.settings != self.seen {
-            self.seen = self.panel.settings.clone();
-            self.log.write(&Event::SettingsChanged(&self.seen));
+    /// Whether maps are to replace those that are shown. Coarse maps of other light do, since what is shown is wrong
+    /// then; coarse maps of the same light only where they are better than what is shown.
+    fn improves_on_what_is_shown(&self, new: &BakedLevel) -> bool {
+        let Some(shown) = &self.last else {
+            return true;
+        };
+        if new.is_final || !new.request.differs_in_accuracy_only(&shown.request) {
+            return true;
+        }
+        match (
+            new.result.estimated_relative_rmse,
+            shown.result.estimated_relative_rmse,
+        ) {
+            (Some(new), Some(shown)) => new <= shown,
+            _ => new.result.counts.rays >= shown.result.counts.rays,
+        }
+    }
+
+    /// What the panel asks for now.
+    fn wanted(&self) -> BakeRequest {
+        BakeRequest {
+            scene: Arc::clone(self.edits.scene()),
+            settings: self.panel.settings.clone(),
+        }
+    }
+
+    /// Does what was pressed, and bakes what was changed.
+    ///
+    /// A change is baked at once where the request before it has shown something: while a slider is dragged, the
+    /// picture follows at the pace of first levels, and no request is stopped before it had one. Where nothing was
+    /// shown yet, the change waits for that, or until it has come to rest.
+    pub fn act(&mut self, wishes: &Wishes, now: Instant) {
+        self.edit(wishes);
+        let wanted = self.wanted();
+        if wanted.settings != self.seen.settings {
+            self.log.write(&Event::SettingsChanged(&wanted.settings));
+        }
+        if !wanted.is_same(&self.seen) || (self.panel.automatic && !self.was_automatic) {
             self.debounce.change(now);
         }
-        if self.panel.automatic && !self.was_automatic {
-            self.debounce.change(now);
-        }
+        self.seen = wanted;
         self.was_automatic = self.panel.automatic;
         if !self.panel.automatic {
             self.debounce.clear();
@@ -170,41 +222,59 @@ impl Model {
         if wishes.cancel {
             self.cancel();
         }
-        let is_changed = self.asked.as_ref() != Some(&self.panel.settings);
-        if wishes.rebake || (self.debounce.is_due(now) && is_changed) {
+        let is_ripe = self.debounce.due().is_some() && self.has_answered();
+        let is_due = self.debounce.is_due(now) || is_ripe;
+        if wishes.rebake || (is_due && self.is_changed()) {
             self.rebake();
         }
     }
 
-    /// Something to see soon: a draft, and then what was asked for.
-    fn first_bake(&mut self) {
-        let wanted = self.panel.settings.clone();
-        let draft = BakeSettings {
-            density_per_sr: (wanted.density_per_sr / DRAFT_SHARE).min(FINEST_DRAFT_PER_SR),
-            ..wanted.clone()
+    /// Whether something else is wanted than what was asked for last.
+    fn is_changed(&self) -> bool {
+        self.asked
+            .as_ref()
+            .is_none_or(|(_, asked)| !asked.is_same(&self.seen))
+    }
+
+    /// Whether the last request has shown maps, or will not any more.
+    fn has_answered(&self) -> bool {
+        let is_shown = |serial: u64| self.last.as_ref().is_some_and(|last| last.serial == serial);
+        !self.state.is_baking() || self.asked.as_ref().is_none_or(|(serial, _)| is_shown(*serial))
+    }
+
+    /// Edits the scene, or takes an edit back.
+    fn edit(&mut self, wishes: &Wishes) {
+        let outcome = match (&wishes.edit, wishes.undo) {
+            (Some(edit), _) => {
+                self.log.write(&Event::Edited(edit));
+                self.edits.edit(edit)
+            }
+            (None, true) => self.edits.undo().map(|undone| {
+                if undone {
+                    self.log.write(&Event::Undone);
+                }
+            }),
+            (None, false) => Ok(()),
         };
-        let steps = if draft.density_per_sr >= COARSEST_DRAFT_PER_SR {
-            vec![draft, wanted]
-        } else {
-            vec![wanted]
-        };
-        self.bake(steps);
+        if wishes.edit.is_some() || wishes.undo {
+            self.refusal = outcome.err().map(|error| error.to_string());
+        }
+        if !wishes.is_dragging {
+            self.edits.release();
+        }
     }
 
     /// Bakes with the panel's settings, unless one of them is out of its range: the panel tells so.
     pub fn rebake(&mut self) {
-        if self.panel.settings.validate().is_ok() {
-            self.bake(vec![self.panel.settings.clone()]);
+        let wanted = self.wanted();
+        if wanted.settings.validate().is_err() {
+            return;
         }
-    }
-
-    fn bake(&mut self, steps: Vec<BakeSettings>) {
         self.debounce.clear();
-        self.asked = steps.last().cloned();
         self.log.write(&Event::Baking {
-            settings: &self.panel.settings,
+            settings: &wanted.settings,
         });
-        self.worker.request_steps(steps);
+        self.asked = Some((self.worker.request(wanted.clone()), wanted));
         self.state = self.worker.state();
     }
 

@@ -35,15 +35,12 @@ fn caveat(facts: &Facts<'_>) -> Option<String> {
         BakeState::Baking { stage, fraction, .. } if is_dark => {
             Some(format!("First look: {} {:.0} %", stage.name(), 100.0 * fraction))
         }
-        BakeState::Baking { stage, fraction, .. } if facts.is_draft => Some(format!(
-            "Draft; the bake is at {} {:.0} %",
-            stage.name(),
-            100.0 * fraction
-        )),
         BakeState::Failed(sentence) if is_dark => Some(sentence.clone()),
         BakeState::Cancelled if is_dark => Some("No light is baked yet: press R to bake.".into()),
         BakeState::Done if is_dark => Some("No light reaches a surface that could show it.".into()),
-        BakeState::Cancelled if facts.is_draft => Some("Draft: press R to bake.".into()),
+        BakeState::Cancelled if facts.last.is_some_and(|last| !last.is_final) => {
+            Some("Coarse maps of a bake that was stopped: press R to bake.".into())
+        }
         _ => None,
     }
 }

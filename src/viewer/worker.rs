@@ -1,4 +1,4 @@
-//! A thread around a bake: requests in, progress and maps out; the window never waits for it.
+//! A thread around a bake: requests in, progress and maps of rising quality out; the window never waits for it.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::AtomicU64;
@@ -9,31 +9,44 @@ use std::time::Instant;
 use super::meter::{Meter, Reporter};
 use crate::error::Result;
 use crate::progress::{Control, Progress, Stage};
-use crate::session::{BakeResult, BakeSession};
+use crate::scene::Scene;
+use crate::session::{BakeResult, BakeSession, StopReason};
 use crate::settings::BakeSettings;
 
 /// What the worker bakes with.
 pub trait Baker {
-    /// See [`BakeSession::bake`].
+    /// See [`BakeSession::set_scene`].
     ///
     /// # Errors
     /// As the session's.
-    fn bake(
+    fn set_scene(&mut self, scene: Arc<Scene>) -> Result<()>;
+
+    /// See [`BakeSession::bake_levels`].
+    ///
+    /// # Errors
+    /// As the session's.
+    fn bake_levels(
         &mut self,
         settings: &BakeSettings,
         progress: &dyn Progress,
         control: &Control,
+        level: &mut dyn FnMut(BakeResult),
     ) -> Result<BakeResult>;
 }
 
 impl Baker for BakeSession {
-    fn bake(
+    fn set_scene(&mut self, scene: Arc<Scene>) -> Result<()> {
+        Self::set_scene(self, scene)
+    }
+
+    fn bake_levels(
         &mut self,
         settings: &BakeSettings,
         progress: &dyn Progress,
         control: &Control,
+        level: &mut dyn FnMut(BakeResult),
     ) -> Result<BakeResult> {
-        Self::bake(self, settings, progress, control)
+        Self::bake_levels(self, settings, progress, control, level)
     }
 }
 
@@ -66,14 +79,49 @@ impl BakeState {
     }
 }
 
-/// A complete bake.
+/// What a bake is asked for.
 #[derive(Clone, Debug)]
-pub struct FinishedBake {
-    /// What it was asked for with; `threads` as asked, before a core was set aside.
+pub struct BakeRequest {
+    /// What is lit.
+    pub scene: Arc<Scene>,
+    /// How it is baked.
     pub settings: BakeSettings,
+}
+
+impl BakeRequest {
+    /// Whether both ask for the very same: this scene and these settings.
+    pub fn is_same(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.scene, &other.scene) && self.settings == other.settings
+    }
+
+    /// Whether both ask for the same maps but for how accurate they are.
+    pub fn differs_in_accuracy_only(&self, other: &Self) -> bool {
+        let accuracy_of_other = BakeSettings {
+            density_per_sr: other.settings.density_per_sr,
+            max_error: other.settings.max_error,
+            max_time_s: other.settings.max_time_s,
+            threads: other.settings.threads,
+            memory_bytes: other.settings.memory_bytes,
+            ..self.settings.clone()
+        };
+        Arc::ptr_eq(&self.scene, &other.scene) && accuracy_of_other == other.settings
+    }
+}
+
+/// Whole maps on the way to what was asked for, or those themselves.
+#[derive(Clone, Debug)]
+pub struct BakedLevel {
+    /// Number of the request that it answers, as [`Worker::request`] gave it.
+    pub serial: u64,
+    /// The request; `threads` as asked, before a core was set aside.
+    pub request: BakeRequest,
+    /// Counted from 1 within its request.
+    pub level: u32,
+    /// Whether the bake is done with it.
+    pub is_final: bool,
     /// Maps and accounts.
     pub result: BakeResult,
-    /// From its start to the maps, wall clock [s].
+    /// From the request to these maps, wall clock [s].
     pub seconds: f64,
 }
 
@@ -94,13 +142,13 @@ pub struct Worker {
 }
 
 impl Worker {
-    /// Starts the thread. `make_baker` is called there before the first bake, and again after one that panicked.
-    /// `wake` is called from any thread when there is news, at most about every 50 ms for mere progress.
+    /// Starts the thread. `make_baker` is called there with the scene of the first request, and again after a bake
+    /// that panicked. `wake` is called from any thread when there is news, at most about every 50 ms for mere progress.
     ///
     /// # Errors
     /// The system gives no thread.
     pub fn spawn<B: Baker>(
-        make_baker: impl Fn() -> Result<B> + Send + 'static,
+        make_baker: impl Fn(Arc<Scene>) -> Result<B> + Send + 'static,
         wake: impl Fn() + Send + Sync + 'static,
     ) -> Result<Self> {
         let shared = Arc::new(Shared::new(Box::new(wake)));
@@ -121,22 +169,20 @@ impl Worker {
         })
     }
 
-    /// Asks for a bake; replaces what was asked before and stops what is running.
-    pub fn request(&self, settings: BakeSettings) {
-        self.request_steps(vec![settings]);
-    }
-
-    /// Asks for several bakes in turn, from the coarsest to the one that is wanted; the maps of each are handed out.
-    pub fn request_steps(&self, steps: Vec<BakeSettings>) {
+    /// Asks for a bake, replaces what was asked before, and stops what is running: nothing of that is handed out from
+    /// now on. Returns the request's number; later ones are higher.
+    pub fn request(&self, asked: BakeRequest) -> u64 {
         let mut slot = self.shared.lock();
         slot.cancel_running();
         slot.serial += 1;
+        let serial = slot.serial;
         slot.request = Some(Request {
-            steps,
+            asked,
             since: Instant::now(),
-            serial: slot.serial,
+            serial,
         });
         self.shared.news.notify_all();
+        serial
     }
 
     /// Stops the running bake and forgets the waiting one; its unfinished maps are dropped.
@@ -166,9 +212,9 @@ impl Worker {
         }
     }
 
-    /// The newest complete bake that was not taken yet.
-    pub fn take_finished(&self) -> Option<FinishedBake> {
-        self.shared.lock().finished.take()
+    /// The newest whole maps that were not taken yet. Older ones that nobody took are gone.
+    pub fn take_level(&self) -> Option<BakedLevel> {
+        self.shared.lock().newest.take()
     }
 }
 
@@ -189,7 +235,7 @@ impl Drop for Worker {
 }
 
 struct Request {
-    steps: Vec<BakeSettings>,
+    asked: BakeRequest,
     since: Instant,
     serial: u64,
 }
@@ -208,7 +254,7 @@ struct Slot {
     running: Option<Running>,
     /// The state while nothing is asked for or running.
     settled: BakeState,
-    finished: Option<FinishedBake>,
+    newest: Option<BakedLevel>,
     quit: bool,
 }
 
@@ -239,7 +285,7 @@ impl Shared {
             request: None,
             running: None,
             settled: BakeState::Idle,
-            finished: None,
+            newest: None,
             quit: false,
         };
         Self {
@@ -275,8 +321,14 @@ impl Shared {
         }
     }
 
-    fn hand_out(&self, finished: FinishedBake) {
-        self.lock().finished = Some(finished);
+    /// Hands whole maps to the window, unless something else was asked for in between.
+    fn hand_out(&self, level: BakedLevel) {
+        let mut slot = self.lock();
+        if slot.serial != level.serial {
+            return;
+        }
+        slot.newest = Some(level);
+        drop(slot);
         (self.wake)();
     }
 
@@ -292,60 +344,79 @@ impl Shared {
 }
 
 /// The thread's life.
-fn serve<B: Baker>(shared: &Shared, make_baker: &impl Fn() -> Result<B>) {
+fn serve<B: Baker>(shared: &Shared, make_baker: &impl Fn(Arc<Scene>) -> Result<B>) {
     let mut baker = None;
     while let Some((request, control, meter)) = shared.next() {
         (shared.wake)();
-        let mut state = BakeState::Done;
-        for settings in request.steps {
-            let start = Instant::now();
-            let progress = Reporter {
-                meter: &meter,
-                wake: &shared.wake,
-                start,
-                next_wake_ms: AtomicU64::new(0),
-            };
-            match bake_once(&mut baker, make_baker, &settings, &progress, &control) {
-                Ok(result) => {
-                    let seconds = start.elapsed().as_secs_f64();
-                    shared.hand_out(FinishedBake {
-                        settings,
-                        result,
-                        seconds,
-                    });
-                }
-                Err(stopped) => {
-                    state = stopped;
-                    break;
-                }
+        let progress = Reporter {
+            meter: &meter,
+            wake: &shared.wake,
+            start: Instant::now(),
+            next_wake_ms: AtomicU64::new(0),
+        };
+        let mut levels = 0;
+        let mut hand_out = |result, is_final| {
+            levels += 1;
+            shared.hand_out(BakedLevel {
+                serial: request.serial,
+                request: request.asked.clone(),
+                level: levels,
+                is_final,
+                result,
+                seconds: request.since.elapsed().as_secs_f64(),
+            });
+        };
+        let mut on_the_way = |result| {
+            if !control.is_cancelled() {
+                hand_out(result, false);
             }
-        }
+        };
+        let outcome = bake(
+            &mut baker,
+            make_baker,
+            &request.asked,
+            &progress,
+            &control,
+            &mut on_the_way,
+        );
+        let state = match outcome {
+            Ok(result) => {
+                hand_out(result, true);
+                BakeState::Done
+            }
+            Err(stopped) => stopped,
+        };
         shared.settle(request.serial, state);
     }
 }
 
-/// One bake; where it gave no complete maps, the state that it leaves.
-fn bake_once<B: Baker>(
+/// One bake; where it did not come to its end, the state that it leaves.
+fn bake<B: Baker>(
     baker: &mut Option<B>,
-    make_baker: &impl Fn() -> Result<B>,
-    settings: &BakeSettings,
+    make_baker: &impl Fn(Arc<Scene>) -> Result<B>,
+    asked: &BakeRequest,
     progress: &dyn Progress,
     control: &Control,
+    level: &mut dyn FnMut(BakeResult),
 ) -> std::result::Result<BakeResult, BakeState> {
     let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
     let settings = BakeSettings {
-        threads: baking_threads(settings.threads, cores),
-        ..settings.clone()
+        threads: baking_threads(asked.settings.threads, cores),
+        ..asked.settings.clone()
     };
     let outcome = catch_unwind(AssertUnwindSafe(|| {
-        if baker.is_none() {
-            *baker = Some(make_baker()?);
-        }
-        let baker = baker.as_mut().expect("it was made above");
-        baker.bake(&settings, progress, control)
+        let scene = Arc::clone(&asked.scene);
+        let baker = match baker {
+            Some(baker) => {
+                baker.set_scene(scene)?;
+                baker
+            }
+            None => baker.insert(make_baker(scene)?),
+        };
+        baker.bake_levels(&settings, progress, control, level)
     }));
     match outcome {
-        Ok(Ok(result)) if !result.partial => Ok(result),
+        Ok(Ok(result)) if result.stop_reason != StopReason::Cancelled => Ok(result),
         Ok(Ok(_)) => Err(BakeState::Cancelled),
         Ok(Err(_)) if control.is_cancelled() => Err(BakeState::Cancelled),
         Ok(Err(error)) => Err(BakeState::Failed(error.to_string())),

@@ -254,7 +254,7 @@ fn maps_can_be_replaced_and_bad_ones_leave_the_old_in_place() {
         )
     };
     let (set, pixel) = shown(&[floor_map(0, 1, 1, vec![[1.0; 3]])]);
-    assert_eq!(set, Ok(()));
+    assert!(set.is_ok());
     assert_close(pixel, [lambert(1.0, 1.0); 3], 2.0 * HALF_ROUNDING);
     for wrong in [
         floor_map(1, 1, 1, vec![[5.0; 3]]),
@@ -265,7 +265,8 @@ fn maps_can_be_replaced_and_bad_ones_leave_the_old_in_place() {
         assert_close(pixel, [lambert(1.0, 1.0); 3], 2.0 * HALF_ROUNDING);
     }
     let (set, pixel) = shown(&[]);
-    assert_eq!((set, pixel), (Ok(()), [0.0; 3]));
+    assert!(set.is_ok());
+    assert_eq!(pixel, [0.0; 3]);
     assert_eq!(gpu.take_error(), None);
 }
 

@@ -1,5 +1,7 @@
 //! The panel without a window: pointer events in, accessibility nodes out.
 
+use std::sync::Arc;
+
 use egui::accesskit::{Node, NodeId, Role};
 use egui::{Event, PointerButton, Pos2, RawInput, Rect, pos2, vec2};
 use nephroid::plan::EffectPlan;
@@ -7,14 +9,17 @@ use nephroid::scene::Scene;
 use nephroid::session::{BakeCounts, BakeResult, StopReason, Timings};
 use nephroid::settings::{BakeSettings, LayerKind};
 use nephroid::viewer::panel::{Facts, Panel, WIDTH, Wishes};
-use nephroid::viewer::worker::{BakeState, FinishedBake};
+use nephroid::viewer::worker::{BakeRequest, BakeState, BakedLevel};
 
 pub struct Headless {
     context: egui::Context,
     pub panel: Panel,
-    pub scene: Scene,
+    pub scene: Arc<Scene>,
+    pub loaded: Arc<Scene>,
+    pub undoable: usize,
+    pub refusal: Option<String>,
     pub state: BakeState,
-    pub last: Option<FinishedBake>,
+    pub last: Option<BakedLevel>,
     pub layers: Vec<LayerKind>,
     /// What was pressed since the start.
     pub wishes: Wishes,
@@ -24,9 +29,15 @@ pub struct Headless {
 }
 
 /// A bake that found nothing to do.
-pub fn finished(settings: &BakeSettings) -> FinishedBake {
-    FinishedBake {
-        settings: settings.clone(),
+pub fn finished(scene: &Arc<Scene>, settings: &BakeSettings) -> BakedLevel {
+    BakedLevel {
+        serial: 1,
+        request: BakeRequest {
+            scene: Arc::clone(scene),
+            settings: settings.clone(),
+        },
+        level: 1,
+        is_final: true,
         result: BakeResult {
             maps: Vec::new(),
             plan: EffectPlan::default(),
@@ -34,6 +45,7 @@ pub fn finished(settings: &BakeSettings) -> FinishedBake {
             counts: BakeCounts::default(),
             timings_s: Timings::default(),
             cpu_s: Timings::default(),
+            estimated_relative_rmse: None,
             stop_reason: StopReason::NothingToDo,
             partial: false,
             warnings: Vec::new(),
@@ -44,6 +56,15 @@ pub fn finished(settings: &BakeSettings) -> FinishedBake {
 
 impl Headless {
     pub fn new(settings: BakeSettings, size: (f32, f32)) -> Self {
+        let scene = Scene {
+            name: "test".into(),
+            ..Scene::default()
+        };
+        Self::with_scene(scene, settings, size)
+    }
+
+    pub fn with_scene(scene: Scene, settings: BakeSettings, size: (f32, f32)) -> Self {
+        let scene = Arc::new(scene);
         let context = egui::Context::default();
         context.enable_accesskit();
         // As in the window: no fade that a test would have to wait for.
@@ -51,10 +72,10 @@ impl Headless {
         let mut headless = Self {
             context,
             panel: Panel::new(settings),
-            scene: Scene {
-                name: "test".into(),
-                ..Scene::default()
-            },
+            loaded: Arc::clone(&scene),
+            scene,
+            undoable: 0,
+            refusal: None,
             state: BakeState::Idle,
             last: None,
             layers: vec![LayerKind::Caustic, LayerKind::Direct],
@@ -80,6 +101,9 @@ impl Headless {
             context,
             panel,
             scene,
+            loaded,
+            undoable,
+            refusal,
             state,
             last,
             layers,
@@ -90,13 +114,15 @@ impl Headless {
             scene,
             state,
             last: last.as_ref(),
-            is_draft: false,
+            loaded,
+            undoable: *undoable,
+            refusal: refusal.as_deref(),
             layers,
             speed_m_per_s: 1.0,
             adapter: "no adapter",
         };
         let mut output = context.run_ui(input, |ui| {
-            *wishes = wishes.and(panel.show(ui, &facts));
+            *wishes = std::mem::take(wishes).and(panel.show(ui, &facts));
         });
         output.textures_delta.clear();
         if let Some(update) = output.platform_output.accesskit_update {

@@ -4,8 +4,9 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use nephroid::progress::Control;
-use nephroid::scene::builtin;
+use nephroid::scene::{Edit, LightKind, Scene, builtin};
 use nephroid::settings::{BakeSettings, LayerKind, MapResolution, Sigma};
+use nephroid::units::RadiantIntensity;
 use nephroid::viewer::ViewerOptions;
 use nephroid::viewer::debounce::QUIET;
 use nephroid::viewer::model::Model;
@@ -46,7 +47,7 @@ fn run(model: &mut Model) {
     let start = Instant::now();
     loop {
         model.poll();
-        model.act(Wishes::default(), Instant::now());
+        model.act(&Wishes::default(), Instant::now());
         if !model.state().is_baking() {
             model.poll();
             return;
@@ -73,62 +74,159 @@ fn it_bakes_on_start_and_shows_every_layer() {
     run(&mut model);
     assert_eq!(*model.state(), BakeState::Done);
     assert_eq!(model.layers(), [LayerKind::Caustic, LayerKind::Direct]);
-    assert!(!model.is_draft, "too few rays for a draft");
+    assert!(model.last.as_ref().is_some_and(|last| last.is_final));
     assert_eq!(logged(&log), ["baking", "done"]);
 }
 
-#[test]
-fn a_large_bake_shows_a_draft_first() {
-    let (mut model, log) = model(50_000.0);
-    run(&mut model);
-    let last = model.last.as_ref().expect("it is baked");
-    assert_eq!(
-        last.settings.density_per_sr, 50_000.0,
-        "in the end it is what was asked for"
-    );
-    assert!(!model.is_draft);
-    assert_eq!(logged(&log), ["baking", "draft", "done"]);
-}
+/// A bake that takes longer than a test waits between its steps.
+const LONG: f64 = 3e7;
 
 #[test]
-fn a_changed_setting_is_baked_once_it_rests() {
+fn a_changed_setting_is_baked_at_once() {
     let (mut model, log) = model(1000.0);
     run(&mut model);
-    let now = Instant::now();
-    for (step, sigma) in [2.0, 3.0, 4.0].into_iter().enumerate() {
-        model.panel.settings.sigma = Sigma::Constant(sigma);
-        model.act(Wishes::default(), now + QUIET / 2 * step as u32);
-        assert!(!model.state().is_baking(), "it waits for the last change");
-    }
-    assert_eq!(model.due(), Some(now + QUIET * 2));
-    model.act(Wishes::default(), now + QUIET * 2);
+    model.panel.settings.sigma = Sigma::Constant(4.0);
+    model.act(&Wishes::default(), Instant::now());
     assert!(model.state().is_baking());
     run(&mut model);
-    assert_eq!(
-        model.last.as_ref().map(|last| last.settings.sigma),
-        Some(Sigma::Constant(4.0))
-    );
-    assert_eq!(
-        logged(&log),
-        [
-            "baking", "done", "settings", "settings", "settings", "baking", "done"
-        ]
-    );
+    let sigma = model.last.as_ref().map(|last| last.request.settings.sigma);
+    assert_eq!(sigma, Some(Sigma::Constant(4.0)));
+    assert_eq!(logged(&log), ["baking", "done", "settings", "baking", "done"]);
 }
 
 #[test]
-fn a_change_that_is_taken_back_bakes_nothing() {
+fn while_a_request_has_shown_nothing_changes_wait_until_they_rest() {
     let (mut model, log) = model(1000.0);
     run(&mut model);
+    model.panel.settings.density_per_sr = LONG;
     let now = Instant::now();
-    let before = model.panel.settings.clone();
+    model.act(&Wishes::default(), now);
+    assert!(model.state().is_baking());
+    for (step, sigma) in [2.0, 3.0, 4.0].into_iter().enumerate() {
+        model.panel.settings.sigma = Sigma::Constant(sigma);
+        model.act(&Wishes::default(), now + QUIET / 2 * step as u32);
+    }
+    assert_eq!(model.due(), Some(now + QUIET * 2));
+    let events = logged(&log);
+    assert_eq!(
+        events[events.len() - 3..],
+        ["settings"; 3],
+        "what runs is not stopped before it has shown something"
+    );
+    model.panel.settings.density_per_sr = 1000.0;
+    model.act(&Wishes::default(), now + QUIET * 2);
+    model.act(&Wishes::default(), now + QUIET * 3);
+    run(&mut model);
+    let last = model.last.as_ref().expect("it is baked");
+    assert_eq!(last.request.settings.sigma, Sigma::Constant(4.0));
+    assert_eq!(logged(&log).last().map(String::as_str), Some("done"));
+}
+
+#[test]
+fn a_change_that_is_taken_back_before_it_is_baked_bakes_nothing() {
+    let (mut model, log) = model(1000.0);
+    run(&mut model);
+    model.panel.settings.density_per_sr = LONG;
+    let now = Instant::now();
+    model.act(&Wishes::default(), now);
+    let asked = model.panel.settings.clone();
     model.panel.settings.seed = 5;
-    model.act(Wishes::default(), now);
-    model.panel.settings = before;
-    model.act(Wishes::default(), now);
-    model.act(Wishes::default(), now + QUIET * 2);
+    model.act(&Wishes::default(), now);
+    model.panel.settings = asked;
+    model.act(&Wishes::default(), now);
+    model.act(&Wishes::default(), now + QUIET * 2);
+    assert!(model.state().is_baking());
+    let bakes = logged(&log).into_iter().filter(|event| event == "baking");
+    assert_eq!(bakes.count(), 2);
+}
+
+#[test]
+fn an_edited_scene_is_baked_and_an_edit_taken_back_too() {
+    let (mut model, log) = model(1000.0);
+    run(&mut model);
+    let flux = |model: &Model| -> f64 {
+        let maps = model.maps().iter();
+        maps.map(|map| map.flux_w(LayerKind::Direct).luminance()).sum()
+    };
+    let (before, original) = (flux(&model), Arc::clone(model.scene()));
+    let brighter = |times: f64| Wishes {
+        edit: Some(Edit::LightIntensity {
+            light: 0,
+            intensity: intensity(&original) * times,
+        }),
+        is_dragging: true,
+        ..Wishes::default()
+    };
+    // Two steps of one drag, then the mouse is let go.
+    for times in [2.0, 4.0] {
+        model.act(&brighter(times), Instant::now());
+    }
+    model.act(&Wishes::default(), Instant::now());
+    assert_eq!(model.edits().undoable(), 1, "a drag is taken back as one");
+    wait_until_baked(&mut model);
+    assert!(
+        (flux(&model) / before - 4.0).abs() < 1e-5,
+        "{}",
+        flux(&model) / before
+    );
+
+    let undo = Wishes {
+        undo: true,
+        ..Wishes::default()
+    };
+    model.act(&undo, Instant::now());
+    assert_eq!(model.scene().lights, original.lights);
+    wait_until_baked(&mut model);
+    assert_eq!(flux(&model), before);
+    model.act(&undo, Instant::now());
+    assert_eq!(
+        model.scene().lights,
+        original.lights,
+        "nothing is left to take back"
+    );
+
+    let wrong = Wishes {
+        edit: Some(Edit::MaterialIor {
+            material: 0,
+            ior: 0.5,
+        }),
+        ..Wishes::default()
+    };
+    model.act(&wrong, Instant::now());
+    assert!(
+        model
+            .refusal
+            .as_ref()
+            .is_some_and(|sentence| sentence.contains("0.5")),
+        "{:?}",
+        model.refusal
+    );
     assert!(!model.state().is_baking());
-    assert_eq!(logged(&log), ["baking", "done", "settings", "settings"]);
+    let log = logged(&log);
+    assert!(
+        log.contains(&"edit".into()) && log.contains(&"undo".into()),
+        "{log:?}"
+    );
+}
+
+fn intensity(scene: &Scene) -> RadiantIntensity {
+    match scene.lights[0].kind {
+        LightKind::Point { intensity, .. } => intensity,
+        _ => panic!("the ring has a lamp"),
+    }
+}
+
+/// Frames until the shown maps are what is wanted now.
+fn wait_until_baked(model: &mut Model) {
+    let start = Instant::now();
+    loop {
+        run(model);
+        let last = model.last.as_ref().expect("it was baked");
+        if last.is_final && Arc::ptr_eq(&last.request.scene, model.scene()) {
+            return;
+        }
+        assert!(start.elapsed() < PATIENCE, "it never comes");
+    }
 }
 
 #[test]
@@ -138,11 +236,11 @@ fn without_automatic_only_the_button_bakes() {
     let now = Instant::now();
     model.panel.automatic = false;
     model.panel.settings.seed = 5;
-    model.act(Wishes::default(), now);
-    model.act(Wishes::default(), now + QUIET * 10);
+    model.act(&Wishes::default(), now);
+    model.act(&Wishes::default(), now + QUIET * 10);
     assert!(!model.state().is_baking() && model.due().is_none());
     model.act(
-        Wishes {
+        &Wishes {
             rebake: true,
             ..Wishes::default()
         },
@@ -151,10 +249,10 @@ fn without_automatic_only_the_button_bakes() {
     assert!(model.state().is_baking());
     run(&mut model);
     model.panel.settings.seed = 6;
-    model.act(Wishes::default(), now);
+    model.act(&Wishes::default(), now);
     model.panel.automatic = true;
-    model.act(Wishes::default(), now);
-    model.act(Wishes::default(), now + QUIET);
+    model.act(&Wishes::default(), now);
+    model.act(&Wishes::default(), now + QUIET);
     assert!(model.state().is_baking(), "switched on, it catches up");
 }
 
@@ -165,13 +263,13 @@ fn settings_out_of_range_are_not_baked() {
     model.panel.settings.sigma = Sigma::Constant(-1.0);
     let now = Instant::now();
     model.act(
-        Wishes {
+        &Wishes {
             rebake: true,
             ..Wishes::default()
         },
         now,
     );
-    model.act(Wishes::default(), now + QUIET);
+    model.act(&Wishes::default(), now + QUIET);
     assert!(!model.state().is_baking());
     assert_eq!(logged(&log), ["baking", "done", "settings"]);
 }
@@ -182,14 +280,14 @@ fn cancelling_keeps_the_maps_that_are_shown() {
     run(&mut model);
     model.panel.settings.density_per_sr = 3e7;
     model.act(
-        Wishes {
+        &Wishes {
             rebake: true,
             ..Wishes::default()
         },
         Instant::now(),
     );
     model.act(
-        Wishes {
+        &Wishes {
             cancel: true,
             ..Wishes::default()
         },
@@ -198,7 +296,10 @@ fn cancelling_keeps_the_maps_that_are_shown() {
     run(&mut model);
     assert_eq!(*model.state(), BakeState::Cancelled);
     assert_eq!(
-        model.last.as_ref().map(|last| last.settings.density_per_sr),
+        model
+            .last
+            .as_ref()
+            .map(|last| last.request.settings.density_per_sr),
         Some(1000.0)
     );
     assert!(!model.maps().is_empty());
@@ -238,16 +339,16 @@ fn given_maps_are_shown_without_a_bake() {
     assert_eq!(*model.state(), BakeState::Idle);
     assert_eq!(model.maps().len(), first.maps().len());
     let now = Instant::now();
-    model.act(Wishes::default(), now);
-    model.act(Wishes::default(), now + QUIET);
+    model.act(&Wishes::default(), now);
+    model.act(&Wishes::default(), now + QUIET);
     assert_eq!(
         *model.state(),
         BakeState::Idle,
         "nothing changed, nothing is baked"
     );
     model.panel.settings.seed = 3;
-    model.act(Wishes::default(), now);
-    model.act(Wishes::default(), now + QUIET);
+    model.act(&Wishes::default(), now);
+    model.act(&Wishes::default(), now + QUIET);
     assert!(model.state().is_baking());
 }
 

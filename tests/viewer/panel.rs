@@ -210,7 +210,7 @@ fn states_are_told_in_words() {
     panel.settle();
     assert!(panel.says("Cancelled"));
     panel.state = BakeState::Done;
-    panel.last = Some(finished(&settings()));
+    panel.last = Some(finished(&panel.scene, &settings()));
     panel.settle();
     assert!(panel.says("the maps belong to these settings"));
     panel.panel.settings.seed = 7;
@@ -231,7 +231,7 @@ fn the_ledger_is_summed_over_lights_and_tells_an_open_account() {
             ..Truncated::default()
         },
     };
-    let mut last = finished(&settings());
+    let mut last = finished(&panel.scene, &settings());
     last.result.ledgers = [0.625, 0.625]
         .map(|escaped| LightLedger {
             light: "lamp".into(),
@@ -267,7 +267,7 @@ fn the_ledger_is_summed_over_lights_and_tells_an_open_account() {
 #[test]
 fn effects_are_listed_with_their_reasons() {
     let mut panel = panel();
-    let mut last = finished(&settings());
+    let mut last = finished(&panel.scene, &settings());
     last.result.plan = EffectPlan {
         effects: vec![EffectLine {
             effect: Effect::Refraction,

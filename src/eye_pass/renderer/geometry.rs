@@ -1,11 +1,13 @@
 //! The scene's triangles on the device: few large vertex buffers, each below the device's limit.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use bytemuck::{Pod, Zeroable};
 use glam::DVec2;
 use wgpu::util::DeviceExt;
 
+use super::tiles::Uploaded;
 use crate::gpu::Gpu;
 use crate::illumination::Chart;
 use crate::scene::{Mesh, Object, Scene, TextureRef};
@@ -71,6 +73,8 @@ pub(super) struct Segment {
     first_corner: usize,
     /// Triangles of the object's mesh.
     triangles: Range<usize>,
+    /// Whether its corners are the mesh's vertices; else three for each triangle.
+    shares_corners: bool,
 }
 
 /// Corners with as many map coordinates, and which three of them make a triangle.
@@ -87,6 +91,10 @@ pub(super) struct Geometry {
     pub(super) pages: Vec<Page>,
     /// One list per object of the scene.
     pub(super) segments: Vec<Vec<Segment>>,
+    /// What the corners show, object by object.
+    meshes: Vec<Arc<Mesh>>,
+    /// Where the map coordinates come from, object by object.
+    charts: Vec<Option<Arc<Chart>>>,
 }
 
 impl Geometry {
@@ -110,21 +118,106 @@ impl Geometry {
         Self {
             pages: packing.pages,
             segments,
+            meshes: meshes(scene),
+            charts: vec![None; scene.objects.len()],
         }
     }
 
-    /// Writes the map coordinates of one object, which takes light.
-    pub(super) fn set_chart(&self, gpu: &Gpu, chart: &Chart) {
+    /// Takes over an edited scene with as many objects. Corners of moved objects are written again; where an object
+    /// needs others than it has, everything is uploaded anew.
+    pub(super) fn set_scene(&mut self, gpu: &Gpu, scene: &Scene) -> Uploaded {
+        let changed = (0..scene.objects.len()).filter(|index| self.is_changed(scene, *index));
+        let changed: Vec<usize> = changed.collect();
+        if changed.iter().all(|index| self.can_hold(scene, *index)) {
+            let bytes = changed.iter().map(|index| self.write_corners(gpu, scene, *index));
+            let bytes = bytes.sum();
+            self.meshes = meshes(scene);
+            return Uploaded::other(bytes);
+        }
+        let charts = std::mem::take(&mut self.charts);
+        *self = Self::new(gpu, scene);
+        let mut uploaded = Uploaded::other(self.bytes());
+        for chart in charts.iter().flatten() {
+            if chart.corner_uvs.len() == self.meshes[chart.object].triangles.len() {
+                uploaded += self.set_chart(gpu, chart);
+            }
+        }
+        uploaded
+    }
+
+    fn is_changed(&self, scene: &Scene, index: usize) -> bool {
+        !Arc::ptr_eq(&self.meshes[index], &scene.objects[index].mesh) || !self.can_hold(scene, index)
+    }
+
+    /// Whether an object's corners have the places that it needs: maps may cut a receiver anywhere.
+    fn can_hold(&self, scene: &Scene, index: usize) -> bool {
+        let (old, new) = (&self.meshes[index], &scene.objects[index].mesh);
+        let has_same_shape = Arc::ptr_eq(old, new)
+            || (old.positions.len() == new.positions.len() && old.triangles == new.triangles);
+        let is_shared = self.segments[index].iter().any(|segment| segment.shares_corners);
+        has_same_shape && !(is_shared && scene.material_of(index).surface.is_receiver())
+    }
+
+    fn write_corners(&self, gpu: &Gpu, scene: &Scene, index: usize) -> usize {
+        let object = &scene.objects[index];
+        let image = scene.material_of(index).base_colour_texture.as_ref();
+        let mut bytes = 0;
+        for segment in &self.segments[index] {
+            let corners = segment.corners(&object.mesh, image);
+            let offset = (segment.first_corner * size_of::<Corner>()) as u64;
+            let page = &self.pages[segment.page];
+            gpu.queue
+                .write_buffer(&page.corners, offset, bytemuck::cast_slice(&corners));
+            bytes += size_of_val(corners.as_slice());
+        }
+        bytes
+    }
+
+    fn bytes(&self) -> usize {
+        let page_bytes = |page: &Page| page.corners.size() + page.indices.size();
+        self.pages.iter().map(page_bytes).sum::<u64>() as usize
+    }
+
+    /// Writes the map coordinates of one object, which takes light, unless they are there already.
+    pub(super) fn set_chart(&mut self, gpu: &Gpu, chart: &Arc<Chart>) -> Uploaded {
+        let is_there = |shown: &Arc<Chart>| Arc::ptr_eq(shown, chart) || shown.corner_uvs == chart.corner_uvs;
+        if self.charts[chart.object].as_ref().is_some_and(is_there) {
+            return Uploaded::default();
+        }
+        self.charts[chart.object] = Some(Arc::clone(chart));
+        let mut bytes = 0;
         for segment in &self.segments[chart.object] {
             let triangles = &chart.corner_uvs[segment.triangles.clone()];
             let uvs: Vec<MapUv> = triangles.iter().flatten().map(|uv| single(*uv)).collect();
             let offset = (segment.first_corner * size_of::<MapUv>()) as u64;
-            gpu.queue.write_buffer(
-                &self.pages[segment.page].map_uvs,
-                offset,
-                bytemuck::cast_slice(&uvs),
-            );
+            let page = &self.pages[segment.page];
+            gpu.queue
+                .write_buffer(&page.map_uvs, offset, bytemuck::cast_slice(&uvs));
+            bytes += size_of_val(uvs.as_slice());
         }
+        Uploaded::other(bytes)
+    }
+}
+
+fn meshes(scene: &Scene) -> Vec<Arc<Mesh>> {
+    scene
+        .objects
+        .iter()
+        .map(|object| Arc::clone(&object.mesh))
+        .collect()
+}
+
+impl Segment {
+    fn corners(&self, mesh: &Mesh, image: Option<&TextureRef>) -> Vec<Corner> {
+        if self.shares_corners {
+            return (0..mesh.positions.len())
+                .map(|vertex| corner(mesh, image, vertex))
+                .collect();
+        }
+        let vertices = mesh.triangles[self.triangles.clone()].iter().flatten();
+        vertices
+            .map(|vertex| corner(mesh, image, *vertex as usize))
+            .collect()
     }
 }
 
@@ -145,10 +238,9 @@ impl Packing<'_> {
         let mesh = &object.mesh;
         let largest = mesh.positions.len().max(3 * mesh.triangles.len());
         if !material.surface.is_receiver() && largest <= self.page_corners {
-            let segment = self.segment(largest, 0..mesh.triangles.len());
+            let segment = self.segment(largest, 0..mesh.triangles.len(), true);
             let first = self.corners.len() as u32;
-            self.corners
-                .extend((0..mesh.positions.len()).map(|vertex| corner(mesh, image, vertex)));
+            self.corners.extend(segment.corners(mesh, image));
             self.indices
                 .extend(mesh.triangles.iter().flatten().map(|vertex| first + vertex));
             return vec![segment];
@@ -159,18 +251,18 @@ impl Packing<'_> {
             let room = (self.page_corners - self.corners.len().max(self.indices.len())) / 3;
             let room = if room == 0 { self.page_corners / 3 } else { room };
             let triangles = triangle..mesh.triangles.len().min(triangle + room);
-            segments.push(self.segment(3 * triangles.len(), triangles.clone()));
-            for vertex in mesh.triangles[triangles.clone()].iter().flatten() {
-                self.indices.push(self.corners.len() as u32);
-                self.corners.push(corner(mesh, image, *vertex as usize));
-            }
             triangle = triangles.end;
+            let segment = self.segment(3 * triangles.len(), triangles, false);
+            let first = self.corners.len() as u32;
+            self.corners.extend(segment.corners(mesh, image));
+            self.indices.extend(first..self.corners.len() as u32);
+            segments.push(segment);
         }
         segments
     }
 
     /// The segment that comes next, on a new page where this one has no room for so many corners or indices.
-    fn segment(&mut self, needed: usize, triangles: Range<usize>) -> Segment {
+    fn segment(&mut self, needed: usize, triangles: Range<usize>, shares_corners: bool) -> Segment {
         if self.corners.len().max(self.indices.len()) + needed > self.page_corners {
             self.close_page();
         }
@@ -180,6 +272,7 @@ impl Packing<'_> {
             indices: first_index..first_index + 3 * triangles.len() as u32,
             first_corner: self.corners.len(),
             triangles,
+            shares_corners,
         }
     }
 
@@ -199,7 +292,7 @@ impl Packing<'_> {
             corners: filled(
                 "corners",
                 bytemuck::cast_slice(&self.corners),
-                wgpu::BufferUsages::VERTEX,
+                wgpu::BufferUsages::VERTEX | wgpu::BufferUsages::COPY_DST,
             ),
             indices: filled(
                 "indices",

@@ -15,9 +15,11 @@ mod shaders;
 mod surroundings;
 mod targets;
 mod textures;
+mod tiles;
 mod uniforms;
 
 pub use shaders::{programs, shared_structs, vertex_attributes};
+pub use tiles::Uploaded;
 
 use half::f16;
 use wgpu::util::DeviceExt;
@@ -80,26 +82,43 @@ impl Renderer {
             geometry: Geometry::new(gpu, scene),
             objects: Objects::new(gpu, scene, &surfaces.object_layout),
             surfaces,
-            surroundings: DeviceSurroundings::new(gpu, scene, &[]),
+            surroundings: DeviceSurroundings::none(gpu),
             surroundings_sampler: linear_sampler(gpu),
             targets: None,
         };
         gpu.take_error().map_or(Ok(renderer), Err)
     }
 
-    /// Replaces all illumination maps; surfaces without one are dark.
+    /// Shows an edited scene: other materials, moved objects. Uploads what differs; the maps stay until
+    /// [`set_maps`](Self::set_maps), which has to follow.
+    ///
+    /// # Errors
+    /// A device that refuses what it is given.
+    pub fn set_scene(&mut self, gpu: &Gpu, scene: &Scene) -> Result<Uploaded> {
+        let mut uploaded = Uploaded::default();
+        if self.objects.list.len() == scene.objects.len() {
+            uploaded += self.geometry.set_scene(gpu, scene);
+            uploaded += self.objects.set_scene(gpu, scene);
+        } else {
+            self.geometry = Geometry::new(gpu, scene);
+            self.objects = Objects::new(gpu, scene, &self.surfaces.object_layout);
+        }
+        gpu.take_error().map_or(Ok(uploaded), Err)
+    }
+
+    /// Replaces all illumination maps; surfaces without one are dark. Of maps that keep their size only the tiles that
+    /// differ from what is shown are uploaded.
     ///
     /// # Errors
     /// A map that does not belong to the scene or is larger than the device's textures: the old maps stay. A device
     /// that refuses what it is given.
-    pub fn set_maps(&mut self, gpu: &Gpu, scene: &Scene, maps: &[IlluminationMap]) -> Result<()> {
-        self.objects
-            .set_maps(gpu, scene, &self.surfaces.object_layout, maps)?;
+    pub fn set_maps(&mut self, gpu: &Gpu, scene: &Scene, maps: &[IlluminationMap]) -> Result<Uploaded> {
+        let mut uploaded = self.objects.set_maps(gpu, scene, maps)?;
         for map in maps {
-            self.geometry.set_chart(gpu, &map.chart);
+            uploaded += self.geometry.set_chart(gpu, &map.chart);
         }
-        self.surroundings = DeviceSurroundings::new(gpu, scene, maps);
-        gpu.take_error().map_or(Ok(()), Err)
+        uploaded += self.surroundings.update(gpu, scene, maps);
+        gpu.take_error().map_or(Ok(uploaded), Err)
     }
 
     /// Draws a picture into `target`, a view of the size of `view` and of the format given to [`new`](Self::new).
@@ -216,9 +235,9 @@ impl Renderer {
 
     fn draw_opaque(&self, pass: &mut wgpu::RenderPass<'_>) {
         for (index, object) in self.objects.list.iter().enumerate() {
-            if !is_clear(object.surface) {
+            if !is_clear(object.look.surface) {
                 let pipelines = &self.surfaces;
-                let pipeline = if object.double_sided {
+                let pipeline = if object.look.double_sided {
                     &pipelines.opaque_double_sided
                 } else {
                     &pipelines.opaque_single_sided
@@ -236,17 +255,17 @@ impl Renderer {
             .list
             .iter()
             .enumerate()
-            .filter(|(_, object)| is_clear(object.surface))
+            .filter(|(_, object)| is_clear(object.look.surface))
             .collect();
-        let distance = |object: &DeviceObject| object.centre.distance_squared(view.camera.position);
+        let distance = |object: &DeviceObject| object.look.centre.distance_squared(view.camera.position);
         clear.sort_by(|(_, a), (_, b)| distance(b).total_cmp(&distance(a)));
         for (index, object) in clear {
-            let faces: &[&ClearPipelines] = match object.surface {
+            let faces: &[&ClearPipelines] = match object.look.surface {
                 SurfaceKind::ThinWall => &[&self.surfaces.clear_both_faces],
                 _ => &[&self.surfaces.clear_back_faces, &self.surfaces.clear_front_faces],
             };
             for pipelines in faces {
-                let in_turn: &[_] = if object.is_grey {
+                let in_turn: &[_] = if object.look.is_grey {
                     &[&pipelines.grey]
                 } else {
                     &[&pipelines.transmitted, &pipelines.reflected]

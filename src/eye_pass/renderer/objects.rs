@@ -1,21 +1,24 @@
 //! Objects on the device: materials, maps and what they are bound by.
 
+use std::sync::Arc;
+
 use glam::DVec3;
 use wgpu::util::DeviceExt;
 
 use super::bindings::bind_group;
 use super::maps::DeviceMap;
 use super::textures::BaseColour;
+use super::tiles::Uploaded;
 use super::uniforms::{ObjectUniform, rgb};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::illumination::IlluminationMap;
 use crate::optics::LinearSrgb;
-use crate::scene::{Material, Object, Scene, SurfaceKind};
+use crate::scene::{Material, Object, Scene, SurfaceKind, Texture};
 
-/// One object, ready to be drawn.
-#[derive(Debug)]
-pub(super) struct DeviceObject {
+/// What an object looks like but for its map.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Look {
     /// How its material is treated.
     pub(super) surface: SurfaceKind,
     pub(super) double_sided: bool,
@@ -25,43 +28,91 @@ pub(super) struct DeviceObject {
     pub(super) is_grey: bool,
     uniform: ObjectUniform,
     base_colour_texture: Option<usize>,
+}
+
+/// One object, ready to be drawn.
+#[derive(Debug)]
+pub(super) struct DeviceObject {
+    pub(super) look: Look,
+    map: Option<DeviceMap>,
+    /// As `buffer` holds it.
+    written: ObjectUniform,
+    buffer: wgpu::Buffer,
     /// Group 1.
-    pub(super) bind_group: Option<wgpu::BindGroup>,
+    pub(super) bind_group: wgpu::BindGroup,
+}
+
+/// What objects are bound with.
+#[derive(Debug)]
+struct Shared {
+    layout: wgpu::BindGroupLayout,
+    /// As `textures` hold them.
+    sources: Vec<Arc<Texture>>,
+    textures: Vec<BaseColour>,
+    white: BaseColour,
+    no_map: DeviceMap,
 }
 
 /// All objects with the textures they share.
 #[derive(Debug)]
 pub(super) struct Objects {
     pub(super) list: Vec<DeviceObject>,
-    textures: Vec<BaseColour>,
-    white: BaseColour,
-    no_map: DeviceMap,
+    shared: Shared,
     /// Largest radiance that any surface sends out by itself or from its map [W/(m² sr)].
     pub(super) peak_radiance: f64,
 }
 
 impl Objects {
     pub(super) fn new(gpu: &Gpu, scene: &Scene, layout: &wgpu::BindGroupLayout) -> Self {
-        let mut objects = Self {
-            list: scene
-                .objects
-                .iter()
-                .map(|object| DeviceObject::new(scene, object))
-                .collect(),
-            textures: scene
-                .textures
-                .iter()
-                .map(|texture| BaseColour::new(gpu, texture))
-                .collect(),
+        let textures = scene.textures.iter();
+        let shared = Shared {
+            layout: layout.clone(),
+            sources: scene.textures.clone(),
+            textures: textures.map(|texture| BaseColour::new(gpu, texture)).collect(),
             white: BaseColour::white(gpu),
             no_map: DeviceMap::black(gpu),
+        };
+        let looks = scene.objects.iter().map(|object| Look::of(scene, object));
+        let mut objects = Self {
+            list: looks.map(|look| DeviceObject::new(gpu, &shared, look)).collect(),
+            shared,
             peak_radiance: 0.0,
         };
-        objects.bind(gpu, layout, Vec::new());
+        objects.find_peak();
         objects
     }
 
-    /// Replaces all maps; objects without one turn dark.
+    /// Takes over an edited scene with as many objects; the maps stay.
+    pub(super) fn set_scene(&mut self, gpu: &Gpu, scene: &Scene) -> Uploaded {
+        let has_other_images = self.shared.sources.len() != scene.textures.len()
+            || self
+                .shared
+                .sources
+                .iter()
+                .zip(&scene.textures)
+                .any(|(a, b)| !Arc::ptr_eq(a, b));
+        let mut uploaded = Uploaded::default();
+        if has_other_images {
+            self.shared.sources.clone_from(&scene.textures);
+            let textures = scene.textures.iter();
+            self.shared.textures = textures.map(|texture| BaseColour::new(gpu, texture)).collect();
+            let texels = scene.textures.iter().map(|texture| texture.rgba.len());
+            uploaded += Uploaded::other(4 * texels.sum::<usize>());
+        }
+        for (object, source) in self.list.iter_mut().zip(&scene.objects) {
+            let look = Look::of(scene, source);
+            let must_bind = has_other_images || look.base_colour_texture != object.look.base_colour_texture;
+            object.look = look;
+            uploaded += object.write_uniform(gpu);
+            if must_bind {
+                object.bind(gpu, &self.shared);
+            }
+        }
+        self.find_peak();
+        uploaded
+    }
+
+    /// Replaces all maps; objects without one turn dark. Only what differs from the maps before is uploaded.
     ///
     /// # Errors
     /// A map of an object that the scene lacks, or one larger than the device's textures; the old maps stay.
@@ -69,52 +120,32 @@ impl Objects {
         &mut self,
         gpu: &Gpu,
         scene: &Scene,
-        layout: &wgpu::BindGroupLayout,
         maps: &[IlluminationMap],
-    ) -> Result<()> {
-        let uploaded = maps
-            .iter()
-            .map(|map| {
-                let index = map.chart.object;
-                check_chart(scene, map)?;
-                Ok((index, DeviceMap::new(gpu, &scene.objects[index].name, map)?))
-            })
-            .collect::<Result<Vec<_>>>()?;
-        self.bind(gpu, layout, uploaded);
-        Ok(())
+    ) -> Result<Uploaded> {
+        let mut map_of: Vec<Option<&IlluminationMap>> = vec![None; self.list.len()];
+        for map in maps {
+            check_chart(scene, map)?;
+            let index = map.chart.object;
+            let name = format!("map of {}", scene.objects[index].name);
+            gpu.check_texture_size(&name, map.width() as u32, map.height() as u32)?;
+            map_of[index] = Some(map);
+        }
+        let mut uploaded = Uploaded::default();
+        for ((object, source), map) in self.list.iter_mut().zip(&scene.objects).zip(map_of) {
+            uploaded += object.set_map(gpu, &self.shared, &source.name, map);
+        }
+        self.find_peak();
+        Ok(uploaded)
     }
 
-    fn bind(&mut self, gpu: &Gpu, layout: &wgpu::BindGroupLayout, maps: Vec<(usize, DeviceMap)>) {
-        let mut map_of: Vec<Option<DeviceMap>> = self.list.iter().map(|_| None).collect();
-        for (object, map) in maps {
-            map_of[object] = Some(map);
-        }
-        self.peak_radiance = 0.0;
-        for (object, map) in self.list.iter_mut().zip(&map_of) {
-            let map = map.as_ref().unwrap_or(&self.no_map);
-            let image = object
-                .base_colour_texture
-                .map_or(&self.white, |index| &self.textures[index]);
-            object.uniform.irradiance_scale = map.irradiance_scale;
-            self.peak_radiance = self.peak_radiance.max(object.peak_radiance(map));
-            let uniform = gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-                label: Some("object"),
-                contents: bytemuck::bytes_of(&object.uniform),
-                usage: wgpu::BufferUsages::UNIFORM,
-            });
-            let resources = [
-                uniform.as_entire_binding(),
-                wgpu::BindingResource::TextureView(&map.view),
-                wgpu::BindingResource::TextureView(&image.view),
-                wgpu::BindingResource::Sampler(&image.sampler),
-            ];
-            object.bind_group = Some(bind_group(gpu, "object", layout, resources));
-        }
+    fn find_peak(&mut self) {
+        let peaks = self.list.iter().map(DeviceObject::peak_radiance);
+        self.peak_radiance = peaks.fold(0.0, f64::max);
     }
 }
 
-impl DeviceObject {
-    fn new(scene: &Scene, object: &Object) -> Self {
+impl Look {
+    fn of(scene: &Scene, object: &Object) -> Self {
         let material = &scene.materials[object.material];
         let (low, high) = object.mesh.bounds().unwrap_or_default();
         let body_transmittance = rgb(body_transmittance(material, (high - low).min_element()));
@@ -136,16 +167,86 @@ impl DeviceObject {
                 surface: surface_code(material.surface),
             },
             base_colour_texture: material.base_colour_texture.as_ref().map(|image| image.texture),
-            bind_group: None,
+        }
+    }
+}
+
+impl DeviceObject {
+    fn new(gpu: &Gpu, shared: &Shared, look: Look) -> Self {
+        let written = ObjectUniform {
+            irradiance_scale: shared.no_map.irradiance_scale,
+            ..look.uniform
+        };
+        let buffer = gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+            label: Some("object"),
+            contents: bytemuck::bytes_of(&written),
+            usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+        });
+        Self {
+            bind_group: bound(gpu, shared, &look, &buffer, &shared.no_map),
+            look,
+            map: None,
+            written,
+            buffer,
         }
     }
 
-    /// Bound on the radiance that leaves it, reflections aside [W/(m² sr)].
-    fn peak_radiance(&self, map: &DeviceMap) -> f64 {
-        let largest = |rgb: [f32; 3]| f64::from(rgb.into_iter().fold(0.0, f32::max));
-        let diffuse = largest(self.uniform.base_colour) * f64::from(map.peak_w_m2) / std::f64::consts::PI;
-        diffuse + largest(self.uniform.emitted_radiance)
+    /// Shows another map or none: in the same texture where it has the same size.
+    fn set_map(&mut self, gpu: &Gpu, shared: &Shared, name: &str, map: Option<&IlluminationMap>) -> Uploaded {
+        let mut uploaded = match (&mut self.map, map) {
+            (Some(shown), Some(map)) if shown.has_size_of(map) => shown.update(gpu, map),
+            (None, None) => Uploaded::default(),
+            (_, map) => {
+                let (shown, uploaded) = map.map(|map| DeviceMap::new(gpu, name, map)).unzip();
+                self.map = shown;
+                self.bind(gpu, shared);
+                uploaded.unwrap_or_default()
+            }
+        };
+        uploaded += self.write_uniform(gpu);
+        uploaded
     }
+
+    fn bind(&mut self, gpu: &Gpu, shared: &Shared) {
+        let map = self.map.as_ref().unwrap_or(&shared.no_map);
+        self.bind_group = bound(gpu, shared, &self.look, &self.buffer, map);
+    }
+
+    fn write_uniform(&mut self, gpu: &Gpu) -> Uploaded {
+        let wanted = ObjectUniform {
+            irradiance_scale: self.map.as_ref().map_or(1.0, |map| map.irradiance_scale),
+            ..self.look.uniform
+        };
+        if wanted == self.written {
+            return Uploaded::default();
+        }
+        self.written = wanted;
+        gpu.queue
+            .write_buffer(&self.buffer, 0, bytemuck::bytes_of(&wanted));
+        Uploaded::other(size_of_val(&wanted))
+    }
+
+    /// Bound on the radiance that leaves it, reflections aside [W/(m² sr)].
+    fn peak_radiance(&self) -> f64 {
+        let largest = |rgb: [f32; 3]| f64::from(rgb.into_iter().fold(0.0, f32::max));
+        let peak_w_m2 = self.map.as_ref().map_or(0.0, |map| f64::from(map.peak_w_m2));
+        let uniform = &self.look.uniform;
+        let diffuse = largest(uniform.base_colour) * peak_w_m2 / std::f64::consts::PI;
+        diffuse + largest(uniform.emitted_radiance)
+    }
+}
+
+fn bound(gpu: &Gpu, shared: &Shared, look: &Look, buffer: &wgpu::Buffer, map: &DeviceMap) -> wgpu::BindGroup {
+    let image = look
+        .base_colour_texture
+        .map_or(&shared.white, |index| &shared.textures[index]);
+    let resources = [
+        buffer.as_entire_binding(),
+        wgpu::BindingResource::TextureView(&map.view),
+        wgpu::BindingResource::TextureView(&image.view),
+        wgpu::BindingResource::Sampler(&image.sampler),
+    ];
+    bind_group(gpu, "object", &shared.layout, resources)
 }
 
 /// The shader's `SURFACE_*`.

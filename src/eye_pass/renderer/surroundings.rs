@@ -6,7 +6,7 @@ use glam::{DVec2, DVec3};
 use half::f16;
 use wgpu::util::DeviceExt;
 
-use super::maps::scale_for_half_floats;
+use super::tiles::{Texel, TiledImage, Uploaded, kept_scale, texel};
 use super::uniforms::{MAX_RECEIVERS, Receiver, Surroundings};
 use crate::gpu::Gpu;
 use crate::illumination::IlluminationMap;
@@ -23,12 +23,34 @@ const FLATNESS: f64 = 1e-4;
 #[derive(Debug)]
 pub(super) struct DeviceSurroundings {
     pub(super) uniform: wgpu::Buffer,
+    /// As `uniform` holds it.
+    written: Surroundings,
+    image: TiledImage,
     pub(super) images: wgpu::TextureView,
 }
 
 impl DeviceSurroundings {
-    /// Takes the largest plane receivers of the maps.
-    pub(super) fn new(gpu: &Gpu, scene: &Scene, maps: &[IlluminationMap]) -> Self {
+    /// Nothing but the background.
+    pub(super) fn none(gpu: &Gpu) -> Self {
+        let written = Surroundings {
+            radiance_scale: 1.0,
+            ..Zeroable::zeroed()
+        };
+        let (image, _) = TiledImage::new(gpu, "surroundings", [SIDE; 2], layers_of(&[], 1.0));
+        Self {
+            uniform: gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+                label: Some("surroundings"),
+                contents: bytemuck::bytes_of(&written),
+                usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+            }),
+            written,
+            images: image.view(wgpu::TextureViewDimension::D2Array),
+            image,
+        }
+    }
+
+    /// Takes the largest plane receivers of the maps; uploads what differs from before.
+    pub(super) fn update(&mut self, gpu: &Gpu, scene: &Scene, maps: &[IlluminationMap]) -> Uploaded {
         let mut planes: Vec<_> = maps
             .iter()
             .filter_map(|map| Some((plane_receiver(scene, map)?, map)))
@@ -37,24 +59,33 @@ impl DeviceSurroundings {
         planes.truncate(MAX_RECEIVERS);
 
         let images: Vec<Image> = planes.iter().map(|(_, map)| Image::of(scene, map)).collect();
-        let scale = scale_for_half_floats(images.iter().map(Image::peak).fold(0.0, f32::max));
-        let mut uniform = Surroundings {
+        let peak = images.iter().map(Image::peak).fold(0.0, f32::max);
+        let scale = kept_scale(self.written.radiance_scale, peak);
+        let mut wanted = Surroundings {
             radiance_scale: scale,
             count: planes.len() as u32,
             mean_radiance: super::uniforms::rgb(mean_radiance(scene, maps)),
             ..Zeroable::zeroed()
         };
-        for (slot, ((plane, _), image)) in uniform.receivers.iter_mut().zip(planes.iter().zip(&images)) {
+        for (slot, ((plane, _), image)) in wanted.receivers.iter_mut().zip(planes.iter().zip(&images)) {
             *slot = plane.receiver(image.size);
         }
-        Self {
-            uniform: gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-                label: Some("surroundings"),
-                contents: bytemuck::bytes_of(&uniform),
-                usage: wgpu::BufferUsages::UNIFORM,
-            }),
-            images: upload(gpu, &images, scale),
+        let texels = layers_of(&images, scale);
+        let mut uploaded = if texels.len() == self.image.len() {
+            self.image.update(gpu, texels)
+        } else {
+            let (image, uploaded) = TiledImage::new(gpu, "surroundings", [SIDE; 2], texels);
+            self.images = image.view(wgpu::TextureViewDimension::D2Array);
+            self.image = image;
+            uploaded
+        };
+        if wanted != self.written {
+            self.written = wanted;
+            gpu.queue
+                .write_buffer(&self.uniform, 0, bytemuck::bytes_of(&wanted));
+            uploaded += Uploaded::other(size_of_val(&wanted));
         }
+        uploaded.as_other()
     }
 }
 
@@ -165,46 +196,20 @@ impl Image {
     }
 }
 
-/// One layer per image, each in its layer's upper left corner.
-fn upload(gpu: &Gpu, images: &[Image], scale: f32) -> wgpu::TextureView {
-    let layers = images.len().max(1);
-    let mut halves = vec![[f16::ZERO; 4]; layers * SIDE * SIDE];
-    for (image, layer) in images.iter().zip(halves.chunks_exact_mut(SIDE * SIDE)) {
-        for (row, texels) in layer
+/// One layer per image, each in its layer's upper left corner; at least one layer.
+fn layers_of(images: &[Image], scale: f32) -> Vec<Texel> {
+    let mut texels = vec![[f16::ZERO; 4]; images.len().max(1) * SIDE * SIDE];
+    for (image, layer) in images.iter().zip(texels.chunks_exact_mut(SIDE * SIDE)) {
+        for (row, radiance) in layer
             .chunks_exact_mut(SIDE)
             .zip(image.texels.chunks_exact(image.width))
         {
-            for (half, texel) in row.iter_mut().zip(texels) {
-                let [r, g, b] = texel
-                    .to_array()
-                    .map(|channel| f16::from_f32(channel as f32 / scale));
-                *half = [r, g, b, f16::ONE];
+            for (half, radiance) in row.iter_mut().zip(radiance) {
+                *half = texel(radiance.to_array().map(|channel| channel as f32), scale);
             }
         }
     }
-    let texture = gpu.device.create_texture_with_data(
-        &gpu.queue,
-        &wgpu::TextureDescriptor {
-            label: Some("surroundings"),
-            size: wgpu::Extent3d {
-                width: SIDE as u32,
-                height: SIDE as u32,
-                depth_or_array_layers: layers as u32,
-            },
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format: wgpu::TextureFormat::Rgba16Float,
-            usage: wgpu::TextureUsages::TEXTURE_BINDING,
-            view_formats: &[],
-        },
-        wgpu::util::TextureDataOrder::LayerMajor,
-        bytemuck::cast_slice(&halves),
-    );
-    texture.create_view(&wgpu::TextureViewDescriptor {
-        dimension: Some(wgpu::TextureViewDimension::D2Array),
-        ..Default::default()
-    })
+    texels
 }
 
 /// Mean radiance ρE/π of all surfaces with a map, by area [W/(m² sr)]; black without maps.

@@ -1,11 +1,13 @@
 //! Section *Bake*: start, stop, progress, and what the last bake came to.
 
+use std::sync::Arc;
+
 use egui::{Color32, Grid, ProgressBar, RichText, Ui};
 
 use super::control::{counted, grouped};
 use super::{Facts, Panel, Wishes};
 use crate::light_pass::ledger::EnergyLedger;
-use crate::viewer::worker::{BakeState, FinishedBake};
+use crate::viewer::worker::{BakeState, BakedLevel};
 
 /// Text of what went wrong.
 pub const FAILED: Color32 = Color32::from_rgb(255, 120, 110);
@@ -42,7 +44,9 @@ pub fn show(ui: &mut Ui, panel: &mut Panel, facts: &Facts<'_>, wishes: &mut Wish
 }
 
 fn state_line(ui: &mut Ui, panel: &Panel, facts: &Facts<'_>) {
-    let is_stale = facts.last.is_some_and(|last| last.settings != panel.settings);
+    let is_stale = facts.last.is_some_and(|last| {
+        last.request.settings != panel.settings || !Arc::ptr_eq(&last.request.scene, facts.scene)
+    });
     match facts.state {
         BakeState::Baking {
             stage,
@@ -70,8 +74,8 @@ fn state_line(ui: &mut Ui, panel: &Panel, facts: &Facts<'_>) {
     }
 }
 
-fn last_bake(ui: &mut Ui, last: &FinishedBake) {
-    let FinishedBake { result, seconds, .. } = last;
+fn last_bake(ui: &mut Ui, last: &BakedLevel) {
+    let BakedLevel { result, seconds, .. } = last;
     let hover = format!(
         "From request to maps. Build {:.2} s, plan {:.2} s, trace {:.2} s, deposit {:.2} s; \
          {:.2} s of CPU over all threads.",

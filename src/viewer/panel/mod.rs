@@ -7,13 +7,15 @@ mod effects;
 mod help;
 mod light_pass;
 
+use std::sync::Arc;
+
 use egui::{CollapsingHeader, Frame, Margin, RichText, ScrollArea, Ui};
 
-use super::worker::{BakeState, FinishedBake};
+use super::worker::{BakeState, BakedLevel};
 use crate::error::Warning;
 use crate::eye_pass::ToneMap;
 use crate::plan::EffectPlan;
-use crate::scene::Scene;
+use crate::scene::{Edit, Scene};
 use crate::settings::{BakeSettings, LayerKind};
 
 /// Width of the panel [points].
@@ -57,14 +59,18 @@ pub struct Panel {
 /// What the panel tells.
 #[derive(Clone, Copy, Debug)]
 pub struct Facts<'a> {
-    /// The scene in the window.
-    pub scene: &'a Scene,
+    /// The scene in the window, edited or not.
+    pub scene: &'a Arc<Scene>,
+    /// As it was before every edit.
+    pub loaded: &'a Scene,
+    /// Edits that can be taken back.
+    pub undoable: usize,
+    /// Why the last edit was refused.
+    pub refusal: Option<&'a str>,
     /// Where the bake stands.
     pub state: &'a BakeState,
-    /// The bake that the picture shows.
-    pub last: Option<&'a FinishedBake>,
-    /// Whether that was only a first look at the bake that runs.
-    pub is_draft: bool,
+    /// The maps that the picture shows.
+    pub last: Option<&'a BakedLevel>,
     /// Layers of the maps that the picture shows.
     pub layers: &'a [LayerKind],
     /// Flying speed [m/s].
@@ -74,7 +80,7 @@ pub struct Facts<'a> {
 }
 
 /// What the user pressed.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default)]
 pub struct Wishes {
     /// Bake now.
     pub rebake: bool,
@@ -82,6 +88,12 @@ pub struct Wishes {
     pub cancel: bool,
     /// Choose the exposure from the picture.
     pub measure_exposure: bool,
+    /// Change the scene.
+    pub edit: Option<Edit>,
+    /// Take the last change of the scene back.
+    pub undo: bool,
+    /// Whether the mouse is held: edits that follow one another then are one.
+    pub is_dragging: bool,
 }
 
 /// Dark, since the picture beside it is what is to be judged; without animations, so that an idle window rests.
@@ -103,6 +115,9 @@ impl Wishes {
             rebake: self.rebake || other.rebake,
             cancel: self.cancel || other.cancel,
             measure_exposure: self.measure_exposure || other.measure_exposure,
+            edit: other.edit.or(self.edit),
+            undo: self.undo || other.undo,
+            is_dragging: self.is_dragging || other.is_dragging,
         }
     }
 }
