@@ -113,6 +113,9 @@ fn scaled(radiance: vec3f) -> vec4f {
 @fragment
 fn opaque(fragment: Fragment, @builtin(front_facing) front: bool) -> @location(0) vec4f {
     let point = surface_point(fragment, front);
+    if frame.maps_as_they_are != 0u {
+        return scaled(irradiance(fragment.map_uv));
+    }
     var radiance = object.emitted_radiance;
     if object.surface == SURFACE_MIRROR {
         radiance += metal_reflectance(point.cos_view, point.base_colour) * reflected_radiance(fragment, point);

@@ -128,6 +128,19 @@ impl Edit {
         Ok((edited, inverse))
     }
 
+    /// An object's mesh at an offset [m] from its place in `mesh`; that mesh itself where the offset is 0.
+    pub fn object_at(object: usize, mesh: &Arc<Mesh>, offset: DVec3) -> Self {
+        let mesh = if offset == DVec3::ZERO {
+            Arc::clone(mesh)
+        } else {
+            Arc::new(Mesh {
+                positions: mesh.positions.iter().map(|point| *point + offset).collect(),
+                ..Mesh::clone(mesh)
+            })
+        };
+        Self::ObjectMesh { object, mesh }
+    }
+
     /// What it sets.
     pub fn target(&self) -> EditTarget {
         match self {

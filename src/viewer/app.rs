@@ -11,19 +11,20 @@ use winit::event::{
     DeviceEvent, DeviceId, ElementState, KeyEvent, MouseButton, MouseScrollDelta, StartCause, WindowEvent,
 };
 use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoopProxy};
-use winit::keyboard::PhysicalKey;
+use winit::keyboard::{ModifiersState, PhysicalKey};
 use winit::window::{CursorGrabMode, WindowId};
 
-use super::ViewerOptions;
 use super::event_log::Event;
 use super::graphics::{Graphics, RETRY_AFTER, Shown};
 use super::input::{self, Shortcut};
 use super::interface::Painting;
 use super::model::Model;
 use super::overlay;
-use super::panel::{Facts, Wishes};
+use super::panel::{Display, Facts, Quantity, Wishes};
+use super::{ViewerOptions, error_view};
 use crate::error::{Error, Result};
-use crate::eye_pass::View;
+use crate::eye_pass::renderer::MapStyle;
+use crate::eye_pass::{ToneMap, View};
 use crate::optics::LinearSrgb;
 use crate::progress::Control;
 
@@ -83,6 +84,8 @@ pub struct App {
     rested_at: u64,
     /// Told over the picture until the next key press.
     notice: Option<String>,
+    /// Held now: Ctrl, Shift and the like.
+    modifiers: ModifiersState,
     failure: Option<Error>,
 }
 
@@ -116,6 +119,7 @@ impl App {
             frames: 0,
             rested_at: 0,
             notice: None,
+            modifiers: ModifiersState::empty(),
             failure: None,
         })
     }
@@ -209,7 +213,7 @@ impl App {
     fn redraw(&mut self, event_loop: &ActiveEventLoop) {
         self.fly();
         self.must_set_maps |= self.model.poll();
-        let layer = self.model.panel.display.layer;
+        let (layer, quantity) = (self.model.panel.display.layer, self.model.quantity());
         let mut wishes = std::mem::take(&mut self.pressed);
         let Some(mut painting) = self.run_interface(&mut wishes) else {
             return;
@@ -217,6 +221,12 @@ impl App {
         let scene = Arc::clone(self.model.scene());
         self.model.act(&wishes, Instant::now());
         self.must_set_maps |= layer != self.model.panel.display.layer;
+        if quantity != self.model.quantity() {
+            self.must_set_maps = true;
+            let is_error = self.model.quantity() == Quantity::Error;
+            let what = if is_error { "error" } else { "light" };
+            self.model.log.write(&Event::Shows(what));
+        }
         self.must_set_maps |= !Arc::ptr_eq(&scene, self.model.scene());
         self.must_measure_exposure |= wishes.measure_exposure;
         if let Err(error) = self.draw_picture() {
@@ -255,6 +265,7 @@ impl App {
         let edits = model.edits();
         let (scene, loaded) = (Arc::clone(edits.scene()), Arc::clone(edits.loaded()));
         let undoable = edits.undoable();
+        let (has_errors, quantity) = (error_view::is_available(model.maps()), model.quantity());
         let Model {
             panel, last, refusal, ..
         } = model;
@@ -266,12 +277,13 @@ impl App {
             state: &state,
             last: last.as_ref(),
             layers: &layers,
+            has_errors,
             speed_m_per_s,
             adapter: &adapter,
         };
         Some(graphics.interface().run(&window, |ui| {
             *wishes = std::mem::take(wishes).and(panel.show(ui, &facts));
-            *picture_rect = overlay::show(ui, picture, &facts, notice.as_deref());
+            *picture_rect = overlay::show(ui, picture, &facts, quantity, notice.as_deref());
         }))
     }
 
@@ -284,10 +296,15 @@ impl App {
             return Ok(());
         };
         if std::mem::take(&mut self.must_set_maps) {
-            let uploaded = graphics.set_maps(self.model.scene(), &self.model.shown_maps())?;
+            let style = match self.model.quantity() {
+                Quantity::Light => MapStyle::Lit,
+                Quantity::Error => MapStyle::AsItIs,
+            };
+            let uploaded = graphics.set_maps(self.model.scene(), &self.model.shown_maps(), style)?;
             self.model.log.write(&Event::Uploaded(uploaded));
         }
-        if self.must_measure_exposure && !self.model.maps().is_empty() {
+        let shows_light = self.model.quantity() == Quantity::Light;
+        if self.must_measure_exposure && shows_light && !self.model.maps().is_empty() {
             self.must_measure_exposure = false;
             view.exposure_stops = graphics.measure_exposure(&view)?;
             self.model.panel.display.exposure_stops = view.exposure_stops;
@@ -342,7 +359,15 @@ impl App {
             pixels(self.picture_rect.width()),
             pixels(self.picture_rect.height()),
         );
-        let display = self.model.panel.display;
+        let display = match self.model.quantity() {
+            Quantity::Light => self.model.panel.display,
+            // Colours of a legend are shown as they are.
+            Quantity::Error => Display {
+                exposure_stops: 0.0,
+                tone_map: ToneMap::None,
+                ..self.model.panel.display
+            },
+        };
         (width >= 1.0 && height >= 1.0).then(|| View {
             camera: self.model.navigator.camera_for(f64::from(width / height)),
             width: width as u32,
@@ -362,6 +387,13 @@ impl App {
             return;
         }
         self.fly();
+        if self.modifiers.control_key() || self.modifiers.super_key() {
+            // Nothing flies or bakes by a chord.
+            self.pressed.undo |= event.state.is_pressed() && input::is_undo(&event.logical_key);
+            if event.state.is_pressed() {
+                return;
+            }
+        }
         if let PhysicalKey::Code(code) = event.physical_key
             && input::hold(&mut self.model.navigator.keys, code, event.state)
         {
@@ -493,6 +525,7 @@ impl ApplicationHandler<News> for App {
             WindowEvent::CursorMoved { position, .. } => self.pointer = position,
             WindowEvent::MouseInput { button, state, .. } => self.on_mouse_button(button, state),
             WindowEvent::MouseWheel { delta, .. } => self.on_wheel(delta),
+            WindowEvent::ModifiersChanged(modifiers) => self.modifiers = modifiers.state(),
             WindowEvent::KeyboardInput { event, .. } => self.on_key(&event),
             _ => {}
         }

@@ -12,7 +12,7 @@ use super::interface::{Interface, Painting};
 use super::picture::Picture;
 use super::surface::{Acquired, Screen};
 use crate::error::{Error, Result};
-use crate::eye_pass::renderer::{Renderer, Uploaded};
+use crate::eye_pass::renderer::{MapStyle, Renderer, Uploaded};
 use crate::eye_pass::{View, tone_mapping};
 use crate::gpu::Gpu;
 use crate::illumination::IlluminationMap;
@@ -120,8 +120,14 @@ impl Graphics {
     ///
     /// # Errors
     /// The device cannot hold them: what was shown stays.
-    pub fn set_maps(&mut self, scene: &Arc<Scene>, maps: &[IlluminationMap]) -> Result<Uploaded> {
+    pub fn set_maps(
+        &mut self,
+        scene: &Arc<Scene>,
+        maps: &[IlluminationMap],
+        style: MapStyle,
+    ) -> Result<Uploaded> {
         self.picture.invalidate();
+        self.renderer.set_map_style(style);
         let mut uploaded = Uploaded::default();
         if !Arc::ptr_eq(&self.scene, scene) {
             self.scene = Arc::clone(scene);

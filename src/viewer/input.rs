@@ -51,3 +51,8 @@ pub fn shortcut(key: &Key) -> Option<Shortcut> {
         _ => None,
     }
 }
+
+/// Whether a key, with Ctrl held, takes the last edit back.
+pub fn is_undo(key: &Key) -> bool {
+    matches!(key, Key::Character(letter) if letter.eq_ignore_ascii_case("z"))
+}

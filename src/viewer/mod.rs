@@ -3,6 +3,7 @@
 mod app;
 pub mod debounce;
 pub mod edits;
+pub mod error_view;
 pub mod event_log;
 mod graphics;
 mod input;

@@ -4,13 +4,13 @@ use std::borrow::Cow;
 use std::sync::Arc;
 use std::time::Instant;
 
-use super::ViewerOptions;
 use super::debounce::Debounce;
 use super::edits::EditedScene;
 use super::event_log::{Event, EventLog};
 use super::navigation::Navigator;
-use super::panel::{LayerShown, Panel, Wishes};
+use super::panel::{LayerShown, Panel, Quantity, Wishes};
 use super::worker::{BakeRequest, BakeState, BakedLevel, Worker};
+use super::{ViewerOptions, error_view};
 use crate::error::Result;
 use crate::illumination::IlluminationMap;
 use crate::scene::Scene;
@@ -116,7 +116,15 @@ impl Model {
         kinds
     }
 
-    /// The maps with the layers that the panel asks to be shown.
+    /// What the picture shows: the light where the panel asks for errors that the maps do not have.
+    pub fn quantity(&self) -> Quantity {
+        match self.panel.display.quantity {
+            Quantity::Error if error_view::is_available(self.maps()) => Quantity::Error,
+            _ => Quantity::Light,
+        }
+    }
+
+    /// The maps as the panel asks them to be shown: some layers, or the errors.
     pub fn shown_maps(&self) -> Cow<'_, [IlluminationMap]> {
         // Until the next maps come, an edit may have made a receiver clear, or a mirror.
         let receives = |map: &&IlluminationMap| {
@@ -124,6 +132,10 @@ impl Model {
             let object = scene.objects.get(map.chart.object);
             object.is_none_or(|object| scene.materials[object.material].surface.is_receiver())
         };
+        if self.quantity() == Quantity::Error {
+            let maps = error_view::maps(self.maps());
+            return Cow::Owned(maps.into_iter().filter(|map| receives(&map)).collect());
+        }
         let LayerShown::Only(kind) = self.panel.display.layer else {
             return if self.maps().iter().all(|map| receives(&map)) {
                 Cow::Borrowed(self.maps())

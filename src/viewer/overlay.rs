@@ -1,15 +1,22 @@
-//! What stands over the picture: how the first bake gets on, and what went wrong.
+//! What stands over the picture: how the first bake gets on, what went wrong, and what false colours mean.
 
 use egui::{Align2, Color32, FontId, Rect, Ui, pos2, vec2};
 
-use super::panel::Facts;
+use super::error_view;
+use super::panel::{Facts, Quantity};
 use super::worker::BakeState;
 
 const TEXT: Color32 = Color32::from_gray(230);
 const SIZE: f32 = 16.0;
 
 /// Shows the picture in the space that is left, with what is to be told over it; returns where it lies.
-pub fn show(ui: &mut Ui, picture: egui::TextureId, facts: &Facts<'_>, notice: Option<&str>) -> Rect {
+pub fn show(
+    ui: &mut Ui,
+    picture: egui::TextureId,
+    facts: &Facts<'_>,
+    quantity: Quantity,
+    notice: Option<&str>,
+) -> Rect {
     let rect = ui.available_rect_before_wrap();
     let whole = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
     ui.painter().image(picture, rect, whole, Color32::WHITE);
@@ -25,7 +32,45 @@ pub fn show(ui: &mut Ui, picture: egui::TextureId, facts: &Facts<'_>, notice: Op
         );
         ui.painter().galley(place.min, galley, TEXT);
     }
+    if quantity == Quantity::Error {
+        legend(ui, rect);
+    }
     rect
+}
+
+/// Says what the false colours mean, at the picture's lower edge.
+fn legend(ui: &Ui, picture: Rect) {
+    const BAR: egui::Vec2 = vec2(300.0, 14.0);
+    const STEPS: usize = 150;
+    let painter = ui.painter();
+    let font = FontId::proportional(13.0);
+    let size = BAR + vec2(48.0, 56.0);
+    let frame = Rect::from_min_size(picture.left_bottom() + vec2(16.0, -16.0 - size.y), size);
+    painter.rect_filled(frame, 6.0, Color32::from_black_alpha(190));
+    let bar = Rect::from_min_size(frame.min + vec2(24.0, 28.0), BAR);
+    let title = "Estimated error of each texel, in % of its map's mean irradiance";
+    painter.text(
+        pos2(frame.center().x, frame.top() + 14.0),
+        Align2::CENTER_CENTER,
+        title,
+        FontId::proportional(11.5),
+        TEXT,
+    );
+    let (low, high) = error_view::RANGE;
+    let at = |share: f64| low * (high / low).powf(share);
+    let step = bar.width() / STEPS as f32;
+    for index in 0..STEPS {
+        let [r, g, b] = error_view::colour(at((index as f64 + 0.5) / STEPS as f64));
+        let left = bar.left() + index as f32 * step;
+        let part = Rect::from_min_max(pos2(left, bar.top()), pos2(left + step + 0.5, bar.bottom()));
+        painter.rect_filled(part, 0.0, Color32::from_rgb(r, g, b));
+    }
+    for mark in 0..=3 {
+        let share = f64::from(mark) / 3.0;
+        let place = pos2(bar.left() + bar.width() * share as f32, bar.bottom() + 8.0);
+        let text = format!("{} %", 100.0 * at(share));
+        painter.text(place, Align2::CENTER_CENTER, text, font.clone(), TEXT);
+    }
 }
 
 /// Says why the picture is dark or coarse.

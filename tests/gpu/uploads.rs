@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use glam::{DQuat, DVec3};
-use nephroid::eye_pass::renderer::{Renderer, Uploaded, render_offscreen};
+use nephroid::eye_pass::renderer::{MapStyle, Renderer, Uploaded, render_offscreen};
 use nephroid::eye_pass::{Picture, View};
 use nephroid::gpu::Gpu;
 use nephroid::illumination::IlluminationMap;
@@ -212,4 +212,31 @@ fn a_scene_of_other_objects_is_taken_over_whole() {
     renderer.set_scene(&gpu, &other).expect("it is uploaded");
     renderer.set_maps(&gpu, &other, &maps).expect("the maps fit");
     assert_as_fresh(&gpu, &mut renderer, &other, &maps, &from_above(64));
+}
+
+#[test]
+fn maps_as_they_are_show_their_values_whatever_the_surface() {
+    let Some(gpu) = gpu() else { return };
+    let (mut scene, _) = room();
+    scene.materials[0].base_colour = LinearSrgb::new(0.1, 0.5, 0.9);
+    scene.materials[0].emitted_radiance = LinearSrgb::WHITE;
+    let value = [0.25, 0.5, 0.75];
+    let maps = [floor_map(0, 2, 2, vec![value; 4])];
+    let (mut renderer, _) = renderer(&gpu, &scene, &maps);
+    let from_above = from_above(64);
+    let at = |picture: &Picture, x: usize, y: usize| picture.radiance[y * 64 + x];
+    renderer.set_map_style(MapStyle::AsItIs);
+    let shown = renderer.radiance(&gpu, &from_above).expect("it renders");
+    assert_eq!(
+        at(&shown, 26, 26),
+        value,
+        "under the glass ball, which is left out"
+    );
+    assert_eq!(at(&shown, 5, 60), value, "beside everything");
+    assert_eq!(at(&shown, 51, 51), [0.0; 3], "a box without a map, that glows");
+    renderer.set_map_style(MapStyle::Lit);
+    let lit = renderer.radiance(&gpu, &from_above).expect("it renders");
+    let fresh = render_offscreen(&gpu, &scene, &maps, &from_above, 1).expect("it renders");
+    assert_eq!(lit.radiance, fresh.radiance);
+    assert_ne!(at(&lit, 26, 26), value);
 }

@@ -21,6 +21,7 @@ pub struct Headless {
     pub state: BakeState,
     pub last: Option<BakedLevel>,
     pub layers: Vec<LayerKind>,
+    pub has_errors: bool,
     /// What was pressed since the start.
     pub wishes: Wishes,
     size: egui::Vec2,
@@ -79,6 +80,7 @@ impl Headless {
             state: BakeState::Idle,
             last: None,
             layers: vec![LayerKind::Caustic, LayerKind::Direct],
+            has_errors: false,
             wishes: Wishes::default(),
             size: vec2(size.0, size.1),
             time_s: 0.0,
@@ -107,6 +109,7 @@ impl Headless {
             state,
             last,
             layers,
+            has_errors,
             wishes,
             ..
         } = self;
@@ -118,6 +121,7 @@ impl Headless {
             undoable: *undoable,
             refusal: refusal.as_deref(),
             layers,
+            has_errors: *has_errors,
             speed_m_per_s: 1.0,
             adapter: "no adapter",
         };
@@ -232,6 +236,20 @@ impl Headless {
             self.move_to(from + (to - from) * (step as f32 / 5.0));
         }
         self.press(to, false);
+        self.settle();
+    }
+
+    /// Types over what a field has selected, and confirms.
+    pub fn type_text(&mut self, text: &str) {
+        let key = |key: egui::Key| Event::Key {
+            key,
+            physical_key: None,
+            pressed: true,
+            repeat: false,
+            modifiers: egui::Modifiers::default(),
+        };
+        self.pass(vec![Event::Text(text.into())]);
+        self.pass(vec![key(egui::Key::Enter)]);
         self.settle();
     }
 

@@ -1,14 +1,20 @@
 //! The panel, driven by pointer events without a window.
 
+use std::sync::Arc;
 use std::time::Instant;
 
 use egui::accesskit::Role;
 use egui::{Pos2, Rect, pos2};
+use glam::DVec3;
 use nephroid::light_pass::ledger::{EnergyLedger, LightLedger, Truncated};
 use nephroid::plan::{Effect, EffectLine, EffectPlan};
 use nephroid::progress::Stage;
+use nephroid::scene::builtin::{parts, shapes};
+use nephroid::scene::{Edit, LightKind, Scene};
+use nephroid::session::StopReason;
 use nephroid::settings::{BakeSettings, Footprint, Kernel, LayerKind, MapResolution, Sigma};
-use nephroid::viewer::panel::LayerShown;
+use nephroid::units::{Flux, Irradiance, RadiantIntensity};
+use nephroid::viewer::panel::{LayerShown, Quantity};
 use nephroid::viewer::worker::BakeState;
 
 use super::headless::{Headless, finished};
@@ -20,6 +26,237 @@ fn settings() -> BakeSettings {
         layers: vec![LayerKind::Caustic, LayerKind::Direct],
         ..BakeSettings::splat()
     }
+}
+
+/// Every section open.
+const TALL: (f32, f32) = (1280.0, 1400.0);
+
+/// A floor, a ball of glass, a lamp, a sun and a spot.
+fn scene() -> Scene {
+    let mut scene = parts::reference_scene(0.6);
+    let ball = shapes::sphere(DVec3::new(0.0, 0.8, 0.0), 0.5, 1);
+    parts::add(&mut scene, "ball", ball, parts::dielectric("glass", 1.5));
+    scene
+        .lights
+        .push(parts::point_light("lamp", DVec3::Y * 3.0, Flux(100.0)));
+    scene
+        .lights
+        .push(parts::sun("sun", DVec3::new(0.0, -1.0, -1.0), Irradiance(2.0)));
+    let mut spot = scene.lights[0].clone();
+    spot.name = "spot".into();
+    spot.kind = LightKind::Spot {
+        position: DVec3::Y,
+        direction: DVec3::NEG_Y,
+        intensity: RadiantIntensity(3.0),
+        inner_cone_rad: 0.1,
+        outer_cone_rad: 0.4,
+    };
+    scene.lights.push(spot);
+    scene
+}
+
+/// Types a number into the first field whose text begins like this.
+fn type_into(panel: &mut Headless, shown: &str, text: &str) {
+    let begins = |text: Option<&str>| text.is_some_and(|text| text.starts_with(shown));
+    let mut fields = panel.nodes().filter(|node| {
+        matches!(node.role(), Role::SpinButton | Role::Button)
+            && (begins(node.label()) || begins(node.value()))
+    });
+    let field = fields
+        .next()
+        .unwrap_or_else(|| panic!("no {shown:?} in {:#?}", panel.texts()));
+    let centre = Headless::rect_of(field).center();
+    drop(fields);
+    panel.click(centre);
+    panel.type_text(text);
+}
+
+#[test]
+fn power_is_dragged_on_a_logarithmic_scale_with_its_unit() {
+    let mut panel = Headless::with_scene(scene(), settings(), SIZE);
+    drag(&mut panel, "Intensity [W/sr]", 0.5, 0.75);
+    let Some(Edit::LightIntensity { light: 0, intensity }) = panel.wishes.edit else {
+        panic!("{:?}", panel.wishes.edit)
+    };
+    let times = intensity.0 / (100.0 / (4.0 * std::f64::consts::PI));
+    assert!(
+        (5.0..20.0).contains(&times),
+        "a quarter of four decades is one decade: {times}"
+    );
+    assert!(!panel.wishes.undo);
+
+    choose(&mut panel, "Light", "sun");
+    drag(&mut panel, "Irradiance [W/m²]", 0.5, 0.25);
+    let Some(Edit::LightNormalIrradiance {
+        light: 1,
+        normal_irradiance,
+    }) = panel.wishes.edit
+    else {
+        panic!("{:?}", panel.wishes.edit)
+    };
+    assert!((0.1..0.4).contains(&normal_irradiance.0), "{normal_irradiance:?}");
+}
+
+#[test]
+fn looking_at_the_scene_edits_nothing() {
+    let mut panel = Headless::with_scene(scene(), settings(), SIZE);
+    for light in ["sun", "spot", "lamp"] {
+        choose(&mut panel, "Light", light);
+        for object in ["ball", "floor"] {
+            choose(&mut panel, "Object", object);
+            for y in (0..720).step_by(8) {
+                panel.move_to(pos2(250.0, y as f32));
+            }
+        }
+    }
+    assert!(panel.wishes.edit.is_none(), "{:?}", panel.wishes.edit);
+}
+
+#[test]
+fn places_and_directions_are_typed_in_numbers() {
+    let mut panel = Headless::with_scene(scene(), settings(), SIZE);
+    type_into(&mut panel, "y: 3", "2.5");
+    assert_eq!(
+        panel.wishes.edit,
+        Some(Edit::LightPosition {
+            light: 0,
+            position: DVec3::Y * 2.5
+        })
+    );
+    choose(&mut panel, "Light", "sun");
+    // From 45° above the horizon to straight down, and on from there.
+    type_into(&mut panel, "elev.: -45", "-90");
+    let Some(Edit::LightDirection { light: 1, direction }) = panel.wishes.edit else {
+        panic!("{:?}", panel.wishes.edit)
+    };
+    assert!(
+        direction.dot(DVec3::NEG_Y) > 0.999_999 && direction.z < 0.0,
+        "{direction}"
+    );
+    choose(&mut panel, "Light", "spot");
+    assert!(
+        panel.says("elev.: -90.0") && panel.says("y: 1.0"),
+        "a spot has both"
+    );
+}
+
+#[test]
+fn a_material_shows_what_it_has_and_an_object_moves_from_its_place_in_the_file() {
+    let mut panel = Headless::with_scene(scene(), settings(), SIZE);
+    assert!(panel.labelled(Role::Slider, "Refractive index").is_disabled());
+    let centre = slider(&panel, "Refractive index").center();
+    panel.hover(centre);
+    assert!(panel.says("Only glass, water and polish have one"));
+    choose(&mut panel, "Object", "ball");
+    drag(&mut panel, "Refractive index", 0.25, 0.5);
+    let Some(Edit::MaterialIor { material: 1, ior }) = panel.wishes.edit else {
+        panic!("{:?}", panel.wishes.edit)
+    };
+    assert!((1.7..2.3).contains(&ior), "{ior}");
+    drag(&mut panel, "Roughness", 0.0, 0.5);
+    let Some(Edit::MaterialRoughness {
+        material: 1,
+        roughness,
+    }) = panel.wishes.edit
+    else {
+        panic!("{:?}", panel.wishes.edit)
+    };
+    assert!((0.3..0.7).contains(&roughness), "{roughness}");
+
+    type_into(&mut panel, "y: 0", "0.25");
+    let edit = panel.wishes.edit.take().expect("it moved");
+    let (moved, _) = edit.apply(&panel.scene).expect("it is in range");
+    let low = |scene: &Scene| scene.objects[1].mesh.bounds().expect("a ball").0;
+    assert!((low(&moved) - low(&panel.scene)).distance(DVec3::Y * 0.25) < 1e-12);
+    panel.scene = Arc::new(moved);
+    panel.settle();
+    assert!(panel.says("y: 0.25"), "{:#?}", panel.texts());
+    type_into(&mut panel, "y: 0.25", "0");
+    let (back, _) = panel
+        .wishes
+        .edit
+        .take()
+        .expect("it moved")
+        .apply(&panel.scene)
+        .expect("it is in range");
+    assert!(
+        Arc::ptr_eq(&back.objects[1].mesh, &panel.loaded.objects[1].mesh),
+        "the file's place exactly"
+    );
+}
+
+#[test]
+fn undo_is_offered_where_there_is_something_to_take_back() {
+    let mut panel = Headless::with_scene(scene(), settings(), SIZE);
+    assert!(panel.named(Role::Button, "Undo (Ctrl+Z)").is_disabled());
+    panel.undoable = 1;
+    panel.refusal = Some("light `lamp`: no; yes".into());
+    panel.settle();
+    click(&mut panel, Role::Button, "Undo (Ctrl+Z)");
+    assert!(panel.wishes.undo && panel.says("light `lamp`: no; yes"));
+}
+
+#[test]
+fn a_bake_ends_by_density_error_or_time() {
+    let mut panel = Headless::new(
+        BakeSettings {
+            layers: vec![LayerKind::Caustic],
+            ..BakeSettings::default()
+        },
+        SIZE,
+    );
+    choose(&mut panel, "Bake until", "max error 3 %");
+    assert_eq!(panel.panel.settings.max_error, Some(0.03));
+    assert_eq!(panel.panel.settings.max_time_s, None);
+    type_into(&mut panel, "3.0", "0.5");
+    assert_eq!(panel.panel.settings.max_error, Some(0.005));
+    choose(&mut panel, "Bake until", "max time 10 s");
+    assert_eq!(panel.panel.settings.max_error, None);
+    type_into(&mut panel, "10.0", "0.25");
+    assert_eq!(panel.panel.settings.max_time_s, Some(0.25));
+    choose(&mut panel, "Bake until", "ray density");
+    assert_eq!(
+        (panel.panel.settings.max_error, panel.panel.settings.max_time_s),
+        (None, None)
+    );
+    choose(&mut panel, "Bake until", "max error 1 %");
+    choose(&mut panel, "Estimator", "splat");
+    assert_eq!(panel.panel.settings.max_error, None, "splats do not refine");
+}
+
+#[test]
+fn levels_tell_their_error_and_time() {
+    let mut panel = panel();
+    let mut last = finished(&panel.scene, &settings());
+    (last.is_final, last.level, last.seconds) = (false, 2, 0.42);
+    last.result.estimated_relative_rmse = Some(0.0213);
+    panel.last = Some(last.clone());
+    panel.settle();
+    assert!(
+        panel.says("estimated error 2.1 %, 0.42 s: level 2, more to come"),
+        "{:#?}",
+        panel.texts()
+    );
+    last.is_final = true;
+    last.result.estimated_relative_rmse = None;
+    last.result.stop_reason = StopReason::MaxTime;
+    panel.last = Some(last);
+    panel.settle();
+    assert!(panel.says("error not estimated, 0.42 s: done, the time is up"));
+}
+
+#[test]
+fn the_error_is_shown_only_where_there_is_one() {
+    let mut panel = panel();
+    let centre = Headless::rect_of(panel.named(Role::RadioButton, "estimated error")).center();
+    panel.click(centre);
+    assert_eq!(panel.panel.display.quantity, Quantity::Light);
+    panel.hover(centre);
+    assert!(panel.says("come without an estimate of their error"));
+    panel.has_errors = true;
+    panel.settle();
+    panel.click(centre);
+    assert_eq!(panel.panel.display.quantity, Quantity::Error);
 }
 
 fn panel() -> Headless {
@@ -39,6 +276,10 @@ fn drag(panel: &mut Headless, label: &str, from: f32, to: f32) {
 fn click(panel: &mut Headless, role: Role, name: &str) {
     let centre = Headless::rect_of(panel.named(role, name)).center();
     panel.click(centre);
+}
+
+fn open(panel: &mut Headless, section: &str) {
+    click(panel, Role::DisclosureTriangle, section);
 }
 
 fn choose(panel: &mut Headless, label: &str, value: &str) {
@@ -91,11 +332,11 @@ fn sigma_is_dragged_on_a_logarithmic_scale() {
 }
 
 #[test]
-fn density_moves_in_doublings() {
+fn density_moves_in_nested_steps() {
     let mut panel = panel();
     drag(&mut panel, "Ray density [rays/sr]", 0.4, 0.8);
-    let steps = (panel.panel.settings.density_per_sr / 100_000.0).log2();
-    assert!(steps > 3.0 && (steps - steps.round()).abs() < 1e-9, "{steps}");
+    let steps = (panel.panel.settings.density_per_sr / 100_000.0).log(4.0);
+    assert!(steps > 1.0 && (steps - steps.round()).abs() < 1e-9, "{steps}");
     assert_eq!(
         panel.panel.settings,
         BakeSettings {
@@ -108,6 +349,7 @@ fn density_moves_in_doublings() {
 #[test]
 fn every_list_changes_its_setting() {
     let mut panel = panel();
+    open(&mut panel, "Rays and kernels");
     choose(&mut panel, "Footprint", "fixed");
     choose(&mut panel, "Map size [texels]", "256");
     choose(&mut panel, "Kernel", "disc");
@@ -242,6 +484,7 @@ fn the_ledger_is_summed_over_lights_and_tells_an_open_account() {
     last.result.counts.rays = 1_234_567;
     panel.last = Some(last);
     panel.settle();
+    open(&mut panel, "Energy");
     for text in [
         "4.000000 W",
         "2.000000 W",
@@ -299,7 +542,7 @@ fn a_layer_that_was_not_baked_cannot_be_shown() {
 
 #[test]
 fn everything_of_use_is_in_the_window_at_1280_by_720() {
-    let mut panel = panel();
+    let mut panel = Headless::with_scene(scene(), settings(), SIZE);
     panel.state = BakeState::Done;
     panel.settle();
     let is_control = |role: Role| {
@@ -335,10 +578,20 @@ fn everything_of_use_is_in_the_window_at_1280_by_720() {
 
 #[test]
 fn every_control_says_what_it_does_to_accuracy_and_cost() {
-    let mut panel = panel();
+    let mut panel = Headless::with_scene(scene(), settings(), TALL);
+    open(&mut panel, "Rays and kernels");
     for label in [
+        "Light",
+        "Intensity [W/sr]",
+        "Position [m]",
+        "Object",
+        "Refractive index",
+        "Roughness",
+        "Base colour",
+        "Offset [m]",
         "Estimator",
         "Layers",
+        "Bake until",
         "Ray density [rays/sr]",
         "Sigma [radii²]",
         "Adaptive sigma",
@@ -353,6 +606,7 @@ fn every_control_says_what_it_does_to_accuracy_and_cost() {
         "Exposure [stops]",
         "Tone map",
         "Light shown",
+        "Map shown",
     ]) {
         let centre = Headless::rect_of(panel.named(Role::Label, label)).center();
         panel.hover(centre);

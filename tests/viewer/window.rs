@@ -67,7 +67,8 @@ fn sigma_slider() -> ((i32, i32), (i32, i32)) {
         layers: vec![LayerKind::Caustic],
         ..BakeSettings::splat()
     };
-    let panel = Headless::new(settings, (SIZE.0 as f32, SIZE.1 as f32));
+    let scene = builtin::build("ring").expect("it is built in");
+    let panel = Headless::with_scene(scene, settings, (SIZE.0 as f32, SIZE.1 as f32));
     let rect = Headless::rect_of(panel.labelled(Role::Slider, "Sigma [radii²]"));
     let at = |share: f32| ((rect.left() + 4.0 + share * 104.0) as i32, rect.center().y as i32);
     (at(0.5), at(0.75))

@@ -41,6 +41,16 @@ use crate::scene::{Scene, SurfaceKind};
 /// multiply it by the square of its refractive index.
 const LARGEST_SCALED: f64 = 4096.0;
 
+/// What the values of maps stand for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum MapStyle {
+    /// Irradiance [W/m²]: surfaces send it by their albedo, mirrors reflect it, glass lets it through.
+    #[default]
+    Lit,
+    /// Colours in linear light: shown as they are, and clear bodies left out. Surfaces without a map are black.
+    AsItIs,
+}
+
 /// A scene on the device, drawn as often as asked.
 #[derive(Debug)]
 pub struct Renderer {
@@ -53,6 +63,7 @@ pub struct Renderer {
     surroundings: DeviceSurroundings,
     surroundings_sampler: wgpu::Sampler,
     targets: Option<Targets>,
+    map_style: MapStyle,
 }
 
 impl Renderer {
@@ -85,6 +96,7 @@ impl Renderer {
             surroundings: DeviceSurroundings::none(gpu),
             surroundings_sampler: linear_sampler(gpu),
             targets: None,
+            map_style: MapStyle::default(),
         };
         gpu.take_error().map_or(Ok(renderer), Err)
     }
@@ -119,6 +131,11 @@ impl Renderer {
         }
         uploaded += self.surroundings.update(gpu, scene, maps);
         gpu.take_error().map_or(Ok(uploaded), Err)
+    }
+
+    /// Says what the values of the maps stand for, from the next picture on.
+    pub fn set_map_style(&mut self, style: MapStyle) {
+        self.map_style = style;
     }
 
     /// Draws a picture into `target`, a view of the size of `view` and of the format given to [`new`](Self::new).
@@ -206,7 +223,9 @@ impl Renderer {
             let mut pass = targets.begin_pass(encoder, background.to_array());
             pass.set_bind_group(0, &frame, &[]);
             self.draw_opaque(&mut pass);
-            self.draw_clear(&mut pass, view);
+            if self.map_style == MapStyle::Lit {
+                self.draw_clear(&mut pass, view);
+            }
         }
         Ok(self.targets.insert(targets))
     }
@@ -217,7 +236,7 @@ impl Renderer {
             camera_position: camera::single(view.camera.position),
             radiance_scale: radiance_scale as f32,
             background: rgb(view.background),
-            ..Default::default()
+            maps_as_they_are: u32::from(self.map_style == MapStyle::AsItIs),
         };
         let buffer = gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
             label: Some("frame"),

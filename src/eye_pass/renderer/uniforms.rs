@@ -14,7 +14,8 @@ shader_struct! {
         radiance_scale: f32,
         /// Seen where nothing is hit [W/(m² sr)].
         background: [f32; 3],
-        padding: f32,
+        /// 1 where maps are shown as they are, neither lit nor reflected.
+        maps_as_they_are: u32,
     }
 }
 

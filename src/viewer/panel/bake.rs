@@ -7,6 +7,7 @@ use egui::{Color32, Grid, ProgressBar, RichText, Ui};
 use super::control::{counted, grouped};
 use super::{Facts, Panel, Wishes};
 use crate::light_pass::ledger::EnergyLedger;
+use crate::session::StopReason;
 use crate::viewer::worker::{BakeState, BakedLevel};
 
 /// Text of what went wrong.
@@ -31,7 +32,10 @@ pub fn show(ui: &mut Ui, panel: &mut Panel, facts: &Facts<'_>, wishes: &mut Wish
             .on_disabled_hover_text("No bake is running.");
         wishes.cancel |= cancel.clicked();
         ui.checkbox(&mut panel.automatic, "automatic")
-            .on_hover_text("Bakes 0.15 s after the last change of a setting. Default: on.");
+            .on_hover_text(
+                "Bakes every change of a setting or of the scene, at the pace of first levels while it is dragged. \
+                 Default: on.",
+            );
     });
     match &refused {
         Some(error) => drop(ui.colored_label(FAILED, error.to_string())),
@@ -75,9 +79,13 @@ fn state_line(ui: &mut Ui, panel: &Panel, facts: &Facts<'_>) {
 }
 
 fn last_bake(ui: &mut Ui, last: &BakedLevel) {
-    let BakedLevel { result, seconds, .. } = last;
+    let result = &last.result;
+    ui.label(level_line(last)).on_hover_text(
+        "Relative RMSE over all maps as estimated without a reference, and the time from the request to these maps. \
+         Maps of rising quality are shown until the bake is done.",
+    );
     let hover = format!(
-        "From request to maps. Build {:.2} s, plan {:.2} s, trace {:.2} s, deposit {:.2} s; \
+        "This level: Build {:.2} s, plan {:.2} s, trace {:.2} s, deposit {:.2} s; \
          {:.2} s of CPU over all threads.",
         result.timings_s.build,
         result.timings_s.plan,
@@ -86,7 +94,7 @@ fn last_bake(ui: &mut Ui, last: &BakedLevel) {
         result.cpu_s.total,
     );
     ui.label(format!(
-        "{seconds:.2} s, {}, {} rays, {} {}",
+        "{}, {} rays, {} {}",
         counted(result.maps.len(), "map"),
         grouped(result.counts.rays),
         grouped(result.counts.cells.max(result.counts.splats)),
@@ -97,8 +105,12 @@ fn last_bake(ui: &mut Ui, last: &BakedLevel) {
         },
     ))
     .on_hover_text(hover);
-    let total = result
-        .ledgers
+}
+
+/// Shows section *Energy*: where the light of the last bake went.
+pub fn energy(ui: &mut Ui, last: Option<&BakedLevel>) {
+    let ledgers = last.map_or(&[][..], |last| &last.result.ledgers);
+    let total = ledgers
         .iter()
         .fold(EnergyLedger::default(), |sum, light| add(sum, &light.energy_w));
     if total.emitted > 0.0 {
@@ -106,6 +118,29 @@ fn last_bake(ui: &mut Ui, last: &BakedLevel) {
     } else {
         ui.label(RichText::new("No light meets glass, a mirror or water.").weak());
     }
+}
+
+/// "estimated error 2.1 %, 0.42 s: level 2, more to come".
+fn level_line(last: &BakedLevel) -> String {
+    let error = match last.result.estimated_relative_rmse {
+        Some(error) => format!("estimated error {} %", two_digits(100.0 * error)),
+        None => "error not estimated".into(),
+    };
+    let level = match (last.is_final, last.result.stop_reason) {
+        (false, _) => format!("level {}, more to come", last.level),
+        (true, StopReason::Density) => "done at this density".into(),
+        (true, StopReason::MaxError) => "done, the error is reached".into(),
+        (true, StopReason::MaxTime) => "done, the time is up".into(),
+        (true, StopReason::NothingToDo) => "nothing to do".into(),
+        (true, StopReason::Cancelled) => "stopped".into(),
+    };
+    format!("{error}, {:.2} s: {level}", last.seconds)
+}
+
+/// Two significant digits.
+fn two_digits(value: f64) -> String {
+    let decimals = (1.0 - value.abs().max(1e-6).log10().floor()).clamp(0.0, 6.0) as usize;
+    format!("{value:.decimals$}")
 }
 
 fn ledger(ui: &mut Ui, total: &EnergyLedger) {

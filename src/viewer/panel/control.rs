@@ -3,7 +3,7 @@
 use egui::{ComboBox, Grid, Response, RichText, Ui};
 
 /// Width of the control beside its label [points].
-const CONTROL_WIDTH: f32 = 190.0;
+pub const CONTROL_WIDTH: f32 = 190.0;
 /// Width of a slider without its value [points].
 const SLIDER_WIDTH: f32 = 112.0;
 
@@ -94,6 +94,19 @@ pub fn chosen<'a, T: PartialEq>(value: &T, choices: &[(T, &'a str, &'a str)]) ->
         .iter()
         .find(|(candidate, ..)| candidate == value)
         .map_or("custom", |(_, label, _)| label)
+}
+
+/// A number in four significant digits; very large and very small ones in powers of ten.
+pub fn significant(value: f64) -> String {
+    let magnitude = value.abs().log10().floor();
+    if value == 0.0 || !value.is_finite() {
+        return value.to_string();
+    }
+    if (-3.0..6.0).contains(&magnitude) {
+        let decimals = (3.0 - magnitude).clamp(0.0, 6.0) as usize;
+        return format!("{value:.decimals$}");
+    }
+    format!("{value:.3e}")
 }
 
 /// A count with separators for thousands: 1,234,567.

@@ -3,7 +3,7 @@
 use egui::{Response, Slider, SliderClamping, Ui};
 
 use super::control::{About, choice, chosen, row, rows};
-use super::{Display, LayerShown, Wishes};
+use super::{Display, Facts, LayerShown, Quantity, Wishes};
 use crate::eye_pass::ToneMap;
 use crate::settings::LayerKind;
 
@@ -14,13 +14,8 @@ const EXPOSURE: About = About {
     accuracy: "none: only the picture changes",
     cost: "none",
 };
-const AUTO_EXPOSURE: About = About {
-    label: "",
-    what: "Measures the present picture and sets the exposure once, so that brightness stays comparable afterwards.",
-    range: "a button",
-    accuracy: "none: only the picture changes",
-    cost: "one small picture",
-};
+const AUTO_EXPOSURE: &str = "Measures the present picture and sets the exposure once, so that brightness stays \
+                             comparable afterwards. Takes one small picture.";
 const TONE_MAP: About = About {
     label: "Tone map",
     what: "How radiance beyond what the display shows is brought into its range.",
@@ -36,6 +31,16 @@ const LAYER: About = About {
     cost: "none",
 };
 
+const QUANTITY: About = About {
+    label: "Map shown",
+    what: "The light, or how far each texel may be off: its estimated error in false colours, relative to the map's \
+           mean irradiance.",
+    range: "light, estimated error; default light",
+    accuracy: "none: only the picture changes",
+    cost: "none: the error is estimated in every bake",
+};
+const NO_ERRORS: &str = "These maps come without an estimate of their error.";
+
 const TONE_MAPS: [(ToneMap, &str, &str); 2] = [
     (
         ToneMap::Neutral,
@@ -45,16 +50,18 @@ const TONE_MAPS: [(ToneMap, &str, &str); 2] = [
     (ToneMap::None, "none", "cut at the display's white"),
 ];
 
-/// Shows the section; `baked` are the layers of the shown maps.
-pub fn show(ui: &mut Ui, display: &mut Display, baked: &[LayerKind], wishes: &mut Wishes) {
+/// Shows the section.
+pub fn show(ui: &mut Ui, display: &mut Display, facts: &Facts<'_>, wishes: &mut Wishes) {
+    let baked = facts.layers;
     rows(ui, "display", |ui| {
         row(ui, &EXPOSURE, None, |ui| {
-            exposure(ui, &mut display.exposure_stops)
-        });
-        row(ui, &AUTO_EXPOSURE, None, |ui| {
-            let response = ui.button("Auto exposure");
-            wishes.measure_exposure |= response.clicked();
-            response
+            ui.horizontal(|ui| {
+                let slider = exposure(ui, &mut display.exposure_stops);
+                let auto = ui.button("Auto").on_hover_text(AUTO_EXPOSURE);
+                wishes.measure_exposure |= auto.clicked();
+                slider
+            })
+            .inner
         });
         row(ui, &TONE_MAP, None, |ui| {
             let selected = chosen(&display.tone_map, &TONE_MAPS);
@@ -62,6 +69,8 @@ pub fn show(ui: &mut Ui, display: &mut Display, baked: &[LayerKind], wishes: &mu
         });
         let nothing = baked.is_empty().then_some("There are no maps yet.");
         row(ui, &LAYER, nothing, |ui| layer(ui, &mut display.layer, baked));
+        let no_errors = nothing.or((!facts.has_errors).then_some(NO_ERRORS));
+        row(ui, &QUANTITY, no_errors, |ui| quantity(ui, &mut display.quantity));
     });
 }
 
@@ -71,6 +80,14 @@ fn exposure(ui: &mut Ui, stops: &mut f64) -> Response {
             .clamping(SliderClamping::Edits)
             .fixed_decimals(2),
     )
+}
+
+fn quantity(ui: &mut Ui, shown: &mut Quantity) -> Response {
+    ui.horizontal(|ui| {
+        ui.radio_value(shown, Quantity::Light, "light")
+            .union(ui.radio_value(shown, Quantity::Error, "estimated error"))
+    })
+    .inner
 }
 
 fn layer(ui: &mut Ui, shown: &mut LayerShown, baked: &[LayerKind]) -> Response {

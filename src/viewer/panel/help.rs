@@ -14,6 +14,7 @@ pub fn show(ui: &mut Ui, speed_m_per_s: f64) {
         ("C", "next camera of the file"),
         ("F", "frame the whole scene"),
         ("R", "re-bake"),
+        ("Ctrl+Z", "take the last change of the scene back"),
         ("Esc", "let go of the mouse, cancel the bake"),
         ("H", "open or close this list"),
     ];

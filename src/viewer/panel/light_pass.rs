@@ -1,5 +1,7 @@
 //! Section *Light pass*: how the next bake is made.
 
+mod target;
+
 use egui::{Response, Slider, SliderClamping, Ui};
 
 use super::control::{About, choice, chosen, grouped, row, rows};
@@ -7,10 +9,12 @@ use crate::settings::{
     BakeSettings, Estimator, Footprint, ItemBufferKind, Kernel, LayerKind, MapResolution, RayPlacement, Sigma,
 };
 
-/// Density at the slider's zero [rays/sr]; each step doubles it.
+/// Density at the slider's zero [rays/sr]. Each step is [`NESTING`] times the one before: the lattice's sides double,
+/// and what was traced of one is kept for the next.
 const BASE_DENSITY_PER_SR: f64 = 100_000.0;
-/// The slider's ends: 781 to 102,400,000 rays/sr.
-const DENSITY_STEPS: std::ops::RangeInclusive<f64> = -7.0..=10.0;
+const NESTING: f64 = 4.0;
+/// The slider's ends: 391 to 102,400,000 rays/sr.
+const DENSITY_STEPS: std::ops::RangeInclusive<f64> = -4.0..=5.0;
 const SIGMA_RANGE: std::ops::RangeInclusive<f64> = 0.01..=100.0;
 
 const ESTIMATOR: About = About {
@@ -31,9 +35,18 @@ const LAYERS: About = About {
 const DENSITY: About = About {
     label: "Ray density [rays/sr]",
     what: "Light rays per steradian around each lamp; for a sun the same density over the casters.",
-    range: "781 to 102,400,000 in steps of ×2; default 25,000 (splat: 100,000)",
-    accuracy: "finer caustics and less noise with more rays",
-    cost: "time grows in proportion to it",
+    range: "391 to 102,400,000 in steps of ×4; default 25,000 (splat: 100,000)",
+    accuracy: "finer caustics and less noise with more rays; with a max error only where refinement starts, with a max \
+               time the finest that is tried",
+    cost: "time grows in proportion to it; a step keeps the rays of the one before",
+};
+const TARGET: About = About {
+    label: "Bake until",
+    what: "What ends a bake: the ray density below exactly, an estimated error (relative RMSE over all maps) that is \
+           small enough, or time that is up.",
+    range: "density; max error 0.01 to 100 %; max time 0.001 to 10,000 s; default density",
+    accuracy: "a max error is kept by the estimate, not by a reference; after a max time the finest complete maps are shown",
+    cost: "halving the error takes about four times the rays",
 };
 const SIGMA: About = About {
     label: "Sigma [radii²]",
@@ -145,28 +158,38 @@ const NOT_GAUSSIAN: &str = "Sigma is the spread of the gaussian kernel; the chos
 
 /// Shows the section; `settings` holds what the user chose.
 pub fn show(ui: &mut Ui, settings: &mut BakeSettings) {
-    let no_caustic = (!settings.layers.contains(&LayerKind::Caustic)).then_some(NO_CAUSTIC);
+    let no_caustic = no_caustic(settings);
     let is_wavefront = settings.estimator == Estimator::Wavefront;
-    let no_splats = no_caustic.or(is_wavefront.then_some(NO_SPLATS));
-    let not_gaussian = !is_wavefront && settings.kernel != Kernel::Gaussian;
-    let no_sigma = no_caustic.or(not_gaussian.then_some(NOT_GAUSSIAN));
+    let no_sigma = no_sigma(settings);
     rows(ui, "light pass", |ui| {
         let before = settings.estimator;
         row(ui, &ESTIMATOR, no_caustic, |ui| {
             listed(ui, "estimator", &mut settings.estimator, &ESTIMATORS)
         });
         if settings.estimator != before {
-            settings.density_per_sr *=
-                settings.estimator.preview_density_per_sr() / before.preview_density_per_sr();
-            settings.sigma = settings.estimator.default_sigma();
+            change_estimator(settings, before);
         }
         row(ui, &LAYERS, None, |ui| layers(ui, &mut settings.layers));
+        row(ui, &TARGET, no_caustic, |ui| target::show(ui, settings));
         row(ui, &DENSITY, no_caustic, |ui| {
             density(ui, &mut settings.density_per_sr)
         });
         row(ui, &SIGMA, no_sigma, |ui| {
             sigma(ui, &mut settings.sigma, is_wavefront)
         });
+        row(ui, &MAP_RESOLUTION, None, |ui| {
+            map_resolution(ui, &mut settings.map_resolution)
+        });
+    });
+}
+
+/// Shows the section of what is seldom changed.
+pub fn show_details(ui: &mut Ui, settings: &mut BakeSettings) {
+    let no_caustic = no_caustic(settings);
+    let is_wavefront = settings.estimator == Estimator::Wavefront;
+    let no_splats = no_caustic.or(is_wavefront.then_some(NO_SPLATS));
+    let no_sigma = no_sigma(settings);
+    rows(ui, "rays and kernels", |ui| {
         row(ui, &ADAPTIVE, no_splats.or(no_sigma), |ui| {
             adaptive(ui, &mut settings.sigma)
         });
@@ -182,10 +205,25 @@ pub fn show(ui: &mut Ui, settings: &mut BakeSettings) {
         row(ui, &ITEM_BUFFER, no_caustic, |ui| {
             listed(ui, "item buffer", &mut settings.item_buffer, &ITEM_BUFFERS)
         });
-        row(ui, &MAP_RESOLUTION, None, |ui| {
-            map_resolution(ui, &mut settings.map_resolution)
-        });
     });
+}
+
+/// Takes over what suits another estimator.
+fn change_estimator(settings: &mut BakeSettings, before: Estimator) {
+    settings.density_per_sr *= settings.estimator.preview_density_per_sr() / before.preview_density_per_sr();
+    settings.sigma = settings.estimator.default_sigma();
+    if settings.estimator == Estimator::Splat {
+        settings.max_error = None;
+    }
+}
+
+fn no_caustic(settings: &BakeSettings) -> Option<&'static str> {
+    (!settings.layers.contains(&LayerKind::Caustic)).then_some(NO_CAUSTIC)
+}
+
+fn no_sigma(settings: &BakeSettings) -> Option<&'static str> {
+    let not_gaussian = settings.estimator == Estimator::Splat && settings.kernel != Kernel::Gaussian;
+    no_caustic(settings).or(not_gaussian.then_some(NOT_GAUSSIAN))
 }
 
 fn listed<T: PartialEq + Copy>(
@@ -221,10 +259,10 @@ fn layers(ui: &mut Ui, layers: &mut Vec<LayerKind>) -> Response {
 }
 
 fn density(ui: &mut Ui, density_per_sr: &mut f64) -> Response {
-    let step_of = |density: f64| (density / BASE_DENSITY_PER_SR).log2();
+    let step_of = |density: f64| (density / BASE_DENSITY_PER_SR).log(NESTING);
     let get_set = |step: Option<f64>| {
         if let Some(step) = step.filter(|step| step.is_finite()) {
-            *density_per_sr = BASE_DENSITY_PER_SR * step.round().exp2();
+            *density_per_sr = BASE_DENSITY_PER_SR * NESTING.powf(step.round());
         }
         step_of(*density_per_sr)
     };
@@ -232,7 +270,7 @@ fn density(ui: &mut Ui, density_per_sr: &mut f64) -> Response {
         Slider::from_get_set(DENSITY_STEPS, get_set)
             .clamping(SliderClamping::Edits)
             .step_by(1.0)
-            .custom_formatter(|step, _| grouped((BASE_DENSITY_PER_SR * step.exp2()).round() as u64))
+            .custom_formatter(|step, _| grouped((BASE_DENSITY_PER_SR * NESTING.powf(step)).round() as u64))
             .custom_parser(move |text| {
                 let density: f64 = text.replace(',', "").trim().parse().ok()?;
                 (density > 0.0).then(|| step_of(density))

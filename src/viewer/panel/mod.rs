@@ -6,6 +6,7 @@ mod display;
 mod effects;
 mod help;
 mod light_pass;
+mod scene;
 
 use std::sync::Arc;
 
@@ -31,6 +32,16 @@ pub enum LayerShown {
     Only(LayerKind),
 }
 
+/// What of the maps the picture shows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Quantity {
+    /// The lit scene.
+    #[default]
+    Light,
+    /// How far the light may be off, in false colours.
+    Error,
+}
+
 /// How the picture shows the maps.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Display {
@@ -40,6 +51,8 @@ pub struct Display {
     pub tone_map: ToneMap,
     /// Which light.
     pub layer: LayerShown,
+    /// The light or its error.
+    pub quantity: Quantity,
 }
 
 /// What the user can set.
@@ -51,6 +64,8 @@ pub struct Panel {
     pub automatic: bool,
     /// Of the picture.
     pub display: Display,
+    /// What is edited.
+    selection: scene::Selection,
     /// Whether the list of keys is open.
     pub help_open: bool,
     help_was_open: bool,
@@ -73,6 +88,8 @@ pub struct Facts<'a> {
     pub last: Option<&'a BakedLevel>,
     /// Layers of the maps that the picture shows.
     pub layers: &'a [LayerKind],
+    /// Whether these maps tell how far they may be off.
+    pub has_errors: bool,
     /// Flying speed [m/s].
     pub speed_m_per_s: f64,
     /// What draws the picture.
@@ -129,6 +146,7 @@ impl Panel {
             settings,
             automatic: true,
             display: Display::default(),
+            selection: scene::Selection::default(),
             help_open: false,
             help_was_open: false,
         }
@@ -136,7 +154,10 @@ impl Panel {
 
     /// Shows the panel at the left and returns what was pressed.
     pub fn show(&mut self, ui: &mut Ui, facts: &Facts<'_>) -> Wishes {
-        let mut wishes = Wishes::default();
+        let mut wishes = Wishes {
+            is_dragging: ui.input(|input| input.pointer.any_down()),
+            ..Wishes::default()
+        };
         let frame = Frame::side_top_panel(ui.style()).inner_margin(Margin::symmetric(10, 8));
         egui::Panel::left("panel")
             .exact_size(WIDTH)
@@ -153,14 +174,21 @@ impl Panel {
     fn sections(&mut self, ui: &mut Ui, facts: &Facts<'_>, wishes: &mut Wishes) {
         ui.spacing_mut().item_spacing.y = 3.0;
         title(ui, facts);
+        section(ui, "Scene", true, |ui| {
+            scene::show(ui, &mut self.selection, facts, wishes)
+        });
         section(ui, "Light pass", true, |ui| {
             light_pass::show(ui, &mut self.settings)
         });
+        section(ui, "Rays and kernels", false, |ui| {
+            light_pass::show_details(ui, &mut self.settings)
+        });
         section(ui, "Bake", true, |ui| bake::show(ui, self, facts, wishes));
         section(ui, "Display", true, |ui| {
-            display::show(ui, &mut self.display, facts.layers, wishes)
+            display::show(ui, &mut self.display, facts, wishes)
         });
         let plan: Option<&EffectPlan> = facts.last.map(|last| &last.result.plan);
+        section(ui, "Energy", false, |ui| bake::energy(ui, facts.last));
         section(ui, "Effects", false, |ui| effects::show(ui, plan));
         let baked: &[Warning] = facts.last.map_or(&[], |last| &last.result.warnings);
         let warnings: Vec<_> = facts.scene.warnings.iter().chain(baked).collect();
