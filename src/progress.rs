@@ -1,8 +1,8 @@
 //! What a running bake tells, and how it is stopped.
 
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-
-use crate::illumination::IlluminationMap;
+use std::time::Instant;
 
 /// What a bake is doing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -36,21 +36,37 @@ impl Stage {
 pub trait Progress: Sync {
     /// `done` of `total` of a stage; totals of different stages are not comparable.
     fn advance(&self, _stage: Stage, _done: u64, _total: u64) {}
-
-    /// A whole picture of lower quality, on the way to the final one.
-    fn preview(&self, _maps: Vec<IlluminationMap>) {}
 }
 
 /// Hears nothing.
 impl Progress for () {}
 
-/// A request to stop, that any thread may set.
+/// A request to stop: any thread may set it, or a time may be set for it.
 #[derive(Debug, Default)]
 pub struct Control {
-    cancelled: AtomicBool,
+    cancelled: Arc<AtomicBool>,
+    deadline: Option<Instant>,
 }
 
 impl Control {
+    /// The same request, that also comes by itself at a given time.
+    #[must_use]
+    pub fn with_deadline(&self, deadline: Instant) -> Self {
+        Self {
+            cancelled: Arc::clone(&self.cancelled),
+            deadline: Some(deadline),
+        }
+    }
+
+    /// The same request, whatever the time.
+    #[must_use]
+    pub fn without_deadline(&self) -> Self {
+        Self {
+            cancelled: Arc::clone(&self.cancelled),
+            deadline: None,
+        }
+    }
+
     /// Asks the bake to stop soon; what it has is still returned, marked partial.
     pub fn cancel(&self) {
         self.cancelled.store(true, Ordering::Relaxed);
@@ -59,5 +75,6 @@ impl Control {
     /// Whether it was asked to stop.
     pub fn is_cancelled(&self) -> bool {
         self.cancelled.load(Ordering::Relaxed)
+            || self.deadline.is_some_and(|deadline| Instant::now() >= deadline)
     }
 }

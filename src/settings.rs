@@ -145,8 +145,8 @@ pub struct BakeSettings {
     pub estimator: Estimator,
     /// Light rays per steradian [1/sr]; for suns density/D² rays per m².
     pub density_per_sr: f64,
-    /// Target for the relative RMSE of maps, > 0: the lattice of `density_per_sr` is refined where that needs it
-    /// (wavefront). `None`: exactly that lattice.
+    /// Target for the estimated relative RMSE of maps, [`LEAST_MAX_ERROR`] to 1: the lattice of `density_per_sr` is
+    /// refined where that needs it (wavefront). `None`: exactly that lattice.
     pub max_error: Option<f64>,
     /// Ends the light pass after so many seconds of wall-clock time, > 0, with the finest maps that were complete.
     pub max_time_s: Option<f64>,
@@ -177,6 +177,12 @@ pub struct BakeSettings {
     /// Largest memory for maps [bytes].
     pub memory_bytes: u64,
 }
+
+/// Least density that refinement begins from [rays/sr].
+const COARSEST_START_PER_SR: f64 = 1_600.0;
+
+/// Least target for the relative RMSE [1].
+pub const LEAST_MAX_ERROR: f64 = 1e-4;
 
 /// Largest map side [texels].
 pub const MAX_MAP_SIDE: usize = 16384;
@@ -235,6 +241,16 @@ impl BakeSettings {
         }
     }
 
+    /// Density that refinement towards a relative RMSE begins from [rays/sr]: coarse enough that refinement decides, fine
+    /// enough that no caster falls through.
+    pub fn starting_density_per_sr(target: f64) -> f64 {
+        if target <= LEAST_MAX_ERROR {
+            // Not a target but as much as time allows.
+            return COARSEST_START_PER_SR;
+        }
+        (40.0 / target).clamp(COARSEST_START_PER_SR, 40_000.0)
+    }
+
     /// Memory that traced light may take until the next bake [bytes]: a quarter of all.
     pub fn kept_light_bytes(&self) -> u64 {
         self.memory_bytes / 4
@@ -258,7 +274,7 @@ impl BakeSettings {
         };
         finite_in("--density", self.density_per_sr, 1.0, 1e12)?;
         if let Some(target) = self.max_error {
-            finite_in("--max-error", target, 1e-4, 1.0)?;
+            finite_in("--max-error", target, LEAST_MAX_ERROR, 1.0)?;
         }
         if let Some(limit_s) = self.max_time_s {
             finite_in("--max-time", limit_s, 1e-3, 1e7)?;

@@ -120,6 +120,15 @@ fn summary(manifest: &Manifest, result: &BakeResult, folder: &str) -> String {
         cells => format!("{cells} cells, {} splats", counts.splats),
     };
     line("rays", format!("{}, {pieces}", counts.rays));
+    if let Some(error) = result.estimated_relative_rmse {
+        let percent = 100.0 * error;
+        let why = match result.stop_reason {
+            StopReason::MaxError => ": the target is met",
+            StopReason::MaxTime => ": the time was up",
+            _ => "",
+        };
+        line("error", format!("{percent:.2} % (relative RMSE, estimated){why}"));
+    }
     let energy = &manifest.energy_w;
     line(
         "watts",

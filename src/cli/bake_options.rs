@@ -2,10 +2,9 @@
 
 use clap::{Args, ValueEnum};
 use nephroid::error::{Error, Result};
-use nephroid::light_pass::wavefront::refine::Refinement;
 use nephroid::settings::{
-    BakeSettings, Estimator, Footprint, ItemBufferKind, Kernel, KernelSampling, LayerKind, MapResolution,
-    RayPlacement, Sigma,
+    BakeSettings, Estimator, Footprint, ItemBufferKind, Kernel, KernelSampling, LEAST_MAX_ERROR, LayerKind,
+    MapResolution, RayPlacement, Sigma,
 };
 
 use super::values;
@@ -13,23 +12,31 @@ use super::values;
 /// How carefully to bake.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum Preset {
-    /// 3,125 rays per steradian (splat: 12,500).
+    /// 10 % of relative RMSE (splat: 12,500 rays per steradian).
     Draft,
-    /// 25,000 rays per steradian (splat: 100,000).
+    /// 3 % (splat: 100,000 rays per steradian).
     #[default]
     Preview,
-    /// 200,000 rays per steradian (splat: 800,000).
+    /// 1 % (splat: 800,000 rays per steradian).
     Final,
 }
 
 impl Preset {
-    fn density_per_sr(self, estimator: Estimator) -> f64 {
+    fn max_error(self) -> f64 {
+        match self {
+            Self::Draft => 0.10,
+            Self::Preview => 0.03,
+            Self::Final => 0.01,
+        }
+    }
+
+    fn splat_density_per_sr(self) -> f64 {
         let times = match self {
             Self::Draft => 0.125,
             Self::Preview => 1.0,
             Self::Final => 8.0,
         };
-        estimator.preview_density_per_sr() * times
+        Estimator::Splat.preview_density_per_sr() * times
     }
 }
 
@@ -37,20 +44,23 @@ impl Preset {
 #[derive(Clone, Debug, Default, Args)]
 #[command(next_help_heading = "Bake options")]
 pub struct BakeOptions {
-    /// Ray density by name [default: preview]
+    /// Target error by name [default: preview, unless density, error or time is given]
     #[arg(long, value_enum)]
     preset: Option<Preset>,
     /// How light rays become irradiance [default: wavefront]
     #[arg(long, value_enum)]
     estimator: Option<Estimator>,
-    /// Light rays per steradian, exactly; for suns density/D² rays per m², D from the casters' centre to their
-    /// farthest receiver
+    /// Light rays per steradian, and no refinement; with --max-error, to begin with. For suns density/D² rays per m², D
+    /// from the casters' centre to their farthest receiver
     #[arg(long, value_name = "RAYS_PER_SR", allow_negative_numbers = true)]
     density: Option<f64>,
-    /// Target for the relative RMSE of the maps: refines the lattice where that needs it (wavefront); without
-    /// --density, from a coarse one
+    /// Refines until the estimated relative RMSE of the maps is below this, such as 2% (wavefront)
     #[arg(long, value_name = "SHARE", value_parser = values::share, allow_hyphen_values = true)]
     max_error: Option<f64>,
+    /// Ends the light pass after so long, such as 10s, with the finest maps that are complete by then; without
+    /// --max-error, refines as far as that goes (wavefront)
+    #[arg(long, value_name = "TIME", value_parser = values::seconds, allow_hyphen_values = true)]
+    max_time: Option<f64>,
     /// Where in its lattice cell a light ray starts (splat) [default: lattice]
     #[arg(long, value_enum, value_name = "PLACEMENT")]
     rays: Option<RayPlacement>,
@@ -106,14 +116,17 @@ impl BakeOptions {
         let mut layers = self.layers.clone().unwrap_or_else(|| default_layers.to_vec());
         layers.sort_unstable();
         layers.dedup();
+        let preset = self.preset.unwrap_or_default();
+        let max_error = self.target(estimator, preset);
         let settings = BakeSettings {
             estimator,
-            max_error: self.max_error,
-            max_time_s: None,
-            density_per_sr: self
-                .density
-                .or(self.max_error.map(Refinement::starting_density_per_sr))
-                .unwrap_or_else(|| self.preset.unwrap_or_default().density_per_sr(estimator)),
+            max_error,
+            max_time_s: self.max_time,
+            density_per_sr: self.density.unwrap_or_else(|| match (estimator, max_error) {
+                (Estimator::Splat, _) => preset.splat_density_per_sr(),
+                (Estimator::Wavefront, Some(target)) => BakeSettings::starting_density_per_sr(target),
+                (Estimator::Wavefront, None) => estimator.preview_density_per_sr(),
+            }),
             rays: self.rays.unwrap_or(defaults.rays),
             sigma: self.sigma.unwrap_or(defaults.sigma),
             kernel: self.kernel.unwrap_or(defaults.kernel),
@@ -130,6 +143,17 @@ impl BakeOptions {
         };
         settings.validate()?;
         Ok(settings)
+    }
+
+    /// The relative RMSE to refine towards.
+    fn target(&self, estimator: Estimator, preset: Preset) -> Option<f64> {
+        let is_exact = self.density.is_some() || estimator == Estimator::Splat;
+        self.max_error.or(match (is_exact, self.preset, self.max_time) {
+            (true, ..) => None,
+            // As far as the time goes.
+            (false, None, Some(_)) => Some(LEAST_MAX_ERROR),
+            (false, ..) => Some(preset.max_error()),
+        })
     }
 
     fn refuse_what_does_not_apply(&self, estimator: Estimator) -> Result<()> {
@@ -177,13 +201,14 @@ mod tests {
             ..Default::default()
         };
         let settings = options.settings(&[LayerKind::Caustic], 0).expect("valid");
-        assert!((settings.density_per_sr - 3125.0).abs() < 1e-9);
+        assert_eq!(settings.max_error, Some(0.1));
         let options = BakeOptions {
             density: Some(123.0),
             ..options
         };
         let settings = options.settings(&[LayerKind::Caustic], 0).expect("valid");
         assert!((settings.density_per_sr - 123.0).abs() < 1e-9);
+        assert_eq!(settings.max_error, None);
     }
 
     #[test]

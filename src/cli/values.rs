@@ -22,6 +22,16 @@ pub fn share(text: &str) -> Result<f64, String> {
     number.map_err(|_| "give a share such as 2% or 0.02".to_string())
 }
 
+/// `10s`, `500ms`, `2min`, or seconds without a unit.
+pub fn seconds(text: &str) -> Result<f64, String> {
+    let units = [("ms", 1e-3), ("min", 60.0), ("s", 1.0), ("", 1.0)];
+    let parsed = units.iter().find_map(|(unit, seconds)| {
+        let number: f64 = text.strip_suffix(unit)?.trim().parse().ok()?;
+        Some(number * seconds)
+    });
+    parsed.ok_or_else(|| "give a time such as 10s, 500ms or 2min".to_string())
+}
+
 /// `auto`, `N` (square) or `WxH` [texels].
 pub fn map_resolution(text: &str) -> Result<MapResolution, String> {
     if text == "auto" {

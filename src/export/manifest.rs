@@ -165,7 +165,7 @@ impl Manifest {
             energy_w: energy.into(),
             ledgers: result.ledgers.iter().map(LedgerEntry::from).collect(),
             error: ErrorEstimate {
-                estimated_relative_rmse: None,
+                estimated_relative_rmse: result.estimated_relative_rmse,
             },
             maps,
         }

@@ -106,11 +106,13 @@ impl TriangleBvh {
             let Some((distance_m, barycentric)) = sheared.intersect(&self.corners[slot]) else {
                 return f32::INFINITY;
             };
-            if best.is_some_and(|hit| hit.distance_m <= distance_m) {
+            let triangle = self.bvh.primitive_indices[slot];
+            // Of surfaces at the same distance the first given, whatever the hierarchy looks like.
+            if best.is_some_and(|hit| (hit.distance_m, hit.triangle) <= (distance_m, triangle)) {
                 return f32::INFINITY;
             }
             best = Some(TriangleHit {
-                triangle: self.bvh.primitive_indices[slot],
+                triangle,
                 distance_m,
                 barycentric,
             });

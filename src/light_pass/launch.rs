@@ -9,13 +9,13 @@ use crate::scene::{Light, LightKind, Scene};
 use crate::settings::ItemBufferKind;
 
 /// Start domain of one light.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Launch {
     light: Light,
     domain: Domain,
 }
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 enum Domain {
     /// Six cube faces around a point.
     Sphere { position: DVec3, mapping: FaceMapping },
@@ -27,6 +27,12 @@ enum Domain {
         direction: DVec3,
     },
 }
+
+/// From this density on [rays/sr], lattices double with it: 58 to 116 cells across a face at first.
+const COARSEST_NESTED_PER_SR: f64 = 1_600.0;
+
+/// Smaller lattices may have odd sides [cells].
+const ODD_SIDES: f64 = 16.0;
 
 impl Launch {
     /// The domain of a light. For a sun: the smallest rectangle, in a frame fixed by the direction alone, around all
@@ -64,15 +70,27 @@ impl Launch {
 
     /// Lattice cells across and down each face at a density [1/sr]; suns take density/D² rays per m², D = `reach_m`
     /// the distance from the casters' centre to their farthest receiver.
+    ///
+    /// Sides are rounded up to multiples of powers of two, by a thirtieth at most, so that the lattice of a quarter of
+    /// the density is every second ray of this one.
     pub fn lattice_size(&self, density_per_sr: f64, reach_m: f64) -> (usize, usize) {
-        let cells = |count: f64| count.ceil().clamp(1.0, 1e9) as usize;
+        let doublings = (density_per_sr / COARSEST_NESTED_PER_SR)
+            .log(4.0)
+            .floor()
+            .clamp(0.0, 24.0);
+        let base_per_sr = density_per_sr / 4_f64.powf(doublings);
+        let cells = |count: f64| {
+            let even = if count > ODD_SIDES { 2.0 } else { 1.0 };
+            let base = (count / even).ceil() * even;
+            (base * doublings.exp2()).clamp(1.0, 1e9) as usize
+        };
         match self.domain {
             Domain::Sphere { .. } => {
-                let side = cells((density_per_sr * cube_face::FACE_SOLID_ANGLE_SR).sqrt());
+                let side = cells((base_per_sr * cube_face::FACE_SOLID_ANGLE_SR).sqrt());
                 (side, side)
             }
             Domain::Plane { across, down, .. } => {
-                let rays_per_m = density_per_sr.sqrt() / reach_m;
+                let rays_per_m = base_per_sr.sqrt() / reach_m;
                 (
                     cells(across.length() * rays_per_m),
                     cells(down.length() * rays_per_m),

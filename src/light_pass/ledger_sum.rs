@@ -52,13 +52,6 @@ impl LedgerSum {
         }
     }
 
-    /// Books a sum of counts.
-    pub fn book_many(&mut self, account: Account, counts: [i128; 3]) {
-        for (sum, channel) in self.counts[account as usize].iter_mut().zip(counts) {
-            *sum += channel;
-        }
-    }
-
     /// Adds another part of the same light's ledger.
     pub fn merge(&mut self, other: &Self) {
         for (sums, parts) in self.counts.iter_mut().zip(other.counts) {
@@ -68,15 +61,17 @@ impl LedgerSum {
         }
     }
 
-    /// Luminous-equivalent watts of an account.
-    pub fn watts(&self, account: Account, unit: FluxUnit) -> f64 {
-        LinearSrgb::from(self.counts[account as usize].map(|channel| channel as f64 * unit.watts()))
-            .luminance()
+    /// Luminous-equivalent watts of an account, of a light of the given strength where the counts are of one of unit
+    /// strength.
+    pub fn watts(&self, account: Account, unit: FluxUnit, strength: LinearSrgb) -> f64 {
+        let flux_w =
+            LinearSrgb::from(self.counts[account as usize].map(|channel| channel as f64 * unit.watts()));
+        (flux_w * strength).luminance()
     }
 
     /// As it is reported.
-    pub fn report(&self, light: &str, unit: FluxUnit) -> LightLedger {
-        let watts = |account| self.watts(account, unit);
+    pub fn report(&self, light: &str, unit: FluxUnit, strength: LinearSrgb) -> LightLedger {
+        let watts = |account| self.watts(account, unit, strength);
         LightLedger {
             light: light.to_owned(),
             energy_w: EnergyLedger {

@@ -1,5 +1,6 @@
 //! From the lights through specular surfaces onto diffuse ones.
 
+pub mod accuracy;
 pub mod caustic;
 pub mod direct;
 pub mod item_buffer;

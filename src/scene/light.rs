@@ -48,6 +48,39 @@ pub struct Light {
     pub kind: LightKind,
 }
 
+impl Light {
+    /// What its maps are multiplied by per channel: intensity [W/sr] or, for suns, normal irradiance [W/m²], times the
+    /// colour.
+    pub fn strength(&self) -> LinearSrgb {
+        self.colour
+            * match self.kind {
+                LightKind::Point { intensity, .. } | LightKind::Spot { intensity, .. } => intensity.0,
+                LightKind::Sun {
+                    normal_irradiance, ..
+                } => normal_irradiance.0,
+            }
+    }
+
+    /// The same light, white and of 1 W/sr or 1 W/m².
+    #[must_use]
+    pub fn of_unit_strength(&self) -> Self {
+        let mut kind = self.kind;
+        match &mut kind {
+            LightKind::Point { intensity, .. } | LightKind::Spot { intensity, .. } => {
+                *intensity = RadiantIntensity(1.0);
+            }
+            LightKind::Sun {
+                normal_irradiance, ..
+            } => *normal_irradiance = Irradiance(1.0),
+        }
+        Self {
+            name: self.name.clone(),
+            colour: LinearSrgb::WHITE,
+            kind,
+        }
+    }
+}
+
 impl LightKind {
     /// Fall-off of a spot, [0, 1]: the square of a linear ramp in the cosine (KHR_lights_punctual); 1 for the others.
     /// `direction` is unit and points away from the light.

@@ -1,14 +1,18 @@
 //! A bake as a session: scene and settings in, maps out. The command line's `bake` is a session that runs once.
 
-mod caustic_layer;
+mod caustic;
+mod direct_cache;
 mod finish;
+mod level_plan;
+mod light_level;
 pub mod result;
+mod scene_change;
 mod sizes;
-mod splat_cache;
-mod wavefront_cache;
-mod wavefront_layer;
+mod splat_level;
+mod wavefront_level;
 
 use std::sync::Arc;
+use std::time::Instant;
 
 pub use result::{BakeCounts, BakeResult, StopReason, Timings};
 
@@ -18,23 +22,25 @@ use crate::light_pass::caustic::setup::Aim;
 use crate::plan::{self, Effect, EffectPlan};
 use crate::progress::{Control, Progress, Stage};
 use crate::scene::Scene;
-use crate::settings::{BakeSettings, Estimator, ItemBufferKind};
+use crate::settings::{BakeSettings, ItemBufferKind};
 use crate::transport::Tracer;
-use caustic_layer::CausticLayer;
+use caustic::{CausticLayer, CausticOutcome, Stopped};
+use direct_cache::DirectCache;
+use finish::{Finish, Shown};
+use light_level::LightStates;
+use scene_change::SceneChange;
 use sizes::MapSizes;
-use splat_cache::SplatCache;
-use wavefront_cache::WavefrontCache;
 
-/// Owns a scene with all that is derived from it, and bakes it as often as settings change. What does not depend on
-/// the settings (hierarchy, parametrisations, item buffers) is kept from bake to bake.
+/// Owns a scene with all that is derived from it, and bakes it as often as scene or settings change. What a change does
+/// not touch is kept: hierarchy, parametrisations, item buffers, what rays met, patches, maps, and their errors.
 #[derive(Debug)]
 pub struct BakeSession {
     scene: Arc<Scene>,
     tracer: Option<Arc<Tracer>>,
     aim: Option<(ItemBufferKind, Arc<Aim>)>,
     sizes: MapSizes,
-    wavefront_cache: WavefrontCache,
-    splat_cache: SplatCache,
+    lights: LightStates,
+    direct: DirectCache,
 }
 
 /// What `inspect` says before any bake.
@@ -67,8 +73,8 @@ impl BakeSession {
             tracer: None,
             aim: None,
             sizes,
-            wavefront_cache: WavefrontCache::default(),
-            splat_cache: SplatCache::default(),
+            lights: LightStates::default(),
+            direct: DirectCache::default(),
         })
     }
 
@@ -77,15 +83,54 @@ impl BakeSession {
         &self.scene
     }
 
-    /// Goes on with another scene, an edited one as a rule: what the difference does not touch is kept.
+    /// Goes on with another scene, an edited one as a rule: what the difference does not touch is kept. Another strength
+    /// or colour of a light touches nothing: it is a scale of its maps.
     ///
     /// # Errors
     /// As [`Self::new`]; the session then keeps its scene.
     pub fn set_scene(&mut self, scene: Arc<Scene>) -> Result<()> {
-        if !Arc::ptr_eq(&self.scene, &scene) {
-            *self = Self::new(scene)?;
+        match SceneChange::between(&self.scene, &scene) {
+            Some(change) => self.edit(scene, &change),
+            None => *self = Self::new(scene)?,
         }
         Ok(())
+    }
+
+    fn edit(&mut self, scene: Arc<Scene>, change: &SceneChange) {
+        self.tracer = self
+            .tracer
+            .take()
+            .map(|tracer| Arc::new(tracer.edited(scene.clone())));
+        let sizes = std::mem::replace(&mut self.sizes, MapSizes::new(scene.clone()));
+        self.sizes = sizes.edited(scene.clone(), &change.shapes);
+        if change.moves_paths() || change.shares {
+            self.direct.clear();
+            self.lights.statistics = None;
+        }
+        if change.moves_paths() || !change.lights.is_empty() {
+            self.aim = None;
+        }
+        for state in self.lights.iter_mut() {
+            if change.moves_paths() || change.shares {
+                state.forget_maps();
+            }
+            if change.moves_paths() {
+                state.rays.begin_edit();
+            }
+            for &object in &change.shapes {
+                let nowhere = (glam::DVec3::INFINITY, glam::DVec3::NEG_INFINITY);
+                let bounds = scene.objects[object].mesh.bounds().unwrap_or(nowhere);
+                state.rays.shape_changed(object, bounds);
+            }
+            for &object in &change.directions {
+                state.rays.material_changed(object);
+            }
+        }
+        for &light in &change.lights {
+            self.lights.forget(light);
+            self.direct.forget(light);
+        }
+        self.scene = scene;
     }
 
     /// The scene with its hierarchy, built on first use.
@@ -136,12 +181,7 @@ impl BakeSession {
         progress: &dyn Progress,
         control: &Control,
     ) -> Result<BakeResult> {
-        settings.validate()?;
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(settings.threads)
-            .build()
-            .map_err(|error| Error::failure("--threads", error.to_string(), "ask for fewer threads"))?;
-        pool.install(|| self.bake_here(settings, progress, control))
+        self.bake_on_threads(settings, progress, control, None)
     }
 
     /// Bakes like [`Self::bake`] and hands out whole maps of lower quality on the way, from the coarsest on; each is
@@ -154,9 +194,24 @@ impl BakeSession {
         settings: &BakeSettings,
         progress: &dyn Progress,
         control: &Control,
-        _level: &mut dyn FnMut(BakeResult),
+        level: &mut (dyn FnMut(BakeResult) + Send),
     ) -> Result<BakeResult> {
-        self.bake(settings, progress, control)
+        self.bake_on_threads(settings, progress, control, Some(level))
+    }
+
+    fn bake_on_threads(
+        &mut self,
+        settings: &BakeSettings,
+        progress: &dyn Progress,
+        control: &Control,
+        level: Option<&mut (dyn FnMut(BakeResult) + Send)>,
+    ) -> Result<BakeResult> {
+        settings.validate()?;
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(settings.threads)
+            .build()
+            .map_err(|error| Error::failure("--threads", error.to_string(), "ask for fewer threads"))?;
+        pool.install(|| self.bake_here(settings, progress, control, level))
     }
 
     fn aim(&mut self, kind: ItemBufferKind) -> Arc<Aim> {
@@ -175,40 +230,79 @@ impl BakeSession {
         settings: &BakeSettings,
         progress: &dyn Progress,
         control: &Control,
+        mut level: Option<&mut (dyn FnMut(BakeResult) + Send)>,
     ) -> Result<BakeResult> {
         let whole = Stopwatch::start();
         let mut clock = Clock::default();
         progress.advance(Stage::Build, 0, 1);
         let tracer = clock.time(|clock| &mut clock.build, || self.tracer());
+        let began = Instant::now();
         progress.advance(Stage::Plan, 0, 1);
         let aim = clock.time(|clock| &mut clock.plan, || self.aim(settings.item_buffer));
         let plan = plan::decide(&self.scene, settings, &aim.casters);
-
-        let caustic = if plan.is_on(Effect::LightPass) {
+        let finish = Finish {
+            scene: &self.scene,
+            sizes: &self.sizes,
+            settings,
+            plan: &plan,
+        };
+        let (lights, direct) = (&mut self.lights, &mut self.direct);
+        let mut outcome = CausticOutcome::default();
+        if plan.is_on(Effect::LightPass) {
             let layer = CausticLayer {
                 tracer: &tracer,
                 aim: &aim,
                 settings,
                 sizes: &self.sizes,
                 plan: &plan,
+                progress,
+                control,
+                began,
             };
-            match settings.estimator {
-                Estimator::Wavefront => {
-                    layer.bake_wavefront(progress, control, &mut clock, &mut self.wavefront_cache)?
+            let mut is_first = true;
+            outcome = layer.bake(lights, &mut clock, &mut |levels, counts, clock| {
+                let Some(level) = &mut level else {
+                    return Ok(());
+                };
+                let mut so_far = CausticOutcome {
+                    counts,
+                    ..CausticOutcome::default()
+                };
+                let charts = finish.charts(levels)?;
+                // The first picture is to come soon: direct light follows with the second.
+                let waits =
+                    std::mem::take(&mut is_first) && !direct.knows(finish.scene.lights.len(), &charts);
+                if !waits && plan.is_on(Effect::Direct) {
+                    let watch = Stopwatch::start();
+                    let report = direct.complete(&tracer, &charts, progress, control);
+                    so_far.counts.shadow_rays += report.shadow_rays;
+                    clock.trace.add(watch.elapsed());
                 }
-                Estimator::Splat => layer.bake(progress, control, &mut clock, &mut self.splat_cache)?,
+                let mut result = finish.run(levels, &charts, direct, &so_far);
+                clock.total = whole.elapsed();
+                (result.timings_s, result.cpu_s) = clock.timings();
+                level(result);
+                Ok(())
+            })?;
+        }
+        let finished: Vec<Shown> = outcome
+            .finished
+            .iter()
+            .filter_map(|&light| Some((light, lights.finest(light)?)))
+            .collect();
+        let charts = finish.charts(&finished)?;
+        if plan.is_on(Effect::Direct) {
+            let watch = Stopwatch::start();
+            let report = direct.complete(&tracer, &charts, progress, control);
+            outcome.counts.shadow_rays += report.shadow_rays;
+            if !report.complete {
+                outcome.stopped = Some(Stopped::Cancelled);
             }
-        } else {
-            caustic_layer::CausticOutcome::default()
-        };
-        let result = finish::Finish {
-            tracer: &tracer,
-            sizes: &self.sizes,
-            settings,
-            plan,
-            caustic,
-        };
-        let mut result = result.run(progress, control, &mut clock)?;
+            clock.trace.add(watch.elapsed());
+        }
+        let watch = Stopwatch::start();
+        let mut result = finish.run(&finished, &charts, direct, &outcome);
+        clock.deposit.add(watch.elapsed());
         clock.total = whole.elapsed();
         (result.timings_s, result.cpu_s) = clock.timings();
         Ok(result)

@@ -1,6 +1,7 @@
 //! How large each surface's map is.
 
-use std::sync::{Arc, OnceLock};
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use crate::error::{Error, Result};
 use crate::illumination::Chart;
@@ -23,7 +24,15 @@ pub const BYTES_PER_TEXEL: u64 = 24 + 2 * 12 + 8;
 pub struct MapSizes {
     scene: Arc<Scene>,
     parametrisations: Vec<OnceLock<Option<Parametrisation>>>,
+    /// Charts made so far, by object and size.
+    charts: Mutex<BTreeMap<ChartKey, Arc<Chart>>>,
 }
+
+/// Object, texels across and down.
+type ChartKey = (usize, (usize, usize));
+
+/// Charts that are kept; beyond it, all are made anew.
+const MOST_CHARTS: usize = 256;
 
 impl MapSizes {
     /// Nothing made yet.
@@ -32,19 +41,46 @@ impl MapSizes {
         Self {
             scene,
             parametrisations,
+            charts: Mutex::default(),
         }
+    }
+
+    /// For an edited copy of the scene: what belongs to shapes that stay is kept.
+    pub fn edited(self, scene: Arc<Scene>, changed: &[usize]) -> Self {
+        let mut sizes = Self { scene, ..self };
+        for &object in changed {
+            sizes.parametrisations[object] = OnceLock::new();
+        }
+        let charts = sizes.charts.get_mut().unwrap_or_else(PoisonError::into_inner);
+        charts.retain(|(object, _), _| !changed.contains(object));
+        sizes
     }
 
     /// The parametrisation of an object; `None` where it has no area.
     pub fn parametrisation(&self, object: usize) -> Option<&Parametrisation> {
         self.parametrisations[object]
-            .get_or_init(|| parametrise(object, &self.scene.objects[object].mesh, DEFAULT_NOMINAL_SIDE))
+            .get_or_init(|| {
+                let mesh = &self.scene.objects[object].mesh;
+                parametrise(object, mesh, DEFAULT_NOMINAL_SIDE)
+            })
             .as_ref()
     }
 
     /// A chart of the given size.
     pub fn chart(&self, object: usize, (width, height): (usize, usize)) -> Option<Arc<Chart>> {
-        Some(Arc::new(self.parametrisation(object)?.chart(width, height)))
+        let key = (object, (width, height));
+        // Whatever panicked under the lock, the charts in the map are whole.
+        let charts = || self.charts.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(chart) = charts().get(&key) {
+            return Some(Arc::clone(chart));
+        }
+        let chart = Arc::new(self.parametrisation(object)?.chart(width, height));
+        let mut charts = charts();
+        if charts.len() >= MOST_CHARTS {
+            charts.clear();
+        }
+        charts.insert(key, Arc::clone(&chart));
+        Some(chart)
     }
 
     /// How often the map of an object doubles from its first size until texels are no larger than the mean footprint

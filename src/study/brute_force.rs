@@ -22,6 +22,7 @@ use crate::light_pass::caustic::pass::Stopwatch;
 use crate::light_pass::caustic::path::{Arrival, PathLimits, PathTracer};
 use crate::light_pass::caustic::setup::{Aim, AimedLight};
 use crate::light_pass::ledger_sum::{Account, LedgerSum};
+use crate::optics::LinearSrgb;
 use crate::plan::{self, Effect, EffectPlan};
 use crate::progress::{Control, Progress, Stage};
 use crate::scene::Scene;
@@ -123,7 +124,9 @@ fn run(
         result.counts.rays += tally.rays;
         result.counts.segments += tally.segments;
         let name = &scene.lights[light.light].name;
-        result.ledgers.push(tally.ledger.report(name, run.unit));
+        result
+            .ledgers
+            .push(tally.ledger.report(name, run.unit, LinearSrgb::WHITE));
     }
     result.maps = run
         .targets
@@ -209,6 +212,7 @@ impl Run<'_> {
         let mut random = self.generator(light.light, place);
         let mut tally = Tally::default();
         let mut deposited = LedgerSum::default();
+        let strength = self.tracer.scene().lights[light.light].strength() * (1.0 / HALVES as f64);
         let cell_size = DVec2::new(1.0 / size.0 as f64, 1.0 / size.1 as f64);
         for (start, end) in light.item_buffer.lattice_spans(face, row, size) {
             for column in start..end {
@@ -216,7 +220,7 @@ impl Run<'_> {
                 let high = DVec2::new((column + 1) as f64, (row + 1) as f64) * cell_size;
                 let square = low + (high - low) * DVec2::new(random(), random());
                 let ray = light.launch.ray(face, square);
-                let flux_w = light.launch.cell_flux_w(low, high, ray.direction) * (1.0 / HALVES as f64);
+                let flux_w = light.launch.cell_flux_w(low, high, ray.direction) * strength;
                 tally.rays += 1;
                 paths.trace(ray, flux_w, |arrival| {
                     let count = self.unit.count(arrival.flux_w);
@@ -322,7 +326,10 @@ fn targets(scene: &Scene, (width, height): (usize, usize)) -> Vec<Option<Target>
 }
 
 fn unit(scene: &Scene, lights: &[AimedLight]) -> Result<FluxUnit> {
-    let power_w: f64 = lights.iter().map(|light| light.launch.power_bound_w()).sum();
+    let power_w: f64 = lights
+        .iter()
+        .map(|light| light.launch.power_bound_w() * scene.lights[light.light].strength().max_channel())
+        .sum();
     if lights.is_empty() {
         return Ok(FluxUnit::for_power(1.0));
     }

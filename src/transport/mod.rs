@@ -10,4 +10,4 @@ pub mod tracer;
 pub use differential::{RayDerivative, RayDifferential, SurfaceScale};
 pub use interaction::{Branch, Event, Interaction};
 pub use medium::MediumStack;
-pub use tracer::{SurfaceHit, Tracer};
+pub use tracer::{HitPlace, SurfaceHit, Tracer};

@@ -11,17 +11,60 @@ use crate::geometry::{Ray, TriangleBvh, ray};
 use crate::optics::LinearSrgb;
 use crate::scene::Scene;
 
-/// A scene with its hierarchy.
+/// A scene with its hierarchy. What edits of the scene leave as it is, edited copies share.
 #[derive(Debug)]
 pub struct Tracer {
     scene: Arc<Scene>,
+    hierarchy: Arc<Hierarchy>,
+    /// Of specular objects; `None` for the others.
+    specular: Vec<Option<Arc<SpecularShape>>>,
+}
+
+/// The hierarchy over all triangles of a scene.
+#[derive(Debug)]
+struct Hierarchy {
     bvh: TriangleBvh,
     /// Object and triangle within it, by the hierarchy's triangle index.
     triangles: Vec<(u32, u32)>,
-    /// How the normals of specular objects turn; `None` for the others.
-    normal_fields: Vec<Option<NormalField>>,
-    /// Smoothing group of each triangle, by specular object; empty for the others.
-    groups: Vec<Vec<u32>>,
+}
+
+/// What is known of the shape of a specular object.
+#[derive(Debug)]
+struct SpecularShape {
+    /// How its normals turn.
+    normals: NormalField,
+    /// Smoothing group of each triangle.
+    groups: Vec<u32>,
+}
+
+impl Hierarchy {
+    fn new(scene: &Scene) -> Self {
+        let mut corners = Vec::with_capacity(scene.triangle_count());
+        let mut triangles = Vec::with_capacity(scene.triangle_count());
+        for (object, item) in scene.objects.iter().enumerate() {
+            for triangle in 0..item.mesh.triangles.len() {
+                corners.push(item.mesh.corners(triangle));
+                triangles.push((object as u32, triangle as u32));
+            }
+        }
+        Self {
+            bvh: TriangleBvh::build(&corners),
+            triangles,
+        }
+    }
+}
+
+/// The place where a ray met a surface, and nothing that follows from it: what is worth keeping of a hit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HitPlace {
+    /// Index into `Scene::objects`.
+    pub object: u32,
+    /// Index into the object's triangles.
+    pub triangle: u32,
+    /// Of the triangle's corners.
+    pub barycentric: [f64; 3],
+    /// From the ray's origin [m].
+    pub distance_m: f64,
 }
 
 /// A point of a surface that a ray met.
@@ -58,50 +101,71 @@ impl SurfaceHit {
 impl Tracer {
     /// Builds the hierarchy over all triangles of a scene.
     pub fn new(scene: Arc<Scene>) -> Self {
-        let mut corners = Vec::with_capacity(scene.triangle_count());
-        let mut triangles = Vec::with_capacity(scene.triangle_count());
-        for (object, item) in scene.objects.iter().enumerate() {
-            for triangle in 0..item.mesh.triangles.len() {
-                corners.push(item.mesh.corners(triangle));
-                triangles.push((object as u32, triangle as u32));
-            }
-        }
-        let bvh = TriangleBvh::build(&corners);
-        let normal_fields = (0..scene.objects.len())
+        let hierarchy = Arc::new(Hierarchy::new(&scene));
+        let specular = (0..scene.objects.len())
             .into_par_iter()
-            .map(|object| {
-                let specular = scene.material_of(object).surface.is_specular();
-                specular.then(|| NormalField::new(&scene.objects[object].mesh))
-            })
+            .map(|object| Self::specular_shape(&scene, object))
             .collect();
-        let groups = (0..scene.objects.len())
+        Self {
+            scene,
+            hierarchy,
+            specular,
+        }
+    }
+
+    /// For an edited copy of the scene, with the same objects: builds only what the edits changed.
+    #[must_use]
+    pub fn edited(&self, scene: Arc<Scene>) -> Self {
+        let is_same = |object: usize| {
+            let pair = [&self.scene, &scene].map(|scene| &scene.objects[object].mesh);
+            Arc::ptr_eq(pair[0], pair[1])
+        };
+        let count = scene.objects.len();
+        if count != self.scene.objects.len() {
+            return Self::new(scene);
+        }
+        let hierarchy = if (0..count).all(is_same) {
+            Arc::clone(&self.hierarchy)
+        } else {
+            Arc::new(Hierarchy::new(&scene))
+        };
+        let specular = (0..count)
             .into_par_iter()
-            .map(|object| {
-                let specular = scene.material_of(object).surface.is_specular();
-                if specular {
-                    smoothing_groups(&scene.objects[object].mesh)
-                } else {
-                    Vec::new()
+            .map(|object| match &self.specular[object] {
+                Some(shape) if is_same(object) && scene.material_of(object).surface.is_specular() => {
+                    Some(Arc::clone(shape))
                 }
+                _ => Self::specular_shape(&scene, object),
             })
             .collect();
         Self {
             scene,
-            bvh,
-            triangles,
-            normal_fields,
-            groups,
+            hierarchy,
+            specular,
         }
+    }
+
+    fn specular_shape(scene: &Scene, object: usize) -> Option<Arc<SpecularShape>> {
+        let mesh = &scene.objects[object].mesh;
+        scene.material_of(object).surface.is_specular().then(|| {
+            Arc::new(SpecularShape {
+                normals: NormalField::new(mesh),
+                groups: smoothing_groups(mesh),
+            })
+        })
     }
 
     /// How the normals of an object turn; `None` where it is not specular.
     pub fn normal_field(&self, object: usize) -> Option<&NormalField> {
-        self.normal_fields[object].as_ref()
+        self.specular[object].as_ref().map(|shape| &shape.normals)
     }
 
     /// Smoothing group of a triangle within its object; 0 where the object is not specular.
     pub fn smoothing_group(&self, object: usize, triangle: usize) -> u32 {
-        self.groups[object].get(triangle).copied().unwrap_or(0)
+        self.specular[object]
+            .as_ref()
+            .and_then(|shape| shape.groups.get(triangle).copied())
+            .unwrap_or(0)
     }
 
     /// The scene.
@@ -111,14 +175,29 @@ impl Tracer {
 
     /// The hierarchy.
     pub fn bvh(&self) -> &TriangleBvh {
-        &self.bvh
+        &self.hierarchy.bvh
     }
 
     /// The nearest surface in front of the ray's origin.
     pub fn closest_hit(&self, ray: &Ray) -> Option<SurfaceHit> {
-        let hit = self.bvh.closest_hit(ray)?;
-        let (object, triangle) = self.triangles[hit.triangle as usize];
-        let (object, triangle) = (object as usize, triangle as usize);
+        Some(self.surface_at(&self.closest_place(ray)?))
+    }
+
+    /// Where the nearest surface in front of the ray's origin is met.
+    pub fn closest_place(&self, ray: &Ray) -> Option<HitPlace> {
+        let hit = self.hierarchy.bvh.closest_hit(ray)?;
+        let (object, triangle) = self.hierarchy.triangles[hit.triangle as usize];
+        Some(HitPlace {
+            object,
+            triangle,
+            barycentric: hit.barycentric,
+            distance_m: hit.distance_m,
+        })
+    }
+
+    /// The surface at a place that a ray met.
+    pub fn surface_at(&self, hit: &HitPlace) -> SurfaceHit {
+        let (object, triangle) = (hit.object as usize, hit.triangle as usize);
         let mesh = &self.scene.objects[object].mesh;
         let corners = mesh.corners(triangle);
         let (point, point_error) = ray::point_with_error(&corners, hit.barycentric);
@@ -128,7 +207,7 @@ impl Tracer {
         let shading_normal = (a * wa + b * wb + c * wc)
             .try_normalize()
             .unwrap_or(geometric_normal);
-        Some(SurfaceHit {
+        SurfaceHit {
             object,
             triangle,
             barycentric: hit.barycentric,
@@ -137,12 +216,12 @@ impl Tracer {
             point_error,
             geometric_normal,
             shading_normal,
-        })
+        }
     }
 
     /// Whether any surface lies on the ray before `distance_m`.
     pub fn is_blocked(&self, ray: &Ray, distance_m: f64) -> bool {
-        self.bvh.is_blocked(ray, distance_m)
+        self.hierarchy.bvh.is_blocked(ray, distance_m)
     }
 
     /// Base colour of the surface at a hit, its texture included.

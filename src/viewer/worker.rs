@@ -30,7 +30,7 @@ pub trait Baker {
         settings: &BakeSettings,
         progress: &dyn Progress,
         control: &Control,
-        level: &mut dyn FnMut(BakeResult),
+        level: &mut (dyn FnMut(BakeResult) + Send),
     ) -> Result<BakeResult>;
 }
 
@@ -44,7 +44,7 @@ impl Baker for BakeSession {
         settings: &BakeSettings,
         progress: &dyn Progress,
         control: &Control,
-        level: &mut dyn FnMut(BakeResult),
+        level: &mut (dyn FnMut(BakeResult) + Send),
     ) -> Result<BakeResult> {
         Self::bake_levels(self, settings, progress, control, level)
     }
@@ -397,7 +397,7 @@ fn bake<B: Baker>(
     asked: &BakeRequest,
     progress: &dyn Progress,
     control: &Control,
-    level: &mut dyn FnMut(BakeResult),
+    level: &mut (dyn FnMut(BakeResult) + Send),
 ) -> std::result::Result<BakeResult, BakeState> {
     let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
     let settings = BakeSettings {

@@ -1,9 +1,8 @@
 //! Map sizes, and what is not baked.
 
-use nephroid::illumination::IlluminationMap;
 use nephroid::plan::Effect;
-use nephroid::progress::{Control, Progress};
-use nephroid::session::{BakeSession, StopReason};
+use nephroid::progress::Control;
+use nephroid::session::{BakeResult, BakeSession, StopReason};
 use nephroid::settings::{BakeSettings, LayerKind, MapResolution};
 
 use crate::tools::{bake, builtin_scene, energy_fault, map_of, settings};
@@ -50,39 +49,48 @@ fn without_light_or_anything_specular_nothing_is_traced_or_allocated() {
     }
 }
 
-/// Keeps the first picture of a bake.
-#[derive(Default)]
-struct FirstPicture(std::sync::Mutex<Option<Vec<IlluminationMap>>>);
-
-impl Progress for FirstPicture {
-    fn preview(&self, maps: Vec<IlluminationMap>) {
-        self.0.lock().expect("no other listener").get_or_insert(maps);
-    }
-}
-
 #[test]
-fn an_automatic_bake_gives_a_coarse_picture_first() {
+fn whole_pictures_come_before_the_last_one_each_finer_than_the_one_before() {
     let scene = std::sync::Arc::new(builtin_scene("ring"));
-    let first = FirstPicture::default();
     let settings = BakeSettings {
         map_resolution: MapResolution::Auto,
-        ..settings(1e5, 0)
+        density_per_sr: 1e5,
+        ..BakeSettings::default()
     };
     let mut session = BakeSession::new(scene.clone()).expect("a session");
-    let result = session
-        .bake(&settings, &first, &Control::default())
+    let mut levels = Vec::new();
+    let last = session
+        .bake_levels(&settings, &(), &Control::default(), &mut |level| {
+            levels.push(level)
+        })
         .expect("a bake");
-    let preview = first.0.into_inner().expect("no panic").expect("a first picture");
-    let (coarse, fine) = (&preview[0], map_of(&result, &scene, "floor"));
-    assert!(coarse.width() < fine.width());
-    let flux = |map: &IlluminationMap| map.flux_w(LayerKind::Caustic).luminance();
+    assert!(levels.len() >= 3, "{} levels", levels.len());
+    let flux = |result: &BakeResult| {
+        let map = map_of(result, &scene, "floor");
+        map.flux_w(LayerKind::Caustic).luminance()
+    };
+    for level in &levels {
+        assert!(
+            (flux(level) / flux(&last) - 1.0).abs() < 0.01,
+            "{} W",
+            flux(level)
+        );
+    }
+    levels.push(last);
     assert!(
-        (flux(coarse) / flux(fine) - 1.0).abs() < 0.01,
-        "{} W against {} W",
-        flux(coarse),
-        flux(fine)
+        levels[0].counts.rays * 8 < levels[levels.len() - 1].counts.rays,
+        "the first one is coarse"
     );
-    assert_eq!(coarse.width(), coarse.height());
+    let errors: Vec<f64> = levels
+        .iter()
+        .filter_map(|level| level.estimated_relative_rmse)
+        .collect();
+    assert_eq!(
+        errors.len(),
+        levels.len() - 1,
+        "all but the first have an estimate"
+    );
+    assert!(errors.windows(2).all(|pair| pair[1] < pair[0]), "{errors:?}");
 }
 
 #[test]

@@ -328,8 +328,15 @@ fn the_same_bytes_for_any_number_of_threads() {
             .num_threads(threads)
             .build()
             .expect("a pool of threads");
-        let layers =
-            pool.install(|| bake_direct(&tracer, &[&charts[0], &charts[1]], &(), &Control::default()));
+        let layers = pool.install(|| {
+            bake_direct(
+                &tracer,
+                &tracer.scene().lights,
+                &[&charts[0], &charts[1]],
+                &(),
+                &Control::default(),
+            )
+        });
         layers
             .into_iter()
             .map(|layer| (layer.irradiance, layer.shadow_rays))
@@ -350,6 +357,6 @@ fn a_cancelled_bake_says_so() {
     let chart = chart(&tracer, 0, 4, 4);
     let control = Control::default();
     control.cancel();
-    let layers = bake_direct(&tracer, &[&chart], &(), &control);
+    let layers = bake_direct(&tracer, &tracer.scene().lights, &[&chart], &(), &control);
     assert!(!layers[0].complete);
 }

@@ -7,6 +7,7 @@ use nephroid::light_pass::caustic::path::PathLimits;
 use nephroid::light_pass::caustic::setup::Aim;
 use nephroid::light_pass::wavefront::strand::{Landing, Strand};
 use nephroid::light_pass::wavefront::trace::StrandTracer;
+use nephroid::progress::Control;
 use nephroid::scene::builtin;
 use nephroid::settings::ItemBufferKind;
 use nephroid::transport::Tracer;
@@ -27,6 +28,8 @@ fn mismatch(name: &str, step: f64) -> (f64, usize) {
             absorption: false,
         },
         steps: [2.0 * step; 2],
+        kept: None,
+        control: &Control::default(),
     };
     let (mut squares, mut count) = (0.0, 0);
     for face in 0..launch.face_count() {

@@ -86,7 +86,7 @@ impl Baker for Scripted {
         settings: &BakeSettings,
         progress: &dyn Progress,
         control: &Control,
-        level: &mut dyn FnMut(BakeResult),
+        level: &mut (dyn FnMut(BakeResult) + Send),
     ) -> Result<BakeResult> {
         let wait = || {
             let opened = self.gate.lock().expect("one thread").recv_timeout(PATIENCE);

@@ -141,7 +141,7 @@ fn add_all<'a>(
             ledger.book(Account::Unresolved, splat.flux);
         }
     }
-    ledger.book_many(Account::Deposited, deposited);
+    ledger.book_sum(Account::Deposited, deposited);
     ledger
 }
 

@@ -13,7 +13,7 @@ use crate::transport::Tracer;
 pub struct AimedLight {
     /// Index into `Scene::lights`.
     pub light: usize,
-    /// Where its rays start.
+    /// Where its rays start, as of a white light of unit strength: what the real one gives is a scale of that.
     pub launch: Launch,
     /// Which of them are worth tracing.
     pub item_buffer: ItemBuffer,
@@ -51,7 +51,7 @@ impl Aim {
             return aim;
         }
         for (light, source) in scene.lights.iter().enumerate() {
-            let Some(launch) = Launch::new(source, scene, &casters, item_buffer) else {
+            let Some(launch) = Launch::new(&source.of_unit_strength(), scene, &casters, item_buffer) else {
                 aim.casters[light] = Some(Vec::new());
                 continue;
             };

@@ -17,7 +17,7 @@ use crate::illumination::gutter::{fill_gutter, neighbours};
 use crate::illumination::parametrisation::coverage::{Polygon, for_each_texel_in_row, rows};
 use crate::optics::LinearSrgb;
 use crate::progress::{Control, Progress, Stage};
-use crate::scene::Material;
+use crate::scene::{Light, Material};
 use crate::transport::Tracer;
 use facet::Facet;
 use lighting::Arriving;
@@ -44,10 +44,11 @@ pub struct DirectLayer {
     pub complete: bool,
 }
 
-/// Bakes the direct light of all lights of the tracer's scene onto the charts, one layer each. The same for any
-/// number of threads. Progress counts rows over all charts.
+/// Bakes the direct light of some lights onto the charts, one layer each. The same for any number of threads. Progress
+/// counts rows over all charts.
 pub fn bake_direct(
     tracer: &Tracer,
+    lights: &[Light],
     charts: &[&Chart],
     progress: &dyn Progress,
     control: &Control,
@@ -57,12 +58,13 @@ pub fn bake_direct(
     let row_done = || progress.advance(Stage::Direct, done.fetch_add(1, Ordering::Relaxed) + 1, total);
     charts
         .iter()
-        .map(|chart| Baker::new(tracer, chart).bake(&row_done, control))
+        .map(|chart| Baker::new(tracer, lights, chart).bake(&row_done, control))
         .collect()
 }
 
 struct Baker<'a> {
     tracer: &'a Tracer,
+    lights: &'a [Light],
     chart: &'a Chart,
     material: &'a Material,
     /// Triangles that reach each row: those of row r are `triangles[first[r]..first[r + 1]]`.
@@ -71,7 +73,7 @@ struct Baker<'a> {
 }
 
 impl<'a> Baker<'a> {
-    fn new(tracer: &'a Tracer, chart: &'a Chart) -> Self {
+    fn new(tracer: &'a Tracer, lights: &'a [Light], chart: &'a Chart) -> Self {
         let size = DVec2::new(1.0, chart.height as f64);
         let reach = |uvs: &[DVec2; 3]| rows(uvs.map(|uv| uv * size), chart.height);
         let mut first = vec![0; chart.height + 1];
@@ -93,6 +95,7 @@ impl<'a> Baker<'a> {
         }
         Self {
             tracer,
+            lights,
             chart,
             material: tracer.scene().material_of(chart.object),
             first,
@@ -230,7 +233,7 @@ impl<'a> Baker<'a> {
             mask: 0,
             shadow_rays: 0,
         };
-        for (index, light) in self.tracer.scene().lights.iter().enumerate() {
+        for (index, light) in self.lights.iter().enumerate() {
             let Some(arriving) = Arriving::unshadowed(light, &point, self.material) else {
                 continue;
             };

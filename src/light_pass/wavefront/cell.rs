@@ -4,7 +4,7 @@ use glam::DVec2;
 
 use super::band::{Corner, SampleId, Workspace};
 use super::bodies::{DEEPEST_BODY_LEVEL, SmallBodies};
-use super::edge::{Edge, EdgeCutter, Reach, SUSPICION, mismatch};
+use super::edge::{Edge, EdgeCutter, Reach, SUSPICION, may_bulge, mismatch};
 use super::refine::Refinement;
 use super::strand::LightSample;
 use crate::illumination::accumulator::FluxUnit;
@@ -88,7 +88,7 @@ pub struct CellCutter<'a> {
     pub edges: EdgeCutter<'a>,
     /// Of the accounts.
     pub unit: FluxUnit,
-    /// Towards a target error, if there is one.
+    /// Where cells are divided, if anywhere.
     pub refinement: Option<&'a Refinement<'a>>,
     /// What corners alone would miss.
     pub bodies: &'a SmallBodies,
@@ -97,8 +97,10 @@ pub struct CellCutter<'a> {
 /// How often a cell was divided.
 #[derive(Clone, Copy, Debug, Default)]
 struct Depth {
-    /// In all.
-    level: u32,
+    /// Because it, or a cell around it, holds a small body.
+    bodies: u32,
+    /// In rounds of refinement.
+    rounds: usize,
     /// Because its cuts were ambiguous.
     ambiguous: u32,
 }
@@ -142,9 +144,13 @@ impl CellCutter<'_> {
 
     fn cut_at(&self, cell: &Cell, depth: Depth, work: &mut Workspace, out: &mut CellOutput) {
         out.cells += 1;
-        let level = depth.level + 1;
-        if self.is_too_coarse(cell, depth.level, work) {
-            return self.split(cell, Depth { level, ..depth }, work, out);
+        if self.holds_small_body(cell, depth.bodies) {
+            let bodies = depth.bodies + 1;
+            return self.split(cell, Depth { bodies, ..depth }, work, out);
+        }
+        if self.is_too_coarse(cell, depth.rounds, work) {
+            let rounds = depth.rounds + 1;
+            return self.split(cell, Depth { rounds, ..depth }, work, out);
         }
         if cell.edges.iter().all(Option::is_none) {
             return self.whole(cell, work, out);
@@ -152,7 +158,7 @@ impl CellCutter<'_> {
         if self.is_ambiguous(cell, work) {
             return if depth.ambiguous < DEEPEST_SPLIT {
                 let ambiguous = depth.ambiguous + 1;
-                self.split(cell, Depth { level, ambiguous }, work, out)
+                self.split(cell, Depth { ambiguous, ..depth }, work, out)
             } else {
                 self.scatter(cell, work, out)
             };
@@ -191,29 +197,31 @@ impl CellCutter<'_> {
         }
     }
 
-    fn is_too_coarse(&self, cell: &Cell, level: u32, work: &Workspace) -> bool {
+    fn holds_small_body(&self, cell: &Cell, level: u32) -> bool {
         let [low, _, high, _] = cell.corners.map(|corner| corner.square);
         let launch = self.edges.tracer.launch;
-        if level < DEEPEST_BODY_LEVEL && self.bodies.ask_for_finer(launch, self.edges.face, low, high) {
-            return true;
-        }
+        level < DEEPEST_BODY_LEVEL && self.bodies.ask_for_finer(launch, self.edges.face, low, high)
+    }
+
+    fn is_too_coarse(&self, cell: &Cell, rounds_before: usize, work: &Workspace) -> bool {
         let Some(refinement) = self.refinement else {
             return false;
         };
+        let samples = cell.corners.map(|corner| work.get(corner.sample));
+        let brightest_w = samples
+            .iter()
+            .map(|sample| sample.brightest_w)
+            .fold(0.0, f64::max);
         let found = signatures(cell, work, |sample, found| {
             found.extend(sample.strands.iter().map(|strand| strand.signature));
         });
         let strands = found.into_iter().map(|signature| {
-            cell.corners
+            samples
                 .iter()
-                .filter_map(|corner| {
-                    let sample = work.get(corner.sample);
-                    Some((corner.square, &sample.strands[sample.find(signature)?]))
-                })
+                .filter_map(|sample| Some(&sample.strands[sample.find(signature)?]))
                 .collect()
         });
-        let step = cell.step();
-        refinement.is_too_coarse(strands, step.x * step.y, level)
+        refinement.is_too_coarse(strands, brightest_w, rounds_before)
     }
 
     /// All corners agree in everything.
@@ -361,24 +369,39 @@ impl CellCutter<'_> {
         });
         let [bottom, right, top, left] = middles;
         let centre = self.edges.corner(a.square.lerp(c.square, 0.5), work);
-        let mut half = |edge: usize, second: bool, from: Corner, to: Corner| {
+        let mut half = |edge: usize, second: bool, ends: [Corner; 2], beyond: [Corner; 2]| {
             let (low, high) = if second { (0.5, 1.0) } else { (0.0, 0.5) };
-            let known = match &cell.edges[edge] {
-                Some(edge) if edge.at(0.5).is_some() => edge.part(low, high),
-                _ => Edge::plain(from.sample, to.sample),
-            };
-            self.finish_edge(known, from, to, work)
+            match &cell.edges[edge] {
+                Some(edge) if edge.at(0.5).is_some() => {
+                    let known = edge.part(low, high);
+                    self.finish_edge(known, ends, work)
+                }
+                _ => self.new_edge(ends, &[beyond], work),
+            }
         };
         let halves = [
-            [half(0, false, a, bottom), half(0, true, bottom, b)],
-            [half(1, false, b, right), half(1, true, right, c)],
-            [half(2, false, d, top), half(2, true, top, c)],
-            [half(3, false, a, left), half(3, true, left, d)],
+            [
+                half(0, false, [a, bottom], [left, centre]),
+                half(0, true, [bottom, b], [centre, right]),
+            ],
+            [
+                half(1, false, [b, right], [bottom, centre]),
+                half(1, true, [right, c], [centre, top]),
+            ],
+            [
+                half(2, false, [d, top], [left, centre]),
+                half(2, true, [top, c], [centre, right]),
+            ],
+            [
+                half(3, false, [a, left], [bottom, centre]),
+                half(3, true, [left, d], [centre, top]),
+            ],
         ];
-        let mut inner =
-            |from: Corner, to: Corner| self.finish_edge(Edge::plain(from.sample, to.sample), from, to, work);
-        let (down, up) = (inner(bottom, centre), inner(centre, top));
-        let (west, east) = (inner(left, centre), inner(centre, right));
+        let mut inner = |ends: [Corner; 2], beyond: [[Corner; 2]; 2]| self.new_edge(ends, &beyond, work);
+        let down = inner([bottom, centre], [[a, left], [b, right]]);
+        let up = inner([centre, top], [[left, d], [right, c]]);
+        let west = inner([left, centre], [[a, bottom], [d, top]]);
+        let east = inner([centre, right], [[bottom, b], [top, c]]);
         let [[b0, b1], [r0, r1], [t0, t1], [l0, l1]] = halves;
         let children = [
             ([a, bottom, centre, left], [b0, down.clone(), west.clone(), l0]),
@@ -391,7 +414,16 @@ impl CellCutter<'_> {
         }
     }
 
-    fn finish_edge(&self, mut edge: Edge, from: Corner, to: Corner, work: &mut Workspace) -> Option<Edge> {
+    /// An edge within a cell, with pairs of samples on either side of it.
+    fn new_edge(&self, ends: [Corner; 2], beyond: &[[Corner; 2]], work: &mut Workspace) -> Option<Edge> {
+        let samples = |corners: [Corner; 2]| corners.map(|corner| work.get(corner.sample));
+        let bulges = beyond
+            .iter()
+            .any(|&beyond| may_bulge(samples(ends), samples(beyond)));
+        self.edges.edge(ends, bulges, work)
+    }
+
+    fn finish_edge(&self, mut edge: Edge, [from, to]: [Corner; 2], work: &mut Workspace) -> Option<Edge> {
         let step = to.square - from.square;
         if edge.samples.len() == 2 && Edge::is_plain(work.get(from.sample), work.get(to.sample), step) {
             return None;

@@ -161,6 +161,17 @@ impl Edge {
         }
     }
 
+    /// Two edges of equal length as one.
+    fn followed_by(&self, next: &Self) -> Self {
+        let first = self.samples.iter().map(|(place, sample)| (0.5 * place, *sample));
+        let second = next.samples.iter().skip(1);
+        Self {
+            samples: first
+                .chain(second.map(|(place, sample)| (0.5 + 0.5 * place, *sample)))
+                .collect(),
+        }
+    }
+
     /// Sample at a place, where there is one.
     pub fn at(&self, place: f64) -> Option<SampleId> {
         self.samples
@@ -238,6 +249,26 @@ impl Edge {
     }
 }
 
+/// Light below this share of the brightest does not make a bulge.
+const BULGE_SHARE: f64 = 0.1;
+
+/// Whether a border of some light may bulge over an edge that has it at both ends or at neither, as it lies between the
+/// edge and two samples beyond it.
+pub fn may_bulge(ends: [&LightSample; 2], beyond: [&LightSample; 2]) -> bool {
+    let all = [ends[0], ends[1], beyond[0], beyond[1]];
+    let brightest_w = all.iter().map(|sample| sample.brightest_w).fold(0.0, f64::max);
+    let has = |sample: &LightSample, signature| sample.find(signature).is_some();
+    // The border has the light on one side: one of the ends, or one of those beyond.
+    [ends[0], beyond[0]].into_iter().any(|sample| {
+        let bright = |strand: &&Strand| strand.flux_w.luminance() > BULGE_SHARE * brightest_w;
+        sample.strands.iter().filter(bright).any(|strand| {
+            let here = ends.map(|sample| has(sample, strand.signature));
+            let there = beyond.map(|sample| has(sample, strand.signature));
+            here[0] == here[1] && there[0] == there[1] && here[0] != there[0]
+        })
+    })
+}
+
 /// Bisects edges of one face.
 #[derive(Clone, Copy, Debug)]
 pub struct EdgeCutter<'a> {
@@ -289,6 +320,29 @@ impl EdgeCutter<'_> {
                 self.bracket_change(edge, ends, signature, bits, work);
             }
         }
+    }
+
+    /// An edge between two places of the unit square, cut wherever the way of light changes along it; `None` where it
+    /// does not. `bulges`: whether something may reach over it that its ends do not tell.
+    pub fn edge(&self, ends: [Corner; 2], bulges: bool, work: &mut Workspace) -> Option<Edge> {
+        let [a, b] = ends;
+        if bulges {
+            let middle = self.corner(a.square.lerp(b.square, 0.5), work);
+            let halves = [[a, middle], [middle, b]].map(|half| self.edge(half, false, work));
+            if !halves.iter().all(Option::is_none) {
+                let [low, high] = halves;
+                let low = low.unwrap_or_else(|| Edge::plain(a.sample, middle.sample));
+                let high = high.unwrap_or_else(|| Edge::plain(middle.sample, b.sample));
+                return Some(low.followed_by(&high));
+            }
+        }
+        let step = b.square - a.square;
+        if Edge::is_plain(work.get(a.sample), work.get(b.sample), step) {
+            return None;
+        }
+        let mut edge = Edge::plain(a.sample, b.sample);
+        self.resolve(&mut edge, [a.square, b.square], work);
+        Some(edge)
     }
 
     fn has(sample: &LightSample, signature: PathSignature) -> bool {

@@ -6,7 +6,8 @@ use rayon::prelude::*;
 use super::band::{Corner, SampleId, Samples, Workspace};
 use super::bodies::SmallBodies;
 use super::cell::{Cell, CellCutter, CellOutput, Patch};
-use super::edge::{Edge, EdgeCutter};
+use super::edge::{Edge, EdgeCutter, may_bulge};
+use super::kept_rays::{FreshRay, KeptRays};
 use super::refine::Refinement;
 use super::strand::LightSample;
 use super::trace::StrandTracer;
@@ -28,7 +29,7 @@ pub struct WavefrontLattice<'a> {
     pub size: (usize, usize),
     /// Of the accounts.
     pub unit: FluxUnit,
-    /// Towards a target error, if there is one.
+    /// Where it is finer, if anywhere.
     pub refinement: Option<&'a Refinement<'a>>,
     /// What corners alone would miss.
     pub bodies: &'a SmallBodies,
@@ -43,7 +44,9 @@ pub struct TracedBand {
     pub patches: Vec<Vec<Patch>>,
     /// What surfaces did with the light on its way.
     pub ledger: LedgerSum,
-    /// Light rays.
+    /// What rays met that were not known before, in no order that matters.
+    pub fresh: Vec<FreshRay>,
+    /// Light rays for which something had to be searched.
     pub rays: u64,
     /// Closest-hit queries.
     pub segments: u64,
@@ -81,6 +84,13 @@ impl TracedBand {
 }
 
 impl WavefrontLattice<'_> {
+    /// The same lattice with rays that were traced before.
+    pub fn knowing<'b>(&'b self, kept: &'b KeptRays) -> WavefrontLattice<'b> {
+        let mut lattice: WavefrontLattice<'b> = *self;
+        lattice.tracer.kept = Some(kept);
+        lattice
+    }
+
     /// Lattice cells that touch a marked cell of the item buffer.
     pub fn cell_count(&self) -> u64 {
         self.item_buffer
@@ -132,7 +142,7 @@ impl WavefrontLattice<'_> {
             .into_par_iter()
             .map(|row| {
                 let mut work = Workspace::new(&samples, rows + 1 + row);
-                let edges = self.edges_across(face, band.0 + row, row, &index[row], &mut work);
+                let edges = self.edges_across(face, (band.0, row), &index, &mut work);
                 (edges, work.own)
             })
             .collect();
@@ -147,8 +157,8 @@ impl WavefrontLattice<'_> {
                 let mut work = Workspace::new(&samples, 2 * (rows + 1) + row);
                 let output = self.cut_row(
                     face,
-                    (band.0 + row, row),
-                    [&index[row], &index[row + 1]],
+                    (band.0, row),
+                    &index,
                     [&edges[row], &edges[row + 1]],
                     &mut work,
                 );
@@ -163,9 +173,10 @@ impl WavefrontLattice<'_> {
             traced.splats += output.splats;
             traced.patches.push(output.patches);
         }
-        for sample in samples.chunks.iter().flatten() {
-            traced.rays += 1;
+        for sample in samples.chunks.iter_mut().flatten() {
+            traced.rays += u64::from(sample.segments > 0);
             traced.segments += u64::from(sample.segments);
+            traced.fresh.extend(sample.fresh.take().map(|fresh| *fresh));
         }
         traced.samples = samples;
         traced
@@ -194,91 +205,87 @@ impl WavefrontLattice<'_> {
         traced
     }
 
-    /// Edges along a row of corners; `None` where nothing changes along one.
+    /// Edges along row `row` of the band's corners; `None` where nothing changes along one.
     fn edges_across(
         &self,
         face: usize,
-        row: usize,
-        chunk: usize,
-        index: &[u32],
+        (first_row, row): (usize, usize),
+        index: &[Vec<u32>],
         work: &mut Workspace,
     ) -> Vec<Option<Edge>> {
+        let corner = |row: usize, column: usize| self.corner_at(first_row, row, column, index);
+        let beside = [row.checked_sub(1), Some(row + 1).filter(|row| *row < index.len())];
         (0..self.size.0)
             .map(|column| {
-                let (a, b) = (index[column], index[column + 1]);
-                if a == NONE || b == NONE {
-                    return None;
-                }
-                let id = |index: u32| SampleId {
-                    chunk: chunk as u32,
-                    index,
-                };
-                let ends = [self.square(column, row), self.square(column + 1, row)];
-                self.edge(face, [id(a), id(b)], ends, work)
+                let ends = [corner(row, column)?, corner(row, column + 1)?];
+                let bulges = beside.iter().flatten().any(|&row| {
+                    let beyond = [corner(row, column), corner(row, column + 1)];
+                    may_bulge_over(ends, beyond, work)
+                });
+                self.edge_cutter(face).edge(ends, bulges, work)
             })
             .collect()
     }
 
-    fn edge(
-        &self,
-        face: usize,
-        [a, b]: [SampleId; 2],
-        ends: [DVec2; 2],
-        work: &mut Workspace,
-    ) -> Option<Edge> {
-        if Edge::is_plain(work.get(a), work.get(b), ends[1] - ends[0]) {
-            return None;
-        }
-        let mut edge = Edge::plain(a, b);
-        let cutter = EdgeCutter {
+    /// A traced corner of a band whose first row is `first_row`; `None` where there is none.
+    fn corner_at(&self, first_row: usize, row: usize, column: usize, index: &[Vec<u32>]) -> Option<Corner> {
+        let place = *index[row].get(column)?;
+        (place != NONE).then(|| Corner {
+            square: self.square(column, first_row + row),
+            sample: SampleId {
+                chunk: row as u32,
+                index: place,
+            },
+        })
+    }
+
+    fn edge_cutter(&self, face: usize) -> EdgeCutter<'_> {
+        EdgeCutter {
             tracer: &self.tracer,
             face,
-        };
-        cutter.resolve(&mut edge, ends, work);
-        Some(edge)
+        }
     }
 
     fn cut_row(
         &self,
         face: usize,
-        (row, chunk): (usize, usize),
-        index: [&[u32]; 2],
+        (first_row, row): (usize, usize),
+        index: &[Vec<u32>],
         across: [&[Option<Edge>]; 2],
         work: &mut Workspace,
     ) -> CellOutput {
         let mut output = CellOutput::default();
         let cutter = CellCutter {
-            edges: EdgeCutter {
-                tracer: &self.tracer,
-                face,
-            },
+            edges: self.edge_cutter(face),
             unit: self.unit,
             refinement: self.refinement,
             bodies: self.bodies,
         };
-        for (start, end) in self.spans(face, row) {
-            let corner = |column: usize, upper: usize| Corner {
-                square: self.square(column, row + upper),
-                sample: SampleId {
-                    chunk: (chunk + upper) as u32,
-                    index: index[upper][column],
-                },
-            };
-            let down = |column: usize, work: &mut Workspace| {
-                let (a, b) = (corner(column, 0), corner(column, 1));
-                self.edge(face, [a.sample, b.sample], [a.square, b.square], work)
-            };
+        let corner = |row: usize, column: usize| self.corner_at(first_row, row, column, index);
+        let down = |column: usize, work: &mut Workspace| {
+            let ends = [corner(row, column)?, corner(row + 1, column)?];
+            let bulges = [column.checked_sub(1), Some(column + 1)]
+                .into_iter()
+                .flatten()
+                .any(|column| may_bulge_over(ends, [corner(row, column), corner(row + 1, column)], work));
+            cutter.edges.edge(ends, bulges, work)
+        };
+        for (start, end) in self.spans(face, first_row + row) {
             let mut left = down(start, work);
-            #[allow(clippy::needless_range_loop, reason = "columns name corners of four slices")]
+            #[allow(clippy::needless_range_loop, reason = "columns name corners of both rows")]
             for column in start..end {
                 let right = down(column + 1, work);
+                let corners = [
+                    corner(row, column),
+                    corner(row, column + 1),
+                    corner(row + 1, column + 1),
+                    corner(row + 1, column),
+                ];
+                let [Some(a), Some(b), Some(c), Some(d)] = corners else {
+                    continue;
+                };
                 let cell = Cell {
-                    corners: [
-                        corner(column, 0),
-                        corner(column + 1, 0),
-                        corner(column + 1, 1),
-                        corner(column, 1),
-                    ],
+                    corners: [a, b, c, d],
                     edges: [
                         across[0][column].clone(),
                         right.clone(),
@@ -303,4 +310,13 @@ impl WavefrontLattice<'_> {
             output.ledger.book(Account::NotEmitted, self.unit.count(missed_w));
         }
     }
+}
+
+/// Whether something may bulge over an edge from two corners beyond it.
+fn may_bulge_over(ends: [Corner; 2], beyond: [Option<Corner>; 2], work: &Workspace) -> bool {
+    let [Some(a), Some(b)] = beyond else {
+        return false;
+    };
+    let samples = |corners: [Corner; 2]| corners.map(|corner| work.get(corner.sample));
+    may_bulge(samples(ends), samples([a, b]))
 }

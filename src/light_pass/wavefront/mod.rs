@@ -7,6 +7,7 @@ pub mod cell;
 pub mod coverage;
 mod division;
 pub mod edge;
+pub mod kept_rays;
 pub mod lattice;
 mod mesh;
 pub mod pass;

@@ -3,13 +3,14 @@
 use rayon::prelude::*;
 
 use super::coverage::{FluxTriangle, deposit_triangles};
+use super::kept_rays::KeptRays;
 use super::lattice::{TracedBand, WavefrontLattice};
 use super::receivers::Receivers;
 use super::spread::{SpreadOutput, Spreader};
 use crate::light_pass::caustic::pass::{Listener, PassReport, Stopwatch};
 use crate::light_pass::ledger_sum::Account;
 use crate::light_pass::receiver_maps::{ChartFor, ReceiverMaps};
-use crate::progress::Stage;
+use crate::progress::{Control, Stage};
 
 /// Patches that one task spreads.
 const PATCHES_PER_TASK: usize = 128;
@@ -31,6 +32,15 @@ impl TracedLight {
     }
 }
 
+/// Memory that a run may take beyond its end [bytes].
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Room {
+    /// For bands.
+    pub bands_bytes: u64,
+    /// For all rays, those of earlier runs included.
+    pub rays_bytes: u64,
+}
+
 /// How patches go to maps.
 #[derive(Clone, Copy)]
 pub struct WavefrontDepositor<'a> {
@@ -47,13 +57,14 @@ pub struct WavefrontDepositor<'a> {
 }
 
 impl WavefrontDepositor<'_> {
-    /// Traces and deposits a whole lattice. Bands are kept in `kept` while they take less than `keep_bytes`; beyond
-    /// that all are dropped, and `kept` is `None`.
+    /// Traces and deposits a whole lattice. Bands are given back where they take less than `room.bands_bytes`; what
+    /// rays met is added to `rays`. A cancelled run is to be thrown away, all but its rays.
     pub fn run(
         &self,
+        rays: &mut KeptRays,
         maps: Option<&mut ReceiverMaps>,
         listener: &Listener,
-        keep_bytes: u64,
+        room: Room,
     ) -> (PassReport, Option<TracedLight>) {
         let mut report = PassReport::default();
         let mut kept = Some(TracedLight::default());
@@ -61,20 +72,23 @@ impl WavefrontDepositor<'_> {
         let mut maps = maps;
         for face in 0..self.lattice.tracer.launch.face_count() {
             for rows in self.lattice.bands(face) {
+                let watch = Stopwatch::start();
+                let mut band = self.lattice.knowing(rays).trace(face, rows);
+                for fresh in band.fresh.drain(..) {
+                    rays.insert(fresh, room.rays_bytes);
+                }
+                report.trace_s.add(watch.elapsed());
+                report.count_traced(&band);
+                self.deposit(&band, maps.as_deref_mut(), listener.control, &mut report);
                 if listener.control.is_cancelled() {
                     report.cancelled = true;
                     return (report, None);
                 }
-                let watch = Stopwatch::start();
-                let band = self.lattice.trace(face, rows);
-                report.trace_s.add(watch.elapsed());
-                report.count_traced(&band);
-                self.deposit(&band, maps.as_deref_mut(), &mut report);
                 listener
                     .progress
                     .advance(Stage::Caustic, listener.done + report.rays, listener.total);
                 kept_bytes += band.bytes();
-                if kept_bytes > keep_bytes {
+                if kept_bytes > room.bands_bytes {
                     kept = None;
                 }
                 if let Some(kept) = &mut kept {
@@ -94,20 +108,26 @@ impl WavefrontDepositor<'_> {
     ) -> PassReport {
         let mut report = PassReport::default();
         for band in &traced.bands {
+            report.ledger.merge(&band.ledger);
+            report.cells += band.cells;
+            report.splats += band.splats;
+            self.deposit(band, Some(&mut *maps), listener.control, &mut report);
             if listener.control.is_cancelled() {
                 report.cancelled = true;
                 return report;
             }
-            report.ledger.merge(&band.ledger);
-            report.cells += band.cells;
-            report.splats += band.splats;
-            self.deposit(band, Some(&mut *maps), &mut report);
         }
         report
     }
 
     /// Spreads a band's patches and adds them to the maps; without maps, only counts.
-    fn deposit(&self, band: &TracedBand, maps: Option<&mut ReceiverMaps>, report: &mut PassReport) {
+    fn deposit(
+        &self,
+        band: &TracedBand,
+        maps: Option<&mut ReceiverMaps>,
+        control: &Control,
+        report: &mut PassReport,
+    ) {
         let watch = Stopwatch::start();
         let spreader = Spreader {
             receivers: self.receivers,
@@ -128,7 +148,7 @@ impl WavefrontDepositor<'_> {
                 .par_iter()
                 .map(|patches| {
                     let mut output = SpreadOutput::default();
-                    for patch in *patches {
+                    for patch in patches.iter().take_while(|_| !control.is_cancelled()) {
                         spreader.spread(patch, &mut output);
                     }
                     output

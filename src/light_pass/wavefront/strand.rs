@@ -2,6 +2,7 @@
 
 use glam::{DVec2, DVec3};
 
+use super::kept_rays::FreshRay;
 use crate::geometry::Ray;
 use crate::light_pass::caustic::path::PathSignature;
 use crate::optics::LinearSrgb;
@@ -112,8 +113,10 @@ pub struct LightSample {
     pub not_emitted: LinearSrgb,
     /// Largest flux of any strand, luminance [W per unit square].
     pub brightest_w: f64,
-    /// Closest-hit queries.
+    /// Closest-hit queries; 0 where all that it met was known.
     pub segments: u32,
+    /// What it met, where not all of that was known.
+    pub fresh: Option<Box<FreshRay>>,
 }
 
 impl LightSample {

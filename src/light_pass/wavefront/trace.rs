@@ -2,13 +2,16 @@
 
 use glam::DVec2;
 
+use super::kept_rays::{FreshRay, KeptHit, KeptRays, Known, RayKey};
 use super::strand::{Landing, LightSample, Strand, SurfaceNode};
 use crate::geometry::Ray;
 use crate::light_pass::caustic::path::{PathLimits, PathSignature};
 use crate::light_pass::launch::Launch;
 use crate::optics::LinearSrgb;
+use crate::progress::Control;
 use crate::transport::{
-    Branch, Interaction, MediumStack, RayDerivative, RayDifferential, SurfaceHit, SurfaceScale, Tracer,
+    Branch, HitPlace, Interaction, MediumStack, RayDerivative, RayDifferential, SurfaceHit, SurfaceScale,
+    Tracer,
 };
 
 /// Strands that one light ray may have waiting: a closed mirror box with glass in it doubles them without end.
@@ -28,6 +31,10 @@ pub struct StrandTracer<'a> {
     pub limits: PathLimits,
     /// Distance between neighbouring rays, in units of the unit square.
     pub steps: [f64; 2],
+    /// What was traced before.
+    pub kept: Option<&'a KeptRays>,
+    /// Asks to stop: then rays end at once, and what they give is to be thrown away.
+    pub control: &'a Control,
 }
 
 /// A ray that waits to be followed.
@@ -41,6 +48,16 @@ struct Waiting {
     depth: u32,
     /// Index of its strand; none for the light's own ray.
     strand: Option<usize>,
+    /// Whether it is the very ray that a kept one was, as long as there is a kept one.
+    is_known: bool,
+}
+
+/// What a light ray meets: as it is kept, or as a search finds it.
+struct Search<'a> {
+    known: Option<Known<'a>>,
+    hits: Vec<KeptHit>,
+    /// Closest-hit queries.
+    searches: u32,
 }
 
 impl StrandTracer<'_> {
@@ -49,6 +66,15 @@ impl StrandTracer<'_> {
         // Just within the domain: its border may be the very border of a surface.
         let square = square.clamp(DVec2::splat(DOMAIN_MARGIN), DVec2::splat(1.0 - DOMAIN_MARGIN));
         let mut sample = LightSample::default();
+        if self.control.is_cancelled() {
+            return sample;
+        }
+        let key = RayKey::new(face, square);
+        let mut search = Search {
+            known: self.kept.and_then(|kept| kept.get(&key)),
+            hits: Vec::new(),
+            searches: 0,
+        };
         let (ray, differential) = self.launch.ray_with_differential(face, square);
         let flux_w = self.launch.flux_density_w(square, ray.direction);
         if !(flux_w.is_finite() && flux_w.max_channel() > 0.0) {
@@ -63,9 +89,17 @@ impl StrandTracer<'_> {
             signature: PathSignature::default(),
             depth: 0,
             strand: None,
+            is_known: search.known.is_some(),
         }];
         while let Some(next) = waiting.pop() {
-            self.step(&next, floor_w, &mut sample, &mut waiting);
+            self.step(next, floor_w, &mut search, &mut sample, &mut waiting);
+        }
+        sample.segments = search.searches;
+        if search.searches > 0 {
+            sample.fresh = Some(Box::new(FreshRay {
+                key,
+                hits: search.hits.into_boxed_slice(),
+            }));
         }
         sample.strands.sort_by_key(|strand| strand.signature);
         sample.nodes.sort_by_key(|node| node.signature);
@@ -77,9 +111,17 @@ impl StrandTracer<'_> {
         sample
     }
 
-    fn step(&self, from: &Waiting, floor_w: f64, sample: &mut LightSample, waiting: &mut Vec<Waiting>) {
-        sample.segments += 1;
-        let Some(hit) = self.tracer.closest_hit(&from.ray) else {
+    fn step(
+        &self,
+        from: Waiting,
+        floor_w: f64,
+        search: &mut Search,
+        sample: &mut LightSample,
+        waiting: &mut Vec<Waiting>,
+    ) {
+        let (place, is_known) = search.closest(self.tracer, &from);
+        let from = &Waiting { is_known, ..from };
+        let Some(hit) = place.map(|place| self.tracer.surface_at(&place)) else {
             if from.strand.is_none() {
                 sample.not_emitted = from.flux_w;
             }
@@ -196,6 +238,7 @@ fn push(
         signature,
         depth: from.depth + 1,
         strand: Some(sample.strands.len()),
+        is_known: from.is_known,
     });
     sample.strands.push(Strand {
         signature,
@@ -207,6 +250,28 @@ fn push(
         from_group: surface.1,
         landing: Landing::Escaped,
     });
+}
+
+impl Search<'_> {
+    /// Where a segment ends, and whether what goes on from there is as it was when it was kept.
+    fn closest(&mut self, tracer: &Tracer, from: &Waiting) -> (Option<HitPlace>, bool) {
+        let known = self.known.filter(|_| from.is_known);
+        let kept = known.and_then(|known| known.hit(from.signature));
+        let place = match (known, kept) {
+            (Some(known), Some(kept)) if known.holds(&from.ray, kept) => kept,
+            _ => {
+                self.searches += 1;
+                tracer.closest_place(&from.ray)
+            }
+        };
+        let is_known = kept == Some(place)
+            && known.is_some_and(|known| place.is_none_or(|place| known.leaves_alike(place.object)));
+        self.hits.push(KeptHit {
+            signature: from.signature,
+            place,
+        });
+        (place, is_known)
+    }
 }
 
 fn landing(hit: &SurfaceHit, is_receiver: bool) -> Landing {

@@ -1,0 +1,292 @@
+//! How good maps are, without a reference: from the differences between maps of nested lattices.
+//!
+//! Let I be the map of a lattice, I₂ that of the lattice with steps of twice the length, I₄ the next. The errors of
+//! neighbouring levels turn out to be independent (they come from where cuts and cells happen to lie), so that
+//! ⟨(I − I₂)²⟩ = e²(1 + R²), R = e₂/e. R = 2 is what light cut along lines gives (first order); it is also measured, as
+//! √(⟨(I₂ − I₄)²⟩/⟨(I − I₂)²⟩). One measurement of a ratio is noisy: R is the geometric mean of both.
+//!
+//! Neither level can see what both miss, and a difference does not see what all levels share: what was given up on
+//! the way (threshold, depth, no place) is added by its watts.
+
+use std::collections::BTreeMap;
+
+use super::ledger::EnergyLedger;
+use super::receiver_maps::ReceiverMaps;
+use super::wavefront::refine::{RoughTiles, TILE_SIDE, TileSet, tile_counts};
+use crate::illumination::Chart;
+use crate::illumination::accumulator::FluxUnit;
+
+/// Error ratio of neighbouring levels before it is measured: first order.
+const PRIOR_RATIO: f64 = 2.0;
+
+/// Measured ratios are taken to lie between these.
+const RATIO_RANGE: (f64, f64) = (1.5, 6.0);
+
+/// A texel's error is that of the texels around it up to this many texels away.
+const WINDOW_TEXELS: usize = 2;
+
+/// Irradiance of one map, for estimates.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Image {
+    /// Texels across.
+    pub width: usize,
+    /// Texels down.
+    pub height: usize,
+    /// Luminance of E, row by row [W/m², of a light of unit strength].
+    pub luminance: Vec<f64>,
+    /// Area under each texel [m²]; a single value where all are alike.
+    pub texel_areas_m2: Vec<f64>,
+}
+
+/// Maps of one level, by object.
+pub type Images = BTreeMap<usize, Image>;
+
+/// What is known of the error of one map.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MapError {
+    /// Of the map [texels].
+    pub size: (usize, usize),
+    /// Expected error of each texel's luminance [W/m², of a light of unit strength]: root of variance and squared bias.
+    pub texels: Vec<f64>,
+    /// Squared error times area, summed over each tile [W²/m²].
+    pub tiles: Vec<f64>,
+}
+
+/// What is known of the error of all maps of one light.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct LightError {
+    /// By object.
+    pub maps: BTreeMap<usize, MapError>,
+    /// Root mean square of the error over the mean irradiance, over all texels by their area.
+    pub relative_rmse: f64,
+    /// How many times smaller the error became with the last level.
+    pub ratio: f64,
+}
+
+/// Luminance of all maps.
+pub fn images(maps: &ReceiverMaps, unit: FluxUnit) -> Images {
+    maps.iter()
+        .map(|(object, map)| {
+            let chart = &map.chart;
+            let luminance = map
+                .flux()
+                .texels()
+                .iter()
+                .enumerate()
+                .map(|(texel, &count)| {
+                    let area_m2 = chart.texel_area_m2(texel);
+                    if area_m2 > 0.0 {
+                        unit.flux_w(count).luminance() / area_m2
+                    } else {
+                        0.0
+                    }
+                })
+                .collect();
+            (object, Image::new(chart, luminance))
+        })
+        .collect()
+}
+
+impl Image {
+    fn new(chart: &Chart, luminance: Vec<f64>) -> Self {
+        Self {
+            width: chart.width,
+            height: chart.height,
+            luminance,
+            texel_areas_m2: chart.texel_areas_m2.clone(),
+        }
+    }
+
+    fn area_m2(&self, texel: usize) -> f64 {
+        if self.texel_areas_m2.len() == 1 {
+            self.texel_areas_m2[0]
+        } else {
+            self.texel_areas_m2[texel]
+        }
+    }
+
+    fn tile_of(&self, texel: usize) -> usize {
+        let (columns, _) = tile_counts(self.width, self.height);
+        texel / self.width / TILE_SIDE * columns + texel % self.width / TILE_SIDE
+    }
+
+    /// Flux [W] and area [m²] of all texels.
+    fn sums(&self) -> (f64, f64) {
+        (0..self.luminance.len()).fold((0.0, 0.0), |(flux, area), texel| {
+            let texel_m2 = self.area_m2(texel);
+            (flux + self.luminance[texel] * texel_m2, area + texel_m2)
+        })
+    }
+
+    /// Squared differences from another map of the same surface, texel by texel; from black where there is none.
+    fn squared_difference(&self, other: Option<&Self>) -> Vec<f64> {
+        let square = |(texel, value): (usize, &f64)| {
+            let before = other.map_or(0.0, |other| other.luminance[texel]);
+            (value - before) * (value - before)
+        };
+        self.luminance.iter().enumerate().map(square).collect()
+    }
+
+    /// Sums over tiles, each texel by its area.
+    fn tile_sums(&self, squares: &[f64]) -> Vec<f64> {
+        let (columns, rows) = tile_counts(self.width, self.height);
+        let mut sums = vec![0.0; columns * rows];
+        for (texel, square) in squares.iter().enumerate() {
+            sums[self.tile_of(texel)] += square * self.area_m2(texel);
+        }
+        sums
+    }
+
+    /// Means over a square window around each texel; borders repeat nothing.
+    fn windowed(&self, squares: &[f64]) -> Vec<f64> {
+        let across = window_means(squares, self.width, 1, self.height, self.width);
+        window_means(&across, self.height, self.width, self.width, 1)
+    }
+}
+
+/// Means along lines of `length` values `step` apart; `lines` of them begin `apart`.
+fn window_means(values: &[f64], length: usize, step: usize, lines: usize, apart: usize) -> Vec<f64> {
+    let mut means = vec![0.0; values.len()];
+    for line in 0..lines {
+        for index in 0..length {
+            let low = index.saturating_sub(WINDOW_TEXELS);
+            let high = (index + WINDOW_TEXELS).min(length - 1);
+            let sum: f64 = (low..=high).map(|i| values[line * apart + i * step]).sum();
+            means[line * apart + index * step] = sum / (high - low + 1) as f64;
+        }
+    }
+    means
+}
+
+/// What the round before this one knew, where this one refined only some tiles.
+#[derive(Clone, Copy, Debug)]
+pub struct Before<'a> {
+    /// Its error.
+    pub error: &'a LightError,
+    /// Where this round is finer.
+    pub refined: &'a RoughTiles,
+}
+
+/// The error of `fine` by the two coarser levels before it (`coarser[0]` the nearer one; the other may be missing).
+/// Tiles that were not refined keep their error of before. `None` where no light arrived.
+pub fn estimate(
+    fine: &Images,
+    coarser: [Option<&Images>; 2],
+    before: Option<Before>,
+    ledger: &EnergyLedger,
+) -> Option<LightError> {
+    let middle = coarser[0]?;
+    let is_refined = |object: usize, tile: usize| {
+        before.is_none_or(|before| {
+            let tiles = before.refined.get(&object);
+            tiles.is_some_and(|tiles| tiles.is_chosen(tile))
+        })
+    };
+    let differences: BTreeMap<usize, (Vec<f64>, Vec<f64>)> = fine
+        .iter()
+        .map(|(&object, image)| {
+            let squares = image.squared_difference(middle.get(&object));
+            let tiles = image.tile_sums(&squares);
+            (object, (squares, tiles))
+        })
+        .collect();
+    let ratio = match (coarser[1], before) {
+        (Some(coarse), None) => measured_ratio(middle, coarse, &differences),
+        // Later rounds go on as the first ones did: their tiles differ from round to round.
+        (_, Some(before)) => before.error.ratio,
+        (None, None) => PRIOR_RATIO,
+    };
+    let share = 1.0 / (1.0 + ratio * ratio);
+    let mut error = LightError {
+        ratio,
+        ..LightError::default()
+    };
+    let (mut squares_sum, mut flux_w, mut area_m2) = (0.0, 0.0, 0.0);
+    for (&object, image) in fine {
+        let (squares, tile_sums) = &differences[&object];
+        let old = before.and_then(|before| before.error.maps.get(&object));
+        let windowed = image.windowed(squares);
+        let texels = (0..windowed.len()).map(|texel| match old {
+            Some(old) if !is_refined(object, image.tile_of(texel)) => old.texels[texel],
+            _ => (windowed[texel] * share).sqrt(),
+        });
+        let tiles: Vec<f64> = (0..tile_sums.len())
+            .map(|tile| match old {
+                Some(old) if !is_refined(object, tile) => old.tiles[tile],
+                _ => tile_sums[tile] * share,
+            })
+            .collect();
+        squares_sum += tiles.iter().sum::<f64>();
+        let (map_w, map_m2) = image.sums();
+        (flux_w, area_m2) = (flux_w + map_w, area_m2 + map_m2);
+        let texels = texels.collect();
+        let size = (image.width, image.height);
+        error.maps.insert(object, MapError { size, texels, tiles });
+    }
+    let given_up = given_up_share(ledger);
+    let mean = flux_w / area_m2;
+    error.relative_rmse = (squares_sum / area_m2 / (mean * mean) + given_up * given_up).sqrt();
+    (flux_w > 0.0).then_some(error)
+}
+
+/// R = e₂/e from three levels, half-way to the first-order ratio.
+fn measured_ratio(middle: &Images, coarse: &Images, fine: &BTreeMap<usize, (Vec<f64>, Vec<f64>)>) -> f64 {
+    let newer: f64 = fine.values().flat_map(|(_, tiles)| tiles).sum();
+    let older: f64 = middle
+        .iter()
+        .map(|(object, image)| {
+            let squares = image.squared_difference(coarse.get(object));
+            image.tile_sums(&squares).iter().sum::<f64>()
+        })
+        .sum();
+    let measured = (older / newer).sqrt().clamp(RATIO_RANGE.0, RATIO_RANGE.1);
+    if measured.is_nan() {
+        PRIOR_RATIO
+    } else {
+        (measured * PRIOR_RATIO).sqrt()
+    }
+}
+
+/// Share of the light that no map shows though it should.
+pub fn given_up_share(ledger: &EnergyLedger) -> f64 {
+    let truncated = &ledger.truncated;
+    let lost = truncated.depth
+        + truncated.threshold
+        + truncated.non_finite
+        + truncated.unresolved
+        + truncated.quadrature.abs();
+    if ledger.deposited > 0.0 {
+        lost / ledger.deposited
+    } else {
+        0.0
+    }
+}
+
+/// The roughest tiles, as many as have to be refined for a relative RMSE of `goal`: refining divides their error by the
+/// ratio of the levels. All that have some error, where that is not enough.
+pub fn rough_tiles(error: &LightError, goal: f64) -> RoughTiles {
+    let mut tiles: Vec<(f64, usize, usize)> = Vec::new();
+    for (&object, map) in &error.maps {
+        let with_error = map.tiles.iter().enumerate().filter(|(_, square)| **square > 0.0);
+        tiles.extend(with_error.map(|(tile, &square)| (square, object, tile)));
+    }
+    // The roughest first; equals by their place.
+    tiles.sort_by(|a, b| b.0.total_cmp(&a.0).then((a.1, a.2).cmp(&(b.1, b.2))));
+    let total: f64 = tiles.iter().map(|(square, ..)| square).sum();
+    let wanted = total * (goal / error.relative_rmse) * (goal / error.relative_rmse);
+    let gain = 1.0 - 1.0 / (error.ratio * error.ratio);
+    let mut chosen = RoughTiles::new();
+    let mut left = total;
+    for (square, object, tile) in tiles {
+        if left <= wanted {
+            break;
+        }
+        left -= square * gain;
+        let (width, height) = error.maps[&object].size;
+        chosen
+            .entry(object)
+            .or_insert_with(|| TileSet::none(width, height))
+            .choose(tile);
+    }
+    chosen
+}

@@ -1,0 +1,205 @@
+//! What the light rays of one light met, kept: rays of nested lattices, and rays that an edit of the scene does not
+//! touch, are followed again without a search.
+//!
+//! Only hits are kept. Everything that follows from them (directions, derivatives, flux) is worked out anew, so that a
+//! ray followed from here is the ray that a search would give, bit for bit.
+
+use std::collections::HashMap;
+
+use glam::{DVec2, DVec3};
+
+use crate::geometry::Ray;
+use crate::light_pass::caustic::path::PathSignature;
+use crate::transport::HitPlace;
+
+/// The start of a light ray: the face of the launch domain and the bits of its place in the unit square.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct RayKey {
+    face: u32,
+    square: [u64; 2],
+}
+
+impl RayKey {
+    /// Of a ray that starts at a point of the unit square of a face.
+    pub fn new(face: usize, square: DVec2) -> Self {
+        Self {
+            face: face as u32,
+            square: square.to_array().map(f64::to_bits),
+        }
+    }
+}
+
+/// What one segment of a path met.
+#[derive(Clone, Copy, Debug)]
+pub struct KeptHit {
+    /// The way to where the segment starts.
+    pub signature: PathSignature,
+    /// `None` where it met nothing.
+    pub place: Option<HitPlace>,
+}
+
+/// All that one light ray met, along all its branches.
+#[derive(Clone, Debug)]
+pub struct FreshRay {
+    /// Where it started.
+    pub key: RayKey,
+    /// In the order in which its branches were followed.
+    pub hits: Box<[KeptHit]>,
+}
+
+#[derive(Clone, Debug)]
+struct KeptRay {
+    /// Edit after which it was traced.
+    edit: u32,
+    hits: Box<[KeptHit]>,
+}
+
+/// What edits did to an object.
+#[derive(Clone, Copy, Debug)]
+struct Edited {
+    object: u32,
+    /// Last edit of its shape or place, and the box that it is in since [m].
+    shape: Option<(u32, [DVec3; 2])>,
+    /// Last edit after which light leaves it otherwise.
+    material: Option<u32>,
+}
+
+/// Kept rays of one light.
+#[derive(Clone, Debug, Default)]
+pub struct KeptRays {
+    rays: HashMap<RayKey, KeptRay>,
+    bytes: u64,
+    /// Number of the last edit.
+    edit: u32,
+    edited: Vec<Edited>,
+}
+
+/// A kept ray, seen from the present scene.
+#[derive(Clone, Copy, Debug)]
+pub struct Known<'a> {
+    ray: &'a KeptRay,
+    edited: &'a [Edited],
+}
+
+impl KeptRays {
+    /// Memory that they take [bytes], roughly.
+    pub fn bytes(&self) -> u64 {
+        self.bytes
+    }
+
+    /// Number of rays.
+    pub fn len(&self) -> usize {
+        self.rays.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.rays.is_empty()
+    }
+
+    /// The ray of a start; `None` where it was never traced.
+    pub fn get(&self, key: &RayKey) -> Option<Known<'_>> {
+        Some(Known {
+            ray: self.rays.get(key)?,
+            edited: &self.edited,
+        })
+    }
+
+    /// Keeps what a ray met, unless all would then take more than so many bytes.
+    pub fn insert(&mut self, fresh: FreshRay, most_bytes: u64) {
+        let bytes = |hits: &[KeptHit]| (size_of_val(hits) + size_of::<(RayKey, KeptRay)>()) as u64;
+        let old = self.rays.get(&fresh.key).map_or(0, |ray| bytes(&ray.hits));
+        let new = self.bytes - old + bytes(&fresh.hits);
+        if new <= most_bytes {
+            self.bytes = new;
+            let ray = KeptRay {
+                edit: self.edit,
+                hits: fresh.hits,
+            };
+            self.rays.insert(fresh.key, ray);
+        }
+    }
+
+    /// Begins an edit: what is told until the next one belongs to it.
+    pub fn begin_edit(&mut self) {
+        self.edit += 1;
+    }
+
+    /// An object has another shape or place, within the box between two corners [m].
+    pub fn shape_changed(&mut self, object: usize, bounds: (DVec3, DVec3)) {
+        let edit = self.edit;
+        self.edited_mut(object).shape = Some((edit, [bounds.0, bounds.1]));
+    }
+
+    /// Light leaves an object in other directions than before.
+    pub fn material_changed(&mut self, object: usize) {
+        let edit = self.edit;
+        self.edited_mut(object).material = Some(edit);
+    }
+
+    fn edited_mut(&mut self, object: usize) -> &mut Edited {
+        let object = object as u32;
+        let place = self.edited.iter().position(|edited| edited.object == object);
+        let place = place.unwrap_or_else(|| {
+            self.edited.push(Edited {
+                object,
+                shape: None,
+                material: None,
+            });
+            self.edited.len() - 1
+        });
+        &mut self.edited[place]
+    }
+}
+
+impl Known<'_> {
+    /// What the segment met that starts after `signature`, as far as it is kept.
+    pub fn hit(&self, signature: PathSignature) -> Option<Option<HitPlace>> {
+        let hit = self.ray.hits.iter().find(|hit| hit.signature == signature)?;
+        Some(hit.place)
+    }
+
+    /// Whether a segment along the very ray that was traced still meets what it met then.
+    pub fn holds(&self, ray: &Ray, place: Option<HitPlace>) -> bool {
+        let reach_m = place.map_or(f64::INFINITY, |place| place.distance_m);
+        let met = place.map(|place| place.object);
+        self.edited.iter().all(|edited| match edited.shape {
+            Some((edit, bounds)) if edit > self.ray.edit => {
+                met != Some(edited.object) && !meets_box(ray, bounds, reach_m)
+            }
+            _ => true,
+        })
+    }
+
+    /// Whether light still leaves an object as it did.
+    pub fn leaves_alike(&self, object: u32) -> bool {
+        let is_new = |edited: &&Edited| edited.material.is_some_and(|edit| edit > self.ray.edit);
+        !self
+            .edited
+            .iter()
+            .filter(is_new)
+            .any(|edited| edited.object == object)
+    }
+}
+
+/// Boxes count as larger by this share of the numbers involved: hits are found with rounding.
+const BOX_MARGIN: f64 = 1e-9;
+
+/// Whether a ray meets a box before a distance [m], or nearly does; never false where it does.
+fn meets_box(ray: &Ray, [low, high]: [DVec3; 2], reach_m: f64) -> bool {
+    let margin = BOX_MARGIN * (low.abs().max(high.abs()).max_element() + ray.origin.abs().max_element());
+    let (mut enter, mut leave) = (0.0_f64, reach_m * (1.0 + BOX_MARGIN) + margin);
+    for axis in 0..3 {
+        let (origin, direction) = (ray.origin[axis], ray.direction[axis]);
+        let (near, far) = (low[axis] - margin - origin, high[axis] + margin - origin);
+        if direction == 0.0 {
+            if near > 0.0 || far < 0.0 {
+                return false;
+            }
+        } else {
+            let (a, b) = (near / direction, far / direction);
+            (enter, leave) = (enter.max(a.min(b)), leave.min(a.max(b)));
+        }
+    }
+    enter <= leave * (1.0 + BOX_MARGIN) + margin
+}

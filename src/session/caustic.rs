@@ -1,0 +1,291 @@
+//! The caustic layer of all lights, level by level: a coarse whole picture first, then finer ones, each with its error.
+
+use std::time::{Duration, Instant};
+
+use super::finish::Shown;
+use super::light_level::{KeptError, LevelKey, LightLevel, LightState, LightStates, Sizes};
+use super::sizes::MapSizes;
+use super::{BakeCounts, Clock};
+use crate::error::{Result, Warning};
+use crate::illumination::accumulator::FluxUnit;
+use crate::light_pass::accuracy::{self, Before, Images};
+use crate::light_pass::caustic::pass::{PassReport, Stopwatch};
+use crate::light_pass::caustic::setup::{Aim, AimedLight};
+use crate::light_pass::caustic::statistics::FootprintStatistics;
+use crate::light_pass::wavefront::refine::RoughTiles;
+use crate::optics::LinearSrgb;
+use crate::plan::EffectPlan;
+use crate::progress::{Control, Progress};
+use crate::settings::{BakeSettings, Estimator};
+use crate::transport::Tracer;
+
+/// Levels that an error estimate needs: each lattice with half the steps of the one before.
+pub(super) const ESTIMATED_LEVELS: usize = 3;
+
+/// A refinement aims at this part of the target, so that it need not be done again for little.
+const GOAL: f64 = 0.85;
+
+/// No round of refinement aims at less than this part of the error before it.
+const ROUND_GAIN: f64 = 0.4;
+
+/// Rounds of refinement at most: cells are then a 2¹⁶th of the first ones.
+const MOST_ROUNDS: usize = 8;
+
+/// All that the layer needs.
+pub(super) struct CausticLayer<'a> {
+    pub(super) tracer: &'a Tracer,
+    pub(super) aim: &'a Aim,
+    pub(super) settings: &'a BakeSettings,
+    pub(super) sizes: &'a MapSizes,
+    pub(super) plan: &'a EffectPlan,
+    pub(super) progress: &'a dyn Progress,
+    /// What the user asks.
+    pub(super) control: &'a Control,
+    /// When the light pass began.
+    pub(super) began: Instant,
+}
+
+/// Where the bake of the layer stands.
+#[derive(Debug, Default)]
+pub(super) struct CausticOutcome {
+    /// Of this layer, this time.
+    pub(super) counts: BakeCounts,
+    /// Maps coarser than they should be.
+    pub(super) warnings: Vec<Warning>,
+    /// Why no finer level came, where that was not the end of the lattice.
+    pub(super) stopped: Option<Stopped>,
+    /// Lights with maps: the last level of their state is the picture.
+    pub(super) finished: Vec<usize>,
+}
+
+/// What ended a bake before its lattice did.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Stopped {
+    /// The estimated error is below the target.
+    Target,
+    /// The time was up.
+    Time,
+    /// It was asked to.
+    Cancelled,
+}
+
+/// The levels of one light in the bake under way.
+#[derive(Debug, Default)]
+struct Climb {
+    /// The coarsest first.
+    levels: Vec<LightLevel>,
+    rounds: Vec<RoughTiles>,
+    /// Relative RMSE that the last round aims at.
+    goal: Option<f64>,
+    done: bool,
+}
+
+/// Takes a picture that is not the last: levels, what they took so far, and the clock.
+pub(super) type ShowLevels<'a> = dyn FnMut(&[Shown], BakeCounts, &mut Clock) -> Result<()> + 'a;
+
+/// Works on a bake in its course.
+pub(super) struct Course<'a> {
+    pub(super) control: &'a Control,
+    pub(super) clock: &'a mut Clock,
+    pub(super) outcome: &'a mut CausticOutcome,
+    /// Mean footprints, where they are wanted.
+    pub(super) statistics: Option<FootprintStatistics>,
+}
+
+impl CausticLayer<'_> {
+    /// Bakes all lights, taking from the states what still holds. `show` is called whenever there is a better picture
+    /// than before, but for the last.
+    ///
+    /// # Errors
+    /// Maps that do not fit into memory; a light whose power is no number.
+    pub(super) fn bake(
+        &self,
+        states: &mut LightStates,
+        clock: &mut Clock,
+        show: &mut ShowLevels,
+    ) -> Result<CausticOutcome> {
+        let mut outcome = CausticOutcome::default();
+        let lights: Vec<&AimedLight> = self.lit().collect();
+        let whole = self.control.without_deadline();
+        let mut course = Course {
+            control: &whole,
+            clock,
+            outcome: &mut outcome,
+            statistics: None,
+        };
+        for light in &lights {
+            let state = states.of_mut(light.light);
+            state.begin(&light.launch, self.settings.kept_light_bytes());
+        }
+        let sizes = self.sizes_of_maps(states, &lights, &mut course)?;
+        course.statistics = states.statistics.as_ref().map(|(_, known)| known.clone());
+        let mut climbs: Vec<Climb> = lights.iter().map(|_| Climb::default()).collect();
+        let limited = match self.settings.max_time_s {
+            Some(limit_s) => self
+                .control
+                .with_deadline(self.began + Duration::from_secs_f64(limit_s)),
+            None => self.control.without_deadline(),
+        };
+        loop {
+            for (light, climb) in lights.iter().zip(&mut climbs).filter(|(_, climb)| !climb.done) {
+                self.climb(light, &sizes, states.of_mut(light.light), climb, &mut course)?;
+            }
+            // The first picture is worth waiting for, the others have their time.
+            course.control = &limited;
+            if limited.is_cancelled() || climbs.iter().all(|climb| climb.done) {
+                break;
+            }
+            let levels: Vec<Shown> = lights
+                .iter()
+                .zip(&climbs)
+                .filter_map(|(light, climb)| Some((light.light, climb.levels.last()?)))
+                .collect();
+            show(&levels, course.outcome.counts, course.clock)?;
+        }
+        outcome.stopped = self.stopped(&climbs, &limited);
+        for (light, climb) in lights.iter().zip(climbs) {
+            if !climb.levels.is_empty() {
+                outcome.finished.push(light.light);
+            }
+            let state = states.of_mut(light.light);
+            state.keep(climb.levels, self.settings.memory_bytes);
+        }
+        Ok(outcome)
+    }
+
+    /// Why there is no finer level.
+    fn stopped(&self, climbs: &[Climb], limited: &Control) -> Option<Stopped> {
+        if self.control.is_cancelled() {
+            return Some(Stopped::Cancelled);
+        }
+        if limited.is_cancelled() && !climbs.iter().all(|climb| climb.done) {
+            return Some(Stopped::Time);
+        }
+        let target = self.settings.max_error?;
+        let is_good = |climb: &Climb| {
+            let error = climb.levels.last().and_then(|level| level.error.as_ref());
+            error.is_none_or(|error| error.estimate.relative_rmse <= target)
+        };
+        climbs.iter().all(is_good).then_some(Stopped::Target)
+    }
+
+    /// Lights that see something specular and shine at all.
+    fn lit(&self) -> impl Iterator<Item = &AimedLight> {
+        let scene = self.tracer.scene();
+        let lights = self.aim.lights.iter();
+        lights.filter(|light| scene.lights[light.light].strength().max_channel() > 0.0)
+    }
+
+    /// One level more of a light.
+    fn climb(
+        &self,
+        light: &AimedLight,
+        sizes: &Sizes,
+        state: &mut LightState,
+        climb: &mut Climb,
+        course: &mut Course,
+    ) -> Result<()> {
+        let unit = self.unit(light)?;
+        let step = climb.levels.len();
+        let key = self.key(light, step, (&climb.rounds, climb.goal), sizes);
+        let made = match state.take(&key) {
+            Some(level) => Some(level),
+            None => self.make(light, key, unit, state, course),
+        };
+        let Some(mut level) = made else {
+            return Ok(());
+        };
+        let predecessors = step.min(ESTIMATED_LEVELS - 1);
+        let is_known = |error: &KeptError| error.predecessors == predecessors;
+        if !level.error.as_ref().is_some_and(is_known) {
+            level.error = self.error_of(light, &level, state, climb, course);
+        }
+        climb.levels.push(level);
+        if step + 1 >= self.lattices(light).len() {
+            climb.done = !self.refine(climb);
+        }
+        Ok(())
+    }
+
+    fn make(
+        &self,
+        light: &AimedLight,
+        key: LevelKey,
+        unit: FluxUnit,
+        state: &mut LightState,
+        course: &mut Course,
+    ) -> Option<LightLevel> {
+        match self.settings.estimator {
+            Estimator::Wavefront => self.make_wavefront(light, key, unit, state, course),
+            Estimator::Splat => self.make_splats(light, key, unit, state, course),
+        }
+    }
+
+    /// The error of a level, from the levels before it.
+    fn error_of(
+        &self,
+        light: &AimedLight,
+        level: &LightLevel,
+        state: &mut LightState,
+        climb: &Climb,
+        course: &mut Course,
+    ) -> Option<KeptError> {
+        let coarser: Vec<Images> = match self.settings.estimator {
+            Estimator::Wavefront => {
+                let levels = climb.levels.iter().rev().take(ESTIMATED_LEVELS - 1);
+                levels
+                    .map(|level| accuracy::images(&level.maps, level.unit))
+                    .collect()
+            }
+            Estimator::Splat => self.thinned_images(light, level, state, course),
+        };
+        let watch = Stopwatch::start();
+        let before = climb.rounds.last().and_then(|refined| {
+            let error = &climb.levels.last()?.error.as_ref()?.estimate;
+            Some(Before { error, refined })
+        });
+        let ledger = level.ledger.report("", level.unit, LinearSrgb::WHITE).energy_w;
+        let fine = accuracy::images(&level.maps, level.unit);
+        let estimate = accuracy::estimate(&fine, [coarser.first(), coarser.get(1)], before, &ledger);
+        course.clock.deposit.add(watch.elapsed());
+        estimate.map(|estimate| KeptError {
+            predecessors: climb.levels.len().min(ESTIMATED_LEVELS - 1),
+            estimate,
+        })
+    }
+
+    /// Decides on another round of refinement; false where there is nothing more to do.
+    fn refine(&self, climb: &mut Climb) -> bool {
+        let error = climb.levels.last().and_then(|level| level.error.as_ref());
+        let Some(error) = error.map(|error| &error.estimate) else {
+            return false;
+        };
+        let goal = match self.settings.max_error {
+            None => return false,
+            Some(target) if error.relative_rmse <= target => return false,
+            // No round can do much more, and a bake that has its time shows what came of it.
+            Some(target) => (GOAL * target).max(ROUND_GAIN * error.relative_rmse),
+        };
+        if self.settings.estimator == Estimator::Splat || climb.rounds.len() >= MOST_ROUNDS {
+            return false;
+        }
+        let tiles = accuracy::rough_tiles(error, goal);
+        let is_any = !tiles.is_empty();
+        climb.rounds.push(tiles);
+        climb.goal = Some(goal);
+        is_any
+    }
+}
+
+impl CausticOutcome {
+    /// Counts what a pass did.
+    pub(super) fn count(&mut self, report: &PassReport, clock: &mut Clock) {
+        self.counts.rays += report.rays;
+        self.counts.segments += report.segments;
+        self.counts.splats += report.splats;
+        self.counts.cells += report.cells;
+        self.counts.receiver_queries += report.receiver_queries;
+        clock.trace.add(report.trace_s);
+        clock.deposit.add(report.deposit_s);
+    }
+}

@@ -1,0 +1,302 @@
+//! Which lattices and map sizes a bake goes through.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use super::caustic::{CausticLayer, Course, ESTIMATED_LEVELS};
+use super::light_level::{LevelKey, LightStates, Sizes, TraceKey};
+use super::sizes;
+use super::splat_level::LEVEL_STRIDES;
+use crate::error::{Error, Result, Warning};
+use crate::illumination::Chart;
+use crate::illumination::accumulator::FluxUnit;
+use crate::light_pass::caustic::lattice::Lattice;
+use crate::light_pass::caustic::path::PathLimits;
+use crate::light_pass::caustic::setup::AimedLight;
+use crate::light_pass::caustic::statistics::FootprintStatistics;
+use crate::light_pass::wavefront::refine::RoughTiles;
+use crate::plan::Effect;
+use crate::settings::{BakeSettings, Estimator, Footprint, Kernel, MapResolution, Sigma};
+
+/// The coarsest lattice has fewer rays than this [rays/sr]: it is the first picture.
+const FIRST_PICTURE_PER_SR: f64 = 1_600.0;
+
+/// Least side of the lattice that mean footprints are taken from [cells].
+const LEAST_STATISTICS_SIDE: usize = 32;
+
+/// How much coarser than the last one a coarse lattice is deposited at most.
+const MOST_COARSE: f64 = 8.0;
+
+/// How coarse triangles may be for a target, relative to those of a bake without one: over this relative RMSE.
+const USUAL_ERROR: f64 = 0.04;
+
+impl CausticLayer<'_> {
+    /// Cells across and down each face, from the coarsest lattice to that of the settings. Splats have strides instead.
+    pub(super) fn lattices(&self, light: &AimedLight) -> Vec<(usize, usize)> {
+        let finest = self.lattice_size(light);
+        if self.settings.estimator == Estimator::Splat {
+            return vec![finest; LEVEL_STRIDES.len()];
+        }
+        let mut lattices = vec![finest];
+        let mut density_per_sr = self.settings.density_per_sr;
+        while lattices.len() < ESTIMATED_LEVELS || density_per_sr >= FIRST_PICTURE_PER_SR {
+            let (columns, rows) = lattices[lattices.len() - 1];
+            lattices.push((columns.div_ceil(2), rows.div_ceil(2)));
+            density_per_sr /= 4.0;
+        }
+        lattices.reverse();
+        lattices
+    }
+
+    fn lattice_size(&self, light: &AimedLight) -> (usize, usize) {
+        light
+            .launch
+            .lattice_size(self.settings.density_per_sr, self.aim.reach_m)
+    }
+
+    /// All that a level depends on.
+    pub(super) fn key(
+        &self,
+        light: &AimedLight,
+        step: usize,
+        (rounds, goal): (&[RoughTiles], Option<f64>),
+        sizes: &Sizes,
+    ) -> LevelKey {
+        let lattices = self.lattices(light);
+        let size = lattices[step.min(lattices.len() - 1)];
+        // Coarse lattices are deposited as coarsely, so that their difference shows both kinds of error.
+        let before_last = (lattices.len() - 1).saturating_sub(step);
+        LevelKey {
+            trace: self.trace_key(size, rounds),
+            sizes: sizes.clone(),
+            coarseness: coarseness(self.settings.max_error, goal)
+                * (before_last as f64).exp2().min(MOST_COARSE),
+            kernels: self.kernels(),
+            stride: match self.settings.estimator {
+                Estimator::Wavefront => 1,
+                Estimator::Splat => LEVEL_STRIDES[step.min(LEVEL_STRIDES.len() - 1)],
+            },
+        }
+    }
+
+    pub(super) fn trace_key(&self, size: (usize, usize), rounds: &[RoughTiles]) -> TraceKey {
+        let settings = self.settings;
+        let mut paths = BakeSettings {
+            estimator: settings.estimator,
+            max_depth: settings.max_depth,
+            branch_threshold: settings.branch_threshold,
+            item_buffer: settings.item_buffer,
+            ..BakeSettings::default()
+        };
+        if settings.estimator == Estimator::Splat {
+            (paths.rays, paths.seed) = (settings.rays, settings.seed);
+        }
+        TraceKey {
+            settings: paths,
+            absorption: self.plan.is_on(Effect::Absorption),
+            size,
+            rounds: rounds.to_vec(),
+        }
+    }
+
+    fn kernels(&self) -> BakeSettings {
+        let settings = self.settings;
+        let usual = BakeSettings::default();
+        match settings.estimator {
+            Estimator::Wavefront => usual,
+            Estimator::Splat => BakeSettings {
+                sigma: settings.sigma,
+                kernel: settings.kernel,
+                kernel_sampling: settings.kernel_sampling,
+                footprint: settings.footprint,
+                ..usual
+            },
+        }
+    }
+
+    /// The unit of a light's sums: by its own launch, so that other lights do not change a bit.
+    pub(super) fn unit(&self, light: &AimedLight) -> Result<FluxUnit> {
+        let source = &self.tracer.scene().lights[light.light];
+        let power_w = light.launch.power_bound_w();
+        let real_w = power_w * source.strength().max_channel();
+        if power_w.is_finite() && power_w > 0.0 && real_w.is_finite() {
+            return Ok(FluxUnit::for_power(power_w));
+        }
+        Err(Error::failure(
+            &self.tracer.scene().source,
+            format!("light `{}` sends {real_w:e} W", source.name),
+            "give it an intensity that makes that a finite number",
+        ))
+    }
+
+    /// The lattice of rays, as splats have it.
+    pub(super) fn lattice<'a>(&'a self, light: &'a AimedLight, unit: FluxUnit) -> Lattice<'a> {
+        Lattice {
+            tracer: self.tracer,
+            launch: &light.launch,
+            item_buffer: &light.item_buffer,
+            size: self.lattice_size(light),
+            strides: (1, 1),
+            placement: self.settings.rays,
+            seed: self.settings.seed,
+            limits: self.limits(),
+            unit,
+        }
+    }
+
+    /// Of paths.
+    pub(super) fn limits(&self) -> PathLimits {
+        PathLimits {
+            max_depth: self.settings.max_depth,
+            branch_threshold: self.settings.branch_threshold,
+            absorption: self.plan.is_on(Effect::Absorption),
+        }
+    }
+
+    /// Whether mean footprints are wanted.
+    fn wants_statistics(&self) -> bool {
+        let settings = self.settings;
+        let adaptive = settings.kernel == Kernel::Gaussian && settings.sigma == Sigma::Adaptive;
+        let of_splats = adaptive || settings.footprint == Footprint::Fixed;
+        settings.map_resolution == MapResolution::Auto
+            || (settings.estimator == Estimator::Splat && of_splats)
+    }
+
+    /// Mean footprints at the settings' density, where they are wanted, from a thinner lattice; and the sizes of all
+    /// maps.
+    pub(super) fn sizes_of_maps(
+        &self,
+        states: &mut LightStates,
+        lights: &[&AimedLight],
+        course: &mut Course,
+    ) -> Result<Sizes> {
+        if self.wants_statistics() {
+            let keys: BTreeMap<usize, TraceKey> = lights
+                .iter()
+                .map(|light| (light.light, self.trace_key(self.lattice_size(light), &[])))
+                .collect();
+            if states.statistics.as_ref().is_none_or(|(known, _)| *known != keys) {
+                let mut statistics = FootprintStatistics::default();
+                for light in lights {
+                    let unit = self.unit(light)?;
+                    let state = states.of_mut(light.light);
+                    statistics.merge(&match self.settings.estimator {
+                        Estimator::Wavefront => self.wavefront_statistics(light, unit, state, course),
+                        Estimator::Splat => self.splat_statistics(light, unit, state, course),
+                    });
+                }
+                // What a cancelled run saw is not all.
+                let complete = !course.control.is_cancelled();
+                states.statistics = complete.then_some((keys, statistics));
+            }
+        }
+        let statistics = states.statistics.as_ref().map(|(_, statistics)| statistics);
+        let sizes = self.map_sizes(statistics)?;
+        if let (MapResolution::Auto, Some(statistics)) = (self.settings.map_resolution, statistics) {
+            course.outcome.warnings = self.coarse_maps(&sizes, statistics);
+        }
+        Ok(sizes)
+    }
+
+    /// The lattice that mean footprints are taken from: one of the light's lattices.
+    pub(super) fn statistics_size(&self, light: &AimedLight) -> (usize, usize) {
+        let lattices = self.lattices(light);
+        let coarse = lattices.len().saturating_sub(ESTIMATED_LEVELS);
+        let fine_enough = |size: &&(usize, usize)| size.0.max(size.1) >= LEAST_STATISTICS_SIDE;
+        let last = lattices[lattices.len() - 1];
+        lattices[coarse..]
+            .iter()
+            .find(fine_enough)
+            .copied()
+            .unwrap_or(last)
+    }
+
+    /// Sizes of the maps that the coarse run saw lit.
+    pub(super) fn map_sizes(
+        &self,
+        statistics: Option<&FootprintStatistics>,
+    ) -> Result<BTreeMap<usize, (usize, usize)>> {
+        let mut sizes = BTreeMap::new();
+        for object in 0..self.tracer.scene().objects.len() {
+            let size = match (self.settings.map_resolution, statistics) {
+                (MapResolution::Fixed { width, height }, _) => Some((width, height)),
+                (MapResolution::Auto, Some(statistics)) => self.automatic_size(object, statistics),
+                (MapResolution::Auto, None) => None,
+            };
+            if let Some(size) = size {
+                sizes.insert(object, size);
+            }
+        }
+        if self.settings.map_resolution == MapResolution::Auto {
+            let texels = |(width, height): (usize, usize)| width as u64 * height as u64;
+            let total =
+                |sizes: &BTreeMap<usize, (usize, usize)>| sizes.values().copied().map(texels).sum::<u64>();
+            let limit = self.settings.memory_bytes / sizes::BYTES_PER_TEXEL;
+            // Halve the largest until all fit.
+            while total(&sizes) > limit {
+                let Some(largest) = sizes.values_mut().max_by_key(|size| texels(**size)) else {
+                    break;
+                };
+                if texels(*largest) <= 1 {
+                    break;
+                }
+                *largest = ((largest.0 / 2).max(1), (largest.1 / 2).max(1));
+            }
+        } else if let MapResolution::Fixed { width, height } = self.settings.map_resolution {
+            sizes::check_memory(width as u64 * height as u64, self.settings)?;
+        }
+        Ok(sizes)
+    }
+
+    /// Says which automatic maps stay coarser than their light, for the largest automatic size or for memory.
+    pub(super) fn coarse_maps(
+        &self,
+        sizes: &BTreeMap<usize, (usize, usize)>,
+        statistics: &FootprintStatistics,
+    ) -> Vec<Warning> {
+        let coarse = |(&object, &(width, height)): (&usize, &(usize, usize))| {
+            let footprint_texels = (width * height) as f64 * statistics.mean(object)?.map_share;
+            (footprint_texels < 1.0).then(|| {
+                Warning::new(
+                    &self.tracer.scene().objects[object].name,
+                    format!(
+                        "its map of {width} x {height} texels is coarser than the light it holds: a ray's mean \
+                         footprint is {footprint_texels:.2} texels"
+                    ),
+                    "ask for a larger --map-resolution, or allow more --memory",
+                )
+            })
+        };
+        sizes.iter().filter_map(coarse).collect()
+    }
+
+    fn automatic_size(&self, object: usize, statistics: &FootprintStatistics) -> Option<(usize, usize)> {
+        self.sizes
+            .doubled_size(object, self.sizes.doublings(object, statistics)?)
+    }
+
+    /// The chart of an object at its size among `sizes`.
+    pub(super) fn chart(&self, object: usize, sizes: &BTreeMap<usize, (usize, usize)>) -> Option<Arc<Chart>> {
+        let size = sizes
+            .get(&object)
+            .copied()
+            .or_else(|| self.default_size(object))?;
+        self.sizes.chart(object, size)
+    }
+
+    /// For a surface that only the full lattice reached.
+    pub(super) fn default_size(&self, object: usize) -> Option<(usize, usize)> {
+        Some(sizes::first_size(
+            self.sizes.parametrisation(object)?.suggested_aspect,
+        ))
+    }
+}
+
+/// How coarse triangles may be for a target or, in a round of refinement, its goal.
+fn coarseness(target: Option<f64>, goal: Option<f64>) -> f64 {
+    match (target, goal) {
+        (None, _) => 1.0,
+        (Some(target), None) => (target / USUAL_ERROR).clamp(0.5, 2.0),
+        (Some(_), Some(goal)) => (goal / USUAL_ERROR).clamp(0.1, 2.0),
+    }
+}

@@ -1,0 +1,175 @@
+//! What a session keeps of one light: rays, and the maps of the levels of the last bake.
+
+use std::collections::BTreeMap;
+
+use crate::illumination::accumulator::{FluxCount, FluxUnit};
+use crate::light_pass::accuracy::LightError;
+use crate::light_pass::caustic::kept::KeptLight;
+use crate::light_pass::caustic::statistics::FootprintStatistics;
+use crate::light_pass::launch::Launch;
+use crate::light_pass::ledger_sum::LedgerSum;
+use crate::light_pass::receiver_maps::ReceiverMaps;
+use crate::light_pass::wavefront::kept_rays::KeptRays;
+use crate::light_pass::wavefront::pass::TracedLight;
+use crate::light_pass::wavefront::refine::RoughTiles;
+use crate::settings::BakeSettings;
+
+/// Sizes of maps [texels across, down], by object.
+pub(super) type Sizes = BTreeMap<usize, (usize, usize)>;
+
+/// All that a light's paths depend on beside the scene.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct TraceKey {
+    /// With what does not matter to paths at its default.
+    pub(super) settings: BakeSettings,
+    /// Whether any volume absorbs.
+    pub(super) absorption: bool,
+    /// Cells across and down each face.
+    pub(super) size: (usize, usize),
+    /// Where cells are divided further, round by round.
+    pub(super) rounds: Vec<RoughTiles>,
+}
+
+/// All that a light's maps depend on beside the scene.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct LevelKey {
+    /// Its paths.
+    pub(super) trace: TraceKey,
+    /// Of the maps; those of the rounds are the same.
+    pub(super) sizes: Sizes,
+    /// How much coarser or finer triangles are than is usual.
+    pub(super) coarseness: f64,
+    /// Kernels of splats; with what does not matter to them at its default.
+    pub(super) kernels: BakeSettings,
+    /// Every so many-th ray alone (splats).
+    pub(super) stride: usize,
+}
+
+/// Levels that are kept whatever they take: an error needs them.
+const LEVELS_TO_KEEP: usize = 3;
+
+/// Maps of one light at one level, as of a white light of unit strength.
+#[derive(Debug)]
+pub(super) struct LightLevel {
+    pub(super) key: LevelKey,
+    /// Flux per texel.
+    pub(super) maps: ReceiverMaps,
+    /// Of the flux.
+    pub(super) unit: FluxUnit,
+    /// Of all paths.
+    pub(super) ledger: LedgerSum,
+    /// By the levels before it; `None` where there are none, or no light arrived.
+    pub(super) error: Option<KeptError>,
+    /// To be deposited again; `None` where that was too much to keep.
+    pub(super) traced: Option<TracedLight>,
+}
+
+/// An estimate with what it was made from.
+#[derive(Clone, Debug)]
+pub(super) struct KeptError {
+    /// Coarser levels that it is made from.
+    pub(super) predecessors: usize,
+    pub(super) estimate: LightError,
+}
+
+/// What is kept of all lights of a scene.
+#[derive(Debug, Default)]
+pub(super) struct LightStates {
+    by_light: BTreeMap<usize, LightState>,
+    /// Mean footprints that set the sizes of maps, with what they depend on.
+    pub(super) statistics: Option<(BTreeMap<usize, TraceKey>, FootprintStatistics)>,
+}
+
+impl LightStates {
+    /// Of a light, by its place in the scene.
+    pub(super) fn of_mut(&mut self, light: usize) -> &mut LightState {
+        self.by_light.entry(light).or_default()
+    }
+
+    /// The finest level of a light.
+    pub(super) fn finest(&self, light: usize) -> Option<&LightLevel> {
+        self.by_light.get(&light)?.levels.last()
+    }
+
+    /// A light is not what it was.
+    pub(super) fn forget(&mut self, light: usize) {
+        self.by_light.remove(&light);
+        self.statistics = None;
+    }
+
+    /// All states.
+    pub(super) fn iter_mut(&mut self) -> impl Iterator<Item = &mut LightState> {
+        self.by_light.values_mut()
+    }
+}
+
+/// What is kept of one light.
+#[derive(Debug, Default)]
+pub(super) struct LightState {
+    /// Where its rays start.
+    launch: Option<Launch>,
+    /// What its rays met.
+    pub(super) rays: KeptRays,
+    /// Levels of the last bake, the coarsest first.
+    pub(super) levels: Vec<LightLevel>,
+    /// What splats were made of.
+    pub(super) arrivals: Option<(TraceKey, KeptLight)>,
+}
+
+impl LightLevel {
+    fn bytes(&self) -> u64 {
+        let texels = self
+            .maps
+            .iter()
+            .map(|(_, map)| (map.chart.width * map.chart.height) as u64);
+        texels.sum::<u64>() * size_of::<FluxCount>() as u64
+            + self.traced.as_ref().map_or(0, TracedLight::bytes)
+    }
+}
+
+impl LightState {
+    /// Forgets rays that start elsewhere, and what is more than so many bytes.
+    pub(super) fn begin(&mut self, launch: &Launch, kept_bytes: u64) {
+        if self.launch.as_ref() != Some(launch) {
+            *self = Self {
+                launch: Some(launch.clone()),
+                ..Self::default()
+            };
+        }
+        if self.rays.bytes() > kept_bytes {
+            self.rays = KeptRays::default();
+        }
+        self.arrivals
+            .take_if(|(_, arrivals)| arrivals.bytes() > kept_bytes);
+    }
+
+    /// Paths have changed: maps are to be made anew. Rays stay, as they know what holds of them.
+    pub(super) fn forget_maps(&mut self) {
+        self.levels.clear();
+        self.arrivals = None;
+    }
+
+    /// Takes the level of a key out, if it is there.
+    pub(super) fn take(&mut self, key: &LevelKey) -> Option<LightLevel> {
+        let place = self.levels.iter().position(|level| level.key == *key)?;
+        Some(self.levels.remove(place))
+    }
+
+    /// Takes the paths of a level out that differs in its maps alone.
+    pub(super) fn take_traced(&mut self, key: &LevelKey) -> Option<TracedLight> {
+        self.levels
+            .iter_mut()
+            .find(|level| level.key.trace == key.trace && level.traced.is_some())
+            .and_then(|level| level.traced.take())
+    }
+
+    /// Keeps the levels of a bake for the next one; older ones only while that bake was stopped early, coarse ones only
+    /// as memory allows.
+    pub(super) fn keep(&mut self, levels: Vec<LightLevel>, memory_bytes: u64) {
+        self.levels = levels;
+        let mut bytes: u64 = self.levels.iter().map(LightLevel::bytes).sum();
+        while bytes > memory_bytes / 2 && self.levels.len() > LEVELS_TO_KEEP {
+            bytes -= self.levels.remove(0).bytes();
+        }
+    }
+}

@@ -1,0 +1,84 @@
+//! What an edit changed of a scene, as far as baked light depends on it.
+
+use std::sync::Arc;
+
+use crate::scene::{Light, LightKind, Material, Scene};
+
+/// The difference between a scene and its edited copy.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(super) struct SceneChange {
+    /// Objects of another shape or at another place.
+    pub(super) shapes: Vec<usize>,
+    /// Objects that light leaves in other directions.
+    pub(super) directions: Vec<usize>,
+    /// Whether surfaces take another share of the light, the directions included.
+    pub(super) shares: bool,
+    /// Lights at another place, or that shine another way; another strength alone is no change.
+    pub(super) lights: Vec<usize>,
+}
+
+impl SceneChange {
+    /// `None` where the scenes do not have the same objects, materials and lights.
+    pub(super) fn between(old: &Scene, new: &Scene) -> Option<Self> {
+        let same_parts = old.objects.len() == new.objects.len()
+            && old.lights.len() == new.lights.len()
+            && old.textures.len() == new.textures.len()
+            && old
+                .textures
+                .iter()
+                .zip(&new.textures)
+                .all(|(a, b)| Arc::ptr_eq(a, b));
+        if !same_parts {
+            return None;
+        }
+        let objects = 0..new.objects.len();
+        let shapes = objects
+            .clone()
+            .filter(|&object| !Arc::ptr_eq(&old.objects[object].mesh, &new.objects[object].mesh));
+        let changed = |is_same: fn(&Material, &Material) -> bool| {
+            let is_changed =
+                move |&object: &usize| !is_same(old.material_of(object), new.material_of(object));
+            objects.clone().filter(is_changed)
+        };
+        let lights = old.lights.iter().zip(&new.lights).enumerate();
+        Some(Self {
+            shapes: shapes.collect(),
+            directions: changed(leave_alike).collect(),
+            shares: changed(share_alike).next().is_some(),
+            lights: lights
+                .filter(|(_, (old, new))| !shine_alike(old, new))
+                .map(|(light, _)| light)
+                .collect(),
+        })
+    }
+
+    /// Whether paths of light may go elsewhere than before.
+    pub(super) fn moves_paths(&self) -> bool {
+        !(self.shapes.is_empty() && self.directions.is_empty())
+    }
+}
+
+/// Whether light leaves both materials in the same directions.
+fn leave_alike(a: &Material, b: &Material) -> bool {
+    a.surface == b.surface
+        && a.ior == b.ior
+        && a.volume.is_some() == b.volume.is_some()
+        && a.double_sided == b.double_sided
+}
+
+/// Whether both materials take and send on the same shares of light.
+fn share_alike(a: &Material, b: &Material) -> bool {
+    leave_alike(a, b)
+        && a.base_colour == b.base_colour
+        && a.base_colour_texture == b.base_colour_texture
+        && a.metallic == b.metallic
+        && a.roughness == b.roughness
+        && a.transmission == b.transmission
+        && a.volume == b.volume
+}
+
+/// Whether both lights are one, but for strength and colour.
+fn shine_alike(a: &Light, b: &Light) -> bool {
+    let unit = |light: &Light| -> LightKind { light.of_unit_strength().kind };
+    unit(a) == unit(b)
+}

@@ -1,0 +1,172 @@
+//! One light by splats: the whole lattice at once, and thinner ones for its error.
+
+use super::caustic::{CausticLayer, Course};
+use super::light_level::{LevelKey, LightLevel, LightState, TraceKey};
+use crate::illumination::accumulator::FluxUnit;
+use crate::light_pass::accuracy::{self, Images};
+use crate::light_pass::caustic::deposit::Depositor;
+use crate::light_pass::caustic::kept::KeptLight;
+use crate::light_pass::caustic::lattice::Lattice;
+use crate::light_pass::caustic::pass::{self, Listener, PassReport, Source};
+use crate::light_pass::caustic::setup::AimedLight;
+use crate::light_pass::caustic::statistics::FootprintStatistics;
+use crate::light_pass::receiver_maps::ReceiverMaps;
+use crate::settings::{BakeSettings, Footprint, Sigma};
+
+/// Strides of the lattice for mean footprints, at most.
+const COARSENING: usize = 8;
+
+/// Least side of that lattice.
+const LEAST_COARSE_SIDE: usize = 64;
+
+/// Strides of the lattices that an error is estimated from.
+const ERROR_STRIDES: [usize; 2] = [2, 4];
+
+impl CausticLayer<'_> {
+    /// Traces and deposits a light, or deposits again what arrived for other kernels and maps; `None` where it was
+    /// stopped.
+    pub(super) fn make_splats(
+        &self,
+        light: &AimedLight,
+        key: LevelKey,
+        unit: FluxUnit,
+        state: &mut LightState,
+        course: &mut Course,
+    ) -> Option<LightLevel> {
+        let mut maps = ReceiverMaps::new(self.tracer.scene().objects.len());
+        let lattice = Lattice {
+            strides: (key.stride, key.stride),
+            ..self.lattice(light, unit)
+        };
+        let source = match source_of(state, &key.trace) {
+            Source::Rays { .. } if key.stride == 1 => Source::Rays {
+                keep_bytes: self.settings.kept_light_bytes(),
+            },
+            source => source,
+        };
+        let (report, arrived) = self.deposit_splats(lattice, source, &key, &mut maps, course);
+        if let Some(arrived) = arrived {
+            state.arrivals = Some((key.trace.clone(), arrived));
+        }
+        course.outcome.count(&report, course.clock);
+        (!report.cancelled).then_some(LightLevel {
+            key,
+            maps,
+            unit,
+            ledger: report.ledger,
+            error: None,
+            traced: None,
+        })
+    }
+
+    fn deposit_splats(
+        &self,
+        lattice: Lattice,
+        source: Source,
+        key: &LevelKey,
+        maps: &mut ReceiverMaps,
+        course: &Course,
+    ) -> (PassReport, Option<KeptLight>) {
+        let depositor = Depositor {
+            lattice,
+            settings: self.settings,
+            statistics: course.statistics.as_ref(),
+            gathers: false,
+        };
+        let listener = Listener {
+            progress: self.progress,
+            control: course.control,
+            done: course.outcome.counts.rays,
+            total: lattice.ray_count(),
+        };
+        let chart_for = |object: usize| self.chart(object, &key.sizes);
+        pass::run(&depositor, source, maps, &chart_for, &listener)
+    }
+
+    /// Maps of every second and every fourth ray, each for as many.
+    pub(super) fn thinned_images(
+        &self,
+        light: &AimedLight,
+        level: &LightLevel,
+        state: &LightState,
+        course: &mut Course,
+    ) -> Vec<Images> {
+        if level.key.stride > 1 {
+            return Vec::new();
+        }
+        ERROR_STRIDES
+            .iter()
+            .map(|&stride| {
+                let lattice = Lattice {
+                    strides: (stride, stride),
+                    ..self.lattice(light, level.unit)
+                };
+                let mut maps = ReceiverMaps::new(self.tracer.scene().objects.len());
+                let source = source_of(state, &level.key.trace);
+                let (report, _) = self.deposit_splats(lattice, source, &level.key, &mut maps, course);
+                course.outcome.count(&report, course.clock);
+                accuracy::images(&maps, level.unit)
+            })
+            .collect()
+    }
+
+    /// Mean footprints at the full density, from a lattice some 64 times thinner.
+    pub(super) fn splat_statistics(
+        &self,
+        light: &AimedLight,
+        unit: FluxUnit,
+        state: &LightState,
+        course: &mut Course,
+    ) -> FootprintStatistics {
+        let settings = BakeSettings {
+            footprint: Footprint::Ellipse,
+            sigma: Sigma::Constant(1.0),
+            ..self.settings.clone()
+        };
+        let lattice = thinned(self.lattice(light, unit));
+        let depositor = Depositor {
+            lattice,
+            settings: &settings,
+            statistics: None,
+            gathers: true,
+        };
+        let listener = Listener {
+            progress: &(),
+            control: course.control,
+            done: 0,
+            total: 0,
+        };
+        let chart_for = |object: usize| {
+            let aspect = self.sizes.parametrisation(object)?.suggested_aspect;
+            self.sizes.chart(object, super::sizes::first_size(aspect))
+        };
+        let mut maps = ReceiverMaps::new(self.tracer.scene().objects.len());
+        let source = source_of(state, &self.trace_key(lattice.size, &[]));
+        let (mut report, _) = pass::run(&depositor, source, &mut maps, &chart_for, &listener);
+        // The kernels of the coarse run are in no map.
+        report.splats = 0;
+        course.outcome.count(&report, course.clock);
+        let cells = (lattice.strides.0 * lattice.strides.1) as f64;
+        report.statistics.refined(cells)
+    }
+}
+
+/// Strides of a light's levels: something soon, then every ray.
+pub(super) const LEVEL_STRIDES: [usize; 2] = [8, 1];
+
+/// What arrived before, or rays that are not kept.
+fn source_of<'a>(state: &'a LightState, key: &TraceKey) -> Source<'a> {
+    match &state.arrivals {
+        Some((known, kept)) if known == key => Source::Kept(kept),
+        _ => Source::Rays { keep_bytes: 0 },
+    }
+}
+
+/// The lattice for mean footprints: every so many-th of the same rays, so that kept ones will do.
+fn thinned(lattice: Lattice) -> Lattice {
+    let stride = |side: usize| (side / LEAST_COARSE_SIDE).clamp(1, COARSENING);
+    Lattice {
+        strides: (stride(lattice.size.0), stride(lattice.size.1)),
+        ..lattice
+    }
+}

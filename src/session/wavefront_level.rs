@@ -1,0 +1,166 @@
+//! One level of one light by the wavefront estimator.
+
+use glam::DVec2;
+
+use super::caustic::{CausticLayer, Course};
+use super::light_level::{LevelKey, LightLevel, LightState};
+use crate::illumination::accumulator::FluxUnit;
+use crate::light_pass::caustic::pass::Listener;
+use crate::light_pass::caustic::setup::AimedLight;
+use crate::light_pass::caustic::statistics::FootprintStatistics;
+use crate::light_pass::receiver_maps::{ChartFor, ReceiverMaps};
+use crate::light_pass::wavefront::bodies::SmallBodies;
+use crate::light_pass::wavefront::lattice::WavefrontLattice;
+use crate::light_pass::wavefront::pass::{Room, WavefrontDepositor};
+use crate::light_pass::wavefront::receivers::Receivers;
+use crate::light_pass::wavefront::refine::Refinement;
+use crate::light_pass::wavefront::trace::StrandTracer;
+use crate::progress::Control;
+use crate::settings::Estimator;
+
+impl CausticLayer<'_> {
+    /// Traces and deposits a level, or deposits again what was traced for other maps; `None` where it was stopped.
+    pub(super) fn make_wavefront(
+        &self,
+        light: &AimedLight,
+        key: LevelKey,
+        unit: FluxUnit,
+        state: &mut LightState,
+        course: &mut Course,
+    ) -> Option<LightLevel> {
+        let chart_for = |object: usize| self.chart(object, &key.sizes);
+        let receivers = Receivers::new(self.tracer, &chart_for);
+        let refinement = Refinement {
+            receivers: &receivers,
+            rounds: &key.trace.rounds,
+        };
+        let bodies = self.small_bodies(light, key.trace.size);
+        let depositor = WavefrontDepositor {
+            receivers: &receivers,
+            chart_for: &chart_for,
+            lattice: WavefrontLattice {
+                refinement: Some(&refinement),
+                ..self.wavefront_lattice(light, key.trace.size, &bodies, unit, course.control)
+            },
+            reference_w: reference_w(light),
+            coarseness: key.coarseness,
+        };
+        let listener = Listener {
+            progress: self.progress,
+            control: course.control,
+            done: course.outcome.counts.rays,
+            total: depositor.lattice.cell_count(),
+        };
+        let mut maps = ReceiverMaps::new(self.tracer.scene().objects.len());
+        let (report, traced) = match state.take_traced(&key) {
+            Some(traced) => (
+                depositor.deposit_again(&traced, &mut maps, &listener),
+                Some(traced),
+            ),
+            None => depositor.run(&mut state.rays, Some(&mut maps), &listener, self.room()),
+        };
+        course.outcome.count(&report, course.clock);
+        (!report.cancelled).then_some(LightLevel {
+            key,
+            maps,
+            unit,
+            ledger: report.ledger,
+            error: None,
+            traced,
+        })
+    }
+
+    /// Sizes of lit areas at the density that maps are meant for, from a thinner lattice.
+    pub(super) fn wavefront_statistics(
+        &self,
+        light: &AimedLight,
+        unit: FluxUnit,
+        state: &mut LightState,
+        course: &mut Course,
+    ) -> FootprintStatistics {
+        let chart_for: &ChartFor = &|object: usize| self.sizes.chart(object, self.default_size(object)?);
+        let receivers = Receivers::new(self.tracer, chart_for);
+        let none = SmallBodies::default();
+        let size = self.statistics_size(light);
+        let depositor = WavefrontDepositor {
+            receivers: &receivers,
+            chart_for,
+            lattice: self.wavefront_lattice(light, size, &none, unit, course.control),
+            reference_w: reference_w(light),
+            coarseness: 1.0,
+        };
+        let listener = Listener {
+            progress: &(),
+            control: course.control,
+            done: 0,
+            total: 0,
+        };
+        let room = Room {
+            bands_bytes: 0,
+            ..self.room()
+        };
+        let (mut report, _) = depositor.run(&mut state.rays, None, &listener, room);
+        // Its patches are in no map.
+        (report.cells, report.splats) = (0, 0);
+        course.outcome.count(&report, course.clock);
+        let cells = |size: (usize, usize)| size.0 as f64 * size.1 as f64;
+        let meant = light
+            .launch
+            .lattice_size(self.map_density_per_sr(), self.aim.reach_m);
+        report.statistics.refined(cells(meant) / cells(size))
+    }
+
+    /// The density that automatic maps are made for [rays/sr]: with a target, the lattice says nothing of it.
+    fn map_density_per_sr(&self) -> f64 {
+        if self.settings.max_error.is_some() {
+            Estimator::Wavefront.preview_density_per_sr()
+        } else {
+            self.settings.density_per_sr
+        }
+    }
+
+    fn room(&self) -> Room {
+        let bytes = self.settings.kept_light_bytes() / 2;
+        Room {
+            bands_bytes: bytes,
+            rays_bytes: bytes,
+        }
+    }
+
+    /// Bodies that are small beside the cells of a lattice.
+    fn small_bodies(&self, light: &AimedLight, (columns, rows): (usize, usize)) -> SmallBodies {
+        let cell = DVec2::new(1.0 / columns as f64, 1.0 / rows as f64);
+        SmallBodies::find(self.tracer.scene(), &light.launch, cell)
+    }
+
+    fn wavefront_lattice<'a>(
+        &'a self,
+        light: &'a AimedLight,
+        size: (usize, usize),
+        bodies: &'a SmallBodies,
+        unit: FluxUnit,
+        control: &'a Control,
+    ) -> WavefrontLattice<'a> {
+        WavefrontLattice {
+            tracer: StrandTracer {
+                tracer: self.tracer,
+                launch: &light.launch,
+                limits: self.limits(),
+                steps: [1.0 / size.0 as f64, 1.0 / size.1 as f64],
+                kept: None,
+                control,
+            },
+            item_buffer: &light.item_buffer,
+            size,
+            unit,
+            refinement: None,
+            bodies,
+        }
+    }
+}
+
+/// Flux that a light of unit strength sends to marked cells [W].
+fn reference_w(light: &AimedLight) -> f64 {
+    let whole = light.launch.cell_measure(DVec2::ZERO, DVec2::ONE) * light.launch.face_count() as f64;
+    light.launch.power_bound_w() * light.item_buffer.marked_measure(&light.launch) / whole
+}
