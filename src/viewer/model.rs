@@ -192,7 +192,8 @@ impl Model {
         let Some(shown) = &self.last else {
             return true;
         };
-        if new.is_final || !new.request.differs_in_accuracy_only(&shown.request) {
+        let is_next = new.is_final || new.serial == shown.serial;
+        if is_next || !new.request.differs_in_accuracy_only(&shown.request) {
             return true;
         }
         match (
@@ -200,7 +201,9 @@ impl Model {
             shown.result.estimated_relative_rmse,
         ) {
             (Some(new), Some(shown)) => new <= shown,
-            _ => new.result.counts.rays >= shown.result.counts.rays,
+            (Some(_), None) => true,
+            (None, Some(_)) => false,
+            (None, None) => !shown.is_final,
         }
     }
 

@@ -57,7 +57,14 @@ fn run(model: &mut Model) {
     }
 }
 
+/// Names of events, levels left out: how many of them are seen depends on when one looks.
 fn logged(log: &tempfile::NamedTempFile) -> Vec<String> {
+    let mut events = all_logged(log);
+    events.retain(|event| event != "level");
+    events
+}
+
+fn all_logged(log: &tempfile::NamedTempFile) -> Vec<String> {
     let text = std::fs::read_to_string(log.path()).expect("it is written");
     let event = |line: &str| {
         let event: serde_json::Value = serde_json::from_str(line).expect("a line is JSON");
@@ -76,6 +83,42 @@ fn it_bakes_on_start_and_shows_every_layer() {
     assert_eq!(model.layers(), [LayerKind::Caustic, LayerKind::Direct]);
     assert!(model.last.as_ref().is_some_and(|last| last.is_final));
     assert_eq!(logged(&log), ["baking", "done"]);
+}
+
+#[test]
+fn levels_are_shown_before_the_bake_is_done_and_a_finer_bake_never_shows_coarser_ones() {
+    let (mut model, log) = model(20_000.0);
+    let mut errors = Vec::new();
+    let mut watch = |model: &mut Model| {
+        let start = Instant::now();
+        while model.state().is_baking() {
+            model.act(&Wishes::default(), Instant::now());
+            if model.poll() {
+                let last = model.last.as_ref().expect("there are new maps");
+                errors.push((last.is_final, last.result.estimated_relative_rmse));
+                assert!(!model.maps().is_empty());
+            }
+            assert!(start.elapsed() < PATIENCE, "it never ends");
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        model.poll();
+    };
+    watch(&mut model);
+    let first = all_logged(&log);
+    assert_eq!(first[..2], ["baking", "level"], "{first:?}");
+    model.panel.settings.density_per_sr *= 4.0;
+    model.act(&Wishes::default(), Instant::now());
+    watch(&mut model);
+    let done = errors.iter().position(|(is_final, _)| *is_final);
+    let (before, after) = errors.split_at(done.expect("the first bake ends") + 1);
+    let limit = before[before.len() - 1].1.expect("it is estimated");
+    for (is_final, error) in after {
+        assert!(
+            *is_final || error.is_some_and(|error| error <= limit),
+            "{error:?} was shown after {limit}"
+        );
+    }
+    assert!(after.last().is_some_and(|(is_final, _)| *is_final));
 }
 
 /// A bake that takes longer than a test waits between its steps.

@@ -12,7 +12,7 @@ use nephroid::progress::Stage;
 use nephroid::scene::builtin::{parts, shapes};
 use nephroid::scene::{Edit, LightKind, Scene};
 use nephroid::session::StopReason;
-use nephroid::settings::{BakeSettings, Footprint, Kernel, LayerKind, MapResolution, Sigma};
+use nephroid::settings::{BakeSettings, Footprint, Kernel, LEAST_MAX_ERROR, LayerKind, MapResolution, Sigma};
 use nephroid::units::{Flux, Irradiance, RadiantIntensity};
 use nephroid::viewer::panel::{LayerShown, Quantity};
 use nephroid::viewer::worker::BakeState;
@@ -208,13 +208,20 @@ fn a_bake_ends_by_density_error_or_time() {
     choose(&mut panel, "Bake until", "max error 3 %");
     assert_eq!(panel.panel.settings.max_error, Some(0.03));
     assert_eq!(panel.panel.settings.max_time_s, None);
+    let starting = BakeSettings::starting_density_per_sr(0.03);
+    assert_eq!(panel.panel.settings.density_per_sr, starting);
     type_into(&mut panel, "3.0", "0.5");
     assert_eq!(panel.panel.settings.max_error, Some(0.005));
     choose(&mut panel, "Bake until", "max time 10 s");
-    assert_eq!(panel.panel.settings.max_error, None);
+    assert_eq!(
+        panel.panel.settings.max_error,
+        Some(LEAST_MAX_ERROR),
+        "as far as the time goes"
+    );
     type_into(&mut panel, "10.0", "0.25");
     assert_eq!(panel.panel.settings.max_time_s, Some(0.25));
     choose(&mut panel, "Bake until", "ray density");
+    assert_eq!(panel.panel.settings.density_per_sr, 25_000.0);
     assert_eq!(
         (panel.panel.settings.max_error, panel.panel.settings.max_time_s),
         (None, None)
@@ -222,6 +229,7 @@ fn a_bake_ends_by_density_error_or_time() {
     choose(&mut panel, "Bake until", "max error 1 %");
     choose(&mut panel, "Estimator", "splat");
     assert_eq!(panel.panel.settings.max_error, None, "splats do not refine");
+    assert_eq!(panel.panel.settings.density_per_sr, 100_000.0);
 }
 
 #[test]

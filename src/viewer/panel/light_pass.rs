@@ -44,7 +44,7 @@ const TARGET: About = About {
     label: "Bake until",
     what: "What ends a bake: the ray density below exactly, an estimated error (relative RMSE over all maps) that is \
            small enough, or time that is up.",
-    range: "density; max error 0.01 to 100 %; max time 0.001 to 10,000 s; default density",
+    range: "density; max error 0.01 to 100 %, default 3 %; max time 0.001 to 10,000 s",
     accuracy: "a max error is kept by the estimate, not by a reference; after a max time the finest complete maps are shown",
     cost: "halving the error takes about four times the rays",
 };
@@ -212,9 +212,7 @@ pub fn show_details(ui: &mut Ui, settings: &mut BakeSettings) {
 fn change_estimator(settings: &mut BakeSettings, before: Estimator) {
     settings.density_per_sr *= settings.estimator.preview_density_per_sr() / before.preview_density_per_sr();
     settings.sigma = settings.estimator.default_sigma();
-    if settings.estimator == Estimator::Splat {
-        settings.max_error = None;
-    }
+    target::after_change_of_estimator(settings);
 }
 
 fn no_caustic(settings: &BakeSettings) -> Option<&'static str> {

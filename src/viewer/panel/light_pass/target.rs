@@ -2,7 +2,7 @@
 
 use egui::{ComboBox, DragValue, Response, Ui};
 
-use crate::settings::{BakeSettings, Estimator};
+use crate::settings::{BakeSettings, Estimator, LEAST_MAX_ERROR};
 
 /// Errors offered by name [relative RMSE]: those of the presets.
 const ERRORS: [f64; 3] = [0.10, 0.03, 0.01];
@@ -21,25 +21,32 @@ enum Target {
 }
 
 impl Target {
+    /// An error that is no target stands beside a time: as far as that goes.
     fn of(settings: &BakeSettings) -> Self {
         match (settings.max_error, settings.max_time_s) {
+            (Some(error), Some(time_s)) if error <= LEAST_MAX_ERROR => Self::Time(time_s),
             (Some(error), _) => Self::Error(error),
             (None, Some(time_s)) => Self::Time(time_s),
             (None, None) => Self::Density,
         }
     }
 
+    /// Refinement begins from a density of its own; without it the density is all that counts.
     fn set(self, settings: &mut BakeSettings) {
-        settings.max_error = if let Self::Error(error) = self {
-            Some(error)
-        } else {
-            None
+        let was_refined = settings.max_error.is_some();
+        (settings.max_error, settings.max_time_s) = match self {
+            Self::Density => (None, None),
+            Self::Error(error) => (Some(error), None),
+            Self::Time(time_s) if settings.estimator == Estimator::Wavefront => {
+                (Some(LEAST_MAX_ERROR), Some(time_s))
+            }
+            Self::Time(time_s) => (None, Some(time_s)),
         };
-        settings.max_time_s = if let Self::Time(time_s) = self {
-            Some(time_s)
-        } else {
-            None
-        };
+        match settings.max_error {
+            Some(error) => settings.density_per_sr = BakeSettings::starting_density_per_sr(error),
+            None if was_refined => settings.density_per_sr = settings.estimator.preview_density_per_sr(),
+            None => {}
+        }
     }
 
     fn name(self) -> String {
@@ -54,6 +61,15 @@ impl Target {
 /// In per cent, without what rounding leaves.
 fn percent(share: f64) -> f64 {
     (share * 1e6).round() / 1e4
+}
+
+/// Keeps what ends a bake where another estimator can: splats do not refine.
+pub fn after_change_of_estimator(settings: &mut BakeSettings) {
+    match (Target::of(settings), settings.estimator) {
+        (Target::Error(_), Estimator::Splat) => Target::Density,
+        (target, _) => target,
+    }
+    .set(settings);
 }
 
 /// A list of targets with the value of the chosen one beside it. Settings that ask for both an error and a time keep
