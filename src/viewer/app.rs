@@ -23,7 +23,7 @@ use super::overlay;
 use super::panel::{Display, Facts, Quantity, Wishes};
 use super::{ViewerOptions, error_view};
 use crate::error::{Error, Result};
-use crate::eye_pass::renderer::MapStyle;
+use crate::eye_pass::renderer::{MapStyle, Uploaded};
 use crate::eye_pass::{ToneMap, View};
 use crate::optics::LinearSrgb;
 use crate::progress::Control;
@@ -218,7 +218,6 @@ impl App {
         let Some(mut painting) = self.run_interface(&mut wishes) else {
             return;
         };
-        let scene = Arc::clone(self.model.scene());
         self.model.act(&wishes, Instant::now());
         self.must_set_maps |= layer != self.model.panel.display.layer;
         if quantity != self.model.quantity() {
@@ -227,7 +226,6 @@ impl App {
             let what = if is_error { "error" } else { "light" };
             self.model.log.write(&Event::Shows(what));
         }
-        self.must_set_maps |= !Arc::ptr_eq(&scene, self.model.scene());
         self.must_measure_exposure |= wishes.measure_exposure;
         if let Err(error) = self.draw_picture() {
             self.notice = Some(error.to_string());
@@ -295,13 +293,20 @@ impl App {
         let Some(graphics) = &mut self.graphics else {
             return Ok(());
         };
-        if std::mem::take(&mut self.must_set_maps) {
+        let start = Instant::now();
+        let mut uploaded = graphics.set_scene(self.model.scene())?;
+        let mut is_new = uploaded != Uploaded::default();
+        if std::mem::take(&mut self.must_set_maps) || is_new {
             let style = match self.model.quantity() {
                 Quantity::Light => MapStyle::Lit,
                 Quantity::Error => MapStyle::AsItIs,
             };
-            let uploaded = graphics.set_maps(self.model.scene(), &self.model.shown_maps(), style)?;
-            self.model.log.write(&Event::Uploaded(uploaded));
+            uploaded += graphics.set_maps(&self.model.shown_maps(), style)?;
+            is_new = true;
+        }
+        if is_new {
+            let seconds = start.elapsed().as_secs_f64();
+            self.model.log.write(&Event::Uploaded { uploaded, seconds });
         }
         let shows_light = self.model.quantity() == Quantity::Light;
         if self.must_measure_exposure && shows_light && !self.model.maps().is_empty() {

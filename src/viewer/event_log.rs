@@ -37,8 +37,13 @@ pub enum Event<'a> {
     },
     /// A bake is complete; its maps are in the next picture.
     Done(&'a BakedLevel),
-    /// Maps or a scene went to the device: what of them had changed.
-    Uploaded(Uploaded),
+    /// Maps or a scene went to the device.
+    Uploaded {
+        /// What of them had changed.
+        uploaded: Uploaded,
+        /// How long the window's thread took to find and send that [s].
+        seconds: f64,
+    },
     /// The scene was edited.
     Edited(&'a Edit),
     /// The last edit was taken back.
@@ -83,12 +88,13 @@ impl Event<'_> {
                 line
             }
             Self::Done(level) => baked("done", level),
-            Self::Uploaded(uploaded) => {
+            Self::Uploaded { uploaded, seconds } => {
                 json!({
                     "event": "upload",
                     "tiles": uploaded.tiles,
                     "tile_bytes": uploaded.tile_bytes,
                     "other_bytes": uploaded.other_bytes,
+                    "upload_s": seconds,
                 })
             }
             Self::Edited(edit) => json!({"event": "edit", "target": format!("{:?}", edit.target())}),

@@ -116,25 +116,31 @@ impl Graphics {
         self.screen.resize(&self.gpu.device);
     }
 
-    /// Shows a scene with other maps from the next picture on; tells what of them had changed.
+    /// Shows an edited scene from the next picture on; tells what of it had changed. Where that is anything, the maps
+    /// have to be set again: mirrors see what changed.
+    ///
+    /// # Errors
+    /// The device cannot hold it.
+    pub fn set_scene(&mut self, scene: &Arc<Scene>) -> Result<Uploaded> {
+        if Arc::ptr_eq(&self.scene, scene) {
+            return Ok(Uploaded::default());
+        }
+        self.scene = Arc::clone(scene);
+        let uploaded = self.renderer.set_scene(&self.gpu, scene)?;
+        if uploaded != Uploaded::default() {
+            self.picture.invalidate();
+        }
+        Ok(uploaded)
+    }
+
+    /// Shows other maps from the next picture on; tells what of them had changed.
     ///
     /// # Errors
     /// The device cannot hold them: what was shown stays.
-    pub fn set_maps(
-        &mut self,
-        scene: &Arc<Scene>,
-        maps: &[IlluminationMap],
-        style: MapStyle,
-    ) -> Result<Uploaded> {
+    pub fn set_maps(&mut self, maps: &[IlluminationMap], style: MapStyle) -> Result<Uploaded> {
         self.picture.invalidate();
         self.renderer.set_map_style(style);
-        let mut uploaded = Uploaded::default();
-        if !Arc::ptr_eq(&self.scene, scene) {
-            self.scene = Arc::clone(scene);
-            uploaded += self.renderer.set_scene(&self.gpu, scene)?;
-        }
-        uploaded += self.renderer.set_maps(&self.gpu, scene, maps)?;
-        Ok(uploaded)
+        self.renderer.set_maps(&self.gpu, &self.scene, maps)
     }
 
     /// Exposure that suits the picture [stops].

@@ -68,7 +68,9 @@ fn legend(ui: &Ui, picture: Rect) {
     for mark in 0..=3 {
         let share = f64::from(mark) / 3.0;
         let place = pos2(bar.left() + bar.width() * share as f32, bar.bottom() + 8.0);
-        let text = format!("{} %", 100.0 * at(share));
+        // Without what rounding leaves.
+        let per_cent = (1e5 * at(share)).round() / 1e3;
+        let text = format!("{per_cent} %");
         painter.text(place, Align2::CENTER_CENTER, text, font.clone(), TEXT);
     }
 }

@@ -241,7 +241,7 @@ fn levels_tell_their_error_and_time() {
     panel.last = Some(last.clone());
     panel.settle();
     assert!(
-        panel.says("estimated error 2.1 %, 0.42 s: level 2, more to come"),
+        panel.says("estimated error 2.1 %, 0.42 s: level 2, goes on"),
         "{:#?}",
         panel.texts()
     );
@@ -250,7 +250,7 @@ fn levels_tell_their_error_and_time() {
     last.result.stop_reason = StopReason::MaxTime;
     panel.last = Some(last);
     panel.settle();
-    assert!(panel.says("error not estimated, 0.42 s: done, the time is up"));
+    assert!(panel.says("error not estimated, 0.42 s: time is up"));
 }
 
 #[test]
@@ -503,7 +503,7 @@ fn the_ledger_is_summed_over_lights_and_tells_an_open_account() {
     ] {
         assert!(panel.says(text), "{text} in {:#?}", panel.texts());
     }
-    assert!(panel.says("1,234,567 rays"));
+    assert!(panel.says("1,234,567 rays traced"));
     if let Some(last) = &mut panel.last {
         last.result.ledgers[0].energy_w.escaped = 0.0;
     }

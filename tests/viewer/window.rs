@@ -10,9 +10,10 @@ use nephroid::scene::builtin;
 use nephroid::settings::{BakeSettings, LayerKind};
 use nephroid::viewer::navigation::Navigator;
 use nephroid::viewer::panel::WIDTH;
+use nephroid::viewer::worker::BakeState;
 
 use super::desktop::{SIZE, Screen, Viewer};
-use super::headless::Headless;
+use super::headless::{Headless, finished};
 
 /// The caustic alone, coarse enough to be baked in a second.
 const RING: [&str; 9] = [
@@ -197,4 +198,113 @@ fn a_signal_closes_the_window_even_while_it_bakes() {
     // The bake begins before the window is there.
     let viewer = Viewer::open(&screen, &["builtin:ring", "--density", "3e7"]);
     assert_eq!(viewer.signal("TERM").code(), Some(143));
+}
+
+/// The caustic alone, refined until its error is small: several levels.
+const REFINED: [&str; 7] = [
+    "builtin:ring",
+    "--max-error",
+    "10%",
+    "--map-resolution",
+    "128",
+    "--layers",
+    "caustic",
+];
+
+/// The panel once such a bake is done.
+fn panel_when_done() -> Headless {
+    let settings = BakeSettings {
+        layers: vec![LayerKind::Caustic],
+        max_error: Some(0.1),
+        ..BakeSettings::default()
+    };
+    let scene = builtin::build("ring").expect("it is built in");
+    let mut panel = Headless::with_scene(scene, settings.clone(), (SIZE.0 as f32, SIZE.1 as f32));
+    panel.layers = vec![LayerKind::Caustic];
+    panel.has_errors = true;
+    panel.last = Some(finished(&panel.scene, &settings));
+    panel.state = BakeState::Done;
+    panel.settle();
+    panel
+}
+
+/// A share of the way along a slider [pixels].
+fn on_slider(panel: &Headless, label: &str, share: f32) -> (i32, i32) {
+    let rect = Headless::rect_of(panel.labelled(Role::Slider, label));
+    ((rect.left() + 4.0 + share * 104.0) as i32, rect.center().y as i32)
+}
+
+#[test]
+fn levels_come_before_the_end_edits_are_baked_while_dragged_and_errors_are_shown() {
+    let Some(screen) = Screen::start("viewer edits") else {
+        return;
+    };
+    let mut viewer = Viewer::open(&screen, &REFINED);
+    let panel = panel_when_done();
+
+    // A whole picture comes before the last one.
+    let level = viewer.wait_for("level", |level| level["shown"] == true);
+    let done = viewer.wait_for("done", |_| true);
+    assert_eq!(level["request"], done["request"]);
+    assert!(level["maps"].as_u64() > Some(0) && level["level"].as_u64() < done["level"].as_u64());
+    let error = done["error"].as_f64().expect("it is estimated");
+    assert!(error > 0.0 && error <= 0.1, "{done}");
+    viewer.wait_for("rest", |_| true);
+    let baked = viewer.screenshot();
+
+    // Four times the power, at the place where the mouse is held: no ray is traced for it.
+    let (x0, y) = on_slider(&panel, "Intensity [W/sr]", 0.5);
+    let (x1, _) = on_slider(&panel, "Intensity [W/sr]", 0.65);
+    viewer.forget();
+    viewer.hands(&format!(
+        "mousemove {x0} {y} sleep 0.2 mousedown 1 sleep 0.2 mousemove {x1} {y}"
+    ));
+    viewer.wait_for("edit", |edit| edit["target"] == "LightPower(0)");
+    let done = viewer.wait_for("done", |_| true);
+    assert_eq!(done["rays"].as_u64(), Some(0), "{done}");
+    let uploaded = viewer.wait_for("upload", |upload| upload["tiles"].as_u64() > Some(0));
+    assert!(
+        uploaded["tiles"].as_u64() <= Some(4),
+        "two by two tiles: {uploaded}"
+    );
+    screenshot_that(&viewer, "is brighter", |shot| difference(&baked, shot) > 0.05);
+    viewer.hands("mouseup 1 sleep 0.2");
+
+    // Ctrl+Z brings the old light back.
+    viewer.forget();
+    viewer.hands("mousemove 900 300 key ctrl+z");
+    viewer.wait_for("undo", |_| true);
+    viewer.wait_for("done", |_| true);
+    screenshot_that(&viewer, "is as before", |shot| difference(&baked, shot) < 0.001);
+
+    // The error takes the place of the light, with a legend, and goes again.
+    let click = |panel: &Headless, name: &str| {
+        let centre = Headless::rect_of(panel.named(Role::RadioButton, name)).center();
+        format!(
+            "mousemove {} {} sleep 0.2 click 1 mousemove 900 300",
+            centre.x as i32, centre.y as i32
+        )
+    };
+    viewer.hands(&click(&panel, "estimated error"));
+    viewer.wait_for("shows", |shows| shows["what"] == "error");
+    let false_colours = screenshot_that(&viewer, "shows errors", |shot| difference(&baked, shot) > 0.1);
+    let coloured = |shot: &RgbImage| {
+        let spread = |rgb: [u8; 3]| rgb.into_iter().max().zip(rgb.into_iter().min());
+        let is_coloured = |rgb: [u8; 3]| spread(rgb).is_some_and(|(most, least)| most - least > 20);
+        let pixels = shot.enumerate_pixels();
+        pixels
+            .filter(|(x, _, pixel)| *x > WIDTH as u32 && is_coloured(pixel.0))
+            .count()
+    };
+    assert_eq!(coloured(&baked), 0, "the light is white");
+    assert!(coloured(&false_colours) > 20_000, "{}", coloured(&false_colours));
+    viewer.hands(&click(&panel, "light"));
+    viewer.wait_for("shows", |shows| shows["what"] == "light");
+    screenshot_that(&viewer, "shows light again", |shot| {
+        difference(&baked, shot) < 0.001
+    });
+
+    let (status, stderr) = viewer.close();
+    assert_eq!(status.code(), Some(0), "{stderr}");
+    assert!(!stderr.contains("panicked"), "{stderr}");
 }

@@ -1,8 +1,18 @@
 //! Illumination maps on the device, as half floats with a scale of their own.
 
-use super::tiles::{Texel, TiledImage, Uploaded, kept_scale, scale_for_half_floats, texel};
+use std::borrow::Cow;
+
+use half::f16;
+use half::slice::HalfFloatSliceExt;
+use rayon::iter::{IndexedParallelIterator, ParallelIterator};
+use rayon::slice::{ParallelSlice, ParallelSliceMut};
+
+use super::tiles::{Texel, TiledImage, Uploaded, kept_scale, scale_for_half_floats};
 use crate::gpu::Gpu;
 use crate::illumination::IlluminationMap;
+
+/// Texels that one thread works on at a time.
+const BLOCK: usize = 4096;
 
 /// A map on the device: E [W/m²] = texel × `irradiance_scale`.
 #[derive(Debug)]
@@ -14,10 +24,32 @@ pub(super) struct DeviceMap {
     pub(super) peak_w_m2: f32,
 }
 
+/// What a map shows: the sum of its layers [W/m²], computed once for all who need it.
+#[derive(Clone, Debug)]
+pub(super) struct ShownMap<'a> {
+    pub(super) map: &'a IlluminationMap,
+    pub(super) irradiance: Cow<'a, [[f32; 3]]>,
+}
+
+impl<'a> ShownMap<'a> {
+    pub(super) fn of(map: &'a IlluminationMap) -> Self {
+        let irradiance = match &map.layers[..] {
+            [alone] => Cow::Borrowed(&alone.irradiance[..]),
+            _ => Cow::Owned(map.total()),
+        };
+        Self { map, irradiance }
+    }
+
+    /// Texels across and down.
+    fn size(&self) -> [usize; 2] {
+        [self.map.width(), self.map.height()]
+    }
+}
+
 impl DeviceMap {
-    /// Uploads the sum of a map's layers; the map has to fit the device's textures.
-    pub(super) fn new(gpu: &Gpu, name: &str, map: &IlluminationMap) -> (Self, Uploaded) {
-        Self::from_texels(gpu, name, [map.width(), map.height()], &map.total())
+    /// Uploads a map, which has to fit the device's textures.
+    pub(super) fn new(gpu: &Gpu, name: &str, map: &ShownMap) -> (Self, Uploaded) {
+        Self::from_texels(gpu, name, map.size(), &map.irradiance)
     }
 
     /// One black texel, for surfaces without a map.
@@ -26,17 +58,17 @@ impl DeviceMap {
     }
 
     /// Whether a map can take this one's place in the same texture.
-    pub(super) fn has_size_of(&self, map: &IlluminationMap) -> bool {
-        self.image.size() == [map.width(), map.height()]
+    pub(super) fn has_size_of(&self, map: &ShownMap) -> bool {
+        self.image.size() == map.size()
     }
 
     /// Replaces the map by one of the same size and uploads the tiles that differ. The scale stays where the new peak
     /// still fits it; else it changes, and with it all tiles that are not black.
-    pub(super) fn update(&mut self, gpu: &Gpu, map: &IlluminationMap) -> Uploaded {
-        let irradiance = map.total();
-        self.peak_w_m2 = peak(&irradiance);
+    pub(super) fn update(&mut self, gpu: &Gpu, map: &ShownMap) -> Uploaded {
+        self.peak_w_m2 = peak(&map.irradiance);
         self.irradiance_scale = kept_scale(self.irradiance_scale, self.peak_w_m2);
-        self.image.update(gpu, texels(&irradiance, self.irradiance_scale))
+        self.image
+            .update(gpu, texels(&map.irradiance, self.irradiance_scale))
     }
 
     fn from_texels(gpu: &Gpu, name: &str, size: [usize; 2], irradiance: &[[f32; 3]]) -> (Self, Uploaded) {
@@ -54,12 +86,30 @@ impl DeviceMap {
 }
 
 fn peak(irradiance: &[[f32; 3]]) -> f32 {
+    let of_block = |block: &[[f32; 3]]| {
+        block
+            .iter()
+            .flatten()
+            .fold(0.0, |peak: f32, value| peak.max(*value))
+    };
     irradiance
-        .iter()
-        .flatten()
-        .fold(0.0, |peak: f32, channel| peak.max(*channel))
+        .par_chunks(BLOCK)
+        .map(of_block)
+        .reduce(|| 0.0, f32::max)
 }
 
+/// Half floats of a map, many at once: a window waits for them.
 fn texels(irradiance: &[[f32; 3]], scale: f32) -> Vec<Texel> {
-    irradiance.iter().map(|values| texel(*values, scale)).collect()
+    let mut texels = vec![[f16::ZERO; 4]; irradiance.len()];
+    let blocks = texels.par_chunks_mut(BLOCK).zip(irradiance.par_chunks(BLOCK));
+    blocks.for_each(|(texels, irradiance)| {
+        let scaled: Vec<[f32; 4]> = irradiance
+            .iter()
+            .map(|[r, g, b]| [*r / scale, *g / scale, *b / scale, 1.0])
+            .collect();
+        texels
+            .as_flattened_mut()
+            .convert_from_f32_slice(scaled.as_flattened());
+    });
+    texels
 }

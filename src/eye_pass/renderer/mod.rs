@@ -26,6 +26,7 @@ use wgpu::util::DeviceExt;
 
 use self::bindings::bind_group;
 use self::geometry::Geometry;
+use self::maps::ShownMap;
 use self::objects::{DeviceObject, Objects};
 use self::pipelines::{ClearPipelines, SurfacePipelines, ToneMappingPipeline};
 use self::surroundings::DeviceSurroundings;
@@ -102,7 +103,7 @@ impl Renderer {
     }
 
     /// Shows an edited scene: other materials, moved objects. Uploads what differs; the maps stay until
-    /// [`set_maps`](Self::set_maps), which has to follow.
+    /// [`set_maps`](Self::set_maps), which has to follow where anything was uploaded: mirrors see what changed.
     ///
     /// # Errors
     /// A device that refuses what it is given.
@@ -125,11 +126,12 @@ impl Renderer {
     /// A map that does not belong to the scene or is larger than the device's textures: the old maps stay. A device
     /// that refuses what it is given.
     pub fn set_maps(&mut self, gpu: &Gpu, scene: &Scene, maps: &[IlluminationMap]) -> Result<Uploaded> {
-        let mut uploaded = self.objects.set_maps(gpu, scene, maps)?;
+        let shown: Vec<ShownMap> = maps.iter().map(ShownMap::of).collect();
+        let mut uploaded = self.objects.set_maps(gpu, scene, &shown)?;
         for map in maps {
             uploaded += self.geometry.set_chart(gpu, &map.chart);
         }
-        uploaded += self.surroundings.update(gpu, scene, maps);
+        uploaded += self.surroundings.update(gpu, scene, &shown);
         gpu.take_error().map_or(Ok(uploaded), Err)
     }
 

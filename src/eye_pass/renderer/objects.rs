@@ -6,7 +6,7 @@ use glam::DVec3;
 use wgpu::util::DeviceExt;
 
 use super::bindings::bind_group;
-use super::maps::DeviceMap;
+use super::maps::{DeviceMap, ShownMap};
 use super::textures::BaseColour;
 use super::tiles::Uploaded;
 use super::uniforms::{ObjectUniform, rgb};
@@ -116,19 +116,15 @@ impl Objects {
     ///
     /// # Errors
     /// A map of an object that the scene lacks, or one larger than the device's textures; the old maps stay.
-    pub(super) fn set_maps(
-        &mut self,
-        gpu: &Gpu,
-        scene: &Scene,
-        maps: &[IlluminationMap],
-    ) -> Result<Uploaded> {
-        let mut map_of: Vec<Option<&IlluminationMap>> = vec![None; self.list.len()];
-        for map in maps {
+    pub(super) fn set_maps(&mut self, gpu: &Gpu, scene: &Scene, maps: &[ShownMap]) -> Result<Uploaded> {
+        let mut map_of: Vec<Option<&ShownMap>> = vec![None; self.list.len()];
+        for shown in maps {
+            let map = shown.map;
             check_chart(scene, map)?;
             let index = map.chart.object;
             let name = format!("map of {}", scene.objects[index].name);
             gpu.check_texture_size(&name, map.width() as u32, map.height() as u32)?;
-            map_of[index] = Some(map);
+            map_of[index] = Some(shown);
         }
         let mut uploaded = Uploaded::default();
         for ((object, source), map) in self.list.iter_mut().zip(&scene.objects).zip(map_of) {
@@ -192,7 +188,7 @@ impl DeviceObject {
     }
 
     /// Shows another map or none: in the same texture where it has the same size.
-    fn set_map(&mut self, gpu: &Gpu, shared: &Shared, name: &str, map: Option<&IlluminationMap>) -> Uploaded {
+    fn set_map(&mut self, gpu: &Gpu, shared: &Shared, name: &str, map: Option<&ShownMap>) -> Uploaded {
         let mut uploaded = match (&mut self.map, map) {
             (Some(shown), Some(map)) if shown.has_size_of(map) => shown.update(gpu, map),
             (None, None) => Uploaded::default(),

@@ -4,8 +4,10 @@
 use bytemuck::Zeroable;
 use glam::{DVec2, DVec3};
 use half::f16;
+use rayon::iter::{IntoParallelIterator, ParallelIterator};
 use wgpu::util::DeviceExt;
 
+use super::maps::ShownMap;
 use super::tiles::{Texel, TiledImage, Uploaded, kept_scale, texel};
 use super::uniforms::{MAX_RECEIVERS, Receiver, Surroundings};
 use crate::gpu::Gpu;
@@ -50,10 +52,10 @@ impl DeviceSurroundings {
     }
 
     /// Takes the largest plane receivers of the maps; uploads what differs from before.
-    pub(super) fn update(&mut self, gpu: &Gpu, scene: &Scene, maps: &[IlluminationMap]) -> Uploaded {
+    pub(super) fn update(&mut self, gpu: &Gpu, scene: &Scene, maps: &[ShownMap]) -> Uploaded {
         let mut planes: Vec<_> = maps
             .iter()
-            .filter_map(|map| Some((plane_receiver(scene, map)?, map)))
+            .filter_map(|map| Some((plane_receiver(scene, map.map)?, map)))
             .collect();
         planes.sort_by(|a, b| b.0.area_m2.total_cmp(&a.0.area_m2));
         planes.truncate(MAX_RECEIVERS);
@@ -64,9 +66,12 @@ impl DeviceSurroundings {
         let mut wanted = Surroundings {
             radiance_scale: scale,
             count: planes.len() as u32,
-            mean_radiance: super::uniforms::rgb(mean_radiance(scene, maps)),
             ..Zeroable::zeroed()
         };
+        if planes.is_empty() {
+            // Only then is it looked at.
+            wanted.mean_radiance = super::uniforms::rgb(mean_radiance(scene, maps));
+        }
         for (slot, ((plane, _), image)) in wanted.receivers.iter_mut().zip(planes.iter().zip(&images)) {
             *slot = plane.receiver(image.size);
         }
@@ -161,13 +166,13 @@ struct Image {
 }
 
 impl Image {
-    fn of(scene: &Scene, map: &IlluminationMap) -> Self {
+    fn of(scene: &Scene, shown: &ShownMap) -> Self {
+        let (map, irradiance) = (shown.map, &shown.irradiance);
         let (width, height) = (map.width(), map.height());
         let (across, down) = (width.div_ceil(SIDE), height.div_ceil(SIDE));
         let material = scene.material_of(map.chart.object);
         let per_irradiance = mean_albedo(scene, material) / std::f64::consts::PI;
-        let irradiance = map.total();
-        let block = |column: usize, row: usize| {
+        let block = &|column: usize, row: usize| {
             let mut sum = LinearSrgb::BLACK;
             let mut count = 0.0;
             for y in row * down..((row + 1) * down).min(height) {
@@ -183,8 +188,8 @@ impl Image {
             size: DVec2::new(width as f64 / across as f64, height as f64 / down as f64),
             width: columns,
             texels: (0..rows)
-                .flat_map(|row| (0..columns).map(move |column| (column, row)))
-                .map(|(column, row)| block(column, row))
+                .into_par_iter()
+                .flat_map_iter(|row| (0..columns).map(move |column| block(column, row)))
                 .collect(),
         }
     }
@@ -213,9 +218,9 @@ fn layers_of(images: &[Image], scale: f32) -> Vec<Texel> {
 }
 
 /// Mean radiance ρE/π of all surfaces with a map, by area [W/(m² sr)]; black without maps.
-fn mean_radiance(scene: &Scene, maps: &[IlluminationMap]) -> LinearSrgb {
+fn mean_radiance(scene: &Scene, maps: &[ShownMap]) -> LinearSrgb {
     let (mut exitance_w, mut area_m2) = (LinearSrgb::BLACK, 0.0);
-    for map in maps {
+    for map in maps.iter().map(|shown| shown.map) {
         let albedo = mean_albedo(scene, scene.material_of(map.chart.object));
         for layer in &map.layers {
             exitance_w += map.flux_w(layer.kind) * albedo;

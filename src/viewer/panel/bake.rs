@@ -85,8 +85,8 @@ fn last_bake(ui: &mut Ui, last: &BakedLevel) {
          Maps of rising quality are shown until the bake is done.",
     );
     let hover = format!(
-        "This level: Build {:.2} s, plan {:.2} s, trace {:.2} s, deposit {:.2} s; \
-         {:.2} s of CPU over all threads.",
+        "Rays that this bake traced up to here; those kept from earlier bakes are not counted. Build {:.2} s, \
+         plan {:.2} s, trace {:.2} s, deposit {:.2} s; {:.2} s of CPU over all threads.",
         result.timings_s.build,
         result.timings_s.plan,
         result.timings_s.trace,
@@ -94,7 +94,7 @@ fn last_bake(ui: &mut Ui, last: &BakedLevel) {
         result.cpu_s.total,
     );
     ui.label(format!(
-        "{}, {} rays, {} {}",
+        "{}, {} rays traced, {} {}",
         counted(result.maps.len(), "map"),
         grouped(result.counts.rays),
         grouped(result.counts.cells.max(result.counts.splats)),
@@ -120,17 +120,16 @@ pub fn energy(ui: &mut Ui, last: Option<&BakedLevel>) {
     }
 }
 
-/// "estimated error 2.1 %, 0.42 s: level 2, more to come".
+/// "estimated error 2.1 %, 0.42 s: level 2, goes on": one line of the panel.
 fn level_line(last: &BakedLevel) -> String {
     let error = match last.result.estimated_relative_rmse {
         Some(error) => format!("estimated error {} %", two_digits(100.0 * error)),
         None => "error not estimated".into(),
     };
     let level = match (last.is_final, last.result.stop_reason) {
-        (false, _) => format!("level {}, more to come", last.level),
-        (true, StopReason::Density) => "done at this density".into(),
-        (true, StopReason::MaxError) => "done, the error is reached".into(),
-        (true, StopReason::MaxTime) => "done, the time is up".into(),
+        (false, _) => format!("level {}, goes on", last.level),
+        (true, StopReason::Density | StopReason::MaxError) => "done".into(),
+        (true, StopReason::MaxTime) => "time is up".into(),
         (true, StopReason::NothingToDo) => "nothing to do".into(),
         (true, StopReason::Cancelled) => "stopped".into(),
     };

@@ -84,10 +84,10 @@ fn exposure(ui: &mut Ui, stops: &mut f64) -> Response {
 
 fn quantity(ui: &mut Ui, shown: &mut Quantity) -> Response {
     ui.horizontal(|ui| {
-        ui.radio_value(shown, Quantity::Light, "light")
-            .union(ui.radio_value(shown, Quantity::Error, "estimated error"))
+        ui.radio_value(shown, Quantity::Light, "light");
+        ui.radio_value(shown, Quantity::Error, "estimated error");
     })
-    .inner
+    .response
 }
 
 fn layer(ui: &mut Ui, shown: &mut LayerShown, baked: &[LayerKind]) -> Response {
