@@ -45,7 +45,8 @@ const TARGET: About = About {
     what: "What ends a bake: the ray density below exactly, an estimated error (relative RMSE over all maps) that is \
            small enough, or time that is up.",
     range: "density; max error 0.01 to 100 %, default 3 %; max time 0.001 to 10,000 s",
-    accuracy: "a max error is kept by the estimate, not by a reference; after a max time the finest complete maps are shown",
+    accuracy: "a max error is kept by the estimate, not by a reference; after a max time the finest complete maps are \
+               shown",
     cost: "halving the error takes about four times the rays",
 };
 const SIGMA: About = About {

@@ -1,4 +1,5 @@
-//! The side panel: settings of the bake, its state, and how the picture shows it. Knows egui, but no window.
+//! The side panel: edits of the scene, settings of the bake, its state, and how the picture shows it. Knows egui, but
+//! no window.
 
 mod bake;
 pub mod control;

@@ -48,7 +48,8 @@ const POSITION: About = About {
 };
 const DIRECTION: About = About {
     label: "Direction [°]",
-    what: "The way the light travels: azimuth, clockwise from −z as seen from above, and elevation; −90 is straight down.",
+    what: "The way the light travels: azimuth, clockwise from −z as seen from above, and elevation; −90 is straight \
+           down.",
     range: "azimuth −180 to 180, elevation −89.99 to 89.99",
     accuracy: "none: light is as exact as before",
     cost: "this light is traced anew",

@@ -1,0 +1,127 @@
+//! Edits of lights.
+
+use std::mem::replace;
+
+use glam::DVec3;
+
+use super::Edit;
+use super::ranges::{check_place, out_of_range};
+use crate::error::{Error, Result};
+use crate::optics::LinearSrgb;
+use crate::scene::{Light, LightKind};
+use crate::units::{Irradiance, RadiantIntensity};
+
+/// A direction whose squared length is this near to 1 is unit already and stays bit for bit.
+const UNIT: f64 = 1e-12;
+
+/// Edits a light, and gives the edit that undoes this one.
+pub(super) fn apply(edit: &Edit, index: usize, light: &mut Light) -> Result<Edit> {
+    let owner = format!("light `{}`", light.name);
+    let lacks = |what: &str, remedy: &str| Error::usage(&owner, format!("has no {what}"), remedy);
+    let kind = &mut light.kind;
+    Ok(match edit {
+        Edit::LightIntensity { intensity: new, .. } => {
+            let instead = "set its normal irradiance";
+            let old = intensity(kind).ok_or_else(|| lacks("radiant intensity, as it is a sun", instead))?;
+            check_power(new.0, "W/sr", &owner)?;
+            Edit::LightIntensity {
+                light: index,
+                intensity: replace(old, *new),
+            }
+        }
+        Edit::LightNormalIrradiance {
+            normal_irradiance: new,
+            ..
+        } => {
+            let instead = "set its radiant intensity";
+            let old = normal_irradiance(kind)
+                .ok_or_else(|| lacks("normal irradiance, as it is no sun", instead))?;
+            check_power(new.0, "W/m²", &owner)?;
+            Edit::LightNormalIrradiance {
+                light: index,
+                normal_irradiance: replace(old, *new),
+            }
+        }
+        Edit::LightPosition { position: new, .. } => {
+            let old = position(kind).ok_or_else(|| lacks("position, as it is a sun", "set its direction"))?;
+            check_place(*new, &owner)?;
+            Edit::LightPosition {
+                light: index,
+                position: replace(old, *new),
+            }
+        }
+        Edit::LightDirection { direction: new, .. } => {
+            let why = "direction, as it shines everywhere alike";
+            let old = direction(kind).ok_or_else(|| lacks(why, "set its position"))?;
+            Edit::LightDirection {
+                light: index,
+                direction: replace(old, unit(*new, &owner)?),
+            }
+        }
+        Edit::LightColour { colour: new, .. } => {
+            check_colour(*new, &owner)?;
+            Edit::LightColour {
+                light: index,
+                colour: replace(&mut light.colour, *new),
+            }
+        }
+        _ => return Err(lacks("such property", "edit what it has")),
+    })
+}
+
+fn intensity(kind: &mut LightKind) -> Option<&mut RadiantIntensity> {
+    match kind {
+        LightKind::Point { intensity, .. } | LightKind::Spot { intensity, .. } => Some(intensity),
+        LightKind::Sun { .. } => None,
+    }
+}
+
+fn normal_irradiance(kind: &mut LightKind) -> Option<&mut Irradiance> {
+    match kind {
+        LightKind::Sun {
+            normal_irradiance, ..
+        } => Some(normal_irradiance),
+        LightKind::Point { .. } | LightKind::Spot { .. } => None,
+    }
+}
+
+fn position(kind: &mut LightKind) -> Option<&mut DVec3> {
+    match kind {
+        LightKind::Point { position, .. } | LightKind::Spot { position, .. } => Some(position),
+        LightKind::Sun { .. } => None,
+    }
+}
+
+fn direction(kind: &mut LightKind) -> Option<&mut DVec3> {
+    match kind {
+        LightKind::Spot { direction, .. } | LightKind::Sun { direction, .. } => Some(direction),
+        LightKind::Point { .. } => None,
+    }
+}
+
+fn check_power(value: f64, unit: &str, owner: &str) -> Result<()> {
+    if value > 0.0 && value.is_finite() {
+        return Ok(());
+    }
+    let range = "what is above 0 and finite";
+    Err(out_of_range(owner, "strength", format!("{value} {unit}"), range))
+}
+
+fn check_colour(colour: LinearSrgb, owner: &str) -> Result<()> {
+    let channels = colour.to_array();
+    let is_light = channels.iter().all(|channel| *channel >= 0.0) && colour.luminance() > 0.0;
+    if is_light && colour.is_finite() {
+        return Ok(());
+    }
+    let range = "0 up, not all 0";
+    Err(out_of_range(owner, "colour", format!("{channels:?}"), range))
+}
+
+fn unit(direction: DVec3, owner: &str) -> Result<DVec3> {
+    if (direction.length_squared() - 1.0).abs() <= UNIT {
+        return Ok(direction);
+    }
+    direction
+        .try_normalize()
+        .ok_or_else(|| out_of_range(owner, "direction", direction, "what has a length"))
+}

@@ -1,0 +1,212 @@
+//! Edits of a scene as data: each gives the edited scene and the edit that takes it back, bit for bit.
+
+mod light;
+mod material;
+mod ranges;
+mod shape;
+
+use std::sync::Arc;
+
+use glam::{DQuat, DVec3};
+
+use super::{Mesh, Scene};
+use crate::error::{Error, Result};
+use crate::optics::LinearSrgb;
+use crate::units::{Irradiance, RadiantIntensity};
+
+/// One change of a scene. Indices are those of [`Scene::lights`], [`Scene::materials`] and [`Scene::objects`].
+#[derive(Clone, Debug, PartialEq)]
+pub enum Edit {
+    /// Strength of a point or spot light.
+    LightIntensity {
+        /// Which light.
+        light: usize,
+        /// On a spot's axis; > 0 and finite.
+        intensity: RadiantIntensity,
+    },
+    /// Strength of a sun.
+    LightNormalIrradiance {
+        /// Which light.
+        light: usize,
+        /// Measured across the beam; > 0 and finite.
+        normal_irradiance: Irradiance,
+    },
+    /// Place of a point or spot light.
+    LightPosition {
+        /// Which light.
+        light: usize,
+        /// Scene coordinates [m].
+        position: DVec3,
+    },
+    /// Where a spot points, or a sun's light travels.
+    LightDirection {
+        /// Which light.
+        light: usize,
+        /// Of any length but 0; made unit.
+        direction: DVec3,
+    },
+    /// Colour of a light.
+    LightColour {
+        /// Which light.
+        light: usize,
+        /// Each channel ≥ 0, not all 0.
+        colour: LinearSrgb,
+    },
+    /// Refractive index of a material.
+    MaterialIor {
+        /// Which material.
+        material: usize,
+        /// At least 1.
+        ior: f64,
+    },
+    /// Base colour of a material: the tint of glass, the albedo of what is matte.
+    MaterialTint {
+        /// Which material.
+        material: usize,
+        /// Each channel in [0, 1].
+        base_colour: LinearSrgb,
+    },
+    /// Roughness of a material; its class follows as it does on loading.
+    MaterialRoughness {
+        /// Which material.
+        material: usize,
+        /// [0, 1].
+        roughness: f64,
+    },
+    /// An object turned about the middle of its box, and then moved.
+    ObjectMoved {
+        /// Which object.
+        object: usize,
+        /// Unit; made so.
+        rotation: DQuat,
+        /// [m].
+        translation: DVec3,
+    },
+    /// Another shape for an object: what takes a movement back.
+    ObjectMesh {
+        /// Which object.
+        object: usize,
+        /// In scene coordinates; finite, with valid indices.
+        mesh: Arc<Mesh>,
+    },
+    /// Several edits, one after the other.
+    Several(Vec<Self>),
+}
+
+/// What an edit sets: edits of the same target replace one another.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum EditTarget {
+    /// Strength of a light.
+    LightPower(usize),
+    /// Place of a light.
+    LightPosition(usize),
+    /// Direction of a light.
+    LightDirection(usize),
+    /// Colour of a light.
+    LightColour(usize),
+    /// Refractive index of a material.
+    MaterialIor(usize),
+    /// Base colour of a material.
+    MaterialTint(usize),
+    /// Roughness of a material.
+    MaterialRoughness(usize),
+    /// Place of an object.
+    ObjectPlace(usize),
+    /// All of these.
+    Several(Vec<Self>),
+}
+
+impl Edit {
+    /// The edited scene, which shares every mesh and image that is not touched, and the edit that undoes this one
+    /// exactly.
+    ///
+    /// # Errors
+    /// An index that the scene lacks, a property that the light does not have, a value outside its range.
+    pub fn apply(&self, scene: &Scene) -> Result<(Scene, Self)> {
+        let mut edited = scene.clone();
+        let inverse = self.apply_to(&mut edited)?;
+        Ok((edited, inverse))
+    }
+
+    /// An object's mesh at an offset [m] from its place in `mesh`; that mesh itself where the offset is 0.
+    pub fn object_at(object: usize, mesh: &Arc<Mesh>, offset: DVec3) -> Self {
+        let mesh = if offset == DVec3::ZERO {
+            Arc::clone(mesh)
+        } else {
+            Arc::new(Mesh {
+                positions: mesh.positions.iter().map(|point| *point + offset).collect(),
+                ..Mesh::clone(mesh)
+            })
+        };
+        Self::ObjectMesh { object, mesh }
+    }
+
+    /// What it sets.
+    pub fn target(&self) -> EditTarget {
+        match self {
+            Self::LightIntensity { light, .. } | Self::LightNormalIrradiance { light, .. } => {
+                EditTarget::LightPower(*light)
+            }
+            Self::LightPosition { light, .. } => EditTarget::LightPosition(*light),
+            Self::LightDirection { light, .. } => EditTarget::LightDirection(*light),
+            Self::LightColour { light, .. } => EditTarget::LightColour(*light),
+            Self::MaterialIor { material, .. } => EditTarget::MaterialIor(*material),
+            Self::MaterialTint { material, .. } => EditTarget::MaterialTint(*material),
+            Self::MaterialRoughness { material, .. } => EditTarget::MaterialRoughness(*material),
+            Self::ObjectMoved { object, .. } | Self::ObjectMesh { object, .. } => {
+                EditTarget::ObjectPlace(*object)
+            }
+            Self::Several(edits) => EditTarget::Several(edits.iter().map(Self::target).collect()),
+        }
+    }
+
+    fn apply_to(&self, scene: &mut Scene) -> Result<Self> {
+        match self {
+            Self::LightIntensity { light, .. }
+            | Self::LightNormalIrradiance { light, .. }
+            | Self::LightPosition { light, .. }
+            | Self::LightDirection { light, .. }
+            | Self::LightColour { light, .. } => {
+                let found = existing(&mut scene.lights, *light, "light")?;
+                light::apply(self, *light, found)
+            }
+            Self::MaterialIor { material, .. }
+            | Self::MaterialTint { material, .. }
+            | Self::MaterialRoughness { material, .. } => {
+                let found = existing(&mut scene.materials, *material, "material")?;
+                material::apply(self, *material, found)
+            }
+            Self::ObjectMoved {
+                object,
+                rotation,
+                translation,
+            } => {
+                let found = existing(&mut scene.objects, *object, "object")?;
+                let moved = shape::moved(&found.mesh, *rotation, *translation, &found.name)?;
+                Ok(shape::replace_mesh(*object, &mut found.mesh, Arc::new(moved)))
+            }
+            Self::ObjectMesh { object, mesh } => {
+                let found = existing(&mut scene.objects, *object, "object")?;
+                shape::check_mesh(mesh, &found.name)?;
+                Ok(shape::replace_mesh(*object, &mut found.mesh, Arc::clone(mesh)))
+            }
+            Self::Several(edits) => {
+                let inverses: Result<Vec<Self>> = edits.iter().map(|edit| edit.apply_to(scene)).collect();
+                let mut inverses = inverses?;
+                inverses.reverse();
+                Ok(Self::Several(inverses))
+            }
+        }
+    }
+}
+
+fn existing<'a, T>(list: &'a mut [T], index: usize, noun: &str) -> Result<&'a mut T> {
+    let count = list.len();
+    list.get_mut(index).ok_or_else(|| {
+        Error::usage(
+            format!("{noun} {index}"),
+            format!("the scene has {count} of them, counted from 0"),
+            format!("choose a {noun} of the scene"),
+        )
+    })
+}
