@@ -75,6 +75,8 @@ pub struct App {
     /// When the next frame is due though nothing happens.
     wake_at: Option<Instant>,
     must_measure_exposure: bool,
+    /// The exposure that was measured last [stops], and how many layers the maps had then.
+    measured: Option<(f64, usize)>,
     must_set_maps: bool,
     pressed: Wishes,
     losses: Vec<Instant>,
@@ -112,6 +114,7 @@ impl App {
             moved_until: Instant::now(),
             wake_at: None,
             must_measure_exposure: options.exposure_stops.is_none(),
+            measured: None,
             must_set_maps: true,
             pressed: Wishes::default(),
             losses: Vec::new(),
@@ -290,6 +293,7 @@ impl App {
         let Some(mut view) = self.view() else {
             return Ok(());
         };
+        let wants_exposure = self.wants_exposure();
         let Some(graphics) = &mut self.graphics else {
             return Ok(());
         };
@@ -308,15 +312,28 @@ impl App {
             let seconds = start.elapsed().as_secs_f64();
             self.model.log.write(&Event::Uploaded { uploaded, seconds });
         }
-        let shows_light = self.model.quantity() == Quantity::Light;
-        if self.must_measure_exposure && shows_light && !self.model.maps().is_empty() {
+        if wants_exposure {
             self.must_measure_exposure = false;
             view.exposure_stops = graphics.measure_exposure(&view)?;
             self.model.panel.display.exposure_stops = view.exposure_stops;
+            self.measured = Some((view.exposure_stops, self.model.layers().len()));
             self.model.log.write(&Event::Exposure(view.exposure_stops));
         }
         self.pictures += u64::from(graphics.draw_picture(&view)?);
         Ok(())
+    }
+
+    /// Whether the exposure is to be measured: because it was asked for, or because the first bake has brought a layer
+    /// since it was measured and nobody changed it. The very first maps come without direct light, and the exposure
+    /// that suits them does not suit the scene.
+    fn wants_exposure(&self) -> bool {
+        let (model, now_stops) = (&self.model, self.model.panel.display.exposure_stops);
+        let is_first = model.last.as_ref().is_some_and(|last| last.serial == 1);
+        let is_outdated = self.measured.is_some_and(|(measured_stops, layers)| {
+            measured_stops == now_stops && layers < model.layers().len()
+        });
+        let shows_light = model.quantity() == Quantity::Light && !model.maps().is_empty();
+        shows_light && (self.must_measure_exposure || (is_first && is_outdated))
     }
 
     /// Decides when the next frame comes.

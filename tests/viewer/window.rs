@@ -204,7 +204,7 @@ fn a_signal_closes_the_window_even_while_it_bakes() {
 const REFINED: [&str; 7] = [
     "builtin:ring",
     "--max-error",
-    "10%",
+    "3%",
     "--map-resolution",
     "128",
     "--layers",
@@ -215,7 +215,7 @@ const REFINED: [&str; 7] = [
 fn panel_when_done() -> Headless {
     let settings = BakeSettings {
         layers: vec![LayerKind::Caustic],
-        max_error: Some(0.1),
+        max_error: Some(0.03),
         ..BakeSettings::default()
     };
     let scene = builtin::build("ring").expect("it is built in");
@@ -242,15 +242,36 @@ fn levels_come_before_the_end_edits_are_baked_while_dragged_and_errors_are_shown
     let mut viewer = Viewer::open(&screen, &REFINED);
     let panel = panel_when_done();
 
-    // A whole picture comes before the last one.
-    let level = viewer.wait_for("level", |level| level["shown"] == true);
+    // The last maps are not the first.
     let done = viewer.wait_for("done", |_| true);
-    assert_eq!(level["request"], done["request"]);
-    assert!(level["maps"].as_u64() > Some(0) && level["level"].as_u64() < done["level"].as_u64());
+    assert!(done["level"].as_u64() > Some(1), "{done}");
     let error = done["error"].as_f64().expect("it is estimated");
-    assert!(error > 0.0 && error <= 0.1, "{done}");
+    assert!(error > 0.0 && error <= 0.03, "{done}");
     viewer.wait_for("rest", |_| true);
     let baked = viewer.screenshot();
+
+    // The lamp is moved: coarse maps are shown before the last ones.
+    let field = panel.nodes().find(|node| {
+        let is_x = |text: Option<&str>| text.is_some_and(|text| text.starts_with("x: -0.7"));
+        is_x(node.value()) || is_x(node.label())
+    });
+    let field = Headless::rect_of(field.expect("the lamp has a place")).center();
+    let (x, y) = (field.x as i32, field.y as i32);
+    viewer.hands(&format!(
+        "mousemove {x} {y} sleep 0.2 mousedown 1 sleep 0.2 mousemove {} {y} sleep 0.2 mouseup 1",
+        x + 60
+    ));
+    viewer.wait_for("edit", |edit| edit["target"] == "LightPosition(0)");
+    let level = viewer.wait_for("level", |level| level["shown"] == true);
+    assert!(level["maps"].as_u64() > Some(0), "{level}");
+    viewer.wait_for("done", |done| {
+        done["request"].as_u64() >= level["request"].as_u64()
+    });
+    viewer.forget();
+    viewer.hands("mousemove 900 300 key ctrl+z");
+    viewer.wait_for("undo", |_| true);
+    viewer.wait_for("done", |_| true);
+    viewer.wait_for("rest", |_| true);
 
     // Four times the power, at the place where the mouse is held: no ray is traced for it.
     let (x0, y) = on_slider(&panel, "Intensity [W/sr]", 0.5);
@@ -307,4 +328,26 @@ fn levels_come_before_the_end_edits_are_baked_while_dragged_and_errors_are_shown
     let (status, stderr) = viewer.close();
     assert_eq!(status.code(), Some(0), "{stderr}");
     assert!(!stderr.contains("panicked"), "{stderr}");
+}
+
+#[test]
+fn the_exposure_suits_the_whole_light_and_not_only_the_first_maps() {
+    let Some(screen) = Screen::start("viewer exposure") else {
+        return;
+    };
+    // Caustic and direct light: the first maps come without the second.
+    let arguments = ["builtin:showroom", "--map-resolution", "64", "--max-error", "50%"];
+    let mut viewer = Viewer::open(&screen, &arguments);
+    let stops = |event: serde_json::Value| event["stops"].as_f64().expect("a number");
+    let of_the_caustic = stops(viewer.wait_for("exposure", |_| true));
+    let of_both = stops(viewer.wait_for("exposure", |_| true));
+    assert!(
+        of_both < of_the_caustic - 2.0,
+        "{of_the_caustic}, then {of_both} stops"
+    );
+    let shot = viewer.screenshot();
+    let pixels = shot.enumerate_pixels().filter(|(x, ..)| *x > WIDTH as u32);
+    let white = pixels.filter(|(.., pixel)| pixel.0 == [255; 3]).count();
+    let all = f64::from((SIZE.0 - WIDTH as u32) * SIZE.1);
+    assert!((white as f64) < 0.2 * all, "{white} white pixels");
 }
