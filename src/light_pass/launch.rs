@@ -28,11 +28,19 @@ enum Domain {
     },
 }
 
-/// From this density on [rays/sr], lattices double with it: 58 to 116 cells across a face at first.
-const COARSEST_NESTED_PER_SR: f64 = 1_600.0;
+/// Sides from this one on double with the square root of the density [cells].
+const FIRST_NESTED_SIDE: f64 = 58.0;
 
-/// Smaller lattices may have odd sides [cells].
+/// Smaller sides may be odd [cells].
 const ODD_SIDES: f64 = 16.0;
+
+/// Cells along a side for as many as `wanted`, or a few more.
+fn nested_side(wanted: f64) -> usize {
+    let doublings = (wanted / FIRST_NESTED_SIDE).log2().floor().clamp(0.0, 24.0);
+    let base = wanted / doublings.exp2();
+    let even = if base > ODD_SIDES { 2.0 } else { 1.0 };
+    ((base / even).ceil() * even * doublings.exp2()).clamp(1.0, 1e9) as usize
+}
 
 impl Launch {
     /// The domain of a light. For a sun: the smallest rectangle, in a frame fixed by the direction alone, around all
@@ -74,26 +82,16 @@ impl Launch {
     /// Sides are rounded up to multiples of powers of two, by a thirtieth at most, so that the lattice of a quarter of
     /// the density is every second ray of this one.
     pub fn lattice_size(&self, density_per_sr: f64, reach_m: f64) -> (usize, usize) {
-        let doublings = (density_per_sr / COARSEST_NESTED_PER_SR)
-            .log(4.0)
-            .floor()
-            .clamp(0.0, 24.0);
-        let base_per_sr = density_per_sr / 4_f64.powf(doublings);
-        let cells = |count: f64| {
-            let even = if count > ODD_SIDES { 2.0 } else { 1.0 };
-            let base = (count / even).ceil() * even;
-            (base * doublings.exp2()).clamp(1.0, 1e9) as usize
-        };
         match self.domain {
             Domain::Sphere { .. } => {
-                let side = cells((base_per_sr * cube_face::FACE_SOLID_ANGLE_SR).sqrt());
+                let side = nested_side((density_per_sr * cube_face::FACE_SOLID_ANGLE_SR).sqrt());
                 (side, side)
             }
             Domain::Plane { across, down, .. } => {
-                let rays_per_m = base_per_sr.sqrt() / reach_m;
+                let rays_per_m = density_per_sr.sqrt() / reach_m;
                 (
-                    cells(across.length() * rays_per_m),
-                    cells(down.length() * rays_per_m),
+                    nested_side(across.length() * rays_per_m),
+                    nested_side(down.length() * rays_per_m),
                 )
             }
         }
