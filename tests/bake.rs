@@ -20,6 +20,8 @@ mod invariance;
 mod kept;
 #[path = "bake/layers.rs"]
 mod layers;
+#[path = "bake/live.rs"]
+mod live;
 #[path = "bake/reference.rs"]
 mod reference;
 #[path = "bake/smoothing.rs"]

@@ -84,7 +84,10 @@ fn the_manifest_has_every_field() {
     );
     assert!(number(&manifest["counts"]["rays"]) > 0.0);
     assert!(number(&manifest["counts"]["shadow_rays"]) > 0.0);
-    assert_eq!(manifest["error"]["estimated_relative_rmse"], Value::Null);
+    let error = number(&manifest["error"]["estimated_relative_rmse"]);
+    assert!((1e-6..0.2).contains(&error), "an error of {error}");
+    let of_map = number(&manifest["maps"][0]["estimated_relative_rmse"]);
+    assert!(of_map > 0.0 && of_map <= error * 1.000_001, "{of_map} of {error}");
     let map = &manifest["maps"][0];
     assert_keys(
         map,
@@ -192,7 +195,8 @@ fn maps_are_read_back_channel_by_channel() {
             "caustic.R",
             "direct.B",
             "direct.G",
-            "direct.R"
+            "direct.R",
+            "error.Y"
         ]
     );
     let (caustic, direct) = (
