@@ -2,6 +2,8 @@
 
 #![allow(clippy::print_stdout, reason = "figures, for those who ask by --nocapture")]
 
+#[path = "bake/accuracy.rs"]
+mod accuracy;
 #[path = "bake/brute_force.rs"]
 mod brute_force;
 #[path = "bake/collection.rs"]

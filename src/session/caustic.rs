@@ -197,7 +197,7 @@ impl CausticLayer<'_> {
         };
         let predecessors = step.min(ESTIMATED_LEVELS - 1);
         let is_known = |error: &KeptError| error.predecessors == predecessors;
-        if !level.error.as_ref().is_some_and(is_known) {
+        if !level.error.as_ref().is_some_and(is_known) && !course.control.is_cancelled() {
             level.error = self.error_of(light, &level, state, climb, course);
         }
         climb.levels.push(level);

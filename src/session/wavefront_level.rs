@@ -130,7 +130,7 @@ impl CausticLayer<'_> {
     /// Bodies that are small beside the cells of a lattice.
     fn small_bodies(&self, light: &AimedLight, (columns, rows): (usize, usize)) -> SmallBodies {
         let cell = DVec2::new(1.0 / columns as f64, 1.0 / rows as f64);
-        SmallBodies::find(self.tracer.scene(), &light.launch, cell)
+        SmallBodies::find(self.tracer, &light.launch, cell)
     }
 
     fn wavefront_lattice<'a>(

@@ -1,5 +1,6 @@
 //! One step of light at a surface: shared by the light pass, the direct layer and the CPU eye pass.
 
+pub mod corners;
 pub mod curvature;
 pub mod differential;
 pub mod interaction;

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
+use super::corners::sharp_corners;
 use super::curvature::NormalField;
 use super::smoothing::smoothing_groups;
 use crate::geometry::{Ray, TriangleBvh, ray};
@@ -35,6 +36,8 @@ struct SpecularShape {
     normals: NormalField,
     /// Smoothing group of each triangle.
     groups: Vec<u32>,
+    /// Its sharp corners [m].
+    corners: Vec<DVec3>,
 }
 
 impl Hierarchy {
@@ -151,6 +154,7 @@ impl Tracer {
             Arc::new(SpecularShape {
                 normals: NormalField::new(mesh),
                 groups: smoothing_groups(mesh),
+                corners: sharp_corners(mesh),
             })
         })
     }
@@ -158,6 +162,11 @@ impl Tracer {
     /// How the normals of an object turn; `None` where it is not specular.
     pub fn normal_field(&self, object: usize) -> Option<&NormalField> {
         self.specular[object].as_ref().map(|shape| &shape.normals)
+    }
+
+    /// Sharp corners of an object [m]; none where it is not specular.
+    pub fn sharp_corners(&self, object: usize) -> &[DVec3] {
+        self.specular[object].as_ref().map_or(&[], |shape| &shape.corners)
     }
 
     /// Smoothing group of a triangle within its object; 0 where the object is not specular.

@@ -1,9 +1,10 @@
-//! Bodies that are smaller than the cells of a lattice: corners alone would miss them.
+//! Bodies that are smaller than the cells of a lattice, and sharp corners of larger ones: the cells' own corners alone
+//! would miss them.
 
 use glam::{DVec2, DVec3};
 
 use crate::light_pass::launch::Launch;
-use crate::scene::Scene;
+use crate::transport::Tracer;
 
 /// A body counts as small while it is less than this many cells across.
 const SMALL_CELLS: f64 = 2.0;
@@ -12,7 +13,10 @@ const SMALL_CELLS: f64 = 2.0;
 const CELLS_ACROSS: f64 = 160.0;
 
 /// How often a cell is divided at most for a body in it.
-pub const DEEPEST_BODY_LEVEL: u32 = 18;
+const DEEPEST_BODY_LEVEL: u32 = 18;
+
+/// How often a cell is divided for a sharp corner in it: the corner is then cut off in a 1,024th of the cell.
+const CORNER_LEVELS: u32 = 5;
 
 /// More small bodies than this are a texture of the scene that the lattice has to resolve by itself.
 const MOST_BODIES: usize = 256;
@@ -28,11 +32,21 @@ struct Body {
 #[derive(Clone, Debug, Default)]
 pub struct SmallBodies {
     bodies: Vec<Body>,
+    /// Sharp corners [m].
+    corners: Vec<DVec3>,
 }
 
 impl SmallBodies {
-    /// The objects that are small beside cells of the given size in the unit square.
-    pub fn find(scene: &Scene, launch: &Launch, cell: DVec2) -> Self {
+    /// The objects that are small beside cells of the given size in the unit square, and the corners of the others.
+    pub fn find(tracer: &Tracer, launch: &Launch, cell: DVec2) -> Self {
+        let scene = tracer.scene();
+        let mut corners: Vec<DVec3> = (0..scene.objects.len())
+            .flat_map(|object| tracer.sharp_corners(object))
+            .copied()
+            .collect();
+        if corners.len() > MOST_BODIES {
+            corners.clear();
+        }
         let mut bodies: Vec<Body> = scene
             .objects
             .iter()
@@ -55,30 +69,48 @@ impl SmallBodies {
         if bodies.len() > MOST_BODIES {
             bodies.clear();
         }
-        Self { bodies }
+        Self { bodies, corners }
     }
 
-    /// Whether a cell of a face, between two corners of the unit square, may hold a body that is small beside it.
-    pub fn ask_for_finer(&self, launch: &Launch, face: usize, low: DVec2, high: DVec2) -> bool {
-        if self.bodies.is_empty() {
+    /// Whether a cell of a face, between two corners of the unit square, may hold a body that is small beside it, or a
+    /// sharp corner; `level` how often it was divided for such.
+    pub fn ask_for_finer(
+        &self,
+        launch: &Launch,
+        face: usize,
+        (low, high): (DVec2, DVec2),
+        level: u32,
+    ) -> bool {
+        if level >= DEEPEST_BODY_LEVEL || (self.bodies.is_empty() && self.corners.is_empty()) {
             return false;
         }
         let middle = launch.ray(face, (low + high) * 0.5);
         let corners = [low, high, DVec2::new(low.x, high.y), DVec2::new(high.x, low.y)]
             .map(|corner| launch.ray(face, corner));
-        self.bodies.iter().any(|body| {
-            let along_m = (body.centre - middle.origin).dot(middle.direction);
-            if along_m <= -body.radius_m {
-                return false;
-            }
-            let along_m = along_m.max(0.0);
+        let reach_m = |along_m: f64| {
             let centre = middle.at(along_m);
-            let reach_m = corners
+            corners
                 .iter()
                 .map(|corner| corner.at(along_m).distance(centre))
-                .fold(0.0, f64::max);
-            centre.distance(body.centre) <= body.radius_m + 1.5 * reach_m
-                && CELLS_ACROSS * reach_m > 2.0 * body.radius_m
-        })
+                .fold(0.0, f64::max)
+        };
+        let along_m = |point: DVec3| (point - middle.origin).dot(middle.direction);
+        let holds_corner = level < CORNER_LEVELS
+            && self.corners.iter().any(|corner| {
+                let along_m = along_m(*corner);
+                along_m > 0.0 && middle.at(along_m).distance(*corner) <= reach_m(along_m)
+            });
+        holds_corner
+            || self.bodies.iter().any(|body| {
+                let along_m = along_m(body.centre);
+                if along_m <= -body.radius_m {
+                    return false;
+                }
+                let along_m = along_m.max(0.0);
+                let centre = middle.at(along_m);
+                let reach_m = reach_m(along_m);
+                centre.distance(body.centre) <= body.radius_m + 1.5 * reach_m
+                    && CELLS_ACROSS * reach_m > 2.0 * body.radius_m
+            })
     }
 }

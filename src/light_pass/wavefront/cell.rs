@@ -3,7 +3,7 @@
 use glam::DVec2;
 
 use super::band::{Corner, SampleId, Workspace};
-use super::bodies::{DEEPEST_BODY_LEVEL, SmallBodies};
+use super::bodies::SmallBodies;
 use super::edge::{Edge, EdgeCutter, Reach, SUSPICION, may_bulge, mismatch};
 use super::refine::Refinement;
 use super::strand::LightSample;
@@ -200,7 +200,8 @@ impl CellCutter<'_> {
     fn holds_small_body(&self, cell: &Cell, level: u32) -> bool {
         let [low, _, high, _] = cell.corners.map(|corner| corner.square);
         let launch = self.edges.tracer.launch;
-        level < DEEPEST_BODY_LEVEL && self.bodies.ask_for_finer(launch, self.edges.face, low, high)
+        self.bodies
+            .ask_for_finer(launch, self.edges.face, (low, high), level)
     }
 
     fn is_too_coarse(&self, cell: &Cell, rounds_before: usize, work: &Workspace) -> bool {

@@ -160,7 +160,8 @@ impl WavefrontDepositor<'_> {
                 report.statistics.merge(&part.statistics);
             }
             if let Some(maps) = maps.as_deref_mut() {
-                for (object, triangles) in parts.iter().flat_map(|part| &part.triangles) {
+                let placed = parts.iter().flat_map(|part| &part.triangles);
+                for (object, triangles) in placed.take_while(|_| !control.is_cancelled()) {
                     self.place(*object, triangles, maps, report);
                 }
             }
