@@ -22,6 +22,12 @@ const PRIOR_RATIO: f64 = 2.0;
 /// Measured ratios are taken to lie between these.
 const RATIO_RANGE: (f64, f64) = (1.5, 6.0);
 
+/// No level is taken to have a smaller part of the squared error of the one before it.
+const LEAST_GAIN: f64 = 1.0 / (RATIO_RANGE.1 * RATIO_RANGE.1);
+
+/// A tile's squared error is taken to be at least this part of that of the tiles around it.
+const LEAST_SHARE_OF_NEIGHBOURS: f64 = 0.25;
+
 /// A texel's error is that of the texels around it up to this many texels away.
 const WINDOW_TEXELS: usize = 2;
 
@@ -137,6 +143,20 @@ impl Image {
         sums
     }
 
+    /// At least a part of the mean of the tiles around: two levels may agree in a tile by chance.
+    fn pooled(&self, tiles: &[f64]) -> Vec<f64> {
+        let (columns, rows) = tile_counts(self.width, self.height);
+        let around = |tile: usize| {
+            let (column, row) = (tile % columns, tile / columns);
+            let near = |index: usize, count: usize| index.saturating_sub(1)..=(index + 1).min(count - 1);
+            let cells = near(row, rows).flat_map(|row| near(column, columns).map(move |c| row * columns + c));
+            let (sum, count) = cells.fold((0.0, 0), |(sum, count), tile| (sum + tiles[tile], count + 1));
+            sum / f64::from(count)
+        };
+        let least = |(tile, own): (usize, &f64)| own.max(LEAST_SHARE_OF_NEIGHBOURS * around(tile));
+        tiles.iter().enumerate().map(least).collect()
+    }
+
     /// Means over a square window around each texel; borders repeat nothing.
     fn windowed(&self, squares: &[f64]) -> Vec<f64> {
         let across = window_means(squares, self.width, 1, self.height, self.width);
@@ -186,7 +206,7 @@ pub fn estimate(
         .iter()
         .map(|(&object, image)| {
             let squares = image.squared_difference(middle.get(&object));
-            let tiles = image.tile_sums(&squares);
+            let tiles = image.pooled(&image.tile_sums(&squares));
             (object, (squares, tiles))
         })
         .collect();
@@ -205,6 +225,7 @@ pub fn estimate(
     for (&object, image) in fine {
         let (squares, tile_sums) = &differences[&object];
         let old = before.and_then(|before| before.error.maps.get(&object));
+        let older_tiles = older_differences(object, middle, coarser[1]);
         let windowed = image.windowed(squares);
         let texels = (0..windowed.len()).map(|texel| match old {
             Some(old) if !is_refined(object, image.tile_of(texel)) => old.texels[texel],
@@ -213,7 +234,12 @@ pub fn estimate(
         let tiles: Vec<f64> = (0..tile_sums.len())
             .map(|tile| match old {
                 Some(old) if !is_refined(object, tile) => old.tiles[tile],
-                _ => tile_sums[tile] * share,
+                // A difference may vanish by chance, or because both levels miss the same.
+                Some(old) => (tile_sums[tile] * share).max(old.tiles[tile] * LEAST_GAIN),
+                None => {
+                    let older = older_tiles.as_ref().map_or(0.0, |tiles| tiles[tile]);
+                    tile_sums[tile].max(older * LEAST_GAIN) * share
+                }
             })
             .collect();
         squares_sum += tiles.iter().sum::<f64>();
@@ -227,6 +253,12 @@ pub fn estimate(
     let mean = flux_w / area_m2;
     error.relative_rmse = (squares_sum / area_m2 / (mean * mean) + given_up * given_up).sqrt();
     (flux_w > 0.0).then_some(error)
+}
+
+/// Squared differences of the two coarser levels, tile by tile.
+fn older_differences(object: usize, middle: &Images, coarse: Option<&Images>) -> Option<Vec<f64>> {
+    let image = middle.get(&object)?;
+    Some(image.tile_sums(&image.squared_difference(coarse?.get(&object))))
 }
 
 /// R = e₂/e from three levels, half-way to the first-order ratio.

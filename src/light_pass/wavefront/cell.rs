@@ -5,7 +5,7 @@ use glam::DVec2;
 use super::band::{Corner, SampleId, Workspace};
 use super::bodies::SmallBodies;
 use super::edge::{Edge, EdgeCutter, Reach, SUSPICION, may_bulge, mismatch};
-use super::refine::Refinement;
+use super::refine::{Refinement, RoundSet};
 use super::strand::LightSample;
 use crate::illumination::accumulator::FluxUnit;
 use crate::light_pass::caustic::path::PathSignature;
@@ -113,6 +113,8 @@ pub struct Cell {
     pub corners: [Corner; 4],
     /// Bottom (0→1), right (1→2), top (3→2), left (0→3).
     pub edges: [Option<Edge>; 4],
+    /// Rounds that divide the light on the other side of each edge, as far as it is not the cell's own.
+    pub beside: [RoundSet; 4],
 }
 
 /// Ends of the four edges among the corners.
@@ -148,7 +150,7 @@ impl CellCutter<'_> {
             let bodies = depth.bodies + 1;
             return self.split(cell, Depth { bodies, ..depth }, work, out);
         }
-        if self.is_too_coarse(cell, depth.rounds, work) {
+        if self.is_too_coarse(cell, &depth, work) {
             let rounds = depth.rounds + 1;
             return self.split(cell, Depth { rounds, ..depth }, work, out);
         }
@@ -204,25 +206,22 @@ impl CellCutter<'_> {
             .ask_for_finer(launch, self.edges.face, (low, high), level)
     }
 
-    fn is_too_coarse(&self, cell: &Cell, rounds_before: usize, work: &Workspace) -> bool {
+    fn is_too_coarse(&self, cell: &Cell, depth: &Depth, work: &Workspace) -> bool {
         let Some(refinement) = self.refinement else {
             return false;
         };
-        let samples = cell.corners.map(|corner| work.get(corner.sample));
-        let brightest_w = samples
-            .iter()
-            .map(|sample| sample.brightest_w)
-            .fold(0.0, f64::max);
-        let found = signatures(cell, work, |sample, found| {
-            found.extend(sample.strands.iter().map(|strand| strand.signature));
-        });
-        let strands = found.into_iter().map(|signature| {
-            samples
-                .iter()
-                .filter_map(|sample| Some(&sample.strands[sample.find(signature)?]))
-                .collect()
-        });
-        refinement.is_too_coarse(strands, brightest_w, rounds_before)
+        let beside = cell.beside.iter().fold(0, |all, rounds| all | rounds);
+        beside >> depth.rounds & 1 == 1
+            || refinement.is_too_coarse(cell.corners.map(|corner| work.get(corner.sample)), depth.rounds)
+    }
+
+    /// Rounds that divide the light beside a cell, by samples on that side.
+    pub fn rounds_beside(&self, own: [Corner; 4], beside: &[Corner], work: &Workspace) -> RoundSet {
+        self.refinement.map_or(0, |refinement| {
+            let sample = |corner: &Corner| work.get(corner.sample);
+            let beside: Vec<&LightSample> = beside.iter().map(sample).collect();
+            refinement.rounds_beside(own.map(|corner| sample(&corner)), &beside)
+        })
     }
 
     /// All corners agree in everything.
@@ -410,8 +409,25 @@ impl CellCutter<'_> {
             ([left, centre, top, d], [west, up.clone(), t0, l1]),
             ([centre, right, c, top], [east, r1, t1, up]),
         ];
-        for (corners, edges) in children {
-            self.cut_at(&Cell { corners, edges }, depth, work, out);
+        // A child's neighbours: its siblings within the cell, the cell's own beyond it.
+        const SIBLINGS: [[Option<usize>; 4]; 4] = [
+            [None, Some(1), Some(2), None],
+            [None, None, Some(3), Some(0)],
+            [Some(0), Some(3), None, None],
+            [Some(1), None, None, Some(2)],
+        ];
+        let corners_of = children.each_ref().map(|(corners, _)| *corners);
+        for (child, (corners, edges)) in children.into_iter().enumerate() {
+            let beside = std::array::from_fn(|side| match SIBLINGS[child][side] {
+                Some(sibling) => self.rounds_beside(corners, &corners_of[sibling], work),
+                None => cell.beside[side],
+            });
+            let part = Cell {
+                corners,
+                edges,
+                beside,
+            };
+            self.cut_at(&part, depth, work, out);
         }
     }
 

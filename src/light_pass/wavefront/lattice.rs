@@ -229,7 +229,7 @@ impl WavefrontLattice<'_> {
 
     /// A traced corner of a band whose first row is `first_row`; `None` where there is none.
     fn corner_at(&self, first_row: usize, row: usize, column: usize, index: &[Vec<u32>]) -> Option<Corner> {
-        let place = *index[row].get(column)?;
+        let place = *index.get(row)?.get(column)?;
         (place != NONE).then(|| Corner {
             square: self.square(column, first_row + row),
             sample: SampleId {
@@ -284,8 +284,26 @@ impl WavefrontLattice<'_> {
                 let [Some(a), Some(b), Some(c), Some(d)] = corners else {
                     continue;
                 };
+                let beyond = [
+                    (row.checked_sub(1), Some(column), (0, 1)),
+                    (Some(row), Some(column + 2), (1, 0)),
+                    (Some(row + 2), Some(column), (0, 1)),
+                    (Some(row), column.checked_sub(1), (1, 0)),
+                ];
+                let own = [a, b, c, d];
+                let beside = beyond.map(|(row, column, (across, down))| {
+                    let (Some(row), Some(column)) = (row, column) else {
+                        return 0;
+                    };
+                    let ends = [corner(row, column), corner(row + down, column + across)];
+                    let [Some(first), Some(second)] = ends else {
+                        return 0;
+                    };
+                    cutter.rounds_beside(own, &[first, second], work)
+                });
                 let cell = Cell {
-                    corners: [a, b, c, d],
+                    beside,
+                    corners: own,
                     edges: [
                         across[0][column].clone(),
                         right.clone(),

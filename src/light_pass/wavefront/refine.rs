@@ -8,7 +8,8 @@ use std::collections::BTreeMap;
 use glam::DVec2;
 
 use super::receivers::Receivers;
-use super::strand::{Landing, Strand};
+use super::strand::{Landing, LightSample, Strand};
+use crate::light_pass::caustic::path::PathSignature;
 
 /// Side of a tile [texels].
 pub const TILE_SIDE: usize = 16;
@@ -77,24 +78,40 @@ pub struct Refinement<'a> {
     pub rounds: &'a [RoughTiles],
 }
 
+/// Rounds as a set: bit r stands for round r.
+pub type RoundSet = u32;
+
 impl Refinement<'_> {
-    /// Whether a cell has to be divided that was divided in so many rounds before. Per strand: those of the cell's
-    /// corners that have it.
-    pub fn is_too_coarse<'s>(
-        &self,
-        strands: impl Iterator<Item = Vec<&'s Strand>>,
-        brightest_w: f64,
-        rounds_before: usize,
-    ) -> bool {
+    /// Whether a cell has to be divided that was divided in so many rounds before, by the samples at its corners.
+    pub fn is_too_coarse(&self, corners: [&LightSample; 4], rounds_before: usize) -> bool {
         let Some(tiles) = self.rounds.get(rounds_before) else {
             return false;
         };
-        strands
-            .filter(|corners| {
-                let most_w = corners.iter().map(|strand| strand.flux_w.luminance());
-                most_w.fold(0.0, f64::max) >= LEAST_SHARE * brightest_w
-            })
-            .any(|corners| self.falls_on(&corners, tiles))
+        bright_signatures(&corners).into_iter().any(|signature| {
+            let strands = strands_of(&corners, signature);
+            self.falls_on(&strands, tiles)
+        })
+    }
+
+    /// Rounds that divide light beside a cell which not all of its corners have: the border of that light may reach into
+    /// the cell, between its corners.
+    pub fn rounds_beside(&self, own: [&LightSample; 4], beside: &[&LightSample]) -> RoundSet {
+        if self.rounds.is_empty() {
+            return 0;
+        }
+        let mut rounds = 0;
+        for signature in bright_signatures(beside) {
+            if own.iter().all(|sample| sample.find(signature).is_some()) {
+                continue;
+            }
+            let strands = strands_of(beside, signature);
+            for (round, tiles) in self.rounds.iter().enumerate() {
+                if self.falls_on(&strands, tiles) {
+                    rounds |= 1 << round;
+                }
+            }
+        }
+        rounds
     }
 
     /// Whether a strand's light may fall on chosen tiles: they meet the box around the places that its corners light.
@@ -125,4 +142,28 @@ impl Refinement<'_> {
                 .is_some_and(|tiles| tiles.meets(low, high))
         })
     }
+}
+
+/// Signatures of all strands that are not dim beside the brightest.
+fn bright_signatures(samples: &[&LightSample]) -> Vec<PathSignature> {
+    let brightest_w = samples
+        .iter()
+        .map(|sample| sample.brightest_w)
+        .fold(0.0, f64::max);
+    let is_bright = |strand: &&Strand| strand.flux_w.luminance() >= LEAST_SHARE * brightest_w;
+    let strands = samples
+        .iter()
+        .flat_map(|sample| &sample.strands)
+        .filter(is_bright);
+    let mut signatures: Vec<PathSignature> = strands.map(|strand| strand.signature).collect();
+    signatures.sort_unstable();
+    signatures.dedup();
+    signatures
+}
+
+fn strands_of<'s>(samples: &[&'s LightSample], signature: PathSignature) -> Vec<&'s Strand> {
+    samples
+        .iter()
+        .filter_map(|sample| Some(&sample.strands[sample.find(signature)?]))
+        .collect()
 }
