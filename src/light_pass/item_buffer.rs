@@ -76,6 +76,12 @@ impl ItemBuffer {
         self.faces.iter().map(CellBits::count).sum()
     }
 
+    /// Marked cells' part of the whole domain, (0, 1] where any is marked.
+    pub fn marked_share(&self, launch: &Launch) -> f64 {
+        let whole = launch.cell_measure(DVec2::ZERO, DVec2::ONE) * launch.face_count() as f64;
+        self.marked_measure(launch) / whole
+    }
+
     /// Solid angle [sr] of the marked cells, or their area [m²] for a sun.
     pub fn marked_measure(&self, launch: &Launch) -> f64 {
         let side = CELLS_PER_SIDE as f64;

@@ -12,7 +12,7 @@ use crate::light_pass::accuracy::{self, Before, Images};
 use crate::light_pass::caustic::pass::{PassReport, Stopwatch};
 use crate::light_pass::caustic::setup::{Aim, AimedLight};
 use crate::light_pass::caustic::statistics::FootprintStatistics;
-use crate::light_pass::wavefront::refine::RoughTiles;
+use crate::light_pass::wavefront::refine::Round;
 use crate::optics::LinearSrgb;
 use crate::plan::EffectPlan;
 use crate::progress::{Control, Progress};
@@ -74,7 +74,7 @@ pub(super) enum Stopped {
 struct Climb {
     /// The coarsest first.
     levels: Vec<LightLevel>,
-    rounds: Vec<RoughTiles>,
+    rounds: Vec<Round>,
     /// Relative RMSE that the last round aims at.
     goal: Option<f64>,
     done: bool,
@@ -240,8 +240,9 @@ impl CausticLayer<'_> {
             Estimator::Splat => self.thinned_images(light, level, state, course),
         };
         let watch = Stopwatch::start();
-        let before = climb.rounds.last().and_then(|refined| {
+        let before = climb.rounds.last().and_then(|round| {
             let error = &climb.levels.last()?.error.as_ref()?.estimate;
+            let refined = &round.tiles;
             Some(Before { error, refined })
         });
         let ledger = level.ledger.report("", level.unit, LinearSrgb::WHITE).energy_w;
@@ -271,7 +272,9 @@ impl CausticLayer<'_> {
         }
         let tiles = accuracy::rough_tiles(error, goal);
         let is_any = !tiles.is_empty();
-        climb.rounds.push(tiles);
+        let overreaches = climb.levels.last().map_or(&[][..], |level| &level.overreaches);
+        let round = Round::new(tiles, overreaches);
+        climb.rounds.push(round);
         climb.goal = Some(goal);
         is_any
     }

@@ -14,21 +14,36 @@ use crate::light_pass::caustic::lattice::Lattice;
 use crate::light_pass::caustic::path::PathLimits;
 use crate::light_pass::caustic::setup::AimedLight;
 use crate::light_pass::caustic::statistics::FootprintStatistics;
-use crate::light_pass::wavefront::refine::RoughTiles;
+use crate::light_pass::wavefront::refine::Round;
 use crate::plan::Effect;
 use crate::settings::{BakeSettings, Estimator, Footprint, Kernel, MapResolution, Sigma};
 
 /// The coarsest lattice has fewer rays than this [rays/sr]: it is the first picture.
 const FIRST_PICTURE_PER_SR: f64 = 1_600.0;
 
+/// Cells of the first lattice whose error is known, over the error that is aimed at.
+const CELLS_FOR_AN_ERROR: f64 = 30.0;
+
+/// No target asks for more cells to begin with than this one.
+const STARTING_TARGET: f64 = 0.005;
+
+/// Cells to begin with, at least.
+const LEAST_CELLS: f64 = 500.0;
+
+/// A small caster makes the lattice so many times denser at most.
+const MOST_DENSER: f64 = 64.0;
+
+/// Density at which cells are counted: high enough that no side is rounded by much [rays/sr].
+const UNIT_DENSITY_PER_SR: f64 = 1e5;
+
 /// Least side of the lattice that mean footprints are taken from [cells].
 const LEAST_STATISTICS_SIDE: usize = 32;
 
 /// How much coarser than the last one a coarse lattice is deposited at most.
-const MOST_COARSE: f64 = 8.0;
+const MOST_COARSE: f64 = 16.0;
 
 /// How coarse triangles may be for a target, relative to those of a bake without one: over this relative RMSE.
-const USUAL_ERROR: f64 = 0.04;
+const USUAL_ERROR: f64 = 0.012;
 
 impl CausticLayer<'_> {
     /// Cells across and down each face, from the coarsest lattice to that of the settings. Splats have strides instead.
@@ -38,7 +53,7 @@ impl CausticLayer<'_> {
             return vec![finest; LEVEL_STRIDES.len()];
         }
         let mut lattices = vec![finest];
-        let mut density_per_sr = self.settings.density_per_sr;
+        let mut density_per_sr = self.density_per_sr(light);
         while lattices.len() < ESTIMATED_LEVELS || density_per_sr >= FIRST_PICTURE_PER_SR {
             let (columns, rows) = lattices[lattices.len() - 1];
             lattices.push((columns.div_ceil(2), rows.div_ceil(2)));
@@ -51,7 +66,23 @@ impl CausticLayer<'_> {
     fn lattice_size(&self, light: &AimedLight) -> (usize, usize) {
         light
             .launch
-            .lattice_size(self.settings.density_per_sr, self.aim.reach_m)
+            .lattice_size(self.density_per_sr(light), self.aim.reach_m)
+    }
+
+    /// Density of a light's lattice [rays/sr]: as it is set or, with a target, so much that a small caster has its share
+    /// of cells.
+    fn density_per_sr(&self, light: &AimedLight) -> f64 {
+        let set = self.settings.density_per_sr;
+        let Some(target) = self.settings.max_error else {
+            return set;
+        };
+        let wanted = (CELLS_FOR_AN_ERROR / target.max(STARTING_TARGET)).max(LEAST_CELLS);
+        // A lattice of 1 ray/sr has as many cells on casters as this; suns scale it by their reach.
+        let (columns, rows) = light.launch.lattice_size(UNIT_DENSITY_PER_SR, self.aim.reach_m);
+        let whole = (columns * rows * light.launch.face_count()) as f64;
+        let share = light.item_buffer.marked_share(&light.launch);
+        set.max(UNIT_DENSITY_PER_SR * wanted / (whole * share))
+            .min(set * MOST_DENSER)
     }
 
     /// All that a level depends on.
@@ -59,7 +90,7 @@ impl CausticLayer<'_> {
         &self,
         light: &AimedLight,
         step: usize,
-        (rounds, goal): (&[RoughTiles], Option<f64>),
+        (rounds, goal): (&[Round], Option<f64>),
         sizes: &Sizes,
     ) -> LevelKey {
         let lattices = self.lattices(light);
@@ -79,7 +110,7 @@ impl CausticLayer<'_> {
         }
     }
 
-    pub(super) fn trace_key(&self, size: (usize, usize), rounds: &[RoughTiles]) -> TraceKey {
+    pub(super) fn trace_key(&self, size: (usize, usize), rounds: &[Round]) -> TraceKey {
         let settings = self.settings;
         let mut paths = BakeSettings {
             estimator: settings.estimator,
@@ -296,7 +327,7 @@ impl CausticLayer<'_> {
 fn coarseness(target: Option<f64>, goal: Option<f64>) -> f64 {
     match (target, goal) {
         (None, _) => 1.0,
-        (Some(target), None) => (target / USUAL_ERROR).clamp(0.5, 2.0),
-        (Some(_), Some(goal)) => (goal / USUAL_ERROR).clamp(0.1, 2.0),
+        (Some(target), None) => (target / USUAL_ERROR).clamp(1.0, 8.0),
+        (Some(_), Some(goal)) => (goal / USUAL_ERROR).clamp(0.1, 8.0),
     }
 }

@@ -10,8 +10,9 @@ use crate::light_pass::launch::Launch;
 use crate::light_pass::ledger_sum::LedgerSum;
 use crate::light_pass::receiver_maps::ReceiverMaps;
 use crate::light_pass::wavefront::kept_rays::KeptRays;
+use crate::light_pass::wavefront::overreach::Overreach;
 use crate::light_pass::wavefront::pass::TracedLight;
-use crate::light_pass::wavefront::refine::RoughTiles;
+use crate::light_pass::wavefront::refine::Round;
 use crate::settings::BakeSettings;
 
 /// Sizes of maps [texels across, down], by object.
@@ -27,7 +28,7 @@ pub(super) struct TraceKey {
     /// Cells across and down each face.
     pub(super) size: (usize, usize),
     /// Where cells are divided further, round by round.
-    pub(super) rounds: Vec<RoughTiles>,
+    pub(super) rounds: Vec<Round>,
 }
 
 /// All that a light's maps depend on beside the scene.
@@ -58,6 +59,8 @@ pub(super) struct LightLevel {
     pub(super) unit: FluxUnit,
     /// Of all paths.
     pub(super) ledger: LedgerSum,
+    /// Patches that reach farther than their rays.
+    pub(super) overreaches: Vec<Overreach>,
     /// By the levels before it; `None` where there are none, or no light arrived.
     pub(super) error: Option<KeptError>,
     /// To be deposited again; `None` where that was too much to keep.

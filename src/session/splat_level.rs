@@ -54,6 +54,7 @@ impl CausticLayer<'_> {
             maps,
             unit,
             ledger: report.ledger,
+            overreaches: Vec::new(),
             error: None,
             traced: None,
         })

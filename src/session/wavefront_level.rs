@@ -65,6 +65,7 @@ impl CausticLayer<'_> {
             maps,
             unit,
             ledger: report.ledger,
+            overreaches: report.overreaches,
             error: None,
             traced,
         })
@@ -161,6 +162,5 @@ impl CausticLayer<'_> {
 
 /// Flux that a light of unit strength sends to marked cells [W].
 fn reference_w(light: &AimedLight) -> f64 {
-    let whole = light.launch.cell_measure(DVec2::ZERO, DVec2::ONE) * light.launch.face_count() as f64;
-    light.launch.power_bound_w() * light.item_buffer.marked_measure(&light.launch) / whole
+    light.launch.power_bound_w() * light.item_buffer.marked_share(&light.launch)
 }

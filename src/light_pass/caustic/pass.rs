@@ -12,6 +12,7 @@ use super::lattice::{Lattice, TracedRow};
 use super::statistics::FootprintStatistics;
 use crate::light_pass::ledger_sum::LedgerSum;
 use crate::light_pass::receiver_maps::{ChartFor, ReceiverMaps};
+use crate::light_pass::wavefront::overreach::Overreach;
 use crate::progress::{Control, Progress, Stage};
 
 /// Rays that a band aims at: enough for all cores, and few enough that what they bring stays in their caches.
@@ -38,6 +39,8 @@ pub struct PassReport {
     pub receiver_queries: u64,
     /// Sizes of footprints.
     pub statistics: FootprintStatistics,
+    /// Patches that reach farther than their rays.
+    pub overreaches: Vec<Overreach>,
     /// Wall-clock and CPU seconds of tracing.
     pub trace_s: Seconds,
     /// Wall-clock and CPU seconds of depositing.

@@ -5,8 +5,10 @@ use glam::DVec2;
 use super::band::{Corner, SampleId, Workspace};
 use super::bodies::SmallBodies;
 use super::edge::{Edge, EdgeCutter, Reach, SUSPICION, may_bulge, mismatch};
+use super::patch::PatchShape;
 use super::refine::{Refinement, RoundSet};
 use super::strand::LightSample;
+use crate::geometry::Ray;
 use crate::illumination::accumulator::FluxUnit;
 use crate::light_pass::caustic::path::PathSignature;
 use crate::light_pass::ledger_sum::{Account, LedgerSum};
@@ -20,6 +22,18 @@ const BRIGHT_SHARE: f64 = 0.1;
 
 /// Mismatch along an edge from which a check ray decides between the cubic and the bilinear patch.
 const CHECK_MISMATCH: f64 = 0.08;
+
+/// A patch that is off by more than this share of the cell's width in its middle is of no use.
+const DOUBTFUL_SHARE: f64 = 0.1;
+
+/// How far patches are off in the middle of a cell, and how wide the cell is there: distances between origins with those
+/// between directions over the way to where they land [m].
+#[derive(Clone, Copy, Debug)]
+struct Check {
+    cubic: f64,
+    bilinear: f64,
+    width: f64,
+}
 
 /// A piece of the wavefront between traced strands.
 #[derive(Clone, Copy, Debug)]
@@ -155,7 +169,12 @@ impl CellCutter<'_> {
             return self.split(cell, Depth { rounds, ..depth }, work, out);
         }
         if cell.edges.iter().all(Option::is_none) {
-            return self.whole(cell, work, out);
+            return if depth.ambiguous < DEEPEST_SPLIT && self.is_doubtful(cell, work) {
+                let ambiguous = depth.ambiguous + 1;
+                self.split(cell, Depth { ambiguous, ..depth }, work, out)
+            } else {
+                self.whole(cell, work, out)
+            };
         }
         if self.is_ambiguous(cell, work) {
             return if depth.ambiguous < DEEPEST_SPLIT {
@@ -211,8 +230,16 @@ impl CellCutter<'_> {
             return false;
         };
         let beside = cell.beside.iter().fold(0, |all, rounds| all | rounds);
-        beside >> depth.rounds & 1 == 1
-            || refinement.is_too_coarse(cell.corners.map(|corner| work.get(corner.sample)), depth.rounds)
+        let [low, _, high, _] = cell.corners.map(|corner| corner.square);
+        let place = (self.edges.face, low, high);
+        // Near a silhouette light goes much farther between the corners than at them.
+        let along = cell.edges.iter().flatten().flat_map(|edge| &edge.samples);
+        let corners = cell.corners.iter().map(|corner| corner.sample);
+        let samples: Vec<&LightSample> = corners
+            .chain(along.map(|(_, sample)| *sample))
+            .map(|sample| work.get(sample))
+            .collect();
+        beside >> depth.rounds & 1 == 1 || refinement.is_too_coarse(place, &samples, depth.rounds)
     }
 
     /// Rounds that divide the light beside a cell, by samples on that side.
@@ -247,14 +274,7 @@ impl CellCutter<'_> {
         out: &mut CellOutput,
     ) {
         let step = cell.step();
-        let mut worst: f64 = 0.0;
-        for (edge, (from, to)) in EDGE_ENDS.into_iter().enumerate() {
-            let strand = |corner: usize| {
-                let (id, strand) = corners[corner];
-                &work.get(id).strands[usize::from(strand)]
-            };
-            worst = worst.max(mismatch(strand(from), strand(to), cell.edge_step(edge)));
-        }
+        let worst = worst_mismatch(cell, corners, work);
         let mut kind = PatchKind::Rectangle;
         if worst > CHECK_MISMATCH && self.is_bilinear_better(cell, corners, step, work) {
             kind = PatchKind::BilinearRectangle;
@@ -274,28 +294,58 @@ impl CellCutter<'_> {
         step: DVec2,
         work: &mut Workspace,
     ) -> bool {
-        use super::patch::PatchShape;
+        self.check(cell, corners, step, work)
+            .is_none_or(|Check { cubic, bilinear, .. }| cubic > bilinear || cubic.is_nan())
+    }
+
+    /// Whether no patch over a cell says where the bright light in its middle goes.
+    fn is_doubtful(&self, cell: &Cell, work: &mut Workspace) -> bool {
+        let ids = cell.corners.map(|corner| corner.sample);
+        let brightest_w = ids.iter().map(|id| work.get(*id).brightest_w).fold(0.0, f64::max);
+        (0..work.get(ids[0]).strands.len()).any(|strand| {
+            let corners = ids.map(|id| (id, strand as u16));
+            let flux_w = work.get(ids[0]).strands[strand].flux_w.luminance();
+            flux_w > BRIGHT_SHARE * brightest_w
+                && worst_mismatch(cell, corners, work) > CHECK_MISMATCH
+                && self.check(cell, corners, cell.step(), work).is_none_or(
+                    |Check {
+                         cubic,
+                         bilinear,
+                         width,
+                     }| {
+                        let best = if cubic < bilinear { cubic } else { bilinear };
+                        best.is_nan() || best > DOUBTFUL_SHARE * width
+                    },
+                )
+        })
+    }
+
+    /// Where both shapes of patch send light from the middle, against where it goes; `None` where it does not go that
+    /// way at all.
+    fn check(
+        &self,
+        cell: &Cell,
+        corners: [(SampleId, u16); 4],
+        step: DVec2,
+        work: &mut Workspace,
+    ) -> Option<Check> {
         let middle = cell.corners[0].square + step * 0.5;
-        let check = self.edges.corner(middle, work);
+        let middle = self.edges.corner(middle, work);
         let strands = corners.map(|(id, strand)| &work.get(id).strands[usize::from(strand)]);
-        let check = work.get(check.sample);
-        let Some(found) = check.find(strands[0].signature) else {
-            return true;
-        };
-        let found = &check.strands[found];
+        let check = work.get(middle.sample);
+        let found = &check.strands[check.find(strands[0].signature)?];
         let reach_m = found.landing.distance_m();
         let reach_m = if reach_m.is_finite() { reach_m } else { 1.0 };
-        let error = |shape: &PatchShape| {
-            let ray = shape.ray(DVec2::splat(0.5));
-            let direction = ray.direction.normalize_or_zero();
-            ray.origin.distance(found.ray.origin) + reach_m * direction.distance(found.ray.direction)
+        let apart = |a: &Ray, b: &Ray| {
+            let direction = a.direction.normalize_or_zero();
+            a.origin.distance(b.origin) + reach_m * direction.distance(b.direction)
         };
-        let (cubic, bilinear) = (
-            error(&PatchShape::coons(strands, step)),
-            error(&PatchShape::bilinear(strands)),
-        );
-        // Also where the cubic is not a number.
-        cubic > bilinear || cubic.is_nan()
+        let error = |shape: &PatchShape| apart(&shape.ray(DVec2::splat(0.5)), &found.ray);
+        Some(Check {
+            cubic: error(&PatchShape::coons(strands, step)),
+            bilinear: error(&PatchShape::bilinear(strands)),
+            width: apart(&strands[0].ray, &strands[2].ray).max(apart(&strands[1].ray, &strands[3].ray)),
+        })
     }
 
     /// Whether cuts along the edges do not tell what lies between them.
@@ -579,6 +629,19 @@ impl CellCutter<'_> {
         }
         out.ledger.book(Account::Quadrature, passed);
     }
+}
+
+/// Largest mismatch along a cell's edges.
+fn worst_mismatch(cell: &Cell, corners: [(SampleId, u16); 4], work: &Workspace) -> f64 {
+    let strand = |corner: usize| {
+        let (id, strand) = corners[corner];
+        &work.get(id).strands[usize::from(strand)]
+    };
+    EDGE_ENDS
+        .into_iter()
+        .enumerate()
+        .map(|(edge, (from, to))| mismatch(strand(from), strand(to), cell.edge_step(edge)))
+        .fold(0.0, f64::max)
 }
 
 fn reach_of(cell: &Cell, edge: usize, work: &Workspace, signature: PathSignature, backwards: bool) -> Reach {

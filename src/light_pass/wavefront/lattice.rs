@@ -38,6 +38,8 @@ pub struct WavefrontLattice<'a> {
 /// Some traced rows of cells of one face.
 #[derive(Clone, Debug, Default)]
 pub struct TracedBand {
+    /// Of the launch domain.
+    pub face: u32,
     /// All samples that patches refer to.
     pub samples: Samples,
     /// Patches, row by row.
@@ -165,7 +167,10 @@ impl WavefrontLattice<'_> {
                 (output, work.own)
             })
             .collect();
-        let mut traced = TracedBand::default();
+        let mut traced = TracedBand {
+            face: face as u32,
+            ..TracedBand::default()
+        };
         for (output, own) in cut {
             samples.chunks.push(own);
             traced.ledger.merge(&output.ledger);

@@ -10,6 +10,7 @@ pub mod edge;
 pub mod kept_rays;
 pub mod lattice;
 mod mesh;
+pub mod overreach;
 pub mod pass;
 pub mod patch;
 pub mod receivers;

@@ -131,6 +131,7 @@ impl WavefrontDepositor<'_> {
         let watch = Stopwatch::start();
         let spreader = Spreader {
             receivers: self.receivers,
+            face: band.face,
             samples: &band.samples,
             unit: self.lattice.unit,
             absorption: self.lattice.tracer.limits.absorption,
@@ -158,6 +159,7 @@ impl WavefrontDepositor<'_> {
                 report.ledger.merge(&part.ledger);
                 report.receiver_queries += part.queries;
                 report.statistics.merge(&part.statistics);
+                report.overreaches.extend_from_slice(&part.overreaches);
             }
             if let Some(maps) = maps.as_deref_mut() {
                 let placed = parts.iter().flat_map(|part| &part.triangles);

@@ -7,6 +7,7 @@ use std::collections::BTreeMap;
 
 use glam::DVec2;
 
+use super::overreach::Overreach;
 use super::receivers::Receivers;
 use super::strand::{Landing, LightSample, Strand};
 use crate::light_pass::caustic::path::PathSignature;
@@ -69,26 +70,78 @@ pub fn tile_counts(width: usize, height: usize) -> (usize, usize) {
     )
 }
 
+/// What one round refines.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Round {
+    /// Cells whose light falls here.
+    pub tiles: RoughTiles,
+    /// Cells that hold one of these places of the launch domain: face and point of the unit square, ascending. Their
+    /// patches reach the tiles, though their rays do not.
+    places: Vec<(u32, DVec2)>,
+}
+
+impl Round {
+    /// For these tiles, after a level with these patches.
+    pub fn new(tiles: RoughTiles, overreaches: &[Overreach]) -> Self {
+        let meets = |patch: &&Overreach| {
+            let tiles = tiles.get(&(patch.object as usize));
+            tiles.is_some_and(|tiles| tiles.meets(patch.low, patch.high))
+        };
+        let mut places: Vec<(u32, DVec2)> = overreaches
+            .iter()
+            .filter(meets)
+            .map(|patch| (patch.face, patch.middle))
+            .collect();
+        places.sort_by(|a, b| {
+            a.0.cmp(&b.0)
+                .then(a.1.x.total_cmp(&b.1.x))
+                .then(a.1.y.total_cmp(&b.1.y))
+        });
+        Self { tiles, places }
+    }
+
+    /// Whether one of the places lies between two corners of the unit square.
+    fn has_place(&self, face: u32, low: DVec2, high: DVec2) -> bool {
+        let begin = self
+            .places
+            .partition_point(|(on, place)| (*on, place.x) < (face, low.x));
+        self.places[begin..]
+            .iter()
+            .take_while(|(on, place)| *on == face && place.x <= high.x)
+            .any(|(_, place)| place.y >= low.y && place.y <= high.y)
+    }
+}
+
 /// Rounds of refinement so far.
 #[derive(Clone, Copy, Debug)]
 pub struct Refinement<'a> {
     /// Who is lit.
     pub receivers: &'a Receivers<'a>,
-    /// Where each round refines.
-    pub rounds: &'a [RoughTiles],
+    /// What each round refines.
+    pub rounds: &'a [Round],
 }
 
 /// Rounds as a set: bit r stands for round r.
 pub type RoundSet = u32;
 
 impl Refinement<'_> {
-    /// Whether a cell has to be divided that was divided in so many rounds before, by the samples at its corners.
-    pub fn is_too_coarse(&self, corners: [&LightSample; 4], rounds_before: usize) -> bool {
-        let Some(tiles) = self.rounds.get(rounds_before) else {
+    /// Whether a cell has to be divided that was divided in so many rounds before, by the samples at its corners and along
+    /// its edges.
+    /// `low` and `high` are corners of the cell in the unit square of its face.
+    pub fn is_too_coarse(
+        &self,
+        (face, low, high): (usize, DVec2, DVec2),
+        samples: &[&LightSample],
+        rounds_before: usize,
+    ) -> bool {
+        let Some(Round { tiles, .. }) = self.rounds.get(rounds_before) else {
             return false;
         };
-        bright_signatures(&corners).into_iter().any(|signature| {
-            let strands = strands_of(&corners, signature);
+        if self.rounds[rounds_before].has_place(face as u32, low, high) {
+            return true;
+        }
+        bright_signatures(samples).into_iter().any(|signature| {
+            let strands = strands_of(samples, signature);
             self.falls_on(&strands, tiles)
         })
     }
@@ -105,7 +158,7 @@ impl Refinement<'_> {
                 continue;
             }
             let strands = strands_of(beside, signature);
-            for (round, tiles) in self.rounds.iter().enumerate() {
+            for (round, Round { tiles, .. }) in self.rounds.iter().enumerate() {
                 if self.falls_on(&strands, tiles) {
                     rounds |= 1 << round;
                 }

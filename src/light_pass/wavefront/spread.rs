@@ -7,6 +7,7 @@ use super::band::Samples;
 use super::cell::{Patch, PatchKind};
 use super::coverage::FluxTriangle;
 use super::mesh::{PatchMesh, even_grid};
+use super::overreach::Overreach;
 use super::patch::{CoonsPatch, PatchShape};
 use super::receivers::Receivers;
 use super::shares::{difference, mean, scaled};
@@ -22,6 +23,8 @@ use crate::optics::LinearSrgb;
 pub struct Spreader<'a> {
     /// Who is lit.
     pub receivers: &'a Receivers<'a>,
+    /// Of the launch domain.
+    pub face: u32,
     /// The patches' strands.
     pub samples: &'a Samples,
     /// Of the accounts.
@@ -45,6 +48,8 @@ pub struct SpreadOutput {
     pub queries: u64,
     /// Sizes of lit areas.
     pub statistics: FootprintStatistics,
+    /// Patches that reach farther than their rays.
+    pub overreaches: Vec<Overreach>,
 }
 
 impl SpreadOutput {
@@ -84,11 +89,33 @@ impl Spreader<'_> {
         let flux_w = mean(strands.iter().map(|strand| strand.flux_w)) * patch.area();
         let flux = self.unit.count(flux_w);
         out.ledger.book(Account::Quadrature, flux.map(|count| -count));
+        let before: Vec<usize> = out.triangles.iter().map(|(_, list)| list.len()).collect();
         match self.course(strands) {
             Course::Escapes => out.ledger.book(Account::Escaped, flux),
             Course::Onward => self.onward(strands, flux, out),
             Course::Plane(object) => self.over(patch, strands, flux, flux_w, Some(object), out),
             Course::Mixed => self.over(patch, strands, flux, flux_w, None, out),
+        }
+        self.note_overreach(patch, strands, &before, out);
+    }
+
+    /// Notes where the patch's triangles, those beyond the given counts, lie far from its traced rays.
+    fn note_overreach(&self, patch: &Patch, strands: &[&Strand], before: &[usize], out: &mut SpreadOutput) {
+        let squares = &patch.squares[..patch.corner_count().max(3)];
+        let middle = squares.iter().sum::<DVec2>() / squares.len() as f64;
+        for (index, (object, list)) in out.triangles.iter().enumerate() {
+            let new = &list[before.get(index).copied().unwrap_or(0)..];
+            let traced = strands.iter().filter_map(|strand| match strand.landing {
+                Landing::Receiver {
+                    object: lit,
+                    triangle,
+                    barycentric,
+                    ..
+                } if lit == *object => Some(self.receivers.get(lit)?.texel(triangle, barycentric)),
+                _ => None,
+            });
+            let found = Overreach::of(self.face, middle, *object, new, traced);
+            out.overreaches.extend(found);
         }
     }
 

@@ -1,0 +1,54 @@
+//! Patches that light places which none of their traced rays reaches: near silhouettes and foci a smooth patch may swing
+//! far out. Who refines those places has to divide these patches' cells.
+
+use glam::DVec2;
+
+use super::coverage::FluxTriangle;
+
+/// Light may fall so far from where the traced rays do [texels].
+const TOLERATED_TEXELS: f64 = 8.0;
+
+/// A patch that reaches farther than its rays.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Overreach {
+    /// Face of the launch domain.
+    pub face: u32,
+    /// Its middle in the unit square.
+    pub middle: DVec2,
+    /// Whose map it reaches; index into `Scene::objects`.
+    pub object: u32,
+    /// Box around its light on the map [texels].
+    pub low: DVec2,
+    /// The other corner.
+    pub high: DVec2,
+}
+
+impl Overreach {
+    /// Of a patch with the given triangles on one map, whose traced rays fall on it at `traced` [texels]; `None` where it
+    /// keeps to them.
+    pub fn of(
+        face: u32,
+        middle: DVec2,
+        object: u32,
+        triangles: &[FluxTriangle],
+        traced: impl Iterator<Item = DVec2>,
+    ) -> Option<Self> {
+        let (low, high) = bounds(triangles.iter().flat_map(|triangle| triangle.corners));
+        let (traced_low, traced_high) = bounds(traced);
+        let keeps = low.cmpge(traced_low - TOLERATED_TEXELS).all()
+            && high.cmple(traced_high + TOLERATED_TEXELS).all();
+        (!triangles.is_empty() && !keeps).then_some(Self {
+            face,
+            middle,
+            object,
+            low,
+            high,
+        })
+    }
+}
+
+fn bounds(points: impl Iterator<Item = DVec2>) -> (DVec2, DVec2) {
+    points.fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(low, high), point| {
+        (low.min(point), high.max(point))
+    })
+}
