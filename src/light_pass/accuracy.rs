@@ -10,6 +10,8 @@
 
 use std::collections::BTreeMap;
 
+use rayon::prelude::*;
+
 use super::ledger::EnergyLedger;
 use super::receiver_maps::ReceiverMaps;
 use super::wavefront::refine::{RoughTiles, TILE_SIDE, TileSet, tile_counts};
@@ -77,7 +79,7 @@ pub fn images(maps: &ReceiverMaps, unit: FluxUnit) -> Images {
             let luminance = map
                 .flux()
                 .texels()
-                .iter()
+                .par_iter()
                 .enumerate()
                 .map(|(texel, &count)| {
                     let area_m2 = chart.texel_area_m2(texel);
@@ -130,7 +132,7 @@ impl Image {
             let before = other.map_or(0.0, |other| other.luminance[texel]);
             (value - before) * (value - before)
         };
-        self.luminance.iter().enumerate().map(square).collect()
+        self.luminance.par_iter().enumerate().map(square).collect()
     }
 
     /// Sums over tiles, each texel by its area.
@@ -157,25 +159,29 @@ impl Image {
         tiles.iter().enumerate().map(least).collect()
     }
 
-    /// Means over a square window around each texel; borders repeat nothing.
+    /// Means over a square window around each texel, as far as the map reaches.
     fn windowed(&self, squares: &[f64]) -> Vec<f64> {
-        let across = window_means(squares, self.width, 1, self.height, self.width);
-        window_means(&across, self.height, self.width, self.width, 1)
+        let near = |index: usize, count: usize| {
+            index.saturating_sub(WINDOW_TEXELS)..(index + WINDOW_TEXELS + 1).min(count)
+        };
+        let (width, height) = (self.width, self.height);
+        let mut means = vec![0.0; squares.len()];
+        means.par_chunks_mut(width).enumerate().for_each(|(row, line)| {
+            let rows = near(row, height);
+            let mut columns = vec![0.0; width];
+            for row in rows.clone() {
+                for (sum, square) in columns.iter_mut().zip(&squares[row * width..][..width]) {
+                    *sum += square;
+                }
+            }
+            for (column, mean) in line.iter_mut().enumerate() {
+                let window = near(column, width);
+                let texels = (window.len() * rows.len()) as f64;
+                *mean = columns[window].iter().sum::<f64>() / texels;
+            }
+        });
+        means
     }
-}
-
-/// Means along lines of `length` values `step` apart; `lines` of them begin `apart`.
-fn window_means(values: &[f64], length: usize, step: usize, lines: usize, apart: usize) -> Vec<f64> {
-    let mut means = vec![0.0; values.len()];
-    for line in 0..lines {
-        for index in 0..length {
-            let low = index.saturating_sub(WINDOW_TEXELS);
-            let high = (index + WINDOW_TEXELS).min(length - 1);
-            let sum: f64 = (low..=high).map(|i| values[line * apart + i * step]).sum();
-            means[line * apart + index * step] = sum / (high - low + 1) as f64;
-        }
-    }
-    means
 }
 
 /// What the round before this one knew, where this one refined only some tiles.
@@ -259,6 +265,61 @@ pub fn estimate(
 fn older_differences(object: usize, middle: &Images, coarse: Option<&Images>) -> Option<Vec<f64>> {
     let image = middle.get(&object)?;
     Some(image.tile_sums(&image.squared_difference(coarse?.get(&object))))
+}
+
+/// Squared difference of half sets of rays, around each texel, by object [W²/m⁴ of a light of unit strength].
+pub type Noise = BTreeMap<usize, Vec<f64>>;
+
+/// The noise of the sum of two half sets: their difference has the same variance.
+pub fn half_set_noise(a: &Images, b: &Images) -> Noise {
+    let of = |(&object, image): (&usize, &Image)| {
+        let squares = image.squared_difference(b.get(&object));
+        (object, image.windowed(&squares))
+    };
+    a.iter().map(of).collect()
+}
+
+/// Share of the noise of a map that its difference from one of every fourth of its rays has, beside that one's own.
+const NOISE_OF_DIFFERENCE: f64 = 1.5;
+
+/// The error of splats: noise by half sets, blur by the difference from `thinner`, the map of every fourth ray. Blur of
+/// splats twice as wide is twice as large at an edge (first order), so that it is what the difference holds beyond noise.
+/// `None` where no light arrived.
+pub fn estimate_splats(
+    fine: &Images,
+    thinner: &Images,
+    noise: &Noise,
+    ledger: &EnergyLedger,
+) -> Option<LightError> {
+    let mut error = LightError {
+        ratio: PRIOR_RATIO,
+        ..LightError::default()
+    };
+    let (mut squares_sum, mut flux_w, mut area_m2) = (0.0, 0.0, 0.0);
+    for (&object, image) in fine {
+        let differences = image.windowed(&image.squared_difference(thinner.get(&object)));
+        let noise = noise.get(&object)?;
+        let squares: Vec<f64> = differences
+            .iter()
+            .zip(noise)
+            .map(|(difference, noise)| noise + (difference - NOISE_OF_DIFFERENCE * noise).max(0.0))
+            .collect();
+        let tiles = image.tile_sums(&squares);
+        squares_sum += tiles.iter().sum::<f64>();
+        let (map_w, map_m2) = image.sums();
+        (flux_w, area_m2) = (flux_w + map_w, area_m2 + map_m2);
+        let map = MapError {
+            size: (image.width, image.height),
+            texels: squares.iter().map(|square| square.sqrt()).collect(),
+            tiles,
+        };
+        error.maps.insert(object, map);
+    }
+    let mean = flux_w / area_m2;
+    error.relative_rmse = (squares_sum / area_m2 / (mean * mean))
+        .sqrt()
+        .hypot(given_up_share(ledger));
+    (flux_w > 0.0).then_some(error)
 }
 
 /// R = e₂/e from three levels, half-way to the first-order ratio.

@@ -83,6 +83,17 @@ impl ReceiverMaps {
         }
     }
 
+    /// Adds the flux of other maps of the same sizes.
+    pub fn add(&mut self, other: Self) {
+        for (slot, part) in self.slots.iter_mut().zip(other.slots) {
+            match (slot, part) {
+                (Slot::Allocated(sum), Slot::Allocated(part)) => sum.add(&part),
+                (slot, part @ Slot::Allocated(_)) => *slot = part,
+                _ => {}
+            }
+        }
+    }
+
     /// All maps with their objects, in the order of the objects.
     pub fn iter(&self) -> impl Iterator<Item = (usize, &ReceiverMap)> {
         (0..self.slots.len()).filter_map(|object| Some((object, self.get(object)?)))
@@ -142,6 +153,16 @@ impl ReceiverMap {
     pub fn level_for(&self, spread_texels: f64) -> usize {
         let fits = |level: &usize| spread_texels / f64::from(1_u32 << level) >= LEAST_SPREAD_TEXELS;
         (1..self.levels.len()).take_while(fits).last().unwrap_or(0)
+    }
+
+    fn add(&mut self, part: &Self) {
+        for (level, other) in self.levels.iter_mut().zip(&part.levels) {
+            for (texel, more) in level.texels_mut().iter_mut().zip(other.texels()) {
+                for channel in 0..3 {
+                    texel[channel] += more[channel];
+                }
+            }
+        }
     }
 
     /// All flux at the map's size: coarser levels spread smoothly.

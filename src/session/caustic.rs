@@ -230,25 +230,30 @@ impl CausticLayer<'_> {
         climb: &Climb,
         course: &mut Course,
     ) -> Option<KeptError> {
-        let coarser: Vec<Images> = match self.settings.estimator {
-            Estimator::Wavefront => {
-                let levels = climb.levels.iter().rev().take(ESTIMATED_LEVELS - 1);
-                levels
-                    .map(|level| accuracy::images(&level.maps, level.unit))
-                    .collect()
-            }
-            Estimator::Splat => self.thinned_images(light, level, state, course),
-        };
-        let watch = Stopwatch::start();
-        let before = climb.rounds.last().and_then(|round| {
-            let error = &climb.levels.last()?.error.as_ref()?.estimate;
-            let refined = &round.tiles;
-            Some(Before { error, refined })
-        });
         let ledger = level.ledger.report("", level.unit, LinearSrgb::WHITE).energy_w;
-        let fine = accuracy::images(&level.maps, level.unit);
-        let estimate = accuracy::estimate(&fine, [coarser.first(), coarser.get(1)], before, &ledger);
-        course.clock.deposit.add(watch.elapsed());
+        let estimate = match self.settings.estimator {
+            Estimator::Wavefront => {
+                let watch = Stopwatch::start();
+                let levels = climb.levels.iter().rev().take(ESTIMATED_LEVELS - 1);
+                let coarser: Vec<Images> = levels
+                    .map(|level| accuracy::images(&level.maps, level.unit))
+                    .collect();
+                let before = climb.rounds.last().and_then(|round| {
+                    let error = &climb.levels.last()?.error.as_ref()?.estimate;
+                    let refined = &round.tiles;
+                    Some(Before { error, refined })
+                });
+                let fine = accuracy::images(&level.maps, level.unit);
+                let estimate = accuracy::estimate(&fine, [coarser.first(), coarser.get(1)], before, &ledger);
+                course.clock.deposit.add(watch.elapsed());
+                estimate
+            }
+            Estimator::Splat => {
+                let thinner = self.thinned_images(light, level, state, course)?;
+                let fine = accuracy::images(&level.maps, level.unit);
+                accuracy::estimate_splats(&fine, &thinner, level.noise.as_ref()?, &ledger)
+            }
+        };
         estimate.map(|estimate| KeptError {
             predecessors: climb.levels.len().min(ESTIMATED_LEVELS - 1),
             estimate,

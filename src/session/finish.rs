@@ -3,6 +3,8 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use rayon::prelude::*;
+
 use super::caustic::{CausticOutcome, Stopped};
 use super::direct_cache::DirectCache;
 use super::light_level::LightLevel;
@@ -148,6 +150,7 @@ impl Finish<'_> {
             })
             .collect();
         let mut irradiance: Vec<[f32; 3]> = (0..chart.width * chart.height)
+            .into_par_iter()
             .map(|texel| {
                 let area_m2 = chart.texel_area_m2(texel);
                 if area_m2 <= 0.0 {

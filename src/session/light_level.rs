@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::illumination::accumulator::{FluxCount, FluxUnit};
-use crate::light_pass::accuracy::LightError;
+use crate::light_pass::accuracy::{LightError, Noise};
 use crate::light_pass::caustic::kept::KeptLight;
 use crate::light_pass::caustic::statistics::FootprintStatistics;
 use crate::light_pass::launch::Launch;
@@ -61,6 +61,8 @@ pub(super) struct LightLevel {
     pub(super) ledger: LedgerSum,
     /// Patches that reach farther than their rays.
     pub(super) overreaches: Vec<Overreach>,
+    /// Of splats: the squared difference of half sets, by object.
+    pub(super) noise: Option<Noise>,
     /// By the levels before it; `None` where there are none, or no light arrived.
     pub(super) error: Option<KeptError>,
     /// To be deposited again; `None` where that was too much to keep.

@@ -4,7 +4,7 @@ use super::caustic::{CausticLayer, Course};
 use super::light_level::{LevelKey, LightLevel, LightState, TraceKey};
 use crate::illumination::accumulator::FluxUnit;
 use crate::light_pass::accuracy::{self, Images};
-use crate::light_pass::caustic::deposit::Depositor;
+use crate::light_pass::caustic::deposit::{Depositor, Halves};
 use crate::light_pass::caustic::kept::KeptLight;
 use crate::light_pass::caustic::lattice::Lattice;
 use crate::light_pass::caustic::pass::{self, Listener, PassReport, Source};
@@ -19,8 +19,8 @@ const COARSENING: usize = 8;
 /// Least side of that lattice.
 const LEAST_COARSE_SIDE: usize = 64;
 
-/// Strides of the lattices that an error is estimated from.
-const ERROR_STRIDES: [usize; 2] = [2, 4];
+/// Stride of the lattice that the blur of splats is estimated from.
+const ERROR_STRIDE: usize = 2;
 
 impl CausticLayer<'_> {
     /// Traces and deposits a light, or deposits again what arrived for other kernels and maps; `None` where it was
@@ -33,7 +33,7 @@ impl CausticLayer<'_> {
         state: &mut LightState,
         course: &mut Course,
     ) -> Option<LightLevel> {
-        let mut maps = ReceiverMaps::new(self.tracer.scene().objects.len());
+        let (mut maps, mut second) = (self.no_maps(), self.no_maps());
         let lattice = Lattice {
             strides: (key.stride, key.stride),
             ..self.lattice(light, unit)
@@ -44,13 +44,28 @@ impl CausticLayer<'_> {
             },
             source => source,
         };
-        let (report, arrived) = self.deposit_splats(lattice, source, &key, &mut maps, course);
+        let mut halves = Halves {
+            first: &mut maps,
+            second: Some(&mut second),
+        };
+        let (report, arrived) = self.deposit_splats(lattice, source, &key, &mut halves, course);
         if let Some(arrived) = arrived {
             state.arrivals = Some((key.trace.clone(), arrived));
         }
         course.outcome.count(&report, course.clock);
+        let noise = (!report.cancelled).then(|| {
+            course.clock.time(
+                |clock| &mut clock.deposit,
+                || {
+                    let [a, b] = [&maps, &second].map(|maps| accuracy::images(maps, unit));
+                    accuracy::half_set_noise(&a, &b)
+                },
+            )
+        });
+        maps.add(second);
         (!report.cancelled).then_some(LightLevel {
             key,
+            noise,
             maps,
             unit,
             ledger: report.ledger,
@@ -65,7 +80,7 @@ impl CausticLayer<'_> {
         lattice: Lattice,
         source: Source,
         key: &LevelKey,
-        maps: &mut ReceiverMaps,
+        halves: &mut Halves,
         course: &Course,
     ) -> (PassReport, Option<KeptLight>) {
         let depositor = Depositor {
@@ -81,34 +96,37 @@ impl CausticLayer<'_> {
             total: lattice.ray_count(),
         };
         let chart_for = |object: usize| self.chart(object, &key.sizes);
-        pass::run(&depositor, source, maps, &chart_for, &listener)
+        pass::run(&depositor, source, halves, &chart_for, &listener)
     }
 
-    /// Maps of every second and every fourth ray, each for as many.
+    /// Maps of every second ray across and down, each for four.
     pub(super) fn thinned_images(
         &self,
         light: &AimedLight,
         level: &LightLevel,
         state: &LightState,
         course: &mut Course,
-    ) -> Vec<Images> {
+    ) -> Option<Images> {
         if level.key.stride > 1 {
-            return Vec::new();
+            return None;
         }
-        ERROR_STRIDES
-            .iter()
-            .map(|&stride| {
-                let lattice = Lattice {
-                    strides: (stride, stride),
-                    ..self.lattice(light, level.unit)
-                };
-                let mut maps = ReceiverMaps::new(self.tracer.scene().objects.len());
-                let source = source_of(state, &level.key.trace);
-                let (report, _) = self.deposit_splats(lattice, source, &level.key, &mut maps, course);
-                course.outcome.count(&report, course.clock);
-                accuracy::images(&maps, level.unit)
-            })
-            .collect()
+        let lattice = Lattice {
+            strides: (ERROR_STRIDE, ERROR_STRIDE),
+            ..self.lattice(light, level.unit)
+        };
+        let mut maps = self.no_maps();
+        let source = source_of(state, &level.key.trace);
+        let mut all = Halves {
+            first: &mut maps,
+            second: None,
+        };
+        let (report, _) = self.deposit_splats(lattice, source, &level.key, &mut all, course);
+        course.outcome.count(&report, course.clock);
+        Some(accuracy::images(&maps, level.unit))
+    }
+
+    fn no_maps(&self) -> ReceiverMaps {
+        ReceiverMaps::new(self.tracer.scene().objects.len())
     }
 
     /// Mean footprints at the full density, from a lattice some 64 times thinner.
@@ -141,9 +159,13 @@ impl CausticLayer<'_> {
             let aspect = self.sizes.parametrisation(object)?.suggested_aspect;
             self.sizes.chart(object, super::sizes::first_size(aspect))
         };
-        let mut maps = ReceiverMaps::new(self.tracer.scene().objects.len());
+        let mut maps = self.no_maps();
+        let mut all = Halves {
+            first: &mut maps,
+            second: None,
+        };
         let source = source_of(state, &self.trace_key(lattice.size, &[]));
-        let (mut report, _) = pass::run(&depositor, source, &mut maps, &chart_for, &listener);
+        let (mut report, _) = pass::run(&depositor, source, &mut all, &chart_for, &listener);
         // The kernels of the coarse run are in no map.
         report.splats = 0;
         course.outcome.count(&report, course.clock);

@@ -66,6 +66,7 @@ impl CausticLayer<'_> {
             unit,
             ledger: report.ledger,
             overreaches: report.overreaches,
+            noise: None,
             error: None,
             traced,
         })

@@ -6,7 +6,7 @@ use nephroid::optics::LinearSrgb;
 use nephroid::scene::builtin::{parts, shapes};
 use nephroid::scene::{Material, Mesh, Scene};
 use nephroid::session::{BakeResult, StopReason};
-use nephroid::settings::{BakeSettings, LayerKind, MapResolution};
+use nephroid::settings::{BakeSettings, LayerKind, MapResolution, RayPlacement};
 use nephroid::units::{Flux, Irradiance};
 use rand_pcg::Pcg64Mcg;
 use rand_pcg::rand_core::{Rng, SeedableRng};
@@ -208,4 +208,43 @@ fn estimates_of_random_scenes_are_within_a_factor_of_two() {
     assert!(ratios.len() >= 45, "{} scenes are lit", ratios.len());
     assert!(faults.len() <= 2, "{faults:#?}");
     assert!(ratios[0] > 0.33 && ratios[ratios.len() - 1] < 3.0, "{ratios:?}");
+}
+/// A splat bake of randomly placed rays against the mean of many such: what is left is noise.
+#[test]
+fn most_texels_lie_within_their_error() {
+    let settings = |seed: u64| BakeSettings {
+        rays: RayPlacement::Jittered,
+        seed,
+        ..BakeSettings {
+            map_resolution: exactly(1.0).map_resolution,
+            density_per_sr: 3e4,
+            ..BakeSettings::splat()
+        }
+    };
+    for name in ["ring", "pool"] {
+        let bakes: Vec<BakeResult> = (0..12)
+            .map(|seed| bake(builtin_scene(name), &settings(seed)))
+            .collect();
+        let maps: Vec<Vec<f64>> = bakes
+            .iter()
+            .map(|bake| luminance(&bake.maps[0]).collect())
+            .collect();
+        let mean = |texel: usize| maps.iter().map(|map| map[texel]).sum::<f64>() / maps.len() as f64;
+        let error = bakes[0].maps[0].error.as_ref().expect("an estimate");
+        let lit: Vec<usize> = (0..maps[0].len()).filter(|&texel| mean(texel) > 0.0).collect();
+        // The mean of twelve holds a twelfth of the one.
+        let scale = (1.0 - 1.0 / maps.len() as f64).sqrt();
+        let within = lit
+            .iter()
+            .filter(|&&texel| (maps[0][texel] - mean(texel)).abs() <= f64::from(error[texel]) * scale)
+            .count();
+        let share = within as f64 / lit.len() as f64;
+        println!(
+            "{name}: {:.1} % of {} texels within one error",
+            100.0 * share,
+            lit.len()
+        );
+        // Blur adds to the noise that this is about.
+        assert!((0.6..=0.8).contains(&share), "{name}: {share}");
+    }
 }

@@ -13,7 +13,7 @@ use super::splat::Splat;
 use super::statistics::FootprintStatistics;
 use super::surface::{Surface, Surfaces};
 use crate::light_pass::ledger_sum::{Account, LedgerSum};
-use crate::light_pass::receiver_maps::ReceiverMaps;
+use crate::light_pass::receiver_maps::{ChartFor, ReceiverMaps};
 use crate::settings::{BakeSettings, Kernel, KernelSampling, Sigma};
 
 /// How kernels are made from arrivals.
@@ -42,6 +42,32 @@ pub struct RowContext<'a> {
     pub after: Option<&'a TracedRow>,
 }
 
+/// Maps of both half sets of rays, or of all in one.
+#[derive(Debug)]
+pub struct Halves<'a> {
+    /// Of every ray, or of every other one.
+    pub first: &'a mut ReceiverMaps,
+    /// Of the rest.
+    pub second: Option<&'a mut ReceiverMaps>,
+}
+
+impl Halves<'_> {
+    fn maps(&mut self, is_second: bool) -> &mut ReceiverMaps {
+        match &mut self.second {
+            Some(second) if is_second => second,
+            _ => self.first,
+        }
+    }
+
+    /// Allocates the maps of an object unless that was tried before.
+    pub fn touch(&mut self, object: usize, chart_for: &ChartFor) {
+        self.first.touch(object, chart_for);
+        if let Some(second) = &mut self.second {
+            second.touch(object, chart_for);
+        }
+    }
+}
+
 /// What a deposit did.
 #[derive(Clone, Debug, Default)]
 pub struct DepositReport {
@@ -54,11 +80,15 @@ pub struct DepositReport {
 }
 
 impl Depositor<'_> {
-    /// Deposits rows of one face. Maps must have been touched for every object of the arrivals.
-    pub fn deposit(&self, rows: &[RowContext], maps: &mut ReceiverMaps) -> DepositReport {
-        let parts: Vec<RowSplats> = rows.par_iter().map(|row| self.splats_of(row, maps)).collect();
+    /// Deposits rows of one face. Maps must have been touched for every object of the arrivals. Of neighbouring rays every
+    /// other one goes to the second half set, where there is one.
+    pub fn deposit(&self, rows: &[RowContext], halves: &mut Halves) -> DepositReport {
+        let parts: Vec<RowSplats> = rows
+            .par_iter()
+            .map(|row| self.splats_of(row, halves.first))
+            .collect();
         let mut report = DepositReport::default();
-        let mut groups: BTreeMap<(u32, u32), Vec<&Placed>> = BTreeMap::new();
+        let mut groups: BTreeMap<(bool, u32, u32), Vec<&Placed>> = BTreeMap::new();
         for part in &parts {
             report.ledger.merge(&part.ledger);
             report.statistics.merge(&part.statistics);
@@ -68,12 +98,20 @@ impl Depositor<'_> {
                 .splats
                 .chunk_by(|a, b| (a.object, a.level) == (b.object, b.level))
             {
-                let group = groups.entry((run[0].object, run[0].level)).or_default();
-                group.extend(run);
+                if halves.second.is_none() {
+                    let group = groups.entry((false, run[0].object, run[0].level)).or_default();
+                    group.extend(run);
+                    continue;
+                }
+                for splat in run {
+                    let key = (splat.is_second, splat.object, splat.level);
+                    groups.entry(key).or_default().push(splat);
+                }
             }
         }
-        for ((object, level), splats) in groups {
-            let map = maps
+        for ((is_second, object, level), splats) in groups {
+            let map = halves
+                .maps(is_second)
                 .get_mut(object as usize)
                 .expect("splats are made only for allocated maps");
             let (flux, covered) = map.level(level as usize);
@@ -100,7 +138,10 @@ impl Depositor<'_> {
                 .of(arrival)
                 .and_then(|surface| self.place(arrival, &neighbours, surface, &unbent_area_m2, &mut made));
             match placed {
-                Some(placed) => made.splats.push(placed),
+                Some(placed) => made.splats.push(Placed {
+                    is_second: (column + context.index) % 2 == 1,
+                    ..placed
+                }),
                 None => made
                     .ledger
                     .book(Account::Unresolved, self.lattice.unit.count(arrival.flux_w)),
@@ -171,6 +212,7 @@ impl Depositor<'_> {
         Some(Placed {
             object: arrival.object,
             level: level as u32,
+            is_second: false,
             reach,
             splat,
         })
@@ -183,6 +225,8 @@ pub(super) struct Placed {
     object: u32,
     /// Of the object's map.
     level: u32,
+    /// Whether its ray belongs to the second half set.
+    is_second: bool,
     /// Where it may add.
     pub(super) reach: Reach,
     pub(super) splat: Splat,

@@ -6,12 +6,12 @@ use cpu_time::ProcessTime;
 use rayon::prelude::*;
 use std::time::Instant;
 
-use super::deposit::{DepositReport, Depositor, RowContext};
+use super::deposit::{DepositReport, Depositor, Halves, RowContext};
 use super::kept::KeptLight;
 use super::lattice::{Lattice, TracedRow};
 use super::statistics::FootprintStatistics;
 use crate::light_pass::ledger_sum::LedgerSum;
-use crate::light_pass::receiver_maps::{ChartFor, ReceiverMaps};
+use crate::light_pass::receiver_maps::ChartFor;
 use crate::light_pass::wavefront::overreach::Overreach;
 use crate::progress::{Control, Progress, Stage};
 
@@ -125,7 +125,7 @@ pub enum Source<'a> {
 pub fn run(
     depositor: &Depositor,
     source: Source,
-    maps: &mut ReceiverMaps,
+    halves: &mut Halves,
     chart_for: &ChartFor,
     listener: &Listener,
 ) -> (PassReport, Option<KeptLight>) {
@@ -159,7 +159,7 @@ pub fn run(
             let watch = Stopwatch::start();
             carried = deposit_band(
                 depositor,
-                maps,
+                halves,
                 chart_for,
                 carried,
                 traced,
@@ -231,7 +231,7 @@ fn band_end(lattice: &Lattice, face: usize, first_row: usize) -> usize {
 )]
 fn deposit_band(
     depositor: &Depositor,
-    maps: &mut ReceiverMaps,
+    halves: &mut Halves,
     chart_for: &ChartFor,
     mut rows: Vec<TracedRow>,
     traced: Vec<TracedRow>,
@@ -258,9 +258,9 @@ fn deposit_band(
         .map(|run| run[0].object)
         .collect();
     for object in objects {
-        maps.touch(object as usize, chart_for);
+        halves.touch(object as usize, chart_for);
     }
-    report.add(&depositor.deposit(&contexts, maps));
+    report.add(&depositor.deposit(&contexts, halves));
     let keep = rows.len().saturating_sub(2);
     rows.split_off(keep)
 }
