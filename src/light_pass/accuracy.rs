@@ -282,9 +282,8 @@ pub fn half_set_noise(a: &Images, b: &Images) -> Noise {
 /// Share of the noise of a map that its difference from one of every fourth of its rays has, beside that one's own.
 const NOISE_OF_DIFFERENCE: f64 = 1.5;
 
-/// The error of splats: noise by half sets, blur by the difference from `thinner`, the map of every fourth ray. Blur of
-/// splats twice as wide is twice as large at an edge (first order), so that it is what the difference holds beyond noise.
-/// `None` where no light arrived.
+/// The error of splats: noise by half sets; what the difference from `thinner`, the map of every fourth ray, holds beyond
+/// noise is blur, of first order and independent as elsewhere. `None` where no light arrived.
 pub fn estimate_splats(
     fine: &Images,
     thinner: &Images,
@@ -295,6 +294,7 @@ pub fn estimate_splats(
         ratio: PRIOR_RATIO,
         ..LightError::default()
     };
+    let share = 1.0 / (1.0 + PRIOR_RATIO * PRIOR_RATIO);
     let (mut squares_sum, mut flux_w, mut area_m2) = (0.0, 0.0, 0.0);
     for (&object, image) in fine {
         let differences = image.windowed(&image.squared_difference(thinner.get(&object)));
@@ -302,7 +302,7 @@ pub fn estimate_splats(
         let squares: Vec<f64> = differences
             .iter()
             .zip(noise)
-            .map(|(difference, noise)| noise + (difference - NOISE_OF_DIFFERENCE * noise).max(0.0))
+            .map(|(difference, noise)| noise + (difference - NOISE_OF_DIFFERENCE * noise).max(0.0) * share)
             .collect();
         let tiles = image.tile_sums(&squares);
         squares_sum += tiles.iter().sum::<f64>();

@@ -245,6 +245,6 @@ fn most_texels_lie_within_their_error() {
             lit.len()
         );
         // Blur adds to the noise that this is about.
-        assert!((0.6..=0.8).contains(&share), "{name}: {share}");
+        assert!((0.55..=0.8).contains(&share), "{name}: {share}");
     }
 }
