@@ -283,7 +283,8 @@ pub fn half_set_noise(a: &Images, b: &Images) -> Noise {
 const NOISE_OF_DIFFERENCE: f64 = 1.5;
 
 /// The error of splats: noise by half sets; what the difference from `thinner`, the map of every fourth ray, holds beyond
-/// noise is blur, of first order and independent as elsewhere. `None` where no light arrived.
+/// noise is half blur, which levels share (e = D/(R − 1)), and half the pattern of the lattice, which they do not
+/// (e = D/√(1 + R²)), both of first order. `None` where no light arrived.
 pub fn estimate_splats(
     fine: &Images,
     thinner: &Images,
@@ -294,7 +295,8 @@ pub fn estimate_splats(
         ratio: PRIOR_RATIO,
         ..LightError::default()
     };
-    let share = 1.0 / (1.0 + PRIOR_RATIO * PRIOR_RATIO);
+    let blur = 1.0 / ((PRIOR_RATIO - 1.0) * (PRIOR_RATIO - 1.0));
+    let share = 0.5 * (blur + 1.0 / (1.0 + PRIOR_RATIO * PRIOR_RATIO));
     let (mut squares_sum, mut flux_w, mut area_m2) = (0.0, 0.0, 0.0);
     for (&object, image) in fine {
         let differences = image.windowed(&image.squared_difference(thinner.get(&object)));
