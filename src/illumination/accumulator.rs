@@ -91,26 +91,6 @@ impl FluxAccumulator {
         &mut self.texels
     }
 
-    /// Twice the size each way: every texel's flux goes in four equal parts to those that replace it (section 3.1.1 of
-    /// the paper); what does not divide by four goes to the first of them, so that the sum stays exact.
-    #[must_use]
-    pub fn doubled(&self) -> Self {
-        let mut fine = Self::new(2 * self.width, 2 * self.height);
-        for row in 0..self.height {
-            for column in 0..self.width {
-                let coarse = self.texels[row * self.width + column];
-                let quarter = coarse.map(|channel| channel / 4);
-                let first = std::array::from_fn(|channel| coarse[channel] - 3 * quarter[channel]);
-                let corner = 2 * row * fine.width + 2 * column;
-                fine.texels[corner] = first;
-                for texel in [corner + 1, corner + fine.width, corner + fine.width + 1] {
-                    fine.texels[texel] = quarter;
-                }
-            }
-        }
-        fine
-    }
-
     /// Adds all flux, smoothly spread, to a map of twice the size each way: across and down, each texel goes with the
     /// weights 1/8, 3/8, 3/8, 1/8 to the four nearest finer ones (linear interpolation), mirrored at the borders. What
     /// rounding leaves goes to the first of the two it covers, so that the sum stays exact.

@@ -116,22 +116,6 @@ const LEAST_SPREAD_TEXELS: f64 = 6.0;
 const LEAST_LEVEL_SIDE: usize = 16;
 
 impl ReceiverMap {
-    /// Doubles the map each way until it is as wide as `size`, in texels; each texel's flux goes in four equal parts to
-    /// those that replace it. `chart_for` gives the chart of a size.
-    pub fn grow_to(
-        &mut self,
-        size: (usize, usize),
-        chart_for: &dyn Fn((usize, usize)) -> Option<Arc<Chart>>,
-    ) {
-        let mut flux = self.flux();
-        while flux.width() < size.0 {
-            flux = flux.doubled();
-        }
-        if let Some(chart) = chart_for((flux.width(), flux.height())) {
-            *self = Self::new(chart, flux);
-        }
-    }
-
     fn new(chart: Arc<Chart>, flux: FluxAccumulator) -> Self {
         let islands = Islands::find(&chart);
         let mut levels = vec![flux];

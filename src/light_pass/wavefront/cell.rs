@@ -4,11 +4,11 @@ use glam::DVec2;
 
 use super::band::{Corner, SampleId, Workspace};
 use super::bodies::SmallBodies;
+use super::doubt::worst_mismatch;
 use super::edge::{Edge, EdgeCutter, Reach, SUSPICION, may_bulge, mismatch};
-use super::patch::PatchShape;
 use super::refine::{Refinement, RoundSet};
+use super::regions::{Outline, regions, triangles};
 use super::strand::LightSample;
-use crate::geometry::Ray;
 use crate::illumination::accumulator::FluxUnit;
 use crate::light_pass::caustic::path::PathSignature;
 use crate::light_pass::ledger_sum::{Account, LedgerSum};
@@ -17,23 +17,8 @@ use crate::optics::LinearSrgb;
 /// How often a cell is split whose cuts are ambiguous; what is then left goes on as one small patch per ray.
 const DEEPEST_SPLIT: u32 = 2;
 
-/// Light below this share of the brightest is cut as it comes; what its cuts leave open is booked.
-const BRIGHT_SHARE: f64 = 0.1;
-
 /// Mismatch along an edge from which a check ray decides between the cubic and the bilinear patch.
-const CHECK_MISMATCH: f64 = 0.08;
-
-/// A patch that is off by more than this share of the cell's width in its middle is of no use.
-const DOUBTFUL_SHARE: f64 = 0.1;
-
-/// How far patches are off in the middle of a cell, and how wide the cell is there: distances between origins with those
-/// between directions over the way to where they land [m].
-#[derive(Clone, Copy, Debug)]
-struct Check {
-    cubic: f64,
-    bilinear: f64,
-    width: f64,
-}
+pub(super) const CHECK_MISMATCH: f64 = 0.08;
 
 /// A piece of the wavefront between traced strands.
 #[derive(Clone, Copy, Debug)]
@@ -132,21 +117,14 @@ pub struct Cell {
 }
 
 /// Ends of the four edges among the corners.
-const EDGE_ENDS: [(usize, usize); 4] = [(0, 1), (1, 2), (3, 2), (0, 3)];
-
-/// One corner of a region of a cell.
-#[derive(Clone, Copy, Debug)]
-struct Outline {
-    square: DVec2,
-    sample: SampleId,
-}
+pub(super) const EDGE_ENDS: [(usize, usize); 4] = [(0, 1), (1, 2), (3, 2), (0, 3)];
 
 impl Cell {
-    fn step(&self) -> DVec2 {
+    pub(super) fn step(&self) -> DVec2 {
         self.corners[2].square - self.corners[0].square
     }
 
-    fn edge_step(&self, edge: usize) -> DVec2 {
+    pub(super) fn edge_step(&self, edge: usize) -> DVec2 {
         let (from, to) = EDGE_ENDS[edge];
         self.corners[to].square - self.corners[from].square
     }
@@ -284,126 +262,6 @@ impl CellCutter<'_> {
             squares: cell.corners.map(|corner| corner.square),
             kind,
         });
-    }
-
-    /// A check ray through the middle of the cell decides.
-    fn is_bilinear_better(
-        &self,
-        cell: &Cell,
-        corners: [(SampleId, u16); 4],
-        step: DVec2,
-        work: &mut Workspace,
-    ) -> bool {
-        self.check(cell, corners, step, work)
-            .is_none_or(|Check { cubic, bilinear, .. }| cubic > bilinear || cubic.is_nan())
-    }
-
-    /// Whether no patch over a cell says where the bright light in its middle goes.
-    fn is_doubtful(&self, cell: &Cell, work: &mut Workspace) -> bool {
-        let ids = cell.corners.map(|corner| corner.sample);
-        let brightest_w = ids.iter().map(|id| work.get(*id).brightest_w).fold(0.0, f64::max);
-        (0..work.get(ids[0]).strands.len()).any(|strand| {
-            let corners = ids.map(|id| (id, strand as u16));
-            let flux_w = work.get(ids[0]).strands[strand].flux_w.luminance();
-            flux_w > BRIGHT_SHARE * brightest_w
-                && worst_mismatch(cell, corners, work) > CHECK_MISMATCH
-                && self.check(cell, corners, cell.step(), work).is_none_or(
-                    |Check {
-                         cubic,
-                         bilinear,
-                         width,
-                     }| {
-                        let best = if cubic < bilinear { cubic } else { bilinear };
-                        best.is_nan() || best > DOUBTFUL_SHARE * width
-                    },
-                )
-        })
-    }
-
-    /// Where both shapes of patch send light from the middle, against where it goes; `None` where it does not go that
-    /// way at all.
-    fn check(
-        &self,
-        cell: &Cell,
-        corners: [(SampleId, u16); 4],
-        step: DVec2,
-        work: &mut Workspace,
-    ) -> Option<Check> {
-        let middle = cell.corners[0].square + step * 0.5;
-        let middle = self.edges.corner(middle, work);
-        let strands = corners.map(|(id, strand)| &work.get(id).strands[usize::from(strand)]);
-        let check = work.get(middle.sample);
-        let found = &check.strands[check.find(strands[0].signature)?];
-        let reach_m = found.landing.distance_m();
-        let reach_m = if reach_m.is_finite() { reach_m } else { 1.0 };
-        let apart = |a: &Ray, b: &Ray| {
-            let direction = a.direction.normalize_or_zero();
-            a.origin.distance(b.origin) + reach_m * direction.distance(b.direction)
-        };
-        let error = |shape: &PatchShape| apart(&shape.ray(DVec2::splat(0.5)), &found.ray);
-        Some(Check {
-            cubic: error(&PatchShape::coons(strands, step)),
-            bilinear: error(&PatchShape::bilinear(strands)),
-            width: apart(&strands[0].ray, &strands[2].ray).max(apart(&strands[1].ray, &strands[3].ray)),
-        })
-    }
-
-    /// Whether cuts along the edges do not tell what lies between them.
-    fn is_ambiguous(&self, cell: &Cell, work: &Workspace) -> bool {
-        let samples = cell.corners.map(|corner| work.get(corner.sample));
-        let brightest_w = samples
-            .iter()
-            .map(|sample| sample.brightest_w)
-            .fold(0.0, f64::max);
-        let least_w = brightest_w * BRIGHT_SHARE;
-        let bright = |sample: &LightSample| -> Vec<PathSignature> {
-            sample
-                .strands
-                .iter()
-                .filter(|strand| strand.flux_w.luminance() > least_w)
-                .map(|strand| strand.signature)
-                .collect()
-        };
-        let mut kinds: Vec<Vec<PathSignature>> = samples.iter().map(|sample| bright(sample)).collect();
-        let all: Vec<PathSignature> = {
-            let mut all: Vec<_> = kinds.iter().flatten().copied().collect();
-            all.sort_unstable();
-            all.dedup();
-            all
-        };
-        // A strand that is bright at one corner counts at all where it is.
-        for (kind, sample) in kinds.iter_mut().zip(samples) {
-            *kind = all
-                .iter()
-                .copied()
-                .filter(|s| sample.find(*s).is_some())
-                .collect();
-        }
-        kinds.sort_unstable();
-        kinds.dedup();
-        // Light that only the samples along the edges met lies between the corners.
-        let is_between = |sample: SampleId| {
-            let inner = bright(work.get(sample));
-            inner
-                .iter()
-                .any(|signature| all.binary_search(signature).is_err())
-        };
-        let mut inner = cell.edges.iter().flatten().flat_map(|edge| &edge.samples);
-        if kinds.len() > 2 || inner.any(|(_, sample)| is_between(*sample)) {
-            return true;
-        }
-        all.iter().any(|&signature| {
-            let there = samples.map(|sample| sample.find(signature).is_some());
-            let diagonal = there == [true, false, true, false] || there == [false, true, false, true];
-            let crossed_twice = cell
-                .edges
-                .iter()
-                .flatten()
-                .any(|edge| edge.changes(work, signature) > 1);
-            let torn = there == [true; 4]
-                && (0..4).any(|edge| reach_of(cell, edge, work, signature, false) != Reach::Whole);
-            diagonal || crossed_twice || torn
-        })
     }
 
     /// Four cells of the given depth in place of one.
@@ -631,20 +489,13 @@ impl CellCutter<'_> {
     }
 }
 
-/// Largest mismatch along a cell's edges.
-fn worst_mismatch(cell: &Cell, corners: [(SampleId, u16); 4], work: &Workspace) -> f64 {
-    let strand = |corner: usize| {
-        let (id, strand) = corners[corner];
-        &work.get(id).strands[usize::from(strand)]
-    };
-    EDGE_ENDS
-        .into_iter()
-        .enumerate()
-        .map(|(edge, (from, to))| mismatch(strand(from), strand(to), cell.edge_step(edge)))
-        .fold(0.0, f64::max)
-}
-
-fn reach_of(cell: &Cell, edge: usize, work: &Workspace, signature: PathSignature, backwards: bool) -> Reach {
+pub(super) fn reach_of(
+    cell: &Cell,
+    edge: usize,
+    work: &Workspace,
+    signature: PathSignature,
+    backwards: bool,
+) -> Reach {
     match &cell.edges[edge] {
         Some(samples) => samples.reach(work, signature, cell.edge_step(edge), backwards),
         None => Reach::Whole,
@@ -664,105 +515,4 @@ fn signatures(
     found.sort_unstable();
     found.dedup();
     found
-}
-
-/// Outlines of the parts of a cell that a signature fills: its corners, joined along edges that it reaches from end to
-/// end, with the cuts between.
-fn regions(
-    cell: &Cell,
-    reach: &impl Fn(usize, bool) -> Reach,
-    is_there: &impl Fn(usize) -> bool,
-) -> Vec<Vec<Outline>> {
-    let there: [bool; 4] = std::array::from_fn(is_there);
-    // Side i of the outline runs from corner i to corner i + 1.
-    const BACKWARDS: [bool; 4] = [false, false, true, true];
-    let ahead: [Option<Reach>; 4] =
-        std::array::from_fn(|side| there[side].then(|| reach(side, BACKWARDS[side])));
-    let behind: [Option<Reach>; 4] = std::array::from_fn(|corner| {
-        let side = (corner + 3) % 4;
-        there[corner].then(|| reach(side, !BACKWARDS[side]))
-    });
-    let joined: [bool; 4] =
-        std::array::from_fn(|side| there[side] && there[(side + 1) % 4] && ahead[side] == Some(Reach::Whole));
-    let mut outlines = Vec::new();
-    if there == [true; 4] && joined.iter().filter(|joined| **joined).count() >= 3 {
-        outlines.push(cell.corners.map(outline_of).to_vec());
-        return outlines;
-    }
-    let mut used = [false; 4];
-    for start in 0..4 {
-        // A region starts at a corner that is not joined to the one before.
-        if !there[start] || used[start] || joined[(start + 3) % 4] {
-            continue;
-        }
-        let mut outline = Vec::with_capacity(16);
-        if let Some(reach) = behind[start] {
-            let side = (start + 3) % 4;
-            outline.extend(up_to_cut(cell, side, !BACKWARDS[side], reach).into_iter().rev());
-        }
-        let mut corner = start;
-        loop {
-            used[corner] = true;
-            outline.push(outline_of(cell.corners[corner]));
-            if !joined[corner] {
-                break;
-            }
-            corner = (corner + 1) % 4;
-        }
-        if let Some(reach) = ahead[corner] {
-            outline.extend(up_to_cut(cell, corner, BACKWARDS[corner], reach));
-        }
-        outlines.push(outline);
-    }
-    outlines
-}
-
-fn outline_of(corner: Corner) -> Outline {
-    Outline {
-        square: corner.square,
-        sample: corner.sample,
-    }
-}
-
-/// Samples along a side from a corner up to the cut, and the cut: near a silhouette the wavefront bends like a root, and
-/// bisection left samples just where they are needed.
-fn up_to_cut(cell: &Cell, side: usize, backwards: bool, reach: Reach) -> Vec<Outline> {
-    let Reach::Cut {
-        place,
-        sample,
-        between,
-    } = reach
-    else {
-        return Vec::new();
-    };
-    let (from, to) = EDGE_ENDS[side];
-    let at = |place: f64, sample: SampleId| Outline {
-        square: cell.corners[from].square.lerp(cell.corners[to].square, place),
-        sample,
-    };
-    let inner = cell.edges[side]
-        .iter()
-        .flat_map(|edge| edge.inner(between, backwards));
-    inner
-        .map(|(place, sample)| at(place, sample))
-        .chain([at(place, sample)])
-        .collect()
-}
-
-/// An outline as a strip of triangles between its two ends, always over the shorter diagonal.
-fn triangles(region: &[Outline]) -> Vec<[Outline; 3]> {
-    let (mut first, mut last) = (0, region.len().saturating_sub(1));
-    let mut strip = Vec::with_capacity(region.len());
-    while first + 1 < last {
-        let [a, b] = [region[first], region[last]];
-        let (after, before) = (region[first + 1], region[last - 1]);
-        if after.square.distance_squared(b.square) <= a.square.distance_squared(before.square) {
-            strip.push([a, after, b]);
-            first += 1;
-        } else {
-            strip.push([a, before, b]);
-            last -= 1;
-        }
-    }
-    strip
 }

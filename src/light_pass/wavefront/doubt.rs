@@ -1,0 +1,161 @@
+//! Where a cell's corners and edges do not tell what lies between them.
+
+use glam::DVec2;
+
+use super::band::{SampleId, Workspace};
+use super::cell::{CHECK_MISMATCH, Cell, CellCutter, EDGE_ENDS, reach_of};
+use super::edge::{Reach, mismatch};
+use super::patch::PatchShape;
+use super::strand::LightSample;
+use crate::geometry::Ray;
+use crate::light_pass::caustic::path::PathSignature;
+
+/// Light below this share of the brightest is cut as it comes; what its cuts leave open is booked.
+const BRIGHT_SHARE: f64 = 0.1;
+
+/// A patch that is off by more than this share of the cell's width in its middle is of no use.
+const DOUBTFUL_SHARE: f64 = 0.1;
+
+/// How far patches are off in the middle of a cell, and how wide the cell is there: distances between origins with those
+/// between directions over the way to where they land [m].
+#[derive(Clone, Copy, Debug)]
+struct Check {
+    cubic: f64,
+    bilinear: f64,
+    width: f64,
+}
+
+impl CellCutter<'_> {
+    /// A check ray through the middle of the cell decides.
+    pub(super) fn is_bilinear_better(
+        &self,
+        cell: &Cell,
+        corners: [(SampleId, u16); 4],
+        step: DVec2,
+        work: &mut Workspace,
+    ) -> bool {
+        self.check(cell, corners, step, work)
+            .is_none_or(|Check { cubic, bilinear, .. }| cubic > bilinear || cubic.is_nan())
+    }
+
+    /// Whether no patch over a cell says where the bright light in its middle goes.
+    pub(super) fn is_doubtful(&self, cell: &Cell, work: &mut Workspace) -> bool {
+        let ids = cell.corners.map(|corner| corner.sample);
+        let brightest_w = ids.iter().map(|id| work.get(*id).brightest_w).fold(0.0, f64::max);
+        (0..work.get(ids[0]).strands.len()).any(|strand| {
+            let corners = ids.map(|id| (id, strand as u16));
+            let flux_w = work.get(ids[0]).strands[strand].flux_w.luminance();
+            flux_w > BRIGHT_SHARE * brightest_w
+                && worst_mismatch(cell, corners, work) > CHECK_MISMATCH
+                && self.check(cell, corners, cell.step(), work).is_none_or(
+                    |Check {
+                         cubic,
+                         bilinear,
+                         width,
+                     }| {
+                        let best = if cubic < bilinear { cubic } else { bilinear };
+                        best.is_nan() || best > DOUBTFUL_SHARE * width
+                    },
+                )
+        })
+    }
+
+    /// Where both shapes of patch send light from the middle, against where it goes; `None` where it does not go that
+    /// way at all.
+    fn check(
+        &self,
+        cell: &Cell,
+        corners: [(SampleId, u16); 4],
+        step: DVec2,
+        work: &mut Workspace,
+    ) -> Option<Check> {
+        let middle = cell.corners[0].square + step * 0.5;
+        let middle = self.edges.corner(middle, work);
+        let strands = corners.map(|(id, strand)| &work.get(id).strands[usize::from(strand)]);
+        let check = work.get(middle.sample);
+        let found = &check.strands[check.find(strands[0].signature)?];
+        let reach_m = found.landing.distance_m();
+        let reach_m = if reach_m.is_finite() { reach_m } else { 1.0 };
+        let apart = |a: &Ray, b: &Ray| {
+            let direction = a.direction.normalize_or_zero();
+            a.origin.distance(b.origin) + reach_m * direction.distance(b.direction)
+        };
+        let error = |shape: &PatchShape| apart(&shape.ray(DVec2::splat(0.5)), &found.ray);
+        Some(Check {
+            cubic: error(&PatchShape::coons(strands, step)),
+            bilinear: error(&PatchShape::bilinear(strands)),
+            width: apart(&strands[0].ray, &strands[2].ray).max(apart(&strands[1].ray, &strands[3].ray)),
+        })
+    }
+
+    /// Whether cuts along the edges do not tell what lies between them.
+    pub(super) fn is_ambiguous(&self, cell: &Cell, work: &Workspace) -> bool {
+        let samples = cell.corners.map(|corner| work.get(corner.sample));
+        let brightest_w = samples
+            .iter()
+            .map(|sample| sample.brightest_w)
+            .fold(0.0, f64::max);
+        let least_w = brightest_w * BRIGHT_SHARE;
+        let bright = |sample: &LightSample| -> Vec<PathSignature> {
+            sample
+                .strands
+                .iter()
+                .filter(|strand| strand.flux_w.luminance() > least_w)
+                .map(|strand| strand.signature)
+                .collect()
+        };
+        let mut kinds: Vec<Vec<PathSignature>> = samples.iter().map(|sample| bright(sample)).collect();
+        let all: Vec<PathSignature> = {
+            let mut all: Vec<_> = kinds.iter().flatten().copied().collect();
+            all.sort_unstable();
+            all.dedup();
+            all
+        };
+        // A strand that is bright at one corner counts at all where it is.
+        for (kind, sample) in kinds.iter_mut().zip(samples) {
+            *kind = all
+                .iter()
+                .copied()
+                .filter(|s| sample.find(*s).is_some())
+                .collect();
+        }
+        kinds.sort_unstable();
+        kinds.dedup();
+        // Light that only the samples along the edges met lies between the corners.
+        let is_between = |sample: SampleId| {
+            let inner = bright(work.get(sample));
+            inner
+                .iter()
+                .any(|signature| all.binary_search(signature).is_err())
+        };
+        let mut inner = cell.edges.iter().flatten().flat_map(|edge| &edge.samples);
+        if kinds.len() > 2 || inner.any(|(_, sample)| is_between(*sample)) {
+            return true;
+        }
+        all.iter().any(|&signature| {
+            let there = samples.map(|sample| sample.find(signature).is_some());
+            let diagonal = there == [true, false, true, false] || there == [false, true, false, true];
+            let crossed_twice = cell
+                .edges
+                .iter()
+                .flatten()
+                .any(|edge| edge.changes(work, signature) > 1);
+            let torn = there == [true; 4]
+                && (0..4).any(|edge| reach_of(cell, edge, work, signature, false) != Reach::Whole);
+            diagonal || crossed_twice || torn
+        })
+    }
+}
+
+/// Largest mismatch along a cell's edges.
+pub(super) fn worst_mismatch(cell: &Cell, corners: [(SampleId, u16); 4], work: &Workspace) -> f64 {
+    let strand = |corner: usize| {
+        let (id, strand) = corners[corner];
+        &work.get(id).strands[usize::from(strand)]
+    };
+    EDGE_ENDS
+        .into_iter()
+        .enumerate()
+        .map(|(edge, (from, to))| mismatch(strand(from), strand(to), cell.edge_step(edge)))
+        .fold(0.0, f64::max)
+}
