@@ -18,6 +18,9 @@ const PATCHES_PER_TASK: usize = 128;
 /// Tasks whose triangles wait together to be deposited: memory does not grow with the light.
 const TASKS_AT_ONCE: usize = 64;
 
+/// Triangles that are deposited between two looks at whether to stop.
+const TRIANGLES_AT_ONCE: usize = 1 << 13;
+
 /// Traced bands of one light, to be deposited again without a ray.
 #[derive(Clone, Debug, Default)]
 pub struct TracedLight {
@@ -162,9 +165,13 @@ impl WavefrontDepositor<'_> {
                 report.overreaches.extend_from_slice(&part.overreaches);
             }
             if let Some(maps) = maps.as_deref_mut() {
-                let placed = parts.iter().flat_map(|part| &part.triangles);
-                for (object, triangles) in placed.take_while(|_| !control.is_cancelled()) {
-                    self.place(*object, triangles, maps, report);
+                let lists = parts.iter().flat_map(|part| &part.triangles);
+                let pieces = lists.flat_map(|(object, triangles)| {
+                    let pieces = triangles.chunks(TRIANGLES_AT_ONCE);
+                    pieces.map(|piece| (*object, piece))
+                });
+                for (object, piece) in pieces.take_while(|_| !control.is_cancelled()) {
+                    self.place(object, piece, maps, report);
                 }
             }
         }
