@@ -375,3 +375,98 @@ fn a_hundred_edits_while_baking_end_at_a_fresh_bakes_maps_and_leave_nothing_behi
         None
     );
 }
+
+#[test]
+fn hard_edits_end_at_a_fresh_bakes_bits_and_lose_no_watt() {
+    let scene = two_casters();
+    let glass = scene.objects[1].material;
+    let moved = |object: usize, translation: DVec3| Edit::ObjectMoved {
+        object,
+        rotation: DQuat::IDENTITY,
+        translation,
+    };
+    let hard = [
+        (
+            "a lamp within glass",
+            Edit::LightPosition {
+                light: 0,
+                position: DVec3::new(-0.8, 0.5, 0.0),
+            },
+        ),
+        (
+            "a lamp in the floor",
+            Edit::LightPosition {
+                light: 0,
+                position: DVec3::new(0.3, 0.0, 0.2),
+            },
+        ),
+        ("a ball through the other", moved(1, DVec3::new(1.3, 0.1, 0.05))),
+        (
+            "a ball half under the floor",
+            moved(1, DVec3::new(0.0, -0.5, 0.0)),
+        ),
+        ("a ball beyond all light", moved(1, DVec3::new(0.0, 0.0, 1e6))),
+        ("the floor above the lamp", moved(0, DVec3::new(0.0, 5.0, 0.0))),
+        (
+            "glass like air",
+            Edit::MaterialIor {
+                material: glass,
+                ior: 1.0,
+            },
+        ),
+        (
+            "glass of index 40",
+            Edit::MaterialIor {
+                material: glass,
+                ior: 40.0,
+            },
+        ),
+        (
+            "black glass",
+            Edit::MaterialTint {
+                material: glass,
+                base_colour: LinearSrgb::BLACK,
+            },
+        ),
+        (
+            "rough glass",
+            Edit::MaterialRoughness {
+                material: glass,
+                roughness: 1.0,
+            },
+        ),
+    ];
+    let settings = at(1e3, 48);
+    for (what, change) in hard {
+        let mut session = session(&scene);
+        run(&mut session, &settings);
+        edit(&mut session, &change);
+        let edited = run(&mut session, &settings);
+        let whole = fresh(&session.scene().clone(), &settings);
+        assert_eq!(difference(&edited, &whole), None, "{what}");
+        assert_eq!(energy_fault(&edited), None, "{what}");
+        // And back, as if nothing had been.
+        session.set_scene(Arc::new(scene.clone())).expect("a sound scene");
+        let back = run(&mut session, &settings);
+        assert_eq!(
+            difference(&back, &fresh(&scene, &settings)),
+            None,
+            "{what}, taken back"
+        );
+    }
+}
+
+#[test]
+fn no_time_at_all_still_gives_a_whole_picture() {
+    let scene = builtin_scene("ring");
+    let hurried = BakeSettings {
+        max_error: Some(1e-4),
+        max_time_s: Some(1e-3),
+        ..at(1.6e3, 64)
+    };
+    let result = fresh(&scene, &hurried);
+    assert_eq!(result.stop_reason, StopReason::MaxTime);
+    assert!(!result.partial);
+    assert_eq!(result.maps.len(), 1);
+    assert_eq!(energy_fault(&result), None);
+}
