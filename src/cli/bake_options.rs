@@ -145,6 +145,11 @@ impl BakeOptions {
         Ok(settings)
     }
 
+    /// Whether an option says how good maps are to be, or how long they may take.
+    pub fn names_quality(&self) -> bool {
+        self.preset.is_some() || self.density.is_some() || self.max_error.is_some() || self.max_time.is_some()
+    }
+
     /// The relative RMSE to refine towards.
     fn target(&self, estimator: Estimator, preset: Preset) -> Option<f64> {
         let is_exact = self.density.is_some() || estimator == Estimator::Splat;

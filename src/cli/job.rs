@@ -53,6 +53,8 @@ pub struct ViewJob {
     #[cfg(feature = "viewer")]
     pub event_log: Option<PathBuf>,
     pub force: bool,
+    /// No option says how good the maps are to be: without a window nobody should wait long for them.
+    pub hurries: bool,
 }
 
 /// `bake`.
@@ -210,6 +212,7 @@ fn view_job(arguments: ViewArguments) -> Result<Job> {
         #[cfg(feature = "viewer")]
         event_log: arguments.event_log,
         force: arguments.force,
+        hurries: !arguments.bake.names_quality(),
     }))
 }
 

@@ -12,6 +12,9 @@ use super::job::{MapSource, PictureFormat, ViewJob};
 use super::terminal::{self, Terminal};
 use super::{picture, render};
 
+/// Time of the light pass where neither quality nor time is asked for [s].
+const HURRIED_S: f64 = 5.0;
+
 /// Where files go when there is no display.
 const HEADLESS_FOLDER: &str = "nephroid-out";
 
@@ -122,7 +125,11 @@ fn headless(
         return terminal::print(&folder.path().display().to_string());
     }
     let folder = MapFolder::open(path, job.force)?;
-    let settings = job.maps.settings();
+    let mut settings = job.maps.settings().clone();
+    if job.hurries {
+        settings.max_time_s = Some(HURRIED_S);
+    }
+    let settings = &settings;
     let result = bake::bake(loaded, settings, clock, terminal, interrupt)?;
     if !result.partial {
         let made = picture::make(&loaded.scene, &result.maps, &job.picture, terminal, interrupt)?;
