@@ -8,7 +8,7 @@ use super::sizes::MapSizes;
 use super::{BakeCounts, Clock};
 use crate::error::{Result, Warning};
 use crate::illumination::accumulator::FluxUnit;
-use crate::light_pass::accuracy::{self, Before, Images};
+use crate::light_pass::accuracy::{self, Before, Images, LightError};
 use crate::light_pass::caustic::pass::{PassReport, Stopwatch};
 use crate::light_pass::caustic::setup::{Aim, AimedLight};
 use crate::light_pass::caustic::statistics::FootprintStatistics;
@@ -198,7 +198,11 @@ impl CausticLayer<'_> {
         let predecessors = step.min(ESTIMATED_LEVELS - 1);
         let is_known = |error: &KeptError| error.predecessors == predecessors;
         if !level.error.as_ref().is_some_and(is_known) && !course.control.is_cancelled() {
-            level.error = self.error_of(light, &level, state, climb, course);
+            let estimate = self.error_of(light, &level, state, climb, course);
+            level.error = estimate.map(|estimate| KeptError {
+                predecessors,
+                estimate,
+            });
         }
         climb.levels.push(level);
         if step + 1 >= self.lattices(light).len() {
@@ -229,9 +233,9 @@ impl CausticLayer<'_> {
         state: &mut LightState,
         climb: &Climb,
         course: &mut Course,
-    ) -> Option<KeptError> {
+    ) -> Option<LightError> {
         let ledger = level.ledger.report("", level.unit, LinearSrgb::WHITE).energy_w;
-        let estimate = match self.settings.estimator {
+        match self.settings.estimator {
             Estimator::Wavefront => {
                 let watch = Stopwatch::start();
                 let levels = climb.levels.iter().rev().take(ESTIMATED_LEVELS - 1);
@@ -253,11 +257,7 @@ impl CausticLayer<'_> {
                 let fine = accuracy::images(&level.maps, level.unit);
                 accuracy::estimate_splats(&fine, &thinner, level.noise.as_ref()?, &ledger)
             }
-        };
-        estimate.map(|estimate| KeptError {
-            predecessors: climb.levels.len().min(ESTIMATED_LEVELS - 1),
-            estimate,
-        })
+        }
     }
 
     /// Decides on another round of refinement; false where there is nothing more to do.

@@ -6,25 +6,18 @@ use nephroid::optics::LinearSrgb;
 use nephroid::scene::builtin::{parts, shapes};
 use nephroid::scene::{Material, Mesh, Scene};
 use nephroid::session::{BakeResult, StopReason};
-use nephroid::settings::{BakeSettings, LayerKind, MapResolution, RayPlacement};
+use nephroid::settings::{BakeSettings, LayerKind, RayPlacement};
 use nephroid::units::{Flux, Irradiance};
 use rand_pcg::Pcg64Mcg;
 use rand_pcg::rand_core::{Rng, SeedableRng};
 
-use crate::tools::{bake, builtin_scene};
+use crate::tools::{at, bake, builtin_scene};
 
 /// Side of all maps [texels].
 const SIDE: usize = 128;
 
 fn exactly(density_per_sr: f64) -> BakeSettings {
-    BakeSettings {
-        density_per_sr,
-        map_resolution: MapResolution::Fixed {
-            width: SIDE,
-            height: SIDE,
-        },
-        ..BakeSettings::default()
-    }
+    at(density_per_sr, SIDE)
 }
 
 fn towards(target: f64) -> BakeSettings {

@@ -15,18 +15,7 @@ use nephroid::units::{Flux, RadiantIntensity};
 use rand_pcg::Pcg64Mcg;
 use rand_pcg::rand_core::{Rng, SeedableRng};
 
-use crate::tools::{bits, builtin_scene, energy_fault};
-
-fn at(density_per_sr: f64, side: usize) -> BakeSettings {
-    BakeSettings {
-        density_per_sr,
-        map_resolution: MapResolution::Fixed {
-            width: side,
-            height: side,
-        },
-        ..BakeSettings::default()
-    }
-}
+use crate::tools::{at, bits, builtin_scene, energy_fault};
 
 fn session(scene: &Scene) -> BakeSession {
     BakeSession::new(Arc::new(scene.clone())).expect("a session")

@@ -26,6 +26,18 @@ pub fn settings(density_per_sr: f64, side: usize) -> BakeSettings {
     }
 }
 
+/// Wavefront settings at a density [rays/sr], with maps of `side` texels each way.
+pub fn at(density_per_sr: f64, side: usize) -> BakeSettings {
+    BakeSettings {
+        density_per_sr,
+        map_resolution: MapResolution::Fixed {
+            width: side,
+            height: side,
+        },
+        ..BakeSettings::default()
+    }
+}
+
 /// Bakes a scene to the end.
 pub fn bake(scene: Scene, settings: &BakeSettings) -> BakeResult {
     let mut session = BakeSession::new(Arc::new(scene)).expect("a session");

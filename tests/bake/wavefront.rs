@@ -11,18 +11,7 @@ use nephroid::settings::{BakeSettings, MapResolution, Sigma};
 
 use crate::hard_scenes;
 use crate::support::{self, assert_close};
-use crate::tools::{bake, bits, builtin_scene, caustic, energy_fault, map_of, transformed};
-
-fn at(density_per_sr: f64, side: usize) -> BakeSettings {
-    BakeSettings {
-        density_per_sr,
-        map_resolution: MapResolution::Fixed {
-            width: side,
-            height: side,
-        },
-        ..BakeSettings::default()
-    }
-}
+use crate::tools::{at, bake, bits, builtin_scene, caustic, energy_fault, map_of, transformed};
 
 fn towards(target: f64, density_per_sr: f64) -> BakeSettings {
     BakeSettings {
