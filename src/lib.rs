@@ -9,6 +9,7 @@
 //!
 //! A module imports only what stands above it in this list.
 
+pub mod effect;
 pub mod error;
 pub mod settings;
 pub mod units;

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::effect::{Effect, EffectSwitch, EffectSwitches};
 use crate::error::{Error, Result};
 
 /// Which light a layer holds. The order is that of the files' channels.
@@ -125,19 +126,6 @@ pub enum MapResolution {
     },
 }
 
-/// Switch of one effect.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum EffectSwitch {
-    /// On where the scene calls for it.
-    #[default]
-    Auto,
-    /// Always.
-    On,
-    /// Never.
-    Off,
-}
-
 /// All bake options. [`validate`](Self::validate) states the ranges.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BakeSettings {
@@ -166,10 +154,13 @@ pub struct BakeSettings {
     pub map_resolution: MapResolution,
     /// Largest number of specular surfaces on a path, ≥ 1.
     pub max_depth: u32,
-    /// Branches that carry less than this share of their light ray's flux are not followed; booked as truncated.
-    pub branch_threshold: f64,
+    /// Branches that carry less than this share of their light ray's flux are not followed; booked as truncated. `None`:
+    /// as the target allows, see [`Self::path_threshold`].
+    pub branch_threshold: Option<f64>,
     /// Layers to bake.
     pub layers: Vec<LayerKind>,
+    /// Effects that are forced on or off.
+    pub effects: EffectSwitches,
     /// Of everything random.
     pub seed: u64,
     /// Worker threads; 0 = one per core.
@@ -180,6 +171,12 @@ pub struct BakeSettings {
 
 /// Least density that refinement begins from [rays/sr].
 const COARSEST_START_PER_SR: f64 = 1_600.0;
+
+/// Least share of a light ray's flux that is followed without a target [1].
+const USUAL_THRESHOLD: f64 = 1e-4;
+
+/// Least share that is followed, over the relative RMSE that is aimed at.
+const THRESHOLD_PER_ERROR: f64 = 0.03;
 
 /// Least target for the relative RMSE [1].
 pub const LEAST_MAX_ERROR: f64 = 1e-4;
@@ -203,8 +200,9 @@ impl Default for BakeSettings {
             item_buffer: ItemBufferKind::Equal,
             map_resolution: MapResolution::Auto,
             max_depth: 16,
-            branch_threshold: 1e-4,
+            branch_threshold: None,
             layers: vec![LayerKind::Caustic],
+            effects: EffectSwitches::default(),
             seed: 0,
             threads: 0,
             memory_bytes: 4 << 30,
@@ -251,6 +249,16 @@ impl BakeSettings {
         (40.0 / target).clamp(COARSEST_START_PER_SR, 40_000.0)
     }
 
+    /// Least share of a light ray's flux (luminance) that a branch must carry to be followed: as it is set, else so small
+    /// that what is left out is far below the target.
+    pub fn path_threshold(&self) -> f64 {
+        self.branch_threshold.unwrap_or_else(|| match self.max_error {
+            Some(target) if target > LEAST_MAX_ERROR => (target * THRESHOLD_PER_ERROR).clamp(1e-6, 1e-2),
+            // No target, or as much as time allows.
+            _ => USUAL_THRESHOLD,
+        })
+    }
+
     /// Memory that traced light may take until the next bake [bytes]: a quarter of all.
     pub fn kept_light_bytes(&self) -> u64 {
         self.memory_bytes / 4
@@ -291,7 +299,9 @@ impl BakeSettings {
                 ));
             }
         }
-        finite_in("--branch-threshold", self.branch_threshold, 0.0, 0.5)?;
+        if let Some(share) = self.branch_threshold {
+            finite_in("--branch-threshold", share, 0.0, 0.5)?;
+        }
         if let MapResolution::Fixed { width, height } = self.map_resolution {
             finite_in("--map-resolution", width as f64, 1.0, MAX_MAP_SIDE as f64)?;
             finite_in("--map-resolution", height as f64, 1.0, MAX_MAP_SIDE as f64)?;
@@ -310,6 +320,15 @@ impl BakeSettings {
                 "--layers",
                 "the indirect layer is not available in this version",
                 "use caustic, direct or both",
+            ));
+        }
+        let unavailable =
+            |effect: &Effect| !effect.is_available() && self.effects.get(*effect) == EffectSwitch::On;
+        if let Some(effect) = Effect::ALL.into_iter().find(unavailable) {
+            return Err(Error::usage(
+                "--effects",
+                format!("{} is not available in this version", effect.name()),
+                format!("leave {}=on out", effect.name()),
             ));
         }
         Ok(())

@@ -1,6 +1,7 @@
 //! Bake options: from flags to validated settings.
 
 use clap::{Args, ValueEnum};
+use nephroid::effect::{Effect, EffectSwitch, EffectSwitches};
 use nephroid::error::{Error, Result};
 use nephroid::settings::{
     BakeSettings, Estimator, Footprint, ItemBufferKind, Kernel, KernelSampling, LEAST_MAX_ERROR, LayerKind,
@@ -87,12 +88,15 @@ pub struct BakeOptions {
     #[arg(long, value_name = "N")]
     max_depth: Option<u32>,
     /// Branches that carry less than this share of their light ray's flux are not followed, and booked as truncated
-    /// [default: 0.0001]
+    /// [default: 3 % of the target error, 0.0001 without a target]
     #[arg(long, value_name = "SHARE", allow_negative_numbers = true)]
     branch_threshold: Option<f64>,
     /// Layers to bake [default: caustic for bake, caustic,direct for pictures]
     #[arg(long, value_enum, value_delimiter = ',', value_name = "LAYER,...")]
     layers: Option<Vec<LayerKind>>,
+    /// Forces effects on or off, such as refraction=off [default: auto, on where the scene calls for it]
+    #[arg(long, value_delimiter = ',', value_name = "NAME=auto|on|off", value_parser = values::effect_switch)]
+    effects: Option<Vec<(Effect, EffectSwitch)>>,
     /// Seed of everything random [default: 0]
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
@@ -135,14 +139,23 @@ impl BakeOptions {
             item_buffer: self.item_buffer.unwrap_or(defaults.item_buffer),
             map_resolution: self.map_resolution.unwrap_or(defaults.map_resolution),
             max_depth: self.max_depth.unwrap_or(defaults.max_depth),
-            branch_threshold: self.branch_threshold.unwrap_or(defaults.branch_threshold),
+            branch_threshold: self.branch_threshold,
             layers,
+            effects: self.switches(),
             seed: self.seed.unwrap_or(defaults.seed),
             threads,
             memory_bytes: self.memory.unwrap_or(defaults.memory_bytes),
         };
         settings.validate()?;
         Ok(settings)
+    }
+
+    /// The last one counts where an effect is named twice.
+    fn switches(&self) -> EffectSwitches {
+        let named = self.effects.iter().flatten();
+        named.fold(EffectSwitches::default(), |switches, &(effect, switch)| {
+            switches.with(effect, switch)
+        })
     }
 
     /// Whether an option says how good maps are to be, or how long they may take.

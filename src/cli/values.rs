@@ -1,5 +1,6 @@
 //! Values of options: how they are written.
 
+use nephroid::effect::{Effect, EffectSwitch};
 use nephroid::settings::{MapResolution, Sigma};
 
 /// `1.5` or `adaptive`.
@@ -77,6 +78,28 @@ pub fn memory(text: &str) -> Result<u64, String> {
         .filter(|bytes| (MIN_MEMORY_BYTES as f64..1e18).contains(bytes))
         .map(|bytes| bytes as u64)
         .ok_or_else(|| "give at least 1M, as bytes or with K, M, G or T, such as 512M or 2G".to_string())
+}
+
+/// `refraction=off`: an effect and its switch.
+pub fn effect_switch(text: &str) -> Result<(Effect, EffectSwitch), String> {
+    let names = || Effect::ALL.map(Effect::name).join(", ");
+    let Some((name, switch)) = text.split_once('=') else {
+        return Err(format!(
+            "{text} is not of the form NAME=auto|on|off; NAME is one of {}",
+            names()
+        ));
+    };
+    let effect = Effect::ALL
+        .into_iter()
+        .find(|effect| effect.name() == name)
+        .ok_or_else(|| format!("there is no effect {name}; there are {}", names()))?;
+    let switch = match switch {
+        "auto" => EffectSwitch::Auto,
+        "on" => EffectSwitch::On,
+        "off" => EffectSwitch::Off,
+        other => return Err(format!("{other} is no switch; use auto, on or off")),
+    };
+    Ok((effect, switch))
 }
 
 /// `auto` (none) or a number of stops, −64 to 64.

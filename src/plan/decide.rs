@@ -1,6 +1,6 @@
 //! The decision, once per scene and settings.
 
-use super::{Effect, EffectLine, EffectPlan, LightLine};
+use super::{Effect, EffectLine, EffectPlan, EffectSwitch, LightLine};
 use crate::scene::{Scene, SurfaceKind};
 use crate::settings::{BakeSettings, LayerKind};
 
@@ -24,16 +24,19 @@ pub fn decide(scene: &Scene, settings: &BakeSettings, casters: &CastersByLight) 
         match cause {
             _ if !pass.on => EffectLine {
                 effect,
+                switch: settings.effects.get(effect),
                 on: false,
                 reason: "the light pass is off".into(),
             },
             Some(&(object, light)) => EffectLine {
                 effect,
+                switch: settings.effects.get(effect),
                 on: true,
                 reason: lit_by(scene, object, light),
             },
             None => EffectLine {
                 effect,
+                switch: settings.effects.get(effect),
                 on: false,
                 reason: none.into(),
             },
@@ -71,6 +74,7 @@ fn lit_by(scene: &Scene, object: usize, light: usize) -> String {
 fn light_pass(scene: &Scene, settings: &BakeSettings, lit: &[(usize, usize)]) -> EffectLine {
     let line = |on, reason: String| EffectLine {
         effect: Effect::LightPass,
+        switch: settings.effects.get(Effect::LightPass),
         on,
         reason,
     };
@@ -133,6 +137,7 @@ fn light_lines(scene: &Scene, settings: &BakeSettings, casters: &CastersByLight)
 fn absorption(scene: &Scene, pass: &EffectLine) -> EffectLine {
     let line = |on, reason: String| EffectLine {
         effect: Effect::Absorption,
+        switch: EffectSwitch::Auto,
         on,
         reason,
     };
@@ -153,6 +158,7 @@ fn absorption(scene: &Scene, pass: &EffectLine) -> EffectLine {
 fn direct(scene: &Scene, settings: &BakeSettings) -> EffectLine {
     let line = |on, reason: &str| EffectLine {
         effect: Effect::Direct,
+        switch: settings.effects.get(Effect::Direct),
         on,
         reason: reason.into(),
     };

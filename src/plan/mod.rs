@@ -6,40 +6,15 @@ pub use decide::{CastersByLight, decide};
 
 use serde::{Deserialize, Serialize};
 
-/// One effect that can be simulated or left out.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Effect {
-    /// Light pass at all.
-    LightPass,
-    /// Refraction branch.
-    Refraction,
-    /// Reflection branch.
-    Reflection,
-    /// Beer-Lambert absorption in volumes.
-    Absorption,
-    /// Direct layer.
-    Direct,
-}
-
-impl Effect {
-    /// Its name on the command line and in files.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::LightPass => "light_pass",
-            Self::Refraction => "refraction",
-            Self::Reflection => "reflection",
-            Self::Absorption => "absorption",
-            Self::Direct => "direct",
-        }
-    }
-}
+pub use crate::effect::{Effect, EffectSwitch};
 
 /// Whether an effect is on, and why.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct EffectLine {
     /// Which effect.
     pub effect: Effect,
+    /// How the user switched it.
+    pub switch: EffectSwitch,
     /// Whether it is simulated.
     pub on: bool,
     /// Why, with the names of the objects and lights that cause it.

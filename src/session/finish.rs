@@ -75,6 +75,7 @@ impl Finish<'_> {
             estimated_relative_rmse: relative_rmse(&maps).map(|rmse| rmse.hypot(given_up)),
             maps,
             plan: self.plan.clone(),
+            effects: Vec::new(),
             ledgers,
             counts: outcome.counts,
             timings_s: Timings::default(),

@@ -115,7 +115,7 @@ impl CausticLayer<'_> {
         let mut paths = BakeSettings {
             estimator: settings.estimator,
             max_depth: settings.max_depth,
-            branch_threshold: settings.branch_threshold,
+            branch_threshold: Some(settings.path_threshold()),
             item_buffer: settings.item_buffer,
             ..BakeSettings::default()
         };
@@ -179,7 +179,7 @@ impl CausticLayer<'_> {
     pub(super) fn limits(&self) -> PathLimits {
         PathLimits {
             max_depth: self.settings.max_depth,
-            branch_threshold: self.settings.branch_threshold,
+            branch_threshold: self.settings.path_threshold(),
             absorption: self.plan.is_on(Effect::Absorption),
         }
     }

@@ -14,7 +14,7 @@ mod wavefront_level;
 use std::sync::Arc;
 use std::time::Instant;
 
-pub use result::{BakeCounts, BakeResult, StopReason, Timings};
+pub use result::{BakeCounts, BakeResult, EffectCounts, EffectReport, StopReason, Timings};
 
 use crate::error::{Error, Result};
 use crate::light_pass::caustic::pass::{Seconds, Stopwatch};

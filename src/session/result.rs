@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::error::Warning;
 use crate::illumination::IlluminationMap;
 use crate::light_pass::ledger::LightLedger;
-use crate::plan::EffectPlan;
+use crate::plan::{EffectLine, EffectPlan};
 
 /// Why a bake ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -42,6 +42,33 @@ pub struct BakeCounts {
     pub cells: u64,
 }
 
+/// What an effect took, counted where the work is done.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct EffectCounts {
+    /// Rays traced for it: light rays, segments after an event of its kind, shadow rays, rays of the eye.
+    pub rays: u64,
+    /// Patches and kernels that it brought to a map.
+    pub deposits: u64,
+    /// Memory that is held for it [bytes].
+    pub bytes: u64,
+    /// CPU time [ms]; where effects share loops, by their share of rays and deposits.
+    pub cpu_ms: f64,
+    /// Render pipelines created for it; `None` where it is none of the eye pass.
+    pub pipelines: Option<u64>,
+    /// Time on the graphics device [ms]; `None` where it is none of the eye pass or the device cannot tell.
+    pub gpu_ms: Option<f64>,
+}
+
+/// One effect as it was planned, with what it took.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct EffectReport {
+    /// The plan's line.
+    #[serde(flatten)]
+    pub line: EffectLine,
+    /// What it took.
+    pub counts: EffectCounts,
+}
+
 /// Seconds per stage; used for wall-clock times and for CPU times of the whole process.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Timings {
@@ -66,6 +93,8 @@ pub struct BakeResult {
     pub maps: Vec<IlluminationMap>,
     /// Which effects were on, and why.
     pub plan: EffectPlan,
+    /// What each effect took, in the order of the plan.
+    pub effects: Vec<EffectReport>,
     /// Energy of the caustic layer, one per light with its name.
     pub ledgers: Vec<LightLedger>,
     /// Counters.

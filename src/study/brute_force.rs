@@ -101,7 +101,7 @@ fn run(
         tracer,
         limits: PathLimits {
             max_depth: settings.max_depth,
-            branch_threshold: settings.branch_threshold,
+            branch_threshold: settings.path_threshold(),
             absorption: plan.is_on(Effect::Absorption),
         },
         unit: unit(scene, lights)?,
@@ -347,6 +347,7 @@ fn empty_result(plan: EffectPlan, nothing_to_do: bool) -> BakeResult {
     BakeResult {
         maps: Vec::new(),
         plan,
+        effects: Vec::new(),
         ledgers: Vec::new(),
         counts: BakeCounts::default(),
         timings_s: Timings::default(),

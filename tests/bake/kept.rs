@@ -132,7 +132,7 @@ fn what_changes_the_rays_traces_them_again() {
             ..base.clone()
         },
         BakeSettings {
-            branch_threshold: 0.01,
+            branch_threshold: Some(0.01),
             ..base.clone()
         },
         BakeSettings {

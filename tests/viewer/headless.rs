@@ -42,6 +42,7 @@ pub fn finished(scene: &Arc<Scene>, settings: &BakeSettings) -> BakedLevel {
         result: BakeResult {
             maps: Vec::new(),
             plan: EffectPlan::default(),
+            effects: Vec::new(),
             ledgers: Vec::new(),
             counts: BakeCounts::default(),
             timings_s: Timings::default(),

@@ -439,7 +439,7 @@ fn buttons_tell_what_was_pressed() {
 fn absurd_settings_are_refused_with_the_sentence_of_the_library() {
     let mut panel = Headless::new(
         BakeSettings {
-            branch_threshold: -1.0,
+            branch_threshold: Some(-1.0),
             ..settings()
         },
         SIZE,
@@ -521,6 +521,7 @@ fn effects_are_listed_with_their_reasons() {
     let mut last = finished(&panel.scene, &settings());
     last.result.plan = EffectPlan {
         effects: vec![EffectLine {
+            switch: Default::default(),
             effect: Effect::Refraction,
             on: false,
             reason: "no light reaches the glass of 'ball'".into(),

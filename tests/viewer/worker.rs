@@ -20,6 +20,7 @@ fn result(rays: u64, partial: bool) -> BakeResult {
     BakeResult {
         maps: Vec::new(),
         plan: EffectPlan::default(),
+        effects: Vec::new(),
         ledgers: Vec::new(),
         counts: BakeCounts {
             rays,

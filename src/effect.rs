@@ -1,0 +1,126 @@
+//! The effects that can be simulated or left out, and the user's switch of each.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+/// One effect that can be simulated or left out.
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, clap::ValueEnum,
+)]
+#[serde(rename_all = "snake_case")]
+#[value(rename_all = "snake_case")]
+pub enum Effect {
+    /// Light pass of the caustic layer at all.
+    LightPass,
+    /// Light that goes through a surface: solid bodies and panes.
+    Refraction,
+    /// Light that a surface sends back.
+    Reflection,
+    /// Beer and Lambert's absorption within bodies.
+    Absorption,
+    /// Base-colour textures of surfaces that light goes on from.
+    Textures,
+    /// The direct layer.
+    Direct,
+    /// The indirect layer.
+    Indirect,
+    /// What the eye sees in mirrors and through glass.
+    Chains,
+}
+
+impl Effect {
+    /// All of them, as they are listed.
+    pub const ALL: [Self; 8] = [
+        Self::LightPass,
+        Self::Refraction,
+        Self::Reflection,
+        Self::Absorption,
+        Self::Textures,
+        Self::Direct,
+        Self::Indirect,
+        Self::Chains,
+    ];
+
+    /// Its name on the command line and in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::LightPass => "light_pass",
+            Self::Refraction => "refraction",
+            Self::Reflection => "reflection",
+            Self::Absorption => "absorption",
+            Self::Textures => "textures",
+            Self::Direct => "direct",
+            Self::Indirect => "indirect",
+            Self::Chains => "chains",
+        }
+    }
+
+    /// What it is, in one sentence for people.
+    pub fn description(self) -> &'static str {
+        match self {
+            Self::LightPass => {
+                "Light that meets glass, mirrors or water before it falls on diffuse surfaces."
+            }
+            Self::Refraction => "Light that goes through glass, water and panes.",
+            Self::Reflection => "Light that mirrors, polish and glass send back.",
+            Self::Absorption => "Coloured bodies take light along the way through them (Beer and Lambert).",
+            Self::Textures => "Images on mirrors and glass tint the light that goes on from them.",
+            Self::Direct => "Light straight from the lamps, with its shadows.",
+            Self::Indirect => "Light that diffuse surfaces send each other.",
+            Self::Chains => "What the eye sees in mirrors and through glass.",
+        }
+    }
+
+    /// Whether this version simulates it.
+    pub fn is_available(self) -> bool {
+        self != Self::Indirect
+    }
+}
+
+/// Switch of one effect.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum EffectSwitch {
+    /// On where the scene calls for it.
+    #[default]
+    Auto,
+    /// Always: what the scene does not call for is looked for all the same.
+    On,
+    /// Never: light that would need it is booked as switched off.
+    Off,
+}
+
+/// The switches of all effects; those that are not named are at [`EffectSwitch::Auto`].
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct EffectSwitches(BTreeMap<Effect, EffectSwitch>);
+
+impl EffectSwitches {
+    /// Every effect of this version forced on.
+    pub fn all_on() -> Self {
+        let available = Effect::ALL.into_iter().filter(|effect| effect.is_available());
+        Self(available.map(|effect| (effect, EffectSwitch::On)).collect())
+    }
+
+    /// The switch of an effect.
+    pub fn get(&self, effect: Effect) -> EffectSwitch {
+        self.0.get(&effect).copied().unwrap_or_default()
+    }
+
+    /// Sets the switch of an effect.
+    pub fn set(&mut self, effect: Effect, switch: EffectSwitch) {
+        match switch {
+            // One form for the same switches.
+            EffectSwitch::Auto => self.0.remove(&effect),
+            EffectSwitch::On | EffectSwitch::Off => self.0.insert(effect, switch),
+        };
+    }
+
+    /// The same with one effect switched.
+    #[must_use]
+    pub fn with(mut self, effect: Effect, switch: EffectSwitch) -> Self {
+        self.set(effect, switch);
+        self
+    }
+}
