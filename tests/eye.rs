@@ -1,5 +1,7 @@
 //! Maps on surfaces, the direct layer and the CPU eye pass, on scenes whose answer is known.
 
+#[path = "eye/chains.rs"]
+mod chains;
 #[path = "eye/charts.rs"]
 mod charts;
 #[path = "eye/direct.rs"]

@@ -13,6 +13,8 @@ mod builtins;
 mod device;
 #[path = "gpu/display.rs"]
 mod display;
+#[path = "gpu/on_demand.rs"]
+mod on_demand;
 #[path = "gpu/radiance.rs"]
 mod radiance;
 #[path = "gpu/reflections.rs"]

@@ -5,7 +5,7 @@ struct Frame {
     camera_position: vec3f,
     radiance_scale: f32,
     background: vec3f,
-    maps_as_they_are: u32,
+    padding: u32,
 }
 
 @group(0) @binding(0) var<uniform> frame: Frame;

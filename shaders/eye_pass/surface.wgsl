@@ -8,7 +8,7 @@ struct ObjectUniform {
     emitted_radiance: vec3f,
     ior: f32,
     body_transmittance: vec3f,
-    surface: u32,
+    padding: u32,
 }
 
 const SURFACE_DIFFUSE: u32 = 0u;
@@ -16,6 +16,11 @@ const SURFACE_MIRROR: u32 = 1u;
 const SURFACE_DIELECTRIC: u32 = 2u;
 const SURFACE_THIN_WALL: u32 = 3u;
 const SURFACE_MIXED: u32 = 4u;
+
+// Kind of the surface, one of SURFACE_*.
+override SURFACE: u32;
+// Whether base_colour_texture is an image and not just white.
+override HAS_BASE_COLOUR_TEXTURE: bool;
 
 const PI: f32 = 3.14159265358979;
 // Largest value written [scaled radiance]: half floats end at 65504, and a pane may still multiply it.
@@ -65,11 +70,14 @@ struct SurfacePoint {
 }
 
 fn surface_point(fragment: Fragment, front: bool) -> SurfacePoint {
-    let texel = textureSample(base_colour_texture, base_colour_sampler, fragment.uv).rgb;
+    var base_colour = object.base_colour;
+    if HAS_BASE_COLOUR_TEXTURE {
+        base_colour *= textureSample(base_colour_texture, base_colour_sampler, fragment.uv).rgb;
+    }
     let view = normalize(fragment.from_camera);
     let outward = normalize(fragment.normal);
     let normal = select(-outward, outward, front);
-    return SurfacePoint(object.base_colour * texel, normal, view, clamp(-dot(normal, view), 0.0, 1.0));
+    return SurfacePoint(base_colour, normal, view, clamp(-dot(normal, view), 0.0, 1.0));
 }
 
 // E [W/m²]: bilinear between texel centres, held at the border. Weights in full precision, since the steps of the
@@ -110,30 +118,50 @@ fn scaled(radiance: vec3f) -> vec4f {
     return vec4f(clamp(radiance * frame.radiance_scale, vec3f(0.0), vec3f(LARGEST)), 1.0);
 }
 
+// Share of light that a polish sends back; 0 without one.
+fn polish_reflectance(point: SurfacePoint) -> f32 {
+    if SURFACE == SURFACE_MIXED {
+        return dielectric_reflectance(point.cos_view, object.ior);
+    }
+    return 0.0;
+}
+
+// What a surface sends by itself: emission, and the share of its map that its polish lets out.
+fn own_radiance(fragment: Fragment, point: SurfacePoint) -> vec3f {
+    if SURFACE == SURFACE_MIRROR {
+        return object.emitted_radiance;
+    }
+    let diffuse = diffuse_radiance(fragment, point.base_colour);
+    return object.emitted_radiance + (1.0 - polish_reflectance(point)) * diffuse;
+}
+
+// Opaque surfaces that reflect nothing, or whose reflections are left out.
 @fragment
-fn opaque(fragment: Fragment, @builtin(front_facing) front: bool) -> @location(0) vec4f {
+fn own(fragment: Fragment, @builtin(front_facing) front: bool) -> @location(0) vec4f {
+    return scaled(own_radiance(fragment, surface_point(fragment, front)));
+}
+
+// Opaque surfaces with their reflections.
+@fragment
+fn own_and_reflected(fragment: Fragment, @builtin(front_facing) front: bool) -> @location(0) vec4f {
     let point = surface_point(fragment, front);
-    if frame.maps_as_they_are != 0u {
-        return scaled(irradiance(fragment.map_uv));
+    var reflectance = vec3f(polish_reflectance(point));
+    if SURFACE == SURFACE_MIRROR {
+        reflectance = metal_reflectance(point.cos_view, point.base_colour);
     }
-    var radiance = object.emitted_radiance;
-    if object.surface == SURFACE_MIRROR {
-        radiance += metal_reflectance(point.cos_view, point.base_colour) * reflected_radiance(fragment, point);
-    } else {
-        var reflectance = 0.0;
-        if object.surface == SURFACE_MIXED {
-            reflectance = dielectric_reflectance(point.cos_view, object.ior);
-        }
-        radiance += (1.0 - reflectance) * diffuse_radiance(fragment, point.base_colour);
-        radiance += reflectance * reflected_radiance(fragment, point);
-    }
-    return scaled(radiance);
+    return scaled(own_radiance(fragment, point) + reflectance * reflected_radiance(fragment, point));
+}
+
+// Maps as they are, neither lit nor reflected.
+@fragment
+fn map_value(fragment: Fragment) -> @location(0) vec4f {
+    return scaled(irradiance(fragment.map_uv));
 }
 
 // Share of light sent back by a clear interface as seen from outside; both faces of a body are treated alike, since
 // rays are not bent here.
 fn clear_reflectance(point: SurfacePoint) -> f32 {
-    if object.surface == SURFACE_THIN_WALL {
+    if SURFACE == SURFACE_THIN_WALL {
         return thin_wall_reflectance(point.cos_view, object.ior);
     }
     return dielectric_reflectance(point.cos_view, object.ior);
@@ -142,7 +170,7 @@ fn clear_reflectance(point: SurfacePoint) -> f32 {
 // Factor on the radiance behind a clear surface. Radiance falls by n² into a body and grows by n² out of it.
 fn clear_transmittance(point: SurfacePoint, reflectance: f32, front: bool) -> vec3f {
     let factor = (1.0 - reflectance) * point.base_colour;
-    if object.surface != SURFACE_DIELECTRIC {
+    if SURFACE != SURFACE_DIELECTRIC {
         return factor;
     }
     let n2 = object.ior * object.ior;

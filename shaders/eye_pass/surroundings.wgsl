@@ -3,6 +3,9 @@
 
 const MAX_RECEIVERS: u32 = 16u;
 
+// False where nothing plane is to be looked at: `surroundings.count` is 0.
+override HAS_RECEIVERS: bool;
+
 struct Receiver {
     plane: vec4f,
     u: vec4f,
@@ -21,9 +24,9 @@ struct Surroundings {
     padding2: f32,
 }
 
-@group(0) @binding(1) var<uniform> surroundings: Surroundings;
-@group(0) @binding(2) var receiver_images: texture_2d_array<f32>;
-@group(0) @binding(3) var receiver_sampler: sampler;
+@group(2) @binding(0) var<uniform> surroundings: Surroundings;
+@group(2) @binding(1) var receiver_images: texture_2d_array<f32>;
+@group(2) @binding(2) var receiver_sampler: sampler;
 
 fn along(row: vec4f, place: vec3f) -> f32 {
     return dot(row.xyz, place) + row.w;
@@ -31,6 +34,10 @@ fn along(row: vec4f, place: vec3f) -> f32 {
 
 // Radiance from `direction` (unit) at `place`, from receivers farther than `nearest` [m].
 fn surrounding_radiance(place: vec3f, direction: vec3f, nearest: f32) -> vec3f {
+    if !HAS_RECEIVERS {
+        // The mean of what is lit stands in for the ground.
+        return mix(surroundings.mean_radiance, frame.background, smoothstep(-0.2, 0.2, direction.y));
+    }
     var distance = -1.0;
     var hit = 0u;
     var hit_uv = vec2f(0.0);
@@ -52,10 +59,6 @@ fn surrounding_radiance(place: vec3f, direction: vec3f, nearest: f32) -> vec3f {
         let texel = clamp(hit_uv * size, vec2f(0.5), max(size - 0.5, vec2f(0.5)));
         let image_uv = texel / vec2f(textureDimensions(receiver_images));
         return textureSampleLevel(receiver_images, receiver_sampler, image_uv, hit, 0.0).rgb * surroundings.radiance_scale;
-    }
-    if surroundings.count == 0u {
-        // Nothing plane to look at: the mean of what is lit stands in for the ground.
-        return mix(surroundings.mean_radiance, frame.background, smoothstep(-0.2, 0.2, direction.y));
     }
     return frame.background;
 }

@@ -1,14 +1,11 @@
-// Last pass: the picture's radiance, resolved, to the target's colour.
+// Last pass: the picture's exposed radiance, resolved, to the target's colour.
 
-struct ToneMapping {
-    exposure: f32,
-    tone_map: u32,
-    encode_srgb: u32,
-    padding: u32,
-}
+// One of TONE_MAP_*.
+override TONE_MAP: u32;
+// False for formats that encode by themselves: they take linear light.
+override ENCODE_SRGB: bool;
 
-@group(0) @binding(0) var<uniform> tone_mapping: ToneMapping;
-@group(0) @binding(1) var scene_radiance: texture_2d<f32>;
+@group(0) @binding(0) var exposed_radiance: texture_2d<f32>;
 
 // One triangle that covers the target.
 @vertex
@@ -19,10 +16,9 @@ fn cover(@builtin(vertex_index) index: u32) -> @builtin(position) vec4f {
 
 @fragment
 fn to_display(@builtin(position) pixel: vec4f) -> @location(0) vec4f {
-    let radiance = textureLoad(scene_radiance, vec2i(pixel.xy), 0).rgb;
-    var display = tone_map(radiance * tone_mapping.exposure, tone_mapping.tone_map);
-    // Formats that encode by themselves take linear light.
-    if tone_mapping.encode_srgb != 0u {
+    let radiance = textureLoad(exposed_radiance, vec2i(pixel.xy), 0).rgb;
+    var display = tone_map(radiance, TONE_MAP);
+    if ENCODE_SRGB {
         display = srgb_from_linear(display);
     }
     return vec4f(display, 1.0);

@@ -6,7 +6,7 @@ use crate::optics::LinearSrgb;
 use crate::scene::Camera;
 
 /// How radiance becomes display colour.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub enum ToneMap {
     /// Cut at 1.

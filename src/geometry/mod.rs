@@ -2,8 +2,10 @@
 
 pub mod bvh;
 pub mod cube_face;
+pub mod frustum;
 pub mod ray;
 pub mod triangle;
 
 pub use bvh::{TriangleBvh, TriangleHit};
+pub use frustum::Frustum;
 pub use ray::Ray;

@@ -25,6 +25,9 @@ pub struct Gpu {
     faults: Faults,
 }
 
+/// Tells how long the device takes; nothing else depends on it.
+const CLOCK: wgpu::Features = wgpu::Features::TIMESTAMP_QUERY;
+
 /// Location of the error of a machine without an adapter.
 const GRAPHICS: &str = "graphics";
 
@@ -68,7 +71,7 @@ impl Gpu {
         Self::from_adapter(instance, adapter, limits)
     }
 
-    /// No optional feature is asked for, so that what runs here runs everywhere.
+    /// No optional feature but a clock is asked for, so that what runs here runs everywhere.
     fn from_adapter(
         instance: wgpu::Instance,
         adapter: wgpu::Adapter,
@@ -76,7 +79,7 @@ impl Gpu {
     ) -> Result<Self> {
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("nephroid"),
-            required_features: wgpu::Features::empty(),
+            required_features: adapter.features() & CLOCK,
             required_limits,
             ..Default::default()
         };

@@ -1,8 +1,10 @@
 //! Which effects a scene calls for, and why.
 
 mod decide;
+mod eye;
 
 pub use decide::{CastersByLight, decide};
+pub use eye::chains;
 
 use serde::{Deserialize, Serialize};
 

@@ -2,6 +2,8 @@
 
 use glam::DVec3;
 
+use crate::geometry::Frustum;
+
 /// Full vertical angle of view of a camera that frames a scene [rad].
 const FRAMING_FOV_RAD: f64 = 0.8;
 
@@ -59,5 +61,17 @@ impl Camera {
     pub fn direction(&self, x: f64, y: f64, aspect: f64) -> DVec3 {
         let half_height = (0.5 * self.vertical_fov_rad).tan();
         (self.forward + self.right() * (x * half_height * aspect) + self.up * (y * half_height)).normalize()
+    }
+
+    /// What it sees in a picture of `aspect` = width/height.
+    pub fn frustum(&self, aspect: f64) -> Frustum {
+        let half_height = (0.5 * self.vertical_fov_rad).tan();
+        Frustum::new(
+            self.position,
+            self.forward,
+            self.right() * (half_height * aspect),
+            self.up * half_height,
+            self.near_m,
+        )
     }
 }

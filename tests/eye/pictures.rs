@@ -62,6 +62,7 @@ fn exact() -> ReferenceSettings {
         limits: ChainLimits {
             max_depth: 64,
             branch_threshold: 1e-10,
+            ..ChainLimits::default()
         },
     }
 }

@@ -3,8 +3,10 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
+use naga::ShaderStage;
+use naga::back::pipeline_constants::process_overrides;
 use naga::valid::{Capabilities, ValidationFlags, Validator};
-use nephroid::eye_pass::renderer::{programs, shared_structs};
+use nephroid::eye_pass::renderer::{programs, shared_structs, specialisations};
 
 fn modules() -> Vec<(String, naga::Module)> {
     let programs = programs();
@@ -18,14 +20,64 @@ fn modules() -> Vec<(String, naga::Module)> {
     programs.iter().map(parse).collect()
 }
 
+fn validator() -> Validator {
+    Validator::new(ValidationFlags::all(), Capabilities::empty())
+}
+
 #[test]
 fn every_program_is_valid_without_any_optional_capability() {
     for (name, module) in modules() {
-        let mut validator = Validator::new(ValidationFlags::all(), Capabilities::empty());
-        validator
+        validator()
             .validate(&module)
             .unwrap_or_else(|error| panic!("{name}: {error:?}"));
         assert!(!module.entry_points.is_empty(), "{name} draws something");
+    }
+}
+
+/// As devices get them: the overrides replaced by their values.
+#[test]
+fn every_specialisation_is_valid_without_any_optional_capability() {
+    let modules: BTreeMap<String, naga::Module> = modules().into_iter().collect();
+    for found in specialisations() {
+        let module = &modules[found.program];
+        let info = validator().validate(module).expect("tested above");
+        let constants = found.constants.iter();
+        let constants = constants
+            .map(|(name, value)| ((*name).to_owned(), *value))
+            .collect();
+        let entry_point = Some((ShaderStage::Fragment, found.entry_point));
+        let (resolved, _) = process_overrides(module, &info, entry_point, &constants)
+            .unwrap_or_else(|error| panic!("{found:?}: {error}"));
+        assert_eq!(resolved.entry_points.len(), 1, "{found:?}");
+        validator()
+            .validate_resolved_overrides(&resolved)
+            .unwrap_or_else(|error| panic!("{found:?}: {error:?}"));
+    }
+}
+
+#[test]
+fn every_override_and_every_fragment_stage_is_specialised() {
+    for (name, module) in modules() {
+        let overrides = module.overrides.iter();
+        let overrides: BTreeSet<&str> = overrides.filter_map(|(_, found)| found.name.as_deref()).collect();
+        let all = specialisations();
+        let of_program: Vec<_> = all.iter().filter(|found| found.program == name).collect();
+        for found in &of_program {
+            let given: BTreeSet<&str> = found.constants.iter().map(|(name, _)| *name).collect();
+            assert_eq!(given, overrides, "{found:?}");
+        }
+        let stages = module.entry_points.iter();
+        let stages = stages.filter(|stage| stage.stage == ShaderStage::Fragment);
+        let stages: BTreeSet<&str> = stages.map(|stage| stage.name.as_str()).collect();
+        let used: BTreeSet<&str> = of_program.iter().map(|found| found.entry_point).collect();
+        assert_eq!(stages, used, "{name}");
+        // A question that has one answer needs no override.
+        for wanted in overrides {
+            let values = of_program.iter().flat_map(|found| &found.constants);
+            let values = values.filter(|(name, _)| *name == wanted);
+            let values: BTreeSet<String> = values.map(|(_, value)| value.to_string()).collect();
+            assert!(values.len() > 1, "{name}: {wanted} is always {values:?}");
+        }
     }
 }
 
@@ -125,7 +177,7 @@ fn vertex_inputs_match_the_vertex_buffers() {
     let vertex = surface
         .entry_points
         .iter()
-        .find(|entry| entry.stage == naga::ShaderStage::Vertex);
+        .find(|entry| entry.stage == ShaderStage::Vertex);
     let arguments = &vertex.expect("it has a vertex stage").function.arguments;
     let naga::TypeInner::Struct { members, .. } = &surface.types[arguments[0].ty].inner else {
         panic!("corners come as a struct");

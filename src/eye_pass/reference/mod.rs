@@ -7,16 +7,17 @@ use rayon::iter::{IntoParallelIterator, ParallelIterator};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::view::{Picture, View};
+use crate::effect::EffectSwitch;
 use crate::error::{Error, Result};
 use crate::geometry::Ray;
 use crate::illumination::IlluminationMap;
 use crate::optics::LinearSrgb;
 use crate::progress::{Control, Progress, Stage};
 use crate::scene::Camera;
-use crate::transport::Tracer;
+use crate::transport::{MediumStack, Tracer};
 use radiance::{LitScene, visible_hit};
 
-pub use radiance::ChainLimits;
+pub use radiance::{ChainLimits, EyeRays};
 pub use start::media_at;
 
 /// How well a picture is made.
@@ -51,41 +52,76 @@ pub fn render(
     progress: &dyn Progress,
     control: &Control,
 ) -> Result<Picture> {
+    render_counted(tracer, maps, view, settings, progress, control).map(|(picture, _)| picture)
+}
+
+/// [`render`] with the rays that it took: where nothing specular is in view, none of them belongs to a chain.
+///
+/// # Errors
+/// It was cancelled.
+pub fn render_counted(
+    tracer: &Tracer,
+    maps: &[IlluminationMap],
+    view: &View,
+    settings: &ReferenceSettings,
+    progress: &dyn Progress,
+    control: &Control,
+) -> Result<(Picture, EyeRays)> {
     let lit = LitScene::new(tracer, maps, view.background, settings.limits);
-    let media = media_at(tracer, view.camera.position);
-    let side = settings.samples_per_side.max(1);
+    let sides = settings.samples_per_side.max(1);
+    match settings.limits.switch {
+        EffectSwitch::Auto | EffectSwitch::On => {
+            let media = media_at(tracer, view.camera.position);
+            trace::<true>(&lit, media, view, sides, progress, control)
+        }
+        // Bodies that are left out surround nobody.
+        EffectSwitch::Off => trace::<false>(&lit, MediumStack::default(), view, sides, progress, control),
+    }
+}
+
+fn trace<const CHAINS: bool>(
+    lit: &LitScene<'_>,
+    media: MediumStack,
+    view: &View,
+    side: u32,
+    progress: &dyn Progress,
+    control: &Control,
+) -> Result<(Picture, EyeRays)> {
     let done = AtomicU64::new(0);
-    let rows: Vec<Vec<[f32; 3]>> = (0..view.height)
+    let pixel = |column: u32, row: u32, rays: &mut EyeRays| {
+        let mut sum = LinearSrgb::BLACK;
+        for sample in 0..side * side {
+            let within = [sample % side, sample / side].map(|s| (f64::from(s) + 0.5) / f64::from(side));
+            sum += lit.radiance::<CHAINS>(eye_ray(view, [column, row], within), media, rays);
+        }
+        let mean = sum / f64::from(side * side);
+        mean.to_array().map(|channel| channel as f32)
+    };
+    let rows: Vec<(Vec<[f32; 3]>, EyeRays)> = (0..view.height)
         .into_par_iter()
         .map(|row| {
+            let mut rays = EyeRays::default();
             if control.is_cancelled() {
-                return Vec::new();
+                return (Vec::new(), rays);
             }
-            let pixels = (0..view.width).map(|column| {
-                let mut sum = LinearSrgb::BLACK;
-                for sample in 0..side * side {
-                    let within =
-                        [sample % side, sample / side].map(|s| (f64::from(s) + 0.5) / f64::from(side));
-                    sum += lit.radiance(eye_ray(view, [column, row], within), media);
-                }
-                (sum / f64::from(side * side))
-                    .to_array()
-                    .map(|channel| channel as f32)
-            });
-            let pixels = pixels.collect();
+            let pixels = (0..view.width)
+                .map(|column| pixel(column, row, &mut rays))
+                .collect();
             let rows_done = done.fetch_add(1, Ordering::Relaxed) + 1;
             progress.advance(Stage::Picture, rows_done, u64::from(view.height));
-            pixels
+            (pixels, rays)
         })
         .collect();
     if control.is_cancelled() {
         return Err(Error::cancelled("picture"));
     }
-    Ok(Picture {
+    let rays = rows.iter().fold(EyeRays::default(), |sum, (_, rays)| sum + *rays);
+    let picture = Picture {
         width: view.width,
         height: view.height,
-        radiance: rows.concat(),
-    })
+        radiance: rows.into_iter().flat_map(|(pixels, _)| pixels).collect(),
+    };
+    Ok((picture, rays))
 }
 
 /// The object that each pixel's centre sees first, row 0 at the top; `None` where it sees the background.

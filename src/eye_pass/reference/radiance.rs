@@ -1,5 +1,6 @@
 //! Radiance along a ray: DS*E chains followed from the eye.
 
+use crate::effect::EffectSwitch;
 use crate::geometry::Ray;
 use crate::illumination::lookup::bilinear;
 use crate::illumination::{Chart, IlluminationMap};
@@ -14,6 +15,9 @@ pub struct ChainLimits {
     pub max_depth: u32,
     /// Branches that carry less than this share of their pixel are black.
     pub branch_threshold: f64,
+    /// Off: mirrors show what they emit, polished surfaces their diffuse part, and clear bodies are left out. Auto and
+    /// on are the same here: nothing is prepared for chains.
+    pub switch: EffectSwitch,
 }
 
 impl Default for ChainLimits {
@@ -21,6 +25,27 @@ impl Default for ChainLimits {
         Self {
             max_depth: 32,
             branch_threshold: 1e-4,
+            switch: EffectSwitch::Auto,
+        }
+    }
+}
+
+/// Rays of a picture.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct EyeRays {
+    /// From the eye, one for each sample.
+    pub camera_rays: u64,
+    /// Further ones, each after a specular surface.
+    pub chain_rays: u64,
+}
+
+impl std::ops::Add for EyeRays {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self {
+            camera_rays: self.camera_rays + other.camera_rays,
+            chain_rays: self.chain_rays + other.chain_rays,
         }
     }
 }
@@ -73,8 +98,15 @@ impl<'a> LitScene<'a> {
         }
     }
 
-    /// Radiance [W/(m² sr)] that arrives against a ray which starts within `media`.
-    pub fn radiance(&self, ray: Ray, media: MediumStack) -> LinearSrgb {
+    /// Radiance [W/(m² sr)] that arrives against a ray which starts within `media`. Without `CHAINS` the ray ends at the
+    /// first surface that is not clear.
+    pub fn radiance<const CHAINS: bool>(
+        &self,
+        ray: Ray,
+        media: MediumStack,
+        rays: &mut EyeRays,
+    ) -> LinearSrgb {
+        rays.camera_rays += 1;
         let mut seen = LinearSrgb::BLACK;
         let mut waiting = vec![Gaze {
             ray,
@@ -83,19 +115,27 @@ impl<'a> LitScene<'a> {
             depth: 0,
         }];
         while let Some(mut gaze) = waiting.pop() {
-            let Some((hit, distance_m)) = visible_hit(self.tracer, gaze.ray) else {
+            let Some((hit, distance_m)) = nearest::<CHAINS>(self.tracer, gaze.ray) else {
                 seen += gaze.weight * self.background;
                 continue;
             };
-            gaze.weight = gaze.weight * gaze.media.transmittance(self.tracer.scene(), distance_m);
+            if CHAINS {
+                gaze.weight = gaze.weight * gaze.media.transmittance(self.tracer.scene(), distance_m);
+            }
             let incident = gaze.ray.direction;
             let interaction = self.tracer.interact(&hit, incident, &gaze.media);
             seen += gaze.weight * self.own_radiance(&hit, interaction.deposit);
+            if !CHAINS {
+                break;
+            }
             for branch in [interaction.reflection, interaction.transmission]
                 .into_iter()
                 .flatten()
             {
-                waiting.extend(self.followed(&gaze, &branch));
+                if let Some(next) = self.followed(&gaze, &branch) {
+                    rays.chain_rays += 1;
+                    waiting.push(next);
+                }
             }
         }
         seen
@@ -134,15 +174,25 @@ impl<'a> LitScene<'a> {
 
 /// The nearest surface that is drawn, with its distance from the ray's origin [m]: backs of single-sided opaque
 /// surfaces are not.
-pub fn visible_hit(tracer: &Tracer, mut ray: Ray) -> Option<(SurfaceHit, f64)> {
+pub fn visible_hit(tracer: &Tracer, ray: Ray) -> Option<(SurfaceHit, f64)> {
+    nearest::<true>(tracer, ray)
+}
+
+/// The nearest surface that is drawn; without `CHAINS` clear ones are not.
+fn nearest<const CHAINS: bool>(tracer: &Tracer, mut ray: Ray) -> Option<(SurfaceHit, f64)> {
     let mut passed_m = 0.0;
     loop {
         let hit = tracer.closest_hit(&ray)?;
         let material = tracer.scene().material_of(hit.object);
-        let opaque = !matches!(material.surface, SurfaceKind::Dielectric | SurfaceKind::ThinWall);
+        let clear = matches!(material.surface, SurfaceKind::Dielectric | SurfaceKind::ThinWall);
         let back = hit.geometric_normal.dot(ray.direction) > 0.0;
         passed_m += hit.distance_m;
-        if !(opaque && back && !material.double_sided) {
+        let is_drawn = if clear {
+            CHAINS
+        } else {
+            !back || material.double_sided
+        };
+        if is_drawn {
             return Some((hit, passed_m));
         }
         ray = hit.spawn(ray.direction);

@@ -94,7 +94,7 @@ pub(super) struct Geometry {
     /// What the corners show, object by object.
     meshes: Vec<Arc<Mesh>>,
     /// Where the map coordinates come from, object by object.
-    charts: Vec<Option<Arc<Chart>>>,
+    pub(super) charts: Vec<Option<Arc<Chart>>>,
 }
 
 impl Geometry {

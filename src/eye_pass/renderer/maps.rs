@@ -10,6 +10,7 @@ use rayon::slice::{ParallelSlice, ParallelSliceMut};
 use super::tiles::{Texel, TiledImage, Uploaded, kept_scale, scale_for_half_floats};
 use crate::gpu::Gpu;
 use crate::illumination::IlluminationMap;
+use crate::optics::LinearSrgb;
 
 /// Texels that one thread works on at a time.
 const BLOCK: usize = 4096;
@@ -55,6 +56,22 @@ impl DeviceMap {
     /// One black texel, for surfaces without a map.
     pub(super) fn black(gpu: &Gpu) -> Self {
         Self::from_texels(gpu, "black", [1, 1], &[[0.0; 3]]).0
+    }
+
+    /// What it takes on the device [bytes].
+    pub(super) fn bytes(&self) -> u64 {
+        self.image.bytes()
+    }
+
+    /// Texels across and down.
+    pub(super) fn size(&self) -> [usize; 2] {
+        self.image.size()
+    }
+
+    /// Irradiance [W/m²] of a texel, row by row, as the device holds it.
+    pub(super) fn irradiance(&self, texel: usize) -> LinearSrgb {
+        let [r, g, b, _] = self.image.texels()[texel];
+        LinearSrgb::from([r, g, b].map(f64::from)) * f64::from(self.irradiance_scale)
     }
 
     /// Whether a map can take this one's place in the same texture.

@@ -4,39 +4,53 @@
 //! (see `surroundings`), and the view's background, but no other object, and what is clear shows what is straight
 //! behind it, unbent, dimmed by Fresnel's equations, by the body's tint and by the square of its refractive index. The
 //! CPU eye pass follows the true paths.
+//!
+//! Only what a view calls for is made: pipelines when an object that needs them first comes into view, and so what
+//! mirrors and glass are shown.
 
 mod bindings;
 mod camera;
+mod counts;
+mod draws;
 mod geometry;
 mod maps;
 mod objects;
 mod pipelines;
+mod receivers;
 mod shaders;
 mod surroundings;
 mod targets;
 mod textures;
 mod tiles;
+mod timing;
+mod tone_mapping;
 mod uniforms;
 
-pub use shaders::{programs, shared_structs, vertex_attributes};
+pub use counts::{EyeCounts, GpuMs};
+pub use shaders::{Specialisation, programs, shared_structs, specialisations, vertex_attributes};
 pub use tiles::Uploaded;
 
 use half::f16;
 use wgpu::util::DeviceExt;
 
 use self::bindings::bind_group;
+use self::draws::{Draw, DrawList, Manner, visible_objects};
 use self::geometry::Geometry;
 use self::maps::ShownMap;
-use self::objects::{DeviceObject, Objects};
-use self::pipelines::{ClearPipelines, SurfacePipelines, ToneMappingPipeline};
+use self::objects::Objects;
+use self::pipelines::SurfacePipelines;
+use self::receivers::LitSurface;
 use self::surroundings::DeviceSurroundings;
 use self::targets::Targets;
-use self::uniforms::{Frame, ToneMapping, rgb};
-use super::{Picture, ToneMap, View};
+use self::timing::Timing;
+use self::tone_mapping::ToneMappingPipelines;
+use self::uniforms::{Frame, rgb};
+use super::{Picture, View};
+use crate::effect::EffectSwitch;
 use crate::error::{Error, Result};
 use crate::gpu::{Gpu, readback};
 use crate::illumination::IlluminationMap;
-use crate::scene::{Scene, SurfaceKind};
+use crate::scene::Scene;
 
 /// Largest value of scaled radiance that the picture is scaled to: half floats end at 65504, and a body may still
 /// multiply it by the square of its refractive index.
@@ -56,15 +70,20 @@ pub enum MapStyle {
 #[derive(Debug)]
 pub struct Renderer {
     sample_count: u32,
-    encode_srgb: bool,
+    scene: Scene,
     surfaces: SurfacePipelines,
-    tone_mapping: ToneMappingPipeline,
+    tone_mapping: ToneMappingPipelines,
     geometry: Geometry,
     objects: Objects,
-    surroundings: DeviceSurroundings,
-    surroundings_sampler: wgpu::Sampler,
+    surroundings: Option<DeviceSurroundings>,
+    /// Whether the scene or the maps changed since the surroundings were made.
+    surroundings_are_stale: bool,
     targets: Option<Targets>,
     map_style: MapStyle,
+    chains: EffectSwitch,
+    timing: Option<Timing>,
+    /// Objects of the last picture, and the specular ones among them.
+    drawn: [usize; 2],
 }
 
 impl Renderer {
@@ -89,21 +108,24 @@ impl Renderer {
         let surfaces = SurfacePipelines::new(gpu, sample_count);
         let renderer = Self {
             sample_count,
-            encode_srgb: !colour_format.is_srgb(),
-            tone_mapping: ToneMappingPipeline::new(gpu, colour_format),
+            scene: scene.clone(),
+            tone_mapping: ToneMappingPipelines::new(gpu, colour_format),
             geometry: Geometry::new(gpu, scene),
             objects: Objects::new(gpu, scene, &surfaces.object_layout),
             surfaces,
-            surroundings: DeviceSurroundings::none(gpu),
-            surroundings_sampler: linear_sampler(gpu),
+            surroundings: None,
+            surroundings_are_stale: true,
             targets: None,
             map_style: MapStyle::default(),
+            chains: EffectSwitch::default(),
+            timing: Timing::new(gpu),
+            drawn: [0; 2],
         };
         gpu.take_error().map_or(Ok(renderer), Err)
     }
 
     /// Shows an edited scene: other materials, moved objects. Uploads what differs; the maps stay until
-    /// [`set_maps`](Self::set_maps), which has to follow where anything was uploaded: mirrors see what changed.
+    /// [`set_maps`](Self::set_maps), unless the number of objects changed.
     ///
     /// # Errors
     /// A device that refuses what it is given.
@@ -116,6 +138,8 @@ impl Renderer {
             self.geometry = Geometry::new(gpu, scene);
             self.objects = Objects::new(gpu, scene, &self.surfaces.object_layout);
         }
+        self.scene = scene.clone();
+        self.surroundings_are_stale = true;
         gpu.take_error().map_or(Ok(uploaded), Err)
     }
 
@@ -131,13 +155,51 @@ impl Renderer {
         for map in maps {
             uploaded += self.geometry.set_chart(gpu, &map.chart);
         }
-        uploaded += self.surroundings.update(gpu, scene, &shown);
+        self.surroundings_are_stale = true;
         gpu.take_error().map_or(Ok(uploaded), Err)
     }
 
     /// Says what the values of the maps stand for, from the next picture on.
     pub fn set_map_style(&mut self, style: MapStyle) {
         self.map_style = style;
+    }
+
+    /// Switches what is seen in mirrors and through glass, from the next picture on. Auto makes what it takes when a
+    /// specular surface comes into view, on makes at once what all of the scene's objects could take. Off gives it up:
+    /// mirrors show what they emit, polished surfaces their diffuse part, and clear bodies are left out.
+    ///
+    /// # Errors
+    /// A device that refuses what it is given.
+    pub fn set_chains(&mut self, gpu: &Gpu, switch: EffectSwitch) -> Result<()> {
+        self.chains = switch;
+        match switch {
+            EffectSwitch::Auto => {}
+            EffectSwitch::On => self.make_everything(gpu),
+            EffectSwitch::Off => {
+                self.surfaces.drop_specular();
+                self.surroundings = None;
+            }
+        }
+        gpu.take_error().map_or(Ok(()), Err)
+    }
+
+    /// What was made and drawn so far.
+    pub fn counts(&self) -> EyeCounts {
+        EyeCounts {
+            pipelines: (self.surfaces.count() + self.tone_mapping.count()) as u64,
+            specular_pipelines: self.surfaces.specular_count() as u64,
+            surroundings_bytes: self.surroundings.as_ref().map_or(0, DeviceSurroundings::bytes),
+            map_bytes: self.objects.map_bytes(),
+            drawn_objects: self.drawn[0] as u64,
+            drawn_specular: self.drawn[1] as u64,
+            gpu_ms: self.timing.as_ref().and_then(Timing::latest),
+        }
+    }
+
+    /// Looks whether the device has told how long pictures took, without waiting for it. Tells whether it has:
+    /// [`counts`](Self::counts) then says so. [`draw`](Self::draw) does this too, for pictures before its own.
+    pub fn collect_times(&mut self, gpu: &Gpu) -> bool {
+        self.timing.as_mut().is_some_and(|timing| timing.collect(gpu))
     }
 
     /// Draws a picture into `target`, a view of the size of `view` and of the format given to [`new`](Self::new).
@@ -157,16 +219,15 @@ impl Renderer {
         }
         // Exposed already, so that half floats hold whatever can be displayed.
         let exposure = view.exposure_stops.exp2();
-        self.draw_radiance(gpu, encoder, view, exposure)?;
+        let has_specular = self.draw_radiance(gpu, encoder, view, exposure)?;
         if let Some(targets) = &self.targets {
-            let uniform = ToneMapping {
-                exposure: 1.0,
-                tone_map: tone_map_code(view.tone_map),
-                encode_srgb: u32::from(self.encode_srgb),
-                padding: 0,
-            };
+            let marks = self.timing.as_ref().map(Timing::around_tone_mapping);
+            let radiance = &targets.resolved_view;
             self.tone_mapping
-                .draw(gpu, encoder, target, &targets.resolved_view, uniform);
+                .draw(gpu, encoder, target, radiance, view.tone_map, marks);
+        }
+        if let Some(timing) = &mut self.timing {
+            timing.finish(encoder, has_specular, true);
         }
         Ok(())
     }
@@ -188,9 +249,16 @@ impl Renderer {
             .create_command_encoder(&wgpu::CommandEncoderDescriptor {
                 label: Some("radiance"),
             });
-        let targets = self.draw_radiance(gpu, &mut encoder, view, scale)?;
+        let has_specular = self.draw_radiance(gpu, &mut encoder, view, scale)?;
+        if let Some(timing) = &mut self.timing {
+            timing.finish(&mut encoder, has_specular, false);
+        }
         gpu.queue.submit([encoder.finish()]);
-        let bytes = readback::read_texture(gpu, &targets.resolved)?;
+        let bytes = match &self.targets {
+            Some(targets) => readback::read_texture(gpu, &targets.resolved)?,
+            None => Vec::new(),
+        };
+        self.collect_times(gpu);
         let unscaled = |half: f16| (f64::from(half) / scale) as f32;
         let texels = bytes.chunks_exact(8).map(|texel| {
             std::array::from_fn(|channel| {
@@ -204,32 +272,124 @@ impl Renderer {
         })
     }
 
-    /// The surface pass, into this renderer's own targets.
+    /// The surface pass, into this renderer's own targets; tells whether it drew anything specular.
     fn draw_radiance(
         &mut self,
         gpu: &Gpu,
         encoder: &mut wgpu::CommandEncoder,
         view: &View,
         radiance_scale: f64,
-    ) -> Result<&Targets> {
+    ) -> Result<bool> {
+        self.collect_times(gpu);
         let size_fits = |targets: &Targets| (targets.width, targets.height) == (view.width, view.height);
         let targets = match self.targets.take().filter(size_fits) {
             Some(targets) => targets,
             None => Targets::new(gpu, view.width, view.height, self.sample_count)?,
         };
+        let list = self.prepare(gpu, view);
         let frame = self.bind_frame(gpu, view, radiance_scale);
         let background = view
             .background
             .map(|channel| (channel * radiance_scale).min(LARGEST_SCALED));
-        {
-            let mut pass = targets.begin_pass(encoder, background.to_array());
-            pass.set_bind_group(0, &frame, &[]);
-            self.draw_opaque(&mut pass);
-            if self.map_style == MapStyle::Lit {
-                self.draw_clear(&mut pass, view);
+        self.draw_surfaces(encoder, &targets, &frame, background.to_array(), &list);
+        self.drawn = [list.objects, list.specular_objects];
+        self.targets = Some(targets);
+        Ok(list.specular_objects > 0)
+    }
+
+    /// Specular surfaces are drawn in a pass of their own where times are taken: devices that draw tile by tile cannot
+    /// tell the parts of a pass apart.
+    fn draw_surfaces(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        targets: &Targets,
+        frame: &wgpu::BindGroup,
+        background: [f64; 3],
+        list: &DrawList,
+    ) {
+        let timing = self.timing.as_ref();
+        let is_split = timing.is_some() && !list.specular.is_empty();
+        let marks = timing.map(Timing::around_plain);
+        let mut pass = targets.begin_pass(encoder, Some(background), !is_split, marks);
+        pass.set_bind_group(0, frame, &[]);
+        self.draw_each(&mut pass, &list.plain);
+        if is_split {
+            drop(pass);
+            let marks = timing.map(Timing::around_specular);
+            pass = targets.begin_pass(encoder, None, true, marks);
+            pass.set_bind_group(0, frame, &[]);
+        }
+        if let Some(surroundings) = &self.surroundings {
+            pass.set_bind_group(2, &surroundings.bind_group, &[]);
+        }
+        self.draw_each(&mut pass, &list.specular);
+    }
+
+    /// Makes what a view calls for and does not exist yet; gives what it draws.
+    fn prepare(&mut self, gpu: &Gpu, view: &View) -> DrawList {
+        if self.chains == EffectSwitch::On {
+            self.make_everything(gpu);
+        }
+        let visible = visible_objects(&self.objects, view);
+        self.make_surroundings(gpu, self.manner(), &visible);
+        let list = DrawList::new(&self.objects, &visible, view.camera.position, self.manner());
+        for draw in list.plain.iter().chain(&list.specular) {
+            self.surfaces.make(gpu, draw.key);
+        }
+        list
+    }
+
+    /// Makes what any view could call for, with maps as light.
+    fn make_everything(&mut self, gpu: &Gpu) {
+        let lit = Manner {
+            style: MapStyle::Lit,
+            ..self.manner()
+        };
+        let all: Vec<usize> = (0..self.objects.list.len()).collect();
+        self.make_surroundings(gpu, lit, &all);
+        let lit = Manner {
+            has_receivers: self.manner().has_receivers,
+            ..lit
+        };
+        for object in &self.objects.list {
+            for key in lit.keys(&object.look) {
+                self.surfaces.make(gpu, key);
             }
         }
-        Ok(self.targets.insert(targets))
+    }
+
+    /// How objects are drawn now.
+    fn manner(&self) -> Manner {
+        let surroundings = self.surroundings.as_ref();
+        Manner {
+            style: self.map_style,
+            has_chains: self.chains != EffectSwitch::Off,
+            has_receivers: surroundings.is_some_and(DeviceSurroundings::has_receivers),
+        }
+    }
+
+    /// Makes the surroundings or brings them up to date, where any of these objects is specular.
+    fn make_surroundings(&mut self, gpu: &Gpu, manner: Manner, objects: &[usize]) {
+        let is_specular = |index: &usize| manner.is_specular(&self.objects.list[*index].look);
+        let is_up_to_date = self.surroundings.is_some() && !self.surroundings_are_stale;
+        if is_up_to_date || !objects.iter().any(is_specular) {
+            return;
+        }
+        let objects = self.objects.list.iter().zip(&self.geometry.charts);
+        let lit: Vec<LitSurface> = objects
+            .filter_map(|(object, chart)| {
+                Some(LitSurface {
+                    chart: chart.as_ref()?,
+                    map: object.map.as_ref()?,
+                })
+            })
+            .collect();
+        let layout = &self.surfaces.surroundings_layout;
+        match &mut self.surroundings {
+            Some(surroundings) => surroundings.update(gpu, &self.scene, &lit, layout),
+            none => *none = Some(DeviceSurroundings::new(gpu, &self.scene, &lit, layout)),
+        }
+        self.surroundings_are_stale = false;
     }
 
     fn bind_frame(&self, gpu: &Gpu, view: &View, radiance_scale: f64) -> wgpu::BindGroup {
@@ -238,75 +398,31 @@ impl Renderer {
             camera_position: camera::single(view.camera.position),
             radiance_scale: radiance_scale as f32,
             background: rgb(view.background),
-            maps_as_they_are: u32::from(self.map_style == MapStyle::AsItIs),
+            padding: 0,
         };
         let buffer = gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
             label: Some("frame"),
             contents: bytemuck::bytes_of(&frame),
             usage: wgpu::BufferUsages::UNIFORM,
         });
-        let resources = [
-            buffer.as_entire_binding(),
-            self.surroundings.uniform.as_entire_binding(),
-            wgpu::BindingResource::TextureView(&self.surroundings.images),
-            wgpu::BindingResource::Sampler(&self.surroundings_sampler),
-        ];
+        let resources = [buffer.as_entire_binding()];
         bind_group(gpu, "frame", &self.surfaces.frame_layout, resources)
     }
 
-    fn draw_opaque(&self, pass: &mut wgpu::RenderPass<'_>) {
-        for (index, object) in self.objects.list.iter().enumerate() {
-            if !is_clear(object.look.surface) {
-                let pipelines = &self.surfaces;
-                let pipeline = if object.look.double_sided {
-                    &pipelines.opaque_double_sided
-                } else {
-                    &pipelines.opaque_single_sided
-                };
-                pass.set_pipeline(pipeline);
-                self.draw_object(pass, index, object);
-            }
-        }
-    }
-
-    /// Far ones first; within a body the far side first.
-    fn draw_clear(&self, pass: &mut wgpu::RenderPass<'_>, view: &View) {
-        let mut clear: Vec<_> = self
-            .objects
-            .list
-            .iter()
-            .enumerate()
-            .filter(|(_, object)| is_clear(object.look.surface))
-            .collect();
-        let distance = |object: &DeviceObject| object.look.centre.distance_squared(view.camera.position);
-        clear.sort_by(|(_, a), (_, b)| distance(b).total_cmp(&distance(a)));
-        for (index, object) in clear {
-            let faces: &[&ClearPipelines] = match object.look.surface {
-                SurfaceKind::ThinWall => &[&self.surfaces.clear_both_faces],
-                _ => &[&self.surfaces.clear_back_faces, &self.surfaces.clear_front_faces],
+    fn draw_each(&self, pass: &mut wgpu::RenderPass<'_>, draws: &[Draw]) {
+        for draw in draws {
+            let Some(pipeline) = self.surfaces.get(draw.key) else {
+                continue;
             };
-            for pipelines in faces {
-                let in_turn: &[_] = if object.look.is_grey {
-                    &[&pipelines.grey]
-                } else {
-                    &[&pipelines.transmitted, &pipelines.reflected]
-                };
-                for pipeline in in_turn {
-                    pass.set_pipeline(pipeline);
-                    self.draw_object(pass, index, object);
-                }
+            pass.set_pipeline(pipeline);
+            pass.set_bind_group(1, &self.objects.list[draw.object].bind_group, &[]);
+            for segment in &self.geometry.segments[draw.object] {
+                let page = &self.geometry.pages[segment.page];
+                pass.set_vertex_buffer(0, page.corners.slice(..));
+                pass.set_vertex_buffer(1, page.map_uvs.slice(..));
+                pass.set_index_buffer(page.indices.slice(..), wgpu::IndexFormat::Uint32);
+                pass.draw_indexed(segment.indices.clone(), 0, 0..1);
             }
-        }
-    }
-
-    fn draw_object(&self, pass: &mut wgpu::RenderPass<'_>, index: usize, object: &DeviceObject) {
-        pass.set_bind_group(1, &object.bind_group, &[]);
-        for segment in &self.geometry.segments[index] {
-            let page = &self.geometry.pages[segment.page];
-            pass.set_vertex_buffer(0, page.corners.slice(..));
-            pass.set_vertex_buffer(1, page.map_uvs.slice(..));
-            pass.set_index_buffer(page.indices.slice(..), wgpu::IndexFormat::Uint32);
-            pass.draw_indexed(segment.indices.clone(), 0, 0..1);
         }
     }
 }
@@ -323,28 +439,25 @@ pub fn render_offscreen(
     view: &View,
     samples: u32,
 ) -> Result<Picture> {
+    let counted = render_counted(gpu, scene, maps, view, samples, EffectSwitch::Auto)?;
+    Ok(counted.0)
+}
+
+/// [`render_offscreen`] with chains switched, and what was made and drawn for it.
+///
+/// # Errors
+/// Those of [`render_offscreen`].
+pub fn render_counted(
+    gpu: &Gpu,
+    scene: &Scene,
+    maps: &[IlluminationMap],
+    view: &View,
+    samples: u32,
+    chains: EffectSwitch,
+) -> Result<(Picture, EyeCounts)> {
     let mut renderer = Renderer::new(gpu, scene, wgpu::TextureFormat::Rgba8Unorm, samples)?;
     renderer.set_maps(gpu, scene, maps)?;
-    renderer.radiance(gpu, view)
-}
-
-fn linear_sampler(gpu: &Gpu) -> wgpu::Sampler {
-    gpu.device.create_sampler(&wgpu::SamplerDescriptor {
-        label: Some("surroundings"),
-        mag_filter: wgpu::FilterMode::Linear,
-        min_filter: wgpu::FilterMode::Linear,
-        ..Default::default()
-    })
-}
-
-fn is_clear(surface: SurfaceKind) -> bool {
-    matches!(surface, SurfaceKind::Dielectric | SurfaceKind::ThinWall)
-}
-
-/// The shader's `TONE_MAP_*`.
-fn tone_map_code(tone_map: ToneMap) -> u32 {
-    match tone_map {
-        ToneMap::None => 0,
-        ToneMap::Neutral => 1,
-    }
+    renderer.set_chains(gpu, chains)?;
+    let picture = renderer.radiance(gpu, view)?;
+    Ok((picture, renderer.counts()))
 }

@@ -22,8 +22,8 @@ pub(super) struct Look {
     /// How its material is treated.
     pub(super) surface: SurfaceKind,
     pub(super) double_sided: bool,
-    /// Middle of its box, by which clear objects are sorted [m].
-    pub(super) centre: DVec3,
+    /// Smallest box [m]; `None` without vertices.
+    pub(super) bounds: Option<(DVec3, DVec3)>,
     /// Whether what it lets through keeps its colour.
     pub(super) is_grey: bool,
     uniform: ObjectUniform,
@@ -34,7 +34,7 @@ pub(super) struct Look {
 #[derive(Debug)]
 pub(super) struct DeviceObject {
     pub(super) look: Look,
-    map: Option<DeviceMap>,
+    pub(super) map: Option<DeviceMap>,
     /// As `buffer` holds it.
     written: ObjectUniform,
     buffer: wgpu::Buffer,
@@ -134,6 +134,12 @@ impl Objects {
         Ok(uploaded)
     }
 
+    /// Illumination maps on the device [bytes].
+    pub(super) fn map_bytes(&self) -> u64 {
+        let maps = self.list.iter().filter_map(|object| object.map.as_ref());
+        maps.map(DeviceMap::bytes).sum()
+    }
+
     fn find_peak(&mut self) {
         let peaks = self.list.iter().map(DeviceObject::peak_radiance);
         self.peak_radiance = peaks.fold(0.0, f64::max);
@@ -143,14 +149,15 @@ impl Objects {
 impl Look {
     fn of(scene: &Scene, object: &Object) -> Self {
         let material = &scene.materials[object.material];
-        let (low, high) = object.mesh.bounds().unwrap_or_default();
+        let bounds = object.mesh.bounds();
+        let (low, high) = bounds.unwrap_or_default();
         let body_transmittance = rgb(body_transmittance(material, (high - low).min_element()));
         let base_colour = rgb(material.base_colour);
         let is_grey = |[r, g, b]: [f32; 3]| r == g && g == b;
         Self {
             surface: material.surface,
             double_sided: material.double_sided,
-            centre: 0.5 * (low + high),
+            bounds,
             is_grey: material.base_colour_texture.is_none()
                 && is_grey(base_colour)
                 && is_grey(body_transmittance),
@@ -160,10 +167,25 @@ impl Look {
                 emitted_radiance: rgb(material.emitted_radiance),
                 ior: material.ior as f32,
                 body_transmittance,
-                surface: surface_code(material.surface),
+                padding: 0,
             },
             base_colour_texture: material.base_colour_texture.as_ref().map(|image| image.texture),
         }
+    }
+
+    /// Middle of its box, by which clear objects are sorted [m].
+    pub(super) fn centre(&self) -> DVec3 {
+        let (low, high) = self.bounds.unwrap_or_default();
+        0.5 * (low + high)
+    }
+
+    pub(super) fn has_texture(&self) -> bool {
+        self.base_colour_texture.is_some()
+    }
+
+    /// Whether it shows what is behind it.
+    pub(super) fn is_clear(&self) -> bool {
+        matches!(self.surface, SurfaceKind::Dielectric | SurfaceKind::ThinWall)
     }
 }
 
@@ -243,17 +265,6 @@ fn bound(gpu: &Gpu, shared: &Shared, look: &Look, buffer: &wgpu::Buffer, map: &D
         wgpu::BindingResource::Sampler(&image.sampler),
     ];
     bind_group(gpu, "object", &shared.layout, resources)
-}
-
-/// The shader's `SURFACE_*`.
-fn surface_code(surface: SurfaceKind) -> u32 {
-    match surface {
-        SurfaceKind::Diffuse => 0,
-        SurfaceKind::Mirror => 1,
-        SurfaceKind::Dielectric => 2,
-        SurfaceKind::ThinWall => 3,
-        SurfaceKind::Mixed => 4,
-    }
 }
 
 /// What a body lets through along its thinnest extent [m], standing in for the path that is not traced.

@@ -1,9 +1,13 @@
 //! The eye pass's shader modules and what they share with Rust.
 
 use super::geometry::{CORNER_LAYOUT, MAP_UV_LAYOUT};
-use super::uniforms::{Frame, ObjectUniform, Receiver, Surroundings, ToneMapping};
+use super::pipelines::{Faces, PipelineKey, Writes};
+use super::tone_mapping;
+use super::uniforms::{Frame, ObjectUniform, Receiver, Surroundings};
+use crate::eye_pass::ToneMap;
 use crate::gpu::layout::StructLayout;
 use crate::gpu::shader::{Program, shader_source};
+use crate::scene::SurfaceKind;
 
 /// Surfaces of the scene.
 pub(super) const SURFACE: Program = Program {
@@ -38,7 +42,6 @@ pub fn shared_structs() -> Vec<StructLayout> {
         ObjectUniform::layout(),
         Receiver::layout(),
         Surroundings::layout(),
-        ToneMapping::layout(),
     ]
 }
 
@@ -49,4 +52,49 @@ pub fn vertex_attributes() -> Vec<wgpu::VertexAttribute> {
         .flat_map(|layout| layout.attributes)
         .copied()
         .collect()
+}
+
+/// A fragment stage as a pipeline may use it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Specialisation {
+    /// Name of its program.
+    pub program: &'static str,
+    /// Name of the stage in WGSL.
+    pub entry_point: &'static str,
+    /// Values of the program's overrides.
+    pub constants: Vec<(&'static str, f64)>,
+}
+
+/// Every specialisation that pipelines can ask for, for the tests; some of them more than once.
+pub fn specialisations() -> Vec<Specialisation> {
+    const KINDS: [SurfaceKind; 5] = [
+        SurfaceKind::Diffuse,
+        SurfaceKind::Mirror,
+        SurfaceKind::Dielectric,
+        SurfaceKind::ThinWall,
+        SurfaceKind::Mixed,
+    ];
+    let mut all = Vec::new();
+    for writes in Writes::ALL {
+        for kind in KINDS {
+            for flags in 0..4 {
+                let key = PipelineKey::new(writes, kind, Faces::Both, flags & 1 > 0, flags & 2 > 0);
+                all.push(Specialisation {
+                    program: SURFACE.name,
+                    entry_point: writes.entry_point(),
+                    constants: key.constants().to_vec(),
+                });
+            }
+        }
+    }
+    for tone_map in [ToneMap::None, ToneMap::Neutral] {
+        for encode_srgb in [false, true] {
+            all.push(Specialisation {
+                program: TONE_MAPPING.name,
+                entry_point: "to_display",
+                constants: tone_mapping::constants(tone_map, encode_srgb).to_vec(),
+            });
+        }
+    }
+    all
 }

@@ -57,17 +57,25 @@ impl Targets {
         })
     }
 
-    /// Starts the surface pass on a background [scaled radiance].
+    /// Starts a pass over surfaces: on a background [scaled radiance], or on what an earlier one left. Only the last
+    /// one's samples are resolved; after it neither samples nor depths are kept.
     pub(super) fn begin_pass<'a>(
         &self,
         encoder: &'a mut wgpu::CommandEncoder,
-        background: [f64; 3],
+        background: Option<[f64; 3]>,
+        is_last: bool,
+        timestamp_writes: Option<wgpu::RenderPassTimestampWrites<'_>>,
     ) -> wgpu::RenderPass<'a> {
-        let [r, g, b] = background;
+        let kept = if is_last {
+            wgpu::StoreOp::Discard
+        } else {
+            wgpu::StoreOp::Store
+        };
         let (view, resolve_target, store) = match &self.multisampled {
-            Some(samples) => (samples, Some(&self.resolved_view), wgpu::StoreOp::Discard),
+            Some(samples) => (samples, is_last.then_some(&self.resolved_view), kept),
             None => (&self.resolved_view, None, wgpu::StoreOp::Store),
         };
+        let colour = |[r, g, b]: [f64; 3]| wgpu::LoadOp::Clear(wgpu::Color { r, g, b, a: 1.0 });
         encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("surfaces"),
             color_attachments: &[Some(wgpu::RenderPassColorAttachment {
@@ -75,18 +83,19 @@ impl Targets {
                 depth_slice: None,
                 resolve_target,
                 ops: wgpu::Operations {
-                    load: wgpu::LoadOp::Clear(wgpu::Color { r, g, b, a: 1.0 }),
+                    load: background.map_or(wgpu::LoadOp::Load, colour),
                     store,
                 },
             })],
             depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
                 view: &self.depth,
                 depth_ops: Some(wgpu::Operations {
-                    load: wgpu::LoadOp::Clear(0.0),
-                    store: wgpu::StoreOp::Discard,
+                    load: background.map_or(wgpu::LoadOp::Load, |_| wgpu::LoadOp::Clear(0.0)),
+                    store: kept,
                 }),
                 stencil_ops: None,
             }),
+            timestamp_writes,
             ..Default::default()
         })
     }

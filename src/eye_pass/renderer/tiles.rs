@@ -22,7 +22,7 @@ pub struct Uploaded {
     pub tiles: u64,
     /// Bytes of these tiles.
     pub tile_bytes: u64,
-    /// Bytes of everything else: geometry, map coordinates, materials, what mirrors and glass see.
+    /// Bytes of everything else: geometry, map coordinates, materials.
     pub other_bytes: u64,
 }
 
@@ -31,15 +31,6 @@ impl Uploaded {
         Self {
             other_bytes: bytes as u64,
             ..Self::default()
-        }
-    }
-
-    /// The same bytes, not counted as maps.
-    pub(super) fn as_other(self) -> Self {
-        Self {
-            tiles: 0,
-            tile_bytes: 0,
-            other_bytes: self.tile_bytes + self.other_bytes,
         }
     }
 }
@@ -130,9 +121,14 @@ impl TiledImage {
         self.size
     }
 
-    /// Texels of all layers.
-    pub(super) fn len(&self) -> usize {
-        self.texels.len()
+    /// Texels of all layers, layer by layer, row by row.
+    pub(super) fn texels(&self) -> &[Texel] {
+        &self.texels
+    }
+
+    /// What they take on the device [bytes].
+    pub(super) fn bytes(&self) -> u64 {
+        size_of_val(self.texels.as_slice()) as u64
     }
 
     /// To be read by shaders as one layer, or as an array of all.

@@ -14,8 +14,7 @@ shader_struct! {
         radiance_scale: f32,
         /// Seen where nothing is hit [W/(m² sr)].
         background: [f32; 3],
-        /// 1 where maps are shown as they are, neither lit nor reflected.
-        maps_as_they_are: u32,
+        padding: u32,
     }
 }
 
@@ -67,20 +66,6 @@ shader_struct! {
         ior: f32,
         /// What a clear body lets through over its typical thickness, [0, 1].
         body_transmittance: [f32; 3],
-        /// Kind of surface, `SURFACE_*` in the shader.
-        surface: u32,
-    }
-}
-
-shader_struct! {
-    /// The last pass.
-    ToneMapping {
-        /// Display light per written value.
-        exposure: f32,
-        /// `TONE_MAP_*` in the shader.
-        tone_map: u32,
-        /// 1 where the target does not encode by itself.
-        encode_srgb: u32,
         padding: u32,
     }
 }

@@ -1,0 +1,182 @@
+//! How long the device takes for a picture: marks in the command stream, read back when they are there.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU8, Ordering};
+
+use super::counts::GpuMs;
+use crate::gpu::Gpu;
+
+/// Marks of each pass: where it begins and where it ends.
+const PLAIN: [u32; 2] = [0, 1];
+const SPECULAR: [u32; 2] = [2, 3];
+const TONE_MAPPING: [u32; 2] = [4, 5];
+const MARKS: u32 = 6;
+/// Results are written at multiples of this [bytes].
+const STRIDE: u64 = wgpu::QUERY_RESOLVE_BUFFER_ALIGNMENT;
+/// One place for each pass.
+const BYTES: u64 = 3 * STRIDE;
+
+/// Pictures that may be under way at once; further ones are not timed.
+const SLOTS: usize = 3;
+
+const FREE: u8 = 0;
+const UNDER_WAY: u8 = 1;
+const READABLE: u8 = 2;
+const FAILED: u8 = 3;
+
+/// The marks of one picture on their way back.
+#[derive(Debug)]
+struct Slot {
+    buffer: wgpu::Buffer,
+    state: Arc<AtomicU8>,
+    /// Which passes there were: plain, specular, tone mapping.
+    passes: [bool; 3],
+}
+
+impl Slot {
+    /// Marks of the passes that there were, each with its place in the buffers [bytes].
+    fn set_marks(&self) -> impl Iterator<Item = (u64, [u32; 2])> + use<> {
+        let passes = (0..).zip([PLAIN, SPECULAR, TONE_MAPPING]).zip(self.passes);
+        passes.filter_map(|((index, marks), was_drawn)| was_drawn.then_some((index * STRIDE, marks)))
+    }
+}
+
+/// Times pictures on a device that can.
+#[derive(Debug)]
+pub(super) struct Timing {
+    marks: wgpu::QuerySet,
+    resolved: wgpu::Buffer,
+    slots: Vec<Slot>,
+    /// Of one tick [ms].
+    tick_ms: f64,
+    latest: Option<GpuMs>,
+}
+
+impl Timing {
+    /// `None` where the device cannot tell.
+    pub(super) fn new(gpu: &Gpu) -> Option<Self> {
+        if !gpu.device.features().contains(wgpu::Features::TIMESTAMP_QUERY) {
+            return None;
+        }
+        let buffer = |label, usage| {
+            gpu.device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some(label),
+                size: BYTES,
+                usage,
+                mapped_at_creation: false,
+            })
+        };
+        let slot = || Slot {
+            buffer: buffer(
+                "times read back",
+                wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
+            ),
+            state: Arc::new(AtomicU8::new(FREE)),
+            passes: [false; 3],
+        };
+        Some(Self {
+            marks: gpu.device.create_query_set(&wgpu::QuerySetDescriptor {
+                label: Some("times"),
+                ty: wgpu::QueryType::Timestamp,
+                count: MARKS,
+            }),
+            resolved: buffer(
+                "times",
+                wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC,
+            ),
+            slots: (0..SLOTS).map(|_| slot()).collect(),
+            tick_ms: f64::from(gpu.queue.get_timestamp_period()) * 1e-6,
+            latest: None,
+        })
+    }
+
+    /// Times of the last picture that is done.
+    pub(super) fn latest(&self) -> Option<GpuMs> {
+        self.latest
+    }
+
+    /// Marks around the pass over what is not specular.
+    pub(super) fn around_plain(&self) -> wgpu::RenderPassTimestampWrites<'_> {
+        self.around(PLAIN)
+    }
+
+    /// Marks around the pass over specular surfaces.
+    pub(super) fn around_specular(&self) -> wgpu::RenderPassTimestampWrites<'_> {
+        self.around(SPECULAR)
+    }
+
+    /// Marks around the last pass.
+    pub(super) fn around_tone_mapping(&self) -> wgpu::RenderPassTimestampWrites<'_> {
+        self.around(TONE_MAPPING)
+    }
+
+    fn around(&self, [begin, end]: [u32; 2]) -> wgpu::RenderPassTimestampWrites<'_> {
+        wgpu::RenderPassTimestampWrites {
+            query_set: &self.marks,
+            beginning_of_pass_write_index: Some(begin),
+            end_of_pass_write_index: Some(end),
+        }
+    }
+
+    /// Ends a picture: its times are read back once `encoder` was submitted and the device is done.
+    pub(super) fn finish(
+        &mut self,
+        encoder: &mut wgpu::CommandEncoder,
+        has_specular: bool,
+        has_tone_mapping: bool,
+    ) {
+        let is_free = |slot: &&mut Slot| slot.state.load(Ordering::Acquire) == FREE;
+        let Some(slot) = self.slots.iter_mut().find(is_free) else {
+            return;
+        };
+        slot.passes = [true, has_specular, has_tone_mapping];
+        // Only marks that were set: the others have no value.
+        for (place, [begin, end]) in slot.set_marks() {
+            encoder.resolve_query_set(&self.marks, begin..end + 1, &self.resolved, place);
+        }
+        encoder.copy_buffer_to_buffer(&self.resolved, 0, &slot.buffer, 0, BYTES);
+        slot.state.store(UNDER_WAY, Ordering::Release);
+        let state = Arc::clone(&slot.state);
+        encoder.map_buffer_on_submit(&slot.buffer, wgpu::MapMode::Read, .., move |outcome| {
+            state.store(if outcome.is_ok() { READABLE } else { FAILED }, Ordering::Release);
+        });
+    }
+
+    /// Takes what has come back; waits for nothing. Tells whether anything has.
+    pub(super) fn collect(&mut self, gpu: &Gpu) -> bool {
+        // Runs the call-backs of what is done. A lost device is found by whoever draws.
+        let _ = gpu.device.poll(wgpu::PollType::Poll);
+        let mut has_news = false;
+        for index in 0..self.slots.len() {
+            let slot = &self.slots[index];
+            match slot.state.load(Ordering::Acquire) {
+                READABLE => {
+                    self.latest = self.times(slot).or(self.latest);
+                    slot.buffer.unmap();
+                    has_news = true;
+                }
+                FAILED => {}
+                _ => continue,
+            }
+            slot.state.store(FREE, Ordering::Release);
+        }
+        has_news
+    }
+
+    fn times(&self, slot: &Slot) -> Option<GpuMs> {
+        let range = slot.buffer.get_mapped_range(..).ok()?;
+        let mut ms = [0.0; 3];
+        for (place, _) in slot.set_marks() {
+            let at = place as usize;
+            let [begin, end] =
+                bytemuck::pod_read_unaligned::<[u64; 2]>(&range[at..at + size_of::<[u64; 2]>()]);
+            ms[at / STRIDE as usize] = end.saturating_sub(begin) as f64 * self.tick_ms;
+        }
+        let [opaque, specular, tone_mapping] = ms;
+        Some(GpuMs {
+            opaque,
+            specular,
+            tone_mapping,
+        })
+    }
+}
