@@ -6,6 +6,8 @@ mod debounce;
 #[cfg(target_os = "linux")]
 #[path = "viewer/desktop.rs"]
 mod desktop;
+#[path = "viewer/effects.rs"]
+mod effects;
 #[path = "viewer/error_view.rs"]
 mod error_view;
 #[path = "viewer/headless.rs"]

@@ -21,12 +21,14 @@ use super::interface::Painting;
 use super::model::Model;
 use super::overlay;
 use super::panel::{Display, Facts, Quantity, Wishes};
-use super::{ViewerOptions, error_view};
+use super::{ViewerOptions, error_view, eye_report};
+use crate::effect::{Effect, EffectSwitch};
 use crate::error::{Error, Result};
 use crate::eye_pass::renderer::{MapStyle, Uploaded};
 use crate::eye_pass::{ToneMap, View};
 use crate::optics::LinearSrgb;
 use crate::progress::Control;
+use crate::session::EffectReport;
 
 /// What other threads tell the window.
 #[derive(Debug)]
@@ -49,6 +51,10 @@ const PIXELS_PER_NOTCH: f64 = 40.0;
 const LOOK_FOR_STOP: Duration = Duration::from_millis(200);
 /// Time between frames that only show how a bake gets on.
 const BAKING_FRAME: Duration = Duration::from_millis(100);
+/// Time between a picture and the frame that tells what it took.
+const REPORT_AFTER: Duration = Duration::from_millis(40);
+/// A device that has not told in so many frames how long a picture took is not asked again until the next one.
+const MOST_REPORTS: u32 = 25;
 /// Longest time that one frame flies: after a stall the camera is not thrown through the scene.
 const LONGEST_STEP: Duration = Duration::from_millis(500);
 /// A device that was lost this often within [`LOSSES_WITHIN`] is given up.
@@ -84,6 +90,10 @@ pub struct App {
     frames: u64,
     /// Pictures at the last line of the log that told of rest.
     rested_at: u64,
+    /// The eye's chains in the picture that is shown.
+    chains: Option<EffectReport>,
+    /// Frames that may still come only to tell what the last picture took.
+    reports_due: u32,
     /// Told over the picture until the next key press.
     notice: Option<String>,
     /// Held now: Ctrl, Shift and the like.
@@ -121,6 +131,8 @@ impl App {
             pictures: 0,
             frames: 0,
             rested_at: 0,
+            chains: None,
+            reports_due: 0,
             notice: None,
             modifiers: ModifiersState::empty(),
             failure: None,
@@ -216,6 +228,7 @@ impl App {
     fn redraw(&mut self, event_loop: &ActiveEventLoop) {
         self.fly();
         self.must_set_maps |= self.model.poll();
+        self.report_chains();
         let (layer, quantity) = (self.model.panel.display.layer, self.model.quantity());
         let mut wishes = std::mem::take(&mut self.pressed);
         let Some(mut painting) = self.run_interface(&mut wishes) else {
@@ -246,12 +259,35 @@ impl App {
         self.schedule(event_loop, shown, painting.repaint_after);
     }
 
+    /// Looks what the picture that is shown takes.
+    fn report_chains(&mut self) {
+        let (Some(view), switch) = (self.view(), self.chains_switch()) else {
+            return;
+        };
+        let Some(graphics) = &mut self.graphics else {
+            return;
+        };
+        let counts = graphics.counts();
+        self.chains = Some(eye_report::chains(self.model.scene(), &view, switch, &counts));
+        let is_complete = !graphics.awaits_times();
+        self.reports_due = if is_complete {
+            0
+        } else {
+            self.reports_due.saturating_sub(1)
+        };
+    }
+
+    fn chains_switch(&self) -> EffectSwitch {
+        self.model.panel.settings.effects.get(Effect::Chains)
+    }
+
     /// Shows panel and picture to egui.
     fn run_interface(&mut self, wishes: &mut Wishes) -> Option<Painting> {
         let Self {
             model,
             graphics,
             picture_rect,
+            chains,
             notice,
             ..
         } = self;
@@ -279,6 +315,7 @@ impl App {
             last: last.as_ref(),
             layers: &layers,
             has_errors,
+            chains: chains.as_ref(),
             speed_m_per_s,
             adapter: &adapter,
         };
@@ -293,7 +330,7 @@ impl App {
         let Some(mut view) = self.view() else {
             return Ok(());
         };
-        let wants_exposure = self.wants_exposure();
+        let (wants_exposure, chains) = (self.wants_exposure(), self.chains_switch());
         let Some(graphics) = &mut self.graphics else {
             return Ok(());
         };
@@ -312,6 +349,7 @@ impl App {
             let seconds = start.elapsed().as_secs_f64();
             self.model.log.write(&Event::Uploaded { uploaded, seconds });
         }
+        graphics.set_chains(chains)?;
         if wants_exposure {
             self.must_measure_exposure = false;
             view.exposure_stops = graphics.measure_exposure(&view)?;
@@ -319,7 +357,10 @@ impl App {
             self.measured = Some((view.exposure_stops, self.model.layers().len()));
             self.model.log.write(&Event::Exposure(view.exposure_stops));
         }
-        self.pictures += u64::from(graphics.draw_picture(&view)?);
+        if graphics.draw_picture(&view)? {
+            self.pictures += 1;
+            self.reports_due = MOST_REPORTS;
+        }
         Ok(())
     }
 
@@ -350,6 +391,12 @@ impl App {
             Shown::Yes if self.model.state().is_baking() => repaint_after.min(BAKING_FRAME),
             Shown::Yes => repaint_after,
         };
+        let is_report_due = self.reports_due > 0 && shown == Shown::Yes;
+        let wait = if is_report_due {
+            wait.min(REPORT_AFTER)
+        } else {
+            wait
+        };
         self.frames += u64::from(shown == Shown::Yes);
         if wait.is_zero() {
             self.wake_at = None;
@@ -360,7 +407,7 @@ impl App {
             .into_iter()
             .flatten()
             .min();
-        if self.rested_at != self.pictures && !self.model.state().is_baking() {
+        if self.rested_at != self.pictures && !self.model.state().is_baking() && !is_report_due {
             self.rested_at = self.pictures;
             let (pictures, frames) = (self.pictures, self.frames);
             let position = self.model.navigator.camera().position.to_array();

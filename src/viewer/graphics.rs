@@ -11,8 +11,9 @@ use super::app::News;
 use super::interface::{Interface, Painting};
 use super::picture::Picture;
 use super::surface::{Acquired, Screen};
+use crate::effect::EffectSwitch;
 use crate::error::{Error, Result};
-use crate::eye_pass::renderer::{MapStyle, Renderer, Uploaded};
+use crate::eye_pass::renderer::{EyeCounts, MapStyle, Renderer, Uploaded};
 use crate::eye_pass::{View, tone_mapping};
 use crate::gpu::Gpu;
 use crate::illumination::IlluminationMap;
@@ -43,6 +44,8 @@ pub struct Graphics {
     renderer: Renderer,
     /// As the renderer shows it.
     scene: Arc<Scene>,
+    /// As the renderer has it.
+    chains: EffectSwitch,
     screen: Screen,
     gpu: Gpu,
 }
@@ -86,6 +89,7 @@ impl Graphics {
             picture,
             renderer,
             scene: Arc::clone(scene),
+            chains: EffectSwitch::default(),
             screen,
             gpu,
         })
@@ -117,7 +121,7 @@ impl Graphics {
     }
 
     /// Shows an edited scene from the next picture on; tells what of it had changed. Where that is anything, the maps
-    /// have to be set again: mirrors see what changed.
+    /// have to be set again: surfaces may have come to receive light.
     ///
     /// # Errors
     /// The device cannot hold it.
@@ -141,6 +145,30 @@ impl Graphics {
         self.picture.invalidate();
         self.renderer.set_map_style(style);
         self.renderer.set_maps(&self.gpu, &self.scene, maps)
+    }
+
+    /// Switches the eye's chains from the next picture on.
+    ///
+    /// # Errors
+    /// The device cannot hold what they take.
+    pub fn set_chains(&mut self, switch: EffectSwitch) -> Result<()> {
+        if self.chains == switch {
+            return Ok(());
+        }
+        self.chains = switch;
+        self.picture.invalidate();
+        self.renderer.set_chains(&self.gpu, switch)
+    }
+
+    /// What the picture takes, with what the device has told by now of how long it took.
+    pub fn counts(&mut self) -> EyeCounts {
+        self.renderer.collect_times(&self.gpu);
+        self.renderer.counts()
+    }
+
+    /// Whether the device has still to tell how long a picture took.
+    pub fn awaits_times(&self) -> bool {
+        self.renderer.awaits_times()
     }
 
     /// Exposure that suits the picture [stops].

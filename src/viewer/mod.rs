@@ -5,6 +5,7 @@ pub mod debounce;
 pub mod edits;
 pub mod error_view;
 pub mod event_log;
+mod eye_report;
 mod graphics;
 mod input;
 mod interface;

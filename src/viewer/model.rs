@@ -52,10 +52,7 @@ impl Model {
     pub fn new(options: &ViewerOptions, wake: impl Fn() + Send + Sync + 'static) -> Result<Self> {
         let scene = Arc::clone(&options.scene);
         let worker = Worker::spawn(BakeSession::new, wake)?;
-        let wanted = BakeRequest {
-            scene: Arc::clone(&scene),
-            settings: options.settings.clone(),
-        };
+        let wanted = BakeRequest::new(Arc::clone(&scene), options.settings.clone());
         let mut model = Self {
             navigator: Navigator::new(&scene, options.camera.as_deref()),
             panel: Panel::new(options.settings.clone()),
@@ -209,10 +206,7 @@ impl Model {
 
     /// What the panel asks for now.
     fn wanted(&self) -> BakeRequest {
-        BakeRequest {
-            scene: Arc::clone(self.edits.scene()),
-            settings: self.panel.settings.clone(),
-        }
+        BakeRequest::new(Arc::clone(self.edits.scene()), self.panel.settings.clone())
     }
 
     /// Does what was pressed, and bakes what was changed.

@@ -7,6 +7,7 @@ use std::thread::JoinHandle;
 use std::time::Instant;
 
 use super::meter::{Meter, Reporter};
+use crate::effect::{Effect, EffectSwitch};
 use crate::error::Result;
 use crate::progress::{Control, Progress, Stage};
 use crate::scene::Scene;
@@ -89,6 +90,12 @@ pub struct BakeRequest {
 }
 
 impl BakeRequest {
+    /// A request for what is baked of these settings: how the eye's chains are switched is none of a bake's.
+    pub fn new(scene: Arc<Scene>, mut settings: BakeSettings) -> Self {
+        settings.effects.set(Effect::Chains, EffectSwitch::Auto);
+        Self { scene, settings }
+    }
+
     /// Whether both ask for the very same: this scene and these settings.
     pub fn is_same(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.scene, &other.scene) && self.settings == other.settings

@@ -283,6 +283,18 @@ fn new_maps_reach_what_mirrors_show_after_they_were_out_of_view() {
 }
 
 #[test]
+fn pipelines_for_surroundings_that_are_gone_are_given_up() {
+    let Some(gpu) = gpu() else { return };
+    let (scene, maps) = hall();
+    let mut renderer = renderer(&gpu, &scene, &[]);
+    for maps in [&[][..], &maps, &[], &maps] {
+        renderer.set_maps(&gpu, &scene, maps).expect("the maps fit");
+        renderer.radiance(&gpu, &to_specular()).expect("it renders");
+        assert_eq!(renderer.counts().specular_pipelines, 8, "{} maps", maps.len());
+    }
+}
+
+#[test]
 fn each_tone_map_in_use_has_a_pipeline_of_its_own() {
     let Some(gpu) = gpu() else { return };
     let (scene, maps) = hall();

@@ -6,7 +6,7 @@ use egui::accesskit::{Node, NodeId, Role};
 use egui::{Event, PointerButton, Pos2, RawInput, Rect, pos2, vec2};
 use nephroid::plan::EffectPlan;
 use nephroid::scene::Scene;
-use nephroid::session::{BakeCounts, BakeResult, StopReason, Timings};
+use nephroid::session::{BakeCounts, BakeResult, EffectReport, StopReason, Timings};
 use nephroid::settings::{BakeSettings, LayerKind};
 use nephroid::viewer::panel::{Facts, Panel, WIDTH, Wishes};
 use nephroid::viewer::worker::{BakeRequest, BakeState, BakedLevel};
@@ -22,11 +22,13 @@ pub struct Headless {
     pub last: Option<BakedLevel>,
     pub layers: Vec<LayerKind>,
     pub has_errors: bool,
+    pub chains: Option<EffectReport>,
     /// What was pressed since the start.
     pub wishes: Wishes,
     size: egui::Vec2,
     time_s: f64,
     nodes: Vec<(NodeId, Node)>,
+    focus: NodeId,
 }
 
 /// A bake that found nothing to do.
@@ -82,10 +84,12 @@ impl Headless {
             last: None,
             layers: vec![LayerKind::Caustic, LayerKind::Direct],
             has_errors: false,
+            chains: None,
             wishes: Wishes::default(),
             size: vec2(size.0, size.1),
             time_s: 0.0,
             nodes: Vec::new(),
+            focus: NodeId(0),
         };
         headless.settle();
         headless
@@ -111,6 +115,7 @@ impl Headless {
             last,
             layers,
             has_errors,
+            chains,
             wishes,
             ..
         } = self;
@@ -123,6 +128,7 @@ impl Headless {
             refusal: refusal.as_deref(),
             layers,
             has_errors: *has_errors,
+            chains: chains.as_ref(),
             speed_m_per_s: 1.0,
             adapter: "no adapter",
         };
@@ -132,6 +138,7 @@ impl Headless {
         output.textures_delta.clear();
         if let Some(update) = output.platform_output.accesskit_update {
             self.nodes = update.nodes;
+            self.focus = update.focus;
         }
     }
 
@@ -242,16 +249,28 @@ impl Headless {
 
     /// Types over what a field has selected, and confirms.
     pub fn type_text(&mut self, text: &str) {
-        let key = |key: egui::Key| Event::Key {
-            key,
-            physical_key: None,
-            pressed: true,
-            repeat: false,
-            modifiers: egui::Modifiers::default(),
-        };
         self.pass(vec![Event::Text(text.into())]);
-        self.pass(vec![key(egui::Key::Enter)]);
+        self.strike(egui::Key::Enter);
         self.settle();
+    }
+
+    /// Presses a key and lets it go.
+    pub fn strike(&mut self, key: egui::Key) {
+        for pressed in [true, false] {
+            self.pass(vec![Event::Key {
+                key,
+                physical_key: None,
+                pressed,
+                repeat: false,
+                modifiers: egui::Modifiers::default(),
+            }]);
+        }
+    }
+
+    /// The name of what the keyboard is at.
+    pub fn focused(&self) -> Option<&str> {
+        let focus = self.nodes.iter().find(|(id, _)| *id == self.focus);
+        focus.and_then(|(_, node)| node.label().or(node.value()))
     }
 
     /// Whether a rectangle is wholly within the panel.

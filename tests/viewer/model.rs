@@ -3,6 +3,7 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use nephroid::effect::{Effect, EffectSwitch};
 use nephroid::progress::Control;
 use nephroid::scene::{Edit, LightKind, Scene, builtin};
 use nephroid::settings::{BakeSettings, LayerKind, MapResolution, Sigma};
@@ -123,6 +124,20 @@ fn levels_are_shown_before_the_bake_is_done_and_a_finer_bake_never_shows_coarser
 
 /// A bake that takes longer than a test waits between its steps.
 const LONG: f64 = 3e7;
+
+#[test]
+fn the_eyes_chains_are_switched_without_a_bake() {
+    let (mut model, log) = model(1000.0);
+    run(&mut model);
+    let effects = &mut model.panel.settings.effects;
+    effects.set(Effect::Chains, EffectSwitch::Off);
+    let later = Instant::now() + 2 * QUIET;
+    for now in [Instant::now(), later, later + QUIET] {
+        model.act(&Wishes::default(), now);
+        assert!(!model.state().is_baking() && model.due().is_none());
+    }
+    assert_eq!(logged(&log), ["baking", "done"]);
+}
 
 #[test]
 fn a_changed_setting_is_baked_at_once() {

@@ -7,7 +7,6 @@ use egui::accesskit::Role;
 use egui::{Pos2, Rect, pos2};
 use glam::DVec3;
 use nephroid::light_pass::ledger::{EnergyLedger, LightLedger, Truncated};
-use nephroid::plan::{Effect, EffectLine, EffectPlan};
 use nephroid::progress::Stage;
 use nephroid::scene::builtin::{parts, shapes};
 use nephroid::scene::{Edit, LightKind, Scene};
@@ -513,29 +512,6 @@ fn the_ledger_is_summed_over_lights_and_tells_an_open_account() {
         "0.625 of 4 W is missing: {:#?}",
         panel.texts()
     );
-}
-
-#[test]
-fn effects_are_listed_with_their_reasons() {
-    let mut panel = panel();
-    let mut last = finished(&panel.scene, &settings());
-    last.result.plan = EffectPlan {
-        effects: vec![EffectLine {
-            switch: Default::default(),
-            effect: Effect::Refraction,
-            on: false,
-            reason: "no light reaches the glass of 'ball'".into(),
-        }],
-        lights: Vec::new(),
-    };
-    panel.last = Some(last);
-    panel.settle();
-    assert!(
-        !panel.says("no light reaches the glass"),
-        "the section is closed at first"
-    );
-    click(&mut panel, Role::DisclosureTriangle, "Effects");
-    assert!(panel.says("refraction: off") && panel.says("no light reaches the glass of 'ball'"));
 }
 
 #[test]

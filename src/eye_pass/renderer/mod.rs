@@ -202,6 +202,11 @@ impl Renderer {
         self.timing.as_mut().is_some_and(|timing| timing.collect(gpu))
     }
 
+    /// Whether the device has still to tell how long a picture took.
+    pub fn awaits_times(&self) -> bool {
+        self.timing.as_ref().is_some_and(Timing::is_waiting)
+    }
+
     /// Draws a picture into `target`, a view of the size of `view` and of the format given to [`new`](Self::new).
     /// Draws nothing for a size of 0, which a minimised window has.
     ///
@@ -390,6 +395,7 @@ impl Renderer {
             none => *none = Some(DeviceSurroundings::new(gpu, &self.scene, &lit, layout)),
         }
         self.surroundings_are_stale = false;
+        self.surfaces.drop_reflecting(!self.manner().has_receivers);
     }
 
     fn bind_frame(&self, gpu: &Gpu, view: &View, radiance_scale: f64) -> wgpu::BindGroup {

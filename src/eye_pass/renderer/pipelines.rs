@@ -199,6 +199,12 @@ impl SurfacePipelines {
         self.made.retain(|key, _| !key.writes.is_specular());
     }
 
+    /// Gives up those that were made for surroundings with receivers, or without.
+    pub(super) fn drop_reflecting(&mut self, has_receivers: bool) {
+        self.made
+            .retain(|key, _| !key.writes.reflects() || key.has_receivers != has_receivers);
+    }
+
     /// How many there are.
     pub(super) fn count(&self) -> usize {
         self.made.len()

@@ -163,6 +163,12 @@ impl Timing {
         has_news
     }
 
+    /// Whether times are on their way back.
+    pub(super) fn is_waiting(&self) -> bool {
+        let states = self.slots.iter().map(|slot| slot.state.load(Ordering::Acquire));
+        states.into_iter().any(|state| state != FREE)
+    }
+
     fn times(&self, slot: &Slot) -> Option<GpuMs> {
         let range = slot.buffer.get_mapped_range(..).ok()?;
         let mut ms = [0.0; 3];

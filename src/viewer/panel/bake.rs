@@ -8,7 +8,7 @@ use super::control::{counted, grouped};
 use super::{Facts, Panel, Wishes};
 use crate::light_pass::ledger::EnergyLedger;
 use crate::session::StopReason;
-use crate::viewer::worker::{BakeState, BakedLevel};
+use crate::viewer::worker::{BakeRequest, BakeState, BakedLevel};
 
 /// Text of what went wrong.
 pub const FAILED: Color32 = Color32::from_rgb(255, 120, 110);
@@ -48,9 +48,8 @@ pub fn show(ui: &mut Ui, panel: &mut Panel, facts: &Facts<'_>, wishes: &mut Wish
 }
 
 fn state_line(ui: &mut Ui, panel: &Panel, facts: &Facts<'_>) {
-    let is_stale = facts.last.is_some_and(|last| {
-        last.request.settings != panel.settings || !Arc::ptr_eq(&last.request.scene, facts.scene)
-    });
+    let wanted = BakeRequest::new(Arc::clone(facts.scene), panel.settings.clone());
+    let is_stale = facts.last.is_some_and(|last| !last.request.is_same(&wanted));
     match facts.state {
         BakeState::Baking {
             stage,

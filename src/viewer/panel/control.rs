@@ -122,6 +122,15 @@ pub fn grouped(count: u64) -> String {
     text
 }
 
+/// A size with its unit, in powers of 1000.
+pub fn bytes(count: u64) -> String {
+    match count {
+        0..1000 => format!("{count} B"),
+        1000..1_000_000 => format!("{:.1} kB", count as f64 / 1e3),
+        _ => format!("{:.1} MB", count as f64 / 1e6),
+    }
+}
+
 /// A count with its noun: "1 light", "2 lights".
 pub fn counted(count: usize, noun: &str) -> String {
     let plural = if count == 1 { "" } else { "s" };

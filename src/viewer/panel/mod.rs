@@ -16,8 +16,8 @@ use egui::{CollapsingHeader, Frame, Margin, RichText, ScrollArea, Ui};
 use super::worker::{BakeState, BakedLevel};
 use crate::error::Warning;
 use crate::eye_pass::ToneMap;
-use crate::plan::EffectPlan;
 use crate::scene::{Edit, Scene};
+use crate::session::EffectReport;
 use crate::settings::{BakeSettings, LayerKind};
 
 /// Width of the panel [points].
@@ -91,6 +91,8 @@ pub struct Facts<'a> {
     pub layers: &'a [LayerKind],
     /// Whether these maps tell how far they may be off.
     pub has_errors: bool,
+    /// The eye's chains in the picture that is shown.
+    pub chains: Option<&'a EffectReport>,
     /// Flying speed [m/s].
     pub speed_m_per_s: f64,
     /// What draws the picture.
@@ -188,9 +190,10 @@ impl Panel {
         section(ui, "Display", true, |ui| {
             display::show(ui, &mut self.display, facts, wishes)
         });
-        let plan: Option<&EffectPlan> = facts.last.map(|last| &last.result.plan);
         section(ui, "Energy", false, |ui| bake::energy(ui, facts.last));
-        section(ui, "Effects", false, |ui| effects::show(ui, plan));
+        section(ui, "Effects", false, |ui| {
+            effects::show(ui, &mut self.settings.effects, facts)
+        });
         let baked: &[Warning] = facts.last.map_or(&[], |last| &last.result.warnings);
         let warnings: Vec<_> = facts.scene.warnings.iter().chain(baked).collect();
         if !warnings.is_empty() {
