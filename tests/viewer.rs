@@ -6,6 +6,8 @@ mod debounce;
 #[cfg(target_os = "linux")]
 #[path = "viewer/desktop.rs"]
 mod desktop;
+#[path = "viewer/difference_view.rs"]
+mod difference_view;
 #[path = "viewer/effects.rs"]
 mod effects;
 #[path = "viewer/error_view.rs"]
@@ -26,3 +28,5 @@ mod support;
 mod window;
 #[path = "viewer/worker.rs"]
 mod worker;
+#[path = "viewer/worth.rs"]
+mod worth;

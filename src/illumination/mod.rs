@@ -3,6 +3,7 @@
 pub mod accumulator;
 pub mod chart;
 pub mod compare;
+pub mod difference;
 pub mod gutter;
 pub mod islands;
 pub mod lookup;

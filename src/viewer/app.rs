@@ -238,9 +238,7 @@ impl App {
         self.must_set_maps |= layer != self.model.panel.display.layer;
         if quantity != self.model.quantity() {
             self.must_set_maps = true;
-            let is_error = self.model.quantity() == Quantity::Error;
-            let what = if is_error { "error" } else { "light" };
-            self.model.log.write(&Event::Shows(what));
+            self.model.log.write(&Event::Shows(self.model.quantity().name()));
         }
         self.must_measure_exposure |= wishes.measure_exposure;
         if let Err(error) = self.draw_picture() {
@@ -304,7 +302,11 @@ impl App {
         let undoable = edits.undoable();
         let (has_errors, quantity) = (error_view::is_available(model.maps()), model.quantity());
         let Model {
-            panel, last, refusal, ..
+            panel,
+            last,
+            worth,
+            refusal,
+            ..
         } = model;
         let facts = Facts {
             scene: &scene,
@@ -312,7 +314,8 @@ impl App {
             undoable,
             refusal: refusal.as_deref(),
             state: &state,
-            last: last.as_ref(),
+            last: last.as_deref(),
+            worth: worth.as_ref(),
             layers: &layers,
             has_errors,
             chains: chains.as_ref(),
@@ -340,7 +343,7 @@ impl App {
         if std::mem::take(&mut self.must_set_maps) || is_new {
             let style = match self.model.quantity() {
                 Quantity::Light => MapStyle::Lit,
-                Quantity::Error => MapStyle::AsItIs,
+                Quantity::Error | Quantity::Difference => MapStyle::AsItIs,
             };
             uploaded += graphics.set_maps(&self.model.shown_maps(), style)?;
             is_new = true;
@@ -388,7 +391,7 @@ impl App {
             Shown::Hidden => Duration::MAX,
             Shown::Later => RETRY_AFTER,
             Shown::Yes if self.model.navigator.is_moving() => Duration::ZERO,
-            Shown::Yes if self.model.state().is_baking() => repaint_after.min(BAKING_FRAME),
+            Shown::Yes if self.model.state().is_working() => repaint_after.min(BAKING_FRAME),
             Shown::Yes => repaint_after,
         };
         let is_report_due = self.reports_due > 0 && shown == Shown::Yes;
@@ -407,7 +410,7 @@ impl App {
             .into_iter()
             .flatten()
             .min();
-        if self.rested_at != self.pictures && !self.model.state().is_baking() && !is_report_due {
+        if self.rested_at != self.pictures && !self.model.state().is_working() && !is_report_due {
             self.rested_at = self.pictures;
             let (pictures, frames) = (self.pictures, self.frames);
             let position = self.model.navigator.camera().position.to_array();
@@ -431,7 +434,7 @@ impl App {
         let display = match self.model.quantity() {
             Quantity::Light => self.model.panel.display,
             // Colours of a legend are shown as they are.
-            Quantity::Error => Display {
+            Quantity::Error | Quantity::Difference => Display {
                 exposure_stops: 0.0,
                 tone_map: ToneMap::None,
                 ..self.model.panel.display

@@ -7,7 +7,7 @@ use std::time::Instant;
 
 use serde_json::{Value, json};
 
-use super::worker::BakedLevel;
+use super::worker::{BakedLevel, Worth};
 use crate::error::{Error, Result};
 use crate::eye_pass::renderer::Uploaded;
 use crate::scene::Edit;
@@ -48,7 +48,9 @@ pub enum Event<'a> {
     Edited(&'a Edit),
     /// The last edit was taken back.
     Undone,
-    /// The picture shows the light, or how far it may be off.
+    /// What an effect is worth to the maps that are shown was found, or what failed.
+    Compared(&'a Worth),
+    /// The picture shows the light, how far it may be off, or what an effect is worth.
     Shows(&'a str),
     /// The bake was stopped.
     Cancelled,
@@ -99,6 +101,7 @@ impl Event<'_> {
             }
             Self::Edited(edit) => json!({"event": "edit", "target": format!("{:?}", edit.target())}),
             Self::Undone => json!({"event": "undo"}),
+            Self::Compared(worth) => compared(worth),
             Self::Shows(what) => json!({"event": "shows", "what": what}),
             Self::Cancelled => json!({"event": "cancelled"}),
             Self::Failed(sentence) => json!({"event": "failed", "sentence": sentence}),
@@ -115,6 +118,20 @@ impl Event<'_> {
             Self::DeviceRecovered => json!({"event": "device_recovered"}),
             Self::Closing => json!({"event": "closing"}),
         }
+    }
+}
+
+fn compared(worth: &Worth) -> Value {
+    let effect = worth.effect.name();
+    match &worth.difference {
+        Ok(found) => json!({
+            "event": "compared",
+            "effect": effect,
+            "with_w": found.with_w,
+            "without_w": found.without_w,
+            "relative_rmse": found.relative_rmse,
+        }),
+        Err(sentence) => json!({"event": "compared", "effect": effect, "failed": sentence}),
     }
 }
 

@@ -2,6 +2,7 @@
 
 mod app;
 pub mod debounce;
+pub mod difference_view;
 pub mod edits;
 pub mod error_view;
 pub mod event_log;

@@ -9,10 +9,12 @@ use super::edits::EditedScene;
 use super::event_log::{Event, EventLog};
 use super::navigation::Navigator;
 use super::panel::{LayerShown, Panel, Quantity, Wishes};
-use super::worker::{BakeRequest, BakeState, BakedLevel, Worker};
-use super::{ViewerOptions, error_view};
+use super::worker::{BakeRequest, BakeState, BakedLevel, Worker, Worth};
+use super::{ViewerOptions, difference_view, error_view};
+use crate::effect::Effect;
 use crate::error::Result;
 use crate::illumination::IlluminationMap;
+use crate::illumination::difference::Difference;
 use crate::scene::Scene;
 use crate::session::BakeSession;
 use crate::settings::LayerKind;
@@ -31,7 +33,9 @@ pub struct Model {
     worker: Worker,
     state: BakeState,
     /// The maps that the picture shows.
-    pub last: Option<BakedLevel>,
+    pub last: Option<Arc<BakedLevel>>,
+    /// What an effect is worth to these maps, where that was asked for.
+    pub worth: Option<Worth>,
     /// Maps that were baked before the start; until the first bake.
     given: Vec<IlluminationMap>,
     debounce: Debounce,
@@ -60,6 +64,7 @@ impl Model {
             worker,
             state: BakeState::Idle,
             last: None,
+            worth: None,
             given: options.maps.clone().unwrap_or_default(),
             debounce: Debounce::default(),
             seen: wanted.clone(),
@@ -113,15 +118,21 @@ impl Model {
         kinds
     }
 
-    /// What the picture shows: the light where the panel asks for errors that the maps do not have.
+    /// What the picture shows: the light where the panel asks for what there is not.
     pub fn quantity(&self) -> Quantity {
         match self.panel.display.quantity {
             Quantity::Error if error_view::is_available(self.maps()) => Quantity::Error,
+            Quantity::Difference if self.difference().is_some() => Quantity::Difference,
             _ => Quantity::Light,
         }
     }
 
-    /// The maps as the panel asks them to be shown: some layers, or the errors.
+    /// What an effect adds to the maps that are shown or takes from them, where that was found.
+    fn difference(&self) -> Option<&Difference> {
+        self.worth.as_ref()?.difference.as_ref().ok()
+    }
+
+    /// The maps as the panel asks them to be shown: some layers, the errors, or what an effect is worth.
     pub fn shown_maps(&self) -> Cow<'_, [IlluminationMap]> {
         // Until the next maps come, an edit may have made a receiver clear, or a mirror.
         let receives = |map: &&IlluminationMap| {
@@ -129,8 +140,12 @@ impl Model {
             let object = scene.objects.get(map.chart.object);
             object.is_none_or(|object| scene.materials[object.material].surface.is_receiver())
         };
-        if self.quantity() == Quantity::Error {
-            let maps = error_view::maps(self.maps());
+        let in_colours = match self.quantity() {
+            Quantity::Light => None,
+            Quantity::Error => Some(error_view::maps(self.maps())),
+            Quantity::Difference => self.difference().map(difference_view::maps),
+        };
+        if let Some(maps) = in_colours {
             return Cow::Owned(maps.into_iter().filter(|map| receives(&map)).collect());
         }
         let LayerShown::Only(kind) = self.panel.display.layer else {
@@ -169,18 +184,40 @@ impl Model {
                 }
             });
             if has_maps {
-                self.last = Some(level);
+                self.last = Some(Arc::new(level));
+                // It was found on other maps.
+                self.worth = None;
             }
+        }
+        if let Some(worth) = self.worker.take_worth() {
+            has_maps |= self.take_worth(worth);
         }
         if std::mem::discriminant(&state) != std::mem::discriminant(&self.state) {
             match &state {
                 BakeState::Cancelled => self.log.write(&Event::Cancelled),
                 BakeState::Failed(sentence) => self.log.write(&Event::Failed(sentence)),
-                BakeState::Idle | BakeState::Baking { .. } | BakeState::Done => {}
+                BakeState::Idle
+                | BakeState::Baking { .. }
+                | BakeState::Comparing { .. }
+                | BakeState::Done => {}
             }
         }
         self.state = state;
         has_maps
+    }
+
+    /// Shows what an effect is worth; tells whether there is anything new to be shown.
+    fn take_worth(&mut self, worth: Worth) -> bool {
+        let is_of_shown = |last: &Arc<BakedLevel>| Arc::ptr_eq(last, &worth.with);
+        if !self.last.as_ref().is_some_and(is_of_shown) {
+            return false;
+        }
+        self.log.write(&Event::Compared(&worth));
+        if worth.difference.is_ok() {
+            self.panel.display.quantity = Quantity::Difference;
+        }
+        self.worth = Some(worth);
+        true
     }
 
     /// Whether maps are to replace those that are shown. Coarse maps of other light do, since what is shown is wrong
@@ -235,6 +272,18 @@ impl Model {
         let is_due = self.debounce.is_due(now) || is_ripe;
         if wishes.rebake || (is_due && self.is_changed()) {
             self.rebake();
+        } else if let Some(effect) = wishes.worth {
+            self.compare(effect);
+        }
+    }
+
+    /// Finds what an effect is worth to the maps that are shown, once these are done.
+    fn compare(&mut self, effect: Effect) {
+        let Some(last) = self.last.as_ref().filter(|last| last.is_final) else {
+            return;
+        };
+        if self.worker.compare(effect, Arc::clone(last)) {
+            self.state = self.worker.state();
         }
     }
 

@@ -2,9 +2,10 @@
 
 use egui::{Align2, Color32, FontId, Rect, Ui, pos2, vec2};
 
-use super::error_view;
 use super::panel::{Facts, Quantity};
 use super::worker::BakeState;
+use super::{difference_view, error_view};
+use crate::effect::Effect;
 
 const TEXT: Color32 = Color32::from_gray(230);
 const SIZE: f32 = 16.0;
@@ -32,14 +33,44 @@ pub fn show(
         );
         ui.painter().galley(place.min, galley, TEXT);
     }
-    if quantity == Quantity::Error {
-        legend(ui, rect);
+    match (quantity, facts.worth) {
+        (Quantity::Error, _) => error_legend(ui, rect),
+        (Quantity::Difference, Some(worth)) => difference_legend(ui, rect, worth.effect),
+        _ => {}
     }
     rect
 }
 
-/// Says what the false colours mean, at the picture's lower edge.
-fn legend(ui: &Ui, picture: Rect) {
+fn error_legend(ui: &Ui, picture: Rect) {
+    let (low, high) = error_view::RANGE;
+    let at = |share: f64| low * (high / low).powf(share);
+    let marks = (0..=3).map(|mark| f64::from(mark) / 3.0);
+    // Without what rounding leaves.
+    let marks: Vec<_> = marks
+        .map(|share| (share, format!("{} %", (1e5 * at(share)).round() / 1e3)))
+        .collect();
+    let title = "Estimated error of each texel, in % of its map's mean irradiance";
+    legend(ui, picture, title, &|share| error_view::colour(at(share)), &marks);
+}
+
+fn difference_legend(ui: &Ui, picture: Rect, effect: Effect) {
+    let at = |share: f64| difference_view::at(2.0 * share - 1.0);
+    let marks = (-3..=3).map(|mark| {
+        let text = match mark {
+            -3..=-1 => format!("−{}", 10_i32.pow(-mark as u32)),
+            0 => "0".into(),
+            _ => format!("+{}", 10_i32.pow(mark as u32)),
+        };
+        (f64::from(mark + 3) / 6.0, text)
+    });
+    let name = effect.name().replace('_', " ");
+    let title = format!("What {name} adds (warm) or takes (cool), in % of the map's mean");
+    let colour = |share: f64| difference_view::colour(at(share));
+    legend(ui, picture, &title, &colour, &marks.collect::<Vec<_>>());
+}
+
+/// Says what false colours mean, at the picture's lower edge: `colour` and `marks` by their share of the scale.
+fn legend(ui: &Ui, picture: Rect, title: &str, colour: &dyn Fn(f64) -> [u8; 3], marks: &[(f64, String)]) {
     const BAR: egui::Vec2 = vec2(300.0, 14.0);
     const STEPS: usize = 150;
     let painter = ui.painter();
@@ -48,7 +79,6 @@ fn legend(ui: &Ui, picture: Rect) {
     let frame = Rect::from_min_size(picture.left_bottom() + vec2(16.0, -16.0 - size.y), size);
     painter.rect_filled(frame, 6.0, Color32::from_black_alpha(190));
     let bar = Rect::from_min_size(frame.min + vec2(24.0, 28.0), BAR);
-    let title = "Estimated error of each texel, in % of its map's mean irradiance";
     painter.text(
         pos2(frame.center().x, frame.top() + 14.0),
         Align2::CENTER_CENTER,
@@ -56,21 +86,15 @@ fn legend(ui: &Ui, picture: Rect) {
         FontId::proportional(11.5),
         TEXT,
     );
-    let (low, high) = error_view::RANGE;
-    let at = |share: f64| low * (high / low).powf(share);
     let step = bar.width() / STEPS as f32;
     for index in 0..STEPS {
-        let [r, g, b] = error_view::colour(at((index as f64 + 0.5) / STEPS as f64));
+        let [r, g, b] = colour((index as f64 + 0.5) / STEPS as f64);
         let left = bar.left() + index as f32 * step;
         let part = Rect::from_min_max(pos2(left, bar.top()), pos2(left + step + 0.5, bar.bottom()));
         painter.rect_filled(part, 0.0, Color32::from_rgb(r, g, b));
     }
-    for mark in 0..=3 {
-        let share = f64::from(mark) / 3.0;
-        let place = pos2(bar.left() + bar.width() * share as f32, bar.bottom() + 8.0);
-        // Without what rounding leaves.
-        let per_cent = (1e5 * at(share)).round() / 1e3;
-        let text = format!("{per_cent} %");
+    for (share, text) in marks {
+        let place = pos2(bar.left() + bar.width() * *share as f32, bar.bottom() + 8.0);
         painter.text(place, Align2::CENTER_CENTER, text, font.clone(), TEXT);
     }
 }

@@ -9,6 +9,7 @@ use std::time::Instant;
 use super::meter::{Meter, Reporter};
 use crate::effect::{Effect, EffectSwitch};
 use crate::error::Result;
+use crate::illumination::difference::{Difference, difference};
 use crate::progress::{Control, Progress, Stage};
 use crate::scene::Scene;
 use crate::session::{BakeResult, BakeSession, StopReason};
@@ -65,6 +66,15 @@ pub enum BakeState {
         /// When it was asked for.
         since: Instant,
     },
+    /// At work on what an effect is worth; the maps belong to the settings last asked for.
+    Comparing {
+        /// What is left out.
+        effect: Effect,
+        /// What it is doing.
+        stage: Stage,
+        /// Of this stage, [0, 1].
+        fraction: f64,
+    },
     /// The maps belong to the settings last asked for.
     Done,
     /// Stopped by the user; the maps are those of an earlier bake.
@@ -77,6 +87,11 @@ impl BakeState {
     /// Whether a bake is running or about to.
     pub fn is_baking(&self) -> bool {
         matches!(self, Self::Baking { .. })
+    }
+
+    /// Whether anything is running or about to that can be stopped.
+    pub fn is_working(&self) -> bool {
+        matches!(self, Self::Baking { .. } | Self::Comparing { .. })
     }
 }
 
@@ -132,6 +147,17 @@ pub struct BakedLevel {
     pub seconds: f64,
 }
 
+/// What the light of a scene owes to an effect.
+#[derive(Clone, Debug)]
+pub struct Worth {
+    /// The effect that was left out.
+    pub effect: Effect,
+    /// The bake with it.
+    pub with: Arc<BakedLevel>,
+    /// That bake minus the one without, or one sentence on what failed.
+    pub difference: std::result::Result<Difference, String>,
+}
+
 /// Threads that leave one core to the window where none are asked for (`asked` = 0), at least 1.
 pub fn baking_threads(asked: usize, cores: usize) -> usize {
     if asked == 0 {
@@ -182,21 +208,47 @@ impl Worker {
         let mut slot = self.shared.lock();
         slot.cancel_running();
         slot.serial += 1;
+        slot.worth = None;
         let serial = slot.serial;
         slot.request = Some(Request {
             asked,
             since: Instant::now(),
-            serial,
+            task: Task::Bake { serial },
         });
         self.shared.news.notify_all();
         serial
     }
 
-    /// Stops the running bake and forgets the waiting one; its unfinished maps are dropped.
+    /// Asks what an effect is worth to a bake: the same is baked without it, by a session of its own. Replaces another
+    /// comparison, and gives way to every later request. Tells whether it is taken on: not while maps are baked.
+    pub fn compare(&self, effect: Effect, with: Arc<BakedLevel>) -> bool {
+        let mut slot = self.shared.lock();
+        let bakes = |task: Option<&Task>| task.is_some_and(|task| matches!(task, Task::Bake { .. }));
+        if bakes(slot.request.as_ref().map(|request| &request.task))
+            || bakes(slot.running.as_ref().map(|running| &running.task))
+        {
+            return false;
+        }
+        slot.cancel_running();
+        slot.worth = None;
+        let mut asked = with.request.clone();
+        asked.settings.effects.set(effect, EffectSwitch::Off);
+        slot.request = Some(Request {
+            asked,
+            since: Instant::now(),
+            task: Task::Comparison { effect, with },
+        });
+        self.shared.news.notify_all();
+        true
+    }
+
+    /// Stops what is running and forgets what is waiting; unfinished maps are dropped.
     pub fn cancel(&self) {
         let mut slot = self.shared.lock();
         slot.cancel_running();
-        if slot.request.take().is_some() && slot.running.is_none() {
+        let waiting = slot.request.take();
+        let is_bake = waiting.is_some_and(|request| matches!(request.task, Task::Bake { .. }));
+        if is_bake && slot.running.is_none() {
             slot.settled = BakeState::Cancelled;
         }
     }
@@ -204,19 +256,16 @@ impl Worker {
     /// Where the bake stands now.
     pub fn state(&self) -> BakeState {
         let slot = self.shared.lock();
-        let baking = |stage, fraction, since| BakeState::Baking {
-            stage,
-            fraction,
-            since,
-        };
         match (&slot.request, &slot.running) {
-            (Some(request), _) => baking(Stage::Build, 0.0, request.since),
-            (None, Some(running)) => {
-                let (stage, fraction) = running.meter.read();
-                baking(stage, fraction, running.since)
-            }
+            (Some(request), _) => request.task.state((Stage::Build, 0.0), request.since),
+            (None, Some(running)) => running.task.state(running.meter.read(), running.since),
             (None, None) => slot.settled.clone(),
         }
+    }
+
+    /// What the last comparison found, unless that was taken or something else was asked for since.
+    pub fn take_worth(&self) -> Option<Worth> {
+        self.shared.lock().worth.take()
     }
 
     /// The newest whole maps that were not taken yet. Older ones that nobody took are gone.
@@ -241,13 +290,40 @@ impl Drop for Worker {
     }
 }
 
+/// What is to be done with the maps.
+#[derive(Clone)]
+enum Task {
+    /// Handed out under this number.
+    Bake { serial: u64 },
+    /// Held against others.
+    Comparison { effect: Effect, with: Arc<BakedLevel> },
+}
+
+impl Task {
+    fn state(&self, (stage, fraction): (Stage, f64), since: Instant) -> BakeState {
+        match *self {
+            Self::Bake { .. } => BakeState::Baking {
+                stage,
+                fraction,
+                since,
+            },
+            Self::Comparison { effect, .. } => BakeState::Comparing {
+                effect,
+                stage,
+                fraction,
+            },
+        }
+    }
+}
+
 struct Request {
     asked: BakeRequest,
     since: Instant,
-    serial: u64,
+    task: Task,
 }
 
 struct Running {
+    task: Task,
     control: Arc<Control>,
     meter: Arc<Meter>,
     since: Instant,
@@ -255,13 +331,14 @@ struct Running {
 
 /// What both threads look at, under one lock.
 struct Slot {
-    /// Of the newest request, waiting or not.
+    /// Of the newest request for maps, waiting or not.
     serial: u64,
     request: Option<Request>,
     running: Option<Running>,
     /// The state while nothing is asked for or running.
     settled: BakeState,
     newest: Option<BakedLevel>,
+    worth: Option<Worth>,
     quit: bool,
 }
 
@@ -293,6 +370,7 @@ impl Shared {
             running: None,
             settled: BakeState::Idle,
             newest: None,
+            worth: None,
             quit: false,
         };
         Self {
@@ -318,6 +396,7 @@ impl Shared {
                 let control = Arc::new(Control::default());
                 let meter = Arc::new(Meter::default());
                 slot.running = Some(Running {
+                    task: request.task.clone(),
                     control: Arc::clone(&control),
                     meter: Arc::clone(&meter),
                     since: request.since,
@@ -335,6 +414,17 @@ impl Shared {
             return;
         }
         slot.newest = Some(level);
+        drop(slot);
+        (self.wake)();
+    }
+
+    /// Ends a comparison, and hands out what it found unless something else was asked for in between.
+    fn end_comparison(&self, worth: Option<Worth>, control: &Control) {
+        let mut slot = self.lock();
+        slot.running = None;
+        if !control.is_cancelled() {
+            slot.worth = worth;
+        }
         drop(slot);
         (self.wake)();
     }
@@ -361,40 +451,86 @@ fn serve<B: Baker>(shared: &Shared, make_baker: &impl Fn(Arc<Scene>) -> Result<B
             start: Instant::now(),
             next_wake_ms: AtomicU64::new(0),
         };
-        let mut levels = 0;
-        let mut hand_out = |result, is_final| {
-            levels += 1;
-            shared.hand_out(BakedLevel {
-                serial: request.serial,
-                request: request.asked.clone(),
-                level: levels,
-                is_final,
-                result,
-                seconds: request.since.elapsed().as_secs_f64(),
-            });
-        };
-        let mut on_the_way = |result| {
-            if !control.is_cancelled() {
-                hand_out(result, false);
+        match &request.task {
+            Task::Bake { serial } => {
+                let state = serve_bake(
+                    shared, &mut baker, make_baker, &request, *serial, &progress, &control,
+                );
+                shared.settle(*serial, state);
             }
-        };
-        let outcome = bake(
-            &mut baker,
-            make_baker,
-            &request.asked,
-            &progress,
-            &control,
-            &mut on_the_way,
-        );
-        let state = match outcome {
-            Ok(result) => {
-                hand_out(result, true);
-                BakeState::Done
+            Task::Comparison { effect, with } => {
+                // The session of the maps that are shown keeps all it has.
+                let mut own = None;
+                let ignore = &mut |_| ();
+                let outcome = bake(&mut own, make_baker, &request.asked, &progress, &control, ignore);
+                drop(own);
+                let worth = worth(*effect, with, outcome);
+                shared.end_comparison(worth, &control);
             }
-            Err(stopped) => stopped,
-        };
-        shared.settle(request.serial, state);
+        }
     }
+}
+
+/// Bakes, hands out every level, and tells how it ended.
+fn serve_bake<B: Baker>(
+    shared: &Shared,
+    baker: &mut Option<B>,
+    make_baker: &impl Fn(Arc<Scene>) -> Result<B>,
+    request: &Request,
+    serial: u64,
+    progress: &dyn Progress,
+    control: &Control,
+) -> BakeState {
+    let mut levels = 0;
+    let mut hand_out = |result, is_final| {
+        levels += 1;
+        shared.hand_out(BakedLevel {
+            serial,
+            request: request.asked.clone(),
+            level: levels,
+            is_final,
+            result,
+            seconds: request.since.elapsed().as_secs_f64(),
+        });
+    };
+    let mut on_the_way = |result| {
+        if !control.is_cancelled() {
+            hand_out(result, false);
+        }
+    };
+    let outcome = bake(
+        baker,
+        make_baker,
+        &request.asked,
+        progress,
+        control,
+        &mut on_the_way,
+    );
+    match outcome {
+        Ok(result) => {
+            hand_out(result, true);
+            BakeState::Done
+        }
+        Err(stopped) => stopped,
+    }
+}
+
+/// What a bake without an effect tells; `None` where it was stopped.
+fn worth(
+    effect: Effect,
+    with: &Arc<BakedLevel>,
+    without: std::result::Result<BakeResult, BakeState>,
+) -> Option<Worth> {
+    let difference = match without {
+        Ok(without) => difference(&with.result.maps, &without.maps).map_err(|error| error.to_string()),
+        Err(BakeState::Failed(sentence)) => Err(sentence),
+        Err(_) => return None,
+    };
+    Some(Worth {
+        effect,
+        with: Arc::clone(with),
+        difference,
+    })
 }
 
 /// One bake; where it did not come to its end, the state that it leaves.

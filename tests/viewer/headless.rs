@@ -9,7 +9,7 @@ use nephroid::scene::Scene;
 use nephroid::session::{BakeCounts, BakeResult, EffectReport, StopReason, Timings};
 use nephroid::settings::{BakeSettings, LayerKind};
 use nephroid::viewer::panel::{Facts, Panel, WIDTH, Wishes};
-use nephroid::viewer::worker::{BakeRequest, BakeState, BakedLevel};
+use nephroid::viewer::worker::{BakeRequest, BakeState, BakedLevel, Worth};
 
 pub struct Headless {
     context: egui::Context,
@@ -22,6 +22,7 @@ pub struct Headless {
     pub last: Option<BakedLevel>,
     pub layers: Vec<LayerKind>,
     pub has_errors: bool,
+    pub worth: Option<Worth>,
     pub chains: Option<EffectReport>,
     /// What was pressed since the start.
     pub wishes: Wishes,
@@ -84,6 +85,7 @@ impl Headless {
             last: None,
             layers: vec![LayerKind::Caustic, LayerKind::Direct],
             has_errors: false,
+            worth: None,
             chains: None,
             wishes: Wishes::default(),
             size: vec2(size.0, size.1),
@@ -115,6 +117,7 @@ impl Headless {
             last,
             layers,
             has_errors,
+            worth,
             chains,
             wishes,
             ..
@@ -128,6 +131,7 @@ impl Headless {
             refusal: refusal.as_deref(),
             layers,
             has_errors: *has_errors,
+            worth: worth.as_ref(),
             chains: chains.as_ref(),
             speed_m_per_s: 1.0,
             adapter: "no adapter",

@@ -255,7 +255,7 @@ fn levels_tell_their_error_and_time() {
 #[test]
 fn the_error_is_shown_only_where_there_is_one() {
     let mut panel = panel();
-    let centre = Headless::rect_of(panel.named(Role::RadioButton, "estimated error")).center();
+    let centre = Headless::rect_of(panel.named(Role::RadioButton, "error")).center();
     panel.click(centre);
     assert_eq!(panel.panel.display.quantity, Quantity::Light);
     panel.hover(centre);

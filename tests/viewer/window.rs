@@ -306,7 +306,7 @@ fn levels_come_before_the_end_edits_are_baked_while_dragged_and_errors_are_shown
             centre.x as i32, centre.y as i32
         )
     };
-    viewer.hands(&click(&panel, "estimated error"));
+    viewer.hands(&click(&panel, "error"));
     viewer.wait_for("shows", |shows| shows["what"] == "error");
     let false_colours = screenshot_that(&viewer, "shows errors", |shot| difference(&baked, shot) > 0.1);
     let coloured = |shot: &RgbImage| {

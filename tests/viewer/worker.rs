@@ -16,7 +16,7 @@ use nephroid::viewer::worker::{BakeRequest, BakeState, BakedLevel, Baker, Worker
 /// Far longer than anything here takes; only a failing test waits for it.
 const PATIENCE: Duration = Duration::from_secs(20);
 
-fn result(rays: u64, partial: bool) -> BakeResult {
+pub fn result(rays: u64, partial: bool) -> BakeResult {
     BakeResult {
         maps: Vec::new(),
         plan: EffectPlan::default(),
@@ -47,7 +47,7 @@ fn settings(density_per_sr: f64) -> BakeSettings {
 }
 
 /// A request on a scene that says nothing.
-fn asked(density_per_sr: f64) -> BakeRequest {
+pub fn asked(density_per_sr: f64) -> BakeRequest {
     BakeRequest {
         scene: Arc::new(Scene::default()),
         settings: settings(density_per_sr),
@@ -63,13 +63,13 @@ struct Scripted {
 }
 
 /// Bakes at once.
-const AT_ONCE: f64 = 1000.0;
+pub const AT_ONCE: f64 = 1000.0;
 /// Bakes until it is cancelled.
-const ENDLESS: f64 = 2000.0;
-const PANICKING: f64 = 3000.0;
-const FAILING: f64 = 4000.0;
+pub const ENDLESS: f64 = 2000.0;
+pub const PANICKING: f64 = 3000.0;
+pub const FAILING: f64 = 4000.0;
 /// Ignores cancelling and ends when the gate opens.
-const STUBBORN: f64 = 5000.0;
+pub const STUBBORN: f64 = 5000.0;
 /// Hands out levels of 1 and 2 rays, the second once the gate opened, and is done when it opens again. Ignores
 /// cancelling.
 const IN_LEVELS: f64 = 6000.0;
@@ -128,17 +128,17 @@ impl Drop for Scripted {
     }
 }
 
-struct Bench {
-    worker: Worker,
-    started: Arc<AtomicUsize>,
+pub struct Bench {
+    pub worker: Worker,
+    pub started: Arc<AtomicUsize>,
     /// Bakers that exist.
-    alive: Arc<AtomicUsize>,
-    made: Arc<AtomicUsize>,
-    woken: Arc<AtomicUsize>,
-    gate: Sender<()>,
+    pub alive: Arc<AtomicUsize>,
+    pub made: Arc<AtomicUsize>,
+    pub woken: Arc<AtomicUsize>,
+    pub gate: Sender<()>,
 }
 
-fn bench() -> Bench {
+pub fn bench() -> Bench {
     let counter = || Arc::new(AtomicUsize::new(0));
     let (started, alive, made, woken) = (counter(), counter(), counter(), counter());
     let (gate, opened) = channel();
@@ -170,7 +170,7 @@ fn bench() -> Bench {
     }
 }
 
-fn wait_for(what: &str, mut condition: impl FnMut() -> bool) {
+pub fn wait_for(what: &str, mut condition: impl FnMut() -> bool) {
     let start = Instant::now();
     while !condition() {
         assert!(start.elapsed() < PATIENCE, "waited in vain for {what}");

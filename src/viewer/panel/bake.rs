@@ -27,7 +27,7 @@ pub fn show(ui: &mut Ui, panel: &mut Panel, facts: &Facts<'_>, wishes: &mut Wish
             .on_disabled_hover_text("A setting is out of its range.");
         wishes.rebake |= rebake.clicked();
         let cancel = ui
-            .add_enabled(facts.state.is_baking(), egui::Button::new("Cancel"))
+            .add_enabled(facts.state.is_working(), egui::Button::new("Cancel"))
             .on_hover_text("Stops the bake and drops its unfinished maps; the shown maps stay.")
             .on_disabled_hover_text("No bake is running.");
         wishes.cancel |= cancel.clicked();
@@ -64,6 +64,16 @@ fn state_line(ui: &mut Ui, panel: &Panel, facts: &Facts<'_>) {
             );
             ui.add(ProgressBar::new(*fraction as f32).text(text).desired_height(18.0))
                 .on_hover_text("Share of this stage that is done, and time since the bake was asked for.");
+        }
+        BakeState::Comparing {
+            effect,
+            stage,
+            fraction,
+        } => {
+            let name = effect.name().replace('_', " ");
+            let text = format!("without {name}: {} {:.0} %", stage.name(), fraction * 100.0);
+            ui.add(ProgressBar::new(*fraction as f32).text(text).desired_height(18.0))
+                .on_hover_text("Bakes once more without the effect, beside the maps that are shown.");
         }
         BakeState::Failed(sentence) => drop(ui.colored_label(FAILED, sentence)),
         BakeState::Cancelled => {
@@ -136,7 +146,7 @@ fn level_line(last: &BakedLevel) -> String {
 }
 
 /// Two significant digits.
-fn two_digits(value: f64) -> String {
+pub fn two_digits(value: f64) -> String {
     let decimals = (1.0 - value.abs().max(1e-6).log10().floor()).clamp(0.0, 6.0) as usize;
     format!("{value:.decimals$}")
 }

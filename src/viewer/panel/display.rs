@@ -33,12 +33,14 @@ const LAYER: About = About {
 
 const QUANTITY: About = About {
     label: "Map shown",
-    what: "The light, or how far each texel may be off: its estimated error in false colours, relative to the map's \
-           mean irradiance.",
-    range: "light, estimated error; default light",
+    what: "The light; how far each texel may be off, its estimated error; or what an effect adds and takes away. The \
+           last two in false colours, relative to the map's mean irradiance.",
+    range: "light, error, difference; default light",
     accuracy: "none: only the picture changes",
-    cost: "none: the error is estimated in every bake",
+    cost: "none: the error is estimated in every bake, and the difference was found when an effect's worth was asked \
+           for",
 };
+const NO_DIFFERENCE: &str = "Ask under Effects what an effect is worth.";
 const NO_ERRORS: &str = "These maps come without an estimate of their error.";
 
 const TONE_MAPS: [(ToneMap, &str, &str); 2] = [
@@ -69,8 +71,9 @@ pub fn show(ui: &mut Ui, display: &mut Display, facts: &Facts<'_>, wishes: &mut 
         });
         let nothing = baked.is_empty().then_some("There are no maps yet.");
         row(ui, &LAYER, nothing, |ui| layer(ui, &mut display.layer, baked));
-        let no_errors = nothing.or((!facts.has_errors).then_some(NO_ERRORS));
-        row(ui, &QUANTITY, no_errors, |ui| quantity(ui, &mut display.quantity));
+        row(ui, &QUANTITY, nothing, |ui| {
+            quantity(ui, &mut display.quantity, facts)
+        });
     });
 }
 
@@ -82,10 +85,20 @@ fn exposure(ui: &mut Ui, stops: &mut f64) -> Response {
     )
 }
 
-fn quantity(ui: &mut Ui, shown: &mut Quantity) -> Response {
+fn quantity(ui: &mut Ui, shown: &mut Quantity, facts: &Facts<'_>) -> Response {
+    let has_difference = facts.worth.is_some_and(|worth| worth.difference.is_ok());
     ui.horizontal(|ui| {
         ui.radio_value(shown, Quantity::Light, "light");
-        ui.radio_value(shown, Quantity::Error, "estimated error");
+        for (kind, label, is_there, why_not) in [
+            (Quantity::Error, "error", facts.has_errors, NO_ERRORS),
+            (Quantity::Difference, "difference", has_difference, NO_DIFFERENCE),
+        ] {
+            ui.add_enabled_ui(is_there, |ui| {
+                ui.radio_value(shown, kind, label)
+                    .on_hover_text(QUANTITY.what)
+                    .on_disabled_hover_text(why_not);
+            });
+        }
     })
     .response
 }

@@ -2,11 +2,14 @@
 
 use egui::{Button, Frame, RichText, Role, Ui, WidgetInfo, vec2};
 
-use super::Facts;
-use super::control::{bytes, counted, grouped};
+use super::bake::{FAILED, two_digits};
+use super::control::{bytes, counted, grouped, significant};
+use super::{Facts, Wishes};
 use crate::effect::{Effect, EffectSwitch, EffectSwitches};
+use crate::illumination::difference::Difference;
 use crate::plan::EffectLine;
 use crate::session::EffectCounts;
+use crate::viewer::worker::BakeState;
 
 /// Width of the three switches of an effect [points].
 const SWITCHES_WIDTH: f32 = 128.0;
@@ -33,6 +36,10 @@ const SWITCHES: [(EffectSwitch, &str, &str); 3] = [
         "Never: the light that would need it is missing, and booked as switched off. Less time and memory.",
     ),
 ];
+const WORTH: &str = "Bakes once more without this effect, beside the maps that are shown, and shows in false colours \
+                     where it adds light and where it takes light away. Costs a whole bake; any change stops it.";
+const WORTH_LINE: &str = "Light on all maps and layers with the effect minus without it, in luminous-equivalent watts; \
+                          the root mean square of the difference over the mean with it.";
 const UNAVAILABLE: &str = "This version does not simulate it.";
 
 /// What is known of an effect.
@@ -43,10 +50,16 @@ struct Known<'a> {
 }
 
 /// Shows every effect, then every light.
-pub fn show(ui: &mut Ui, switches: &mut EffectSwitches, facts: &Facts<'_>) {
+pub fn show(ui: &mut Ui, switches: &mut EffectSwitches, facts: &Facts<'_>, wishes: &mut Wishes) {
     for effect in Effect::ALL {
         let mut switch = switches.get(effect);
-        entry(ui, effect, &mut switch, known(effect, facts));
+        let known = known(effect, facts);
+        entry(ui, effect, &mut switch, known, |ui| {
+            let is_on = known.line.is_some_and(|line| line.on);
+            if is_on && effect.is_available() && effect != Effect::Chains {
+                worth(ui, effect, facts, wishes);
+            }
+        });
         switches.set(effect, switch);
     }
     for line in facts.last.iter().flat_map(|last| &last.result.plan.lights) {
@@ -73,7 +86,13 @@ fn known<'a>(effect: Effect, facts: &Facts<'a>) -> Known<'a> {
     }
 }
 
-fn entry(ui: &mut Ui, effect: Effect, switch: &mut EffectSwitch, known: Known<'_>) {
+fn entry(
+    ui: &mut Ui,
+    effect: Effect,
+    switch: &mut EffectSwitch,
+    known: Known<'_>,
+    add_worth: impl FnOnce(&mut Ui),
+) {
     let name = effect.name().replace('_', " ");
     ui.horizontal(|ui| {
         let is_on = known.line.map(|line| line.on);
@@ -92,7 +111,56 @@ fn entry(ui: &mut Ui, effect: Effect, switch: &mut EffectSwitch, known: Known<'_
         if let Some(counts) = known.counts.filter(|_| effect.is_available()) {
             counters(ui, counts);
         }
+        add_worth(ui);
     });
+}
+
+/// What the effect brings to the maps that are shown, or a button that finds it.
+fn worth(ui: &mut Ui, effect: Effect, facts: &Facts<'_>, wishes: &mut Wishes) {
+    if let BakeState::Comparing {
+        effect: left_out,
+        stage,
+        fraction,
+    } = facts.state
+        && *left_out == effect
+    {
+        let text = format!("baking without it: {} {:.0} %", stage.name(), 100.0 * fraction);
+        ui.label(RichText::new(text).size(COUNTER));
+        return;
+    }
+    if let Some(worth) = facts.worth.filter(|worth| worth.effect == effect) {
+        match &worth.difference {
+            Ok(found) => {
+                ui.label(RichText::new(worth_line(found)).size(COUNTER))
+                    .on_hover_text(WORTH_LINE);
+            }
+            Err(sentence) => drop(ui.colored_label(FAILED, sentence)),
+        }
+        return;
+    }
+    let is_ready = !facts.state.is_working() && facts.last.is_some_and(|last| last.is_final);
+    let name = effect.name().replace('_', " ");
+    let button = ui
+        .add_enabled(is_ready, Button::new("worth").small())
+        .on_hover_text(WORTH)
+        .on_disabled_hover_text("Known once the bake is done.");
+    button.widget_info(|| WidgetInfo::labeled(Role::Button, is_ready, format!("{name}: worth")));
+    if button.clicked() {
+        wishes.worth = Some(effect);
+    }
+}
+
+/// "+12.3 W of 16.1 W deposited; maps differ by 84 % (relative RMSE)".
+fn worth_line(found: &Difference) -> String {
+    let sign = if found.difference_w() < 0.0 { "−" } else { "+" };
+    let difference = significant(found.difference_w().abs());
+    let with = significant(found.with_w);
+    let differ = found
+        .relative_rmse
+        .map_or("there is no light with it".into(), |rmse| {
+            format!("maps differ by {} % (relative RMSE)", two_digits(100.0 * rmse))
+        });
+    format!("{sign}{difference} W of {with} W deposited; {differ}")
 }
 
 /// "refraction: on", strong where it is on.

@@ -13,7 +13,8 @@ use std::sync::Arc;
 
 use egui::{CollapsingHeader, Frame, Margin, RichText, ScrollArea, Ui};
 
-use super::worker::{BakeState, BakedLevel};
+use super::worker::{BakeState, BakedLevel, Worth};
+use crate::effect::Effect;
 use crate::error::Warning;
 use crate::eye_pass::ToneMap;
 use crate::scene::{Edit, Scene};
@@ -41,6 +42,19 @@ pub enum Quantity {
     Light,
     /// How far the light may be off, in false colours.
     Error,
+    /// What an effect adds to the light or takes from it, in false colours.
+    Difference,
+}
+
+impl Quantity {
+    /// Its name in the event log.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Light => "light",
+            Self::Error => "error",
+            Self::Difference => "difference",
+        }
+    }
 }
 
 /// How the picture shows the maps.
@@ -52,7 +66,7 @@ pub struct Display {
     pub tone_map: ToneMap,
     /// Which light.
     pub layer: LayerShown,
-    /// The light or its error.
+    /// The light, its error or a difference.
     pub quantity: Quantity,
 }
 
@@ -91,6 +105,8 @@ pub struct Facts<'a> {
     pub layers: &'a [LayerKind],
     /// Whether these maps tell how far they may be off.
     pub has_errors: bool,
+    /// What an effect is worth to these maps, where that was asked for.
+    pub worth: Option<&'a Worth>,
     /// The eye's chains in the picture that is shown.
     pub chains: Option<&'a EffectReport>,
     /// Flying speed [m/s].
@@ -108,6 +124,8 @@ pub struct Wishes {
     pub cancel: bool,
     /// Choose the exposure from the picture.
     pub measure_exposure: bool,
+    /// Find what this effect is worth to the maps that are shown.
+    pub worth: Option<Effect>,
     /// Change the scene.
     pub edit: Option<Edit>,
     /// Take the last change of the scene back.
@@ -135,6 +153,7 @@ impl Wishes {
             rebake: self.rebake || other.rebake,
             cancel: self.cancel || other.cancel,
             measure_exposure: self.measure_exposure || other.measure_exposure,
+            worth: other.worth.or(self.worth),
             edit: other.edit.or(self.edit),
             undo: self.undo || other.undo,
             is_dragging: self.is_dragging || other.is_dragging,
@@ -192,7 +211,7 @@ impl Panel {
         });
         section(ui, "Energy", false, |ui| bake::energy(ui, facts.last));
         section(ui, "Effects", false, |ui| {
-            effects::show(ui, &mut self.settings.effects, facts)
+            effects::show(ui, &mut self.settings.effects, facts, wishes)
         });
         let baked: &[Warning] = facts.last.map_or(&[], |last| &last.result.warnings);
         let warnings: Vec<_> = facts.scene.warnings.iter().chain(baked).collect();
