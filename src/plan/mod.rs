@@ -1,8 +1,11 @@
 //! Which effects a scene calls for, and why.
 
+mod compartments;
 mod decide;
+mod reach;
 
-pub use decide::{CastersByLight, decide};
+pub use decide::{Sight, decide, wants_caustics};
+pub use reach::Reach;
 
 use serde::{Deserialize, Serialize};
 
