@@ -10,8 +10,15 @@ mod brute_force;
 mod collection;
 #[path = "bake/coverage.rs"]
 mod coverage;
+#[path = "bake/effect_matrix.rs"]
+mod effect_matrix;
+#[path = "support/effect_scenes.rs"]
+mod effect_scenes;
 #[path = "bake/energy.rs"]
 mod energy;
+#[path = "scene/glb.rs"]
+#[allow(dead_code)]
+mod glb;
 #[path = "bake/hard_cases.rs"]
 mod hard_cases;
 #[path = "support/hard_scenes.rs"]
@@ -32,5 +39,7 @@ mod smoothing;
 mod support;
 #[path = "bake/tools.rs"]
 mod tools;
+#[path = "bake/useless.rs"]
+mod useless;
 #[path = "bake/wavefront.rs"]
 mod wavefront;

@@ -147,10 +147,7 @@ pub const UNITS: &str = "W/m^2";
 impl Manifest {
     /// The manifest of a bake whose maps are stored as `maps` say; `settings` are those it was run with.
     pub fn new(scene: &Scene, settings: &BakeSettings, result: &BakeResult, maps: Vec<MapEntry>) -> Self {
-        let energy = result
-            .ledgers
-            .iter()
-            .fold(EnergyLedger::default(), |sum, ledger| add(sum, &ledger.energy_w));
+        let energy: EnergyLedger = result.ledgers.iter().map(|ledger| &ledger.energy_w).sum();
         Self {
             schema: SCHEMA,
             program_version: env!("CARGO_PKG_VERSION"),
@@ -170,19 +167,6 @@ impl Manifest {
             maps,
         }
     }
-}
-
-fn add(mut sum: EnergyLedger, other: &EnergyLedger) -> EnergyLedger {
-    sum.emitted += other.emitted;
-    sum.deposited += other.deposited;
-    sum.absorbed += other.absorbed;
-    sum.escaped += other.escaped;
-    sum.truncated.depth += other.truncated.depth;
-    sum.truncated.threshold += other.truncated.threshold;
-    sum.truncated.non_finite += other.truncated.non_finite;
-    sum.truncated.unresolved += other.truncated.unresolved;
-    sum.truncated.quadrature += other.truncated.quadrature;
-    sum
 }
 
 impl From<EnergyLedger> for EnergyAccounts {

@@ -2,6 +2,7 @@
 
 pub mod bvh;
 pub mod cube_face;
+pub mod enclosure;
 pub mod frustum;
 pub mod ray;
 pub mod triangle;

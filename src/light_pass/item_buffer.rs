@@ -2,18 +2,23 @@
 //!
 //! Cells are marked by projecting the scene's hierarchy onto the faces of the launch domain, and the triangles of
 //! specular objects below it where a box does not decide; triangles are tested against the cells exactly: one that is
-//! smaller than a cell, edge-on or on a cube edge is never missed. Occlusion is left to the rays.
+//! smaller than a cell, edge-on or on a cube edge is never missed. Cells whose whole frustum opaque faces cover before
+//! every caster are dropped ([`hidden`]); all other occlusion is left to the rays.
 
 mod bits;
 mod grid;
+mod hidden;
 mod lit;
 mod polygon;
 mod search;
 
-use glam::DVec2;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use self::bits::CellBits;
+use self::hidden::{Facet, Hidden, HiddenCells};
 use self::search::{Bounds, Search};
 use super::launch::Launch;
 use crate::geometry::bvh::Node;
@@ -34,41 +39,113 @@ pub struct ItemBuffer {
     faces: Vec<CellBits>,
     /// Specular objects that mark at least one cell, ascending.
     pub casters: Vec<usize>,
+    /// Cells that opaque faces cover before every caster.
+    pub hidden_cells: u64,
+    /// Nodes, triangles and cells that were tested: the work that it took.
+    pub tests: u64,
+}
+
+/// A box around everything.
+const EVERYWHERE: [Bounds; 1] = [(DVec3::NEG_INFINITY, DVec3::INFINITY)];
+
+/// What becomes of cells whose casters lie behind opaque faces.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Hiding {
+    /// They are marked like all others.
+    Keep,
+    /// They are dropped.
+    Drop,
 }
 
 impl ItemBuffer {
     /// Marks the cells that may see one of the `casters` (indices of specular objects).
-    pub fn build(launch: &Launch, tracer: &Tracer, casters: &[usize]) -> Self {
+    pub fn build(launch: &Launch, tracer: &Tracer, casters: &[usize], hiding: Hiding) -> Self {
         let lit: Vec<CellBits> = (0..launch.face_count())
             .into_par_iter()
             .map(|face| lit::lit_cells(launch, face))
             .collect();
-        let builder = Builder {
-            launch,
-            tracer,
-            lit,
-            owners: Owners::new(tracer),
-        };
         let objects = &tracer.scene().objects;
         let bounds: Vec<Option<Bounds>> = objects.par_iter().map(|object| object.mesh.bounds()).collect();
-        let seen: Vec<usize> = casters
-            .par_iter()
-            .copied()
-            .filter(|&object| bounds[object].is_some_and(|bounds| builder.sees(object, bounds)))
-            .collect();
         let mut wanted = vec![false; objects.len()];
         casters.iter().for_each(|&object| wanted[object] = true);
         let boxes = |of_wanted: bool| {
             let chosen = (0..objects.len()).filter(|&object| wanted[object] == of_wanted);
             few(chosen.filter_map(|object| bounds[object]).collect())
         };
-        let faces = builder.mark(&boxes(true), &boxes(false), &wanted);
-        Self { faces, casters: seen }
+        let builder = Builder {
+            launch,
+            tracer,
+            owners: Owners::new(tracer),
+            boxes: boxes(true),
+            wanted: &wanted,
+            tests: AtomicU64::new(0),
+        };
+        let mut faces = builder.mark(&lit, &boxes(false));
+        let hidden = match hiding {
+            Hiding::Keep => Vec::new(),
+            Hiding::Drop => builder.hidden(&faces),
+        };
+        let mut hidden_cells = 0;
+        // Where no caster is hidden; all that the light shines on, where that is known to be everywhere.
+        let mut clear = lit;
+        for (face, (doubtful, found)) in hidden.iter().enumerate() {
+            clear[face] = faces[face].without(doubtful);
+            hidden_cells += found.cells.count();
+            faces[face] = faces[face].without(&found.cells);
+        }
+        let seen_beside = |object: usize| hidden.iter().any(|(_, found)| found.seen.contains(&object));
+        let seen: Vec<usize> = casters
+            .par_iter()
+            .copied()
+            .filter(|&object| {
+                seen_beside(object)
+                    || bounds[object].is_some_and(|bounds| builder.sees(object, bounds, &clear))
+            })
+            .collect();
+        let tests = builder.tests.into_inner();
+        Self {
+            faces,
+            casters: seen,
+            hidden_cells,
+            tests,
+        }
     }
 
     /// Whether a cell is marked.
     pub fn is_marked(&self, face: usize, column: usize, row: usize) -> bool {
         self.faces[face].get(column, row)
+    }
+
+    /// Whether any cell that a box [m] may lie in is marked.
+    pub fn is_marked_towards(&self, launch: &Launch, bounds: (DVec3, DVec3)) -> bool {
+        let none = |_: u32| false;
+        self.faces.iter().enumerate().any(|(face, marked)| {
+            let search = Search::new(launch, face, &[], &[], &none);
+            search.may_touch(bounds, marked)
+        })
+    }
+
+    /// Whether an object may bend light, or stand in its way to a caster.
+    pub fn may_concern(&self, launch: &Launch, tracer: &Tracer, object: usize) -> bool {
+        let Some(bounds) = tracer.scene().objects[object].mesh.bounds() else {
+            return false;
+        };
+        if !self.is_marked_towards(launch, bounds) || self.casters.contains(&object) {
+            return self.casters.contains(&object);
+        }
+        let mut wanted = vec![false; tracer.scene().objects.len()];
+        self.casters.iter().for_each(|&caster| wanted[caster] = true);
+        let owners = Owners::new(tracer);
+        let wanted = |triangle: u32| wanted[owners.of(triangle)];
+        self.faces.iter().enumerate().any(|(face, marked)| {
+            let search = Search::new(launch, face, &EVERYWHERE, &[], &wanted);
+            search.may_hide(bounds, marked, tracer.bvh().root())
+        })
+    }
+
+    /// Memory that it holds [bytes].
+    pub fn bytes(&self) -> u64 {
+        (self.faces.len() * CELLS_PER_SIDE * CELLS_PER_SIDE / 8) as u64
     }
 
     /// Number of marked cells.
@@ -172,9 +249,12 @@ fn few(boxes: Vec<Bounds>) -> Vec<Bounds> {
 struct Builder<'a> {
     launch: &'a Launch,
     tracer: &'a Tracer,
-    /// Cells that the light sends anything to, by face.
-    lit: Vec<CellBits>,
     owners: Owners,
+    /// Of the wanted objects.
+    boxes: Vec<Bounds>,
+    /// Whether an object is a caster.
+    wanted: &'a [bool],
+    tests: AtomicU64,
 }
 
 impl Builder<'_> {
@@ -182,47 +262,125 @@ impl Builder<'_> {
         self.tracer.bvh().root()
     }
 
-    /// Whether the light sends anything towards an object.
-    fn sees(&self, object: usize, bounds: Bounds) -> bool {
+    fn count(&self, tests: u64) {
+        // A sum: the order does not matter.
+        self.tests.fetch_add(tests, Ordering::Relaxed);
+    }
+
+    /// Whether any of the cells sees an object.
+    fn sees(&self, object: usize, bounds: Bounds, visible: &[CellBits]) -> bool {
         let wanted = |triangle: u32| self.owners.of(triangle) == object;
         let bounds = [bounds];
         let mesh = &self.tracer.scene().objects[object].mesh;
-        let faces = || self.lit.iter().enumerate();
-        let at_once = (0..mesh.triangles.len().min(TRIED_FIRST)).any(|triangle| {
-            let corners = mesh.corners(triangle);
-            faces().any(|(face, lit)| {
-                Search::new(self.launch, face, &bounds, &[], &wanted).touches(&corners, lit)
-            })
-        });
-        at_once
-            || self.root().is_some_and(|root| {
-                faces()
-                    .any(|(face, lit)| Search::new(self.launch, face, &bounds, &[], &wanted).finds(root, lit))
-            })
+        visible.iter().enumerate().any(|(face, visible)| {
+            let search = Search::new(self.launch, face, &bounds, &[], &wanted);
+            let first = 0..mesh.triangles.len().min(TRIED_FIRST);
+            let at_once = first
+                .into_iter()
+                .any(|triangle| search.touches(&mesh.corners(triangle), visible));
+            let seen = at_once || self.root().is_some_and(|root| search.finds(root, visible));
+            self.count(search.tests());
+            seen
+        })
     }
 
-    /// The lit cells of each face that a triangle of a wanted object touches.
-    fn mark(&self, boxes: &[Bounds], others: &[Bounds], objects: &[bool]) -> Vec<CellBits> {
-        let wanted = |triangle: u32| objects[self.owners.of(triangle)];
+    /// The lit cells of each face that a triangle of a wanted object touches. `others`: boxes of all other objects.
+    fn mark(&self, lit: &[CellBits], others: &[Bounds]) -> Vec<CellBits> {
+        let wanted = |triangle: u32| self.wanted[self.owners.of(triangle)];
         let mark = |(face, lit): (usize, &CellBits)| {
             let mut open = lit.clone();
-            let search = Search::new(self.launch, face, boxes, others, &wanted);
-            for (object, _) in self
-                .tracer
-                .scene()
-                .objects
-                .iter()
-                .zip(objects)
-                .filter(|(_, wanted)| **wanted)
-            {
+            let search = Search::new(self.launch, face, &self.boxes, others, &wanted);
+            let objects = self.tracer.scene().objects.iter().zip(self.wanted);
+            for (object, _) in objects.filter(|(_, wanted)| **wanted) {
                 search.close_some(&object.mesh, &mut open);
             }
             if let Some(root) = self.root() {
                 search.close(root, &mut open);
             }
+            self.count(search.tests());
             lit.without(&open)
         };
-        self.lit.par_iter().enumerate().map(mark).collect()
+        lit.par_iter().enumerate().map(mark).collect()
+    }
+
+    /// Of each face, the cells in which something may be hidden, and what is; nothing where that is so nowhere.
+    fn hidden(&self, faces: &[CellBits]) -> Vec<(CellBits, Hidden)> {
+        let hiders = self.hiders();
+        if hiders.is_empty() {
+            return Vec::new();
+        }
+        let wanted = |triangle: u32| self.wanted[self.owners.of(triangle)];
+        let find = |(face, marked): (usize, &CellBits)| {
+            let mut cells = HiddenCells::new(self.launch);
+            let mut tests = 0;
+            let facet = |&(object, triangle): &(usize, usize)| {
+                let corners = self.tracer.scene().objects[object].mesh.corners(triangle);
+                (object, Facet::new(self.launch, face, &corners))
+            };
+            for (object, facet) in hiders.iter().filter(|_| marked.count() > 0).map(facet) {
+                tests += if self.wanted[object] {
+                    cells.add_opaque_caster(object, &facet)
+                } else {
+                    cells.add_opaque(object, &facet, marked)
+                };
+            }
+            let search = Search::new(self.launch, face, &self.boxes, &[], &wanted);
+            let doubtful = cells.doubtful().clone();
+            if let Some(root) = self.root() {
+                search.visit(root, &doubtful, |triangle, corners| {
+                    let facet = Facet::new(self.launch, face, corners);
+                    tests += cells.add_caster(self.owners.of(triangle), &facet);
+                });
+            }
+            self.count(tests + search.tests());
+            let found = cells.find();
+            (doubtful, found)
+        };
+        faces.par_iter().enumerate().map(find).collect()
+    }
+
+    /// Opaque triangles, with their objects, whose plane has part of a caster's box behind it, as the light sees it: no
+    /// other can hide one. Casters come last, else the largest come first.
+    fn hiders(&self) -> Vec<(usize, usize)> {
+        let scene = self.tracer.scene();
+        let mut tests = 0;
+        let mut hiders = Vec::new();
+        for (object, item) in scene.objects.iter().enumerate() {
+            if !scene.material_of(object).surface.is_opaque() || self.is_the_only_caster(object) {
+                continue;
+            }
+            for triangle in 0..item.mesh.triangles.len() {
+                tests += 1;
+                let (corner, normal) = (item.mesh.corners(triangle)[0], item.mesh.face_normal(triangle));
+                let side = self.launch.side_of_light(corner, normal);
+                let has_behind = self.boxes.iter().any(|(low, high)| {
+                    let height = ((*low + *high) * 0.5 - corner).dot(normal);
+                    let reach = ((*high - *low) * 0.5).dot(normal.abs());
+                    side * height - reach < 0.0
+                });
+                if has_behind {
+                    hiders.push((object, triangle));
+                }
+            }
+        }
+        self.count(tests);
+        if hiders.iter().all(|(object, _)| self.wanted[*object]) {
+            return Vec::new();
+        }
+        let area_m2 = |object: usize, triangle: usize| {
+            let [a, b, c] = scene.objects[object].mesh.corners(triangle);
+            0.5 * (b - a).cross(c - a).length()
+        };
+        hiders.sort_by(|&(a, i), &(b, j)| {
+            let by_kind = self.wanted[a].cmp(&self.wanted[b]);
+            by_kind.then(area_m2(b, j).total_cmp(&area_m2(a, i)))
+        });
+        hiders
+    }
+
+    /// Nothing hides itself.
+    fn is_the_only_caster(&self, object: usize) -> bool {
+        self.wanted[object] && self.wanted.iter().filter(|wanted| **wanted).count() == 1
     }
 }
 

@@ -223,6 +223,26 @@ impl Launch {
         }
     }
 
+    /// Grows the nearer a point is to the light, and over [`Self::to_face`]'s third coordinate is linear on planes: 1, or
+    /// for a sun the distance [m] before the launch plane, negative.
+    pub fn nearness(&self, point: DVec3) -> f64 {
+        match self.domain {
+            Domain::Sphere { .. } => 1.0,
+            Domain::Plane {
+                corner, direction, ..
+            } => (corner - point).dot(direction),
+        }
+    }
+
+    /// The sign of the side of a plane that the light is on: 1 before it, -1 behind it.
+    pub fn side_of_light(&self, point: DVec3, normal: DVec3) -> f64 {
+        let height = match self.domain {
+            Domain::Sphere { position, .. } => (position - point).dot(normal),
+            Domain::Plane { direction, .. } => -direction.dot(normal),
+        };
+        height.signum()
+    }
+
     /// How the unit square lies on a face.
     pub fn mapping(&self) -> FaceMapping {
         match self.domain {

@@ -1,5 +1,8 @@
 //! Every watt accounted for.
 
+use std::iter::Sum;
+use std::ops::AddAssign;
+
 use serde::{Deserialize, Serialize};
 
 /// What was given up, by cause [W, luminous-equivalent].
@@ -15,12 +18,14 @@ pub struct Truncated {
     pub unresolved: f64,
     /// What separate refinement left open.
     pub quadrature: f64,
+    /// Light of effects that the user switched off.
+    pub switched_off: f64,
 }
 
 impl Truncated {
     /// Over all causes [W].
     pub fn total(&self) -> f64 {
-        self.depth + self.threshold + self.non_finite + self.unresolved + self.quadrature
+        self.depth + self.threshold + self.non_finite + self.unresolved + self.quadrature + self.switched_off
     }
 }
 
@@ -37,6 +42,36 @@ pub struct EnergyLedger {
     pub escaped: f64,
     /// Given up by us.
     pub truncated: Truncated,
+}
+
+impl AddAssign for Truncated {
+    fn add_assign(&mut self, other: Self) {
+        self.depth += other.depth;
+        self.threshold += other.threshold;
+        self.non_finite += other.non_finite;
+        self.unresolved += other.unresolved;
+        self.quadrature += other.quadrature;
+        self.switched_off += other.switched_off;
+    }
+}
+
+impl AddAssign for EnergyLedger {
+    fn add_assign(&mut self, other: Self) {
+        self.emitted += other.emitted;
+        self.deposited += other.deposited;
+        self.absorbed += other.absorbed;
+        self.escaped += other.escaped;
+        self.truncated += other.truncated;
+    }
+}
+
+impl<'a> Sum<&'a EnergyLedger> for EnergyLedger {
+    fn sum<I: Iterator<Item = &'a Self>>(ledgers: I) -> Self {
+        ledgers.fold(Self::default(), |mut sum, ledger| {
+            sum += *ledger;
+            sum
+        })
+    }
 }
 
 impl EnergyLedger {

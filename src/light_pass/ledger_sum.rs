@@ -27,9 +27,11 @@ pub enum Account {
     Unresolved,
     /// What surfaces passed on, less what the paths refined on their own took up; of either sign.
     Quadrature,
+    /// Belongs to an effect that is switched off.
+    SwitchedOff,
 }
 
-const ACCOUNTS: usize = Account::Quadrature as usize + 1;
+const ACCOUNTS: usize = Account::SwitchedOff as usize + 1;
 
 /// All accounts of one light, exact.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -85,6 +87,7 @@ impl LedgerSum {
                     non_finite: watts(Account::NonFinite),
                     unresolved: watts(Account::Unresolved),
                     quadrature: watts(Account::Quadrature),
+                    switched_off: watts(Account::SwitchedOff),
                 },
             },
             not_emitted_w: watts(Account::NotEmitted),

@@ -1,172 +1,254 @@
 //! The decision, once per scene and settings.
 
 use super::{Effect, EffectLine, EffectPlan, EffectSwitch, LightLine};
-use crate::scene::{Scene, SurfaceKind};
+use crate::scene::{Material, Scene, SurfaceKind};
 use crate::settings::{BakeSettings, LayerKind};
 
-/// Specular objects that each light's item buffer found, in the order of `Scene::lights`; `None` where the light was
-/// not looked at.
-pub type CastersByLight = [Option<Vec<usize>>];
+/// What a light sees of the specular objects in the scene.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Sight {
+    /// Specular objects that nothing opaque and closed seals from the light.
+    pub unsealed: usize,
+    /// Those whose light may go on to a diffuse surface.
+    pub casters: usize,
+    /// Those that the light's item buffer found, ascending.
+    pub seen: Vec<usize>,
+    /// Cells of the item buffer that opaque faces cover.
+    pub hidden_cells: u64,
+    /// All specular objects that the light's light may meet, with the object that sends it there, where the light does
+    /// not see it itself.
+    pub reached: Vec<(usize, Option<usize>)>,
+}
 
-/// Decides every effect.
-pub fn decide(scene: &Scene, settings: &BakeSettings, casters: &CastersByLight) -> EffectPlan {
-    let lights = light_lines(scene, settings, casters);
-    let lit: Vec<(usize, usize)> = casters
-        .iter()
-        .enumerate()
-        .flat_map(|(light, seen)| seen.iter().flatten().map(move |&object| (object, light)))
-        .collect();
-    let pass = light_pass(scene, settings, &lit);
-    let branch = |effect, wanted: &dyn Fn(SurfaceKind) -> bool, none: &str| {
-        let cause = lit
-            .iter()
-            .find(|(object, _)| wanted(scene.material_of(*object).surface));
-        match cause {
-            _ if !pass.on => EffectLine {
-                effect,
-                switch: settings.effects.get(effect),
-                on: false,
-                reason: "the light pass is off".into(),
-            },
-            Some(&(object, light)) => EffectLine {
-                effect,
-                switch: settings.effects.get(effect),
-                on: true,
-                reason: lit_by(scene, object, light),
-            },
-            None => EffectLine {
-                effect,
-                switch: settings.effects.get(effect),
-                on: false,
-                reason: none.into(),
-            },
-        }
+/// Decides every effect. `sights` in the order of `Scene::lights`.
+pub fn decide(scene: &Scene, settings: &BakeSettings, sights: &[Sight]) -> EffectPlan {
+    let decision = Decision {
+        scene,
+        settings,
+        sights,
+        caustic: wants_caustics(settings),
     };
-    let refraction = branch(
-        Effect::Refraction,
-        &|kind| matches!(kind, SurfaceKind::Dielectric | SurfaceKind::ThinWall),
-        "no lit surface lets light through",
-    );
-    let reflection = branch(
-        Effect::Reflection,
-        &|kind| kind.is_specular(),
-        "no lit surface is specular",
-    );
+    let pass = decision.light_pass();
+    let on_paths = |effect, wanted: &dyn Fn(&Material) -> bool, none: &str| {
+        decision.on_paths(effect, pass.on, wanted, none)
+    };
+    let lets_through = |material: &Material| !material.surface.is_opaque();
+    let absorbs = |material: &Material| {
+        let volume = material.volume.as_ref();
+        material.surface == SurfaceKind::Dielectric
+            && volume.is_some_and(|volume| volume.attenuation_distance_m.is_finite())
+    };
     let effects = vec![
-        refraction,
-        reflection,
-        absorption(scene, &pass),
-        direct(scene, settings),
+        on_paths(
+            Effect::Refraction,
+            &lets_through,
+            "no lit surface lets light through",
+        ),
+        on_paths(
+            Effect::Reflection,
+            &|material| material.surface.is_specular(),
+            "no lit surface is specular",
+        ),
+        on_paths(
+            Effect::Absorption,
+            &absorbs,
+            "no lit solid has a finite attenuation distance",
+        ),
+        on_paths(
+            Effect::Textures,
+            &|material| material.surface != SurfaceKind::Mixed && material.base_colour_texture.is_some(),
+            "no lit mirror or glass has a texture",
+        ),
+        decision.direct(),
+        decision.indirect(),
     ];
     EffectPlan {
         effects: std::iter::once(pass).chain(effects).collect(),
-        lights,
+        lights: decision.lights(),
     }
 }
 
-fn lit_by(scene: &Scene, object: usize, light: usize) -> String {
-    format!(
-        "`{}` is lit by `{}`",
-        scene.objects[object].name, scene.lights[light].name
-    )
+/// Whether the caustic layer is to be baked at all.
+pub fn wants_caustics(settings: &BakeSettings) -> bool {
+    is_wanted(settings, Effect::LightPass, LayerKind::Caustic)
 }
 
-fn light_pass(scene: &Scene, settings: &BakeSettings, lit: &[(usize, usize)]) -> EffectLine {
-    let line = |on, reason: String| EffectLine {
-        effect: Effect::LightPass,
-        switch: settings.effects.get(Effect::LightPass),
-        on,
-        reason,
-    };
-    if !settings.layers.contains(&LayerKind::Caustic) {
-        return line(false, "the caustic layer is not asked for".into());
-    }
-    if scene.lights.is_empty() {
-        return line(false, "the scene has no light".into());
-    }
-    if !scene
-        .objects
-        .iter()
-        .any(|object| scene.materials[object.material].surface.is_specular())
-    {
-        return line(false, "nothing in the scene is specular".into());
-    }
-    if !scene
-        .objects
-        .iter()
-        .any(|object| scene.materials[object.material].surface.is_receiver())
-    {
-        return line(false, "nothing in the scene can receive light diffusely".into());
-    }
-    match lit.first() {
-        Some(&(object, light)) => line(true, lit_by(scene, object, light)),
-        None => line(false, "no light sees a specular surface".into()),
+/// Whether a layer is to be baked: as its effect is switched, else as the layers say.
+fn is_wanted(settings: &BakeSettings, effect: Effect, layer: LayerKind) -> bool {
+    match settings.effects.get(effect) {
+        EffectSwitch::On => true,
+        EffectSwitch::Off => false,
+        EffectSwitch::Auto => settings.layers.contains(&layer),
     }
 }
 
-fn light_lines(scene: &Scene, settings: &BakeSettings, casters: &CastersByLight) -> Vec<LightLine> {
-    let asked = settings.layers.contains(&LayerKind::Caustic);
-    scene
-        .lights
-        .iter()
-        .zip(casters)
-        .map(|(light, seen)| {
-            let names: Vec<String> = seen
-                .iter()
-                .flatten()
-                .map(|&object| format!("`{}`", scene.objects[object].name))
-                .collect();
-            let reason = match (asked, seen) {
-                (false, _) => "the caustic layer is not asked for".into(),
-                (true, None) => "there is nothing specular to aim at, or nothing to receive it".into(),
-                (true, Some(_)) if names.is_empty() => "it sees nothing specular".into(),
-                (true, Some(_)) if names.len() > 3 => {
-                    format!("sees {} and {} more", names[..3].join(", "), names.len() - 3)
-                }
-                (true, Some(_)) => format!("sees {}", names.join(", ")),
-            };
-            LightLine {
-                light: light.name.clone(),
-                on: asked && !names.is_empty(),
-                reason,
+/// Why an effect is off that the user switched off.
+const SWITCHED_OFF: &str = "switched off by the user";
+
+/// Why an effect is on that nothing calls for.
+const FORCED_ON: &str = "switched on by the user, though nothing calls for it";
+
+struct Decision<'a> {
+    scene: &'a Scene,
+    settings: &'a BakeSettings,
+    sights: &'a [Sight],
+    /// Whether the caustic layer is wanted.
+    caustic: bool,
+}
+
+impl Decision<'_> {
+    fn line(&self, effect: Effect, on: bool, reason: impl Into<String>) -> EffectLine {
+        EffectLine {
+            effect,
+            switch: self.settings.effects.get(effect),
+            on,
+            reason: reason.into(),
+        }
+    }
+
+    /// Whether any object has a material that `wanted` accepts.
+    fn has(&self, wanted: impl Fn(SurfaceKind) -> bool) -> bool {
+        (0..self.scene.objects.len()).any(|object| wanted(self.scene.material_of(object).surface))
+    }
+
+    fn light_pass(&self) -> EffectLine {
+        let effect = Effect::LightPass;
+        let line = |on, reason: &str| self.line(effect, on, reason);
+        if self.settings.effects.get(effect) == EffectSwitch::Off {
+            return line(false, SWITCHED_OFF);
+        }
+        if !self.caustic {
+            return line(false, "the caustic layer is not asked for");
+        }
+        if self.scene.lights.is_empty() {
+            return line(false, "the scene has no light");
+        }
+        if !self.has(SurfaceKind::is_specular) {
+            return line(false, "nothing in the scene is specular");
+        }
+        if !self.has(SurfaceKind::is_receiver) {
+            return line(false, "nothing in the scene can receive light diffusely");
+        }
+        let lit = self.lit_objects().find(|(_, _, way)| way.is_none());
+        match lit {
+            Some((object, light, way)) => line(true, &self.lit_by(object, light, way)),
+            None => line(
+                false,
+                "no light sees a specular surface that could send light to a diffuse one",
+            ),
+        }
+    }
+
+    /// Objects that light may meet: object, light, and what sends it there.
+    fn lit_objects(&self) -> impl Iterator<Item = (usize, usize, Option<usize>)> {
+        let shining = |light: usize| self.scene.lights[light].strength().max_channel() > 0.0;
+        let sights = self.sights.iter().enumerate();
+        sights
+            .filter(move |(light, _)| shining(*light))
+            .flat_map(|(light, sight)| {
+                let reached = sight.reached.iter();
+                reached.map(move |&(object, way)| (object, light, way))
+            })
+    }
+
+    fn lit_by(&self, object: usize, light: usize, way: Option<usize>) -> String {
+        let name = |object: usize| &self.scene.objects[object].name;
+        let by_way = way.map_or(String::new(), |way| format!(" by way of `{}`", name(way)));
+        let (object, light) = (name(object), &self.scene.lights[light].name);
+        format!("`{object}` is lit by `{light}`{by_way}")
+    }
+
+    /// An effect of the paths of the light pass: what is lit calls for it.
+    fn on_paths(
+        &self,
+        effect: Effect,
+        pass: bool,
+        wanted: &dyn Fn(&Material) -> bool,
+        none: &str,
+    ) -> EffectLine {
+        let calls = |object: usize| wanted(self.scene.material_of(object));
+        let cause = self.lit_objects().find(|&(object, ..)| calls(object));
+        match (self.settings.effects.get(effect), cause) {
+            (EffectSwitch::Off, _) => self.line(effect, false, SWITCHED_OFF),
+            _ if !pass => self.line(effect, false, "the light pass is off"),
+            (_, Some((object, light, way))) => self.line(effect, true, self.lit_by(object, light, way)),
+            (EffectSwitch::On, None) => self.line(effect, true, FORCED_ON),
+            (EffectSwitch::Auto, None) => self.line(effect, false, none),
+        }
+    }
+
+    fn direct(&self) -> EffectLine {
+        let effect = Effect::Direct;
+        let wanted = is_wanted(self.settings, effect, LayerKind::Direct);
+        match self.settings.effects.get(effect) {
+            EffectSwitch::Off => self.line(effect, false, SWITCHED_OFF),
+            _ if !wanted => self.line(effect, false, "the direct layer is not asked for"),
+            _ if self.scene.lights.is_empty() => self.line(effect, false, "the scene has no light"),
+            _ if !self.has(SurfaceKind::is_receiver) => {
+                self.line(effect, false, "nothing in the scene can receive light diffusely")
             }
-        })
-        .collect()
-}
-
-fn absorption(scene: &Scene, pass: &EffectLine) -> EffectLine {
-    let line = |on, reason: String| EffectLine {
-        effect: Effect::Absorption,
-        switch: EffectSwitch::Auto,
-        on,
-        reason,
-    };
-    if !pass.on {
-        return line(false, "the light pass is off".into());
+            EffectSwitch::On => self.line(effect, true, "switched on by the user"),
+            EffectSwitch::Auto => self.line(effect, true, "the direct layer is asked for"),
+        }
     }
-    let absorbing = scene.objects.iter().find(|object| {
-        scene.materials[object.material]
-            .volume
-            .is_some_and(|volume| volume.attenuation_distance_m.is_finite())
-    });
-    match absorbing {
-        Some(object) => line(true, format!("`{}` has an attenuation distance", object.name)),
-        None => line(false, "no solid has a finite attenuation distance".into()),
-    }
-}
 
-fn direct(scene: &Scene, settings: &BakeSettings) -> EffectLine {
-    let line = |on, reason: &str| EffectLine {
-        effect: Effect::Direct,
-        switch: settings.effects.get(Effect::Direct),
-        on,
-        reason: reason.into(),
-    };
-    if !settings.layers.contains(&LayerKind::Direct) {
-        line(false, "the direct layer is not asked for")
-    } else if scene.lights.is_empty() {
-        line(false, "the scene has no light")
-    } else {
-        line(true, "the direct layer is asked for")
+    fn indirect(&self) -> EffectLine {
+        // The settings refuse it where it is asked for.
+        self.line(
+            Effect::Indirect,
+            false,
+            "not asked for, and not available in this version",
+        )
+    }
+
+    fn lights(&self) -> Vec<LightLine> {
+        let lights = self.scene.lights.iter().enumerate();
+        lights
+            .map(|(light, source)| {
+                let sight = self.sights.get(light);
+                let shines = source.strength().max_channel() > 0.0;
+                let seen = sight.map_or(&[][..], |sight| &sight.seen);
+                LightLine {
+                    light: source.name.clone(),
+                    on: self.caustic && shines && !seen.is_empty(),
+                    reason: self.light_reason(shines, sight),
+                }
+            })
+            .collect()
+    }
+
+    fn light_reason(&self, shines: bool, sight: Option<&Sight>) -> String {
+        let Some(sight) = sight.filter(|_| self.caustic) else {
+            return "the caustic layer is not asked for".into();
+        };
+        if !shines {
+            return "it does not shine".into();
+        }
+        if !self.has(SurfaceKind::is_specular) {
+            return "nothing in the scene is specular".into();
+        }
+        if sight.unsealed == 0 {
+            return "opaque bodies seal it from everything specular".into();
+        }
+        if sight.casters == 0 {
+            return "nothing specular that it could light can send light to a diffuse surface".into();
+        }
+        if sight.seen.is_empty() {
+            let why = if sight.hidden_cells > 0 {
+                "opaque surfaces hide everything specular from it"
+            } else {
+                "it sees nothing specular"
+            };
+            return why.into();
+        }
+        let names: Vec<String> = sight
+            .seen
+            .iter()
+            .map(|&object| format!("`{}`", self.scene.objects[object].name))
+            .collect();
+        match names.len() {
+            0..=3 => format!("sees {}", names.join(", ")),
+            count => format!("sees {} and {} more", names[..3].join(", "), count - 3),
+        }
     }
 }

@@ -1,10 +1,13 @@
 //! Which effects a scene calls for, and why.
 
+mod compartments;
 mod decide;
 mod eye;
+mod reach;
 
-pub use decide::{CastersByLight, decide};
+pub use decide::{Sight, decide, wants_caustics};
 pub use eye::chains;
+pub use reach::Reach;
 
 use serde::{Deserialize, Serialize};
 

@@ -37,6 +37,11 @@ impl SurfaceKind {
         self != Self::Diffuse
     }
 
+    /// Whether no light goes through it.
+    pub fn is_opaque(self) -> bool {
+        !matches!(self, Self::Dielectric | Self::ThinWall)
+    }
+
     /// Whether it takes light into an illumination map.
     pub fn is_receiver(self) -> bool {
         matches!(self, Self::Diffuse | Self::Mixed)

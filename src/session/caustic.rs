@@ -2,6 +2,7 @@
 
 use std::time::{Duration, Instant};
 
+use super::effects::EffectMeter;
 use super::finish::Shown;
 use super::light_level::{KeptError, LevelKey, LightLevel, LightState, LightStates, Sizes};
 use super::sizes::MapSizes;
@@ -46,10 +47,12 @@ pub(super) struct CausticLayer<'a> {
 }
 
 /// Where the bake of the layer stands.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct CausticOutcome {
     /// Of this layer, this time.
     pub(super) counts: BakeCounts,
+    /// The same by effect.
+    pub(super) meter: EffectMeter,
     /// Maps coarser than they should be.
     pub(super) warnings: Vec<Warning>,
     /// Why no finer level came, where that was not the end of the lattice.
@@ -80,8 +83,8 @@ struct Climb {
     done: bool,
 }
 
-/// Takes a picture that is not the last: levels, what they took so far, and the clock.
-pub(super) type ShowLevels<'a> = dyn FnMut(&[Shown], BakeCounts, &mut Clock) -> Result<()> + 'a;
+/// Takes a picture that is not the last: levels, where the bake stands, and the clock.
+pub(super) type ShowLevels<'a> = dyn FnMut(&[Shown], &CausticOutcome, &mut Clock) -> Result<()> + 'a;
 
 /// Works on a bake in its course.
 pub(super) struct Course<'a> {
@@ -140,7 +143,7 @@ impl CausticLayer<'_> {
                 .zip(&climbs)
                 .filter_map(|(light, climb)| Some((light.light, climb.levels.last()?)))
                 .collect();
-            show(&levels, course.outcome.counts, course.clock)?;
+            show(&levels, course.outcome, course.clock)?;
         }
         outcome.stopped = self.stopped(&climbs, &limited);
         for (light, climb) in lights.iter().zip(climbs) {
@@ -293,6 +296,8 @@ impl CausticOutcome {
         self.counts.splats += report.splats;
         self.counts.cells += report.cells;
         self.counts.receiver_queries += report.receiver_queries;
+        self.meter.paths += report.paths;
+        self.meter.deposits += report.deposits;
         clock.trace.add(report.trace_s);
         clock.deposit.add(report.deposit_s);
     }

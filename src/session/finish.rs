@@ -76,6 +76,7 @@ impl Finish<'_> {
             maps,
             plan: self.plan.clone(),
             effects: Vec::new(),
+            item_buffers: Vec::new(),
             ledgers,
             counts: outcome.counts,
             timings_s: Timings::default(),

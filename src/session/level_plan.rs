@@ -15,8 +15,8 @@ use crate::light_pass::caustic::path::PathLimits;
 use crate::light_pass::caustic::setup::AimedLight;
 use crate::light_pass::caustic::statistics::FootprintStatistics;
 use crate::light_pass::wavefront::refine::Round;
-use crate::plan::Effect;
 use crate::settings::{BakeSettings, Estimator, Footprint, Kernel, MapResolution, Sigma};
+use crate::transport::EffectSet;
 
 /// The coarsest lattice has fewer rays than this [rays/sr]: it is the first picture.
 const FIRST_PICTURE_PER_SR: f64 = 1_600.0;
@@ -66,7 +66,7 @@ impl CausticLayer<'_> {
     fn lattice_size(&self, light: &AimedLight) -> (usize, usize) {
         light
             .launch
-            .lattice_size(self.density_per_sr(light), self.aim.reach_m)
+            .lattice_size(self.density_per_sr(light), light.reach_m)
     }
 
     /// Density of a light's lattice [rays/sr]: as it is set or, with a target, so much that a small caster has its share
@@ -78,7 +78,7 @@ impl CausticLayer<'_> {
         };
         let wanted = (CELLS_FOR_AN_ERROR / target.max(STARTING_TARGET)).max(LEAST_CELLS);
         // A lattice of 1 ray/sr has as many cells on casters as this; suns scale it by their reach.
-        let (columns, rows) = light.launch.lattice_size(UNIT_DENSITY_PER_SR, self.aim.reach_m);
+        let (columns, rows) = light.launch.lattice_size(UNIT_DENSITY_PER_SR, light.reach_m);
         let whole = (columns * rows * light.launch.face_count()) as f64;
         let share = light.item_buffer.marked_share(&light.launch);
         set.max(UNIT_DENSITY_PER_SR * wanted / (whole * share))
@@ -124,7 +124,7 @@ impl CausticLayer<'_> {
         }
         TraceKey {
             settings: paths,
-            absorption: self.plan.is_on(Effect::Absorption),
+            effects: EffectSet::of(self.plan),
             size,
             rounds: rounds.to_vec(),
         }
@@ -180,7 +180,7 @@ impl CausticLayer<'_> {
         PathLimits {
             max_depth: self.settings.max_depth,
             branch_threshold: self.settings.path_threshold(),
-            absorption: self.plan.is_on(Effect::Absorption),
+            effects: EffectSet::of(self.plan),
         }
     }
 

@@ -14,6 +14,7 @@ use crate::light_pass::wavefront::overreach::Overreach;
 use crate::light_pass::wavefront::pass::TracedLight;
 use crate::light_pass::wavefront::refine::Round;
 use crate::settings::BakeSettings;
+use crate::transport::EffectSet;
 
 /// Sizes of maps [texels across, down], by object.
 pub(super) type Sizes = BTreeMap<usize, (usize, usize)>;
@@ -23,8 +24,8 @@ pub(super) type Sizes = BTreeMap<usize, (usize, usize)>;
 pub(super) struct TraceKey {
     /// With what does not matter to paths at its default.
     pub(super) settings: BakeSettings,
-    /// Whether any volume absorbs.
-    pub(super) absorption: bool,
+    /// What they may need.
+    pub(super) effects: EffectSet,
     /// Cells across and down each face.
     pub(super) size: (usize, usize),
     /// Where cells are divided further, round by round.
@@ -102,6 +103,11 @@ impl LightStates {
         self.statistics = None;
     }
 
+    /// Memory of all that is kept [bytes].
+    pub(super) fn bytes(&self) -> u64 {
+        self.by_light.values().map(LightState::bytes).sum()
+    }
+
     /// All states.
     pub(super) fn iter_mut(&mut self) -> impl Iterator<Item = &mut LightState> {
         self.by_light.values_mut()
@@ -122,7 +128,8 @@ pub(super) struct LightState {
 }
 
 impl LightLevel {
-    fn bytes(&self) -> u64 {
+    /// Memory of its maps and paths [bytes].
+    pub(super) fn bytes(&self) -> u64 {
         let texels = self
             .maps
             .iter()
@@ -133,6 +140,13 @@ impl LightLevel {
 }
 
 impl LightState {
+    /// Memory of all that is kept [bytes].
+    pub(super) fn bytes(&self) -> u64 {
+        self.rays.bytes()
+            + self.levels.iter().map(LightLevel::bytes).sum::<u64>()
+            + self.arrivals.as_ref().map_or(0, |(_, arrivals)| arrivals.bytes())
+    }
+
     /// Forgets rays that start elsewhere, and what is more than so many bytes.
     pub(super) fn begin(&mut self, launch: &Launch, kept_bytes: u64) {
         if self.launch.as_ref() != Some(launch) {

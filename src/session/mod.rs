@@ -2,6 +2,7 @@
 
 mod caustic;
 mod direct_cache;
+mod effects;
 mod finish;
 mod level_plan;
 mod light_level;
@@ -14,11 +15,12 @@ mod wavefront_level;
 use std::sync::Arc;
 use std::time::Instant;
 
-pub use result::{BakeCounts, BakeResult, EffectCounts, EffectReport, StopReason, Timings};
+pub use result::{BakeCounts, BakeResult, EffectCounts, EffectReport, ItemBufferReport, StopReason, Timings};
 
+use crate::effect::EffectSwitch;
 use crate::error::{Error, Result};
 use crate::light_pass::caustic::pass::{Seconds, Stopwatch};
-use crate::light_pass::caustic::setup::Aim;
+use crate::light_pass::caustic::setup::{Aim, Aiming};
 use crate::plan::{self, Effect, EffectPlan};
 use crate::progress::{Control, Progress, Stage};
 use crate::scene::Scene;
@@ -37,7 +39,7 @@ use sizes::MapSizes;
 pub struct BakeSession {
     scene: Arc<Scene>,
     tracer: Option<Arc<Tracer>>,
-    aim: Option<(ItemBufferKind, Arc<Aim>)>,
+    aim: Option<((ItemBufferKind, Aiming), Arc<Aim>)>,
     sizes: MapSizes,
     lights: LightStates,
     direct: DirectCache,
@@ -154,8 +156,8 @@ impl BakeSession {
     /// Settings outside their ranges.
     pub fn estimate(&mut self, settings: &BakeSettings) -> Result<BakeEstimate> {
         settings.validate()?;
-        let aim = self.aim(settings.item_buffer);
-        let plan = plan::decide(&self.scene, settings, &aim.casters);
+        let aim = self.aim(settings);
+        let plan = plan::decide(&self.scene, settings, &aim.sights);
         let mut estimate = BakeEstimate {
             plan,
             rays: 0,
@@ -163,7 +165,7 @@ impl BakeSession {
         };
         if estimate.plan.is_on(Effect::LightPass) {
             for light in &aim.lights {
-                let size = light.launch.lattice_size(settings.density_per_sr, aim.reach_m);
+                let size = light.launch.lattice_size(settings.density_per_sr, light.reach_m);
                 estimate.rays += light.item_buffer.lattice_cells(light.launch.face_count(), size);
                 estimate.item_buffer_cells += light.item_buffer.marked_cells();
             }
@@ -214,12 +216,21 @@ impl BakeSession {
         pool.install(|| self.bake_here(settings, progress, control, level))
     }
 
-    fn aim(&mut self, kind: ItemBufferKind) -> Arc<Aim> {
+    fn aim(&mut self, settings: &BakeSettings) -> Arc<Aim> {
+        if !plan::wants_caustics(settings) {
+            // Nobody looks for what nobody wants to see.
+            return Arc::default();
+        }
+        let aiming = match settings.effects.get(Effect::LightPass) {
+            EffectSwitch::On => Aiming::Everything,
+            EffectSwitch::Auto | EffectSwitch::Off => Aiming::Reachable,
+        };
+        let wanted = (settings.item_buffer, aiming);
         match &self.aim {
-            Some((cached, aim)) if *cached == kind => aim.clone(),
+            Some((known, aim)) if *known == wanted => aim.clone(),
             _ => {
-                let aim = Arc::new(Aim::take(&self.tracer(), kind));
-                self.aim = Some((kind, aim.clone()));
+                let aim = Arc::new(Aim::take(&self.tracer(), settings.item_buffer, aiming));
+                self.aim = Some((wanted, aim.clone()));
                 aim
             }
         }
@@ -238,8 +249,10 @@ impl BakeSession {
         let tracer = clock.time(|clock| &mut clock.build, || self.tracer());
         let began = Instant::now();
         progress.advance(Stage::Plan, 0, 1);
-        let aim = clock.time(|clock| &mut clock.plan, || self.aim(settings.item_buffer));
-        let plan = plan::decide(&self.scene, settings, &aim.casters);
+        let known = self.aim.as_ref().map(|(_, aim)| Arc::clone(aim));
+        let aim = clock.time(|clock| &mut clock.plan, || self.aim(settings));
+        let is_new = known.is_none_or(|known| !Arc::ptr_eq(&known, &aim));
+        let plan = plan::decide(&self.scene, settings, &aim.sights);
         let finish = Finish {
             scene: &self.scene,
             sizes: &self.sizes,
@@ -247,7 +260,9 @@ impl BakeSession {
             plan: &plan,
         };
         let (lights, direct) = (&mut self.lights, &mut self.direct);
+        let item_buffer_tests = if is_new { aim.tests() } else { 0 };
         let mut outcome = CausticOutcome::default();
+        let mut lamps = DirectWork::default();
         if plan.is_on(Effect::LightPass) {
             let layer = CausticLayer {
                 tracer: &tracer,
@@ -260,27 +275,22 @@ impl BakeSession {
                 began,
             };
             let mut is_first = true;
-            outcome = layer.bake(lights, &mut clock, &mut |levels, counts, clock| {
+            outcome = layer.bake(lights, &mut clock, &mut |levels, so_far, clock| {
                 let Some(level) = &mut level else {
                     return Ok(());
-                };
-                let mut so_far = CausticOutcome {
-                    counts,
-                    ..CausticOutcome::default()
                 };
                 let charts = finish.charts(levels)?;
                 // The first picture is to come soon: direct light follows with the second.
                 let waits =
                     std::mem::take(&mut is_first) && !direct.knows(finish.scene.lights.len(), &charts);
                 if !waits && plan.is_on(Effect::Direct) {
-                    let watch = Stopwatch::start();
-                    let report = direct.complete(&tracer, &charts, progress, control);
-                    so_far.counts.shadow_rays += report.shadow_rays;
-                    clock.trace.add(watch.elapsed());
+                    lamps.shine(&tracer, &charts, direct, (progress, control));
                 }
+                let mut so_far = lamps.added_to(so_far);
+                so_far.counts.item_buffer_tests = item_buffer_tests;
                 let mut result = finish.run(levels, &charts, direct, &so_far);
                 clock.total = whole.elapsed();
-                (result.timings_s, result.cpu_s) = clock.timings();
+                account(&mut result, &finish, &aim, &so_far, &lamps.clock(clock));
                 level(result);
                 Ok(())
             })?;
@@ -292,23 +302,70 @@ impl BakeSession {
             .collect();
         let charts = finish.charts(&finished)?;
         if plan.is_on(Effect::Direct) {
-            let watch = Stopwatch::start();
-            let report = direct.complete(&tracer, &charts, progress, control);
-            outcome.counts.shadow_rays += report.shadow_rays;
-            if !report.complete {
+            let complete = lamps.shine(&tracer, &charts, direct, (progress, control));
+            if !complete {
                 outcome.stopped = Some(Stopped::Cancelled);
             }
-            clock.trace.add(watch.elapsed());
         }
+        let mut outcome = lamps.added_to(&outcome);
+        outcome.counts.item_buffer_tests = item_buffer_tests;
+        outcome.meter.direct_bytes = direct.bytes();
+        outcome.meter.caustic_bytes = lights.bytes();
+        let mut clock = lamps.clock(&clock);
         let watch = Stopwatch::start();
         let mut result = finish.run(&finished, &charts, direct, &outcome);
         clock.deposit.add(watch.elapsed());
         clock.total = whole.elapsed();
-        (result.timings_s, result.cpu_s) = clock.timings();
+        account(&mut result, &finish, &aim, &outcome, &clock);
         Ok(result)
     }
 }
 
+/// Writes down what a bake took so far.
+fn account(result: &mut BakeResult, finish: &Finish, aim: &Aim, outcome: &CausticOutcome, clock: &Clock) {
+    (result.timings_s, result.cpu_s) = clock.timings();
+    result.effects = effects::reports(finish.scene, finish.plan, aim, outcome, clock);
+    result.item_buffers = effects::item_buffers(finish.scene, aim);
+}
+
+/// Direct light in the course of a bake.
+#[derive(Clone, Copy, Debug, Default)]
+struct DirectWork {
+    shadow_rays: u64,
+    seconds: Seconds,
+}
+
+impl DirectWork {
+    /// Bakes what is missing; false where it was cancelled.
+    fn shine(
+        &mut self,
+        tracer: &Tracer,
+        charts: &finish::Charts,
+        direct: &mut DirectCache,
+        (progress, control): (&dyn Progress, &Control),
+    ) -> bool {
+        let watch = Stopwatch::start();
+        let report = direct.complete(tracer, charts, progress, control);
+        self.shadow_rays += report.shadow_rays;
+        self.seconds.add(watch.elapsed());
+        report.complete
+    }
+
+    /// The bake with this.
+    fn added_to(&self, outcome: &CausticOutcome) -> CausticOutcome {
+        let mut both = outcome.clone();
+        both.counts.shadow_rays += self.shadow_rays;
+        both.meter.direct_s.add(self.seconds);
+        both
+    }
+
+    /// The clock with this.
+    fn clock(&self, clock: &Clock) -> Clock {
+        let mut both = *clock;
+        both.trace.add(self.seconds);
+        both
+    }
+}
 /// Both clocks of every stage.
 #[derive(Clone, Copy, Debug, Default)]
 struct Clock {

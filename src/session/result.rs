@@ -30,6 +30,8 @@ pub struct BakeCounts {
     pub rays: u64,
     /// Rays traced to build item buffers.
     pub item_buffer_rays: u64,
+    /// Nodes, triangles and cells tested to build item buffers.
+    pub item_buffer_tests: u64,
     /// Closest-hit queries along light paths.
     pub segments: u64,
     /// Any-hit queries of the direct layer.
@@ -51,8 +53,8 @@ pub struct EffectCounts {
     pub deposits: u64,
     /// Memory that is held for it [bytes].
     pub bytes: u64,
-    /// CPU time [ms]; where effects share loops, by their share of rays and deposits.
-    pub cpu_ms: f64,
+    /// CPU time [ms]; where effects share loops, by their share of rays and deposits. `None` where it is a part of others.
+    pub cpu_ms: Option<f64>,
     /// Render pipelines created for it; `None` where it is none of the eye pass.
     pub pipelines: Option<u64>,
     /// Time on the graphics device [ms]; `None` where it is none of the eye pass or the device cannot tell.
@@ -67,6 +69,21 @@ pub struct EffectReport {
     pub line: EffectLine,
     /// What it took.
     pub counts: EffectCounts,
+}
+
+/// What it took to look around from one light: tests, no rays.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ItemBufferReport {
+    /// The light's name.
+    pub light: String,
+    /// Cells that may see something specular.
+    pub cells: u64,
+    /// Cells that would, if opaque surfaces did not cover them.
+    pub hidden_cells: u64,
+    /// Nodes, triangles and cells that were tested.
+    pub tests: u64,
+    /// CPU time [ms].
+    pub cpu_ms: f64,
 }
 
 /// Seconds per stage; used for wall-clock times and for CPU times of the whole process.
@@ -95,6 +112,8 @@ pub struct BakeResult {
     pub plan: EffectPlan,
     /// What each effect took, in the order of the plan.
     pub effects: Vec<EffectReport>,
+    /// What looking around from each light took.
+    pub item_buffers: Vec<ItemBufferReport>,
     /// Energy of the caustic layer, one per light with its name.
     pub ledgers: Vec<LightLedger>,
     /// Counters.

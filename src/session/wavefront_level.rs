@@ -108,7 +108,7 @@ impl CausticLayer<'_> {
         let cells = |size: (usize, usize)| size.0 as f64 * size.1 as f64;
         let meant = light
             .launch
-            .lattice_size(self.map_density_per_sr(), self.aim.reach_m);
+            .lattice_size(self.map_density_per_sr(), light.reach_m);
         report.statistics.refined(cells(meant) / cells(size))
     }
 
@@ -132,7 +132,7 @@ impl CausticLayer<'_> {
     /// Bodies that are small beside the cells of a lattice.
     fn small_bodies(&self, light: &AimedLight, (columns, rows): (usize, usize)) -> SmallBodies {
         let cell = DVec2::new(1.0 / columns as f64, 1.0 / rows as f64);
-        SmallBodies::find(self.tracer, &light.launch, cell)
+        SmallBodies::find(self.tracer, &light.launch, light.visible(), cell)
     }
 
     fn wavefront_lattice<'a>(
@@ -144,14 +144,13 @@ impl CausticLayer<'_> {
         control: &'a Control,
     ) -> WavefrontLattice<'a> {
         WavefrontLattice {
-            tracer: StrandTracer {
-                tracer: self.tracer,
-                launch: &light.launch,
-                limits: self.limits(),
-                steps: [1.0 / size.0 as f64, 1.0 / size.1 as f64],
-                kept: None,
+            tracer: StrandTracer::new(
+                self.tracer,
+                &light.launch,
+                self.limits(),
+                [1.0 / size.0 as f64, 1.0 / size.1 as f64],
                 control,
-            },
+            ),
             item_buffer: &light.item_buffer,
             size,
             unit,

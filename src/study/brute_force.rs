@@ -20,7 +20,7 @@ use crate::illumination::parametrisation::{DEFAULT_NOMINAL_SIDE, parametrise};
 use crate::illumination::{Chart, IlluminationMap, Layer};
 use crate::light_pass::caustic::pass::Stopwatch;
 use crate::light_pass::caustic::path::{Arrival, PathLimits, PathTracer};
-use crate::light_pass::caustic::setup::{Aim, AimedLight};
+use crate::light_pass::caustic::setup::{Aim, AimedLight, Aiming};
 use crate::light_pass::ledger_sum::{Account, LedgerSum};
 use crate::optics::LinearSrgb;
 use crate::plan::{self, Effect, EffectPlan};
@@ -28,7 +28,7 @@ use crate::progress::{Control, Progress, Stage};
 use crate::scene::Scene;
 use crate::session::{BakeCounts, BakeResult, StopReason, Timings};
 use crate::settings::{BakeSettings, LayerKind, MapResolution};
-use crate::transport::Tracer;
+use crate::transport::{EffectSet, Everything, Tracer};
 
 /// Least and most rays of a run.
 pub const RAYS: std::ops::RangeInclusive<u64> = 1_000..=1_000_000_000_000;
@@ -90,8 +90,8 @@ fn run(
     let scene = tracer.scene();
     let watch = Stopwatch::start();
     progress.advance(Stage::Plan, 0, 1);
-    let aim = Aim::take(tracer, settings.item_buffer);
-    let plan = plan::decide(scene, settings, &aim.casters);
+    let aim = Aim::take(tracer, settings.item_buffer, Aiming::Everything);
+    let plan = plan::decide(scene, settings, &aim.sights);
     let lights: &[AimedLight] = if plan.is_on(Effect::LightPass) {
         &aim.lights
     } else {
@@ -102,7 +102,7 @@ fn run(
         limits: PathLimits {
             max_depth: settings.max_depth,
             branch_threshold: settings.path_threshold(),
-            absorption: plan.is_on(Effect::Absorption),
+            effects: EffectSet::EVERYTHING,
         },
         unit: unit(scene, lights)?,
         targets: targets(scene, size),
@@ -222,7 +222,7 @@ impl Run<'_> {
                 let ray = light.launch.ray(face, square);
                 let flux_w = light.launch.cell_flux_w(low, high, ray.direction) * strength;
                 tally.rays += 1;
-                paths.trace(ray, flux_w, |arrival| {
+                paths.trace::<Everything>(ray, flux_w, |arrival| {
                     let count = self.unit.count(arrival.flux_w);
                     deposited.book(self.deposit(half, &arrival, count), count);
                 });
@@ -348,6 +348,7 @@ fn empty_result(plan: EffectPlan, nothing_to_do: bool) -> BakeResult {
         maps: Vec::new(),
         plan,
         effects: Vec::new(),
+        item_buffers: Vec::new(),
         ledgers: Vec::new(),
         counts: BakeCounts::default(),
         timings_s: Timings::default(),

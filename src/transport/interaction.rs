@@ -3,6 +3,7 @@
 
 use glam::DVec3;
 
+use super::effects::{Everything, PathEffects};
 use super::{MediumStack, SurfaceHit, Tracer};
 use crate::geometry::Ray;
 use crate::optics::{LinearSrgb, fresnel, refraction};
@@ -53,6 +54,19 @@ pub struct Interaction {
     pub deposit: LinearSrgb,
     /// Turned into heat here.
     pub absorbed: LinearSrgb,
+    /// What a branch would have taken that is switched off.
+    pub switched_off: LinearSrgb,
+}
+
+impl Interaction {
+    /// No light is anywhere yet.
+    const NOTHING: Self = Self {
+        reflection: None,
+        transmission: None,
+        deposit: LinearSrgb::BLACK,
+        absorbed: LinearSrgb::BLACK,
+        switched_off: LinearSrgb::BLACK,
+    };
 }
 
 /// Orientation of a hit: normals on the side of the incoming ray.
@@ -132,25 +146,33 @@ impl Facing {
 }
 
 impl Tracer {
-    /// What becomes of light that arrives at `hit` along the unit direction `incident`, within `media`.
+    /// What becomes of light that arrives at `hit` along the unit direction `incident`, within `media`, with every effect.
     pub fn interact(&self, hit: &SurfaceHit, incident: DVec3, media: &MediumStack) -> Interaction {
+        self.interact_with::<Everything>(hit, incident, media)
+    }
+
+    /// The same with some effects. Light that would need a branch which is not among them is `switched_off`; where
+    /// textures are not, the material's factor alone tints.
+    pub fn interact_with<E: PathEffects>(
+        &self,
+        hit: &SurfaceHit,
+        incident: DVec3,
+        media: &MediumStack,
+    ) -> Interaction {
         let material = self.scene().material_of(hit.object);
         let facing = Facing::new(hit, incident);
         let cos_incident = -incident.dot(facing.shading);
         match material.surface {
             SurfaceKind::Diffuse => Interaction {
-                reflection: None,
-                transmission: None,
                 deposit: LinearSrgb::WHITE,
-                absorbed: LinearSrgb::BLACK,
+                ..Interaction::NOTHING
             },
             SurfaceKind::Mirror => {
-                let share = fresnel::metal_reflectance(cos_incident, self.base_colour(hit));
+                let share = fresnel::metal_reflectance(cos_incident, self.tint::<E>(hit, material));
+                let back = || reflection(hit, &facing, incident, media, share);
                 Interaction {
-                    reflection: Some(reflection(hit, &facing, incident, media, share)),
-                    transmission: None,
-                    deposit: LinearSrgb::BLACK,
                     absorbed: LinearSrgb::WHITE - share,
+                    ..sent_back::<E>(share, back)
                 }
             }
             SurfaceKind::Mixed => {
@@ -158,19 +180,27 @@ impl Tracer {
                     cos_incident,
                     material.ior / media.ior(self.scene()),
                 ));
+                let back = || reflection(hit, &facing, incident, media, share);
                 Interaction {
-                    reflection: Some(reflection(hit, &facing, incident, media, share)),
-                    transmission: None,
                     deposit: LinearSrgb::WHITE - share,
-                    absorbed: LinearSrgb::BLACK,
+                    ..sent_back::<E>(share, back)
                 }
             }
-            SurfaceKind::ThinWall => self.thin_wall(hit, &facing, incident, media, material),
-            SurfaceKind::Dielectric => self.dielectric(hit, &facing, incident, media, material),
+            SurfaceKind::ThinWall => self.thin_wall::<E>(hit, &facing, incident, media, material),
+            SurfaceKind::Dielectric => self.dielectric::<E>(hit, &facing, incident, media, material),
         }
     }
 
-    fn thin_wall(
+    /// Base colour at a hit, its texture included where textures are.
+    fn tint<E: PathEffects>(&self, hit: &SurfaceHit, material: &Material) -> LinearSrgb {
+        if E::TEXTURES {
+            self.base_colour(hit)
+        } else {
+            material.base_colour
+        }
+    }
+
+    fn thin_wall<E: PathEffects>(
         &self,
         hit: &SurfaceHit,
         facing: &Facing,
@@ -181,7 +211,16 @@ impl Tracer {
         let cos_incident = -incident.dot(facing.shading);
         let reflectance =
             fresnel::thin_wall_reflectance(cos_incident, material.ior / media.ior(self.scene()));
-        let transmitted = self.base_colour(hit) * (1.0 - reflectance);
+        let share = LinearSrgb::grey(reflectance);
+        let returned = sent_back::<E>(share, || reflection(hit, facing, incident, media, share));
+        let beneath = LinearSrgb::grey(1.0 - reflectance);
+        if !E::TRANSMISSION {
+            return Interaction {
+                switched_off: returned.switched_off + beneath,
+                ..returned
+            };
+        }
+        let transmitted = self.tint::<E>(hit, material) * (1.0 - reflectance);
         let transmission = Branch {
             ray: hit.spawn(incident),
             share: transmitted,
@@ -192,20 +231,13 @@ impl Tracer {
             by_shading: facing.is_smooth,
         };
         Interaction {
-            reflection: Some(reflection(
-                hit,
-                facing,
-                incident,
-                media,
-                LinearSrgb::grey(reflectance),
-            )),
             transmission: Some(transmission),
-            deposit: LinearSrgb::BLACK,
-            absorbed: LinearSrgb::grey(1.0 - reflectance) - transmitted,
+            absorbed: beneath - transmitted,
+            ..returned
         }
     }
 
-    fn dielectric(
+    fn dielectric<E: PathEffects>(
         &self,
         hit: &SurfaceHit,
         facing: &Facing,
@@ -225,17 +257,27 @@ impl Tracer {
         };
         let eta = ior_far / ior_near;
         let Some(turned) = facing.refracted(incident, eta) else {
-            let mut total = reflection(hit, facing, incident, media, LinearSrgb::WHITE);
-            total.event = Event::TotalInternalReflection;
-            return Interaction {
-                reflection: Some(total),
-                transmission: None,
-                deposit: LinearSrgb::BLACK,
-                absorbed: LinearSrgb::BLACK,
-            };
+            return sent_back::<E>(LinearSrgb::WHITE, || {
+                let mut total = reflection(hit, facing, incident, media, LinearSrgb::WHITE);
+                total.event = Event::TotalInternalReflection;
+                total
+            });
         };
         let reflectance = fresnel::dielectric_reflectance(-incident.dot(facing.shading), eta);
-        let transmitted = self.base_colour(hit) * (1.0 - reflectance);
+        let share = LinearSrgb::grey(reflectance);
+        let returned = if reflectance > 0.0 {
+            sent_back::<E>(share, || reflection(hit, facing, incident, media, share))
+        } else {
+            Interaction::NOTHING
+        };
+        let beneath = LinearSrgb::grey(1.0 - reflectance);
+        if !E::TRANSMISSION {
+            return Interaction {
+                switched_off: returned.switched_off + beneath,
+                ..returned
+            };
+        }
+        let transmitted = self.tint::<E>(hit, material) * (1.0 - reflectance);
         let transmission = Branch {
             ray: hit.spawn(turned.direction),
             share: transmitted,
@@ -246,11 +288,24 @@ impl Tracer {
             by_shading: turned.by_shading,
         };
         Interaction {
-            reflection: (reflectance > 0.0)
-                .then(|| reflection(hit, facing, incident, media, LinearSrgb::grey(reflectance))),
             transmission: Some(transmission),
-            deposit: LinearSrgb::BLACK,
-            absorbed: LinearSrgb::grey(1.0 - reflectance) - transmitted,
+            absorbed: beneath - transmitted,
+            ..returned
+        }
+    }
+}
+
+/// A share of the light goes back.
+fn sent_back<E: PathEffects>(share: LinearSrgb, branch: impl FnOnce() -> Branch) -> Interaction {
+    if E::REFLECTION {
+        Interaction {
+            reflection: Some(branch()),
+            ..Interaction::NOTHING
+        }
+    } else {
+        Interaction {
+            switched_off: share,
+            ..Interaction::NOTHING
         }
     }
 }

@@ -52,6 +52,12 @@ impl MediumStack {
         self
     }
 
+    /// Whether the medium on top absorbs anything.
+    pub fn absorbs(&self, scene: &Scene) -> bool {
+        let volume = self.top().and_then(|object| scene.material_of(object).volume);
+        volume.is_some_and(|volume| volume.attenuation_distance_m.is_finite())
+    }
+
     /// Share of the light that is left after a distance [m] in the medium on top.
     pub fn transmittance(&self, scene: &Scene, distance_m: f64) -> LinearSrgb {
         match self.top().and_then(|object| scene.material_of(object).volume) {

@@ -3,12 +3,14 @@
 pub mod corners;
 pub mod curvature;
 pub mod differential;
+pub mod effects;
 pub mod interaction;
 pub mod medium;
 pub mod smoothing;
 pub mod tracer;
 
 pub use differential::{RayDerivative, RayDifferential, SurfaceScale};
+pub use effects::{EffectSet, Everything, ForEffects, PathCounts, PathEffects, Specialised};
 pub use interaction::{Branch, Event, Interaction};
 pub use medium::MediumStack;
 pub use tracer::{HitPlace, SurfaceHit, Tracer};

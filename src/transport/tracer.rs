@@ -10,7 +10,7 @@ use super::curvature::NormalField;
 use super::smoothing::smoothing_groups;
 use crate::geometry::{Ray, TriangleBvh, ray};
 use crate::optics::LinearSrgb;
-use crate::scene::Scene;
+use crate::scene::{Scene, SurfaceKind};
 
 /// A scene with its hierarchy. What edits of the scene leave as it is, edited copies share.
 #[derive(Debug)]
@@ -231,6 +231,16 @@ impl Tracer {
     /// Whether any surface lies on the ray before `distance_m`.
     pub fn is_blocked(&self, ray: &Ray, distance_m: f64) -> bool {
         self.hierarchy.bvh.is_blocked(ray, distance_m)
+    }
+
+    /// Whether light that goes on from an object is tinted by a texture.
+    pub fn is_textured(&self, object: usize) -> bool {
+        let material = self.scene.material_of(object);
+        material.base_colour_texture.is_some()
+            && matches!(
+                material.surface,
+                SurfaceKind::Mirror | SurfaceKind::Dielectric | SurfaceKind::ThinWall
+            )
     }
 
     /// Base colour of the surface at a hit, its texture included.

@@ -75,17 +75,16 @@ fn legend(ui: &Ui, picture: Rect, title: &str, colour: &dyn Fn(f64) -> [u8; 3], 
     const STEPS: usize = 150;
     let painter = ui.painter();
     let font = FontId::proportional(13.0);
-    let size = BAR + vec2(48.0, 56.0);
+    let title = painter.layout_no_wrap(title.to_owned(), FontId::proportional(11.5), TEXT);
+    let size = vec2(BAR.x.max(title.size().x - 16.0), BAR.y) + vec2(48.0, 56.0);
     let frame = Rect::from_min_size(picture.left_bottom() + vec2(16.0, -16.0 - size.y), size);
     painter.rect_filled(frame, 6.0, Color32::from_black_alpha(190));
-    let bar = Rect::from_min_size(frame.min + vec2(24.0, 28.0), BAR);
-    painter.text(
-        pos2(frame.center().x, frame.top() + 14.0),
-        Align2::CENTER_CENTER,
-        title,
-        FontId::proportional(11.5),
-        TEXT,
+    let bar = Rect::from_min_size(pos2(frame.center().x - 0.5 * BAR.x, frame.top() + 28.0), BAR);
+    let place = pos2(
+        frame.center().x - 0.5 * title.size().x,
+        frame.top() + 14.0 - 0.5 * title.size().y,
     );
+    painter.galley(place, title, TEXT);
     let step = bar.width() / STEPS as f32;
     for index in 0..STEPS {
         let [r, g, b] = colour((index as f64 + 0.5) / STEPS as f64);

@@ -75,6 +75,7 @@ fn the_manifest_has_every_field() {
         &[
             "rays",
             "item_buffer_rays",
+            "item_buffer_tests",
             "segments",
             "shadow_rays",
             "receiver_queries",

@@ -4,33 +4,28 @@ use std::sync::Arc;
 
 use glam::DVec2;
 use nephroid::light_pass::caustic::path::PathLimits;
-use nephroid::light_pass::caustic::setup::Aim;
+use nephroid::light_pass::caustic::setup::{Aim, Aiming};
 use nephroid::light_pass::wavefront::strand::{Landing, Strand};
 use nephroid::light_pass::wavefront::trace::StrandTracer;
 use nephroid::progress::Control;
 use nephroid::scene::builtin;
 use nephroid::settings::ItemBufferKind;
-use nephroid::transport::Tracer;
+use nephroid::transport::{EffectSet, Tracer};
 
 /// Compares derivatives of the strand that carries most, at places over the domain, with central differences over a
 /// step of the unit square; returns the root mean square of the relative difference and how many places there were.
 fn mismatch(name: &str, step: f64) -> (f64, usize) {
     let scene = Arc::new(builtin::build(name).expect("a built-in scene"));
     let tracer = Tracer::new(scene);
-    let aim = Aim::take(&tracer, ItemBufferKind::Equal);
+    let aim = Aim::take(&tracer, ItemBufferKind::Equal, Aiming::Everything);
     let launch = &aim.lights[0].launch;
-    let rays = StrandTracer {
-        tracer: &tracer,
-        launch,
-        limits: PathLimits {
-            max_depth: 4,
-            branch_threshold: 0.5,
-            absorption: false,
-        },
-        steps: [2.0 * step; 2],
-        kept: None,
-        control: &Control::default(),
+    let limits = PathLimits {
+        max_depth: 4,
+        branch_threshold: 0.5,
+        effects: EffectSet::EVERYTHING,
     };
+    let control = Control::default();
+    let rays = StrandTracer::new(&tracer, launch, limits, [2.0 * step; 2], &control);
     let (mut squares, mut count) = (0.0, 0);
     for face in 0..launch.face_count() {
         for index in 0..900 {

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::{DVec2, DVec3};
 use nephroid::geometry::cube_face::{self, FaceMapping};
-use nephroid::light_pass::item_buffer::{CELLS_PER_SIDE, ItemBuffer};
+use nephroid::light_pass::item_buffer::{CELLS_PER_SIDE, Hiding, ItemBuffer};
 use nephroid::light_pass::launch::Launch;
 use nephroid::optics::LinearSrgb;
 use nephroid::scene::{Light, LightKind, Material, Mesh, Object, Scene, SurfaceKind};
@@ -51,7 +51,7 @@ fn mirrors(triangles: &[[DVec3; 3]]) -> Scene {
 }
 
 fn build(launch: &Launch, scene: &Scene) -> ItemBuffer {
-    ItemBuffer::build(launch, &Tracer::new(Arc::new(scene.clone())), &[0])
+    ItemBuffer::build(launch, &Tracer::new(Arc::new(scene.clone())), &[0], Hiding::Keep)
 }
 
 #[test]
@@ -317,7 +317,7 @@ fn diffuse_surfaces_among_the_casters_mark_nothing() {
     scene.materials.push(Material::default());
     for light in lights() {
         let launch = Launch::new(&light, &alone, &[0], ItemBufferKind::Equal).expect("a domain");
-        let among = ItemBuffer::build(&launch, &Tracer::new(Arc::new(scene.clone())), &[1]);
+        let among = ItemBuffer::build(&launch, &Tracer::new(Arc::new(scene.clone())), &[1], Hiding::Keep);
         let faces = launch.face_count();
         assert_eq!(marks(&among, faces), marks(&build(&launch, &alone), faces));
     }
@@ -355,6 +355,6 @@ fn objects_beside_a_cone_are_no_casters() {
     };
     let casters = [0, 1, 2, 3];
     let launch = Launch::new(&light, &scene, &casters, ItemBufferKind::Equal).expect("a domain");
-    let buffer = ItemBuffer::build(&launch, &Tracer::new(Arc::new(scene)), &casters);
+    let buffer = ItemBuffer::build(&launch, &Tracer::new(Arc::new(scene)), &casters, Hiding::Keep);
     assert_eq!(buffer.casters, [1, 2]);
 }

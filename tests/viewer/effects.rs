@@ -69,7 +69,7 @@ fn reports_come_with_what_the_effects_took() {
         rays: 12_345,
         deposits: 678,
         bytes: 2_500_000,
-        cpu_ms: 3.21,
+        cpu_ms: Some(3.21),
         ..EffectCounts::default()
     };
     let mut panel = panel(vec![
@@ -193,7 +193,7 @@ fn the_list_stays_within_the_panel() {
         rays: 12_345_678_901,
         deposits: 2_345_678_901,
         bytes: 12_500_000_000,
-        cpu_ms: 123_456.7,
+        cpu_ms: Some(123_456.7),
         ..EffectCounts::default()
     };
     let reason = "`a body of glass with a very long name that goes on` is lit by `a lamp with one as long`";

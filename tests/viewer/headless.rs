@@ -46,6 +46,7 @@ pub fn finished(scene: &Arc<Scene>, settings: &BakeSettings) -> BakedLevel {
             maps: Vec::new(),
             plan: EffectPlan::default(),
             effects: Vec::new(),
+            item_buffers: Vec::new(),
             ledgers: Vec::new(),
             counts: BakeCounts::default(),
             timings_s: Timings::default(),

@@ -21,6 +21,7 @@ pub fn result(rays: u64, partial: bool) -> BakeResult {
         maps: Vec::new(),
         plan: EffectPlan::default(),
         effects: Vec::new(),
+        item_buffers: Vec::new(),
         ledgers: Vec::new(),
         counts: BakeCounts {
             rays,

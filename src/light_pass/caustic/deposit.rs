@@ -15,6 +15,7 @@ use super::surface::{Surface, Surfaces};
 use crate::light_pass::ledger_sum::{Account, LedgerSum};
 use crate::light_pass::receiver_maps::{ChartFor, ReceiverMaps};
 use crate::settings::{BakeSettings, Kernel, KernelSampling, Sigma};
+use crate::transport::PathCounts;
 
 /// How kernels are made from arrivals.
 #[derive(Clone, Copy, Debug)]
@@ -75,6 +76,8 @@ pub struct DepositReport {
     pub ledger: LedgerSum,
     /// Kernels deposited.
     pub splats: u64,
+    /// The same by what took part in them.
+    pub deposits: PathCounts,
     /// Sizes of their footprints.
     pub statistics: FootprintStatistics,
 }
@@ -93,6 +96,7 @@ impl Depositor<'_> {
             report.ledger.merge(&part.ledger);
             report.statistics.merge(&part.statistics);
             report.splats += part.splats.len() as u64;
+            report.deposits += part.deposits;
             // Neighbours mostly go to the same map.
             for run in part
                 .splats
@@ -138,10 +142,13 @@ impl Depositor<'_> {
                 .of(arrival)
                 .and_then(|surface| self.place(arrival, &neighbours, surface, &unbent_area_m2, &mut made));
             match placed {
-                Some(placed) => made.splats.push(Placed {
-                    is_second: (column + context.index) % 2 == 1,
-                    ..placed
-                }),
+                Some(placed) => {
+                    made.deposits.count_segment(arrival.event);
+                    made.splats.push(Placed {
+                        is_second: (column + context.index) % 2 == 1,
+                        ..placed
+                    });
+                }
                 None => made
                     .ledger
                     .book(Account::Unresolved, self.lattice.unit.count(arrival.flux_w)),
@@ -237,5 +244,6 @@ pub(super) struct Placed {
 struct RowSplats {
     splats: Vec<Placed>,
     ledger: LedgerSum,
+    deposits: PathCounts,
     statistics: FootprintStatistics,
 }

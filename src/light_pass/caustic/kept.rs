@@ -7,6 +7,7 @@ use super::lattice::{Lattice, Points, TracedRow};
 use super::path::{Arrival, PathSignature};
 use crate::light_pass::ledger_sum::LedgerSum;
 use crate::optics::LinearSrgb;
+use crate::transport::Event;
 
 /// All that one light sent to diffuse surfaces, row by row of its lattice.
 #[derive(Debug, Default)]
@@ -37,6 +38,7 @@ struct Kept {
     column: u32,
     object: u32,
     triangle: u32,
+    event: Event,
 }
 
 impl KeptLight {
@@ -98,6 +100,7 @@ impl KeptRow {
             column,
             object: arrival.object,
             triangle: arrival.triangle,
+            event: arrival.event,
         };
         let is_grey = |arrival: &Arrival| {
             let [r, g, b] = arrival.flux_w.to_array().map(f64::to_bits);
@@ -134,6 +137,7 @@ impl KeptRow {
             point: glam::DVec3::ZERO,
             flux_w: LinearSrgb::new(kept.flux_w, g, b),
             path_m: kept.path_m,
+            event: kept.event,
         }
     }
 

@@ -12,7 +12,7 @@ use crate::light_pass::launch::Launch;
 use crate::light_pass::ledger_sum::LedgerSum;
 use crate::scene::Scene;
 use crate::settings::RayPlacement;
-use crate::transport::Tracer;
+use crate::transport::{ForEffects, PathCounts, PathEffects, Tracer};
 
 /// All that is needed to trace the lattice of one light.
 #[derive(Clone, Copy, Debug)]
@@ -51,6 +51,8 @@ pub struct TracedRow {
     pub rays: u64,
     /// Closest-hit queries.
     pub segments: u64,
+    /// The same by what began them.
+    pub paths: PathCounts,
 }
 
 impl TracedRow {
@@ -98,6 +100,21 @@ impl<'a> Points<'a> {
 /// First of the columns (rows) of the whole lattice that a traced one stands for, and the one after the last.
 fn group(index: usize, stride: usize, size: usize) -> (usize, usize) {
     (index * stride, ((index + 1) * stride).min(size))
+}
+
+/// A row to be traced.
+struct RowOf<'a> {
+    lattice: &'a Lattice<'a>,
+    face: usize,
+    row: usize,
+}
+
+impl ForEffects for RowOf<'_> {
+    type Output = TracedRow;
+
+    fn run<E: PathEffects>(self) -> TracedRow {
+        self.lattice.trace_row_with::<E>(self.face, self.row)
+    }
 }
 
 impl Lattice<'_> {
@@ -159,6 +176,11 @@ impl Lattice<'_> {
 
     /// Traces one row of one face.
     pub fn trace_row(&self, face: usize, row: usize) -> TracedRow {
+        let lattice = self;
+        self.limits.effects.specialise(RowOf { lattice, face, row })
+    }
+
+    fn trace_row_with<E: PathEffects>(&self, face: usize, row: usize) -> TracedRow {
         let mut traced = TracedRow::default();
         let fine_row = self.fine_row(row);
         if fine_row >= self.size.1 {
@@ -183,7 +205,7 @@ impl Lattice<'_> {
                     continue;
                 }
                 traced.rays += 1;
-                paths.trace(ray, flux_w, |mut arrival| {
+                paths.trace::<E>(ray, flux_w, |mut arrival| {
                     arrival.point = points.of(&arrival);
                     arrival.flux_w = arrival.flux_w * self.cells_of(column, row);
                     traced.columns.push(column as u32);
@@ -193,6 +215,7 @@ impl Lattice<'_> {
         }
         traced.ledger = paths.ledger;
         traced.segments = paths.segments;
+        traced.paths = paths.counts;
         traced
     }
 

@@ -14,6 +14,7 @@ use crate::light_pass::ledger_sum::LedgerSum;
 use crate::light_pass::receiver_maps::ChartFor;
 use crate::light_pass::wavefront::overreach::Overreach;
 use crate::progress::{Control, Progress, Stage};
+use crate::transport::PathCounts;
 
 /// Rays that a band aims at: enough for all cores, and few enough that what they bring stays in their caches.
 const RAYS_PER_BAND: usize = 1 << 14;
@@ -31,6 +32,10 @@ pub struct PassReport {
     pub rays: u64,
     /// Closest-hit queries.
     pub segments: u64,
+    /// Segments by what began them.
+    pub paths: PathCounts,
+    /// Patches and kernels that came to a map, by what took part in them.
+    pub deposits: PathCounts,
     /// Kernels deposited.
     pub splats: u64,
     /// Wavefront cells.
@@ -271,6 +276,7 @@ impl PassReport {
             self.ledger.merge(&row.ledger);
             self.rays += row.rays;
             self.segments += row.segments;
+            self.paths += row.paths;
         }
     }
 

@@ -6,7 +6,7 @@ use super::super::ledger_sum::{Account, LedgerSum};
 use crate::geometry::Ray;
 use crate::illumination::accumulator::FluxUnit;
 use crate::optics::LinearSrgb;
-use crate::transport::{Branch, Event, MediumStack, SurfaceHit, Tracer};
+use crate::transport::{Branch, EffectSet, Event, MediumStack, PathCounts, PathEffects, SurfaceHit, Tracer};
 
 /// Sequence of (object, event) along a path, as a hash: equal for neighbouring rays that took the same way.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -57,6 +57,8 @@ pub struct Arrival {
     pub flux_w: LinearSrgb,
     /// From the light to here [m].
     pub path_m: f64,
+    /// The last event on the way.
+    pub event: Event,
 }
 
 /// Limits of a path.
@@ -66,8 +68,8 @@ pub struct PathLimits {
     pub max_depth: u32,
     /// Least share of the ray's flux (luminance) that a branch must carry to be followed.
     pub branch_threshold: f64,
-    /// Whether any volume absorbs.
-    pub absorption: bool,
+    /// What paths may need.
+    pub effects: EffectSet,
 }
 
 /// What waits to be traced.
@@ -77,6 +79,8 @@ struct Segment {
     flux_w: LinearSrgb,
     media: MediumStack,
     signature: PathSignature,
+    /// What began it; `None` for the light's own ray.
+    event: Option<Event>,
     depth: u32,
     path_m: f64,
 }
@@ -92,6 +96,8 @@ pub struct PathTracer<'a> {
     pub ledger: LedgerSum,
     /// Closest-hit queries so far.
     pub segments: u64,
+    /// What effects took part.
+    pub counts: PathCounts,
 }
 
 impl<'a> PathTracer<'a> {
@@ -104,12 +110,13 @@ impl<'a> PathTracer<'a> {
             waiting: Vec::new(),
             ledger: LedgerSum::default(),
             segments: 0,
+            counts: PathCounts::default(),
         }
     }
 
     /// Follows a ray that carries `flux_w` from the light; arrivals on diffuse surfaces after at least one specular
     /// event are handed to `arrive`. `Deposited` is not booked here but by who places the flux.
-    pub fn trace(&mut self, ray: Ray, flux_w: LinearSrgb, mut arrive: impl FnMut(Arrival)) {
+    pub fn trace<E: PathEffects>(&mut self, ray: Ray, flux_w: LinearSrgb, mut arrive: impl FnMut(Arrival)) {
         if !flux_w.is_finite() {
             return;
         }
@@ -120,12 +127,13 @@ impl<'a> PathTracer<'a> {
             flux_w,
             media,
             signature: PathSignature::default(),
+            event: None,
             depth: 0,
             path_m: 0.0,
         };
         self.waiting.push(first);
         while let Some(segment) = self.waiting.pop() {
-            self.step(segment, floor_w, &mut arrive);
+            self.step::<E>(segment, floor_w, &mut arrive);
         }
     }
 
@@ -133,8 +141,11 @@ impl<'a> PathTracer<'a> {
         self.ledger.book(account, self.unit.count(flux_w));
     }
 
-    fn step(&mut self, segment: Segment, floor_w: f64, arrive: &mut impl FnMut(Arrival)) {
+    fn step<E: PathEffects>(&mut self, segment: Segment, floor_w: f64, arrive: &mut impl FnMut(Arrival)) {
         self.segments += 1;
+        if let Some(event) = segment.event {
+            self.counts.count_segment(event);
+        }
         let Some(hit) = self.tracer.closest_hit(&segment.ray) else {
             let account = if segment.depth == 0 {
                 Account::NotEmitted
@@ -144,21 +155,28 @@ impl<'a> PathTracer<'a> {
             return self.book(account, segment.flux_w);
         };
         let mut flux_w = segment.flux_w;
-        if self.limits.absorption {
+        if E::ABSORPTION && segment.media.absorbs(self.tracer.scene()) {
             flux_w = flux_w * segment.media.transmittance(self.tracer.scene(), hit.distance_m);
+            self.counts.attenuated += 1;
             self.book(Account::Absorbed, segment.flux_w - flux_w);
         }
         let path_m = segment.path_m + hit.distance_m;
-        let interaction = self.tracer.interact(&hit, segment.ray.direction, &segment.media);
+        let interaction = self
+            .tracer
+            .interact_with::<E>(&hit, segment.ray.direction, &segment.media);
+        if E::TEXTURES && self.tracer.is_textured(hit.object) {
+            self.counts.textured += 1;
+        }
         let deposit_w = flux_w * interaction.deposit;
         if segment.depth == 0 {
             // What a polished surface takes on the first hit is direct light.
             self.book(Account::NotEmitted, deposit_w);
             self.book(Account::Emitted, flux_w - deposit_w);
-        } else if deposit_w.max_channel() > 0.0 {
-            arrive(arrival(&hit, segment.signature, deposit_w, path_m));
+        } else if let (Some(event), true) = (segment.event, deposit_w.max_channel() > 0.0) {
+            arrive(arrival(&hit, segment.signature, event, deposit_w, path_m));
         }
         self.book(Account::Absorbed, flux_w * interaction.absorbed);
+        self.book(Account::SwitchedOff, flux_w * interaction.switched_off);
         for branch in [interaction.reflection, interaction.transmission]
             .into_iter()
             .flatten()
@@ -197,13 +215,20 @@ impl<'a> PathTracer<'a> {
             flux_w,
             media: branch.media,
             signature: from.signature.with(object, branch.event),
+            event: Some(branch.event),
             depth: from.depth + 1,
             path_m,
         });
     }
 }
 
-fn arrival(hit: &SurfaceHit, signature: PathSignature, flux_w: LinearSrgb, path_m: f64) -> Arrival {
+fn arrival(
+    hit: &SurfaceHit,
+    signature: PathSignature,
+    event: Event,
+    flux_w: LinearSrgb,
+    path_m: f64,
+) -> Arrival {
     Arrival {
         object: hit.object as u32,
         triangle: hit.triangle as u32,
@@ -212,5 +237,6 @@ fn arrival(hit: &SurfaceHit, signature: PathSignature, flux_w: LinearSrgb, path_
         point: hit.point,
         flux_w,
         path_m,
+        event,
     }
 }

@@ -2,9 +2,11 @@
 
 use glam::DVec3;
 
-use crate::light_pass::item_buffer::ItemBuffer;
+use super::pass::{Seconds, Stopwatch};
+use crate::light_pass::item_buffer::{Hiding, ItemBuffer};
 use crate::light_pass::launch::Launch;
-use crate::scene::Scene;
+use crate::plan::{Reach, Sight};
+use crate::scene::{Scene, SurfaceKind};
 use crate::settings::ItemBufferKind;
 use crate::transport::Tracer;
 
@@ -17,55 +19,171 @@ pub struct AimedLight {
     pub launch: Launch,
     /// Which of them are worth tracing.
     pub item_buffer: ItemBuffer,
-}
-
-/// What all lights see.
-#[derive(Debug)]
-pub struct Aim {
-    /// Lights with at least one marked cell.
-    pub lights: Vec<AimedLight>,
-    /// Specular objects seen, by light; `None` where there was nothing to look for.
-    pub casters: Vec<Option<Vec<usize>>>,
+    /// Where light can matter, if less than that.
+    visible: Option<ItemBuffer>,
     /// Distance from the casters' centre to their farthest receiver [m]: scales the density of suns.
     pub reach_m: f64,
 }
 
+impl AimedLight {
+    /// Where light can matter: the item buffer, or less where everything is aimed at.
+    pub fn visible(&self) -> &ItemBuffer {
+        self.visible.as_ref().unwrap_or(&self.item_buffer)
+    }
+}
+
+/// How thoroughly what cannot matter is left out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Aiming {
+    /// Specular objects that are sealed off, hidden, or can send no light to a diffuse one are left out.
+    Reachable,
+    /// Everything specular is aimed at.
+    Everything,
+}
+
+/// What it took to look around from one light.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct LookAround {
+    /// Marked cells of the item buffer.
+    pub cells: u64,
+    /// Cells that opaque faces cover.
+    pub hidden_cells: u64,
+    /// Nodes, triangles and cells that were tested.
+    pub tests: u64,
+    /// Wall-clock and CPU seconds.
+    pub seconds: Seconds,
+}
+
+/// What all lights see.
+#[derive(Debug, Default)]
+pub struct Aim {
+    /// Lights with at least one marked cell.
+    pub lights: Vec<AimedLight>,
+    /// What each light of the scene sees.
+    pub sights: Vec<Sight>,
+    /// What that took, light by light.
+    pub looks: Vec<LookAround>,
+}
+
 impl Aim {
-    /// Builds the item buffers of all lights. Nothing is looked for where no surface can receive light.
-    pub fn take(tracer: &Tracer, item_buffer: ItemBufferKind) -> Self {
+    /// Builds the item buffers of all lights that something specular could call for.
+    pub fn take(tracer: &Tracer, item_buffer: ItemBufferKind, aiming: Aiming) -> Self {
         let scene = tracer.scene();
-        let of_kind = |wanted: fn(crate::scene::SurfaceKind) -> bool| -> Vec<usize> {
-            (0..scene.objects.len())
-                .filter(|&object| wanted(scene.material_of(object).surface))
-                .collect()
+        let has = |wanted: fn(SurfaceKind) -> bool| {
+            (0..scene.objects.len()).any(|object| wanted(scene.material_of(object).surface))
         };
-        let casters = of_kind(crate::scene::SurfaceKind::is_specular);
-        let receivers = of_kind(crate::scene::SurfaceKind::is_receiver);
-        let reach_m = reach_m(scene, &casters, &receivers);
-        let mut aim = Self {
-            lights: Vec::new(),
-            casters: vec![None; scene.lights.len()],
-            reach_m,
-        };
-        if casters.is_empty() || receivers.is_empty() {
+        let mut aim = Self::default();
+        if !has(SurfaceKind::is_specular) || !has(SurfaceKind::is_receiver) {
+            aim.sights = vec![Sight::default(); scene.lights.len()];
+            aim.looks = vec![LookAround::default(); scene.lights.len()];
             return aim;
         }
-        for (light, source) in scene.lights.iter().enumerate() {
-            let Some(launch) = Launch::new(&source.of_unit_strength(), scene, &casters, item_buffer) else {
-                aim.casters[light] = Some(Vec::new());
-                continue;
-            };
-            let item_buffer = ItemBuffer::build(&launch, tracer, &casters);
-            aim.casters[light] = Some(item_buffer.casters.clone());
-            if !item_buffer.casters.is_empty() {
-                aim.lights.push(AimedLight {
-                    light,
-                    launch,
-                    item_buffer,
-                });
-            }
+        let looker = Looker {
+            tracer,
+            item_buffer,
+            aiming,
+            reach: Reach::of(scene),
+        };
+        for light in 0..scene.lights.len() {
+            let watch = Stopwatch::start();
+            let (sight, aimed, mut look) = looker.look(light);
+            look.seconds = watch.elapsed();
+            aim.sights.push(sight);
+            aim.looks.push(look);
+            aim.lights.extend(aimed);
         }
         aim
+    }
+}
+
+impl Aim {
+    /// Nodes, triangles and cells that were tested for all lights.
+    pub fn tests(&self) -> u64 {
+        self.looks.iter().map(|look| look.tests).sum()
+    }
+}
+
+struct Looker<'a> {
+    tracer: &'a Tracer,
+    item_buffer: ItemBufferKind,
+    aiming: Aiming,
+    reach: Reach<'a>,
+}
+
+impl Looker<'_> {
+    fn look(&self, light: usize) -> (Sight, Option<AimedLight>, LookAround) {
+        let scene = self.tracer.scene();
+        let specular = || -> Vec<usize> {
+            (0..scene.objects.len())
+                .filter(|&object| scene.material_of(object).surface.is_specular())
+                .collect()
+        };
+        let (unsealed, casters) = match self.aiming {
+            Aiming::Reachable => (self.reach.unsealed(light), self.reach.casters(light)),
+            Aiming::Everything => (specular(), specular()),
+        };
+        let mut sight = Sight {
+            unsealed: unsealed.len(),
+            casters: casters.len(),
+            ..Sight::default()
+        };
+        let mut look = LookAround::default();
+        let Some((launch, item_buffer)) = self.item_buffer(light, &casters, &mut look) else {
+            return (sight, None, look);
+        };
+        sight.seen = item_buffer.casters.clone();
+        sight.hidden_cells = item_buffer.hidden_cells;
+        sight.reached = match self.aiming {
+            Aiming::Reachable => self.reach.reached(light, &sight.seen),
+            Aiming::Everything => specular().into_iter().map(|object| (object, None)).collect(),
+        };
+        look.cells = item_buffer.marked_cells();
+        if sight.seen.is_empty() {
+            return (sight, None, look);
+        }
+        let visible = match self.aiming {
+            Aiming::Reachable => None,
+            Aiming::Everything => {
+                let casters = self.reach.casters(light);
+                let visible = ItemBuffer::build(&launch, self.tracer, &casters, Hiding::Drop);
+                look.tests += visible.tests;
+                Some(visible)
+            }
+        };
+        let aimed = AimedLight {
+            light,
+            visible,
+            launch,
+            reach_m: reach_m(scene, &sight.seen),
+            item_buffer,
+        };
+        (sight, Some(aimed), look)
+    }
+
+    fn item_buffer(
+        &self,
+        light: usize,
+        casters: &[usize],
+        look: &mut LookAround,
+    ) -> Option<(Launch, ItemBuffer)> {
+        let source = self.tracer.scene().lights[light].of_unit_strength();
+        let hiding = match self.aiming {
+            Aiming::Reachable => Hiding::Drop,
+            Aiming::Everything => Hiding::Keep,
+        };
+        let mut build = |casters: &[usize]| {
+            let launch = Launch::new(&source, self.tracer.scene(), casters, self.item_buffer)?;
+            let item_buffer = ItemBuffer::build(&launch, self.tracer, casters, hiding);
+            look.tests += item_buffer.tests;
+            look.hidden_cells += item_buffer.hidden_cells;
+            Some((launch, item_buffer))
+        };
+        let first = build(casters)?;
+        // What a sun does not see is to have no part in its rectangle.
+        if first.0.face_count() == 1 && first.1.casters.len() < casters.len() && !first.1.casters.is_empty() {
+            return build(&first.1.casters);
+        }
+        Some(first)
     }
 }
 
@@ -77,15 +195,15 @@ fn bounds_of(scene: &Scene, objects: &[usize]) -> Option<(DVec3, DVec3)> {
 }
 
 /// At least the casters' own radius, so that it is never zero where they have a size.
-fn reach_m(scene: &Scene, casters: &[usize], receivers: &[usize]) -> f64 {
+fn reach_m(scene: &Scene, casters: &[usize]) -> f64 {
     let Some((low, high)) = bounds_of(scene, casters) else {
         return 1.0;
     };
     let centre = low * 0.5 + high * 0.5;
     let own = (high - centre).length();
-    let farthest = receivers
-        .iter()
-        .flat_map(|&object| &scene.objects[object].mesh.positions)
+    let farthest = (0..scene.objects.len())
+        .filter(|&object| scene.material_of(object).surface.is_receiver())
+        .flat_map(|object| &scene.objects[object].mesh.positions)
         .map(|position| position.distance(centre))
         .fold(own, f64::max);
     if farthest > 0.0 { farthest } else { 1.0 }

@@ -2,7 +2,8 @@
 
 use glam::{DVec2, DVec3};
 
-use super::grid::MARGIN;
+use super::bits::CellBits;
+use super::grid::{CellRange, Grid, MARGIN};
 
 /// A convex polygon in homogeneous face coordinates, at most a triangle clipped by four planes.
 pub(super) struct Polygon {
@@ -83,6 +84,20 @@ impl Polygon {
             low.clamp(DVec2::NEG_ONE, DVec2::ONE),
             high.clamp(DVec2::NEG_ONE, DVec2::ONE),
         ))
+    }
+
+    /// Cells of `set` that the polygon touches; all of them where it reaches the light.
+    pub(super) fn touched(&self, grid: &Grid, set: &CellBits) -> Vec<(usize, usize)> {
+        let Some((low, high)) = self.plane_bounds() else {
+            return set.list(&CellRange::ALL);
+        };
+        let cells = grid.cells(low, high);
+        let mut list = set.list(&cells);
+        if !cells.is_single() && !list.is_empty() {
+            let edges = self.edges();
+            list.retain(|&(column, row)| edges.touch(grid.cell(column, row)));
+        }
+        list
     }
 
     /// The planes through the light and each edge, for tests against many cells.

@@ -1,9 +1,12 @@
 //! Searches the scene's hierarchy for specular triangles in the cells of one face.
 
+use std::cell::Cell;
+
 use glam::{DMat3, DVec2, DVec3};
 
 use super::bits::CellBits;
 use super::grid::{CellRange, Grid};
+use super::hidden::Facet;
 use super::polygon::{Polygon, WIDENED};
 use crate::geometry::bvh::Node;
 use crate::light_pass::launch::Launch;
@@ -25,6 +28,8 @@ pub(super) struct Search<'a> {
     wanted: &'a (dyn Fn(u32) -> bool + Sync),
     /// Absolute values of the linear part of the way from the scene to the face: what a box's half sides reach there.
     reach: DMat3,
+    /// Nodes and triangles tested so far.
+    tests: Cell<u64>,
 }
 
 /// Where a node's box lies on a face.
@@ -56,8 +61,85 @@ impl<'a> Search<'a> {
             others,
             wanted,
             reach: DMat3::from_cols(along(DVec3::X), along(DVec3::Y), along(DVec3::Z)),
+            tests: Cell::new(0),
         }
     }
+
+    /// Nodes and triangles tested so far.
+    pub(super) fn tests(&self) -> u64 {
+        self.tests.get()
+    }
+
+    fn count(&self) {
+        self.tests.set(self.tests.get() + 1);
+    }
+
+    /// Whether a box may lie in any cell of a set.
+    pub(super) fn may_touch(&self, bounds: Bounds, cells: &CellBits) -> bool {
+        match self.project(bounds) {
+            Projection::Outside => false,
+            Projection::Cells { cells: within, .. } => cells.any_in(&within),
+            Projection::Unbounded => true,
+        }
+    }
+
+    /// Whether a box lies before any part of a wanted triangle, in the marked cells that it may lie in.
+    pub(super) fn may_hide(&self, bounds: Bounds, marked: &CellBits, root: Option<Node>) -> bool {
+        let range = match self.project(bounds) {
+            Projection::Outside => return false,
+            Projection::Cells { cells, .. } => cells,
+            Projection::Unbounded => return true,
+        };
+        let mut cells = CellBits::filled(false);
+        for (column, row) in marked.list(&range) {
+            cells.set(column, row);
+        }
+        let nearness = self.nearest(bounds);
+        let mut found = false;
+        if let Some(root) = root {
+            self.visit(root, &cells, |_, corners| {
+                let facet = Facet::new(self.launch, self.face, corners);
+                let behind = |&(column, row): &(usize, usize)| {
+                    let farthest = facet.farthest_in(self.grid.cell(column, row));
+                    farthest.is_none_or(|farthest| farthest < nearness)
+                };
+                found = found || self.touched(corners, &cells).iter().any(behind);
+            });
+        }
+        found
+    }
+
+    /// How near the nearest point of a box before the light is.
+    fn nearest(&self, (low, high): Bounds) -> f64 {
+        let corners = (0..8).map(|corner| {
+            let side = |axis: usize| {
+                if corner >> axis & 1 == 1 {
+                    high[axis]
+                } else {
+                    low[axis]
+                }
+            };
+            let point = DVec3::new(side(0), side(1), side(2));
+            self.launch.nearness(point) / self.launch.to_face(self.face, point).z
+        });
+        corners.fold(f64::NEG_INFINITY, f64::max)
+    }
+
+    /// Hands out the wanted triangles, with their index, below a node that may touch any cell of a set.
+    pub(super) fn visit(&self, root: Node, cells: &CellBits, mut take: impl FnMut(u32, &[DVec3; 3])) {
+        let mut waiting = vec![root];
+        while let Some(node) = waiting.pop() {
+            let bounds = node.bounds();
+            if !self.may_touch(bounds, cells) || !overlaps(bounds, self.boxes) {
+                continue;
+            }
+            waiting.extend(node.children().into_iter().flatten());
+            for (triangle, corners) in node.triangles().filter(|(triangle, _)| (self.wanted)(*triangle)) {
+                take(triangle, corners);
+            }
+        }
+    }
+
     /// Clears the bits of all cells in `open` that a wanted triangle touches.
     ///
     /// A node whose cells are all closed is passed over; in a node within a single cell, any wanted triangle will do.
@@ -131,12 +213,7 @@ impl<'a> Search<'a> {
         let mut waiting = vec![root];
         while let Some(node) = waiting.pop() {
             let bounds = node.bounds();
-            let beyond = match self.project(bounds) {
-                Projection::Outside => true,
-                Projection::Cells { cells, .. } => !lit.any_in(&cells),
-                Projection::Unbounded => false,
-            };
-            if beyond || !overlaps(bounds, self.boxes) {
+            if !self.may_touch(bounds, lit) || !overlaps(bounds, self.boxes) {
                 continue;
             }
             waiting.extend(node.children().into_iter().flatten());
@@ -155,20 +232,12 @@ impl<'a> Search<'a> {
 
     /// Set cells that a triangle touches; all of them where it reaches the light.
     fn touched(&self, corners: &[DVec3; 3], set: &CellBits) -> Vec<(usize, usize)> {
+        self.count();
         let projected = corners.map(|corner| self.launch.to_face(self.face, corner));
         let Some(polygon) = Polygon::seen(&projected) else {
             return Vec::new();
         };
-        let Some((low, high)) = polygon.plane_bounds() else {
-            return set.list(&CellRange::ALL);
-        };
-        let cells = self.grid.cells(low, high);
-        let mut list = set.list(&cells);
-        if !cells.is_single() && !list.is_empty() {
-            let edges = polygon.edges();
-            list.retain(|&(column, row)| edges.touch(self.grid.cell(column, row)));
-        }
-        list
+        polygon.touched(self.grid, set)
     }
 
     /// Whether any triangle below a node is wanted.
@@ -191,6 +260,7 @@ impl<'a> Search<'a> {
 
     /// Where a box lies on the face.
     fn project(&self, (from, to): Bounds) -> Projection {
+        self.count();
         let half = (to - from) * 0.5;
         let middle = self.launch.to_face(self.face, from + half);
         let reach = self.reach * half;

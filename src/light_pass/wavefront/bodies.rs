@@ -3,6 +3,7 @@
 
 use glam::{DVec2, DVec3};
 
+use crate::light_pass::item_buffer::ItemBuffer;
 use crate::light_pass::launch::Launch;
 use crate::transport::Tracer;
 
@@ -37,12 +38,16 @@ pub struct SmallBodies {
 }
 
 impl SmallBodies {
-    /// The objects that are small beside cells of the given size in the unit square, and the corners of the others.
-    pub fn find(tracer: &Tracer, launch: &Launch, cell: DVec2) -> Self {
+    /// The objects that are small beside cells of the given size in the unit square, and sharp corners of those that
+    /// the light sees: both only where they can bend light or stand in its way, as `visible` tells.
+    pub fn find(tracer: &Tracer, launch: &Launch, visible: &ItemBuffer, cell: DVec2) -> Self {
         let scene = tracer.scene();
-        let mut corners: Vec<DVec3> = (0..scene.objects.len())
-            .flat_map(|object| tracer.sharp_corners(object))
+        let mut corners: Vec<DVec3> = visible
+            .casters
+            .iter()
+            .flat_map(|&object| tracer.sharp_corners(object))
             .copied()
+            .filter(|corner| visible.is_marked_towards(launch, (*corner, *corner)))
             .collect();
         if corners.len() > MOST_BODIES {
             corners.clear();
@@ -50,9 +55,10 @@ impl SmallBodies {
         let mut bodies: Vec<Body> = scene
             .objects
             .iter()
-            .filter_map(|object| {
+            .enumerate()
+            .filter_map(|(index, object)| {
                 let (low, high) = object.mesh.bounds()?;
-                Some(Body {
+                visible.may_concern(launch, tracer, index).then(|| Body {
                     centre: low * 0.5 + high * 0.5,
                     radius_m: 0.5 * (high - low).length(),
                 })
@@ -72,16 +78,23 @@ impl SmallBodies {
         Self { bodies, corners }
     }
 
+    /// Whether there is nothing to look for.
+    pub fn is_empty(&self) -> bool {
+        self.bodies.is_empty() && self.corners.is_empty()
+    }
+
     /// Whether a cell of a face, between two corners of the unit square, may hold a body that is small beside it, or a
-    /// sharp corner; `level` how often it was divided for such.
+    /// sharp corner, no farther than `hidden_beyond_m` from where rays start [m]; `level` how often it was divided for
+    /// such.
     pub fn ask_for_finer(
         &self,
         launch: &Launch,
         face: usize,
         (low, high): (DVec2, DVec2),
         level: u32,
+        hidden_beyond_m: f64,
     ) -> bool {
-        if level >= DEEPEST_BODY_LEVEL || (self.bodies.is_empty() && self.corners.is_empty()) {
+        if level >= DEEPEST_BODY_LEVEL || self.is_empty() {
             return false;
         }
         let middle = launch.ray(face, (low + high) * 0.5);
@@ -98,12 +111,14 @@ impl SmallBodies {
         let holds_corner = level < CORNER_LEVELS
             && self.corners.iter().any(|corner| {
                 let along_m = along_m(*corner);
-                along_m > 0.0 && middle.at(along_m).distance(*corner) <= reach_m(along_m)
+                along_m > 0.0
+                    && along_m <= hidden_beyond_m
+                    && middle.at(along_m).distance(*corner) <= reach_m(along_m)
             });
         holds_corner
             || self.bodies.iter().any(|body| {
                 let along_m = along_m(body.centre);
-                if along_m <= -body.radius_m {
+                if along_m <= -body.radius_m || along_m - body.radius_m > hidden_beyond_m {
                     return false;
                 }
                 let along_m = along_m.max(0.0);

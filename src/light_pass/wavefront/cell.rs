@@ -138,7 +138,7 @@ impl CellCutter<'_> {
 
     fn cut_at(&self, cell: &Cell, depth: Depth, work: &mut Workspace, out: &mut CellOutput) {
         out.cells += 1;
-        if self.holds_small_body(cell, depth.bodies) {
+        if self.holds_small_body(cell, depth.bodies, work) {
             let bodies = depth.bodies + 1;
             return self.split(cell, Depth { bodies, ..depth }, work, out);
         }
@@ -196,11 +196,20 @@ impl CellCutter<'_> {
         }
     }
 
-    fn holds_small_body(&self, cell: &Cell, level: u32) -> bool {
+    fn holds_small_body(&self, cell: &Cell, level: u32, work: &Workspace) -> bool {
+        if self.bodies.is_empty() {
+            return false;
+        }
         let [low, _, high, _] = cell.corners.map(|corner| corner.square);
         let launch = self.edges.tracer.launch;
+        // What lies behind all that the corners meet is not seen in the cell.
+        let hidden_beyond_m = cell
+            .corners
+            .iter()
+            .map(|corner| work.get(corner.sample).stopped_m.unwrap_or(f64::INFINITY))
+            .fold(0.0, f64::max);
         self.bodies
-            .ask_for_finer(launch, self.edges.face, (low, high), level)
+            .ask_for_finer(launch, self.edges.face, (low, high), level, hidden_beyond_m)
     }
 
     fn is_too_coarse(&self, cell: &Cell, depth: &Depth, work: &Workspace) -> bool {
@@ -470,6 +479,10 @@ impl CellCutter<'_> {
             (Account::Depth, self.unit.count(sum(|node| node.depth))),
             (Account::Threshold, self.unit.count(sum(|node| node.threshold))),
             (Account::NonFinite, self.unit.count(sum(|node| node.non_finite))),
+            (
+                Account::SwitchedOff,
+                self.unit.count(sum(|node| node.switched_off)),
+            ),
         ];
         // Incident flux comes out of the strands that lead here (or out of the light), the rest goes into others.
         let mut passed: [i64; 3] = std::array::from_fn(|channel| incident[channel] - taken[channel]);

@@ -6,6 +6,7 @@ use super::patch::PatchShape;
 use super::spread::{SpreadOutput, Spreader};
 use super::virtual_vertex::{VirtualRays, VirtualVertex};
 use crate::optics::LinearSrgb;
+use crate::transport::PathEffects;
 
 /// Deviation from straight that triangles may have [texels].
 const CHORD_TEXELS: f64 = 0.02;
@@ -30,7 +31,7 @@ const MIXED_TEXELS: f64 = 16.0;
 /// corners.
 const DETAILS_PER_PATCH: f64 = 64.0;
 
-impl Spreader<'_> {
+impl<E: PathEffects> Spreader<'_, E> {
     /// Whether nine rays of a patch meet a plane within its map.
     pub(super) fn stays_on_map(&self, shape: &PatchShape, object: u32) -> bool {
         let Some(surface) = self.receivers.get(object) else {
@@ -52,7 +53,7 @@ impl Spreader<'_> {
     pub(super) fn steps(
         &self,
         shape: &PatchShape,
-        rays: &mut VirtualRays,
+        rays: &mut VirtualRays<E>,
         is_plane: bool,
         flux_w: LinearSrgb,
         out: &mut SpreadOutput,

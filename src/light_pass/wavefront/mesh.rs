@@ -10,6 +10,7 @@ use super::virtual_vertex::{Place, VirtualRays, VirtualVertex};
 use crate::illumination::accumulator::FluxCount;
 use crate::light_pass::ledger_sum::Account;
 use crate::optics::LinearSrgb;
+use crate::transport::PathEffects;
 
 /// Bisections of a virtual edge between rays that go to different surfaces.
 const CUT_STEPS: u32 = 10;
@@ -54,13 +55,14 @@ pub(super) fn even_grid(
 }
 
 /// One patch while it is spread.
-pub(super) struct PatchMesh<'a, 'b> {
+pub(super) struct PatchMesh<'a, 'b, E> {
     pub(super) shape: &'a PatchShape,
-    pub(super) rays: VirtualRays<'a>,
+    pub(super) rays: VirtualRays<'a, E>,
     /// Flux density at the patch's corners.
     pub(super) colours: &'a [LinearSrgb],
     pub(super) out: &'b mut SpreadOutput,
-    pub(super) absorption: bool,
+    /// Whether its light is absorbed on the way.
+    pub(super) absorbs: bool,
     /// Whether any traced ray of the patch leaves the scene.
     pub(super) goes_out: bool,
 }
@@ -72,7 +74,7 @@ struct Knot {
     vertex: VirtualVertex,
 }
 
-impl PatchMesh<'_, '_> {
+impl<E: PathEffects> PatchMesh<'_, '_, E> {
     fn knot(&mut self, at: DVec2) -> Knot {
         Knot {
             at,
@@ -179,7 +181,7 @@ impl PatchMesh<'_, '_> {
     /// All three rays go to the same surface, or nowhere.
     fn place(&mut self, knots: &[Knot; 3], flux: FluxCount) {
         let mut arrived = flux;
-        if self.absorption {
+        if E::ABSORPTION && self.absorbs {
             let left = knots
                 .iter()
                 .fold(LinearSrgb::BLACK, |sum, knot| sum + knot.vertex.transmittance)

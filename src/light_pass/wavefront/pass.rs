@@ -2,6 +2,7 @@
 
 use rayon::prelude::*;
 
+use super::cell::Patch;
 use super::coverage::{FluxTriangle, deposit_triangles};
 use super::kept_rays::KeptRays;
 use super::lattice::{TracedBand, WavefrontLattice};
@@ -11,6 +12,7 @@ use crate::light_pass::caustic::pass::{Listener, PassReport, Stopwatch};
 use crate::light_pass::ledger_sum::Account;
 use crate::light_pass::receiver_maps::{ChartFor, ReceiverMaps};
 use crate::progress::{Control, Stage};
+use crate::transport::{ForEffects, PathEffects};
 
 /// Patches that one task spreads.
 const PATCHES_PER_TASK: usize = 128;
@@ -132,15 +134,6 @@ impl WavefrontDepositor<'_> {
         report: &mut PassReport,
     ) {
         let watch = Stopwatch::start();
-        let spreader = Spreader {
-            receivers: self.receivers,
-            face: band.face,
-            samples: &band.samples,
-            unit: self.lattice.unit,
-            absorption: self.lattice.tracer.limits.absorption,
-            reference_w: self.reference_w,
-            coarseness: self.coarseness,
-        };
         let tasks: Vec<_> = band
             .patches
             .iter()
@@ -148,19 +141,16 @@ impl WavefrontDepositor<'_> {
             .collect();
         let mut maps = maps;
         for tasks in tasks.chunks(TASKS_AT_ONCE) {
-            let parts: Vec<SpreadOutput> = tasks
-                .par_iter()
-                .map(|patches| {
-                    let mut output = SpreadOutput::default();
-                    for patch in patches.iter().take_while(|_| !control.is_cancelled()) {
-                        spreader.spread(patch, &mut output);
-                    }
-                    output
-                })
-                .collect();
+            let parts = self.lattice.tracer.limits.effects.specialise(SpreadTasks {
+                depositor: self,
+                band,
+                tasks,
+                control,
+            });
             for part in &parts {
                 report.ledger.merge(&part.ledger);
                 report.receiver_queries += part.queries;
+                report.deposits += part.deposits;
                 report.statistics.merge(&part.statistics);
                 report.overreaches.extend_from_slice(&part.overreaches);
             }
@@ -176,6 +166,39 @@ impl WavefrontDepositor<'_> {
             }
         }
         report.deposit_s.add(watch.elapsed());
+    }
+}
+
+/// Patches that are spread at once, task by task.
+struct SpreadTasks<'a> {
+    depositor: &'a WavefrontDepositor<'a>,
+    band: &'a TracedBand,
+    tasks: &'a [&'a [Patch]],
+    control: &'a Control,
+}
+
+impl ForEffects for SpreadTasks<'_> {
+    type Output = Vec<SpreadOutput>;
+
+    fn run<E: PathEffects>(self) -> Vec<SpreadOutput> {
+        let depositor = self.depositor;
+        let spreader = Spreader {
+            receivers: depositor.receivers,
+            face: self.band.face,
+            samples: &self.band.samples,
+            unit: depositor.lattice.unit,
+            effects: E::default(),
+            reference_w: depositor.reference_w,
+            coarseness: depositor.coarseness,
+        };
+        let spread = |patches: &&[Patch]| {
+            let mut output = SpreadOutput::default();
+            for patch in patches.iter().take_while(|_| !self.control.is_cancelled()) {
+                spreader.spread(patch, &mut output);
+            }
+            output
+        };
+        self.tasks.par_iter().map(spread).collect()
     }
 }
 
@@ -209,6 +232,7 @@ impl PassReport {
         self.ledger.merge(&band.ledger);
         self.rays += band.rays;
         self.segments += band.segments;
+        self.paths += band.paths;
         self.cells += band.cells;
         self.splats += band.splats;
     }

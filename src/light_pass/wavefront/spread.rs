@@ -17,10 +17,11 @@ use crate::illumination::accumulator::{FluxCount, FluxUnit};
 use crate::light_pass::caustic::statistics::FootprintStatistics;
 use crate::light_pass::ledger_sum::{Account, LedgerSum};
 use crate::optics::LinearSrgb;
+use crate::transport::{PathCounts, PathEffects};
 
 /// Spreads patches.
 #[derive(Clone, Copy, Debug)]
-pub struct Spreader<'a> {
+pub struct Spreader<'a, E> {
     /// Who is lit.
     pub receivers: &'a Receivers<'a>,
     /// Of the launch domain.
@@ -29,8 +30,8 @@ pub struct Spreader<'a> {
     pub samples: &'a Samples,
     /// Of the accounts.
     pub unit: FluxUnit,
-    /// Whether any volume absorbs.
-    pub absorption: bool,
+    /// What paths may need.
+    pub effects: E,
     /// Flux that all lights send to specular surfaces [W, luminance]: over a map, about its mean irradiance.
     pub reference_w: f64,
     /// How much coarser (> 1) or finer triangles may be than is usual.
@@ -50,6 +51,8 @@ pub struct SpreadOutput {
     pub statistics: FootprintStatistics,
     /// Patches that reach farther than their rays.
     pub overreaches: Vec<Overreach>,
+    /// Patches that came to a map, by what took part in them.
+    pub deposits: PathCounts,
 }
 
 impl SpreadOutput {
@@ -79,7 +82,7 @@ enum Course {
     Mixed,
 }
 
-impl Spreader<'_> {
+impl<E: PathEffects> Spreader<'_, E> {
     /// Spreads one patch.
     pub fn spread(&self, patch: &Patch, out: &mut SpreadOutput) {
         let strands: [&Strand; 4] = patch
@@ -96,7 +99,28 @@ impl Spreader<'_> {
             Course::Plane(object) => self.over(patch, strands, flux, flux_w, Some(object), out),
             Course::Mixed => self.over(patch, strands, flux, flux_w, None, out),
         }
+        self.count(strands[0], &before, out);
         self.note_overreach(patch, strands, &before, out);
+    }
+
+    /// Counts a patch that came to a map, by what took part in it.
+    fn count(&self, strand: &Strand, before: &[usize], out: &mut SpreadOutput) {
+        let lists = out.triangles.iter().enumerate();
+        let is_deposited = |(index, (_, list)): (usize, &(u32, Vec<FluxTriangle>))| {
+            list.len() > before.get(index).copied().unwrap_or(0)
+        };
+        if !lists.into_iter().any(is_deposited) {
+            return;
+        }
+        let tracer = self.receivers.tracer;
+        out.deposits.count_segment(strand.event);
+        out.deposits.attenuated += u64::from(self.absorbs(strand));
+        out.deposits.textured += u64::from(E::TEXTURES && tracer.is_textured(strand.from as usize));
+    }
+
+    /// Whether the light of a strand is absorbed on its way from the surface it left.
+    pub(super) fn absorbs(&self, strand: &Strand) -> bool {
+        E::ABSORPTION && strand.media.absorbs(self.receivers.tracer.scene())
     }
 
     /// Notes where the patch's triangles, those beyond the given counts, lie far from its traced rays.
@@ -172,7 +196,7 @@ impl Spreader<'_> {
     /// All of it goes on; volumes take their share.
     fn onward(&self, strands: &[&Strand], flux: FluxCount, out: &mut SpreadOutput) {
         let mut passed = flux;
-        if self.absorption {
+        if self.absorbs(strands[0]) {
             let scene = self.receivers.tracer.scene();
             let transmittance =
                 |strand: &&Strand| strand.media.transmittance(scene, strand.landing.distance_m());
@@ -200,6 +224,7 @@ impl Spreader<'_> {
         let mut rays = VirtualRays::new(self, &shape, strands, plane);
         let steps = self.steps(&shape, &mut rays, plane.is_some(), flux_w, out);
         if let (PatchShape::Coons(coons), Some(object)) = (&shape, plane)
+            && !self.absorbs(strands[0])
             && let Some(grid) = self.plane_grid(coons, object, steps)
         {
             out.queries += rays.queries + grid.len() as u64;
@@ -210,7 +235,7 @@ impl Spreader<'_> {
             rays,
             colours: &colours,
             out,
-            absorption: self.absorption,
+            absorbs: self.absorbs(strands[0]),
             goes_out,
         };
         if shape.is_rectangle() {
@@ -222,12 +247,9 @@ impl Spreader<'_> {
         out.queries += queries;
     }
 
-    /// Texel coordinates of a grid of rays, row by row, where all of them meet one plane and nothing is absorbed.
+    /// Texel coordinates of a grid of rays, row by row, where all of them meet one plane.
     fn plane_grid(&self, coons: &CoonsPatch, object: u32, steps: (usize, usize)) -> Option<Vec<DVec2>> {
         let plane = self.receivers.get(object)?.plane?;
-        if self.absorption {
-            return None;
-        }
         let mut grid = Vec::with_capacity((steps.0 + 1) * (steps.1 + 1));
         let mut all = true;
         coons.for_each_row(steps, |_, rays| {

@@ -6,13 +6,15 @@ use super::kept_rays::FreshRay;
 use crate::geometry::Ray;
 use crate::light_pass::caustic::path::PathSignature;
 use crate::optics::LinearSrgb;
-use crate::transport::{MediumStack, RayDifferential};
+use crate::transport::{Event, MediumStack, PathCounts, RayDifferential};
 
 /// An outgoing ray after a specular event. Flux is per unit area of the launch domain's unit square.
 #[derive(Clone, Copy, Debug)]
 pub struct Strand {
     /// The way up to and with the event; where the ray goes from here is no part of it.
     pub signature: PathSignature,
+    /// The event itself.
+    pub event: Event,
     /// Starts at the specular surface.
     pub ray: Ray,
     /// Derivatives of the ray by the coordinates of the unit square.
@@ -98,6 +100,8 @@ pub struct SurfaceNode {
     pub threshold: LinearSrgb,
     /// Met a number that is not finite.
     pub non_finite: LinearSrgb,
+    /// Would have needed an effect that is switched off.
+    pub switched_off: LinearSrgb,
     /// Taken by the surface itself as direct light (first hits) or, later, by its map.
     pub taken: LinearSrgb,
 }
@@ -109,12 +113,16 @@ pub struct LightSample {
     pub strands: Vec<Strand>,
     /// Specular surfaces met, in ascending order of their signatures.
     pub nodes: Vec<SurfaceNode>,
+    /// Distance to its first hit [m], where no light goes through what it met.
+    pub stopped_m: Option<f64>,
     /// Flux whose first hit is not specular [W per unit square, per channel].
     pub not_emitted: LinearSrgb,
     /// Largest flux of any strand, luminance [W per unit square].
     pub brightest_w: f64,
     /// Closest-hit queries; 0 where all that it met was known.
     pub segments: u32,
+    /// What effects took part.
+    pub counts: PathCounts,
     /// What it met, where not all of that was known.
     pub fresh: Option<Box<FreshRay>>,
 }

@@ -10,8 +10,8 @@ use crate::light_pass::launch::Launch;
 use crate::optics::LinearSrgb;
 use crate::progress::Control;
 use crate::transport::{
-    Branch, HitPlace, Interaction, MediumStack, RayDerivative, RayDifferential, SurfaceHit, SurfaceScale,
-    Tracer,
+    Branch, Event, ForEffects, HitPlace, Interaction, MediumStack, PathCounts, PathEffects, RayDerivative,
+    RayDifferential, SurfaceHit, SurfaceScale, Tracer,
 };
 
 /// Strands that one light ray may have waiting: a closed mirror box with glass in it doubles them without end.
@@ -35,6 +35,22 @@ pub struct StrandTracer<'a> {
     pub kept: Option<&'a KeptRays>,
     /// Asks to stop: then rays end at once, and what they give is to be thrown away.
     pub control: &'a Control,
+    /// The code that follows rays, compiled for the effects of `limits`.
+    follow: Follow,
+}
+
+/// Follows the ray that starts at a point of the unit square of a face.
+type Follow = for<'t, 'a> fn(&'t StrandTracer<'a>, usize, DVec2) -> LightSample;
+
+/// Chooses the code for a set of effects.
+struct FollowFor;
+
+impl ForEffects for FollowFor {
+    type Output = Follow;
+
+    fn run<E: PathEffects>(self) -> Follow {
+        |tracer, face, square| tracer.follow::<E>(face, square)
+    }
 }
 
 /// A ray that waits to be followed.
@@ -45,6 +61,8 @@ struct Waiting {
     flux_w: LinearSrgb,
     media: MediumStack,
     signature: PathSignature,
+    /// What began it; `None` for the light's own ray.
+    event: Option<Event>,
     depth: u32,
     /// Index of its strand; none for the light's own ray.
     strand: Option<usize>,
@@ -58,11 +76,36 @@ struct Search<'a> {
     hits: Vec<KeptHit>,
     /// Closest-hit queries.
     searches: u32,
+    /// The same by what began the segment.
+    counts: PathCounts,
 }
 
-impl StrandTracer<'_> {
+impl<'a> StrandTracer<'a> {
+    /// A tracer without kept rays; `steps`: distance between neighbouring rays, in units of the unit square.
+    pub fn new(
+        tracer: &'a Tracer,
+        launch: &'a Launch,
+        limits: PathLimits,
+        steps: [f64; 2],
+        control: &'a Control,
+    ) -> Self {
+        Self {
+            tracer,
+            launch,
+            limits,
+            steps,
+            kept: None,
+            control,
+            follow: limits.effects.specialise(FollowFor),
+        }
+    }
+
     /// Traces the ray that starts at a point of the unit square of a face.
     pub fn trace(&self, face: usize, square: DVec2) -> LightSample {
+        (self.follow)(self, face, square)
+    }
+
+    fn follow<E: PathEffects>(&self, face: usize, square: DVec2) -> LightSample {
         // Just within the domain: its border may be the very border of a surface.
         let square = square.clamp(DVec2::splat(DOMAIN_MARGIN), DVec2::splat(1.0 - DOMAIN_MARGIN));
         let mut sample = LightSample::default();
@@ -74,6 +117,7 @@ impl StrandTracer<'_> {
             known: self.kept.and_then(|kept| kept.get(&key)),
             hits: Vec::new(),
             searches: 0,
+            counts: PathCounts::default(),
         };
         let (ray, differential) = self.launch.ray_with_differential(face, square);
         let flux_w = self.launch.flux_density_w(square, ray.direction);
@@ -87,14 +131,16 @@ impl StrandTracer<'_> {
             flux_w,
             media: MediumStack::default(),
             signature: PathSignature::default(),
+            event: None,
             depth: 0,
             strand: None,
             is_known: search.known.is_some(),
         }];
         while let Some(next) = waiting.pop() {
-            self.step(next, floor_w, &mut search, &mut sample, &mut waiting);
+            self.step::<E>(next, floor_w, &mut search, &mut sample, &mut waiting);
         }
         sample.segments = search.searches;
+        sample.counts += search.counts;
         if search.searches > 0 {
             sample.fresh = Some(Box::new(FreshRay {
                 key,
@@ -111,7 +157,7 @@ impl StrandTracer<'_> {
         sample
     }
 
-    fn step(
+    fn step<E: PathEffects>(
         &self,
         from: Waiting,
         floor_w: f64,
@@ -128,8 +174,11 @@ impl StrandTracer<'_> {
             return;
         };
         let material = self.tracer.scene().material_of(hit.object);
-        if let Some(strand) = from.strand {
-            sample.strands[strand].landing = landing(&hit, material.surface.is_receiver());
+        match from.strand {
+            Some(strand) => {
+                sample.strands[strand].landing = landing(&hit, material.surface.is_receiver());
+            }
+            None => sample.stopped_m = material.surface.is_opaque().then_some(hit.distance_m),
         }
         if !material.surface.is_specular() {
             if from.strand.is_none() {
@@ -138,10 +187,16 @@ impl StrandTracer<'_> {
             return;
         }
         let mut incident = from.flux_w;
-        if self.limits.absorption {
+        if E::ABSORPTION && from.media.absorbs(self.tracer.scene()) {
             incident = incident * from.media.transmittance(self.tracer.scene(), hit.distance_m);
+            sample.counts.attenuated += 1;
         }
-        let interaction = self.tracer.interact(&hit, from.ray.direction, &from.media);
+        if E::TEXTURES && self.tracer.is_textured(hit.object) {
+            sample.counts.textured += 1;
+        }
+        let interaction = self
+            .tracer
+            .interact_with::<E>(&hit, from.ray.direction, &from.media);
         self.scatter(from, &hit, incident, &interaction, floor_w, sample, waiting);
     }
 
@@ -177,6 +232,7 @@ impl StrandTracer<'_> {
             depth: LinearSrgb::BLACK,
             threshold: LinearSrgb::BLACK,
             non_finite: LinearSrgb::BLACK,
+            switched_off: incident * interaction.switched_off,
             taken: incident * interaction.deposit,
         };
         for branch in [interaction.reflection, interaction.transmission]
@@ -236,12 +292,14 @@ fn push(
         flux_w,
         media: branch.media,
         signature,
+        event: Some(branch.event),
         depth: from.depth + 1,
         strand: Some(sample.strands.len()),
         is_known: from.is_known,
     });
     sample.strands.push(Strand {
         signature,
+        event: branch.event,
         ray: branch.ray,
         differential,
         flux_w,
@@ -261,6 +319,9 @@ impl Search<'_> {
             (Some(known), Some(kept)) if known.holds(&from.ray, kept) => kept,
             _ => {
                 self.searches += 1;
+                if let Some(event) = from.event {
+                    self.counts.count_segment(event);
+                }
                 tracer.closest_place(&from.ray)
             }
         };

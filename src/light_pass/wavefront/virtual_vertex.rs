@@ -1,5 +1,7 @@
 //! Rays between the traced ones, and where they land.
 
+use std::marker::PhantomData;
+
 use glam::DVec2;
 
 use super::patch::PatchShape;
@@ -9,6 +11,7 @@ use super::strand::{Landing, Strand};
 use crate::geometry::Ray;
 use crate::optics::LinearSrgb;
 use crate::scene::SurfaceKind;
+use crate::transport::PathEffects;
 use crate::transport::{MediumStack, SurfaceHit};
 
 /// Where a ray lands.
@@ -76,13 +79,15 @@ pub struct VirtualVertex {
 }
 
 /// Makes rays of one patch and lets them land.
-pub struct VirtualRays<'a> {
+pub struct VirtualRays<'a, E> {
     receivers: &'a Receivers<'a>,
     shape: &'a PatchShape,
     /// Object whose extended plane all rays are for.
     plane: Option<u32>,
     media: MediumStack,
-    absorption: bool,
+    /// Whether light is absorbed on the way.
+    absorbs: bool,
+    effects: PhantomData<E>,
     /// Object and smoothing group that the rays leave.
     from: (u32, u32),
     /// Within this distance of its origin a ray may meet the surface it leaves, since its origin is interpolated [m].
@@ -91,10 +96,10 @@ pub struct VirtualRays<'a> {
     pub queries: u64,
 }
 
-impl<'a> VirtualRays<'a> {
+impl<'a, E: PathEffects> VirtualRays<'a, E> {
     /// For one patch between strands of one signature.
     pub fn new(
-        spreader: &Spreader<'a>,
+        spreader: &Spreader<'a, E>,
         shape: &'a PatchShape,
         strands: &[&Strand],
         plane: Option<u32>,
@@ -117,7 +122,8 @@ impl<'a> VirtualRays<'a> {
             shape,
             plane,
             media: first.media,
-            absorption: spreader.absorption,
+            absorbs: spreader.absorbs(first),
+            effects: PhantomData,
             from: (first.from, first.from_group),
             skin_m: spread_m.min(0.5 * nearest_own_m),
             queries: 0,
@@ -155,7 +161,7 @@ impl<'a> VirtualRays<'a> {
     }
 
     fn transmittance(&self, distance_m: f64) -> LinearSrgb {
-        if self.absorption {
+        if E::ABSORPTION && self.absorbs {
             self.media
                 .transmittance(self.receivers.tracer.scene(), distance_m)
         } else {

@@ -119,9 +119,7 @@ fn last_bake(ui: &mut Ui, last: &BakedLevel) {
 /// Shows section *Energy*: where the light of the last bake went.
 pub fn energy(ui: &mut Ui, last: Option<&BakedLevel>) {
     let ledgers = last.map_or(&[][..], |last| &last.result.ledgers);
-    let total = ledgers
-        .iter()
-        .fold(EnergyLedger::default(), |sum, light| add(sum, &light.energy_w));
+    let total: EnergyLedger = ledgers.iter().map(|light| &light.energy_w).sum();
     if total.emitted > 0.0 {
         ledger(ui, &total);
     } else {
@@ -198,20 +196,4 @@ fn ledger(ui: &mut Ui, total: &EnergyLedger) {
             .on_hover_text(hover);
             ui.end_row();
         });
-}
-
-fn add(a: EnergyLedger, b: &EnergyLedger) -> EnergyLedger {
-    let mut truncated = a.truncated;
-    truncated.depth += b.truncated.depth;
-    truncated.threshold += b.truncated.threshold;
-    truncated.non_finite += b.truncated.non_finite;
-    truncated.unresolved += b.truncated.unresolved;
-    truncated.quadrature += b.truncated.quadrature;
-    EnergyLedger {
-        emitted: a.emitted + b.emitted,
-        deposited: a.deposited + b.deposited,
-        absorbed: a.absorbed + b.absorbed,
-        escaped: a.escaped + b.escaped,
-        truncated,
-    }
 }

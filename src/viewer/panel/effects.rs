@@ -2,14 +2,11 @@
 
 use egui::{Button, Frame, RichText, Role, Ui, WidgetInfo, vec2};
 
-use super::bake::{FAILED, two_digits};
-use super::control::{bytes, counted, grouped, significant};
-use super::{Facts, Wishes};
+use super::control::{bytes, counted, grouped};
+use super::{Facts, Wishes, worth};
 use crate::effect::{Effect, EffectSwitch, EffectSwitches};
-use crate::illumination::difference::Difference;
 use crate::plan::EffectLine;
 use crate::session::EffectCounts;
-use crate::viewer::worker::BakeState;
 
 /// Width of the three switches of an effect [points].
 const SWITCHES_WIDTH: f32 = 128.0;
@@ -17,7 +14,7 @@ const SWITCHES_WIDTH: f32 = 128.0;
 const SWITCH: egui::Vec2 = vec2(40.0, 18.0);
 
 /// Size of the counters' text [points].
-const COUNTER: f32 = 11.5;
+pub const COUNTER: f32 = 11.5;
 
 const SWITCHES: [(EffectSwitch, &str, &str); 3] = [
     (
@@ -36,10 +33,6 @@ const SWITCHES: [(EffectSwitch, &str, &str); 3] = [
         "Never: the light that would need it is missing, and booked as switched off. Less time and memory.",
     ),
 ];
-const WORTH: &str = "Bakes once more without this effect, beside the maps that are shown, and shows in false colours \
-                     where it adds light and where it takes light away. Costs a whole bake; any change stops it.";
-const WORTH_LINE: &str = "Light on all maps and layers with the effect minus without it, in luminous-equivalent watts; \
-                          the root mean square of the difference over the mean with it.";
 const UNAVAILABLE: &str = "This version does not simulate it.";
 
 /// What is known of an effect.
@@ -53,13 +46,9 @@ struct Known<'a> {
 pub fn show(ui: &mut Ui, switches: &mut EffectSwitches, facts: &Facts<'_>, wishes: &mut Wishes) {
     for effect in Effect::ALL {
         let mut switch = switches.get(effect);
-        let known = known(effect, facts);
-        entry(ui, effect, &mut switch, known, |ui| {
-            let is_on = known.line.is_some_and(|line| line.on);
-            if is_on && effect.is_available() && effect != Effect::Chains {
-                worth(ui, effect, facts, wishes);
-            }
-        });
+        if entry(ui, effect, &mut switch, facts) {
+            wishes.worth = Some(effect);
+        }
         switches.set(effect, switch);
     }
     for line in facts.last.iter().flat_map(|last| &last.result.plan.lights) {
@@ -86,17 +75,18 @@ fn known<'a>(effect: Effect, facts: &Facts<'a>) -> Known<'a> {
     }
 }
 
-fn entry(
-    ui: &mut Ui,
-    effect: Effect,
-    switch: &mut EffectSwitch,
-    known: Known<'_>,
-    add_worth: impl FnOnce(&mut Ui),
-) {
+/// Shows one effect; tells whether it was asked what it is worth.
+fn entry(ui: &mut Ui, effect: Effect, switch: &mut EffectSwitch, facts: &Facts<'_>) -> bool {
+    let known = known(effect, facts);
+    let is_on = known.line.map(|line| line.on).filter(|_| effect.is_available());
     let name = effect.name().replace('_', " ");
+    let has_worth = is_on == Some(true) && effect != Effect::Chains;
+    let mut is_asked = false;
     ui.horizontal(|ui| {
-        let is_on = known.line.map(|line| line.on);
-        title(ui, &name, is_on.filter(|_| effect.is_available())).on_hover_text(effect.description());
+        title(ui, &name, is_on).on_hover_text(effect.description());
+        if has_worth {
+            is_asked = worth::button(ui, effect, facts);
+        }
         ui.add_space((ui.available_width() - SWITCHES_WIDTH).max(0.0));
         ui.add_enabled_ui(effect.is_available(), |ui| segments(ui, &name, switch));
     });
@@ -111,56 +101,11 @@ fn entry(
         if let Some(counts) = known.counts.filter(|_| effect.is_available()) {
             counters(ui, counts);
         }
-        add_worth(ui);
-    });
-}
-
-/// What the effect brings to the maps that are shown, or a button that finds it.
-fn worth(ui: &mut Ui, effect: Effect, facts: &Facts<'_>, wishes: &mut Wishes) {
-    if let BakeState::Comparing {
-        effect: left_out,
-        stage,
-        fraction,
-    } = facts.state
-        && *left_out == effect
-    {
-        let text = format!("baking without it: {} {:.0} %", stage.name(), 100.0 * fraction);
-        ui.label(RichText::new(text).size(COUNTER));
-        return;
-    }
-    if let Some(worth) = facts.worth.filter(|worth| worth.effect == effect) {
-        match &worth.difference {
-            Ok(found) => {
-                ui.label(RichText::new(worth_line(found)).size(COUNTER))
-                    .on_hover_text(WORTH_LINE);
-            }
-            Err(sentence) => drop(ui.colored_label(FAILED, sentence)),
+        if has_worth {
+            worth::line(ui, effect, facts);
         }
-        return;
-    }
-    let is_ready = !facts.state.is_working() && facts.last.is_some_and(|last| last.is_final);
-    let name = effect.name().replace('_', " ");
-    let button = ui
-        .add_enabled(is_ready, Button::new("worth").small())
-        .on_hover_text(WORTH)
-        .on_disabled_hover_text("Known once the bake is done.");
-    button.widget_info(|| WidgetInfo::labeled(Role::Button, is_ready, format!("{name}: worth")));
-    if button.clicked() {
-        wishes.worth = Some(effect);
-    }
-}
-
-/// "+12.3 W of 16.1 W deposited; maps differ by 84 % (relative RMSE)".
-fn worth_line(found: &Difference) -> String {
-    let sign = if found.difference_w() < 0.0 { "−" } else { "+" };
-    let difference = significant(found.difference_w().abs());
-    let with = significant(found.with_w);
-    let differ = found
-        .relative_rmse
-        .map_or("there is no light with it".into(), |rmse| {
-            format!("maps differ by {} % (relative RMSE)", two_digits(100.0 * rmse))
-        });
-    format!("{sign}{difference} W of {with} W deposited; {differ}")
+    });
+    is_asked
 }
 
 /// "refraction: on", strong where it is on.
@@ -225,26 +170,10 @@ fn counters(ui: &mut Ui, counts: &EffectCounts) {
             "Time on the graphics device for the last picture's specular surfaces, in milliseconds. Some devices \
              cannot tell.",
         );
-    } else if *counts == EffectCounts::default() {
-        add(
-            "takes no rays, no memory, no time".into(),
-            "Counted where the work would be done.",
-        );
     } else {
-        add(
-            format!("{} rays", grouped(counts.rays)),
-            "Rays traced for it: light rays, segments after an event of its kind, shadow rays.",
-        );
-        add(
-            format!("{} deposits", grouped(counts.deposits)),
-            "Patches and kernels that it brought to a map.",
-        );
-        add(bytes(counts.bytes), "Memory that is held for it.");
-        add(
-            format!("{:.1} ms CPU", counts.cpu_ms),
-            "CPU time over all threads, in milliseconds; where effects share loops, by their share of rays and \
-             deposits.",
-        );
+        for (text, hover) in light_counters(counts) {
+            add(text, hover);
+        }
     }
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = 10.0;
@@ -252,4 +181,39 @@ fn counters(ui: &mut Ui, counts: &EffectCounts) {
             ui.label(RichText::new(text).size(COUNTER)).on_hover_text(hover);
         }
     });
+}
+
+/// Of an effect of the light: what it took none of is left out.
+fn light_counters(counts: &EffectCounts) -> Vec<(String, &'static str)> {
+    let cpu_ms = counts.cpu_ms.unwrap_or(0.0);
+    let counters = [
+        (
+            counts.rays > 0,
+            format!("{} rays", grouped(counts.rays)),
+            "Rays traced for it: light rays, segments after an event of its kind, shadow rays.",
+        ),
+        (
+            counts.deposits > 0,
+            format!("{} deposits", grouped(counts.deposits)),
+            "Patches and kernels that it brought to a map.",
+        ),
+        (
+            counts.bytes > 0,
+            bytes(counts.bytes),
+            "Memory that is held for it.",
+        ),
+        (
+            cpu_ms > 0.0,
+            format!("{cpu_ms:.1} ms CPU"),
+            "CPU time over all threads, in milliseconds; where effects share loops, by their share of rays and \
+             deposits. What is a part of other effects' time is not told.",
+        ),
+    ];
+    let taken = counters.into_iter().filter(|(is_taken, ..)| *is_taken);
+    let taken: Vec<_> = taken.map(|(_, text, hover)| (text, hover)).collect();
+    if taken.is_empty() {
+        let text = "takes no rays, no memory, no time".into();
+        return vec![(text, "Counted where the work would be done.")];
+    }
+    taken
 }

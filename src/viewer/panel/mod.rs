@@ -8,6 +8,7 @@ mod effects;
 mod help;
 mod light_pass;
 mod scene;
+mod worth;
 
 use std::sync::Arc;
 

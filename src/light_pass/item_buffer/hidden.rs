@@ -1,0 +1,261 @@
+//! Cells whose casters lie behind opaque faces.
+//!
+//! A cell is dropped only where its whole frustum is covered by opaque faces that are nearer to the light than every
+//! caster in it: each ray that could start there ends on an opaque face first. Mirrors are opaque too, and hide what is
+//! behind them, though not themselves. Faces are subtracted from the cell's
+//! rectangle one by one. Two faces that share an edge share its plane bit for bit, so that no gap opens between them;
+//! what is left thinner than [`SLIVER`] is rounding.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use glam::{DVec2, DVec3};
+
+use super::CELLS_PER_SIDE;
+use super::bits::CellBits;
+use super::grid::Grid;
+use super::polygon::Polygon;
+use crate::light_pass::launch::Launch;
+
+/// Widths below this are rounding [half sides of a face].
+const SLIVER: f64 = 1e-11;
+
+/// A face counts as nearer by this relative distance.
+const NEARER: f64 = 1e-7;
+
+/// A triangle that spans less than this, seen from the light, has a plane that rounding may tilt.
+const LEAST_VOLUME: f64 = 1e-6;
+
+/// Faces that are subtracted from a cell: those that came first.
+const MOST_FACES: usize = 64;
+
+/// Pieces that a cell may fall into.
+const MOST_PIECES: usize = 256;
+
+/// A triangle in a face's homogeneous coordinates, with how near to the light it is.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Facet {
+    corners: [DVec3; 3],
+    /// Planes through the light and the edges: positive on directions within, where the light sees the triangle.
+    edges: [DVec3; 3],
+    /// `nearness·(x, y, 1)` is how near the triangle's plane is in the direction of a point of the face: 1/z or, for a
+    /// sun, the distance before the launch plane's origin. `None` where the triangle is small or seen edge-on.
+    nearness: Option<DVec3>,
+    /// Largest and smallest nearness of the corners, where all of them lie before the light.
+    range: Option<(f64, f64)>,
+}
+
+impl Facet {
+    pub(super) fn new(launch: &Launch, face: usize, triangle: &[DVec3; 3]) -> Self {
+        let corners = triangle.map(|corner| launch.to_face(face, corner));
+        let values = triangle.map(|corner| launch.nearness(corner));
+        let [a, b, c] = corners;
+        let mut edges = [b.cross(c), c.cross(a), a.cross(b)];
+        let volume = a.dot(edges[0]);
+        let weighted = edges[0] * values[0] + edges[1] * values[1] + edges[2] * values[2];
+        let whole = a.length() * b.length() * c.length();
+        let is_sound = volume.abs() > LEAST_VOLUME * whole;
+        if volume < 0.0 {
+            edges = edges.map(|edge| -edge);
+        }
+        let at_corners = [0, 1, 2].map(|corner| values[corner] / corners[corner].z);
+        let all_before = corners.iter().all(|corner| corner.z > 0.0);
+        let [u, v, w] = at_corners;
+        Self {
+            corners,
+            edges,
+            nearness: is_sound.then_some(weighted / volume),
+            range: all_before.then_some((u.max(v).max(w), u.min(v).min(w))),
+        }
+    }
+
+    /// No point of the triangle in a rectangle of the face is nearer than this.
+    fn nearest_in(&self, cell: (DVec2, DVec2)) -> f64 {
+        let by_plane = self
+            .nearness
+            .map_or(f64::INFINITY, |plane| extremes(plane, cell).1);
+        let by_corners = self.range.map_or(f64::INFINITY, |(nearest, _)| nearest);
+        by_plane.min(by_corners)
+    }
+
+    /// All points of the triangle in a rectangle of the face are at least this near; `None` where that is not known.
+    pub(super) fn farthest_in(&self, cell: (DVec2, DVec2)) -> Option<f64> {
+        let by_plane = self.nearness.map(|plane| extremes(plane, cell).0);
+        let by_corners = self.range.map(|(_, farthest)| farthest);
+        match (by_plane, by_corners) {
+            (Some(plane), Some(corners)) => Some(plane.max(corners)),
+            (one, other) => one.or(other),
+        }
+    }
+}
+
+/// Least and largest value of a linear function over a rectangle of the plane z = 1.
+fn extremes(plane: DVec3, (low, high): (DVec2, DVec2)) -> (f64, f64) {
+    let middle = (low + high) * 0.5;
+    let half = (high - low) * 0.5;
+    let value = plane.dot(middle.extend(1.0));
+    let reach = plane.x.abs() * half.x + plane.y.abs() * half.y;
+    (value - reach, value + reach)
+}
+
+/// What lies in the marked cells of one face.
+pub(super) struct HiddenCells {
+    grid: &'static Grid,
+    /// Opaque faces that may hide a caster, with their object, by cell.
+    faces: Vec<Vec<(usize, Facet)>>,
+    /// Cells that hold such faces.
+    doubtful: CellBits,
+    /// How near an object comes at most in a doubtful cell (column, row).
+    casters: BTreeMap<((usize, usize), usize), f64>,
+}
+
+/// What is hidden of the casters in the doubtful cells of one face.
+#[derive(Debug)]
+pub(super) struct Hidden {
+    /// Cells in which every caster is hidden.
+    pub(super) cells: CellBits,
+    /// Casters that are not hidden in some doubtful cell.
+    pub(super) seen: BTreeSet<usize>,
+}
+
+impl HiddenCells {
+    pub(super) fn new(launch: &Launch) -> Self {
+        Self {
+            grid: Grid::of(launch.mapping()),
+            faces: vec![Vec::new(); CELLS_PER_SIDE * CELLS_PER_SIDE],
+            doubtful: CellBits::filled(false),
+            casters: BTreeMap::new(),
+        }
+    }
+
+    /// Adds an opaque face of an object that may lie before a caster in some of the `marked` cells, which become doubtful
+    /// by it. Returns the cells looked at.
+    pub(super) fn add_opaque(&mut self, object: usize, facet: &Facet, marked: &CellBits) -> u64 {
+        let Some(polygon) = Polygon::seen(&facet.corners) else {
+            return 1;
+        };
+        let cells = polygon.touched(self.grid, marked);
+        for &(column, row) in &cells {
+            let faces = &mut self.faces[row * CELLS_PER_SIDE + column];
+            if faces.len() < MOST_FACES {
+                faces.push((object, *facet));
+            }
+            self.doubtful.set(column, row);
+        }
+        1 + cells.len() as u64
+    }
+
+    /// Adds a face of an opaque caster to cells that are doubtful already: alone it drops no cell, since its own light
+    /// leaves from there. Returns the cells looked at.
+    pub(super) fn add_opaque_caster(&mut self, object: usize, facet: &Facet) -> u64 {
+        let doubtful = self.doubtful.clone();
+        self.add_opaque(object, facet, &doubtful)
+    }
+
+    /// Cells that opaque faces may cover.
+    pub(super) fn doubtful(&self) -> &CellBits {
+        &self.doubtful
+    }
+
+    /// Adds a triangle of a caster. Returns the cells looked at.
+    pub(super) fn add_caster(&mut self, object: usize, facet: &Facet) -> u64 {
+        let Some(polygon) = Polygon::seen(&facet.corners) else {
+            return 1;
+        };
+        let cells = polygon.touched(self.grid, &self.doubtful);
+        for &cell in &cells {
+            let nearest = self.casters.entry((cell, object)).or_insert(f64::NEG_INFINITY);
+            *nearest = nearest.max(facet.nearest_in(self.grid.cell(cell.0, cell.1)));
+        }
+        1 + cells.len() as u64
+    }
+
+    /// Looks at every caster in every doubtful cell.
+    pub(super) fn find(&self) -> Hidden {
+        let mut hidden = Hidden {
+            cells: CellBits::filled(false),
+            seen: BTreeSet::new(),
+        };
+        for (&((column, row), _), _) in &self.casters {
+            hidden.cells.set(column, row);
+        }
+        for (&((column, row), object), &nearness) in &self.casters {
+            if !self.is_covered((column, row), object, nearness) {
+                hidden.cells.clear(column, row);
+                hidden.seen.insert(object);
+            }
+        }
+        hidden
+    }
+
+    /// Whether faces of other objects cover a whole cell before an object that comes this near.
+    fn is_covered(&self, (column, row): (usize, usize), object: usize, nearness: f64) -> bool {
+        let faces = &self.faces[row * CELLS_PER_SIDE + column];
+        let cell = self.grid.cell(column, row);
+        let margin = NEARER * nearness.abs();
+        let is_before = |facet: &Facet| {
+            let farthest = facet.farthest_in(cell);
+            farthest.is_some_and(|farthest| farthest > nearness + margin)
+        };
+        let (low, high) = cell;
+        let corner = |x: f64, y: f64| DVec3::new(x, y, 1.0);
+        let mut left = vec![vec![
+            corner(low.x, low.y),
+            corner(high.x, low.y),
+            corner(high.x, high.y),
+            corner(low.x, high.y),
+        ]];
+        for (_, facet) in faces
+            .iter()
+            .filter(|(owner, facet)| *owner != object && is_before(facet))
+        {
+            left = left.into_iter().flat_map(|piece| without(piece, facet)).collect();
+            if left.is_empty() {
+                return true;
+            }
+            if left.len() > MOST_PIECES {
+                return false;
+            }
+        }
+        false
+    }
+}
+
+/// What is left of a convex piece of the plane z = 1 outside of a triangle.
+fn without(piece: Vec<DVec3>, facet: &Facet) -> Vec<Vec<DVec3>> {
+    let mut left = Vec::new();
+    let mut inside = piece.clone();
+    for edge in facet.edges {
+        let heights: Vec<f64> = inside.iter().map(|corner| corner.dot(edge)).collect();
+        // Distances on the plane are heights over this.
+        let scale = edge.truncate().length();
+        let sliver = SLIVER * scale;
+        let lowest = heights.iter().copied().fold(f64::INFINITY, f64::min);
+        let highest = heights.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        // Also where a number is not one: then nothing is taken away.
+        if highest <= sliver || highest.is_nan() {
+            return vec![piece];
+        }
+        if lowest >= -sliver {
+            continue;
+        }
+        left.push(half(&inside, &heights, -1.0));
+        inside = half(&inside, &heights, 1.0);
+    }
+    left
+}
+
+/// The part of a convex polygon where the heights have a sign.
+fn half(polygon: &[DVec3], heights: &[f64], sign: f64) -> Vec<DVec3> {
+    let mut part = Vec::with_capacity(polygon.len() + 1);
+    for (index, &a) in polygon.iter().enumerate() {
+        let next = (index + 1) % polygon.len();
+        let (da, db) = (sign * heights[index], sign * heights[next]);
+        if da >= 0.0 {
+            part.push(a);
+        }
+        if (da < 0.0) != (db < 0.0) {
+            part.push(a + (polygon[next] - a) * (da / (da - db)));
+        }
+    }
+    part
+}

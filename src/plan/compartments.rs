@@ -1,0 +1,142 @@
+//! Parts of the scene that opaque closed surfaces seal from each other.
+
+use glam::DVec3;
+
+use crate::geometry::enclosure::{Bounds, is_closed, triangle_meets_box, winding_number};
+use crate::scene::{LightKind, Mesh, Scene};
+
+/// Larger meshes are not looked at: they seal nothing.
+const MOST_TRIANGLES: usize = 200_000;
+
+/// A winding number this close to a whole one is taken for it.
+const WINDING_TOLERANCE: f64 = 1e-6;
+
+/// The opaque closed objects around something, ascending; `None` where that cannot be told.
+type Around = Option<Vec<usize>>;
+
+/// Which closed opaque objects everything lies inside of.
+#[derive(Debug)]
+pub(super) struct Compartments {
+    objects: Vec<Around>,
+    lights: Vec<Around>,
+    /// Whether the object is such a surface itself: it has to do with its outside and its inside.
+    encloses: Vec<bool>,
+}
+
+impl Compartments {
+    pub(super) fn of(scene: &Scene) -> Self {
+        let bounds: Vec<Option<Bounds>> = scene.objects.iter().map(|object| object.mesh.bounds()).collect();
+        let mut compartments = Self {
+            objects: vec![Some(Vec::new()); scene.objects.len()],
+            lights: vec![Some(Vec::new()); scene.lights.len()],
+            encloses: vec![false; scene.objects.len()],
+        };
+        for (container, object) in scene.objects.iter().enumerate() {
+            let Some(around) = bounds[container].filter(|_| scene.material_of(container).surface.is_opaque())
+            else {
+                continue;
+            };
+            let inside: Vec<(usize, Bounds)> = bounds
+                .iter()
+                .enumerate()
+                .filter(|(other, _)| *other != container)
+                .filter_map(|(other, bounds)| Some((other, bounds.filter(|inner| holds(around, *inner))?)))
+                .collect();
+            let lamps: Vec<(usize, DVec3)> = scene
+                .lights
+                .iter()
+                .enumerate()
+                .filter_map(|(light, source)| Some((light, position(&source.kind)?)))
+                .filter(|(_, place)| holds(around, (*place, *place)))
+                .collect();
+            let mesh = &object.mesh;
+            if (inside.is_empty() && lamps.is_empty())
+                || mesh.triangles.len() > MOST_TRIANGLES
+                || !is_closed(&mesh.positions, &mesh.triangles)
+            {
+                continue;
+            }
+            compartments.encloses[container] = true;
+            for (other, bounds) in inside {
+                book(
+                    &mut compartments.objects[other],
+                    container,
+                    is_inside(mesh, bounds),
+                );
+            }
+            for (light, place) in lamps {
+                book(
+                    &mut compartments.lights[light],
+                    container,
+                    is_inside(mesh, (place, place)),
+                );
+            }
+        }
+        compartments
+    }
+
+    /// Whether light of a light may meet an object at all.
+    pub(super) fn light_meets(&self, light: usize, object: usize) -> bool {
+        self.borders(object, &self.lights[light])
+    }
+
+    /// Whether light may go from one object to another.
+    pub(super) fn share(&self, from: usize, to: usize) -> bool {
+        let Some(own) = &self.objects[from] else {
+            return true;
+        };
+        let inner = self.encloses[from].then(|| Some(with(own, from)));
+        self.borders(to, &self.objects[from]) || inner.is_some_and(|inner| self.borders(to, &inner))
+    }
+
+    /// Whether an object borders the space within `around`.
+    fn borders(&self, object: usize, around: &Around) -> bool {
+        let (Some(own), Some(around)) = (&self.objects[object], around) else {
+            return true;
+        };
+        own == around || (self.encloses[object] && with(own, object) == *around)
+    }
+}
+
+/// Where a light is; suns are outside of everything.
+fn position(light: &LightKind) -> Option<DVec3> {
+    match *light {
+        LightKind::Point { position, .. } | LightKind::Spot { position, .. } => Some(position),
+        LightKind::Sun { .. } => None,
+    }
+}
+
+fn holds((low, high): Bounds, (from, to): Bounds) -> bool {
+    low.cmple(from).all() && high.cmpge(to).all()
+}
+
+/// Whether a box lies wholly inside a closed mesh; `None` where the mesh goes through it, or hardly passes it.
+fn is_inside(mesh: &Mesh, (low, high): Bounds) -> Option<bool> {
+    let corners = || (0..mesh.triangles.len()).map(|triangle| mesh.corners(triangle));
+    // Wider than rounding, so that what touches is not told apart.
+    let margin = DVec3::splat(1e-9 * (high.abs().max(low.abs()).max_element() + (high - low).length()));
+    let widened = (low - margin, high + margin);
+    if corners().any(|corners| triangle_meets_box(corners, widened)) {
+        return None;
+    }
+    let winding = winding_number(corners(), low * 0.5 + high * 0.5).abs();
+    let whole = winding.round();
+    ((winding - whole).abs() < WINDING_TOLERANCE).then_some(whole == 1.0)
+}
+
+/// Adds a container to what is around something.
+fn book(around: &mut Around, container: usize, is_inside: Option<bool>) {
+    match (around.as_mut(), is_inside) {
+        (Some(list), Some(true)) => list.push(container),
+        (_, None) => *around = None,
+        _ => {}
+    }
+}
+
+/// The same containers and one more.
+fn with(around: &[usize], container: usize) -> Vec<usize> {
+    let place = around.partition_point(|&other| other < container);
+    let mut all = around.to_vec();
+    all.insert(place, container);
+    all
+}

@@ -1,0 +1,193 @@
+//! Which specular surfaces a light can meet, and from which of them its light can go on to a diffuse one: by bounds
+//! alone, and never too few.
+
+use glam::DVec3;
+
+use super::compartments::Compartments;
+use crate::geometry::enclosure::Bounds;
+use crate::scene::{LightKind, Mesh, Scene, SurfaceKind};
+
+/// With more specular objects than this, all that share a compartment are taken to send light to each other.
+const MOST_RELAYS: usize = 512;
+
+/// Tests of a triangle with a box that are worth making for an object; beyond, it is taken to reach everything.
+const MOST_TESTS: usize = 1 << 22;
+
+/// Rounding that planes and boxes are compared with, relative to the scene.
+const TOLERANCE: f64 = 1e-9;
+
+/// What may send light to what.
+#[derive(Debug)]
+pub struct Reach<'a> {
+    scene: &'a Scene,
+    compartments: Compartments,
+    bounds: Vec<Option<Bounds>>,
+    specular: Vec<usize>,
+    receivers: Vec<usize>,
+    tolerance_m: f64,
+    /// Specular objects whose light, wherever it comes from, may end on a receiver.
+    is_useful: Vec<bool>,
+}
+
+impl<'a> Reach<'a> {
+    /// Looks at a scene.
+    pub fn of(scene: &'a Scene) -> Self {
+        let of_kind = |wanted: fn(SurfaceKind) -> bool| -> Vec<usize> {
+            (0..scene.objects.len())
+                .filter(|&object| wanted(scene.material_of(object).surface))
+                .collect()
+        };
+        let size_m = scene.bounds().map_or(0.0, |(low, high)| {
+            (high - low).length() + low.abs().max(high.abs()).max_element()
+        });
+        let mut reach = Self {
+            scene,
+            compartments: Compartments::of(scene),
+            bounds: scene.objects.iter().map(|object| object.mesh.bounds()).collect(),
+            specular: of_kind(SurfaceKind::is_specular),
+            receivers: of_kind(SurfaceKind::is_receiver),
+            tolerance_m: TOLERANCE * size_m,
+            is_useful: vec![false; scene.objects.len()],
+        };
+        reach.find_useful();
+        reach
+    }
+
+    /// Specular objects that a light may meet first and whose light may end on a receiver, ascending.
+    pub fn casters(&self, light: usize) -> Vec<usize> {
+        let source = &self.scene.lights[light].kind;
+        let goes_on = |&object: &usize| {
+            self.compartments.light_meets(light, object)
+                && (self.sends_to_any(object, Some(source), &self.receivers)
+                    || self
+                        .specular
+                        .iter()
+                        .any(|&next| self.is_useful[next] && self.sends(object, Some(source), next)))
+        };
+        self.specular.iter().copied().filter(goes_on).collect()
+    }
+
+    /// Specular objects that no opaque body seals from a light, whether their light may end on a receiver or not.
+    pub fn unsealed(&self, light: usize) -> Vec<usize> {
+        let meets = |&object: &usize| self.compartments.light_meets(light, object);
+        self.specular.iter().copied().filter(meets).collect()
+    }
+
+    /// All specular objects that light may meet on its way from a light that sees `seen`, those included, ascending;
+    /// with the object that sends it there, where the light does not see it itself.
+    pub fn reached(&self, light: usize, seen: &[usize]) -> Vec<(usize, Option<usize>)> {
+        let source = &self.scene.lights[light].kind;
+        let mut by_way_of: Vec<Option<Option<usize>>> = vec![None; self.scene.objects.len()];
+        let mut waiting: Vec<(usize, Option<&LightKind>)> = Vec::new();
+        for &object in seen {
+            by_way_of[object] = Some(None);
+            waiting.push((object, Some(source)));
+        }
+        while let Some((from, lit_by)) = waiting.pop() {
+            for &to in &self.specular {
+                if by_way_of[to].is_none() && self.sends(from, lit_by, to) {
+                    by_way_of[to] = Some(Some(from));
+                    waiting.push((to, None));
+                }
+            }
+            // What a mirror sends to itself comes from another side.
+            if lit_by.is_some() && self.sends(from, lit_by, from) {
+                waiting.push((from, None));
+            }
+        }
+        let found = by_way_of.iter().enumerate();
+        found
+            .filter_map(|(object, way)| Some((object, (*way)?)))
+            .collect()
+    }
+
+    /// From the receivers backwards.
+    fn find_useful(&mut self) {
+        if self.specular.len() > MOST_RELAYS {
+            self.specular
+                .iter()
+                .for_each(|&object| self.is_useful[object] = true);
+            return;
+        }
+        loop {
+            let newly: Vec<usize> = self
+                .specular
+                .iter()
+                .copied()
+                .filter(|&object| !self.is_useful[object])
+                .filter(|&object| {
+                    self.sends_to_any(object, None, &self.receivers)
+                        || self
+                            .specular
+                            .iter()
+                            .any(|&next| self.is_useful[next] && self.sends(object, None, next))
+                })
+                .collect();
+            if newly.is_empty() {
+                return;
+            }
+            newly.iter().for_each(|&object| self.is_useful[object] = true);
+        }
+    }
+
+    fn sends_to_any(&self, from: usize, lit_by: Option<&LightKind>, to: &[usize]) -> bool {
+        let tests = self.scene.objects[from]
+            .mesh
+            .triangles
+            .len()
+            .saturating_mul(to.len());
+        let shares = |&to: &usize| self.compartments.share(from, to);
+        if tests > MOST_TESTS {
+            return to.iter().any(shares);
+        }
+        to.iter().any(|&to| self.sends(from, lit_by, to))
+    }
+
+    /// Whether a specular object may send light to another object: what comes straight from `lit_by`, or light from
+    /// anywhere.
+    fn sends(&self, from: usize, lit_by: Option<&LightKind>, to: usize) -> bool {
+        let Some(bounds) = self.bounds[to] else {
+            return false;
+        };
+        if !self.compartments.share(from, to) {
+            return false;
+        }
+        match self.scene.material_of(from).surface {
+            SurfaceKind::Dielectric | SurfaceKind::ThinWall => true,
+            SurfaceKind::Diffuse => false,
+            SurfaceKind::Mirror | SurfaceKind::Mixed => {
+                let mesh = &self.scene.objects[from].mesh;
+                self.specular.len() > MOST_RELAYS || self.reflects_into(mesh, lit_by, bounds)
+            }
+        }
+    }
+
+    /// Whether any triangle of a mirror has part of a box before it, on the side that its light comes from.
+    fn reflects_into(&self, mesh: &Mesh, lit_by: Option<&LightKind>, bounds: Bounds) -> bool {
+        (0..mesh.triangles.len()).any(|triangle| {
+            let corner = mesh.corners(triangle)[0];
+            let normal = mesh.face_normal(triangle);
+            let lit = lit_by.map_or([true, true], |light| self.lit_sides(light, corner, normal));
+            let (low, high) = heights(bounds, corner, normal);
+            (lit[0] && high > self.tolerance_m) || (lit[1] && low < -self.tolerance_m)
+        })
+    }
+
+    /// Whether a light may fall on the front and on the back of a plane.
+    fn lit_sides(&self, light: &LightKind, point: DVec3, normal: DVec3) -> [bool; 2] {
+        let (height, tolerance) = match *light {
+            LightKind::Point { position, .. } | LightKind::Spot { position, .. } => {
+                ((position - point).dot(normal), self.tolerance_m)
+            }
+            LightKind::Sun { direction, .. } => (-direction.dot(normal), TOLERANCE),
+        };
+        [height >= -tolerance, height <= tolerance]
+    }
+}
+
+/// Lowest and highest point of a box above a plane [m].
+fn heights((low, high): Bounds, point: DVec3, normal: DVec3) -> (f64, f64) {
+    let centre = (low * 0.5 + high * 0.5 - point).dot(normal);
+    let reach = ((high - low) * 0.5).dot(normal.abs());
+    (centre - reach, centre + reach)
+}
