@@ -4,6 +4,8 @@
 
 #[path = "bake/accuracy.rs"]
 mod accuracy;
+#[path = "bake/auto_or_everything.rs"]
+mod auto_or_everything;
 #[path = "bake/brute_force.rs"]
 mod brute_force;
 #[path = "bake/collection.rs"]

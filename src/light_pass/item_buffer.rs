@@ -12,6 +12,7 @@ mod lit;
 mod polygon;
 mod search;
 
+use std::cmp::Reverse;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use glam::{DVec2, DVec3};
@@ -94,9 +95,11 @@ impl ItemBuffer {
             faces[face] = faces[face].without(&found.cells);
         }
         let seen_beside = |object: usize| hidden.iter().any(|(_, found)| found.seen.contains(&object));
+        let is_any = faces.iter().any(|face| face.count() > 0);
         let seen: Vec<usize> = casters
             .par_iter()
             .copied()
+            .filter(|_| is_any)
             .filter(|&object| {
                 seen_beside(object)
                     || bounds[object].is_some_and(|bounds| builder.sees(object, bounds, &clear))
@@ -367,13 +370,11 @@ impl Builder<'_> {
         if hiders.iter().all(|(object, _)| self.wanted[*object]) {
             return Vec::new();
         }
-        let area_m2 = |object: usize, triangle: usize| {
+        hiders.sort_by_cached_key(|&(object, triangle)| {
             let [a, b, c] = scene.objects[object].mesh.corners(triangle);
-            0.5 * (b - a).cross(c - a).length()
-        };
-        hiders.sort_by(|&(a, i), &(b, j)| {
-            let by_kind = self.wanted[a].cmp(&self.wanted[b]);
-            by_kind.then(area_m2(b, j).total_cmp(&area_m2(a, i)))
+            // Bits of positive numbers are ordered as the numbers are.
+            let area = (b - a).cross(c - a).length().to_bits();
+            (self.wanted[object], Reverse(area))
         });
         hiders
     }

@@ -68,6 +68,11 @@ impl Launch {
         &self.light
     }
 
+    /// Whether the domain is fitted to what it is aimed at.
+    pub fn is_fitted(&self) -> bool {
+        matches!(self.domain, Domain::Plane { .. })
+    }
+
     /// Unit squares of the domain.
     pub fn face_count(&self) -> usize {
         match self.domain {

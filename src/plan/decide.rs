@@ -153,9 +153,11 @@ impl Decision<'_> {
 
     fn lit_by(&self, object: usize, light: usize, way: Option<usize>) -> String {
         let name = |object: usize| &self.scene.objects[object].name;
-        let by_way = way.map_or(String::new(), |way| format!(" by way of `{}`", name(way)));
         let (object, light) = (name(object), &self.scene.lights[light].name);
-        format!("`{object}` is lit by `{light}`{by_way}")
+        match way {
+            None => format!("`{object}` is lit by `{light}`"),
+            Some(way) => format!("`{object}` may be lit by `{light}` by way of `{}`", name(way)),
+        }
     }
 
     /// An effect of the paths of the light pass: what is lit calls for it.

@@ -80,7 +80,7 @@ impl CausticLayer<'_> {
         // A lattice of 1 ray/sr has as many cells on casters as this; suns scale it by their reach.
         let (columns, rows) = light.launch.lattice_size(UNIT_DENSITY_PER_SR, light.reach_m);
         let whole = (columns * rows * light.launch.face_count()) as f64;
-        let share = light.item_buffer.marked_share(&light.launch);
+        let share = light.visible().marked_share(&light.launch);
         set.max(UNIT_DENSITY_PER_SR * wanted / (whole * share))
             .min(set * MOST_DENSER)
     }

@@ -162,5 +162,5 @@ impl CausticLayer<'_> {
 
 /// Flux that a light of unit strength sends to marked cells [W].
 fn reference_w(light: &AimedLight) -> f64 {
-    light.launch.power_bound_w() * light.item_buffer.marked_share(&light.launch)
+    light.launch.power_bound_w() * light.visible().marked_share(&light.launch)
 }

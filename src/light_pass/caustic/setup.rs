@@ -112,78 +112,116 @@ struct Looker<'a> {
 
 impl Looker<'_> {
     fn look(&self, light: usize) -> (Sight, Option<AimedLight>, LookAround) {
-        let scene = self.tracer.scene();
-        let specular = || -> Vec<usize> {
-            (0..scene.objects.len())
-                .filter(|&object| scene.material_of(object).surface.is_specular())
-                .collect()
-        };
-        let (unsealed, casters) = match self.aiming {
-            Aiming::Reachable => (self.reach.unsealed(light), self.reach.casters(light)),
-            Aiming::Everything => (specular(), specular()),
-        };
-        let mut sight = Sight {
-            unsealed: unsealed.len(),
-            casters: casters.len(),
-            ..Sight::default()
-        };
+        let casters = self.reach.casters(light);
         let mut look = LookAround::default();
-        let Some((launch, item_buffer)) = self.item_buffer(light, &casters, &mut look) else {
-            return (sight, None, look);
-        };
-        sight.seen = item_buffer.casters.clone();
-        sight.hidden_cells = item_buffer.hidden_cells;
-        sight.reached = match self.aiming {
-            Aiming::Reachable => self.reach.reached(light, &sight.seen),
-            Aiming::Everything => specular().into_iter().map(|object| (object, None)).collect(),
-        };
-        look.cells = item_buffer.marked_cells();
-        if sight.seen.is_empty() {
-            return (sight, None, look);
+        let visible = self.visible(light, &casters, &mut look);
+        match self.aiming {
+            Aiming::Reachable => self.at_reachable(light, casters.len(), visible, look),
+            Aiming::Everything => self.at_everything(light, visible, look),
         }
-        let visible = match self.aiming {
-            Aiming::Reachable => None,
-            Aiming::Everything => {
-                let casters = self.reach.casters(light);
-                let visible = ItemBuffer::build(&launch, self.tracer, &casters, Hiding::Drop);
-                look.tests += visible.tests;
-                Some(visible)
-            }
-        };
-        let aimed = AimedLight {
-            light,
-            visible,
-            launch,
-            reach_m: reach_m(scene, &sight.seen),
-            item_buffer,
-        };
-        (sight, Some(aimed), look)
     }
 
-    fn item_buffer(
+    fn at_reachable(
+        &self,
+        light: usize,
+        casters: usize,
+        visible: Option<(Launch, ItemBuffer)>,
+        mut look: LookAround,
+    ) -> (Sight, Option<AimedLight>, LookAround) {
+        let mut sight = Sight {
+            unsealed: self.reach.unsealed(light).len(),
+            casters,
+            ..Sight::default()
+        };
+        let Some((launch, item_buffer)) = visible else {
+            return (sight, None, look);
+        };
+        sight.seen.clone_from(&item_buffer.casters);
+        sight.hidden_cells = item_buffer.hidden_cells;
+        sight.reached = self.reach.reached(light, &sight.seen);
+        look.cells = item_buffer.marked_cells();
+        look.hidden_cells = item_buffer.hidden_cells;
+        let aimed = (!sight.seen.is_empty()).then(|| AimedLight {
+            light,
+            reach_m: reach_m(self.tracer.scene(), &sight.seen),
+            launch,
+            item_buffer,
+            visible: None,
+        });
+        (sight, aimed, look)
+    }
+
+    /// Rays start from the same lattice, so that its maps are the same; more of its cells are traced.
+    fn at_everything(
+        &self,
+        light: usize,
+        visible: Option<(Launch, ItemBuffer)>,
+        mut look: LookAround,
+    ) -> (Sight, Option<AimedLight>, LookAround) {
+        let scene = self.tracer.scene();
+        let specular: Vec<usize> = (0..scene.objects.len())
+            .filter(|&object| scene.material_of(object).surface.is_specular())
+            .collect();
+        let mut sight = Sight {
+            unsealed: specular.len(),
+            casters: specular.len(),
+            reached: specular.iter().map(|&object| (object, None)).collect(),
+            ..Sight::default()
+        };
+        let visible = visible.filter(|(_, visible)| !visible.casters.is_empty());
+        let (launch, visible) = match visible {
+            Some((launch, visible)) => (Some(launch), Some(visible)),
+            None => (self.launch(light, &specular), None),
+        };
+        let Some(launch) = launch else {
+            return (sight, None, look);
+        };
+        let item_buffer = ItemBuffer::build(&launch, self.tracer, &specular, Hiding::Keep);
+        look.tests += item_buffer.tests;
+        look.cells = item_buffer.marked_cells();
+        sight.seen.clone_from(&item_buffer.casters);
+        let near = visible.as_ref().map_or(&sight.seen, |visible| &visible.casters);
+        let reach_m = reach_m(scene, near);
+        let aimed = (!sight.seen.is_empty()).then(|| AimedLight {
+            light,
+            reach_m,
+            launch,
+            item_buffer,
+            visible,
+        });
+        (sight, aimed, look)
+    }
+
+    fn launch(&self, light: usize, casters: &[usize]) -> Option<Launch> {
+        let source = self.tracer.scene().lights[light].of_unit_strength();
+        Launch::new(&source, self.tracer.scene(), casters, self.item_buffer)
+    }
+
+    /// Where light can matter; `None` where nothing could be aimed at.
+    fn visible(
         &self,
         light: usize,
         casters: &[usize],
         look: &mut LookAround,
     ) -> Option<(Launch, ItemBuffer)> {
-        let source = self.tracer.scene().lights[light].of_unit_strength();
-        let hiding = match self.aiming {
-            Aiming::Reachable => Hiding::Drop,
-            Aiming::Everything => Hiding::Keep,
-        };
         let mut build = |casters: &[usize]| {
-            let launch = Launch::new(&source, self.tracer.scene(), casters, self.item_buffer)?;
-            let item_buffer = ItemBuffer::build(&launch, self.tracer, casters, hiding);
+            if casters.is_empty() {
+                return None;
+            }
+            let launch = self.launch(light, casters)?;
+            let item_buffer = ItemBuffer::build(&launch, self.tracer, casters, Hiding::Drop);
             look.tests += item_buffer.tests;
-            look.hidden_cells += item_buffer.hidden_cells;
             Some((launch, item_buffer))
         };
-        let first = build(casters)?;
+        let (launch, item_buffer) = build(casters)?;
         // What a sun does not see is to have no part in its rectangle.
-        if first.0.face_count() == 1 && first.1.casters.len() < casters.len() && !first.1.casters.is_empty() {
-            return build(&first.1.casters);
-        }
-        Some(first)
+        let is_smaller = launch.is_fitted() && item_buffer.casters.len() < casters.len();
+        let smaller = if is_smaller {
+            build(&item_buffer.casters)
+        } else {
+            None
+        };
+        Some(smaller.unwrap_or((launch, item_buffer)))
     }
 }
 

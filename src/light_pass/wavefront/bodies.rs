@@ -10,8 +10,11 @@ use crate::transport::Tracer;
 /// A body counts as small while it is less than this many cells across.
 const SMALL_CELLS: f64 = 2.0;
 
-/// Cells across a body once they are fine enough.
-const CELLS_ACROSS: f64 = 160.0;
+/// Cells across a caster once they are fine enough.
+const CELLS_ACROSS_CASTERS: f64 = 160.0;
+
+/// Cells across what only stands in the way: enough to find its silhouette.
+const CELLS_ACROSS_OTHERS: f64 = 8.0;
 
 /// How often a cell is divided at most for a body in it.
 const DEEPEST_BODY_LEVEL: u32 = 18;
@@ -27,6 +30,8 @@ const MOST_BODIES: usize = 256;
 struct Body {
     centre: DVec3,
     radius_m: f64,
+    /// Cells across it once they are fine enough.
+    cells_across: f64,
 }
 
 /// Small bodies as one light sees them.
@@ -61,6 +66,11 @@ impl SmallBodies {
                 visible.may_concern(launch, tracer, index).then(|| Body {
                     centre: low * 0.5 + high * 0.5,
                     radius_m: 0.5 * (high - low).length(),
+                    cells_across: if scene.material_of(index).surface.is_specular() {
+                        CELLS_ACROSS_CASTERS
+                    } else {
+                        CELLS_ACROSS_OTHERS
+                    },
                 })
             })
             .collect();
@@ -125,7 +135,7 @@ impl SmallBodies {
                 let centre = middle.at(along_m);
                 let reach_m = reach_m(along_m);
                 centre.distance(body.centre) <= body.radius_m + 1.5 * reach_m
-                    && CELLS_ACROSS * reach_m > 2.0 * body.radius_m
+                    && body.cells_across * reach_m > 2.0 * body.radius_m
             })
     }
 }
