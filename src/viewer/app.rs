@@ -227,9 +227,10 @@ impl App {
     /// One frame.
     fn redraw(&mut self, event_loop: &ActiveEventLoop) {
         self.fly();
+        let quantity = self.model.quantity();
         self.must_set_maps |= self.model.poll();
         self.report_chains();
-        let (layer, quantity) = (self.model.panel.display.layer, self.model.quantity());
+        let layer = self.model.panel.display.layer;
         let mut wishes = std::mem::take(&mut self.pressed);
         let Some(mut painting) = self.run_interface(&mut wishes) else {
             return;

@@ -6,6 +6,8 @@ use std::time::{Duration, Instant};
 use egui::accesskit::Role;
 use glam::DVec3;
 use image::RgbImage;
+use nephroid::effect::{Effect, EffectSwitch};
+use nephroid::plan::EffectLine;
 use nephroid::scene::builtin;
 use nephroid::settings::{BakeSettings, LayerKind};
 use nephroid::viewer::navigation::Navigator;
@@ -350,4 +352,55 @@ fn the_exposure_suits_the_whole_light_and_not_only_the_first_maps() {
     let white = pixels.filter(|(.., pixel)| pixel.0 == [255; 3]).count();
     let all = f64::from((SIZE.0 - WIDTH as u32) * SIZE.1);
     assert!((white as f64) < 0.2 * all, "{white} white pixels");
+}
+
+#[test]
+fn the_worth_of_the_light_pass_is_found_beside_the_maps_and_shown_in_false_colours() {
+    let Some(screen) = Screen::start("viewer worth") else {
+        return;
+    };
+    let mut viewer = Viewer::open(&screen, &RING);
+    viewer.wait_for("done", |_| true);
+    viewer.wait_for("rest", |_| true);
+    let baked = viewer.screenshot();
+
+    // The same panel without a window tells where everything is.
+    let settings = BakeSettings {
+        layers: vec![LayerKind::Caustic],
+        ..BakeSettings::splat()
+    };
+    let scene = builtin::build("ring").expect("it is built in");
+    let mut panel = Headless::with_scene(scene, settings.clone(), (SIZE.0 as f32, SIZE.1 as f32));
+    let mut last = finished(&panel.scene, &settings);
+    last.result.plan.effects = vec![EffectLine {
+        effect: Effect::LightPass,
+        switch: EffectSwitch::Auto,
+        on: true,
+        reason: "`mirror` is lit by `lamp`".into(),
+    }];
+    panel.last = Some(last);
+    panel.state = BakeState::Done;
+    panel.settle();
+    let mut click = |role: Role, name: &str| {
+        let centre = Headless::rect_of(panel.named(role, name)).center();
+        panel.click(centre);
+        viewer.hands(&format!(
+            "mousemove {} {} sleep 0.3 click 1 sleep 0.3",
+            centre.x as i32, centre.y as i32
+        ));
+    };
+    for section in ["Scene", "Light pass", "Effects"] {
+        click(Role::DisclosureTriangle, section);
+    }
+    click(Role::Button, "light pass: worth");
+    let compared = viewer.wait_for("compared", |_| true);
+    assert_eq!(compared["effect"], "light_pass");
+    assert!(compared["with_w"].as_f64() > Some(0.0), "{compared}");
+    viewer.wait_for("shows", |shows| shows["what"] == "difference");
+    screenshot_that(&viewer, "shows the difference", |shot| {
+        difference(&baked, shot) > 0.1
+    });
+    viewer.hands("mousemove 900 300");
+    let (status, stderr) = viewer.close();
+    assert_eq!(status.code(), Some(0), "{stderr}");
 }
