@@ -49,6 +49,10 @@ pub fn winding_number(triangles: impl Iterator<Item = [DVec3; 3]>, point: DVec3)
 
 /// Whether a triangle and a box have a point in common; touching counts.
 pub fn triangle_meets_box(corners: [DVec3; 3], (low, high): Bounds) -> bool {
+    let [a, b, c] = corners;
+    if a.min(b).min(c).cmpgt(high).any() || a.max(b).max(c).cmplt(low).any() {
+        return false;
+    }
     let mut polygon = corners.to_vec();
     for axis in 0..3 {
         for (limit, sign) in [(low[axis], 1.0), (high[axis], -1.0)] {

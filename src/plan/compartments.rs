@@ -36,33 +36,37 @@ impl Compartments {
             else {
                 continue;
             };
-            let inside: Vec<(usize, Bounds)> = bounds
+            // What reaches through such a surface is on both sides of it.
+            let near: Vec<(usize, Bounds)> = bounds
                 .iter()
                 .enumerate()
                 .filter(|(other, _)| *other != container)
-                .filter_map(|(other, bounds)| Some((other, bounds.filter(|inner| holds(around, *inner))?)))
+                .filter_map(|(other, bounds)| Some((other, bounds.filter(|other| overlap(around, *other))?)))
                 .collect();
             let lamps: Vec<(usize, DVec3)> = scene
                 .lights
                 .iter()
                 .enumerate()
                 .filter_map(|(light, source)| Some((light, position(&source.kind)?)))
-                .filter(|(_, place)| holds(around, (*place, *place)))
+                .filter(|(_, place)| overlap(around, (*place, *place)))
                 .collect();
             let mesh = &object.mesh;
-            if (inside.is_empty() && lamps.is_empty())
+            if (near.is_empty() && lamps.is_empty())
                 || mesh.triangles.len() > MOST_TRIANGLES
                 || !is_closed(&mesh.positions, &mesh.triangles)
             {
                 continue;
             }
             compartments.encloses[container] = true;
-            for (other, bounds) in inside {
-                book(
-                    &mut compartments.objects[other],
-                    container,
-                    is_inside(mesh, bounds),
-                );
+            for (other, bounds) in near {
+                // Boxes overlap easily where surfaces do not.
+                if enters(&scene.objects[other].mesh, around) {
+                    book(
+                        &mut compartments.objects[other],
+                        container,
+                        is_inside(mesh, bounds),
+                    );
+                }
             }
             for (light, place) in lamps {
                 book(
@@ -106,8 +110,14 @@ fn position(light: &LightKind) -> Option<DVec3> {
     }
 }
 
-fn holds((low, high): Bounds, (from, to): Bounds) -> bool {
-    low.cmple(from).all() && high.cmpge(to).all()
+fn overlap((low, high): Bounds, (from, to): Bounds) -> bool {
+    low.cmple(to).all() && high.cmpge(from).all()
+}
+
+/// Whether any part of a mesh lies in a box.
+fn enters(mesh: &Mesh, bounds: Bounds) -> bool {
+    mesh.triangles.len() > MOST_TRIANGLES
+        || (0..mesh.triangles.len()).any(|triangle| triangle_meets_box(mesh.corners(triangle), bounds))
 }
 
 /// Whether a box lies wholly inside a closed mesh; `None` where the mesh goes through it, or hardly passes it.

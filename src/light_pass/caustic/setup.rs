@@ -182,14 +182,17 @@ impl Looker<'_> {
         sight.seen.clone_from(&item_buffer.casters);
         let near = visible.as_ref().map_or(&sight.seen, |visible| &visible.casters);
         let reach_m = reach_m(scene, near);
-        let aimed = (!sight.seen.is_empty()).then(|| AimedLight {
+        if sight.seen.is_empty() {
+            return (sight, None, look);
+        }
+        let aimed = AimedLight {
             light,
             reach_m,
             launch,
             item_buffer,
             visible,
-        });
-        (sight, aimed, look)
+        };
+        (sight, Some(aimed), look)
     }
 
     fn launch(&self, light: usize, casters: &[usize]) -> Option<Launch> {

@@ -175,7 +175,7 @@ impl HiddenCells {
             cells: CellBits::filled(false),
             seen: BTreeSet::new(),
         };
-        for (&((column, row), _), _) in &self.casters {
+        for &((column, row), _) in self.casters.keys() {
             hidden.cells.set(column, row);
         }
         for (&((column, row), object), &nearness) in &self.casters {
