@@ -231,6 +231,8 @@ pub enum Study {
     Convergence(ConvergenceArguments),
     /// Maps by brute force, one texel per ray, with their noise
     Reference(ReferenceArguments),
+    /// What each effect costs and what it is worth, by bakes with and without it
+    Effects(EffectsArguments),
 }
 
 #[derive(Debug, Args)]
@@ -300,6 +302,27 @@ pub struct ReferenceArguments {
     pub run: RunOptions,
 }
 
+#[derive(Debug, Args)]
+pub struct EffectsArguments {
+    /// .glb, .gltf or builtin:NAME
+    pub scene: String,
+    /// Folder for effects.csv and a picture per effect
+    #[arg(short, long, value_name = "DIR")]
+    pub output: PathBuf,
+    /// Write into the folder even if it holds other files
+    #[arg(long)]
+    pub force: bool,
+    /// Bakes as planned and with everything forced on, in turns, whose median CPU times count [default: 5]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    pub repeat: Option<usize>,
+    #[command(flatten)]
+    pub scene_options: SceneOptions,
+    #[command(flatten)]
+    pub bake: BakeOptions,
+    #[command(flatten)]
+    pub run: RunOptions,
+}
+
 /// What the arguments ask for.
 pub enum Parsed {
     /// A job to run.
@@ -349,6 +372,7 @@ impl Arguments {
                 None => &study.run,
                 Some(Study::Convergence(convergence)) => &convergence.run,
                 Some(Study::Reference(reference)) => &reference.run,
+                Some(Study::Effects(effects)) => &effects.run,
             },
         }
     }

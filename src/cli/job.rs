@@ -8,11 +8,12 @@ use nephroid::eye_pass::ToneMap;
 use nephroid::settings::{BakeSettings, Estimator, LayerKind, MapResolution};
 use nephroid::study::brute_force;
 use nephroid::study::convergence::{DEFAULT_DENSITIES, Ladder};
+use nephroid::study::effects::EffectStudy;
 
 use super::args::{
-    Arguments, Backend, BakeArguments, Command, CompareArguments, ConvergenceArguments, InspectArguments,
-    MapsOption, PictureOptions, ReferenceArguments, RenderArguments, RunOptions, SceneOptions, Study,
-    StudyArguments, ViewArguments,
+    Arguments, Backend, BakeArguments, Command, CompareArguments, ConvergenceArguments, EffectsArguments,
+    InspectArguments, MapsOption, PictureOptions, ReferenceArguments, RenderArguments, RunOptions,
+    SceneOptions, Study, StudyArguments, ViewArguments,
 };
 use super::bake_options::BakeOptions;
 use super::compare::{self, LayerChoice};
@@ -20,7 +21,7 @@ use super::interrupt::Interrupt;
 use super::scene_input::{MissingLight, SceneInput};
 use super::terminal::Terminal;
 use super::values::Exposure;
-use super::{bake, inspect, render, study, view};
+use super::{bake, inspect, render, study, study_effects, view};
 
 /// Scene of `view` when none is named.
 const DEFAULT_SCENE: &str = "builtin:showroom";
@@ -42,6 +43,7 @@ pub enum Job {
     ListStudies,
     Convergence(ConvergenceJob),
     Reference(ReferenceJob),
+    Effects(EffectsJob),
 }
 
 /// `view`.
@@ -111,6 +113,15 @@ pub struct ReferenceJob {
     pub scene: SceneInput,
     pub settings: BakeSettings,
     pub rays: u64,
+    pub output: PathBuf,
+    pub force: bool,
+}
+
+/// `study effects`.
+#[derive(Debug)]
+pub struct EffectsJob {
+    pub scene: SceneInput,
+    pub study: EffectStudy,
     pub output: PathBuf,
     pub force: bool,
 }
@@ -186,6 +197,7 @@ impl Job {
             Self::ListStudies => study::list(terminal),
             Self::Convergence(job) => study::convergence(&job, terminal, interrupt),
             Self::Reference(job) => study::reference(&job, terminal, interrupt),
+            Self::Effects(job) => study_effects::run(&job, terminal, interrupt),
         }
     }
 }
@@ -305,6 +317,7 @@ fn study_job(arguments: StudyArguments) -> Result<Job> {
     match arguments.study {
         Some(Study::Convergence(convergence)) => convergence_job(convergence),
         Some(Study::Reference(reference)) => reference_job(reference),
+        Some(Study::Effects(effects)) => effects_job(effects),
         None if arguments.list => Ok(Job::ListStudies),
         None => Err(Error::usage(
             "study",
@@ -350,16 +363,8 @@ fn convergence_job(arguments: ConvergenceArguments) -> Result<Job> {
         }
     }
     let repeats = match arguments.repeat {
-        Some(repeats) if (1..=MAX_REPEATS).contains(&repeats) => repeats,
-        Some(repeats) => {
-            return Err(Error::usage(
-                "--repeat",
-                format!("{repeats} is outside 1 to {MAX_REPEATS}"),
-                "give a number in that range",
-            ));
-        }
         None if arguments.quick => 1,
-        None => DEFAULT_REPEATS,
+        asked => repeats(asked)?,
     };
     let scene = arguments.scene.unwrap_or_else(|| "builtin:ring".to_string());
     Ok(Job::Convergence(ConvergenceJob {
@@ -375,6 +380,19 @@ fn convergence_job(arguments: ConvergenceArguments) -> Result<Job> {
         output: arguments.output,
         force: arguments.force,
     }))
+}
+
+/// Bakes of each kind.
+fn repeats(asked: Option<usize>) -> Result<usize> {
+    match asked {
+        None => Ok(DEFAULT_REPEATS),
+        Some(repeats) if (1..=MAX_REPEATS).contains(&repeats) => Ok(repeats),
+        Some(repeats) => Err(Error::usage(
+            "--repeat",
+            format!("{repeats} is outside 1 to {MAX_REPEATS}"),
+            "give a number in that range",
+        )),
+    }
 }
 
 fn check_ladder(densities: &[f64], settings: &BakeSettings) -> Result<()> {
@@ -411,6 +429,28 @@ fn reference_job(arguments: ReferenceArguments) -> Result<Job> {
         scene: scene_input(arguments.scene, &arguments.scene_options, MissingLight::Fail),
         settings,
         rays: arguments.rays,
+        output: arguments.output,
+        force: arguments.force,
+    }))
+}
+
+fn effects_job(arguments: EffectsArguments) -> Result<Job> {
+    let settings = arguments
+        .bake
+        .settings(&[LayerKind::Caustic], threads(&arguments.run)?)?;
+    if settings.max_time_s.is_some() {
+        return Err(Error::usage(
+            "--max-time",
+            "bakes that a clock ends do not differ by their effects alone",
+            "leave it out, or use --max-error or --density",
+        ));
+    }
+    Ok(Job::Effects(EffectsJob {
+        scene: scene_input(arguments.scene, &arguments.scene_options, MissingLight::Fail),
+        study: EffectStudy {
+            settings,
+            repeats: repeats(arguments.repeat)?,
+        },
         output: arguments.output,
         force: arguments.force,
     }))

@@ -12,6 +12,7 @@ mod progress_bar;
 mod render;
 mod scene_input;
 mod study;
+mod study_effects;
 mod study_values;
 mod terminal;
 mod values;

@@ -1,4 +1,4 @@
-//! `study`: what accuracy costs, and references by brute force.
+//! `study`: which there are, what accuracy costs, and references by brute force.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -25,7 +25,7 @@ use super::scene_input::SceneInput;
 use super::terminal::Terminal;
 
 /// Name and one line of each study.
-const STUDIES: [(&str, &str); 2] = [
+const STUDIES: [(&str, &str); 3] = [
     (
         "convergence",
         "error against light rays and CPU time, for every estimator",
@@ -33,6 +33,10 @@ const STUDIES: [(&str, &str); 2] = [
     (
         "reference",
         "maps by brute force, one texel per ray, with their noise",
+    ),
+    (
+        "effects",
+        "what each effect costs and what it is worth, by bakes with and without it",
     ),
 ];
 
@@ -64,7 +68,7 @@ pub fn list(terminal: &Terminal) -> Result<()> {
 /// Input, output or a bake that failed; stopped before the end, which writes nothing.
 pub fn convergence(job: &ConvergenceJob, terminal: &Terminal, interrupt: &Interrupt) -> Result<()> {
     let scene = load(&job.scene, terminal)?;
-    let folder = open_folder(&job.output, job.force)?;
+    let folder = open_folder(&job.output, job.force, CSV)?;
     let bar = StageBar::new(terminal);
     let reference = match &job.reference {
         Some(path) => file_reference(path, job.surface.as_deref(), &scene)?,
@@ -77,7 +81,7 @@ pub fn convergence(job: &ConvergenceJob, terminal: &Terminal, interrupt: &Interr
     drop(bar);
     let title = format!("{} against {}", scene.source, reference.kind);
     let svg = convergence_svg(&measurements, &title)?;
-    let csv = csv_of(&measurements)?;
+    let csv = csv_of(CSV, &measurements)?;
     write(&folder, CSV, &csv)?;
     write(&folder, SVG, svg.as_bytes())?;
     let report = Report::new(&job.output, &reference, measurements);
@@ -110,7 +114,10 @@ pub fn reference(job: &ReferenceJob, terminal: &Terminal, interrupt: &Interrupt)
 }
 
 /// Loads a scene and prints its warnings.
-fn load(input: &SceneInput, terminal: &Terminal) -> Result<Arc<Scene>> {
+///
+/// # Errors
+/// A scene that cannot be read, or has no light where one is needed.
+pub fn load(input: &SceneInput, terminal: &Terminal) -> Result<Arc<Scene>> {
     let scene = Arc::new(input.load()?);
     terminal.print_warnings(&scene.warnings);
     Ok(scene)
@@ -121,10 +128,13 @@ fn file_reference(path: &Path, surface: Option<&str>, scene: &Scene) -> Result<R
     Reference::of_surface(scene, surface, grid, format!("file {}", path.display()))
 }
 
-/// A folder that is empty, holds an earlier study, or is taken by force.
-fn open_folder(path: &Path, force: bool) -> Result<OutputFolder> {
+/// A folder that is empty, holds the `table` of an earlier study, or is taken by force.
+///
+/// # Errors
+/// A place that cannot be written; other people's files in it.
+pub fn open_folder(path: &Path, force: bool, table: &str) -> Result<OutputFolder> {
     let folder = OutputFolder::open(path)?;
-    if force || path.join(CSV).is_file() || folder.is_empty()? {
+    if force || path.join(table).is_file() || folder.is_empty()? {
         return Ok(folder);
     }
     Err(Error::failure(
@@ -134,22 +144,30 @@ fn open_folder(path: &Path, force: bool) -> Result<OutputFolder> {
     ))
 }
 
-fn write(folder: &OutputFolder, name: &str, bytes: &[u8]) -> Result<()> {
+/// Writes a file of that name in the folder.
+///
+/// # Errors
+/// A disk that is full, a place that cannot be written any more.
+pub fn write(folder: &OutputFolder, name: &str, bytes: &[u8]) -> Result<()> {
     files::write_atomically(&folder.path().join(name), |writer| writer.write_all(bytes))
 }
 
-fn csv_of(measurements: &[Measurement]) -> Result<Vec<u8>> {
+/// A table with a header; `name` is named in errors.
+///
+/// # Errors
+/// Rows that no table can hold.
+pub fn csv_of(name: &str, rows: impl IntoIterator<Item = impl Serialize>) -> Result<Vec<u8>> {
     let unwritten = |reason: String| {
         Error::failure(
-            CSV,
+            name,
             format!("the table cannot be written ({reason})"),
             "report this",
         )
     };
     let mut writer = csv::Writer::from_writer(Vec::new());
-    for measurement in measurements {
+    for row in rows {
         writer
-            .serialize(measurement)
+            .serialize(row)
             .map_err(|error| unwritten(error.to_string()))?;
     }
     writer.into_inner().map_err(|error| unwritten(error.to_string()))

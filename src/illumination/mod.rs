@@ -4,6 +4,7 @@ pub mod accumulator;
 pub mod chart;
 pub mod compare;
 pub mod difference;
+pub mod difference_colours;
 pub mod gutter;
 pub mod islands;
 pub mod lookup;

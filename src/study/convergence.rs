@@ -7,10 +7,11 @@ use serde::Serialize;
 
 use super::cost::{self, Cost};
 use super::references::Reference;
-use crate::error::{Error, Result};
+use super::repeats::{bake, light_pass_cpu_s, median};
+use crate::error::Result;
 use crate::progress::{Control, Progress};
 use crate::scene::Scene;
-use crate::session::{BakeResult, BakeSession};
+use crate::session::BakeResult;
 use crate::settings::{BakeSettings, Estimator};
 
 /// Errors that costs are given for.
@@ -202,19 +203,6 @@ impl Ladder {
     }
 }
 
-fn bake(
-    scene: &Arc<Scene>,
-    settings: &BakeSettings,
-    progress: &dyn Progress,
-    control: &Control,
-) -> Result<BakeResult> {
-    let result = BakeSession::new(scene.clone())?.bake(settings, progress, control)?;
-    if result.partial {
-        return Err(Error::cancelled(&scene.source));
-    }
-    Ok(result)
-}
-
 fn measurement(
     scene: &Scene,
     settings: &BakeSettings,
@@ -232,7 +220,7 @@ fn measurement(
         receiver_queries: counts.receiver_queries,
         splats: counts.splats,
         cells: counts.cells,
-        cpu_light_pass_s: cpu(|result| result.cpu_s.plan + result.cpu_s.trace + result.cpu_s.deposit),
+        cpu_light_pass_s: cpu(light_pass_cpu_s),
         cpu_trace_s: cpu(|result| result.cpu_s.trace),
         cpu_deposit_s: cpu(|result| result.cpu_s.deposit),
         relative_rmse: agreement.relative_rmse,
@@ -241,25 +229,4 @@ fn measurement(
         flux_ratio: agreement.flux_ratio,
         reference: reference.kind.clone(),
     })
-}
-
-/// The middle of an odd number of values, the lower middle of an even one; 0 of none.
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values
-        .get(values.len().saturating_sub(1) / 2)
-        .copied()
-        .unwrap_or(0.0)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn one_slow_run_does_not_move_the_median() {
-        assert!((median(vec![3.0, 1.0, 100.0]) - 3.0).abs() < 1e-15);
-        assert!((median(vec![2.0, 1.0]) - 1.0).abs() < 1e-15);
-        assert!(median(Vec::new()).abs() < 1e-15);
-    }
 }

@@ -2,10 +2,11 @@
 
 use egui::{Align2, Color32, FontId, Rect, Ui, pos2, vec2};
 
+use super::error_view;
 use super::panel::{Facts, Quantity};
 use super::worker::BakeState;
-use super::{difference_view, error_view};
 use crate::effect::Effect;
+use crate::illumination::difference_colours;
 
 const TEXT: Color32 = Color32::from_gray(230);
 const SIZE: f32 = 16.0;
@@ -54,7 +55,7 @@ fn error_legend(ui: &Ui, picture: Rect) {
 }
 
 fn difference_legend(ui: &Ui, picture: Rect, effect: Effect) {
-    let at = |share: f64| difference_view::at(2.0 * share - 1.0);
+    let at = |share: f64| difference_colours::at(2.0 * share - 1.0);
     let marks = (-3..=3).map(|mark| {
         let text = match mark {
             -3..=-1 => format!("−{}", 10_i32.pow(-mark as u32)),
@@ -65,7 +66,7 @@ fn difference_legend(ui: &Ui, picture: Rect, effect: Effect) {
     });
     let name = effect.name().replace('_', " ");
     let title = format!("What {name} adds (warm) or takes (cool), in % of the map's mean");
-    let colour = |share: f64| difference_view::colour(at(share));
+    let colour = |share: f64| difference_colours::colour(at(share));
     legend(ui, picture, &title, &colour, &marks.collect::<Vec<_>>());
 }
 

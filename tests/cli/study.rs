@@ -1,5 +1,7 @@
 //! Studies: tables and plots that say what they hold, references with their noise, nothing half-written.
 
+use nephroid::export::FloatImage;
+
 use crate::program::{Run, Sandbox};
 
 const TINY: &str =
@@ -7,11 +9,11 @@ const TINY: &str =
 
 /// Columns of a table and its rows, by name.
 fn read_table(sandbox: &Sandbox, file: &str) -> (Vec<String>, Vec<Vec<String>>) {
-    let text = std::fs::read_to_string(sandbox.path(file)).expect("a table");
-    let mut lines = text
-        .lines()
-        .map(|line| line.split(',').map(str::to_string).collect::<Vec<String>>());
-    (lines.next().expect("a header"), lines.collect())
+    let mut reader = csv::Reader::from_path(sandbox.path(file)).expect("a table");
+    let row = |record: &csv::StringRecord| record.iter().map(str::to_string).collect::<Vec<String>>();
+    let header = row(reader.headers().expect("a header"));
+    let rows = reader.records().map(|record| row(&record.expect("a row")));
+    (header, rows.collect())
 }
 
 fn column(table: &(Vec<String>, Vec<Vec<String>>), name: &str) -> Vec<String> {
@@ -33,7 +35,7 @@ fn rmse(run: &Run) -> f64 {
 fn studies_are_listed_and_have_to_be_named() {
     let sandbox = Sandbox::new();
     let list = sandbox.succeed("study --list");
-    for study in ["convergence", "reference"] {
+    for study in ["convergence", "reference", "effects"] {
         assert!(list.stdout.contains(study), "{}", list.stdout);
     }
     assert_eq!(
@@ -61,6 +63,25 @@ fn studies_are_listed_and_have_to_be_named() {
         (
             "study reference builtin:ring -o out --rays 1e4 --map-resolution auto",
             "--map-resolution",
+        ),
+        ("study effects -o out", "SCENE"),
+        ("study effects builtin:ball", "--output"),
+        ("study effects builtin:ball -o out --repeat 0", "--repeat"),
+        ("study effects builtin:ball -o out --repeat -1", "--repeat"),
+        ("study effects builtin:ball -o out --max-time 1s", "--max-time"),
+        ("study effects builtin:ball -o out --density -5", "--density"),
+        ("study effects builtin:ball -o out --layers indirect", "--layers"),
+        (
+            "study effects builtin:ball -o out --effects indirect=on",
+            "indirect",
+        ),
+        (
+            "study effects builtin:ball -o out --effects sparkle=off",
+            "sparkle",
+        ),
+        (
+            "study effects builtin:ball -o out --footprint disc",
+            "--footprint",
         ),
     ] {
         sandbox.run(line).failed_in_one_sentence(2, &[word]);
@@ -223,4 +244,116 @@ fn references_are_maps_that_know_their_noise() {
     );
     // A folder of maps as any other.
     sandbox.succeed("render builtin:mirror -o picture.png --maps out --backend cpu --size 32x18");
+}
+
+/// Luminance on all maps of a bake [W]; for maps whose texels are all of one size.
+fn watts(sandbox: &Sandbox, folder: &str) -> f64 {
+    let manifest = sandbox.manifest(folder);
+    let maps = manifest["maps"].as_array().expect("maps");
+    maps.iter()
+        .map(|map| {
+            let file = map["file"].as_str().expect("a path");
+            let image = FloatImage::read(&sandbox.path(folder).join(file)).expect("a map");
+            let sum: f64 = image.luminance("").expect("R, G, B").values.iter().sum();
+            sum * map["texel_area_m2"].as_f64().expect("an area")
+        })
+        .sum()
+}
+
+#[test]
+fn effects_are_worth_what_the_maps_say() {
+    const QUICK: &str = "--density 1e3 --map-resolution 32";
+    let sandbox = Sandbox::new();
+    let run = sandbox.succeed(&format!(
+        "study effects builtin:ball -o out {QUICK} --repeat 2 --json"
+    ));
+    assert_eq!(
+        sandbox.files("out"),
+        [
+            "difference_light_pass.png",
+            "difference_reflection.png",
+            "difference_refraction.png",
+            "effects.csv"
+        ]
+    );
+    let table = read_table(&sandbox, "out/effects.csv");
+    let names = column(&table, "effect");
+    assert_eq!(
+        names,
+        ["light_pass", "refraction", "reflection", "everything forced on"]
+    );
+    let [with, without, worth] = ["with_w", "without_w", "difference_w"].map(|name| numbers(&table, name));
+
+    sandbox.succeed(&format!("bake builtin:ball -o with {QUICK}"));
+    sandbox.succeed(&format!(
+        "bake builtin:ball -o without {QUICK} --effects refraction=off"
+    ));
+    let expected = watts(&sandbox, "with") - watts(&sandbox, "without");
+    assert!(expected > 1.0, "{expected} W");
+    assert!(
+        (worth[1] / expected - 1.0).abs() < 1e-6,
+        "{worth:?}, not {expected}"
+    );
+    for row in 0..4 {
+        assert!((with[row] - without[row] - worth[row]).abs() < 1e-12);
+    }
+    assert_eq!(without[0], 0.0, "no light pass, no light");
+
+    // Forced on, other code gives the same maps.
+    let differences = numbers(&table, "relative_rmse");
+    assert_eq!((differences[3], worth[3]), (0.0, 0.0));
+    assert!(differences[..3].iter().all(|rmse| *rmse > 0.0), "{differences:?}");
+    for name in ["rays", "bytes", "cpu_with_s", "cpu_without_s"] {
+        let sizes = numbers(&table, name);
+        assert!(sizes.iter().all(|size| *size > 0.0), "{name}: {sizes:?}");
+    }
+    // What leaves the ball last refracted.
+    let deposits = numbers(&table, "deposits");
+    assert!(deposits[1] > 0.0 && deposits[0] == deposits[3], "{deposits:?}");
+    let document = run.json();
+    let forced = &document["everything_forced_on"];
+    for ratio in ["cpu_ratio", "rays_ratio"] {
+        let ratio = forced[ratio].as_f64().expect("a ratio");
+        assert!(ratio > 0.1 && ratio < 10.0, "{ratio}");
+    }
+    assert_eq!(document["effects"][1]["picture"]["surface"], "floor");
+    assert_eq!(document["effects"][1]["difference_w"].as_f64(), Some(worth[1]));
+}
+
+#[test]
+fn pictures_of_effects_are_warm_where_light_is_added() {
+    const QUICK: &str = "--density 1e3 --map-resolution 16 --repeat 1";
+    let sandbox = Sandbox::new();
+    let run = sandbox.succeed(&format!(
+        "study effects builtin:mirror -o out {QUICK} --layers caustic,direct"
+    ));
+    for effect in ["light_pass", "reflection", "direct", "everything forced on"] {
+        assert!(run.stdout.contains(effect), "no {effect} in {}", run.stdout);
+    }
+    for effect in ["reflection", "direct"] {
+        let picture = image::open(sandbox.path(&format!("out/difference_{effect}.png"))).expect("a PNG");
+        let picture = picture.to_rgb8();
+        assert_eq!((picture.width(), picture.height()), (16, 16));
+        let warmest = picture
+            .pixels()
+            .map(|pixel| i32::from(pixel.0[0]) - i32::from(pixel.0[2]));
+        assert!(warmest.max() > Some(50), "{effect} adds light");
+    }
+    // A later study without an effect leaves no picture of it behind, and other files alone.
+    sandbox.write("out/notes.txt", "keep me");
+    sandbox.succeed(&format!("study effects builtin:mirror -o out {QUICK}"));
+    assert_eq!(
+        sandbox.files("out"),
+        [
+            "difference_light_pass.png",
+            "difference_reflection.png",
+            "effects.csv",
+            "notes.txt"
+        ]
+    );
+    std::fs::create_dir(sandbox.path("photos")).expect("a folder");
+    sandbox.write("photos/cat.jpg", "a cat");
+    sandbox
+        .run(&format!("study effects builtin:mirror -o photos {QUICK}"))
+        .failed_in_one_sentence(1, &["photos", "--force"]);
 }

@@ -1,50 +1,13 @@
-//! False colours of differences.
+//! Maps of differences, in false colours.
 
 use std::sync::Arc;
 
 use glam::DVec2;
 use nephroid::illumination::difference::{Difference, SignedMap};
+use nephroid::illumination::difference_colours::colour;
 use nephroid::illumination::{Chart, UvSet};
 use nephroid::optics::LinearSrgb;
-use nephroid::viewer::difference_view::{RANGE, at, colour, maps};
-
-#[test]
-fn warm_is_more_cool_is_less_and_dark_is_none() {
-    let warmth = |[r, _, b]: [u8; 3]| i32::from(r) - i32::from(b);
-    let (low, high) = RANGE;
-    for step in 1..=20 {
-        let size = low * (high / low).powf(f64::from(step) / 20.0);
-        assert!(warmth(colour(size)) > 0, "{size}: {:?}", colour(size));
-        assert!(warmth(colour(-size)) < 0, "{size}: {:?}", colour(-size));
-    }
-    let brightness = |colour: [u8; 3]| colour.iter().map(|code| u32::from(*code)).sum::<u32>();
-    for sign in [-1.0, 1.0] {
-        let steps: Vec<_> = (0..=20)
-            .map(|step| brightness(colour(at(sign * f64::from(step) / 20.0))))
-            .collect();
-        assert!(steps.windows(2).all(|pair| pair[0] < pair[1]), "{steps:?}");
-        assert_eq!(colour(sign * 1e9), colour(sign * high), "the scale's end goes on");
-        assert_eq!(
-            colour(sign * 0.99 * low),
-            colour(0.0),
-            "below the scale is nothing"
-        );
-    }
-    assert_eq!(colour(f64::NAN), colour(0.0));
-}
-
-#[test]
-fn places_of_the_scale_run_from_end_to_end() {
-    let (low, high) = RANGE;
-    for (place, expected) in [(-1.0, -high), (1.0, high), (0.0, low)] {
-        assert!(
-            (at(place) / expected - 1.0).abs() < 1e-12,
-            "{place}: {}",
-            at(place)
-        );
-    }
-    assert!((at(0.5) / (low * high).sqrt() - 1.0).abs() < 1e-12);
-}
+use nephroid::viewer::difference_view::maps;
 
 #[test]
 fn each_texel_shows_its_difference_relative_to_the_maps_mean() {
