@@ -21,6 +21,9 @@ mod scenes;
 #[cfg(unix)]
 #[path = "cli/signals.rs"]
 mod signals;
+#[cfg(feature = "gpu")]
+#[path = "support/skip.rs"]
+mod skip;
 #[path = "cli/study.rs"]
 mod study;
 #[path = "cli/usage.rs"]

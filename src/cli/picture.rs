@@ -2,13 +2,15 @@
 
 use std::sync::Arc;
 
+use nephroid::effect::{Effect, EffectSwitch};
 use nephroid::error::{Error, Result};
 use nephroid::export::{exr, png};
-use nephroid::eye_pass::reference::{self, ReferenceSettings};
+use nephroid::eye_pass::reference::{self, ChainLimits, ReferenceSettings};
 use nephroid::eye_pass::{Picture, View, tone_mapping};
 use nephroid::illumination::IlluminationMap;
 use nephroid::optics::LinearSrgb;
 use nephroid::scene::{Camera, Scene};
+use nephroid::settings::BakeSettings;
 use nephroid::transport::Tracer;
 
 use super::args::Backend;
@@ -51,13 +53,14 @@ impl MadePicture {
     }
 }
 
-/// Makes the picture, by the card where there is one and no other wish.
+/// Makes the picture, by the card where there is one and no other wish; `settings` switch the eye's chains.
 ///
 /// # Errors
 /// No such camera; a card that was asked for and is not there; a signal.
 pub fn make(
     scene: &Arc<Scene>,
     maps: &[IlluminationMap],
+    settings: &BakeSettings,
     request: &PictureRequest,
     terminal: &Terminal,
     interrupt: &Interrupt,
@@ -71,15 +74,16 @@ pub fn make(
         tone_map: request.tone_map,
         background: LinearSrgb::BLACK,
     };
+    let chains = settings.effects.get(Effect::Chains);
     interrupt.check("picture")?;
     let (picture, made_by) = match request.backend {
-        Some(Backend::Cpu) => by_cpu(scene, maps, &view, terminal, interrupt)?,
-        Some(Backend::Gpu) => by_gpu(scene, maps, &view)?,
-        None => match by_gpu(scene, maps, &view) {
+        Some(Backend::Cpu) => by_cpu(scene, maps, &view, chains, terminal, interrupt)?,
+        Some(Backend::Gpu) => by_gpu(scene, maps, &view, chains)?,
+        None => match by_gpu(scene, maps, &view, chains) {
             Ok(made) => made,
             Err(error) => {
                 terminal.print_note(&format!("{error}: the CPU makes the picture"));
-                by_cpu(scene, maps, &view, terminal, interrupt)?
+                by_cpu(scene, maps, &view, chains, terminal, interrupt)?
             }
         },
     };
@@ -99,13 +103,17 @@ fn by_cpu(
     scene: &Arc<Scene>,
     maps: &[IlluminationMap],
     view: &View,
+    chains: EffectSwitch,
     terminal: &Terminal,
     interrupt: &Interrupt,
 ) -> Result<(Picture, String)> {
     let tracer = Tracer::new(scene.clone());
     let settings = ReferenceSettings {
         samples_per_side: SAMPLES_PER_SIDE,
-        ..ReferenceSettings::default()
+        limits: ChainLimits {
+            switch: chains,
+            ..ChainLimits::default()
+        },
     };
     let bar = StageBar::new(terminal);
     let picture = reference::render(&tracer, maps, view, &settings, &bar, interrupt.control())?;
@@ -113,15 +121,21 @@ fn by_cpu(
 }
 
 #[cfg(feature = "gpu")]
-fn by_gpu(scene: &Scene, maps: &[IlluminationMap], view: &View) -> Result<(Picture, String)> {
+fn by_gpu(
+    scene: &Scene,
+    maps: &[IlluminationMap],
+    view: &View,
+    chains: EffectSwitch,
+) -> Result<(Picture, String)> {
+    use nephroid::eye_pass::renderer::render_counted;
+
     let gpu = nephroid::gpu::Gpu::headless()?;
-    let picture =
-        nephroid::eye_pass::renderer::render_offscreen(&gpu, scene, maps, view, SAMPLES_PER_SIDE.pow(2))?;
+    let (picture, _) = render_counted(&gpu, scene, maps, view, SAMPLES_PER_SIDE.pow(2), chains)?;
     Ok((picture, gpu.adapter_name()))
 }
 
 #[cfg(not(feature = "gpu"))]
-fn by_gpu(_: &Scene, _: &[IlluminationMap], _: &View) -> Result<(Picture, String)> {
+fn by_gpu(_: &Scene, _: &[IlluminationMap], _: &View, _: EffectSwitch) -> Result<(Picture, String)> {
     Err(Error::failure(
         "--backend gpu",
         "this program was built without the gpu feature",

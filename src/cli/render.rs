@@ -40,7 +40,14 @@ pub fn run(job: &RenderJob, terminal: &Terminal, interrupt: &Interrupt) -> Resul
         MapSource::Bake(settings) => bake_maps(&loaded, settings, &clock, terminal, interrupt)?,
         MapSource::Folder(folder, _) => read_maps(folder, &loaded, terminal)?,
     };
-    let made = picture::make(&loaded.scene, &maps, &job.picture, terminal, interrupt)?;
+    let made = picture::make(
+        &loaded.scene,
+        &maps,
+        job.maps.settings(),
+        &job.picture,
+        terminal,
+        interrupt,
+    )?;
     let location = job.output.display().to_string();
     let bytes = made.encode(job.format, &location)?;
     files::write_atomically(&job.output, |writer| writer.write_all(&bytes))?;

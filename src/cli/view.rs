@@ -118,7 +118,14 @@ fn headless(
     let location = picture_path.display().to_string();
     if let MapSource::Folder(folder, _) = &job.maps {
         let maps = render::read_maps(folder, loaded, terminal)?;
-        let made = picture::make(&loaded.scene, &maps, &job.picture, terminal, interrupt)?;
+        let made = picture::make(
+            &loaded.scene,
+            &maps,
+            job.maps.settings(),
+            &job.picture,
+            terminal,
+            interrupt,
+        )?;
         let folder = files::OutputFolder::open(path)?;
         let bytes = made.encode(PictureFormat::Png, &location)?;
         files::write_atomically(&picture_path, |writer| writer.write_all(&bytes))?;
@@ -132,7 +139,14 @@ fn headless(
     let settings = &settings;
     let result = bake::bake(loaded, settings, clock, terminal, interrupt)?;
     if !result.partial {
-        let made = picture::make(&loaded.scene, &result.maps, &job.picture, terminal, interrupt)?;
+        let made = picture::make(
+            &loaded.scene,
+            &result.maps,
+            settings,
+            &job.picture,
+            terminal,
+            interrupt,
+        )?;
         let bytes = made.encode(PictureFormat::Png, &location)?;
         files::write_atomically(&picture_path, |writer| writer.write_all(&bytes))?;
     }

@@ -33,6 +33,24 @@ fn no_display_writes_maps_and_a_picture() {
 }
 
 #[test]
+fn chains_are_left_out_of_the_picture_where_they_are_switched_off() {
+    let sandbox = Sandbox::new();
+    let black_pixels = |switch: &str| {
+        sandbox.succeed(&format!(
+            "view builtin:mirror {QUICK} --exposure 0 --effects chains={switch}"
+        ));
+        let picture = image::open(sandbox.path("nephroid-out/picture.png")).expect("a PNG");
+        let pixels = picture.to_rgb8();
+        pixels.pixels().filter(|pixel| pixel.0 == [0; 3]).count()
+    };
+    let [auto, off] = ["auto", "off"].map(black_pixels);
+    assert!(
+        off > auto + 20,
+        "{off} black pixels without chains, {auto} with them"
+    );
+}
+
+#[test]
 fn a_display_that_is_not_there_counts_as_none() {
     let sandbox = Sandbox::new();
     let arguments: Vec<&str> = "builtin:slab".split(' ').chain(QUICK.split(' ')).collect();

@@ -1,8 +1,16 @@
 //! Pictures, and maps that are read back for them.
 
-use nephroid::export::FloatImage;
+use std::sync::Arc;
 
-use crate::program::Sandbox;
+use nephroid::export::FloatImage;
+use nephroid::eye_pass::{ToneMap, View, reference};
+use nephroid::optics::LinearSrgb;
+use nephroid::scene::builtin;
+use nephroid::transport::Tracer;
+
+use crate::program::{Run, Sandbox};
+#[cfg(feature = "gpu")]
+use crate::skip::skip;
 
 const QUICK: &str = "--density 1e4 --map-resolution 64";
 const SMALL: &str = "--size 40x30 --backend cpu";
@@ -132,4 +140,96 @@ fn a_missing_card_is_a_failure_only_when_asked_for() {
     assert_eq!(fallback.code, 0, "{}", fallback.stderr);
     assert_eq!(fallback.json()["made_by"], "cpu");
     assert!(fallback.stderr.contains("CPU"), "{}", fallback.stderr);
+}
+
+/// How many of a pixel's four samples see the mirror of `builtin:mirror`, in a picture of 40 by 30.
+fn samples_of_the_mirror() -> Vec<usize> {
+    let scene = Arc::new(builtin::build("mirror").expect("it is listed"));
+    let samples = View {
+        camera: scene.cameras[0].clone(),
+        width: 80,
+        height: 60,
+        exposure_stops: 0.0,
+        tone_map: ToneMap::None,
+        background: LinearSrgb::BLACK,
+    };
+    let hits = reference::first_hits(&Tracer::new(scene.clone()), &samples);
+    let sees = |object: usize| scene.objects[object].name == "mirror";
+    let mut seen = vec![0; 40 * 30];
+    for (sample, hit) in hits.into_iter().enumerate() {
+        seen[sample / 160 * 40 + sample % 80 / 2] += usize::from(hit.is_some_and(sees));
+    }
+    seen
+}
+
+fn pixels(sandbox: &Sandbox, file: &str) -> Vec<[f32; 3]> {
+    let image = FloatImage::read(&sandbox.path(file)).expect("a picture");
+    image.rgb("").expect("R, G, B")
+}
+
+/// The part of the samples within some pixels that see the mirror, if they agree: all or none.
+fn sees_the_mirror(samples: &[usize], pixel: usize, margin: usize) -> Option<bool> {
+    let (column, row) = (pixel % 40, pixel / 40);
+    let columns = column.saturating_sub(margin)..=(column + margin).min(39);
+    let rows = row.saturating_sub(margin)..=(row + margin).min(29);
+    let mut near = rows.flat_map(|row| columns.clone().map(move |column| samples[row * 40 + column]));
+    match samples[pixel] {
+        0 => near.all(|seen| seen == 0).then_some(false),
+        4 => near.all(|seen| seen == 4).then_some(true),
+        _ => None,
+    }
+}
+
+/// Without chains the mirror is black and all else as before; pixels within a margin of its edge may be either.
+fn check_chains(auto: &[[f32; 3]], off: &[[f32; 3]], margin: usize) {
+    let samples = samples_of_the_mirror();
+    let (mut mirroring, mut others) = (0, 0);
+    for pixel in 0..samples.len() {
+        match sees_the_mirror(&samples, pixel, margin) {
+            Some(false) => {
+                assert_eq!(auto[pixel], off[pixel], "pixel {pixel} sees no mirror");
+                others += 1;
+            }
+            Some(true) => {
+                assert_eq!(off[pixel], [0.0; 3], "pixel {pixel} of the mirror");
+                mirroring += usize::from(auto[pixel][1] > 0.0);
+            }
+            None => {}
+        }
+    }
+    assert!(mirroring > 5 && others > 500, "{mirroring}, {others}");
+}
+
+fn with_chains(sandbox: &Sandbox, backend: &str, switch: &str) -> Run {
+    sandbox.run(&format!(
+        "render builtin:mirror -o {switch}.exr --size 40x30 --backend {backend} {QUICK} --effects chains={switch}"
+    ))
+}
+
+#[test]
+fn without_chains_the_mirror_is_black_and_all_else_as_before() {
+    let sandbox = Sandbox::new();
+    let [auto, on, off] = ["auto", "on", "off"].map(|switch| {
+        assert_eq!(with_chains(&sandbox, "cpu", switch).code, 0);
+        pixels(&sandbox, &format!("{switch}.exr"))
+    });
+    assert!(auto == on, "forced on is what is seen anyway");
+    check_chains(&auto, &off, 0);
+}
+
+#[cfg(feature = "gpu")]
+#[test]
+fn the_card_leaves_chains_out_too() {
+    let sandbox = Sandbox::new();
+    let first = with_chains(&sandbox, "gpu", "off");
+    if first.stderr.contains("adapter") {
+        return skip("the_card_leaves_chains_out_too", &first.stderr);
+    }
+    let [auto, on, off] = ["auto", "on", "off"].map(|switch| {
+        assert_eq!(with_chains(&sandbox, "gpu", switch).code, 0);
+        pixels(&sandbox, &format!("{switch}.exr"))
+    });
+    assert!(auto == on, "forced on is what is seen anyway");
+    // The card's samples lie elsewhere within their pixels.
+    check_chains(&auto, &off, 1);
 }
