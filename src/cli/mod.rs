@@ -13,6 +13,7 @@ mod render;
 mod scene_input;
 mod study;
 mod study_values;
+mod survey_report;
 mod terminal;
 mod values;
 mod view;
