@@ -126,6 +126,52 @@ pub enum MapResolution {
     },
 }
 
+/// How carefully to bake, by name.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum Preset {
+    /// 10 % of relative RMSE (splat: 12,500 rays per steradian).
+    Draft,
+    /// 3 % (splat: 100,000 rays per steradian).
+    #[default]
+    Preview,
+    /// 1 % (splat: 800,000 rays per steradian).
+    Final,
+}
+
+impl Preset {
+    /// From the coarsest on.
+    pub const ALL: [Self; 3] = [Self::Draft, Self::Preview, Self::Final];
+
+    /// Its name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Draft => "draft",
+            Self::Preview => "preview",
+            Self::Final => "final",
+        }
+    }
+
+    /// Relative RMSE that it aims at [1].
+    pub fn max_error(self) -> f64 {
+        match self {
+            Self::Draft => 0.10,
+            Self::Preview => 0.03,
+            Self::Final => 0.01,
+        }
+    }
+
+    /// Density of splats that stands for it [rays/sr].
+    pub fn splat_density_per_sr(self) -> f64 {
+        let times = match self {
+            Self::Draft => 0.125,
+            Self::Preview => 1.0,
+            Self::Final => 8.0,
+        };
+        Estimator::Splat.preview_density_per_sr() * times
+    }
+}
+
 /// All bake options. [`validate`](Self::validate) states the ranges.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BakeSettings {

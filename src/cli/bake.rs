@@ -129,6 +129,16 @@ fn summary(manifest: &Manifest, result: &BakeResult, folder: &str) -> String {
         };
         line("error", format!("{percent:.2} % (relative RMSE, estimated){why}"));
     }
+    if let Some(report) = &result.forecast {
+        let (expected, actual) = (&report.expected, &report.actual);
+        line(
+            "forecast",
+            format!(
+                "{} rays and {:.2} s of CPU were expected after {} rays; it took {} and {:.2} s",
+                expected.rays, expected.cpu_s, report.made_at.rays, actual.rays, actual.cpu_s
+            ),
+        );
+    }
     let energy = &manifest.energy_w;
     line(
         "watts",

@@ -1,45 +1,14 @@
 //! Bake options: from flags to validated settings.
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use nephroid::effect::{Effect, EffectSwitch, EffectSwitches};
 use nephroid::error::{Error, Result};
 use nephroid::settings::{
     BakeSettings, Estimator, Footprint, ItemBufferKind, Kernel, KernelSampling, LEAST_MAX_ERROR, LayerKind,
-    MapResolution, RayPlacement, Sigma,
+    MapResolution, Preset, RayPlacement, Sigma,
 };
 
 use super::values;
-
-/// How carefully to bake.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub enum Preset {
-    /// 10 % of relative RMSE (splat: 12,500 rays per steradian).
-    Draft,
-    /// 3 % (splat: 100,000 rays per steradian).
-    #[default]
-    Preview,
-    /// 1 % (splat: 800,000 rays per steradian).
-    Final,
-}
-
-impl Preset {
-    fn max_error(self) -> f64 {
-        match self {
-            Self::Draft => 0.10,
-            Self::Preview => 0.03,
-            Self::Final => 0.01,
-        }
-    }
-
-    fn splat_density_per_sr(self) -> f64 {
-        let times = match self {
-            Self::Draft => 0.125,
-            Self::Preview => 1.0,
-            Self::Final => 8.0,
-        };
-        Estimator::Splat.preview_density_per_sr() * times
-    }
-}
 
 /// Flags of a bake; those not given keep the defaults of [`BakeSettings`].
 #[derive(Clone, Debug, Default, Args)]

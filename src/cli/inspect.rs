@@ -1,15 +1,18 @@
-//! `inspect`: what is in a scene, and which effects it calls for.
+//! `inspect`: what is in a scene, which effects it calls for, and what a bake would take.
 
 use std::fmt::Write as _;
 
+use nephroid::effect::Effect;
 use nephroid::error::{Result, Warning};
-use nephroid::plan::EffectPlan;
+use nephroid::plan::{self, EffectLine, EffectPlan};
 use nephroid::scene::{Light, LightKind, Scene, SurfaceKind};
-use nephroid::session::{BakeEstimate, BakeSession};
+use nephroid::session::{BakeSession, Survey};
 use serde::Serialize;
 
 use super::bake::{self, Clock};
+use super::interrupt::Interrupt;
 use super::job::InspectJob;
+use super::survey_report::SurveyReport;
 use super::terminal::Terminal;
 
 /// The result, as `--json` prints it.
@@ -25,8 +28,11 @@ struct Report {
     lights: Vec<LightReport>,
     cameras: Vec<String>,
     plan: EffectPlan,
-    /// Upper bound of the light rays of the caustic layer at these settings.
+    /// Upper bound of the light rays of the caustic layer's lattice at these settings.
     estimated_rays: u64,
+    /// Maps, what each preset is expected to take, and what a pilot took.
+    #[serde(flatten)]
+    survey: SurveyReport,
     warnings: Vec<Warning>,
 }
 
@@ -59,19 +65,27 @@ struct LightReport {
     normal_irradiance_w_per_m2: Option<f64>,
 }
 
-/// Loads, plans, and prints.
+/// Width over height of the picture that eye-pass effects are told for.
+const PICTURE_ASPECT: f64 = 16.0 / 9.0;
+
+/// Loads, plans, bakes a pilot, and prints.
 ///
 /// # Errors
 /// A scene that cannot be read, settings that do not fit it.
-pub fn run(job: &InspectJob, terminal: &Terminal) -> Result<()> {
+pub fn run(job: &InspectJob, terminal: &Terminal, interrupt: &Interrupt) -> Result<()> {
     let loaded = bake::load(&job.scene, &Clock::start(), terminal)?;
-    let estimate = BakeSession::new(loaded.scene.clone())?.estimate(&job.settings)?;
-    let report = Report::new(&loaded.scene, estimate);
+    let scene = &loaded.scene;
+    let survey = BakeSession::new(scene.clone())?.survey(&job.settings, interrupt.control())?;
+    let camera = scene.cameras.first().map(|camera| (camera, PICTURE_ASPECT));
+    let chains = plan::chains(scene, camera, job.settings.effects.get(Effect::Chains));
+    let report = Report::new(scene, &survey, chains);
     terminal.print_result(&text(&report), &report)
 }
 
 impl Report {
-    fn new(scene: &Scene, estimate: BakeEstimate) -> Self {
+    fn new(scene: &Scene, survey: &Survey, chains: EffectLine) -> Self {
+        let mut plan = survey.estimate.plan.clone();
+        plan.effects.push(chains.clone());
         Self {
             scene: scene.source.clone(),
             name: scene.name.clone(),
@@ -85,8 +99,9 @@ impl Report {
             materials: material_reports(scene),
             lights: scene.lights.iter().map(light_report).collect(),
             cameras: scene.cameras.iter().map(|camera| camera.name.clone()).collect(),
-            plan: estimate.plan,
-            estimated_rays: estimate.rays,
+            plan,
+            estimated_rays: survey.estimate.rays,
+            survey: SurveyReport::new(scene, survey, chains),
             warnings: scene.warnings.clone(),
         }
     }
@@ -228,25 +243,16 @@ fn text(report: &Report) -> String {
     for camera in &report.cameras {
         line("camera", camera.clone());
     }
-    let switch = |on: bool| if on { "on" } else { "off" };
-    for effect in &report.plan.effects {
-        line(
-            "effect",
-            format!(
-                "{}: {}, {}",
-                effect.effect.name(),
-                switch(effect.on),
-                effect.reason
-            ),
-        );
-    }
     for light in &report.plan.lights {
+        let switch = if light.on { "on" } else { "off" };
         line(
             "rays from",
-            format!("{}: {}, {}", light.light, switch(light.on), light.reason),
+            format!("{}: {switch}, {}", light.light, light.reason),
         );
     }
-    line("rays", format!("at most {}", report.estimated_rays));
+    for (name, value) in report.survey.lines() {
+        line(name, value);
+    }
     text
 }
 

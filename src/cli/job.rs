@@ -192,7 +192,7 @@ impl Job {
             Self::View(job) => view::run(job, terminal, interrupt),
             Self::Bake(job) => bake::run(&job, terminal, interrupt),
             Self::Render(job) => render::run(&job, terminal, interrupt),
-            Self::Inspect(job) => inspect::run(&job, terminal),
+            Self::Inspect(job) => inspect::run(&job, terminal, interrupt),
             Self::Compare(job) => compare::run(&job, terminal),
             Self::ListStudies => study::list(terminal),
             Self::Convergence(job) => study::convergence(&job, terminal, interrupt),

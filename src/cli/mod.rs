@@ -14,6 +14,7 @@ mod scene_input;
 mod study;
 mod study_effects;
 mod study_values;
+mod survey_report;
 mod terminal;
 mod values;
 mod view;

@@ -6,7 +6,9 @@ use crate::error::Warning;
 use crate::illumination::{IlluminationMap, UvSet};
 use crate::light_pass::ledger::{EnergyLedger, LightLedger, Truncated};
 use crate::scene::Scene;
-use crate::session::{BakeCounts, BakeResult, StopReason, Timings};
+use crate::session::{
+    BakeCounts, BakeResult, CostPoint, EffectReport, ForecastReport, ItemBufferReport, StopReason, Timings,
+};
 use crate::settings::{BakeSettings, LayerKind};
 
 /// Version of the format.
@@ -38,6 +40,14 @@ pub struct Manifest {
     pub cpu_s: Timings,
     /// What it took.
     pub counts: BakeCounts,
+    /// What each effect took, and why it was on or off.
+    pub effects: Vec<EffectReport>,
+    /// What looking around from each light took.
+    pub item_buffers: Vec<ItemBufferReport>,
+    /// What the target was expected to cost, and what it cost.
+    pub forecast: Option<ForecastReport>,
+    /// Where the bake stood after each level whose error was known.
+    pub course: Vec<CostPoint>,
     /// Of the caustic layer, over all lights.
     pub energy_w: EnergyAccounts,
     /// One per light and layer.
@@ -159,6 +169,10 @@ impl Manifest {
             timings_s: result.timings_s,
             cpu_s: result.cpu_s,
             counts: result.counts,
+            effects: result.effects.clone(),
+            item_buffers: result.item_buffers.clone(),
+            forecast: result.forecast,
+            course: result.course.clone(),
             energy_w: energy.into(),
             ledgers: result.ledgers.iter().map(LedgerEntry::from).collect(),
             error: ErrorEstimate {

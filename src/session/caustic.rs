@@ -4,6 +4,7 @@ use std::time::{Duration, Instant};
 
 use super::effects::EffectMeter;
 use super::finish::Shown;
+use super::forecast::{CostPoint, Forecast, forecast};
 use super::light_level::{KeptError, LevelKey, LightLevel, LightState, LightStates, Sizes};
 use super::sizes::MapSizes;
 use super::{BakeCounts, Clock};
@@ -13,6 +14,7 @@ use crate::light_pass::accuracy::{self, Before, Images, LightError};
 use crate::light_pass::caustic::pass::{PassReport, Stopwatch};
 use crate::light_pass::caustic::setup::{Aim, AimedLight};
 use crate::light_pass::caustic::statistics::FootprintStatistics;
+use crate::light_pass::ledger_sum::Account;
 use crate::light_pass::wavefront::refine::Round;
 use crate::optics::LinearSrgb;
 use crate::plan::EffectPlan;
@@ -53,6 +55,10 @@ pub(super) struct CausticOutcome {
     pub(super) counts: BakeCounts,
     /// The same by effect.
     pub(super) meter: EffectMeter,
+    /// Where it stood after each level whose error is known.
+    pub(super) course: Vec<CostPoint>,
+    /// What the target was expected to cost when its error was first known.
+    pub(super) forecast: Option<(CostPoint, Forecast)>,
     /// Maps coarser than they should be.
     pub(super) warnings: Vec<Warning>,
     /// Why no finer level came, where that was not the end of the lattice.
@@ -133,6 +139,7 @@ impl CausticLayer<'_> {
             for (light, climb) in lights.iter().zip(&mut climbs).filter(|(_, climb)| !climb.done) {
                 self.climb(light, &sizes, states.of_mut(light.light), climb, &mut course)?;
             }
+            self.note_cost(states, &lights, &climbs, &mut course);
             // The first picture is worth waiting for, the others have their time.
             course.control = &limited;
             if limited.is_cancelled() || climbs.iter().all(|climb| climb.done) {
@@ -154,6 +161,44 @@ impl CausticLayer<'_> {
             state.keep(climb.levels, self.settings.memory_bytes);
         }
         Ok(outcome)
+    }
+
+    /// Writes down what the error of this level took, where it is known.
+    fn note_cost(&self, states: &LightStates, lights: &[&AimedLight], climbs: &[Climb], course: &mut Course) {
+        let (mut squares, mut sum_w) = (0.0_f64, 0.0);
+        for (light, climb) in lights.iter().zip(climbs) {
+            let strength = self.tracer.scene().lights[light.light].strength();
+            let known = climb
+                .levels
+                .last()
+                .and_then(|level| Some((level, level.error.as_ref()?)));
+            let Some((level, error)) = known else {
+                return;
+            };
+            let deposited_w = level.ledger.watts(Account::Deposited, level.unit, strength);
+            squares += (error.estimate.relative_rmse * deposited_w).powi(2);
+            sum_w += deposited_w;
+        }
+        let relative_rmse = squares.sqrt() / sum_w;
+        if !relative_rmse.is_finite() {
+            return;
+        }
+        let held = climbs
+            .iter()
+            .flat_map(|climb| &climb.levels)
+            .map(LightLevel::bytes);
+        let clock = &course.clock;
+        let point = CostPoint {
+            rays: course.outcome.counts.rays,
+            cpu_s: clock.plan.cpu + clock.trace.cpu + clock.deposit.cpu,
+            bytes: states.bytes() + held.sum::<u64>(),
+            relative_rmse,
+        };
+        course.outcome.course.push(point);
+        if let (None, Some(target)) = (course.outcome.forecast, self.settings.max_error) {
+            let expected = forecast(&course.outcome.course, target);
+            course.outcome.forecast = expected.map(|expected| (point, expected));
+        }
     }
 
     /// Why there is no finer level.

@@ -7,6 +7,7 @@ use rayon::prelude::*;
 
 use super::caustic::{CausticOutcome, Stopped};
 use super::direct_cache::DirectCache;
+use super::forecast::ForecastReport;
 use super::light_level::LightLevel;
 use super::sizes::{self, MapSizes};
 use super::{BakeResult, StopReason, Timings};
@@ -79,6 +80,15 @@ impl Finish<'_> {
             item_buffers: Vec::new(),
             ledgers,
             counts: outcome.counts,
+            course: outcome.course.clone(),
+            forecast: outcome.forecast.and_then(|(made_at, expected)| {
+                let actual = *outcome.course.last()?;
+                Some(ForecastReport {
+                    made_at,
+                    expected,
+                    actual,
+                })
+            }),
             timings_s: Timings::default(),
             cpu_s: Timings::default(),
             stop_reason,

@@ -4,18 +4,23 @@ mod caustic;
 mod direct_cache;
 mod effects;
 mod finish;
+pub mod forecast;
 mod level_plan;
 mod light_level;
 pub mod result;
 mod scene_change;
 mod sizes;
 mod splat_level;
+pub mod survey;
 mod wavefront_level;
 
 use std::sync::Arc;
 use std::time::Instant;
 
+pub use forecast::{CostPoint, Forecast, ForecastReport};
 pub use result::{BakeCounts, BakeResult, EffectCounts, EffectReport, ItemBufferReport, StopReason, Timings};
+pub use sizes::BYTES_PER_TEXEL;
+pub use survey::{PresetForecast, Survey};
 
 use crate::effect::EffectSwitch;
 use crate::error::{Error, Result};

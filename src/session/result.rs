@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::forecast::{CostPoint, ForecastReport};
 use crate::error::Warning;
 use crate::illumination::IlluminationMap;
 use crate::light_pass::ledger::LightLedger;
@@ -118,6 +119,10 @@ pub struct BakeResult {
     pub ledgers: Vec<LightLedger>,
     /// Counters.
     pub counts: BakeCounts,
+    /// Where it stood after each level whose error was known.
+    pub course: Vec<CostPoint>,
+    /// What the target was expected to cost, and what it cost; `None` without a target.
+    pub forecast: Option<ForecastReport>,
     /// Wall-clock seconds.
     pub timings_s: Timings,
     /// CPU seconds over all threads of the process.

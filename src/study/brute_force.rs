@@ -351,6 +351,8 @@ fn empty_result(plan: EffectPlan, nothing_to_do: bool) -> BakeResult {
         item_buffers: Vec::new(),
         ledgers: Vec::new(),
         counts: BakeCounts::default(),
+        course: Vec::new(),
+        forecast: None,
         timings_s: Timings::default(),
         cpu_s: Timings::default(),
         estimated_relative_rmse: None,

@@ -45,3 +45,71 @@ fn the_estimate_of_rays_follows_the_density() {
     let ratio = rays("4e6") / rays("1e6");
     assert!((ratio - 4.0).abs() < 0.1, "{ratio}");
 }
+
+#[test]
+fn what_a_bake_would_take_for_every_preset() {
+    let sandbox = Sandbox::new();
+    let report = sandbox
+        .succeed("inspect builtin:ring --json --map-resolution 64")
+        .json();
+    let presets = report["presets"].as_array().expect("presets");
+    let of = |preset: &serde_json::Value, field: &str| preset[field].as_f64().expect("a number");
+    assert_eq!(presets.len(), 3);
+    for (preset, (name, target)) in presets
+        .iter()
+        .zip([("draft", 0.1), ("preview", 0.03), ("final", 0.01)])
+    {
+        assert_eq!(preset["preset"], name);
+        assert!((of(preset, "target") - target).abs() < 1e-12);
+        assert!(of(preset, "rays") > 100.0 && of(preset, "cpu_s") > 0.0 && of(preset, "bytes") > 64.0 * 64.0);
+    }
+    assert!(of(&presets[0], "rays") < of(&presets[2], "rays"));
+    let map = &report["maps"][0];
+    assert_eq!((&map["surface"], &map["width"]), (&"floor".into(), &64.into()));
+    let effects = report["pilot"]["effects"].as_array().expect("effects");
+    let rays = |name: &str| {
+        let effect = effects.iter().find(|effect| effect["effect"] == name);
+        effect.expect("a line for every effect")["counts"]["rays"]
+            .as_u64()
+            .expect("a count")
+    };
+    assert!(rays("reflection") > 0 && rays("light_pass") > 0);
+    assert_eq!(
+        (rays("refraction"), rays("absorption"), rays("direct")),
+        (0, 0, 0)
+    );
+}
+
+#[test]
+fn effects_that_are_switched_off_say_so() {
+    let sandbox = Sandbox::new();
+    let text = sandbox
+        .succeed("inspect builtin:ball --map-resolution 32 --effects refraction=off,chains=off")
+        .stdout;
+    assert!(
+        text.contains("refraction: off, switched off by the user"),
+        "{text}"
+    );
+    let refused = sandbox.run("inspect builtin:ball --effects refraction=sideways");
+    refused.failed_in_one_sentence(2, &["auto, on or off"]);
+    let refused = sandbox.run("inspect builtin:ball --effects indirect=on");
+    refused.failed_in_one_sentence(2, &["not available in this version"]);
+}
+
+#[test]
+fn a_bake_tells_what_was_expected_and_what_it_took() {
+    let sandbox = Sandbox::new();
+    let manifest = sandbox
+        .succeed("bake builtin:ring -o out --max-error 2% --map-resolution 64 --json")
+        .json();
+    let forecast = &manifest["forecast"];
+    let rays = |part: &str| forecast[part]["rays"].as_f64().expect("a count");
+    assert!(rays("made_at") > 0.0 && rays("expected") >= rays("made_at"));
+    assert_eq!(
+        rays("actual"),
+        manifest["counts"]["rays"].as_f64().expect("a count")
+    );
+    let ratio = rays("actual") / rays("expected");
+    assert!((0.2..5.0).contains(&ratio), "{forecast}");
+    assert!(manifest["course"].as_array().expect("points").len() >= 2);
+}

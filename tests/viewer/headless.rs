@@ -46,6 +46,8 @@ pub fn finished(scene: &Arc<Scene>, settings: &BakeSettings) -> BakedLevel {
             maps: Vec::new(),
             plan: EffectPlan::default(),
             effects: Vec::new(),
+            course: Vec::new(),
+            forecast: None,
             item_buffers: Vec::new(),
             ledgers: Vec::new(),
             counts: BakeCounts::default(),

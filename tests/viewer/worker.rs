@@ -21,6 +21,8 @@ pub fn result(rays: u64, partial: bool) -> BakeResult {
         maps: Vec::new(),
         plan: EffectPlan::default(),
         effects: Vec::new(),
+        course: Vec::new(),
+        forecast: None,
         item_buffers: Vec::new(),
         ledgers: Vec::new(),
         counts: BakeCounts {

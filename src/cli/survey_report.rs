@@ -1,0 +1,138 @@
+//! What a bake would take, as `inspect` tells it.
+
+use nephroid::plan::EffectLine;
+use nephroid::scene::Scene;
+use nephroid::session::{CostPoint, EffectReport, Forecast, ItemBufferReport, Survey};
+use nephroid::settings::Preset;
+use serde::Serialize;
+
+/// As `--json` prints it.
+#[derive(Debug, Serialize)]
+pub struct SurveyReport {
+    /// Maps that light reaches.
+    maps: Vec<MapReport>,
+    /// What each preset is expected to take.
+    presets: Vec<PresetReport>,
+    /// What that was learnt from.
+    pilot: PilotReport,
+}
+
+#[derive(Debug, Serialize)]
+struct MapReport {
+    surface: String,
+    width: usize,
+    height: usize,
+    /// While it is baked.
+    bytes: u64,
+}
+
+#[derive(Debug, Serialize)]
+struct PresetReport {
+    preset: Preset,
+    #[serde(flatten)]
+    forecast: Option<Forecast>,
+}
+
+#[derive(Debug, Serialize)]
+struct PilotReport {
+    /// Of the whole survey, on the wall.
+    seconds: f64,
+    course: Vec<CostPoint>,
+    effects: Vec<EffectReport>,
+    item_buffers: Vec<ItemBufferReport>,
+}
+
+impl SurveyReport {
+    /// Of a survey of a scene; `chains` is the line of the eye pass.
+    pub fn new(scene: &Scene, survey: &Survey, chains: EffectLine) -> Self {
+        let maps = survey.pilot.maps.iter().map(|map| MapReport {
+            surface: scene.objects[map.chart.object].name.clone(),
+            width: map.width(),
+            height: map.height(),
+            bytes: (map.width() * map.height()) as u64 * nephroid::session::BYTES_PER_TEXEL,
+        });
+        let mut effects = survey.pilot.effects.clone();
+        effects.push(EffectReport {
+            line: chains,
+            counts: Default::default(),
+        });
+        Self {
+            maps: maps.collect(),
+            presets: survey
+                .presets
+                .iter()
+                .map(|preset| PresetReport {
+                    preset: preset.preset,
+                    forecast: preset.forecast,
+                })
+                .collect(),
+            pilot: PilotReport {
+                seconds: survey.seconds,
+                course: survey.pilot.course.clone(),
+                effects,
+                item_buffers: survey.pilot.item_buffers.clone(),
+            },
+        }
+    }
+
+    /// Name and value of each line of the text.
+    pub fn lines(&self) -> Vec<(&'static str, String)> {
+        let mut lines = Vec::new();
+        for report in &self.pilot.effects {
+            lines.push(("effect", effect_line(report)));
+        }
+        for map in &self.maps {
+            let size = format!("{} x {}, {}", map.width, map.height, bytes(map.bytes));
+            lines.push(("map", format!("{}: {size}", map.surface)));
+        }
+        for preset in &self.presets {
+            lines.push((preset.preset.name(), preset_line(preset.forecast.as_ref())));
+        }
+        lines
+    }
+}
+
+/// "refraction: on, `ball` is lit by `lamp` (24560 rays, 6838 deposits, 1.4 MB)".
+fn effect_line(report: &EffectReport) -> String {
+    let line = &report.line;
+    let switch = if line.on { "on" } else { "off" };
+    let mut text = format!("{}: {switch}, {}", line.effect.name(), line.reason);
+    let counts = &report.counts;
+    if counts.rays > 0 {
+        text += &format!(
+            " (pilot: {} rays, {} deposits, {})",
+            counts.rays,
+            counts.deposits,
+            bytes(counts.bytes)
+        );
+    }
+    text
+}
+
+fn preset_line(forecast: Option<&Forecast>) -> String {
+    let Some(forecast) = forecast else {
+        return "not known: the pilot found no error to go by".into();
+    };
+    let doubt = if forecast.factor > 1.0 {
+        format!("within a factor of {:.1}", forecast.factor)
+    } else {
+        "as measured".into()
+    };
+    format!(
+        "{:.1} % error: {} rays, {:.2} s of CPU, {}, {doubt}",
+        100.0 * forecast.target,
+        forecast.rays,
+        forecast.cpu_s,
+        bytes(forecast.bytes)
+    )
+}
+
+/// A size with its unit.
+fn bytes(count: u64) -> String {
+    match count {
+        0..1_000 => format!("{count} B"),
+        1_000..1_000_000 => format!("{:.1} kB", count as f64 / 1e3),
+        1_000_000..1_000_000_000 => format!("{:.1} MB", count as f64 / 1e6),
+        _ => format!("{:.2} GB", count as f64 / 1e9),
+    }
+}
