@@ -131,7 +131,7 @@ fn a_missing_card_is_a_failure_only_when_asked_for() {
             .env("VK_DRIVER_FILES", "/nonexistent.json")
             .output()
             .expect("the program starts");
-        crate::program::Run::from(output)
+        Run::from(output)
     };
     let quick = "--size 40x30 --density 1e3 --map-resolution 16";
     run(&format!("render builtin:mirror -o a.png --backend gpu {quick}"))
@@ -142,22 +142,22 @@ fn a_missing_card_is_a_failure_only_when_asked_for() {
     assert!(fallback.stderr.contains("CPU"), "{}", fallback.stderr);
 }
 
-/// How many of a pixel's four samples see the mirror of `builtin:mirror`, in a picture of 40 by 30.
+/// How many of a pixel's four samples see the mirror of `builtin:mirror`, in a picture of 80 by 60.
 fn samples_of_the_mirror() -> Vec<usize> {
     let scene = Arc::new(builtin::build("mirror").expect("it is listed"));
     let samples = View {
         camera: scene.cameras[0].clone(),
-        width: 80,
-        height: 60,
+        width: 160,
+        height: 120,
         exposure_stops: 0.0,
         tone_map: ToneMap::None,
         background: LinearSrgb::BLACK,
     };
     let hits = reference::first_hits(&Tracer::new(scene.clone()), &samples);
     let sees = |object: usize| scene.objects[object].name == "mirror";
-    let mut seen = vec![0; 40 * 30];
+    let mut seen = vec![0; 80 * 60];
     for (sample, hit) in hits.into_iter().enumerate() {
-        seen[sample / 160 * 40 + sample % 80 / 2] += usize::from(hit.is_some_and(sees));
+        seen[sample / 320 * 80 + sample % 160 / 2] += usize::from(hit.is_some_and(sees));
     }
     seen
 }
@@ -169,10 +169,10 @@ fn pixels(sandbox: &Sandbox, file: &str) -> Vec<[f32; 3]> {
 
 /// The part of the samples within some pixels that see the mirror, if they agree: all or none.
 fn sees_the_mirror(samples: &[usize], pixel: usize, margin: usize) -> Option<bool> {
-    let (column, row) = (pixel % 40, pixel / 40);
-    let columns = column.saturating_sub(margin)..=(column + margin).min(39);
-    let rows = row.saturating_sub(margin)..=(row + margin).min(29);
-    let mut near = rows.flat_map(|row| columns.clone().map(move |column| samples[row * 40 + column]));
+    let (column, row) = (pixel % 80, pixel / 80);
+    let columns = column.saturating_sub(margin)..=(column + margin).min(79);
+    let rows = row.saturating_sub(margin)..=(row + margin).min(59);
+    let mut near = rows.flat_map(|row| columns.clone().map(move |column| samples[row * 80 + column]));
     match samples[pixel] {
         0 => near.all(|seen| seen == 0).then_some(false),
         4 => near.all(|seen| seen == 4).then_some(true),
@@ -202,7 +202,7 @@ fn check_chains(auto: &[[f32; 3]], off: &[[f32; 3]], margin: usize) {
 
 fn with_chains(sandbox: &Sandbox, backend: &str, switch: &str) -> Run {
     sandbox.run(&format!(
-        "render builtin:mirror -o {switch}.exr --size 40x30 --backend {backend} {QUICK} --effects chains={switch}"
+        "render builtin:mirror -o {switch}.exr --size 80x60 --backend {backend} {QUICK} --effects chains={switch}"
     ))
 }
 
