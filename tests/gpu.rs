@@ -13,6 +13,13 @@ mod builtins;
 mod device;
 #[path = "gpu/display.rs"]
 mod display;
+#[path = "gpu/effect_matrix.rs"]
+mod effect_matrix;
+#[path = "support/effect_scenes.rs"]
+mod effect_scenes;
+#[path = "scene/glb.rs"]
+#[allow(dead_code)]
+mod glb;
 #[path = "gpu/on_demand.rs"]
 mod on_demand;
 #[path = "gpu/radiance.rs"]

@@ -20,8 +20,9 @@ pub struct EffectScene {
     pub scene: Scene,
     pub layers: Vec<LayerKind>,
     /// What the scene calls for; nothing else.
+    #[allow(dead_code, reason = "the tests of bakes ask for it")]
     pub calls_for: &'static [Effect],
-    /// Whether the scene's first camera sees something specular.
+    /// Whether something specular is in view of the scene's first camera, hidden or not.
     #[allow(dead_code, reason = "the tests of the eye pass ask for it")]
     pub shows_specular: bool,
 }
