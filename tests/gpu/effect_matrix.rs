@@ -1,7 +1,7 @@
 //! A dozen scenes against the eye's chains: where nothing specular is in view they take no pipeline, no byte and no ray,
 //! counted where the work is done; where something is they take some, and without them the picture is another.
 
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock};
 
 use nephroid::effect::EffectSwitch;
 use nephroid::eye_pass::reference::{self, ChainLimits, EyeRays, ReferenceSettings};
@@ -21,6 +21,9 @@ use crate::effect_scenes::{EffectScene, all};
 
 /// Switches that look for chains, and the one that does not.
 const SWITCHES: [EffectSwitch; 3] = [EffectSwitch::Auto, EffectSwitch::On, EffectSwitch::Off];
+
+/// All scenes, baked once for all tests.
+static SHOWN: LazyLock<Vec<Shown>> = LazyLock::new(|| all().iter().map(Shown::new).collect());
 
 /// A scene, lit, from its own first camera.
 struct Shown {
@@ -94,7 +97,7 @@ fn bits(picture: &Picture) -> Vec<u32> {
 
 #[test]
 fn scenes_of_both_kinds_are_there_and_one_hides_what_is_in_view() {
-    let shown: Vec<Shown> = all().iter().map(Shown::new).collect();
+    let shown = &*SHOWN;
     assert!(shown.len() >= 11);
     assert!(shown.iter().filter(|shown| !shown.in_view).count() >= 3);
     assert!(shown.iter().filter(|shown| shown.visible).count() >= 6);
@@ -125,7 +128,7 @@ fn the_plan_says_what_is_in_view() {
 fn the_card_makes_and_draws_for_chains_what_is_in_view() {
     let Some(gpu) = gpu() else { return };
     let mut faults = Vec::new();
-    for shown in all().iter().map(Shown::new) {
+    for shown in SHOWN.iter() {
         let [(auto, took), (on, _), (off, left)] = SWITCHES.map(|switch| shown.by_gpu(&gpu, switch));
         let specular = |counts: &EyeCounts| {
             [
@@ -162,7 +165,7 @@ fn the_card_makes_and_draws_for_chains_what_is_in_view() {
 #[test]
 fn the_reference_traces_chains_where_something_specular_is_seen() {
     let mut faults = Vec::new();
-    for shown in all().iter().map(Shown::new) {
+    for shown in SHOWN.iter() {
         let [(auto, took), (on, forced), (off, left)] = SWITCHES.map(|switch| shown.by_cpu(switch));
         let mut check = |holds: bool, what: String| {
             if !holds {
