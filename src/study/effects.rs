@@ -63,7 +63,7 @@ pub struct EffectRow {
     pub deposits: u64,
     /// Memory that is held for it [bytes].
     pub bytes: u64,
-    /// CPU time [ms]; `None` where it is a part of others.
+    /// CPU time of the median bake [ms]; `None` where it is a part of others.
     pub cpu_ms: Option<f64>,
     /// On all maps and layers with it [W].
     pub with_w: f64,
@@ -77,7 +77,7 @@ pub struct EffectRow {
     pub cpu_with_s: f64,
     /// The same without it: of one bake, or median of the repeats where that is the planned one.
     pub cpu_without_s: f64,
-    /// CPU seconds with it over those without; `None` where nothing was done without.
+    /// CPU seconds with it over those without; `None` where no ray was traced without.
     pub cpu_ratio: Option<f64>,
     /// Light rays of the bake with it over those without; `None` where there are none without.
     pub rays_ratio: Option<f64>,
@@ -151,20 +151,27 @@ fn forced(settings: &BakeSettings) -> EffectSwitches {
     })
 }
 
-/// A bake with the median CPU seconds of its light pass over all bakes of its kind.
+/// A bake with the CPU seconds of the light pass of the median bake of its kind.
 struct Timed {
+    /// The first of its kind, with what effects took in the median one.
     result: BakeResult,
     cpu_s: f64,
 }
 
 impl Timed {
-    /// Keeps the first of them.
+    /// Of at least one bake.
     fn of(mut bakes: Vec<BakeResult>) -> Self {
         let cpu_s = median(bakes.iter().map(light_pass_cpu_s).collect());
-        Self {
-            result: bakes.swap_remove(0),
-            cpu_s,
-        }
+        let is_median = |bake: &&BakeResult| light_pass_cpu_s(bake).to_bits() == cpu_s.to_bits();
+        let effects = bakes.iter().find(is_median).map(|bake| bake.effects.clone());
+        let mut result = bakes.swap_remove(0);
+        result.effects = effects.unwrap_or_default();
+        Self { result, cpu_s }
+    }
+
+    /// Rays from the lights, for both layers.
+    fn rays(&self) -> u64 {
+        self.result.counts.rays + self.result.counts.shadow_rays
     }
 }
 
@@ -176,7 +183,7 @@ fn alternating(repeats: usize, mut bake: impl FnMut(usize) -> Result<BakeResult>
             let which = (round + turn) % 2;
             let mut result = bake(which)?;
             if round > 0 {
-                // Only their seconds count.
+                // Only what they took counts.
                 result.maps.clear();
             }
             bakes[which].push(result);
@@ -197,8 +204,8 @@ fn compared(
     [with, without]: [&Timed; 2],
 ) -> Result<(EffectRow, Difference)> {
     let found = difference(&with.result.maps, &without.result.maps)?;
-    let ratio = |a: f64, b: f64| (b > 0.0).then(|| a / b);
-    let rays = |timed: &Timed| timed.result.counts.rays as f64;
+    let ratio = |a: f64, b: f64| (without.rays() > 0 && b > 0.0).then(|| a / b);
+    let light_rays = |timed: &Timed| timed.result.counts.rays as f64;
     let row = EffectRow {
         effect: effect.into(),
         reason: reason.into(),
@@ -213,7 +220,7 @@ fn compared(
         cpu_with_s: with.cpu_s,
         cpu_without_s: without.cpu_s,
         cpu_ratio: ratio(with.cpu_s, without.cpu_s),
-        rays_ratio: ratio(rays(with), rays(without)),
+        rays_ratio: ratio(light_rays(with), light_rays(without)),
     };
     Ok((row, found))
 }
