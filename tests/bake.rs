@@ -39,6 +39,8 @@ mod reference;
 mod smoothing;
 #[path = "support/mod.rs"]
 mod support;
+#[path = "bake/threshold.rs"]
+mod threshold;
 #[path = "bake/tools.rs"]
 mod tools;
 #[path = "bake/useless.rs"]

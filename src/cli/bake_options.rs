@@ -57,7 +57,7 @@ pub struct BakeOptions {
     #[arg(long, value_name = "N")]
     max_depth: Option<u32>,
     /// Branches that carry less than this share of their light ray's flux are not followed, and booked as truncated
-    /// [default: 3 % of the target error, 0.0001 without a target]
+    /// [default: 0.003 of the target error, 0.0001 without a target]
     #[arg(long, value_name = "SHARE", allow_negative_numbers = true)]
     branch_threshold: Option<f64>,
     /// Layers to bake [default: caustic for bake, caustic,direct for pictures]
