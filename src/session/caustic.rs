@@ -193,6 +193,10 @@ impl CausticLayer<'_> {
             cpu_s: clock.plan.cpu + clock.trace.cpu + clock.deposit.cpu,
             bytes: states.bytes() + held.sum::<u64>(),
             relative_rmse,
+            is_coarse: lights
+                .iter()
+                .zip(climbs)
+                .any(|(light, climb)| climb.levels.len() < self.lattices(light).len()),
         };
         course.outcome.course.push(point);
         if let (None, Some(target)) = (course.outcome.forecast, self.settings.max_error) {

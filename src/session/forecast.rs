@@ -16,6 +16,8 @@ pub struct CostPoint {
     pub bytes: u64,
     /// Of all maps, estimated.
     pub relative_rmse: f64,
+    /// Whether the lattice that refinement begins from is still to come: no bake ends before it.
+    pub is_coarse: bool,
 }
 
 /// What a target is expected to cost.
@@ -55,7 +57,9 @@ const DOUBT: f64 = 0.35;
 
 /// What `target` is expected to cost; `None` where nothing is known of the error yet.
 pub fn forecast(course: &[CostPoint], target: f64) -> Option<Forecast> {
-    let met = course.iter().find(|point| point.relative_rmse <= target);
+    let met = course
+        .iter()
+        .find(|point| !point.is_coarse && point.relative_rmse <= target);
     if let Some(point) = met {
         return Some(Forecast {
             target,
@@ -77,7 +81,12 @@ pub fn forecast(course: &[CostPoint], target: f64) -> Option<Forecast> {
         let measured = measured.unwrap_or(USUAL_EXPONENT).clamp(EXPONENTS.0, EXPONENTS.1);
         0.5 * (measured + USUAL_EXPONENT)
     };
-    let gain = last.relative_rmse / target;
+    // What is still to come before a bake may end halves the error once or twice, whatever the target.
+    let gain = if last.is_coarse {
+        2.0 * (last.relative_rmse / target).max(1.0)
+    } else {
+        last.relative_rmse / target
+    };
     let grown = |of: fn(&CostPoint) -> f64| of(last) * gain.powf(exponent(of));
     let rays = grown(|point| point.rays.max(1) as f64);
     Some(Forecast {
@@ -100,6 +109,7 @@ mod tests {
             cpu_s,
             bytes: 1000,
             relative_rmse,
+            is_coarse: false,
         }
     }
 
@@ -113,10 +123,10 @@ mod tests {
         let next = forecast(&course, 0.0125 / 4.0).expect("known");
         // Measured exponents 1 and ln 3/ln 4, both drawn towards 0.6.
         assert!(
-            (next.rays as f64 / (16_000.0 * 4_f64.powf(0.9)) - 1.0).abs() < 1e-3,
+            (next.rays as f64 / (16_000.0 * 4_f64.powf(0.8)) - 1.0).abs() < 1e-3,
             "{next:?}"
         );
-        assert!(next.cpu_s > 2.4 && next.cpu_s < 3.2, "{next:?}");
+        assert!(next.cpu_s > 2.1 && next.cpu_s < 2.8, "{next:?}");
         assert!(next.factor > 1.25 && next.factor < 2.0);
     }
 
@@ -129,6 +139,16 @@ mod tests {
     }
 
     #[test]
+    fn no_bake_ends_on_a_coarse_lattice() {
+        let coarse = CostPoint {
+            is_coarse: true,
+            ..point(1_000, 0.1, 0.01)
+        };
+        let next = forecast(&[coarse], 0.05).expect("known");
+        assert!(next.rays > 1_200 && next.factor > 1.2, "{next:?}");
+    }
+
+    #[test]
     fn a_single_level_or_one_that_gained_nothing_takes_the_usual_power() {
         for course in [
             vec![point(1_000, 0.1, 0.2)],
@@ -136,7 +156,7 @@ mod tests {
         ] {
             let next = forecast(&course, 0.02).expect("known");
             assert!(
-                (next.cpu_s / (0.1 * 10_f64.powf(0.8)) - 1.0).abs() < 1e-9,
+                (next.cpu_s / (0.1 * 10_f64.powf(0.6)) - 1.0).abs() < 1e-9,
                 "{next:?}"
             );
         }
