@@ -1,5 +1,7 @@
 //! Hard cases: each has a law that must hold.
 
+#[path = "stability/hidden_cells.rs"]
+mod hidden_cells;
 #[path = "stability/intersection.rs"]
 mod intersection;
 #[path = "stability/item_buffer.rs"]

@@ -2,12 +2,13 @@
 
 use std::time::{Duration, Instant};
 
+use super::BakeCounts;
+use super::clock::Clock;
 use super::effects::EffectMeter;
 use super::finish::Shown;
 use super::forecast::{CostPoint, Forecast, forecast};
 use super::light_level::{KeptError, LevelKey, LightLevel, LightState, LightStates, Sizes};
 use super::sizes::MapSizes;
-use super::{BakeCounts, Clock};
 use crate::error::{Result, Warning};
 use crate::illumination::accumulator::FluxUnit;
 use crate::light_pass::accuracy::{self, Before, Images, LightError};

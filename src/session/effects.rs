@@ -1,8 +1,9 @@
 //! What each effect took, put together from what was counted where the work is done.
 
+use super::BakeCounts;
 use super::caustic::CausticOutcome;
+use super::clock::Clock;
 use super::result::{EffectCounts, EffectReport, ItemBufferReport};
-use super::{BakeCounts, Clock};
 use crate::light_pass::caustic::pass::Seconds;
 use crate::light_pass::caustic::setup::Aim;
 use crate::light_pass::wavefront::kept_rays::KeptHit;

@@ -1,7 +1,9 @@
 //! A bake as a session: scene and settings in, maps out. The command line's `bake` is a session that runs once.
 
 mod caustic;
+mod clock;
 mod direct_cache;
+mod direct_work;
 mod effects;
 mod finish;
 pub mod forecast;
@@ -24,7 +26,7 @@ pub use survey::{PresetForecast, Survey};
 
 use crate::effect::EffectSwitch;
 use crate::error::{Error, Result};
-use crate::light_pass::caustic::pass::{Seconds, Stopwatch};
+use crate::light_pass::caustic::pass::Stopwatch;
 use crate::light_pass::caustic::setup::{Aim, Aiming};
 use crate::plan::{self, Effect, EffectPlan};
 use crate::progress::{Control, Progress, Stage};
@@ -32,7 +34,9 @@ use crate::scene::Scene;
 use crate::settings::{BakeSettings, ItemBufferKind};
 use crate::transport::Tracer;
 use caustic::{CausticLayer, CausticOutcome, Stopped};
+use clock::Clock;
 use direct_cache::DirectCache;
+use direct_work::DirectWork;
 use finish::{Finish, Shown};
 use light_level::LightStates;
 use scene_change::SceneChange;
@@ -331,73 +335,4 @@ fn account(result: &mut BakeResult, finish: &Finish, aim: &Aim, outcome: &Causti
     (result.timings_s, result.cpu_s) = clock.timings();
     result.effects = effects::reports(finish.scene, finish.plan, aim, outcome, clock);
     result.item_buffers = effects::item_buffers(finish.scene, aim);
-}
-
-/// Direct light in the course of a bake.
-#[derive(Clone, Copy, Debug, Default)]
-struct DirectWork {
-    shadow_rays: u64,
-    seconds: Seconds,
-}
-
-impl DirectWork {
-    /// Bakes what is missing; false where it was cancelled.
-    fn shine(
-        &mut self,
-        tracer: &Tracer,
-        charts: &finish::Charts,
-        direct: &mut DirectCache,
-        (progress, control): (&dyn Progress, &Control),
-    ) -> bool {
-        let watch = Stopwatch::start();
-        let report = direct.complete(tracer, charts, progress, control);
-        self.shadow_rays += report.shadow_rays;
-        self.seconds.add(watch.elapsed());
-        report.complete
-    }
-
-    /// The bake with this.
-    fn added_to(&self, outcome: &CausticOutcome) -> CausticOutcome {
-        let mut both = outcome.clone();
-        both.counts.shadow_rays += self.shadow_rays;
-        both.meter.direct_s.add(self.seconds);
-        both
-    }
-
-    /// The clock with this.
-    fn clock(&self, clock: &Clock) -> Clock {
-        let mut both = *clock;
-        both.trace.add(self.seconds);
-        both
-    }
-}
-/// Both clocks of every stage.
-#[derive(Clone, Copy, Debug, Default)]
-struct Clock {
-    build: Seconds,
-    plan: Seconds,
-    trace: Seconds,
-    deposit: Seconds,
-    total: Seconds,
-}
-
-impl Clock {
-    fn time<T>(&mut self, stage: impl Fn(&mut Self) -> &mut Seconds, work: impl FnOnce() -> T) -> T {
-        let watch = Stopwatch::start();
-        let done = work();
-        stage(self).add(watch.elapsed());
-        done
-    }
-
-    fn timings(&self) -> (Timings, Timings) {
-        let of = |pick: fn(Seconds) -> f64| Timings {
-            load: 0.0,
-            build: pick(self.build),
-            plan: pick(self.plan),
-            trace: pick(self.trace),
-            deposit: pick(self.deposit),
-            total: pick(self.total),
-        };
-        (of(|seconds| seconds.wall), of(|seconds| seconds.cpu))
-    }
 }

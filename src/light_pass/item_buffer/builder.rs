@@ -1,0 +1,176 @@
+//! Marks the cells of an item buffer, and finds those whose casters are hidden.
+
+use std::cmp::Reverse;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use rayon::prelude::*;
+
+use super::bits::CellBits;
+use super::hidden::{Facet, Hidden, HiddenCells};
+use super::search::{Bounds, Search};
+use crate::geometry::bvh::Node;
+use crate::light_pass::launch::Launch;
+use crate::transport::Tracer;
+
+/// Triangles of an object that are tried before its nodes are searched for one that the light sees.
+const TRIED_FIRST: usize = 16;
+
+/// What marking needs.
+pub(super) struct Builder<'a> {
+    pub(super) launch: &'a Launch,
+    pub(super) tracer: &'a Tracer,
+    pub(super) owners: Owners,
+    /// Of the wanted objects.
+    pub(super) boxes: Vec<Bounds>,
+    /// Whether an object is a caster.
+    pub(super) wanted: &'a [bool],
+    pub(super) tests: AtomicU64,
+}
+
+impl Builder<'_> {
+    fn root(&self) -> Option<Node<'_>> {
+        self.tracer.bvh().root()
+    }
+
+    fn count(&self, tests: u64) {
+        // A sum: the order does not matter.
+        self.tests.fetch_add(tests, Ordering::Relaxed);
+    }
+
+    /// Whether any of the cells sees an object.
+    pub(super) fn sees(&self, object: usize, bounds: Bounds, visible: &[CellBits]) -> bool {
+        let wanted = |triangle: u32| self.owners.of(triangle) == object;
+        let bounds = [bounds];
+        let mesh = &self.tracer.scene().objects[object].mesh;
+        visible.iter().enumerate().any(|(face, visible)| {
+            let search = Search::new(self.launch, face, &bounds, &[], &wanted);
+            let first = 0..mesh.triangles.len().min(TRIED_FIRST);
+            let at_once = first
+                .into_iter()
+                .any(|triangle| search.touches(&mesh.corners(triangle), visible));
+            let seen = at_once || self.root().is_some_and(|root| search.finds(root, visible));
+            self.count(search.tests());
+            seen
+        })
+    }
+
+    /// The lit cells of each face that a triangle of a wanted object touches. `others`: boxes of all other objects.
+    pub(super) fn mark(&self, lit: &[CellBits], others: &[Bounds]) -> Vec<CellBits> {
+        let wanted = |triangle: u32| self.wanted[self.owners.of(triangle)];
+        let mark = |(face, lit): (usize, &CellBits)| {
+            let mut open = lit.clone();
+            let search = Search::new(self.launch, face, &self.boxes, others, &wanted);
+            let objects = self.tracer.scene().objects.iter().zip(self.wanted);
+            for (object, _) in objects.filter(|(_, wanted)| **wanted) {
+                search.close_some(&object.mesh, &mut open);
+            }
+            if let Some(root) = self.root() {
+                search.close(root, &mut open);
+            }
+            self.count(search.tests());
+            lit.without(&open)
+        };
+        lit.par_iter().enumerate().map(mark).collect()
+    }
+
+    /// Of each face, the cells in which something may be hidden, and what is; nothing where that is so nowhere.
+    pub(super) fn hidden(&self, faces: &[CellBits]) -> Vec<(CellBits, Hidden)> {
+        let hiders = self.hiders();
+        if hiders.is_empty() {
+            return Vec::new();
+        }
+        let wanted = |triangle: u32| self.wanted[self.owners.of(triangle)];
+        let find = |(face, marked): (usize, &CellBits)| {
+            let mut cells = HiddenCells::new(self.launch);
+            let mut tests = 0;
+            let facet = |&(object, triangle): &(usize, usize)| {
+                let corners = self.tracer.scene().objects[object].mesh.corners(triangle);
+                (object, Facet::new(self.launch, face, &corners))
+            };
+            for (object, facet) in hiders.iter().filter(|_| marked.count() > 0).map(facet) {
+                tests += if self.wanted[object] {
+                    cells.add_opaque_caster(object, &facet)
+                } else {
+                    cells.add_opaque(object, &facet, marked)
+                };
+            }
+            let search = Search::new(self.launch, face, &self.boxes, &[], &wanted);
+            let doubtful = cells.doubtful().clone();
+            if let Some(root) = self.root() {
+                search.visit(root, &doubtful, |triangle, corners| {
+                    let facet = Facet::new(self.launch, face, corners);
+                    tests += cells.add_caster(self.owners.of(triangle), &facet);
+                });
+            }
+            self.count(tests + search.tests());
+            let found = cells.find();
+            (doubtful, found)
+        };
+        faces.par_iter().enumerate().map(find).collect()
+    }
+
+    /// Opaque triangles, with their objects, whose plane has part of a caster's box behind it, as the light sees it: no
+    /// other can hide one. Casters come last, else the largest come first.
+    fn hiders(&self) -> Vec<(usize, usize)> {
+        let scene = self.tracer.scene();
+        let mut tests = 0;
+        let mut hiders = Vec::new();
+        for (object, item) in scene.objects.iter().enumerate() {
+            if !scene.material_of(object).surface.is_opaque() || self.is_the_only_caster(object) {
+                continue;
+            }
+            for triangle in 0..item.mesh.triangles.len() {
+                tests += 1;
+                let (corner, normal) = (item.mesh.corners(triangle)[0], item.mesh.face_normal(triangle));
+                let side = self.launch.side_of_light(corner, normal);
+                let has_behind = self.boxes.iter().any(|(low, high)| {
+                    let height = ((*low + *high) * 0.5 - corner).dot(normal);
+                    let reach = ((*high - *low) * 0.5).dot(normal.abs());
+                    side * height - reach < 0.0
+                });
+                if has_behind {
+                    hiders.push((object, triangle));
+                }
+            }
+        }
+        self.count(tests);
+        if hiders.iter().all(|(object, _)| self.wanted[*object]) {
+            return Vec::new();
+        }
+        hiders.sort_by_cached_key(|&(object, triangle)| {
+            let [a, b, c] = scene.objects[object].mesh.corners(triangle);
+            // Bits of positive numbers are ordered as the numbers are.
+            let area = (b - a).cross(c - a).length().to_bits();
+            (self.wanted[object], Reverse(area))
+        });
+        hiders
+    }
+
+    /// Nothing hides itself.
+    fn is_the_only_caster(&self, object: usize) -> bool {
+        self.wanted[object] && self.wanted.iter().filter(|wanted| **wanted).count() == 1
+    }
+}
+
+/// Which object a triangle of the hierarchy belongs to: they are counted object by object.
+pub(super) struct Owners {
+    /// Index after the last triangle of each object.
+    ends: Vec<u32>,
+}
+
+impl Owners {
+    pub(super) fn new(tracer: &Tracer) -> Self {
+        let mut end = 0;
+        let count = |object: &crate::scene::Object| {
+            end += object.mesh.triangles.len() as u32;
+            end
+        };
+        Self {
+            ends: tracer.scene().objects.iter().map(count).collect(),
+        }
+    }
+
+    pub(super) fn of(&self, triangle: u32) -> usize {
+        self.ends.partition_point(|&end| end <= triangle)
+    }
+}

@@ -1,0 +1,48 @@
+//! Direct light in the course of a bake: beside the levels of the caustic layer, and counted apart.
+
+use super::caustic::CausticOutcome;
+use super::clock::Clock;
+use super::direct_cache::DirectCache;
+use super::finish::Charts;
+use crate::light_pass::caustic::pass::{Seconds, Stopwatch};
+use crate::progress::{Control, Progress};
+use crate::transport::Tracer;
+
+/// Direct light in the course of a bake.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct DirectWork {
+    shadow_rays: u64,
+    seconds: Seconds,
+}
+
+impl DirectWork {
+    /// Bakes what is missing; false where it was cancelled.
+    pub(super) fn shine(
+        &mut self,
+        tracer: &Tracer,
+        charts: &Charts,
+        direct: &mut DirectCache,
+        (progress, control): (&dyn Progress, &Control),
+    ) -> bool {
+        let watch = Stopwatch::start();
+        let report = direct.complete(tracer, charts, progress, control);
+        self.shadow_rays += report.shadow_rays;
+        self.seconds.add(watch.elapsed());
+        report.complete
+    }
+
+    /// The bake with this.
+    pub(super) fn added_to(&self, outcome: &CausticOutcome) -> CausticOutcome {
+        let mut both = outcome.clone();
+        both.counts.shadow_rays += self.shadow_rays;
+        both.meter.direct_s.add(self.seconds);
+        both
+    }
+
+    /// The clock with this.
+    pub(super) fn clock(&self, clock: &Clock) -> Clock {
+        let mut both = *clock;
+        both.trace.add(self.seconds);
+        both
+    }
+}
