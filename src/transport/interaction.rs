@@ -213,28 +213,15 @@ impl Tracer {
             fresnel::thin_wall_reflectance(cos_incident, material.ior / media.ior(self.scene()));
         let share = LinearSrgb::grey(reflectance);
         let returned = sent_back::<E>(share, || reflection(hit, facing, incident, media, share));
-        let beneath = LinearSrgb::grey(1.0 - reflectance);
-        if !E::TRANSMISSION {
-            return Interaction {
-                switched_off: returned.switched_off + beneath,
-                ..returned
-            };
-        }
-        let transmitted = self.tint::<E>(hit, material) * (1.0 - reflectance);
-        let transmission = Branch {
+        let_through::<E>(returned, reflectance, || Branch {
             ray: hit.spawn(incident),
-            share: transmitted,
+            share: self.tint::<E>(hit, material) * (1.0 - reflectance),
             event: Event::ThinTransmission,
             media: *media,
             ior_ratio: 1.0,
             normal: facing.shading,
             by_shading: facing.is_smooth,
-        };
-        Interaction {
-            transmission: Some(transmission),
-            absorbed: beneath - transmitted,
-            ..returned
-        }
+        })
     }
 
     fn dielectric<E: PathEffects>(
@@ -270,28 +257,36 @@ impl Tracer {
         } else {
             Interaction::NOTHING
         };
-        let beneath = LinearSrgb::grey(1.0 - reflectance);
-        if !E::TRANSMISSION {
-            return Interaction {
-                switched_off: returned.switched_off + beneath,
-                ..returned
-            };
-        }
-        let transmitted = self.tint::<E>(hit, material) * (1.0 - reflectance);
-        let transmission = Branch {
+        let_through::<E>(returned, reflectance, || Branch {
             ray: hit.spawn(turned.direction),
-            share: transmitted,
+            share: self.tint::<E>(hit, material) * (1.0 - reflectance),
             event: Event::Refraction,
             media: beyond,
             ior_ratio: ior_near / ior_far,
             normal: turned.normal,
             by_shading: turned.by_shading,
-        };
-        Interaction {
-            transmission: Some(transmission),
-            absorbed: beneath - transmitted,
+        })
+    }
+}
+
+/// What does not go back goes through, but for what the surface's tint takes.
+fn let_through<E: PathEffects>(
+    returned: Interaction,
+    reflectance: f64,
+    branch: impl FnOnce() -> Branch,
+) -> Interaction {
+    let beneath = LinearSrgb::grey(1.0 - reflectance);
+    if !E::TRANSMISSION {
+        return Interaction {
+            switched_off: returned.switched_off + beneath,
             ..returned
-        }
+        };
+    }
+    let transmission = branch();
+    Interaction {
+        absorbed: beneath - transmission.share,
+        transmission: Some(transmission),
+        ..returned
     }
 }
 
