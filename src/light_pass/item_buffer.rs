@@ -129,8 +129,11 @@ impl ItemBuffer {
         let Some(bounds) = tracer.scene().objects[object].mesh.bounds() else {
             return false;
         };
-        if !self.is_marked_towards(launch, bounds) || self.casters.contains(&object) {
-            return self.casters.contains(&object);
+        if self.casters.contains(&object) {
+            return true;
+        }
+        if !self.is_marked_towards(launch, bounds) {
+            return false;
         }
         let mut wanted = vec![false; tracer.scene().objects.len()];
         self.casters.iter().for_each(|&caster| wanted[caster] = true);

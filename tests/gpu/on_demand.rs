@@ -152,21 +152,23 @@ fn forced_on_all_is_made_at_once_and_the_picture_is_the_same() {
     assert_eq!(at_once.surroundings_bytes, counts.surroundings_bytes);
 }
 
+/// Pipelines, those of specular surfaces, and bytes of the surroundings.
+fn made(renderer: &Renderer) -> (u64, u64, u64) {
+    let counts = renderer.counts();
+    (
+        counts.pipelines,
+        counts.specular_pipelines,
+        counts.surroundings_bytes,
+    )
+}
+
 #[test]
 fn forced_on_in_a_matte_scene_makes_nothing_specular() {
     let Some(gpu) = gpu() else { return };
     let scene = floor_scene(diffuse(LinearSrgb::WHITE));
     let mut renderer = renderer(&gpu, &scene, &[]);
     renderer.set_chains(&gpu, EffectSwitch::On).expect("it is made");
-    let counts = renderer.counts();
-    assert_eq!(
-        (
-            counts.pipelines,
-            counts.specular_pipelines,
-            counts.surroundings_bytes
-        ),
-        (1, 0, 0)
-    );
+    assert_eq!(made(&renderer), (1, 0, 0));
 }
 
 #[test]
@@ -257,15 +259,7 @@ fn maps_as_they_are_call_for_nothing_specular() {
     let mut renderer = renderer(&gpu, &scene, &maps);
     renderer.set_map_style(MapStyle::AsItIs);
     renderer.radiance(&gpu, &to_specular()).expect("it renders");
-    let counts = renderer.counts();
-    assert_eq!(
-        (
-            counts.pipelines,
-            counts.specular_pipelines,
-            counts.surroundings_bytes
-        ),
-        (1, 0, 0)
-    );
+    assert_eq!(made(&renderer), (1, 0, 0));
 }
 
 #[test]

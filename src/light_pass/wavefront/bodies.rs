@@ -57,13 +57,21 @@ impl SmallBodies {
         if corners.len() > MOST_BODIES {
             corners.clear();
         }
+        let middle = DVec2::splat(0.5);
+        let origin = launch.ray(0, middle).origin;
+        let is_small = |body: &Body| {
+            let width_m = launch
+                .cell_area_at_m2(middle, middle + cell, origin.distance(body.centre))
+                .sqrt();
+            body.radius_m > 0.0 && 2.0 * body.radius_m < SMALL_CELLS * width_m
+        };
         let mut bodies: Vec<Body> = scene
             .objects
             .iter()
             .enumerate()
             .filter_map(|(index, object)| {
                 let (low, high) = object.mesh.bounds()?;
-                visible.may_concern(launch, tracer, index).then(|| Body {
+                let body = Body {
                     centre: low * 0.5 + high * 0.5,
                     radius_m: 0.5 * (high - low).length(),
                     cells_across: if scene.material_of(index).surface.is_specular() {
@@ -71,17 +79,11 @@ impl SmallBodies {
                     } else {
                         CELLS_ACROSS_OTHERS
                     },
-                })
+                };
+                // The cheap question first: the other one searches the scene.
+                (is_small(&body) && visible.may_concern(launch, tracer, index)).then_some(body)
             })
             .collect();
-        let middle = DVec2::splat(0.5);
-        bodies.retain(|body| {
-            let origin = launch.ray(0, middle).origin;
-            let width_m = launch
-                .cell_area_at_m2(middle, middle + cell, origin.distance(body.centre))
-                .sqrt();
-            body.radius_m > 0.0 && 2.0 * body.radius_m < SMALL_CELLS * width_m
-        });
         if bodies.len() > MOST_BODIES {
             bodies.clear();
         }
