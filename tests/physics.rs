@@ -12,6 +12,8 @@ mod fresnel;
 mod lights;
 #[path = "physics/refraction.rs"]
 mod refraction;
+#[path = "physics/tone_maps.rs"]
+mod tone_maps;
 
 /// How a law is tried: many cases, the same ones in every run, so that a failure can be looked at.
 fn law() -> proptest::test_runner::Config {

@@ -2,6 +2,8 @@
 
 const TONE_MAP_NONE: u32 = 0u;
 const TONE_MAP_NEUTRAL: u32 = 1u;
+const TONE_MAP_AGX: u32 = 2u;
+const TONE_MAP_ACES: u32 = 3u;
 
 // Khronos PBR Neutral: exact below its shoulder, hue kept above it.
 fn tone_map_neutral(exposed: vec3f) -> vec3f {
@@ -20,10 +22,64 @@ fn tone_map_neutral(exposed: vec3f) -> vec3f {
     return mix(colour * (new_peak / peak), vec3f(new_peak), whiteness);
 }
 
+// The matrices below are written row by row: a colour is multiplied from the left.
+
+// AgX's working space: primaries of BT.709 drawn in by a fifth of their distance to D65; and back.
+const AGX_INSET = mat3x3f(
+    0.842398929049531, 0.078430165104864, 0.079170905845605,
+    0.042398929049531, 0.878430165104864, 0.079170905845605,
+    0.042398929049531, 0.078430165104864, 0.879170905845605,
+);
+const AGX_OUTSET = mat3x3f(
+    1.197001338688086, -0.098037706381080, -0.098963632307006,
+    -0.052998661311914, 1.151962293618920, -0.098963632307006,
+    -0.052998661311914, -0.098037706381080, 1.151036367692994,
+);
+
+// The sigmoid of AgX in its closed form: slope 2 and value 1/2 at middle grey, other powers below and above.
+fn agx_contrast(position: vec3f) -> vec3f {
+    let rise = 2.0 * (position - 10.0 / 16.5);
+    let is_toe = rise < vec3f(0.0);
+    let power = select(vec3f(3.25), vec3f(3.0), is_toe);
+    let scale = select(vec3f(0.5414641562781497), vec3f(0.5122773822930714), is_toe);
+    return 0.5 + rise * pow(1.0 + pow(abs(rise) / scale, power), -1.0 / power);
+}
+
+// Troy Sobotka's AgX without a look: ten stops below middle grey to 6.5 above.
+fn tone_map_agx(exposed: vec3f) -> vec3f {
+    let least = -12.473931188332413;
+    let most = 4.026068811667587;
+    // Black has no logarithm.
+    let stops = clamp(log2(max(exposed * AGX_INSET, vec3f(1e-5))), vec3f(least), vec3f(most));
+    let codes = agx_contrast((stops - least) / (most - least)) * AGX_OUTSET;
+    return pow(max(codes, vec3f(0.0)), vec3f(2.2));
+}
+
+const ACES_INPUT = mat3x3f(
+    0.59719, 0.35458, 0.04823,
+    0.07600, 0.90834, 0.01566,
+    0.02840, 0.13383, 0.83777,
+);
+const ACES_OUTPUT = mat3x3f(
+    1.60475, -0.53108, -0.07367,
+    -0.10208, 1.10813, -0.00605,
+    -0.00327, -0.07276, 1.07602,
+);
+
+// ACES in the fit of Stephen Hill.
+fn tone_map_aces(exposed: vec3f) -> vec3f {
+    let v = exposed * ACES_INPUT;
+    let fitted = (v * (v + 0.0245786) - 0.000090537) / (v * (0.983729 * v + 0.4329510) + 0.238081);
+    return fitted * ACES_OUTPUT;
+}
+
 fn tone_map(exposed: vec3f, kind: u32) -> vec3f {
     var display = max(exposed, vec3f(0.0));
-    if kind == TONE_MAP_NEUTRAL {
-        display = tone_map_neutral(display);
+    switch kind {
+        case TONE_MAP_NEUTRAL: { display = tone_map_neutral(display); }
+        case TONE_MAP_AGX: { display = tone_map_agx(display); }
+        case TONE_MAP_ACES: { display = tone_map_aces(display); }
+        default: {}
     }
     return clamp(display, vec3f(0.0), vec3f(1.0));
 }

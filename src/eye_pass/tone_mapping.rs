@@ -29,6 +29,103 @@ fn neutral(exposed: LinearSrgb) -> LinearSrgb {
     colour * (new_peak / peak) * (1.0 - whiteness) + LinearSrgb::grey(new_peak * whiteness)
 }
 
+/// Rows of a 3 × 3 matrix.
+type Rows = [[f64; 3]; 3];
+
+fn transform(rows: &Rows, colour: LinearSrgb) -> LinearSrgb {
+    let [r, g, b] = rows.map(|[r, g, b]| r * colour.r + g * colour.g + b * colour.b);
+    LinearSrgb::new(r, g, b)
+}
+
+/// From linear sRGB to AgX's working space: primaries of BT.709 drawn in by a fifth of their distance to D65.
+///
+/// Worked out from that rule, so that greys stay grey; the rounded matrix of the sources differs by 1e-4.
+const AGX_INSET: Rows = [
+    [
+        0.842_398_929_049_531,
+        0.078_430_165_104_864,
+        0.079_170_905_845_605,
+    ],
+    [
+        0.042_398_929_049_531,
+        0.878_430_165_104_864,
+        0.079_170_905_845_605,
+    ],
+    [
+        0.042_398_929_049_531,
+        0.078_430_165_104_864,
+        0.879_170_905_845_605,
+    ],
+];
+
+/// The inverse of [`AGX_INSET`].
+const AGX_OUTSET: Rows = [
+    [
+        1.197_001_338_688_086,
+        -0.098_037_706_381_080,
+        -0.098_963_632_307_006,
+    ],
+    [
+        -0.052_998_661_311_914,
+        1.151_962_293_618_92,
+        -0.098_963_632_307_006,
+    ],
+    [
+        -0.052_998_661_311_914,
+        -0.098_037_706_381_080,
+        1.151_036_367_692_994,
+    ],
+];
+
+/// Ten stops below and 6.5 above middle grey, as powers of two: log2(0.18) − 10 and + 6.5.
+const AGX_STOPS: [f64; 2] = [-12.473_931_188_332_413, 4.026_068_811_667_587];
+
+/// AgX's sigmoid from [0, 1] to display codes [0, 1]: slope 2 at middle grey, which becomes 1/2, and powers 3 below it
+/// and 3.25 above. The scales are what brings its ends to 0 and 1.
+///
+/// The closed form that the table of the reference was made with, not one of the polynomials that approximate it.
+/// Source: `AgX.py` of <https://github.com/sobotka/SB2383-Configuration-Generation>, after Jed Smith; agrees with every
+/// entry that was compared of `AgX_Default_Contrast.spi1d` in <https://github.com/sobotka/AgX>.
+fn agx_contrast(position: f64) -> f64 {
+    const PIVOT: f64 = 10.0 / 16.5;
+    let rise = 2.0 * (position - PIVOT);
+    let (power, scale) = if rise < 0.0 {
+        (3.0, 0.512_277_382_293_071_4)
+    } else {
+        (3.25, 0.541_464_156_278_149_7)
+    };
+    0.5 + rise * (1.0 + (rise.abs() / scale).powf(power)).powf(-1.0 / power)
+}
+
+/// Troy Sobotka's AgX without a look. Black, and all that is darker than ten stops below middle grey, is 0.
+/// Sources: <https://github.com/sobotka/AgX>; the order of its steps, and the display's exponent of 2.2 at the end, as in
+/// <https://iolite-engine.com/blog_posts/minimal_agx_implementation>.
+fn agx(exposed: LinearSrgb) -> LinearSrgb {
+    let [least, most] = AGX_STOPS;
+    let codes = transform(&AGX_INSET, exposed)
+        .map(|channel| agx_contrast((channel.log2().clamp(least, most) - least) / (most - least)));
+    transform(&AGX_OUTSET, codes).map(|code| code.max(0.0).powf(2.2))
+}
+
+/// The fit of ACES' reference rendering and output transforms by Stephen Hill, matrices from and to linear sRGB
+/// included. Greys below 0.0033 are 0, those above 25.7 are white; a fit, not the transform of the Academy itself.
+/// Source: `ACES.hlsl` of <https://github.com/TheRealMJP/BakingLab>.
+fn aces(exposed: LinearSrgb) -> LinearSrgb {
+    const INPUT: Rows = [
+        [0.597_19, 0.354_58, 0.048_23],
+        [0.076_00, 0.908_34, 0.015_66],
+        [0.028_40, 0.133_83, 0.837_77],
+    ];
+    const OUTPUT: Rows = [
+        [1.604_75, -0.531_08, -0.073_67],
+        [-0.102_08, 1.108_13, -0.006_05],
+        [-0.003_27, -0.072_76, 1.076_02],
+    ];
+    let curve =
+        |v: f64| (v * (v + 0.024_578_6) - 0.000_090_537) / (v * (0.983_729 * v + 0.432_951_0) + 0.238_081);
+    transform(&OUTPUT, transform(&INPUT, exposed).map(curve))
+}
+
 impl ToneMap {
     /// Display light [0, 1] from exposed radiance, where 1 is the display's white. Negative channels count as 0.
     pub fn apply(self, exposed: LinearSrgb) -> LinearSrgb {
@@ -36,6 +133,8 @@ impl ToneMap {
         let display = match self {
             Self::None => exposed,
             Self::Neutral => neutral(exposed),
+            Self::AgX => agx(exposed),
+            Self::Aces => aces(exposed),
         };
         display.map(|channel| channel.clamp(0.0, 1.0))
     }

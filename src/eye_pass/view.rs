@@ -11,9 +11,19 @@ use crate::scene::Camera;
 pub enum ToneMap {
     /// Cut at 1.
     None,
-    /// Khronos PBR Neutral.
+    /// Khronos PBR Neutral: keeps hues, rolls highlights off.
     #[default]
     Neutral,
+    /// AgX: soft shoulder, saturated lights turn white.
+    #[value(name = "agx")]
+    AgX,
+    /// ACES, in the fit of Stephen Hill: more contrast, darker middle tones.
+    Aces,
+}
+
+impl ToneMap {
+    /// Every one.
+    pub const ALL: [Self; 4] = [Self::None, Self::Neutral, Self::AgX, Self::Aces];
 }
 
 /// One picture to be made.

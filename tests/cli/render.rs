@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use nephroid::export::FloatImage;
-use nephroid::eye_pass::{ToneMap, View, reference};
+use nephroid::eye_pass::{Picture, ToneMap, View, reference, tone_mapping};
 use nephroid::optics::LinearSrgb;
 use nephroid::scene::builtin;
 use nephroid::transport::Tracer;
@@ -64,6 +64,33 @@ fn png_and_json_say_what_was_made() {
     }
     assert_eq!(brightness("a.png"), brightness("same.png"));
     assert!(brightness("darker.png") < brightness("a.png"));
+}
+
+#[test]
+fn every_tone_map_shows_the_same_radiance_in_its_own_way() {
+    let sandbox = Sandbox::new();
+    sandbox.succeed(&format!("render builtin:mirror -o radiance.exr {SMALL} {QUICK}"));
+    let picture = Picture {
+        width: 40,
+        height: 30,
+        radiance: pixels(&sandbox, "radiance.exr"),
+    };
+    let mut seen: Vec<Vec<u8>> = Vec::new();
+    for (name, tone_map) in ["none", "neutral", "agx", "aces"].into_iter().zip(ToneMap::ALL) {
+        sandbox.succeed(&format!(
+            "render builtin:mirror -o {name}.png {SMALL} {QUICK} --exposure 1 --tone-map {name}"
+        ));
+        let path = sandbox.path(&format!("{name}.png"));
+        let shown = image::open(path).expect("a PNG").to_rgba8().into_raw();
+        assert!(
+            shown == tone_mapping::display_rgba8(&picture, 1.0, tone_map),
+            "{name}"
+        );
+        assert!(!seen.contains(&shown), "{name} shows what another one shows");
+        seen.push(shown);
+    }
+    let help = sandbox.succeed("render --help").stdout;
+    assert!(help.contains("none, neutral, agx, aces"), "{help}");
 }
 
 #[test]

@@ -53,7 +53,7 @@ fn device_and_processor_show_the_same_on_every_kind_of_target() {
     let Some(gpu) = gpu() else { return };
     let (scene, maps) = ramp();
     let mut brightest_seen = 0;
-    for tone_map in [ToneMap::None, ToneMap::Neutral] {
+    for tone_map in ToneMap::ALL {
         for exposure_stops in [-3.0, 0.0, 2.5] {
             let view = View {
                 exposure_stops,

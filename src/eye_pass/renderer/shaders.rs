@@ -87,7 +87,7 @@ pub fn specialisations() -> Vec<Specialisation> {
             }
         }
     }
-    for tone_map in [ToneMap::None, ToneMap::Neutral] {
+    for tone_map in ToneMap::ALL {
         for encode_srgb in [false, true] {
             all.push(Specialisation {
                 program: TONE_MAPPING.name,

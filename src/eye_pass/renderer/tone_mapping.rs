@@ -102,6 +102,8 @@ pub(super) fn constants(tone_map: ToneMap, encode_srgb: bool) -> [(&'static str,
     let code = match tone_map {
         ToneMap::None => 0.0,
         ToneMap::Neutral => 1.0,
+        ToneMap::AgX => 2.0,
+        ToneMap::Aces => 3.0,
     };
     [
         ("TONE_MAP", code),

@@ -19,7 +19,7 @@ const AUTO_EXPOSURE: &str = "Measures the present picture and sets the exposure 
 const TONE_MAP: About = About {
     label: "Tone map",
     what: "How radiance beyond what the display shows is brought into its range.",
-    range: "neutral, none; default neutral",
+    range: "neutral, AgX, ACES, none; default neutral",
     accuracy: "none: only the picture changes",
     cost: "none",
 };
@@ -43,11 +43,21 @@ const QUANTITY: About = About {
 const NO_DIFFERENCE: &str = "Ask under Effects what an effect is worth.";
 const NO_ERRORS: &str = "These maps come without an estimate of their error.";
 
-const TONE_MAPS: [(ToneMap, &str, &str); 2] = [
+const TONE_MAPS: [(ToneMap, &str, &str); 4] = [
     (
         ToneMap::Neutral,
         "neutral",
         "Khronos PBR Neutral: keeps hues, rolls highlights off",
+    ),
+    (
+        ToneMap::AgX,
+        "AgX",
+        "Troy Sobotka's AgX: soft highlights; bright saturated light turns white",
+    ),
+    (
+        ToneMap::Aces,
+        "ACES",
+        "Stephen Hill's fit of ACES: more contrast, darker middle tones",
     ),
     (ToneMap::None, "none", "cut at the display's white"),
 ];
