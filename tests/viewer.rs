@@ -20,6 +20,8 @@ mod model;
 mod navigation;
 #[path = "viewer/panel.rs"]
 mod panel;
+#[path = "viewer/screenshot.rs"]
+mod screenshot;
 #[cfg(target_os = "linux")]
 #[path = "support/mod.rs"]
 mod support;

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use nephroid::effect::{Effect, EffectSwitch};
 use nephroid::error::{Error, Result};
-use nephroid::export::{exr, png};
+use nephroid::export::picture;
 use nephroid::eye_pass::reference::{self, ChainLimits, ReferenceSettings};
 use nephroid::eye_pass::{Picture, View, tone_mapping};
 use nephroid::illumination::IlluminationMap;
@@ -40,15 +40,10 @@ impl MadePicture {
     pub fn encode(&self, format: PictureFormat, location: &str) -> Result<Vec<u8>> {
         match format {
             PictureFormat::Png => {
-                let rgba =
-                    tone_mapping::display_rgba8(&self.picture, self.view.exposure_stops, self.view.tone_map);
-                png::encode(self.picture.width, self.picture.height, rgba, location)
+                let view = &self.view;
+                picture::display_png(&self.picture, view.exposure_stops, view.tone_map, location)
             }
-            PictureFormat::Exr => exr::encode(
-                exr::image_of_picture(&self.picture),
-                "radiance in W/(m^2 sr) (cd/m^2 / 683), linear sRGB; row 0 is the top",
-                location,
-            ),
+            PictureFormat::Exr => picture::radiance_exr(&self.picture, location),
         }
     }
 }

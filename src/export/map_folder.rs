@@ -17,9 +17,6 @@ const MAPS: &str = "maps";
 /// Largest manifest that is read [bytes].
 pub(super) const MAX_MANIFEST_BYTES: u64 = 64 << 20;
 
-/// Longest part of a surface's name in a file's name [characters].
-const MAX_SLUG: usize = 40;
-
 /// A folder that a bake may write to.
 #[derive(Debug)]
 pub struct MapFolder {
@@ -86,7 +83,10 @@ impl MapFolder {
 
     fn write_map(&self, scene: &Scene, map: &IlluminationMap) -> Result<MapEntry> {
         let object = map.chart.object;
-        let stem = format!("{object:04}_{}", slug(&scene.objects[object].name));
+        let stem = format!(
+            "{object:04}_{}",
+            files::slug(&scene.objects[object].name, "surface")
+        );
         let uv_name = (map.chart.uv_set == UvSet::Generated).then(|| format!("{stem}.uv"));
         if let Some(name) = &uv_name {
             let bytes = uv_file::encode(&map.chart.corner_uvs);
@@ -144,45 +144,18 @@ pub(super) fn is_map_file(file: &str) -> bool {
     })
 }
 
-/// A surface's name as part of a file's name: lower-case ASCII letters, digits and hyphens; never empty.
-fn slug(name: &str) -> String {
-    let mut slug = String::new();
-    for character in name.chars() {
-        if character.is_ascii_alphanumeric() {
-            slug.push(character.to_ascii_lowercase());
-        } else if !slug.is_empty() && !slug.ends_with('-') {
-            slug.push('-');
-        }
-        if slug.len() == MAX_SLUG {
-            break;
-        }
-    }
-    let slug = slug.trim_end_matches('-');
-    if slug.is_empty() {
-        "surface".into()
-    } else {
-        slug.into()
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn no_name_forms_a_path() {
-        for (name, expected) in [
-            ("Floor", "floor"),
-            ("../../etc/passwd", "etc-passwd"),
-            ("", "surface"),
-            ("床", "surface"),
-            ("a  b\0c", "a-b-c"),
-            ("C:\\x", "c-x"),
-        ] {
-            assert_eq!(slug(name), expected);
-            assert!(is_map_file(&format!("maps/0001_{}.exr", slug(name))));
+    fn slugs_are_map_files() {
+        for name in ["Floor", "../../etc/passwd", "", "床", "C:\\x"] {
+            assert!(is_map_file(&format!(
+                "maps/0001_{}.exr",
+                files::slug(name, "surface")
+            )));
         }
-        assert_eq!(slug(&"x".repeat(500)).len(), MAX_SLUG);
     }
 
     #[test]

@@ -6,6 +6,7 @@ pub mod manifest;
 pub mod map_folder;
 pub mod map_reader;
 pub mod pfm;
+pub mod picture;
 pub mod png;
 pub mod uv_file;
 

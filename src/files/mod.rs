@@ -2,8 +2,10 @@
 
 mod folder;
 mod read;
+mod slug;
 mod write;
 
 pub use folder::{OutputFolder, check_output_file, remove_file};
 pub use read::read_file;
+pub use slug::slug;
 pub use write::write_atomically;

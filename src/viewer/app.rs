@@ -1,5 +1,6 @@
 //! The window's life: events in, frames out, and rest while nothing changes.
 
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -21,7 +22,7 @@ use super::interface::Painting;
 use super::model::Model;
 use super::overlay;
 use super::panel::{Display, Facts, Quantity, Wishes};
-use super::{ViewerOptions, error_view, eye_report};
+use super::{ViewerOptions, error_view, eye_report, screenshot};
 use crate::effect::{Effect, EffectSwitch};
 use crate::error::{Error, Result};
 use crate::eye_pass::renderer::{MapStyle, Uploaded};
@@ -255,7 +256,44 @@ impl App {
         {
             self.notice = Some(error.to_string());
         }
+        if wishes.save_picture {
+            self.save_picture();
+        }
         self.schedule(event_loop, shown, painting.repaint_after);
+    }
+
+    /// Writes the picture to files in the working folder, and tells where over the picture.
+    fn save_picture(&mut self) {
+        let outcome = self.written_picture();
+        let notice = match &outcome {
+            Ok(files) => {
+                self.model.log.write(&Event::Saved(files));
+                screenshot::told(files)
+            }
+            Err(error) => {
+                let sentence = error.to_string();
+                self.model.log.write(&Event::NotSaved(&sentence));
+                sentence
+            }
+        };
+        self.notice = Some(notice);
+        self.request_redraw();
+    }
+
+    fn written_picture(&mut self) -> Result<Vec<PathBuf>> {
+        let (Some(view), Some(graphics)) = (self.view(), &mut self.graphics) else {
+            return Err(Error::failure(
+                "picture",
+                "the window has no room for it",
+                "make the window larger",
+            ));
+        };
+        let picture = graphics.radiance(&view)?;
+        // Said in full where the system knows it: the window does not show where it was started.
+        let folder = std::env::current_dir().unwrap_or_else(|_| PathBuf::from("."));
+        // False colours are no radiance.
+        let has_radiance = self.model.quantity() == Quantity::Light;
+        screenshot::save(&folder, &self.model.scene().name, &picture, &view, has_radiance)
     }
 
     /// Looks what the picture that is shown takes.
@@ -481,6 +519,7 @@ impl App {
                     self.model.navigator.frame(f64::from(aspect));
                 }
                 Some(Shortcut::Rebake) => self.pressed.rebake = true,
+                Some(Shortcut::SavePicture) => self.pressed.save_picture = true,
                 Some(Shortcut::Help) => self.model.panel.help_open = !self.model.panel.help_open,
                 Some(Shortcut::LetGo) if self.looking_from.is_some() => self.stop_looking(),
                 Some(Shortcut::LetGo) => self.pressed.cancel = true,

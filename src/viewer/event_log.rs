@@ -2,7 +2,7 @@
 
 use std::fs::File;
 use std::io::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use serde_json::{Value, json};
@@ -58,6 +58,10 @@ pub enum Event<'a> {
     Failed(&'a str),
     /// A setting was changed in the panel.
     SettingsChanged(&'a BakeSettings),
+    /// The picture was written to files.
+    Saved(&'a [PathBuf]),
+    /// The picture could not be written.
+    NotSaved(&'a str),
     /// The exposure was measured [stops].
     Exposure(f64),
     /// Pictures since the start; written when the window comes to rest.
@@ -106,6 +110,8 @@ impl Event<'_> {
             Self::Cancelled => json!({"event": "cancelled"}),
             Self::Failed(sentence) => json!({"event": "failed", "sentence": sentence}),
             Self::SettingsChanged(settings) => json!({"event": "settings", "settings": settings}),
+            Self::Saved(files) => json!({"event": "saved", "files": files}),
+            Self::NotSaved(sentence) => json!({"event": "not_saved", "sentence": sentence}),
             Self::Exposure(stops) => json!({"event": "exposure", "stops": stops}),
             Self::AtRest {
                 pictures,

@@ -14,7 +14,7 @@ use super::surface::{Acquired, Screen};
 use crate::effect::EffectSwitch;
 use crate::error::{Error, Result};
 use crate::eye_pass::renderer::{EyeCounts, MapStyle, Renderer, Uploaded};
-use crate::eye_pass::{View, tone_mapping};
+use crate::eye_pass::{self, View, tone_mapping};
 use crate::gpu::Gpu;
 use crate::illumination::IlluminationMap;
 use crate::scene::Scene;
@@ -184,6 +184,14 @@ impl Graphics {
         };
         let picture = self.renderer.radiance(&self.gpu, &part)?;
         Ok(tone_mapping::auto_exposure_stops(&picture))
+    }
+
+    /// Radiance of every pixel of a view.
+    ///
+    /// # Errors
+    /// A picture without area or above the device's limit; the device was lost.
+    pub fn radiance(&mut self, view: &View) -> Result<eye_pass::Picture> {
+        self.renderer.radiance(&self.gpu, view)
     }
 
     /// Draws the scene where the view changed since the last time; tells whether it drew.

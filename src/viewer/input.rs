@@ -16,6 +16,8 @@ pub enum Shortcut {
     Rebake,
     /// H
     Help,
+    /// F12
+    SavePicture,
     /// Esc
     LetGo,
 }
@@ -41,6 +43,7 @@ pub fn hold(keys: &mut HeldKeys, key: KeyCode, state: ElementState) -> bool {
 pub fn shortcut(key: &Key) -> Option<Shortcut> {
     match key {
         Key::Named(NamedKey::Escape) => Some(Shortcut::LetGo),
+        Key::Named(NamedKey::F12) => Some(Shortcut::SavePicture),
         Key::Character(letter) => match letter.to_lowercase().as_str() {
             "c" => Some(Shortcut::NextCamera),
             "f" => Some(Shortcut::Frame),

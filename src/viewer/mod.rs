@@ -16,6 +16,7 @@ pub mod navigation;
 mod overlay;
 pub mod panel;
 mod picture;
+pub mod screenshot;
 mod surface;
 pub mod worker;
 

@@ -2,6 +2,7 @@
 
 use std::fs;
 use std::io::{BufRead, BufReader, Read};
+use std::path::PathBuf;
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
@@ -16,6 +17,9 @@ use super::support::skip::skip;
 const PATIENCE: Duration = Duration::from_secs(120);
 /// Size of the screen and of the window [pixels].
 pub const SIZE: (u32, u32) = (1280, 720);
+
+/// The folder that the program is started in, within the test's own.
+const WORKING: &str = "working";
 
 /// An X server of its own on a display number that was free.
 pub struct Screen {
@@ -95,11 +99,13 @@ impl<'a> Viewer<'a> {
     pub fn open(screen: &'a Screen, arguments: &[&str]) -> Self {
         let folder = tempfile::tempdir().expect("a folder");
         let stderr = fs::File::create(folder.path().join("stderr")).expect("a file");
+        fs::create_dir(folder.path().join(WORKING)).expect("a folder");
         let program = Command::new(env!("CARGO_BIN_EXE_nephroid"))
             .arg("view")
             .args(arguments)
             .args(["--size", &format!("{}x{}", SIZE.0, SIZE.1), "--event-log"])
             .arg(folder.path().join("events"))
+            .current_dir(folder.path().join(WORKING))
             .env("DISPLAY", &screen.display)
             .env("WINIT_X11_SCALE_FACTOR", "1")
             .env_remove("WAYLAND_DISPLAY")
@@ -140,6 +146,11 @@ impl<'a> Viewer<'a> {
     /// The window by its number.
     pub fn window(&self) -> &str {
         &self.window
+    }
+
+    /// Where the program was started.
+    pub fn working_folder(&self) -> PathBuf {
+        self.folder.path().join(WORKING)
     }
 
     fn events(&self) -> Vec<Value> {

@@ -1,12 +1,16 @@
 //! The real program in a real window on a screen without a monitor, used as a person would: seen only by screenshots
 //! and its event log.
 
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 use egui::accesskit::Role;
 use glam::DVec3;
 use image::RgbImage;
 use nephroid::effect::{Effect, EffectSwitch};
+use nephroid::export::FloatImage;
+use nephroid::eye_pass::tone_mapping::display_rgba8;
+use nephroid::eye_pass::{Picture, ToneMap};
 use nephroid::plan::EffectLine;
 use nephroid::scene::builtin;
 use nephroid::settings::{BakeSettings, LayerKind};
@@ -403,4 +407,92 @@ fn the_worth_of_the_light_pass_is_found_beside_the_maps_and_shown_in_false_colou
     viewer.hands("mousemove 900 300");
     let (status, stderr) = viewer.close();
     assert_eq!(status.code(), Some(0), "{stderr}");
+}
+
+/// A pair of files that the log tells of: the PNG's pixels and the EXR's radiance.
+fn saved(event: &serde_json::Value) -> (RgbImage, Picture) {
+    let file = |index: usize| Path::new(event["files"][index].as_str().expect("a path")).to_owned();
+    let shown = image::open(file(0)).expect("a PNG").to_rgb8();
+    let image = FloatImage::read(&file(1)).expect("an EXR");
+    let radiance = Picture {
+        width: image.width as u32,
+        height: image.height as u32,
+        radiance: image.rgb("").expect("R, G, B"),
+    };
+    (shown, radiance)
+}
+
+#[test]
+fn the_picture_is_saved_as_it_is_seen_and_as_radiance() {
+    let Some(screen) = Screen::start("viewer screenshot") else {
+        return;
+    };
+    let mut viewer = Viewer::open(&screen, &RING);
+    let stops = viewer.wait_for("exposure", |_| true)["stops"]
+        .as_f64()
+        .expect("a number");
+    viewer.wait_for("rest", |_| true);
+    let seen = viewer.screenshot();
+
+    // By key: the PNG is the screen beside the panel, and the EXR, shown by the CPU, is the PNG.
+    viewer.hands("key F12");
+    let event = viewer.wait_for("saved", |_| true);
+    let names: Vec<_> = (0..2).map(|index| event["files"][index].to_string()).collect();
+    assert!(names[0].ends_with("nephroid-ring-0001.png\""), "{names:?}");
+    let (shown, radiance) = saved(&event);
+    let left = WIDTH as u32;
+    assert_eq!(shown.dimensions(), (SIZE.0 - left, SIZE.1));
+    let most = |a: &[u8], b: &[u8]| a.iter().zip(b).map(|(a, b)| a.abs_diff(*b)).max();
+    let on_screen = image::imageops::crop_imm(&seen, left, 0, SIZE.0 - left, SIZE.1).to_image();
+    let off = most(on_screen.as_raw(), shown.as_raw());
+    assert!(off <= Some(1), "{off:?} codes between the screen and the file");
+    let by_cpu = display_rgba8(&radiance, stops, ToneMap::Neutral);
+    let by_cpu: Vec<u8> = by_cpu
+        .chunks(4)
+        .flat_map(|rgba| [rgba[0], rgba[1], rgba[2]])
+        .collect();
+    let off = most(&by_cpu, shown.as_raw());
+    assert!(off <= Some(1), "{off:?} codes between the two files");
+    assert!(by_cpu.iter().any(|code| *code > 100), "it is not dark");
+
+    // Where it lies is told over the picture, and the next key takes that away.
+    screenshot_that(&viewer, "tells where", |shot| difference(&seen, shot) > 0.001);
+    viewer.hands("key b");
+    screenshot_that(&viewer, "is clear again", |shot| difference(&seen, shot) == 0.0);
+
+    // By the button: the next number.
+    let settings = BakeSettings {
+        layers: vec![LayerKind::Caustic],
+        ..BakeSettings::splat()
+    };
+    let scene = builtin::build("ring").expect("it is built in");
+    let panel = Headless::with_scene(scene, settings, (SIZE.0 as f32, SIZE.1 as f32));
+    let button = Headless::rect_of(panel.named(Role::Button, "Save picture")).center();
+    viewer.hands(&format!(
+        "mousemove {} {} sleep 0.2 click 1",
+        button.x as i32, button.y as i32
+    ));
+    let event = viewer.wait_for("saved", |_| true);
+    assert!(
+        event["files"][1]
+            .to_string()
+            .ends_with("nephroid-ring-0002.exr\""),
+        "{event}"
+    );
+    assert_eq!(saved(&event), (shown, radiance), "the same picture again");
+
+    // Where it cannot be written the window says so and goes on.
+    std::fs::remove_dir_all(viewer.working_folder()).expect("it was there");
+    viewer.hands("mousemove 900 300 key F12");
+    let event = viewer.wait_for("not_saved", |_| true);
+    let sentence = event["sentence"].as_str().expect("a sentence");
+    assert!(
+        sentence.contains("nephroid-ring-0001") && !sentence.contains('\n'),
+        "{sentence}"
+    );
+    viewer.hands("key b");
+    screenshot_that(&viewer, "goes on", |shot| difference(&seen, shot) == 0.0);
+    let (status, stderr) = viewer.close();
+    assert_eq!(status.code(), Some(0), "{stderr}");
+    assert!(!stderr.contains("panicked"), "{stderr}");
 }

@@ -15,6 +15,7 @@ pub fn show(ui: &mut Ui, speed_m_per_s: f64) {
         ("F", "frame the whole scene"),
         ("R", "re-bake"),
         ("Ctrl+Z", "take the last change of the scene back"),
+        ("F12", "save the picture as .png and .exr"),
         ("Esc", "let go of the mouse, cancel the bake"),
         ("H", "open or close this list"),
     ];

@@ -12,7 +12,7 @@ mod worth;
 
 use std::sync::Arc;
 
-use egui::{CollapsingHeader, Frame, Margin, RichText, ScrollArea, Ui};
+use egui::{Align, CollapsingHeader, Frame, Label, Layout, Margin, RichText, ScrollArea, Ui};
 
 use super::worker::{BakeState, BakedLevel, Worth};
 use crate::effect::Effect;
@@ -24,6 +24,9 @@ use crate::settings::{BakeSettings, LayerKind};
 
 /// Width of the panel [points].
 pub const WIDTH: f32 = 344.0;
+
+const SAVE: &str = "Writes the picture without the panel into the working folder (F12): a .png as it is seen, and an .exr \
+                    with its radiance in W/(m² sr), which neither exposure nor tone map changes.";
 
 /// Which layer the picture shows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -125,6 +128,8 @@ pub struct Wishes {
     pub cancel: bool,
     /// Choose the exposure from the picture.
     pub measure_exposure: bool,
+    /// Write the picture to files.
+    pub save_picture: bool,
     /// Find what this effect is worth to the maps that are shown.
     pub worth: Option<Effect>,
     /// Change the scene.
@@ -154,6 +159,7 @@ impl Wishes {
             rebake: self.rebake || other.rebake,
             cancel: self.cancel || other.cancel,
             measure_exposure: self.measure_exposure || other.measure_exposure,
+            save_picture: self.save_picture || other.save_picture,
             worth: other.worth.or(self.worth),
             edit: other.edit.or(self.edit),
             undo: self.undo || other.undo,
@@ -196,7 +202,7 @@ impl Panel {
 
     fn sections(&mut self, ui: &mut Ui, facts: &Facts<'_>, wishes: &mut Wishes) {
         ui.spacing_mut().item_spacing.y = 3.0;
-        title(ui, facts);
+        title(ui, facts, wishes);
         section(ui, "Scene", true, |ui| {
             scene::show(ui, &mut self.selection, facts, wishes)
         });
@@ -231,15 +237,24 @@ impl Panel {
             .body_response
             .filter(|_| self.help_open && !self.help_was_open)
         {
-            keys.scroll_to_me(Some(egui::Align::BOTTOM));
+            keys.scroll_to_me(Some(Align::BOTTOM));
         }
         self.help_was_open = self.help_open;
     }
 }
 
-fn title(ui: &mut Ui, facts: &Facts<'_>) {
+fn title(ui: &mut Ui, facts: &Facts<'_>, wishes: &mut Wishes) {
     let scene = facts.scene;
-    ui.heading(&scene.name).on_hover_text(&scene.source);
+    ui.horizontal(|ui| {
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            let save = ui.button("Save picture").on_hover_text(SAVE);
+            wishes.save_picture |= save.clicked();
+            ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
+                let name = Label::new(RichText::new(&scene.name).heading()).truncate();
+                ui.add(name).on_hover_text(&scene.source);
+            });
+        });
+    });
     ui.label(
         RichText::new(format!(
             "{}, {}, {}",

@@ -1,0 +1,31 @@
+//! A picture as a file: what a display shows of it, or the radiance that it holds.
+
+use super::{exr, png};
+use crate::error::Result;
+use crate::eye_pass::{Picture, ToneMap, tone_mapping};
+
+/// The bytes of a PNG file: radiance × 2^`exposure_stops`, tone-mapped and sRGB-encoded; `location` is named in errors.
+///
+/// # Errors
+/// A size that the format cannot hold.
+pub fn display_png(
+    picture: &Picture,
+    exposure_stops: f64,
+    tone_map: ToneMap,
+    location: &str,
+) -> Result<Vec<u8>> {
+    let rgba = tone_mapping::display_rgba8(picture, exposure_stops, tone_map);
+    png::encode(picture.width, picture.height, rgba, location)
+}
+
+/// The bytes of an EXR file: radiance [W/(m² sr)], without exposure and tone mapping; `location` is named in errors.
+///
+/// # Errors
+/// A size that the format cannot hold.
+pub fn radiance_exr(picture: &Picture, location: &str) -> Result<Vec<u8>> {
+    exr::encode(
+        exr::image_of_picture(picture),
+        "radiance in W/(m^2 sr) (cd/m^2 / 683), linear sRGB; row 0 is the top",
+        location,
+    )
+}
