@@ -16,6 +16,8 @@ mod inspect;
 mod program;
 #[path = "cli/render.rs"]
 mod render;
+#[path = "cli/render_path.rs"]
+mod render_path;
 #[path = "cli/scenes.rs"]
 mod scenes;
 #[cfg(unix)]

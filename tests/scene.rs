@@ -4,6 +4,8 @@ mod support;
 
 #[path = "scene/builtins.rs"]
 mod builtins;
+#[path = "scene/camera_paths.rs"]
+mod camera_paths;
 #[path = "scene/collections.rs"]
 mod collections;
 #[path = "scene/edits.rs"]

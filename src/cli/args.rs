@@ -161,9 +161,15 @@ pub enum Backend {
 pub struct RenderArguments {
     /// .glb, .gltf or builtin:NAME
     pub scene: String,
-    /// Picture: .png for display, .exr for radiance in W/(m² sr)
-    #[arg(short, long, value_name = "FILE")]
-    pub output: PathBuf,
+    /// Picture: .png for display, .exr for radiance in W/(m² sr); with --path a folder for its frames as .png
+    #[arg(short, long, value_name = "FILE", required_unless_present = "path")]
+    pub output: Option<PathBuf>,
+    /// Draw the frames of a camera's path, a JSON file, on the graphics card
+    #[arg(long, value_name = "FILE", conflicts_with = "camera")]
+    pub path: Option<PathBuf>,
+    /// With --path: time every frame with and without what is seen in mirrors and through glass
+    #[arg(long, requires = "path")]
+    pub stats: bool,
     #[command(flatten)]
     pub maps: MapsOption,
     /// How radiance becomes display colour [default: neutral]

@@ -3,6 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
+#[cfg(feature = "gpu")]
+use nephroid::effect::{Effect, EffectSwitch};
 use nephroid::error::{Error, Result};
 use nephroid::eye_pass::ToneMap;
 use nephroid::settings::{BakeSettings, Estimator, LayerKind, MapResolution};
@@ -18,6 +20,8 @@ use super::args::{
 use super::bake_options::BakeOptions;
 use super::compare::{self, LayerChoice};
 use super::interrupt::Interrupt;
+#[cfg(feature = "gpu")]
+use super::render_path;
 use super::scene_input::{MissingLight, SceneInput};
 use super::terminal::Terminal;
 use super::values::Exposure;
@@ -38,6 +42,8 @@ pub enum Job {
     View(ViewJob),
     Bake(BakeJob),
     Render(RenderJob),
+    #[cfg(feature = "gpu")]
+    RenderPath(PathJob),
     Inspect(InspectJob),
     Compare(CompareJob),
     ListStudies,
@@ -76,6 +82,21 @@ pub struct RenderJob {
     pub picture: PictureRequest,
     pub output: PathBuf,
     pub format: PictureFormat,
+}
+
+/// `render` of a camera's path.
+#[cfg(feature = "gpu")]
+#[derive(Debug)]
+pub struct PathJob {
+    pub scene: SceneInput,
+    pub maps: MapSource,
+    /// Of every frame; it names no camera.
+    pub picture: PictureRequest,
+    pub path: PathBuf,
+    /// Whether frames are timed with and without chains.
+    pub stats: bool,
+    /// Folder for the frames.
+    pub output: Option<PathBuf>,
 }
 
 /// `inspect`.
@@ -192,6 +213,8 @@ impl Job {
             Self::View(job) => view::run(job, terminal, interrupt),
             Self::Bake(job) => bake::run(&job, terminal, interrupt),
             Self::Render(job) => render::run(&job, terminal, interrupt),
+            #[cfg(feature = "gpu")]
+            Self::RenderPath(job) => render_path::run(&job, terminal, interrupt),
             Self::Inspect(job) => inspect::run(&job, terminal, interrupt),
             Self::Compare(job) => compare::run(&job, terminal),
             Self::ListStudies => study::list(terminal),
@@ -240,7 +263,17 @@ fn bake_job(arguments: BakeArguments) -> Result<Job> {
 }
 
 fn render_job(arguments: RenderArguments) -> Result<Job> {
-    let format = picture_format(&arguments.output)?;
+    if let Some(path) = arguments.path.clone() {
+        return path_job(arguments, path);
+    }
+    let Some(output) = arguments.output else {
+        return Err(Error::usage(
+            "--output",
+            "no file for the picture is named",
+            "add -o FILE.png or -o FILE.exr",
+        ));
+    };
+    let format = picture_format(&output)?;
     let PictureOptions {
         camera,
         exposure,
@@ -271,9 +304,60 @@ fn render_job(arguments: RenderArguments) -> Result<Job> {
             tone_map: arguments.tone_map.unwrap_or_default(),
             backend: arguments.backend,
         },
-        output: arguments.output,
+        output,
         format,
     }))
+}
+
+#[cfg(feature = "gpu")]
+fn path_job(arguments: RenderArguments, path: PathBuf) -> Result<Job> {
+    let RenderArguments { stats, output, .. } = arguments;
+    let refused = |option: &str, what: &str, remedy: &str| Err(Error::usage(option, what, remedy));
+    if arguments.backend == Some(Backend::Cpu) {
+        return refused(
+            "--backend cpu",
+            "frames of a path are drawn by the graphics card",
+            "leave it out, or render single pictures",
+        );
+    }
+    if !stats && output.is_none() {
+        return refused(
+            "--path",
+            "nothing is wanted of its frames",
+            "add --stats to time them, or -o DIR to keep them",
+        );
+    }
+    let maps = map_source(arguments.maps, &arguments.bake, &arguments.run)?;
+    if stats && maps.settings().effects.get(Effect::Chains) == EffectSwitch::Off {
+        return refused(
+            "--effects chains=off",
+            "--stats times frames with and without chains",
+            "leave one of the two out",
+        );
+    }
+    Ok(Job::RenderPath(PathJob {
+        scene: scene_input(arguments.scene, &arguments.scene_options, MissingLight::Add),
+        maps,
+        picture: PictureRequest {
+            camera: None,
+            size: arguments.picture.size.unwrap_or(DEFAULT_SIZE),
+            exposure: arguments.picture.exposure.unwrap_or_default(),
+            tone_map: arguments.tone_map.unwrap_or_default(),
+            backend: arguments.backend,
+        },
+        path,
+        stats,
+        output,
+    }))
+}
+
+#[cfg(not(feature = "gpu"))]
+fn path_job(_: RenderArguments, _: PathBuf) -> Result<Job> {
+    Err(Error::usage(
+        "--path",
+        "this program was built without the gpu feature, which draws the frames",
+        "render single pictures",
+    ))
 }
 
 fn inspect_job(arguments: InspectArguments) -> Result<Job> {

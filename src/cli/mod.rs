@@ -10,6 +10,8 @@ mod job;
 mod picture;
 mod progress_bar;
 mod render;
+#[cfg(feature = "gpu")]
+mod render_path;
 mod scene_input;
 mod study;
 mod study_effects;

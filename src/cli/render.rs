@@ -36,10 +36,7 @@ pub fn run(job: &RenderJob, terminal: &Terminal, interrupt: &Interrupt) -> Resul
     let clock = Clock::start();
     let loaded = bake::load(&job.scene, &clock, terminal)?;
     files::check_output_file(&job.output)?;
-    let maps = match &job.maps {
-        MapSource::Bake(settings) => bake_maps(&loaded, settings, &clock, terminal, interrupt)?,
-        MapSource::Folder(folder, _) => read_maps(folder, &loaded, terminal)?,
-    };
+    let maps = maps(&job.maps, &loaded, &clock, terminal, interrupt)?;
     let made = picture::make(
         &loaded.scene,
         &maps,
@@ -73,6 +70,23 @@ pub fn run(job: &RenderJob, terminal: &Terminal, interrupt: &Interrupt) -> Resul
         report.seconds
     );
     terminal.print_result(&text, &report)
+}
+
+/// Maps from where they are to come.
+///
+/// # Errors
+/// Those of a bake, or of [`read_maps`].
+pub fn maps(
+    source: &MapSource,
+    loaded: &LoadedScene,
+    clock: &Clock,
+    terminal: &Terminal,
+    interrupt: &Interrupt,
+) -> Result<Vec<IlluminationMap>> {
+    match source {
+        MapSource::Bake(settings) => bake_maps(loaded, settings, clock, terminal, interrupt),
+        MapSource::Folder(folder, _) => read_maps(folder, loaded, terminal),
+    }
 }
 
 /// Maps of a bake that ran to its end: half-lit pictures are not made.

@@ -3,6 +3,7 @@
 
 pub mod builtin;
 pub mod camera;
+pub mod camera_path;
 pub mod edit;
 mod gltf;
 pub mod light;
@@ -16,6 +17,7 @@ use std::sync::Arc;
 use glam::DVec3;
 
 pub use camera::Camera;
+pub use camera_path::CameraPath;
 pub use edit::{Edit, EditTarget};
 pub use light::{Light, LightKind};
 pub use load::{LoadOptions, load};

@@ -1,11 +1,13 @@
-//! Accuracy against cost: references by brute force, agreement of maps, how errors fall with rays and seconds, and what
-//! each effect costs and is worth.
+//! Accuracy against cost: references by brute force, agreement of maps, how errors fall with rays and seconds, what
+//! each effect costs and is worth, and how long frames take.
 
 pub mod agreement;
 pub mod brute_force;
 pub mod convergence;
 pub mod cost;
 pub mod effects;
+#[cfg(feature = "gpu")]
+pub mod frame_times;
 pub mod plot;
 pub mod references;
 mod repeats;
