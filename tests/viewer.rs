@@ -12,6 +12,8 @@ mod difference_view;
 mod effects;
 #[path = "viewer/error_view.rs"]
 mod error_view;
+#[path = "viewer/frame_times.rs"]
+mod frame_times;
 #[path = "viewer/headless.rs"]
 mod headless;
 #[path = "viewer/model.rs"]

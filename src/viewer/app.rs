@@ -16,6 +16,7 @@ use winit::keyboard::{ModifiersState, PhysicalKey};
 use winit::window::{CursorGrabMode, WindowId};
 
 use super::event_log::Event;
+use super::frame_times::{FrameTimes, sum_ms};
 use super::graphics::{Graphics, RETRY_AFTER, Shown};
 use super::input::{self, Shortcut};
 use super::interface::Painting;
@@ -93,6 +94,7 @@ pub struct App {
     rested_at: u64,
     /// The eye's chains in the picture that is shown.
     chains: Option<EffectReport>,
+    frame_times: FrameTimes,
     /// Frames that may still come only to tell what the last picture took.
     reports_due: u32,
     /// Told over the picture until the next key press.
@@ -133,6 +135,7 @@ impl App {
             frames: 0,
             rested_at: 0,
             chains: None,
+            frame_times: FrameTimes::default(),
             reports_due: 0,
             notice: None,
             modifiers: ModifiersState::empty(),
@@ -304,6 +307,9 @@ impl App {
         let Some(graphics) = &mut self.graphics else {
             return;
         };
+        if let Some(ms) = graphics.take_times() {
+            self.frame_times.push(ms);
+        }
         let counts = graphics.counts();
         self.chains = Some(eye_report::chains(self.model.scene(), &view, switch, &counts));
         let is_complete = !graphics.awaits_times();
@@ -325,6 +331,7 @@ impl App {
             graphics,
             picture_rect,
             chains,
+            frame_times,
             notice,
             ..
         } = self;
@@ -335,6 +342,7 @@ impl App {
             graphics.gpu().adapter_name(),
         );
         let (window, picture) = (Arc::clone(graphics.window()), graphics.picture_id());
+        let tells_times = graphics.tells_times();
         let speed_m_per_s = model.navigator.speed_m_per_s();
         let edits = model.edits();
         let (scene, loaded) = (Arc::clone(edits.scene()), Arc::clone(edits.loaded()));
@@ -358,6 +366,7 @@ impl App {
             layers: &layers,
             has_errors,
             chains: chains.as_ref(),
+            frame_times: tells_times.then_some(&*frame_times),
             speed_m_per_s,
             adapter: &adapter,
         };
@@ -398,6 +407,10 @@ impl App {
             self.model.panel.display.exposure_stops = view.exposure_stops;
             self.measured = Some((view.exposure_stops, self.model.layers().len()));
             self.model.log.write(&Event::Exposure(view.exposure_stops));
+        }
+        // Drawing would take them in without a word.
+        if let Some(ms) = graphics.take_times() {
+            self.frame_times.push(ms);
         }
         if graphics.draw_picture(&view)? {
             self.pictures += 1;
@@ -457,6 +470,7 @@ impl App {
                 pictures,
                 frames,
                 position,
+                device_ms: self.frame_times.newest().copied().map(sum_ms),
             });
         }
     }

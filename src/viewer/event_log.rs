@@ -72,6 +72,8 @@ pub enum Event<'a> {
         frames: u64,
         /// Position of the camera [m].
         position: [f64; 3],
+        /// What the last timed picture took on the graphics device [ms]; `None` where it cannot tell.
+        device_ms: Option<f64>,
     },
     /// The graphics device was lost.
     DeviceLost(&'a str),
@@ -117,9 +119,14 @@ impl Event<'_> {
                 pictures,
                 frames,
                 position,
-            } => {
-                json!({"event": "rest", "pictures": pictures, "frames": frames, "position_m": position})
-            }
+                device_ms,
+            } => json!({
+                "event": "rest",
+                "pictures": pictures,
+                "frames": frames,
+                "position_m": position,
+                "device_ms": device_ms,
+            }),
             Self::DeviceLost(reason) => json!({"event": "device_lost", "reason": reason}),
             Self::DeviceRecovered => json!({"event": "device_recovered"}),
             Self::Closing => json!({"event": "closing"}),

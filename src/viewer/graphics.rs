@@ -13,7 +13,7 @@ use super::picture::Picture;
 use super::surface::{Acquired, Screen};
 use crate::effect::EffectSwitch;
 use crate::error::{Error, Result};
-use crate::eye_pass::renderer::{EyeCounts, MapStyle, Renderer, Uploaded};
+use crate::eye_pass::renderer::{EyeCounts, GpuMs, MapStyle, Renderer, Uploaded};
 use crate::eye_pass::{self, View, tone_mapping};
 use crate::gpu::Gpu;
 use crate::illumination::IlluminationMap;
@@ -160,10 +160,23 @@ impl Graphics {
         self.renderer.set_chains(&self.gpu, switch)
     }
 
-    /// What the picture takes, with what the device has told by now of how long it took.
-    pub fn counts(&mut self) -> EyeCounts {
-        self.renderer.collect_times(&self.gpu);
+    /// What the picture takes.
+    pub fn counts(&self) -> EyeCounts {
         self.renderer.counts()
+    }
+
+    /// Whether the device can tell how long pictures take.
+    pub fn tells_times(&self) -> bool {
+        self.gpu
+            .device
+            .features()
+            .contains(wgpu::Features::TIMESTAMP_QUERY)
+    }
+
+    /// How long the last picture took of which the device has told since this was asked.
+    pub fn take_times(&mut self) -> Option<GpuMs> {
+        let is_new = self.renderer.collect_times(&self.gpu);
+        self.counts().gpu_ms.filter(|_| is_new)
     }
 
     /// Whether the device has still to tell how long a picture took.

@@ -7,6 +7,7 @@ pub mod edits;
 pub mod error_view;
 pub mod event_log;
 mod eye_report;
+pub mod frame_times;
 mod graphics;
 mod input;
 mod interface;

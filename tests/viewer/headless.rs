@@ -8,6 +8,7 @@ use nephroid::plan::EffectPlan;
 use nephroid::scene::Scene;
 use nephroid::session::{BakeCounts, BakeResult, EffectReport, StopReason, Timings};
 use nephroid::settings::{BakeSettings, LayerKind};
+use nephroid::viewer::frame_times::FrameTimes;
 use nephroid::viewer::panel::{Facts, Panel, WIDTH, Wishes};
 use nephroid::viewer::worker::{BakeRequest, BakeState, BakedLevel, Worth};
 
@@ -24,6 +25,7 @@ pub struct Headless {
     pub has_errors: bool,
     pub worth: Option<Worth>,
     pub chains: Option<EffectReport>,
+    pub frame_times: Option<FrameTimes>,
     /// What was pressed since the start.
     pub wishes: Wishes,
     size: egui::Vec2,
@@ -90,6 +92,7 @@ impl Headless {
             has_errors: false,
             worth: None,
             chains: None,
+            frame_times: None,
             wishes: Wishes::default(),
             size: vec2(size.0, size.1),
             time_s: 0.0,
@@ -122,6 +125,7 @@ impl Headless {
             has_errors,
             worth,
             chains,
+            frame_times,
             wishes,
             ..
         } = self;
@@ -136,6 +140,7 @@ impl Headless {
             has_errors: *has_errors,
             worth: worth.as_ref(),
             chains: chains.as_ref(),
+            frame_times: frame_times.as_ref(),
             speed_m_per_s: 1.0,
             adapter: "no adapter",
         };

@@ -11,6 +11,7 @@ use nephroid::effect::{Effect, EffectSwitch};
 use nephroid::export::FloatImage;
 use nephroid::eye_pass::tone_mapping::display_rgba8;
 use nephroid::eye_pass::{Picture, ToneMap};
+use nephroid::gpu::Gpu;
 use nephroid::plan::EffectLine;
 use nephroid::scene::builtin;
 use nephroid::settings::{BakeSettings, LayerKind};
@@ -176,7 +177,16 @@ fn a_window_at_rest_takes_no_time_and_survives_every_size() {
     };
     let mut viewer = Viewer::open(&screen, &RING);
     viewer.wait_for("done", |_| true);
-    viewer.wait_for("rest", |_| true);
+    let rest = viewer.wait_for("rest", |_| true);
+    // What the picture took has come back by then, from a device that can tell.
+    let gpu = Gpu::headless().expect("the window has an adapter too");
+    let tells = gpu.device.features().contains(wgpu::Features::TIMESTAMP_QUERY);
+    let device_ms = rest["device_ms"].as_f64();
+    assert!(
+        device_ms.is_some_and(|ms| ms > 0.0 && ms < 1e5) == tells,
+        "{rest}"
+    );
+    drop(gpu);
     std::thread::sleep(Duration::from_millis(500));
     let before = viewer.cpu_s();
     std::thread::sleep(Duration::from_secs(2));

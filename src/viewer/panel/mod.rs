@@ -5,6 +5,7 @@ mod bake;
 pub mod control;
 mod display;
 mod effects;
+pub mod frame_graph;
 mod help;
 mod light_pass;
 mod scene;
@@ -14,6 +15,7 @@ use std::sync::Arc;
 
 use egui::{Align, CollapsingHeader, Frame, Label, Layout, Margin, RichText, ScrollArea, Ui};
 
+use super::frame_times::FrameTimes;
 use super::worker::{BakeState, BakedLevel, Worth};
 use crate::effect::Effect;
 use crate::error::Warning;
@@ -113,6 +115,8 @@ pub struct Facts<'a> {
     pub worth: Option<&'a Worth>,
     /// The eye's chains in the picture that is shown.
     pub chains: Option<&'a EffectReport>,
+    /// How long the last pictures took; `None` where the device cannot tell.
+    pub frame_times: Option<&'a FrameTimes>,
     /// Flying speed [m/s].
     pub speed_m_per_s: f64,
     /// What draws the picture.
@@ -219,6 +223,9 @@ impl Panel {
         section(ui, "Energy", false, |ui| bake::energy(ui, facts.last));
         section(ui, "Effects", false, |ui| {
             effects::show(ui, &mut self.settings.effects, facts, wishes)
+        });
+        section(ui, &frame_graph::title(facts.frame_times), false, |ui| {
+            frame_graph::show(ui, facts.frame_times)
         });
         let baked: &[Warning] = facts.last.map_or(&[], |last| &last.result.warnings);
         let warnings: Vec<_> = facts.scene.warnings.iter().chain(baked).collect();
