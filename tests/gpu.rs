@@ -9,6 +9,8 @@ mod support;
 mod against_cpu;
 #[path = "gpu/builtins.rs"]
 mod builtins;
+#[path = "gpu/chain_pictures.rs"]
+mod chain_pictures;
 #[path = "gpu/device.rs"]
 mod device;
 #[path = "gpu/display.rs"]
@@ -17,6 +19,8 @@ mod display;
 mod effect_matrix;
 #[path = "support/effect_scenes.rs"]
 mod effect_scenes;
+#[path = "support/flip.rs"]
+mod flip;
 #[path = "scene/glb.rs"]
 #[allow(dead_code)]
 mod glb;
