@@ -2,15 +2,15 @@
 
 // Smooth dielectric, unpolarised; eta = n_t / n_i. 1 beyond the critical angle.
 fn dielectric_reflectance(cos_incident: f32, eta: f32) -> f32 {
-    let cos_i = clamp(cos_incident, 0.0, 1.0);
-    let sin2_t = (1.0 - cos_i * cos_i) / (eta * eta);
-    if sin2_t >= 1.0 {
-        return 1.0;
-    }
     if eta == 1.0 {
         return 0.0;
     }
-    let cos_t = sqrt(1.0 - sin2_t);
+    let cos_i = clamp(cos_incident, 0.0, 1.0);
+    let scaled_cos2 = scaled_cos2_transmitted(cos_i, eta);
+    if scaled_cos2 <= 0.0 {
+        return 1.0;
+    }
+    let cos_t = sqrt(scaled_cos2) / eta;
     let rs = (cos_i - eta * cos_t) / (cos_i + eta * cos_t);
     let rp = (eta * cos_i - cos_t) / (eta * cos_i + cos_t);
     return 0.5 * (rs * rs + rp * rp);

@@ -125,7 +125,7 @@ fn by_gpu(
     use nephroid::eye_pass::renderer::render_counted;
 
     let gpu = nephroid::gpu::Gpu::headless()?;
-    let (picture, _) = render_counted(&gpu, scene, maps, view, SAMPLES_PER_SIDE.pow(2), chains)?;
+    let (picture, _) = render_counted(&gpu, scene, maps, view, SAMPLES_PER_SIDE, chains)?;
     Ok((picture, gpu.adapter_name()))
 }
 

@@ -9,6 +9,7 @@ use obvhs::{
     ray::RayHit,
 };
 
+use super::packed::{self, PackedBvh, PackedNode};
 use super::{Ray, triangle::ShearedRay};
 
 /// Boxes are widened by this share of the scene's size, so that no rounding of the single-precision box test can lose
@@ -141,6 +142,29 @@ impl TriangleBvh {
         })
     }
 
+    /// The hierarchy for devices.
+    pub fn packed(&self) -> PackedBvh {
+        let has_triangles = !self.corners.is_empty();
+        let nodes: Vec<PackedNode> = self.bvh.nodes[..if has_triangles { self.bvh.nodes.len() } else { 0 }]
+            .iter()
+            .map(|node| PackedNode {
+                low: node.aabb().min.to_array(),
+                first: node.first_index,
+                high: node.aabb().max.to_array(),
+                count: node.prim_count,
+            })
+            .collect();
+        let local = |corner: DVec3| to_single((corner - self.centre) * self.scale).to_array();
+        PackedBvh {
+            corners: self.corners.iter().map(|corners| corners.map(local)).collect(),
+            triangles: self.bvh.primitive_indices.clone(),
+            centre: self.centre,
+            scale: self.scale,
+            depth: packed::depth(&nodes),
+            nodes,
+        }
+    }
+
     /// Number of triangles.
     pub fn triangle_count(&self) -> usize {
         self.corners.len()
@@ -211,6 +235,6 @@ impl<'a> Node<'a> {
     }
 }
 
-fn to_single(v: DVec3) -> Vec3A {
+pub(super) fn to_single(v: DVec3) -> Vec3A {
     Vec3A::new(v.x as f32, v.y as f32, v.z as f32)
 }

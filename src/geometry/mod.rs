@@ -4,9 +4,11 @@ pub mod bvh;
 pub mod cube_face;
 pub mod enclosure;
 pub mod frustum;
+pub mod packed;
 pub mod ray;
 pub mod triangle;
 
 pub use bvh::{TriangleBvh, TriangleHit};
 pub use frustum::Frustum;
+pub use packed::{PackedBvh, PackedNode};
 pub use ray::Ray;

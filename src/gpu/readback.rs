@@ -1,4 +1,4 @@
-//! From a texture back to the processor.
+//! From the device back to the processor.
 
 use super::{Gpu, faults};
 use crate::error::Result;
@@ -36,15 +36,38 @@ pub fn read_texture(gpu: &Gpu, texture: &wgpu::Texture) -> Result<Vec<u8>> {
         texture.size(),
     );
     gpu.queue.submit([encoder.finish()]);
-    // The outcome of the mapping shows in whether the range can be had below.
-    buffer.map_async(wgpu::MapMode::Read, .., |_| ());
-    gpu.wait()?;
-    let padded = buffer
-        .get_mapped_range(..)
-        .map_err(|error| faults::device_error(&error.to_string()))?;
+    let padded = mapped(gpu, &buffer)?;
     Ok(padded
         .chunks_exact(stride as usize)
         .flat_map(|row| &row[..row_bytes as usize])
         .copied()
         .collect())
+}
+
+/// The bytes of a buffer (usage `COPY_SRC`).
+///
+/// # Errors
+/// The device was lost or refused the copy.
+pub fn read_buffer(gpu: &Gpu, source: &wgpu::Buffer) -> Result<Vec<u8>> {
+    let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some("read-back"),
+        size: source.size(),
+        usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
+        mapped_at_creation: false,
+    });
+    let mut encoder = gpu.device.create_command_encoder(&Default::default());
+    encoder.copy_buffer_to_buffer(source, 0, &buffer, 0, source.size());
+    gpu.queue.submit([encoder.finish()]);
+    mapped(gpu, &buffer)
+}
+
+/// Waits for a buffer (usage `MAP_READ`) and gives its bytes.
+fn mapped(gpu: &Gpu, buffer: &wgpu::Buffer) -> Result<Vec<u8>> {
+    // The outcome of the mapping shows in whether the range can be had below.
+    buffer.map_async(wgpu::MapMode::Read, .., |_| ());
+    gpu.wait()?;
+    let range = buffer
+        .get_mapped_range(..)
+        .map_err(|error| faults::device_error(&error.to_string()))?;
+    Ok(range.to_vec())
 }

@@ -57,6 +57,16 @@ impl Islands {
         self.of_triangle[triangle]
     }
 
+    /// The island that has a texel for itself, or why there is none: `Err(true)` where several share it, `Err(false)`
+    /// where none covers it.
+    pub fn owner(&self, texel: usize) -> Result<u32, bool> {
+        match self.of_texel[texel] {
+            SHARED => Err(true),
+            NONE => Err(false),
+            island => Ok(island),
+        }
+    }
+
     /// Whether an island reaches a texel.
     pub fn covers(&self, column: usize, row: usize, island: u32) -> bool {
         let owner = self.of_texel[row * self.width + column];

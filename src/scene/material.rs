@@ -17,7 +17,7 @@ pub struct Volume {
 }
 
 /// How transport treats a surface.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum SurfaceKind {
     /// Lambert: takes the full flux into its illumination map.
     Diffuse,

@@ -21,6 +21,11 @@ impl MediumStack {
         self.top().map_or(1.0, |object| scene.material_of(object).ior)
     }
 
+    /// The bodies, outermost first.
+    pub fn objects(&self) -> &[u32] {
+        &self.objects[..usize::from(self.depth)]
+    }
+
     /// The innermost object.
     pub fn top(&self) -> Option<usize> {
         self.depth

@@ -13,7 +13,7 @@ pub fn chains(scene: &Scene, view: &View, switch: EffectSwitch, counts: &EyeCoun
     EffectReport {
         line: plan::chains(scene, Some((&view.camera, aspect)), switch),
         counts: EffectCounts {
-            bytes: counts.surroundings_bytes,
+            bytes: counts.chain_bytes,
             pipelines: Some(counts.specular_pipelines),
             gpu_ms: counts.gpu_ms.map(|times| times.specular),
             ..EffectCounts::default()

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use nephroid::eye_pass::renderer::render_offscreen;
+use nephroid::eye_pass::renderer::{EyeQuality, Renderer};
 use nephroid::eye_pass::tone_mapping::{auto_exposure_stops, display_rgba8};
 use nephroid::eye_pass::{Picture, ToneMap, View, reference};
 use nephroid::optics::LinearSrgb;
@@ -82,7 +82,14 @@ fn compare(name: &str) {
         &Default::default(),
     );
     let on_cpu = on_cpu.expect("nobody cancels it");
-    let on_gpu = render_offscreen(&gpu, &scene, &maps, &view, 1).expect("it renders");
+    let mut renderer =
+        Renderer::new(&gpu, &scene, wgpu::TextureFormat::Rgba8Unorm, 1).expect("it is uploaded");
+    renderer.set_quality(EyeQuality {
+        minifies: false,
+        ..EyeQuality::STILL
+    });
+    renderer.set_maps(&gpu, &scene, &maps).expect("the maps fit");
+    let on_gpu = renderer.radiance(&gpu, &view).expect("it renders");
     assert_eq!(gpu.take_error(), None);
     view.exposure_stops = auto_exposure_stops(&on_cpu);
 

@@ -60,7 +60,7 @@ fn device_and_processor_show_the_same_on_every_kind_of_target() {
                 tone_map,
                 ..from_above(SIZE)
             };
-            let picture = nephroid::eye_pass::renderer::render_offscreen(&gpu, &scene, &maps, &view, 1)
+            let picture = nephroid::eye_pass::renderer::render_offscreen(&gpu, &scene, &maps, &view)
                 .expect("it renders");
             let expected = display_rgba8(&picture, exposure_stops, tone_map);
             for format in [

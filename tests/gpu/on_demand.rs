@@ -1,4 +1,4 @@
-//! Pipelines and surroundings exist only once a view has called for them.
+//! Pipelines, and what chains are traced through, exist only once a view has called for them.
 
 use std::sync::Arc;
 
@@ -92,28 +92,26 @@ fn nothing_is_made_for_specular_surfaces_before_one_is_in_view() {
     renderer.radiance(&gpu, &to_matte()).expect("it renders");
     let before = renderer.counts();
     assert_eq!(
-        (
-            before.pipelines,
-            before.specular_pipelines,
-            before.surroundings_bytes
-        ),
+        (before.pipelines, before.specular_pipelines, before.chain_bytes),
         (1, 0, 0)
     );
     assert_eq!((before.drawn_objects, before.drawn_specular), (2, 0));
-    assert_eq!(before.map_bytes, 4 * 8);
+    assert_eq!(before.map_bytes, 65 * 65 * 8, "a tile");
 
     renderer.radiance(&gpu, &to_specular()).expect("it renders");
     let turned = renderer.counts();
-    // Mirror, polish; the glass from both sides; the tinted one in two steps from both sides.
-    assert_eq!((turned.pipelines, turned.specular_pipelines), (9, 8));
-    assert!(turned.surroundings_bytes >= 256 * 256 * 8);
+    // Depth, chains, and the picture of them: all kinds of surfaces share these.
+    assert_eq!((turned.pipelines, turned.specular_pipelines), (4, 3));
+    let triangles = scene.triangle_count() as u64;
+    assert!(turned.chain_bytes >= 48 * triangles);
+    assert_eq!(turned.traced_pixels, 48 * 32);
     assert_eq!((turned.drawn_objects, turned.drawn_specular), (5, 4));
 
     renderer.radiance(&gpu, &to_matte()).expect("it renders");
     let back = renderer.counts();
     assert_eq!(
         (back.pipelines, back.specular_pipelines),
-        (9, 8),
+        (4, 3),
         "what was made is kept"
     );
     assert_eq!((back.drawn_objects, back.drawn_specular), (2, 0));
@@ -130,7 +128,7 @@ fn objects_of_one_kind_share_their_pipelines() {
     }
     let mut renderer = renderer(&gpu, &scene, &maps);
     renderer.radiance(&gpu, &to_specular()).expect("it renders");
-    assert_eq!(renderer.counts().specular_pipelines, 8);
+    assert_eq!(renderer.counts().specular_pipelines, 3);
 }
 
 #[test]
@@ -149,17 +147,13 @@ fn forced_on_all_is_made_at_once_and_the_picture_is_the_same() {
     let counts = auto.counts();
     assert_eq!(at_once.pipelines, counts.pipelines);
     assert_eq!(at_once.specular_pipelines, counts.specular_pipelines);
-    assert_eq!(at_once.surroundings_bytes, counts.surroundings_bytes);
+    assert_eq!(at_once.chain_bytes, counts.chain_bytes);
 }
 
-/// Pipelines, those of specular surfaces, and bytes of the surroundings.
+/// Pipelines, those of specular surfaces, and bytes that chains are traced through.
 fn made(renderer: &Renderer) -> (u64, u64, u64) {
     let counts = renderer.counts();
-    (
-        counts.pipelines,
-        counts.specular_pipelines,
-        counts.surroundings_bytes,
-    )
+    (counts.pipelines, counts.specular_pipelines, counts.chain_bytes)
 }
 
 #[test]
@@ -182,13 +176,13 @@ fn switched_off_everything_is_given_up_and_what_is_left_is_the_surfaces_own_ligh
         .set_chains(&gpu, EffectSwitch::Off)
         .expect("it is dropped");
     let dropped = renderer.counts();
-    assert_eq!((dropped.specular_pipelines, dropped.surroundings_bytes), (0, 0));
+    assert_eq!((dropped.specular_pipelines, dropped.chain_bytes), (0, 0));
     let off = renderer.radiance(&gpu, &view).expect("it renders");
     let counts = renderer.counts();
     assert_eq!(
         (
             counts.specular_pipelines,
-            counts.surroundings_bytes,
+            counts.chain_bytes,
             counts.drawn_specular
         ),
         (0, 0, 0)
@@ -277,14 +271,14 @@ fn new_maps_reach_what_mirrors_show_after_they_were_out_of_view() {
 }
 
 #[test]
-fn pipelines_for_surroundings_that_are_gone_are_given_up() {
+fn maps_that_come_and_go_take_no_further_pipelines() {
     let Some(gpu) = gpu() else { return };
     let (scene, maps) = hall();
     let mut renderer = renderer(&gpu, &scene, &[]);
     for maps in [&[][..], &maps, &[], &maps] {
         renderer.set_maps(&gpu, &scene, maps).expect("the maps fit");
         renderer.radiance(&gpu, &to_specular()).expect("it renders");
-        assert_eq!(renderer.counts().specular_pipelines, 8, "{} maps", maps.len());
+        assert_eq!(renderer.counts().specular_pipelines, 3, "{} maps", maps.len());
     }
 }
 

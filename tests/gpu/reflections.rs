@@ -42,7 +42,7 @@ fn a_mirror_above_the_floor_shows_the_floors_light_at_the_right_place() {
         background: LinearSrgb::grey(9.0),
         ..from_above(65)
     };
-    let picture = render_offscreen(&gpu, &scene, &maps, &view, 1).expect("it renders");
+    let picture = render_offscreen(&gpu, &scene, &maps, &view).expect("it renders");
     assert_eq!(gpu.take_error(), None);
     for (index, pixel) in picture.radiance.iter().enumerate() {
         let at = |index: usize| (index as f64 + 0.5) / 65.0 * 2.0 - 1.0;
@@ -78,7 +78,7 @@ fn a_mirror_that_sees_no_receiver_shows_the_background() {
         background: LinearSrgb::new(0.5, 0.25, 2.0),
         ..from_above(9)
     };
-    let picture = render_offscreen(&gpu, &scene, &maps, &view, 4).expect("it renders");
+    let picture = render_offscreen(&gpu, &scene, &maps, &view).expect("it renders");
     for pixel in picture.radiance {
         for (found, expected) in pixel.iter().zip(view.background.to_array()) {
             assert!(

@@ -102,12 +102,14 @@ fn every_shader_file_is_part_of_a_program() {
     assert_eq!(files, used);
 }
 
-/// Names of the structs in a module's uniform buffers, those within arrays and other structs included.
-fn uniform_structs(module: &naga::Module) -> BTreeSet<String> {
-    let uniforms = module
-        .global_variables
-        .iter()
-        .filter(|(_, variable)| variable.space == naga::AddressSpace::Uniform);
+/// Names of the structs in a module's buffers, those within arrays and other structs included.
+fn shared_in(module: &naga::Module) -> BTreeSet<String> {
+    let uniforms = module.global_variables.iter().filter(|(_, variable)| {
+        matches!(
+            variable.space,
+            naga::AddressSpace::Uniform | naga::AddressSpace::Storage { .. }
+        )
+    });
     let mut pending: Vec<_> = uniforms.map(|(_, variable)| variable.ty).collect();
     let mut names = BTreeSet::new();
     while let Some(handle) = pending.pop() {
@@ -133,8 +135,7 @@ fn structs_lie_the_same_in_rust_and_in_the_shaders() {
                 continue;
             };
             let name = ty.name.clone().unwrap_or_default();
-            let is_uniform = uniform_structs(&module).contains(&name);
-            if is_uniform {
+            if shared_in(&module).contains(&name) {
                 let fields: Vec<_> = members
                     .iter()
                     .map(|m| (m.name.clone().unwrap_or_default(), m.offset as usize))
@@ -149,7 +150,7 @@ fn structs_lie_the_same_in_rust_and_in_the_shaders() {
     assert_eq!(
         names,
         found.keys().map(String::as_str).collect(),
-        "every uniform struct is declared on both sides"
+        "every struct of a buffer is declared on both sides"
     );
     for layout in shared {
         let (program, size, fields) = &found[layout.name];

@@ -1,9 +1,10 @@
 //! What is uploaded when maps or the scene change, and that the picture is that of a fresh upload.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use glam::{DQuat, DVec3};
-use nephroid::eye_pass::renderer::{MapStyle, Renderer, Uploaded, render_offscreen};
+use nephroid::eye_pass::renderer::{EyeQuality, MapStyle, Renderer, Uploaded, render_offscreen};
 use nephroid::eye_pass::{Picture, View};
 use nephroid::gpu::Gpu;
 use nephroid::illumination::IlluminationMap;
@@ -28,8 +29,37 @@ fn map(irradiance: Vec<[f32; 3]>) -> IlluminationMap {
     floor_map(0, SIZE[0], SIZE[1], irradiance)
 }
 
+/// Tiles on all levels of a map, of those that are asked for by their level and the texels that they store, and their
+/// bytes: 64 texels each way and one more, which may be a repeated one; levels are halved down to 16 texels.
+fn tiles_and_bytes(size: [usize; 2], counts: impl Fn(usize, &[Range<usize>; 2]) -> bool) -> (u64, u64) {
+    let (mut tiles, mut bytes) = (0, 0);
+    let (mut size, mut level) = (size, 0);
+    loop {
+        let starts = |side: usize| {
+            (0..side)
+                .step_by(64)
+                .map(move |start| start..side.min(start + 64) + 1)
+        };
+        for rows in starts(size[1]) {
+            for columns in starts(size[0]) {
+                let texels = columns.len() * rows.len();
+                if counts(level, &[columns, rows.clone()]) {
+                    tiles += 1;
+                    bytes += 8 * texels as u64;
+                }
+            }
+        }
+        if size.iter().all(|side| *side <= 16) {
+            return (tiles, bytes);
+        }
+        size = size.map(|side| side.div_ceil(2));
+        level += 1;
+    }
+}
+
 fn renderer(gpu: &Gpu, scene: &Scene, maps: &[IlluminationMap]) -> (Renderer, Uploaded) {
     let mut renderer = Renderer::new(gpu, scene, FORMAT, 1).expect("the scene is uploaded");
+    renderer.set_quality(EyeQuality::STILL);
     let uploaded = renderer.set_maps(gpu, scene, maps).expect("the maps fit");
     (renderer, uploaded)
 }
@@ -37,7 +67,7 @@ fn renderer(gpu: &Gpu, scene: &Scene, maps: &[IlluminationMap]) -> (Renderer, Up
 #[track_caller]
 fn assert_as_fresh(gpu: &Gpu, renderer: &mut Renderer, scene: &Scene, maps: &[IlluminationMap], view: &View) {
     let shown = renderer.radiance(gpu, view).expect("it renders");
-    let fresh = render_offscreen(gpu, scene, maps, view, 1).expect("it renders");
+    let fresh = render_offscreen(gpu, scene, maps, view).expect("it renders");
     let bits = |picture: &Picture| -> Vec<u32> {
         let channels = picture.radiance.iter().flatten();
         channels.map(|channel| channel.to_bits()).collect()
@@ -55,7 +85,10 @@ fn only_tiles_that_differ_are_uploaded() {
     let scene = floor_scene(diffuse(LinearSrgb::new(0.8, 0.5, 0.2)));
     let mut irradiance = ramp();
     let (mut renderer, first) = renderer(&gpu, &scene, &[map(irradiance.clone())]);
-    assert_eq!((first.tiles, first.tile_bytes), (6, 8 * 15_000));
+    assert_eq!(
+        (first.tiles, first.tile_bytes),
+        tiles_and_bytes(SIZE, |_, _| true)
+    );
 
     let again = renderer.set_maps(&gpu, &scene, &[map(irradiance.clone())]);
     assert_eq!(
@@ -65,18 +98,23 @@ fn only_tiles_that_differ_are_uploaded() {
     );
 
     // Each lies in the corner of a tile, next to others.
-    for (column, row, bytes) in [
-        (64, 63, 8 * 64 * 64),
-        (63, 64, 8 * 64 * 36),
-        (149, 99, 8 * 22 * 36),
-    ] {
-        irradiance[row * SIZE[0] + column][1] += 100.0;
+    for (column, row) in [(64, 63), (63, 64), (149, 99), (64, 64), (70, 70)] {
+        // Enough to show on the coarsest level.
+        irradiance[row * SIZE[0] + column][1] += 5000.0;
         let maps = [map(irradiance.clone())];
         let uploaded = renderer.set_maps(&gpu, &scene, &maps).expect("the maps fit");
+        let holds = |level: usize, [columns, rows]: &[Range<usize>; 2]| {
+            columns.contains(&(column >> level)) && rows.contains(&(row >> level))
+        };
+        let expected = tiles_and_bytes(SIZE, holds);
         assert_eq!(
             (uploaded.tiles, uploaded.tile_bytes),
-            (1, bytes),
+            expected,
             "texel {column}, {row}"
+        );
+        assert!(
+            expected.0 <= 4 + 4,
+            "a tile and its neighbours, and one of each coarser level"
         );
         assert_as_fresh(&gpu, &mut renderer, &scene, &maps, &from_above(256));
     }
@@ -91,7 +129,7 @@ fn a_peak_that_outgrows_or_leaves_its_scale_is_uploaded_anew() {
     irradiance[7] = [1e6; 3];
     let maps = [map(irradiance.clone())];
     let uploaded = renderer.set_maps(&gpu, &scene, &maps).expect("the maps fit");
-    assert_eq!(uploaded.tiles, 6);
+    assert_eq!(uploaded.tiles, tiles_and_bytes(SIZE, |_, _| true).0);
     assert_as_fresh(&gpu, &mut renderer, &scene, &maps, &from_above(256));
 
     for factor in [1e-3, 1e-9, 0.0] {
@@ -99,7 +137,7 @@ fn a_peak_that_outgrows_or_leaves_its_scale_is_uploaded_anew() {
         let maps = [map(dim.collect())];
         renderer.set_maps(&gpu, &scene, &maps).expect("the maps fit");
         let shown = renderer.radiance(&gpu, &from_above(64)).expect("it renders");
-        let fresh = render_offscreen(&gpu, &scene, &maps, &from_above(64), 1).expect("it renders");
+        let fresh = render_offscreen(&gpu, &scene, &maps, &from_above(64)).expect("it renders");
         assert_eq!(shown.radiance, fresh.radiance, "factor {factor}");
     }
 }
@@ -111,7 +149,10 @@ fn another_size_and_no_map_take_new_textures() {
     let (mut renderer, _) = renderer(&gpu, &scene, &[map(ramp())]);
     let maps = [floor_map(0, 64, 65, vec![[2.0; 3]; 64 * 65])];
     let uploaded = renderer.set_maps(&gpu, &scene, &maps).expect("the maps fit");
-    assert_eq!((uploaded.tiles, uploaded.tile_bytes), (2, 8 * 64 * 65));
+    assert_eq!(
+        (uploaded.tiles, uploaded.tile_bytes),
+        tiles_and_bytes([64, 65], |_, _| true)
+    );
     assert_as_fresh(&gpu, &mut renderer, &scene, &maps, &from_above(32));
     let uploaded = renderer.set_maps(&gpu, &scene, &[]).expect("no map fits");
     assert_eq!(uploaded.tiles, 0);
@@ -146,7 +187,8 @@ fn an_edited_scene_shows_as_if_it_were_new_and_uploads_what_differs() {
         translation: DVec3::new(-0.1, 0.05, 0.02),
     };
     let corners = |object: usize| 32 * scene.objects[object].mesh.positions.len() as u64;
-    let uniform = 48;
+    // All objects are written at once.
+    let uniform = 64 * scene.objects.len() as u64;
     let ball_corners = corners(1);
     let edits = [
         (
@@ -236,7 +278,7 @@ fn maps_as_they_are_show_their_values_whatever_the_surface() {
     assert_eq!(at(&shown, 51, 51), [0.0; 3], "a box without a map, that glows");
     renderer.set_map_style(MapStyle::Lit);
     let lit = renderer.radiance(&gpu, &from_above).expect("it renders");
-    let fresh = render_offscreen(&gpu, &scene, &maps, &from_above, 1).expect("it renders");
+    let fresh = render_offscreen(&gpu, &scene, &maps, &from_above).expect("it renders");
     assert_eq!(lit.radiance, fresh.radiance);
     assert_ne!(at(&lit, 26, 26), value);
 }

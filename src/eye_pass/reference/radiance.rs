@@ -15,6 +15,8 @@ pub struct ChainLimits {
     pub max_depth: u32,
     /// Branches that carry less than this share of their pixel are black.
     pub branch_threshold: f64,
+    /// Up to this many surfaces on a chain both ways on are followed, and after them the one that carries more.
+    pub branching_depth: u32,
     /// Off: mirrors show what they emit, polished surfaces their diffuse part, and clear bodies are left out. Auto and
     /// on are the same here: nothing is prepared for chains.
     pub switch: EffectSwitch,
@@ -25,6 +27,7 @@ impl Default for ChainLimits {
         Self {
             max_depth: 32,
             branch_threshold: 1e-4,
+            branching_depth: u32::MAX,
             switch: EffectSwitch::Auto,
         }
     }
@@ -128,14 +131,18 @@ impl<'a> LitScene<'a> {
             if !CHAINS {
                 break;
             }
-            for branch in [interaction.reflection, interaction.transmission]
-                .into_iter()
-                .flatten()
-            {
-                if let Some(next) = self.followed(&gaze, &branch) {
-                    rays.chain_rays += 1;
-                    waiting.push(next);
-                }
+            let [back, through] = [interaction.reflection, interaction.transmission]
+                .map(|branch| branch.and_then(|branch| self.followed(&gaze, &branch)));
+            let is_through_stronger = match (&back, &through) {
+                (Some(back), Some(through)) => through.weight.max_channel() >= back.weight.max_channel(),
+                _ => through.is_some(),
+            };
+            let follows_both = gaze.depth < self.limits.branching_depth;
+            let back = back.filter(|_| follows_both || !is_through_stronger);
+            let through = through.filter(|_| follows_both || is_through_stronger);
+            for next in [back, through].into_iter().flatten() {
+                rays.chain_rays += 1;
+                waiting.push(next);
             }
         }
         seen

@@ -23,11 +23,14 @@ pub(super) fn texture(filterable: bool, view_dimension: wgpu::TextureViewDimensi
     (wgpu::ShaderStages::FRAGMENT, texture)
 }
 
-pub(super) fn filtering_sampler() -> Binding {
-    (
-        wgpu::ShaderStages::FRAGMENT,
-        wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering),
-    )
+/// A buffer that fragments read.
+pub(super) fn storage() -> Binding {
+    let buffer = wgpu::BindingType::Buffer {
+        ty: wgpu::BufferBindingType::Storage { read_only: true },
+        has_dynamic_offset: false,
+        min_binding_size: None,
+    };
+    (wgpu::ShaderStages::FRAGMENT, buffer)
 }
 
 /// A layout whose bindings are numbered in order.

@@ -7,7 +7,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::DVec2;
 use wgpu::util::DeviceExt;
 
-use super::tiles::Uploaded;
+use super::paging::Uploaded;
 use crate::gpu::Gpu;
 use crate::illumination::Chart;
 use crate::scene::{Mesh, Object, Scene, TextureRef};
@@ -59,8 +59,8 @@ const fn attribute(shader_location: u32, offset: usize, format: wgpu::VertexForm
     }
 }
 
-/// Largest buffer [bytes]: one allocation that every driver serves.
-const PAGE_BYTES: u64 = 128 << 20;
+/// Largest buffer [bytes]: one allocation that drivers serve. Chains need all of a scene in one page.
+const PAGE_BYTES: u64 = 1 << 30;
 
 /// Part of an object within one page.
 #[derive(Clone, Debug)]
@@ -72,7 +72,7 @@ pub(super) struct Segment {
     /// First corner within the page.
     first_corner: usize,
     /// Triangles of the object's mesh.
-    triangles: Range<usize>,
+    pub(super) triangles: Range<usize>,
     /// Whether its corners are the mesh's vertices; else three for each triangle.
     shares_corners: bool,
 }
@@ -100,7 +100,9 @@ pub(super) struct Geometry {
 impl Geometry {
     /// Uploads a scene's triangles; map coordinates are zero at first.
     pub(super) fn new(gpu: &Gpu, scene: &Scene) -> Self {
-        let limit = gpu.limits().max_buffer_size.min(PAGE_BYTES) as usize;
+        let limits = gpu.limits();
+        let bindable = limits.max_storage_buffer_binding_size.max(1 << 20);
+        let limit = limits.max_buffer_size.min(bindable).min(PAGE_BYTES) as usize;
         let mut packing = Packing {
             gpu,
             // Indices are smaller than corners, and never more of them are allowed.
@@ -292,17 +294,19 @@ impl Packing<'_> {
             corners: filled(
                 "corners",
                 bytemuck::cast_slice(&self.corners),
-                wgpu::BufferUsages::VERTEX | wgpu::BufferUsages::COPY_DST,
+                wgpu::BufferUsages::VERTEX | wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
             ),
             indices: filled(
                 "indices",
                 bytemuck::cast_slice(&self.indices),
-                wgpu::BufferUsages::INDEX,
+                wgpu::BufferUsages::INDEX | wgpu::BufferUsages::STORAGE,
             ),
             map_uvs: self.gpu.device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some("map coordinates"),
                 size: (self.corners.len() * size_of::<MapUv>()) as u64,
-                usage: wgpu::BufferUsages::VERTEX | wgpu::BufferUsages::COPY_DST,
+                usage: wgpu::BufferUsages::VERTEX
+                    | wgpu::BufferUsages::STORAGE
+                    | wgpu::BufferUsages::COPY_DST,
                 mapped_at_creation: false,
             }),
         });

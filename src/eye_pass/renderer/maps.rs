@@ -1,25 +1,35 @@
 //! Illumination maps on the device, as half floats with a scale of their own.
 
 use std::borrow::Cow;
+use std::sync::Arc;
 
 use half::f16;
 use half::slice::HalfFloatSliceExt;
 use rayon::iter::{IndexedParallelIterator, ParallelIterator};
 use rayon::slice::{ParallelSlice, ParallelSliceMut};
 
-use super::tiles::{Texel, TiledImage, Uploaded, kept_scale, scale_for_half_floats};
+use super::minify::Minification;
+use super::paging::{Level, PagedImage, TilePool, Uploaded};
 use crate::gpu::Gpu;
-use crate::illumination::IlluminationMap;
-use crate::optics::LinearSrgb;
+use crate::illumination::{Chart, IlluminationMap};
+use crate::scene::texture::Wrap;
+
+/// A texel: linear red, green and blue, and nothing.
+pub(super) type Texel = [f16; 4];
 
 /// Texels that one thread works on at a time.
 const BLOCK: usize = 4096;
+/// Largest value written: below the end of half floats, 65504, with room to spare.
+const LARGEST_VALUE: f32 = 32768.0;
+/// Least peak that a kept scale leaves [written value]: 21 binary orders of half floats are below it.
+const LEAST_PEAK: f32 = 128.0;
 
 /// A map on the device: E [W/m²] = texel × `irradiance_scale`.
 #[derive(Debug)]
 pub(super) struct DeviceMap {
-    image: TiledImage,
-    pub(super) view: wgpu::TextureView,
+    pub(super) image: PagedImage<Texel>,
+    chart: Arc<Chart>,
+    minification: Minification,
     pub(super) irradiance_scale: f32,
     /// Largest channel of any texel [W/m²].
     pub(super) peak_w_m2: f32,
@@ -40,65 +50,62 @@ impl<'a> ShownMap<'a> {
         };
         Self { map, irradiance }
     }
-
-    /// Texels across and down.
-    fn size(&self) -> [usize; 2] {
-        [self.map.width(), self.map.height()]
-    }
 }
 
 impl DeviceMap {
-    /// Uploads a map, which has to fit the device's textures.
-    pub(super) fn new(gpu: &Gpu, name: &str, map: &ShownMap) -> (Self, Uploaded) {
-        Self::from_texels(gpu, name, map.size(), &map.irradiance)
-    }
-
-    /// One black texel, for surfaces without a map.
-    pub(super) fn black(gpu: &Gpu) -> Self {
-        Self::from_texels(gpu, "black", [1, 1], &[[0.0; 3]]).0
-    }
-
-    /// What it takes on the device [bytes].
-    pub(super) fn bytes(&self) -> u64 {
-        self.image.bytes()
-    }
-
-    /// Texels across and down.
-    pub(super) fn size(&self) -> [usize; 2] {
-        self.image.size()
-    }
-
-    /// Irradiance [W/m²] of a texel, row by row, as the device holds it.
-    pub(super) fn irradiance(&self, texel: usize) -> LinearSrgb {
-        let [r, g, b, _] = self.image.texels()[texel];
-        LinearSrgb::from([r, g, b].map(f64::from)) * f64::from(self.irradiance_scale)
-    }
-
-    /// Whether a map can take this one's place in the same texture.
-    pub(super) fn has_size_of(&self, map: &ShownMap) -> bool {
-        self.image.size() == map.size()
-    }
-
-    /// Replaces the map by one of the same size and uploads the tiles that differ. The scale stays where the new peak
-    /// still fits it; else it changes, and with it all tiles that are not black.
-    pub(super) fn update(&mut self, gpu: &Gpu, map: &ShownMap) -> Uploaded {
-        self.peak_w_m2 = peak(&map.irradiance);
-        self.irradiance_scale = kept_scale(self.irradiance_scale, self.peak_w_m2);
-        self.image
-            .update(gpu, texels(&map.irradiance, self.irradiance_scale))
-    }
-
-    fn from_texels(gpu: &Gpu, name: &str, size: [usize; 2], irradiance: &[[f32; 3]]) -> (Self, Uploaded) {
-        let peak_w_m2 = peak(irradiance);
+    /// Uploads a map with its coarser levels, the finest of them aside where they are not to be held.
+    pub(super) fn new(gpu: &Gpu, pool: &mut TilePool, map: &ShownMap, finest: usize) -> (Self, Uploaded) {
+        let minification = Minification::of(&map.map.chart);
+        let peak_w_m2 = peak(&map.irradiance);
         let irradiance_scale = scale_for_half_floats(peak_w_m2);
-        let (image, uploaded) = TiledImage::new(gpu, name, size, texels(irradiance, irradiance_scale));
+        let levels = levels(&minification, &map.irradiance, irradiance_scale);
+        let (image, uploaded) = PagedImage::new(gpu, pool, levels, [Wrap::ClampToEdge; 2], finest);
         let map = Self {
-            view: image.view(wgpu::TextureViewDimension::D2),
             image,
+            chart: Arc::clone(&map.map.chart),
+            minification,
             irradiance_scale,
             peak_w_m2,
         };
         (map, uploaded)
+    }
+
+    /// Whether a map can take this one's place: it lies in the same chart.
+    pub(super) fn can_become(&self, map: &ShownMap) -> bool {
+        let (old, new) = (&self.chart, &map.map.chart);
+        Arc::ptr_eq(old, new)
+            || ([old.width, old.height] == [new.width, new.height]
+                && old.corner_uvs == new.corner_uvs
+                && old.texel_areas_m2 == new.texel_areas_m2)
+    }
+
+    /// Replaces the map by another of the same chart and uploads the tiles that differ. The scale stays where the new
+    /// peak still fits it; else it changes, and with it all tiles that are not black.
+    pub(super) fn update(&mut self, gpu: &Gpu, pool: &mut TilePool, map: &ShownMap) -> Uploaded {
+        self.peak_w_m2 = peak(&map.irradiance);
+        self.irradiance_scale = kept_scale(self.irradiance_scale, self.peak_w_m2);
+        let levels = levels(&self.minification, &map.irradiance, self.irradiance_scale);
+        self.image.update(gpu, pool, levels)
+    }
+}
+
+/// The power of two by which a peak [any unit] is divided to lie in (16384, 32768]; 1 for nothing. Powers of two
+/// change no digit, and half floats keep all of theirs down to 2⁻²⁹ of the peak.
+fn scale_for_half_floats(peak: f32) -> f32 {
+    if peak > 0.0 && peak.is_finite() {
+        (peak / LARGEST_VALUE).log2().ceil().exp2()
+    } else {
+        1.0
+    }
+}
+
+/// The present scale where a peak still fits it, so that what did not change keeps its bits; else the peak's own.
+fn kept_scale(present: f32, peak: f32) -> f32 {
+    let written = peak / present;
+    if (LEAST_PEAK..=LARGEST_VALUE).contains(&written) {
+        present
+    } else {
+        scale_for_half_floats(peak)
     }
 }
 
@@ -115,6 +122,22 @@ fn peak(irradiance: &[[f32; 3]]) -> f32 {
         .reduce(|| 0.0, f32::max)
 }
 
+fn levels(minification: &Minification, irradiance: &[[f32; 3]], scale: f32) -> Vec<Level<Texel>> {
+    let sizes = minification.sizes();
+    let [width, height] = sizes[0].map(|side| side as f32);
+    let coarser = minification.coarser(irradiance);
+    let all = std::iter::once(irradiance).chain(coarser.iter().map(Vec::as_slice));
+    (0..)
+        .zip(sizes)
+        .zip(all)
+        .map(|((level, size), irradiance)| Level {
+            size: *size,
+            extent: [width, height].map(|side| side * (-level as f32).exp2()),
+            texels: texels(irradiance, scale),
+        })
+        .collect()
+}
+
 /// Half floats of a map, many at once: a window waits for them.
 fn texels(irradiance: &[[f32; 3]], scale: f32) -> Vec<Texel> {
     let mut texels = vec![[f16::ZERO; 4]; irradiance.len()];
@@ -122,7 +145,7 @@ fn texels(irradiance: &[[f32; 3]], scale: f32) -> Vec<Texel> {
     blocks.for_each(|(texels, irradiance)| {
         let scaled: Vec<[f32; 4]> = irradiance
             .iter()
-            .map(|[r, g, b]| [*r / scale, *g / scale, *b / scale, 1.0])
+            .map(|[r, g, b]| [*r / scale, *g / scale, *b / scale, 0.0])
             .collect();
         texels
             .as_flattened_mut()

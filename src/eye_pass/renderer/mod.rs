@@ -1,60 +1,71 @@
-//! The eye pass on the device: depth-tested triangles, radiance from the illumination maps, then tone mapping.
+//! The eye pass on the device: triangles with radiance from the illumination maps, chains traced where something
+//! specular is nearest, then tone mapping.
 //!
-//! Diffuse surfaces show L = ρE/π. Specular ones are approximated: they reflect the scene's plane receivers, coarsely
-//! (see `surroundings`), and the view's background, but no other object, and what is clear shows what is straight
-//! behind it, unbent, dimmed by Fresnel's equations, by the body's tint and by the square of its refractive index. The
-//! CPU eye pass follows the true paths.
+//! Diffuse surfaces show L = ρE/π. Where a mirror, polish, glass or water is the nearest surface of a pixel, its chain
+//! is followed through the scene's hierarchy as the CPU eye pass follows it, in single precision. Two things are
+//! approximated: after the first surfaces of a chain only the stronger way on is followed, and images are looked up by
+//! an isotropic footprint. [`EyeQuality`] sets both.
 //!
 //! Only what a view calls for is made: pipelines when an object that needs them first comes into view, and so what
-//! mirrors and glass are shown.
+//! chains are traced through.
 
+mod accumulation;
 mod bindings;
+mod budget;
 mod camera;
+mod chains;
 mod counts;
 mod draws;
 mod geometry;
+mod images;
 mod maps;
+mod minify;
 mod objects;
+mod offscreen;
+mod paging;
+mod passes;
 mod pipelines;
-mod receivers;
+mod probe;
+mod quality;
 mod shaders;
-mod surroundings;
+mod storage;
 mod targets;
 mod textures;
-mod tiles;
 mod timing;
 mod tone_mapping;
 mod uniforms;
 
 pub use counts::{EyeCounts, GpuMs};
+pub use offscreen::{render_counted, render_offscreen, render_sampled};
+pub use paging::Uploaded;
+pub use probe::{ProbedHit, probe};
+pub use quality::EyeQuality;
 pub use shaders::{Specialisation, programs, shared_structs, specialisations, vertex_attributes};
-pub use tiles::Uploaded;
 
-use half::f16;
-use wgpu::util::DeviceExt;
+use std::sync::Arc;
 
-use self::bindings::bind_group;
-use self::draws::{Draw, DrawList, Manner, visible_objects};
+use self::accumulation::Mean;
+use self::chains::ChainScene;
+use self::draws::Manner;
 use self::geometry::Geometry;
 use self::maps::ShownMap;
 use self::objects::Objects;
 use self::pipelines::SurfacePipelines;
-use self::receivers::LitSurface;
-use self::surroundings::DeviceSurroundings;
-use self::targets::Targets;
+use self::quality::Sample;
+use self::targets::{Targets, TracedTargets};
 use self::timing::Timing;
 use self::tone_mapping::ToneMappingPipelines;
-use self::uniforms::{Frame, rgb};
-use super::{Picture, View};
+use super::View;
 use crate::effect::EffectSwitch;
 use crate::error::{Error, Result};
-use crate::gpu::{Gpu, readback};
+use crate::gpu::Gpu;
 use crate::illumination::IlluminationMap;
 use crate::scene::Scene;
 
-/// Largest value of scaled radiance that the picture is scaled to: half floats end at 65504, and a body may still
-/// multiply it by the square of its refractive index.
-const LARGEST_SCALED: f64 = 4096.0;
+/// Most that illumination maps take on the device unless it is told otherwise [bytes].
+const MAP_BUDGET_BYTES: u64 = 1 << 30;
+/// Storage buffers that every fragment reads.
+const LEAST_BUFFERS: u32 = 2;
 
 /// What the values of maps stand for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -70,17 +81,25 @@ pub enum MapStyle {
 #[derive(Debug)]
 pub struct Renderer {
     sample_count: u32,
-    scene: Scene,
+    scene: Arc<Scene>,
     surfaces: SurfacePipelines,
     tone_mapping: ToneMappingPipelines,
     geometry: Geometry,
     objects: Objects,
-    surroundings: Option<DeviceSurroundings>,
-    /// Whether the scene or the maps changed since the surroundings were made.
-    surroundings_are_stale: bool,
+    /// What chains are traced through.
+    chain_scene: Option<ChainScene>,
+    /// Whether triangles changed since it was made.
+    chain_scene_is_stale: bool,
+    /// Why there are no chains though they were called for.
+    refusal: Option<Error>,
     targets: Option<Targets>,
+    traced: Option<TracedTargets>,
+    mean: Option<Mean>,
+    /// What `targets` show, if that is what [`draw`](Self::draw) drew last.
+    drawn_view: Option<View>,
     map_style: MapStyle,
     chains: EffectSwitch,
+    quality: EyeQuality,
     timing: Option<Timing>,
     /// Objects of the last picture, and the specular ones among them.
     drawn: [usize; 2],
@@ -105,19 +124,30 @@ impl Renderer {
                 "use 1 or 4",
             ));
         }
-        let surfaces = SurfacePipelines::new(gpu, sample_count);
+        if gpu.limits().max_storage_buffers_per_shader_stage < LEAST_BUFFERS {
+            return Err(Error::failure(
+                "graphics device",
+                format!("{} lets fragments read no storage buffers", gpu.adapter_name()),
+                "update its driver, or use --backend cpu",
+            ));
+        }
         let renderer = Self {
             sample_count,
-            scene: scene.clone(),
+            scene: Arc::new(scene.clone()),
             tone_mapping: ToneMappingPipelines::new(gpu, colour_format),
             geometry: Geometry::new(gpu, scene),
-            objects: Objects::new(gpu, scene, &surfaces.object_layout),
-            surfaces,
-            surroundings: None,
-            surroundings_are_stale: true,
+            objects: Objects::new(gpu, scene, MAP_BUDGET_BYTES),
+            surfaces: SurfacePipelines::new(gpu, sample_count),
+            chain_scene: None,
+            chain_scene_is_stale: false,
+            refusal: None,
             targets: None,
+            traced: None,
+            mean: None,
+            drawn_view: None,
             map_style: MapStyle::default(),
             chains: EffectSwitch::default(),
+            quality: EyeQuality::default(),
             timing: Timing::new(gpu),
             drawn: [0; 2],
         };
@@ -132,14 +162,16 @@ impl Renderer {
     pub fn set_scene(&mut self, gpu: &Gpu, scene: &Scene) -> Result<Uploaded> {
         let mut uploaded = Uploaded::default();
         if self.objects.list.len() == scene.objects.len() {
-            uploaded += self.geometry.set_scene(gpu, scene);
-            uploaded += self.objects.set_scene(gpu, scene);
+            let triangles = self.geometry.set_scene(gpu, scene);
+            self.chain_scene_is_stale |= triangles != Uploaded::default();
+            uploaded += triangles;
         } else {
             self.geometry = Geometry::new(gpu, scene);
-            self.objects = Objects::new(gpu, scene, &self.surfaces.object_layout);
+            self.chain_scene = None;
         }
-        self.scene = scene.clone();
-        self.surroundings_are_stale = true;
+        uploaded += self.objects.set_scene(gpu, scene);
+        self.scene = Arc::new(scene.clone());
+        self.drawn_view = None;
         gpu.take_error().map_or(Ok(uploaded), Err)
     }
 
@@ -147,21 +179,39 @@ impl Renderer {
     /// differ from what is shown are uploaded.
     ///
     /// # Errors
-    /// A map that does not belong to the scene or is larger than the device's textures: the old maps stay. A device
-    /// that refuses what it is given.
+    /// A map that does not belong to the scene: the old maps stay. A device that refuses what it is given.
     pub fn set_maps(&mut self, gpu: &Gpu, scene: &Scene, maps: &[IlluminationMap]) -> Result<Uploaded> {
         let shown: Vec<ShownMap> = maps.iter().map(ShownMap::of).collect();
         let mut uploaded = self.objects.set_maps(gpu, scene, &shown)?;
         for map in maps {
             uploaded += self.geometry.set_chart(gpu, &map.chart);
         }
-        self.surroundings_are_stale = true;
+        self.drawn_view = None;
         gpu.take_error().map_or(Ok(uploaded), Err)
     }
 
     /// Says what the values of the maps stand for, from the next picture on.
     pub fn set_map_style(&mut self, style: MapStyle) {
         self.map_style = style;
+        self.drawn_view = None;
+    }
+
+    /// Most that illumination maps take on the device [bytes], from the next picture on; 1 GiB before. Maps that do not
+    /// fit are shown more coarsely, those first of which the detail would not be seen.
+    pub fn set_map_budget(&mut self, bytes: u64) {
+        self.objects.images.set_budget(bytes);
+        self.drawn_view = None;
+    }
+
+    /// How well pictures are made from the next one on.
+    pub fn set_quality(&mut self, quality: EyeQuality) {
+        self.quality = quality.clamped();
+        self.drawn_view = None;
+    }
+
+    /// How well pictures are made.
+    pub fn quality(&self) -> EyeQuality {
+        self.quality
     }
 
     /// Switches what is seen in mirrors and through glass, from the next picture on. Auto makes what it takes when a
@@ -172,26 +222,42 @@ impl Renderer {
     /// A device that refuses what it is given.
     pub fn set_chains(&mut self, gpu: &Gpu, switch: EffectSwitch) -> Result<()> {
         self.chains = switch;
+        self.drawn_view = None;
         match switch {
             EffectSwitch::Auto => {}
             EffectSwitch::On => self.make_everything(gpu),
             EffectSwitch::Off => {
                 self.surfaces.drop_specular();
-                self.surroundings = None;
+                self.chain_scene = None;
+                self.traced = None;
             }
         }
         gpu.take_error().map_or(Ok(()), Err)
     }
 
+    /// Why mirrors and glass are drawn without what is seen in them though that was called for: the scene is too large
+    /// for the device.
+    pub fn chain_refusal(&self) -> Option<&Error> {
+        self.refusal.as_ref()
+    }
+
     /// What was made and drawn so far.
     pub fn counts(&self) -> EyeCounts {
+        let traced_pixels = self
+            .traced
+            .as_ref()
+            .filter(|_| self.drawn[1] > 0)
+            .map(|traced| u64::from(traced.width) * u64::from(traced.height));
         EyeCounts {
             pipelines: (self.surfaces.count() + self.tone_mapping.count()) as u64,
             specular_pipelines: self.surfaces.specular_count() as u64,
-            surroundings_bytes: self.surroundings.as_ref().map_or(0, DeviceSurroundings::bytes),
-            map_bytes: self.objects.map_bytes(),
+            chain_bytes: self.chain_scene.as_ref().map_or(0, ChainScene::bytes),
+            map_bytes: self.objects.images.map_bytes(),
+            coarse_maps: self.objects.images.coarse_maps(),
             drawn_objects: self.drawn[0] as u64,
             drawn_specular: self.drawn[1] as u64,
+            traced_pixels: traced_pixels.unwrap_or(0),
+            samples: self.mean.as_ref().map_or(1, |mean| mean.count().max(1)),
             gpu_ms: self.timing.as_ref().and_then(Timing::latest),
         }
     }
@@ -222,248 +288,79 @@ impl Renderer {
         if view.width == 0 || view.height == 0 {
             return Ok(());
         }
-        // Exposed already, so that half floats hold whatever can be displayed.
-        let exposure = view.exposure_stops.exp2();
-        let has_specular = self.draw_radiance(gpu, encoder, view, exposure)?;
+        if let Some(mean) = &mut self.mean {
+            mean.clear();
+        }
+        self.draw_radiance(gpu, encoder, view, exposure(view), Sample::CENTRE, self.quality)?;
         if let Some(targets) = &self.targets {
             let marks = self.timing.as_ref().map(Timing::around_tone_mapping);
             let radiance = &targets.resolved_view;
             self.tone_mapping
                 .draw(gpu, encoder, target, radiance, view.tone_map, marks);
         }
+        let has_specular = self.drawn[1] > 0;
         if let Some(timing) = &mut self.timing {
             timing.finish(encoder, has_specular, true);
         }
+        self.drawn_view = Some(view.clone());
         Ok(())
     }
 
-    /// Radiance per pixel without exposure and tone mapping, in the precision of half floats.
+    /// Makes the picture of a view that was drawn last better: draws it once more, through other places of its pixels,
+    /// and shows the mean of all. Draws it for the first time where another one was drawn.
     ///
     /// # Errors
-    /// A size of 0 or above the device's limit; a lost device.
-    pub fn radiance(&mut self, gpu: &Gpu, view: &View) -> Result<Picture> {
-        let peak = self.objects.peak_radiance.max(view.background.max_channel());
-        // A power of two changes no digit.
-        let scale = if peak > 0.0 {
-            (LARGEST_SCALED / peak).log2().floor().exp2()
-        } else {
-            1.0
-        };
-        let mut encoder = gpu
-            .device
-            .create_command_encoder(&wgpu::CommandEncoderDescriptor {
-                label: Some("radiance"),
-            });
-        let has_specular = self.draw_radiance(gpu, &mut encoder, view, scale)?;
-        if let Some(timing) = &mut self.timing {
-            timing.finish(&mut encoder, has_specular, false);
-        }
-        gpu.queue.submit([encoder.finish()]);
-        let bytes = match &self.targets {
-            Some(targets) => readback::read_texture(gpu, &targets.resolved)?,
-            None => Vec::new(),
-        };
-        self.collect_times(gpu);
-        let unscaled = |half: f16| (f64::from(half) / scale) as f32;
-        let texels = bytes.chunks_exact(8).map(|texel| {
-            std::array::from_fn(|channel| {
-                unscaled(f16::from_le_bytes([texel[2 * channel], texel[2 * channel + 1]]))
-            })
-        });
-        Ok(Picture {
-            width: view.width,
-            height: view.height,
-            radiance: texels.collect(),
-        })
-    }
-
-    /// The surface pass, into this renderer's own targets; tells whether it drew anything specular.
-    fn draw_radiance(
+    /// A picture larger than the device's textures.
+    pub fn refine(
         &mut self,
         gpu: &Gpu,
         encoder: &mut wgpu::CommandEncoder,
+        target: &wgpu::TextureView,
         view: &View,
-        radiance_scale: f64,
-    ) -> Result<bool> {
-        self.collect_times(gpu);
-        let size_fits = |targets: &Targets| (targets.width, targets.height) == (view.width, view.height);
-        let targets = match self.targets.take().filter(size_fits) {
-            Some(targets) => targets,
-            None => Targets::new(gpu, view.width, view.height, self.sample_count)?,
+    ) -> Result<()> {
+        if self.drawn_view.as_ref() != Some(view) {
+            return self.draw(gpu, encoder, target, view);
+        }
+        let mut mean = match self
+            .mean
+            .take()
+            .filter(|mean| mean.has_size(view.width, view.height))
+        {
+            Some(mean) => mean,
+            None => Mean::new(gpu, view.width, view.height),
         };
-        let list = self.prepare(gpu, view);
-        let frame = self.bind_frame(gpu, view, radiance_scale);
-        let background = view
-            .background
-            .map(|channel| (channel * radiance_scale).min(LARGEST_SCALED));
-        self.draw_surfaces(encoder, &targets, &frame, background.to_array(), &list);
-        self.drawn = [list.objects, list.specular_objects];
-        self.targets = Some(targets);
-        Ok(list.specular_objects > 0)
-    }
-
-    /// Specular surfaces are drawn in a pass of their own where times are taken: devices that draw tile by tile cannot
-    /// tell the parts of a pass apart.
-    fn draw_surfaces(
-        &self,
-        encoder: &mut wgpu::CommandEncoder,
-        targets: &Targets,
-        frame: &wgpu::BindGroup,
-        background: [f64; 3],
-        list: &DrawList,
-    ) {
-        let timing = self.timing.as_ref();
-        let is_split = timing.is_some() && !list.specular.is_empty();
-        let marks = timing.map(Timing::around_plain);
-        let mut pass = targets.begin_pass(encoder, Some(background), !is_split, marks);
-        pass.set_bind_group(0, frame, &[]);
-        self.draw_each(&mut pass, &list.plain);
-        if is_split {
-            drop(pass);
-            let marks = timing.map(Timing::around_specular);
-            pass = targets.begin_pass(encoder, None, true, marks);
-            pass.set_bind_group(0, frame, &[]);
+        if mean.count() == 0
+            && let Some(targets) = &self.targets
+        {
+            mean.add(gpu, encoder, &targets.resolved_view);
         }
-        if let Some(surroundings) = &self.surroundings {
-            pass.set_bind_group(2, &surroundings.bind_group, &[]);
-        }
-        self.draw_each(&mut pass, &list.specular);
-    }
-
-    /// Makes what a view calls for and does not exist yet; gives what it draws.
-    fn prepare(&mut self, gpu: &Gpu, view: &View) -> DrawList {
-        if self.chains == EffectSwitch::On {
-            self.make_everything(gpu);
-        }
-        let visible = visible_objects(&self.objects, view);
-        self.make_surroundings(gpu, self.manner(), &visible);
-        let list = DrawList::new(&self.objects, &visible, view.camera.position, self.manner());
-        for draw in list.plain.iter().chain(&list.specular) {
-            self.surfaces.make(gpu, draw.key);
-        }
-        list
-    }
-
-    /// Makes what any view could call for, with maps as light.
-    fn make_everything(&mut self, gpu: &Gpu) {
-        let lit = Manner {
-            style: MapStyle::Lit,
-            ..self.manner()
+        let sample = Sample::of_sequence(mean.count());
+        let still = EyeQuality {
+            traced_scale: self.quality.traced_scale.max(1.0),
+            branching_depth: EyeQuality::STILL.branching_depth,
+            ..self.quality
         };
-        let all: Vec<usize> = (0..self.objects.list.len()).collect();
-        self.make_surroundings(gpu, lit, &all);
-        let lit = Manner {
-            has_receivers: self.manner().has_receivers,
-            ..lit
-        };
-        for object in &self.objects.list {
-            for key in lit.keys(&object.look) {
-                self.surfaces.make(gpu, key);
-            }
+        self.draw_radiance(gpu, encoder, view, exposure(view), sample, still)?;
+        if let Some(targets) = &self.targets {
+            mean.add(gpu, encoder, &targets.resolved_view);
         }
+        let (_, radiance) = mean.picture();
+        self.tone_mapping
+            .draw(gpu, encoder, target, radiance, view.tone_map, None);
+        self.mean = Some(mean);
+        Ok(())
     }
 
     /// How objects are drawn now.
     fn manner(&self) -> Manner {
-        let surroundings = self.surroundings.as_ref();
         Manner {
             style: self.map_style,
-            has_chains: self.chains != EffectSwitch::Off,
-            has_receivers: surroundings.is_some_and(DeviceSurroundings::has_receivers),
-        }
-    }
-
-    /// Makes the surroundings or brings them up to date, where any of these objects is specular.
-    fn make_surroundings(&mut self, gpu: &Gpu, manner: Manner, objects: &[usize]) {
-        let is_specular = |index: &usize| manner.is_specular(&self.objects.list[*index].look);
-        let is_up_to_date = self.surroundings.is_some() && !self.surroundings_are_stale;
-        if is_up_to_date || !objects.iter().any(is_specular) {
-            return;
-        }
-        let objects = self.objects.list.iter().zip(&self.geometry.charts);
-        let lit: Vec<LitSurface> = objects
-            .filter_map(|(object, chart)| {
-                Some(LitSurface {
-                    chart: chart.as_ref()?,
-                    map: object.map.as_ref()?,
-                })
-            })
-            .collect();
-        let layout = &self.surfaces.surroundings_layout;
-        match &mut self.surroundings {
-            Some(surroundings) => surroundings.update(gpu, &self.scene, &lit, layout),
-            none => *none = Some(DeviceSurroundings::new(gpu, &self.scene, &lit, layout)),
-        }
-        self.surroundings_are_stale = false;
-        self.surfaces.drop_reflecting(!self.manner().has_receivers);
-    }
-
-    fn bind_frame(&self, gpu: &Gpu, view: &View, radiance_scale: f64) -> wgpu::BindGroup {
-        let frame = Frame {
-            clip_from_camera: camera::clip_from_camera(view),
-            camera_position: camera::single(view.camera.position),
-            radiance_scale: radiance_scale as f32,
-            background: rgb(view.background),
-            padding: 0,
-        };
-        let buffer = gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-            label: Some("frame"),
-            contents: bytemuck::bytes_of(&frame),
-            usage: wgpu::BufferUsages::UNIFORM,
-        });
-        let resources = [buffer.as_entire_binding()];
-        bind_group(gpu, "frame", &self.surfaces.frame_layout, resources)
-    }
-
-    fn draw_each(&self, pass: &mut wgpu::RenderPass<'_>, draws: &[Draw]) {
-        for draw in draws {
-            let Some(pipeline) = self.surfaces.get(draw.key) else {
-                continue;
-            };
-            pass.set_pipeline(pipeline);
-            pass.set_bind_group(1, &self.objects.list[draw.object].bind_group, &[]);
-            for segment in &self.geometry.segments[draw.object] {
-                let page = &self.geometry.pages[segment.page];
-                pass.set_vertex_buffer(0, page.corners.slice(..));
-                pass.set_vertex_buffer(1, page.map_uvs.slice(..));
-                pass.set_index_buffer(page.indices.slice(..), wgpu::IndexFormat::Uint32);
-                pass.draw_indexed(segment.indices.clone(), 0, 0..1);
-            }
+            has_chains: self.chains != EffectSwitch::Off && self.refusal.is_none(),
         }
     }
 }
 
-/// One picture without a window: radiance before exposure and tone mapping, with 1 or 4 `samples` per pixel; a single
-/// sample lies at the pixel's centre.
-///
-/// # Errors
-/// Those of [`Renderer::new`], [`Renderer::set_maps`] and [`Renderer::radiance`].
-pub fn render_offscreen(
-    gpu: &Gpu,
-    scene: &Scene,
-    maps: &[IlluminationMap],
-    view: &View,
-    samples: u32,
-) -> Result<Picture> {
-    let counted = render_counted(gpu, scene, maps, view, samples, EffectSwitch::Auto)?;
-    Ok(counted.0)
-}
-
-/// [`render_offscreen`] with chains switched, and what was made and drawn for it.
-///
-/// # Errors
-/// Those of [`render_offscreen`].
-pub fn render_counted(
-    gpu: &Gpu,
-    scene: &Scene,
-    maps: &[IlluminationMap],
-    view: &View,
-    samples: u32,
-    chains: EffectSwitch,
-) -> Result<(Picture, EyeCounts)> {
-    let mut renderer = Renderer::new(gpu, scene, wgpu::TextureFormat::Rgba8Unorm, samples)?;
-    renderer.set_maps(gpu, scene, maps)?;
-    renderer.set_chains(gpu, chains)?;
-    let picture = renderer.radiance(gpu, view)?;
-    Ok((picture, renderer.counts()))
+/// By which radiance is multiplied before it is displayed: half floats then hold whatever can be.
+fn exposure(view: &View) -> f64 {
+    view.exposure_stops.exp2()
 }

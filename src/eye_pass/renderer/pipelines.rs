@@ -2,10 +2,12 @@
 
 use std::collections::HashMap;
 
-use super::bindings::{bind_group_layout, filtering_sampler, pipeline_layout, texture, uniform};
+use super::bindings::{bind_group_layout, pipeline_layout, storage, texture, uniform};
 use super::geometry::{CORNER_LAYOUT, MAP_UV_LAYOUT};
-use super::shaders::SURFACE;
+use super::objects::surface_code;
+use super::shaders::{COMPOSED, SURFACE, TRACED};
 use crate::gpu::Gpu;
+use crate::gpu::shader::Program;
 use crate::scene::SurfaceKind;
 
 /// Radiance is kept in half floats until it is displayed.
@@ -13,170 +15,136 @@ pub(super) const HDR_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Fl
 /// Reversed and infinite, see `camera`.
 pub(super) const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 
-/// What a pipeline writes; its entry point in `surface.wgsl`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+/// What a pipeline writes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(super) enum Writes {
     /// What an opaque surface sends by itself.
     Own,
-    /// The same with what it reflects.
-    OwnAndReflected,
     /// The map's value.
     MapValue,
-    /// The factor of a clear surface on what is behind it.
-    Transmitted,
-    /// What a clear surface adds.
-    Reflected,
-    /// Both at once. Blending takes one factor for all channels, so that only what is grey does that.
-    Grey,
+    /// Depth only, before chains are traced for what is nearest.
+    Depth,
+    /// Chains that begin at a specular surface.
+    Traced,
+    /// What was traced, in the picture.
+    Composed,
 }
 
 impl Writes {
-    pub(super) const ALL: [Self; 6] = [
+    pub(super) const ALL: [Self; 5] = [
         Self::Own,
-        Self::OwnAndReflected,
         Self::MapValue,
-        Self::Transmitted,
-        Self::Reflected,
-        Self::Grey,
+        Self::Depth,
+        Self::Traced,
+        Self::Composed,
     ];
 
-    pub(super) fn entry_point(self) -> &'static str {
+    /// Its fragment stage, if it has one.
+    pub(super) fn entry_point(self) -> Option<&'static str> {
         match self {
-            Self::Own => "own",
-            Self::OwnAndReflected => "own_and_reflected",
-            Self::MapValue => "map_value",
-            Self::Transmitted => "transmitted",
-            Self::Reflected => "reflected",
-            Self::Grey => "grey",
+            Self::Own => Some("own"),
+            Self::MapValue => Some("map_value"),
+            Self::Depth => None,
+            Self::Traced => Some("traced"),
+            Self::Composed => Some("composed"),
+        }
+    }
+
+    /// The shader module it is part of.
+    pub(super) fn program(self) -> Program {
+        match self {
+            Self::Own | Self::MapValue | Self::Depth => SURFACE,
+            Self::Traced => TRACED,
+            Self::Composed => COMPOSED,
         }
     }
 
     /// Whether it is part of a chain from the eye over specular surfaces.
     pub(super) fn is_specular(self) -> bool {
-        !matches!(self, Self::Own | Self::MapValue)
+        matches!(self, Self::Depth | Self::Traced | Self::Composed)
     }
 
-    /// Whether it sees the surroundings.
-    fn reflects(self) -> bool {
-        matches!(self, Self::OwnAndReflected | Self::Reflected | Self::Grey)
-    }
-
-    /// How it is blended with what is behind; `None` where it hides that.
-    fn blend(self) -> Option<wgpu::BlendComponent> {
-        let (src_factor, dst_factor) = match self {
-            Self::Own | Self::OwnAndReflected | Self::MapValue => return None,
-            Self::Transmitted => (wgpu::BlendFactor::Zero, wgpu::BlendFactor::Src),
-            Self::Reflected => (wgpu::BlendFactor::One, wgpu::BlendFactor::One),
-            Self::Grey => (wgpu::BlendFactor::One, wgpu::BlendFactor::SrcAlpha),
-        };
-        Some(wgpu::BlendComponent {
-            src_factor,
-            dst_factor,
-            operation: wgpu::BlendOperation::Add,
-        })
+    /// Whether it draws into the traced picture, which has one sample per pixel.
+    fn is_of_traced_picture(self) -> bool {
+        matches!(self, Self::Depth | Self::Traced)
     }
 }
 
 /// Which faces are drawn.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(super) enum Faces {
     Front,
-    Back,
     Both,
 }
 
 /// All that a pipeline is specialised by.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(super) struct PipelineKey {
     pub(super) writes: Writes,
     pub(super) faces: Faces,
+    /// Of what shows itself only.
     surface: SurfaceKind,
     has_texture: bool,
-    has_receivers: bool,
 }
 
 impl PipelineKey {
     /// The key of a kind of drawing. What does not matter to it is left out, so that fewer pipelines serve.
-    pub(super) fn new(
-        writes: Writes,
-        surface: SurfaceKind,
-        faces: Faces,
-        has_texture: bool,
-        has_receivers: bool,
-    ) -> Self {
-        let shows_map = writes == Writes::MapValue;
-        let shows_emission = writes == Writes::Own && surface == SurfaceKind::Mirror;
+    pub(super) fn new(writes: Writes, surface: SurfaceKind, faces: Faces, has_texture: bool) -> Self {
+        let shows_itself = writes == Writes::Own;
         Self {
             writes,
             faces,
-            surface: if shows_map { SurfaceKind::Diffuse } else { surface },
-            has_texture: has_texture && !shows_map && !shows_emission && writes != Writes::Reflected,
-            has_receivers: has_receivers && writes.reflects(),
+            surface: if shows_itself {
+                surface
+            } else {
+                SurfaceKind::Diffuse
+            },
+            has_texture: has_texture && shows_itself && surface != SurfaceKind::Mirror,
         }
     }
 
     /// The values of the shader's overrides.
-    pub(super) fn constants(self) -> [(&'static str, f64); 3] {
-        [
-            ("SURFACE", f64::from(surface_code(self.surface))),
-            ("HAS_BASE_COLOUR_TEXTURE", f64::from(u8::from(self.has_texture))),
-            ("HAS_RECEIVERS", f64::from(u8::from(self.has_receivers))),
-        ]
-    }
-}
-
-/// The shader's `SURFACE_*`.
-fn surface_code(surface: SurfaceKind) -> u32 {
-    match surface {
-        SurfaceKind::Diffuse => 0,
-        SurfaceKind::Mirror => 1,
-        SurfaceKind::Dielectric => 2,
-        SurfaceKind::ThinWall => 3,
-        SurfaceKind::Mixed => 4,
+    pub(super) fn constants(self) -> Vec<(&'static str, f64)> {
+        match self.writes {
+            Writes::Own | Writes::MapValue | Writes::Depth => vec![
+                ("SURFACE", f64::from(surface_code(self.surface))),
+                ("HAS_TEXTURE", f64::from(u8::from(self.has_texture))),
+            ],
+            Writes::Traced | Writes::Composed => Vec::new(),
+        }
     }
 }
 
 /// The pipelines that were called for so far, and how they are bound.
 #[derive(Debug)]
 pub(super) struct SurfacePipelines {
-    module: wgpu::ShaderModule,
+    modules: HashMap<&'static str, wgpu::ShaderModule>,
     sample_count: u32,
     /// Group 0.
     pub(super) frame_layout: wgpu::BindGroupLayout,
-    /// Group 1.
-    pub(super) object_layout: wgpu::BindGroupLayout,
-    /// Group 2, of those that reflect.
-    pub(super) surroundings_layout: wgpu::BindGroupLayout,
-    plain: wgpu::PipelineLayout,
-    reflecting: wgpu::PipelineLayout,
+    /// Group 1 of what traces; made with the first of it, as many devices cannot have it.
+    traced_layout: Option<wgpu::BindGroupLayout>,
+    /// Group 1 of what shows what was traced.
+    pub(super) composed_layout: wgpu::BindGroupLayout,
     made: HashMap<PipelineKey, wgpu::RenderPipeline>,
 }
 
 impl SurfacePipelines {
     pub(super) fn new(gpu: &Gpu, sample_count: u32) -> Self {
-        let frame = [uniform(wgpu::ShaderStages::VERTEX_FRAGMENT)];
-        let frame_layout = bind_group_layout(gpu, "frame", &frame);
-        let object = [
-            uniform(wgpu::ShaderStages::FRAGMENT),
-            texture(false, wgpu::TextureViewDimension::D2),
-            texture(true, wgpu::TextureViewDimension::D2),
-            filtering_sampler(),
+        let frame = [
+            uniform(wgpu::ShaderStages::VERTEX_FRAGMENT),
+            storage(),
+            storage(),
+            texture(false, wgpu::TextureViewDimension::D2Array),
+            texture(false, wgpu::TextureViewDimension::D2Array),
         ];
-        let object_layout = bind_group_layout(gpu, "object", &object);
-        let surroundings = [
-            uniform(wgpu::ShaderStages::FRAGMENT),
-            texture(true, wgpu::TextureViewDimension::D2Array),
-            filtering_sampler(),
-        ];
-        let surroundings_layout = bind_group_layout(gpu, "surroundings", &surroundings);
+        let traced_picture = [texture(false, wgpu::TextureViewDimension::D2)];
         Self {
-            module: SURFACE.module(&gpu.device),
+            modules: HashMap::new(),
             sample_count,
-            plain: pipeline_layout(gpu, &[&frame_layout, &object_layout]),
-            reflecting: pipeline_layout(gpu, &[&frame_layout, &object_layout, &surroundings_layout]),
-            frame_layout,
-            object_layout,
-            surroundings_layout,
+            frame_layout: bind_group_layout(gpu, "frame", &frame),
+            traced_layout: None,
+            composed_layout: bind_group_layout(gpu, "traced picture", &traced_picture),
             made: HashMap::new(),
         }
     }
@@ -184,6 +152,13 @@ impl SurfacePipelines {
     /// Makes a pipeline unless it is there.
     pub(super) fn make(&mut self, gpu: &Gpu, key: PipelineKey) {
         if !self.made.contains_key(&key) {
+            let program = key.writes.program();
+            self.modules
+                .entry(program.name)
+                .or_insert_with(|| program.module(&gpu.device));
+            if key.writes == Writes::Traced {
+                self.make_traced_layout(gpu);
+            }
             let pipeline = self.pipeline(gpu, key);
             self.made.insert(key, pipeline);
         }
@@ -194,15 +169,14 @@ impl SurfacePipelines {
         self.made.get(&key)
     }
 
+    /// Group 1 of what traces, where any of that was made.
+    pub(super) fn traced_layout(&self) -> Option<&wgpu::BindGroupLayout> {
+        self.traced_layout.as_ref()
+    }
+
     /// Gives up those of specular surfaces.
     pub(super) fn drop_specular(&mut self) {
         self.made.retain(|key, _| !key.writes.is_specular());
-    }
-
-    /// Gives up those that were made for surroundings with receivers, or without.
-    pub(super) fn drop_reflecting(&mut self, has_receivers: bool) {
-        self.made
-            .retain(|key, _| !key.writes.reflects() || key.has_receivers != has_receivers);
     }
 
     /// How many there are.
@@ -215,19 +189,55 @@ impl SurfacePipelines {
         self.made.keys().filter(|key| key.writes.is_specular()).count()
     }
 
-    fn pipeline(&self, gpu: &Gpu, key: PipelineKey) -> wgpu::RenderPipeline {
-        let layout = if key.writes.reflects() {
-            &self.reflecting
-        } else {
-            &self.plain
+    fn make_traced_layout(&mut self, gpu: &Gpu) {
+        let chains = [
+            uniform(wgpu::ShaderStages::FRAGMENT),
+            storage(),
+            storage(),
+            storage(),
+            storage(),
+            storage(),
+        ];
+        self.traced_layout
+            .get_or_insert_with(|| bind_group_layout(gpu, "chains", &chains));
+    }
+
+    fn layout(&self, gpu: &Gpu, writes: Writes) -> wgpu::PipelineLayout {
+        let second = match writes {
+            Writes::Own | Writes::MapValue | Writes::Depth => None,
+            Writes::Traced => self.traced_layout.as_ref(),
+            Writes::Composed => Some(&self.composed_layout),
         };
-        let blend = key.writes.blend();
+        let groups: Vec<_> = std::iter::once(&self.frame_layout).chain(second).collect();
+        pipeline_layout(gpu, &groups)
+    }
+
+    fn pipeline(&self, gpu: &Gpu, key: PipelineKey) -> wgpu::RenderPipeline {
+        let writes = key.writes;
+        let module = &self.modules[writes.program().name];
+        let constants = key.constants();
+        let target = [Some(wgpu::ColorTargetState::from(HDR_FORMAT))];
+        let fragment = writes.entry_point().map(|entry_point| wgpu::FragmentState {
+            module,
+            entry_point: Some(entry_point),
+            compilation_options: wgpu::PipelineCompilationOptions {
+                constants: &constants,
+                ..Default::default()
+            },
+            targets: &target,
+        });
+        // Chains are traced once per pixel: where the surface is the nearest, which was drawn before.
+        let (depth_write, depth_compare) = if writes == Writes::Traced {
+            (false, wgpu::CompareFunction::Equal)
+        } else {
+            (true, wgpu::CompareFunction::Greater)
+        };
         gpu.device
             .create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-                label: Some(key.writes.entry_point()),
-                layout: Some(layout),
+                label: Some(writes.entry_point().unwrap_or("depth")),
+                layout: Some(&self.layout(gpu, writes)),
                 vertex: wgpu::VertexState {
-                    module: &self.module,
+                    module,
                     entry_point: Some("place"),
                     compilation_options: Default::default(),
                     buffers: &[Some(CORNER_LAYOUT), Some(MAP_UV_LAYOUT)],
@@ -235,39 +245,26 @@ impl SurfacePipelines {
                 primitive: wgpu::PrimitiveState {
                     cull_mode: match key.faces {
                         Faces::Front => Some(wgpu::Face::Back),
-                        Faces::Back => Some(wgpu::Face::Front),
                         Faces::Both => None,
                     },
                     ..Default::default()
                 },
                 depth_stencil: Some(wgpu::DepthStencilState {
                     format: DEPTH_FORMAT,
-                    // What is clear hides nothing.
-                    depth_write_enabled: Some(blend.is_none()),
-                    depth_compare: Some(wgpu::CompareFunction::Greater),
+                    depth_write_enabled: Some(depth_write),
+                    depth_compare: Some(depth_compare),
                     stencil: Default::default(),
                     bias: Default::default(),
                 }),
                 multisample: wgpu::MultisampleState {
-                    count: self.sample_count,
+                    count: if writes.is_of_traced_picture() {
+                        1
+                    } else {
+                        self.sample_count
+                    },
                     ..Default::default()
                 },
-                fragment: Some(wgpu::FragmentState {
-                    module: &self.module,
-                    entry_point: Some(key.writes.entry_point()),
-                    compilation_options: wgpu::PipelineCompilationOptions {
-                        constants: &key.constants(),
-                        ..Default::default()
-                    },
-                    targets: &[Some(wgpu::ColorTargetState {
-                        format: HDR_FORMAT,
-                        blend: blend.map(|color| wgpu::BlendState {
-                            color,
-                            alpha: wgpu::BlendComponent::REPLACE,
-                        }),
-                        write_mask: wgpu::ColorWrites::ALL,
-                    })],
-                }),
+                fragment,
                 multiview_mask: None,
                 cache: None,
             })

@@ -3,20 +3,70 @@
 use super::geometry::{CORNER_LAYOUT, MAP_UV_LAYOUT};
 use super::pipelines::{Faces, PipelineKey, Writes};
 use super::tone_mapping;
-use super::uniforms::{Frame, ObjectUniform, Receiver, Surroundings};
+use super::uniforms::{Accumulation, ChainStart, Frame, Node, ObjectRecord, ProbeHit, ProbeRay, Triangle};
 use crate::eye_pass::ToneMap;
 use crate::gpu::layout::StructLayout;
 use crate::gpu::shader::{Program, shader_source};
 use crate::scene::SurfaceKind;
 
-/// Surfaces of the scene.
+/// Surfaces of the scene by themselves.
 pub(super) const SURFACE: Program = Program {
     name: "surface",
     sources: &[
+        shader_source!("shared/refraction"),
         shader_source!("shared/fresnel"),
         shader_source!("eye_pass/frame"),
-        shader_source!("eye_pass/surroundings"),
+        shader_source!("eye_pass/objects"),
+        shader_source!("eye_pass/images"),
+        shader_source!("eye_pass/place"),
         shader_source!("eye_pass/surface"),
+    ],
+};
+
+/// Chains of specular surfaces.
+pub(super) const TRACED: Program = Program {
+    name: "traced",
+    sources: &[
+        shader_source!("shared/refraction"),
+        shader_source!("shared/fresnel"),
+        shader_source!("shared/traversal"),
+        shader_source!("eye_pass/frame"),
+        shader_source!("eye_pass/objects"),
+        shader_source!("eye_pass/images"),
+        shader_source!("eye_pass/place"),
+        shader_source!("eye_pass/corners"),
+        shader_source!("eye_pass/medium"),
+        shader_source!("eye_pass/interaction"),
+        shader_source!("eye_pass/chain"),
+        shader_source!("eye_pass/traced"),
+    ],
+};
+
+/// What was traced, in the picture.
+pub(super) const COMPOSED: Program = Program {
+    name: "composed",
+    sources: &[
+        shader_source!("eye_pass/frame"),
+        shader_source!("eye_pass/place"),
+        shader_source!("eye_pass/composed"),
+    ],
+};
+
+/// Means of pictures.
+pub(super) const ACCUMULATED: Program = Program {
+    name: "accumulated",
+    sources: &[
+        shader_source!("shared/cover"),
+        shader_source!("eye_pass/accumulated"),
+    ],
+};
+
+/// Rays, to hold the device's answers against the processor's.
+pub(super) const PROBE: Program = Program {
+    name: "probe",
+    sources: &[
+        shader_source!("shared/traversal"),
+        shader_source!("eye_pass/probe"),
     ],
 };
 
@@ -24,6 +74,7 @@ pub(super) const SURFACE: Program = Program {
 pub(super) const TONE_MAPPING: Program = Program {
     name: "tone_mapping",
     sources: &[
+        shader_source!("shared/cover"),
         shader_source!("shared/srgb"),
         shader_source!("shared/tone_map"),
         shader_source!("eye_pass/tone_mapping"),
@@ -32,16 +83,20 @@ pub(super) const TONE_MAPPING: Program = Program {
 
 /// Every shader module of the eye pass, for the tests.
 pub fn programs() -> Vec<Program> {
-    vec![SURFACE, TONE_MAPPING]
+    vec![SURFACE, TRACED, COMPOSED, ACCUMULATED, PROBE, TONE_MAPPING]
 }
 
 /// Every struct that the eye pass shares with its shaders, for the tests.
 pub fn shared_structs() -> Vec<StructLayout> {
     vec![
         Frame::layout(),
-        ObjectUniform::layout(),
-        Receiver::layout(),
-        Surroundings::layout(),
+        ChainStart::layout(),
+        ObjectRecord::layout(),
+        Node::layout(),
+        Triangle::layout(),
+        Accumulation::layout(),
+        ProbeRay::layout(),
+        ProbeHit::layout(),
     ]
 }
 
@@ -74,15 +129,22 @@ pub fn specialisations() -> Vec<Specialisation> {
         SurfaceKind::ThinWall,
         SurfaceKind::Mixed,
     ];
-    let mut all = Vec::new();
+    let mut all = vec![Specialisation {
+        program: ACCUMULATED.name,
+        entry_point: "accumulated",
+        constants: Vec::new(),
+    }];
     for writes in Writes::ALL {
+        let Some(entry_point) = writes.entry_point() else {
+            continue;
+        };
         for kind in KINDS {
-            for flags in 0..4 {
-                let key = PipelineKey::new(writes, kind, Faces::Both, flags & 1 > 0, flags & 2 > 0);
+            for has_texture in [false, true] {
+                let key = PipelineKey::new(writes, kind, Faces::Both, has_texture);
                 all.push(Specialisation {
-                    program: SURFACE.name,
-                    entry_point: writes.entry_point(),
-                    constants: key.constants().to_vec(),
+                    program: writes.program().name,
+                    entry_point,
+                    constants: key.constants(),
                 });
             }
         }

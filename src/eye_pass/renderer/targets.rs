@@ -1,4 +1,4 @@
-//! What the surface pass draws into, remade when the size changes.
+//! What is drawn into, remade when the size changes.
 
 use super::pipelines::{DEPTH_FORMAT, HDR_FORMAT};
 use crate::error::Result;
@@ -17,65 +17,48 @@ pub(super) struct Targets {
     depth: wgpu::TextureView,
 }
 
+/// The traced picture: chains of specular surfaces, in a resolution of its own.
+#[derive(Debug)]
+pub(super) struct TracedTargets {
+    pub(super) width: u32,
+    pub(super) height: u32,
+    pub(super) view: wgpu::TextureView,
+    depth: wgpu::TextureView,
+}
+
+const ATTACHMENT: wgpu::TextureUsages = wgpu::TextureUsages::RENDER_ATTACHMENT;
+
 impl Targets {
     /// # Errors
     /// A side of 0 or above the device's limit.
     pub(super) fn new(gpu: &Gpu, width: u32, height: u32, sample_count: u32) -> Result<Self> {
         gpu.check_texture_size("picture", width, height)?;
-        let texture = |label, format, sample_count, usage| {
-            gpu.device.create_texture(&wgpu::TextureDescriptor {
-                label: Some(label),
-                size: wgpu::Extent3d {
-                    width,
-                    height,
-                    depth_or_array_layers: 1,
-                },
-                mip_level_count: 1,
-                sample_count,
-                dimension: wgpu::TextureDimension::D2,
-                format,
-                usage: wgpu::TextureUsages::RENDER_ATTACHMENT | usage,
-                view_formats: &[],
-            })
-        };
-        let view = |texture: &wgpu::Texture| texture.create_view(&wgpu::TextureViewDescriptor::default());
-        let resolved = texture(
-            "radiance",
-            HDR_FORMAT,
-            1,
-            wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_SRC,
-        );
-        let none = wgpu::TextureUsages::empty();
+        let size = [width, height];
+        let read = wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_SRC;
+        let resolved = texture(gpu, "radiance", size, HDR_FORMAT, 1, ATTACHMENT | read);
+        let samples = |label, format| texture(gpu, label, size, format, sample_count, ATTACHMENT);
         Ok(Self {
             width,
             height,
             resolved_view: view(&resolved),
             resolved,
-            multisampled: (sample_count > 1)
-                .then(|| view(&texture("radiance samples", HDR_FORMAT, sample_count, none))),
-            depth: view(&texture("depth", DEPTH_FORMAT, sample_count, none)),
+            multisampled: (sample_count > 1).then(|| view(&samples("radiance samples", HDR_FORMAT))),
+            depth: view(&samples("depth", DEPTH_FORMAT)),
         })
     }
 
-    /// Starts a pass over surfaces: on a background [scaled radiance], or on what an earlier one left. Only the last
-    /// one's samples are resolved; after it neither samples nor depths are kept.
+    /// Starts the pass over all surfaces, on a background [scaled radiance]. Its samples are resolved; neither they nor
+    /// depths are kept.
     pub(super) fn begin_pass<'a>(
         &self,
         encoder: &'a mut wgpu::CommandEncoder,
-        background: Option<[f64; 3]>,
-        is_last: bool,
+        [r, g, b]: [f64; 3],
         timestamp_writes: Option<wgpu::RenderPassTimestampWrites<'_>>,
     ) -> wgpu::RenderPass<'a> {
-        let kept = if is_last {
-            wgpu::StoreOp::Discard
-        } else {
-            wgpu::StoreOp::Store
-        };
         let (view, resolve_target, store) = match &self.multisampled {
-            Some(samples) => (samples, is_last.then_some(&self.resolved_view), kept),
+            Some(samples) => (samples, Some(&self.resolved_view), wgpu::StoreOp::Discard),
             None => (&self.resolved_view, None, wgpu::StoreOp::Store),
         };
-        let colour = |[r, g, b]: [f64; 3]| wgpu::LoadOp::Clear(wgpu::Color { r, g, b, a: 1.0 });
         encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("surfaces"),
             color_attachments: &[Some(wgpu::RenderPassColorAttachment {
@@ -83,20 +66,111 @@ impl Targets {
                 depth_slice: None,
                 resolve_target,
                 ops: wgpu::Operations {
-                    load: background.map_or(wgpu::LoadOp::Load, colour),
+                    load: wgpu::LoadOp::Clear(wgpu::Color { r, g, b, a: 1.0 }),
                     store,
                 },
             })],
-            depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
-                view: &self.depth,
-                depth_ops: Some(wgpu::Operations {
-                    load: background.map_or(wgpu::LoadOp::Load, |_| wgpu::LoadOp::Clear(0.0)),
-                    store: kept,
-                }),
-                stencil_ops: None,
-            }),
+            depth_stencil_attachment: Some(depth(&self.depth, Some(0.0), wgpu::StoreOp::Discard)),
             timestamp_writes,
             ..Default::default()
         })
     }
+}
+
+impl TracedTargets {
+    /// # Errors
+    /// A side of 0 or above the device's limit.
+    pub(super) fn new(gpu: &Gpu, width: u32, height: u32) -> Result<Self> {
+        gpu.check_texture_size("traced picture", width, height)?;
+        let size = [width, height];
+        let read = wgpu::TextureUsages::TEXTURE_BINDING;
+        let picture = texture(gpu, "traced picture", size, HDR_FORMAT, 1, ATTACHMENT | read);
+        let depth = texture(gpu, "traced depth", size, DEPTH_FORMAT, 1, ATTACHMENT);
+        Ok(Self {
+            width,
+            height,
+            view: view(&picture),
+            depth: view(&depth),
+        })
+    }
+
+    /// Starts the pass that finds what is nearest.
+    pub(super) fn begin_depth<'a>(
+        &self,
+        encoder: &'a mut wgpu::CommandEncoder,
+        timestamp_writes: Option<wgpu::RenderPassTimestampWrites<'_>>,
+    ) -> wgpu::RenderPass<'a> {
+        encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("traced depth"),
+            depth_stencil_attachment: Some(depth(&self.depth, Some(0.0), wgpu::StoreOp::Store)),
+            timestamp_writes,
+            ..Default::default()
+        })
+    }
+
+    /// Starts the pass that traces, on nothing.
+    pub(super) fn begin_chains<'a>(
+        &self,
+        encoder: &'a mut wgpu::CommandEncoder,
+        timestamp_writes: Option<wgpu::RenderPassTimestampWrites<'_>>,
+    ) -> wgpu::RenderPass<'a> {
+        encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("chains"),
+            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                view: &self.view,
+                depth_slice: None,
+                resolve_target: None,
+                ops: wgpu::Operations {
+                    load: wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT),
+                    store: wgpu::StoreOp::Store,
+                },
+            })],
+            depth_stencil_attachment: Some(depth(&self.depth, None, wgpu::StoreOp::Discard)),
+            timestamp_writes,
+            ..Default::default()
+        })
+    }
+}
+
+fn depth(
+    view: &wgpu::TextureView,
+    clear: Option<f32>,
+    store: wgpu::StoreOp,
+) -> wgpu::RenderPassDepthStencilAttachment<'_> {
+    wgpu::RenderPassDepthStencilAttachment {
+        view,
+        depth_ops: Some(wgpu::Operations {
+            load: clear.map_or(wgpu::LoadOp::Load, wgpu::LoadOp::Clear),
+            store,
+        }),
+        stencil_ops: None,
+    }
+}
+
+fn view(texture: &wgpu::Texture) -> wgpu::TextureView {
+    texture.create_view(&wgpu::TextureViewDescriptor::default())
+}
+
+fn texture(
+    gpu: &Gpu,
+    label: &str,
+    [width, height]: [u32; 2],
+    format: wgpu::TextureFormat,
+    sample_count: u32,
+    usage: wgpu::TextureUsages,
+) -> wgpu::Texture {
+    gpu.device.create_texture(&wgpu::TextureDescriptor {
+        label: Some(label),
+        size: wgpu::Extent3d {
+            width,
+            height,
+            depth_or_array_layers: 1,
+        },
+        mip_level_count: 1,
+        sample_count,
+        dimension: wgpu::TextureDimension::D2,
+        format,
+        usage,
+        view_formats: &[],
+    })
 }

@@ -7,8 +7,8 @@ use super::counts::GpuMs;
 use crate::gpu::Gpu;
 
 /// Marks of each pass: where it begins and where it ends.
-const PLAIN: [u32; 2] = [0, 1];
-const SPECULAR: [u32; 2] = [2, 3];
+const SURFACES: [u32; 2] = [0, 1];
+const CHAINS: [u32; 2] = [2, 3];
 const TONE_MAPPING: [u32; 2] = [4, 5];
 const MARKS: u32 = 6;
 /// Results are written at multiples of this [bytes].
@@ -29,14 +29,14 @@ const FAILED: u8 = 3;
 struct Slot {
     buffer: wgpu::Buffer,
     state: Arc<AtomicU8>,
-    /// Which passes there were: plain, specular, tone mapping.
+    /// Which passes there were: surfaces, chains, tone mapping.
     passes: [bool; 3],
 }
 
 impl Slot {
     /// Marks of the passes that there were, each with its place in the buffers [bytes].
     fn set_marks(&self) -> impl Iterator<Item = (u64, [u32; 2])> + use<> {
-        let passes = (0..).zip([PLAIN, SPECULAR, TONE_MAPPING]).zip(self.passes);
+        let passes = (0..).zip([SURFACES, CHAINS, TONE_MAPPING]).zip(self.passes);
         passes.filter_map(|((index, marks), was_drawn)| was_drawn.then_some((index * STRIDE, marks)))
     }
 }
@@ -95,26 +95,31 @@ impl Timing {
         self.latest
     }
 
-    /// Marks around the pass over what is not specular.
-    pub(super) fn around_plain(&self) -> wgpu::RenderPassTimestampWrites<'_> {
-        self.around(PLAIN)
+    /// Marks around the pass over all surfaces.
+    pub(super) fn around_surfaces(&self) -> wgpu::RenderPassTimestampWrites<'_> {
+        self.marks(Some(SURFACES[0]), Some(SURFACES[1]))
     }
 
-    /// Marks around the pass over specular surfaces.
-    pub(super) fn around_specular(&self) -> wgpu::RenderPassTimestampWrites<'_> {
-        self.around(SPECULAR)
+    /// Mark before the passes that trace chains.
+    pub(super) fn before_chains(&self) -> wgpu::RenderPassTimestampWrites<'_> {
+        self.marks(Some(CHAINS[0]), None)
+    }
+
+    /// Mark after the passes that trace chains.
+    pub(super) fn after_chains(&self) -> wgpu::RenderPassTimestampWrites<'_> {
+        self.marks(None, Some(CHAINS[1]))
     }
 
     /// Marks around the last pass.
     pub(super) fn around_tone_mapping(&self) -> wgpu::RenderPassTimestampWrites<'_> {
-        self.around(TONE_MAPPING)
+        self.marks(Some(TONE_MAPPING[0]), Some(TONE_MAPPING[1]))
     }
 
-    fn around(&self, [begin, end]: [u32; 2]) -> wgpu::RenderPassTimestampWrites<'_> {
+    fn marks(&self, begin: Option<u32>, end: Option<u32>) -> wgpu::RenderPassTimestampWrites<'_> {
         wgpu::RenderPassTimestampWrites {
             query_set: &self.marks,
-            beginning_of_pass_write_index: Some(begin),
-            end_of_pass_write_index: Some(end),
+            beginning_of_pass_write_index: begin,
+            end_of_pass_write_index: end,
         }
     }
 

@@ -14,39 +14,107 @@ shader_struct! {
         radiance_scale: f32,
         /// Seen where nothing is hit [W/(m² sr)].
         background: [f32; 3],
-        padding: u32,
+        /// Added to the level at which images are looked up; far below zero for the finest one always.
+        level_bias: f32,
+        /// Unit, where the camera looks.
+        forward: [f32; 3],
+        /// Pixels of the traced picture across.
+        traced_width: f32,
+        /// From the picture's middle to its right border, at a distance of 1.
+        right: [f32; 3],
+        /// Pixels of the traced picture down.
+        traced_height: f32,
+        /// From the picture's middle to its upper border, at a distance of 1.
+        up: [f32; 3],
+        /// Angle of a pixel of the traced picture [rad].
+        pixel_rad: f32,
+        /// By which all of the picture is shifted, right and up [half pictures].
+        jitter: [f32; 2],
+        /// Pixels of the traced picture per pixel, across and down.
+        traced_per_pixel: [f32; 2],
     }
 }
 
-/// Plane receivers that specular surfaces see; `MAX_RECEIVERS` in the shader.
-pub(super) const MAX_RECEIVERS: usize = 16;
-
 shader_struct! {
-    /// A plane receiver as specular surfaces see it. Rows are linear functions of the place: xyz · place + w.
-    Receiver {
-        /// Distance from the plane [m].
-        plane: [f32; 4],
-        /// Map coordinate across.
-        u: [f32; 4],
-        /// Map coordinate down.
-        v: [f32; 4],
-        /// Texels of its image that the whole map covers.
-        image_size: [f32; 2],
-        padding: [f32; 2],
+    /// Where chains begin, and how far they are followed.
+    ChainStart {
+        /// The camera, local.
+        eye: [f32; 3],
+        /// Of a local unit [m].
+        unit_m: f32,
+        /// The media around the eye, see `medium.wgsl`.
+        media: [u32; 4],
+        /// Distance of the nearest thing that is seen, along the camera's axis, local.
+        near: f32,
+        /// Chains that carry less than this share of their pixel end.
+        branch_threshold: f32,
+        /// Most specular surfaces on a chain.
+        max_depth: u32,
+        /// Up to this many surfaces both ways on are followed, and then the stronger.
+        branching_depth: u32,
     }
 }
 
 shader_struct! {
-    /// What specular surfaces see.
-    Surroundings {
-        /// The first `count` are in use.
-        receivers: [Receiver; MAX_RECEIVERS],
-        /// Seen below the horizon where there are no receivers [W/(m² sr)].
-        mean_radiance: [f32; 3],
-        /// Receivers in use.
+    /// One object.
+    ObjectRecord {
+        /// [`Material::base_colour`](crate::scene::Material::base_colour).
+        base_colour: [f32; 3],
+        /// Refractive index.
+        ior: f32,
+        /// [W/(m² sr)].
+        emitted_radiance: [f32; 3],
+        /// `SURFACE_*`.
+        surface: u32,
+        /// What its body absorbs [1/m].
+        absorption_per_m: [f32; 3],
+        /// Whether its back is drawn.
+        double_sided: u32,
+        /// Record of its illumination map.
+        map: u32,
+        /// Record of its base colour texture.
+        texture: u32,
+        padding: [u32; 2],
+    }
+}
+
+shader_struct! {
+    /// A node of the hierarchy.
+    Node {
+        /// Minimum corner, local.
+        low: [f32; 3],
+        /// Of a leaf its first triangle, of others the first of two children.
+        first: u32,
+        /// Maximum corner, local.
+        high: [f32; 3],
+        /// Triangles of a leaf; 0 for other nodes.
         count: u32,
-        /// Radiance [W/(m² sr)] of an image value of 1.
-        radiance_scale: f32,
+    }
+}
+
+shader_struct! {
+    /// A triangle of the hierarchy.
+    Triangle {
+        /// First corner, local.
+        a: [f32; 3],
+        /// Index into the scene's objects.
+        object: u32,
+        /// Second corner, local.
+        b: [f32; 3],
+        /// Of three indices of its corners.
+        first_index: u32,
+        /// Third corner, local.
+        c: [f32; 3],
+        /// Of triangles at the same distance the one of lowest order is met.
+        order: u32,
+    }
+}
+
+shader_struct! {
+    /// How a mean of pictures takes up another one.
+    Accumulation {
+        /// Share of the new picture in the mean.
+        share: f32,
         padding0: f32,
         padding1: f32,
         padding2: f32,
@@ -54,19 +122,25 @@ shader_struct! {
 }
 
 shader_struct! {
-    /// One object.
-    ObjectUniform {
-        /// [`Material::base_colour`](crate::scene::Material::base_colour).
-        base_colour: [f32; 3],
-        /// Irradiance [W/m²] of a map value of 1.
-        irradiance_scale: f32,
-        /// [W/(m² sr)].
-        emitted_radiance: [f32; 3],
-        /// Refractive index.
-        ior: f32,
-        /// What a clear body lets through over its typical thickness, [0, 1].
-        body_transmittance: [f32; 3],
-        padding: u32,
+    /// A ray to be traced for its own sake.
+    ProbeRay {
+        /// Local.
+        origin: [f32; 3],
+        padding0: u32,
+        /// Unit.
+        direction: [f32; 3],
+        padding1: u32,
+    }
+}
+
+shader_struct! {
+    /// What a ray met.
+    ProbeHit {
+        /// Order of the triangle; `NO_TRIANGLE` where nothing was met.
+        order: u32,
+        /// Local.
+        distance: f32,
+        padding: [u32; 2],
     }
 }
 

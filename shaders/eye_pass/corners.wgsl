@@ -1,0 +1,88 @@
+// What is known of a point of a surface from the corners of its triangle.
+
+// Two per corner: position and normal.x, then normal.yz and texture coordinates.
+@group(1) @binding(3) var<storage, read> corners: array<vec4f>;
+@group(1) @binding(4) var<storage, read> corner_map_uvs: array<vec2f>;
+// Three for each triangle.
+@group(1) @binding(5) var<storage, read> corner_indices: array<u32>;
+
+// Coordinates are local.
+struct SurfacePoint {
+    place: vec3f,
+    // Bound of its rounding error.
+    error: vec3f,
+    object: u32,
+    // Unit, by the triangle's winding.
+    geometric_normal: vec3f,
+    // Unit, interpolated.
+    shading_normal: vec3f,
+    // How much the normals spread per length, > 0 where the surface is convex.
+    curvature: f32,
+    uv: vec2f,
+    map_uv: vec2f,
+    // Coordinates over area, square root: their change along a line of length one.
+    uv_density: f32,
+    map_density: f32,
+}
+
+fn corner_normal(corner: u32) -> vec3f {
+    let second = corners[2u * corner + 1u];
+    return vec3f(corners[2u * corner].w, second.x, second.y);
+}
+
+fn area_ratio(a: vec2f, b: vec2f, c: vec2f, twice_area: f32) -> f32 {
+    let ab = b - a;
+    let ac = c - a;
+    return sqrt(abs(ab.x * ac.y - ab.y * ac.x) / max(twice_area, 1e-30));
+}
+
+// Change of the normal along an edge over its length.
+fn bend(from_place: vec3f, to_place: vec3f, from_normal: vec3f, to_normal: vec3f) -> f32 {
+    let edge = to_place - from_place;
+    return dot(to_normal - from_normal, edge) / max(dot(edge, edge), 1e-30);
+}
+
+fn surface_point(hit: Hit) -> SurfacePoint {
+    let triangle = triangles[hit.triangle];
+    let weight = hit.barycentric;
+    let first = corner_indices[triangle.first_index];
+    let second = corner_indices[triangle.first_index + 1u];
+    let third = corner_indices[triangle.first_index + 2u];
+    let terms_a = triangle.a * weight.x;
+    let terms_b = triangle.b * weight.y;
+    let terms_c = triangle.c * weight.z;
+    let across = cross(triangle.b - triangle.a, triangle.c - triangle.a);
+    let twice_area = length(across);
+    let normal_a = corner_normal(first);
+    let normal_b = corner_normal(second);
+    let normal_c = corner_normal(third);
+    let mixed = normal_a * weight.x + normal_b * weight.y + normal_c * weight.z;
+    var point: SurfacePoint;
+    point.place = terms_a + terms_b + terms_c;
+    point.error = (abs(terms_a) + abs(terms_b) + abs(terms_c)) * gamma(7.0);
+    point.object = triangle.object;
+    point.geometric_normal = across / twice_area;
+    point.shading_normal = select(point.geometric_normal, normalize(mixed), dot(mixed, mixed) > 0.0);
+    point.curvature = (bend(triangle.a, triangle.b, normal_a, normal_b)
+        + bend(triangle.b, triangle.c, normal_b, normal_c)
+        + bend(triangle.c, triangle.a, normal_c, normal_a)) / 3.0;
+    let uv_a = corners[2u * first + 1u].zw;
+    let uv_b = corners[2u * second + 1u].zw;
+    let uv_c = corners[2u * third + 1u].zw;
+    point.uv = uv_a * weight.x + uv_b * weight.y + uv_c * weight.z;
+    point.uv_density = area_ratio(uv_a, uv_b, uv_c, twice_area);
+    let map_a = corner_map_uvs[first];
+    let map_b = corner_map_uvs[second];
+    let map_c = corner_map_uvs[third];
+    point.map_uv = map_a * weight.x + map_b * weight.y + map_c * weight.z;
+    point.map_density = area_ratio(map_a, map_b, map_c, twice_area);
+    return point;
+}
+
+// Where a ray starts that leaves a point: beyond the rounding error, on the side of its direction.
+fn leave(point: SurfacePoint, direction: vec3f) -> vec3f {
+    let step = dot(abs(point.geometric_normal), point.error);
+    // Rounding of the sum itself is covered by twice the step.
+    let side = select(2.0 * step, -2.0 * step, dot(direction, point.geometric_normal) < 0.0);
+    return point.place + point.geometric_normal * side;
+}

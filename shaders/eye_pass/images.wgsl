@@ -1,0 +1,159 @@
+// Illumination maps and textures, in tiles through a page table.
+
+// All images: a record each, then where their tiles are. A record is
+//   finest level that is held, number of levels, scale, how coordinates wrap (2 bits each way),
+// and for each level
+//   texels across and down, texels of the unit square across and down, index of its first page, pages across.
+@group(0) @binding(2) var<storage, read> image_table: array<u32>;
+@group(0) @binding(3) var map_tiles: texture_2d_array<f32>;
+@group(0) @binding(4) var texture_tiles: texture_2d_array<f32>;
+
+// In place of a record where there is no image.
+const NO_IMAGE: u32 = 0xffffffffu;
+const EMPTY: u32 = 0xffffffffu;
+const TILE: i32 = 64;
+const STORED: i32 = 65;
+const POOL_ACROSS: u32 = 31u;
+
+const RECORD_WORDS: u32 = 4u;
+const LEVEL_WORDS: u32 = 6u;
+
+const WRAP_CLAMP: u32 = 0u;
+const WRAP_REPEAT: u32 = 1u;
+const WRAP_MIRROR: u32 = 2u;
+
+// Four texels of a pool, and where between them.
+struct Spot {
+    texel: vec2i,
+    layer: i32,
+    is_empty: bool,
+    weight: vec2f,
+}
+
+fn level_extent(record: u32, level: u32) -> vec2f {
+    let at = record + RECORD_WORDS + level * LEVEL_WORDS;
+    return vec2f(bitcast<f32>(image_table[at + 2u]), bitcast<f32>(image_table[at + 3u]));
+}
+
+// Distances between texel centres below the place, brought into the image.
+fn wrapped(position: f32, size: f32, wrap: u32) -> f32 {
+    if wrap == WRAP_REPEAT {
+        return position - size * floor(position / size);
+    }
+    return clamp(position, 0.0, size - 1.0);
+}
+
+// Mirrored coordinates are folded: at the fold both neighbours are the same texel.
+fn folded(uv: f32, wrap: u32) -> f32 {
+    if wrap == WRAP_MIRROR {
+        let turn = uv - 2.0 * floor(0.5 * uv);
+        return min(turn, 2.0 - turn);
+    }
+    return uv;
+}
+
+fn locate(record: u32, level: u32, uv: vec2f) -> Spot {
+    let at = record + RECORD_WORDS + level * LEVEL_WORDS;
+    let size = vec2f(f32(image_table[at]), f32(image_table[at + 1u]));
+    let wraps = image_table[record + 3u];
+    let wrap = vec2u(wraps & 3u, wraps >> 2u);
+    let place = vec2f(folded(uv.x, wrap.x), folded(uv.y, wrap.y)) * level_extent(record, level) - 0.5;
+    let position = vec2f(wrapped(place.x, size.x, wrap.x), wrapped(place.y, size.y, wrap.y));
+    let low = min(floor(position), size - 1.0);
+    let cell = vec2i(low);
+    let tile = cell / TILE;
+    let page = image_table[image_table[at + 4u] + u32(tile.y) * image_table[at + 5u] + u32(tile.x)];
+    let per_layer = POOL_ACROSS * POOL_ACROSS;
+    let within = page % per_layer;
+    let corner = vec2i(i32(within % POOL_ACROSS), i32(within / POOL_ACROSS)) * STORED;
+    return Spot(corner + cell - tile * TILE, i32(page / per_layer), page == EMPTY, position - low);
+}
+
+fn map_level(record: u32, level: u32, uv: vec2f) -> vec3f {
+    let spot = locate(record, level, uv);
+    if spot.is_empty {
+        return vec3f(0.0);
+    }
+    // Weights in full precision: the steps of the 8-bit weights that samplers use show at the edge of a caustic.
+    let top = mix(
+        textureLoad(map_tiles, spot.texel, spot.layer, 0).rgb,
+        textureLoad(map_tiles, spot.texel + vec2i(1, 0), spot.layer, 0).rgb,
+        spot.weight.x,
+    );
+    let bottom = mix(
+        textureLoad(map_tiles, spot.texel + vec2i(0, 1), spot.layer, 0).rgb,
+        textureLoad(map_tiles, spot.texel + vec2i(1, 1), spot.layer, 0).rgb,
+        spot.weight.x,
+    );
+    return mix(top, bottom, spot.weight.y);
+}
+
+fn texture_level(record: u32, level: u32, uv: vec2f) -> vec3f {
+    let spot = locate(record, level, uv);
+    if spot.is_empty {
+        return vec3f(0.0);
+    }
+    let top = mix(
+        textureLoad(texture_tiles, spot.texel, spot.layer, 0).rgb,
+        textureLoad(texture_tiles, spot.texel + vec2i(1, 0), spot.layer, 0).rgb,
+        spot.weight.x,
+    );
+    let bottom = mix(
+        textureLoad(texture_tiles, spot.texel + vec2i(0, 1), spot.layer, 0).rgb,
+        textureLoad(texture_tiles, spot.texel + vec2i(1, 1), spot.layer, 0).rgb,
+        spot.weight.x,
+    );
+    return mix(top, bottom, spot.weight.y);
+}
+
+// The two levels to blend, and the share of the coarser one.
+struct Levels {
+    fine: u32,
+    coarse: u32,
+    share: f32,
+}
+
+fn levels(record: u32, level: f32) -> Levels {
+    let finest = f32(image_table[record]);
+    let coarsest = f32(image_table[record + 1u]) - 1.0;
+    let wanted = clamp(level + frame.level_bias, finest, coarsest);
+    let fine = floor(wanted);
+    return Levels(u32(fine), u32(min(fine + 1.0, coarsest)), wanted - fine);
+}
+
+// E [W/m²] at a place of a map, seen at a level; black without a map.
+fn irradiance(record: u32, uv: vec2f, level: f32) -> vec3f {
+    if record == NO_IMAGE {
+        return vec3f(0.0);
+    }
+    let at = levels(record, level);
+    var value = map_level(record, at.fine, uv);
+    if at.share > 0.0 {
+        value = mix(value, map_level(record, at.coarse, uv), at.share);
+    }
+    return value * bitcast<f32>(image_table[record + 2u]);
+}
+
+// Linear colour at a place of a texture, seen at a level; white without one.
+fn texture_colour(record: u32, uv: vec2f, level: f32) -> vec3f {
+    if record == NO_IMAGE {
+        return vec3f(1.0);
+    }
+    let at = levels(record, level);
+    var value = texture_level(record, at.fine, uv);
+    if at.share > 0.0 {
+        value = mix(value, texture_level(record, at.coarse, uv), at.share);
+    }
+    return value;
+}
+
+// The level at which a texel is as large as a parallelogram of coordinates.
+fn level_of(record: u32, across: vec2f, down: vec2f) -> f32 {
+    if record == NO_IMAGE {
+        return 0.0;
+    }
+    let extent = level_extent(record, 0u);
+    let x = across * extent;
+    let y = down * extent;
+    return 0.5 * log2(max(abs(x.x * y.y - x.y * y.x), 1e-20));
+}

@@ -1,0 +1,119 @@
+// What becomes of a gaze that meets a surface; twin of transport/interaction.rs.
+
+// Orientation of a point: normals on the side of the gaze.
+struct Facing {
+    front: bool,
+    geometric: vec3f,
+    // The geometric one where the shading normal faces away.
+    shading: vec3f,
+}
+
+// A way on. Its share is of radiance; 0 where there is none.
+struct Branch {
+    direction: vec3f,
+    share: vec3f,
+    media: vec4u,
+    // Change of the angle across the footprint, over the footprint's width and by its own spread.
+    spread_per_width: f32,
+    spread_factor: f32,
+}
+
+struct Interaction {
+    // Share of the light of the map that comes back along the gaze.
+    own: f32,
+    reflection: Branch,
+    transmission: Branch,
+}
+
+fn face(point: SurfacePoint, incident: vec3f) -> Facing {
+    let front = dot(incident, point.geometric_normal) < 0.0;
+    let geometric = select(-point.geometric_normal, point.geometric_normal, front);
+    let towards = dot(point.shading_normal, geometric) >= 0.0;
+    let shading = select(-point.shading_normal, point.shading_normal, towards);
+    return Facing(front, geometric, select(geometric, shading, dot(incident, shading) < 0.0));
+}
+
+fn no_branch() -> Branch {
+    return Branch(vec3f(0.0), vec3f(0.0), vec4u(0u), 0.0, 1.0);
+}
+
+fn reflection(point: SurfacePoint, facing: Facing, incident: vec3f, media: vec4u, share: vec3f) -> Branch {
+    var direction = mirrored(incident, facing.shading);
+    if dot(direction, facing.geometric) <= 0.0 {
+        direction = mirrored(incident, facing.geometric);
+    }
+    let curvature = select(-point.curvature, point.curvature, facing.front);
+    return Branch(direction, share, media, 2.0 * curvature, 1.0);
+}
+
+fn thin_wall(point: SurfacePoint, facing: Facing, incident: vec3f, media: vec4u, tint: vec3f) -> Interaction {
+    let object = objects[point.object];
+    let reflectance = thin_wall_reflectance(-dot(incident, facing.shading), object.ior / medium_ior(media));
+    return Interaction(
+        0.0,
+        reflection(point, facing, incident, media, vec3f(reflectance)),
+        Branch(incident, tint * (1.0 - reflectance), media, 0.0, 1.0),
+    );
+}
+
+fn dielectric(point: SurfacePoint, facing: Facing, incident: vec3f, media: vec4u, tint: vec3f) -> Interaction {
+    let ior = objects[point.object].ior;
+    var beyond = left(media, point.object);
+    var ior_near = ior;
+    var ior_far = medium_ior(beyond);
+    if facing.front {
+        beyond = entered(media, point.object);
+        ior_near = medium_ior(media);
+        ior_far = ior;
+    }
+    let eta = ior_far / ior_near;
+    let cos_incident = -dot(incident, facing.shading);
+    let cos_clamped = clamp(cos_incident, 0.0, 1.0);
+    let cos_geometric = clamp(-dot(incident, facing.geometric), 0.0, 1.0);
+    let whole = Interaction(0.0, reflection(point, facing, incident, media, vec3f(1.0)), no_branch());
+    if eta != 1.0 && scaled_cos2_transmitted(cos_clamped, eta) <= 0.0 {
+        return whole;
+    }
+    var direction = refracted(incident, facing.shading, eta);
+    if dot(direction, facing.geometric) >= 0.0 {
+        if eta != 1.0 && scaled_cos2_transmitted(cos_geometric, eta) <= 0.0 {
+            return whole;
+        }
+        direction = refracted(incident, facing.geometric, eta);
+    }
+    let reflectance = dielectric_reflectance(cos_incident, eta);
+    // Radiance grows by the square of n on the gaze's side over n on the far side.
+    let share = tint * ((1.0 - reflectance) / (eta * eta));
+    let curvature = select(-point.curvature, point.curvature, facing.front);
+    return Interaction(
+        0.0,
+        reflection(point, facing, incident, media, vec3f(reflectance)),
+        Branch(direction, share, beyond, curvature * (1.0 / eta - 1.0), 1.0 / eta),
+    );
+}
+
+fn interact(point: SurfacePoint, incident: vec3f, media: vec4u, tint: vec3f) -> Interaction {
+    let object = objects[point.object];
+    let facing = face(point, incident);
+    let cos_incident = -dot(incident, facing.shading);
+    switch object.surface {
+        case SURFACE_MIRROR: {
+            let share = metal_reflectance(cos_incident, tint);
+            return Interaction(0.0, reflection(point, facing, incident, media, share), no_branch());
+        }
+        case SURFACE_MIXED: {
+            let reflectance = dielectric_reflectance(cos_incident, object.ior / medium_ior(media));
+            let back = reflection(point, facing, incident, media, vec3f(reflectance));
+            return Interaction(1.0 - reflectance, back, no_branch());
+        }
+        case SURFACE_THIN_WALL: {
+            return thin_wall(point, facing, incident, media, tint);
+        }
+        case SURFACE_DIELECTRIC: {
+            return dielectric(point, facing, incident, media, tint);
+        }
+        default: {
+            return Interaction(1.0, no_branch(), no_branch());
+        }
+    }
+}

@@ -1,0 +1,62 @@
+// The bodies that a chain is inside of, innermost first: eight 16-bit numbers, object index + 1 each, 0 for none. Twin
+// of transport/medium.rs.
+
+const MEDIA: u32 = 8u;
+
+fn medium_at(media: vec4u, place: u32) -> u32 {
+    return (media[place / 2u] >> (16u * (place % 2u))) & 0xffffu;
+}
+
+// Number of the innermost body, 0 outside of all.
+fn innermost(media: vec4u) -> u32 {
+    return media.x & 0xffffu;
+}
+
+// Beyond the capacity a body is not remembered.
+fn entered(media: vec4u, object: u32) -> vec4u {
+    if medium_at(media, MEDIA - 1u) != 0u {
+        return media;
+    }
+    return vec4u(
+        (media.x << 16u) | (object + 1u),
+        (media.y << 16u) | (media.x >> 16u),
+        (media.z << 16u) | (media.y >> 16u),
+        (media.w << 16u) | (media.z >> 16u),
+    );
+}
+
+// Its innermost entry is taken out; unchanged where the chain was not inside it.
+fn left(media: vec4u, object: u32) -> vec4u {
+    var place = 0u;
+    while place < MEDIA && medium_at(media, place) != object + 1u {
+        place += 1u;
+    }
+    if place == MEDIA {
+        return media;
+    }
+    var kept = vec4u(0u);
+    for (var to = 0u; to < MEDIA; to += 1u) {
+        let source = select(to + 1u, to, to < place);
+        if source < MEDIA {
+            kept[to / 2u] |= medium_at(media, source) << (16u * (to % 2u));
+        }
+    }
+    return kept;
+}
+
+fn medium_ior(media: vec4u) -> f32 {
+    let number = innermost(media);
+    if number == 0u {
+        return 1.0;
+    }
+    return objects[number - 1u].ior;
+}
+
+// Share of light that is left after a distance [m] in the innermost body (Beer and Lambert).
+fn medium_transmittance(media: vec4u, distance_m: f32) -> vec3f {
+    let number = innermost(media);
+    if number == 0u {
+        return vec3f(1.0);
+    }
+    return exp(-objects[number - 1u].absorption_per_m * distance_m);
+}

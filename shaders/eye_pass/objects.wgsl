@@ -1,0 +1,23 @@
+// What objects look like, all of them in one buffer.
+
+struct ObjectRecord {
+    base_colour: vec3f,
+    ior: f32,
+    emitted_radiance: vec3f,
+    surface: u32,
+    absorption_per_m: vec3f,
+    double_sided: u32,
+    map: u32,
+    texture: u32,
+    padding: vec2u,
+}
+
+const SURFACE_DIFFUSE: u32 = 0u;
+const SURFACE_MIRROR: u32 = 1u;
+const SURFACE_DIELECTRIC: u32 = 2u;
+const SURFACE_THIN_WALL: u32 = 3u;
+const SURFACE_MIXED: u32 = 4u;
+
+const PI: f32 = 3.14159265358979;
+
+@group(0) @binding(1) var<storage, read> objects: array<ObjectRecord>;

@@ -1,0 +1,28 @@
+// Corners of triangles in the picture.
+
+struct Corner {
+    @location(0) position: vec3f,
+    @location(1) normal: vec3f,
+    @location(2) uv: vec2f,
+    @location(3) map_uv: vec2f,
+}
+
+struct Fragment {
+    // The same bits in every pass: what is drawn twice is compared for equal depth.
+    @builtin(position) @invariant clip: vec4f,
+    @location(0) from_camera: vec3f,
+    @location(1) normal: vec3f,
+    @location(2) uv: vec2f,
+    @location(3) map_uv: vec2f,
+    @location(4) @interpolate(flat) object: u32,
+}
+
+@vertex
+fn place(corner: Corner, @builtin(instance_index) object: u32) -> Fragment {
+    // Relative to the camera first: differences of nearby numbers lose nothing.
+    let from_camera = corner.position - frame.camera_position;
+    var clip = frame.clip_from_camera * vec4f(from_camera, 1.0);
+    clip.x -= frame.jitter.x * clip.w;
+    clip.y -= frame.jitter.y * clip.w;
+    return Fragment(clip, from_camera, corner.normal, corner.uv, corner.map_uv, object);
+}

@@ -1,0 +1,18 @@
+// What is seen where a specular surface is nearest: the pixel's chain, from the eye on.
+
+// Objects are told apart by this many marks, which half floats hold.
+const MARKS: u32 = 2000u;
+
+fn mark(object: u32) -> f32 {
+    return f32(object % MARKS + 1u);
+}
+
+@fragment
+fn traced(fragment: Fragment) -> @location(0) vec4f {
+    let size = vec2f(frame.traced_width, frame.traced_height);
+    let within = fragment.clip.xy / size * vec2f(2.0, -2.0) + vec2f(-1.0, 1.0) + frame.jitter;
+    let direction = normalize(frame.forward + within.x * frame.right + within.y * frame.up);
+    let origin = start.eye + direction * (start.near / dot(direction, frame.forward));
+    let gaze = Gaze(origin, 0u, direction, start.near * frame.pixel_rad, vec3f(1.0), frame.pixel_rad, start.media);
+    return vec4f(scaled(chain_radiance(gaze)), mark(fragment.object));
+}

@@ -1,0 +1,180 @@
+// The nearest triangle on a ray, in local coordinates: the scene's radius is at most one. Twin of geometry/bvh.rs and
+// geometry/triangle.rs in single precision.
+
+struct Node {
+    low: vec3f,
+    first: u32,
+    high: vec3f,
+    count: u32,
+}
+
+struct Triangle {
+    a: vec3f,
+    object: u32,
+    b: vec3f,
+    first_index: u32,
+    c: vec3f,
+    order: u32,
+}
+
+@group(1) @binding(1) var<storage, read> nodes: array<Node>;
+@group(1) @binding(2) var<storage, read> triangles: array<Triangle>;
+
+// In place of a triangle where nothing is met.
+const NO_TRIANGLE: u32 = 0xffffffffu;
+// Farther than anything [local].
+const FAR_AWAY: f32 = 3e38;
+// By which boxes are too large [local]: rounding of distances to them stays below.
+const BOX_MARGIN: f32 = 1.9073486e-6;
+// Nodes that may wait: hierarchies are at most this deep.
+const STACK: u32 = 64u;
+
+struct Hit {
+    triangle: u32,
+    distance: f32,
+    barycentric: vec3f,
+}
+
+// A ray as all triangles and boxes need it.
+struct Sheared {
+    origin: vec3f,
+    inverse: vec3f,
+    shear: vec3f,
+    // Which axis is the largest of the direction, and whether it points down it.
+    axis: u32,
+    is_down: bool,
+}
+
+// The ray's largest axis as z, handedness kept.
+fn turned(v: vec3f, ray: Sheared) -> vec3f {
+    let along = select(select(v.xyz, v.zxy, ray.axis == 1u), v.yzx, ray.axis == 0u);
+    return select(along, along.yxz, ray.is_down);
+}
+
+fn sheared(origin: vec3f, direction: vec3f) -> Sheared {
+    let size = abs(direction);
+    var axis = 2u;
+    if size.x > size.y && size.x > size.z {
+        axis = 0u;
+    } else if size.x <= size.y && size.y > size.z {
+        axis = 1u;
+    }
+    // No division by zero; signs do not matter where the other side of a box is as far.
+    let safe = select(direction, vec3f(1e-20), size < vec3f(1e-20));
+    let is_down = direction[axis] < 0.0;
+    var ray = Sheared(origin, 1.0 / safe, vec3f(0.0), axis, is_down);
+    let d = turned(direction, ray);
+    ray.shear = vec3f(d.x / d.z, d.y / d.z, 1.0 / d.z);
+    return ray;
+}
+
+// p.x q.y - p.y q.x, computed alike for both triangles of an edge whatever the compiler makes of it.
+fn edge_function(p: vec2f, q: vec2f) -> f32 {
+    let is_ordered = p.x < q.x || (p.x == q.x && p.y < q.y);
+    let low = select(q, p, is_ordered);
+    let high = select(p, q, is_ordered);
+    let value = low.x * high.y - low.y * high.x;
+    return select(-value, value, is_ordered);
+}
+
+// Bound of the relative error of n rounded operations.
+fn gamma(n: f32) -> f32 {
+    return n * 5.9604645e-8 / (1.0 - n * 5.9604645e-8);
+}
+
+// Woop, Benthin and Wald 2013: watertight. Distance below zero where the triangle is missed.
+fn meet_triangle(ray: Sheared, index: u32) -> Hit {
+    let triangle = triangles[index];
+    let a = turned(triangle.a - ray.origin, ray);
+    let b = turned(triangle.b - ray.origin, ray);
+    let c = turned(triangle.c - ray.origin, ray);
+    let pa = a.xy - ray.shear.xy * a.z;
+    let pb = b.xy - ray.shear.xy * b.z;
+    let pc = c.xy - ray.shear.xy * c.z;
+    let u = edge_function(pc, pb);
+    let v = edge_function(pa, pc);
+    let w = edge_function(pb, pa);
+    let missed = Hit(NO_TRIANGLE, -1.0, vec3f(0.0));
+    if min(u, min(v, w)) < 0.0 && max(u, max(v, w)) > 0.0 {
+        return missed;
+    }
+    let determinant = u + v + w;
+    if determinant == 0.0 {
+        return missed;
+    }
+    let distance = ray.shear.z * (u * a.z + v * b.z + w * c.z) / determinant;
+    // Pharr, Jakob and Humphreys, Physically Based Rendering, 6.8.7: below this it may be no distance at all.
+    let x = max(abs(pa.x), max(abs(pb.x), abs(pc.x)));
+    let y = max(abs(pa.y), max(abs(pb.y), abs(pc.y)));
+    let z = max(abs(a.z), max(abs(b.z), abs(c.z))) * abs(ray.shear.z);
+    let edge = max(abs(u), max(abs(v), abs(w)));
+    let error_x = gamma(5.0) * (x + z);
+    let error_y = gamma(5.0) * (y + z);
+    let error_edge = 2.0 * (gamma(2.0) * x * y + error_y * x + error_x * y);
+    let bound = 3.0 * (gamma(3.0) * edge * z + error_edge * z + gamma(3.0) * z * edge) / abs(determinant);
+    if distance > bound && distance < FAR_AWAY {
+        return Hit(index, distance, vec3f(u, v, w) / determinant);
+    }
+    return missed;
+}
+
+// Distance at which a ray enters a box before a limit; FAR_AWAY where it does not.
+fn enter(ray: Sheared, index: u32, limit: f32) -> f32 {
+    let node = nodes[index];
+    let low = (node.low - ray.origin) * ray.inverse;
+    let high = (node.high - ray.origin) * ray.inverse;
+    let near = min(low, high);
+    let far = max(low, high);
+    let begin = max(max(near.x, near.y), max(near.z, 0.0));
+    let end = min(min(far.x, far.y), min(far.z, limit + BOX_MARGIN));
+    return select(FAR_AWAY, begin, begin <= end);
+}
+
+// The nearest triangle before a limit, from either side.
+fn closest_hit(origin: vec3f, direction: vec3f, limit: f32) -> Hit {
+    let ray = sheared(origin, direction);
+    var best = Hit(NO_TRIANGLE, limit, vec3f(0.0));
+    var best_order = 0u;
+    var waiting: array<vec2f, STACK>;
+    var count = 0u;
+    var index = 0u;
+    loop {
+        let node = nodes[index];
+        if node.count > 0u {
+            for (var slot = node.first; slot < node.first + node.count; slot += 1u) {
+                let found = meet_triangle(ray, slot);
+                let order = triangles[slot].order;
+                // Of triangles at the same distance the first given.
+                let is_nearer = found.distance < best.distance
+                    || (found.distance == best.distance && order < best_order);
+                if found.triangle != NO_TRIANGLE && is_nearer {
+                    best = found;
+                    best_order = order;
+                }
+            }
+        } else {
+            let left = enter(ray, node.first, best.distance);
+            let right = enter(ray, node.first + 1u, best.distance);
+            let is_left = left <= right;
+            if max(left, right) < FAR_AWAY && count < STACK {
+                let later = select(node.first, node.first + 1u, is_left);
+                waiting[count] = vec2f(bitcast<f32>(later), max(left, right));
+                count += 1u;
+            }
+            if min(left, right) < FAR_AWAY {
+                index = select(node.first + 1u, node.first, is_left);
+                continue;
+            }
+        }
+        var has_next = false;
+        while count > 0u && !has_next {
+            count -= 1u;
+            index = bitcast<u32>(waiting[count].x);
+            has_next = waiting[count].y <= best.distance + BOX_MARGIN;
+        }
+        if !has_next {
+            break;
+        }
+    }
+    return best;
+}

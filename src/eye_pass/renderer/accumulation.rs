@@ -1,0 +1,142 @@
+//! The mean of several pictures of the same view: edges of what is seen in mirrors and through glass become as smooth
+//! as all others.
+
+use wgpu::util::DeviceExt;
+
+use super::bindings::{bind_group, bind_group_layout, pipeline_layout, texture, uniform};
+use super::shaders::ACCUMULATED;
+use super::uniforms::Accumulation;
+use crate::gpu::Gpu;
+
+/// A mean of many half floats needs more digits than they have.
+const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Float;
+
+/// Two pictures in turn: the mean, and the mean before.
+#[derive(Debug)]
+pub(super) struct Mean {
+    width: u32,
+    height: u32,
+    pictures: [wgpu::Texture; 2],
+    views: [wgpu::TextureView; 2],
+    /// Pictures in the mean.
+    count: u32,
+    layout: wgpu::BindGroupLayout,
+    pipeline: wgpu::RenderPipeline,
+}
+
+impl Mean {
+    /// For pictures of a size that the device's textures can have.
+    pub(super) fn new(gpu: &Gpu, width: u32, height: u32) -> Self {
+        let picture = || {
+            gpu.device.create_texture(&wgpu::TextureDescriptor {
+                label: Some("mean"),
+                size: wgpu::Extent3d {
+                    width,
+                    height,
+                    depth_or_array_layers: 1,
+                },
+                mip_level_count: 1,
+                sample_count: 1,
+                dimension: wgpu::TextureDimension::D2,
+                format: FORMAT,
+                usage: wgpu::TextureUsages::RENDER_ATTACHMENT
+                    | wgpu::TextureUsages::TEXTURE_BINDING
+                    | wgpu::TextureUsages::COPY_SRC,
+                view_formats: &[],
+            })
+        };
+        let pictures = [picture(), picture()];
+        let picture = || texture(false, wgpu::TextureViewDimension::D2);
+        let bindings = [uniform(wgpu::ShaderStages::FRAGMENT), picture(), picture()];
+        let layout = bind_group_layout(gpu, "mean", &bindings);
+        Self {
+            width,
+            height,
+            views: [0, 1].map(|index: usize| pictures[index].create_view(&Default::default())),
+            pictures,
+            count: 0,
+            pipeline: pipeline(gpu, &layout),
+            layout,
+        }
+    }
+
+    pub(super) fn has_size(&self, width: u32, height: u32) -> bool {
+        (self.width, self.height) == (width, height)
+    }
+
+    /// Forgets all pictures.
+    pub(super) fn clear(&mut self) {
+        self.count = 0;
+    }
+
+    /// Pictures in the mean.
+    pub(super) fn count(&self) -> u32 {
+        self.count
+    }
+
+    /// Takes up a picture of the same size.
+    pub(super) fn add(&mut self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, picture: &wgpu::TextureView) {
+        let accumulation = Accumulation {
+            share: 1.0 / (self.count + 1) as f32,
+            ..Default::default()
+        };
+        let buffer = gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+            label: Some("share"),
+            contents: bytemuck::bytes_of(&accumulation),
+            usage: wgpu::BufferUsages::UNIFORM,
+        });
+        let (before, after) = (self.count as usize % 2, (self.count as usize + 1) % 2);
+        let resources = [
+            buffer.as_entire_binding(),
+            wgpu::BindingResource::TextureView(picture),
+            wgpu::BindingResource::TextureView(&self.views[before]),
+        ];
+        let bind_group = bind_group(gpu, "mean", &self.layout, resources);
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("mean"),
+            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                view: &self.views[after],
+                depth_slice: None,
+                resolve_target: None,
+                ops: wgpu::Operations::default(),
+            })],
+            ..Default::default()
+        });
+        pass.set_pipeline(&self.pipeline);
+        pass.set_bind_group(0, &bind_group, &[]);
+        pass.draw(0..3, 0..1);
+        self.count += 1;
+    }
+
+    /// The mean: to be looked at, and to be read back as four floats per pixel.
+    pub(super) fn picture(&self) -> (&wgpu::Texture, &wgpu::TextureView) {
+        let latest = self.count as usize % 2;
+        (&self.pictures[latest], &self.views[latest])
+    }
+}
+
+fn pipeline(gpu: &Gpu, layout: &wgpu::BindGroupLayout) -> wgpu::RenderPipeline {
+    let module = ACCUMULATED.module(&gpu.device);
+    gpu.device
+        .create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+            label: Some("mean"),
+            layout: Some(&pipeline_layout(gpu, &[layout])),
+            vertex: wgpu::VertexState {
+                module: &module,
+                entry_point: Some("cover"),
+                compilation_options: Default::default(),
+                buffers: &[],
+            },
+            primitive: Default::default(),
+            depth_stencil: None,
+            multisample: Default::default(),
+            fragment: Some(wgpu::FragmentState {
+                module: &module,
+                entry_point: Some("accumulated"),
+                compilation_options: Default::default(),
+                targets: &[Some(FORMAT.into())],
+            }),
+            multiview_mask: None,
+            cache: None,
+        })
+}

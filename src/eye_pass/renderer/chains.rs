@@ -1,0 +1,214 @@
+//! What chains are traced through: the scene's triangles in their hierarchy, made when something specular first comes
+//! into view.
+
+use std::sync::Arc;
+
+use glam::DVec3;
+use wgpu::util::DeviceExt;
+
+use super::bindings::bind_group;
+use super::geometry::Geometry;
+use super::storage::Storage;
+use super::uniforms::{ChainStart, Node, Triangle};
+use crate::error::{Error, Result};
+use crate::eye_pass::View;
+use crate::eye_pass::reference::{ChainLimits, media_at};
+use crate::geometry::PackedBvh;
+use crate::gpu::Gpu;
+use crate::scene::Scene;
+use crate::transport::{MediumStack, Tracer};
+
+/// Nodes that may wait while a ray is traced; `STACK` in the shader.
+const STACK: usize = 64;
+/// Largest number of a body that a chain can remember.
+const MOST_OBJECTS: usize = u16::MAX as usize - 1;
+/// Storage buffers that a fragment of a chain reads.
+const BUFFERS: u32 = 7;
+/// Surfaces at which both ways on can be followed; `MOST_BRANCHING` in the shader.
+pub(super) const MOST_BRANCHING: u32 = 4;
+
+/// The scene as chains see it.
+#[derive(Debug)]
+pub(super) struct ChainScene {
+    /// In double precision: it tells which bodies the eye is in.
+    tracer: Tracer,
+    centre: DVec3,
+    /// Local units per metre.
+    scale: f64,
+    nodes: Storage,
+    triangles: Storage,
+    bytes: u64,
+}
+
+impl ChainScene {
+    /// Builds and uploads the hierarchy; what `before` has of it is not built again.
+    ///
+    /// # Errors
+    /// A scene that is larger than what the device lets a shader read.
+    pub(super) fn new(
+        gpu: &Gpu,
+        scene: &Arc<Scene>,
+        geometry: &Geometry,
+        before: Option<Self>,
+    ) -> Result<Self> {
+        let tracer = match before {
+            Some(before) => before.tracer.edited(Arc::clone(scene)),
+            None => Tracer::new(Arc::clone(scene)),
+        };
+        let packed = tracer.bvh().packed();
+        check(gpu, scene, geometry, &packed)?;
+        let corners = places_of_corners(scene, geometry);
+        let records = packed.triangles.iter().zip(&packed.corners);
+        let records: Vec<Triangle> = records
+            .map(|(&order, &[a, b, c])| {
+                let (object, first_index) = corners[order as usize];
+                Triangle {
+                    a,
+                    object,
+                    b,
+                    first_index,
+                    c,
+                    order,
+                }
+            })
+            .collect();
+        let nodes = packed.nodes.iter().map(|node| Node {
+            low: node.low,
+            first: node.first,
+            high: node.high,
+            count: node.count,
+        });
+        let nodes: Vec<Node> = nodes.collect();
+        let mut made = Self {
+            tracer,
+            centre: packed.centre,
+            scale: packed.scale,
+            nodes: Storage::new(gpu, "nodes"),
+            triangles: Storage::new(gpu, "triangles"),
+            bytes: 0,
+        };
+        made.bytes = (made.nodes.write(gpu, &nodes) + made.triangles.write(gpu, &records)) as u64;
+        Ok(made)
+    }
+
+    /// What it takes on the device [bytes].
+    pub(super) fn bytes(&self) -> u64 {
+        self.bytes
+    }
+
+    /// A place [m] in local coordinates.
+    pub(super) fn local(&self, place: DVec3) -> [f32; 3] {
+        ((place - self.centre) * self.scale).as_vec3().to_array()
+    }
+
+    /// Length of a local unit [m].
+    pub(super) fn unit_m(&self) -> f64 {
+        1.0 / self.scale
+    }
+
+    /// Nodes and triangles.
+    pub(super) fn bindings(&self) -> [wgpu::BindingResource<'_>; 2] {
+        [self.nodes.binding(), self.triangles.binding()]
+    }
+
+    /// Group 1 of what traces; `None` without triangles.
+    pub(super) fn bind(
+        &self,
+        gpu: &Gpu,
+        layout: &wgpu::BindGroupLayout,
+        geometry: &Geometry,
+        start: &ChainStart,
+    ) -> Option<wgpu::BindGroup> {
+        let buffer = gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+            label: Some("start of chains"),
+            contents: bytemuck::bytes_of(start),
+            usage: wgpu::BufferUsages::UNIFORM,
+        });
+        let page = geometry.pages.first()?;
+        let resources = [
+            buffer.as_entire_binding(),
+            self.nodes.binding(),
+            self.triangles.binding(),
+            page.corners.as_entire_binding(),
+            page.map_uvs.as_entire_binding(),
+            page.indices.as_entire_binding(),
+        ];
+        Some(bind_group(gpu, "chains", layout, resources))
+    }
+
+    /// Where the chains of a view begin.
+    pub(super) fn start(&self, view: &View, limits: &ChainLimits) -> ChainStart {
+        let eye = view.camera.position;
+        ChainStart {
+            eye: self.local(eye),
+            unit_m: self.unit_m() as f32,
+            media: numbers(&media_at(&self.tracer, eye)),
+            near: (view.camera.near_m * self.scale) as f32,
+            branch_threshold: limits.branch_threshold as f32,
+            max_depth: limits.max_depth,
+            branching_depth: limits.branching_depth.min(MOST_BRANCHING),
+        }
+    }
+}
+
+/// Object and place of the three corner indices of each triangle, object by object.
+fn places_of_corners(scene: &Scene, geometry: &Geometry) -> Vec<(u32, u32)> {
+    let mut places = Vec::with_capacity(scene.triangle_count());
+    for (object, segments) in (0..).zip(&geometry.segments) {
+        for segment in segments {
+            let firsts = segment.indices.clone().step_by(3);
+            places.extend(firsts.map(|first| (object, first)));
+        }
+    }
+    places
+}
+
+/// Bodies as `medium.wgsl` has them: innermost first, 16 bits each, object index + 1.
+fn numbers(media: &MediumStack) -> [u32; 4] {
+    let mut words = [0; 4];
+    for (place, object) in media.objects().iter().rev().enumerate() {
+        words[place / 2] |= (object + 1) << (16 * (place % 2));
+    }
+    words
+}
+
+/// # Errors
+/// A scene that chains cannot be traced through on this device.
+fn check(gpu: &Gpu, scene: &Scene, geometry: &Geometry, packed: &PackedBvh) -> Result<()> {
+    let limits = gpu.limits();
+    let largest = (packed.nodes.len() * size_of::<Node>()).max(packed.corners.len() * size_of::<Triangle>());
+    let refused = |what: String| {
+        Err(Error::failure(
+            format!("mirrors and glass of {}", scene.name),
+            format!("{what}: they are drawn without what is seen in them"),
+            "use a larger graphics device, or `render --backend cpu`",
+        ))
+    };
+    if limits.max_storage_buffers_per_shader_stage < BUFFERS {
+        return refused(format!(
+            "the device lets a shader read {} buffers, and chains take {BUFFERS}",
+            limits.max_storage_buffers_per_shader_stage
+        ));
+    }
+    let readable = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+    if geometry.pages.len() > 1 || largest as u64 > readable {
+        return refused(format!(
+            "a shader of the device reads {} KiB at a time, and {} triangles take more",
+            readable >> 10,
+            packed.corners.len()
+        ));
+    }
+    if scene.objects.len() > MOST_OBJECTS {
+        return refused(format!(
+            "{} objects are more than the {MOST_OBJECTS} that chains tell apart",
+            scene.objects.len()
+        ));
+    }
+    if packed.depth >= STACK {
+        return refused(format!(
+            "the hierarchy of its triangles is {} levels deep, and chains go through {STACK}",
+            packed.depth
+        ));
+    }
+    Ok(())
+}

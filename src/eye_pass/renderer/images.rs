@@ -1,0 +1,219 @@
+//! All images of a scene on the device: illumination maps and textures, and the table that says where their tiles are.
+
+use std::sync::Arc;
+
+use super::budget;
+use super::maps::{DeviceMap, ShownMap};
+use super::paging::{PagedImage, TilePool, Uploaded};
+use super::storage::Storage;
+use super::textures;
+use crate::gpu::Gpu;
+use crate::scene::{Scene, Texture};
+
+/// What an object refers to in place of an image that it does not have; `NO_IMAGE` in the shaders.
+pub(super) const NO_IMAGE: u32 = u32::MAX;
+
+/// Bytes of a tile of a map, as the device stores it.
+const MAP_TILE_BYTES: u64 =
+    (super::paging::STORED * super::paging::STORED * size_of::<super::maps::Texel>()) as u64;
+
+/// Maps and textures of a scene.
+#[derive(Debug)]
+pub(super) struct Images {
+    map_pool: TilePool,
+    texture_pool: TilePool,
+    /// By object.
+    maps: Vec<Option<DeviceMap>>,
+    /// As `textures` hold them.
+    sources: Vec<Arc<Texture>>,
+    textures: Vec<PagedImage<textures::Texel>>,
+    /// Records of images and where their tiles are.
+    pub(super) table: Storage,
+    /// Where the record of each object's map, and of each texture, starts in the table.
+    map_records: Vec<u32>,
+    texture_records: Vec<u32>,
+    /// Most that maps may take [bytes].
+    budget_bytes: u64,
+}
+
+impl Images {
+    pub(super) fn new(gpu: &Gpu, scene: &Scene, budget_bytes: u64) -> Self {
+        let mut images = Self {
+            map_pool: TilePool::new(gpu, "map tiles", wgpu::TextureFormat::Rgba16Float),
+            texture_pool: TilePool::new(gpu, "texture tiles", wgpu::TextureFormat::Rgba8UnormSrgb),
+            maps: (0..scene.objects.len()).map(|_| None).collect(),
+            sources: Vec::new(),
+            textures: Vec::new(),
+            table: Storage::new(gpu, "image table"),
+            map_records: Vec::new(),
+            texture_records: Vec::new(),
+            budget_bytes,
+        };
+        images.set_scene(gpu, scene);
+        images
+    }
+
+    /// Takes over the images of an edited scene; maps stay where the number of objects does.
+    pub(super) fn set_scene(&mut self, gpu: &Gpu, scene: &Scene) -> Uploaded {
+        let mut uploaded = Uploaded::default();
+        if self.maps.len() != scene.objects.len() {
+            self.maps
+                .iter_mut()
+                .flatten()
+                .for_each(|map| map.image.release(&mut self.map_pool));
+            self.maps = (0..scene.objects.len()).map(|_| None).collect();
+        }
+        let is_same = self.sources.len() == scene.textures.len()
+            && self
+                .sources
+                .iter()
+                .zip(&scene.textures)
+                .all(|(a, b)| Arc::ptr_eq(a, b));
+        if !is_same {
+            self.textures
+                .iter_mut()
+                .for_each(|image| image.release(&mut self.texture_pool));
+            self.sources.clone_from(&scene.textures);
+            self.textures.clear();
+            for texture in &self.sources {
+                let (image, bytes) = textures::upload(gpu, &mut self.texture_pool, texture);
+                self.textures.push(image);
+                uploaded += bytes;
+            }
+        }
+        uploaded += self.write_table(gpu);
+        uploaded
+    }
+
+    /// Shows these maps, by object, and no others.
+    pub(super) fn set_maps(&mut self, gpu: &Gpu, shown: &[Option<&ShownMap>]) -> Uploaded {
+        let mut uploaded = Uploaded::default();
+        for (map, shown) in self.maps.iter_mut().zip(shown) {
+            match (&mut *map, shown) {
+                (Some(old), Some(shown)) if old.can_become(shown) => {
+                    uploaded += old.update(gpu, &mut self.map_pool, shown);
+                }
+                (_, shown) => {
+                    if let Some(old) = map {
+                        old.image.release(&mut self.map_pool);
+                    }
+                    // A map beyond the budget starts with its coarsest level.
+                    let finest = shown.map(|shown| {
+                        let tiles = budget::tiles_of(shown.map.width(), shown.map.height());
+                        if tiles * MAP_TILE_BYTES > self.budget_bytes {
+                            usize::MAX
+                        } else {
+                            0
+                        }
+                    });
+                    let made = shown
+                        .zip(finest)
+                        .map(|(shown, finest)| DeviceMap::new(gpu, &mut self.map_pool, shown, finest));
+                    *map = made.map(|(made, bytes)| {
+                        uploaded += bytes;
+                        made
+                    });
+                }
+            }
+        }
+        uploaded += self.write_table(gpu);
+        uploaded
+    }
+
+    /// Holds of each map the levels that fit the budget together; of maps that are seen coarsely, by `needs` [levels],
+    /// the finest ones go first.
+    pub(super) fn keep_budget(&mut self, gpu: &Gpu, needs: &[f64]) -> Uploaded {
+        let maps: Vec<(usize, &DeviceMap)> = self
+            .maps
+            .iter()
+            .enumerate()
+            .filter_map(|(object, map)| Some((object, map.as_ref()?)))
+            .collect();
+        let costs = maps.iter().map(|(object, map)| budget::Cost {
+            need: needs.get(*object).copied().unwrap_or(f64::INFINITY),
+            tiles: (0..map.image.level_count())
+                .map(|level| map.image.tiles_of_level(level))
+                .collect(),
+        });
+        let finest = budget::finest_levels(&costs.collect::<Vec<_>>(), self.budget_bytes / MAP_TILE_BYTES);
+        let wanted: Vec<(usize, usize)> = maps.iter().map(|(object, _)| *object).zip(finest).collect();
+        let mut uploaded = Uploaded::default();
+        // What goes makes room for what comes.
+        for is_coarser in [true, false] {
+            for (object, finest) in &wanted {
+                if let Some(map) = &mut self.maps[*object]
+                    && (*finest > map.image.finest()) == is_coarser
+                {
+                    uploaded += map.image.set_finest(gpu, &mut self.map_pool, *finest);
+                }
+            }
+        }
+        uploaded += self.write_table(gpu);
+        uploaded
+    }
+
+    /// Whether the maps could take more than the budget allows.
+    pub(super) fn may_exceed_budget(&self) -> bool {
+        let tiles = self.maps.iter().flatten().map(|map| {
+            let [width, height] = map.image.size();
+            budget::tiles_of(width, height)
+        });
+        tiles.sum::<u64>() * MAP_TILE_BYTES > self.budget_bytes
+    }
+
+    /// Changes the budget [bytes].
+    pub(super) fn set_budget(&mut self, bytes: u64) {
+        self.budget_bytes = bytes;
+    }
+
+    /// Illumination maps on the device [bytes].
+    pub(super) fn map_bytes(&self) -> u64 {
+        self.map_pool.tiles() * MAP_TILE_BYTES
+    }
+
+    /// Maps of which the device does not hold the finest level.
+    pub(super) fn coarse_maps(&self) -> u64 {
+        self.maps
+            .iter()
+            .flatten()
+            .filter(|map| map.image.finest() > 0)
+            .count() as u64
+    }
+
+    pub(super) fn map(&self, object: usize) -> Option<&DeviceMap> {
+        self.maps[object].as_ref()
+    }
+
+    /// Record of an object's map.
+    pub(super) fn map_record(&self, object: usize) -> u32 {
+        self.map_records[object]
+    }
+
+    /// Record of a texture.
+    pub(super) fn texture_record(&self, texture: usize) -> u32 {
+        self.texture_records.get(texture).copied().unwrap_or(NO_IMAGE)
+    }
+
+    /// Tiles of maps, and of textures.
+    pub(super) fn views(&self) -> [wgpu::TextureView; 2] {
+        [self.map_pool.view(), self.texture_pool.view()]
+    }
+
+    fn write_table(&mut self, gpu: &Gpu) -> Uploaded {
+        let mut words = Vec::new();
+        let (mut map_records, mut texture_records) = (Vec::new(), Vec::new());
+        for map in &self.maps {
+            map_records.push(map.as_ref().map_or(NO_IMAGE, |map| {
+                let record = words.len() as u32;
+                map.image.write_record(&mut words, map.irradiance_scale);
+                record
+            }));
+        }
+        for texture in &self.textures {
+            texture_records.push(words.len() as u32);
+            texture.write_record(&mut words, 1.0);
+        }
+        (self.map_records, self.texture_records) = (map_records, texture_records);
+        Uploaded::other(self.table.write(gpu, &words))
+    }
+}

@@ -1,0 +1,163 @@
+//! Pictures without a window: radiance before exposure and tone mapping.
+
+use half::f16;
+
+use super::accumulation::Mean;
+use super::quality::Sample;
+use super::{EyeCounts, EyeQuality, Renderer};
+use crate::effect::EffectSwitch;
+use crate::error::Result;
+use crate::eye_pass::{Picture, View};
+use crate::gpu::{Gpu, readback};
+use crate::illumination::IlluminationMap;
+use crate::scene::Scene;
+
+/// Largest value of scaled radiance that the picture is scaled to: half floats end at 65504, and a body may still
+/// multiply it by the square of its refractive index.
+const LARGEST_SCALED: f64 = 4096.0;
+
+impl Renderer {
+    /// Radiance per pixel [W/(m² sr)] of a view, looked at through the centres of its pixels, in the precision of half
+    /// floats.
+    ///
+    /// # Errors
+    /// A size of 0 or above the device's limit; a lost device.
+    pub fn radiance(&mut self, gpu: &Gpu, view: &View) -> Result<Picture> {
+        self.radiance_sampled(gpu, view, 1)
+    }
+
+    /// Mean radiance of `samples_per_side`² places of each pixel, those of the CPU eye pass.
+    ///
+    /// # Errors
+    /// Those of [`radiance`](Self::radiance).
+    pub fn radiance_sampled(&mut self, gpu: &Gpu, view: &View, samples_per_side: u32) -> Result<Picture> {
+        let side = samples_per_side.max(1);
+        let scale = self.scale(view);
+        for index in 0..side * side {
+            let mut encoder = gpu
+                .device
+                .create_command_encoder(&wgpu::CommandEncoderDescriptor {
+                    label: Some("radiance"),
+                });
+            let sample = Sample::of_grid(index, side);
+            self.draw_radiance(gpu, &mut encoder, view, scale, sample, self.quality)?;
+            if side > 1 {
+                self.add_to_mean(gpu, &mut encoder, index == 0);
+            }
+            let has_specular = self.drawn[1] > 0;
+            if let Some(timing) = &mut self.timing {
+                timing.finish(&mut encoder, has_specular, false);
+            }
+            gpu.queue.submit([encoder.finish()]);
+        }
+        let radiance = if side > 1 {
+            self.read_mean(gpu, scale)?
+        } else {
+            self.read_resolved(gpu, scale)?
+        };
+        self.collect_times(gpu);
+        Ok(Picture {
+            width: view.width,
+            height: view.height,
+            radiance,
+        })
+    }
+
+    /// By which radiance fits half floats.
+    fn scale(&self, view: &View) -> f64 {
+        let peak = self.objects.peak_radiance.max(view.background.max_channel());
+        // A power of two changes no digit.
+        if peak > 0.0 {
+            (LARGEST_SCALED / peak).log2().floor().exp2()
+        } else {
+            1.0
+        }
+    }
+
+    fn add_to_mean(&mut self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, is_first: bool) {
+        let Some(targets) = &self.targets else { return };
+        let fits = |mean: &Mean| mean.has_size(targets.width, targets.height);
+        let mut mean = match self.mean.take().filter(fits) {
+            Some(mean) => mean,
+            None => Mean::new(gpu, targets.width, targets.height),
+        };
+        if is_first {
+            mean.clear();
+        }
+        mean.add(gpu, encoder, &targets.resolved_view);
+        self.mean = Some(mean);
+    }
+
+    fn read_resolved(&self, gpu: &Gpu, scale: f64) -> Result<Vec<[f32; 3]>> {
+        let bytes = match &self.targets {
+            Some(targets) => readback::read_texture(gpu, &targets.resolved)?,
+            None => Vec::new(),
+        };
+        let channel = |texel: &[u8], channel: usize| {
+            let half = f16::from_le_bytes([texel[2 * channel], texel[2 * channel + 1]]);
+            (f64::from(half) / scale) as f32
+        };
+        let texels = bytes.chunks_exact(8);
+        Ok(texels
+            .map(|texel| std::array::from_fn(|index| channel(texel, index)))
+            .collect())
+    }
+
+    fn read_mean(&self, gpu: &Gpu, scale: f64) -> Result<Vec<[f32; 3]>> {
+        let bytes = match &self.mean {
+            Some(mean) => readback::read_texture(gpu, mean.picture().0)?,
+            None => Vec::new(),
+        };
+        let channel = |texel: &[u8], channel: usize| {
+            let value: f32 = bytemuck::pod_read_unaligned(&texel[4 * channel..4 * channel + 4]);
+            (f64::from(value) / scale) as f32
+        };
+        let texels = bytes.chunks_exact(16);
+        Ok(texels
+            .map(|texel| std::array::from_fn(|index| channel(texel, index)))
+            .collect())
+    }
+}
+
+/// One picture through the centres of its pixels, in a quality to be kept.
+///
+/// # Errors
+/// Those of [`Renderer::new`], [`Renderer::set_maps`] and [`Renderer::radiance`].
+pub fn render_offscreen(gpu: &Gpu, scene: &Scene, maps: &[IlluminationMap], view: &View) -> Result<Picture> {
+    render_sampled(gpu, scene, maps, view, 1)
+}
+
+/// One picture, the mean of `samples_per_side`² places of each pixel.
+///
+/// # Errors
+/// Those of [`render_offscreen`].
+pub fn render_sampled(
+    gpu: &Gpu,
+    scene: &Scene,
+    maps: &[IlluminationMap],
+    view: &View,
+    samples_per_side: u32,
+) -> Result<Picture> {
+    let counted = render_counted(gpu, scene, maps, view, samples_per_side, EffectSwitch::Auto)?;
+    Ok(counted.0)
+}
+
+/// [`render_sampled`] with chains switched, and what was made and drawn for it.
+///
+/// # Errors
+/// Those of [`render_offscreen`].
+pub fn render_counted(
+    gpu: &Gpu,
+    scene: &Scene,
+    maps: &[IlluminationMap],
+    view: &View,
+    samples_per_side: u32,
+    chains: EffectSwitch,
+) -> Result<(Picture, EyeCounts)> {
+    let mut renderer = Renderer::new(gpu, scene, wgpu::TextureFormat::Rgba8Unorm, 1)?;
+    renderer.set_quality(EyeQuality::STILL);
+    renderer.set_maps(gpu, scene, maps)?;
+    renderer.set_chains(gpu, chains)?;
+    let picture = renderer.radiance_sampled(gpu, view, samples_per_side)?;
+    Ok((picture, renderer.counts()))
+}

@@ -1,0 +1,261 @@
+//! The passes of one picture: what is traced, then all surfaces.
+
+use wgpu::util::DeviceExt;
+
+use super::bindings::bind_group;
+use super::camera;
+use super::chains::ChainScene;
+use super::draws::{Draw, DrawList, Manner, visible_objects};
+use super::quality::{EyeQuality, Sample};
+use super::targets::{Targets, TracedTargets};
+use super::timing::Timing;
+use super::uniforms::{Frame, rgb};
+use super::{MapStyle, Renderer};
+use crate::effect::EffectSwitch;
+use crate::error::Result;
+use crate::eye_pass::View;
+use crate::eye_pass::reference::ChainLimits;
+use crate::gpu::Gpu;
+
+/// Largest value of scaled radiance of a background: half floats end at 65504.
+const LARGEST_SCALED: f64 = 32768.0;
+/// Level that is always finer than the finest.
+const FINEST: f64 = -64.0;
+
+impl Renderer {
+    /// Radiance times a scale, into this renderer's own targets.
+    pub(super) fn draw_radiance(
+        &mut self,
+        gpu: &Gpu,
+        encoder: &mut wgpu::CommandEncoder,
+        view: &View,
+        radiance_scale: f64,
+        sample: Sample,
+        quality: EyeQuality,
+    ) -> Result<()> {
+        self.collect_times(gpu);
+        self.drawn_view = None;
+        let size_fits = |targets: &Targets| (targets.width, targets.height) == (view.width, view.height);
+        let targets = match self.targets.take().filter(size_fits) {
+            Some(targets) => targets,
+            None => Targets::new(gpu, view.width, view.height, self.sample_count)?,
+        };
+        let list = self.prepare(gpu, view);
+        if list.specular_objects > 0 {
+            self.make_traced_targets(gpu, view, quality)?;
+        }
+        let frame = self.bind_frame(gpu, &self.frame(view, radiance_scale, sample, quality));
+        self.trace(gpu, encoder, view, &frame, &list, quality);
+        let background = view
+            .background
+            .map(|channel| (channel * radiance_scale).min(LARGEST_SCALED));
+        let marks = self.timing.as_ref().map(Timing::around_surfaces);
+        let mut pass = targets.begin_pass(encoder, background.to_array(), marks);
+        pass.set_bind_group(0, &frame, &[]);
+        if let Some(composed) = self.bind_composed(gpu, &list) {
+            pass.set_bind_group(1, &composed, &[]);
+        }
+        self.draw_each(&mut pass, &list.surfaces);
+        drop(pass);
+        self.drawn = [list.surfaces.len(), list.specular_objects];
+        self.targets = Some(targets);
+        Ok(())
+    }
+
+    /// Traces the chains of what is specular in view.
+    fn trace(
+        &self,
+        gpu: &Gpu,
+        encoder: &mut wgpu::CommandEncoder,
+        view: &View,
+        frame: &wgpu::BindGroup,
+        list: &DrawList,
+        quality: EyeQuality,
+    ) {
+        let (Some(scene), Some(targets), Some(layout)) =
+            (&self.chain_scene, &self.traced, self.surfaces.traced_layout())
+        else {
+            return;
+        };
+        if list.traced.is_empty() {
+            return;
+        }
+        let limits = ChainLimits {
+            branching_depth: quality.branching_depth,
+            ..ChainLimits::default()
+        };
+        let Some(chains) = scene.bind(gpu, layout, &self.geometry, &scene.start(view, &limits)) else {
+            return;
+        };
+        let timing = self.timing.as_ref();
+        let mut pass = targets.begin_depth(encoder, timing.map(Timing::before_chains));
+        pass.set_bind_group(0, frame, &[]);
+        self.draw_each(&mut pass, &list.depths);
+        drop(pass);
+        let mut pass = targets.begin_chains(encoder, timing.map(Timing::after_chains));
+        pass.set_bind_group(0, frame, &[]);
+        pass.set_bind_group(1, &chains, &[]);
+        self.draw_each(&mut pass, &list.traced);
+    }
+
+    fn make_traced_targets(&mut self, gpu: &Gpu, view: &View, quality: EyeQuality) -> Result<()> {
+        let limit = gpu.limits().max_texture_dimension_2d;
+        let side = |pixels: u32| ((f64::from(pixels) * quality.traced_scale).ceil() as u32).clamp(1, limit);
+        let (width, height) = (side(view.width), side(view.height));
+        let size_fits = |targets: &TracedTargets| (targets.width, targets.height) == (width, height);
+        if !self.traced.as_ref().is_some_and(size_fits) {
+            self.traced = Some(TracedTargets::new(gpu, width, height)?);
+        }
+        Ok(())
+    }
+
+    /// Makes what a view calls for and does not exist yet; gives what it draws.
+    fn prepare(&mut self, gpu: &Gpu, view: &View) -> DrawList {
+        if self.chains == EffectSwitch::On {
+            self.make_everything(gpu);
+        }
+        let visible = visible_objects(&self.objects, view);
+        let pixel_rad = view.camera.vertical_fov_rad / f64::from(view.height);
+        self.objects
+            .keep_budget(gpu, view.camera.position, pixel_rad, &visible);
+        let manner = self.manner();
+        if visible
+            .iter()
+            .any(|object| manner.is_specular(&self.objects.list[*object]))
+        {
+            self.make_chain_scene(gpu);
+        }
+        // What chains are traced through may have been refused.
+        let list = DrawList::new(&self.objects, &visible, self.manner());
+        for draw in list.all() {
+            self.surfaces.make(gpu, draw.key);
+        }
+        list
+    }
+
+    /// Makes what any view could call for, with maps as light.
+    pub(super) fn make_everything(&mut self, gpu: &Gpu) {
+        let lit = |manner: Manner| Manner {
+            style: MapStyle::Lit,
+            ..manner
+        };
+        let is_specular = |look| lit(self.manner()).is_specular(look);
+        let has_specular = self.objects.list.iter().any(is_specular);
+        if has_specular {
+            self.make_chain_scene(gpu);
+        }
+        let manner = lit(self.manner());
+        for look in &self.objects.list {
+            let traced = if has_specular {
+                manner.traced_keys(look)
+            } else {
+                Vec::new()
+            };
+            for key in manner.key(look).into_iter().chain(traced) {
+                self.surfaces.make(gpu, key);
+            }
+        }
+    }
+
+    /// Makes what chains are traced through, or brings it up to date.
+    fn make_chain_scene(&mut self, gpu: &Gpu) {
+        if self.chain_scene.is_some() && !self.chain_scene_is_stale {
+            return;
+        }
+        let before = self.chain_scene.take();
+        match ChainScene::new(gpu, &self.scene, &self.geometry, before) {
+            Ok(made) => {
+                self.chain_scene = Some(made);
+                self.chain_scene_is_stale = false;
+            }
+            Err(refusal) => {
+                log::warn!("{refusal}");
+                self.refusal = Some(refusal);
+            }
+        }
+    }
+
+    fn frame(&self, view: &View, radiance_scale: f64, sample: Sample, quality: EyeQuality) -> Frame {
+        let camera = &view.camera;
+        let size = [view.width, view.height].map(f64::from);
+        let traced = self
+            .traced
+            .as_ref()
+            .map_or([view.width, view.height], |traced| [traced.width, traced.height]);
+        let half_height = (0.5 * camera.vertical_fov_rad).tan();
+        let traced_height = f64::from(traced[1]);
+        let level_bias = if quality.minifies {
+            sample.level_bias
+        } else {
+            FINEST
+        };
+        Frame {
+            clip_from_camera: camera::clip_from_camera(view),
+            camera_position: camera::single(camera.position),
+            radiance_scale: radiance_scale as f32,
+            background: rgb(view.background),
+            level_bias: level_bias as f32,
+            forward: camera::single(camera.forward),
+            traced_width: traced[0] as f32,
+            right: camera::single(camera.right() * (half_height * size[0] / size[1])),
+            traced_height: traced_height as f32,
+            up: camera::single(camera.up * half_height),
+            pixel_rad: (2.0 * half_height / traced_height) as f32,
+            jitter: [
+                (2.0 * sample.offset[0] / size[0]) as f32,
+                (-2.0 * sample.offset[1] / size[1]) as f32,
+            ],
+            traced_per_pixel: [0, 1].map(|axis: usize| (f64::from(traced[axis]) / size[axis]) as f32),
+        }
+    }
+
+    fn bind_frame(&self, gpu: &Gpu, frame: &Frame) -> wgpu::BindGroup {
+        let buffer = gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+            label: Some("frame"),
+            contents: bytemuck::bytes_of(frame),
+            usage: wgpu::BufferUsages::UNIFORM,
+        });
+        let [maps, textures] = self.objects.images.views();
+        let resources = [
+            buffer.as_entire_binding(),
+            self.objects.records.binding(),
+            self.objects.images.table.binding(),
+            wgpu::BindingResource::TextureView(&maps),
+            wgpu::BindingResource::TextureView(&textures),
+        ];
+        bind_group(gpu, "frame", &self.surfaces.frame_layout, resources)
+    }
+
+    fn bind_composed(&self, gpu: &Gpu, list: &DrawList) -> Option<wgpu::BindGroup> {
+        let traced = self.traced.as_ref().filter(|_| list.specular_objects > 0)?;
+        let resources = [wgpu::BindingResource::TextureView(&traced.view)];
+        Some(bind_group(
+            gpu,
+            "traced picture",
+            &self.surfaces.composed_layout,
+            resources,
+        ))
+    }
+
+    fn draw_each(&self, pass: &mut wgpu::RenderPass<'_>, draws: &[Draw]) {
+        let (mut present_key, mut present_page) = (None, None);
+        for draw in draws {
+            let Some(pipeline) = self.surfaces.get(draw.key) else {
+                continue;
+            };
+            if present_key.replace(draw.key) != Some(draw.key) {
+                pass.set_pipeline(pipeline);
+            }
+            let object = draw.object as u32;
+            for segment in &self.geometry.segments[draw.object] {
+                if present_page.replace(segment.page) != Some(segment.page) {
+                    let page = &self.geometry.pages[segment.page];
+                    pass.set_vertex_buffer(0, page.corners.slice(..));
+                    pass.set_vertex_buffer(1, page.map_uvs.slice(..));
+                    pass.set_index_buffer(page.indices.slice(..), wgpu::IndexFormat::Uint32);
+                }
+                pass.draw_indexed(segment.indices.clone(), 0, object..object + 1);
+            }
+        }
+    }
+}
