@@ -5,8 +5,7 @@ use std::fmt::Write as _;
 use nephroid::effect::{Effect, EffectSwitch};
 use nephroid::error::{Error, Result};
 use nephroid::export::png;
-use nephroid::eye_pass::renderer::render_counted;
-use nephroid::eye_pass::{ToneMap, View, tone_mapping};
+use nephroid::eye_pass::{ToneMap, View};
 use nephroid::files::{self, OutputFolder};
 use nephroid::gpu::Gpu;
 use nephroid::optics::LinearSrgb;
@@ -63,7 +62,7 @@ pub fn run(job: &PathJob, terminal: &Terminal, interrupt: &Interrupt) -> Result<
     let maps = render::maps(&job.maps, &loaded, &clock, terminal, interrupt)?;
     let cameras = path.cameras(loaded.scene.origin_world);
     let (width, height) = job.picture.size;
-    let mut view = View {
+    let view = View {
         camera: cameras[0].clone(),
         width,
         height,
@@ -71,19 +70,15 @@ pub fn run(job: &PathJob, terminal: &Terminal, interrupt: &Interrupt) -> Result<
         tone_map: job.picture.tone_map,
         background: LinearSrgb::BLACK,
     };
-    view.exposure_stops = match job.picture.exposure {
-        Exposure::Stops(stops) => stops,
-        Exposure::Auto => {
-            let chains = EffectSwitch::Auto;
-            let (first, _) = render_counted(&gpu, &loaded.scene, &maps, &view, SAMPLES, chains)?;
-            tone_mapping::auto_exposure_stops(&first)
-        }
-    };
-    let walk = Walk {
+    let mut walk = Walk {
         scene: &loaded.scene,
         maps: &maps,
         view,
         cameras: &cameras,
+    };
+    walk.view.exposure_stops = match job.picture.exposure {
+        Exposure::Stops(stops) => stops,
+        Exposure::Auto => frame_times::auto_exposure_stops(&gpu, &walk)?,
     };
     let mut report = Report {
         path: job.path.display().to_string(),

@@ -8,8 +8,8 @@ use serde::Serialize;
 use super::repeats::median;
 use crate::effect::EffectSwitch;
 use crate::error::{Error, Result};
-use crate::eye_pass::View;
 use crate::eye_pass::renderer::{GpuMs, Renderer};
+use crate::eye_pass::{View, tone_mapping};
 use crate::gpu::{Gpu, readback};
 use crate::illumination::IlluminationMap;
 use crate::progress::{Control, Progress, Stage};
@@ -32,7 +32,7 @@ pub struct Walk<'a> {
     pub scene: &'a Scene,
     /// Its light.
     pub maps: &'a [IlluminationMap],
-    /// Size, exposure, tone map and background of every frame; its camera is not used.
+    /// Size, exposure, tone map and background of every frame; its camera counts for the exposure alone.
     pub view: View,
     /// One for each frame.
     pub cameras: &'a [Camera],
@@ -172,6 +172,22 @@ pub fn measure(
         }
     }
     Ok(manners.into_iter().map(Manner::times).collect())
+}
+
+/// Exposure that suits what the walk's view shows [stops].
+///
+/// # Errors
+/// A picture that the device cannot hold; a device that was lost.
+pub fn auto_exposure_stops(gpu: &Gpu, walk: &Walk<'_>) -> Result<f64> {
+    let mut renderer = Renderer::new(gpu, walk.scene, FORMAT, SAMPLES)?;
+    renderer.set_maps(gpu, walk.scene, walk.maps)?;
+    // An eighth of the pixels tells as much about the brightness as all of them.
+    let view = View {
+        width: walk.view.width.div_ceil(8),
+        height: walk.view.height.div_ceil(8),
+        ..walk.view.clone()
+    };
+    Ok(tone_mapping::auto_exposure_stops(&renderer.radiance(gpu, &view)?))
 }
 
 fn target(gpu: &Gpu, view: &View) -> wgpu::Texture {
