@@ -24,10 +24,14 @@ mod flip;
 #[path = "scene/glb.rs"]
 #[allow(dead_code)]
 mod glb;
+#[path = "gpu/nearby.rs"]
+mod nearby;
 #[path = "gpu/on_demand.rs"]
 mod on_demand;
 #[path = "gpu/radiance.rs"]
 mod radiance;
+#[path = "gpu/rays.rs"]
+mod rays;
 #[path = "gpu/reflections.rs"]
 mod reflections;
 #[path = "gpu/scenes.rs"]
