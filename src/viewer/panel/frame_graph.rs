@@ -15,12 +15,12 @@ const PASSES: [(&str, Color32, &str); 3] = [
     (
         "opaque",
         Color32::from_rgb(105, 150, 205),
-        "Surfaces without chains.",
+        "Surfaces, as the picture shows them.",
     ),
     (
         "specular",
         Color32::from_rgb(240, 180, 80),
-        "Mirrors, polish and clear bodies.",
+        "Chains seen in mirrors, polish and clear bodies.",
     ),
     (
         "tone mapping",
