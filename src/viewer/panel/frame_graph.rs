@@ -15,12 +15,12 @@ const PASSES: [(&str, Color32, &str); 3] = [
     (
         "opaque",
         Color32::from_rgb(105, 150, 205),
-        "Surfaces, as the picture shows them.",
+        "Surfaces without chains.",
     ),
     (
         "specular",
         Color32::from_rgb(240, 180, 80),
-        "Chains seen in mirrors, polish and clear bodies.",
+        "Mirrors, polish and clear bodies.",
     ),
     (
         "tone mapping",
