@@ -66,9 +66,9 @@ impl Spread {
 /// Time on the device by pass [ms].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct DeviceMs {
-    /// Surfaces without chains.
+    /// Surfaces, as the picture shows them.
     pub opaque: Spread,
-    /// Mirrors, polish and clear bodies.
+    /// Chains of mirrors, polish and clear bodies.
     pub specular: Spread,
     /// The last pass.
     pub tone_mapping: Spread,

@@ -175,9 +175,9 @@ fn frames_are_kept_as_the_pictures_that_render_makes() {
             .zip(&one)
             .filter(|(a, b)| a.abs_diff(**b) > 1)
             .count();
-        // Rounding moves a sample or two at edges.
+        // `render` takes the mean of several such pictures, which shows at edges and in mirrors.
         assert!(
-            off * 100 < one.len(),
+            off * 20 < one.len(),
             "{off} of {} codes of {name} differ",
             one.len()
         );
