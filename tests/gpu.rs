@@ -9,6 +9,8 @@ mod support;
 mod against_cpu;
 #[path = "gpu/builtins.rs"]
 mod builtins;
+#[path = "support/chain_laws.rs"]
+mod chain_laws;
 #[path = "gpu/chain_pictures.rs"]
 mod chain_pictures;
 #[path = "gpu/device.rs"]
@@ -24,6 +26,8 @@ mod flip;
 #[path = "scene/glb.rs"]
 #[allow(dead_code)]
 mod glb;
+#[path = "gpu/laws.rs"]
+mod laws;
 #[path = "gpu/nearby.rs"]
 mod nearby;
 #[path = "gpu/on_demand.rs"]
