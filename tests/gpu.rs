@@ -28,6 +28,8 @@ mod glb;
 mod on_demand;
 #[path = "gpu/radiance.rs"]
 mod radiance;
+#[path = "gpu/refinement.rs"]
+mod refinement;
 #[path = "gpu/reflections.rs"]
 mod reflections;
 #[path = "gpu/scenes.rs"]
