@@ -36,6 +36,8 @@ mod on_demand;
 mod radiance;
 #[path = "gpu/rays.rs"]
 mod rays;
+#[path = "gpu/refinement.rs"]
+mod refinement;
 #[path = "gpu/reflections.rs"]
 mod reflections;
 #[path = "gpu/scenes.rs"]

@@ -20,6 +20,8 @@ mod headless;
 mod model;
 #[path = "viewer/navigation.rs"]
 mod navigation;
+#[path = "viewer/pace.rs"]
+mod pace;
 #[path = "viewer/panel.rs"]
 mod panel;
 #[path = "viewer/screenshot.rs"]

@@ -13,6 +13,9 @@ struct ChainStart {
 
 @group(1) @binding(0) var<uniform> start: ChainStart;
 
+// Whether a mirror, a pane or a body has a base colour texture.
+override HAS_TINTED_GLASS: bool;
+
 // Gazes that may wait: one for each surface at which both ways on are followed.
 const MOST_BRANCHING: u32 = 4u;
 // Backs of single-sided surfaces that a gaze passes before it is taken to have left the scene.
@@ -97,58 +100,93 @@ fn is_followed(gaze: Gaze) -> bool {
     return gaze.depth <= start.max_depth && carried > 0.0 && carried >= start.branch_threshold;
 }
 
+// A gaze on its way, with those that wait.
+struct Walk {
+    gaze: Gaze,
+    radiance: vec3f,
+    count: u32,
+}
+
+var<private> waiting: array<Gaze, MOST_BRANCHING>;
+
+// Goes on from a surface, both ways at the first ones and then the stronger; false where the gaze ends here.
+fn go_on(walk: ptr<function, Walk>, point: SurfacePoint, next: Interaction) -> bool {
+    let gaze = (*walk).gaze;
+    let reflected = onward(gaze, point, next.reflection);
+    let transmitted = onward(gaze, point, next.transmission);
+    let is_back = is_followed(reflected);
+    let is_through = is_followed(transmitted);
+    let is_stronger = largest(transmitted.weight) >= largest(reflected.weight);
+    if is_back && is_through && gaze.depth < start.branching_depth && (*walk).count < MOST_BRANCHING {
+        waiting[(*walk).count] = reflected;
+        (*walk).count += 1u;
+        (*walk).gaze = transmitted;
+    } else if is_through && (is_stronger || !is_back) {
+        (*walk).gaze = transmitted;
+    } else {
+        (*walk).gaze = reflected;
+    }
+    return is_back || is_through;
+}
+
+fn has_map(surface: u32) -> bool {
+    return surface == SURFACE_DIFFUSE || surface == SURFACE_MIXED;
+}
+
+fn tint(gaze: Gaze, point: SurfacePoint, cos_view: f32) -> vec3f {
+    let object = objects[point.object];
+    let level = footprint_level(object.texture, point.uv_density, gaze.width, cos_view);
+    return object.base_colour * texture_colour(object.texture, point.uv, level);
+}
+
 fn chain_radiance(first: Gaze) -> vec3f {
-    var waiting: array<Gaze, MOST_BRANCHING>;
-    var count = 0u;
-    var gaze = first;
-    var radiance = vec3f(0.0);
+    var walk = Walk(first, vec3f(0.0), 0u);
     loop {
-        var follows = false;
-        let seen = nearest(gaze);
-        if seen.hit.triangle == NO_TRIANGLE {
-            radiance += gaze.weight * frame.background;
-        } else {
-            let point = surface_point(seen.hit);
-            let object = objects[point.object];
-            gaze.weight *= medium_transmittance(gaze.media, seen.distance * start.unit_m);
-            gaze.width += gaze.spread * seen.distance;
-            let cos_view = abs(dot(point.geometric_normal, gaze.direction));
-            let tint = object.base_colour * texture_colour(
-                object.texture,
-                point.uv,
-                footprint_level(object.texture, point.uv_density, gaze.width, cos_view),
-            );
-            let next = interact(point, gaze.direction, gaze.media, tint);
-            var own = object.emitted_radiance;
-            if next.own > 0.0 {
-                let level = footprint_level(object.map, point.map_density, gaze.width, cos_view);
-                own += next.own / PI * tint * irradiance(object.map, point.map_uv, level);
-            }
-            radiance += gaze.weight * own;
-            let reflected = onward(gaze, point, next.reflection);
-            let transmitted = onward(gaze, point, next.transmission);
-            let is_back = is_followed(reflected);
-            let is_through = is_followed(transmitted);
-            let is_stronger = largest(transmitted.weight) >= largest(reflected.weight);
-            // The first surfaces send it both ways, later ones the stronger.
-            if is_back && is_through && gaze.depth < start.branching_depth && count < MOST_BRANCHING {
-                waiting[count] = reflected;
-                count += 1u;
-                gaze = transmitted;
-            } else if is_through && (is_stronger || !is_back) {
-                gaze = transmitted;
-            } else {
-                gaze = reflected;
-            }
-            follows = is_back || is_through;
-        }
-        if !follows {
-            if count == 0u {
+        // Over what is only specular until something else is met: neighbouring gazes then look up maps together.
+        var point: SurfacePoint;
+        var arrives = false;
+        loop {
+            let seen = nearest(walk.gaze);
+            if seen.hit.triangle == NO_TRIANGLE {
+                walk.radiance += walk.gaze.weight * frame.background;
                 break;
             }
-            count -= 1u;
-            gaze = waiting[count];
+            point = surface_point(seen.hit);
+            let object = objects[point.object];
+            walk.gaze.weight *= medium_transmittance(walk.gaze.media, seen.distance * start.unit_m);
+            walk.gaze.width += walk.gaze.spread * seen.distance;
+            walk.radiance += walk.gaze.weight * object.emitted_radiance;
+            if has_map(object.surface) {
+                arrives = true;
+                break;
+            }
+            var colour = object.base_colour;
+            if HAS_TINTED_GLASS {
+                let cos_view = abs(dot(point.geometric_normal, walk.gaze.direction));
+                colour = tint(walk.gaze, point, cos_view);
+            }
+            if !go_on(&walk, point, interact(point, walk.gaze.direction, walk.gaze.media, colour)) {
+                break;
+            }
+        }
+        var goes_on = false;
+        if arrives {
+            let gaze = walk.gaze;
+            let record = objects[point.object].map;
+            let cos_view = abs(dot(point.geometric_normal, gaze.direction));
+            let level = footprint_level(record, point.map_density, gaze.width, cos_view);
+            let own = tint(gaze, point, cos_view) * irradiance(record, point.map_uv, level) / PI;
+            let next = interact(point, gaze.direction, gaze.media, vec3f(1.0));
+            walk.radiance += gaze.weight * next.own * own;
+            goes_on = go_on(&walk, point, next);
+        }
+        if !goes_on {
+            if walk.count == 0u {
+                break;
+            }
+            walk.count -= 1u;
+            walk.gaze = waiting[walk.count];
         }
     }
-    return radiance;
+    return walk.radiance;
 }

@@ -132,51 +132,74 @@ fn enter(ray: Sheared, index: u32, limit: f32) -> f32 {
     return select(FAR_AWAY, begin, begin <= end);
 }
 
-// The nearest triangle before a limit, from either side.
+// A search for the nearest triangle.
+struct Search {
+    best: Hit,
+    best_order: u32,
+    // The node to look at next, where there is one.
+    index: u32,
+    is_over: bool,
+    count: u32,
+}
+
+// The nearest triangle before a limit, from either side. First down to a leaf, then through its triangles: neighbouring
+// rays then do the same at the same time.
 fn closest_hit(origin: vec3f, direction: vec3f, limit: f32) -> Hit {
     let ray = sheared(origin, direction);
-    var best = Hit(NO_TRIANGLE, limit, vec3f(0.0));
-    var best_order = 0u;
     var waiting: array<vec2f, STACK>;
-    var count = 0u;
-    var index = 0u;
+    var search = Search(Hit(NO_TRIANGLE, limit, vec3f(0.0)), 0u, 0u, false, 0u);
     loop {
-        let node = nodes[index];
-        if node.count > 0u {
-            for (var slot = node.first; slot < node.first + node.count; slot += 1u) {
-                let found = meet_triangle(ray, slot);
-                let order = triangles[slot].order;
-                // Of triangles at the same distance the first given.
-                let is_nearer = found.distance < best.distance
-                    || (found.distance == best.distance && order < best_order);
-                if found.triangle != NO_TRIANGLE && is_nearer {
-                    best = found;
-                    best_order = order;
-                }
+        var first = 0u;
+        var end = 0u;
+        loop {
+            let node = nodes[search.index];
+            if node.count > 0u {
+                first = node.first;
+                end = node.first + node.count;
+                break;
             }
-        } else {
-            let left = enter(ray, node.first, best.distance);
-            let right = enter(ray, node.first + 1u, best.distance);
+            let left = enter(ray, node.first, search.best.distance);
+            let right = enter(ray, node.first + 1u, search.best.distance);
             let is_left = left <= right;
-            if max(left, right) < FAR_AWAY && count < STACK {
+            if max(left, right) < FAR_AWAY && search.count < STACK {
                 let later = select(node.first, node.first + 1u, is_left);
-                waiting[count] = vec2f(bitcast<f32>(later), max(left, right));
-                count += 1u;
+                waiting[search.count] = vec2f(bitcast<f32>(later), max(left, right));
+                search.count += 1u;
             }
             if min(left, right) < FAR_AWAY {
-                index = select(node.first + 1u, node.first, is_left);
-                continue;
+                search.index = select(node.first + 1u, node.first, is_left);
+            } else if search.count > 0u {
+                // It may be farther than what was found since: then its children are.
+                search.count -= 1u;
+                search.index = bitcast<u32>(waiting[search.count].x);
+            } else {
+                search.is_over = true;
+                break;
             }
         }
+        for (var slot = first; slot < end; slot += 1u) {
+            let found = meet_triangle(ray, slot);
+            let order = triangles[slot].order;
+            // Of triangles at the same distance the first given.
+            let is_nearer = found.distance < search.best.distance
+                || (found.distance == search.best.distance && order < search.best_order);
+            if found.triangle != NO_TRIANGLE && is_nearer {
+                search.best = found;
+                search.best_order = order;
+            }
+        }
+        if search.is_over {
+            break;
+        }
         var has_next = false;
-        while count > 0u && !has_next {
-            count -= 1u;
-            index = bitcast<u32>(waiting[count].x);
-            has_next = waiting[count].y <= best.distance + BOX_MARGIN;
+        while search.count > 0u && !has_next {
+            search.count -= 1u;
+            search.index = bitcast<u32>(waiting[search.count].x);
+            has_next = waiting[search.count].y <= search.best.distance + BOX_MARGIN;
         }
         if !has_next {
             break;
         }
     }
-    return best;
+    return search.best;
 }

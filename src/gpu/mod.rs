@@ -106,6 +106,11 @@ impl Gpu {
         format!("{} ({})", info.name, info.backend)
     }
 
+    /// Whether the processor plays the device.
+    pub fn is_software(&self) -> bool {
+        self.adapter.get_info().device_type == wgpu::DeviceType::Cpu
+    }
+
     /// What the device can hold.
     pub fn limits(&self) -> wgpu::Limits {
         self.device.limits()

@@ -16,12 +16,13 @@ use winit::keyboard::{ModifiersState, PhysicalKey};
 use winit::window::{CursorGrabMode, WindowId};
 
 use super::event_log::Event;
-use super::frame_times::{FrameTimes, sum_ms};
+use super::frame_times::{FrameTimes, Made, sum_ms};
 use super::graphics::{Graphics, RETRY_AFTER, Shown};
 use super::input::{self, Shortcut};
 use super::interface::Painting;
 use super::model::Model;
 use super::overlay;
+use super::pace::Pace;
 use super::panel::{Display, Facts, Quantity, Wishes};
 use super::{ViewerOptions, error_view, eye_report, screenshot};
 use crate::effect::{Effect, EffectSwitch};
@@ -88,6 +89,12 @@ pub struct App {
     must_set_maps: bool,
     pressed: Wishes,
     losses: Vec<Instant>,
+    /// Chooses how well pictures are made.
+    pace: Pace,
+    /// Whether the picture is still to become better though nothing changes.
+    is_refining: bool,
+    /// Why there are no chains, as it was told.
+    told_refusal: Option<String>,
     pictures: u64,
     frames: u64,
     /// Pictures at the last line of the log that told of rest.
@@ -131,6 +138,9 @@ impl App {
             must_set_maps: true,
             pressed: Wishes::default(),
             losses: Vec::new(),
+            pace: Pace::default(),
+            is_refining: false,
+            told_refusal: None,
             pictures: 0,
             frames: 0,
             rested_at: 0,
@@ -158,6 +168,11 @@ impl App {
                     adapter: &adapter,
                 });
                 graphics.window().request_redraw();
+                self.pace = if graphics.gpu().is_software() {
+                    Pace::of_software()
+                } else {
+                    Pace::default()
+                };
                 self.graphics = Some(graphics);
                 self.must_set_maps = true;
             }
@@ -249,6 +264,7 @@ impl App {
         if let Err(error) = self.draw_picture() {
             self.notice = Some(error.to_string());
         }
+        self.report_making();
         let Some(graphics) = &mut self.graphics else {
             return;
         };
@@ -318,6 +334,21 @@ impl App {
         } else {
             self.reports_due.saturating_sub(1)
         };
+    }
+
+    /// Tells the panel how the picture was made, and the user once where chains cannot be had.
+    fn report_making(&mut self) {
+        let Some(graphics) = &self.graphics else { return };
+        let (counts, quality) = (graphics.counts(), graphics.quality());
+        self.frame_times.set_made(Made {
+            traced_scale: (counts.drawn_specular > 0).then_some(quality.traced_scale),
+            samples: counts.samples,
+        });
+        let refusal = graphics.chain_refusal().map(ToString::to_string);
+        if refusal.is_some() && refusal != self.told_refusal {
+            self.notice.clone_from(&refusal);
+            self.told_refusal = refusal;
+        }
     }
 
     fn chains_switch(&self) -> EffectSwitch {
@@ -410,11 +441,38 @@ impl App {
         }
         // Drawing would take them in without a word.
         if let Some(ms) = graphics.take_times() {
+            if let Some(quality) = graphics.counts().timed_quality {
+                self.pace.learn(ms, quality);
+            }
             self.frame_times.push(ms);
         }
-        if graphics.draw_picture(&view)? {
+        if graphics.shows(&view) {
+            return self.refine_picture(&view);
+        }
+        self.pace.moves();
+        self.is_refining = true;
+        if graphics.draw_picture(&view, self.pace.walking())? {
             self.pictures += 1;
             self.reports_due = MOST_REPORTS;
+        }
+        Ok(())
+    }
+
+    /// Makes the picture of a view at rest better, as long as nothing else is to be done.
+    fn refine_picture(&mut self, view: &View) -> Result<()> {
+        let is_busy = self.model.state().is_working() || self.model.navigator.is_moving();
+        let Some(graphics) = self.graphics.as_mut().filter(|_| !is_busy) else {
+            self.is_refining = false;
+            return Ok(());
+        };
+        let samples = if graphics.quality() == self.pace.resting() {
+            graphics.counts().samples
+        } else {
+            0
+        };
+        self.is_refining = self.pace.refines(samples, Instant::now());
+        if self.is_refining {
+            graphics.refine_picture(view, self.pace.resting())?;
         }
         Ok(())
     }
@@ -442,7 +500,7 @@ impl App {
             }
             Shown::Hidden => Duration::MAX,
             Shown::Later => RETRY_AFTER,
-            Shown::Yes if self.model.navigator.is_moving() => Duration::ZERO,
+            Shown::Yes if self.model.navigator.is_moving() || self.is_refining => Duration::ZERO,
             Shown::Yes if self.model.state().is_working() => repaint_after.min(BAKING_FRAME),
             Shown::Yes => repaint_after,
         };

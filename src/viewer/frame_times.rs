@@ -12,6 +12,16 @@ pub const PICTURES: usize = 120;
 #[derive(Clone, Debug, Default)]
 pub struct FrameTimes {
     pictures: VecDeque<GpuMs>,
+    made: Option<Made>,
+}
+
+/// How the picture that is shown was made.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Made {
+    /// Traced pixels per pixel along a side; `None` where nothing specular is in view.
+    pub traced_scale: Option<f64>,
+    /// Pictures of which it is the mean.
+    pub samples: u32,
 }
 
 impl FrameTimes {
@@ -21,6 +31,16 @@ impl FrameTimes {
             self.pictures.pop_front();
         }
         self.pictures.push_back(ms);
+    }
+
+    /// Says how the picture that is shown was made.
+    pub fn set_made(&mut self, made: Made) {
+        self.made = Some(made);
+    }
+
+    /// How the picture that is shown was made.
+    pub fn made(&self) -> Option<Made> {
+        self.made
     }
 
     /// The oldest first.

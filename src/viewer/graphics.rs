@@ -13,7 +13,7 @@ use super::picture::Picture;
 use super::surface::{Acquired, Screen};
 use crate::effect::EffectSwitch;
 use crate::error::{Error, Result};
-use crate::eye_pass::renderer::{EyeCounts, GpuMs, MapStyle, Renderer, Uploaded};
+use crate::eye_pass::renderer::{EyeCounts, EyeQuality, GpuMs, MapStyle, Renderer, Uploaded};
 use crate::eye_pass::{self, View, tone_mapping};
 use crate::gpu::Gpu;
 use crate::illumination::IlluminationMap;
@@ -199,19 +199,50 @@ impl Graphics {
         Ok(tone_mapping::auto_exposure_stops(&picture))
     }
 
-    /// Radiance of every pixel of a view.
+    /// Radiance of every pixel of the picture that is shown.
     ///
     /// # Errors
     /// A picture without area or above the device's limit; the device was lost.
     pub fn radiance(&mut self, view: &View) -> Result<eye_pass::Picture> {
-        self.renderer.radiance(&self.gpu, view)
+        self.renderer.shown_radiance(&self.gpu, view)
+    }
+
+    /// How well the picture is made.
+    pub fn quality(&self) -> EyeQuality {
+        self.renderer.quality()
+    }
+
+    /// Why mirrors and glass are shown without what is seen in them, if that was called for.
+    pub fn chain_refusal(&self) -> Option<&Error> {
+        self.renderer.chain_refusal()
+    }
+
+    /// Whether the picture shows a view.
+    pub fn shows(&self, view: &View) -> bool {
+        self.picture.shows(view)
+    }
+
+    /// Draws a view in another quality than it is shown in, or makes the picture that is shown better by another sample.
+    ///
+    /// # Errors
+    /// The device cannot hold a picture of that size.
+    pub fn refine_picture(&mut self, view: &View, quality: EyeQuality) -> Result<()> {
+        if self.renderer.quality() != quality {
+            self.picture.invalidate();
+            return self.draw_picture(view, quality).map(|_| ());
+        }
+        let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
+        let target = self.picture.target();
+        self.renderer.refine(&self.gpu, &mut encoder, target, view)?;
+        self.gpu.queue.submit([encoder.finish()]);
+        Ok(())
     }
 
     /// Draws the scene where the view changed since the last time; tells whether it drew.
     ///
     /// # Errors
     /// The device cannot hold a picture of that size.
-    pub fn draw_picture(&mut self, view: &View) -> Result<bool> {
+    pub fn draw_picture(&mut self, view: &View, quality: EyeQuality) -> Result<bool> {
         let Self {
             interface,
             picture,
@@ -225,6 +256,9 @@ impl Graphics {
                 .create_command_encoder(&wgpu::CommandEncoderDescriptor {
                     label: Some("picture"),
                 });
+            if renderer.quality() != quality {
+                renderer.set_quality(quality);
+            }
             renderer.draw(gpu, &mut encoder, target, view)?;
             gpu.queue.submit([encoder.finish()]);
             Ok(())

@@ -15,6 +15,7 @@ mod meter;
 pub mod model;
 pub mod navigation;
 mod overlay;
+pub mod pace;
 pub mod panel;
 mod picture;
 pub mod screenshot;

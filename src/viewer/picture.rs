@@ -43,6 +43,16 @@ impl Picture {
         self.shown = None;
     }
 
+    /// Whether it shows a view.
+    pub fn shows(&self, view: &View) -> bool {
+        self.shown.as_ref() == Some(view)
+    }
+
+    /// What it is drawn into, of the size of the view that it shows.
+    pub fn target(&self) -> &wgpu::TextureView {
+        &self.texture
+    }
+
     /// Draws `view` unless it is shown already; tells whether it drew.
     ///
     /// # Errors

@@ -1,5 +1,7 @@
 //! What the eye pass on the device made and drew.
 
+use super::EyeQuality;
+
 /// Counted where things are made; of the last picture, where it says so.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct EyeCounts {
@@ -23,6 +25,8 @@ pub struct EyeCounts {
     pub samples: u32,
     /// Time on the device of the last picture that it has told of; `None` where it cannot tell, or has not yet.
     pub gpu_ms: Option<GpuMs>,
+    /// How that picture was made.
+    pub timed_quality: Option<EyeQuality>,
 }
 
 /// Time on the device [ms].

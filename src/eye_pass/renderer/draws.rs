@@ -19,6 +19,10 @@ pub(super) struct Manner {
     pub(super) style: MapStyle,
     /// Whether mirrors, polish and clear bodies show more than themselves.
     pub(super) has_chains: bool,
+    /// Whether anything that chains go on from has a texture.
+    pub(super) has_tinted_glass: bool,
+    /// Whether the traced picture has other pixels than the picture.
+    pub(super) is_scaled: bool,
 }
 
 impl Manner {
@@ -53,7 +57,11 @@ impl Manner {
     fn of(self, look: &Look, writes: Writes) -> PipelineKey {
         let has_back = look.double_sided || !look.surface.is_opaque();
         let faces = if has_back { Faces::Both } else { Faces::Front };
-        PipelineKey::new(writes, look.surface, faces, look.has_texture())
+        let has_texture = match writes {
+            Writes::Traced => self.has_tinted_glass,
+            _ => look.has_texture(),
+        };
+        PipelineKey::new(writes, look.surface, faces, has_texture, self.is_scaled)
     }
 }
 

@@ -248,6 +248,7 @@ impl Renderer {
             .as_ref()
             .filter(|_| self.drawn[1] > 0)
             .map(|traced| u64::from(traced.width) * u64::from(traced.height));
+        let timed = self.timing.as_ref().and_then(Timing::latest);
         EyeCounts {
             pipelines: (self.surfaces.count() + self.tone_mapping.count()) as u64,
             specular_pipelines: self.surfaces.specular_count() as u64,
@@ -258,7 +259,8 @@ impl Renderer {
             drawn_specular: self.drawn[1] as u64,
             traced_pixels: traced_pixels.unwrap_or(0),
             samples: self.mean.as_ref().map_or(1, |mean| mean.count().max(1)),
-            gpu_ms: self.timing.as_ref().and_then(Timing::latest),
+            gpu_ms: timed.map(|(ms, _)| ms),
+            timed_quality: timed.map(|(_, quality)| quality),
         }
     }
 
@@ -291,7 +293,7 @@ impl Renderer {
         if let Some(mean) = &mut self.mean {
             mean.clear();
         }
-        self.draw_radiance(gpu, encoder, view, exposure(view), Sample::CENTRE, self.quality)?;
+        self.draw_radiance(gpu, encoder, view, exposure(view), Sample::CENTRE)?;
         if let Some(targets) = &self.targets {
             let marks = self.timing.as_ref().map(Timing::around_tone_mapping);
             let radiance = &targets.resolved_view;
@@ -300,7 +302,7 @@ impl Renderer {
         }
         let has_specular = self.drawn[1] > 0;
         if let Some(timing) = &mut self.timing {
-            timing.finish(encoder, has_specular, true);
+            timing.finish(encoder, has_specular, true, self.quality);
         }
         self.drawn_view = Some(view.clone());
         Ok(())
@@ -335,12 +337,7 @@ impl Renderer {
             mean.add(gpu, encoder, &targets.resolved_view);
         }
         let sample = Sample::of_sequence(mean.count());
-        let still = EyeQuality {
-            traced_scale: self.quality.traced_scale.max(1.0),
-            branching_depth: EyeQuality::STILL.branching_depth,
-            ..self.quality
-        };
-        self.draw_radiance(gpu, encoder, view, exposure(view), sample, still)?;
+        self.draw_radiance(gpu, encoder, view, exposure(view), sample)?;
         if let Some(targets) = &self.targets {
             mean.add(gpu, encoder, &targets.resolved_view);
         }
@@ -348,6 +345,7 @@ impl Renderer {
         self.tone_mapping
             .draw(gpu, encoder, target, radiance, view.tone_map, None);
         self.mean = Some(mean);
+        self.drawn_view = Some(view.clone());
         Ok(())
     }
 
@@ -356,6 +354,8 @@ impl Renderer {
         Manner {
             style: self.map_style,
             has_chains: self.chains != EffectSwitch::Off && self.refusal.is_none(),
+            is_scaled: self.quality.traced_scale != 1.0,
+            has_tinted_glass: self.objects.has_tinted_glass(),
         }
     }
 }

@@ -112,6 +112,12 @@ impl Objects {
         uploaded
     }
 
+    /// Whether a mirror, a pane or a body has a texture.
+    pub(super) fn has_tinted_glass(&self) -> bool {
+        let mut looks = self.list.iter();
+        looks.any(|look| look.surface.is_specular() && !look.surface.is_receiver() && look.has_texture())
+    }
+
     fn write_records(&mut self, gpu: &Gpu) -> Uploaded {
         let records: Vec<ObjectRecord> = (0..)
             .zip(&self.list)

@@ -16,6 +16,11 @@ use crate::scene::Scene;
 /// multiply it by the square of its refractive index.
 const LARGEST_SCALED: f64 = 4096.0;
 
+/// From here on a mean may hold something that a picture cut.
+const CUT_SCALED: f64 = 500.0;
+/// Places across and down a pixel of a picture that is drawn anew to be kept.
+const ANEW_SIDE: u32 = 2;
+
 impl Renderer {
     /// Radiance per pixel [W/(m² sr)] of a view, looked at through the centres of its pixels, in the precision of half
     /// floats.
@@ -40,13 +45,13 @@ impl Renderer {
                     label: Some("radiance"),
                 });
             let sample = Sample::of_grid(index, side);
-            self.draw_radiance(gpu, &mut encoder, view, scale, sample, self.quality)?;
+            self.draw_radiance(gpu, &mut encoder, view, scale, sample)?;
             if side > 1 {
                 self.add_to_mean(gpu, &mut encoder, index == 0);
             }
             let has_specular = self.drawn[1] > 0;
             if let Some(timing) = &mut self.timing {
-                timing.finish(&mut encoder, has_specular, false);
+                timing.finish(&mut encoder, has_specular, false, self.quality);
             }
             gpu.queue.submit([encoder.finish()]);
         }
@@ -56,6 +61,33 @@ impl Renderer {
             self.read_resolved(gpu, scale)?
         };
         self.collect_times(gpu);
+        Ok(Picture {
+            width: view.width,
+            height: view.height,
+            radiance,
+        })
+    }
+
+    /// Radiance of the picture that was drawn last, the mean of all that were made of its view. Where another view was
+    /// drawn, or something is so bright that the picture cuts it, the view is drawn anew.
+    ///
+    /// # Errors
+    /// Those of [`radiance`](Self::radiance).
+    pub fn shown_radiance(&mut self, gpu: &Gpu, view: &View) -> Result<Picture> {
+        if self.drawn_view.as_ref() != Some(view) {
+            return self.radiance_sampled(gpu, view, ANEW_SIDE);
+        }
+        let scale = view.exposure_stops.exp2();
+        let is_mean = self.mean.as_ref().is_some_and(|mean| mean.count() > 0);
+        let radiance = if is_mean {
+            self.read_mean(gpu, scale)?
+        } else {
+            self.read_resolved(gpu, scale)?
+        };
+        let largest = radiance.iter().flatten().fold(0.0_f32, |a, b| a.max(*b));
+        if f64::from(largest) * scale >= CUT_SCALED {
+            return self.radiance_sampled(gpu, view, ANEW_SIDE);
+        }
         Ok(Picture {
             width: view.width,
             height: view.height,

@@ -31,8 +31,8 @@ impl Renderer {
         view: &View,
         radiance_scale: f64,
         sample: Sample,
-        quality: EyeQuality,
     ) -> Result<()> {
+        let quality = self.quality;
         self.collect_times(gpu);
         self.drawn_view = None;
         let size_fits = |targets: &Targets| (targets.width, targets.height) == (view.width, view.height);

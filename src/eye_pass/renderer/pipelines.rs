@@ -85,12 +85,26 @@ pub(super) struct PipelineKey {
     /// Of what shows itself only.
     surface: SurfaceKind,
     has_texture: bool,
+    /// Whether the traced picture has other pixels than the picture.
+    is_scaled: bool,
 }
 
 impl PipelineKey {
     /// The key of a kind of drawing. What does not matter to it is left out, so that fewer pipelines serve.
-    pub(super) fn new(writes: Writes, surface: SurfaceKind, faces: Faces, has_texture: bool) -> Self {
+    /// `has_texture`: whether the surface has one; for chains, whether anything specular in the scene has.
+    pub(super) fn new(
+        writes: Writes,
+        surface: SurfaceKind,
+        faces: Faces,
+        has_texture: bool,
+        is_scaled: bool,
+    ) -> Self {
         let shows_itself = writes == Writes::Own;
+        let looks_up = match writes {
+            Writes::Own => surface != SurfaceKind::Mirror,
+            Writes::Traced => true,
+            Writes::MapValue | Writes::Depth | Writes::Composed => false,
+        };
         Self {
             writes,
             faces,
@@ -99,7 +113,8 @@ impl PipelineKey {
             } else {
                 SurfaceKind::Diffuse
             },
-            has_texture: has_texture && shows_itself && surface != SurfaceKind::Mirror,
+            has_texture: has_texture && looks_up,
+            is_scaled: is_scaled && writes == Writes::Composed,
         }
     }
 
@@ -110,7 +125,8 @@ impl PipelineKey {
                 ("SURFACE", f64::from(surface_code(self.surface))),
                 ("HAS_TEXTURE", f64::from(u8::from(self.has_texture))),
             ],
-            Writes::Traced | Writes::Composed => Vec::new(),
+            Writes::Traced => vec![("HAS_TINTED_GLASS", f64::from(u8::from(self.has_texture)))],
+            Writes::Composed => vec![("IS_SCALED", f64::from(u8::from(self.is_scaled)))],
         }
     }
 }

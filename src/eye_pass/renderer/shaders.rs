@@ -139,8 +139,8 @@ pub fn specialisations() -> Vec<Specialisation> {
             continue;
         };
         for kind in KINDS {
-            for has_texture in [false, true] {
-                let key = PipelineKey::new(writes, kind, Faces::Both, has_texture);
+            for flag in [false, true] {
+                let key = PipelineKey::new(writes, kind, Faces::Both, flag, flag);
                 all.push(Specialisation {
                     program: writes.program().name,
                     entry_point,

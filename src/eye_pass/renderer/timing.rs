@@ -3,6 +3,7 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, Ordering};
 
+use super::EyeQuality;
 use super::counts::GpuMs;
 use crate::gpu::Gpu;
 
@@ -31,6 +32,7 @@ struct Slot {
     state: Arc<AtomicU8>,
     /// Which passes there were: surfaces, chains, tone mapping.
     passes: [bool; 3],
+    quality: EyeQuality,
 }
 
 impl Slot {
@@ -49,7 +51,7 @@ pub(super) struct Timing {
     slots: Vec<Slot>,
     /// Of one tick [ms].
     tick_ms: f64,
-    latest: Option<GpuMs>,
+    latest: Option<(GpuMs, EyeQuality)>,
 }
 
 impl Timing {
@@ -73,6 +75,7 @@ impl Timing {
             ),
             state: Arc::new(AtomicU8::new(FREE)),
             passes: [false; 3],
+            quality: EyeQuality::default(),
         };
         Some(Self {
             marks: gpu.device.create_query_set(&wgpu::QuerySetDescriptor {
@@ -90,8 +93,8 @@ impl Timing {
         })
     }
 
-    /// Times of the last picture that is done.
-    pub(super) fn latest(&self) -> Option<GpuMs> {
+    /// Times of the last picture that is done, and how it was made.
+    pub(super) fn latest(&self) -> Option<(GpuMs, EyeQuality)> {
         self.latest
     }
 
@@ -129,12 +132,14 @@ impl Timing {
         encoder: &mut wgpu::CommandEncoder,
         has_specular: bool,
         has_tone_mapping: bool,
+        quality: EyeQuality,
     ) {
         let is_free = |slot: &&mut Slot| slot.state.load(Ordering::Acquire) == FREE;
         let Some(slot) = self.slots.iter_mut().find(is_free) else {
             return;
         };
         slot.passes = [true, has_specular, has_tone_mapping];
+        slot.quality = quality;
         // Only marks that were set: the others have no value.
         for (place, [begin, end]) in slot.set_marks() {
             encoder.resolve_query_set(&self.marks, begin..end + 1, &self.resolved, place);
@@ -156,7 +161,7 @@ impl Timing {
             let slot = &self.slots[index];
             match slot.state.load(Ordering::Acquire) {
                 READABLE => {
-                    self.latest = self.times(slot).or(self.latest);
+                    self.latest = self.times(slot).map(|ms| (ms, slot.quality)).or(self.latest);
                     slot.buffer.unmap();
                     has_news = true;
                 }

@@ -4,7 +4,7 @@ use egui::{Align2, Color32, FontId, Rect, RichText, Role, Sense, Ui, WidgetInfo,
 
 use super::effects::COUNTER;
 use crate::eye_pass::renderer::GpuMs;
-use crate::viewer::frame_times::{FrameTimes, PICTURES, sum_ms};
+use crate::viewer::frame_times::{FrameTimes, Made, PICTURES, sum_ms};
 
 /// Height of the graph [points].
 const HEIGHT: f32 = 64.0;
@@ -31,12 +31,19 @@ const PASSES: [(&str, Color32, &str); 3] = [
 const GRAPH: &str = "Milliseconds on the graphics device for each of the last 120 pictures that it has told of, the \
                      newest at the right; the panel itself is not counted. A window at rest draws no pictures.";
 const CANNOT_TELL: &str = "This graphics device does not tell how long it takes.";
+const HOW: &str = "While the camera moves and pictures are late, what is seen in mirrors and through glass is traced \
+                   more coarsely; at rest, pictures of one view are averaged until their edges are smooth.";
 const NOT_YET: &str = "Known with the first picture.";
 
 /// The section's title, with the newest time.
 pub fn title(times: Option<&FrameTimes>) -> String {
     match times.and_then(FrameTimes::newest) {
-        Some(newest) => format!("Frame time ({:.2} ms)", sum_ms(*newest)),
+        Some(newest) => {
+            let coarse = times
+                .and_then(coarseness)
+                .map_or(String::new(), |part| format!(", {part}"));
+            format!("Frame time ({:.2} ms{coarse})", sum_ms(*newest))
+        }
         None => "Frame time".into(),
     }
 }
@@ -52,6 +59,10 @@ pub fn show(ui: &mut Ui, times: Option<&FrameTimes>) {
         return;
     };
     graph(ui, times);
+    if let Some(made) = times.made() {
+        ui.label(RichText::new(made_how(made)).size(COUNTER))
+            .on_hover_text(HOW);
+    }
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = 8.0;
         let text = |text: String| RichText::new(text).size(COUNTER);
@@ -62,6 +73,21 @@ pub fn show(ui: &mut Ui, times: Option<&FrameTimes>) {
                 .on_hover_text(what);
         }
     });
+}
+
+/// What is said beside the time where the traced picture is not as fine as the picture.
+fn coarseness(times: &FrameTimes) -> Option<String> {
+    let scale = times.made()?.traced_scale?;
+    (scale < 1.0).then(|| format!("mirrors and glass at 1/{:.0}", 1.0 / scale))
+}
+
+fn made_how(made: Made) -> String {
+    let traced = match made.traced_scale {
+        None => "nothing traced".to_string(),
+        Some(scale) if scale < 1.0 => format!("traced at 1/{:.0} of the resolution", 1.0 / scale),
+        Some(scale) => format!("traced {:.0} times a pixel", scale * scale),
+    };
+    format!("{traced}, mean of {} pictures", made.samples)
 }
 
 fn by_pass(ms: GpuMs) -> [f64; 3] {
