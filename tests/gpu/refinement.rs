@@ -126,7 +126,7 @@ fn the_traced_picture_may_be_coarser_or_finer() {
     // Nothing but the ball.
     let mut view = view(DVec3::new(0.5, 0.8, 1.8));
     view.camera = Camera::look_at("eye", view.camera.position, DVec3::new(0.5, 0.2, 0.5), 0.15);
-    let mut mean_of = |traced_scale: f64, samples_per_side: u32| {
+    let mean_of = |traced_scale: f64, samples_per_side: u32| {
         let mut renderer = Renderer::new(&gpu, &scene, FORMAT, 1).expect("the scene is uploaded");
         renderer.set_quality(EyeQuality {
             traced_scale,

@@ -137,7 +137,7 @@ fn looking_up(name: &'static str, water: Mesh) -> Law {
         expected: Box::new(move |direction| {
             let r = dielectric_reflectance(direction.y, 1.0 / WATER);
             let is_decided = (direction.y.acos() - critical).abs() > 1e-4;
-            is_decided.then(|| r * FLOOR + (1.0 - r) * SKY * WATER * WATER)
+            is_decided.then_some(r * FLOOR + (1.0 - r) * SKY * WATER * WATER)
         }),
         most: SKY * WATER * WATER,
         left_out: 0.0,
@@ -202,7 +202,7 @@ fn through_a_prism() -> Law {
             let fall = direction.y / direction.z;
             let behind = if fall > 0.01 { FLOOR } else { SKY };
             let is_decided = (fall - 0.01).abs() > 0.003;
-            is_decided.then(|| through * FLOOR + back * behind)
+            is_decided.then_some(through * FLOOR + back * behind)
         }),
         most: SKY,
         left_out: 0.002,
