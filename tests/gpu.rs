@@ -9,6 +9,8 @@ mod support;
 mod against_cpu;
 #[path = "gpu/builtins.rs"]
 mod builtins;
+#[path = "support/chain_laws.rs"]
+mod chain_laws;
 #[path = "gpu/chain_pictures.rs"]
 mod chain_pictures;
 #[path = "gpu/device.rs"]
@@ -24,10 +26,16 @@ mod flip;
 #[path = "scene/glb.rs"]
 #[allow(dead_code)]
 mod glb;
+#[path = "gpu/laws.rs"]
+mod laws;
+#[path = "gpu/nearby.rs"]
+mod nearby;
 #[path = "gpu/on_demand.rs"]
 mod on_demand;
 #[path = "gpu/radiance.rs"]
 mod radiance;
+#[path = "gpu/rays.rs"]
+mod rays;
 #[path = "gpu/refinement.rs"]
 mod refinement;
 #[path = "gpu/reflections.rs"]

@@ -1,5 +1,10 @@
 //! Hard cases: each has a law that must hold.
 
+#[path = "support/chain_laws.rs"]
+#[allow(dead_code)]
+mod chain_laws;
+#[path = "stability/chains.rs"]
+mod chains;
 #[path = "stability/hidden_cells.rs"]
 mod hidden_cells;
 #[path = "stability/intersection.rs"]

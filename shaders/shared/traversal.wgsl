@@ -112,7 +112,9 @@ fn meet_triangle(ray: Sheared, index: u32) -> Hit {
     let error_y = gamma(5.0) * (y + z);
     let error_edge = 2.0 * (gamma(2.0) * x * y + error_y * x + error_x * y);
     let bound = 3.0 * (gamma(3.0) * edge * z + error_edge * z + gamma(3.0) * z * edge) / abs(determinant);
-    if distance > bound && distance < FAR_AWAY {
+    // Ahead with all corners it is a distance however narrow the triangle looks: a mean of theirs.
+    let ahead = min(a.z * ray.shear.z, min(b.z * ray.shear.z, c.z * ray.shear.z));
+    if (distance > bound || ahead > gamma(8.0) * z) && distance < FAR_AWAY {
         return Hit(index, distance, vec3f(u, v, w) / determinant);
     }
     return missed;
