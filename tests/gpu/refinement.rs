@@ -141,13 +141,13 @@ fn the_traced_picture_may_be_coarser_or_finer() {
         picture.radiance
     };
     let reference = mean_of(1.0, 8);
-    let mut off = |traced_scale| {
+    let off = |traced_scale| {
         let found = mean_of(traced_scale, 1);
         let pairs = found.iter().flatten().zip(reference.iter().flatten());
         let sum: f32 = pairs.map(|(a, b)| (a - b).abs()).sum();
         f64::from(sum) / found.len() as f64
     };
-    let [quarter, half, whole, double] = [0.25, 0.5, 1.0, 2.0].map(&mut off);
+    let [quarter, half, whole, double] = [0.25, 0.5, 1.0, 2.0].map(off);
     assert!(
         double < whole && whole < half && half < quarter,
         "{double} {whole} {half} {quarter}"

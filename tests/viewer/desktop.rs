@@ -163,6 +163,13 @@ impl<'a> Viewer<'a> {
             .collect()
     }
 
+    /// All events of that name so far.
+    pub fn all(&self, name: &str) -> Vec<Value> {
+        let mut events = self.events();
+        events.retain(|event| event["event"] == name);
+        events
+    }
+
     /// The next event of that name that fits, after those that were waited for before.
     pub fn wait_for(&mut self, name: &str, fits: impl Fn(&Value) -> bool) -> Value {
         let start = Instant::now();
