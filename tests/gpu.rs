@@ -9,6 +9,8 @@ mod support;
 mod against_cpu;
 #[path = "gpu/builtins.rs"]
 mod builtins;
+#[path = "gpu/caustic_images.rs"]
+mod caustic_images;
 #[path = "support/chain_laws.rs"]
 mod chain_laws;
 #[path = "gpu/chain_pictures.rs"]
