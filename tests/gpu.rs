@@ -23,6 +23,8 @@ mod display;
 mod effect_matrix;
 #[path = "support/effect_scenes.rs"]
 mod effect_scenes;
+#[path = "gpu/flights.rs"]
+mod flights;
 #[path = "support/flip.rs"]
 mod flip;
 #[path = "scene/glb.rs"]
@@ -30,8 +32,12 @@ mod flip;
 mod glb;
 #[path = "gpu/laws.rs"]
 mod laws;
+#[path = "gpu/limits.rs"]
+mod limits;
 #[path = "gpu/nearby.rs"]
 mod nearby;
+#[path = "gpu/numbers.rs"]
+mod numbers;
 #[path = "gpu/on_demand.rs"]
 mod on_demand;
 #[path = "gpu/radiance.rs"]

@@ -12,42 +12,14 @@ use nephroid::scene::{Mesh, Scene};
 
 use crate::device::gpu;
 use crate::nearby::{Answer, EPSILON, Judge, Verdict};
+use crate::numbers::Numbers;
 
-/// Evenly spread numbers that are the same in every run (SplitMix64).
-struct Numbers(u64);
-
-impl Numbers {
-    /// In [0, 1).
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    fn index(&mut self, count: usize) -> usize {
-        (self.next() * count as f64) as usize
-    }
-
-    fn direction(&mut self) -> DVec3 {
-        let y = 2.0 * self.next() - 1.0;
-        let (sine, cosine) = (std::f64::consts::TAU * self.next()).sin_cos();
-        DVec3::new(cosine, 0.0, sine) * (1.0 - y * y).sqrt() + DVec3::Y * y
-    }
-
-    /// Within a ball.
-    fn place(&mut self, centre: DVec3, radius: f64) -> DVec3 {
-        centre + self.direction() * (radius * self.next().cbrt())
-    }
-
-    /// A corner of a triangle, or a place on one of its edges.
-    fn rim(&mut self, triangles: &[[DVec3; 3]]) -> DVec3 {
-        let corners = triangles[self.index(triangles.len())];
-        let first = self.index(3);
-        let share = if self.next() < 0.5 { 0.0 } else { self.next() };
-        corners[first].lerp(corners[(first + 1) % 3], share)
-    }
+/// A corner of a triangle, or a place on one of its edges.
+fn rim(numbers: &mut Numbers, triangles: &[[DVec3; 3]]) -> DVec3 {
+    let corners = triangles[numbers.index(triangles.len())];
+    let first = numbers.index(3);
+    let share = if numbers.next() < 0.5 { 0.0 } else { numbers.next() };
+    corners[first].lerp(corners[(first + 1) % 3], share)
 }
 
 fn triangles(scene: &Scene) -> Vec<[DVec3; 3]> {
@@ -60,7 +32,7 @@ fn triangles(scene: &Scene) -> Vec<[DVec3; 3]> {
 /// Half of them anywhere, half aimed at edges and corners.
 fn rays(scene: &Scene, judge: &Judge, count: usize) -> Vec<Ray> {
     let triangles = triangles(scene);
-    let mut numbers = Numbers(count as u64);
+    let mut numbers = Numbers::new(count as u64);
     let (centre, radius) = judge.bounding_sphere();
     (0..count)
         .map(|index| {
@@ -68,7 +40,7 @@ fn rays(scene: &Scene, judge: &Judge, count: usize) -> Vec<Ray> {
             let direction = if index % 2 == 0 {
                 numbers.direction()
             } else {
-                (numbers.rim(&triangles) - origin).normalize()
+                (rim(&mut numbers, &triangles) - origin).normalize()
             };
             Ray { origin, direction }
         })
@@ -97,7 +69,7 @@ fn of(parts_of: Vec<Mesh>) -> Scene {
 /// Far from the origin: a floor of 200 m twice at the same place, slivers 50 m long and 4 to 40 mm wide, balls of
 /// 1 cm and of 0.1 mm, needles.
 fn awkward() -> Scene {
-    let mut numbers = Numbers(5);
+    let mut numbers = Numbers::new(5);
     let cylinder = |radius: f64, segments: u32| {
         shapes::sheet(segments, 1, |u, v| {
             let (sine, cosine) = (std::f64::consts::TAU * u.fract()).sin_cos();
@@ -218,11 +190,11 @@ fn no_ray_leaves_a_closed_surface_on_the_device() {
     let Some(gpu) = gpu() else { return };
     let scene = of(vec![bumpy_sphere()]);
     let triangles = triangles(&scene);
-    let mut numbers = Numbers(9);
+    let mut numbers = Numbers::new(9);
     let rays: Vec<Ray> = (0..250_000)
         .map(|_| {
             let origin = numbers.place(DVec3::ZERO, 0.8);
-            let direction = (numbers.rim(&triangles) - origin).normalize();
+            let direction = (rim(&mut numbers, &triangles) - origin).normalize();
             Ray { origin, direction }
         })
         .collect();

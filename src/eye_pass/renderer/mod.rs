@@ -161,6 +161,9 @@ impl Renderer {
     /// A device that refuses what it is given.
     pub fn set_scene(&mut self, gpu: &Gpu, scene: &Scene) -> Result<Uploaded> {
         let mut uploaded = Uploaded::default();
+        if self.scene.triangle_count() != scene.triangle_count() {
+            self.refusal = None;
+        }
         if self.objects.list.len() == scene.objects.len() {
             let triangles = self.geometry.set_scene(gpu, scene);
             self.chain_scene_is_stale |= triangles != Uploaded::default();
