@@ -30,6 +30,8 @@ mod flip;
 mod glb;
 #[path = "gpu/laws.rs"]
 mod laws;
+#[path = "gpu/lights.rs"]
+mod lights;
 #[path = "gpu/nearby.rs"]
 mod nearby;
 #[path = "gpu/on_demand.rs"]
