@@ -32,6 +32,8 @@ mod glb;
 mod laws;
 #[path = "gpu/lights.rs"]
 mod lights;
+#[path = "gpu/map_levels.rs"]
+mod map_levels;
 #[path = "gpu/nearby.rs"]
 mod nearby;
 #[path = "gpu/on_demand.rs"]
