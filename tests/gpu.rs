@@ -32,8 +32,12 @@ mod flip;
 mod glb;
 #[path = "gpu/laws.rs"]
 mod laws;
+#[path = "gpu/lights.rs"]
+mod lights;
 #[path = "gpu/limits.rs"]
 mod limits;
+#[path = "gpu/map_levels.rs"]
+mod map_levels;
 #[path = "gpu/nearby.rs"]
 mod nearby;
 #[path = "gpu/numbers.rs"]

@@ -1,20 +1,10 @@
 // Radiance along a gaze that goes on over mirrors and through glass until it ends on something diffuse; twin of
 // eye_pass/reference/radiance.rs. All lengths are local but where they say so.
 
-struct ChainStart {
-    eye: vec3f,
-    unit_m: f32,
-    media: vec4u,
-    near: f32,
-    branch_threshold: f32,
-    max_depth: u32,
-    branching_depth: u32,
-}
-
-@group(1) @binding(0) var<uniform> start: ChainStart;
-
 // Whether a mirror, a pane or a body has a base colour texture.
 override HAS_TINTED_GLASS: bool;
+// Whether light straight from the lamps is traced, and not in the maps.
+override TRACES_LIGHTS: bool;
 
 // Gazes that may wait: one for each surface at which both ways on are followed.
 const MOST_BRANCHING: u32 = 4u;
@@ -139,6 +129,11 @@ fn tint(gaze: Gaze, point: SurfacePoint, cos_view: f32) -> vec3f {
     return object.base_colour * texture_colour(object.texture, point.uv, level);
 }
 
+fn lit_point(point: SurfacePoint) -> LitPoint {
+    let margin = 2.0 * dot(abs(point.geometric_normal), point.error);
+    return LitPoint(point.place, margin, point.geometric_normal, point.shading_normal);
+}
+
 fn chain_radiance(first: Gaze) -> vec3f {
     var walk = Walk(first, vec3f(0.0), 0u);
     loop {
@@ -175,7 +170,11 @@ fn chain_radiance(first: Gaze) -> vec3f {
             let record = objects[point.object].map;
             let cos_view = abs(dot(point.geometric_normal, gaze.direction));
             let level = footprint_level(record, point.map_density, gaze.width, cos_view);
-            let own = tint(gaze, point, cos_view) * irradiance(record, point.map_uv, level) / PI;
+            var lit = irradiance(record, point.map_uv, level);
+            if TRACES_LIGHTS {
+                lit += direct_irradiance(lit_point(point), objects[point.object]);
+            }
+            let own = tint(gaze, point, cos_view) * lit / PI;
             let next = interact(point, gaze.direction, gaze.media, vec3f(1.0));
             walk.radiance += gaze.weight * next.own * own;
             goes_on = go_on(&walk, point, next);

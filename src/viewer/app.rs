@@ -87,6 +87,8 @@ pub struct App {
     /// The exposure that was measured last [stops], and how many layers the maps had then.
     measured: Option<(f64, usize)>,
     must_set_maps: bool,
+    /// Whether direct light is traced, and not in the maps on the device.
+    traces_lights: bool,
     pressed: Wishes,
     losses: Vec<Instant>,
     /// Chooses how well pictures are made.
@@ -136,6 +138,7 @@ impl App {
             must_measure_exposure: options.exposure_stops.is_none(),
             measured: None,
             must_set_maps: true,
+            traces_lights: false,
             pressed: Wishes::default(),
             losses: Vec::new(),
             pace: Pace::default(),
@@ -174,6 +177,7 @@ impl App {
                     Pace::default()
                 };
                 self.graphics = Some(graphics);
+                self.traces_lights = false;
                 self.must_set_maps = true;
             }
             Err(error) => self.fail(event_loop, error),
@@ -416,6 +420,13 @@ impl App {
         let Some(graphics) = &mut self.graphics else {
             return Ok(());
         };
+        // Played by the processor, shadow rays take longer than the next bake.
+        let traces_lights = self.model.traces_lights() && !graphics.gpu().is_software();
+        if traces_lights != self.traces_lights {
+            self.traces_lights = traces_lights;
+            self.must_set_maps = true;
+            graphics.set_traces_lights(traces_lights);
+        }
         let start = Instant::now();
         let mut uploaded = graphics.set_scene(self.model.scene())?;
         let mut is_new = uploaded != Uploaded::default();
@@ -424,7 +435,11 @@ impl App {
                 Quantity::Light => MapStyle::Lit,
                 Quantity::Error | Quantity::Difference => MapStyle::AsItIs,
             };
-            uploaded += graphics.set_maps(&self.model.shown_maps(), style)?;
+            uploaded += if traces_lights {
+                graphics.set_maps(&self.model.maps_without_direct(), style)?
+            } else {
+                graphics.set_maps(&self.model.shown_maps(), style)?
+            };
             is_new = true;
         }
         if is_new {

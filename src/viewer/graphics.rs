@@ -147,6 +147,12 @@ impl Graphics {
         self.renderer.set_maps(&self.gpu, &self.scene, maps)
     }
 
+    /// Whether direct light is traced from the next picture on; the maps are then to be set without it.
+    pub fn set_traces_lights(&mut self, traces: bool) {
+        self.picture.invalidate();
+        self.renderer.set_traces_lights(traces);
+    }
+
     /// Switches the eye's chains from the next picture on.
     ///
     /// # Errors

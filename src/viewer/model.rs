@@ -132,6 +132,35 @@ impl Model {
         self.worth.as_ref()?.difference.as_ref().ok()
     }
 
+    /// Whether direct light is to be traced and not looked up: it is shown, and its layer is not baked yet, or a light or
+    /// an object was moved since.
+    pub fn traces_lights(&self) -> bool {
+        let shown = self.panel.display.layer != LayerShown::Only(LayerKind::Caustic);
+        let Some(last) = self
+            .last
+            .as_ref()
+            .filter(|_| shown && self.quantity() == Quantity::Light)
+        else {
+            return false;
+        };
+        let is_asked_for = last.request.settings.layers.contains(&LayerKind::Direct);
+        if self.layers().contains(&LayerKind::Direct) {
+            is_other_light(&last.request.scene, self.scene())
+        } else {
+            is_asked_for && !last.is_final
+        }
+    }
+
+    /// The maps without their direct light.
+    pub fn maps_without_direct(&self) -> Vec<IlluminationMap> {
+        let mut maps = self.shown_maps().into_owned();
+        for map in &mut maps {
+            map.layers.retain(|layer| layer.kind != LayerKind::Direct);
+        }
+        maps.retain(|map| !map.layers.is_empty());
+        maps
+    }
+
     /// The maps as the panel asks them to be shown: some layers, the errors, or what an effect is worth.
     pub fn shown_maps(&self) -> Cow<'_, [IlluminationMap]> {
         // Until the next maps come, an edit may have made a receiver clear, or a mirror.
@@ -341,4 +370,13 @@ impl Model {
         self.debounce.clear();
         self.worker.cancel();
     }
+}
+
+/// Whether a scene is lit otherwise than before: a lamp is another one, or an object elsewhere.
+fn is_other_light(before: &Arc<Scene>, now: &Arc<Scene>) -> bool {
+    let meshes = |scene: &Arc<Scene>| -> Vec<_> {
+        let objects = scene.objects.iter();
+        objects.map(|object| Arc::as_ptr(&object.mesh)).collect()
+    };
+    !Arc::ptr_eq(before, now) && (before.lights != now.lights || meshes(before) != meshes(now))
 }

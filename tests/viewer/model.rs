@@ -215,9 +215,18 @@ fn an_edited_scene_is_baked_and_an_edit_taken_back_too() {
         is_dragging: true,
         ..Wishes::default()
     };
+    assert!(!model.traces_lights(), "the layer holds it");
     // Two steps of one drag, then the mouse is let go.
     for times in [2.0, 4.0] {
         model.act(&brighter(times), Instant::now());
+        // Until maps of this light come, its direct light is not that of the layer.
+        assert!(model.traces_lights());
+        let shown = model.maps_without_direct();
+        let layers = shown.iter().flat_map(|map| &map.layers).map(|layer| layer.kind);
+        assert_eq!(layers.collect::<Vec<_>>(), [LayerKind::Caustic]);
+        model.panel.display.layer = LayerShown::Only(LayerKind::Caustic);
+        assert!(!model.traces_lights(), "no direct light is shown");
+        model.panel.display.layer = LayerShown::All;
     }
     model.act(&Wishes::default(), Instant::now());
     assert_eq!(model.edits().undoable(), 1, "a drag is taken back as one");
@@ -227,6 +236,7 @@ fn an_edited_scene_is_baked_and_an_edit_taken_back_too() {
         "{}",
         flux(&model) / before
     );
+    assert!(!model.traces_lights(), "the layer is that of the brighter light");
 
     let undo = Wishes {
         undo: true,

@@ -9,13 +9,13 @@ use wgpu::util::DeviceExt;
 use super::bindings::bind_group;
 use super::geometry::Geometry;
 use super::storage::Storage;
-use super::uniforms::{ChainStart, Node, Triangle};
+use super::uniforms::{ChainStart, LightRecord, Node, Triangle, rgb};
 use crate::error::{Error, Result};
 use crate::eye_pass::View;
 use crate::eye_pass::reference::{ChainLimits, media_at};
 use crate::geometry::PackedBvh;
 use crate::gpu::Gpu;
-use crate::scene::Scene;
+use crate::scene::{Light, LightKind, Scene};
 use crate::transport::{MediumStack, Tracer};
 
 /// Nodes that may wait while a ray is traced; `STACK` in the shader.
@@ -23,7 +23,7 @@ const STACK: usize = 64;
 /// Largest number of a body that a chain can remember.
 const MOST_OBJECTS: usize = u16::MAX as usize - 1;
 /// Storage buffers that a fragment of a chain reads.
-const BUFFERS: u32 = 7;
+const BUFFERS: u32 = 8;
 /// Surfaces at which both ways on can be followed; `MOST_BRANCHING` in the shader.
 pub(super) const MOST_BRANCHING: u32 = 4;
 
@@ -37,6 +37,7 @@ pub(super) struct ChainScene {
     scale: f64,
     nodes: Storage,
     triangles: Storage,
+    lights: Storage,
     bytes: u64,
 }
 
@@ -85,6 +86,7 @@ impl ChainScene {
             scale: packed.scale,
             nodes: Storage::new(gpu, "nodes"),
             triangles: Storage::new(gpu, "triangles"),
+            lights: Storage::new(gpu, "lights"),
             bytes: 0,
         };
         made.bytes = (made.nodes.write(gpu, &nodes) + made.triangles.write(gpu, &records)) as u64;
@@ -132,12 +134,52 @@ impl ChainScene {
             page.corners.as_entire_binding(),
             page.map_uvs.as_entire_binding(),
             page.indices.as_entire_binding(),
+            self.lights.binding(),
         ];
         Some(bind_group(gpu, "chains", layout, resources))
     }
 
+    /// Takes over the lamps of a scene.
+    pub(super) fn set_lights(&mut self, gpu: &Gpu, lights: &[Light]) {
+        let records: Vec<LightRecord> = lights.iter().map(|light| self.record(light)).collect();
+        self.lights.write(gpu, &records);
+    }
+
+    fn record(&self, light: &Light) -> LightRecord {
+        let strength = rgb(light.strength());
+        let single = |direction: DVec3| direction.as_vec3().to_array();
+        match light.kind {
+            LightKind::Point { position, .. } => LightRecord {
+                place: self.local(position),
+                kind: 0,
+                strength,
+                ..Default::default()
+            },
+            LightKind::Spot {
+                position,
+                direction,
+                inner_cone_rad,
+                outer_cone_rad,
+                ..
+            } => LightRecord {
+                place: self.local(position),
+                kind: 1,
+                strength,
+                cos_inner: inner_cone_rad.cos() as f32,
+                axis: single(direction),
+                cos_outer: outer_cone_rad.cos() as f32,
+            },
+            LightKind::Sun { direction, .. } => LightRecord {
+                place: single(direction),
+                kind: 2,
+                strength,
+                ..Default::default()
+            },
+        }
+    }
+
     /// Where the chains of a view begin.
-    pub(super) fn start(&self, view: &View, limits: &ChainLimits) -> ChainStart {
+    pub(super) fn start(&self, view: &View, limits: &ChainLimits, light_count: usize) -> ChainStart {
         let eye = view.camera.position;
         ChainStart {
             eye: self.local(eye),
@@ -147,6 +189,8 @@ impl ChainScene {
             branch_threshold: limits.branch_threshold as f32,
             max_depth: limits.max_depth,
             branching_depth: limits.branching_depth.min(MOST_BRANCHING),
+            light_count: light_count as u32,
+            ..Default::default()
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use super::MapStyle;
 use super::objects::{Look, Objects};
-use super::pipelines::{Faces, PipelineKey, Writes};
+use super::pipelines::{DrawnHow, Faces, PipelineKey, Writes};
 use crate::eye_pass::View;
 
 /// An object drawn once.
@@ -23,6 +23,8 @@ pub(super) struct Manner {
     pub(super) has_tinted_glass: bool,
     /// Whether the traced picture has other pixels than the picture.
     pub(super) is_scaled: bool,
+    /// Whether light straight from the lamps is traced.
+    pub(super) traces_lights: bool,
 }
 
 impl Manner {
@@ -57,11 +59,15 @@ impl Manner {
     fn of(self, look: &Look, writes: Writes) -> PipelineKey {
         let has_back = look.double_sided || !look.surface.is_opaque();
         let faces = if has_back { Faces::Both } else { Faces::Front };
-        let has_texture = match writes {
-            Writes::Traced => self.has_tinted_glass,
-            _ => look.has_texture(),
+        let how = DrawnHow {
+            has_texture: match writes {
+                Writes::Traced => self.has_tinted_glass,
+                _ => look.has_texture(),
+            },
+            is_scaled: self.is_scaled,
+            traces_lights: self.traces_lights,
         };
-        PipelineKey::new(writes, look.surface, faces, has_texture, self.is_scaled)
+        PipelineKey::new(writes, look.surface, faces, how)
     }
 }
 

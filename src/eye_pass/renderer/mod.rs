@@ -100,6 +100,8 @@ pub struct Renderer {
     map_style: MapStyle,
     chains: EffectSwitch,
     quality: EyeQuality,
+    /// Whether light straight from the lamps is traced.
+    traces_lights: bool,
     timing: Option<Timing>,
     /// Objects of the last picture, and the specular ones among them.
     drawn: [usize; 2],
@@ -148,6 +150,7 @@ impl Renderer {
             map_style: MapStyle::default(),
             chains: EffectSwitch::default(),
             quality: EyeQuality::default(),
+            traces_lights: false,
             timing: Timing::new(gpu),
             drawn: [0; 2],
         };
@@ -209,6 +212,13 @@ impl Renderer {
     /// How well pictures are made from the next one on.
     pub fn set_quality(&mut self, quality: EyeQuality) {
         self.quality = quality.clamped();
+        self.drawn_view = None;
+    }
+
+    /// Whether light straight from the scene's lamps is traced from the next picture on, by a shadow ray for each lamp
+    /// and pixel: right at once where a lamp or an object was moved. The maps are then to be given without it.
+    pub fn set_traces_lights(&mut self, traces: bool) {
+        self.traces_lights = traces;
         self.drawn_view = None;
     }
 
@@ -357,6 +367,7 @@ impl Renderer {
         Manner {
             style: self.map_style,
             has_chains: self.chains != EffectSwitch::Off && self.refusal.is_none(),
+            traces_lights: self.traces_lights && self.map_style == MapStyle::Lit && self.refusal.is_none(),
             is_scaled: self.quality.traced_scale != 1.0,
             has_tinted_glass: self.objects.has_tinted_glass(),
         }

@@ -6,6 +6,7 @@ use super::bindings::bind_group;
 use super::camera;
 use super::chains::ChainScene;
 use super::draws::{Draw, DrawList, Manner, visible_objects};
+use super::pipelines::Writes;
 use super::quality::{EyeQuality, Sample};
 use super::targets::{Targets, TracedTargets};
 use super::timing::Timing;
@@ -45,7 +46,10 @@ impl Renderer {
             self.make_traced_targets(gpu, view, quality)?;
         }
         let frame = self.bind_frame(gpu, &self.frame(view, radiance_scale, sample, quality));
-        self.trace(gpu, encoder, view, &frame, &list, quality);
+        let through_scene = self.bind_chains(gpu, view, quality);
+        if let Some(chains) = &through_scene {
+            self.trace(encoder, &frame, chains, &list);
+        }
         let background = view
             .background
             .map(|channel| (channel * radiance_scale).min(LARGEST_SCALED));
@@ -55,36 +59,46 @@ impl Renderer {
         if let Some(composed) = self.bind_composed(gpu, &list) {
             pass.set_bind_group(1, &composed, &[]);
         }
-        self.draw_each(&mut pass, &list.surfaces);
+        let (composed, own): (Vec<Draw>, Vec<Draw>) = list
+            .surfaces
+            .iter()
+            .partition(|draw| draw.key.writes == Writes::Composed);
+        self.draw_each(&mut pass, &composed);
+        if let Some(chains) = &through_scene {
+            pass.set_bind_group(1, chains, &[]);
+        }
+        self.draw_each(&mut pass, &own);
         drop(pass);
         self.drawn = [list.surfaces.len(), list.specular_objects];
         self.targets = Some(targets);
         Ok(())
     }
 
-    /// Traces the chains of what is specular in view.
-    fn trace(
-        &self,
-        gpu: &Gpu,
-        encoder: &mut wgpu::CommandEncoder,
-        view: &View,
-        frame: &wgpu::BindGroup,
-        list: &DrawList,
-        quality: EyeQuality,
-    ) {
-        let (Some(scene), Some(targets), Some(layout)) =
-            (&self.chain_scene, &self.traced, self.surfaces.traced_layout())
-        else {
-            return;
-        };
-        if list.traced.is_empty() {
-            return;
-        }
+    /// Binds what rays are traced through; `None` where nothing traces.
+    fn bind_chains(&self, gpu: &Gpu, view: &View, quality: EyeQuality) -> Option<wgpu::BindGroup> {
+        let (scene, layout) = (self.chain_scene.as_ref()?, self.surfaces.traced_layout()?);
         let limits = ChainLimits {
             branching_depth: quality.branching_depth,
             ..ChainLimits::default()
         };
-        let Some(chains) = scene.bind(gpu, layout, &self.geometry, &scene.start(view, &limits)) else {
+        let light_count = if self.traces_lights {
+            self.scene.lights.len()
+        } else {
+            0
+        };
+        let start = scene.start(view, &limits, light_count);
+        scene.bind(gpu, layout, &self.geometry, &start)
+    }
+
+    /// Traces the chains of what is specular in view.
+    fn trace(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        frame: &wgpu::BindGroup,
+        chains: &wgpu::BindGroup,
+        list: &DrawList,
+    ) {
+        let Some(targets) = self.traced.as_ref().filter(|_| !list.traced.is_empty()) else {
             return;
         };
         let timing = self.timing.as_ref();
@@ -94,7 +108,7 @@ impl Renderer {
         drop(pass);
         let mut pass = targets.begin_chains(encoder, timing.map(Timing::after_chains));
         pass.set_bind_group(0, frame, &[]);
-        pass.set_bind_group(1, &chains, &[]);
+        pass.set_bind_group(1, chains, &[]);
         self.draw_each(&mut pass, &list.traced);
     }
 
@@ -119,11 +133,12 @@ impl Renderer {
         self.objects
             .keep_budget(gpu, view.camera.position, pixel_rad, &visible);
         let manner = self.manner();
-        if visible
-            .iter()
-            .any(|object| manner.is_specular(&self.objects.list[*object]))
-        {
+        let is_specular = |object: &usize| manner.is_specular(&self.objects.list[*object]);
+        if manner.traces_lights || visible.iter().any(is_specular) {
             self.make_chain_scene(gpu);
+        }
+        if let Some(scene) = self.chain_scene.as_mut().filter(|_| manner.traces_lights) {
+            scene.set_lights(gpu, &self.scene.lights);
         }
         // What chains are traced through may have been refused.
         let list = DrawList::new(&self.objects, &visible, self.manner());

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use super::bindings::{bind_group_layout, pipeline_layout, storage, texture, uniform};
 use super::geometry::{CORNER_LAYOUT, MAP_UV_LAYOUT};
 use super::objects::surface_code;
-use super::shaders::{COMPOSED, SURFACE, TRACED};
+use super::shaders::{COMPOSED, SURFACE, TRACED, UNDER_LIGHTS};
 use crate::gpu::Gpu;
 use crate::gpu::shader::Program;
 use crate::scene::SurfaceKind;
@@ -20,6 +20,8 @@ pub(super) const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth3
 pub(super) enum Writes {
     /// What an opaque surface sends by itself.
     Own,
+    /// The same, lit straight from the lamps by shadow rays.
+    OwnUnderLights,
     /// The map's value.
     MapValue,
     /// Depth only, before chains are traced for what is nearest.
@@ -31,8 +33,9 @@ pub(super) enum Writes {
 }
 
 impl Writes {
-    pub(super) const ALL: [Self; 5] = [
+    pub(super) const ALL: [Self; 6] = [
         Self::Own,
+        Self::OwnUnderLights,
         Self::MapValue,
         Self::Depth,
         Self::Traced,
@@ -43,6 +46,7 @@ impl Writes {
     pub(super) fn entry_point(self) -> Option<&'static str> {
         match self {
             Self::Own => Some("own"),
+            Self::OwnUnderLights => Some("own_under_lights"),
             Self::MapValue => Some("map_value"),
             Self::Depth => None,
             Self::Traced => Some("traced"),
@@ -54,6 +58,7 @@ impl Writes {
     pub(super) fn program(self) -> Program {
         match self {
             Self::Own | Self::MapValue | Self::Depth => SURFACE,
+            Self::OwnUnderLights => UNDER_LIGHTS,
             Self::Traced => TRACED,
             Self::Composed => COMPOSED,
         }
@@ -62,6 +67,11 @@ impl Writes {
     /// Whether it is part of a chain from the eye over specular surfaces.
     pub(super) fn is_specular(self) -> bool {
         matches!(self, Self::Depth | Self::Traced | Self::Composed)
+    }
+
+    /// Whether it sends rays through the scene's hierarchy.
+    pub(super) fn goes_through_scene(self) -> bool {
+        matches!(self, Self::OwnUnderLights | Self::Traced)
     }
 
     /// Whether it draws into the traced picture, which has one sample per pixel.
@@ -84,24 +94,31 @@ pub(super) struct PipelineKey {
     pub(super) faces: Faces,
     /// Of what shows itself only.
     surface: SurfaceKind,
-    has_texture: bool,
+    how: DrawnHow,
+}
+
+/// What a kind of drawing has to be ready for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub(super) struct DrawnHow {
+    /// Whether the surface has a texture; for chains, whether anything specular in the scene has.
+    pub(super) has_texture: bool,
     /// Whether the traced picture has other pixels than the picture.
-    is_scaled: bool,
+    pub(super) is_scaled: bool,
+    /// Whether light straight from the lamps is traced.
+    pub(super) traces_lights: bool,
 }
 
 impl PipelineKey {
     /// The key of a kind of drawing. What does not matter to it is left out, so that fewer pipelines serve.
-    /// `has_texture`: whether the surface has one; for chains, whether anything specular in the scene has.
-    pub(super) fn new(
-        writes: Writes,
-        surface: SurfaceKind,
-        faces: Faces,
-        has_texture: bool,
-        is_scaled: bool,
-    ) -> Self {
-        let shows_itself = writes == Writes::Own;
+    pub(super) fn new(writes: Writes, surface: SurfaceKind, faces: Faces, how: DrawnHow) -> Self {
+        let is_lit = how.traces_lights && surface != SurfaceKind::Mirror;
+        let writes = match writes {
+            Writes::Own if is_lit => Writes::OwnUnderLights,
+            other => other,
+        };
+        let shows_itself = matches!(writes, Writes::Own | Writes::OwnUnderLights);
         let looks_up = match writes {
-            Writes::Own => surface != SurfaceKind::Mirror,
+            Writes::Own | Writes::OwnUnderLights => surface != SurfaceKind::Mirror,
             Writes::Traced => true,
             Writes::MapValue | Writes::Depth | Writes::Composed => false,
         };
@@ -113,22 +130,32 @@ impl PipelineKey {
             } else {
                 SurfaceKind::Diffuse
             },
-            has_texture: has_texture && looks_up,
-            is_scaled: is_scaled && writes == Writes::Composed,
+            how: DrawnHow {
+                has_texture: how.has_texture && looks_up,
+                is_scaled: how.is_scaled && writes == Writes::Composed,
+                traces_lights: how.traces_lights && writes == Writes::Traced,
+            },
         }
     }
 
     /// The values of the shader's overrides.
     pub(super) fn constants(self) -> Vec<(&'static str, f64)> {
         match self.writes {
-            Writes::Own | Writes::MapValue | Writes::Depth => vec![
+            Writes::Own | Writes::OwnUnderLights | Writes::MapValue | Writes::Depth => vec![
                 ("SURFACE", f64::from(surface_code(self.surface))),
-                ("HAS_TEXTURE", f64::from(u8::from(self.has_texture))),
+                ("HAS_TEXTURE", flag(self.how.has_texture)),
             ],
-            Writes::Traced => vec![("HAS_TINTED_GLASS", f64::from(u8::from(self.has_texture)))],
-            Writes::Composed => vec![("IS_SCALED", f64::from(u8::from(self.is_scaled)))],
+            Writes::Traced => vec![
+                ("HAS_TINTED_GLASS", flag(self.how.has_texture)),
+                ("TRACES_LIGHTS", flag(self.how.traces_lights)),
+            ],
+            Writes::Composed => vec![("IS_SCALED", flag(self.how.is_scaled))],
         }
     }
+}
+
+fn flag(is_set: bool) -> f64 {
+    f64::from(u8::from(is_set))
 }
 
 /// The pipelines that were called for so far, and how they are bound.
@@ -172,7 +199,7 @@ impl SurfacePipelines {
             self.modules
                 .entry(program.name)
                 .or_insert_with(|| program.module(&gpu.device));
-            if key.writes == Writes::Traced {
+            if key.writes.goes_through_scene() {
                 self.make_traced_layout(gpu);
             }
             let pipeline = self.pipeline(gpu, key);
@@ -213,6 +240,7 @@ impl SurfacePipelines {
             storage(),
             storage(),
             storage(),
+            storage(),
         ];
         self.traced_layout
             .get_or_insert_with(|| bind_group_layout(gpu, "chains", &chains));
@@ -221,7 +249,7 @@ impl SurfacePipelines {
     fn layout(&self, gpu: &Gpu, writes: Writes) -> wgpu::PipelineLayout {
         let second = match writes {
             Writes::Own | Writes::MapValue | Writes::Depth => None,
-            Writes::Traced => self.traced_layout.as_ref(),
+            Writes::OwnUnderLights | Writes::Traced => self.traced_layout.as_ref(),
             Writes::Composed => Some(&self.composed_layout),
         };
         let groups: Vec<_> = std::iter::once(&self.frame_layout).chain(second).collect();

@@ -1,9 +1,11 @@
 //! The eye pass's shader modules and what they share with Rust.
 
 use super::geometry::{CORNER_LAYOUT, MAP_UV_LAYOUT};
-use super::pipelines::{Faces, PipelineKey, Writes};
+use super::pipelines::{DrawnHow, Faces, PipelineKey, Writes};
 use super::tone_mapping;
-use super::uniforms::{Accumulation, ChainStart, Frame, Node, ObjectRecord, ProbeHit, ProbeRay, Triangle};
+use super::uniforms::{
+    Accumulation, ChainStart, Frame, LightRecord, Node, ObjectRecord, ProbeHit, ProbeRay, Triangle,
+};
 use crate::eye_pass::ToneMap;
 use crate::gpu::layout::StructLayout;
 use crate::gpu::shader::{Program, shader_source};
@@ -20,6 +22,7 @@ pub(super) const SURFACE: Program = Program {
         shader_source!("eye_pass/images"),
         shader_source!("eye_pass/place"),
         shader_source!("eye_pass/surface"),
+        shader_source!("eye_pass/own"),
     ],
 };
 
@@ -34,11 +37,31 @@ pub(super) const TRACED: Program = Program {
         shader_source!("eye_pass/objects"),
         shader_source!("eye_pass/images"),
         shader_source!("eye_pass/place"),
+        shader_source!("eye_pass/start"),
+        shader_source!("eye_pass/lights"),
         shader_source!("eye_pass/corners"),
         shader_source!("eye_pass/medium"),
         shader_source!("eye_pass/interaction"),
         shader_source!("eye_pass/chain"),
         shader_source!("eye_pass/traced"),
+    ],
+};
+
+/// Surfaces of the scene by themselves, while lights are moved.
+pub(super) const UNDER_LIGHTS: Program = Program {
+    name: "under_lights",
+    sources: &[
+        shader_source!("shared/refraction"),
+        shader_source!("shared/fresnel"),
+        shader_source!("shared/traversal"),
+        shader_source!("eye_pass/frame"),
+        shader_source!("eye_pass/objects"),
+        shader_source!("eye_pass/images"),
+        shader_source!("eye_pass/place"),
+        shader_source!("eye_pass/start"),
+        shader_source!("eye_pass/lights"),
+        shader_source!("eye_pass/surface"),
+        shader_source!("eye_pass/own_under_lights"),
     ],
 };
 
@@ -83,7 +106,15 @@ pub(super) const TONE_MAPPING: Program = Program {
 
 /// Every shader module of the eye pass, for the tests.
 pub fn programs() -> Vec<Program> {
-    vec![SURFACE, TRACED, COMPOSED, ACCUMULATED, PROBE, TONE_MAPPING]
+    vec![
+        SURFACE,
+        UNDER_LIGHTS,
+        TRACED,
+        COMPOSED,
+        ACCUMULATED,
+        PROBE,
+        TONE_MAPPING,
+    ]
 }
 
 /// Every struct that the eye pass shares with its shaders, for the tests.
@@ -91,6 +122,7 @@ pub fn shared_structs() -> Vec<StructLayout> {
     vec![
         Frame::layout(),
         ChainStart::layout(),
+        LightRecord::layout(),
         ObjectRecord::layout(),
         Node::layout(),
         Triangle::layout(),
@@ -139,8 +171,13 @@ pub fn specialisations() -> Vec<Specialisation> {
             continue;
         };
         for kind in KINDS {
-            for flag in [false, true] {
-                let key = PipelineKey::new(writes, kind, Faces::Both, flag, flag);
+            for flags in 0..4 {
+                let manner = DrawnHow {
+                    has_texture: flags & 1 > 0,
+                    is_scaled: flags & 1 > 0,
+                    traces_lights: flags & 2 > 0,
+                };
+                let key = PipelineKey::new(writes, kind, Faces::Both, manner);
                 all.push(Specialisation {
                     program: writes.program().name,
                     entry_point,

@@ -52,6 +52,11 @@ shader_struct! {
         max_depth: u32,
         /// Up to this many surfaces both ways on are followed, and then the stronger.
         branching_depth: u32,
+        /// Lights that are traced.
+        light_count: u32,
+        padding0: u32,
+        padding1: u32,
+        padding2: u32,
     }
 }
 
@@ -75,6 +80,24 @@ shader_struct! {
         /// Record of its base colour texture.
         texture: u32,
         padding: [u32; 2],
+    }
+}
+
+shader_struct! {
+    /// A lamp.
+    LightRecord {
+        /// Where it is, local; for suns the way their light travels.
+        place: [f32; 3],
+        /// `LIGHT_*`.
+        kind: u32,
+        /// [W/sr], of suns [W/m²].
+        strength: [f32; 3],
+        /// Cosine of the half-angle of full strength.
+        cos_inner: f32,
+        /// Of a spot, unit, away from the lamp.
+        axis: [f32; 3],
+        /// Cosine of the half-angle at which it ends.
+        cos_outer: f32,
     }
 }
 

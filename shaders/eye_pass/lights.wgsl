@@ -1,0 +1,77 @@
+// Light straight from the lamps, by a shadow ray each; twin of light_pass/direct/lighting.rs. Lengths are local but
+// where they say so.
+
+struct LightRecord {
+    // Where it is; the way its light travels for suns.
+    place: vec3f,
+    kind: u32,
+    // W/sr per channel, or W/m² for suns.
+    strength: vec3f,
+    cos_inner: f32,
+    // Of a spot, away from the lamp.
+    axis: vec3f,
+    cos_outer: f32,
+}
+
+const LIGHT_POINT: u32 = 0u;
+const LIGHT_SPOT: u32 = 1u;
+const LIGHT_SUN: u32 = 2u;
+
+@group(1) @binding(6) var<storage, read> lights: array<LightRecord>;
+
+// Where light may arrive.
+struct LitPoint {
+    place: vec3f,
+    // How far off the surface a shadow ray starts.
+    margin: f32,
+    geometric_normal: vec3f,
+    shading_normal: vec3f,
+}
+
+// Share of its strength that a spot sends along a direction (KHR_lights_punctual); 1 for the others.
+fn falloff(light: LightRecord, direction: vec3f) -> f32 {
+    if light.kind != LIGHT_SPOT {
+        return 1.0;
+    }
+    let cosine = dot(light.axis, direction);
+    var ramp = select(0.0, 1.0, cosine >= light.cos_outer);
+    if light.cos_inner > light.cos_outer {
+        ramp = clamp((cosine - light.cos_outer) / (light.cos_inner - light.cos_outer), 0.0, 1.0);
+    }
+    return ramp * ramp;
+}
+
+// E [W/m²] that a surface of an object takes there: on its front, and on its back where that is drawn. What polish
+// reflects is not taken.
+fn direct_irradiance(point: LitPoint, object: ObjectRecord) -> vec3f {
+    var sum = vec3f(0.0);
+    for (var index = 0u; index < start.light_count; index += 1u) {
+        let light = lights[index];
+        var to_light = -light.place;
+        var distance = FAR_AWAY;
+        var across_beam = 1.0;
+        if light.kind != LIGHT_SUN {
+            let offset = light.place - point.place;
+            distance = length(offset);
+            to_light = offset / max(distance, 1e-20);
+            let distance_m = distance * start.unit_m;
+            across_beam = falloff(light, -to_light) / max(distance_m * distance_m, 1e-20);
+        }
+        let is_front = dot(to_light, point.geometric_normal) >= 0.0;
+        let side = select(-1.0, 1.0, is_front);
+        let cosine = side * dot(to_light, point.shading_normal);
+        var taken = select(0.0, 1.0, is_front || object.double_sided != 0u);
+        if object.surface == SURFACE_MIXED {
+            taken *= 1.0 - dielectric_reflectance(cosine, object.ior);
+        }
+        let share = across_beam * cosine * taken;
+        if share > 0.0 {
+            let origin = point.place + point.geometric_normal * (side * point.margin);
+            // Every surface stops it, clear ones included: what comes through those is in the caustic layer.
+            if closest_hit(origin, to_light, distance).triangle == NO_TRIANGLE {
+                sum += light.strength * share;
+            }
+        }
+    }
+    return sum;
+}
