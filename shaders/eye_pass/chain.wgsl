@@ -80,7 +80,7 @@ fn onward(gaze: Gaze, point: SurfacePoint, branch: Branch) -> Gaze {
         branch.direction,
         gaze.width,
         gaze.weight * branch.share,
-        gaze.spread * branch.spread_factor + bent,
+        gaze.spread * branch.spread_factor + bent + branch.spread_added,
         branch.media,
     );
 }

@@ -16,6 +16,8 @@ struct Branch {
     // Change of the angle across the footprint, over the footprint's width and by its own spread.
     spread_per_width: f32,
     spread_factor: f32,
+    // By what roughness adds to it: an approximation, which blurs maps and textures but no edges.
+    spread_added: f32,
 }
 
 struct Interaction {
@@ -34,7 +36,7 @@ fn face(point: SurfacePoint, incident: vec3f) -> Facing {
 }
 
 fn no_branch() -> Branch {
-    return Branch(vec3f(0.0), vec3f(0.0), vec4u(0u), 0.0, 1.0);
+    return Branch(vec3f(0.0), vec3f(0.0), vec4u(0u), 0.0, 1.0, 0.0);
 }
 
 fn reflection(point: SurfacePoint, facing: Facing, incident: vec3f, media: vec4u, share: vec3f) -> Branch {
@@ -43,7 +45,7 @@ fn reflection(point: SurfacePoint, facing: Facing, incident: vec3f, media: vec4u
         direction = mirrored(incident, facing.geometric);
     }
     let curvature = select(-point.curvature, point.curvature, facing.front);
-    return Branch(direction, share, media, 2.0 * curvature, 1.0);
+    return Branch(direction, share, media, 2.0 * curvature, 1.0, objects[point.object].lobe_rad);
 }
 
 fn thin_wall(point: SurfacePoint, facing: Facing, incident: vec3f, media: vec4u, tint: vec3f) -> Interaction {
@@ -52,7 +54,7 @@ fn thin_wall(point: SurfacePoint, facing: Facing, incident: vec3f, media: vec4u,
     return Interaction(
         0.0,
         reflection(point, facing, incident, media, vec3f(reflectance)),
-        Branch(incident, tint * (1.0 - reflectance), media, 0.0, 1.0),
+        Branch(incident, tint * (1.0 - reflectance), media, 0.0, 1.0, object.lobe_rad),
     );
 }
 
@@ -88,7 +90,15 @@ fn dielectric(point: SurfacePoint, facing: Facing, incident: vec3f, media: vec4u
     return Interaction(
         0.0,
         reflection(point, facing, incident, media, vec3f(reflectance)),
-        Branch(direction, share, beyond, curvature * (1.0 / eta - 1.0), 1.0 / eta),
+        // A tilted facet turns a refracted ray by |1/eta - 1| of its tilt, and a reflected one by twice that tilt.
+        Branch(
+            direction,
+            share,
+            beyond,
+            curvature * (1.0 / eta - 1.0),
+            1.0 / eta,
+            0.5 * abs(1.0 / eta - 1.0) * objects[point.object].lobe_rad,
+        ),
     );
 }
 

@@ -9,7 +9,8 @@ struct ObjectRecord {
     double_sided: u32,
     map: u32,
     texture: u32,
-    padding: vec2u,
+    lobe_rad: f32,
+    padding: u32,
 }
 
 const SURFACE_DIFFUSE: u32 = 0u;

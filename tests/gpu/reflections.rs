@@ -88,3 +88,53 @@ fn a_mirror_that_sees_no_receiver_shows_the_background() {
         }
     }
 }
+
+/// What a polished floor reflects of a check is the greyer the rougher it is: by a wider footprint.
+#[test]
+fn roughness_blurs_what_is_reflected() {
+    let Some(gpu) = gpu() else { return };
+    let contrast = |roughness: f64| {
+        let mut scene = floor_scene(diffuse(LinearSrgb::WHITE));
+        scene.materials.push(Material {
+            surface: SurfaceKind::Mirror,
+            base_colour: LinearSrgb::WHITE,
+            metallic: 1.0,
+            roughness,
+            ..Default::default()
+        });
+        scene.objects.push(floor("mirror", 1, 1.0));
+        let check = (0..64 * 64).map(|texel| {
+            [if (texel / 64 + texel % 64) % 2 == 0 {
+                1.0
+            } else {
+                0.0
+            }; 3]
+        });
+        let maps = [floor_map(0, 64, 64, check.collect())];
+        // From between the two, up to the mirror.
+        let view = View {
+            camera: Camera {
+                position: DVec3::new(0.5, 0.5, 0.5),
+                forward: DVec3::Y,
+                up: DVec3::Z,
+                vertical_fov_rad: 0.1,
+                ..from_above(1).camera
+            },
+            ..from_above(101)
+        };
+        let picture = render_offscreen(&gpu, &scene, &maps, &view).expect("it renders");
+        let values = || picture.radiance.iter().map(|rgb| f64::from(rgb[0]));
+        let mean = values().sum::<f64>() / picture.radiance.len() as f64;
+        assert!(
+            (mean / lambert(1.0, 0.5) - 1.0).abs() < 0.05,
+            "{mean}: no light is lost"
+        );
+        values().map(|value| (value - mean).abs()).sum::<f64>() / picture.radiance.len() as f64 / mean
+    };
+    let [smooth, polished, rough] = [0.0, 0.07, 0.3].map(contrast);
+    assert!(smooth > 0.2 && rough < 0.01 * smooth, "{smooth} {rough}");
+    assert!(
+        (0.1..0.9).contains(&(polished / smooth)),
+        "{polished}, {smooth} where smooth"
+    );
+}

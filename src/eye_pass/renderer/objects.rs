@@ -154,7 +154,8 @@ impl Look {
                 double_sided: u32::from(material.double_sided),
                 map: NO_IMAGE,
                 texture: NO_IMAGE,
-                padding: [0; 2],
+                lobe_rad: lobe_rad(material) as f32,
+                padding: 0,
             },
             base_colour_texture: material.base_colour_texture.as_ref().map(|image| image.texture),
         }
@@ -181,6 +182,12 @@ pub(super) fn surface_code(surface: SurfaceKind) -> u32 {
         SurfaceKind::ThinWall => 3,
         SurfaceKind::Mixed => 4,
     }
+}
+
+/// Angle between the directions in which a surface of GGX α = roughness² reflects light where its microfacets are tilted
+/// by α one way and the other [rad]: half of them are tilted less (Walter et al. 2007, eq. 35, at α: tan²θ = α²).
+fn lobe_rad(material: &Material) -> f64 {
+    4.0 * (material.roughness * material.roughness).atan()
 }
 
 /// What a body absorbs [1/m]: −ln(colour)/distance, per channel.

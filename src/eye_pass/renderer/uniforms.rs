@@ -79,7 +79,9 @@ shader_struct! {
         map: u32,
         /// Record of its base colour texture.
         texture: u32,
-        padding: [u32; 2],
+        /// Angle over which its roughness spreads what it reflects or lets through [rad].
+        lobe_rad: f32,
+        padding: u32,
     }
 }
 

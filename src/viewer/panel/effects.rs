@@ -160,7 +160,7 @@ fn counters(ui: &mut Ui, counts: &EffectCounts) {
         );
         add(
             bytes(counts.bytes),
-            "Memory on the graphics device for what mirrors and glass are shown of their surroundings.",
+            "Memory on the graphics device for the triangles that chains are traced through.",
         );
         let gpu = counts
             .gpu_ms
