@@ -31,7 +31,7 @@ fn composed(fragment: Fragment) -> @location(0) vec4f {
         let sum = add_traced(vec4f(0.0), vec2i(fragment.clip.xy), 1.0, wanted);
         return beside(sum, vec2i(fragment.clip.xy) - 1, wanted);
     }
-    let position = fragment.clip.xy * frame.traced_per_pixel - 0.5;
+    let position = fragment.clip.xy * frame.traced_per_pixel + frame.traced_offset - 0.5;
     let low = floor(position);
     let share = position - low;
     let corner = vec2i(low);

@@ -14,6 +14,8 @@ struct Frame {
     pixel_rad: f32,
     jitter: vec2f,
     traced_per_pixel: vec2f,
+    traced_offset: vec2f,
+    padding: vec2f,
 }
 
 @group(0) @binding(0) var<uniform> frame: Frame;

@@ -152,6 +152,12 @@ fn the_traced_picture_may_be_coarser_or_finer() {
         double < whole && whole < half && half < quarter,
         "{double} {whole} {half} {quarter}"
     );
+    // A mean of many coarse ones is finer than one, though no finer than their pixels blur.
+    let refined = mean_of(0.25, 8);
+    let pairs = refined.iter().flatten().zip(reference.iter().flatten());
+    let sum: f32 = pairs.map(|(a, b)| (a - b).abs()).sum();
+    let off = f64::from(sum) / refined.len() as f64;
+    assert!(off < 0.85 * quarter, "{off}, {quarter} of a single one");
     let brightness = |picture: &[[f32; 3]]| picture.iter().flatten().sum::<f32>();
     let ratio = brightness(&mean_of(0.25, 1)) / brightness(&reference);
     assert!((ratio - 1.0).abs() < 0.03, "{ratio}");

@@ -45,11 +45,16 @@ impl Renderer {
         if list.specular_objects > 0 {
             self.make_traced_targets(gpu, view, quality)?;
         }
-        let frame = self.bind_frame(gpu, &self.frame(view, radiance_scale, sample, quality));
+        let frame = self.frame(view, radiance_scale, sample, quality);
         let through_scene = self.bind_chains(gpu, view, quality);
         if let Some(chains) = &through_scene {
-            self.trace(encoder, &frame, chains, &list);
+            let traced = Frame {
+                jitter: jitter(view, sample.traced_offset(quality)),
+                ..frame
+            };
+            self.trace(encoder, &self.bind_frame(gpu, &traced), chains, &list);
         }
+        let frame = self.bind_frame(gpu, &frame);
         let background = view
             .background
             .map(|channel| (channel * radiance_scale).min(LARGEST_SCALED));
@@ -199,6 +204,7 @@ impl Renderer {
             .map_or([view.width, view.height], |traced| [traced.width, traced.height]);
         let half_height = (0.5 * camera.vertical_fov_rad).tan();
         let traced_height = f64::from(traced[1]);
+        let traced_per_pixel = [0, 1].map(|axis: usize| f64::from(traced[axis]) / size[axis]);
         let level_bias = if quality.minifies {
             sample.level_bias
         } else {
@@ -216,11 +222,13 @@ impl Renderer {
             traced_height: traced_height as f32,
             up: camera::single(camera.up * half_height),
             pixel_rad: (2.0 * half_height / traced_height) as f32,
-            jitter: [
-                (2.0 * sample.offset[0] / size[0]) as f32,
-                (-2.0 * sample.offset[1] / size[1]) as f32,
-            ],
-            traced_per_pixel: [0, 1].map(|axis: usize| (f64::from(traced[axis]) / size[axis]) as f32),
+            jitter: jitter(view, sample.offset),
+            traced_per_pixel: traced_per_pixel.map(|ratio| ratio as f32),
+            traced_offset: [0, 1].map(|axis: usize| {
+                let offset = sample.offset[axis] - sample.traced_offset(quality)[axis];
+                (offset * traced_per_pixel[axis]) as f32
+            }),
+            padding: [0.0; 2],
         }
     }
 
@@ -273,4 +281,10 @@ impl Renderer {
             }
         }
     }
+}
+
+/// A shift of the picture right and down [pixels], as the shaders have it: right and up, in half pictures.
+fn jitter(view: &View, [right, down]: [f64; 2]) -> [f32; 2] {
+    let half = |pixels: f64, size: u32| (2.0 * pixels / f64::from(size)) as f32;
+    [half(right, view.width), -half(down, view.height)]
 }

@@ -65,6 +65,11 @@ impl Sample {
         level_bias: 0.0,
     };
 
+    /// The same for the traced picture: where it is coarser than the picture, its own pixels are shared out.
+    pub(super) fn traced_offset(self, quality: EyeQuality) -> [f64; 2] {
+        self.offset.map(|offset| offset / quality.traced_scale.min(1.0))
+    }
+
     /// One of `side`² places that share out a pixel evenly, those of the CPU eye pass.
     pub(super) fn of_grid(index: u32, side: u32) -> Self {
         let place = |index: u32| (f64::from(index) + 0.5) / f64::from(side) - 0.5;

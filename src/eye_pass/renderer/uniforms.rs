@@ -32,6 +32,9 @@ shader_struct! {
         jitter: [f32; 2],
         /// Pixels of the traced picture per pixel, across and down.
         traced_per_pixel: [f32; 2],
+        /// By which the traced picture is looked up off its place, right and down [pixels of it].
+        traced_offset: [f32; 2],
+        padding: [f32; 2],
     }
 }
 
