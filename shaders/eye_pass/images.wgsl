@@ -69,38 +69,21 @@ fn locate(record: u32, level: u32, uv: vec2f) -> Spot {
     return Spot(corner + cell - tile * TILE, i32(page / per_layer), page == EMPTY, position - low);
 }
 
-fn map_level(record: u32, level: u32, uv: vec2f) -> vec3f {
+// Bilinear between texel centres of one level.
+fn level_value(tiles: texture_2d_array<f32>, record: u32, level: u32, uv: vec2f) -> vec3f {
     let spot = locate(record, level, uv);
     if spot.is_empty {
         return vec3f(0.0);
     }
     // Weights in full precision: the steps of the 8-bit weights that samplers use show at the edge of a caustic.
     let top = mix(
-        textureLoad(map_tiles, spot.texel, spot.layer, 0).rgb,
-        textureLoad(map_tiles, spot.texel + vec2i(1, 0), spot.layer, 0).rgb,
+        textureLoad(tiles, spot.texel, spot.layer, 0).rgb,
+        textureLoad(tiles, spot.texel + vec2i(1, 0), spot.layer, 0).rgb,
         spot.weight.x,
     );
     let bottom = mix(
-        textureLoad(map_tiles, spot.texel + vec2i(0, 1), spot.layer, 0).rgb,
-        textureLoad(map_tiles, spot.texel + vec2i(1, 1), spot.layer, 0).rgb,
-        spot.weight.x,
-    );
-    return mix(top, bottom, spot.weight.y);
-}
-
-fn texture_level(record: u32, level: u32, uv: vec2f) -> vec3f {
-    let spot = locate(record, level, uv);
-    if spot.is_empty {
-        return vec3f(0.0);
-    }
-    let top = mix(
-        textureLoad(texture_tiles, spot.texel, spot.layer, 0).rgb,
-        textureLoad(texture_tiles, spot.texel + vec2i(1, 0), spot.layer, 0).rgb,
-        spot.weight.x,
-    );
-    let bottom = mix(
-        textureLoad(texture_tiles, spot.texel + vec2i(0, 1), spot.layer, 0).rgb,
-        textureLoad(texture_tiles, spot.texel + vec2i(1, 1), spot.layer, 0).rgb,
+        textureLoad(tiles, spot.texel + vec2i(0, 1), spot.layer, 0).rgb,
+        textureLoad(tiles, spot.texel + vec2i(1, 1), spot.layer, 0).rgb,
         spot.weight.x,
     );
     return mix(top, bottom, spot.weight.y);
@@ -121,17 +104,22 @@ fn levels(record: u32, level: f32) -> Levels {
     return Levels(u32(fine), u32(min(fine + 1.0, coarsest)), wanted - fine);
 }
 
+// Blended between the two levels that are nearest to the wanted one.
+fn value_at(tiles: texture_2d_array<f32>, record: u32, uv: vec2f, level: f32) -> vec3f {
+    let at = levels(record, level);
+    var value = level_value(tiles, record, at.fine, uv);
+    if at.share > 0.0 {
+        value = mix(value, level_value(tiles, record, at.coarse, uv), at.share);
+    }
+    return value;
+}
+
 // E [W/m²] at a place of a map, seen at a level; black without a map.
 fn irradiance(record: u32, uv: vec2f, level: f32) -> vec3f {
     if record == NO_IMAGE {
         return vec3f(0.0);
     }
-    let at = levels(record, level);
-    var value = map_level(record, at.fine, uv);
-    if at.share > 0.0 {
-        value = mix(value, map_level(record, at.coarse, uv), at.share);
-    }
-    return value * bitcast<f32>(image_table[record + 2u]);
+    return value_at(map_tiles, record, uv, level) * bitcast<f32>(image_table[record + 2u]);
 }
 
 // Linear colour at a place of a texture, seen at a level; white without one.
@@ -139,12 +127,7 @@ fn texture_colour(record: u32, uv: vec2f, level: f32) -> vec3f {
     if record == NO_IMAGE {
         return vec3f(1.0);
     }
-    let at = levels(record, level);
-    var value = texture_level(record, at.fine, uv);
-    if at.share > 0.0 {
-        value = mix(value, texture_level(record, at.coarse, uv), at.share);
-    }
-    return value;
+    return value_at(texture_tiles, record, uv, level);
 }
 
 // The level at which a texel is as large as a parallelogram of coordinates.

@@ -1,6 +1,9 @@
 //! The window's life: events in, frames out, and rest while nothing changes.
 
-use std::path::PathBuf;
+mod drawing;
+mod hands;
+mod saving;
+
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -8,28 +11,21 @@ use egui_winit::accesskit_winit;
 use glam::DVec2;
 use winit::application::ApplicationHandler;
 use winit::dpi::PhysicalPosition;
-use winit::event::{
-    DeviceEvent, DeviceId, ElementState, KeyEvent, MouseButton, MouseScrollDelta, StartCause, WindowEvent,
-};
+use winit::event::{DeviceEvent, DeviceId, StartCause, WindowEvent};
 use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoopProxy};
-use winit::keyboard::{ModifiersState, PhysicalKey};
-use winit::window::{CursorGrabMode, WindowId};
+use winit::keyboard::ModifiersState;
+use winit::window::WindowId;
 
 use super::event_log::Event;
-use super::frame_times::{FrameTimes, Made, sum_ms};
+use super::frame_times::{FrameTimes, sum_ms};
 use super::graphics::{Graphics, RETRY_AFTER, Shown};
-use super::input::{self, Shortcut};
 use super::interface::Painting;
 use super::model::Model;
 use super::overlay;
 use super::pace::Pace;
-use super::panel::{Display, Facts, Quantity, Wishes};
-use super::{ViewerOptions, error_view, eye_report, screenshot};
-use crate::effect::{Effect, EffectSwitch};
+use super::panel::{Facts, Wishes};
+use super::{ViewerOptions, error_view};
 use crate::error::{Error, Result};
-use crate::eye_pass::renderer::{MapStyle, Uploaded};
-use crate::eye_pass::{ToneMap, View};
-use crate::optics::LinearSrgb;
 use crate::progress::Control;
 use crate::session::EffectReport;
 
@@ -63,8 +59,6 @@ const LONGEST_STEP: Duration = Duration::from_millis(500);
 /// A device that was lost this often within [`LOSSES_WITHIN`] is given up.
 const MOST_LOSSES: usize = 3;
 const LOSSES_WITHIN: Duration = Duration::from_secs(60);
-/// Radiance behind the scene [W/(m² sr)]: dark.
-const BACKGROUND: LinearSrgb = LinearSrgb::BLACK;
 
 /// The whole program behind one window.
 pub struct App {
@@ -285,80 +279,6 @@ impl App {
         self.schedule(event_loop, shown, painting.repaint_after);
     }
 
-    /// Writes the picture to files in the working folder, and tells where over the picture.
-    fn save_picture(&mut self) {
-        let outcome = self.written_picture();
-        let notice = match &outcome {
-            Ok(files) => {
-                self.model.log.write(&Event::Saved(files));
-                screenshot::told(files)
-            }
-            Err(error) => {
-                let sentence = error.to_string();
-                self.model.log.write(&Event::NotSaved(&sentence));
-                sentence
-            }
-        };
-        self.notice = Some(notice);
-        self.request_redraw();
-    }
-
-    fn written_picture(&mut self) -> Result<Vec<PathBuf>> {
-        let (Some(view), Some(graphics)) = (self.view(), &mut self.graphics) else {
-            return Err(Error::failure(
-                "picture",
-                "the window has no room for it",
-                "make the window larger",
-            ));
-        };
-        let picture = graphics.radiance(&view)?;
-        // Said in full where the system knows it: the window does not show where it was started.
-        let folder = std::env::current_dir().unwrap_or_else(|_| PathBuf::from("."));
-        // False colours are no radiance.
-        let has_radiance = self.model.quantity() == Quantity::Light;
-        screenshot::save(&folder, &self.model.scene().name, &picture, &view, has_radiance)
-    }
-
-    /// Looks what the picture that is shown takes.
-    fn report_chains(&mut self) {
-        let (Some(view), switch) = (self.view(), self.chains_switch()) else {
-            return;
-        };
-        let Some(graphics) = &mut self.graphics else {
-            return;
-        };
-        if let Some(ms) = graphics.take_times() {
-            self.frame_times.push(ms);
-        }
-        let counts = graphics.counts();
-        self.chains = Some(eye_report::chains(self.model.scene(), &view, switch, &counts));
-        let is_complete = !graphics.awaits_times();
-        self.reports_due = if is_complete {
-            0
-        } else {
-            self.reports_due.saturating_sub(1)
-        };
-    }
-
-    /// Tells the panel how the picture was made, and the user once where chains cannot be had.
-    fn report_making(&mut self) {
-        let Some(graphics) = &self.graphics else { return };
-        let (counts, quality) = (graphics.counts(), graphics.quality());
-        self.frame_times.set_made(Made {
-            traced_scale: (counts.drawn_specular > 0).then_some(quality.traced_scale),
-            samples: counts.samples,
-        });
-        let refusal = graphics.chain_refusal().map(ToString::to_string);
-        if refusal.is_some() && refusal != self.told_refusal {
-            self.notice.clone_from(&refusal);
-            self.told_refusal = refusal;
-        }
-    }
-
-    fn chains_switch(&self) -> EffectSwitch {
-        self.model.panel.settings.effects.get(Effect::Chains)
-    }
-
     /// Shows panel and picture to egui.
     fn run_interface(&mut self, wishes: &mut Wishes) -> Option<Painting> {
         let Self {
@@ -411,100 +331,6 @@ impl App {
         }))
     }
 
-    /// Draws what changed of the picture: maps, exposure, view.
-    fn draw_picture(&mut self) -> Result<()> {
-        let Some(mut view) = self.view() else {
-            return Ok(());
-        };
-        let (wants_exposure, chains) = (self.wants_exposure(), self.chains_switch());
-        let Some(graphics) = &mut self.graphics else {
-            return Ok(());
-        };
-        // Played by the processor, shadow rays take longer than the next bake.
-        let traces_lights = self.model.traces_lights() && !graphics.gpu().is_software();
-        if traces_lights != self.traces_lights {
-            self.traces_lights = traces_lights;
-            self.must_set_maps = true;
-            graphics.set_traces_lights(traces_lights);
-        }
-        let start = Instant::now();
-        let mut uploaded = graphics.set_scene(self.model.scene())?;
-        let mut is_new = uploaded != Uploaded::default();
-        if std::mem::take(&mut self.must_set_maps) || is_new {
-            let style = match self.model.quantity() {
-                Quantity::Light => MapStyle::Lit,
-                Quantity::Error | Quantity::Difference => MapStyle::AsItIs,
-            };
-            uploaded += if traces_lights {
-                graphics.set_maps(&self.model.maps_without_direct(), style)?
-            } else {
-                graphics.set_maps(&self.model.shown_maps(), style)?
-            };
-            is_new = true;
-        }
-        if is_new {
-            let seconds = start.elapsed().as_secs_f64();
-            self.model.log.write(&Event::Uploaded { uploaded, seconds });
-        }
-        graphics.set_chains(chains)?;
-        if wants_exposure {
-            self.must_measure_exposure = false;
-            view.exposure_stops = graphics.measure_exposure(&view)?;
-            self.model.panel.display.exposure_stops = view.exposure_stops;
-            self.measured = Some((view.exposure_stops, self.model.layers().len()));
-            self.model.log.write(&Event::Exposure(view.exposure_stops));
-        }
-        // Drawing would take them in without a word.
-        if let Some(ms) = graphics.take_times() {
-            if let Some(quality) = graphics.counts().timed_quality {
-                self.pace.learn(ms, quality);
-            }
-            self.frame_times.push(ms);
-        }
-        if graphics.shows(&view) {
-            return self.refine_picture(&view);
-        }
-        self.pace.moves();
-        self.is_refining = true;
-        if graphics.draw_picture(&view, self.pace.walking())? {
-            self.pictures += 1;
-            self.reports_due = MOST_REPORTS;
-        }
-        Ok(())
-    }
-
-    /// Makes the picture of a view at rest better, as long as nothing else is to be done.
-    fn refine_picture(&mut self, view: &View) -> Result<()> {
-        let is_busy = self.model.state().is_working() || self.model.navigator.is_moving();
-        let Some(graphics) = self.graphics.as_mut().filter(|_| !is_busy) else {
-            self.is_refining = false;
-            return Ok(());
-        };
-        let samples = if graphics.quality() == self.pace.resting() {
-            graphics.counts().samples
-        } else {
-            0
-        };
-        self.is_refining = self.pace.refines(samples, Instant::now());
-        if self.is_refining {
-            graphics.refine_picture(view, self.pace.resting())?;
-        }
-        Ok(())
-    }
-
-    /// Whether the exposure is to be measured: because it was asked for, or because the first bake has brought a layer
-    /// since it was measured and nobody changed it. The very first maps come without direct light, and the exposure
-    /// that suits them does not suit the scene.
-    fn wants_exposure(&self) -> bool {
-        let (model, now_stops) = (&self.model, self.model.panel.display.exposure_stops);
-        let is_first = model.last.as_ref().is_some_and(|last| last.serial == 1);
-        let is_outdated = self.measured.is_some_and(|(measured_stops, layers)| {
-            measured_stops == now_stops && layers < model.layers().len()
-        });
-        let shows_light = model.quantity() == Quantity::Light && !model.maps().is_empty();
-        shows_light && (self.must_measure_exposure || (is_first && is_outdated))
-    }
-
     /// Decides when the next frame comes.
     fn schedule(&mut self, event_loop: &ActiveEventLoop, shown: Shown, repaint_after: Duration) {
         let now = Instant::now();
@@ -545,129 +371,6 @@ impl App {
                 position,
                 device_ms: self.frame_times.newest().copied().map(sum_ms),
             });
-        }
-    }
-
-    /// What the picture is to show; `None` while it has no area.
-    fn view(&self) -> Option<View> {
-        let graphics = self.graphics.as_ref()?;
-        let scale = graphics.window().scale_factor() as f32;
-        let pixels = |points: f32| (points * scale).round();
-        let (width, height) = (
-            pixels(self.picture_rect.width()),
-            pixels(self.picture_rect.height()),
-        );
-        let display = match self.model.quantity() {
-            Quantity::Light => self.model.panel.display,
-            // Colours of a legend are shown as they are.
-            Quantity::Error | Quantity::Difference => Display {
-                exposure_stops: 0.0,
-                tone_map: ToneMap::None,
-                ..self.model.panel.display
-            },
-        };
-        (width >= 1.0 && height >= 1.0).then(|| View {
-            camera: self.model.navigator.camera_for(f64::from(width / height)),
-            width: width as u32,
-            height: height as u32,
-            exposure_stops: display.exposure_stops,
-            tone_map: display.tone_map,
-            background: BACKGROUND,
-        })
-    }
-
-    fn on_key(&mut self, event: &KeyEvent) {
-        let is_typing = self
-            .graphics
-            .as_mut()
-            .is_some_and(|graphics| graphics.interface().context().text_edit_focused());
-        if is_typing && event.state.is_pressed() {
-            return;
-        }
-        self.fly();
-        if self.modifiers.control_key() || self.modifiers.super_key() {
-            // Nothing flies or bakes by a chord.
-            self.pressed.undo |= event.state.is_pressed() && input::is_undo(&event.logical_key);
-            if event.state.is_pressed() {
-                return;
-            }
-        }
-        if let PhysicalKey::Code(code) = event.physical_key
-            && input::hold(&mut self.model.navigator.keys, code, event.state)
-        {
-            return;
-        }
-        if event.state.is_pressed() && !event.repeat {
-            self.notice = None;
-            match input::shortcut(&event.logical_key) {
-                Some(Shortcut::NextCamera) => drop(self.model.navigator.next_camera().map(str::to_owned)),
-                Some(Shortcut::Frame) => {
-                    let aspect = self.picture_rect.aspect_ratio();
-                    self.model.navigator.frame(f64::from(aspect));
-                }
-                Some(Shortcut::Rebake) => self.pressed.rebake = true,
-                Some(Shortcut::SavePicture) => self.pressed.save_picture = true,
-                Some(Shortcut::Help) => self.model.panel.help_open = !self.model.panel.help_open,
-                Some(Shortcut::LetGo) if self.looking_from.is_some() => self.stop_looking(),
-                Some(Shortcut::LetGo) => self.pressed.cancel = true,
-                None => {}
-            }
-        }
-    }
-
-    fn on_mouse_button(&mut self, button: MouseButton, state: ElementState) {
-        if button == MouseButton::Right {
-            match state {
-                ElementState::Pressed if self.is_over_picture() => self.start_looking(),
-                ElementState::Pressed => {}
-                ElementState::Released => self.stop_looking(),
-            }
-        }
-    }
-
-    fn on_wheel(&mut self, delta: MouseScrollDelta) {
-        if self.is_over_picture() {
-            self.model.navigator.wheel(match delta {
-                MouseScrollDelta::LineDelta(_, lines) => f64::from(lines),
-                MouseScrollDelta::PixelDelta(pixels) => pixels.y / PIXELS_PER_NOTCH,
-            });
-        }
-    }
-
-    /// Whether the pointer is on the picture and not on a list or text that lies over it.
-    fn is_over_picture(&mut self) -> bool {
-        let Some(graphics) = &mut self.graphics else {
-            return false;
-        };
-        let scale = graphics.window().scale_factor();
-        let pointer: PhysicalPosition<f64> = self.pointer;
-        let points = egui::pos2((pointer.x / scale) as f32, (pointer.y / scale) as f32);
-        let is_background = |layer: egui::LayerId| layer.order == egui::Order::Background;
-        let layer = graphics.interface().context().layer_id_at(points);
-        self.picture_rect.contains(points) && layer.is_none_or(is_background)
-    }
-
-    fn start_looking(&mut self) {
-        self.looking_from = Some(self.pointer);
-        if let Some(graphics) = &self.graphics {
-            let window = graphics.window();
-            // Where neither is to be had, the movements still come; the pointer just leaves the window.
-            let _ = window
-                .set_cursor_grab(CursorGrabMode::Locked)
-                .or_else(|_| window.set_cursor_grab(CursorGrabMode::Confined));
-            window.set_cursor_visible(false);
-        }
-    }
-
-    fn stop_looking(&mut self) {
-        if let Some(from) = self.looking_from.take()
-            && let Some(graphics) = &self.graphics
-        {
-            let window = graphics.window();
-            // A convenience, which not every system offers: the pointer comes back to where it was.
-            let _ = window.set_cursor_position(from);
-            let _ = window.set_cursor_grab(CursorGrabMode::None);
-            window.set_cursor_visible(true);
         }
     }
 }

@@ -3,7 +3,8 @@
 
 use wgpu::util::DeviceExt;
 
-use super::bindings::{bind_group, bind_group_layout, pipeline_layout, texture, uniform};
+use super::bindings::{bind_group, bind_group_layout, texture, uniform};
+use super::cover;
 use super::shaders::ACCUMULATED;
 use super::uniforms::Accumulation;
 use crate::gpu::Gpu;
@@ -55,7 +56,14 @@ impl Mean {
             views: [0, 1].map(|index: usize| pictures[index].create_view(&Default::default())),
             pictures,
             count: 0,
-            pipeline: pipeline(gpu, &layout),
+            pipeline: cover::pipeline(
+                gpu,
+                &ACCUMULATED.module(&gpu.device),
+                &layout,
+                "accumulated",
+                &[],
+                FORMAT,
+            ),
             layout,
         }
     }
@@ -113,30 +121,4 @@ impl Mean {
         let latest = self.count as usize % 2;
         (&self.pictures[latest], &self.views[latest])
     }
-}
-
-fn pipeline(gpu: &Gpu, layout: &wgpu::BindGroupLayout) -> wgpu::RenderPipeline {
-    let module = ACCUMULATED.module(&gpu.device);
-    gpu.device
-        .create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-            label: Some("mean"),
-            layout: Some(&pipeline_layout(gpu, &[layout])),
-            vertex: wgpu::VertexState {
-                module: &module,
-                entry_point: Some("cover"),
-                compilation_options: Default::default(),
-                buffers: &[],
-            },
-            primitive: Default::default(),
-            depth_stencil: None,
-            multisample: Default::default(),
-            fragment: Some(wgpu::FragmentState {
-                module: &module,
-                entry_point: Some("accumulated"),
-                compilation_options: Default::default(),
-                targets: &[Some(FORMAT.into())],
-            }),
-            multiview_mask: None,
-            cache: None,
-        })
 }

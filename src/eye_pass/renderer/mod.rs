@@ -15,6 +15,7 @@ mod budget;
 mod camera;
 mod chains;
 mod counts;
+mod cover;
 mod draws;
 mod geometry;
 mod images;

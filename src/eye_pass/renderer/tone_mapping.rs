@@ -2,7 +2,8 @@
 
 use std::collections::HashMap;
 
-use super::bindings::{bind_group, bind_group_layout, pipeline_layout, texture};
+use super::bindings::{bind_group, bind_group_layout, texture};
+use super::cover;
 use super::shaders::TONE_MAPPING;
 use crate::eye_pass::ToneMap;
 use crate::gpu::Gpu;
@@ -44,7 +45,15 @@ impl ToneMappingPipelines {
         timestamp_writes: Option<wgpu::RenderPassTimestampWrites<'_>>,
     ) {
         if !self.made.contains_key(&tone_map) {
-            let pipeline = self.pipeline(gpu, tone_map);
+            let constants = constants(tone_map, !self.target.is_srgb());
+            let pipeline = cover::pipeline(
+                gpu,
+                &self.module,
+                &self.layout,
+                "to_display",
+                &constants,
+                self.target,
+            );
             self.made.insert(tone_map, pipeline);
         }
         let resources = [wgpu::BindingResource::TextureView(radiance)];
@@ -66,34 +75,6 @@ impl ToneMappingPipelines {
         pass.set_pipeline(&self.made[&tone_map]);
         pass.set_bind_group(0, &bind_group, &[]);
         pass.draw(0..3, 0..1);
-    }
-
-    fn pipeline(&self, gpu: &Gpu, tone_map: ToneMap) -> wgpu::RenderPipeline {
-        gpu.device
-            .create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-                label: Some("tone mapping"),
-                layout: Some(&pipeline_layout(gpu, &[&self.layout])),
-                vertex: wgpu::VertexState {
-                    module: &self.module,
-                    entry_point: Some("cover"),
-                    compilation_options: Default::default(),
-                    buffers: &[],
-                },
-                primitive: Default::default(),
-                depth_stencil: None,
-                multisample: Default::default(),
-                fragment: Some(wgpu::FragmentState {
-                    module: &self.module,
-                    entry_point: Some("to_display"),
-                    compilation_options: wgpu::PipelineCompilationOptions {
-                        constants: &constants(tone_map, !self.target.is_srgb()),
-                        ..Default::default()
-                    },
-                    targets: &[Some(self.target.into())],
-                }),
-                multiview_mask: None,
-                cache: None,
-            })
     }
 }
 

@@ -1,0 +1,181 @@
+//! The picture beside the panel: what it shows, how well it is made, and what is told of that.
+
+use std::time::Instant;
+
+use super::{App, MOST_REPORTS};
+use crate::effect::{Effect, EffectSwitch};
+use crate::error::Result;
+use crate::eye_pass::renderer::{MapStyle, Uploaded};
+use crate::eye_pass::{ToneMap, View};
+use crate::optics::LinearSrgb;
+use crate::viewer::event_log::Event;
+use crate::viewer::eye_report;
+use crate::viewer::frame_times::Made;
+use crate::viewer::panel::{Display, Quantity};
+
+/// Radiance behind the scene [W/(m² sr)]: dark.
+const BACKGROUND: LinearSrgb = LinearSrgb::BLACK;
+
+impl App {
+    /// Draws what changed of the picture: maps, exposure, view.
+    pub(super) fn draw_picture(&mut self) -> Result<()> {
+        let Some(mut view) = self.view() else {
+            return Ok(());
+        };
+        let (wants_exposure, chains) = (self.wants_exposure(), self.chains_switch());
+        let Some(graphics) = &mut self.graphics else {
+            return Ok(());
+        };
+        // Played by the processor, shadow rays take longer than the next bake.
+        let traces_lights = self.model.traces_lights() && !graphics.gpu().is_software();
+        if traces_lights != self.traces_lights {
+            self.traces_lights = traces_lights;
+            self.must_set_maps = true;
+            graphics.set_traces_lights(traces_lights);
+        }
+        let start = Instant::now();
+        let mut uploaded = graphics.set_scene(self.model.scene())?;
+        let mut is_new = uploaded != Uploaded::default();
+        if std::mem::take(&mut self.must_set_maps) || is_new {
+            let style = match self.model.quantity() {
+                Quantity::Light => MapStyle::Lit,
+                Quantity::Error | Quantity::Difference => MapStyle::AsItIs,
+            };
+            uploaded += if traces_lights {
+                graphics.set_maps(&self.model.maps_without_direct(), style)?
+            } else {
+                graphics.set_maps(&self.model.shown_maps(), style)?
+            };
+            is_new = true;
+        }
+        if is_new {
+            let seconds = start.elapsed().as_secs_f64();
+            self.model.log.write(&Event::Uploaded { uploaded, seconds });
+        }
+        graphics.set_chains(chains)?;
+        if wants_exposure {
+            self.must_measure_exposure = false;
+            view.exposure_stops = graphics.measure_exposure(&view)?;
+            self.model.panel.display.exposure_stops = view.exposure_stops;
+            self.measured = Some((view.exposure_stops, self.model.layers().len()));
+            self.model.log.write(&Event::Exposure(view.exposure_stops));
+        }
+        // Drawing would take them in without a word.
+        if let Some(ms) = graphics.take_times() {
+            if let Some(quality) = graphics.counts().timed_quality {
+                self.pace.learn(ms, quality);
+            }
+            self.frame_times.push(ms);
+        }
+        if graphics.shows(&view) {
+            return self.refine_picture(&view);
+        }
+        self.pace.moves();
+        self.is_refining = true;
+        if graphics.draw_picture(&view, self.pace.walking())? {
+            self.pictures += 1;
+            self.reports_due = MOST_REPORTS;
+        }
+        Ok(())
+    }
+
+    /// Makes the picture of a view at rest better, as long as nothing else is to be done.
+    pub(super) fn refine_picture(&mut self, view: &View) -> Result<()> {
+        let is_busy = self.model.state().is_working() || self.model.navigator.is_moving();
+        let Some(graphics) = self.graphics.as_mut().filter(|_| !is_busy) else {
+            self.is_refining = false;
+            return Ok(());
+        };
+        let samples = if graphics.quality() == self.pace.resting() {
+            graphics.counts().samples
+        } else {
+            0
+        };
+        self.is_refining = self.pace.refines(samples, Instant::now());
+        if self.is_refining {
+            graphics.refine_picture(view, self.pace.resting())?;
+        }
+        Ok(())
+    }
+
+    /// Whether the exposure is to be measured: because it was asked for, or because the first bake has brought a layer
+    /// since it was measured and nobody changed it. The very first maps come without direct light, and the exposure
+    /// that suits them does not suit the scene.
+    pub(super) fn wants_exposure(&self) -> bool {
+        let (model, now_stops) = (&self.model, self.model.panel.display.exposure_stops);
+        let is_first = model.last.as_ref().is_some_and(|last| last.serial == 1);
+        let is_outdated = self.measured.is_some_and(|(measured_stops, layers)| {
+            measured_stops == now_stops && layers < model.layers().len()
+        });
+        let shows_light = model.quantity() == Quantity::Light && !model.maps().is_empty();
+        shows_light && (self.must_measure_exposure || (is_first && is_outdated))
+    }
+
+    /// What the picture is to show; `None` while it has no area.
+    pub(super) fn view(&self) -> Option<View> {
+        let graphics = self.graphics.as_ref()?;
+        let scale = graphics.window().scale_factor() as f32;
+        let pixels = |points: f32| (points * scale).round();
+        let (width, height) = (
+            pixels(self.picture_rect.width()),
+            pixels(self.picture_rect.height()),
+        );
+        let display = match self.model.quantity() {
+            Quantity::Light => self.model.panel.display,
+            // Colours of a legend are shown as they are.
+            Quantity::Error | Quantity::Difference => Display {
+                exposure_stops: 0.0,
+                tone_map: ToneMap::None,
+                ..self.model.panel.display
+            },
+        };
+        (width >= 1.0 && height >= 1.0).then(|| View {
+            camera: self.model.navigator.camera_for(f64::from(width / height)),
+            width: width as u32,
+            height: height as u32,
+            exposure_stops: display.exposure_stops,
+            tone_map: display.tone_map,
+            background: BACKGROUND,
+        })
+    }
+
+    /// Looks what the picture that is shown takes.
+    pub(super) fn report_chains(&mut self) {
+        let (Some(view), switch) = (self.view(), self.chains_switch()) else {
+            return;
+        };
+        let Some(graphics) = &mut self.graphics else {
+            return;
+        };
+        if let Some(ms) = graphics.take_times() {
+            self.frame_times.push(ms);
+        }
+        let counts = graphics.counts();
+        self.chains = Some(eye_report::chains(self.model.scene(), &view, switch, &counts));
+        let is_complete = !graphics.awaits_times();
+        self.reports_due = if is_complete {
+            0
+        } else {
+            self.reports_due.saturating_sub(1)
+        };
+    }
+
+    /// Tells the panel how the picture was made, and the user once where chains cannot be had.
+    pub(super) fn report_making(&mut self) {
+        let Some(graphics) = &self.graphics else { return };
+        let (counts, quality) = (graphics.counts(), graphics.quality());
+        self.frame_times.set_made(Made {
+            traced_scale: (counts.drawn_specular > 0).then_some(quality.traced_scale),
+            samples: counts.samples,
+        });
+        let refusal = graphics.chain_refusal().map(ToString::to_string);
+        if refusal.is_some() && refusal != self.told_refusal {
+            self.notice.clone_from(&refusal);
+            self.told_refusal = refusal;
+        }
+    }
+
+    pub(super) fn chains_switch(&self) -> EffectSwitch {
+        self.model.panel.settings.effects.get(Effect::Chains)
+    }
+}

@@ -1,0 +1,106 @@
+//! Keys and mouse.
+
+use winit::dpi::PhysicalPosition;
+use winit::event::{ElementState, KeyEvent, MouseButton, MouseScrollDelta};
+use winit::keyboard::PhysicalKey;
+use winit::window::CursorGrabMode;
+
+use super::{App, PIXELS_PER_NOTCH};
+use crate::viewer::input::{self, Shortcut};
+
+impl App {
+    pub(super) fn on_key(&mut self, event: &KeyEvent) {
+        let is_typing = self
+            .graphics
+            .as_mut()
+            .is_some_and(|graphics| graphics.interface().context().text_edit_focused());
+        if is_typing && event.state.is_pressed() {
+            return;
+        }
+        self.fly();
+        if self.modifiers.control_key() || self.modifiers.super_key() {
+            // Nothing flies or bakes by a chord.
+            self.pressed.undo |= event.state.is_pressed() && input::is_undo(&event.logical_key);
+            if event.state.is_pressed() {
+                return;
+            }
+        }
+        if let PhysicalKey::Code(code) = event.physical_key
+            && input::hold(&mut self.model.navigator.keys, code, event.state)
+        {
+            return;
+        }
+        if event.state.is_pressed() && !event.repeat {
+            self.notice = None;
+            match input::shortcut(&event.logical_key) {
+                Some(Shortcut::NextCamera) => drop(self.model.navigator.next_camera().map(str::to_owned)),
+                Some(Shortcut::Frame) => {
+                    let aspect = self.picture_rect.aspect_ratio();
+                    self.model.navigator.frame(f64::from(aspect));
+                }
+                Some(Shortcut::Rebake) => self.pressed.rebake = true,
+                Some(Shortcut::SavePicture) => self.pressed.save_picture = true,
+                Some(Shortcut::Help) => self.model.panel.help_open = !self.model.panel.help_open,
+                Some(Shortcut::LetGo) if self.looking_from.is_some() => self.stop_looking(),
+                Some(Shortcut::LetGo) => self.pressed.cancel = true,
+                None => {}
+            }
+        }
+    }
+
+    pub(super) fn on_mouse_button(&mut self, button: MouseButton, state: ElementState) {
+        if button == MouseButton::Right {
+            match state {
+                ElementState::Pressed if self.is_over_picture() => self.start_looking(),
+                ElementState::Pressed => {}
+                ElementState::Released => self.stop_looking(),
+            }
+        }
+    }
+
+    pub(super) fn on_wheel(&mut self, delta: MouseScrollDelta) {
+        if self.is_over_picture() {
+            self.model.navigator.wheel(match delta {
+                MouseScrollDelta::LineDelta(_, lines) => f64::from(lines),
+                MouseScrollDelta::PixelDelta(pixels) => pixels.y / PIXELS_PER_NOTCH,
+            });
+        }
+    }
+
+    /// Whether the pointer is on the picture and not on a list or text that lies over it.
+    pub(super) fn is_over_picture(&mut self) -> bool {
+        let Some(graphics) = &mut self.graphics else {
+            return false;
+        };
+        let scale = graphics.window().scale_factor();
+        let pointer: PhysicalPosition<f64> = self.pointer;
+        let points = egui::pos2((pointer.x / scale) as f32, (pointer.y / scale) as f32);
+        let is_background = |layer: egui::LayerId| layer.order == egui::Order::Background;
+        let layer = graphics.interface().context().layer_id_at(points);
+        self.picture_rect.contains(points) && layer.is_none_or(is_background)
+    }
+
+    pub(super) fn start_looking(&mut self) {
+        self.looking_from = Some(self.pointer);
+        if let Some(graphics) = &self.graphics {
+            let window = graphics.window();
+            // Where neither is to be had, the movements still come; the pointer just leaves the window.
+            let _ = window
+                .set_cursor_grab(CursorGrabMode::Locked)
+                .or_else(|_| window.set_cursor_grab(CursorGrabMode::Confined));
+            window.set_cursor_visible(false);
+        }
+    }
+
+    pub(super) fn stop_looking(&mut self) {
+        if let Some(from) = self.looking_from.take()
+            && let Some(graphics) = &self.graphics
+        {
+            let window = graphics.window();
+            // A convenience, which not every system offers: the pointer comes back to where it was.
+            let _ = window.set_cursor_position(from);
+            let _ = window.set_cursor_grab(CursorGrabMode::None);
+            window.set_cursor_visible(true);
+        }
+    }
+}

@@ -1,0 +1,45 @@
+//! The picture as files.
+
+use std::path::PathBuf;
+
+use super::App;
+use crate::error::{Error, Result};
+use crate::viewer::event_log::Event;
+use crate::viewer::panel::Quantity;
+use crate::viewer::screenshot;
+
+impl App {
+    /// Writes the picture to files in the working folder, and tells where over the picture.
+    pub(super) fn save_picture(&mut self) {
+        let outcome = self.written_picture();
+        let notice = match &outcome {
+            Ok(files) => {
+                self.model.log.write(&Event::Saved(files));
+                screenshot::told(files)
+            }
+            Err(error) => {
+                let sentence = error.to_string();
+                self.model.log.write(&Event::NotSaved(&sentence));
+                sentence
+            }
+        };
+        self.notice = Some(notice);
+        self.request_redraw();
+    }
+
+    pub(super) fn written_picture(&mut self) -> Result<Vec<PathBuf>> {
+        let (Some(view), Some(graphics)) = (self.view(), &mut self.graphics) else {
+            return Err(Error::failure(
+                "picture",
+                "the window has no room for it",
+                "make the window larger",
+            ));
+        };
+        let picture = graphics.radiance(&view)?;
+        // Said in full where the system knows it: the window does not show where it was started.
+        let folder = std::env::current_dir().unwrap_or_else(|_| PathBuf::from("."));
+        // False colours are no radiance.
+        let has_radiance = self.model.quantity() == Quantity::Light;
+        screenshot::save(&folder, &self.model.scene().name, &picture, &view, has_radiance)
+    }
+}
