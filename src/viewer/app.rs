@@ -341,7 +341,8 @@ impl App {
             }
             Shown::Hidden => Duration::MAX,
             Shown::Later => RETRY_AFTER,
-            Shown::Yes if self.model.navigator.is_moving() || self.is_refining => Duration::ZERO,
+            Shown::Yes if self.model.navigator.is_moving() => Duration::ZERO,
+            Shown::Yes if self.is_refining => self.pace.pause(now),
             Shown::Yes if self.model.state().is_working() => repaint_after.min(BAKING_FRAME),
             Shown::Yes => repaint_after,
         };
@@ -361,7 +362,8 @@ impl App {
             .into_iter()
             .flatten()
             .min();
-        if self.rested_at != self.pictures && !self.model.state().is_working() && !is_report_due {
+        let is_working = self.model.state().is_working() || self.is_refining || is_report_due;
+        if self.rested_at != self.pictures && !is_working {
             self.rested_at = self.pictures;
             let (pictures, frames) = (self.pictures, self.frames);
             let position = self.model.navigator.camera().position.to_array();
@@ -408,6 +410,9 @@ impl ApplicationHandler<News> for App {
         if window.id() != id {
             return;
         }
+        if is_by_hand(&event) {
+            self.pace.touch(Instant::now());
+        }
         // Egui counts each frame as one that needs another; the schedule knows better.
         if graphics.interface().on_event(&window, &event) && event != WindowEvent::RedrawRequested {
             window.request_redraw();
@@ -447,4 +452,16 @@ impl ApplicationHandler<News> for App {
         let until = [self.wake_at, look].into_iter().flatten().min();
         event_loop.set_control_flow(until.map_or(ControlFlow::Wait, ControlFlow::WaitUntil));
     }
+}
+
+/// Whether an event is one of keys or mouse.
+fn is_by_hand(event: &WindowEvent) -> bool {
+    matches!(
+        event,
+        WindowEvent::KeyboardInput { .. }
+            | WindowEvent::CursorMoved { .. }
+            | WindowEvent::MouseInput { .. }
+            | WindowEvent::MouseWheel { .. }
+            | WindowEvent::ModifiersChanged(_)
+    )
 }

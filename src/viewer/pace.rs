@@ -19,6 +19,8 @@ const REST_MS: f64 = 250.0;
 const MOST_SAMPLES: u32 = 64;
 /// As many are made in any case, however long they take.
 const LEAST_SAMPLES: u32 = 4;
+/// Nothing is refined for so long after a key or the mouse was used.
+const PAUSE: Duration = Duration::from_millis(400);
 /// For how long further ones are made.
 const REFINES_FOR: Duration = Duration::from_secs(2);
 
@@ -29,6 +31,8 @@ pub struct Pace {
     resting: usize,
     /// When the picture at rest was first drawn.
     rests_since: Option<Instant>,
+    /// When a hand last moved.
+    touched: Option<Instant>,
 }
 
 impl Default for Pace {
@@ -37,6 +41,7 @@ impl Default for Pace {
             walking: WHOLE,
             resting: WHOLE,
             rests_since: None,
+            touched: None,
         }
     }
 }
@@ -48,6 +53,7 @@ impl Pace {
             walking: 0,
             resting: 1,
             rests_since: None,
+            touched: None,
         }
     }
 
@@ -91,6 +97,17 @@ impl Pace {
     /// The view has changed.
     pub fn moves(&mut self) {
         self.rests_since = None;
+    }
+
+    /// A key or the mouse was used: what follows is not to wait for a picture.
+    pub fn touch(&mut self, now: Instant) {
+        self.touched = Some(now);
+    }
+
+    /// How long the picture at rest is left as it is for the sake of hands.
+    pub fn pause(&self, now: Instant) -> Duration {
+        let since = self.touched.map_or(PAUSE, |touched| now.duration_since(touched));
+        PAUSE.saturating_sub(since)
     }
 
     /// Whether the mean of so many pictures of a view at rest is to be made better.

@@ -71,3 +71,13 @@ fn a_view_at_rest_is_refined_for_a_while_and_a_little_in_any_case() {
     pace.moves();
     assert!(pace.refines(4, later), "another view starts anew");
 }
+
+#[test]
+fn hands_do_not_wait_for_a_picture() {
+    let (mut pace, start) = (Pace::default(), Instant::now());
+    assert_eq!(pace.pause(start), Duration::ZERO);
+    pace.touch(start);
+    let early = start + Duration::from_millis(100);
+    assert!(pace.pause(early) > Duration::ZERO);
+    assert_eq!(pace.pause(early + pace.pause(early)), Duration::ZERO);
+}

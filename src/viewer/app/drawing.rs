@@ -91,8 +91,10 @@ impl App {
         } else {
             0
         };
-        self.is_refining = self.pace.refines(samples, Instant::now());
-        if self.is_refining {
+        let now = Instant::now();
+        let is_paused = !self.pace.pause(now).is_zero();
+        self.is_refining = is_paused || self.pace.refines(samples, now);
+        if self.is_refining && !is_paused {
             graphics.refine_picture(view, self.pace.resting())?;
         }
         Ok(())
