@@ -331,18 +331,19 @@ impl Model {
 
     /// Edits the scene, or takes an edit back.
     fn edit(&mut self, wishes: &Wishes) {
-        let outcome = match (&wishes.edit, wishes.undo) {
-            (Some(edit), _) => {
-                self.log.write(&Event::Edited(edit));
-                self.edits.edit(edit)
-            }
-            (None, true) => self.edits.undo().map(|undone| {
+        // A slow frame may bring both: the end of a drag, and the wish to take it back.
+        let mut outcome = Ok(());
+        if let Some(edit) = &wishes.edit {
+            self.log.write(&Event::Edited(edit));
+            outcome = self.edits.edit(edit);
+        }
+        if wishes.undo && outcome.is_ok() {
+            outcome = self.edits.undo().map(|undone| {
                 if undone {
                     self.log.write(&Event::Undone);
                 }
-            }),
-            (None, false) => Ok(()),
-        };
+            });
+        }
         if wishes.edit.is_some() || wishes.undo {
             self.refusal = outcome.err().map(|error| error.to_string());
         }

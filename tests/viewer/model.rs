@@ -253,6 +253,15 @@ fn an_edited_scene_is_baked_and_an_edit_taken_back_too() {
         "nothing is left to take back"
     );
 
+    // The end of a drag and the wish to take it back may come in one frame.
+    let both = Wishes {
+        undo: true,
+        ..brighter(8.0)
+    };
+    model.act(&both, Instant::now());
+    assert_eq!(model.scene().lights, original.lights);
+    wait_until_baked(&mut model);
+
     let wrong = Wishes {
         edit: Some(Edit::MaterialIor {
             material: 0,
