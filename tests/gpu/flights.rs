@@ -14,7 +14,7 @@ use nephroid::scene::{Camera, LoadOptions, Scene, SurfaceKind, builtin, load};
 use nephroid::session::BakeSession;
 use nephroid::settings::{BakeSettings, LayerKind, MapResolution};
 
-use crate::device::gpu;
+use crate::device::{self, gpu};
 use crate::numbers::Numbers;
 use crate::support::shared_or_skip;
 
@@ -84,20 +84,7 @@ fn cameras(scene: &Scene) -> Vec<Camera> {
 
 /// A texture to draw into, as a window has.
 fn target(gpu: &Gpu) -> wgpu::TextureView {
-    let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
-        label: None,
-        size: wgpu::Extent3d {
-            width: SIZE[0],
-            height: SIZE[1],
-            depth_or_array_layers: 1,
-        },
-        mip_level_count: 1,
-        sample_count: 1,
-        dimension: wgpu::TextureDimension::D2,
-        format: FORMAT,
-        usage: wgpu::TextureUsages::RENDER_ATTACHMENT,
-        view_formats: &[],
-    });
+    let texture = device::target(gpu, SIZE, FORMAT);
     texture.create_view(&Default::default())
 }
 

@@ -10,7 +10,7 @@ use nephroid::optics::LinearSrgb;
 use nephroid::scene::builtin::{parts, shapes};
 use nephroid::scene::{Camera, Scene};
 
-use crate::device::gpu;
+use crate::device::{self, gpu};
 use crate::scenes::{diffuse, floor_map, floor_scene};
 
 const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
@@ -145,20 +145,7 @@ fn windows_without_a_size_draw_nothing_and_what_comes_after_is_whole() {
     let (scene, maps) = scene(2);
     let mut renderer = Renderer::new(&gpu, &scene, FORMAT, 4).expect("it is uploaded");
     renderer.set_maps(&gpu, &scene, &maps).expect("the maps fit");
-    let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
-        label: None,
-        size: wgpu::Extent3d {
-            width: 1,
-            height: 1,
-            depth_or_array_layers: 1,
-        },
-        mip_level_count: 1,
-        sample_count: 1,
-        dimension: wgpu::TextureDimension::D2,
-        format: FORMAT,
-        usage: wgpu::TextureUsages::RENDER_ATTACHMENT,
-        view_formats: &[],
-    });
+    let texture = device::target(&gpu, [1, 1], FORMAT);
     let target = texture.create_view(&Default::default());
     for [width, height] in [[0, 0], [0, 7], [7, 0], [1, 1], [0, 0]] {
         let sized = View {

@@ -15,7 +15,7 @@ use nephroid::scene::builtin::{self, parts, shapes};
 use nephroid::scene::{Camera, Material, Scene, SurfaceKind};
 use nephroid::transport::Tracer;
 
-use crate::device::gpu;
+use crate::device::{self, gpu};
 use crate::scenes::{diffuse, floor_map, floor_scene};
 
 const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
@@ -287,20 +287,7 @@ fn each_tone_map_in_use_has_a_pipeline_of_its_own() {
     let Some(gpu) = gpu() else { return };
     let (scene, maps) = hall();
     let mut renderer = renderer(&gpu, &scene, &maps);
-    let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
-        label: None,
-        size: wgpu::Extent3d {
-            width: 48,
-            height: 32,
-            depth_or_array_layers: 1,
-        },
-        mip_level_count: 1,
-        sample_count: 1,
-        dimension: wgpu::TextureDimension::D2,
-        format: FORMAT,
-        usage: wgpu::TextureUsages::RENDER_ATTACHMENT,
-        view_formats: &[],
-    });
+    let texture = device::target(&gpu, [48, 32], FORMAT);
     let target = texture.create_view(&Default::default());
     for (tone_map, pipelines) in [(ToneMap::None, 2), (ToneMap::Neutral, 3), (ToneMap::None, 3)] {
         let mut encoder = gpu.device.create_command_encoder(&Default::default());

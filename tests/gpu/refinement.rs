@@ -9,7 +9,7 @@ use nephroid::optics::LinearSrgb;
 use nephroid::scene::builtin::{parts, shapes};
 use nephroid::scene::{Camera, Scene};
 
-use crate::device::gpu;
+use crate::device::{self, gpu};
 use crate::scenes::{diffuse, floor_map, floor_scene};
 
 const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
@@ -48,20 +48,7 @@ struct Target {
 
 impl Target {
     fn new(gpu: &Gpu) -> Self {
-        let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
-            label: None,
-            size: wgpu::Extent3d {
-                width: SIZE[0],
-                height: SIZE[1],
-                depth_or_array_layers: 1,
-            },
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format: FORMAT,
-            usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
-            view_formats: &[],
-        });
+        let texture = device::target(gpu, SIZE, FORMAT);
         let view = texture.create_view(&Default::default());
         Self { texture, view }
     }

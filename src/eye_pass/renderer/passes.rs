@@ -46,7 +46,10 @@ impl Renderer {
             self.make_traced_targets(gpu, view, quality)?;
         }
         let frame = self.frame(view, radiance_scale, sample, quality);
-        let through_scene = self.bind_chains(gpu, view, quality);
+        let needs_scene = list.all().any(|draw| draw.key.writes.goes_through_scene());
+        let through_scene = needs_scene
+            .then(|| self.bind_chains(gpu, view, quality))
+            .flatten();
         if let Some(chains) = &through_scene {
             let traced = Frame {
                 jitter: jitter(view, sample.traced_offset(quality)),
