@@ -5,6 +5,7 @@ use serde::Deserialize;
 use serde_json::Map;
 
 use super::report::Report;
+use super::sizes::StatedSize;
 use super::{extensions, faults};
 use crate::error::{Error, Result};
 
@@ -15,6 +16,10 @@ pub struct Document {
     pub root: Root,
     /// One per node.
     pub transforms: Vec<NodeTransform>,
+    /// One per node: what its `extras` say of the size of its light.
+    pub node_sizes: Vec<StatedSize>,
+    /// One per light of KHR_lights_punctual.
+    pub light_sizes: Vec<StatedSize>,
 }
 
 /// A node's own transform as the file states it, unchecked.
@@ -44,6 +49,8 @@ pub fn parse(json: &[u8], report: &mut Report) -> Result<Document> {
     let required = strings(file, "extensionsRequired")?;
     extensions::check(&required, &strings(file, "extensionsUsed")?, report)?;
     leave_out_what_is_not_read(file, report);
+    let node_sizes = StatedSize::of_each(value.get("nodes"));
+    let light_sizes = StatedSize::of_each(value.pointer("/extensions/KHR_lights_punctual/lights"));
     remove_extras(&mut value);
 
     let transforms = match value.get("nodes") {
@@ -52,7 +59,12 @@ pub fn parse(json: &[u8], report: &mut Report) -> Result<Document> {
     };
     let root: Root = serde_json::from_value(value).map_err(|error| unlike_gltf(&error.to_string()))?;
     faults::report(&root, report);
-    Ok(Document { root, transforms })
+    Ok(Document {
+        root,
+        transforms,
+        node_sizes,
+        light_sizes,
+    })
 }
 
 fn broken_json(json: &[u8], error: &serde_json::Error) -> Error {
@@ -163,7 +175,7 @@ fn objects(list: Option<&mut Value>) -> impl Iterator<Item = &mut Map<String, Va
     items.into_iter().flatten().filter_map(Value::as_object_mut)
 }
 
-/// Application data of any depth: not read, and raw text that the typed reader cannot take everywhere.
+/// Application data of any depth: read by now, and raw text that the typed reader cannot take everywhere.
 fn remove_extras(value: &mut Value) {
     match value {
         Value::Array(items) => items.iter_mut().for_each(remove_extras),
