@@ -25,6 +25,8 @@ pub(super) struct Manner {
     pub(super) is_scaled: bool,
     /// Whether light straight from the lamps is traced.
     pub(super) traces_lights: bool,
+    /// Whether an environment is seen.
+    pub(super) has_sky: bool,
 }
 
 impl Manner {
@@ -66,6 +68,7 @@ impl Manner {
             },
             is_scaled: self.is_scaled,
             traces_lights: self.traces_lights,
+            has_sky: self.has_sky,
         };
         PipelineKey::new(writes, look.surface, faces, how)
     }
