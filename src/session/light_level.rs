@@ -28,6 +28,8 @@ pub(super) struct TraceKey {
     pub(super) effects: EffectSet,
     /// Cells across and down each face.
     pub(super) size: (usize, usize),
+    /// Lattices between this one and the finest, where surfaces have bumps: what cells may miss of them.
+    pub(super) coarser: u32,
     /// Where cells are divided further, round by round.
     pub(super) rounds: Vec<Round>,
 }

@@ -3,13 +3,14 @@
 use glam::DVec2;
 
 use super::caustic::{CausticLayer, Course};
-use super::light_level::{LevelKey, LightLevel, LightState};
+use super::light_level::{LevelKey, LightLevel, LightState, TraceKey};
 use crate::illumination::accumulator::FluxUnit;
 use crate::light_pass::caustic::pass::Listener;
 use crate::light_pass::caustic::setup::AimedLight;
 use crate::light_pass::caustic::statistics::FootprintStatistics;
 use crate::light_pass::receiver_maps::{ChartFor, ReceiverMaps};
 use crate::light_pass::wavefront::bodies::SmallBodies;
+use crate::light_pass::wavefront::bumps::BumpCells;
 use crate::light_pass::wavefront::lattice::WavefrontLattice;
 use crate::light_pass::wavefront::pass::{Room, WavefrontDepositor};
 use crate::light_pass::wavefront::receivers::Receivers;
@@ -40,7 +41,7 @@ impl CausticLayer<'_> {
             chart_for: &chart_for,
             lattice: WavefrontLattice {
                 refinement: Some(&refinement),
-                ..self.wavefront_lattice(light, key.trace.size, &bodies, unit, course.control)
+                ..self.bumpy_lattice(light, &key.trace, &bodies, unit, course.control)
             },
             reference_w: reference_w(light),
             coarseness: key.coarseness,
@@ -135,6 +136,21 @@ impl CausticLayer<'_> {
         SmallBodies::find(self.tracer, &light.launch, light.visible(), cell)
     }
 
+    /// A level's lattice, with cells as fine as the detail of normals asks for.
+    fn bumpy_lattice<'a>(
+        &'a self,
+        light: &'a AimedLight,
+        trace: &TraceKey,
+        bodies: &'a SmallBodies,
+        unit: FluxUnit,
+        control: &'a Control,
+    ) -> WavefrontLattice<'a> {
+        let mut lattice = self.wavefront_lattice(light, trace.size, bodies, unit, control);
+        lattice.tracer.bumps = BumpCells::for_lattice(lattice.cell_count(), trace.coarser);
+        lattice
+    }
+
+    /// A lattice that is as it is, whatever falls into its cells.
     fn wavefront_lattice<'a>(
         &'a self,
         light: &'a AimedLight,
@@ -143,14 +159,11 @@ impl CausticLayer<'_> {
         unit: FluxUnit,
         control: &'a Control,
     ) -> WavefrontLattice<'a> {
+        let steps = [1.0 / size.0 as f64, 1.0 / size.1 as f64];
+        let mut tracer = StrandTracer::new(self.tracer, &light.launch, self.limits(), steps, control);
+        tracer.bumps = BumpCells::UNDIVIDED;
         WavefrontLattice {
-            tracer: StrandTracer::new(
-                self.tracer,
-                &light.launch,
-                self.limits(),
-                [1.0 / size.0 as f64, 1.0 / size.1 as f64],
-                control,
-            ),
+            tracer,
             item_buffer: &light.item_buffer,
             size,
             unit,

@@ -279,6 +279,14 @@ pub struct EdgeCutter<'a> {
 }
 
 impl EdgeCutter<'_> {
+    /// Whether the cells on both sides of an edge between two corners will be divided, or scattered, whatever lies on
+    /// it; `level` how often they were divided for detail of normals.
+    pub fn is_divided(&self, ends: [Corner; 2], level: u32, work: &Workspace) -> bool {
+        let samples = ends.map(|corner| work.get(corner.sample));
+        let step = ends[1].square - ends[0].square;
+        samples.iter().any(|sample| sample.is_rough) || self.tracer.bumps.ask_for_finer(&samples, step, level)
+    }
+
     /// Adds samples until every change of way along an edge between two places of the unit square is bracketed.
     pub fn resolve(&self, edge: &mut Edge, ends: [DVec2; 2], work: &mut Workspace) {
         let first = work.get(edge.samples[0].1);

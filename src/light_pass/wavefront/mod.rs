@@ -3,6 +3,7 @@
 
 pub mod band;
 pub mod bodies;
+pub mod bumps;
 pub mod cell;
 pub mod coverage;
 mod division;

@@ -5,7 +5,7 @@ use serde::Deserialize;
 use serde_json::Map;
 
 use super::report::Report;
-use super::{extensions, faults};
+use super::{extensions, faults, waves};
 use crate::error::{Error, Result};
 
 /// The typed JSON, with node transforms in double precision beside it.
@@ -15,6 +15,8 @@ pub struct Document {
     pub root: Root,
     /// One per node.
     pub transforms: Vec<NodeTransform>,
+    /// Waves of each material, as its extras state them.
+    pub waves: Vec<Option<Value>>,
 }
 
 /// A node's own transform as the file states it, unchecked.
@@ -44,6 +46,7 @@ pub fn parse(json: &[u8], report: &mut Report) -> Result<Document> {
     let required = strings(file, "extensionsRequired")?;
     extensions::check(&required, &strings(file, "extensionsUsed")?, report)?;
     leave_out_what_is_not_read(file, report);
+    let waves = waves::collect(&value);
     remove_extras(&mut value);
 
     let transforms = match value.get("nodes") {
@@ -52,7 +55,11 @@ pub fn parse(json: &[u8], report: &mut Report) -> Result<Document> {
     };
     let root: Root = serde_json::from_value(value).map_err(|error| unlike_gltf(&error.to_string()))?;
     faults::report(&root, report);
-    Ok(Document { root, transforms })
+    Ok(Document {
+        root,
+        transforms,
+        waves,
+    })
 }
 
 fn broken_json(json: &[u8], error: &serde_json::Error) -> Error {
