@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use nephroid::effect::Effect;
 use nephroid::error::{Result, Warning};
+use nephroid::light_pass::emitter::Emitter;
 use nephroid::plan::{self, EffectLine, EffectPlan};
 use nephroid::scene::{Light, LightKind, Scene, SurfaceKind};
 use nephroid::session::{BakeSession, Survey};
@@ -97,7 +98,11 @@ impl Report {
                 .map(|object| object_report(scene, object))
                 .collect(),
             materials: material_reports(scene),
-            lights: scene.lights.iter().map(light_report).collect(),
+            lights: scene
+                .lights
+                .iter()
+                .map(|light| light_report(light, scene))
+                .collect(),
             cameras: scene.cameras.iter().map(|camera| camera.name.clone()).collect(),
             plan,
             estimated_rays: survey.estimate.rays,
@@ -145,22 +150,23 @@ fn material_reports(scene: &Scene) -> Vec<MaterialReport> {
         .collect()
 }
 
-fn light_report(light: &Light) -> LightReport {
-    let luminance = light.colour.luminance();
+fn light_report(light: &Light, scene: &Scene) -> LightReport {
+    let strength = light.strength().luminance();
     let (kind, power_w, normal_irradiance_w_per_m2) = match light.kind {
-        LightKind::Point { intensity, .. } => (
-            "point",
-            Some(intensity.0 * full_beam_sr(&light.kind) * luminance),
-            None,
-        ),
-        LightKind::Spot { intensity, .. } => (
-            "spot",
-            Some(intensity.0 * full_beam_sr(&light.kind) * luminance),
-            None,
-        ),
-        LightKind::Sun {
-            normal_irradiance, ..
-        } => ("sun", None, Some(normal_irradiance.0 * luminance)),
+        LightKind::Point { .. } => ("point", Some(strength * full_beam_sr(&light.kind)), None),
+        LightKind::Spot { .. } => ("spot", Some(strength * full_beam_sr(&light.kind)), None),
+        LightKind::Sun { .. } => ("sun", None, Some(strength)),
+        LightKind::Panel { .. } | LightKind::Surface { .. } => {
+            // A facet's intensity on its axis is L·A: the whole lamp sends πLA.
+            let intensity = Emitter::middle(light, scene).map(|middle| middle.strength.luminance());
+            let name = if matches!(light.kind, LightKind::Panel { .. }) {
+                "panel"
+            } else {
+                "surface"
+            };
+            (name, intensity.map(|axial| axial * std::f64::consts::PI), None)
+        }
+        LightKind::Environment { .. } => ("environment", None, None),
     };
     LightReport {
         name: light.name.clone(),
@@ -181,7 +187,7 @@ fn full_beam_sr(light: &LightKind) -> f64 {
             let (cos_inner, cos_outer) = (inner_cone_rad.cos(), outer_cone_rad.cos());
             (1.0 - cos_inner) + (cos_inner - cos_outer) / 3.0
         }
-        LightKind::Point { .. } | LightKind::Sun { .. } => 2.0,
+        _ => 2.0,
     };
     std::f64::consts::TAU * cap
 }
@@ -259,6 +265,7 @@ fn text(report: &Report) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nephroid::light_pass::emitter::spot_falloff;
     use nephroid::units::RadiantIntensity;
 
     #[test]
@@ -275,10 +282,7 @@ mod tests {
         // Slices of equal solid angle between the planes cosine = constant (Archimedes).
         let integral: f64 = (0..steps)
             .map(|step| -1.0 + (f64::from(step) + 0.5) * width)
-            .map(|cosine| {
-                let sine = (1.0_f64 - cosine * cosine).sqrt();
-                spot.falloff(glam::DVec3::new(sine, 0.0, cosine)) * width * std::f64::consts::TAU
-            })
+            .map(|cosine| spot_falloff(cosine, 0.3, 0.7) * width * std::f64::consts::TAU)
             .sum();
         assert!(
             (integral / full_beam_sr(&spot) - 1.0).abs() < 1e-4,

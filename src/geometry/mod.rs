@@ -6,6 +6,7 @@ pub mod enclosure;
 pub mod frustum;
 pub mod packed;
 pub mod ray;
+pub mod sampling;
 pub mod triangle;
 
 pub use bvh::{TriangleBvh, TriangleHit};

@@ -2,16 +2,17 @@
 
 use glam::{DMat3, DVec2, DVec3};
 
+use super::emitter::{Emitter, EmitterKind};
 use crate::geometry::Ray;
 use crate::geometry::cube_face::{self, FaceMapping};
 use crate::optics::LinearSrgb;
-use crate::scene::{Light, LightKind, Scene};
+use crate::scene::Scene;
 use crate::settings::ItemBufferKind;
 
-/// Start domain of one light.
+/// Start domain of one wavefront.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Launch {
-    light: Light,
+    emitter: Emitter,
     domain: Domain,
 }
 
@@ -43,29 +44,31 @@ fn nested_side(wanted: f64) -> usize {
 }
 
 impl Launch {
-    /// The domain of a light. For a sun: the smallest rectangle, in a frame fixed by the direction alone, around all
+    /// The domain of a source. For parallel light: the smallest rectangle, in a frame fixed by the direction alone, around all
     /// `casters` (indices of specular objects), moved back before the whole scene. `None` where there is nothing to
     /// aim at.
-    pub fn new(light: &Light, scene: &Scene, casters: &[usize], item_buffer: ItemBufferKind) -> Option<Self> {
+    pub fn new(
+        emitter: Emitter,
+        scene: &Scene,
+        casters: &[usize],
+        item_buffer: ItemBufferKind,
+    ) -> Option<Self> {
         let mapping = match item_buffer {
             ItemBufferKind::Equal => FaceMapping::EqualSolidAngle,
             ItemBufferKind::Cube => FaceMapping::Plain,
         };
-        let domain = match light.kind {
-            LightKind::Point { position, .. } | LightKind::Spot { position, .. } => {
-                Domain::Sphere { position, mapping }
-            }
-            LightKind::Sun { direction, .. } => sun_domain(direction, scene, casters)?,
+        let domain = match emitter.kind {
+            EmitterKind::Point { position }
+            | EmitterKind::Spot { position, .. }
+            | EmitterKind::Facet { position, .. } => Domain::Sphere { position, mapping },
+            EmitterKind::Parallel { direction } => sun_domain(direction, scene, casters)?,
         };
-        Some(Self {
-            light: light.clone(),
-            domain,
-        })
+        Some(Self { emitter, domain })
     }
 
-    /// The light.
-    pub fn light(&self) -> &Light {
-        &self.light
+    /// Where the light comes from.
+    pub fn emitter(&self) -> &Emitter {
+        &self.emitter
     }
 
     /// Whether the domain is fitted to what it is aimed at.
@@ -128,13 +131,7 @@ impl Launch {
     /// has in the direction of the cell's ray.
     pub fn cell_flux_w(&self, low: DVec2, high: DVec2, direction: DVec3) -> LinearSrgb {
         let measure = self.cell_measure(low, high);
-        let strength = match self.light.kind {
-            LightKind::Point { intensity, .. } | LightKind::Spot { intensity, .. } => intensity.0,
-            LightKind::Sun {
-                normal_irradiance, ..
-            } => normal_irradiance.0,
-        };
-        self.light.colour * (strength * self.light.kind.falloff(direction) * measure)
+        self.emitter.strength * (self.emitter.kind.falloff(direction) * measure)
     }
 
     /// Flux per unit area of the unit square [W per channel] at a point of it, whose ray has the given direction.
@@ -149,24 +146,13 @@ impl Launch {
             }
             Domain::Sphere { .. } | Domain::Plane { .. } => self.cell_measure(DVec2::ZERO, DVec2::ONE),
         };
-        let strength = match self.light.kind {
-            LightKind::Point { intensity, .. } | LightKind::Spot { intensity, .. } => intensity.0,
-            LightKind::Sun {
-                normal_irradiance, ..
-            } => normal_irradiance.0,
-        };
-        self.light.colour * (strength * self.light.kind.falloff(direction) * measure)
+        self.emitter.strength * (self.emitter.kind.falloff(direction) * measure)
     }
 
     /// Whether the light sends anything into the cell between two corners of the unit square; never false where it
     /// does.
     pub fn may_light_cell(&self, face: usize, low: DVec2, high: DVec2) -> bool {
-        let LightKind::Spot {
-            direction,
-            outer_cone_rad,
-            ..
-        } = self.light.kind
-        else {
+        let Some((axis, half_angle_rad)) = self.emitter.kind.cone() else {
             return true;
         };
         let middle = self.ray(face, (low + high) * 0.5).direction;
@@ -176,7 +162,7 @@ impl Launch {
             .map(|corner| middle.angle_between(self.ray(face, corner).direction))
             .into_iter()
             .fold(0.0, f64::max);
-        direction.angle_between(middle) <= outer_cone_rad + 1.5 * radius
+        axis.angle_between(middle) <= half_angle_rad + 1.5 * radius
     }
 
     /// Solid angle [sr] of a cell, or its area [m²] for a sun.
@@ -201,13 +187,7 @@ impl Launch {
     /// Upper bound of the flux of the whole domain [W], largest channel.
     pub fn power_bound_w(&self) -> f64 {
         let measure = self.cell_measure(DVec2::ZERO, DVec2::ONE) * self.face_count() as f64;
-        let strength = match self.light.kind {
-            LightKind::Point { intensity, .. } | LightKind::Spot { intensity, .. } => intensity.0,
-            LightKind::Sun {
-                normal_irradiance, ..
-            } => normal_irradiance.0,
-        };
-        strength * measure * self.light.colour.max_channel()
+        measure * self.emitter.strength.max_channel()
     }
 
     /// Frame of a face: maps scene points to homogeneous plane coordinates (x, y, z) whose (x/z, y/z) is the point of

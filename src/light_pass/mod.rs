@@ -3,6 +3,7 @@
 pub mod accuracy;
 pub mod caustic;
 pub mod direct;
+pub mod emitter;
 pub mod item_buffer;
 pub mod launch;
 pub mod ledger;

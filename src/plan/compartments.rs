@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use crate::geometry::enclosure::{Bounds, is_closed, triangle_meets_box, winding_number};
-use crate::scene::{LightKind, Mesh, Scene};
+use crate::scene::{Light, LightKind, LightSize, Mesh, Scene};
 
 /// Larger meshes are not looked at: they seal nothing.
 const MOST_TRIANGLES: usize = 200_000;
@@ -43,12 +43,12 @@ impl Compartments {
                 .filter(|(other, _)| *other != container)
                 .filter_map(|(other, bounds)| Some((other, bounds.filter(|other| overlap(around, *other))?)))
                 .collect();
-            let lamps: Vec<(usize, DVec3)> = scene
+            let lamps: Vec<(usize, Bounds)> = scene
                 .lights
                 .iter()
                 .enumerate()
-                .filter_map(|(light, source)| Some((light, position(&source.kind)?)))
-                .filter(|(_, place)| overlap(around, (*place, *place)))
+                .filter_map(|(light, source)| Some((light, extent(source, &bounds)?)))
+                .filter(|(_, place)| overlap(around, *place))
                 .collect();
             let mesh = &object.mesh;
             if (near.is_empty() && lamps.is_empty())
@@ -69,11 +69,7 @@ impl Compartments {
                 }
             }
             for (light, place) in lamps {
-                book(
-                    &mut compartments.lights[light],
-                    container,
-                    is_inside(mesh, (place, place)),
-                );
+                book(&mut compartments.lights[light], container, is_inside(mesh, place));
             }
         }
         compartments
@@ -102,11 +98,24 @@ impl Compartments {
     }
 }
 
-/// Where a light is; suns are outside of everything.
-fn position(light: &LightKind) -> Option<DVec3> {
-    match *light {
-        LightKind::Point { position, .. } | LightKind::Spot { position, .. } => Some(position),
-        LightKind::Sun { .. } => None,
+/// The box that a light comes from; what comes from infinitely far is outside of everything.
+fn extent(light: &Light, objects: &[Option<Bounds>]) -> Option<Bounds> {
+    match light.kind {
+        LightKind::Point { position, .. } | LightKind::Spot { position, .. } => {
+            let reach = match light.size {
+                LightSize::Radius { radius_m } => DVec3::splat(radius_m),
+                _ => DVec3::ZERO,
+            };
+            Some((position - reach, position + reach))
+        }
+        LightKind::Panel {
+            centre, across, down, ..
+        } => {
+            let reach = across.abs() + down.abs();
+            Some((centre - reach, centre + reach))
+        }
+        LightKind::Surface { object, .. } => objects.get(object).copied().flatten(),
+        LightKind::Sun { .. } | LightKind::Environment { .. } => None,
     }
 }
 

@@ -5,7 +5,7 @@ use glam::DVec3;
 
 use super::compartments::Compartments;
 use crate::geometry::enclosure::Bounds;
-use crate::scene::{LightKind, Mesh, Scene, SurfaceKind};
+use crate::scene::{Light, LightKind, Mesh, Scene, SurfaceKind};
 
 /// With more specular objects than this, all that share a compartment are taken to send light to each other.
 const MOST_RELAYS: usize = 512;
@@ -55,7 +55,7 @@ impl<'a> Reach<'a> {
 
     /// Specular objects that a light may meet first and whose light may end on a receiver, ascending.
     pub fn casters(&self, light: usize) -> Vec<usize> {
-        let source = &self.scene.lights[light].kind;
+        let source = &self.scene.lights[light];
         let goes_on = |&object: &usize| {
             self.compartments.light_meets(light, object)
                 && (self.sends_to_any(object, Some(source), &self.receivers)
@@ -76,9 +76,9 @@ impl<'a> Reach<'a> {
     /// All specular objects that light may meet on its way from a light that sees `seen`, those included, ascending;
     /// with the object that sends it there, where the light does not see it itself.
     pub fn reached(&self, light: usize, seen: &[usize]) -> Vec<(usize, Option<usize>)> {
-        let source = &self.scene.lights[light].kind;
+        let source = &self.scene.lights[light];
         let mut by_way_of: Vec<Option<Option<usize>>> = vec![None; self.scene.objects.len()];
-        let mut waiting: Vec<(usize, Option<&LightKind>)> = Vec::new();
+        let mut waiting: Vec<(usize, Option<&Light>)> = Vec::new();
         for &object in seen {
             by_way_of[object] = Some(None);
             waiting.push((object, Some(source)));
@@ -130,7 +130,7 @@ impl<'a> Reach<'a> {
         }
     }
 
-    fn sends_to_any(&self, from: usize, lit_by: Option<&LightKind>, to: &[usize]) -> bool {
+    fn sends_to_any(&self, from: usize, lit_by: Option<&Light>, to: &[usize]) -> bool {
         let tests = self.scene.objects[from]
             .mesh
             .triangles
@@ -145,7 +145,7 @@ impl<'a> Reach<'a> {
 
     /// Whether a specular object may send light to another object: what comes straight from `lit_by`, or light from
     /// anywhere.
-    fn sends(&self, from: usize, lit_by: Option<&LightKind>, to: usize) -> bool {
+    fn sends(&self, from: usize, lit_by: Option<&Light>, to: usize) -> bool {
         let Some(bounds) = self.bounds[to] else {
             return false;
         };
@@ -163,7 +163,7 @@ impl<'a> Reach<'a> {
     }
 
     /// Whether any triangle of a mirror has part of a box before it, on the side that its light comes from.
-    fn reflects_into(&self, mesh: &Mesh, lit_by: Option<&LightKind>, bounds: Bounds) -> bool {
+    fn reflects_into(&self, mesh: &Mesh, lit_by: Option<&Light>, bounds: Bounds) -> bool {
         (0..mesh.triangles.len()).any(|triangle| {
             let corner = mesh.corners(triangle)[0];
             let normal = mesh.face_normal(triangle);
@@ -174,12 +174,15 @@ impl<'a> Reach<'a> {
     }
 
     /// Whether a light may fall on the front and on the back of a plane.
-    fn lit_sides(&self, light: &LightKind, point: DVec3, normal: DVec3) -> [bool; 2] {
-        let (height, tolerance) = match *light {
-            LightKind::Point { position, .. } | LightKind::Spot { position, .. } => {
-                ((position - point).dot(normal), self.tolerance_m)
-            }
+    fn lit_sides(&self, light: &Light, point: DVec3, normal: DVec3) -> [bool; 2] {
+        let (height, tolerance) = match light.kind {
+            // What has a size may reach past any plane.
+            _ if light.has_extent() => return [true, true],
             LightKind::Sun { direction, .. } => (-direction.dot(normal), TOLERANCE),
+            kind => match kind.position() {
+                Some(position) => ((position - point).dot(normal), self.tolerance_m),
+                None => return [true, true],
+            },
         };
         [height >= -tolerance, height <= tolerance]
     }

@@ -3,9 +3,9 @@
 use glam::DVec3;
 
 use crate::optics::LinearSrgb;
-use crate::units::{Irradiance, RadiantIntensity};
+use crate::units::{Irradiance, Radiance, RadiantIntensity};
 
-/// Where a light is and how strong, KHR_lights_punctual.
+/// Where a light is and how strong: KHR_lights_punctual, EXT_lights_area, what glows, and what lies around.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LightKind {
     /// The same in every direction.
@@ -35,6 +35,58 @@ pub enum LightKind {
         /// Measured across the beam: glTF's lux divided by 683 lm/W.
         normal_irradiance: Irradiance,
     },
+    /// A flat lamp that sends the same radiance into all directions of one side.
+    Panel {
+        /// Of its middle, scene coordinates [m].
+        centre: DVec3,
+        /// From the middle to the middle of one side [m].
+        across: DVec3,
+        /// From the middle to the middle of the next side [m]; it shines to the side of `across` × `down`.
+        down: DVec3,
+        /// Its outline.
+        shape: PanelShape,
+        /// glTF's cd/m² divided by 683 lm/W.
+        radiance: Radiance,
+    },
+    /// The triangles of an object that glow.
+    Surface {
+        /// Index into `Scene::objects`.
+        object: usize,
+        /// glTF's cd/m² divided by 683 lm/W.
+        radiance: Radiance,
+    },
+    /// `Scene::environment`, so many times as bright.
+    Environment {
+        /// Factor [1], > 0.
+        scale: f64,
+    },
+}
+
+/// Outline of a flat lamp.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PanelShape {
+    /// The parallelogram of its half-axes.
+    Rectangle,
+    /// The ellipse of its half-axes.
+    Disc,
+}
+
+/// How large a lamp is that would else be a point, or a sun that would else be one direction.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum LightSize {
+    /// Not at all.
+    #[default]
+    None,
+    /// Of a point light: a ball that sends the same radiance everywhere. Of a spot: a disc across its axis.
+    Radius {
+        /// [m], > 0.
+        radius_m: f64,
+    },
+    /// Of a sun.
+    Angle {
+        /// Full angle across its disc [rad], > 0 and at most π.
+        diameter_rad: f64,
+    },
 }
 
 /// A light with its colour.
@@ -46,22 +98,17 @@ pub struct Light {
     pub colour: LinearSrgb,
     /// Where and how strong.
     pub kind: LightKind,
+    /// How large, where the kind does not say it.
+    pub size: LightSize,
 }
 
 impl Light {
-    /// What its maps are multiplied by per channel: intensity [W/sr] or, for suns, normal irradiance [W/m²], times the
-    /// colour.
+    /// What its maps are multiplied by per channel: [`LightKind::strength`] times the colour.
     pub fn strength(&self) -> LinearSrgb {
-        self.colour
-            * match self.kind {
-                LightKind::Point { intensity, .. } | LightKind::Spot { intensity, .. } => intensity.0,
-                LightKind::Sun {
-                    normal_irradiance, ..
-                } => normal_irradiance.0,
-            }
+        self.colour * self.kind.strength()
     }
 
-    /// The same light, white and of 1 W/sr or 1 W/m².
+    /// The same light, white and of strength 1.
     #[must_use]
     pub fn of_unit_strength(&self) -> Self {
         let mut kind = self.kind;
@@ -72,36 +119,50 @@ impl Light {
             LightKind::Sun {
                 normal_irradiance, ..
             } => *normal_irradiance = Irradiance(1.0),
+            LightKind::Panel { radiance, .. } | LightKind::Surface { radiance, .. } => {
+                *radiance = Radiance(1.0);
+            }
+            LightKind::Environment { scale } => *scale = 1.0,
         }
         Self {
             name: self.name.clone(),
             colour: LinearSrgb::WHITE,
             kind,
+            size: self.size,
+        }
+    }
+
+    /// Whether its light comes from more than one point or direction.
+    pub fn has_extent(&self) -> bool {
+        match self.kind {
+            LightKind::Point { .. } | LightKind::Spot { .. } | LightKind::Sun { .. } => {
+                self.size != LightSize::None
+            }
+            LightKind::Panel { .. } | LightKind::Surface { .. } | LightKind::Environment { .. } => true,
         }
     }
 }
 
 impl LightKind {
-    /// Fall-off of a spot, [0, 1]: the square of a linear ramp in the cosine (KHR_lights_punctual); 1 for the others.
-    /// `direction` is unit and points away from the light.
-    pub fn falloff(&self, direction: DVec3) -> f64 {
+    /// Its strength alone: intensity [W/sr], normal irradiance [W/m²] of a sun, radiance [W/(m² sr)] of what glows,
+    /// the scale [1] of an environment.
+    pub fn strength(&self) -> f64 {
         match *self {
-            Self::Spot {
-                direction: axis,
-                inner_cone_rad,
-                outer_cone_rad,
-                ..
-            } => {
-                let (cos_outer, cos_inner) = (outer_cone_rad.cos(), inner_cone_rad.cos());
-                let cosine = axis.dot(direction);
-                let ramp = if cos_inner > cos_outer {
-                    ((cosine - cos_outer) / (cos_inner - cos_outer)).clamp(0.0, 1.0)
-                } else {
-                    f64::from(u8::from(cosine >= cos_outer))
-                };
-                ramp * ramp
-            }
-            Self::Point { .. } | Self::Sun { .. } => 1.0,
+            Self::Point { intensity, .. } | Self::Spot { intensity, .. } => intensity.0,
+            Self::Sun {
+                normal_irradiance, ..
+            } => normal_irradiance.0,
+            Self::Panel { radiance, .. } | Self::Surface { radiance, .. } => radiance.0,
+            Self::Environment { scale } => scale,
+        }
+    }
+
+    /// Where it is [m], or its middle; `None` for what has no single place.
+    pub fn position(&self) -> Option<DVec3> {
+        match *self {
+            Self::Point { position, .. } | Self::Spot { position, .. } => Some(position),
+            Self::Panel { centre, .. } => Some(centre),
+            Self::Sun { .. } | Self::Surface { .. } | Self::Environment { .. } => None,
         }
     }
 
@@ -125,7 +186,20 @@ impl LightKind {
                 inner_cone_rad,
                 outer_cone_rad,
             },
-            sun @ Self::Sun { .. } => sun,
+            Self::Panel {
+                centre,
+                across,
+                down,
+                shape,
+                radiance,
+            } => Self::Panel {
+                centre: centre + offset,
+                across,
+                down,
+                shape,
+                radiance,
+            },
+            far @ (Self::Sun { .. } | Self::Surface { .. } | Self::Environment { .. }) => far,
         }
     }
 }

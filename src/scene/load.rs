@@ -65,6 +65,7 @@ fn add_default_light(scene: &mut Scene) {
             direction: DVec3::new(0.4, -0.8, -0.45).normalize(),
             normal_irradiance: DEFAULT_SUN,
         },
+        size: crate::scene::LightSize::None,
     });
     scene.warnings.push(Warning::new(
         scene.source.clone(),

@@ -5,6 +5,7 @@ pub mod builtin;
 pub mod camera;
 pub mod camera_path;
 pub mod edit;
+pub mod environment;
 mod gltf;
 pub mod light;
 pub mod load;
@@ -20,7 +21,8 @@ use glam::DVec3;
 pub use camera::Camera;
 pub use camera_path::CameraPath;
 pub use edit::{Edit, EditTarget};
-pub use light::{Light, LightKind};
+pub use environment::Environment;
+pub use light::{Light, LightKind, LightSize, PanelShape};
 pub use load::{LoadOptions, load};
 pub use material::{Material, SurfaceKind, Volume};
 pub use mesh::Mesh;
@@ -61,6 +63,8 @@ pub struct Scene {
     pub textures: Vec<Arc<Texture>>,
     /// Lights with some power.
     pub lights: Vec<Light>,
+    /// What lies infinitely far around everything; black where there is none.
+    pub environment: Option<Arc<Environment>>,
     /// Cameras, in file order.
     pub cameras: Vec<Camera>,
     /// What was repaired or ignored on loading.

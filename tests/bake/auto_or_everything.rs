@@ -114,6 +114,7 @@ fn lamp(dice: &mut Dice, index: u32) -> Light {
                 inner_cone_rad: 0.2,
                 outer_cone_rad: dice.between(0.3, 1.0),
             },
+            size: nephroid::scene::LightSize::None,
         },
         _ => parts::point_light(&name, place, Flux(10.0)),
     }

@@ -49,6 +49,7 @@ fn lights_that_see_nothing_specular_change_no_bit() {
                 inner_cone_rad: 0.2,
                 outer_cone_rad: 0.5,
             },
+            size: nephroid::scene::LightSize::None,
         });
     }
     let (a, b) = (

@@ -112,6 +112,7 @@ pub fn transformed(mut scene: Scene, rotation: DMat3, scale: f64, offset: DVec3)
                 *direction = rotation * *direction;
             }
             LightKind::Sun { direction, .. } => *direction = (rotation * *direction).normalize(),
+            other => panic!("{other:?} has no rigid copy"),
         }
     }
     for camera in &mut scene.cameras {

@@ -58,6 +58,7 @@ fn spot(name: &str, position: DVec3, direction: DVec3) -> Light {
             inner_cone_rad: 0.1,
             outer_cone_rad: 0.3,
         },
+        size: nephroid::scene::LightSize::None,
     }
 }
 

@@ -65,7 +65,7 @@ fn edited(session: &mut BakeSession, edit: &Edit) {
 fn strength(scene: &Scene) -> f64 {
     match scene.lights[0].kind {
         LightKind::Point { intensity, .. } | LightKind::Spot { intensity, .. } => intensity.0,
-        LightKind::Sun { .. } => 1.0,
+        _ => 1.0,
     }
 }
 

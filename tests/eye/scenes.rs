@@ -58,6 +58,7 @@ pub fn light(kind: LightKind) -> Light {
         name: "light".into(),
         colour: LinearSrgb::WHITE,
         kind,
+        size: nephroid::scene::LightSize::None,
     }
 }
 

@@ -21,6 +21,7 @@ fn lamp(colour: LinearSrgb, kind: LightKind) -> Light {
         name: "lamp".into(),
         colour,
         kind,
+        size: nephroid::scene::LightSize::None,
     }
 }
 

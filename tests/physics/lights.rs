@@ -1,15 +1,14 @@
 //! Spot fall-off and the lawful products of units.
 
 use glam::DVec3;
-use nephroid::scene::LightKind;
+use nephroid::light_pass::emitter::EmitterKind;
 use nephroid::units::{Area, Irradiance, RadiantIntensity, SolidAngle};
 use proptest::prelude::*;
 
-fn spot(inner_cone_rad: f64, outer_cone_rad: f64) -> LightKind {
-    LightKind::Spot {
+fn spot(inner_cone_rad: f64, outer_cone_rad: f64) -> EmitterKind {
+    EmitterKind::Spot {
         position: DVec3::ZERO,
         direction: DVec3::NEG_Y,
-        intensity: RadiantIntensity(1.0),
         inner_cone_rad,
         outer_cone_rad,
     }
@@ -41,13 +40,11 @@ fn a_hard_spot_is_a_step() {
 
 #[test]
 fn points_and_suns_have_none() {
-    let point = LightKind::Point {
+    let point = EmitterKind::Point {
         position: DVec3::ZERO,
-        intensity: RadiantIntensity(1.0),
     };
-    let sun = LightKind::Sun {
+    let sun = EmitterKind::Parallel {
         direction: DVec3::NEG_Y,
-        normal_irradiance: Irradiance(1.0),
     };
     for angle in [0.0, 1.0, 3.0] {
         assert_eq!(point.falloff(off_axis(angle)), 1.0);

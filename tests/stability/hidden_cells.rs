@@ -3,11 +3,12 @@
 use std::sync::Arc;
 
 use glam::{DVec2, DVec3};
+use nephroid::light_pass::emitter::Emitter;
 use nephroid::light_pass::item_buffer::{CELLS_PER_SIDE, Hiding, ItemBuffer};
 use nephroid::light_pass::launch::Launch;
 use nephroid::optics::LinearSrgb;
-use nephroid::scene::Scene;
 use nephroid::scene::builtin::{parts, shapes};
+use nephroid::scene::{Light, Scene};
 use nephroid::settings::ItemBufferKind;
 use nephroid::transport::Tracer;
 use nephroid::units::{Flux, Irradiance};
@@ -63,7 +64,7 @@ fn every_ray_of_a_dropped_cell_ends_on_an_opaque_face() {
         let scene = Arc::new(hidden_scene(seed));
         let tracer = Tracer::new(Arc::clone(&scene));
         let casters = [0, 1];
-        let launch = Launch::new(&scene.lights[0], &scene, &casters, ItemBufferKind::Equal).expect("casters");
+        let launch = launch(&scene.lights[0], &scene, &casters, ItemBufferKind::Equal).expect("casters");
         let [kept, visible] =
             [Hiding::Keep, Hiding::Drop].map(|hiding| ItemBuffer::build(&launch, &tracer, &casters, hiding));
         assert!(visible.marked_cells() + visible.hidden_cells == kept.marked_cells());
@@ -106,10 +107,14 @@ fn a_light_that_opaque_faces_shut_in_sees_no_caster() {
         DVec3::new(0.01, 0.02, 0.03),
         Flux(1.0),
     ));
-    let launch = Launch::new(&scene.lights[0], &scene, &[0], ItemBufferKind::Equal).expect("a caster");
+    let launch = launch(&scene.lights[0], &scene, &[0], ItemBufferKind::Equal).expect("a caster");
     let tracer = Tracer::new(Arc::new(scene));
     let buffer = ItemBuffer::build(&launch, &tracer, &[0], Hiding::Drop);
     // Round faces meet at some 600 corners, and edges that share their ends share their planes: no gap is left.
     assert_eq!((buffer.marked_cells(), buffer.casters.len()), (0, 0));
     assert!(buffer.hidden_cells > 100);
+}
+
+fn launch(light: &Light, scene: &Scene, casters: &[usize], item_buffer: ItemBufferKind) -> Option<Launch> {
+    Launch::new(Emitter::middle(light, scene)?, scene, casters, item_buffer)
 }

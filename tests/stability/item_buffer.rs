@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use glam::{DVec2, DVec3};
 use nephroid::geometry::cube_face::{self, FaceMapping};
+use nephroid::light_pass::emitter::Emitter;
 use nephroid::light_pass::item_buffer::{CELLS_PER_SIDE, Hiding, ItemBuffer};
 use nephroid::light_pass::launch::Launch;
 use nephroid::optics::LinearSrgb;
@@ -22,6 +23,7 @@ fn lamp(position: DVec3) -> Light {
             position,
             intensity: RadiantIntensity(1.0),
         },
+        size: nephroid::scene::LightSize::None,
     }
 }
 
@@ -148,7 +150,7 @@ fn every_visible_triangle_marks_the_cell_of_each_of_its_points() {
                 .collect();
             let scene = mirrors(&triangles);
             let light = lamp(DVec3::new(0.01, 0.02, -0.015));
-            let launch = Launch::new(&light, &scene, &[0], kind).expect("a domain");
+            let launch = launch(&light, &scene, &[0], kind).expect("a domain");
             let buffer = build(&launch, &scene);
             for corners in &triangles {
                 for _ in 0..20 {
@@ -181,7 +183,7 @@ fn marked_at(launch: &Launch, buffer: &ItemBuffer, target: DVec3) -> bool {
 fn a_small_mirror_marks_few_cells() {
     let a = DVec3::new(1.0, 0.2, 0.3);
     let scene = mirrors(&[[a, a + DVec3::Y * 0.01, a + DVec3::Z * 0.01]]);
-    let launch = Launch::new(&lamp(DVec3::ZERO), &scene, &[0], ItemBufferKind::Equal).expect("a domain");
+    let launch = launch(&lamp(DVec3::ZERO), &scene, &[0], ItemBufferKind::Equal).expect("a domain");
     let marked = build(&launch, &scene).marked_cells();
     assert!((1..=4).contains(&marked), "{marked} cells");
 }
@@ -191,7 +193,7 @@ fn a_light_on_the_mirror_itself_still_sees_it() {
     let corners = [DVec3::ZERO, DVec3::X, DVec3::Z];
     let scene = mirrors(&[corners]);
     for position in [DVec3::ZERO, DVec3::new(0.3, 0.0, 0.3), DVec3::new(0.5, 0.0, 0.0)] {
-        let launch = Launch::new(&lamp(position), &scene, &[0], ItemBufferKind::Equal).expect("a domain");
+        let launch = launch(&lamp(position), &scene, &[0], ItemBufferKind::Equal).expect("a domain");
         let buffer = build(&launch, &scene);
         assert!(buffer.marked_cells() > 0, "nothing marked from {position}");
     }
@@ -201,7 +203,7 @@ fn a_light_on_the_mirror_itself_still_sees_it() {
 fn lattice_spans_hold_every_cell_that_touches_a_marked_one() {
     let a = DVec3::new(1.0, 0.2, 0.3);
     let scene = mirrors(&[[a, a + DVec3::Y * 0.3, a + DVec3::Z * 0.1]]);
-    let launch = Launch::new(&lamp(DVec3::ZERO), &scene, &[0], ItemBufferKind::Equal).expect("a domain");
+    let launch = launch(&lamp(DVec3::ZERO), &scene, &[0], ItemBufferKind::Equal).expect("a domain");
     let buffer = build(&launch, &scene);
     for size in [(1, 1), (5, 3), (128, 128), (300, 301), (1000, 77)] {
         for face in 0..6 {
@@ -292,7 +294,7 @@ fn the_whole_marks_what_its_triangles_mark_one_by_one() {
             let triangles = cloud(seed, count, size);
             let scene = mirrors(&triangles);
             // One frame for all: a sun's follows the casters.
-            let launch = Launch::new(&light, &scene, &[0], ItemBufferKind::Equal).expect("a domain");
+            let launch = launch(&light, &scene, &[0], ItemBufferKind::Equal).expect("a domain");
             let whole = marks(&build(&launch, &scene), launch.face_count());
             let mut apart: Vec<_> = triangles
                 .iter()
@@ -316,7 +318,7 @@ fn diffuse_surfaces_among_the_casters_mark_nothing() {
     scene.objects.insert(0, dust);
     scene.materials.push(Material::default());
     for light in lights() {
-        let launch = Launch::new(&light, &alone, &[0], ItemBufferKind::Equal).expect("a domain");
+        let launch = launch(&light, &alone, &[0], ItemBufferKind::Equal).expect("a domain");
         let among = ItemBuffer::build(&launch, &Tracer::new(Arc::new(scene.clone())), &[1], Hiding::Keep);
         let faces = launch.face_count();
         assert_eq!(marks(&among, faces), marks(&build(&launch, &alone), faces));
@@ -354,7 +356,11 @@ fn objects_beside_a_cone_are_no_casters() {
         ..lamp(DVec3::ZERO)
     };
     let casters = [0, 1, 2, 3];
-    let launch = Launch::new(&light, &scene, &casters, ItemBufferKind::Equal).expect("a domain");
+    let launch = launch(&light, &scene, &casters, ItemBufferKind::Equal).expect("a domain");
     let buffer = ItemBuffer::build(&launch, &Tracer::new(Arc::new(scene)), &casters, Hiding::Keep);
     assert_eq!(buffer.casters, [1, 2]);
+}
+
+fn launch(light: &Light, scene: &Scene, casters: &[usize], item_buffer: ItemBufferKind) -> Option<Launch> {
+    Launch::new(Emitter::middle(light, scene)?, scene, casters, item_buffer)
 }

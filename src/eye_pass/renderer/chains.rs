@@ -175,6 +175,10 @@ impl ChainScene {
                 strength,
                 ..Default::default()
             },
+            // Its light comes with the maps.
+            LightKind::Panel { .. } | LightKind::Surface { .. } | LightKind::Environment { .. } => {
+                LightRecord::default()
+            }
         }
     }
 

@@ -3,6 +3,7 @@
 use glam::DVec3;
 
 use super::pass::{Seconds, Stopwatch};
+use crate::light_pass::emitter::Emitter;
 use crate::light_pass::item_buffer::{Hiding, ItemBuffer};
 use crate::light_pass::launch::Launch;
 use crate::plan::{Reach, Sight};
@@ -196,8 +197,9 @@ impl Looker<'_> {
     }
 
     fn launch(&self, light: usize, casters: &[usize]) -> Option<Launch> {
-        let source = self.tracer.scene().lights[light].of_unit_strength();
-        Launch::new(&source, self.tracer.scene(), casters, self.item_buffer)
+        let scene = self.tracer.scene();
+        let emitter = Emitter::middle(&scene.lights[light].of_unit_strength(), scene)?;
+        Launch::new(emitter, scene, casters, self.item_buffer)
     }
 
     /// Where light can matter; `None` where nothing could be aimed at.

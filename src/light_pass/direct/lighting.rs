@@ -3,9 +3,10 @@
 use glam::DVec3;
 
 use super::facet::SurfacePoint;
+use crate::light_pass::emitter::{Emitter, EmitterKind};
 use crate::optics::LinearSrgb;
 use crate::optics::fresnel::dielectric_reflectance;
-use crate::scene::{Light, LightKind, Material, SurfaceKind};
+use crate::scene::{Material, SurfaceKind};
 
 /// Light on its way to a point.
 pub struct Arriving {
@@ -18,27 +19,18 @@ pub struct Arriving {
 }
 
 impl Arriving {
-    /// What a light gives a point if nothing stands in its way; `None` where it sends nothing, or to the wrong side.
+    /// What a source gives a point if nothing stands in its way; `None` where it sends nothing, or to the wrong side.
     /// A mixed surface takes what its polish does not reflect.
-    pub fn unshadowed(light: &Light, point: &SurfacePoint, material: &Material) -> Option<Self> {
-        let (to_light, distance_m, across_beam) = match light.kind {
-            LightKind::Point { position, intensity }
-            | LightKind::Spot {
-                position, intensity, ..
-            } => {
+    pub fn unshadowed(emitter: &Emitter, point: &SurfacePoint, material: &Material) -> Option<Self> {
+        let (to_light, distance_m, across_beam) = match (emitter.kind, emitter.kind.position()) {
+            (EmitterKind::Parallel { direction }, _) => (-direction, f64::INFINITY, 1.0),
+            (kind, Some(position)) => {
                 let offset = position - point.position;
                 let to_light = offset.try_normalize()?;
-                let share = light.kind.falloff(-to_light);
-                (
-                    to_light,
-                    offset.length(),
-                    intensity.0 * share / offset.length_squared(),
-                )
+                let share = kind.falloff(-to_light);
+                (to_light, offset.length(), share / offset.length_squared())
             }
-            LightKind::Sun {
-                direction,
-                normal_irradiance,
-            } => (-direction, f64::INFINITY, normal_irradiance.0),
+            (_, None) => return None,
         };
         let side = if to_light.dot(point.geometric_normal) >= 0.0 {
             1.0
@@ -54,7 +46,7 @@ impl Arriving {
         };
         let strength = across_beam * cosine * taken;
         (strength > 0.0).then(|| Self {
-            irradiance: light.colour * strength,
+            irradiance: emitter.strength * strength,
             to_light,
             distance_m,
         })

@@ -15,6 +15,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use crate::illumination::Chart;
 use crate::illumination::gutter::{fill_gutter, neighbours};
 use crate::illumination::parametrisation::coverage::{Polygon, for_each_texel_in_row, rows};
+use crate::light_pass::emitter::Emitter;
 use crate::optics::LinearSrgb;
 use crate::progress::{Control, Progress, Stage};
 use crate::scene::{Light, Material};
@@ -64,7 +65,8 @@ pub fn bake_direct(
 
 struct Baker<'a> {
     tracer: &'a Tracer,
-    lights: &'a [Light],
+    /// Of each light, its middle; `None` where it has none or sends nothing.
+    emitters: Vec<Option<Emitter>>,
     chart: &'a Chart,
     material: &'a Material,
     /// Triangles that reach each row: those of row r are `triangles[first[r]..first[r + 1]]`.
@@ -73,7 +75,7 @@ struct Baker<'a> {
 }
 
 impl<'a> Baker<'a> {
-    fn new(tracer: &'a Tracer, lights: &'a [Light], chart: &'a Chart) -> Self {
+    fn new(tracer: &'a Tracer, lights: &[Light], chart: &'a Chart) -> Self {
         let size = DVec2::new(1.0, chart.height as f64);
         let reach = |uvs: &[DVec2; 3]| rows(uvs.map(|uv| uv * size), chart.height);
         let mut first = vec![0; chart.height + 1];
@@ -95,7 +97,10 @@ impl<'a> Baker<'a> {
         }
         Self {
             tracer,
-            lights,
+            emitters: lights
+                .iter()
+                .map(|light| Emitter::middle(light, tracer.scene()))
+                .collect(),
             chart,
             material: tracer.scene().material_of(chart.object),
             first,
@@ -233,8 +238,11 @@ impl<'a> Baker<'a> {
             mask: 0,
             shadow_rays: 0,
         };
-        for (index, light) in self.lights.iter().enumerate() {
-            let Some(arriving) = Arriving::unshadowed(light, &point, self.material) else {
+        for (index, emitter) in self.emitters.iter().enumerate() {
+            let arriving = emitter
+                .as_ref()
+                .and_then(|emitter| Arriving::unshadowed(emitter, &point, self.material));
+            let Some(arriving) = arriving else {
                 continue;
             };
             sample.shadow_rays += 1;

@@ -5,23 +5,17 @@ use glam::{DVec2, DVec3};
 use super::CELLS_PER_SIDE;
 use super::bits::CellBits;
 use crate::light_pass::launch::Launch;
-use crate::scene::LightKind;
 
-/// Cells of a face that the light may light: for spots those that the cone touches.
+/// Cells of a face that the light may light: those that its cone touches.
 pub(super) fn lit_cells(launch: &Launch, face: usize) -> CellBits {
-    let LightKind::Spot {
-        direction,
-        outer_cone_rad,
-        ..
-    } = launch.light().kind
-    else {
+    let Some((axis, half_angle_rad)) = launch.emitter().kind.cone() else {
         return CellBits::filled(true);
     };
     let cone = Cone {
         launch,
         face,
-        axis: direction,
-        half_angle_rad: outer_cone_rad,
+        axis,
+        half_angle_rad,
     };
     let mut lit = CellBits::filled(false);
     cone.fill(0, 0, CELLS_PER_SIDE, &mut lit);

@@ -53,6 +53,7 @@ pub fn point_light(name: &str, position: DVec3, power: Flux) -> Light {
         name: name.into(),
         colour: LinearSrgb::WHITE,
         kind: LightKind::Point { position, intensity },
+        size: crate::scene::LightSize::None,
     }
 }
 
@@ -65,6 +66,7 @@ pub fn sun(name: &str, direction: DVec3, normal_irradiance: Irradiance) -> Light
             direction: direction.normalize(),
             normal_irradiance,
         },
+        size: crate::scene::LightSize::None,
     }
 }
 

@@ -8,7 +8,7 @@ use super::Edit;
 use super::ranges::{check_place, out_of_range};
 use crate::error::{Error, Result};
 use crate::optics::LinearSrgb;
-use crate::scene::{Light, LightKind};
+use crate::scene::{Light, LightKind, LightSize};
 use crate::units::{Irradiance, RadiantIntensity};
 
 /// A direction whose squared length is this near to 1 is unit already and stays bit for bit.
@@ -58,6 +58,22 @@ pub(super) fn apply(edit: &Edit, index: usize, light: &mut Light) -> Result<Edit
                 direction: replace(old, unit(*new, &owner)?),
             }
         }
+        Edit::LightBrightness { brightness: new, .. } => {
+            let why = "brightness of its own, since it is a point or a direction";
+            let old = brightness(&mut light.kind).ok_or_else(|| lacks(why, "set its intensity"))?;
+            check_power(*new, "W/(m² sr)", &owner)?;
+            Edit::LightBrightness {
+                light: index,
+                brightness: replace(old, *new),
+            }
+        }
+        Edit::LightSize { size: new, .. } => {
+            check_size(&light.kind, *new, &owner)?;
+            Edit::LightSize {
+                light: index,
+                size: replace(&mut light.size, *new),
+            }
+        }
         Edit::LightColour { colour: new, .. } => {
             check_colour(*new, &owner)?;
             Edit::LightColour {
@@ -72,7 +88,7 @@ pub(super) fn apply(edit: &Edit, index: usize, light: &mut Light) -> Result<Edit
 fn intensity(kind: &mut LightKind) -> Option<&mut RadiantIntensity> {
     match kind {
         LightKind::Point { intensity, .. } | LightKind::Spot { intensity, .. } => Some(intensity),
-        LightKind::Sun { .. } => None,
+        _ => None,
     }
 }
 
@@ -81,21 +97,48 @@ fn normal_irradiance(kind: &mut LightKind) -> Option<&mut Irradiance> {
         LightKind::Sun {
             normal_irradiance, ..
         } => Some(normal_irradiance),
-        LightKind::Point { .. } | LightKind::Spot { .. } => None,
+        _ => None,
     }
+}
+
+fn brightness(kind: &mut LightKind) -> Option<&mut f64> {
+    match kind {
+        LightKind::Panel { radiance, .. } | LightKind::Surface { radiance, .. } => Some(&mut radiance.0),
+        LightKind::Environment { scale } => Some(scale),
+        _ => None,
+    }
+}
+
+fn check_size(kind: &LightKind, size: LightSize, owner: &str) -> Result<()> {
+    let is_sound = match (kind, size) {
+        (LightKind::Point { .. } | LightKind::Spot { .. } | LightKind::Sun { .. }, LightSize::None) => true,
+        (LightKind::Point { .. } | LightKind::Spot { .. }, LightSize::Radius { radius_m }) => {
+            radius_m > 0.0 && radius_m.is_finite()
+        }
+        (LightKind::Sun { .. }, LightSize::Angle { diameter_rad }) => {
+            diameter_rad > 0.0 && diameter_rad <= std::f64::consts::PI
+        }
+        _ => false,
+    };
+    if is_sound {
+        return Ok(());
+    }
+    let range = "a radius above 0 m for point lights and spots, an angle above 0 and up to π for suns";
+    Err(out_of_range(owner, "size", format!("{size:?}"), range))
 }
 
 fn position(kind: &mut LightKind) -> Option<&mut DVec3> {
     match kind {
         LightKind::Point { position, .. } | LightKind::Spot { position, .. } => Some(position),
-        LightKind::Sun { .. } => None,
+        LightKind::Panel { centre, .. } => Some(centre),
+        _ => None,
     }
 }
 
 fn direction(kind: &mut LightKind) -> Option<&mut DVec3> {
     match kind {
         LightKind::Spot { direction, .. } | LightKind::Sun { direction, .. } => Some(direction),
-        LightKind::Point { .. } => None,
+        _ => None,
     }
 }
 

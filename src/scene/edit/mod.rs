@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use glam::{DQuat, DVec3};
 
-use super::{Mesh, Scene, Waves};
+use super::{LightSize, Mesh, Scene, Waves};
 use crate::error::{Error, Result};
 use crate::optics::LinearSrgb;
 use crate::units::{Irradiance, RadiantIntensity};
@@ -31,7 +31,21 @@ pub enum Edit {
         /// Measured across the beam; > 0 and finite.
         normal_irradiance: Irradiance,
     },
-    /// Place of a point or spot light.
+    /// Strength of a lamp with a surface, or of the environment.
+    LightBrightness {
+        /// Which light.
+        light: usize,
+        /// Radiance [W/(m² sr)], or the environment's scale [1]; > 0 and finite.
+        brightness: f64,
+    },
+    /// How large a point light, spot or sun is.
+    LightSize {
+        /// Which light.
+        light: usize,
+        /// A radius for point lights and spots, an angle for suns; positive and finite.
+        size: LightSize,
+    },
+    /// Place of a point or spot light, or of a flat lamp's middle.
     LightPosition {
         /// Which light.
         light: usize,
@@ -105,6 +119,8 @@ pub enum Edit {
 pub enum EditTarget {
     /// Strength of a light.
     LightPower(usize),
+    /// Size of a light.
+    LightSize(usize),
     /// Place of a light.
     LightPosition(usize),
     /// Direction of a light.
@@ -153,9 +169,10 @@ impl Edit {
     /// What it sets.
     pub fn target(&self) -> EditTarget {
         match self {
-            Self::LightIntensity { light, .. } | Self::LightNormalIrradiance { light, .. } => {
-                EditTarget::LightPower(*light)
-            }
+            Self::LightIntensity { light, .. }
+            | Self::LightNormalIrradiance { light, .. }
+            | Self::LightBrightness { light, .. } => EditTarget::LightPower(*light),
+            Self::LightSize { light, .. } => EditTarget::LightSize(*light),
             Self::LightPosition { light, .. } => EditTarget::LightPosition(*light),
             Self::LightDirection { light, .. } => EditTarget::LightDirection(*light),
             Self::LightColour { light, .. } => EditTarget::LightColour(*light),
@@ -174,6 +191,8 @@ impl Edit {
         match self {
             Self::LightIntensity { light, .. }
             | Self::LightNormalIrradiance { light, .. }
+            | Self::LightBrightness { light, .. }
+            | Self::LightSize { light, .. }
             | Self::LightPosition { light, .. }
             | Self::LightDirection { light, .. }
             | Self::LightColour { light, .. } => {

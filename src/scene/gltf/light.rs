@@ -39,6 +39,7 @@ pub fn read_all(root: &Root, placed: &[Placed], report: &mut Report) -> Vec<Ligh
                 name: light_name(placed, lights.len()),
                 colour: widen_all(source.color).into(),
                 kind,
+                size: crate::scene::LightSize::None,
             }),
             Err(why) => left_out(report, &owner, &why),
         }

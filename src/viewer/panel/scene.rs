@@ -39,6 +39,13 @@ const IRRADIANCE: About = About {
     accuracy: INTENSITY.accuracy,
     cost: INTENSITY.cost,
 };
+const BRIGHTNESS: About = About {
+    label: "Brightness",
+    what: "Radiance of a lamp with a surface [W/(m² sr)], or how many times as bright as its image an environment is.",
+    range: "a hundredth to a hundred times the file's value; others can be typed",
+    accuracy: "none: light scales with it",
+    cost: "none: baked light is scaled",
+};
 const POSITION: About = About {
     label: "Position [m]",
     what: "Place of the light in scene coordinates: x, y (up), z.",
@@ -159,6 +166,7 @@ fn light(ui: &mut Ui, light: usize, facts: &Facts<'_>, wishes: &mut Wishes) {
     let power_about = match kind {
         LightKind::Sun { .. } => &IRRADIANCE,
         LightKind::Point { .. } | LightKind::Spot { .. } => &INTENSITY,
+        LightKind::Panel { .. } | LightKind::Surface { .. } | LightKind::Environment { .. } => &BRIGHTNESS,
     };
     row(ui, power_about, None, |ui| power(ui, light, facts, wishes));
     if let LightKind::Point { position, .. } | LightKind::Spot { position, .. } = kind {
@@ -185,20 +193,10 @@ fn light(ui: &mut Ui, light: usize, facts: &Facts<'_>, wishes: &mut Wishes) {
     }
 }
 
-/// W/sr or W/m².
-fn strength(kind: &LightKind) -> f64 {
-    match kind {
-        LightKind::Point { intensity, .. } | LightKind::Spot { intensity, .. } => intensity.0,
-        LightKind::Sun {
-            normal_irradiance, ..
-        } => normal_irradiance.0,
-    }
-}
-
 fn power(ui: &mut Ui, light: usize, facts: &Facts<'_>, wishes: &mut Wishes) -> Response {
     let kind = &facts.scene.lights[light].kind;
-    let of_file = strength(&facts.loaded.lights[light].kind);
-    let mut value = strength(kind);
+    let of_file = facts.loaded.lights[light].kind.strength();
+    let mut value = kind.strength();
     let response = ui.add(
         Slider::new(&mut value, of_file * POWER_FACTORS.0..=of_file * POWER_FACTORS.1)
             .logarithmic(true)
@@ -215,6 +213,12 @@ fn power(ui: &mut Ui, light: usize, facts: &Facts<'_>, wishes: &mut Wishes) -> R
                 light,
                 intensity: RadiantIntensity(value),
             },
+            LightKind::Panel { .. } | LightKind::Surface { .. } | LightKind::Environment { .. } => {
+                Edit::LightBrightness {
+                    light,
+                    brightness: value,
+                }
+            }
         });
     }
     response

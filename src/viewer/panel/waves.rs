@@ -72,34 +72,48 @@ fn slope(ui: &mut Ui, list: &mut [Wave]) -> Response {
 }
 
 fn one(ui: &mut Ui, wave: &mut Wave) -> Response {
-    let before = wave.direction.x.atan2(-wave.direction.z).to_degrees();
-    let mut azimuth_deg = before;
+    let mut azimuth_deg = wave.direction.x.atan2(-wave.direction.z).to_degrees();
+    let before = azimuth_deg;
     let response = ui
         .horizontal(|ui| {
             ui.spacing_mut().item_spacing.x = 4.0;
             ui.spacing_mut().interact_size.x = 58.0;
-            let (height, length) = (wave.amplitude_m.max(LEAST_HEIGHT_M), wave.wavelength_m);
-            let height = DragValue::new(&mut wave.amplitude_m)
-                .speed(0.01 * height)
-                .range(0.0..=f64::MAX)
-                .max_decimals(5)
-                .prefix("A: ");
-            let length = DragValue::new(&mut wave.wavelength_m)
-                .speed(0.01 * length)
-                .range(f64::MIN_POSITIVE..=f64::MAX)
-                .max_decimals(4)
-                .prefix("λ: ");
-            let azimuth = DragValue::new(&mut azimuth_deg)
-                .speed(0.5)
-                .range(-360.0..=360.0)
-                .max_decimals(1)
-                .prefix("az.: ");
-            ui.add(height).union(ui.add(length)).union(ui.add(azimuth))
+            let fine = |value: f64| 0.01 * value.max(LEAST_HEIGHT_M);
+            let (height_speed, length_speed) = (fine(wave.amplitude_m), fine(wave.wavelength_m));
+            number(ui, &mut wave.amplitude_m, 5, |shown| {
+                shown.speed(height_speed).range(0.0..=f64::MAX).prefix("A: ")
+            })
+            .union(number(ui, &mut wave.wavelength_m, 4, |shown| {
+                shown
+                    .speed(length_speed)
+                    .range(f64::MIN_POSITIVE..=f64::MAX)
+                    .prefix("λ: ")
+            }))
+            .union(number(ui, &mut azimuth_deg, 1, |shown| {
+                shown.speed(0.5).range(-360.0..=360.0).prefix("az.: ")
+            }))
         })
         .inner;
     if azimuth_deg != before {
         let azimuth = azimuth_deg.to_radians();
         wave.direction = DVec3::new(azimuth.sin(), 0.0, -azimuth.cos());
+    }
+    response
+}
+
+/// A value shown with so many decimals. What rounding leaves of it is no change.
+fn number(
+    ui: &mut Ui,
+    value: &mut f64,
+    decimals: i32,
+    style: impl FnOnce(DragValue<'_>) -> DragValue<'_>,
+) -> Response {
+    let unit = 10_f64.powi(-decimals);
+    let rounded = (*value / unit).round() * unit;
+    let mut shown = rounded;
+    let response = ui.add(style(DragValue::new(&mut shown)).max_decimals(decimals as usize));
+    if (shown - rounded).abs() > 1e-9 * unit {
+        *value = shown;
     }
     response
 }

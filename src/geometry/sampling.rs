@@ -1,0 +1,96 @@
+//! Points that fill the unit square evenly, for what a wavefront holds fixed: its source point, its micro-normals.
+//!
+//! Sobol's (0, 2)-sequence with nested uniform scrambling by hashes, its order shuffled the same way, so that any number
+//! of pairs may be drawn at one index (Burley, "Practical Hash-based Owen Scrambling", JCGT 9(4), 2020). The first 2ᵏ
+//! points, and the next 2ᵏ, are each evenly spread.
+
+use glam::DVec2;
+
+/// Direction numbers of Sobol's second dimension; the first is the reversal of bits.
+const fn second_dimension() -> [u32; 32] {
+    let mut numbers = [0; 32];
+    let mut bit = 0;
+    let mut number = 1_u32 << 31;
+    while bit < 32 {
+        numbers[bit] = number;
+        number ^= number >> 1;
+        bit += 1;
+    }
+    numbers
+}
+
+static SECOND: [u32; 32] = second_dimension();
+
+/// The pair of a sequence at an index, in [0, 1)². Different `pair`s of one `seed` are independent of each other.
+pub fn even_point(index: u32, pair: u32, seed: u64) -> DVec2 {
+    let seed = hash(seed as u32 ^ hash((seed >> 32) as u32 ^ hash(pair)));
+    let index = scrambled(index.reverse_bits(), seed).reverse_bits();
+    let x = index.reverse_bits();
+    let y = (0..32)
+        .filter(|bit| index >> bit & 1 == 1)
+        .fold(0, |y, bit| y ^ SECOND[bit as usize]);
+    let unit = |code: u32, dimension: u32| {
+        let code = scrambled(code.reverse_bits(), hash(seed ^ dimension)).reverse_bits();
+        f64::from(code) * (-32_f64).exp2()
+    };
+    // The middle of the cell that 32 bits tell: never 0.
+    DVec2::new(unit(x, 0x9e37_79b9), unit(y, 0x7f4a_7c15)) + DVec2::splat((-33_f64).exp2())
+}
+
+/// Owen's scrambling of reversed bits: every bit is flipped by a hash of the lower ones (Laine and Karras 2011, with
+/// Vegdahl's constants).
+fn scrambled(mut code: u32, seed: u32) -> u32 {
+    code ^= code.wrapping_mul(0x3d20_adea);
+    code = code.wrapping_add(seed);
+    code = code.wrapping_mul((seed >> 16) | 1);
+    code ^= code.wrapping_mul(0x0552_6c56);
+    code ^= code.wrapping_mul(0x53a2_2864);
+    code
+}
+
+/// Mixes all bits (Wellons' lowbias32).
+fn hash(mut code: u32) -> u32 {
+    code ^= code >> 16;
+    code = code.wrapping_mul(0x7feb_352d);
+    code ^= code >> 15;
+    code = code.wrapping_mul(0x846c_a68b);
+    code ^ (code >> 16)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Every elementary box of area 2⁻ᵏ holds one of 2ᵏ consecutive points that begin at a multiple of 2ᵏ.
+    #[test]
+    fn points_are_nets() {
+        for (pair, first) in [(0, 0), (1, 64), (7, 192)] {
+            let points: Vec<DVec2> = (first..first + 64)
+                .map(|index| even_point(index, pair, 5))
+                .collect();
+            for across in 0..=6_u32 {
+                let (columns, rows) = (1 << across, 64 >> across);
+                let mut seen = vec![0; 64];
+                for point in &points {
+                    let column = (point.x * f64::from(columns)) as usize;
+                    let row = (point.y * f64::from(rows)) as usize;
+                    seen[row * columns as usize + column] += 1;
+                }
+                assert!(
+                    seen.iter().all(|&count| count == 1),
+                    "pair {pair}, {columns} columns"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn pairs_do_not_follow_each_other() {
+        let count = 1024;
+        let mean_product = (0..count)
+            .map(|index| (even_point(index, 0, 1).x - 0.5) * (even_point(index, 1, 1).x - 0.5))
+            .sum::<f64>()
+            / f64::from(count);
+        assert!(mean_product.abs() < 0.01, "{mean_product}");
+    }
+}

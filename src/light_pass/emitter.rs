@@ -1,0 +1,284 @@
+//! Where one wavefront comes from: a single point, or a single direction, of a light that may be larger.
+
+use glam::{DVec2, DVec3};
+
+use crate::geometry::ray;
+use crate::optics::LinearSrgb;
+use crate::scene::{Light, LightKind, LightSize, PanelShape, Scene};
+
+/// The source of the rays of one wavefront.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Emitter {
+    /// What leaves in each direction from where.
+    pub kind: EmitterKind,
+    /// Intensity on the axis [W/sr] or, where light is parallel, normal irradiance [W/m²], per channel: of the whole
+    /// light, as if all of it came from here. The mean over all places of the light is the light.
+    pub strength: LinearSrgb,
+}
+
+/// How a source sends light.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum EmitterKind {
+    /// The same in every direction.
+    Point {
+        /// [m].
+        position: DVec3,
+    },
+    /// A cone with a soft edge (KHR_lights_punctual).
+    Spot {
+        /// [m].
+        position: DVec3,
+        /// Unit, away from the lamp.
+        direction: DVec3,
+        /// Half-angle of full strength [rad].
+        inner_cone_rad: f64,
+        /// Half-angle at which it ends [rad], at most π/2.
+        outer_cone_rad: f64,
+    },
+    /// A point of a surface that glows: by the cosine, on one side.
+    Facet {
+        /// [m].
+        position: DVec3,
+        /// Unit, to the side that it shines to.
+        normal: DVec3,
+    },
+    /// Parallel light.
+    Parallel {
+        /// Unit, the way the light travels.
+        direction: DVec3,
+    },
+}
+
+impl EmitterKind {
+    /// Share of the strength that leaves in a unit direction, [0, 1].
+    pub fn falloff(&self, direction: DVec3) -> f64 {
+        match *self {
+            Self::Spot {
+                direction: axis,
+                inner_cone_rad,
+                outer_cone_rad,
+                ..
+            } => spot_falloff(axis.dot(direction), inner_cone_rad, outer_cone_rad),
+            Self::Facet { normal, .. } => normal.dot(direction).max(0.0),
+            Self::Point { .. } | Self::Parallel { .. } => 1.0,
+        }
+    }
+
+    /// Axis and half-angle [rad] of the cone that it shines into, where that is not everywhere.
+    pub fn cone(&self) -> Option<(DVec3, f64)> {
+        match *self {
+            Self::Spot {
+                direction,
+                outer_cone_rad,
+                ..
+            } => Some((direction, outer_cone_rad)),
+            Self::Facet { normal, .. } => Some((normal, std::f64::consts::FRAC_PI_2)),
+            Self::Point { .. } | Self::Parallel { .. } => None,
+        }
+    }
+
+    /// Where it is [m]; `None` for parallel light.
+    pub fn position(&self) -> Option<DVec3> {
+        match *self {
+            Self::Point { position } | Self::Spot { position, .. } | Self::Facet { position, .. } => {
+                Some(position)
+            }
+            Self::Parallel { .. } => None,
+        }
+    }
+}
+
+/// Fall-off of a spot, [0, 1]: the square of a linear ramp in the cosine to its axis (KHR_lights_punctual).
+pub fn spot_falloff(cosine: f64, inner_cone_rad: f64, outer_cone_rad: f64) -> f64 {
+    let (cos_outer, cos_inner) = (outer_cone_rad.cos(), inner_cone_rad.cos());
+    let ramp = if cos_inner > cos_outer {
+        ((cosine - cos_outer) / (cos_inner - cos_outer)).clamp(0.0, 1.0)
+    } else {
+        f64::from(u8::from(cosine >= cos_outer))
+    };
+    ramp * ramp
+}
+
+impl Emitter {
+    /// The middle of a light: what it is without its size. `None` for what has no middle, or sends nothing.
+    pub fn middle(light: &Light, scene: &Scene) -> Option<Self> {
+        match light.kind {
+            LightKind::Environment { .. } => None,
+            _ => Self::at(light, scene, None),
+        }
+    }
+
+    /// The place of a light at a point of the unit square; `None` where it sends nothing.
+    pub fn sample(light: &Light, scene: &Scene, square: DVec2) -> Option<Self> {
+        Self::at(light, scene, Some(square))
+    }
+
+    fn at(light: &Light, scene: &Scene, square: Option<DVec2>) -> Option<Self> {
+        let strength = light.strength();
+        let whole = |kind: EmitterKind, factor: f64| Self {
+            kind,
+            strength: strength * factor,
+        };
+        match (light.kind, light.size, square) {
+            (LightKind::Point { position, .. }, LightSize::Radius { radius_m }, Some(square)) => {
+                let normal = on_sphere(square);
+                // The ball's radiance is I/(πr²): each point of its surface stands for 4πr² of it.
+                let position = position + normal * radius_m;
+                Some(whole(EmitterKind::Facet { position, normal }, 4.0))
+            }
+            (LightKind::Point { position, .. }, ..) => Some(whole(EmitterKind::Point { position }, 1.0)),
+            (
+                LightKind::Spot {
+                    position,
+                    direction,
+                    inner_cone_rad,
+                    outer_cone_rad,
+                    ..
+                },
+                size,
+                square,
+            ) => {
+                let offset = match (size, square) {
+                    (LightSize::Radius { radius_m }, Some(square)) => {
+                        let (x, y) = direction.any_orthonormal_pair();
+                        let place = on_disc(square) * radius_m;
+                        x * place.x + y * place.y
+                    }
+                    _ => DVec3::ZERO,
+                };
+                Some(whole(
+                    EmitterKind::Spot {
+                        position: position + offset,
+                        direction,
+                        inner_cone_rad,
+                        outer_cone_rad,
+                    },
+                    1.0,
+                ))
+            }
+            (LightKind::Sun { direction, .. }, LightSize::Angle { diameter_rad }, Some(square)) => {
+                let half_angle_rad = 0.5 * diameter_rad;
+                let direction = in_cap(direction, half_angle_rad, square);
+                // E⊥ = πL sin²α over the disc's solid angle 2π(1 − cos α).
+                let factor = 2.0 / (1.0 + half_angle_rad.cos());
+                Some(whole(EmitterKind::Parallel { direction }, factor))
+            }
+            (LightKind::Sun { direction, .. }, ..) => Some(whole(EmitterKind::Parallel { direction }, 1.0)),
+            (
+                LightKind::Panel {
+                    centre,
+                    across,
+                    down,
+                    shape,
+                    ..
+                },
+                _,
+                square,
+            ) => {
+                let normal = across.cross(down).try_normalize()?;
+                let place = match (shape, square) {
+                    (_, None) => DVec2::ZERO,
+                    (PanelShape::Rectangle, Some(square)) => square * 2.0 - 1.0,
+                    (PanelShape::Disc, Some(square)) => on_disc(square),
+                };
+                let position = centre + across * place.x + down * place.y;
+                let area_m2 = across.cross(down).length()
+                    * match shape {
+                        PanelShape::Rectangle => 4.0,
+                        PanelShape::Disc => std::f64::consts::PI,
+                    };
+                Some(whole(EmitterKind::Facet { position, normal }, area_m2))
+            }
+            (LightKind::Surface { object, .. }, _, square) => {
+                let (kind, area_m2) = on_surface(scene, object, square)?;
+                Some(whole(kind, area_m2))
+            }
+            (LightKind::Environment { .. }, _, square) => {
+                let sample = scene.environment.as_ref()?.sample(square?)?;
+                Some(Self {
+                    kind: EmitterKind::Parallel {
+                        direction: -sample.to_light,
+                    },
+                    strength: strength * sample.irradiance,
+                })
+            }
+        }
+    }
+}
+
+/// Unit vectors, evenly.
+fn on_sphere(square: DVec2) -> DVec3 {
+    let z = 1.0 - 2.0 * square.x;
+    let radius = (1.0 - z * z).max(0.0).sqrt();
+    let (sine, cosine) = (std::f64::consts::TAU * square.y).sin_cos();
+    DVec3::new(radius * cosine, radius * sine, z)
+}
+
+/// Points of the unit disc, evenly (the concentric map of Shirley and Chiu, 1997: neighbours stay neighbours).
+fn on_disc(square: DVec2) -> DVec2 {
+    let [x, y] = (square * 2.0 - 1.0).to_array();
+    if x == 0.0 && y == 0.0 {
+        return DVec2::ZERO;
+    }
+    let quarter = std::f64::consts::FRAC_PI_4;
+    let (radius, angle) = if x.abs() > y.abs() {
+        (x, quarter * (y / x))
+    } else {
+        (y, std::f64::consts::FRAC_PI_2 - quarter * (x / y))
+    };
+    DVec2::from_angle(angle) * radius
+}
+
+/// Unit directions within a half-angle [rad] of an axis, evenly by solid angle.
+fn in_cap(axis: DVec3, half_angle_rad: f64, square: DVec2) -> DVec3 {
+    let (x, y) = axis.any_orthonormal_pair();
+    let place = on_disc(square);
+    // 1 − cos of the angle, without a difference of nearly equal numbers.
+    let height = 2.0 * (0.5 * half_angle_rad).sin().powi(2) * place.length_squared();
+    let sine = (height * (2.0 - height)).sqrt();
+    let sideways = place.normalize_or_zero() * sine;
+    (x * sideways.x + y * sideways.y + axis * (1.0 - height)).normalize()
+}
+
+/// A point of an object that glows, by area, and the area of all its glowing sides [m²].
+fn on_surface(scene: &Scene, object: usize, square: Option<DVec2>) -> Option<(EmitterKind, f64)> {
+    let mesh = &scene.objects.get(object)?.mesh;
+    let both_sides = scene.material_of(object).double_sided;
+    let mut square = square.unwrap_or(DVec2::splat(0.5));
+    let mut side = 1.0;
+    if both_sides {
+        square.y *= 2.0;
+        if square.y >= 1.0 {
+            (side, square.y) = (-1.0, square.y - 1.0);
+        }
+    }
+    let area_of = |triangle: usize| {
+        let [a, b, c] = mesh.corners(triangle);
+        0.5 * (b - a).cross(c - a).length()
+    };
+    let total_m2 = mesh.area_m2();
+    let mut rest_m2 = square.x * total_m2;
+    let mut chosen = None;
+    for triangle in 0..mesh.triangles.len() {
+        let area_m2 = area_of(triangle);
+        if area_m2 <= 0.0 {
+            continue;
+        }
+        chosen = Some((triangle, (rest_m2 / area_m2).min(1.0)));
+        if rest_m2 < area_m2 {
+            break;
+        }
+        rest_m2 -= area_m2;
+    }
+    let (triangle, share) = chosen?;
+    // Evenly over the triangle: the root of one coordinate, times the other.
+    let root = share.sqrt();
+    let barycentric = [1.0 - root, root * (1.0 - square.y), root * square.y];
+    let (point, error) = ray::point_with_error(&mesh.corners(triangle), barycentric);
+    let normal = mesh.face_normal(triangle) * side;
+    let position = ray::offset_origin(point, error, normal, normal);
+    Some((
+        EmitterKind::Facet { position, normal },
+        total_m2 * if both_sides { 2.0 } else { 1.0 },
+    ))
+}

@@ -1,0 +1,206 @@
+//! Light from all around: an equirectangular image of radiance.
+
+use std::f64::consts::{PI, TAU};
+
+use glam::{DVec2, DVec3};
+
+use crate::optics::LinearSrgb;
+
+/// Radiance from infinitely far, over all directions. Column 0 begins at −z and columns go on over +x (the middle of the
+/// image looks at +z); row 0 is up, y.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Environment {
+    width: usize,
+    height: usize,
+    /// W/(m² sr), row by row, not negative and finite.
+    radiance: Vec<[f32; 3]>,
+    /// Over all rows: share of the luminous radiance × solid angle in the rows above and in this one.
+    rows: Vec<f64>,
+    /// The same within each row.
+    columns: Vec<f64>,
+    /// ∫ L dω of the luminance [W/m²].
+    total: f64,
+}
+
+/// A direction to look for light in.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EnvironmentSample {
+    /// Unit, towards the light.
+    pub to_light: DVec3,
+    /// Radiance over the density of directions [W/m² across the beam]: what the whole environment sends if all of it
+    /// came from there.
+    pub irradiance: LinearSrgb,
+}
+
+impl Environment {
+    /// An image of `width` × `height` pixels of radiance [W/(m² sr)]; `None` where their number is not that, or a number
+    /// is negative or not finite, or there is none.
+    pub fn new(width: usize, height: usize, radiance: Vec<[f32; 3]>) -> Option<Self> {
+        let is_light = |pixel: &[f32; 3]| pixel.iter().all(|channel| channel.is_finite() && *channel >= 0.0);
+        if width == 0 || height == 0 || radiance.len() != width * height || !radiance.iter().all(is_light) {
+            return None;
+        }
+        let mut environment = Self {
+            width,
+            height,
+            radiance,
+            rows: Vec::with_capacity(height),
+            columns: Vec::with_capacity(width * height),
+            total: 0.0,
+        };
+        for row in 0..height {
+            let solid_angle_sr = environment.pixel_solid_angle_sr(row);
+            let mut sum = 0.0;
+            let start = environment.columns.len();
+            for column in 0..width {
+                sum += environment.pixel(column, row).luminance();
+                environment.columns.push(sum);
+            }
+            if sum > 0.0 {
+                environment.columns[start..]
+                    .iter_mut()
+                    .for_each(|share| *share /= sum);
+            }
+            environment.total += sum * solid_angle_sr;
+            environment.rows.push(environment.total);
+        }
+        let total = environment.total;
+        if total > 0.0 {
+            environment.rows.iter_mut().for_each(|share| *share /= total);
+        }
+        Some(environment)
+    }
+
+    /// Pixels across and down.
+    pub fn size(&self) -> (usize, usize) {
+        (self.width, self.height)
+    }
+
+    /// Radiance of all pixels [W/(m² sr)], row by row from the top.
+    pub fn pixels(&self) -> &[[f32; 3]] {
+        &self.radiance
+    }
+
+    /// ∫ L dω over all directions, of the luminance [W/m²].
+    pub fn total_w_per_m2(&self) -> f64 {
+        self.total
+    }
+
+    fn pixel(&self, column: usize, row: usize) -> LinearSrgb {
+        LinearSrgb::from(self.radiance[row * self.width + column].map(f64::from))
+    }
+
+    fn pixel_solid_angle_sr(&self, row: usize) -> f64 {
+        let polar = |row: usize| row as f64 / self.height as f64 * PI;
+        TAU / self.width as f64 * (polar(row).cos() - polar(row + 1).cos())
+    }
+
+    /// Radiance that comes from a unit direction [W/(m² sr)]: that of the pixel there.
+    pub fn radiance(&self, to_light: DVec3) -> LinearSrgb {
+        let [u, v] = coordinates(to_light).to_array();
+        let index = |share: f64, count: usize| ((share * count as f64).max(0.0) as usize).min(count - 1);
+        self.pixel(index(u, self.width), index(v, self.height))
+    }
+
+    /// The direction of a point of the unit square: as many in any region as it sends light. `None` where all is black.
+    pub fn sample(&self, square: DVec2) -> Option<EnvironmentSample> {
+        if self.total <= 0.0 {
+            return None;
+        }
+        let (row, v) = inverted(&self.rows, square.y);
+        let (column, u) = inverted(&self.columns[row * self.width..][..self.width], square.x);
+        // Within a pixel evenly by solid angle.
+        let polar = |edge: usize| (edge as f64 / self.height as f64 * PI).cos();
+        let cosine = polar(row) + (polar(row + 1) - polar(row)) * v;
+        let sine = (1.0 - cosine * cosine).max(0.0).sqrt();
+        let azimuth = (column as f64 + u) / self.width as f64 * TAU;
+        let pixel = self.pixel(column, row);
+        Some(EnvironmentSample {
+            to_light: DVec3::new(sine * azimuth.sin(), cosine, -sine * azimuth.cos()),
+            irradiance: pixel * (self.total / pixel.luminance()),
+        })
+    }
+}
+
+/// Place of a unit direction in the image, [0, 1]² from its top left.
+pub fn coordinates(direction: DVec3) -> DVec2 {
+    let azimuth = direction.x.atan2(-direction.z).rem_euclid(TAU);
+    DVec2::new(azimuth / TAU, direction.y.clamp(-1.0, 1.0).acos() / PI)
+}
+
+/// The step of a cumulated distribution that a share falls into, and how far into it, [0, 1).
+fn inverted(shares: &[f64], share: f64) -> (usize, f64) {
+    // Steps without weight are never chosen, the last ones neither.
+    let last = shares.len() - 1;
+    let end = shares.partition_point(|&upto| upto < shares[last]);
+    let step = shares.partition_point(|&upto| upto <= share).min(end);
+    let before = if step == 0 { 0.0 } else { shares[step - 1] };
+    let width = shares[step] - before;
+    let within = if width > 0.0 {
+        (share - before) / width
+    } else {
+        0.5
+    };
+    (step, within.clamp(0.0, 1.0 - f64::EPSILON))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::sampling::even_point;
+
+    #[test]
+    fn samples_add_up_to_the_whole() {
+        let (width, height) = (16, 8);
+        let pixels: Vec<[f32; 3]> = (0..width * height)
+            .map(|pixel| {
+                let bright = if pixel == 37 { 900.0 } else { (pixel % 5) as f32 };
+                [bright, 0.5 * bright, 0.1 * bright]
+            })
+            .collect();
+        let Some(sky) = Environment::new(width, height, pixels) else {
+            panic!("a sound image");
+        };
+        // ∫ L cos⁺ dω towards a slanted axis, by samples and by pixels.
+        let axis = DVec3::new(0.3, 0.8, -0.5).normalize();
+        let count = 1 << 16;
+        let mut sum = LinearSrgb::BLACK;
+        for index in 0..count {
+            let Some(sample) = sky.sample(even_point(index, 0, 3)) else {
+                panic!("it shines");
+            };
+            sum += sample.irradiance * sample.to_light.dot(axis).max(0.0);
+            let seen = sky.radiance(sample.to_light);
+            let density = seen.luminance() / sky.total_w_per_m2();
+            assert!((sample.irradiance.r * density - seen.r).abs() < 1e-9 * seen.r);
+        }
+        let mean = sum * (1.0 / f64::from(count));
+        let mut expected = LinearSrgb::BLACK;
+        let fine = 400;
+        for row in 0..fine {
+            for column in 0..2 * fine {
+                let polar = (f64::from(row) + 0.5) / f64::from(fine) * PI;
+                let azimuth = (f64::from(column) + 0.5) / f64::from(2 * fine) * TAU;
+                let to_light = DVec3::new(
+                    polar.sin() * azimuth.sin(),
+                    polar.cos(),
+                    -polar.sin() * azimuth.cos(),
+                );
+                let solid_angle_sr = polar.sin() * (PI / f64::from(fine)) * (PI / f64::from(fine));
+                expected += sky.radiance(to_light) * (solid_angle_sr * to_light.dot(axis).max(0.0));
+            }
+        }
+        for (mean, expected) in mean.to_array().into_iter().zip(expected.to_array()) {
+            assert!((mean / expected - 1.0).abs() < 2e-3, "{mean} for {expected}");
+        }
+    }
+
+    #[test]
+    fn a_black_sky_sends_nothing_and_a_broken_one_is_refused() {
+        assert!(
+            Environment::new(2, 1, vec![[0.0; 3]; 2]).is_some_and(|sky| sky.sample(DVec2::ZERO).is_none())
+        );
+        assert!(Environment::new(2, 1, vec![[f32::NAN; 3]; 2]).is_none());
+        assert!(Environment::new(2, 2, vec![[1.0; 3]; 2]).is_none());
+    }
+}
