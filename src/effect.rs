@@ -21,6 +21,10 @@ pub enum Effect {
     Absorption,
     /// Base-colour textures of surfaces that light goes on from.
     Textures,
+    /// Lobes of rough surfaces that light goes on from.
+    Roughness,
+    /// Size of lamps, suns and the environment.
+    AreaLights,
     /// The direct layer.
     Direct,
     /// The indirect layer.
@@ -31,12 +35,14 @@ pub enum Effect {
 
 impl Effect {
     /// All of them, as they are listed.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 10] = [
         Self::LightPass,
         Self::Refraction,
         Self::Reflection,
         Self::Absorption,
         Self::Textures,
+        Self::Roughness,
+        Self::AreaLights,
         Self::Direct,
         Self::Indirect,
         Self::Chains,
@@ -50,6 +56,8 @@ impl Effect {
             Self::Reflection => "reflection",
             Self::Absorption => "absorption",
             Self::Textures => "textures",
+            Self::Roughness => "roughness",
+            Self::AreaLights => "area_lights",
             Self::Direct => "direct",
             Self::Indirect => "indirect",
             Self::Chains => "chains",
@@ -66,6 +74,12 @@ impl Effect {
             Self::Reflection => "Light that mirrors, polish and glass send back.",
             Self::Absorption => "Coloured bodies take light along the way through them (Beer and Lambert).",
             Self::Textures => "Images on mirrors and glass tint the light that goes on from them.",
+            Self::Roughness => {
+                "Rough mirrors and frosted glass spread the light that goes on from them (GGX)."
+            }
+            Self::AreaLights => {
+                "Lamps, suns and skies with a size blur caustics; without it each shines from its middle."
+            }
             Self::Direct => "Light straight from the lamps, with its shadows.",
             Self::Indirect => "Light that diffuse surfaces send each other.",
             Self::Chains => "What the eye sees in mirrors and through glass.",

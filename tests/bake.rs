@@ -39,6 +39,8 @@ mod live;
 mod reference;
 #[path = "bake/smoothing.rs"]
 mod smoothing;
+#[path = "bake/soft.rs"]
+mod soft;
 #[path = "support/mod.rs"]
 mod support;
 #[path = "bake/threshold.rs"]

@@ -14,6 +14,8 @@ mod edits;
 mod files;
 #[path = "scene/glb.rs"]
 mod glb;
+#[path = "scene/lights.rs"]
+mod lights;
 #[path = "scene/materials.rs"]
 mod materials;
 #[path = "scene/meshes.rs"]

@@ -57,6 +57,9 @@ pub struct SceneOptions {
     /// Take transmissive materials without a volume for solid glass, where their meshes are closed
     #[arg(long)]
     pub solid_glass: bool,
+    /// Surround the scene with an image of radiance in W/(m² sr), equirectangular, .hdr or .exr, and light it by that
+    #[arg(long, value_name = "FILE")]
+    pub environment: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]

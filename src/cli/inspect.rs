@@ -6,7 +6,7 @@ use nephroid::effect::Effect;
 use nephroid::error::{Result, Warning};
 use nephroid::light_pass::emitter::Emitter;
 use nephroid::plan::{self, EffectLine, EffectPlan};
-use nephroid::scene::{Light, LightKind, Scene, SurfaceKind};
+use nephroid::scene::{Light, LightKind, LightSize, Scene, SurfaceKind};
 use nephroid::session::{BakeSession, Survey};
 use serde::Serialize;
 
@@ -60,10 +60,18 @@ struct MaterialReport {
 struct LightReport {
     name: String,
     kind: &'static str,
-    /// Luminous-equivalent; `None` for a sun.
+    /// Luminous-equivalent; `None` for what is infinitely far.
     power_w: Option<f64>,
     /// Luminous-equivalent, across the beam of a sun; `None` for the others.
     normal_irradiance_w_per_m2: Option<f64>,
+    /// Luminous-equivalent radiance over all directions, of an environment; `None` for the others.
+    spherical_irradiance_w_per_m2: Option<f64>,
+    /// Of a point light or a spot that has one.
+    radius_m: Option<f64>,
+    /// Of a sun that has one.
+    angular_diameter_deg: Option<f64>,
+    /// Of what glows, all its glowing sides.
+    area_m2: Option<f64>,
 }
 
 /// Width over height of the picture that eye-pass effects are told for.
@@ -152,27 +160,61 @@ fn material_reports(scene: &Scene) -> Vec<MaterialReport> {
 
 fn light_report(light: &Light, scene: &Scene) -> LightReport {
     let strength = light.strength().luminance();
-    let (kind, power_w, normal_irradiance_w_per_m2) = match light.kind {
-        LightKind::Point { .. } => ("point", Some(strength * full_beam_sr(&light.kind)), None),
-        LightKind::Spot { .. } => ("spot", Some(strength * full_beam_sr(&light.kind)), None),
-        LightKind::Sun { .. } => ("sun", None, Some(strength)),
-        LightKind::Panel { .. } | LightKind::Surface { .. } => {
-            // A facet's intensity on its axis is L·A: the whole lamp sends πLA.
-            let intensity = Emitter::middle(light, scene).map(|middle| middle.strength.luminance());
-            let name = if matches!(light.kind, LightKind::Panel { .. }) {
-                "panel"
-            } else {
-                "surface"
-            };
-            (name, intensity.map(|axial| axial * std::f64::consts::PI), None)
-        }
-        LightKind::Environment { .. } => ("environment", None, None),
-    };
-    LightReport {
+    let beam_w = strength * full_beam_sr(&light.kind);
+    // A facet's intensity on its axis is L·A: the whole lamp sends πLA.
+    let glowing = || Emitter::middle(light, scene).map(|middle| middle.strength.luminance());
+    let mut report = LightReport {
         name: light.name.clone(),
-        kind,
-        power_w,
-        normal_irradiance_w_per_m2,
+        kind: "point",
+        power_w: None,
+        normal_irradiance_w_per_m2: None,
+        spherical_irradiance_w_per_m2: None,
+        radius_m: None,
+        angular_diameter_deg: None,
+        area_m2: None,
+    };
+    match light.kind {
+        LightKind::Point { .. } => report.power_w = Some(beam_w),
+        LightKind::Spot { .. } => (report.kind, report.power_w) = ("spot", Some(beam_w)),
+        LightKind::Sun { .. } => {
+            (report.kind, report.normal_irradiance_w_per_m2) = ("sun", Some(strength));
+        }
+        LightKind::Panel { .. } | LightKind::Surface { .. } => {
+            let is_panel = matches!(light.kind, LightKind::Panel { .. });
+            report.kind = if is_panel { "panel" } else { "surface" };
+            report.power_w = glowing().map(|axial| axial * std::f64::consts::PI);
+            report.area_m2 = glowing().map(|axial| axial / strength);
+        }
+        LightKind::Environment { .. } => {
+            report.kind = "environment";
+            let environment = scene.environment.as_ref();
+            report.spherical_irradiance_w_per_m2 =
+                environment.map(|environment| environment.total_w_per_m2() * strength);
+        }
+    }
+    match light.size {
+        LightSize::None => {}
+        LightSize::Radius { radius_m } => report.radius_m = Some(radius_m),
+        LightSize::Angle { diameter_rad } => report.angular_diameter_deg = Some(diameter_rad.to_degrees()),
+    }
+    report
+}
+
+impl LightReport {
+    /// Kind, size and strength with their units.
+    fn line(&self) -> String {
+        let parts = [
+            (self.radius_m, "m radius"),
+            (self.angular_diameter_deg, "degrees across"),
+            (self.area_m2, "m^2"),
+            (self.power_w, "W"),
+            (self.normal_irradiance_w_per_m2, "W/m^2"),
+            (self.spherical_irradiance_w_per_m2, "W/m^2 from all around"),
+        ];
+        let stated = parts
+            .iter()
+            .filter_map(|(value, unit)| value.map(|value| format!(", {value:.4} {unit}")));
+        format!("{}: {}{}", self.name, self.kind, stated.collect::<String>())
     }
 }
 
@@ -239,12 +281,7 @@ fn text(report: &Report) -> String {
         );
     }
     for light in &report.lights {
-        let strength = match (light.power_w, light.normal_irradiance_w_per_m2) {
-            (Some(power), _) => format!("{power:.4} W"),
-            (None, Some(irradiance)) => format!("{irradiance:.4} W/m^2"),
-            (None, None) => String::new(),
-        };
-        line("light", format!("{}: {}, {strength}", light.name, light.kind));
+        line("light", light.line());
     }
     for camera in &report.cameras {
         line("camera", camera.clone());

@@ -549,6 +549,7 @@ fn scene_input(source: String, options: &SceneOptions, otherwise: MissingLight) 
             otherwise
         },
         solid_glass: options.solid_glass,
+        environment: options.environment.clone(),
     }
 }
 

@@ -1,5 +1,7 @@
 //! The scene that a command works on.
 
+use std::path::PathBuf;
+
 use nephroid::error::{Error, Result};
 use nephroid::scene::{self, LoadOptions, Scene};
 
@@ -21,6 +23,8 @@ pub struct SceneInput {
     pub source: String,
     pub missing_light: MissingLight,
     pub solid_glass: bool,
+    /// Image that lies around the scene.
+    pub environment: Option<PathBuf>,
 }
 
 impl SceneInput {
@@ -32,6 +36,7 @@ impl SceneInput {
         let options = LoadOptions {
             solid_glass: self.solid_glass,
             default_light: self.missing_light == MissingLight::Add,
+            environment: self.environment.clone(),
             ..LoadOptions::default()
         };
         let scene = scene::load(&self.source, &options)?;
@@ -39,7 +44,7 @@ impl SceneInput {
             return Err(Error::failure(
                 &self.source,
                 "the scene has no light",
-                "add one to the file or add a sun with --default-light",
+                "add one to the file, a sun with --default-light or a sky with --environment",
             ));
         }
         Ok(scene)

@@ -25,6 +25,15 @@ impl FluxUnit {
         }
     }
 
+    /// The unit of a mean over a number of sums, a power of two, where this is that of the sums.
+    #[must_use]
+    pub fn shared(self, sums: u32) -> Self {
+        Self {
+            watts: self.watts / f64::from(sums),
+            counts_per_watt: self.counts_per_watt * f64::from(sums),
+        }
+    }
+
     /// One count [W].
     pub fn watts(self) -> f64 {
         self.watts

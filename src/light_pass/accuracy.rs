@@ -324,6 +324,56 @@ pub fn estimate_splats(
     (flux_w > 0.0).then_some(error)
 }
 
+/// The error of `fine`, of whose squared difference from `other` it has a share of its own. `None` where no light arrived.
+pub fn by_difference(fine: &Images, other: &Images, share: f64, ledger: &EnergyLedger) -> Option<LightError> {
+    let mut error = LightError {
+        ratio: PRIOR_RATIO,
+        ..LightError::default()
+    };
+    let (mut squares_sum, mut flux_w, mut area_m2) = (0.0, 0.0, 0.0);
+    for (&object, image) in fine {
+        let squares = image.windowed(&image.squared_difference(other.get(&object)));
+        let squares: Vec<f64> = squares.iter().map(|square| square * share).collect();
+        let tiles = image.tile_sums(&squares);
+        squares_sum += tiles.iter().sum::<f64>();
+        let (map_w, map_m2) = image.sums();
+        (flux_w, area_m2) = (flux_w + map_w, area_m2 + map_m2);
+        let map = MapError {
+            size: (image.width, image.height),
+            texels: squares.iter().map(|square| square.sqrt()).collect(),
+            tiles,
+        };
+        error.maps.insert(object, map);
+    }
+    let mean = flux_w / area_m2;
+    error.relative_rmse = (squares_sum / area_m2 / (mean * mean))
+        .sqrt()
+        .hypot(given_up_share(ledger));
+    (flux_w > 0.0).then_some(error)
+}
+
+/// Two independent parts of one error.
+pub fn together(a: &LightError, b: &LightError) -> LightError {
+    let mut sum = a.clone();
+    sum.relative_rmse = a.relative_rmse.hypot(b.relative_rmse);
+    for (object, part) in &b.maps {
+        match sum.maps.get_mut(object) {
+            Some(map) if map.size == part.size => {
+                for (texel, more) in map.texels.iter_mut().zip(&part.texels) {
+                    *texel = texel.hypot(*more);
+                }
+                for (tile, more) in map.tiles.iter_mut().zip(&part.tiles) {
+                    *tile += more;
+                }
+            }
+            _ => {
+                sum.maps.insert(*object, part.clone());
+            }
+        }
+    }
+    sum
+}
+
 /// R = e₂/e from three levels, half-way to the first-order ratio.
 fn measured_ratio(middle: &Images, coarse: &Images, fine: &BTreeMap<usize, (Vec<f64>, Vec<f64>)>) -> f64 {
     let newer: f64 = fine.values().flat_map(|(_, tiles)| tiles).sum();

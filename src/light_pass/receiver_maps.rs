@@ -13,7 +13,7 @@ use crate::illumination::smoothing::smooth;
 use crate::scene::Scene;
 
 /// One surface's map with its flux.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct ReceiverMap {
     /// How the surface lies in the map.
     pub chart: Arc<Chart>,
@@ -28,12 +28,12 @@ pub struct ReceiverMap {
 pub type ChartFor<'a> = dyn Fn(usize) -> Option<Arc<Chart>> + Sync + 'a;
 
 /// Maps of all objects that received flux, by object.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct ReceiverMaps {
     slots: Vec<Slot>,
 }
 
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 enum Slot {
     /// No flux yet.
     Untouched,

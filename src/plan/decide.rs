@@ -59,6 +59,12 @@ pub fn decide(scene: &Scene, settings: &BakeSettings, sights: &[Sight]) -> Effec
             &|material| material.surface != SurfaceKind::Mixed && material.base_colour_texture.is_some(),
             "no lit mirror or glass has a texture",
         ),
+        on_paths(
+            Effect::Roughness,
+            &Material::is_rough,
+            "no lit mirror, glass or polish is rough",
+        ),
+        decision.area_lights(pass.on),
         decision.direct(),
         decision.indirect(),
     ];
@@ -176,6 +182,26 @@ impl Decision<'_> {
             (_, Some((object, light, way))) => self.line(effect, true, self.lit_by(object, light, way)),
             (EffectSwitch::On, None) => self.line(effect, true, FORCED_ON),
             (EffectSwitch::Auto, None) => self.line(effect, false, none),
+        }
+    }
+
+    fn area_lights(&self, pass: bool) -> EffectLine {
+        let effect = Effect::AreaLights;
+        let sized = |light: usize| self.scene.lights[light].has_extent();
+        let lit = self.lit_objects().find(|&(_, light, _)| sized(light));
+        match (self.settings.effects.get(effect), lit) {
+            (EffectSwitch::Off, _) => self.line(effect, false, SWITCHED_OFF),
+            _ if !pass => self.line(effect, false, "the light pass is off"),
+            (_, Some((object, light, way))) => {
+                let reason = format!("{}, which has a size", self.lit_by(object, light, way));
+                self.line(effect, true, reason)
+            }
+            (EffectSwitch::On, None) => self.line(effect, true, FORCED_ON),
+            (EffectSwitch::Auto, None) => self.line(
+                effect,
+                false,
+                "every light that sees a caster is a point or a direction",
+            ),
         }
     }
 

@@ -1,10 +1,14 @@
 //! Light from all around: an equirectangular image of radiance.
 
+mod file;
+
 use std::f64::consts::{PI, TAU};
 
 use glam::{DVec2, DVec3};
 
 use crate::optics::LinearSrgb;
+
+pub use file::read;
 
 /// Radiance from infinitely far, over all directions. Column 0 begins at −z and columns go on over +x (the middle of the
 /// image looks at +z); row 0 is up, y.

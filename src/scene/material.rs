@@ -4,8 +4,15 @@
 use super::{TextureRef, Waves};
 use crate::optics::LinearSrgb;
 
-/// Roughness (glTF's, α = roughness²) up to which an interface counts as smooth; above it the surface is pure Lambert.
+/// Roughness (glTF's, α = roughness²) up to which polish over a diffuse body sends light on; above it the surface is
+/// pure Lambert.
 pub const SPECULAR_ROUGHNESS_LIMIT: f64 = 0.3;
+
+/// Roughness up to which metals and what lets light through send it on in a lobe; above it they are pure Lambert.
+pub const LOBE_ROUGHNESS_LIMIT: f64 = 0.6;
+
+/// Up to this roughness a surface is as good as smooth: its lobe is some hundredths of a degree wide.
+pub const SMOOTH_ROUGHNESS: f64 = 0.01;
 
 /// Inside of a solid dielectric, KHR_materials_volume.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -21,7 +28,7 @@ pub struct Volume {
 pub enum SurfaceKind {
     /// Lambert: takes the full flux into its illumination map.
     Diffuse,
-    /// Smooth metal: reflects by [`Material::base_colour`], absorbs the rest.
+    /// Metal: reflects by [`Material::base_colour`], absorbs the rest.
     Mirror,
     /// Interface of a solid: reflects and refracts by Fresnel's equations.
     Dielectric,
@@ -32,7 +39,7 @@ pub enum SurfaceKind {
 }
 
 impl SurfaceKind {
-    /// Whether light goes on from it in a single direction.
+    /// Whether light goes on from it in a direction or a lobe.
     pub fn is_specular(self) -> bool {
         self != Self::Diffuse
     }
@@ -85,20 +92,26 @@ impl Material {
 
     /// The class that its factors make it: how a file's material is read unless the file says otherwise (unlit).
     pub fn classified(&self) -> SurfaceKind {
-        let smooth = self.roughness <= SPECULAR_ROUGHNESS_LIMIT;
+        let has_lobe = self.roughness <= LOBE_ROUGHNESS_LIMIT;
+        let is_polished = self.roughness <= SPECULAR_ROUGHNESS_LIMIT;
         if self.metallic >= 0.5 {
-            return if smooth {
+            return if has_lobe {
                 SurfaceKind::Mirror
             } else {
                 SurfaceKind::Diffuse
             };
         }
-        match (smooth, self.transmission >= 0.5, self.volume) {
-            (false, ..) => SurfaceKind::Diffuse,
-            (true, true, Some(_)) => SurfaceKind::Dielectric,
-            (true, true, None) => SurfaceKind::ThinWall,
-            (true, false, _) => SurfaceKind::Mixed,
+        match (self.transmission >= 0.5, self.volume) {
+            (true, Some(_)) if has_lobe => SurfaceKind::Dielectric,
+            (true, None) if has_lobe => SurfaceKind::ThinWall,
+            (false, _) if is_polished => SurfaceKind::Mixed,
+            _ => SurfaceKind::Diffuse,
         }
+    }
+
+    /// Whether its specular part has a lobe.
+    pub fn is_rough(&self) -> bool {
+        self.surface.is_specular() && self.roughness > SMOOTH_ROUGHNESS
     }
 }
 

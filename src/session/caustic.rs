@@ -7,20 +7,21 @@ use super::clock::Clock;
 use super::effects::EffectMeter;
 use super::finish::Shown;
 use super::forecast::{CostPoint, Forecast, forecast};
+use super::goals::Goal;
 use super::light_level::{KeptError, LevelKey, LightLevel, LightState, LightStates, Sizes};
 use super::sizes::MapSizes;
+use super::soft_level::SOFT_BEGINNING;
 use crate::error::{Result, Warning};
 use crate::illumination::accumulator::FluxUnit;
 use crate::light_pass::accuracy::{self, Before, Images, LightError};
 use crate::light_pass::caustic::pass::{PassReport, Stopwatch};
-use crate::light_pass::caustic::setup::{Aim, AimedLight};
+use crate::light_pass::caustic::setup::{Aim, AimedLight, Aiming};
 use crate::light_pass::caustic::statistics::FootprintStatistics;
-use crate::light_pass::ledger_sum::Account;
 use crate::light_pass::wavefront::refine::Round;
 use crate::optics::LinearSrgb;
 use crate::plan::EffectPlan;
 use crate::progress::{Control, Progress};
-use crate::settings::{BakeSettings, Estimator};
+use crate::settings::{BakeSettings, Estimator, ItemBufferKind};
 use crate::transport::Tracer;
 
 /// Levels that an error estimate needs: each lattice with half the steps of the one before.
@@ -81,13 +82,20 @@ pub(super) enum Stopped {
 
 /// The levels of one light in the bake under way.
 #[derive(Debug, Default)]
-struct Climb {
+pub(super) struct Climb {
     /// The coarsest first.
-    levels: Vec<LightLevel>,
-    rounds: Vec<Round>,
+    pub(super) levels: Vec<LightLevel>,
+    pub(super) rounds: Vec<Round>,
     /// Relative RMSE that the last round aims at.
     goal: Option<f64>,
-    done: bool,
+    pub(super) done: bool,
+}
+
+impl Climb {
+    /// Of the last level, where it is known.
+    pub(super) fn error(&self) -> Option<&LightError> {
+        Some(&self.levels.last()?.error.as_ref()?.estimate)
+    }
 }
 
 /// Takes a picture that is not the last: levels, where the bake stands, and the clock.
@@ -103,6 +111,12 @@ pub(super) struct Course<'a> {
 }
 
 impl CausticLayer<'_> {
+    /// How item buffers are made, and how thoroughly what cannot matter is left out.
+    pub(super) fn aiming(&self) -> (ItemBufferKind, Aiming) {
+        let (item_buffer, aiming, _) = super::aim_key(self.settings);
+        (item_buffer, aiming)
+    }
+
     /// Bakes all lights, taking from the states what still holds. `show` is called whenever there is a better picture
     /// than before, but for the last.
     ///
@@ -140,6 +154,7 @@ impl CausticLayer<'_> {
             for (light, climb) in lights.iter().zip(&mut climbs).filter(|(_, climb)| !climb.done) {
                 self.climb(light, &sizes, states.of_mut(light.light), climb, &mut course)?;
             }
+            self.decide(&lights, &mut climbs);
             self.note_cost(states, &lights, &climbs, &mut course);
             // The first picture is worth waiting for, the others have their time.
             course.control = &limited;
@@ -153,7 +168,7 @@ impl CausticLayer<'_> {
                 .collect();
             show(&levels, course.outcome, course.clock)?;
         }
-        outcome.stopped = self.stopped(&climbs, &limited);
+        outcome.stopped = self.stopped(&lights, &climbs, &limited);
         for (light, climb) in lights.iter().zip(climbs) {
             if !climb.levels.is_empty() {
                 outcome.finished.push(light.light);
@@ -166,21 +181,10 @@ impl CausticLayer<'_> {
 
     /// Writes down what the error of this level took, where it is known.
     fn note_cost(&self, states: &LightStates, lights: &[&AimedLight], climbs: &[Climb], course: &mut Course) {
-        let (mut squares, mut sum_w) = (0.0_f64, 0.0);
-        for (light, climb) in lights.iter().zip(climbs) {
-            let strength = self.tracer.scene().lights[light.light].strength();
-            let known = climb
-                .levels
-                .last()
-                .and_then(|level| Some((level, level.error.as_ref()?)));
-            let Some((level, error)) = known else {
-                return;
-            };
-            let deposited_w = level.ledger.watts(Account::Deposited, level.unit, strength);
-            squares += (error.estimate.relative_rmse * deposited_w).powi(2);
-            sum_w += deposited_w;
-        }
-        let relative_rmse = squares.sqrt() / sum_w;
+        let Some(errors) = self.errors(lights, climbs) else {
+            return;
+        };
+        let relative_rmse = errors.relative_rmse();
         if !relative_rmse.is_finite() {
             return;
         }
@@ -194,10 +198,15 @@ impl CausticLayer<'_> {
             cpu_s: clock.plan.cpu + clock.trace.cpu + clock.deposit.cpu,
             bytes: states.bytes() + held.sum::<u64>(),
             relative_rmse,
-            is_coarse: lights
-                .iter()
-                .zip(climbs)
-                .any(|(light, climb)| climb.levels.len() < self.lattices(light).len()),
+            is_coarse: lights.iter().zip(climbs).any(|(light, climb)| {
+                let begins = self.lattices(light).len();
+                let begins = if self.is_soft(light) {
+                    SOFT_BEGINNING
+                } else {
+                    begins
+                };
+                climb.levels.len() < begins
+            }),
         };
         course.outcome.course.push(point);
         if let (None, Some(target)) = (course.outcome.forecast, self.settings.max_error) {
@@ -207,7 +216,7 @@ impl CausticLayer<'_> {
     }
 
     /// Why there is no finer level.
-    fn stopped(&self, climbs: &[Climb], limited: &Control) -> Option<Stopped> {
+    fn stopped(&self, lights: &[&AimedLight], climbs: &[Climb], limited: &Control) -> Option<Stopped> {
         if self.control.is_cancelled() {
             return Some(Stopped::Cancelled);
         }
@@ -215,11 +224,8 @@ impl CausticLayer<'_> {
             return Some(Stopped::Time);
         }
         let target = self.settings.max_error?;
-        let is_good = |climb: &Climb| {
-            let error = climb.levels.last().and_then(|level| level.error.as_ref());
-            error.is_none_or(|error| error.estimate.relative_rmse <= target)
-        };
-        climbs.iter().all(is_good).then_some(Stopped::Target)
+        let known = self.known_errors(lights, climbs);
+        (known.lights.is_empty() || known.relative_rmse() <= target).then_some(Stopped::Target)
     }
 
     /// Lights that see something specular and shine at all.
@@ -238,6 +244,9 @@ impl CausticLayer<'_> {
         climb: &mut Climb,
         course: &mut Course,
     ) -> Result<()> {
+        if self.is_soft(light) {
+            return self.climb_soft(light, sizes, state, climb, course);
+        }
         let unit = self.unit(light)?;
         let step = climb.levels.len();
         let key = self.key(light, step, (&climb.rounds, climb.goal), sizes);
@@ -258,10 +267,34 @@ impl CausticLayer<'_> {
             });
         }
         climb.levels.push(level);
-        if step + 1 >= self.lattices(light).len() {
-            climb.done = !self.refine(climb);
-        }
         Ok(())
+    }
+
+    /// Which lights go on, and what each of them aims at.
+    fn decide(&self, lights: &[&AimedLight], climbs: &mut [Climb]) {
+        let goals = self.goals(lights, climbs);
+        for ((light, climb), goal) in lights.iter().zip(climbs).zip(goals) {
+            if climb.done {
+                continue;
+            }
+            climb.done = match goal {
+                Goal::Enough => true,
+                Goal::NextLevel => !self.has_next_level(light, climb),
+                Goal::Refine(target) if self.is_soft(light) => {
+                    let is_good = climb.error().is_some_and(|error| error.relative_rmse <= target);
+                    is_good || !self.has_next_level(light, climb)
+                }
+                Goal::Refine(target) => !self.refine(climb, target),
+            };
+        }
+    }
+
+    fn has_next_level(&self, light: &AimedLight, climb: &Climb) -> bool {
+        if self.is_soft(light) {
+            self.next_resolved(light, climb).is_some()
+        } else {
+            climb.levels.len() < self.lattices(light).len()
+        }
     }
 
     fn make(
@@ -313,18 +346,16 @@ impl CausticLayer<'_> {
         }
     }
 
-    /// Decides on another round of refinement; false where there is nothing more to do.
-    fn refine(&self, climb: &mut Climb) -> bool {
-        let error = climb.levels.last().and_then(|level| level.error.as_ref());
-        let Some(error) = error.map(|error| &error.estimate) else {
+    /// Decides on another round of refinement towards a relative RMSE; false where there is nothing more to do.
+    fn refine(&self, climb: &mut Climb, target: f64) -> bool {
+        let Some(error) = climb.error() else {
             return false;
         };
-        let goal = match self.settings.max_error {
-            None => return false,
-            Some(target) if error.relative_rmse <= target => return false,
-            // No round can do much more, and a bake that has its time shows what came of it.
-            Some(target) => (GOAL * target).max(ROUND_GAIN * error.relative_rmse),
-        };
+        if error.relative_rmse <= target {
+            return false;
+        }
+        // No round can do much more, and a bake that has its time shows what came of it.
+        let goal = (GOAL * target).max(ROUND_GAIN * error.relative_rmse);
         if self.settings.estimator == Estimator::Splat || climb.rounds.len() >= MOST_ROUNDS {
             return false;
         }

@@ -20,6 +20,8 @@ pub(super) struct EffectMeter {
     pub(super) deposits: PathCounts,
     /// Held for the caustic layer: rays, patches, maps [bytes].
     pub(super) caustic_bytes: u64,
+    /// Wavefronts of lights with a size.
+    pub(super) places: EffectCounts,
     /// Held for the direct layer [bytes].
     pub(super) direct_bytes: u64,
     /// The direct layer alone.
@@ -100,6 +102,12 @@ impl Accounts<'_> {
                 },
                 ..EffectCounts::default()
             },
+            Effect::Roughness => EffectCounts {
+                rays: paths.scattered,
+                deposits: deposits.scattered,
+                ..EffectCounts::default()
+            },
+            Effect::AreaLights => self.meter.places,
             Effect::Direct => EffectCounts {
                 rays: self.counts.shadow_rays,
                 bytes: self.meter.direct_bytes,

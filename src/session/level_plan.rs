@@ -40,7 +40,7 @@ const UNIT_DENSITY_PER_SR: f64 = 1e5;
 const LEAST_STATISTICS_SIDE: usize = 32;
 
 /// How much coarser than the last one a coarse lattice is deposited at most.
-const MOST_COARSE: f64 = 16.0;
+pub(super) const MOST_COARSE: f64 = 16.0;
 
 /// How coarse triangles may be for a target, relative to those of a bake without one: over this relative RMSE.
 const USUAL_ERROR: f64 = 0.012;
@@ -98,7 +98,8 @@ impl CausticLayer<'_> {
         // Coarse lattices are deposited as coarsely, so that their difference shows both kinds of error.
         let before_last = (lattices.len() - 1).saturating_sub(step);
         LevelKey {
-            trace: self.trace_key(size, before_last as u32, rounds),
+            trace: self.trace_key(size, before_last as i32, rounds),
+            resolved: None,
             sizes: sizes.clone(),
             coarseness: coarseness(self.settings.max_error, goal)
                 * (before_last as f64).exp2().min(MOST_COARSE),
@@ -110,8 +111,8 @@ impl CausticLayer<'_> {
         }
     }
 
-    /// For a lattice of a size, so many lattices before the finest.
-    pub(super) fn trace_key(&self, size: (usize, usize), coarser: u32, rounds: &[Round]) -> TraceKey {
+    /// For a lattice of a size, so many lattices before the usual finest.
+    pub(super) fn trace_key(&self, size: (usize, usize), coarser: i32, rounds: &[Round]) -> TraceKey {
         let settings = self.settings;
         let mut paths = BakeSettings {
             estimator: settings.estimator,
@@ -181,17 +182,18 @@ impl CausticLayer<'_> {
             strides: (1, 1),
             placement: self.settings.rays,
             seed: self.settings.seed,
-            limits: self.limits(),
+            limits: self.limits(light),
             unit,
         }
     }
 
-    /// Of paths.
-    pub(super) fn limits(&self) -> PathLimits {
+    /// Of the paths of a wavefront.
+    pub(super) fn limits(&self, light: &AimedLight) -> PathLimits {
         PathLimits {
             max_depth: self.settings.max_depth,
             branch_threshold: self.settings.path_threshold(),
             effects: EffectSet::of(self.plan),
+            microfacets: light.microfacets,
         }
     }
 
@@ -335,7 +337,7 @@ impl CausticLayer<'_> {
 }
 
 /// How coarse triangles may be for a target or, in a round of refinement, its goal.
-fn coarseness(target: Option<f64>, goal: Option<f64>) -> f64 {
+pub(super) fn coarseness(target: Option<f64>, goal: Option<f64>) -> f64 {
     match (target, goal) {
         (None, _) => 1.0,
         (Some(target), None) => (target / USUAL_ERROR).clamp(1.0, 8.0),

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use super::soft_level::Resolved;
 use crate::illumination::accumulator::{FluxCount, FluxUnit};
 use crate::light_pass::accuracy::{LightError, Noise};
 use crate::light_pass::caustic::kept::KeptLight;
@@ -28,8 +29,8 @@ pub(super) struct TraceKey {
     pub(super) effects: EffectSet,
     /// Cells across and down each face.
     pub(super) size: (usize, usize),
-    /// Lattices between this one and the finest, where surfaces have bumps: what cells may miss of them.
-    pub(super) coarser: u32,
+    /// How many lattices this one comes before the usual finest, where surfaces have bumps: what cells may miss of them.
+    pub(super) coarser: i32,
     /// Where cells are divided further, round by round.
     pub(super) rounds: Vec<Round>,
 }
@@ -47,6 +48,17 @@ pub(super) struct LevelKey {
     pub(super) kernels: BakeSettings,
     /// Every so many-th ray alone (splats).
     pub(super) stride: usize,
+    /// Of a soft light: its wavefronts.
+    pub(super) resolved: Option<Resolved>,
+}
+
+/// The two dimensions of a soft light's error, as far as they are known.
+#[derive(Clone, Debug, Default)]
+pub(super) struct SoftParts {
+    /// By the number of wavefronts.
+    pub(super) spread: Option<LightError>,
+    /// By the lattice.
+    pub(super) lattice: Option<LightError>,
 }
 
 /// Levels that are kept whatever they take: an error needs them.
@@ -70,6 +82,8 @@ pub(super) struct LightLevel {
     pub(super) error: Option<KeptError>,
     /// To be deposited again; `None` where that was too much to keep.
     pub(super) traced: Option<TracedLight>,
+    /// Of a soft light: what its error is made of.
+    pub(super) parts: SoftParts,
 }
 
 /// An estimate with what it was made from.

@@ -7,11 +7,13 @@ mod direct_work;
 mod effects;
 mod finish;
 pub mod forecast;
+mod goals;
 mod level_plan;
 mod light_level;
 pub mod result;
 mod scene_change;
 mod sizes;
+mod soft_level;
 mod splat_level;
 pub mod survey;
 mod wavefront_level;
@@ -48,10 +50,23 @@ use sizes::MapSizes;
 pub struct BakeSession {
     scene: Arc<Scene>,
     tracer: Option<Arc<Tracer>>,
-    aim: Option<((ItemBufferKind, Aiming), Arc<Aim>)>,
+    aim: Option<(AimKey, Arc<Aim>)>,
     sizes: MapSizes,
     lights: LightStates,
     direct: DirectCache,
+}
+
+/// What an [`Aim`] depends on beside the scene: how directions are divided, how thoroughly what cannot matter is left out,
+/// and whether lights have sizes.
+type AimKey = (ItemBufferKind, Aiming, bool);
+
+fn aim_key(settings: &BakeSettings) -> AimKey {
+    let aiming = match settings.effects.get(Effect::LightPass) {
+        EffectSwitch::On => Aiming::Everything,
+        EffectSwitch::Auto | EffectSwitch::Off => Aiming::Reachable,
+    };
+    let sizes = settings.effects.get(Effect::AreaLights) != EffectSwitch::Off;
+    (settings.item_buffer, aiming, sizes)
 }
 
 /// What `inspect` says before any bake.
@@ -230,15 +245,11 @@ impl BakeSession {
             // Nobody looks for what nobody wants to see.
             return Arc::default();
         }
-        let aiming = match settings.effects.get(Effect::LightPass) {
-            EffectSwitch::On => Aiming::Everything,
-            EffectSwitch::Auto | EffectSwitch::Off => Aiming::Reachable,
-        };
-        let wanted = (settings.item_buffer, aiming);
+        let wanted = aim_key(settings);
         match &self.aim {
             Some((known, aim)) if *known == wanted => aim.clone(),
             _ => {
-                let aim = Arc::new(Aim::take(&self.tracer(), settings.item_buffer, aiming));
+                let aim = Arc::new(Aim::take(&self.tracer(), wanted.0, wanted.1, wanted.2));
                 self.aim = Some((wanted, aim.clone()));
                 aim
             }

@@ -1,7 +1,7 @@
 //! One light by splats: the whole lattice at once, and thinner ones for its error.
 
 use super::caustic::{CausticLayer, Course};
-use super::light_level::{LevelKey, LightLevel, LightState, TraceKey};
+use super::light_level::{LevelKey, LightLevel, LightState, SoftParts, TraceKey};
 use crate::illumination::accumulator::FluxUnit;
 use crate::light_pass::accuracy::{self, Images};
 use crate::light_pass::caustic::deposit::{Depositor, Halves};
@@ -72,6 +72,7 @@ impl CausticLayer<'_> {
             overreaches: Vec::new(),
             error: None,
             traced: None,
+            parts: SoftParts::default(),
         })
     }
 
@@ -97,6 +98,27 @@ impl CausticLayer<'_> {
         };
         let chart_for = |object: usize| self.chart(object, &key.sizes);
         pass::run(&depositor, source, halves, &chart_for, &listener)
+    }
+
+    /// Traces and deposits one wavefront of a soft light onto maps.
+    pub(super) fn run_splats(
+        &self,
+        light: &AimedLight,
+        key: &LevelKey,
+        unit: FluxUnit,
+        maps: &mut ReceiverMaps,
+        course: &Course,
+    ) -> PassReport {
+        let lattice = Lattice {
+            size: key.trace.size,
+            ..self.lattice(light, unit)
+        };
+        let mut all = Halves {
+            first: maps,
+            second: None,
+        };
+        self.deposit_splats(lattice, Source::Rays { keep_bytes: 0 }, key, &mut all, course)
+            .0
     }
 
     /// Maps of every second ray across and down, each for four.
@@ -125,7 +147,7 @@ impl CausticLayer<'_> {
         Some(accuracy::images(&maps, level.unit))
     }
 
-    fn no_maps(&self) -> ReceiverMaps {
+    pub(super) fn no_maps(&self) -> ReceiverMaps {
         ReceiverMaps::new(self.tracer.scene().objects.len())
     }
 

@@ -3,14 +3,15 @@
 use glam::DVec2;
 
 use super::caustic::{CausticLayer, Course};
-use super::light_level::{LevelKey, LightLevel, LightState, TraceKey};
+use super::light_level::{LevelKey, LightLevel, LightState, SoftParts, TraceKey};
 use crate::illumination::accumulator::FluxUnit;
-use crate::light_pass::caustic::pass::Listener;
+use crate::light_pass::caustic::pass::{Listener, PassReport};
 use crate::light_pass::caustic::setup::AimedLight;
 use crate::light_pass::caustic::statistics::FootprintStatistics;
 use crate::light_pass::receiver_maps::{ChartFor, ReceiverMaps};
 use crate::light_pass::wavefront::bodies::SmallBodies;
 use crate::light_pass::wavefront::bumps::BumpCells;
+use crate::light_pass::wavefront::kept_rays::KeptRays;
 use crate::light_pass::wavefront::lattice::WavefrontLattice;
 use crate::light_pass::wavefront::pass::{Room, WavefrontDepositor};
 use crate::light_pass::wavefront::receivers::Receivers;
@@ -70,7 +71,37 @@ impl CausticLayer<'_> {
             noise: None,
             error: None,
             traced,
+            parts: SoftParts::default(),
         })
+    }
+
+    /// Traces and deposits one wavefront of a soft light onto maps.
+    pub(super) fn run_patches(
+        &self,
+        light: &AimedLight,
+        key: &LevelKey,
+        unit: FluxUnit,
+        maps: &mut ReceiverMaps,
+        course: &Course,
+    ) -> PassReport {
+        let chart_for = |object: usize| self.chart(object, &key.sizes);
+        let receivers = Receivers::new(self.tracer, &chart_for);
+        let bodies = self.small_bodies(light, key.trace.size);
+        let depositor = WavefrontDepositor {
+            receivers: &receivers,
+            chart_for: &chart_for,
+            lattice: self.bumpy_lattice(light, &key.trace, &bodies, unit, course.control),
+            reference_w: reference_w(light),
+            coarseness: key.coarseness,
+        };
+        let listener = Listener {
+            progress: &(),
+            control: course.control,
+            done: 0,
+            total: 0,
+        };
+        let mut rays = KeptRays::default();
+        depositor.run(&mut rays, Some(maps), &listener, Room::default()).0
     }
 
     /// Sizes of lit areas at the density that maps are meant for, from a thinner lattice.
@@ -160,7 +191,7 @@ impl CausticLayer<'_> {
         control: &'a Control,
     ) -> WavefrontLattice<'a> {
         let steps = [1.0 / size.0 as f64, 1.0 / size.1 as f64];
-        let mut tracer = StrandTracer::new(self.tracer, &light.launch, self.limits(), steps, control);
+        let mut tracer = StrandTracer::new(self.tracer, &light.launch, self.limits(light), steps, control);
         tracer.bumps = BumpCells::UNDIVIDED;
         WavefrontLattice {
             tracer,

@@ -21,14 +21,15 @@ use crate::illumination::{Chart, IlluminationMap, Layer};
 use crate::light_pass::caustic::pass::Stopwatch;
 use crate::light_pass::caustic::path::{Arrival, PathLimits, PathTracer};
 use crate::light_pass::caustic::setup::{Aim, AimedLight, Aiming};
+use crate::light_pass::emitter::Emitter;
 use crate::light_pass::ledger_sum::{Account, LedgerSum};
 use crate::optics::LinearSrgb;
-use crate::plan::{self, Effect, EffectPlan};
+use crate::plan::{self, Effect, EffectPlan, EffectSwitch};
 use crate::progress::{Control, Progress, Stage};
-use crate::scene::Scene;
+use crate::scene::{Material, Scene};
 use crate::session::{BakeCounts, BakeResult, StopReason, Timings};
-use crate::settings::{BakeSettings, LayerKind, MapResolution};
-use crate::transport::{EffectSet, Everything, Tracer};
+use crate::settings::{BakeSettings, ItemBufferKind, LayerKind, MapResolution};
+use crate::transport::{EffectSet, Everything, Microfacets, Tracer};
 
 /// Least and most rays of a run.
 pub const RAYS: std::ops::RangeInclusive<u64> = 1_000..=1_000_000_000_000;
@@ -90,7 +91,8 @@ fn run(
     let scene = tracer.scene();
     let watch = Stopwatch::start();
     progress.advance(Stage::Plan, 0, 1);
-    let aim = Aim::take(tracer, settings.item_buffer, Aiming::Everything);
+    let sizes = settings.effects.get(Effect::AreaLights) != EffectSwitch::Off;
+    let aim = Aim::take(tracer, settings.item_buffer, Aiming::Everything, sizes);
     let plan = plan::decide(scene, settings, &aim.sights);
     let lights: &[AimedLight] = if plan.is_on(Effect::LightPass) {
         &aim.lights
@@ -103,7 +105,12 @@ fn run(
             max_depth: settings.max_depth,
             branch_threshold: settings.path_threshold(),
             effects: EffectSet::EVERYTHING,
+            microfacets: None,
         },
+        aiming: (settings.item_buffer, Aiming::Reachable),
+        sizes,
+        lobes: settings.effects.get(Effect::Roughness) != EffectSwitch::Off
+            && scene.materials.iter().any(Material::is_rough),
         unit: unit(scene, lights)?,
         targets: targets(scene, size),
         seed: settings.seed,
@@ -142,10 +149,18 @@ fn run(
 /// Independent sets of rays.
 const HALVES: usize = 2;
 
+/// Places of a light with a size, of each half set.
+const PLACES: usize = 2048;
+
 /// What all lights share.
 struct Run<'a> {
     tracer: &'a Tracer,
     limits: PathLimits,
+    aiming: (ItemBufferKind, Aiming),
+    /// Whether lights have sizes.
+    sizes: bool,
+    /// Whether rough surfaces have lobes.
+    lobes: bool,
     unit: FluxUnit,
     targets: Vec<Option<Target>>,
     seed: u64,
@@ -160,6 +175,32 @@ struct Heard<'a> {
     done: u64,
     total: u64,
 }
+
+impl<'a> Heard<'a> {
+    /// Nobody listens, but it may be stopped.
+    fn nobody(control: &'a Control) -> Self {
+        Self {
+            progress: &(),
+            control,
+            done: 0,
+            total: 1,
+        }
+    }
+}
+
+/// Which rays of a light.
+#[derive(Clone, Copy, Debug)]
+struct Part {
+    /// Of one half set; `None` for both.
+    half: Option<usize>,
+    /// Share of the light's flux.
+    share: f64,
+    /// Sets its rays apart from those of other places.
+    place: u64,
+}
+
+/// The stream that places are drawn from.
+const PLACE_STREAM: u64 = u64::MAX;
 
 /// What became of a part of the rays.
 #[derive(Clone, Copy, Debug, Default)]
@@ -181,14 +222,64 @@ impl Tally {
 impl Run<'_> {
     /// Both half sets of one light.
     fn light(&self, light: &AimedLight, heard: &Heard) -> Tally {
+        let source = &self.tracer.scene().lights[light.light];
+        if !(self.sizes && source.has_extent()) {
+            let whole = Part {
+                half: None,
+                share: 1.0 / HALVES as f64,
+                place: 0,
+            };
+            return self.part(light, whole, heard);
+        }
+        // Each half set has places of its own, drawn as its rays are.
+        let done = AtomicU64::new(0);
+        let source = source.of_unit_strength();
+        (0..HALVES * PLACES)
+            .into_par_iter()
+            .map(|index| {
+                let (half, place) = (index / PLACES, index % PLACES);
+                let mut random = self.generator(light.light, (half, 0, place), PLACE_STREAM);
+                // One in each cell of a lattice of places.
+                let side = (PLACES as f64).sqrt().floor() as usize;
+                let square = if place < side * side {
+                    (DVec2::new((place % side) as f64, (place / side) as f64)
+                        + DVec2::new(random(), random()))
+                        / side as f64
+                } else {
+                    DVec2::new(random(), random())
+                };
+                let emitter = Emitter::sample(&source, self.tracer.scene(), square);
+                let there = emitter
+                    .filter(|_| !heard.control.is_cancelled())
+                    .and_then(|emitter| light.another(self.tracer, self.aiming, Some(emitter), None));
+                let part = Part {
+                    half: Some(half),
+                    share: 1.0 / (HALVES * PLACES) as f64,
+                    place: place as u64 + 1,
+                };
+                let tally = there.map(|there| self.part(&there, part, &Heard::nobody(heard.control)));
+                let places = done.fetch_add(1, Ordering::Relaxed) + 1;
+                let share = heard.done * PLACES as u64 + places;
+                heard
+                    .progress
+                    .advance(Stage::Caustic, share, heard.total * PLACES as u64);
+                tally.unwrap_or_default()
+            })
+            .reduce(Tally::default, Tally::merged)
+    }
+
+    /// Rays from one place of a light, of both half sets or one.
+    fn part(&self, light: &AimedLight, part: Part, heard: &Heard) -> Tally {
         let measure = light.item_buffer.marked_measure(&light.launch);
+        let halves = part.half.map_or(0..HALVES, |half| half..half + 1);
+        let places = if part.half.is_some() { PLACES } else { 1 };
         // Rays per steradian, or per square metre for a sun.
-        let density = self.rays_per_half / measure;
+        let density = (self.rays_per_half / places as f64).max(1.0) / measure;
         let size = light.launch.lattice_size(density, 1.0);
         let faces = light.launch.face_count();
         let rows_done = AtomicU64::new(0);
         let rows = (faces * size.1 * HALVES) as u64;
-        (0..HALVES * faces)
+        (halves.start * faces..halves.end * faces)
             .into_par_iter()
             .flat_map(|face| (0..size.1).into_par_iter().map(move |row| (face, row)))
             .map(|(half_face, row)| {
@@ -196,7 +287,7 @@ impl Run<'_> {
                     return Tally::default();
                 }
                 let (half, face) = (half_face / faces, half_face % faces);
-                let tally = self.row(light, size, (half, face, row));
+                let tally = self.row(light, size, (half, face, row), &part);
                 let done = rows_done.fetch_add(1, Ordering::Relaxed) + 1;
                 let share = heard.done * rows + done * HALVES as u64;
                 heard.progress.advance(Stage::Caustic, share, heard.total * rows);
@@ -205,14 +296,20 @@ impl Run<'_> {
             .reduce(Tally::default, Tally::merged)
     }
 
-    /// One ray, with half of its cell's flux, for each cell of a row that may see something specular.
-    fn row(&self, light: &AimedLight, size: (usize, usize), place: (usize, usize, usize)) -> Tally {
+    /// One ray, with its part of its cell's flux, for each cell of a row that may see something specular.
+    fn row(
+        &self,
+        light: &AimedLight,
+        size: (usize, usize),
+        place: (usize, usize, usize),
+        part: &Part,
+    ) -> Tally {
         let (half, face, row) = place;
         let mut paths = PathTracer::new(self.tracer, self.limits, self.unit);
-        let mut random = self.generator(light.light, place);
+        let mut random = self.generator(light.light, place, part.place);
         let mut tally = Tally::default();
         let mut deposited = LedgerSum::default();
-        let strength = self.tracer.scene().lights[light.light].strength() * (1.0 / HALVES as f64);
+        let strength = self.tracer.scene().lights[light.light].strength() * part.share;
         let cell_size = DVec2::new(1.0 / size.0 as f64, 1.0 / size.1 as f64);
         for (start, end) in light.item_buffer.lattice_spans(face, row, size) {
             for column in start..end {
@@ -221,6 +318,10 @@ impl Run<'_> {
                 let square = low + (high - low) * DVec2::new(random(), random());
                 let ray = light.launch.ray(face, square);
                 let flux_w = light.launch.cell_flux_w(low, high, ray.direction) * strength;
+                if self.lobes {
+                    let facets = Microfacets::new(|_| DVec2::new(random(), random()));
+                    paths.limits.microfacets = Some(facets);
+                }
                 tally.rays += 1;
                 paths.trace::<Everything>(ray, flux_w, |arrival| {
                     let count = self.unit.count(arrival.flux_w);
@@ -235,8 +336,15 @@ impl Run<'_> {
     }
 
     /// Uniform numbers in [0, 1): a generator per row, so that the order of the rows does not matter.
-    fn generator(&self, light: usize, (half, face, row): (usize, usize, usize)) -> impl FnMut() -> f64 {
+    fn generator(
+        &self,
+        light: usize,
+        (half, face, row): (usize, usize, usize),
+        place: u64,
+    ) -> impl FnMut() -> f64 {
         let stream = (light as u64) << 40 ^ (half as u64) << 36 ^ (face as u64) << 32 ^ row as u64;
+        // Nothing changes for lights of a single place.
+        let stream = stream ^ place.wrapping_mul(0x9e37_79b9_7f4a_7c15);
         let mut generator = Pcg64Mcg::seed_from_u64(self.seed.rotate_left(29) ^ stream);
         move || (generator.next_u64() >> 11) as f64 * (-53_f64).exp2()
     }
@@ -328,7 +436,15 @@ fn targets(scene: &Scene, (width, height): (usize, usize)) -> Vec<Option<Target>
 fn unit(scene: &Scene, lights: &[AimedLight]) -> Result<FluxUnit> {
     let power_w: f64 = lights
         .iter()
-        .map(|light| light.launch.power_bound_w() * scene.lights[light.light].strength().max_channel())
+        .map(|light| {
+            let source = &scene.lights[light.light];
+            let bound_w = if source.has_extent() {
+                light.power_bound_w(scene)
+            } else {
+                light.launch.power_bound_w()
+            };
+            bound_w * source.strength().max_channel()
+        })
         .sum();
     if lights.is_empty() {
         return Ok(FluxUnit::for_power(1.0));

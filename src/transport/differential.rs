@@ -5,7 +5,8 @@ use glam::DVec3;
 
 use super::bend;
 use super::curvature;
-use super::interaction::{Branch, Event};
+use super::interaction::{Branch, Event, TurnedBy};
+use super::microfacets::Turn;
 use super::{SurfaceHit, Tracer};
 use crate::geometry::Ray;
 
@@ -113,15 +114,35 @@ impl Tracer {
         branch: &Branch,
         surface: (SurfaceScale, SurfaceDetail),
     ) -> RayDifferential {
+        let normal_change_of = |derivative: &RayDerivative| {
+            if branch.by == TurnedBy::Geometric {
+                DVec3::ZERO
+            } else {
+                self.normal_change(hit, branch.normal, derivative.origin, surface)
+            }
+        };
+        if let TurnedBy::Micro(facet) = branch.by {
+            let turn = match branch.event {
+                Event::Refraction => Turn::Refracted {
+                    eta: 1.0 / branch.ior_ratio,
+                },
+                Event::ThinTransmission => Turn::ThroughThinWall,
+                Event::Reflection | Event::TotalInternalReflection => Turn::Reflected,
+            };
+            return at_hit.map(|derivative| RayDerivative {
+                origin: derivative.origin,
+                direction: facet.turned_derivative(
+                    (incident, derivative.direction),
+                    (branch.normal, normal_change_of(&derivative)),
+                    turn,
+                ),
+            });
+        }
         if branch.event == Event::ThinTransmission {
             return *at_hit;
         }
         at_hit.map(|derivative| {
-            let normal_change = if branch.by_shading {
-                self.normal_change(hit, branch.normal, derivative.origin, surface)
-            } else {
-                DVec3::ZERO
-            };
+            let normal_change = normal_change_of(&derivative);
             let cos_change = -(derivative.direction.dot(branch.normal) + incident.dot(normal_change));
             let cos_incident = -incident.dot(branch.normal);
             let direction = match branch.event {

@@ -19,6 +19,8 @@ pub trait PathEffects: Copy + Debug + Default + Send + Sync + 'static {
     const ABSORPTION: bool;
     /// Textures tint what goes on from specular surfaces.
     const TEXTURES: bool;
+    /// Rough surfaces spread what they send on.
+    const LOBES: bool;
 }
 
 /// A set of effects by its members.
@@ -28,19 +30,26 @@ pub struct Specialised<
     const REFLECTION: bool,
     const ABSORPTION: bool,
     const TEXTURES: bool,
+    const LOBES: bool,
 >;
 
-impl<const TRANSMISSION: bool, const REFLECTION: bool, const ABSORPTION: bool, const TEXTURES: bool>
-    PathEffects for Specialised<TRANSMISSION, REFLECTION, ABSORPTION, TEXTURES>
+impl<
+    const TRANSMISSION: bool,
+    const REFLECTION: bool,
+    const ABSORPTION: bool,
+    const TEXTURES: bool,
+    const LOBES: bool,
+> PathEffects for Specialised<TRANSMISSION, REFLECTION, ABSORPTION, TEXTURES, LOBES>
 {
     const TRANSMISSION: bool = TRANSMISSION;
     const REFLECTION: bool = REFLECTION;
     const ABSORPTION: bool = ABSORPTION;
     const TEXTURES: bool = TEXTURES;
+    const LOBES: bool = LOBES;
 }
 
 /// Every effect: code that is ready for any scene.
-pub type Everything = Specialised<true, true, true, true>;
+pub type Everything = Specialised<true, true, true, true, true>;
 
 /// A set of effects, as a plan decides it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -53,6 +62,8 @@ pub struct EffectSet {
     pub absorption: bool,
     /// Textures tint what goes on from specular surfaces.
     pub textures: bool,
+    /// Rough surfaces spread what they send on.
+    pub lobes: bool,
 }
 
 /// Work that is compiled for each set of effects.
@@ -71,6 +82,7 @@ impl EffectSet {
         reflection: true,
         absorption: true,
         textures: true,
+        lobes: true,
     };
 
     /// The effects that are on in a plan.
@@ -80,6 +92,7 @@ impl EffectSet {
             reflection: plan.is_on(Effect::Reflection),
             absorption: plan.is_on(Effect::Absorption),
             textures: plan.is_on(Effect::Textures),
+            lobes: plan.is_on(Effect::Roughness),
         }
     }
 
@@ -95,10 +108,21 @@ impl EffectSet {
 
     fn with<W: ForEffects, const T: bool, const R: bool>(self, work: W) -> W::Output {
         match (self.absorption, self.textures) {
-            (true, true) => work.run::<Specialised<T, R, true, true>>(),
-            (true, false) => work.run::<Specialised<T, R, true, false>>(),
-            (false, true) => work.run::<Specialised<T, R, false, true>>(),
-            (false, false) => work.run::<Specialised<T, R, false, false>>(),
+            (true, true) => self.with_lobes::<W, T, R, true, true>(work),
+            (true, false) => self.with_lobes::<W, T, R, true, false>(work),
+            (false, true) => self.with_lobes::<W, T, R, false, true>(work),
+            (false, false) => self.with_lobes::<W, T, R, false, false>(work),
+        }
+    }
+
+    fn with_lobes<W: ForEffects, const T: bool, const R: bool, const A: bool, const X: bool>(
+        self,
+        work: W,
+    ) -> W::Output {
+        if self.lobes {
+            work.run::<Specialised<T, R, A, X, true>>()
+        } else {
+            work.run::<Specialised<T, R, A, X, false>>()
         }
     }
 }
@@ -114,6 +138,8 @@ pub struct PathCounts {
     pub attenuated: u64,
     /// Textures looked up at specular surfaces.
     pub textured: u64,
+    /// Micro-facets met on rough surfaces.
+    pub scattered: u64,
 }
 
 impl PathCounts {
@@ -132,5 +158,6 @@ impl AddAssign for PathCounts {
         self.reflected += other.reflected;
         self.attenuated += other.attenuated;
         self.textured += other.textured;
+        self.scattered += other.scattered;
     }
 }

@@ -1,9 +1,10 @@
 //! What becomes of light that meets a surface. The shares of reflection, transmission, deposit and absorption add up
 //! to one in every channel.
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use super::effects::{Everything, PathEffects};
+use super::microfacets::{self, Facet, Turn};
 use super::{MediumStack, SurfaceHit, Tracer};
 use crate::geometry::Ray;
 use crate::optics::{LinearSrgb, fresnel, refraction};
@@ -36,11 +37,21 @@ pub struct Branch {
     /// n of the side it leaves over n of the side it enters; 1 for reflections. Radiance that comes back along the
     /// branch is scaled by its square, flux is not.
     pub ior_ratio: f64,
-    /// Unit normal on the side of the incoming ray that gave the direction.
+    /// Unit normal of the surface on the side of the incoming ray that gave the direction.
     pub normal: DVec3,
-    /// Whether that is the surface's shading normal; the geometric one stands in where the former would send light
-    /// through the facet.
-    pub by_shading: bool,
+    /// How it did.
+    pub by: TurnedBy,
+}
+
+/// What light turns about.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum TurnedBy {
+    /// The triangle's normal, where the shading normal would send light through the facet.
+    Geometric,
+    /// The shading normal.
+    Shading,
+    /// A micro-facet around the shading normal.
+    Micro(Facet),
 }
 
 /// The shares of the light at one hit.
@@ -78,17 +89,19 @@ struct Facing {
     shading: DVec3,
     /// Whether `shading` is the shading normal.
     is_smooth: bool,
+    /// The micro-facet that is met, where the surface is rough.
+    micro: Option<Facet>,
 }
 
 /// A direction with the normal that gave it.
 struct Turned {
     direction: DVec3,
     normal: DVec3,
-    by_shading: bool,
+    by: TurnedBy,
 }
 
 impl Facing {
-    fn new(hit: &SurfaceHit, incident: DVec3) -> Self {
+    fn new(hit: &SurfaceHit, incident: DVec3, micro: Option<Facet>) -> Self {
         let front = incident.dot(hit.geometric_normal) < 0.0;
         let side = if front { 1.0 } else { -1.0 };
         let geometric = hit.geometric_normal * side;
@@ -104,11 +117,37 @@ impl Facing {
             geometric,
             shading: if is_smooth { shading } else { geometric },
             is_smooth,
+            micro,
         }
+    }
+
+    /// Cosine between the incoming ray and what it is reflected by.
+    fn cos_incident(&self, incident: DVec3) -> f64 {
+        match self.micro {
+            Some(facet) => -incident.dot(facet.normal(incident, self.shading)),
+            None => -incident.dot(self.shading),
+        }
+    }
+
+    /// By a micro-facet; on the facet's right side in any case.
+    fn turned_by(&self, facet: Facet, incident: DVec3, turn: Turn) -> Option<Turned> {
+        let side = if turn == Turn::Reflected { 1.0 } else { -1.0 };
+        let direction = facet.turned(incident, self.shading, turn)?;
+        Some(Turned {
+            direction: microfacets::out_of(direction, self.geometric, side),
+            normal: self.shading,
+            by: TurnedBy::Micro(facet),
+        })
     }
 
     /// Mirror direction by the shading normal; by the geometric one where the former would end below the surface.
     fn reflected(&self, incident: DVec3) -> Turned {
+        let by_micro = self
+            .micro
+            .and_then(|facet| self.turned_by(facet, incident, Turn::Reflected));
+        if let Some(turned) = by_micro {
+            return turned;
+        }
         let direction = refraction::reflect(incident, self.shading);
         if direction.dot(self.geometric) > 0.0 {
             self.turned(direction)
@@ -116,13 +155,16 @@ impl Facing {
             Turned {
                 direction: refraction::reflect(incident, self.geometric),
                 normal: self.geometric,
-                by_shading: false,
+                by: TurnedBy::Geometric,
             }
         }
     }
 
     /// Refracted direction by the shading normal; by the geometric one where the former would stay above the surface.
     fn refracted(&self, incident: DVec3, eta: f64) -> Option<Turned> {
+        if let Some(facet) = self.micro {
+            return self.turned_by(facet, incident, Turn::Refracted { eta });
+        }
         let direction = refraction::refract(incident, self.shading, eta)?;
         if direction.dot(self.geometric) < 0.0 {
             Some(self.turned(direction))
@@ -130,9 +172,17 @@ impl Facing {
             Some(Turned {
                 direction: refraction::refract(incident, self.geometric, eta)?,
                 normal: self.geometric,
-                by_shading: false,
+                by: TurnedBy::Geometric,
             })
         }
+    }
+
+    /// Straight on through a thin wall, but for its roughness.
+    fn passed(&self, incident: DVec3) -> Turned {
+        let by_micro = self
+            .micro
+            .and_then(|facet| self.turned_by(facet, incident, Turn::ThroughThinWall));
+        by_micro.unwrap_or_else(|| self.turned(incident))
     }
 
     /// A direction that came by the shading normal.
@@ -140,7 +190,11 @@ impl Facing {
         Turned {
             direction,
             normal: self.shading,
-            by_shading: self.is_smooth,
+            by: if self.is_smooth {
+                TurnedBy::Shading
+            } else {
+                TurnedBy::Geometric
+            },
         }
     }
 }
@@ -148,20 +202,28 @@ impl Facing {
 impl Tracer {
     /// What becomes of light that arrives at `hit` along the unit direction `incident`, within `media`, with every effect.
     pub fn interact(&self, hit: &SurfaceHit, incident: DVec3, media: &MediumStack) -> Interaction {
-        self.interact_with::<Everything>(hit, incident, media)
+        self.interact_with::<Everything>(hit, incident, media, None)
     }
 
     /// The same with some effects. Light that would need a branch which is not among them is `switched_off`; where
-    /// textures are not, the material's factor alone tints.
+    /// textures are not, the material's factor alone tints. `micro`: which micro-facet a rough surface shows, as a point
+    /// of the unit square; rough surfaces are smooth without it, or without lobes among the effects.
     pub fn interact_with<E: PathEffects>(
         &self,
         hit: &SurfaceHit,
         incident: DVec3,
         media: &MediumStack,
+        micro: Option<DVec2>,
     ) -> Interaction {
         let material = self.scene().material_of(hit.object);
-        let facing = Facing::new(hit, incident);
-        let cos_incident = -incident.dot(facing.shading);
+        let micro = micro
+            .filter(|_| E::LOBES && material.is_rough())
+            .map(|point| Facet {
+                alpha: material.roughness * material.roughness,
+                point,
+            });
+        let facing = Facing::new(hit, incident, micro);
+        let cos_incident = facing.cos_incident(incident);
         match material.surface {
             SurfaceKind::Diffuse => Interaction {
                 deposit: LinearSrgb::WHITE,
@@ -208,19 +270,22 @@ impl Tracer {
         media: &MediumStack,
         material: &Material,
     ) -> Interaction {
-        let cos_incident = -incident.dot(facing.shading);
+        let cos_incident = facing.cos_incident(incident);
         let reflectance =
             fresnel::thin_wall_reflectance(cos_incident, material.ior / media.ior(self.scene()));
         let share = LinearSrgb::grey(reflectance);
         let returned = sent_back::<E>(share, || reflection(hit, facing, incident, media, share));
-        let_through::<E>(returned, reflectance, || Branch {
-            ray: hit.spawn(incident),
-            share: self.tint::<E>(hit, material) * (1.0 - reflectance),
-            event: Event::ThinTransmission,
-            media: *media,
-            ior_ratio: 1.0,
-            normal: facing.shading,
-            by_shading: facing.is_smooth,
+        let_through::<E>(returned, reflectance, || {
+            let turned = facing.passed(incident);
+            Branch {
+                ray: hit.spawn(turned.direction),
+                share: self.tint::<E>(hit, material) * (1.0 - reflectance),
+                event: Event::ThinTransmission,
+                media: *media,
+                ior_ratio: 1.0,
+                normal: turned.normal,
+                by: turned.by,
+            }
         })
     }
 
@@ -250,7 +315,7 @@ impl Tracer {
                 total
             });
         };
-        let reflectance = fresnel::dielectric_reflectance(-incident.dot(facing.shading), eta);
+        let reflectance = fresnel::dielectric_reflectance(facing.cos_incident(incident), eta);
         let share = LinearSrgb::grey(reflectance);
         let returned = if reflectance > 0.0 {
             sent_back::<E>(share, || reflection(hit, facing, incident, media, share))
@@ -264,7 +329,7 @@ impl Tracer {
             media: beyond,
             ior_ratio: ior_near / ior_far,
             normal: turned.normal,
-            by_shading: turned.by_shading,
+            by: turned.by,
         })
     }
 }
@@ -320,6 +385,6 @@ fn reflection(
         media: *media,
         ior_ratio: 1.0,
         normal: turned.normal,
-        by_shading: turned.by_shading,
+        by: turned.by,
     }
 }

@@ -7,11 +7,13 @@ pub mod differential;
 pub mod effects;
 pub mod interaction;
 pub mod medium;
+pub mod microfacets;
 pub mod smoothing;
 pub mod tracer;
 
 pub use differential::{RayDerivative, RayDifferential, SurfaceDetail, SurfaceScale};
 pub use effects::{EffectSet, Everything, ForEffects, PathCounts, PathEffects, Specialised};
-pub use interaction::{Branch, Event, Interaction};
+pub use interaction::{Branch, Event, Interaction, TurnedBy};
 pub use medium::MediumStack;
+pub use microfacets::Microfacets;
 pub use tracer::{HitPlace, SurfaceHit, Tracer};

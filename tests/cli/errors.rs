@@ -70,6 +70,34 @@ fn a_scene_without_light_names_the_remedy() {
 }
 
 #[test]
+fn environments_that_cannot_be_read() {
+    let sandbox = Sandbox::new();
+    sandbox.write("text.hdr", "this is no sky");
+    sandbox.write("empty.exr", "");
+    for (sky, words) in [
+        ("missing.hdr", ["missing.hdr", "there is no such file"]),
+        ("text.hdr", ["text.hdr", "neither a Radiance nor an OpenEXR"]),
+        ("empty.exr", ["empty.exr", "neither a Radiance nor an OpenEXR"]),
+    ] {
+        for command in ["inspect", "bake -o out", "render -o picture.png"] {
+            sandbox
+                .run(&format!("{command} builtin:ring --environment {sky}"))
+                .failed_in_one_sentence(1, &words);
+        }
+    }
+    assert_eq!(sandbox.files("."), ["empty.exr", "text.hdr"]);
+}
+
+#[test]
+fn an_environment_is_light_enough() {
+    let sandbox = Sandbox::new();
+    sandbox.write("dark.gltf", scenes::dark_triangle());
+    sandbox.write("sky.hdr", scenes::grey_sky());
+    let run = sandbox.succeed("bake dark.gltf -o out --environment sky.hdr");
+    assert!(!run.stderr.contains("sun"), "{}", run.stderr);
+}
+
+#[test]
 fn nothing_specular_is_no_error() {
     let sandbox = Sandbox::new();
     sandbox.write("matte.gltf", scenes::lit_matte_triangle());

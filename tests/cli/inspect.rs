@@ -1,6 +1,7 @@
 //! What `inspect` tells.
 
 use crate::program::Sandbox;
+use crate::scenes;
 
 #[test]
 fn contents_effects_and_reasons() {
@@ -28,6 +29,42 @@ fn contents_effects_and_reasons() {
         "floor",
         "diffuse",
         "mirror",
+    ] {
+        assert!(text.contains(word), "no {word:?} in: {text}");
+    }
+}
+
+#[test]
+fn lights_are_told_with_kind_size_and_strength() {
+    let sandbox = Sandbox::new();
+    sandbox.write("lamps.gltf", scenes::lamps_with_extent());
+    sandbox.write("sky.hdr", scenes::grey_sky());
+    let command = "inspect lamps.gltf --environment sky.hdr --map-resolution 16";
+    let report = sandbox.succeed(&format!("{command} --json")).json();
+    let lights = report["lights"].as_array().expect("lights");
+    let kinds: Vec<&str> = lights
+        .iter()
+        .map(|light| light["kind"].as_str().expect("a kind"))
+        .collect();
+    assert_eq!(kinds, ["point", "sun", "panel", "surface", "environment"]);
+    let number = |light: usize, field: &str| lights[light][field].as_f64().expect(field);
+    let close = |found: f64, expected: f64| assert!((found / expected - 1.0).abs() < 1e-12, "{found}");
+    close(number(0, "radius_m"), 0.05);
+    close(number(1, "angular_diameter_deg"), 0.53);
+    close(number(2, "area_m2"), 0.5);
+    close(number(2, "power_w"), 0.5 * std::f64::consts::PI);
+    close(number(3, "area_m2"), 0.5);
+    close(number(3, "power_w"), 0.5 * std::f64::consts::PI);
+    close(
+        number(4, "spherical_irradiance_w_per_m2"),
+        4.0 * std::f64::consts::PI,
+    );
+    let text = sandbox.succeed(command).stdout;
+    for word in [
+        "0.0500 m radius",
+        "0.5300 degrees across",
+        "panel, 0.5000 m^2",
+        "12.5664 W/m^2 from all",
     ] {
         assert!(text.contains(word), "no {word:?} in: {text}");
     }

@@ -26,6 +26,43 @@ pub fn lit_matte_triangle() -> String {
     scene.to_string()
 }
 
+/// A lamp of 5 cm, a sun of 0.53°, a panel of 0.5 m² and the glowing floor, of 1 W/(m² sr) the latter two.
+pub fn lamps_with_extent() -> String {
+    let mut scene = triangle();
+    scene["materials"] = json!([{"emissiveFactor": [1.0, 1.0, 1.0],
+        "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 683.0}}}]);
+    scene["meshes"][0]["primitives"][0]["material"] = json!(0);
+    scene["extensionsUsed"] = json!([
+        "KHR_lights_punctual",
+        "EXT_lights_area",
+        "KHR_materials_emissive_strength"
+    ]);
+    scene["extensions"] = json!({
+        "KHR_lights_punctual": {"lights": [
+            {"type": "point", "extras": {"radius_m": 0.05}},
+            {"type": "directional", "extras": {"angular_diameter_deg": 0.53}},
+        ]},
+        "EXT_lights_area": {"lights": [
+            {"type": "rect", "intensity": 683.0, "size": 0.5, "rect": {"aspect": 2.0}},
+        ]},
+    });
+    scene["nodes"] = json!([
+        {"mesh": 0, "name": "floor"},
+        {"translation": [0.0, 1.0, 0.0], "extensions": {"KHR_lights_punctual": {"light": 0}}},
+        {"extensions": {"KHR_lights_punctual": {"light": 1}}},
+        {"translation": [0.0, 2.0, 0.0], "extensions": {"EXT_lights_area": {"light": 0}}},
+    ]);
+    scene["scenes"] = json!([{"nodes": [0, 1, 2, 3]}]);
+    scene.to_string()
+}
+
+/// A Radiance image of 2 × 1 pixels of 1 W/(m² sr): 128 · 2^(129 − 136) in each channel.
+pub fn grey_sky() -> Vec<u8> {
+    let mut bytes = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 2\n".to_vec();
+    bytes.extend([128, 128, 128, 129].repeat(2));
+    bytes
+}
+
 fn triangle() -> Value {
     let positions: [f32; 9] = [0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0];
     let bytes: Vec<u8> = positions.iter().flat_map(|value| value.to_le_bytes()).collect();

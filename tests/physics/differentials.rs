@@ -17,12 +17,13 @@ use nephroid::transport::{EffectSet, Tracer};
 fn mismatch(name: &str, step: f64) -> (f64, usize) {
     let scene = Arc::new(builtin::build(name).expect("a built-in scene"));
     let tracer = Tracer::new(scene);
-    let aim = Aim::take(&tracer, ItemBufferKind::Equal, Aiming::Everything);
+    let aim = Aim::take(&tracer, ItemBufferKind::Equal, Aiming::Everything, true);
     let launch = &aim.lights[0].launch;
     let limits = PathLimits {
         max_depth: 4,
         branch_threshold: 0.5,
         effects: EffectSet::EVERYTHING,
+        microfacets: None,
     };
     let control = Control::default();
     let rays = StrandTracer::new(&tracer, launch, limits, [2.0 * step; 2], &control);

@@ -271,6 +271,23 @@ fn deposit_band(
 }
 
 impl PassReport {
+    /// Adds what another pass did to the same light.
+    pub fn merge(&mut self, other: Self) {
+        self.ledger.merge(&other.ledger);
+        self.rays += other.rays;
+        self.segments += other.segments;
+        self.paths += other.paths;
+        self.deposits += other.deposits;
+        self.splats += other.splats;
+        self.cells += other.cells;
+        self.receiver_queries += other.receiver_queries;
+        self.statistics.merge(&other.statistics);
+        self.overreaches.extend(other.overreaches);
+        self.trace_s.add(other.trace_s);
+        self.deposit_s.add(other.deposit_s);
+        self.cancelled |= other.cancelled;
+    }
+
     fn count(&mut self, traced: &[TracedRow]) {
         for row in traced {
             self.ledger.merge(&row.ledger);

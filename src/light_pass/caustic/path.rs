@@ -6,7 +6,9 @@ use super::super::ledger_sum::{Account, LedgerSum};
 use crate::geometry::Ray;
 use crate::illumination::accumulator::FluxUnit;
 use crate::optics::LinearSrgb;
-use crate::transport::{Branch, EffectSet, Event, MediumStack, PathCounts, PathEffects, SurfaceHit, Tracer};
+use crate::transport::{
+    Branch, EffectSet, Event, MediumStack, Microfacets, PathCounts, PathEffects, SurfaceHit, Tracer,
+};
 
 /// Sequence of (object, event) along a path, as a hash: equal for neighbouring rays that took the same way.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -70,6 +72,8 @@ pub struct PathLimits {
     pub branch_threshold: f64,
     /// What paths may need.
     pub effects: EffectSet,
+    /// Which micro-facets rough surfaces show; without, they are smooth.
+    pub microfacets: Option<Microfacets>,
 }
 
 /// What waits to be traced.
@@ -89,7 +93,8 @@ struct Segment {
 #[derive(Debug)]
 pub struct PathTracer<'a> {
     tracer: &'a Tracer,
-    limits: PathLimits,
+    /// Of paths.
+    pub limits: PathLimits,
     unit: FluxUnit,
     waiting: Vec<Segment>,
     /// Accounts of all rays so far.
@@ -161,11 +166,15 @@ impl<'a> PathTracer<'a> {
             self.book(Account::Absorbed, segment.flux_w - flux_w);
         }
         let path_m = segment.path_m + hit.distance_m;
+        let micro = self.limits.microfacets.map(|facets| facets.at(segment.depth));
         let interaction = self
             .tracer
-            .interact_with::<E>(&hit, segment.ray.direction, &segment.media);
+            .interact_with::<E>(&hit, segment.ray.direction, &segment.media, micro);
         if E::TEXTURES && self.tracer.is_textured(hit.object) {
             self.counts.textured += 1;
+        }
+        if E::LOBES && micro.is_some() && self.tracer.scene().material_of(hit.object).is_rough() {
+            self.counts.scattered += 1;
         }
         let deposit_w = flux_w * interaction.deposit;
         if segment.depth == 0 {

@@ -1,35 +1,82 @@
 //! Looks around from every light, before any ray is traced.
 
+use std::sync::Arc;
+
 use glam::DVec3;
 
 use super::pass::{Seconds, Stopwatch};
+use crate::geometry::sampling::even_point;
 use crate::light_pass::emitter::Emitter;
 use crate::light_pass::item_buffer::{Hiding, ItemBuffer};
 use crate::light_pass::launch::Launch;
 use crate::plan::{Reach, Sight};
 use crate::scene::{Scene, SurfaceKind};
 use crate::settings::ItemBufferKind;
-use crate::transport::Tracer;
+use crate::transport::{Microfacets, Tracer};
 
-/// A light that sees something specular.
-#[derive(Debug)]
+/// A light that sees something specular: one wavefront of it.
+#[derive(Clone, Debug)]
 pub struct AimedLight {
     /// Index into `Scene::lights`.
     pub light: usize,
     /// Where its rays start, as of a white light of unit strength: what the real one gives is a scale of that.
     pub launch: Launch,
     /// Which of them are worth tracing.
-    pub item_buffer: ItemBuffer,
+    pub item_buffer: Arc<ItemBuffer>,
     /// Where light can matter, if less than that.
-    visible: Option<ItemBuffer>,
+    visible: Option<Arc<ItemBuffer>>,
     /// Distance from the casters' centre to their farthest receiver [m]: scales the density of suns.
     pub reach_m: f64,
+    /// What rays are aimed at (indices of specular objects), wherever they start.
+    casters: Arc<[usize]>,
+    /// Which micro-facets rough surfaces show; `None` where all are smooth.
+    pub microfacets: Option<Microfacets>,
 }
 
 impl AimedLight {
     /// Where light can matter: the item buffer, or less where everything is aimed at.
     pub fn visible(&self) -> &ItemBuffer {
         self.visible.as_ref().unwrap_or(&self.item_buffer)
+    }
+
+    /// What any wavefront of the same light may carry [W], but for another strength.
+    pub fn power_bound_w(&self, scene: &Scene) -> f64 {
+        let own_w = self.launch.power_bound_w();
+        if !self.launch.is_fitted() {
+            return own_w;
+        }
+        // The rectangle around the casters differs from direction to direction.
+        let (low, high) = scene.bounds().unwrap_or_default();
+        own_w.max(self.launch.emitter().strength.max_channel() * (high - low).length_squared())
+    }
+
+    /// The wavefront of another place of the light, for other micro-facets; `None` where it sends nothing to a caster.
+    pub fn another(
+        &self,
+        tracer: &Tracer,
+        (item_buffer, aiming): (ItemBufferKind, Aiming),
+        emitter: Option<Emitter>,
+        microfacets: Option<Microfacets>,
+    ) -> Option<Self> {
+        let Some(emitter) = emitter else {
+            return Some(Self {
+                microfacets,
+                ..self.clone()
+            });
+        };
+        let aimer = Aimer {
+            tracer,
+            item_buffer,
+            aiming,
+        };
+        let view = aimer.look(&emitter, &self.casters)?;
+        (!view.item_buffer.casters.is_empty()).then(|| Self {
+            launch: view.launch,
+            item_buffer: Arc::new(view.item_buffer),
+            visible: view.visible.map(Arc::new),
+            microfacets,
+            ..self.clone()
+        })
     }
 }
 
@@ -68,7 +115,9 @@ pub struct Aim {
 
 impl Aim {
     /// Builds the item buffers of all lights that something specular could call for.
-    pub fn take(tracer: &Tracer, item_buffer: ItemBufferKind, aiming: Aiming) -> Self {
+    ///
+    /// `sizes`: whether lights are as large as they are, or shine from their middles.
+    pub fn take(tracer: &Tracer, item_buffer: ItemBufferKind, aiming: Aiming, sizes: bool) -> Self {
         let scene = tracer.scene();
         let has = |wanted: fn(SurfaceKind) -> bool| {
             (0..scene.objects.len()).any(|object| wanted(scene.material_of(object).surface))
@@ -80,9 +129,12 @@ impl Aim {
             return aim;
         }
         let looker = Looker {
-            tracer,
-            item_buffer,
-            aiming,
+            aimer: Aimer {
+                tracer,
+                item_buffer,
+                aiming,
+            },
+            sizes,
             reach: Reach::of(scene),
         };
         for light in 0..scene.lights.len() {
@@ -104,129 +156,191 @@ impl Aim {
     }
 }
 
-struct Looker<'a> {
+/// Places of a light with a size that tell what it sees.
+const PLACES: u32 = 16;
+
+/// So many more are tried where those see nothing.
+const MOST_PLACES: u32 = 256;
+
+/// Which places those are.
+const PLACES_SEED: u64 = 0;
+
+/// Aims at casters from a place.
+struct Aimer<'a> {
     tracer: &'a Tracer,
     item_buffer: ItemBufferKind,
     aiming: Aiming,
+}
+
+/// What a place of a light sees.
+struct View {
+    launch: Launch,
+    item_buffer: ItemBuffer,
+    visible: Option<ItemBuffer>,
+    /// Nodes, triangles and cells that were tested.
+    tests: u64,
+}
+
+impl Aimer<'_> {
+    /// `casters`: specular objects that matter; `None` where nothing could be aimed at.
+    fn look(&self, emitter: &Emitter, casters: &[usize]) -> Option<View> {
+        let visible = self.at_reachable(emitter, casters);
+        match self.aiming {
+            Aiming::Reachable => visible,
+            Aiming::Everything => self.at_everything(emitter, visible),
+        }
+    }
+
+    fn launch(&self, emitter: &Emitter, casters: &[usize]) -> Option<Launch> {
+        Launch::new(emitter.clone(), self.tracer.scene(), casters, self.item_buffer)
+    }
+
+    fn at_reachable(&self, emitter: &Emitter, casters: &[usize]) -> Option<View> {
+        let mut tests = 0;
+        let mut build = |casters: &[usize]| {
+            if casters.is_empty() {
+                return None;
+            }
+            let launch = self.launch(emitter, casters)?;
+            let item_buffer = ItemBuffer::build(&launch, self.tracer, casters, Hiding::Drop);
+            tests += item_buffer.tests;
+            Some((launch, item_buffer))
+        };
+        let (mut launch, mut item_buffer) = build(casters)?;
+        // What parallel light does not see is to have no part in its rectangle.
+        if launch.is_fitted()
+            && item_buffer.casters.len() < casters.len()
+            && let Some(smaller) = build(&item_buffer.casters)
+        {
+            (launch, item_buffer) = smaller;
+        }
+        Some(View {
+            launch,
+            item_buffer,
+            visible: None,
+            tests,
+        })
+    }
+
+    /// Rays start from the same lattice, so that its maps are the same; more of its cells are traced.
+    fn at_everything(&self, emitter: &Emitter, visible: Option<View>) -> Option<View> {
+        let specular = specular_objects(self.tracer.scene());
+        let tests = visible.as_ref().map_or(0, |view| view.tests);
+        let visible = visible.filter(|view| !view.item_buffer.casters.is_empty());
+        let (launch, visible) = match visible {
+            Some(view) => (view.launch, Some(view.item_buffer)),
+            None => (self.launch(emitter, &specular)?, None),
+        };
+        let item_buffer = ItemBuffer::build(&launch, self.tracer, &specular, Hiding::Keep);
+        Some(View {
+            tests: tests + item_buffer.tests,
+            launch,
+            item_buffer,
+            visible,
+        })
+    }
+}
+
+fn specular_objects(scene: &Scene) -> Vec<usize> {
+    (0..scene.objects.len())
+        .filter(|&object| scene.material_of(object).surface.is_specular())
+        .collect()
+}
+
+struct Looker<'a> {
+    aimer: Aimer<'a>,
+    /// Whether lights have sizes.
+    sizes: bool,
     reach: Reach<'a>,
 }
 
 impl Looker<'_> {
     fn look(&self, light: usize) -> (Sight, Option<AimedLight>, LookAround) {
-        let casters = self.reach.casters(light);
+        let scene = self.aimer.tracer.scene();
+        let casters: Arc<[usize]> = self.reach.casters(light).into();
         let mut look = LookAround::default();
-        let visible = self.visible(light, &casters, &mut look);
-        match self.aiming {
-            Aiming::Reachable => self.at_reachable(light, casters.len(), visible, look),
-            Aiming::Everything => self.at_everything(light, visible, look),
+        let (mut first, mut seen, mut visibly): (Option<View>, Vec<usize>, Vec<usize>) = Default::default();
+        let mut hidden_cells = 0;
+        for (place, emitter) in self.places(light) {
+            if place >= PLACES && !seen.is_empty() {
+                break;
+            }
+            let Some(view) = self.aimer.look(&emitter, &casters) else {
+                continue;
+            };
+            look.tests += view.tests;
+            hidden_cells = hidden_cells.max(view.item_buffer.hidden_cells);
+            seen.extend(&view.item_buffer.casters);
+            visibly.extend(&view.visible.as_ref().unwrap_or(&view.item_buffer).casters);
+            if first
+                .as_ref()
+                .is_none_or(|first| first.item_buffer.casters.is_empty())
+            {
+                first = Some(view);
+            }
         }
-    }
-
-    fn at_reachable(
-        &self,
-        light: usize,
-        casters: usize,
-        visible: Option<(Launch, ItemBuffer)>,
-        mut look: LookAround,
-    ) -> (Sight, Option<AimedLight>, LookAround) {
-        let mut sight = Sight {
-            unsealed: self.reach.unsealed(light).len(),
-            casters,
-            ..Sight::default()
-        };
-        let Some((launch, item_buffer)) = visible else {
+        for list in [&mut seen, &mut visibly] {
+            list.sort_unstable();
+            list.dedup();
+        }
+        let mut sight = self.sight(light, &casters, seen);
+        let Some(view) = first else {
             return (sight, None, look);
         };
-        sight.seen.clone_from(&item_buffer.casters);
-        sight.hidden_cells = item_buffer.hidden_cells;
-        sight.reached = self.reach.reached(light, &sight.seen);
-        look.cells = item_buffer.marked_cells();
-        look.hidden_cells = item_buffer.hidden_cells;
-        let aimed = (!sight.seen.is_empty()).then(|| AimedLight {
-            light,
-            reach_m: reach_m(self.tracer.scene(), &sight.seen),
-            launch,
-            item_buffer,
-            visible: None,
-        });
-        (sight, aimed, look)
-    }
-
-    /// Rays start from the same lattice, so that its maps are the same; more of its cells are traced.
-    fn at_everything(
-        &self,
-        light: usize,
-        visible: Option<(Launch, ItemBuffer)>,
-        mut look: LookAround,
-    ) -> (Sight, Option<AimedLight>, LookAround) {
-        let scene = self.tracer.scene();
-        let specular: Vec<usize> = (0..scene.objects.len())
-            .filter(|&object| scene.material_of(object).surface.is_specular())
-            .collect();
-        let mut sight = Sight {
-            unsealed: specular.len(),
-            casters: specular.len(),
-            reached: specular.iter().map(|&object| (object, None)).collect(),
-            ..Sight::default()
-        };
-        let visible = visible.filter(|(_, visible)| !visible.casters.is_empty());
-        let (launch, visible) = match visible {
-            Some((launch, visible)) => (Some(launch), Some(visible)),
-            None => (self.launch(light, &specular), None),
-        };
-        let Some(launch) = launch else {
-            return (sight, None, look);
-        };
-        let item_buffer = ItemBuffer::build(&launch, self.tracer, &specular, Hiding::Keep);
-        look.tests += item_buffer.tests;
-        look.cells = item_buffer.marked_cells();
-        sight.seen.clone_from(&item_buffer.casters);
-        let near = visible.as_ref().map_or(&sight.seen, |visible| &visible.casters);
-        let reach_m = reach_m(scene, near);
+        sight.hidden_cells = hidden_cells;
+        look.cells = view.item_buffer.marked_cells();
+        look.hidden_cells = hidden_cells;
         if sight.seen.is_empty() {
             return (sight, None, look);
         }
+        let near = if visibly.is_empty() { &sight.seen } else { &visibly };
         let aimed = AimedLight {
             light,
-            reach_m,
-            launch,
-            item_buffer,
-            visible,
+            reach_m: reach_m(scene, near),
+            launch: view.launch,
+            item_buffer: Arc::new(view.item_buffer),
+            visible: view.visible.map(Arc::new),
+            casters,
+            microfacets: None,
         };
         (sight, Some(aimed), look)
     }
 
-    fn launch(&self, light: usize, casters: &[usize]) -> Option<Launch> {
-        let scene = self.tracer.scene();
-        let emitter = Emitter::middle(&scene.lights[light].of_unit_strength(), scene)?;
-        Launch::new(emitter, scene, casters, self.item_buffer)
+    fn sight(&self, light: usize, casters: &[usize], seen: Vec<usize>) -> Sight {
+        match self.aimer.aiming {
+            Aiming::Reachable => Sight {
+                unsealed: self.reach.unsealed(light).len(),
+                casters: casters.len(),
+                reached: self.reach.reached(light, &seen),
+                seen,
+                ..Sight::default()
+            },
+            Aiming::Everything => {
+                let specular = specular_objects(self.aimer.tracer.scene());
+                Sight {
+                    unsealed: specular.len(),
+                    casters: specular.len(),
+                    reached: specular.iter().map(|&object| (object, None)).collect(),
+                    seen,
+                    ..Sight::default()
+                }
+            }
+        }
     }
 
-    /// Where light can matter; `None` where nothing could be aimed at.
-    fn visible(
-        &self,
-        light: usize,
-        casters: &[usize],
-        look: &mut LookAround,
-    ) -> Option<(Launch, ItemBuffer)> {
-        let mut build = |casters: &[usize]| {
-            if casters.is_empty() {
-                return None;
-            }
-            let launch = self.launch(light, casters)?;
-            let item_buffer = ItemBuffer::build(&launch, self.tracer, casters, Hiding::Drop);
-            look.tests += item_buffer.tests;
-            Some((launch, item_buffer))
-        };
-        let (launch, item_buffer) = build(casters)?;
-        // What a sun does not see is to have no part in its rectangle.
-        let is_smaller = launch.is_fitted() && item_buffer.casters.len() < casters.len();
-        let smaller = if is_smaller {
-            build(&item_buffer.casters)
-        } else {
-            None
-        };
-        Some(smaller.unwrap_or((launch, item_buffer)))
+    /// Where to look from: some places of a light with a size, else its only one.
+    fn places(&self, light: usize) -> impl Iterator<Item = (u32, Emitter)> {
+        let scene = self.aimer.tracer.scene();
+        let source = scene.lights[light].of_unit_strength();
+        let many = self.sizes && source.has_extent();
+        (0..if many { MOST_PLACES } else { 1 }).filter_map(move |place| {
+            let emitter = if many {
+                Emitter::sample(&source, scene, even_point(place, 0, PLACES_SEED))
+            } else {
+                Emitter::middle(&source, scene)
+            };
+            Some((place, emitter?))
+        })
     }
 }
 

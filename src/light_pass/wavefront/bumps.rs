@@ -10,7 +10,7 @@ use crate::transport::RayDifferential;
 const CELLS_PER_WAVE: f64 = 4.0;
 
 /// Cells of a whole lattice at most, once they are divided for detail.
-const MOST_CELLS: u64 = 1 << 21;
+const MOST_CELLS: f64 = 2_097_152.0;
 
 /// Divisions at most.
 const DEEPEST_LEVEL: u32 = 12;
@@ -26,13 +26,15 @@ pub struct BumpCells {
 }
 
 impl BumpCells {
-    /// For the finest lattice, of so many cells, or one of `2^coarser` times longer steps: its cells may be as much
-    /// longer, so that the difference between lattices shows what they miss.
-    pub fn for_lattice(cells: u64, coarser: u32) -> Self {
-        let finest = (cells << (2 * coarser).min(31)).max(1);
+    /// For a lattice of so many cells whose steps are `2^coarser` times longer than those of the usual finest one: its
+    /// cells may be as much longer, so that the difference between lattices shows what they miss.
+    pub fn for_lattice(cells: u64, coarser: i32) -> Self {
+        let longer = f64::from(coarser).exp2();
+        let finest = (cells as f64 * longer * longer).max(1.0);
+        let divisions = 0.5 * (MOST_CELLS / finest).log2();
         Self {
-            per_wave: CELLS_PER_WAVE * (-f64::from(coarser)).exp2(),
-            deepest: (MOST_CELLS / finest).max(1).ilog2() / 2,
+            per_wave: CELLS_PER_WAVE / longer,
+            deepest: (divisions.max(0.0) as u32).min(DEEPEST_LEVEL),
         }
     }
 

@@ -115,6 +115,8 @@ impl<E: PathEffects> Spreader<'_, E> {
         let tracer = self.receivers.tracer;
         out.deposits.count_segment(strand.event);
         out.deposits.attenuated += u64::from(self.absorbs(strand));
+        out.deposits.scattered +=
+            u64::from(E::LOBES && tracer.scene().material_of(strand.from as usize).is_rough());
         out.deposits.textured += u64::from(E::TEXTURES && tracer.is_textured(strand.from as usize));
     }
 

@@ -198,9 +198,13 @@ impl<'a> StrandTracer<'a> {
         if E::TEXTURES && self.tracer.is_textured(hit.object) {
             sample.counts.textured += 1;
         }
+        let micro = self.limits.microfacets.map(|facets| facets.at(from.depth));
+        if E::LOBES && micro.is_some() && material.is_rough() {
+            sample.counts.scattered += 1;
+        }
         let interaction = self
             .tracer
-            .interact_with::<E>(&hit, from.ray.direction, &from.media);
+            .interact_with::<E>(&hit, from.ray.direction, &from.media, micro);
         self.scatter(from, &hit, incident, &interaction, floor_w, sample, waiting);
     }
 

@@ -5,6 +5,7 @@ use serde::Deserialize;
 use serde_json::Map;
 
 use super::report::Report;
+use super::sizes::StatedSize;
 use super::{extensions, faults, waves};
 use crate::error::{Error, Result};
 
@@ -17,6 +18,10 @@ pub struct Document {
     pub transforms: Vec<NodeTransform>,
     /// Waves of each material, as its extras state them.
     pub waves: Vec<Option<Value>>,
+    /// One per node: what its `extras` say of the size of its light.
+    pub node_sizes: Vec<StatedSize>,
+    /// One per light of KHR_lights_punctual.
+    pub light_sizes: Vec<StatedSize>,
 }
 
 /// A node's own transform as the file states it, unchecked.
@@ -47,6 +52,8 @@ pub fn parse(json: &[u8], report: &mut Report) -> Result<Document> {
     extensions::check(&required, &strings(file, "extensionsUsed")?, report)?;
     leave_out_what_is_not_read(file, report);
     let waves = waves::collect(&value);
+    let node_sizes = StatedSize::of_each(value.get("nodes"));
+    let light_sizes = StatedSize::of_each(value.pointer("/extensions/KHR_lights_punctual/lights"));
     remove_extras(&mut value);
 
     let transforms = match value.get("nodes") {
@@ -59,6 +66,8 @@ pub fn parse(json: &[u8], report: &mut Report) -> Result<Document> {
         root,
         transforms,
         waves,
+        node_sizes,
+        light_sizes,
     })
 }
 
@@ -170,7 +179,7 @@ fn objects(list: Option<&mut Value>) -> impl Iterator<Item = &mut Map<String, Va
     items.into_iter().flatten().filter_map(Value::as_object_mut)
 }
 
-/// Application data of any depth: not read, and raw text that the typed reader cannot take everywhere.
+/// Application data of any depth: read by now, and raw text that the typed reader cannot take everywhere.
 fn remove_extras(value: &mut Value) {
     match value {
         Value::Array(items) => items.iter_mut().for_each(remove_extras),

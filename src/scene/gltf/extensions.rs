@@ -4,7 +4,8 @@ use super::report::Report;
 use crate::error::{Error, Result};
 
 /// Read in full, or in the parts that say so in a warning.
-const READ: [&str; 9] = [
+const READ: [&str; 10] = [
+    "EXT_lights_area",
     "EXT_texture_webp",
     "KHR_lights_punctual",
     "KHR_materials_emissive_strength",

@@ -3,20 +3,22 @@
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
 
 use glam::DVec3;
-use gltf::json::Root;
 use gltf::json::extensions::scene::khr_lights_punctual::{Light as Source, Spot, Type};
 use gltf::json::validation::Checked;
 
+use super::document::Document;
 use super::nodes::Placed;
 use super::numbers::{widen, widen_all};
 use super::report::Report;
+use super::sizes::StatedSize;
 use crate::optics::LinearSrgb;
 use crate::scene::{Light, LightKind};
 use crate::units::{Irradiance, LUMENS_PER_WATT, RadiantIntensity};
 
 /// All lights of the placed nodes that have some power, node by node. A light that cannot be read is left out with a
 /// warning.
-pub fn read_all(root: &Root, placed: &[Placed], report: &mut Report) -> Vec<Light> {
+pub fn read_all(document: &Document, placed: &[Placed], report: &mut Report) -> Vec<Light> {
+    let root = &document.root;
     let extension = root
         .extensions
         .as_ref()
@@ -26,6 +28,7 @@ pub fn read_all(root: &Root, placed: &[Placed], report: &mut Report) -> Vec<Ligh
         let extensions = root.nodes[placed.node].extensions.as_ref()?;
         Some(extensions.khr_lights_punctual.as_ref()?.light.value())
     };
+    let unstated = StatedSize::default();
     let mut lights = Vec::new();
     for placed in placed {
         let Some(index) = on_node(placed) else { continue };
@@ -39,7 +42,11 @@ pub fn read_all(root: &Root, placed: &[Placed], report: &mut Report) -> Vec<Ligh
                 name: light_name(placed, lights.len()),
                 colour: widen_all(source.color).into(),
                 kind,
-                size: crate::scene::LightSize::None,
+                size: {
+                    let of_node = document.node_sizes.get(placed.node).unwrap_or(&unstated);
+                    let of_light = document.light_sizes.get(index).unwrap_or(&unstated);
+                    of_node.read(of_light, &kind, &owner, report)
+                },
             }),
             Err(why) => left_out(report, &owner, &why),
         }
@@ -47,7 +54,8 @@ pub fn read_all(root: &Root, placed: &[Placed], report: &mut Report) -> Vec<Ligh
     lights
 }
 
-fn light_name(placed: &Placed, index: usize) -> String {
+/// The node's name; `lightN` where the file gives none.
+pub(super) fn light_name(placed: &Placed, index: usize) -> String {
     let unnamed = placed.name == format!("node{}", placed.node);
     if unnamed {
         format!("light{index}")
@@ -56,7 +64,8 @@ fn light_name(placed: &Placed, index: usize) -> String {
     }
 }
 
-fn left_out(report: &mut Report, owner: &str, why: &str) {
+/// Warns of a light that is not read.
+pub(super) fn left_out(report: &mut Report, owner: &str, why: &str) {
     report.warn(
         owner,
         format!("{why}; it was left out"),

@@ -4,6 +4,7 @@
 //! lets pass.
 
 mod accessor;
+mod area_light;
 mod base64;
 mod buffers;
 mod closed;
@@ -11,7 +12,8 @@ mod container;
 mod document;
 mod extensions;
 mod faults;
-mod guard;
+mod glow;
+pub(super) mod guard;
 mod images;
 mod light;
 mod material;
@@ -22,6 +24,7 @@ mod primitive;
 mod rebase;
 mod report;
 mod shading;
+mod sizes;
 mod surface;
 mod triangles;
 mod uri;
@@ -97,7 +100,9 @@ fn read_scene(bytes: &[u8], path: &Path, options: &LoadOptions) -> Result<Scene>
     )?;
     scene.materials = materials.into_all();
     scene.textures = images.into_textures().into_iter().map(Arc::new).collect();
-    scene.lights = light::read_all(&document.root, &placed, &mut report);
+    scene.lights = light::read_all(&document, &placed, &mut report);
+    area_light::add_all(&mut scene.lights, &document.root, &placed, &mut report);
+    glow::add_lights(&mut scene);
     scene.cameras = viewpoint::read_all(&document.root, &placed, &mut report);
     rebase::rebase(&mut scene);
     scene.warnings = report.into_warnings();

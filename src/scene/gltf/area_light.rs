@@ -1,0 +1,137 @@
+//! Flat lamps of EXT_lights_area, by its draft of 2025 (KhronosGroup/glTF, pull request 2525).
+//!
+//! A lamp lies in the node's xy plane around its origin and shines along −z. Its size is scaled by the largest scale of
+//! the node, the same way in all directions.
+
+use glam::DVec3;
+use gltf::json::{Root, Value};
+use serde::Deserialize;
+
+use super::light::{left_out, light_name};
+use super::nodes::Placed;
+use super::report::Report;
+use crate::optics::LinearSrgb;
+use crate::scene::{Light, LightKind, LightSize, PanelShape};
+use crate::units::{LUMENS_PER_WATT, Radiance};
+
+const NAME: &str = "EXT_lights_area";
+
+/// A lamp as the file states it, unchecked.
+#[derive(Deserialize)]
+#[serde(default)]
+struct Source {
+    /// The draft's schema requires `shape` and then describes `type`.
+    #[serde(rename = "type", alias = "shape")]
+    shape: String,
+    color: [f64; 3],
+    /// [cd/m²].
+    intensity: f64,
+    /// Height of a rectangle, diameter of a disk, in the node's units.
+    size: f64,
+    rect: Rect,
+}
+
+#[derive(Deserialize)]
+#[serde(default)]
+struct Rect {
+    /// Width over height.
+    aspect: f64,
+}
+
+impl Default for Source {
+    fn default() -> Self {
+        Self {
+            shape: "rect".into(),
+            color: [1.0; 3],
+            intensity: 1000.0,
+            size: 1.0,
+            rect: Rect::default(),
+        }
+    }
+}
+
+impl Default for Rect {
+    fn default() -> Self {
+        Self { aspect: 1.0 }
+    }
+}
+
+/// Adds the flat lamps of the placed nodes that have some power, node by node. One that cannot be read is left out with
+/// a warning.
+pub fn add_all(lights: &mut Vec<Light>, root: &Root, placed: &[Placed], report: &mut Report) {
+    let extension = root
+        .extensions
+        .as_ref()
+        .and_then(|extensions| extensions.others.get(NAME));
+    let sources = extension
+        .and_then(|extension| extension.get("lights"))
+        .and_then(Value::as_array);
+    let sources = sources.map_or(&[][..], Vec::as_slice);
+    for placed in placed {
+        let extensions = root.nodes[placed.node].extensions.as_ref();
+        let Some(on_node) = extensions.and_then(|extensions| extensions.others.get(NAME)) else {
+            continue;
+        };
+        let owner = format!("light `{}`", placed.name);
+        match lamp(on_node, sources, placed) {
+            Ok((colour, kind)) => lights.push(Light {
+                name: light_name(placed, lights.len()),
+                colour,
+                kind,
+                size: LightSize::None,
+            }),
+            Err(why) => left_out(report, &owner, &why),
+        }
+    }
+}
+
+fn lamp(on_node: &Value, sources: &[Value], placed: &Placed) -> Result<(LinearSrgb, LightKind), String> {
+    let index = on_node.get("light").and_then(Value::as_u64);
+    let index = index.ok_or("does not say which area light it is")?;
+    let source = usize::try_from(index).ok().and_then(|index| sources.get(index));
+    let source = source.ok_or_else(|| format!("is area light {index}, which does not exist"))?;
+    let source = Source::deserialize(source).map_err(|error| format!("does not follow {NAME} ({error})"))?;
+    let colour = LinearSrgb::from(source.color);
+    if !colour.is_finite() || source.color.iter().any(|channel| *channel < 0.0) {
+        return Err("has a colour that is negative or not finite".into());
+    }
+    let radiance = source.intensity / LUMENS_PER_WATT;
+    if !(radiance >= 0.0 && radiance.is_finite()) {
+        return Err(format!("has an intensity of {}", source.intensity));
+    }
+    if radiance * colour.luminance() == 0.0 {
+        return Err("has no power".into());
+    }
+    let (shape, aspect) = match source.shape.as_str() {
+        "rect" => (PanelShape::Rectangle, source.rect.aspect),
+        "disk" => (PanelShape::Disc, 1.0),
+        _ => return Err("is of an unknown shape".into()),
+    };
+    let (across, down) = half_axes(placed, source.size, aspect).ok_or("has no area")?;
+    Ok((
+        colour,
+        LightKind::Panel {
+            centre: placed.world_from_node.translation,
+            across,
+            down,
+            shape,
+            radiance: Radiance(radiance),
+        },
+    ))
+}
+
+/// From the middle of a lamp to its sides [m], across × down along the node's −z; `None` where it has no area.
+fn half_axes(placed: &Placed, size: f64, aspect: f64) -> Option<(DVec3, DVec3)> {
+    let axes = placed.world_from_node.matrix3;
+    let [x, y, z] = [axes.x_axis, axes.y_axis, axes.z_axis];
+    let half_height_m = 0.5 * size * x.length().max(y.length()).max(z.length());
+    let direction = -z.try_normalize()?;
+    let right = x.reject_from_normalized(direction).try_normalize()?;
+    let is_sound = size > 0.0 && aspect > 0.0;
+    let (across, down) = (
+        right * (half_height_m * aspect),
+        direction.cross(right) * half_height_m,
+    );
+    let area_m2 = across.cross(down).length();
+    (is_sound && area_m2 > 0.0 && area_m2.is_finite()).then_some((across, down))
+}

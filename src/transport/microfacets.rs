@@ -1,0 +1,196 @@
+//! Rough surfaces: light turns about a micro-normal, not about the normal (Walter et al., "Microfacet Models for
+//! Refraction through Rough Surfaces", EGSR 2007).
+//!
+//! Micro-normals are those of the GGX distribution that are visible to the incoming light, drawn by a point of the unit
+//! square. Where that point is held fixed the micro-normal is a smooth function of direction and place, so that a
+//! wavefront stays one; the mean over all points is the lobe.
+//!
+//! Each draw sends the whole of its share on: what a micro-facet would send into the surface is mirrored out of it. That
+//! stands for light that bounces between micro-facets, which the distribution alone would lose; the shadowing of what
+//! leaves is left out for the same reason, so that a surface that absorbs nothing sends on exactly what arrives.
+
+use glam::{DVec2, DVec3};
+
+use crate::optics::refraction;
+
+/// Specular events along a path that have a point of their own; later ones use the same again, moved.
+const POINTS: usize = 12;
+
+/// Which micro-normal rough surfaces show, event by event along a path.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Microfacets {
+    points: [DVec2; POINTS],
+}
+
+impl Microfacets {
+    /// By a function from the number of a pair to a point of the unit square.
+    pub fn new(mut point: impl FnMut(u32) -> DVec2) -> Self {
+        Self {
+            points: std::array::from_fn(|pair| point(pair as u32)),
+        }
+    }
+
+    /// The point of the unit square for the event after so many others.
+    pub fn at(&self, depth: u32) -> DVec2 {
+        let round = f64::from(depth / POINTS as u32);
+        let point = self.points[depth as usize % POINTS];
+        // The golden ratio's steps fill the square evenly, however many there are.
+        (point + DVec2::new(0.754_877_666_246_693, 0.569_840_290_998_053_1) * round).fract()
+    }
+}
+
+/// One micro-facet of a surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Facet {
+    /// GGX α: the square of glTF's roughness.
+    pub alpha: f64,
+    /// Which of them, as a point of the unit square.
+    pub point: DVec2,
+}
+
+/// What sends light on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Turn {
+    /// Back.
+    Reflected,
+    /// Through an interface of n_t/n_i.
+    Refracted {
+        /// n_t/n_i.
+        eta: f64,
+    },
+    /// Through a wall without thickness: the mirror image of what it sends back.
+    ThroughThinWall,
+}
+
+impl Facet {
+    /// Its unit normal, for light along the unit vector `incident` on a surface of unit normal `normal` (incident ·
+    /// normal < 0): a visible one (Dupuy and Benyoub, "Sampling Visible GGX Normals with Spherical Caps", 2023).
+    pub fn normal(&self, incident: DVec3, normal: DVec3) -> DVec3 {
+        let (x, y) = frame(normal);
+        let to_light = -incident;
+        let local = DVec3::new(to_light.dot(x), to_light.dot(y), to_light.dot(normal));
+        let stretched = DVec3::new(self.alpha * local.x, self.alpha * local.y, local.z).normalize();
+        let z = (1.0 - self.point.y) * (1.0 + stretched.z) - stretched.z;
+        let sine = (1.0 - z * z).clamp(0.0, 1.0).sqrt();
+        let (s, c) = (std::f64::consts::TAU * self.point.x).sin_cos();
+        let half = DVec3::new(sine * c, sine * s, z) + stretched;
+        let micro = DVec3::new(self.alpha * half.x, self.alpha * half.y, half.z.max(0.0)).normalize();
+        (x * micro.x + y * micro.y + normal * micro.z).normalize()
+    }
+
+    /// Where light goes on; `None` where a refraction is total.
+    pub fn turned(&self, incident: DVec3, normal: DVec3, turn: Turn) -> Option<DVec3> {
+        let micro = self.normal(incident, normal);
+        let (direction, side) = match turn {
+            Turn::Reflected => (refraction::reflect(incident, micro), 1.0),
+            Turn::Refracted { eta } => (refraction::refract(incident, micro, eta)?, -1.0),
+            Turn::ThroughThinWall => {
+                let back = out_of(refraction::reflect(incident, micro), normal, 1.0);
+                (mirrored(back, normal), -1.0)
+            }
+        };
+        Some(out_of(direction, normal, side))
+    }
+
+    /// Derivative of [`Self::turned`] by those of the incident direction and the normal, by central differences: smooth
+    /// functions in double precision are good to some 1e-10.
+    pub fn turned_derivative(
+        &self,
+        (incident, incident_change): (DVec3, DVec3),
+        (normal, normal_change): (DVec3, DVec3),
+        turn: Turn,
+    ) -> DVec3 {
+        let size = incident_change.length().max(normal_change.length());
+        // Also where it is not a number.
+        if !(size > 0.0 && size.is_finite()) {
+            return DVec3::ZERO;
+        }
+        let step = 1e-6 / size;
+        let at = |step: f64| {
+            let incident = (incident + incident_change * step).normalize();
+            let normal = (normal + normal_change * step).normalize();
+            self.turned(incident, normal, turn)
+        };
+        match (at(step), at(-step)) {
+            (Some(after), Some(before)) => (after - before) / (2.0 * step),
+            // At the very edge of total reflection.
+            _ => DVec3::ZERO,
+        }
+    }
+}
+
+/// The mirror image of a direction in the plane across a unit normal.
+fn mirrored(direction: DVec3, normal: DVec3) -> DVec3 {
+    direction - normal * (2.0 * direction.dot(normal))
+}
+
+/// A direction, or its mirror image, so that it leaves on one side of the plane across `normal`: 1 before, -1 behind.
+pub fn out_of(direction: DVec3, normal: DVec3, side: f64) -> DVec3 {
+    if direction.dot(normal) * side >= 0.0 {
+        direction
+    } else {
+        mirrored(direction, normal)
+    }
+}
+
+/// The direction in which [`frame`] has to break, as every field of tangents on a sphere does: none that surfaces are
+/// usually built along.
+const POLE: DVec3 = DVec3::new(
+    -0.362_357_181_989_727_66,
+    -0.815_303_659_476_887_2,
+    0.451_638_368_060_176_6,
+);
+
+/// Two unit tangents of a unit normal, smooth everywhere but at [`POLE`] (Frisvad 2012, turned so that the pole is there).
+fn frame(normal: DVec3) -> (DVec3, DVec3) {
+    // The turn about POLE × normal that takes −POLE to the normal takes two fixed tangents along.
+    let (x, y) = POLE_TANGENTS;
+    let divisor = 1.0 - POLE.dot(normal);
+    if divisor <= 1e-12 {
+        return (x, -y);
+    }
+    let turned = |tangent: DVec3| tangent + (POLE - normal) * (tangent.dot(normal) / divisor);
+    (turned(x), turned(y))
+}
+
+/// Unit, perpendicular to [`POLE`] and to each other.
+const POLE_TANGENTS: (DVec3, DVec3) = (
+    DVec3::new(-0.913_811_548_620_257_3, 0.406_138_466_053_447_7, 0.0),
+    DVec3::new(
+        -0.183_427_714_014_842_5,
+        -0.412_712_356_533_395_66,
+        -0.892_201_089_719_096_3,
+    ),
+);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frames_are_orthonormal_and_smooth() {
+        let mut worst: f64 = 0.0;
+        for index in 0..2000 {
+            let square = crate::geometry::sampling::even_point(index, 0, 1);
+            let z = 1.0 - 2.0 * square.x;
+            let (s, c) = (std::f64::consts::TAU * square.y).sin_cos();
+            let normal = DVec3::new((1.0 - z * z).sqrt() * c, (1.0 - z * z).sqrt() * s, z);
+            let (x, y) = frame(normal);
+            for product in [
+                x.dot(y),
+                x.dot(normal),
+                y.dot(normal),
+                x.length() - 1.0,
+                y.length() - 1.0,
+            ] {
+                worst = worst.max(product.abs());
+            }
+            // No jump: neighbours' frames are near each other, but near the pole.
+            if normal.dot(POLE) < 0.9 {
+                let next = (normal + DVec3::new(1e-4, -2e-4, 1.5e-4)).normalize();
+                assert!(frame(next).0.distance(x) < 1e-2, "{normal}");
+            }
+        }
+        assert!(worst < 1e-12, "{worst}");
+    }
+}
