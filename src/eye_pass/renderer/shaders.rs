@@ -20,6 +20,7 @@ pub(super) const SURFACE: Program = Program {
         shader_source!("eye_pass/frame"),
         shader_source!("eye_pass/objects"),
         shader_source!("eye_pass/images"),
+        shader_source!("eye_pass/bumps"),
         shader_source!("eye_pass/place"),
         shader_source!("eye_pass/surface"),
         shader_source!("eye_pass/own"),
@@ -36,6 +37,7 @@ pub(super) const TRACED: Program = Program {
         shader_source!("eye_pass/frame"),
         shader_source!("eye_pass/objects"),
         shader_source!("eye_pass/images"),
+        shader_source!("eye_pass/bumps"),
         shader_source!("eye_pass/place"),
         shader_source!("eye_pass/start"),
         shader_source!("eye_pass/lights"),
@@ -57,6 +59,7 @@ pub(super) const UNDER_LIGHTS: Program = Program {
         shader_source!("eye_pass/frame"),
         shader_source!("eye_pass/objects"),
         shader_source!("eye_pass/images"),
+        shader_source!("eye_pass/bumps"),
         shader_source!("eye_pass/place"),
         shader_source!("eye_pass/start"),
         shader_source!("eye_pass/lights"),
@@ -171,11 +174,12 @@ pub fn specialisations() -> Vec<Specialisation> {
             continue;
         };
         for kind in KINDS {
-            for flags in 0..4 {
+            for flags in 0..8 {
                 let manner = DrawnHow {
                     has_texture: flags & 1 > 0,
                     is_scaled: flags & 1 > 0,
                     traces_lights: flags & 2 > 0,
+                    has_bumps: flags & 4 > 0,
                 };
                 let key = PipelineKey::new(writes, kind, Faces::Both, manner);
                 all.push(Specialisation {
