@@ -56,5 +56,7 @@ mod reflections;
 mod scenes;
 #[path = "gpu/shaders.rs"]
 mod shaders;
+#[path = "gpu/skies.rs"]
+mod skies;
 #[path = "gpu/uploads.rs"]
 mod uploads;

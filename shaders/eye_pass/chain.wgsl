@@ -143,7 +143,7 @@ fn chain_radiance(first: Gaze) -> vec3f {
         loop {
             let seen = nearest(walk.gaze);
             if seen.hit.triangle == NO_TRIANGLE {
-                walk.radiance += walk.gaze.weight * frame.background;
+                walk.radiance += walk.gaze.weight * background(walk.gaze.direction);
                 break;
             }
             point = surface_point(seen.hit);

@@ -8,7 +8,7 @@ struct LightRecord {
     // W/sr per channel, or W/m² for suns.
     strength: vec3f,
     cos_inner: f32,
-    // Of a spot, away from the lamp.
+    // Of a spot or of what glows, away from the lamp.
     axis: vec3f,
     cos_outer: f32,
 }
@@ -16,6 +16,10 @@ struct LightRecord {
 const LIGHT_POINT: u32 = 0u;
 const LIGHT_SPOT: u32 = 1u;
 const LIGHT_SUN: u32 = 2u;
+// A piece of a surface that glows: by the cosine, on one side.
+const LIGHT_FACET: u32 = 3u;
+// Share of its way that a shadow ray stops before such a piece, so as not to meet the surface itself.
+const BEFORE_FACET: f32 = 1e-4;
 
 @group(1) @binding(6) var<storage, read> lights: array<LightRecord>;
 
@@ -28,8 +32,11 @@ struct LitPoint {
     shading_normal: vec3f,
 }
 
-// Share of its strength that a spot sends along a direction (KHR_lights_punctual); 1 for the others.
+// Share of its strength that a spot sends along a direction (KHR_lights_punctual), or a surface; 1 for the others.
 fn falloff(light: LightRecord, direction: vec3f) -> f32 {
+    if light.kind == LIGHT_FACET {
+        return max(dot(light.axis, direction), 0.0);
+    }
     if light.kind != LIGHT_SPOT {
         return 1.0;
     }
@@ -56,6 +63,9 @@ fn direct_irradiance(point: LitPoint, object: ObjectRecord) -> vec3f {
             to_light = offset / max(distance, 1e-20);
             let distance_m = distance * start.unit_m;
             across_beam = falloff(light, -to_light) / max(distance_m * distance_m, 1e-20);
+            if light.kind == LIGHT_FACET {
+                distance *= 1.0 - BEFORE_FACET;
+            }
         }
         let is_front = dot(to_light, point.geometric_normal) >= 0.0;
         let side = select(-1.0, 1.0, is_front);

@@ -39,7 +39,7 @@ pub struct View {
     pub exposure_stops: f64,
     /// After the exposure.
     pub tone_map: ToneMap,
-    /// Radiance seen where nothing is hit [W/(m² sr)].
+    /// Radiance seen where nothing is hit [W/(m² sr)], in scenes without an environment.
     pub background: LinearSrgb,
 }
 

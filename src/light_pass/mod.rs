@@ -3,10 +3,11 @@
 pub mod accuracy;
 pub mod caustic;
 pub mod direct;
-pub mod emitter;
 pub mod item_buffer;
 pub mod launch;
 pub mod ledger;
 pub mod ledger_sum;
 pub mod receiver_maps;
 pub mod wavefront;
+
+pub use crate::scene::emitter;

@@ -106,6 +106,22 @@ impl Environment {
         self.pixel(index(u, self.width), index(v, self.height))
     }
 
+    /// Radiance that is seen in a unit direction [W/(m² sr)]: bilinear between the middles of pixels, around the image,
+    /// not over its poles. `sky.wgsl` does the same.
+    pub fn smooth_radiance(&self, direction: DVec3) -> LinearSrgb {
+        let size = DVec2::new(self.width as f64, self.height as f64);
+        let place = coordinates(direction) * size - 0.5;
+        let low = place.floor();
+        let share = place - low;
+        let row = |row: f64| row.clamp(0.0, size.y - 1.0) as usize;
+        let column = |column: f64| (column.rem_euclid(size.x) as usize).min(self.width - 1);
+        let along = |row: usize| {
+            let [left, right] = [low.x, low.x + 1.0].map(|x| self.pixel(column(x), row));
+            left * (1.0 - share.x) + right * share.x
+        };
+        along(row(low.y)) * (1.0 - share.y) + along(row(low.y + 1.0)) * share.y
+    }
+
     /// The direction of a point of the unit square: as many in any region as it sends light. `None` where all is black.
     pub fn sample(&self, square: DVec2) -> Option<EnvironmentSample> {
         if self.total <= 0.0 {

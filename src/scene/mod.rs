@@ -5,6 +5,7 @@ pub mod builtin;
 pub mod camera;
 pub mod camera_path;
 pub mod edit;
+pub mod emitter;
 pub mod environment;
 mod gltf;
 pub mod light;
@@ -30,6 +31,7 @@ pub use texture::{Texture, TextureRef};
 pub use waves::{Wave, Waves};
 
 use crate::error::Warning;
+use crate::optics::LinearSrgb;
 
 /// One mesh primitive of one node: the unit that has a material and, when light reaches it, an illumination map.
 #[derive(Clone, Debug)]
@@ -75,6 +77,25 @@ impl Scene {
     /// The material of an object.
     pub fn material_of(&self, object: usize) -> &Material {
         &self.materials[self.objects[object].material]
+    }
+
+    /// What an object's surface sends by itself [W/(m² sr)]: that of its light, where it has one, as edited.
+    pub fn emitted_radiance(&self, object: usize) -> LinearSrgb {
+        let is_of_it =
+            |light: &&Light| matches!(light.kind, LightKind::Surface { object: of, .. } if of == object);
+        match self.lights.iter().find(is_of_it) {
+            Some(light) => light.strength(),
+            None => self.material_of(object).emitted_radiance,
+        }
+    }
+
+    /// What is seen where nothing stands in the way, and what its radiance is multiplied by: the environment as its
+    /// light is edited; `None` without one.
+    pub fn sky(&self) -> Option<(&Arc<Environment>, LinearSrgb)> {
+        let environment = self.environment.as_ref()?;
+        let mut lights = self.lights.iter();
+        let light = lights.find(|light| matches!(light.kind, LightKind::Environment { .. }));
+        Some((environment, light.map_or(LinearSrgb::WHITE, Light::strength)))
     }
 
     /// Smallest box around all surfaces, as minimum and maximum corner [m]; `None` without surfaces.

@@ -8,10 +8,10 @@ use nephroid::eye_pass::{Picture, ToneMap, View};
 use nephroid::gpu::Gpu;
 use nephroid::optics::LinearSrgb;
 use nephroid::scene::builtin::{parts, shapes};
-use nephroid::scene::{Camera, Light, LightKind, Scene};
+use nephroid::scene::{Camera, Light, LightKind, PanelShape, Scene};
 use nephroid::session::BakeSession;
 use nephroid::settings::{BakeSettings, LayerKind, MapResolution};
-use nephroid::units::{Irradiance, RadiantIntensity};
+use nephroid::units::{Irradiance, Radiance, RadiantIntensity};
 
 use crate::device::gpu;
 use crate::scenes::{diffuse, floor_scene};
@@ -158,6 +158,58 @@ fn shadow_rays_show_what_the_baked_layer_shows() {
         assert!(unlike(&expected, &after) > 0.1);
         assert!(unlike(&by_layer(&gpu, &moved), &after) < 0.02);
     }
+    assert_eq!(gpu.take_error(), None);
+}
+
+/// While hands move, a lamp with a surface is its middle: so small a one is nothing else.
+#[test]
+fn small_panels_and_glowing_surfaces_are_traced_as_their_middles() {
+    let Some(gpu) = gpu() else { return };
+    let half_m = 1e-3;
+    let centre = DVec3::new(0.3, 0.8, 0.6);
+    let radiance = Radiance(0.5 / (4.0 * half_m * half_m));
+    let panel = lamp(
+        LinearSrgb::new(1.0, 0.6, 0.2),
+        LightKind::Panel {
+            centre,
+            across: DVec3::X * half_m,
+            down: DVec3::Z * -half_m,
+            shape: PanelShape::Rectangle,
+            radiance,
+        },
+    );
+    // It shines up, on nothing; turned, down.
+    let mut up = scene(vec![panel.clone()]);
+    assert_eq!(
+        traced(&gpu, &mut renderer(&gpu, &up))
+            .radiance
+            .iter()
+            .flatten()
+            .sum::<f32>(),
+        0.0
+    );
+    let LightKind::Panel { down, .. } = &mut up.lights[0].kind else {
+        panic!("it is a panel");
+    };
+    *down = -*down;
+    let below = up;
+    let (found, expected) = (traced(&gpu, &mut renderer(&gpu, &below)), by_layer(&gpu, &below));
+    assert!(unlike(&expected, &found) < 0.02, "{}", unlike(&expected, &found));
+    // The same lamp as a surface that glows.
+    let mut glowing = scene(Vec::new());
+    let patch = shapes::floor([-half_m, half_m], [-half_m, half_m], 0.0);
+    let mut material = parts::matte("lamp", LinearSrgb::BLACK);
+    material.double_sided = false;
+    parts::add(&mut glowing, "lamp", patch, material);
+    let mesh = Arc::make_mut(&mut glowing.objects[4].mesh);
+    mesh.positions
+        .iter_mut()
+        .for_each(|corner| *corner = centre + *corner);
+    mesh.triangles.iter_mut().for_each(|corners| corners.swap(1, 2));
+    mesh.normals.iter_mut().for_each(|normal| *normal = -*normal);
+    glowing.lights = vec![lamp(panel.colour, LightKind::Surface { object: 4, radiance })];
+    let found = traced(&gpu, &mut renderer(&gpu, &glowing));
+    assert!(unlike(&expected, &found) < 0.02, "{}", unlike(&expected, &found));
     assert_eq!(gpu.take_error(), None);
 }
 

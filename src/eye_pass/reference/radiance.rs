@@ -1,5 +1,7 @@
 //! Radiance along a ray: DS*E chains followed from the eye.
 
+use glam::DVec3;
+
 use crate::effect::EffectSwitch;
 use crate::geometry::Ray;
 use crate::illumination::lookup::bilinear;
@@ -58,6 +60,8 @@ pub struct LitScene<'a> {
     tracer: &'a Tracer,
     /// By object.
     maps: Vec<Option<MapTotal<'a>>>,
+    /// Emission of each object [W/(m² sr)].
+    emitted: Vec<LinearSrgb>,
     background: LinearSrgb,
     limits: ChainLimits,
 }
@@ -79,7 +83,7 @@ struct Gaze {
 }
 
 impl<'a> LitScene<'a> {
-    /// A scene lit by maps, before a background radiance [W/(m² sr)].
+    /// A scene lit by maps, before its environment or else a background radiance [W/(m² sr)].
     pub fn new(
         tracer: &'a Tracer,
         maps: &'a [IlluminationMap],
@@ -93,9 +97,11 @@ impl<'a> LitScene<'a> {
                 irradiance: map.total(),
             });
         }
+        let emitted = (0..tracer.scene().objects.len()).map(|object| tracer.scene().emitted_radiance(object));
         Self {
             tracer,
             maps: by_object,
+            emitted: emitted.collect(),
             background,
             limits,
         }
@@ -119,7 +125,7 @@ impl<'a> LitScene<'a> {
         }];
         while let Some(mut gaze) = waiting.pop() {
             let Some((hit, distance_m)) = nearest::<CHAINS>(self.tracer, gaze.ray) else {
-                seen += gaze.weight * self.background;
+                seen += gaze.weight * self.beyond(gaze.ray.direction);
                 continue;
             };
             if CHAINS {
@@ -148,9 +154,17 @@ impl<'a> LitScene<'a> {
         seen
     }
 
+    /// What is seen where nothing stands in the way [W/(m² sr)].
+    fn beyond(&self, direction: DVec3) -> LinearSrgb {
+        match self.tracer.scene().sky() {
+            Some((sky, strength)) => strength * sky.smooth_radiance(direction),
+            None => self.background,
+        }
+    }
+
     /// What a surface sends by itself: emission, and the share of its map that its polish lets out, L = ρE/π.
     fn own_radiance(&self, hit: &SurfaceHit, share: LinearSrgb) -> LinearSrgb {
-        let emitted = self.tracer.scene().material_of(hit.object).emitted_radiance;
+        let emitted = self.emitted[hit.object];
         let Some(map) = self.maps[hit.object]
             .as_ref()
             .filter(|_| share != LinearSrgb::BLACK)

@@ -15,7 +15,8 @@ use crate::eye_pass::View;
 use crate::eye_pass::reference::{ChainLimits, media_at};
 use crate::geometry::PackedBvh;
 use crate::gpu::Gpu;
-use crate::scene::{Light, LightKind, Scene};
+use crate::scene::Scene;
+use crate::scene::emitter::{Emitter, EmitterKind};
 use crate::transport::{MediumStack, Tracer};
 
 /// Nodes that may wait while a ray is traced; `STACK` in the shader.
@@ -38,6 +39,7 @@ pub(super) struct ChainScene {
     nodes: Storage,
     triangles: Storage,
     lights: Storage,
+    light_count: u32,
     bytes: u64,
 }
 
@@ -87,6 +89,7 @@ impl ChainScene {
             nodes: Storage::new(gpu, "nodes"),
             triangles: Storage::new(gpu, "triangles"),
             lights: Storage::new(gpu, "lights"),
+            light_count: 0,
             bytes: 0,
         };
         made.bytes = (made.nodes.write(gpu, &nodes) + made.triangles.write(gpu, &records)) as u64;
@@ -139,51 +142,58 @@ impl ChainScene {
         Some(bind_group(gpu, "chains", layout, resources))
     }
 
-    /// Takes over the lamps of a scene.
-    pub(super) fn set_lights(&mut self, gpu: &Gpu, lights: &[Light]) {
-        let records: Vec<LightRecord> = lights.iter().map(|light| self.record(light)).collect();
+    /// Takes over the lamps of a scene, each as its middle; an environment has none.
+    pub(super) fn set_lights(&mut self, gpu: &Gpu, scene: &Scene) {
+        let middles = scene
+            .lights
+            .iter()
+            .filter_map(|light| Emitter::middle(light, scene));
+        let records: Vec<LightRecord> = middles.map(|middle| self.record(&middle)).collect();
+        self.light_count = records.len() as u32;
         self.lights.write(gpu, &records);
     }
 
-    fn record(&self, light: &Light) -> LightRecord {
-        let strength = rgb(light.strength());
+    fn record(&self, emitter: &Emitter) -> LightRecord {
         let single = |direction: DVec3| direction.as_vec3().to_array();
-        match light.kind {
-            LightKind::Point { position, .. } => LightRecord {
+        let record = LightRecord {
+            strength: rgb(emitter.strength),
+            ..Default::default()
+        };
+        match emitter.kind {
+            EmitterKind::Point { position } => LightRecord {
                 place: self.local(position),
                 kind: 0,
-                strength,
-                ..Default::default()
+                ..record
             },
-            LightKind::Spot {
+            EmitterKind::Spot {
                 position,
                 direction,
                 inner_cone_rad,
                 outer_cone_rad,
-                ..
             } => LightRecord {
                 place: self.local(position),
                 kind: 1,
-                strength,
                 cos_inner: inner_cone_rad.cos() as f32,
                 axis: single(direction),
                 cos_outer: outer_cone_rad.cos() as f32,
+                ..record
             },
-            LightKind::Sun { direction, .. } => LightRecord {
+            EmitterKind::Parallel { direction } => LightRecord {
                 place: single(direction),
                 kind: 2,
-                strength,
-                ..Default::default()
+                ..record
             },
-            // Its light comes with the maps.
-            LightKind::Panel { .. } | LightKind::Surface { .. } | LightKind::Environment { .. } => {
-                LightRecord::default()
-            }
+            EmitterKind::Facet { position, normal } => LightRecord {
+                place: self.local(position),
+                kind: 3,
+                axis: single(normal),
+                ..record
+            },
         }
     }
 
-    /// Where the chains of a view begin.
-    pub(super) fn start(&self, view: &View, limits: &ChainLimits, light_count: usize) -> ChainStart {
+    /// Where the chains of a view begin; `traces_lights`: whether light straight from the lamps is traced.
+    pub(super) fn start(&self, view: &View, limits: &ChainLimits, traces_lights: bool) -> ChainStart {
         let eye = view.camera.position;
         ChainStart {
             eye: self.local(eye),
@@ -193,7 +203,7 @@ impl ChainScene {
             branch_threshold: limits.branch_threshold as f32,
             max_depth: limits.max_depth,
             branching_depth: limits.branching_depth.min(MOST_BRANCHING),
-            light_count: light_count as u32,
+            light_count: if traces_lights { self.light_count } else { 0 },
             ..Default::default()
         }
     }

@@ -11,6 +11,8 @@ pub struct EyeCounts {
     pub specular_pipelines: u64,
     /// What chains are traced through: the hierarchy with its triangles [bytes].
     pub chain_bytes: u64,
+    /// The environment on the device [bytes].
+    pub sky_bytes: u64,
     /// Illumination maps on the device [bytes].
     pub map_bytes: u64,
     /// Maps of which the device does not hold the finest level, for want of memory.

@@ -27,6 +27,8 @@ pub(super) struct Manner {
     pub(super) is_scaled: bool,
     /// Whether light straight from the lamps is traced.
     pub(super) traces_lights: bool,
+    /// Whether an environment is seen.
+    pub(super) has_sky: bool,
 }
 
 impl Manner {
@@ -72,6 +74,7 @@ impl Manner {
                 Writes::Traced => self.has_bumps,
                 _ => look.has_bumps,
             },
+            has_sky: self.has_sky,
         };
         PipelineKey::new(writes, look.surface, faces, how)
     }

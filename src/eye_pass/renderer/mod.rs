@@ -29,6 +29,7 @@ mod pipelines;
 mod probe;
 mod quality;
 mod shaders;
+mod sky;
 mod storage;
 mod targets;
 mod textures;
@@ -53,6 +54,7 @@ use self::maps::ShownMap;
 use self::objects::Objects;
 use self::pipelines::SurfacePipelines;
 use self::quality::Sample;
+use self::sky::Sky;
 use self::targets::{Targets, TracedTargets};
 use self::timing::Timing;
 use self::tone_mapping::ToneMappingPipelines;
@@ -93,6 +95,8 @@ pub struct Renderer {
     chain_scene_is_stale: bool,
     /// Why there are no chains though they were called for.
     refusal: Option<Error>,
+    /// The environment of the scene.
+    sky: Option<Sky>,
     targets: Option<Targets>,
     traced: Option<TracedTargets>,
     mean: Option<Mean>,
@@ -144,6 +148,7 @@ impl Renderer {
             chain_scene: None,
             chain_scene_is_stale: false,
             refusal: None,
+            sky: None,
             targets: None,
             traced: None,
             mean: None,
@@ -266,6 +271,7 @@ impl Renderer {
         EyeCounts {
             pipelines: (self.surfaces.count() + self.tone_mapping.count()) as u64,
             specular_pipelines: self.surfaces.specular_count() as u64,
+            sky_bytes: self.sky.as_ref().map_or(0, Sky::bytes),
             chain_bytes: self.chain_scene.as_ref().map_or(0, ChainScene::bytes),
             map_bytes: self.objects.images.map_bytes(),
             coarse_maps: self.objects.images.coarse_maps(),
@@ -363,6 +369,11 @@ impl Renderer {
         Ok(())
     }
 
+    /// Whether an environment is seen where nothing stands in the way.
+    fn shows_sky(&self) -> bool {
+        self.map_style == MapStyle::Lit && self.scene.environment.is_some()
+    }
+
     /// How objects are drawn now.
     fn manner(&self) -> Manner {
         Manner {
@@ -372,6 +383,7 @@ impl Renderer {
             is_scaled: self.quality.traced_scale != 1.0,
             has_tinted_glass: self.objects.has_tinted_glass(),
             has_bumps: self.objects.has_bumps(),
+            has_sky: self.shows_sky(),
         }
     }
 }

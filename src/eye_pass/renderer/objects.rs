@@ -10,7 +10,7 @@ use super::uniforms::{ObjectRecord, rgb};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::illumination::{Chart, IlluminationMap};
-use crate::scene::{Material, Mesh, Object, Scene, SurfaceKind};
+use crate::scene::{Material, Mesh, Scene, SurfaceKind};
 
 /// What an object looks like but for its map.
 #[derive(Clone, Debug, PartialEq)]
@@ -56,9 +56,7 @@ impl Objects {
     pub(super) fn set_scene(&mut self, gpu: &Gpu, scene: &Scene) -> Uploaded {
         let mut uploaded = self.images.set_scene(gpu, scene);
         self.texels_per_m.resize(scene.objects.len(), None);
-        self.list = scene
-            .objects
-            .iter()
+        self.list = (0..scene.objects.len())
             .map(|object| Look::of(scene, object))
             .collect();
         uploaded += self.write_records(gpu);
@@ -147,7 +145,8 @@ impl Objects {
 }
 
 impl Look {
-    fn of(scene: &Scene, object: &Object) -> Self {
+    fn of(scene: &Scene, index: usize) -> Self {
+        let object = &scene.objects[index];
         let material = &scene.materials[object.material];
         Self {
             surface: material.surface,
@@ -157,7 +156,7 @@ impl Look {
             record: ObjectRecord {
                 base_colour: rgb(material.base_colour),
                 ior: material.ior as f32,
-                emitted_radiance: rgb(material.emitted_radiance),
+                emitted_radiance: rgb(scene.emitted_radiance(index)),
                 surface: surface_code(material.surface),
                 absorption_per_m: absorption_per_m(material),
                 double_sided: u32::from(material.double_sided),

@@ -16,6 +16,10 @@ use crate::scene::Scene;
 /// multiply it by the square of its refractive index.
 const LARGEST_SCALED: f64 = 4096.0;
 
+/// How much brighter than surfaces an environment may be before it is cut: eleven binary digits of half floats are left
+/// for what sends a thousandth of the brightest surface.
+const LARGEST_OVER_SURFACES: f64 = 1024.0;
+
 /// From here on a mean may hold something that a picture cut.
 const CUT_SCALED: f64 = 500.0;
 /// Places across and down a pixel of a picture that is drawn anew to be kept.
@@ -37,6 +41,7 @@ impl Renderer {
     /// Those of [`radiance`](Self::radiance).
     pub fn radiance_sampled(&mut self, gpu: &Gpu, view: &View, samples_per_side: u32) -> Result<Picture> {
         let side = samples_per_side.max(1);
+        self.make_sky(gpu);
         let scale = self.scale(view);
         for index in 0..side * side {
             let mut encoder = gpu
@@ -97,12 +102,27 @@ impl Renderer {
 
     /// By which radiance fits half floats.
     fn scale(&self, view: &View) -> f64 {
-        let peak = self.objects.peak_radiance.max(view.background.max_channel());
+        let peak = self.objects.peak_radiance.max(self.peak_behind(view));
         // A power of two changes no digit.
         if peak > 0.0 {
             (LARGEST_SCALED / peak).log2().floor().exp2()
         } else {
             1.0
+        }
+    }
+
+    /// Largest radiance that is seen behind surfaces [W/(m² sr)]. A sun in an environment may be cut: a scale that holds
+    /// it must leave what else is seen its digits.
+    fn peak_behind(&self, view: &View) -> f64 {
+        match (self.scene.sky(), self.seen_sky()) {
+            (Some((_, strength)), Some(sky)) => {
+                let peak = sky.peak() * strength.max_channel();
+                match self.objects.peak_radiance {
+                    0.0 => peak,
+                    of_surfaces => peak.min(of_surfaces * LARGEST_OVER_SURFACES),
+                }
+            }
+            _ => view.background.max_channel(),
         }
     }
 

@@ -8,6 +8,7 @@ use super::chains::ChainScene;
 use super::draws::{Draw, DrawList, Manner, visible_objects};
 use super::pipelines::Writes;
 use super::quality::{EyeQuality, Sample};
+use super::sky::Sky;
 use super::targets::{Targets, TracedTargets};
 use super::timing::Timing;
 use super::uniforms::{Frame, rgb};
@@ -17,6 +18,7 @@ use crate::error::Result;
 use crate::eye_pass::View;
 use crate::eye_pass::reference::ChainLimits;
 use crate::gpu::Gpu;
+use crate::optics::LinearSrgb;
 
 /// Largest value of scaled radiance of a background: half floats end at 65504.
 const LARGEST_SCALED: f64 = 32768.0;
@@ -64,6 +66,9 @@ impl Renderer {
         let marks = self.timing.as_ref().map(Timing::around_surfaces);
         let mut pass = targets.begin_pass(encoder, background.to_array(), marks);
         pass.set_bind_group(0, &frame, &[]);
+        if let Some(sky) = self.seen_sky() {
+            sky.draw(&mut pass);
+        }
         if let Some(composed) = self.bind_composed(gpu, &list) {
             pass.set_bind_group(1, &composed, &[]);
         }
@@ -89,12 +94,7 @@ impl Renderer {
             branching_depth: quality.branching_depth,
             ..ChainLimits::default()
         };
-        let light_count = if self.traces_lights {
-            self.scene.lights.len()
-        } else {
-            0
-        };
-        let start = scene.start(view, &limits, light_count);
+        let start = scene.start(view, &limits, self.traces_lights);
         scene.bind(gpu, layout, &self.geometry, &start)
     }
 
@@ -117,6 +117,9 @@ impl Renderer {
         let mut pass = targets.begin_chains(encoder, timing.map(Timing::after_chains));
         pass.set_bind_group(0, frame, &[]);
         pass.set_bind_group(1, chains, &[]);
+        if let Some(sky) = self.seen_sky() {
+            pass.set_bind_group(2, sky.bound(), &[]);
+        }
         self.draw_each(&mut pass, &list.traced);
     }
 
@@ -136,6 +139,7 @@ impl Renderer {
         if self.chains == EffectSwitch::On {
             self.make_everything(gpu);
         }
+        self.make_sky(gpu);
         let visible = visible_objects(&self.objects, view);
         let pixel_rad = view.camera.vertical_fov_rad / f64::from(view.height);
         self.objects
@@ -146,7 +150,7 @@ impl Renderer {
             self.make_chain_scene(gpu);
         }
         if let Some(scene) = self.chain_scene.as_mut().filter(|_| manner.traces_lights) {
-            scene.set_lights(gpu, &self.scene.lights);
+            scene.set_lights(gpu, &self.scene);
         }
         // What chains are traced through may have been refused.
         let list = DrawList::new(&self.objects, &visible, self.manner());
@@ -154,6 +158,38 @@ impl Renderer {
             self.surfaces.make(gpu, draw.key);
         }
         list
+    }
+
+    /// Uploads the environment where one is seen and was not uploaded.
+    pub(super) fn make_sky(&mut self, gpu: &Gpu) {
+        match &self.scene.environment {
+            Some(source) if self.shows_sky() => {
+                if !self.sky.as_ref().is_some_and(|sky| sky.is_of(source)) {
+                    self.sky = Some(Sky::new(
+                        gpu,
+                        source,
+                        &self.surfaces.frame_layout,
+                        self.sample_count,
+                    ));
+                }
+            }
+            Some(_) => {}
+            None => self.sky = None,
+        }
+    }
+
+    /// The environment, where it is seen.
+    pub(super) fn seen_sky(&self) -> Option<&Sky> {
+        self.sky.as_ref().filter(|_| self.shows_sky())
+    }
+
+    /// What is seen where nothing stands in the way: a radiance [W/(m² sr)], or what that of the environment is
+    /// multiplied by.
+    fn background(&self, view: &View) -> LinearSrgb {
+        match self.scene.sky() {
+            Some((_, strength)) if self.shows_sky() => strength,
+            _ => view.background,
+        }
     }
 
     /// Makes what any view could call for, with maps as light.
@@ -217,7 +253,7 @@ impl Renderer {
             clip_from_camera: camera::clip_from_camera(view),
             camera_position: camera::single(camera.position),
             radiance_scale: radiance_scale as f32,
-            background: rgb(view.background),
+            background: rgb(self.background(view)),
             level_bias: level_bias as f32,
             forward: camera::single(camera.forward),
             traced_width: traced[0] as f32,

@@ -5,7 +5,8 @@ use std::collections::HashMap;
 use super::bindings::{bind_group_layout, pipeline_layout, storage, texture, uniform};
 use super::geometry::{CORNER_LAYOUT, MAP_UV_LAYOUT};
 use super::objects::surface_code;
-use super::shaders::{COMPOSED, SURFACE, TRACED, UNDER_LIGHTS};
+use super::shaders::{COMPOSED, SURFACE, TRACED, TRACED_UNDER_SKY, UNDER_LIGHTS};
+use super::sky;
 use crate::gpu::Gpu;
 use crate::gpu::shader::Program;
 use crate::scene::SurfaceKind;
@@ -54,16 +55,6 @@ impl Writes {
         }
     }
 
-    /// The shader module it is part of.
-    pub(super) fn program(self) -> Program {
-        match self {
-            Self::Own | Self::MapValue | Self::Depth => SURFACE,
-            Self::OwnUnderLights => UNDER_LIGHTS,
-            Self::Traced => TRACED,
-            Self::Composed => COMPOSED,
-        }
-    }
-
     /// Whether it is part of a chain from the eye over specular surfaces.
     pub(super) fn is_specular(self) -> bool {
         matches!(self, Self::Depth | Self::Traced | Self::Composed)
@@ -108,6 +99,8 @@ pub(super) struct DrawnHow {
     pub(super) traces_lights: bool,
     /// Whether the surface's normals are bent; for chains, whether those of anything in the scene are.
     pub(super) has_bumps: bool,
+    /// Whether chains that leave the scene end in an environment.
+    pub(super) has_sky: bool,
 }
 
 impl PipelineKey {
@@ -138,7 +131,19 @@ impl PipelineKey {
                 traces_lights: how.traces_lights && writes == Writes::Traced,
                 has_bumps: how.has_bumps
                     && (writes == Writes::Traced || (shows_itself && surface == SurfaceKind::Mixed)),
+                has_sky: how.has_sky && writes == Writes::Traced,
             },
+        }
+    }
+
+    /// The shader module it is part of.
+    pub(super) fn program(self) -> Program {
+        match self.writes {
+            Writes::Own | Writes::MapValue | Writes::Depth => SURFACE,
+            Writes::OwnUnderLights => UNDER_LIGHTS,
+            Writes::Traced if self.how.has_sky => TRACED_UNDER_SKY,
+            Writes::Traced => TRACED,
+            Writes::Composed => COMPOSED,
         }
     }
 
@@ -201,7 +206,7 @@ impl SurfacePipelines {
     /// Makes a pipeline unless it is there.
     pub(super) fn make(&mut self, gpu: &Gpu, key: PipelineKey) {
         if !self.made.contains_key(&key) {
-            let program = key.writes.program();
+            let program = key.program();
             self.modules
                 .entry(program.name)
                 .or_insert_with(|| program.module(&gpu.device));
@@ -252,19 +257,23 @@ impl SurfacePipelines {
             .get_or_insert_with(|| bind_group_layout(gpu, "chains", &chains));
     }
 
-    fn layout(&self, gpu: &Gpu, writes: Writes) -> wgpu::PipelineLayout {
-        let second = match writes {
+    fn layout(&self, gpu: &Gpu, key: PipelineKey) -> wgpu::PipelineLayout {
+        let second = match key.writes {
             Writes::Own | Writes::MapValue | Writes::Depth => None,
             Writes::OwnUnderLights | Writes::Traced => self.traced_layout.as_ref(),
             Writes::Composed => Some(&self.composed_layout),
         };
-        let groups: Vec<_> = std::iter::once(&self.frame_layout).chain(second).collect();
+        let third = key.how.has_sky.then(|| sky::layout(gpu));
+        let groups: Vec<_> = std::iter::once(&self.frame_layout)
+            .chain(second)
+            .chain(&third)
+            .collect();
         pipeline_layout(gpu, &groups)
     }
 
     fn pipeline(&self, gpu: &Gpu, key: PipelineKey) -> wgpu::RenderPipeline {
         let writes = key.writes;
-        let module = &self.modules[writes.program().name];
+        let module = &self.modules[key.program().name];
         let constants = key.constants();
         let target = [Some(wgpu::ColorTargetState::from(HDR_FORMAT))];
         let fragment = writes.entry_point().map(|entry_point| wgpu::FragmentState {
@@ -285,7 +294,7 @@ impl SurfacePipelines {
         gpu.device
             .create_render_pipeline(&wgpu::RenderPipelineDescriptor {
                 label: Some(writes.entry_point().unwrap_or("depth")),
-                layout: Some(&self.layout(gpu, writes)),
+                layout: Some(&self.layout(gpu, key)),
                 vertex: wgpu::VertexState {
                     module,
                     entry_point: Some("place"),

@@ -44,8 +44,41 @@ pub(super) const TRACED: Program = Program {
         shader_source!("eye_pass/corners"),
         shader_source!("eye_pass/medium"),
         shader_source!("eye_pass/interaction"),
+        shader_source!("eye_pass/plain_background"),
         shader_source!("eye_pass/chain"),
         shader_source!("eye_pass/traced"),
+    ],
+};
+
+/// The same in an environment.
+pub(super) const TRACED_UNDER_SKY: Program = Program {
+    name: "traced_under_sky",
+    sources: &[
+        shader_source!("shared/refraction"),
+        shader_source!("shared/fresnel"),
+        shader_source!("shared/traversal"),
+        shader_source!("eye_pass/frame"),
+        shader_source!("eye_pass/objects"),
+        shader_source!("eye_pass/images"),
+        shader_source!("eye_pass/place"),
+        shader_source!("eye_pass/start"),
+        shader_source!("eye_pass/lights"),
+        shader_source!("eye_pass/corners"),
+        shader_source!("eye_pass/medium"),
+        shader_source!("eye_pass/interaction"),
+        shader_source!("eye_pass/sky"),
+        shader_source!("eye_pass/chain"),
+        shader_source!("eye_pass/traced"),
+    ],
+};
+
+/// An environment behind all surfaces.
+pub(super) const SKY: Program = Program {
+    name: "sky",
+    sources: &[
+        shader_source!("eye_pass/frame"),
+        shader_source!("eye_pass/sky"),
+        shader_source!("eye_pass/sky_drawn"),
     ],
 };
 
@@ -113,6 +146,8 @@ pub fn programs() -> Vec<Program> {
         SURFACE,
         UNDER_LIGHTS,
         TRACED,
+        TRACED_UNDER_SKY,
+        SKY,
         COMPOSED,
         ACCUMULATED,
         PROBE,
@@ -164,29 +199,28 @@ pub fn specialisations() -> Vec<Specialisation> {
         SurfaceKind::ThinWall,
         SurfaceKind::Mixed,
     ];
-    let mut all = vec![Specialisation {
-        program: ACCUMULATED.name,
-        entry_point: "accumulated",
+    let alone = |program: Program, entry_point| Specialisation {
+        program: program.name,
+        entry_point,
         constants: Vec::new(),
-    }];
+    };
+    let mut all = vec![alone(ACCUMULATED, "accumulated"), alone(SKY, "sky_drawn")];
     for writes in Writes::ALL {
-        let Some(entry_point) = writes.entry_point() else {
-            continue;
-        };
         for kind in KINDS {
-            for flags in 0..8 {
+            for flags in 0..16 {
                 let manner = DrawnHow {
                     has_texture: flags & 1 > 0,
                     is_scaled: flags & 1 > 0,
                     traces_lights: flags & 2 > 0,
-                    has_bumps: flags & 4 > 0,
+                    has_bumps: flags & 8 > 0,
+                    has_sky: flags & 4 > 0,
                 };
                 let key = PipelineKey::new(writes, kind, Faces::Both, manner);
-                all.push(Specialisation {
-                    program: writes.program().name,
+                all.extend(key.writes.entry_point().map(|entry_point| Specialisation {
+                    program: key.program().name,
                     entry_point,
                     constants: key.constants(),
-                });
+                }));
             }
         }
     }

@@ -12,7 +12,7 @@ shader_struct! {
         camera_position: [f32; 3],
         /// What is written is radiance times this.
         radiance_scale: f32,
-        /// Seen where nothing is hit [W/(m² sr)].
+        /// Seen where nothing is hit [W/(m² sr)]; what the radiance of an environment is multiplied by.
         background: [f32; 3],
         /// Added to the level at which images are looked up; far below zero for the finest one always.
         level_bias: f32,
@@ -100,7 +100,7 @@ shader_struct! {
         strength: [f32; 3],
         /// Cosine of the half-angle of full strength.
         cos_inner: f32,
-        /// Of a spot, unit, away from the lamp.
+        /// Of a spot or of what glows, unit, away from the lamp.
         axis: [f32; 3],
         /// Cosine of the half-angle at which it ends.
         cos_outer: f32,

@@ -2,9 +2,9 @@
 
 use glam::{DVec2, DVec3};
 
+use super::{Light, LightKind, LightSize, PanelShape, Scene};
 use crate::geometry::ray;
 use crate::optics::LinearSrgb;
-use crate::scene::{Light, LightKind, LightSize, PanelShape, Scene};
 
 /// The source of the rays of one wavefront.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,0 +1,183 @@
+//! The environment on the device: drawn behind all surfaces, and seen at the ends of chains. Exists only for scenes that
+//! have one.
+
+use std::sync::Arc;
+
+use wgpu::util::DeviceExt;
+
+use super::bindings::{bind_group, bind_group_layout, pipeline_layout, texture};
+use super::pipelines::{DEPTH_FORMAT, HDR_FORMAT};
+use super::shaders::SKY;
+use crate::gpu::Gpu;
+use crate::scene::Environment;
+
+/// Radiance may span more than half floats do.
+const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Float;
+
+/// An environment ready to be drawn.
+#[derive(Debug)]
+pub(super) struct Sky {
+    source: Arc<Environment>,
+    /// Group 2 of what shows it.
+    bound: wgpu::BindGroup,
+    pipeline: wgpu::RenderPipeline,
+    /// Largest channel of any pixel [W/(m² sr)].
+    peak: f64,
+    bytes: u64,
+}
+
+/// Layout of group 2 of what shows the environment.
+pub(super) fn layout(gpu: &Gpu) -> wgpu::BindGroupLayout {
+    bind_group_layout(gpu, "sky", &[texture(false, wgpu::TextureViewDimension::D2)])
+}
+
+impl Sky {
+    /// Uploads an environment; one that is larger than the device's textures in pixels halved until it fits.
+    pub(super) fn new(
+        gpu: &Gpu,
+        source: &Arc<Environment>,
+        frame_layout: &wgpu::BindGroupLayout,
+        sample_count: u32,
+    ) -> Self {
+        let layout = layout(gpu);
+        let (width, height, pixels) = fitted(source, gpu.limits().max_texture_dimension_2d as usize);
+        let image = gpu.device.create_texture_with_data(
+            &gpu.queue,
+            &wgpu::TextureDescriptor {
+                label: Some("sky"),
+                size: wgpu::Extent3d {
+                    width: width as u32,
+                    height: height as u32,
+                    depth_or_array_layers: 1,
+                },
+                mip_level_count: 1,
+                sample_count: 1,
+                dimension: wgpu::TextureDimension::D2,
+                format: FORMAT,
+                usage: wgpu::TextureUsages::TEXTURE_BINDING,
+                view_formats: &[],
+            },
+            wgpu::util::TextureDataOrder::LayerMajor,
+            bytemuck::cast_slice(&pixels),
+        );
+        let view = image.create_view(&Default::default());
+        let peak = source.pixels().iter().flatten().copied().fold(0.0, f32::max);
+        Self {
+            source: Arc::clone(source),
+            bound: bind_group(gpu, "sky", &layout, [wgpu::BindingResource::TextureView(&view)]),
+            pipeline: pipeline(gpu, frame_layout, &layout, sample_count),
+            peak: f64::from(peak),
+            bytes: size_of_val(&pixels[..]) as u64,
+        }
+    }
+
+    /// Whether it shows that environment.
+    pub(super) fn is_of(&self, source: &Arc<Environment>) -> bool {
+        Arc::ptr_eq(&self.source, source)
+    }
+
+    /// Group 2 of what shows it.
+    pub(super) fn bound(&self) -> &wgpu::BindGroup {
+        &self.bound
+    }
+
+    /// Largest channel of any of its pixels [W/(m² sr)].
+    pub(super) fn peak(&self) -> f64 {
+        self.peak
+    }
+
+    /// What it takes on the device [bytes].
+    pub(super) fn bytes(&self) -> u64 {
+        self.bytes
+    }
+
+    /// Fills a pass over surfaces of which group 0 is set, before any of them.
+    pub(super) fn draw(&self, pass: &mut wgpu::RenderPass<'_>) {
+        pass.set_pipeline(&self.pipeline);
+        pass.set_bind_group(2, &self.bound, &[]);
+        pass.draw(0..3, 0..1);
+    }
+}
+
+/// Size and pixels of an environment whose sides are at most `limit`: means of 2 × 2 as often as it takes.
+fn fitted(source: &Environment, limit: usize) -> (usize, usize, Vec<[f32; 4]>) {
+    let (mut width, mut height) = source.size();
+    let mut pixels: Vec<[f32; 4]> = source.pixels().iter().map(|&[r, g, b]| [r, g, b, 1.0]).collect();
+    while width.max(height) > limit.max(1) {
+        let (wide, high) = (width.div_ceil(2), height.div_ceil(2));
+        let pixel = |x: usize, y: usize| pixels[y.min(height - 1) * width + x.min(width - 1)];
+        let mean = |x: usize, y: usize| {
+            let four =
+                [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(right, down)| pixel(2 * x + right, 2 * y + down));
+            // Quartered first: the sum of four large ones has no float.
+            std::array::from_fn(|channel| four.iter().map(|pixel| 0.25 * pixel[channel]).sum())
+        };
+        pixels = (0..high)
+            .flat_map(|y| (0..wide).map(move |x| (x, y)))
+            .map(|(x, y)| mean(x, y))
+            .collect();
+        (width, height) = (wide, high);
+    }
+    (width, height, pixels)
+}
+
+fn pipeline(
+    gpu: &Gpu,
+    frame: &wgpu::BindGroupLayout,
+    sky: &wgpu::BindGroupLayout,
+    sample_count: u32,
+) -> wgpu::RenderPipeline {
+    let module = SKY.module(&gpu.device);
+    // Group 1 is that of chains, which the picture does not trace.
+    let nothing = bind_group_layout(gpu, "nothing", &[]);
+    gpu.device
+        .create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+            label: Some("sky"),
+            layout: Some(&pipeline_layout(gpu, &[frame, &nothing, sky])),
+            vertex: wgpu::VertexState {
+                module: &module,
+                entry_point: Some("behind"),
+                compilation_options: Default::default(),
+                buffers: &[],
+            },
+            primitive: Default::default(),
+            depth_stencil: Some(wgpu::DepthStencilState {
+                format: DEPTH_FORMAT,
+                depth_write_enabled: Some(false),
+                depth_compare: Some(wgpu::CompareFunction::Always),
+                stencil: Default::default(),
+                bias: Default::default(),
+            }),
+            multisample: wgpu::MultisampleState {
+                count: sample_count,
+                ..Default::default()
+            },
+            fragment: Some(wgpu::FragmentState {
+                module: &module,
+                entry_point: Some("sky_drawn"),
+                compilation_options: Default::default(),
+                targets: &[Some(HDR_FORMAT.into())],
+            }),
+            multiview_mask: None,
+            cache: None,
+        })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn large_skies_are_halved_and_keep_their_mean() {
+        let pixels = (0..8 * 4).map(|pixel| [pixel as f32, 1.0, f32::MAX]).collect();
+        let Some(sky) = Environment::new(8, 4, pixels) else {
+            panic!("a sound image");
+        };
+        assert_eq!(fitted(&sky, 8).2.len(), 32);
+        let (width, height, pixels) = fitted(&sky, 3);
+        assert_eq!((width, height, pixels.len()), (2, 1, 2));
+        let mean = pixels.iter().map(|pixel| pixel[0]).sum::<f32>() / 2.0;
+        assert_eq!(mean, 15.5);
+        assert!(pixels.iter().all(|pixel| pixel[1..3] == [1.0, f32::MAX]));
+    }
+}
