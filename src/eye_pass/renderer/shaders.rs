@@ -60,6 +60,7 @@ pub(super) const TRACED_UNDER_SKY: Program = Program {
         shader_source!("eye_pass/frame"),
         shader_source!("eye_pass/objects"),
         shader_source!("eye_pass/images"),
+        shader_source!("eye_pass/bumps"),
         shader_source!("eye_pass/place"),
         shader_source!("eye_pass/start"),
         shader_source!("eye_pass/lights"),
