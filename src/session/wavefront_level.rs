@@ -10,6 +10,7 @@ use crate::light_pass::caustic::setup::AimedLight;
 use crate::light_pass::caustic::statistics::FootprintStatistics;
 use crate::light_pass::receiver_maps::{ChartFor, ReceiverMaps};
 use crate::light_pass::wavefront::bodies::SmallBodies;
+use crate::light_pass::wavefront::closeness::Closeness;
 use crate::light_pass::wavefront::kept_rays::KeptRays;
 use crate::light_pass::wavefront::lattice::WavefrontLattice;
 use crate::light_pass::wavefront::pass::{Room, WavefrontDepositor};
@@ -80,15 +81,14 @@ impl CausticLayer<'_> {
         light: &AimedLight,
         key: &LevelKey,
         unit: FluxUnit,
+        (receivers, chart_for): (&Receivers, &ChartFor),
         maps: &mut ReceiverMaps,
         course: &Course,
     ) -> PassReport {
-        let chart_for = |object: usize| self.chart(object, &key.sizes);
-        let receivers = Receivers::new(self.tracer, &chart_for);
         let bodies = self.small_bodies(light, key.trace.size);
         let depositor = WavefrontDepositor {
-            receivers: &receivers,
-            chart_for: &chart_for,
+            receivers,
+            chart_for,
             lattice: self.wavefront_lattice(light, key.trace.size, &bodies, unit, course.control),
             reference_w: reference_w(light),
             coarseness: key.coarseness,
@@ -160,10 +160,19 @@ impl CausticLayer<'_> {
         }
     }
 
+    fn closeness(&self, light: &AimedLight) -> Closeness {
+        if self.is_soft(light) {
+            Closeness::SOFT
+        } else {
+            Closeness::SHARP
+        }
+    }
+
     /// Bodies that are small beside the cells of a lattice.
     fn small_bodies(&self, light: &AimedLight, (columns, rows): (usize, usize)) -> SmallBodies {
         let cell = DVec2::new(1.0 / columns as f64, 1.0 / rows as f64);
-        SmallBodies::find(self.tracer, &light.launch, light.visible(), cell)
+        let closeness = self.closeness(light);
+        SmallBodies::find(self.tracer, &light.launch, light.visible(), cell, closeness)
     }
 
     fn wavefront_lattice<'a>(
@@ -174,14 +183,15 @@ impl CausticLayer<'_> {
         unit: FluxUnit,
         control: &'a Control,
     ) -> WavefrontLattice<'a> {
+        let tracer = StrandTracer::new(
+            self.tracer,
+            &light.launch,
+            self.limits(light),
+            [1.0 / size.0 as f64, 1.0 / size.1 as f64],
+            control,
+        );
         WavefrontLattice {
-            tracer: StrandTracer::new(
-                self.tracer,
-                &light.launch,
-                self.limits(light),
-                [1.0 / size.0 as f64, 1.0 / size.1 as f64],
-                control,
-            ),
+            tracer: tracer.with_closeness(self.closeness(light)),
             item_buffer: &light.item_buffer,
             size,
             unit,

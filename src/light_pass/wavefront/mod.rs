@@ -4,6 +4,7 @@
 pub mod band;
 pub mod bodies;
 pub mod cell;
+pub mod closeness;
 pub mod coverage;
 mod division;
 mod doubt;

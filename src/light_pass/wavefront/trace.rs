@@ -2,6 +2,7 @@
 
 use glam::DVec2;
 
+use super::closeness::Closeness;
 use super::kept_rays::{FreshRay, KeptHit, KeptRays, Known, RayKey};
 use super::strand::{Landing, LightSample, Strand, SurfaceNode};
 use crate::geometry::Ray;
@@ -33,6 +34,8 @@ pub struct StrandTracer<'a> {
     pub steps: [f64; 2],
     /// What was traced before.
     pub kept: Option<&'a KeptRays>,
+    /// How closely borders are looked for.
+    pub closeness: Closeness,
     /// Asks to stop: then rays end at once, and what they give is to be thrown away.
     pub control: &'a Control,
     /// The code that follows rays, compiled for the effects of `limits`.
@@ -95,9 +98,16 @@ impl<'a> StrandTracer<'a> {
             limits,
             steps,
             kept: None,
+            closeness: Closeness::SHARP,
             control,
             follow: limits.effects.specialise(FollowFor),
         }
+    }
+
+    /// The same, but for how closely borders are looked for.
+    #[must_use]
+    pub fn with_closeness(self, closeness: Closeness) -> Self {
+        Self { closeness, ..self }
     }
 
     /// Traces the ray that starts at a point of the unit square of a face.
