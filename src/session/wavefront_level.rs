@@ -11,6 +11,7 @@ use crate::light_pass::caustic::statistics::FootprintStatistics;
 use crate::light_pass::receiver_maps::{ChartFor, ReceiverMaps};
 use crate::light_pass::wavefront::bodies::SmallBodies;
 use crate::light_pass::wavefront::bumps::BumpCells;
+use crate::light_pass::wavefront::closeness::Closeness;
 use crate::light_pass::wavefront::kept_rays::KeptRays;
 use crate::light_pass::wavefront::lattice::WavefrontLattice;
 use crate::light_pass::wavefront::pass::{Room, WavefrontDepositor};
@@ -81,15 +82,14 @@ impl CausticLayer<'_> {
         light: &AimedLight,
         key: &LevelKey,
         unit: FluxUnit,
+        (receivers, chart_for): (&Receivers, &ChartFor),
         maps: &mut ReceiverMaps,
         course: &Course,
     ) -> PassReport {
-        let chart_for = |object: usize| self.chart(object, &key.sizes);
-        let receivers = Receivers::new(self.tracer, &chart_for);
         let bodies = self.small_bodies(light, key.trace.size);
         let depositor = WavefrontDepositor {
-            receivers: &receivers,
-            chart_for: &chart_for,
+            receivers,
+            chart_for,
             lattice: self.bumpy_lattice(light, &key.trace, &bodies, unit, course.control),
             reference_w: reference_w(light),
             coarseness: key.coarseness,
@@ -161,10 +161,19 @@ impl CausticLayer<'_> {
         }
     }
 
+    fn closeness(&self, light: &AimedLight) -> Closeness {
+        if self.is_soft(light) {
+            Closeness::SOFT
+        } else {
+            Closeness::SHARP
+        }
+    }
+
     /// Bodies that are small beside the cells of a lattice.
     fn small_bodies(&self, light: &AimedLight, (columns, rows): (usize, usize)) -> SmallBodies {
         let cell = DVec2::new(1.0 / columns as f64, 1.0 / rows as f64);
-        SmallBodies::find(self.tracer, &light.launch, light.visible(), cell)
+        let closeness = self.closeness(light);
+        SmallBodies::find(self.tracer, &light.launch, light.visible(), cell, closeness)
     }
 
     /// A level's lattice, with cells as fine as the detail of normals asks for.
@@ -190,8 +199,14 @@ impl CausticLayer<'_> {
         unit: FluxUnit,
         control: &'a Control,
     ) -> WavefrontLattice<'a> {
-        let steps = [1.0 / size.0 as f64, 1.0 / size.1 as f64];
-        let mut tracer = StrandTracer::new(self.tracer, &light.launch, self.limits(light), steps, control);
+        let tracer = StrandTracer::new(
+            self.tracer,
+            &light.launch,
+            self.limits(light),
+            [1.0 / size.0 as f64, 1.0 / size.1 as f64],
+            control,
+        );
+        let mut tracer = tracer.with_closeness(self.closeness(light));
         tracer.bumps = BumpCells::UNDIVIDED;
         WavefrontLattice {
             tracer,

@@ -7,9 +7,6 @@ use super::strand::{LightSample, Strand};
 use super::trace::StrandTracer;
 use crate::light_pass::caustic::path::PathSignature;
 
-/// Bisections of an edge on which the brightest light changes its way; dimmer light is cut as much more coarsely.
-pub const CUT_BITS: i32 = 8;
-
 /// Changes of way along one edge from which on each is cut more coarsely.
 const MANY_CHANGES: usize = 12;
 
@@ -295,7 +292,8 @@ impl EdgeCutter<'_> {
         let step = ends[1] - ends[0];
         // As fine as on an edge of the lattice itself, in the unit square.
         let whole = DVec2::from(self.tracer.steps).dot(step.abs()) / step.length_squared();
-        let most_bits = (CUT_BITS - whole.log2().round() as i32).clamp(2, CUT_BITS);
+        let cut_bits = self.tracer.closeness.cut_bits;
+        let most_bits = (cut_bits - whole.log2().round() as i32).clamp(2, cut_bits);
         let mut changes: Vec<(PathSignature, i32, bool)> = Vec::new();
         for (sample, other) in [(first, last), (last, first)] {
             for strand in &sample.strands {

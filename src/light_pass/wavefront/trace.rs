@@ -3,6 +3,7 @@
 use glam::DVec2;
 
 use super::bumps::BumpCells;
+use super::closeness::Closeness;
 use super::kept_rays::{FreshRay, KeptHit, KeptRays, Known, RayKey};
 use super::strand::{Landing, LightSample, Strand, SurfaceNode};
 use crate::geometry::Ray;
@@ -36,6 +37,8 @@ pub struct StrandTracer<'a> {
     pub bumps: BumpCells,
     /// What was traced before.
     pub kept: Option<&'a KeptRays>,
+    /// How closely borders are looked for.
+    pub closeness: Closeness,
     /// Asks to stop: then rays end at once, and what they give is to be thrown away.
     pub control: &'a Control,
     /// The code that follows rays, compiled for the effects of `limits`.
@@ -99,9 +102,16 @@ impl<'a> StrandTracer<'a> {
             steps,
             bumps: BumpCells::EXACT,
             kept: None,
+            closeness: Closeness::SHARP,
             control,
             follow: limits.effects.specialise(FollowFor),
         }
+    }
+
+    /// The same, but for how closely borders are looked for.
+    #[must_use]
+    pub fn with_closeness(self, closeness: Closeness) -> Self {
+        Self { closeness, ..self }
     }
 
     /// Traces the ray that starts at a point of the unit square of a face.
