@@ -24,3 +24,5 @@ fn law() -> proptest::test_runner::Config {
         ..proptest::test_runner::Config::default()
     }
 }
+#[path = "physics/waves.rs"]
+mod waves;

@@ -14,7 +14,7 @@ struct SurfacePoint {
     object: u32,
     // Unit, by the triangle's winding.
     geometric_normal: vec3f,
-    // Unit, interpolated.
+    // Unit, interpolated, and bent where the surface has bumps.
     shading_normal: vec3f,
     // How much the normals spread per length, > 0 where the surface is convex.
     curvature: f32,
@@ -66,6 +66,15 @@ fn surface_point(hit: Hit) -> SurfacePoint {
     point.curvature = (bend(triangle.a, triangle.b, normal_a, normal_b)
         + bend(triangle.b, triangle.c, normal_b, normal_c)
         + bend(triangle.c, triangle.a, normal_c, normal_a)) / 3.0;
+    if HAS_BUMPS {
+        let record = objects[triangle.object].bumps;
+        if record != NO_IMAGE {
+            let place_m = frame.camera_position + (point.place - start.eye) * start.unit_m;
+            let bump = bump_at(record, place_m, point.shading_normal);
+            point.shading_normal = bent(point.shading_normal, bump.gradient);
+            point.curvature -= 0.5 * bump.laplacian * start.unit_m;
+        }
+    }
     let uv_a = corners[2u * first + 1u].zw;
     let uv_b = corners[2u * second + 1u].zw;
     let uv_c = corners[2u * third + 1u].zw;

@@ -10,7 +10,7 @@ struct ObjectRecord {
     map: u32,
     texture: u32,
     lobe_rad: f32,
-    padding: u32,
+    bumps: u32,
 }
 
 const SURFACE_DIFFUSE: u32 = 0u;

@@ -26,7 +26,13 @@ fn own_irradiance(fragment: Fragment) -> vec3f {
 // Share of light that a polish sends back, as seen from vacuum; 0 without one.
 fn own_polish(fragment: Fragment) -> f32 {
     if SURFACE == SURFACE_MIXED {
-        let cos_view = abs(dot(normalize(fragment.normal), normalize(fragment.from_camera)));
+        var normal = normalize(fragment.normal);
+        if HAS_BUMPS {
+            let record = objects[fragment.object].bumps;
+            let place_m = frame.camera_position + fragment.from_camera;
+            normal = bent(normal, bump_at(record, place_m, normal).gradient);
+        }
+        let cos_view = abs(dot(normal, normalize(fragment.from_camera)));
         return dielectric_reflectance(cos_view, objects[fragment.object].ior);
     }
     return 0.0;

@@ -1,7 +1,7 @@
 //! Materials, as glTF's metallic-roughness model and its extensions state them, and the class that transport treats
 //! each as.
 
-use super::TextureRef;
+use super::{TextureRef, Waves};
 use crate::optics::LinearSrgb;
 
 /// Roughness (glTF's, α = roughness²) up to which polish over a diffuse body sends light on; above it the surface is
@@ -78,11 +78,18 @@ pub struct Material {
     pub volume: Option<Volume>,
     /// Emitted radiance [W/(m² sr)], luminous-equivalent: glTF's cd/m² divided by 683 lm/W.
     pub emitted_radiance: LinearSrgb,
+    /// What bends its normals where it is specular; light that a diffuse surface takes is that of the surface itself.
+    pub waves: Option<Waves>,
     /// Whether its back is drawn; transport always treats both sides.
     pub double_sided: bool,
 }
 
 impl Material {
+    /// The waves that bend its normals, if it is specular and has any.
+    pub fn bending_waves(&self) -> Option<&Waves> {
+        self.waves.as_ref().filter(|_| self.surface.is_specular())
+    }
+
     /// The class that its factors make it: how a file's material is read unless the file says otherwise (unlit).
     pub fn classified(&self) -> SurfaceKind {
         let has_lobe = self.roughness <= LOBE_ROUGHNESS_LIMIT;
@@ -122,6 +129,7 @@ impl Default for Material {
             ior: 1.5,
             volume: None,
             emitted_radiance: LinearSrgb::BLACK,
+            waves: None,
             double_sided: true,
         }
     }

@@ -13,6 +13,7 @@ pub mod load;
 pub mod material;
 pub mod mesh;
 pub mod texture;
+pub mod waves;
 
 use std::sync::Arc;
 
@@ -27,6 +28,7 @@ pub use load::{LoadOptions, load};
 pub use material::{Material, SurfaceKind, Volume};
 pub use mesh::Mesh;
 pub use texture::{Texture, TextureRef};
+pub use waves::{Wave, Waves};
 
 use crate::error::Warning;
 use crate::optics::LinearSrgb;

@@ -98,7 +98,7 @@ impl CausticLayer<'_> {
         // Coarse lattices are deposited as coarsely, so that their difference shows both kinds of error.
         let before_last = (lattices.len() - 1).saturating_sub(step);
         LevelKey {
-            trace: self.trace_key(size, rounds),
+            trace: self.trace_key(size, before_last as i32, rounds),
             resolved: None,
             sizes: sizes.clone(),
             coarseness: coarseness(self.settings.max_error, goal)
@@ -111,7 +111,8 @@ impl CausticLayer<'_> {
         }
     }
 
-    pub(super) fn trace_key(&self, size: (usize, usize), rounds: &[Round]) -> TraceKey {
+    /// For a lattice of a size, so many lattices before the usual finest.
+    pub(super) fn trace_key(&self, size: (usize, usize), coarser: i32, rounds: &[Round]) -> TraceKey {
         let settings = self.settings;
         let mut paths = BakeSettings {
             estimator: settings.estimator,
@@ -127,8 +128,18 @@ impl CausticLayer<'_> {
             settings: paths,
             effects: EffectSet::of(self.plan),
             size,
+            coarser: if settings.estimator == Estimator::Wavefront && self.has_bumps() {
+                coarser
+            } else {
+                0
+            },
             rounds: rounds.to_vec(),
         }
+    }
+
+    /// Whether normals of anything have detail that no mesh shows.
+    fn has_bumps(&self) -> bool {
+        (0..self.tracer.scene().objects.len()).any(|object| self.tracer.finest_bump_m(object).is_finite())
     }
 
     fn kernels(&self) -> BakeSettings {
@@ -206,7 +217,7 @@ impl CausticLayer<'_> {
         if self.wants_statistics() {
             let keys: BTreeMap<usize, TraceKey> = lights
                 .iter()
-                .map(|light| (light.light, self.trace_key(self.lattice_size(light), &[])))
+                .map(|light| (light.light, self.trace_key(self.lattice_size(light), 0, &[])))
                 .collect();
             if states.statistics.as_ref().is_none_or(|(known, _)| *known != keys) {
                 let mut statistics = FootprintStatistics::default();

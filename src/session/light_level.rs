@@ -29,6 +29,8 @@ pub(super) struct TraceKey {
     pub(super) effects: EffectSet,
     /// Cells across and down each face.
     pub(super) size: (usize, usize),
+    /// How many lattices this one comes before the usual finest, where surfaces have bumps: what cells may miss of them.
+    pub(super) coarser: i32,
     /// Where cells are divided further, round by round.
     pub(super) rounds: Vec<Round>,
 }

@@ -63,6 +63,7 @@ fn leave_alike(a: &Material, b: &Material) -> bool {
     a.surface == b.surface
         && a.ior == b.ior
         && a.volume.is_some() == b.volume.is_some()
+        && a.bending_waves() == b.bending_waves()
         && a.double_sided == b.double_sided
 }
 

@@ -16,7 +16,8 @@ use crate::light_pass::accuracy;
 use crate::light_pass::caustic::pass::{PassReport, Seconds, Stopwatch};
 use crate::light_pass::caustic::setup::AimedLight;
 use crate::light_pass::emitter::Emitter;
-use crate::light_pass::receiver_maps::ReceiverMaps;
+use crate::light_pass::receiver_maps::{ChartFor, ReceiverMaps};
+use crate::light_pass::wavefront::receivers::Receivers;
 use crate::optics::LinearSrgb;
 use crate::plan::Effect;
 use crate::progress::Stage;
@@ -106,7 +107,11 @@ impl CausticLayer<'_> {
     /// Where the first picture begins, and where a bake without a target ends.
     fn soft_ends(&self, light: &AimedLight) -> (usize, usize) {
         let last = self.lattices(light).len() - 1;
-        (last.saturating_sub(1), last)
+        if self.settings.max_error.is_some() {
+            (0, last)
+        } else {
+            (last.saturating_sub(1), last)
+        }
     }
 
     /// What comes after the levels so far; `None` where they are enough.
@@ -133,7 +138,8 @@ impl CausticLayer<'_> {
         let wanted = self.settings.wavefronts.unwrap_or(USUAL_WAVEFRONTS);
         match (&level.parts.spread, &level.parts.lattice) {
             (None, _) if at.wavefronts < most => Some(more),
-            (_, None) if at.lattice <= last => Some(finer),
+            (_, None) => Some(finer),
+            _ if is_fixed && at.lattice < last => Some(finer),
             _ if is_fixed => (at.wavefronts < wanted).then_some(more),
             (spread, lattice) => {
                 let of = |part: &Option<accuracy::LightError>| {
@@ -181,7 +187,9 @@ impl CausticLayer<'_> {
 
     fn soft_key(&self, light: &AimedLight, resolved: Resolved, step: usize, sizes: &Sizes) -> LevelKey {
         let size = self.soft_lattice(light, resolved.lattice);
-        let mut trace = self.trace_key(size, &[]);
+        let (_, last) = self.soft_ends(light);
+        let coarser = last as i32 - resolved.lattice as i32;
+        let mut trace = self.trace_key(size, coarser, &[]);
         // It chooses the points of all wavefronts.
         trace.settings.seed = self.settings.seed;
         LevelKey {
@@ -290,6 +298,9 @@ impl CausticLayer<'_> {
             .min((room as usize).max(1))
             .max(1);
         let done = std::sync::atomic::AtomicU64::new(0);
+        let chart_for = |object: usize| self.chart(object, &key.sizes);
+        let receivers = Receivers::new(self.tracer, &chart_for);
+        let lit = (&receivers, &chart_for as &ChartFor);
         let parts: Vec<(PassReport, ReceiverMaps)> = (0..tasks)
             .into_par_iter()
             .map(|task| {
@@ -301,7 +312,7 @@ impl CausticLayer<'_> {
                         break;
                     }
                     if let Some(wavefront) = self.wavefront(light, index) {
-                        report.merge(self.run_wavefront(&wavefront, key, unit, &mut maps, course));
+                        report.merge(self.run_wavefront(&wavefront, key, unit, lit, &mut maps, course));
                     }
                     let done = done.fetch_add(1, std::sync::atomic::Ordering::Relaxed) + 1;
                     self.progress.advance(Stage::Caustic, done, count as u64);
@@ -368,11 +379,12 @@ impl CausticLayer<'_> {
         wavefront: &AimedLight,
         key: &LevelKey,
         unit: FluxUnit,
+        lit: (&Receivers, &ChartFor),
         maps: &mut ReceiverMaps,
         course: &Course,
     ) -> PassReport {
         match self.settings.estimator {
-            Estimator::Wavefront => self.run_patches(wavefront, key, unit, maps, course),
+            Estimator::Wavefront => self.run_patches(wavefront, key, unit, lit, maps, course),
             Estimator::Splat => self.run_splats(wavefront, key, unit, maps, course),
         }
     }

@@ -186,7 +186,7 @@ impl CausticLayer<'_> {
             first: &mut maps,
             second: None,
         };
-        let source = source_of(state, &self.trace_key(lattice.size, &[]));
+        let source = source_of(state, &self.trace_key(lattice.size, 0, &[]));
         let (mut report, _) = pass::run(&depositor, source, &mut all, &chart_for, &listener);
         // The kernels of the coarse run are in no map.
         report.splats = 0;

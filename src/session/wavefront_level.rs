@@ -3,13 +3,15 @@
 use glam::DVec2;
 
 use super::caustic::{CausticLayer, Course};
-use super::light_level::{LevelKey, LightLevel, LightState, SoftParts};
+use super::light_level::{LevelKey, LightLevel, LightState, SoftParts, TraceKey};
 use crate::illumination::accumulator::FluxUnit;
 use crate::light_pass::caustic::pass::{Listener, PassReport};
 use crate::light_pass::caustic::setup::AimedLight;
 use crate::light_pass::caustic::statistics::FootprintStatistics;
 use crate::light_pass::receiver_maps::{ChartFor, ReceiverMaps};
 use crate::light_pass::wavefront::bodies::SmallBodies;
+use crate::light_pass::wavefront::bumps::BumpCells;
+use crate::light_pass::wavefront::closeness::Closeness;
 use crate::light_pass::wavefront::kept_rays::KeptRays;
 use crate::light_pass::wavefront::lattice::WavefrontLattice;
 use crate::light_pass::wavefront::pass::{Room, WavefrontDepositor};
@@ -41,7 +43,7 @@ impl CausticLayer<'_> {
             chart_for: &chart_for,
             lattice: WavefrontLattice {
                 refinement: Some(&refinement),
-                ..self.wavefront_lattice(light, key.trace.size, &bodies, unit, course.control)
+                ..self.bumpy_lattice(light, &key.trace, &bodies, unit, course.control)
             },
             reference_w: reference_w(light),
             coarseness: key.coarseness,
@@ -80,16 +82,15 @@ impl CausticLayer<'_> {
         light: &AimedLight,
         key: &LevelKey,
         unit: FluxUnit,
+        (receivers, chart_for): (&Receivers, &ChartFor),
         maps: &mut ReceiverMaps,
         course: &Course,
     ) -> PassReport {
-        let chart_for = |object: usize| self.chart(object, &key.sizes);
-        let receivers = Receivers::new(self.tracer, &chart_for);
         let bodies = self.small_bodies(light, key.trace.size);
         let depositor = WavefrontDepositor {
-            receivers: &receivers,
-            chart_for: &chart_for,
-            lattice: self.wavefront_lattice(light, key.trace.size, &bodies, unit, course.control),
+            receivers,
+            chart_for,
+            lattice: self.bumpy_lattice(light, &key.trace, &bodies, unit, course.control),
             reference_w: reference_w(light),
             coarseness: key.coarseness,
         };
@@ -160,12 +161,36 @@ impl CausticLayer<'_> {
         }
     }
 
+    fn closeness(&self, light: &AimedLight) -> Closeness {
+        if self.is_soft(light) {
+            Closeness::SOFT
+        } else {
+            Closeness::SHARP
+        }
+    }
+
     /// Bodies that are small beside the cells of a lattice.
     fn small_bodies(&self, light: &AimedLight, (columns, rows): (usize, usize)) -> SmallBodies {
         let cell = DVec2::new(1.0 / columns as f64, 1.0 / rows as f64);
-        SmallBodies::find(self.tracer, &light.launch, light.visible(), cell)
+        let closeness = self.closeness(light);
+        SmallBodies::find(self.tracer, &light.launch, light.visible(), cell, closeness)
     }
 
+    /// A level's lattice, with cells as fine as the detail of normals asks for.
+    fn bumpy_lattice<'a>(
+        &'a self,
+        light: &'a AimedLight,
+        trace: &TraceKey,
+        bodies: &'a SmallBodies,
+        unit: FluxUnit,
+        control: &'a Control,
+    ) -> WavefrontLattice<'a> {
+        let mut lattice = self.wavefront_lattice(light, trace.size, bodies, unit, control);
+        lattice.tracer.bumps = BumpCells::for_lattice(lattice.cell_count(), trace.coarser);
+        lattice
+    }
+
+    /// A lattice that is as it is, whatever falls into its cells.
     fn wavefront_lattice<'a>(
         &'a self,
         light: &'a AimedLight,
@@ -174,14 +199,17 @@ impl CausticLayer<'_> {
         unit: FluxUnit,
         control: &'a Control,
     ) -> WavefrontLattice<'a> {
+        let tracer = StrandTracer::new(
+            self.tracer,
+            &light.launch,
+            self.limits(light),
+            [1.0 / size.0 as f64, 1.0 / size.1 as f64],
+            control,
+        );
+        let mut tracer = tracer.with_closeness(self.closeness(light));
+        tracer.bumps = BumpCells::UNDIVIDED;
         WavefrontLattice {
-            tracer: StrandTracer::new(
-                self.tracer,
-                &light.launch,
-                self.limits(light),
-                [1.0 / size.0 as f64, 1.0 / size.1 as f64],
-                control,
-            ),
+            tracer,
             item_buffer: &light.item_buffer,
             size,
             unit,

@@ -3,6 +3,7 @@
 
 use glam::DVec3;
 
+use super::bend;
 use super::curvature;
 use super::interaction::{Branch, Event, TurnedBy};
 use super::microfacets::Turn;
@@ -54,6 +55,15 @@ pub enum SurfaceScale {
     Facet,
 }
 
+/// Which detail of a surface's normals its derivatives have.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SurfaceDetail {
+    /// All that turns light.
+    Bumps,
+    /// What the mesh shows: for steps that are longer than all bumps.
+    Mesh,
+}
+
 impl Tracer {
     /// Whether steps of a ray's differential [m, at the hit] leave the triangle that was hit: then the surface's
     /// derivatives are those of the smooth surface around it. `steps` are in units of the differential's coordinates.
@@ -83,7 +93,7 @@ impl Tracer {
     ) -> RayDifferential {
         let normal = match scale {
             SurfaceScale::Facet => hit.geometric_normal,
-            SurfaceScale::Smooth => hit.shading_normal,
+            SurfaceScale::Smooth => hit.interpolated_normal,
         };
         let slope = ray.direction.dot(normal);
         differential.map(|derivative| {
@@ -102,13 +112,13 @@ impl Tracer {
         hit: &SurfaceHit,
         at_hit: &RayDifferential,
         branch: &Branch,
-        scale: SurfaceScale,
+        surface: (SurfaceScale, SurfaceDetail),
     ) -> RayDifferential {
         let normal_change_of = |derivative: &RayDerivative| {
             if branch.by == TurnedBy::Geometric {
                 DVec3::ZERO
             } else {
-                self.normal_change(hit, branch.normal, derivative.origin, scale)
+                self.normal_change(hit, branch.normal, derivative.origin, surface)
             }
         };
         if let TurnedBy::Micro(facet) = branch.by {
@@ -157,15 +167,31 @@ impl Tracer {
         })
     }
 
-    /// Change of the normal, as oriented in `normal`, for a step along the surface [m].
-    fn normal_change(&self, hit: &SurfaceHit, normal: DVec3, step: DVec3, scale: SurfaceScale) -> DVec3 {
+    /// Change of the shading normal, as oriented in `normal`, for a step along the surface [m].
+    fn normal_change(
+        &self,
+        hit: &SurfaceHit,
+        normal: DVec3,
+        step: DVec3,
+        (scale, detail): (SurfaceScale, SurfaceDetail),
+    ) -> DVec3 {
         let mesh = &self.scene().objects[hit.object].mesh;
         let change = match (scale, self.normal_field(hit.object)) {
             (SurfaceScale::Smooth, Some(field)) => {
                 let change = field.turn(mesh, hit.triangle, hit.barycentric, step);
-                change - normal * normal.dot(change)
+                change - hit.interpolated_normal * hit.interpolated_normal.dot(change)
             }
             _ => curvature::turn_within(mesh, hit.triangle, hit.barycentric, step),
+        };
+        let waves = self.scene().material_of(hit.object).bending_waves();
+        let change = match waves.filter(|_| detail == SurfaceDetail::Bumps) {
+            Some(waves) => bend::bent_change(
+                hit.interpolated_normal,
+                waves.gradient(hit.point),
+                change,
+                waves.gradient_change(hit.point, step),
+            ),
+            None => change,
         };
         if normal.dot(hit.shading_normal) < 0.0 {
             -change

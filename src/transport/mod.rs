@@ -1,5 +1,6 @@
 //! One step of light at a surface: shared by the light pass, the direct layer and the CPU eye pass.
 
+pub mod bend;
 pub mod corners;
 pub mod curvature;
 pub mod differential;
@@ -10,7 +11,7 @@ pub mod microfacets;
 pub mod smoothing;
 pub mod tracer;
 
-pub use differential::{RayDerivative, RayDifferential, SurfaceScale};
+pub use differential::{RayDerivative, RayDifferential, SurfaceDetail, SurfaceScale};
 pub use effects::{EffectSet, Everything, ForEffects, PathCounts, PathEffects, Specialised};
 pub use interaction::{Branch, Event, Interaction, TurnedBy};
 pub use medium::MediumStack;

@@ -5,12 +5,13 @@ use std::sync::Arc;
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
+use super::bend;
 use super::corners::sharp_corners;
 use super::curvature::NormalField;
 use super::smoothing::smoothing_groups;
 use crate::geometry::{Ray, TriangleBvh, ray};
 use crate::optics::LinearSrgb;
-use crate::scene::{Scene, SurfaceKind};
+use crate::scene::{Scene, SurfaceKind, Waves};
 
 /// A scene with its hierarchy. What edits of the scene leave as it is, edited copies share.
 #[derive(Debug)]
@@ -87,7 +88,9 @@ pub struct SurfaceHit {
     pub point_error: DVec3,
     /// Unit, by the triangle's winding: outwards.
     pub geometric_normal: DVec3,
-    /// Unit, interpolated from the vertices.
+    /// Unit, interpolated from the vertices: of the surface that the mesh stands for.
+    pub interpolated_normal: DVec3,
+    /// Unit, what turns light: the interpolated one, bent by the waves of a specular surface.
     pub shading_normal: DVec3,
 }
 
@@ -213,7 +216,7 @@ impl Tracer {
         let geometric_normal = mesh.face_normal(triangle);
         let [a, b, c] = mesh.corner_normals(triangle);
         let [wa, wb, wc] = hit.barycentric;
-        let shading_normal = (a * wa + b * wb + c * wc)
+        let interpolated_normal = (a * wa + b * wb + c * wc)
             .try_normalize()
             .unwrap_or(geometric_normal);
         SurfaceHit {
@@ -224,8 +227,23 @@ impl Tracer {
             point,
             point_error,
             geometric_normal,
-            shading_normal,
+            interpolated_normal,
+            shading_normal: self.bent_normal(object, point, interpolated_normal),
         }
+    }
+
+    /// A normal of an object at a point [m] as its waves bend it.
+    fn bent_normal(&self, object: usize, point: DVec3, normal: DVec3) -> DVec3 {
+        match self.scene.material_of(object).bending_waves() {
+            Some(waves) => bend::bent(normal, waves.gradient(point)),
+            None => normal,
+        }
+    }
+
+    /// Length of the finest detail of a specular object's normals, beyond what its mesh has [m]; infinite without.
+    pub fn finest_bump_m(&self, object: usize) -> f64 {
+        let waves = self.scene.material_of(object).bending_waves();
+        waves.map_or(f64::INFINITY, Waves::shortest_m)
     }
 
     /// Whether any surface lies on the ray before `distance_m`.

@@ -42,22 +42,47 @@ fn floor(result: &BakeResult, scene: &Scene) -> Vec<f64> {
     caustic_luminance(map_of(result, scene, "floor"))
 }
 
+/// A scene whose specular materials have a roughness.
+fn roughened(name: &str, roughness: f64) -> Scene {
+    let mut scene = builtin_scene(name);
+    for material in &mut scene.materials {
+        if material.surface.is_specular() {
+            material.roughness = roughness;
+        }
+    }
+    scene
+}
+
 #[test]
 fn explore() {
-    let mut scene = builtin_scene("ring");
-    let place = scene.lights[0].kind.position().expect("a point light");
-    for side_m in [0.05, 0.2, 0.5] {
-        scene.lights = vec![square_lamp(place, side_m, 8.0)];
-        for target in [0.1, 0.03] {
-            let began = std::time::Instant::now();
+    for name in ["mirror", "ball"] {
+        for roughness in [0.05, 0.2, 0.5] {
+            let scene = roughened(name, roughness);
             let cpu = cpu_time::ProcessTime::now();
-            let result = bake(scene.clone(), &towards(target, 64));
-            println!("side {side_m} target {target}: est {:?} rays {} wall {:.2?} cpu {:.2?} stop {:?} {:?}", result.estimated_relative_rmse, result.counts.rays, began.elapsed(), cpu.elapsed(), result.stop_reason, energy_fault(&result));
-            for point in &result.course { println!("   {point:?}"); }
-            let began = std::time::Instant::now();
-            let reference = brute(&scene, &settings(1.0, 64), 6_000_000);
+            let result = bake(scene.clone(), &towards(0.02, 64));
+            println!(
+                "{name} {roughness}: est {:?} rays {} cpu {:.2?} stop {:?} {:?} {:?}",
+                result.estimated_relative_rmse,
+                result.counts.rays,
+                cpu.elapsed(),
+                result.stop_reason,
+                energy_fault(&result),
+                result.ledgers[0].energy_w
+            );
+            for point in &result.course {
+                println!("   {} {} {}", point.rays, point.cpu_s, point.relative_rmse);
+            }
+            let cpu = cpu_time::ProcessTime::now();
+            let reference = brute(&scene, &settings(1.0, 64), 4_000_000);
             let reference_noise = reference.maps[0].estimated_relative_rmse;
-            println!("   true {:?} noise {:?} brute {:.2?} cpu {:?}", relative_rmse(&floor(&result, &scene), &floor(&reference, &scene)), reference_noise, began.elapsed(), result.cpu_s);
+            println!(
+                "   true {:?} noise {:?} brute {:.2?} cpu {:?} {:?}",
+                relative_rmse(&floor(&result, &scene), &floor(&reference, &scene)),
+                reference_noise,
+                cpu.elapsed(),
+                result.cpu_s.trace,
+                reference.ledgers[0].energy_w
+            );
         }
     }
 }

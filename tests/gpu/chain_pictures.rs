@@ -12,7 +12,7 @@ use nephroid::gpu::Gpu;
 use nephroid::illumination::IlluminationMap;
 use nephroid::optics::LinearSrgb;
 use nephroid::scene::builtin::{self, parts, shapes};
-use nephroid::scene::{Camera, Scene, Volume};
+use nephroid::scene::{Camera, Material, Scene, SurfaceKind, Volume, Wave, Waves};
 use nephroid::session::BakeSession;
 use nephroid::settings::{BakeSettings, LayerKind, MapResolution};
 use nephroid::transport::Tracer;
@@ -212,6 +212,50 @@ fn a_ball_looks_as_on_the_cpu() {
 #[test]
 fn a_pool_looks_as_on_the_cpu() {
     compare(built_in("pool"));
+}
+
+#[test]
+fn a_pool_of_one_bumped_quad_looks_as_on_the_cpu() {
+    compare(built_in("pool-bump"));
+}
+
+/// A wavy mirror and a matte pillar on a polished wavy floor.
+fn rippled() -> Scene {
+    let mut scene = parts::reference_scene(1.0);
+    let waves = |direction: DVec3| {
+        let wave = |wavelength_m, direction: DVec3| Wave {
+            amplitude_m: 0.03 * wavelength_m,
+            wavelength_m,
+            direction: direction.normalize(),
+            phase_rad: 0.4,
+        };
+        Waves::new(vec![
+            wave(0.3, direction),
+            wave(0.23, direction.cross(DVec3::ONE)),
+        ])
+        .expect("gentle waves")
+    };
+    let floor = &mut scene.materials[0];
+    (floor.surface, floor.roughness) = (SurfaceKind::Mixed, 0.0);
+    floor.waves = Some(waves(DVec3::X));
+    let mirror = shapes::rectangle(DVec3::new(0.0, 0.5, -0.7), DVec3::X * 0.9, DVec3::Y * 0.48);
+    let wavy = Material {
+        waves: Some(waves(DVec3::new(1.0, 1.0, 0.0))),
+        ..parts::mirror()
+    };
+    parts::add(&mut scene, "mirror", mirror, wavy);
+    let pillar = shapes::cuboid(DVec3::new(0.2, 0.0, -0.1), DVec3::new(0.4, 0.7, 0.1));
+    let red = parts::matte("red", LinearSrgb::new(0.7, 0.2, 0.1));
+    parts::add(&mut scene, "pillar", pillar, red);
+    let lamp = DVec3::new(-0.3, 1.8, 0.7);
+    scene.lights.push(parts::point_light("light", lamp, Flux(100.0)));
+    scene.name = "rippled".into();
+    scene
+}
+
+#[test]
+fn wavy_mirrors_and_polish_look_as_on_the_cpu() {
+    compare(rippled());
 }
 
 #[test]

@@ -7,7 +7,7 @@ use nephroid::error::ErrorKind;
 use nephroid::optics::LinearSrgb;
 use nephroid::scene::builtin::{parts, shapes};
 use nephroid::scene::texture::Wrap;
-use nephroid::scene::{Edit, EditTarget, LightKind, Scene, SurfaceKind, Texture};
+use nephroid::scene::{Edit, EditTarget, LightKind, Scene, SurfaceKind, Texture, Wave, Waves};
 use nephroid::units::{Flux, Irradiance, RadiantIntensity};
 
 /// A scene with a floor (object 0), a glass ball (object 1), an image, a lamp (light 0), a sun (1) and a spot (2).
@@ -39,6 +39,16 @@ fn scene() -> Scene {
         wrap: [Wrap::Repeat; 2],
     }));
     scene
+}
+
+fn ripples() -> Waves {
+    let wave = Wave {
+        amplitude_m: 0.001,
+        wavelength_m: 0.1,
+        direction: DVec3::X,
+        phase_rad: 0.3,
+    };
+    Waves::new(vec![wave]).expect("a gentle wave")
 }
 
 fn edits() -> Vec<Edit> {
@@ -90,6 +100,10 @@ fn edits() -> Vec<Edit> {
         Edit::MaterialRoughness {
             material: 0,
             roughness: 0.1,
+        },
+        Edit::MaterialWaves {
+            material: 1,
+            waves: Some(ripples()),
         },
         Edit::ObjectMoved {
             object: 1,

@@ -335,3 +335,66 @@ fn cameras_look_along_minus_z_and_bad_ones_are_left_out() {
     assert_warned(&scene, &["angle of view of 4 rad"]);
     assert_warned(&scene, &["is orthographic"]);
 }
+
+#[test]
+fn waves_are_read_from_extras_and_what_cannot_be_is_named() {
+    let with = |waves: Value| {
+        let json = json!({
+            "name": "water",
+            "pbrMetallicRoughness": factors(0.0, 0.0),
+            "extras": { "nephroid_waves": waves, "else": [1, { "deep": null }] },
+        });
+        material(json)
+    };
+    let (water, scene) = with(json!([
+        { "amplitude_m": 0.02, "wavelength_m": 0.5, "direction": [3.0, 4.0], "phase_rad": 1.0 },
+        { "amplitude_m": 0.01, "wavelength_m": 0.3, "direction": [0, 2, 0] },
+    ]));
+    let waves = water.waves.expect("both can be");
+    let [first, second] = waves.list() else {
+        panic!("{waves:?}")
+    };
+    assert!(first.direction.distance(DVec3::new(0.6, 0.0, 0.8)) < 1e-12);
+    assert_eq!(
+        (first.amplitude_m, first.wavelength_m, first.phase_rad),
+        (0.02, 0.5, 1.0)
+    );
+    assert_eq!((second.direction, second.phase_rad), (DVec3::Y, 0.0));
+    assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
+
+    let wave = |amplitude_m: Value, direction: Value| json!([{ "amplitude_m": amplitude_m, "wavelength_m": 0.5, "direction": direction }]);
+    for (waves, why) in [
+        (json!(7), "cannot be read"),
+        (json!([]), "0 waves"),
+        (wave(json!(0.02), json!([0.0, 0.0])), "direction"),
+        (wave(json!(0.02), json!([1.0])), "direction"),
+        (wave(json!(0.2), json!([1.0, 0.0])), "steeper"),
+        (wave(json!(-0.02), json!([1.0, 0.0])), "not in its range"),
+        (wave(json!("high"), json!([1.0, 0.0])), "cannot be read"),
+        (json!([{ "amplitude_m": 0.1, "length": 3 }]), "cannot be read"),
+    ] {
+        let (water, scene) = with(waves);
+        assert!(water.waves.is_none());
+        assert_warned(&scene, &[why]);
+    }
+}
+
+#[test]
+fn waves_stay_where_they_are_in_a_scene_that_is_moved_to_its_own_origin() {
+    let json = json!({
+        "pbrMetallicRoughness": factors(0.0, 0.0),
+        "extras": { "nephroid_waves": [{ "amplitude_m": 0.02, "wavelength_m": 0.5, "direction": [1, 1, 0] }] },
+    });
+    let near = Glb::triangle().with_material(json.clone()).scene();
+    let mut far = Glb::triangle().with_material(json);
+    far.json["nodes"][0]["translation"] = json!([1000.0, 0.0, 0.0]);
+    let far = far.scene();
+    let waves = |scene: &Scene| scene.materials[scene.objects[0].material].waves.clone();
+    let (near, moved) = (waves(&near).expect("waves"), waves(&far).expect("waves"));
+    for place in 0..20 {
+        let world = DVec3::new(1000.0 + 0.1 * f64::from(place), 0.3, 0.1);
+        let (a, b) = (near.height_m(world), moved.height_m(world - far.origin_world));
+        assert!((a - b).abs() < 1e-12, "{a} {b}");
+    }
+    assert!(far.origin_world.x > 900.0);
+}

@@ -8,8 +8,8 @@ use egui::{Pos2, Rect, pos2};
 use glam::DVec3;
 use nephroid::light_pass::ledger::{EnergyLedger, LightLedger, Truncated};
 use nephroid::progress::Stage;
-use nephroid::scene::builtin::{parts, shapes};
-use nephroid::scene::{Edit, LightKind, Scene};
+use nephroid::scene::builtin::{self, parts, shapes};
+use nephroid::scene::{Edit, LightKind, Scene, Wave, Waves};
 use nephroid::session::StopReason;
 use nephroid::settings::{BakeSettings, Footprint, Kernel, LEAST_MAX_ERROR, LayerKind, MapResolution, Sigma};
 use nephroid::units::{Flux, Irradiance, RadiantIntensity};
@@ -94,6 +94,42 @@ fn power_is_dragged_on_a_logarithmic_scale_with_its_unit() {
         panic!("{:?}", panel.wishes.edit)
     };
     assert!((0.1..0.4).contains(&normal_irradiance.0), "{normal_irradiance:?}");
+}
+
+#[test]
+fn waves_are_raised_by_their_slope_and_shown_only_where_they_are() {
+    let scene = builtin::build("pool-bump").expect("the pool");
+    let waves = scene.materials[1].waves.clone().expect("it has waves");
+    let mut panel = Headless::with_scene(scene, settings(), TALL);
+    assert!(!panel.says("Waves' slope"), "the floor is chosen first");
+    choose(&mut panel, "Object", "water");
+    assert!(panel.wishes.edit.is_none(), "{:?}", panel.wishes.edit);
+    drag(&mut panel, "Waves' slope", 0.48, 0.24);
+    let Some(Edit::MaterialWaves {
+        material: 1,
+        waves: Some(lower),
+    }) = &panel.wishes.edit
+    else {
+        panic!("{:?}", panel.wishes.edit)
+    };
+    let slope = |waves: &Waves| waves.list().iter().map(Wave::slope).sum::<f64>();
+    assert!((0.15..0.35).contains(&slope(lower)), "{}", slope(lower));
+    for (low, high) in lower.list().iter().zip(waves.list()) {
+        let part = low.amplitude_m / high.amplitude_m;
+        assert!((part - slope(lower) / slope(&waves)).abs() < 1e-9);
+        assert_eq!(
+            (low.wavelength_m, low.direction),
+            (high.wavelength_m, high.direction)
+        );
+    }
+    type_into(&mut panel, "λ: 0.698", "0.5");
+    let Some(Edit::MaterialWaves {
+        waves: Some(shorter), ..
+    }) = &panel.wishes.edit
+    else {
+        panic!("{:?}", panel.wishes.edit)
+    };
+    assert_eq!(shorter.list()[0].wavelength_m, 0.5);
 }
 
 #[test]

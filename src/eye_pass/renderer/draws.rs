@@ -21,6 +21,8 @@ pub(super) struct Manner {
     pub(super) has_chains: bool,
     /// Whether anything that chains go on from has a texture.
     pub(super) has_tinted_glass: bool,
+    /// Whether normals of anything are bent.
+    pub(super) has_bumps: bool,
     /// Whether the traced picture has other pixels than the picture.
     pub(super) is_scaled: bool,
     /// Whether light straight from the lamps is traced.
@@ -68,6 +70,10 @@ impl Manner {
             },
             is_scaled: self.is_scaled,
             traces_lights: self.traces_lights,
+            has_bumps: match writes {
+                Writes::Traced => self.has_bumps,
+                _ => look.has_bumps,
+            },
             has_sky: self.has_sky,
         };
         PipelineKey::new(writes, look.surface, faces, how)

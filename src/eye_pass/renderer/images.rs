@@ -8,7 +8,7 @@ use super::paging::{PagedImage, TilePool, Uploaded};
 use super::storage::Storage;
 use super::textures;
 use crate::gpu::Gpu;
-use crate::scene::{Scene, Texture};
+use crate::scene::{Scene, Texture, Waves};
 
 /// What an object refers to in place of an image that it does not have; `NO_IMAGE` in the shaders.
 pub(super) const NO_IMAGE: u32 = u32::MAX;
@@ -27,11 +27,14 @@ pub(super) struct Images {
     /// As `textures` hold them.
     sources: Vec<Arc<Texture>>,
     textures: Vec<PagedImage<textures::Texel>>,
-    /// Records of images and where their tiles are.
+    /// What bends normals, by object.
+    waves: Vec<Option<Waves>>,
+    /// Records of images and where their tiles are, and of what bends normals.
     pub(super) table: Storage,
     /// Where the record of each object's map, and of each texture, starts in the table.
     map_records: Vec<u32>,
     texture_records: Vec<u32>,
+    bump_records: Vec<u32>,
     /// Most that maps may take [bytes].
     budget_bytes: u64,
 }
@@ -44,9 +47,11 @@ impl Images {
             maps: (0..scene.objects.len()).map(|_| None).collect(),
             sources: Vec::new(),
             textures: Vec::new(),
+            waves: Vec::new(),
             table: Storage::new(gpu, "image table"),
             map_records: Vec::new(),
             texture_records: Vec::new(),
+            bump_records: Vec::new(),
             budget_bytes,
         };
         images.set_scene(gpu, scene);
@@ -81,6 +86,8 @@ impl Images {
                 uploaded += bytes;
             }
         }
+        let waves = |object| scene.material_of(object).bending_waves().cloned();
+        self.waves = (0..scene.objects.len()).map(waves).collect();
         uploaded += self.write_table(gpu);
         uploaded
     }
@@ -194,6 +201,11 @@ impl Images {
         self.texture_records.get(texture).copied().unwrap_or(NO_IMAGE)
     }
 
+    /// Record of what bends an object's normals.
+    pub(super) fn bump_record(&self, object: usize) -> u32 {
+        self.bump_records.get(object).copied().unwrap_or(NO_IMAGE)
+    }
+
     /// Tiles of maps, and of textures.
     pub(super) fn views(&self) -> [wgpu::TextureView; 2] {
         [self.map_pool.view(), self.texture_pool.view()]
@@ -214,6 +226,25 @@ impl Images {
             texture.write_record(&mut words, 1.0);
         }
         (self.map_records, self.texture_records) = (map_records, texture_records);
+        self.bump_records.clear();
+        for waves in &self.waves {
+            self.bump_records.push(match waves {
+                Some(waves) => write_waves(&mut words, waves),
+                None => NO_IMAGE,
+            });
+        }
         Uploaded::other(self.table.write(gpu, &words))
     }
+}
+
+/// Adds the record of waves to the table, as `bumps.wgsl` reads it, and tells where it begins.
+fn write_waves(words: &mut Vec<u32>, waves: &Waves) -> u32 {
+    let record = words.len() as u32;
+    words.push(waves.list().len() as u32);
+    for wave in waves.list() {
+        let [x, y, z] = wave.wave_vector().to_array();
+        let numbers = [x, y, z, wave.phase_rad, wave.amplitude_m];
+        words.extend(numbers.map(|number| (number as f32).to_bits()));
+    }
+    record
 }

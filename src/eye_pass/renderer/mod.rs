@@ -382,6 +382,7 @@ impl Renderer {
             traces_lights: self.traces_lights && self.map_style == MapStyle::Lit && self.refusal.is_none(),
             is_scaled: self.quality.traced_scale != 1.0,
             has_tinted_glass: self.objects.has_tinted_glass(),
+            has_bumps: self.objects.has_bumps(),
             has_sky: self.shows_sky(),
         }
     }

@@ -18,6 +18,8 @@ pub(super) struct Look {
     /// How its material is treated.
     pub(super) surface: SurfaceKind,
     pub(super) double_sided: bool,
+    /// Whether its normals are bent.
+    pub(super) has_bumps: bool,
     /// Smallest box [m]; `None` without vertices.
     pub(super) bounds: Option<(DVec3, DVec3)>,
     /// Without what refers to images.
@@ -116,6 +118,11 @@ impl Objects {
         looks.any(|look| look.surface.is_specular() && !look.surface.is_receiver() && look.has_texture())
     }
 
+    /// Whether normals of anything are bent.
+    pub(super) fn has_bumps(&self) -> bool {
+        self.list.iter().any(|look| look.has_bumps)
+    }
+
     fn write_records(&mut self, gpu: &Gpu) -> Uploaded {
         let records: Vec<ObjectRecord> = (0..)
             .zip(&self.list)
@@ -124,6 +131,7 @@ impl Objects {
                 texture: look
                     .base_colour_texture
                     .map_or(NO_IMAGE, |texture| self.images.texture_record(texture)),
+                bumps: self.images.bump_record(index),
                 ..look.record
             })
             .collect();
@@ -143,6 +151,7 @@ impl Look {
         Self {
             surface: material.surface,
             double_sided: material.double_sided,
+            has_bumps: material.bending_waves().is_some(),
             bounds: object.mesh.bounds(),
             record: ObjectRecord {
                 base_colour: rgb(material.base_colour),
@@ -154,7 +163,7 @@ impl Look {
                 map: NO_IMAGE,
                 texture: NO_IMAGE,
                 lobe_rad: lobe_rad(material) as f32,
-                padding: 0,
+                bumps: NO_IMAGE,
             },
             base_colour_texture: material.base_colour_texture.as_ref().map(|image| image.texture),
         }

@@ -97,6 +97,8 @@ pub(super) struct DrawnHow {
     pub(super) is_scaled: bool,
     /// Whether light straight from the lamps is traced.
     pub(super) traces_lights: bool,
+    /// Whether the surface's normals are bent; for chains, whether those of anything in the scene are.
+    pub(super) has_bumps: bool,
     /// Whether chains that leave the scene end in an environment.
     pub(super) has_sky: bool,
 }
@@ -127,6 +129,8 @@ impl PipelineKey {
                 has_texture: how.has_texture && looks_up,
                 is_scaled: how.is_scaled && writes == Writes::Composed,
                 traces_lights: how.traces_lights && writes == Writes::Traced,
+                has_bumps: how.has_bumps
+                    && (writes == Writes::Traced || (shows_itself && surface == SurfaceKind::Mixed)),
                 has_sky: how.has_sky && writes == Writes::Traced,
             },
         }
@@ -149,10 +153,12 @@ impl PipelineKey {
             Writes::Own | Writes::OwnUnderLights | Writes::MapValue | Writes::Depth => vec![
                 ("SURFACE", f64::from(surface_code(self.surface))),
                 ("HAS_TEXTURE", flag(self.how.has_texture)),
+                ("HAS_BUMPS", flag(self.how.has_bumps)),
             ],
             Writes::Traced => vec![
                 ("HAS_TINTED_GLASS", flag(self.how.has_texture)),
                 ("TRACES_LIGHTS", flag(self.how.traces_lights)),
+                ("HAS_BUMPS", flag(self.how.has_bumps)),
             ],
             Writes::Composed => vec![("IS_SCALED", flag(self.how.is_scaled))],
         }

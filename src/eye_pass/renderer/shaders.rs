@@ -20,6 +20,7 @@ pub(super) const SURFACE: Program = Program {
         shader_source!("eye_pass/frame"),
         shader_source!("eye_pass/objects"),
         shader_source!("eye_pass/images"),
+        shader_source!("eye_pass/bumps"),
         shader_source!("eye_pass/place"),
         shader_source!("eye_pass/surface"),
         shader_source!("eye_pass/own"),
@@ -36,6 +37,7 @@ pub(super) const TRACED: Program = Program {
         shader_source!("eye_pass/frame"),
         shader_source!("eye_pass/objects"),
         shader_source!("eye_pass/images"),
+        shader_source!("eye_pass/bumps"),
         shader_source!("eye_pass/place"),
         shader_source!("eye_pass/start"),
         shader_source!("eye_pass/lights"),
@@ -58,6 +60,7 @@ pub(super) const TRACED_UNDER_SKY: Program = Program {
         shader_source!("eye_pass/frame"),
         shader_source!("eye_pass/objects"),
         shader_source!("eye_pass/images"),
+        shader_source!("eye_pass/bumps"),
         shader_source!("eye_pass/place"),
         shader_source!("eye_pass/start"),
         shader_source!("eye_pass/lights"),
@@ -90,6 +93,7 @@ pub(super) const UNDER_LIGHTS: Program = Program {
         shader_source!("eye_pass/frame"),
         shader_source!("eye_pass/objects"),
         shader_source!("eye_pass/images"),
+        shader_source!("eye_pass/bumps"),
         shader_source!("eye_pass/place"),
         shader_source!("eye_pass/start"),
         shader_source!("eye_pass/lights"),
@@ -204,11 +208,12 @@ pub fn specialisations() -> Vec<Specialisation> {
     let mut all = vec![alone(ACCUMULATED, "accumulated"), alone(SKY, "sky_drawn")];
     for writes in Writes::ALL {
         for kind in KINDS {
-            for flags in 0..8 {
+            for flags in 0..16 {
                 let manner = DrawnHow {
                     has_texture: flags & 1 > 0,
                     is_scaled: flags & 1 > 0,
                     traces_lights: flags & 2 > 0,
+                    has_bumps: flags & 8 > 0,
                     has_sky: flags & 4 > 0,
                 };
                 let key = PipelineKey::new(writes, kind, Faces::Both, manner);

@@ -84,7 +84,8 @@ shader_struct! {
         texture: u32,
         /// Angle over which its roughness spreads what it reflects or lets through [rad].
         lobe_rad: f32,
-        padding: u32,
+        /// Record of what bends its normals.
+        bumps: u32,
     }
 }
 

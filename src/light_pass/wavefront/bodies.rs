@@ -3,6 +3,7 @@
 
 use glam::{DVec2, DVec3};
 
+use super::closeness::Closeness;
 use crate::light_pass::item_buffer::ItemBuffer;
 use crate::light_pass::launch::Launch;
 use crate::transport::Tracer;
@@ -10,17 +11,11 @@ use crate::transport::Tracer;
 /// A body counts as small while it is less than this many cells across.
 const SMALL_CELLS: f64 = 2.0;
 
-/// Cells across a caster once they are fine enough.
-const CELLS_ACROSS_CASTERS: f64 = 160.0;
-
 /// Cells across what only stands in the way: enough to find its silhouette.
 const CELLS_ACROSS_OTHERS: f64 = 8.0;
 
 /// How often a cell is divided at most for a body in it.
 const DEEPEST_BODY_LEVEL: u32 = 18;
-
-/// How often a cell is divided for a sharp corner in it: the corner is then cut off in a 1,024th of the cell.
-const CORNER_LEVELS: u32 = 5;
 
 /// More small bodies than this are a texture of the scene that the lattice has to resolve by itself.
 const MOST_BODIES: usize = 256;
@@ -40,12 +35,20 @@ pub struct SmallBodies {
     bodies: Vec<Body>,
     /// Sharp corners [m].
     corners: Vec<DVec3>,
+    /// How often a cell is divided for one of these.
+    corner_levels: u32,
 }
 
 impl SmallBodies {
     /// The objects that are small beside cells of the given size in the unit square, and sharp corners of those that
     /// the light sees: both only where they can bend light or stand in its way, as `visible` tells.
-    pub fn find(tracer: &Tracer, launch: &Launch, visible: &ItemBuffer, cell: DVec2) -> Self {
+    pub fn find(
+        tracer: &Tracer,
+        launch: &Launch,
+        visible: &ItemBuffer,
+        cell: DVec2,
+        closeness: Closeness,
+    ) -> Self {
         let scene = tracer.scene();
         let mut corners: Vec<DVec3> = visible
             .casters
@@ -75,7 +78,7 @@ impl SmallBodies {
                     centre: low * 0.5 + high * 0.5,
                     radius_m: 0.5 * (high - low).length(),
                     cells_across: if scene.material_of(index).surface.is_specular() {
-                        CELLS_ACROSS_CASTERS
+                        closeness.cells_across_casters
                     } else {
                         CELLS_ACROSS_OTHERS
                     },
@@ -87,7 +90,11 @@ impl SmallBodies {
         if bodies.len() > MOST_BODIES {
             bodies.clear();
         }
-        Self { bodies, corners }
+        Self {
+            bodies,
+            corners,
+            corner_levels: closeness.corner_levels,
+        }
     }
 
     /// Whether there is nothing to look for.
@@ -120,7 +127,7 @@ impl SmallBodies {
                 .fold(0.0, f64::max)
         };
         let along_m = |point: DVec3| (point - middle.origin).dot(middle.direction);
-        let holds_corner = level < CORNER_LEVELS
+        let holds_corner = level < self.corner_levels
             && self.corners.iter().any(|corner| {
                 let along_m = along_m(*corner);
                 along_m > 0.0

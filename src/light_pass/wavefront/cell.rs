@@ -98,6 +98,8 @@ pub struct CellCutter<'a> {
 struct Depth {
     /// Because it, or a cell around it, holds a small body.
     bodies: u32,
+    /// For detail of the normals.
+    bumps: u32,
     /// In rounds of refinement.
     rounds: usize,
     /// Because its cuts were ambiguous.
@@ -142,9 +144,16 @@ impl CellCutter<'_> {
             let bodies = depth.bodies + 1;
             return self.split(cell, Depth { bodies, ..depth }, work, out);
         }
+        if self.holds_bumps(cell, depth.bumps, work) {
+            let bumps = depth.bumps + 1;
+            return self.split(cell, Depth { bumps, ..depth }, work, out);
+        }
         if self.is_too_coarse(cell, &depth, work) {
             let rounds = depth.rounds + 1;
             return self.split(cell, Depth { rounds, ..depth }, work, out);
+        }
+        if cell.corners.iter().any(|corner| work.get(corner.sample).is_rough) {
+            return self.scatter(cell, work, out);
         }
         if cell.edges.iter().all(Option::is_none) {
             return if depth.ambiguous < DEEPEST_SPLIT && self.is_doubtful(cell, work) {
@@ -210,6 +219,13 @@ impl CellCutter<'_> {
             .fold(0.0, f64::max);
         self.bodies
             .ask_for_finer(launch, self.edges.face, (low, high), level, hidden_beyond_m)
+    }
+
+    /// Whether the normals of a surface have detail that is fine beside the cell.
+    fn holds_bumps(&self, cell: &Cell, level: u32, work: &Workspace) -> bool {
+        let samples = cell.corners.map(|corner| work.get(corner.sample));
+        let bumps = &self.edges.tracer.bumps;
+        bumps.ask_for_finer(&samples, cell.step(), level)
     }
 
     fn is_too_coarse(&self, cell: &Cell, depth: &Depth, work: &Workspace) -> bool {
@@ -293,7 +309,7 @@ impl CellCutter<'_> {
                     let known = edge.part(low, high);
                     self.finish_edge(known, ends, work)
                 }
-                _ => self.new_edge(ends, &[beyond], work),
+                _ => self.new_edge(ends, &[beyond], depth.bumps, work),
             }
         };
         let halves = [
@@ -314,7 +330,8 @@ impl CellCutter<'_> {
                 half(3, true, [left, d], [centre, top]),
             ],
         ];
-        let mut inner = |ends: [Corner; 2], beyond: [[Corner; 2]; 2]| self.new_edge(ends, &beyond, work);
+        let mut inner =
+            |ends: [Corner; 2], beyond: [[Corner; 2]; 2]| self.new_edge(ends, &beyond, depth.bumps, work);
         let down = inner([bottom, centre], [[a, left], [b, right]]);
         let up = inner([centre, top], [[left, d], [right, c]]);
         let west = inner([left, centre], [[a, bottom], [d, top]]);
@@ -348,8 +365,17 @@ impl CellCutter<'_> {
         }
     }
 
-    /// An edge within a cell, with pairs of samples on either side of it.
-    fn new_edge(&self, ends: [Corner; 2], beyond: &[[Corner; 2]], work: &mut Workspace) -> Option<Edge> {
+    /// An edge within a cell, divided `level` times for detail, with pairs of samples on either side of it.
+    fn new_edge(
+        &self,
+        ends: [Corner; 2],
+        beyond: &[[Corner; 2]],
+        level: u32,
+        work: &mut Workspace,
+    ) -> Option<Edge> {
+        if self.edges.is_divided(ends, level, work) {
+            return None;
+        }
         let samples = |corners: [Corner; 2]| corners.map(|corner| work.get(corner.sample));
         let bulges = beyond
             .iter()

@@ -7,9 +7,6 @@ use super::strand::{LightSample, Strand};
 use super::trace::StrandTracer;
 use crate::light_pass::caustic::path::PathSignature;
 
-/// Bisections of an edge on which the brightest light changes its way; dimmer light is cut as much more coarsely.
-pub const CUT_BITS: i32 = 8;
-
 /// Changes of way along one edge from which on each is cut more coarsely.
 const MANY_CHANGES: usize = 12;
 
@@ -279,6 +276,14 @@ pub struct EdgeCutter<'a> {
 }
 
 impl EdgeCutter<'_> {
+    /// Whether the cells on both sides of an edge between two corners will be divided, or scattered, whatever lies on
+    /// it; `level` how often they were divided for detail of normals.
+    pub fn is_divided(&self, ends: [Corner; 2], level: u32, work: &Workspace) -> bool {
+        let samples = ends.map(|corner| work.get(corner.sample));
+        let step = ends[1].square - ends[0].square;
+        samples.iter().any(|sample| sample.is_rough) || self.tracer.bumps.ask_for_finer(&samples, step, level)
+    }
+
     /// Adds samples until every change of way along an edge between two places of the unit square is bracketed.
     pub fn resolve(&self, edge: &mut Edge, ends: [DVec2; 2], work: &mut Workspace) {
         let first = work.get(edge.samples[0].1);
@@ -287,7 +292,8 @@ impl EdgeCutter<'_> {
         let step = ends[1] - ends[0];
         // As fine as on an edge of the lattice itself, in the unit square.
         let whole = DVec2::from(self.tracer.steps).dot(step.abs()) / step.length_squared();
-        let most_bits = (CUT_BITS - whole.log2().round() as i32).clamp(2, CUT_BITS);
+        let cut_bits = self.tracer.closeness.cut_bits;
+        let most_bits = (cut_bits - whole.log2().round() as i32).clamp(2, cut_bits);
         let mut changes: Vec<(PathSignature, i32, bool)> = Vec::new();
         for (sample, other) in [(first, last), (last, first)] {
             for strand in &sample.strands {

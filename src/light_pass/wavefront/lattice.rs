@@ -231,7 +231,11 @@ impl WavefrontLattice<'_> {
                     let beyond = [corner(row, column), corner(row, column + 1)];
                     may_bulge_over(ends, beyond, work)
                 });
-                self.edge_cutter(face).edge(ends, bulges, work)
+                let edges = self.edge_cutter(face);
+                if edges.is_divided(ends, 0, work) {
+                    return None;
+                }
+                edges.edge(ends, bulges, work)
             })
             .collect()
     }
@@ -273,6 +277,9 @@ impl WavefrontLattice<'_> {
         let corner = |row: usize, column: usize| self.corner_at(first_row, row, column, index);
         let down = |column: usize, work: &mut Workspace| {
             let ends = [corner(row, column)?, corner(row + 1, column)?];
+            if cutter.edges.is_divided(ends, 0, work) {
+                return None;
+            }
             let bulges = [column.checked_sub(1), Some(column + 1)]
                 .into_iter()
                 .flatten()

@@ -3,7 +3,9 @@
 
 pub mod band;
 pub mod bodies;
+pub mod bumps;
 pub mod cell;
+pub mod closeness;
 pub mod coverage;
 mod division;
 mod doubt;

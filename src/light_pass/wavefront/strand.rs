@@ -119,6 +119,10 @@ pub struct LightSample {
     pub not_emitted: LinearSrgb,
     /// Largest flux of any strand, luminance [W per unit square].
     pub brightest_w: f64,
+    /// Cells across and down the unit square that detail of the normals on its way asks for.
+    pub bump_cells: DVec2,
+    /// Whether detail of the normals is finer than any cell.
+    pub is_rough: bool,
     /// Closest-hit queries; 0 where all that it met was known.
     pub segments: u32,
     /// What effects took part.

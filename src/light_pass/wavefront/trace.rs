@@ -2,6 +2,8 @@
 
 use glam::DVec2;
 
+use super::bumps::BumpCells;
+use super::closeness::Closeness;
 use super::kept_rays::{FreshRay, KeptHit, KeptRays, Known, RayKey};
 use super::strand::{Landing, LightSample, Strand, SurfaceNode};
 use crate::geometry::Ray;
@@ -11,7 +13,7 @@ use crate::optics::LinearSrgb;
 use crate::progress::Control;
 use crate::transport::{
     Branch, Event, ForEffects, HitPlace, Interaction, MediumStack, PathCounts, PathEffects, RayDerivative,
-    RayDifferential, SurfaceHit, SurfaceScale, Tracer,
+    RayDifferential, SurfaceDetail, SurfaceHit, SurfaceScale, Tracer,
 };
 
 /// Strands that one light ray may have waiting: a closed mirror box with glass in it doubles them without end.
@@ -31,8 +33,12 @@ pub struct StrandTracer<'a> {
     pub limits: PathLimits,
     /// Distance between neighbouring rays, in units of the unit square.
     pub steps: [f64; 2],
+    /// What becomes of detail of normals.
+    pub bumps: BumpCells,
     /// What was traced before.
     pub kept: Option<&'a KeptRays>,
+    /// How closely borders are looked for.
+    pub closeness: Closeness,
     /// Asks to stop: then rays end at once, and what they give is to be thrown away.
     pub control: &'a Control,
     /// The code that follows rays, compiled for the effects of `limits`.
@@ -94,10 +100,18 @@ impl<'a> StrandTracer<'a> {
             launch,
             limits,
             steps,
+            bumps: BumpCells::EXACT,
             kept: None,
+            closeness: Closeness::SHARP,
             control,
             follow: limits.effects.specialise(FollowFor),
         }
+    }
+
+    /// The same, but for how closely borders are looked for.
+    #[must_use]
+    pub fn with_closeness(self, closeness: Closeness) -> Self {
+        Self { closeness, ..self }
     }
 
     /// Traces the ray that starts at a point of the unit square of a face.
@@ -226,6 +240,7 @@ impl<'a> StrandTracer<'a> {
                     .transfer(&from.ray, hit, &from.differential, SurfaceScale::Facet)
             }
         };
+        let is_too_fine = self.is_too_fine(hit, &at_hit, sample);
         let group = self.tracer.smoothing_group(hit.object, hit.triangle);
         let at_surface = from.signature.at(hit.object, group);
         let mut node = SurfaceNode {
@@ -256,9 +271,18 @@ impl<'a> StrandTracer<'a> {
             } else if flux_w.luminance() < floor_w || sample.strands.len() >= MOST_BRANCHES {
                 node.threshold += flux_w;
             } else {
-                let differential =
-                    self.tracer
-                        .differential_after(from.ray.direction, hit, &at_hit, &branch, scale);
+                let surface = if is_too_fine {
+                    SurfaceDetail::Mesh
+                } else {
+                    SurfaceDetail::Bumps
+                };
+                let differential = self.tracer.differential_after(
+                    from.ray.direction,
+                    hit,
+                    &at_hit,
+                    &branch,
+                    (scale, surface),
+                );
                 let signature = at_surface.event(branch.event);
                 push(
                     from,
@@ -273,6 +297,19 @@ impl<'a> StrandTracer<'a> {
             }
         }
         sample.nodes.push(node);
+    }
+
+    /// Notes what a surface's normals ask of the lattice, and whether no cell is fine enough for them.
+    fn is_too_fine(&self, hit: &SurfaceHit, at_hit: &RayDifferential, sample: &mut LightSample) -> bool {
+        let detail_m = self.tracer.finest_bump_m(hit.object);
+        if detail_m == f64::INFINITY {
+            return false;
+        }
+        let wanted = self.bumps.wanted(at_hit, detail_m);
+        let is_too_fine = self.bumps.is_too_fine(wanted, self.steps);
+        sample.bump_cells = sample.bump_cells.max(wanted);
+        sample.is_rough |= is_too_fine;
+        is_too_fine
     }
 }
 

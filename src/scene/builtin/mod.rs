@@ -1,11 +1,11 @@
-//! Procedural scenes. All but `showroom` have a reference solution in `assets/reference/` and are meshes of the exact
+//! Procedural scenes. All but `showroom` and `pool-bump` have a reference solution in `assets/reference/` and are meshes of the exact
 //! surfaces that it was computed on.
 
 mod ball;
 mod mirror;
 mod paraboloid;
 pub mod parts;
-mod pool;
+pub mod pool;
 mod ring;
 pub mod shapes;
 mod showroom;
@@ -14,11 +14,12 @@ mod slab;
 use super::Scene;
 
 /// Names of all built-in scenes, the program's default first.
-pub const NAMES: [&str; 8] = [
+pub const NAMES: [&str; 9] = [
     "showroom",
     "ring",
     "ball",
     "pool",
+    "pool-bump",
     "mirror",
     "slab",
     "paraboloid",
@@ -32,6 +33,7 @@ pub fn build(name: &str) -> Option<Scene> {
         "ring" => ring::ring(),
         "ball" => ball::build(),
         "pool" => pool::build(),
+        "pool-bump" => pool::bumped(pool::AMPLITUDE_M),
         "mirror" => mirror::build(),
         "slab" => slab::build(),
         "paraboloid" => paraboloid::build(),

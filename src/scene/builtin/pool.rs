@@ -1,9 +1,10 @@
-//! `pool`: the sun through a wavy water surface.
+//! `pool`: the sun through a wavy water surface, as a mesh of its height and (`pool-bump`) as one quad whose normals
+//! alone have the waves.
 
 use glam::DVec3;
 
 use super::{parts, shapes};
-use crate::scene::{Mesh, Scene};
+use crate::scene::{self, Material, Mesh, Scene, Waves};
 use crate::units::Irradiance;
 
 /// One wave: height A·cos(kx·x + kz·z + phase).
@@ -35,17 +36,61 @@ pub fn water(centre: DVec3, half: [f64; 2], quads: [u32; 2], waves: &[Wave]) -> 
     })
 }
 
-/// A sheet of 3 m × 3 m, n = 1.333, 1 m above a floor of 2 m × 2 m; the sun shines with 1 W/m².
-pub fn build() -> Scene {
+/// Amplitude of each wave [m].
+pub const AMPLITUDE_M: f64 = 0.02;
+
+/// Half width of the water [m].
+const HALF_M: f64 = 1.5;
+
+/// The waves of the pool, each of the given amplitude [m].
+pub fn waves(amplitude_m: f64) -> [Wave; 3] {
     let wave = |kx, kz, phase_rad| Wave {
-        amplitude_m: 0.02,
+        amplitude_m,
         wave_vector: [kx, kz],
         phase_rad,
     };
-    let waves = [wave(9.0, 0.0, 1.0), wave(0.0, 7.0, 2.0), wave(6.0, 5.0, 0.0)];
+    [wave(9.0, 0.0, 1.0), wave(0.0, 7.0, 2.0), wave(6.0, 5.0, 0.0)]
+}
+
+/// A sheet of 3 m × 3 m, n = 1.333, 1 m above a floor of 2 m × 2 m; the sun shines with 1 W/m².
+pub fn build() -> Scene {
+    displaced(AMPLITUDE_M)
+}
+
+/// The pool with waves of the given amplitude [m] as a mesh of 512² quads.
+pub fn displaced(amplitude_m: f64) -> Scene {
+    let surface = water(DVec3::Y, [HALF_M; 2], [512, 512], &waves(amplitude_m));
+    with_water(surface, parts::dielectric("water", 1.333))
+}
+
+/// The same waves on one flat quad, by its normals alone.
+pub fn bumped(amplitude_m: f64) -> Scene {
+    let surface = water(DVec3::Y, [HALF_M; 2], [1, 1], &[]);
+    let material = Material {
+        waves: as_bumps(&waves(amplitude_m)),
+        ..parts::dielectric("water", 1.333)
+    };
+    with_water(surface, material)
+}
+
+/// Waves of a sheet as a material has them.
+fn as_bumps(waves: &[Wave]) -> Option<Waves> {
+    let bump = |wave: &Wave| {
+        let [x, z] = wave.wave_vector;
+        let vector = DVec3::new(x, 0.0, z);
+        scene::Wave {
+            amplitude_m: wave.amplitude_m,
+            wavelength_m: std::f64::consts::TAU / vector.length(),
+            direction: vector.normalize(),
+            phase_rad: wave.phase_rad,
+        }
+    };
+    Waves::new(waves.iter().map(bump).collect()).ok()
+}
+
+fn with_water(surface: Mesh, material: Material) -> Scene {
     let mut scene = parts::reference_scene(1.0);
-    let surface = water(DVec3::Y, [1.5, 1.5], [512, 512], &waves);
-    parts::add(&mut scene, "water", surface, parts::dielectric("water", 1.333));
+    parts::add(&mut scene, "water", surface, material);
     scene
         .lights
         .push(parts::sun("light", DVec3::new(0.3, -1.0, 0.2), Irradiance(1.0)));

@@ -42,6 +42,10 @@ pub(super) fn apply(edit: &Edit, index: usize, material: &mut Material) -> Resul
                 roughness: replace(&mut material.roughness, *roughness),
             }
         }
+        Edit::MaterialWaves { waves, .. } => Edit::MaterialWaves {
+            material: index,
+            waves: replace(&mut material.waves, waves.clone()),
+        },
         _ => {
             return Err(Error::usage(owner, "has no such property", "edit what it has"));
         }

@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use glam::{DQuat, DVec3};
 
-use super::{LightSize, Mesh, Scene};
+use super::{LightSize, Mesh, Scene, Waves};
 use crate::error::{Error, Result};
 use crate::optics::LinearSrgb;
 use crate::units::{Irradiance, RadiantIntensity};
@@ -87,6 +87,13 @@ pub enum Edit {
         /// [0, 1].
         roughness: f64,
     },
+    /// Waves that bend the normals of a material.
+    MaterialWaves {
+        /// Which material.
+        material: usize,
+        /// `None` for none.
+        waves: Option<Waves>,
+    },
     /// An object turned about the middle of its box, and then moved.
     ObjectMoved {
         /// Which object.
@@ -126,6 +133,8 @@ pub enum EditTarget {
     MaterialTint(usize),
     /// Roughness of a material.
     MaterialRoughness(usize),
+    /// Waves of a material.
+    MaterialWaves(usize),
     /// Place of an object.
     ObjectPlace(usize),
     /// All of these.
@@ -170,6 +179,7 @@ impl Edit {
             Self::MaterialIor { material, .. } => EditTarget::MaterialIor(*material),
             Self::MaterialTint { material, .. } => EditTarget::MaterialTint(*material),
             Self::MaterialRoughness { material, .. } => EditTarget::MaterialRoughness(*material),
+            Self::MaterialWaves { material, .. } => EditTarget::MaterialWaves(*material),
             Self::ObjectMoved { object, .. } | Self::ObjectMesh { object, .. } => {
                 EditTarget::ObjectPlace(*object)
             }
@@ -191,7 +201,8 @@ impl Edit {
             }
             Self::MaterialIor { material, .. }
             | Self::MaterialTint { material, .. }
-            | Self::MaterialRoughness { material, .. } => {
+            | Self::MaterialRoughness { material, .. }
+            | Self::MaterialWaves { material, .. } => {
                 let found = existing(&mut scene.materials, *material, "material")?;
                 material::apply(self, *material, found)
             }

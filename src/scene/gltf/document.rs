@@ -6,7 +6,7 @@ use serde_json::Map;
 
 use super::report::Report;
 use super::sizes::StatedSize;
-use super::{extensions, faults};
+use super::{extensions, faults, waves};
 use crate::error::{Error, Result};
 
 /// The typed JSON, with node transforms in double precision beside it.
@@ -16,6 +16,8 @@ pub struct Document {
     pub root: Root,
     /// One per node.
     pub transforms: Vec<NodeTransform>,
+    /// Waves of each material, as its extras state them.
+    pub waves: Vec<Option<Value>>,
     /// One per node: what its `extras` say of the size of its light.
     pub node_sizes: Vec<StatedSize>,
     /// One per light of KHR_lights_punctual.
@@ -49,6 +51,7 @@ pub fn parse(json: &[u8], report: &mut Report) -> Result<Document> {
     let required = strings(file, "extensionsRequired")?;
     extensions::check(&required, &strings(file, "extensionsUsed")?, report)?;
     leave_out_what_is_not_read(file, report);
+    let waves = waves::collect(&value);
     let node_sizes = StatedSize::of_each(value.get("nodes"));
     let light_sizes = StatedSize::of_each(value.pointer("/extensions/KHR_lights_punctual/lights"));
     remove_extras(&mut value);
@@ -62,6 +65,7 @@ pub fn parse(json: &[u8], report: &mut Report) -> Result<Document> {
     Ok(Document {
         root,
         transforms,
+        waves,
         node_sizes,
         light_sizes,
     })

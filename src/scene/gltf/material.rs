@@ -5,12 +5,13 @@ use gltf::json::extensions::material as extension;
 use gltf::json::material::{AlphaMode, Material as Source};
 use gltf::json::texture::Info;
 use gltf::json::validation::Checked;
-use gltf::json::{Index, Root};
+use gltf::json::{Index, Value};
 
+use super::document::Document;
 use super::images::Images;
-use super::names;
 use super::numbers::widen;
 use super::report::{Budget, Report};
+use super::{names, waves};
 use crate::error::Result;
 use crate::optics::LinearSrgb;
 use crate::scene::{Material, SurfaceKind, TextureRef, Volume};
@@ -52,18 +53,19 @@ const DARKEST_ATTENUATION: f64 = 1e-6;
 /// # Errors
 /// Images that do not fit the memory budget.
 pub fn read_all(
-    root: &Root,
+    document: &Document,
     images: &mut Images,
     budget: &mut Budget,
     report: &mut Report,
 ) -> Result<Vec<Material>> {
-    let sources = root.materials.iter().enumerate();
+    let sources = document.root.materials.iter().enumerate();
     sources
         .map(|(index, source)| {
             let name = names::name(source.name.as_ref(), "material", index);
             let mut reading = Reading {
                 owner: format!("material `{name}`"),
                 source,
+                waves: document.waves.get(index).and_then(Option::as_ref),
                 images: &mut *images,
                 budget: &mut *budget,
                 report: &mut *report,
@@ -76,6 +78,8 @@ pub fn read_all(
 struct Reading<'a, 'b> {
     owner: String,
     source: &'a Source,
+    /// As its extras state them.
+    waves: Option<&'a Value>,
     images: &'a mut Images<'b>,
     budget: &'a mut Budget,
     report: &'a mut Report,
@@ -102,6 +106,9 @@ impl Reading<'_, '_> {
             ior: self.ior(extensions),
             volume: self.volume(extensions),
             emitted_radiance: self.emission(extensions)?,
+            waves: self
+                .waves
+                .and_then(|waves| waves::read(waves, &self.owner, self.report)),
             double_sided: self.source.double_sided,
         };
         self.take_means(&mut material, transmission)?;

@@ -27,6 +27,9 @@ pub fn rebase(scene: &mut Scene) {
     for light in &mut scene.lights {
         light.kind = light.kind.moved(-centre);
     }
+    for material in &mut scene.materials {
+        material.waves = material.waves.as_ref().map(|waves| waves.with_origin(centre));
+    }
     for camera in &mut scene.cameras {
         camera.position -= centre;
     }

@@ -9,6 +9,7 @@ pub mod frame_graph;
 mod help;
 mod light_pass;
 mod scene;
+mod waves;
 mod worth;
 
 use std::sync::Arc;

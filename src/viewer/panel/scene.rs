@@ -4,7 +4,7 @@ use egui::{Button, ComboBox, DragValue, Response, Slider, SliderClamping, Ui};
 use glam::DVec3;
 
 use super::control::{About, CONTROL_WIDTH, row, rows, significant};
-use super::{Facts, Wishes, bake};
+use super::{Facts, Wishes, bake, waves};
 use crate::optics::LinearSrgb;
 use crate::scene::{Edit, LightKind, Scene, SurfaceKind};
 use crate::units::{Irradiance, RadiantIntensity};
@@ -296,6 +296,9 @@ fn material(ui: &mut Ui, object: usize, scene: &Scene, wishes: &mut Wishes) {
         }
         response
     });
+    if let Some(waves) = material.bending_waves() {
+        waves::show(ui, index, waves, wishes);
+    }
     row(ui, &TINT, None, |ui| {
         let mut colour = material.base_colour.to_array().map(|channel| channel as f32);
         let response = ui.color_edit_button_rgb(&mut colour);

@@ -1,0 +1,65 @@
+//! Waves of materials: `nephroid_waves` in a material's `extras`, a list of
+//! `{ "amplitude_m", "wavelength_m", "direction": [x, y, z] or [x, z], "phase_rad" }` in the file's world coordinates.
+
+use glam::DVec3;
+use gltf::json::Value;
+use serde::Deserialize;
+
+use super::report::Report;
+use crate::scene::{Wave, Waves};
+
+/// Where waves stand in a material's extras.
+const KEY: &str = "nephroid_waves";
+
+/// A wave as the file states it.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Stated {
+    amplitude_m: f64,
+    wavelength_m: f64,
+    direction: Vec<f64>,
+    #[serde(default)]
+    phase_rad: f64,
+}
+
+/// What the extras of each material state of waves, in file order; to be called before extras are thrown away.
+pub fn collect(file: &Value) -> Vec<Option<Value>> {
+    let materials = file.get("materials").and_then(Value::as_array);
+    let stated = |material: &Value| material.get("extras")?.get(KEY).cloned();
+    materials.into_iter().flatten().map(stated).collect()
+}
+
+/// The waves that a material states; those that cannot be are left out with a warning.
+pub fn read(stated: &Value, owner: &str, report: &mut Report) -> Option<Waves> {
+    let waves = Vec::<Stated>::deserialize(stated)
+        .map_err(|error| format!("its `{KEY}` cannot be read ({error})"))
+        .and_then(|list| list.iter().map(wave).collect())
+        .and_then(|waves| Waves::new(waves).map_err(|why| format!("of its `{KEY}`, {why}")));
+    waves
+        .map_err(|why| {
+            report.warn(
+                owner,
+                format!("{why}: it has none"),
+                "give up to 8 waves of amplitude_m, wavelength_m, direction [x, z] or [x, y, z], phase_rad, with \
+                 slopes amplitude_m·2π/wavelength_m of at most 1 altogether",
+            );
+        })
+        .ok()
+}
+
+fn wave(stated: &Stated) -> Result<Wave, String> {
+    let direction = match stated.direction[..] {
+        [x, z] => DVec3::new(x, 0.0, z),
+        [x, y, z] => DVec3::new(x, y, z),
+        _ => DVec3::ZERO,
+    };
+    let direction = direction
+        .try_normalize()
+        .ok_or_else(|| format!("of its `{KEY}`, a direction is none"))?;
+    Ok(Wave {
+        amplitude_m: stated.amplitude_m,
+        wavelength_m: stated.wavelength_m,
+        direction,
+        phase_rad: stated.phase_rad,
+    })
+}

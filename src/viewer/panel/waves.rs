@@ -1,0 +1,119 @@
+//! Rows of the section *Scene* for the waves of a material.
+
+use egui::{DragValue, Response, Slider, SliderClamping, Ui};
+use glam::DVec3;
+
+use super::Wishes;
+use super::bake::FAILED;
+use super::control::{About, row};
+use crate::scene::waves::STEEPEST_SLOPE;
+use crate::scene::{Edit, Wave, Waves};
+
+const SLOPE: About = About {
+    label: "Waves' slope",
+    what: "Steepest slope A·2π/λ of all waves together; sets their heights, each in proportion.",
+    range: "0 to 1; flatter waves focus farther away",
+    accuracy: "sharper caustics need more rays for the same error",
+    cost: "light that meets this material is traced anew",
+};
+const WAVE: About = About {
+    label: "Wave",
+    what: "One wave of the normals: height A between rest and crest [m], length λ [m], and the direction it runs to, as \
+           an azimuth clockwise from −z as seen from above [°].",
+    range: "A from 0, λ above 0; slopes of at most 1 altogether",
+    accuracy: "cells become as short as a quarter of the shortest wave",
+    cost: "light that meets this material is traced anew; short waves need more rays",
+};
+
+/// Least height that a drag starts from [m].
+const LEAST_HEIGHT_M: f64 = 1e-6;
+
+/// Shows the waves of a material; what is changed goes to `wishes`.
+pub fn show(ui: &mut Ui, material: usize, waves: &Waves, wishes: &mut Wishes) {
+    let mut list = waves.list().to_vec();
+    row(ui, &SLOPE, None, |ui| slope(ui, &mut list));
+    for wave in &mut list {
+        row(ui, &WAVE, None, |ui| one(ui, wave));
+    }
+    if list == waves.list() {
+        return;
+    }
+    match Waves::new(list) {
+        Ok(waves) => {
+            wishes.edit = Some(Edit::MaterialWaves {
+                material,
+                waves: Some(waves),
+            });
+        }
+        Err(why) => {
+            ui.colored_label(FAILED, why);
+            ui.end_row();
+        }
+    }
+}
+
+/// The slope of all; their heights follow it.
+fn slope(ui: &mut Ui, list: &mut [Wave]) -> Response {
+    let present: f64 = list.iter().map(Wave::slope).sum();
+    let mut wanted = present;
+    let slider = Slider::new(&mut wanted, 0.0..=STEEPEST_SLOPE).clamping(SliderClamping::Never);
+    let response = ui.add(slider.fixed_decimals(3));
+    if response.changed() {
+        for wave in list.iter_mut() {
+            // Flat waves rise too, all alike.
+            wave.amplitude_m = wave.amplitude_m.max(LEAST_HEIGHT_M);
+        }
+        let present: f64 = list.iter().map(Wave::slope).sum();
+        for wave in list.iter_mut() {
+            wave.amplitude_m *= wanted / present;
+        }
+    }
+    response
+}
+
+fn one(ui: &mut Ui, wave: &mut Wave) -> Response {
+    let mut azimuth_deg = wave.direction.x.atan2(-wave.direction.z).to_degrees();
+    let before = azimuth_deg;
+    let response = ui
+        .horizontal(|ui| {
+            ui.spacing_mut().item_spacing.x = 4.0;
+            ui.spacing_mut().interact_size.x = 58.0;
+            let fine = |value: f64| 0.01 * value.max(LEAST_HEIGHT_M);
+            let (height_speed, length_speed) = (fine(wave.amplitude_m), fine(wave.wavelength_m));
+            number(ui, &mut wave.amplitude_m, 5, |shown| {
+                shown.speed(height_speed).range(0.0..=f64::MAX).prefix("A: ")
+            })
+            .union(number(ui, &mut wave.wavelength_m, 4, |shown| {
+                shown
+                    .speed(length_speed)
+                    .range(f64::MIN_POSITIVE..=f64::MAX)
+                    .prefix("λ: ")
+            }))
+            .union(number(ui, &mut azimuth_deg, 1, |shown| {
+                shown.speed(0.5).range(-360.0..=360.0).prefix("az.: ")
+            }))
+        })
+        .inner;
+    if azimuth_deg != before {
+        let azimuth = azimuth_deg.to_radians();
+        wave.direction = DVec3::new(azimuth.sin(), 0.0, -azimuth.cos());
+    }
+    response
+}
+
+/// A value shown with so many decimals. What rounding leaves of it is no change.
+fn number(
+    ui: &mut Ui,
+    value: &mut f64,
+    decimals: i32,
+    style: impl FnOnce(DragValue<'_>) -> DragValue<'_>,
+) -> Response {
+    let unit = 10_f64.powi(-decimals);
+    let rounded = (*value / unit).round() * unit;
+    let mut shown = rounded;
+    let response = ui.add(style(DragValue::new(&mut shown)).max_decimals(decimals as usize));
+    if (shown - rounded).abs() > 1e-9 * unit {
+        *value = shown;
+    }
+    response
+}
