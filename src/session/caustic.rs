@@ -229,7 +229,7 @@ impl CausticLayer<'_> {
     }
 
     /// Lights that see something specular and shine at all.
-    fn lit(&self) -> impl Iterator<Item = &AimedLight> {
+    pub(super) fn lit(&self) -> impl Iterator<Item = &AimedLight> {
         let scene = self.tracer.scene();
         let lights = self.aim.lights.iter();
         lights.filter(|light| scene.lights[light.light].strength().max_channel() > 0.0)
@@ -250,6 +250,7 @@ impl CausticLayer<'_> {
         let unit = self.unit(light)?;
         let step = climb.levels.len();
         let key = self.key(light, step, (&climb.rounds, climb.goal), sizes);
+        let key_is_dim = key.is_dim;
         let made = match state.take(&key) {
             Some(level) => Some(level),
             None => self.make(light, key, unit, state, course),
@@ -257,6 +258,19 @@ impl CausticLayer<'_> {
         let Some(mut level) = made else {
             return Ok(());
         };
+        if key_is_dim {
+            // Not known better, and not worth knowing.
+            let whole = accuracy::images(&level.maps, level.unit);
+            let ledger = level.ledger.report("", level.unit, LinearSrgb::WHITE).energy_w;
+            let estimate = accuracy::by_difference(&whole, &Images::new(), 1.0, &ledger);
+            level.error = estimate.map(|estimate| KeptError {
+                predecessors: 0,
+                estimate,
+            });
+            climb.levels.push(level);
+            climb.done = true;
+            return Ok(());
+        }
         let predecessors = step.min(ESTIMATED_LEVELS - 1);
         let is_known = |error: &KeptError| error.predecessors == predecessors;
         if !level.error.as_ref().is_some_and(is_known) && !course.control.is_cancelled() {

@@ -50,6 +50,8 @@ pub(super) struct LevelKey {
     pub(super) stride: usize,
     /// Of a soft light: its wavefronts.
     pub(super) resolved: Option<Resolved>,
+    /// Whether the light hardly shows beside the others.
+    pub(super) is_dim: bool,
 }
 
 /// The two dimensions of a soft light's error, as far as they are known.
