@@ -12,6 +12,8 @@ mod meshes;
 mod pictures;
 #[path = "eye/scenes.rs"]
 mod scenes;
+#[path = "eye/soft_light.rs"]
+mod soft_light;
 #[path = "eye/texel_areas.rs"]
 mod texel_areas;
 

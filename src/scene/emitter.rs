@@ -2,7 +2,7 @@
 
 use glam::{DVec2, DVec3};
 
-use super::{Light, LightKind, LightSize, PanelShape, Scene};
+use super::{Light, LightKind, LightSize, Mesh, PanelShape, Scene};
 use crate::geometry::ray;
 use crate::optics::LinearSrgb;
 
@@ -104,18 +104,53 @@ impl Emitter {
     pub fn middle(light: &Light, scene: &Scene) -> Option<Self> {
         match light.kind {
             LightKind::Environment { .. } => None,
-            _ => Self::at(light, scene, None),
+            _ => Places::new(light, scene).at(None),
         }
     }
 
     /// The place of a light at a point of the unit square; `None` where it sends nothing.
     pub fn sample(light: &Light, scene: &Scene, square: DVec2) -> Option<Self> {
-        Self::at(light, scene, Some(square))
+        Places::new(light, scene).sample(square)
+    }
+}
+
+/// A light whose places are asked for many times.
+#[derive(Debug)]
+pub struct Places<'a> {
+    light: &'a Light,
+    scene: &'a Scene,
+    /// Of an object that glows.
+    surface: Option<Glowing<'a>>,
+}
+
+impl<'a> Places<'a> {
+    /// Of a light of a scene.
+    pub fn new(light: &'a Light, scene: &'a Scene) -> Self {
+        let surface = match light.kind {
+            LightKind::Surface { object, .. } => Glowing::new(scene, object),
+            _ => None,
+        };
+        Self {
+            light,
+            scene,
+            surface,
+        }
     }
 
-    fn at(light: &Light, scene: &Scene, square: Option<DVec2>) -> Option<Self> {
+    /// The place at a point of the unit square; `None` where the light sends nothing.
+    pub fn sample(&self, square: DVec2) -> Option<Emitter> {
+        self.at(Some(square))
+    }
+
+    /// Area of all glowing sides of an object [m²]; 0 of other lights.
+    pub fn surface_m2(&self) -> f64 {
+        self.surface.as_ref().map_or(0.0, Glowing::area_m2)
+    }
+
+    fn at(&self, square: Option<DVec2>) -> Option<Emitter> {
+        let (light, scene) = (self.light, self.scene);
         let strength = light.strength();
-        let whole = |kind: EmitterKind, factor: f64| Self {
+        let whole = |kind: EmitterKind, factor: f64| Emitter {
             kind,
             strength: strength * factor,
         };
@@ -189,13 +224,14 @@ impl Emitter {
                     };
                 Some(whole(EmitterKind::Facet { position, normal }, area_m2))
             }
-            (LightKind::Surface { object, .. }, _, square) => {
-                let (kind, area_m2) = on_surface(scene, object, square)?;
-                Some(whole(kind, area_m2))
+            (LightKind::Surface { .. }, _, square) => {
+                let surface = self.surface.as_ref()?;
+                let kind = surface.facet(square.unwrap_or(DVec2::splat(0.5)))?;
+                Some(whole(kind, surface.area_m2()))
             }
             (LightKind::Environment { .. }, _, square) => {
                 let sample = scene.environment.as_ref()?.sample(square?)?;
-                Some(Self {
+                Some(Emitter {
                     kind: EmitterKind::Parallel {
                         direction: -sample.to_light,
                     },
@@ -240,45 +276,68 @@ fn in_cap(axis: DVec3, half_angle_rad: f64, square: DVec2) -> DVec3 {
     (x * sideways.x + y * sideways.y + axis * (1.0 - height)).normalize()
 }
 
-/// A point of an object that glows, by area, and the area of all its glowing sides [m²].
-fn on_surface(scene: &Scene, object: usize, square: Option<DVec2>) -> Option<(EmitterKind, f64)> {
-    let mesh = &scene.objects.get(object)?.mesh;
-    let both_sides = scene.material_of(object).double_sided;
-    let mut square = square.unwrap_or(DVec2::splat(0.5));
-    let mut side = 1.0;
-    if both_sides {
-        square.y *= 2.0;
-        if square.y >= 1.0 {
-            (side, square.y) = (-1.0, square.y - 1.0);
-        }
+/// An object that glows.
+#[derive(Debug)]
+struct Glowing<'a> {
+    mesh: &'a Mesh,
+    both_sides: bool,
+    /// Area of all triangles up to each, itself included [m²].
+    upto_m2: Vec<f64>,
+}
+
+impl<'a> Glowing<'a> {
+    /// `None` where it has no area.
+    fn new(scene: &'a Scene, object: usize) -> Option<Self> {
+        let mesh = &scene.objects.get(object)?.mesh;
+        let mut sum_m2 = 0.0;
+        let upto_m2: Vec<f64> = (0..mesh.triangles.len())
+            .map(|triangle| {
+                let [a, b, c] = mesh.corners(triangle);
+                sum_m2 += 0.5 * (b - a).cross(c - a).length();
+                sum_m2
+            })
+            .collect();
+        (sum_m2 > 0.0).then(|| Self {
+            mesh,
+            both_sides: scene.material_of(object).double_sided,
+            upto_m2,
+        })
     }
-    let area_of = |triangle: usize| {
-        let [a, b, c] = mesh.corners(triangle);
-        0.5 * (b - a).cross(c - a).length()
-    };
-    let total_m2 = mesh.area_m2();
-    let mut rest_m2 = square.x * total_m2;
-    let mut chosen = None;
-    for triangle in 0..mesh.triangles.len() {
-        let area_m2 = area_of(triangle);
-        if area_m2 <= 0.0 {
-            continue;
-        }
-        chosen = Some((triangle, (rest_m2 / area_m2).min(1.0)));
-        if rest_m2 < area_m2 {
-            break;
-        }
-        rest_m2 -= area_m2;
+
+    fn total_m2(&self) -> f64 {
+        self.upto_m2.last().copied().unwrap_or(0.0)
     }
-    let (triangle, share) = chosen?;
-    // Evenly over the triangle: the root of one coordinate, times the other.
-    let root = share.sqrt();
-    let barycentric = [1.0 - root, root * (1.0 - square.y), root * square.y];
-    let (point, error) = ray::point_with_error(&mesh.corners(triangle), barycentric);
-    let normal = mesh.face_normal(triangle) * side;
-    let position = ray::offset_origin(point, error, normal, normal);
-    Some((
-        EmitterKind::Facet { position, normal },
-        total_m2 * if both_sides { 2.0 } else { 1.0 },
-    ))
+
+    /// Of all glowing sides [m²].
+    fn area_m2(&self) -> f64 {
+        self.total_m2() * if self.both_sides { 2.0 } else { 1.0 }
+    }
+
+    /// A point of it, evenly by area.
+    fn facet(&self, mut square: DVec2) -> Option<EmitterKind> {
+        let mut side = 1.0;
+        if self.both_sides {
+            square.y *= 2.0;
+            if square.y >= 1.0 {
+                (side, square.y) = (-1.0, square.y - 1.0);
+            }
+        }
+        let wanted_m2 = square.x * self.total_m2();
+        // Triangles without area are never chosen, the last ones neither.
+        let end = self.upto_m2.partition_point(|upto| *upto < self.total_m2());
+        let triangle = self.upto_m2.partition_point(|upto| *upto <= wanted_m2).min(end);
+        let before_m2 = if triangle == 0 {
+            0.0
+        } else {
+            self.upto_m2[triangle - 1]
+        };
+        let share = ((wanted_m2 - before_m2) / (self.upto_m2.get(triangle)? - before_m2)).clamp(0.0, 1.0);
+        // Evenly over the triangle: the root of one coordinate, times the other.
+        let root = share.sqrt();
+        let barycentric = [1.0 - root, root * (1.0 - square.y), root * square.y];
+        let (point, error) = ray::point_with_error(&self.mesh.corners(triangle), barycentric);
+        let normal = self.mesh.face_normal(triangle) * side;
+        let position = ray::offset_origin(point, error, normal, normal);
+        Some(EmitterKind::Facet { position, normal })
+    }
 }

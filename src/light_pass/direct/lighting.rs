@@ -3,12 +3,52 @@
 use glam::DVec3;
 
 use super::facet::SurfacePoint;
-use crate::light_pass::emitter::{Emitter, EmitterKind};
 use crate::optics::LinearSrgb;
 use crate::optics::fresnel::dielectric_reflectance;
+use crate::scene::emitter::{Emitter, EmitterKind};
 use crate::scene::{Material, SurfaceKind};
 
-/// Light on its way to a point.
+/// Light on its way to a point, whatever surface is there.
+pub struct Beam {
+    /// Unit.
+    pub to_light: DVec3,
+    /// To the light [m], infinite for a sun.
+    pub distance_m: f64,
+    /// E across the beam for a strength of 1.
+    pub across_beam: f64,
+    pub strength: LinearSrgb,
+}
+
+impl Beam {
+    /// From a source; `None` at its very place.
+    pub fn new(emitter: &Emitter, point: DVec3) -> Option<Self> {
+        Self::of_patch(emitter, point, 0.0)
+    }
+
+    /// From a source that stands for a patch of a surface [m²]: near by it is a disc of that area (Wallace, Elmquist
+    /// and Haines, "A ray tracing algorithm for progressive radiosity", SIGGRAPH 1989), which sends no more than it can.
+    pub fn of_patch(emitter: &Emitter, point: DVec3, patch_m2: f64) -> Option<Self> {
+        let (to_light, distance_m, across_beam) = match (emitter.kind, emitter.kind.position()) {
+            (EmitterKind::Parallel { direction }, _) => (-direction, f64::INFINITY, 1.0),
+            (kind, Some(position)) => {
+                let offset = position - point;
+                let to_light = offset.try_normalize()?;
+                let share = kind.falloff(-to_light);
+                let spread_m2 = offset.length_squared() + patch_m2 / std::f64::consts::PI;
+                (to_light, offset.length(), share / spread_m2)
+            }
+            (_, None) => return None,
+        };
+        Some(Self {
+            to_light,
+            distance_m,
+            across_beam,
+            strength: emitter.strength,
+        })
+    }
+}
+
+/// Light that a surface takes if nothing stands in its way.
 pub struct Arriving {
     /// E that it would give there [W/m²].
     pub irradiance: LinearSrgb,
@@ -16,39 +56,36 @@ pub struct Arriving {
     pub to_light: DVec3,
     /// To the light [m], infinite for a sun.
     pub distance_m: f64,
+    /// E for a strength of 1, before polish reflects its share.
+    pub open: f64,
+    /// And after that.
+    pub strength: f64,
 }
 
 impl Arriving {
-    /// What a source gives a point if nothing stands in its way; `None` where it sends nothing, or to the wrong side.
-    /// A mixed surface takes what its polish does not reflect.
-    pub fn unshadowed(emitter: &Emitter, point: &SurfacePoint, material: &Material) -> Option<Self> {
-        let (to_light, distance_m, across_beam) = match (emitter.kind, emitter.kind.position()) {
-            (EmitterKind::Parallel { direction }, _) => (-direction, f64::INFINITY, 1.0),
-            (kind, Some(position)) => {
-                let offset = position - point.position;
-                let to_light = offset.try_normalize()?;
-                let share = kind.falloff(-to_light);
-                (to_light, offset.length(), share / offset.length_squared())
-            }
-            (_, None) => return None,
-        };
-        let side = if to_light.dot(point.geometric_normal) >= 0.0 {
+    /// What a beam gives a point; `None` where it is nothing, or comes to the wrong side. A mixed surface takes what its
+    /// polish does not reflect.
+    pub fn from_beam(beam: &Beam, point: &SurfacePoint, material: &Material) -> Option<Self> {
+        let side = if beam.to_light.dot(point.geometric_normal) >= 0.0 {
             1.0
         } else if material.double_sided {
             -1.0
         } else {
             return None;
         };
-        let cosine = side * to_light.dot(point.shading_normal);
+        let cosine = side * beam.to_light.dot(point.shading_normal);
         let taken = match material.surface {
             SurfaceKind::Mixed => 1.0 - dielectric_reflectance(cosine, material.ior),
             _ => 1.0,
         };
-        let strength = across_beam * cosine * taken;
+        let open = beam.across_beam * cosine;
+        let strength = open * taken;
         (strength > 0.0).then(|| Self {
-            irradiance: emitter.strength * strength,
-            to_light,
-            distance_m,
+            irradiance: beam.strength * strength,
+            to_light: beam.to_light,
+            distance_m: beam.distance_m,
+            open,
+            strength,
         })
     }
 }

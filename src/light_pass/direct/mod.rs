@@ -2,10 +2,12 @@
 //!
 //! E = I cos θ/r² for points and spots, E⊥ cos θ for suns, θ by the interpolated normal, stopped by every surface,
 //! clear glass included: what comes through that is caustic light (LS+D). A surface takes light on its front, a
-//! double-sided one on either side, into the same map.
+//! double-sided one on either side, into the same map. Lights with extent are means over their places.
 
 mod facet;
 mod lighting;
+mod polygon;
+mod source;
 mod texel;
 
 use glam::DVec2;
@@ -15,13 +17,13 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use crate::illumination::Chart;
 use crate::illumination::gutter::{fill_gutter, neighbours};
 use crate::illumination::parametrisation::coverage::{Polygon, for_each_texel_in_row, rows};
-use crate::light_pass::emitter::Emitter;
 use crate::optics::LinearSrgb;
 use crate::progress::{Control, Progress, Stage};
 use crate::scene::{Light, Material};
 use crate::transport::Tracer;
 use facet::Facet;
-use lighting::Arriving;
+use lighting::{Arriving, Beam};
+use source::Source;
 use texel::{Lit, Part, Row, Sample, Texel, TexelSum};
 
 /// Samples across and down a texel where light is all there or all away.
@@ -57,16 +59,21 @@ pub fn bake_direct(
     let total: u64 = charts.iter().map(|chart| 2 * chart.height as u64).sum();
     let done = AtomicU64::new(0);
     let row_done = || progress.advance(Stage::Direct, done.fetch_add(1, Ordering::Relaxed) + 1, total);
+    let sources: Vec<Option<Source>> = lights
+        .iter()
+        .enumerate()
+        .map(|(index, light)| Source::new(light, tracer.scene(), index))
+        .collect();
     charts
         .iter()
-        .map(|chart| Baker::new(tracer, lights, chart).bake(&row_done, control))
+        .map(|chart| Baker::new(tracer, &sources, chart).bake(&row_done, control))
         .collect()
 }
 
 struct Baker<'a> {
     tracer: &'a Tracer,
-    /// Of each light, its middle; `None` where it has none or sends nothing.
-    emitters: Vec<Option<Emitter>>,
+    /// By light; `None` where it sends nothing.
+    sources: &'a [Option<Source>],
     chart: &'a Chart,
     material: &'a Material,
     /// Triangles that reach each row: those of row r are `triangles[first[r]..first[r + 1]]`.
@@ -75,7 +82,7 @@ struct Baker<'a> {
 }
 
 impl<'a> Baker<'a> {
-    fn new(tracer: &'a Tracer, lights: &[Light], chart: &'a Chart) -> Self {
+    fn new(tracer: &'a Tracer, sources: &'a [Option<Source>], chart: &'a Chart) -> Self {
         let size = DVec2::new(1.0, chart.height as f64);
         let reach = |uvs: &[DVec2; 3]| rows(uvs.map(|uv| uv * size), chart.height);
         let mut first = vec![0; chart.height + 1];
@@ -97,10 +104,7 @@ impl<'a> Baker<'a> {
         }
         Self {
             tracer,
-            emitters: lights
-                .iter()
-                .map(|light| Emitter::middle(light, tracer.scene()))
-                .collect(),
+            sources,
             chart,
             material: tracer.scene().material_of(chart.object),
             first,
@@ -114,6 +118,7 @@ impl<'a> Baker<'a> {
         let dark = Texel {
             irradiance: [0.0; 3],
             lit: Lit::EMPTY,
+            is_uncertain: false,
         };
         let mut texels = vec![dark; width * height];
         let (mut shadow_rays, mut complete) = (0, true);
@@ -129,7 +134,7 @@ impl<'a> Baker<'a> {
         let coarse = self.pass(row_done, control, COARSE_SIDE, |_| true);
         take(coarse, &mut texels);
         let fine = self.pass(row_done, control, FINE_SIDE, |texel| {
-            self.meets_shadow(&texels, texel)
+            texels[texel].is_uncertain || self.meets_shadow(&texels, texel)
         });
         take(fine, &mut texels);
         let mut irradiance = texels
@@ -187,7 +192,9 @@ impl<'a> Baker<'a> {
             for_each_texel_in_row(facet.corners_texels, row, width, |column, part| {
                 if wanted(row * width + column) {
                     let texel = DVec2::new(column as f64, row as f64);
-                    content.shadow_rays += self.add_part(&facet, part, texel, side, &mut sums[column]);
+                    let hash = self.hash(row * width + column);
+                    let sum = &mut sums[column];
+                    content.shadow_rays += self.add_part(&facet, part, (texel, hash), side, sum);
                 }
             });
         }
@@ -195,7 +202,7 @@ impl<'a> Baker<'a> {
             if let (true, Some(part)) = (sum.lit == Lit::EMPTY, sum.largest)
                 && let Some(facet) = self.facet(part.triangle)
             {
-                let sample = self.sample(&facet, part.middle);
+                let sample = self.sample(&facet, part.middle, (self.hash(row * width + column), 0, 1));
                 content.shadow_rays += sample.shadow_rays;
                 sum.add(sample, part.area_m2);
             }
@@ -207,7 +214,14 @@ impl<'a> Baker<'a> {
     }
 
     /// Adds the samples of a texel that lie on its part on one triangle; returns the shadow rays that it took.
-    fn add_part(&self, facet: &Facet, part: &Polygon, texel: DVec2, side: usize, sum: &mut TexelSum) -> u64 {
+    fn add_part(
+        &self,
+        facet: &Facet,
+        part: &Polygon,
+        (texel, hash): (DVec2, u64),
+        side: usize,
+        sum: &mut TexelSum,
+    ) -> u64 {
         let area_m2 = part.area() * facet.m2_per_texel2;
         if sum.largest.is_none_or(|largest| largest.area_m2 < area_m2) {
             sum.largest = Some(Part {
@@ -223,7 +237,7 @@ impl<'a> Baker<'a> {
                 + DVec2::new((index % side) as f64 + 0.5, (index / side) as f64 + 0.5) * step
                 + OFF_THE_DIAGONALS;
             if part.contains(place) {
-                let sample = self.sample(facet, place);
+                let sample = self.sample(facet, place, (hash, index, side * side));
                 shadow_rays += sample.shadow_rays;
                 sum.add(sample, facet.m2_per_texel2 * step * step);
             }
@@ -231,30 +245,44 @@ impl<'a> Baker<'a> {
         shadow_rays
     }
 
-    fn sample(&self, facet: &Facet, place: DVec2) -> Sample {
+    /// What arrives at a place of the map: the `index`th of `places` of a texel with that hash.
+    fn sample(&self, facet: &Facet, place: DVec2, (hash, index, places): (u64, usize, usize)) -> Sample {
         let point = facet.at(place);
         let mut sample = Sample {
             irradiance: LinearSrgb::BLACK,
             mask: 0,
+            soft: 0.0,
             shadow_rays: 0,
         };
-        for (index, emitter) in self.emitters.iter().enumerate() {
-            let arriving = emitter
-                .as_ref()
-                .and_then(|emitter| Arriving::unshadowed(emitter, &point, self.material));
-            let Some(arriving) = arriving else {
-                continue;
-            };
-            sample.shadow_rays += 1;
-            if !self
-                .tracer
-                .is_blocked(&point.spawn(arriving.to_light), arriving.distance_m)
-            {
-                sample.irradiance += arriving.irradiance;
-                sample.mask ^= 1u64.rotate_left(index as u32 % 64);
+        for (light, source) in self.sources.iter().enumerate() {
+            match source {
+                Some(Source::Single(emitter)) => {
+                    let arriving = Beam::new(emitter, point.position)
+                        .and_then(|beam| Arriving::from_beam(&beam, &point, self.material));
+                    let Some(arriving) = arriving else { continue };
+                    sample.shadow_rays += 1;
+                    let ray = point.spawn(arriving.to_light);
+                    if !self.tracer.is_blocked(&ray, arriving.distance_m) {
+                        sample.irradiance += arriving.irradiance;
+                        sample.mask ^= 1u64.rotate_left(light as u32 % 64);
+                    }
+                }
+                Some(Source::Soft(soft)) => {
+                    let run = soft.run(hash, index, places);
+                    let gathered = soft.gather(self.tracer, &point, self.material, run);
+                    sample.shadow_rays += gathered.shadow_rays;
+                    sample.irradiance += gathered.irradiance;
+                    sample.soft += gathered.irradiance.luminance();
+                }
+                None => {}
             }
         }
         sample
+    }
+
+    /// Tells texels of all maps apart.
+    fn hash(&self, texel: usize) -> u64 {
+        (self.chart.object as u64) << 40 ^ texel as u64
     }
 
     fn facet(&self, triangle: u32) -> Option<Facet> {

@@ -34,6 +34,38 @@ pub struct TexelSum {
     pub area_m2: f64,
     pub lit: Lit,
     pub largest: Option<Part>,
+    /// Of lights with extent.
+    pub soft: Spread,
+}
+
+/// How values differ from each other.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Spread {
+    count: f64,
+    sum: f64,
+    squares: f64,
+}
+
+/// Standard error of a texel's mean, as a share of it, above which it is looked at once more.
+const LARGEST_NOISE: f64 = 0.02;
+
+impl Spread {
+    fn add(&mut self, value: f64) {
+        self.count += 1.0;
+        self.sum += value;
+        self.squares += value * value;
+    }
+
+    /// Whether the mean of the values may be off by more than [`LARGEST_NOISE`] of `whole`. A lone value says nothing
+    /// of itself.
+    fn is_uncertain(&self, whole: f64) -> bool {
+        if self.count < 2.0 {
+            return self.sum > 0.0;
+        }
+        let mean = self.sum / self.count;
+        let variance = (self.squares / self.count - mean * mean).max(0.0) / (self.count - 1.0);
+        variance.sqrt() > LARGEST_NOISE * whole
+    }
 }
 
 /// The largest part of a texel that is covered by one triangle: what is looked at where no sample lies on the surface.
@@ -50,18 +82,25 @@ impl TexelSum {
         area_m2: 0.0,
         lit: Lit::EMPTY,
         largest: None,
+        soft: Spread {
+            count: 0.0,
+            sum: 0.0,
+            squares: 0.0,
+        },
     };
 
     pub fn add(&mut self, sample: Sample, area_m2: f64) {
         self.flux += sample.irradiance * area_m2;
         self.area_m2 += area_m2;
         self.lit = self.lit.and(sample.mask);
+        self.soft.add(sample.soft);
     }
 
     pub fn finished(&self) -> Texel {
         Texel {
             irradiance: (self.flux / self.area_m2).to_array().map(|e| e as f32),
             lit: self.lit,
+            is_uncertain: self.soft.is_uncertain((self.flux / self.area_m2).luminance()),
         }
     }
 }
@@ -72,6 +111,8 @@ pub struct Sample {
     pub irradiance: LinearSrgb,
     /// The lights that reach it, folded into a number.
     pub mask: u64,
+    /// Luminance of what comes from lights with extent [W/m²].
+    pub soft: f64,
     pub shadow_rays: u64,
 }
 
@@ -80,6 +121,8 @@ pub struct Sample {
 pub struct Texel {
     pub irradiance: [f32; 3],
     pub lit: Lit,
+    /// Whether lights with extent were looked for with too few samples.
+    pub is_uncertain: bool,
 }
 
 /// The covered texels of one row that were asked for, by column.

@@ -1,0 +1,299 @@
+//! Lights as texels look for them: single points and directions, and what has extent, by samples of it.
+//!
+//! What has extent is a sequence of places, the same for all texels: each run of 2ᵏ of them that begins at a multiple of
+//! 2ᵏ is evenly spread. A texel takes a run by a hash of itself, and shares it out among its own places, so that both
+//! the texel and the light are covered evenly and no pattern repeats from texel to texel.
+
+use std::f64::consts::{PI, TAU};
+use std::ops::Range;
+
+use glam::{DVec2, DVec3};
+
+use super::facet::SurfacePoint;
+use super::lighting::{Arriving, Beam};
+use super::polygon::Polygon;
+use crate::geometry::sampling::even_point;
+use crate::optics::LinearSrgb;
+use crate::scene::emitter::{Emitter, Places};
+use crate::scene::{Light, LightKind, LightSize, Material, PanelShape, Scene};
+use crate::transport::Tracer;
+
+/// Places of a light that are ready: a power of 2.
+const READY: usize = 1 << 13;
+/// Surfaces of more triangles are looked at by samples alone.
+const MOST_POLYGONS: usize = 16;
+/// Corners that stand for the edge of a disc.
+const DISC_CORNERS: usize = 64;
+/// Share of its way that a shadow ray stops before a lamp, so as not to meet the lamp's own surface.
+const BEFORE_LAMP: f64 = 1e-9;
+const SEED: u64 = 0x6c69_6768_7473;
+
+/// A light ready to be looked for.
+pub enum Source {
+    /// From one point or direction.
+    Single(Emitter),
+    /// From many.
+    Soft(Soft),
+}
+
+/// A light with extent.
+pub struct Soft {
+    places: ManyPlaces,
+    /// What it is made of, where that is little: E without shadows is exact, and samples say only what is hidden.
+    shape: Option<Shape>,
+    is_environment: bool,
+    light: u64,
+}
+
+enum ManyPlaces {
+    /// Each as if all light came from there.
+    Emitters { all: Vec<Emitter>, area_m2: f64 },
+    /// A ball, by points of its visible cap.
+    Ball {
+        centre: DVec3,
+        radius_m: f64,
+        radiance: LinearSrgb,
+        squares: Vec<DVec2>,
+    },
+}
+
+struct Shape {
+    polygons: Vec<Polygon>,
+    radiance: LinearSrgb,
+}
+
+/// What a light with extent gives a point.
+#[derive(Clone, Copy, Default)]
+pub struct Gathered {
+    /// E [W/m²].
+    pub irradiance: LinearSrgb,
+    pub shadow_rays: u64,
+}
+
+impl Source {
+    /// A light of a scene, the `index`th that is looked for; `None` where it sends nothing.
+    pub fn new(light: &Light, scene: &Scene, index: usize) -> Option<Self> {
+        if !light.has_extent() {
+            return Emitter::middle(light, scene).map(Self::Single);
+        }
+        let squares = (0..READY as u32).map(|place| even_point(place, 0, SEED + index as u64));
+        let places = match (light.kind, light.size) {
+            (LightKind::Point { position, .. }, LightSize::Radius { radius_m }) => ManyPlaces::Ball {
+                centre: position,
+                radius_m,
+                radiance: light.strength() / (PI * radius_m * radius_m),
+                squares: squares.collect(),
+            },
+            _ => {
+                let places = Places::new(light, scene);
+                let all: Option<Vec<Emitter>> = squares.map(|square| places.sample(square)).collect();
+                ManyPlaces::Emitters {
+                    all: all?,
+                    area_m2: places.surface_m2(),
+                }
+            }
+        };
+        Some(Self::Soft(Soft {
+            places,
+            shape: shape(light, scene),
+            is_environment: matches!(light.kind, LightKind::Environment { .. }),
+            light: index as u64,
+        }))
+    }
+}
+
+/// The polygons of a lamp, where they are few.
+fn shape(light: &Light, scene: &Scene) -> Option<Shape> {
+    let polygons = match light.kind {
+        LightKind::Panel {
+            centre,
+            across,
+            down,
+            shape,
+            ..
+        } => {
+            let normal = across.cross(down).try_normalize()?;
+            let outline: Vec<DVec2> = match shape {
+                PanelShape::Rectangle => vec![
+                    DVec2::NEG_ONE,
+                    DVec2::new(1.0, -1.0),
+                    DVec2::ONE,
+                    DVec2::new(-1.0, 1.0),
+                ],
+                PanelShape::Disc => {
+                    // As large as the disc.
+                    let step = TAU / DISC_CORNERS as f64;
+                    let radius = (step / step.sin()).sqrt();
+                    let corner = |corner: usize| DVec2::from_angle(corner as f64 * step) * radius;
+                    (0..DISC_CORNERS).map(corner).collect()
+                }
+            };
+            let corners = outline
+                .iter()
+                .map(|place| centre + across * place.x + down * place.y);
+            vec![Polygon::new(corners.collect(), normal, false)]
+        }
+        LightKind::Surface { object, .. } => {
+            let mesh = &scene.objects.get(object)?.mesh;
+            if mesh.triangles.len() > MOST_POLYGONS {
+                return None;
+            }
+            let both_sides = scene.material_of(object).double_sided;
+            let with_area =
+                (0..mesh.triangles.len()).filter(|triangle| mesh.face_normal(*triangle) != DVec3::ZERO);
+            with_area
+                .map(|triangle| {
+                    let corners = mesh.corners(triangle).to_vec();
+                    Polygon::new(corners, mesh.face_normal(triangle), both_sides)
+                })
+                .collect()
+        }
+        _ => return None,
+    };
+    Some(Shape {
+        polygons,
+        radiance: light.strength(),
+    })
+}
+
+impl Soft {
+    /// Samples of the light for each of `places` places of a texel.
+    pub fn samples(&self, places: usize) -> usize {
+        let of_texel = match (self.is_environment, places > 16) {
+            (true, false) => 256,
+            (true, true) => 1024,
+            (false, false) => 64,
+            (false, true) => 256,
+        };
+        (of_texel / places.max(1)).max(1)
+    }
+
+    /// The places of the light for one of the `places` of a texel.
+    pub fn run(&self, texel: u64, place: usize, places: usize) -> Range<usize> {
+        let each = self.samples(places);
+        let runs = READY / (each * places.next_power_of_two());
+        let run = (mixed(texel ^ mixed(self.light)) % runs.max(1) as u64) as usize;
+        let first = (run * places + place) * each % READY;
+        first..first + each
+    }
+
+    /// What comes to a point from a run of its places.
+    pub fn gather(
+        &self,
+        tracer: &Tracer,
+        point: &SurfacePoint,
+        material: &Material,
+        run: Range<usize>,
+    ) -> Gathered {
+        let count = run.len() as f64;
+        let mut sum = Sum::default();
+        for index in run {
+            let arriving = self
+                .beam(index, point.position, count)
+                .and_then(|beam| Arriving::from_beam(&beam, point, material));
+            let Some(arriving) = arriving else { continue };
+            sum.shadow_rays += 1;
+            sum.open += arriving.open;
+            let distance_m = arriving.distance_m * (1.0 - BEFORE_LAMP);
+            if !tracer.is_blocked(&point.spawn(arriving.to_light), distance_m) {
+                sum.taken += arriving.strength;
+                sum.irradiance += arriving.irradiance;
+            }
+        }
+        let irradiance = match &self.shape {
+            // Heitz, Hill and McGuire, "Combining analytic direct illumination and stochastic shadows", I3D 2018.
+            Some(shape) if sum.open > 0.0 => shape.irradiance(point, material) * (sum.taken / sum.open),
+            Some(_) => LinearSrgb::BLACK,
+            None => sum.irradiance / count,
+        };
+        Gathered {
+            irradiance,
+            shadow_rays: sum.shadow_rays,
+        }
+    }
+
+    /// What would come from one of its places, of `count` that stand for all.
+    fn beam(&self, index: usize, point: DVec3, count: f64) -> Option<Beam> {
+        match &self.places {
+            ManyPlaces::Emitters { all, area_m2 } => {
+                let patch_m2 = if self.shape.is_some() {
+                    0.0
+                } else {
+                    area_m2 / count
+                };
+                Beam::of_patch(&all[index], point, patch_m2)
+            }
+            ManyPlaces::Ball {
+                centre,
+                radius_m,
+                radiance,
+                squares,
+            } => ball(*centre, *radius_m, *radiance, point, squares[index]),
+        }
+    }
+}
+
+#[derive(Default)]
+struct Sum {
+    irradiance: LinearSrgb,
+    /// Σ of what would come without shadows, polish left aside, and of what is taken, for strength 1.
+    open: f64,
+    taken: f64,
+    shadow_rays: u64,
+}
+
+impl Shape {
+    /// E at a point without shadows [W/m²].
+    fn irradiance(&self, point: &SurfacePoint, material: &Material) -> LinearSrgb {
+        let sides: &[f64] = if material.double_sided {
+            &[1.0, -1.0]
+        } else {
+            &[1.0]
+        };
+        let seen_sr: f64 = sides
+            .iter()
+            .flat_map(|side| self.polygons.iter().map(move |polygon| (side, polygon)))
+            .map(|(side, polygon)| {
+                polygon.projected_solid_angle_sr(
+                    point.position,
+                    point.geometric_normal * *side,
+                    point.shading_normal * *side,
+                )
+            })
+            .sum();
+        self.radiance * seen_sr
+    }
+}
+
+/// A ray towards a ball of even radiance, evenly by solid angle (Shirley, Wang and Zimmerman, "Monte Carlo techniques
+/// for direct lighting calculations", 1996); `None` within it.
+fn ball(centre: DVec3, radius_m: f64, radiance: LinearSrgb, point: DVec3, square: DVec2) -> Option<Beam> {
+    let offset = centre - point;
+    let distance_m = offset.length();
+    let axis = offset.try_normalize().filter(|_| distance_m > radius_m)?;
+    let sine = radius_m / distance_m;
+    // 1 − cos of the half-angle, without a difference of nearly equal numbers.
+    let cap = sine * sine / (1.0 + (1.0 - sine * sine).sqrt());
+    let height = cap * square.x;
+    let sideways = (height * (2.0 - height)).sqrt();
+    let (x, y) = axis.any_orthonormal_pair();
+    let around = DVec2::from_angle(TAU * square.y) * sideways;
+    let to_light = (x * around.x + y * around.y + axis * (1.0 - height)).try_normalize()?;
+    let nearest = distance_m * (1.0 - height);
+    let within = (radius_m * radius_m - (distance_m * sideways).powi(2))
+        .max(0.0)
+        .sqrt();
+    Some(Beam {
+        to_light,
+        distance_m: nearest - within,
+        across_beam: TAU * cap,
+        strength: radiance,
+    })
+}
+
+/// A hash of 64 bits (the finaliser of SplitMix64: Steele, Lea and Flood 2014).
+fn mixed(mut code: u64) -> u64 {
+    code = (code ^ (code >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    code = (code ^ (code >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    code ^ (code >> 31)
+}
