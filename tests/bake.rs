@@ -8,8 +8,6 @@ mod accuracy;
 mod auto_or_everything;
 #[path = "bake/brute_force.rs"]
 mod brute_force;
-#[path = "bake/bumps.rs"]
-mod bumps;
 #[path = "bake/collection.rs"]
 mod collection;
 #[path = "bake/coverage.rs"]
