@@ -19,7 +19,7 @@ use crate::light_pass::caustic::setup::{Aim, AimedLight, Aiming};
 use crate::light_pass::caustic::statistics::FootprintStatistics;
 use crate::light_pass::wavefront::refine::Round;
 use crate::optics::LinearSrgb;
-use crate::plan::EffectPlan;
+use crate::plan::{Effect, EffectPlan};
 use crate::progress::{Control, Progress};
 use crate::settings::{BakeSettings, Estimator, ItemBufferKind};
 use crate::transport::Tracer;
@@ -139,7 +139,8 @@ impl CausticLayer<'_> {
         };
         for light in &lights {
             let state = states.of_mut(light.light);
-            state.begin(&light.launch, self.settings.kept_light_bytes());
+            let has_bumps = self.plan.is_on(Effect::Bumps);
+            state.begin(&light.launch, has_bumps, self.settings.kept_light_bytes());
         }
         let sizes = self.sizes_of_maps(states, &lights, &mut course)?;
         course.statistics = states.statistics.as_ref().map(|(_, known)| known.clone());
