@@ -23,6 +23,8 @@ pub enum Effect {
     Textures,
     /// Lobes of rough surfaces that light goes on from.
     Roughness,
+    /// Waves and other bumps in the normals of surfaces that light goes on from.
+    Bumps,
     /// Size of lamps, suns and the environment.
     AreaLights,
     /// The direct layer.
@@ -35,13 +37,14 @@ pub enum Effect {
 
 impl Effect {
     /// All of them, as they are listed.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 11] = [
         Self::LightPass,
         Self::Refraction,
         Self::Reflection,
         Self::Absorption,
         Self::Textures,
         Self::Roughness,
+        Self::Bumps,
         Self::AreaLights,
         Self::Direct,
         Self::Indirect,
@@ -57,6 +60,7 @@ impl Effect {
             Self::Absorption => "absorption",
             Self::Textures => "textures",
             Self::Roughness => "roughness",
+            Self::Bumps => "bumps",
             Self::AreaLights => "area_lights",
             Self::Direct => "direct",
             Self::Indirect => "indirect",
@@ -76,6 +80,9 @@ impl Effect {
             Self::Textures => "Images on mirrors and glass tint the light that goes on from them.",
             Self::Roughness => {
                 "Rough mirrors and frosted glass spread the light that goes on from them (GGX)."
+            }
+            Self::Bumps => {
+                "Waves in the normals of water, glass and mirrors bend the light that goes on from them."
             }
             Self::AreaLights => {
                 "Lamps, suns and skies with a size blur caustics; without it each shines from its middle."

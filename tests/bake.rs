@@ -29,10 +29,14 @@ mod hard_scenes;
 mod invariance;
 #[path = "bake/kept.rs"]
 mod kept;
+#[path = "bake/lamps.rs"]
+mod lamps;
 #[path = "bake/layers.rs"]
 mod layers;
 #[path = "bake/live.rs"]
 mod live;
+#[path = "bake/nested.rs"]
+mod nested;
 #[path = "bake/reference.rs"]
 mod reference;
 #[path = "bake/smoothing.rs"]
@@ -43,6 +47,8 @@ mod soft;
 mod support;
 #[path = "bake/threshold.rs"]
 mod threshold;
+#[path = "bake/tiny.rs"]
+mod tiny;
 #[path = "bake/tools.rs"]
 mod tools;
 #[path = "bake/useless.rs"]

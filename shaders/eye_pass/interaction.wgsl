@@ -61,7 +61,8 @@ fn thin_wall(point: SurfacePoint, facing: Facing, incident: vec3f, media: vec4u,
 fn dielectric(point: SurfacePoint, facing: Facing, incident: vec3f, media: vec4u, tint: vec3f) -> Interaction {
     let ior = objects[point.object].ior;
     var beyond = left(media, point.object);
-    var ior_near = ior;
+    // Where bodies overlap, the one that was entered last is the medium until it is left; an open sheet was never entered.
+    var ior_near = select(medium_ior(media), ior, all(beyond == media));
     var ior_far = medium_ior(beyond);
     if facing.front {
         beyond = entered(media, point.object);

@@ -45,6 +45,16 @@ pub struct ItemBuffer {
 /// A box around everything.
 const EVERYWHERE: [Bounds; 1] = [(DVec3::NEG_INFINITY, DVec3::INFINITY)];
 
+/// First and last column and row of the cells of a face that a box may touch; `None` where it touches none.
+pub fn cells_towards(
+    launch: &Launch,
+    face: usize,
+    bounds: (DVec3, DVec3),
+) -> Option<((usize, usize), (usize, usize))> {
+    let cells = Search::new(launch, face, &[], &[], &|_| false).cells_of(bounds)?;
+    Some((cells.columns, cells.rows))
+}
+
 /// What becomes of cells whose casters lie behind opaque faces.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Hiding {

@@ -64,6 +64,11 @@ pub fn decide(scene: &Scene, settings: &BakeSettings, sights: &[Sight]) -> Effec
             &Material::is_rough,
             "no lit mirror, glass or polish is rough",
         ),
+        on_paths(
+            Effect::Bumps,
+            &|material| material.bending_waves().is_some(),
+            "no lit mirror, glass or polish has waves",
+        ),
         decision.area_lights(pass.on),
         decision.direct(),
         decision.indirect(),

@@ -19,7 +19,7 @@ use crate::light_pass::caustic::setup::{Aim, AimedLight, Aiming};
 use crate::light_pass::caustic::statistics::FootprintStatistics;
 use crate::light_pass::wavefront::refine::Round;
 use crate::optics::LinearSrgb;
-use crate::plan::EffectPlan;
+use crate::plan::{Effect, EffectPlan};
 use crate::progress::{Control, Progress};
 use crate::settings::{BakeSettings, Estimator, ItemBufferKind};
 use crate::transport::Tracer;
@@ -139,7 +139,8 @@ impl CausticLayer<'_> {
         };
         for light in &lights {
             let state = states.of_mut(light.light);
-            state.begin(&light.launch, self.settings.kept_light_bytes());
+            let has_bumps = self.plan.is_on(Effect::Bumps);
+            state.begin(&light.launch, has_bumps, self.settings.kept_light_bytes());
         }
         let sizes = self.sizes_of_maps(states, &lights, &mut course)?;
         course.statistics = states.statistics.as_ref().map(|(_, known)| known.clone());
@@ -229,7 +230,7 @@ impl CausticLayer<'_> {
     }
 
     /// Lights that see something specular and shine at all.
-    fn lit(&self) -> impl Iterator<Item = &AimedLight> {
+    pub(super) fn lit(&self) -> impl Iterator<Item = &AimedLight> {
         let scene = self.tracer.scene();
         let lights = self.aim.lights.iter();
         lights.filter(|light| scene.lights[light.light].strength().max_channel() > 0.0)
@@ -250,6 +251,7 @@ impl CausticLayer<'_> {
         let unit = self.unit(light)?;
         let step = climb.levels.len();
         let key = self.key(light, step, (&climb.rounds, climb.goal), sizes);
+        let key_is_dim = key.is_dim;
         let made = match state.take(&key) {
             Some(level) => Some(level),
             None => self.make(light, key, unit, state, course),
@@ -257,6 +259,19 @@ impl CausticLayer<'_> {
         let Some(mut level) = made else {
             return Ok(());
         };
+        if key_is_dim {
+            // Not known better, and not worth knowing.
+            let whole = accuracy::images(&level.maps, level.unit);
+            let ledger = level.ledger.report("", level.unit, LinearSrgb::WHITE).energy_w;
+            let estimate = accuracy::by_difference(&whole, &Images::new(), 1.0, &ledger);
+            level.error = estimate.map(|estimate| KeptError {
+                predecessors: 0,
+                estimate,
+            });
+            climb.levels.push(level);
+            climb.done = true;
+            return Ok(());
+        }
         let predecessors = step.min(ESTIMATED_LEVELS - 1);
         let is_known = |error: &KeptError| error.predecessors == predecessors;
         if !level.error.as_ref().is_some_and(is_known) && !course.control.is_cancelled() {

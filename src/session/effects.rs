@@ -107,6 +107,11 @@ impl Accounts<'_> {
                 deposits: deposits.scattered,
                 ..EffectCounts::default()
             },
+            Effect::Bumps => EffectCounts {
+                rays: paths.bent,
+                deposits: deposits.bent,
+                ..EffectCounts::default()
+            },
             Effect::AreaLights => self.meter.places,
             Effect::Direct => EffectCounts {
                 rays: self.counts.shadow_rays,

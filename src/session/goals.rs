@@ -5,7 +5,8 @@ use super::caustic::{CausticLayer, Climb};
 use crate::light_pass::caustic::setup::AimedLight;
 use crate::light_pass::ledger_sum::Account;
 
-/// A light whose error is below this share of what it might be need not even go through all lattices.
+/// A light whose error is below this share of what it might be need not even go through all lattices; one whose whole
+/// light is, is dim.
 const NEGLIGIBLE: f64 = 0.25;
 
 /// What a light aims at.
@@ -55,6 +56,25 @@ impl Errors {
 }
 
 impl CausticLayer<'_> {
+    /// Whether all that a light can add to the maps is less than the error that is aimed at: then one coarse lattice is
+    /// enough, whatever it misses.
+    pub(super) fn is_dim(&self, light: &AimedLight) -> bool {
+        let Some(target) = self.settings.max_error else {
+            return false;
+        };
+        let scene = self.tracer.scene();
+        let sends_w = |light: &AimedLight| {
+            let strength = scene.lights[light.light].strength().luminance();
+            strength * light.launch.power_bound_w() * light.visible().marked_share(&light.launch)
+        };
+        let (mut all_w, mut count) = (0.0, 0);
+        for light in self.lit() {
+            all_w += sends_w(light);
+            count += 1;
+        }
+        sends_w(light) < NEGLIGIBLE * target * all_w / f64::from(count).sqrt()
+    }
+
     /// Errors of all lights; `None` where one is not known yet.
     pub(super) fn errors(&self, lights: &[&AimedLight], climbs: &[Climb]) -> Option<Errors> {
         let known = self.known_errors(lights, climbs);

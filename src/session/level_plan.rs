@@ -100,6 +100,7 @@ impl CausticLayer<'_> {
         LevelKey {
             trace: self.trace_key(size, before_last as i32, rounds),
             resolved: None,
+            is_dim: self.is_dim(light),
             sizes: sizes.clone(),
             coarseness: coarseness(self.settings.max_error, goal)
                 * (before_last as f64).exp2().min(MOST_COARSE),

@@ -50,6 +50,8 @@ pub(super) struct LevelKey {
     pub(super) stride: usize,
     /// Of a soft light: its wavefronts.
     pub(super) resolved: Option<Resolved>,
+    /// Whether the light hardly shows beside the others.
+    pub(super) is_dim: bool,
 }
 
 /// The two dimensions of a soft light's error, as far as they are known.
@@ -135,6 +137,8 @@ impl LightStates {
 pub(super) struct LightState {
     /// Where its rays start.
     launch: Option<Launch>,
+    /// Whether bumps bent them.
+    has_bumps: bool,
     /// What its rays met.
     pub(super) rays: KeptRays,
     /// Levels of the last bake, the coarsest first.
@@ -163,15 +167,16 @@ impl LightState {
             + self.arrivals.as_ref().map_or(0, |(_, arrivals)| arrivals.bytes())
     }
 
-    /// Forgets rays that start elsewhere, and what is more than so many bytes.
-    pub(super) fn begin(&mut self, launch: &Launch, kept_bytes: u64) {
+    /// Forgets rays that start elsewhere or went otherwise, and what is more than so many bytes.
+    pub(super) fn begin(&mut self, launch: &Launch, has_bumps: bool, kept_bytes: u64) {
         if self.launch.as_ref() != Some(launch) {
             *self = Self {
                 launch: Some(launch.clone()),
                 ..Self::default()
             };
         }
-        if self.rays.bytes() > kept_bytes {
+        let went_alike = std::mem::replace(&mut self.has_bumps, has_bumps) == has_bumps;
+        if self.rays.bytes() > kept_bytes || !went_alike {
             self.rays = KeptRays::default();
         }
         self.arrivals

@@ -284,8 +284,9 @@ impl BakeSession {
         let mut outcome = CausticOutcome::default();
         let mut lamps = DirectWork::default();
         if plan.is_on(Effect::LightPass) {
+            let smooth = (!plan.is_on(Effect::Bumps)).then(|| tracer.without_bumps());
             let layer = CausticLayer {
-                tracer: &tracer,
+                tracer: smooth.as_ref().unwrap_or(&tracer),
                 aim: &aim,
                 settings,
                 sizes: &self.sizes,

@@ -162,7 +162,7 @@ impl CausticLayer<'_> {
     }
 
     fn closeness(&self, light: &AimedLight) -> Closeness {
-        if self.is_soft(light) {
+        if self.is_soft(light) || self.is_dim(light) {
             Closeness::SOFT
         } else {
             Closeness::SHARP

@@ -183,7 +183,7 @@ impl Tracer {
             }
             _ => curvature::turn_within(mesh, hit.triangle, hit.barycentric, step),
         };
-        let waves = self.scene().material_of(hit.object).bending_waves();
+        let waves = self.waves_of(hit.object);
         let change = match waves.filter(|_| detail == SurfaceDetail::Bumps) {
             Some(waves) => bend::bent_change(
                 hit.interpolated_normal,

@@ -64,6 +64,8 @@ pub struct EffectSet {
     pub textures: bool,
     /// Rough surfaces spread what they send on.
     pub lobes: bool,
+    /// Normals are bent by what no mesh shows. Tracers know it, not the code: see [`super::Tracer::without_bumps`].
+    pub bumps: bool,
 }
 
 /// Work that is compiled for each set of effects.
@@ -83,6 +85,7 @@ impl EffectSet {
         absorption: true,
         textures: true,
         lobes: true,
+        bumps: true,
     };
 
     /// The effects that are on in a plan.
@@ -93,6 +96,7 @@ impl EffectSet {
             absorption: plan.is_on(Effect::Absorption),
             textures: plan.is_on(Effect::Textures),
             lobes: plan.is_on(Effect::Roughness),
+            bumps: plan.is_on(Effect::Bumps),
         }
     }
 
@@ -138,6 +142,8 @@ pub struct PathCounts {
     pub attenuated: u64,
     /// Textures looked up at specular surfaces.
     pub textured: u64,
+    /// Specular surfaces met whose normals are bent.
+    pub bent: u64,
     /// Micro-facets met on rough surfaces.
     pub scattered: u64,
 }
@@ -158,6 +164,7 @@ impl AddAssign for PathCounts {
         self.reflected += other.reflected;
         self.attenuated += other.attenuated;
         self.textured += other.textured;
+        self.bent += other.bent;
         self.scattered += other.scattered;
     }
 }

@@ -304,8 +304,12 @@ impl Tracer {
         };
         let (ior_near, ior_far) = if facing.front {
             (media.ior(self.scene()), material.ior)
+        } else if beyond == *media {
+            // Never entered: an open sheet, or a start within.
+            (material.ior, media.ior(self.scene()))
         } else {
-            (material.ior, beyond.ior(self.scene()))
+            // Where bodies overlap, the one that was entered last is the medium until it is left.
+            (media.ior(self.scene()), beyond.ior(self.scene()))
         };
         let eta = ior_far / ior_near;
         let Some(turned) = facing.refracted(incident, eta) else {

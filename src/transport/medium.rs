@@ -7,7 +7,8 @@ use crate::scene::{Scene, Volume};
 const CAPACITY: usize = 8;
 
 /// Objects whose inside the path is in, innermost last. Rule: entering an object puts it on top, leaving takes its
-/// topmost entry out; the medium is the one on top, vacuum when there is none. A body beyond the capacity is not
+/// topmost entry out; the medium is the one on top, vacuum when there is none. Where bodies overlap it is thus the one that
+/// was entered last, and leaving the other one within it bends nothing. A body beyond the capacity is not
 /// remembered: the path then leaves it into the medium on top.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct MediumStack {

@@ -20,6 +20,8 @@ pub struct Tracer {
     hierarchy: Arc<Hierarchy>,
     /// Of specular objects; `None` for the others.
     specular: Vec<Option<Arc<SpecularShape>>>,
+    /// Whether waves bend normals.
+    has_bumps: bool,
 }
 
 /// The hierarchy over all triangles of a scene.
@@ -116,6 +118,7 @@ impl Tracer {
             scene,
             hierarchy,
             specular,
+            has_bumps: true,
         }
     }
 
@@ -148,7 +151,27 @@ impl Tracer {
             scene,
             hierarchy,
             specular,
+            has_bumps: self.has_bumps,
         }
+    }
+
+    /// The same scene with the normals that its meshes have.
+    #[must_use]
+    pub fn without_bumps(&self) -> Self {
+        Self {
+            scene: Arc::clone(&self.scene),
+            hierarchy: Arc::clone(&self.hierarchy),
+            specular: self.specular.clone(),
+            has_bumps: false,
+        }
+    }
+
+    /// What bends the normals of an object, if anything does.
+    pub fn waves_of(&self, object: usize) -> Option<&Waves> {
+        self.scene
+            .material_of(object)
+            .bending_waves()
+            .filter(|_| self.has_bumps)
     }
 
     fn specular_shape(scene: &Scene, object: usize) -> Option<Arc<SpecularShape>> {
@@ -234,7 +257,7 @@ impl Tracer {
 
     /// A normal of an object at a point [m] as its waves bend it.
     fn bent_normal(&self, object: usize, point: DVec3, normal: DVec3) -> DVec3 {
-        match self.scene.material_of(object).bending_waves() {
+        match self.waves_of(object) {
             Some(waves) => bend::bent(normal, waves.gradient(point)),
             None => normal,
         }
@@ -242,8 +265,7 @@ impl Tracer {
 
     /// Length of the finest detail of a specular object's normals, beyond what its mesh has [m]; infinite without.
     pub fn finest_bump_m(&self, object: usize) -> f64 {
-        let waves = self.scene.material_of(object).bending_waves();
-        waves.map_or(f64::INFINITY, Waves::shortest_m)
+        self.waves_of(object).map_or(f64::INFINITY, Waves::shortest_m)
     }
 
     /// Whether any surface lies on the ray before `distance_m`.

@@ -1,10 +1,16 @@
 //! Light through waves that only bend normals, against the same waves as a shape.
 
-use glam::DVec3;
-use nephroid::scene::builtin::pool::{AMPLITUDE_M, bumped, displaced};
-use nephroid::scene::{LightKind, Scene, Wave, Waves};
+use std::sync::Arc;
 
-use crate::tools::{at, bake, caustic, energy_fault, map_of};
+use glam::DVec3;
+use nephroid::effect::{Effect, EffectSwitch, EffectSwitches};
+use nephroid::progress::Control;
+use nephroid::scene::builtin::pool::{AMPLITUDE_M, bumped, displaced};
+use nephroid::scene::{Edit, LightKind, Scene, Wave, Waves};
+use nephroid::session::{BakeResult, BakeSession};
+use nephroid::settings::BakeSettings;
+
+use crate::tools::{at, bake, bits, caustic, energy_fault, map_of, settings};
 
 /// Relative RMSE of two maps of equal texels.
 fn difference(a: &[f64], b: &[f64]) -> f64 {
@@ -126,4 +132,74 @@ fn waves_finer_than_any_cell_blur_the_light_and_lose_none() {
     );
     assert!(counts.splats < 16 * counts.rays, "cells are not divided in vain");
     assert!(off < 0.15 && (flux - 1.0).abs() < 5e-3, "{off} {flux}");
+}
+
+fn floor_bits(result: &BakeResult, scene: &Scene) -> Vec<u32> {
+    bits(map_of(result, scene, "floor"))
+}
+
+fn bumps_taken(result: &BakeResult) -> (bool, u64) {
+    let report = result
+        .effects
+        .iter()
+        .find(|report| report.line.effect == Effect::Bumps);
+    let report = report.expect("every effect is reported");
+    (report.line.on, report.counts.rays + report.counts.deposits)
+}
+
+#[test]
+fn bumps_are_an_effect_that_scenes_call_for_and_that_can_be_left_out() {
+    let (wavy, still) = (bumped(AMPLITUDE_M), bumped(0.0));
+    for settings in [at(1e3, 32), settings(1e4, 32)] {
+        let off = BakeSettings {
+            effects: EffectSwitches::default().with(Effect::Bumps, EffectSwitch::Off),
+            ..settings.clone()
+        };
+        let mut session = BakeSession::new(Arc::new(wavy.clone())).expect("a session");
+        let mut run =
+            |settings: &BakeSettings| session.bake(settings, &(), &Control::default()).expect("a bake");
+        let (with, without, again) = (run(&settings), run(&off), run(&settings));
+        let (on, taken) = bumps_taken(&with);
+        assert!(on && taken > 0);
+        assert_eq!(bumps_taken(&without), (false, 0));
+        assert_eq!(energy_fault(&without), None);
+        let flat = bake(still.clone(), &off);
+        assert!(
+            floor_bits(&without, &wavy) == floor_bits(&flat, &still),
+            "normals of the mesh"
+        );
+        assert!(floor_bits(&without, &wavy) != floor_bits(&with, &wavy));
+        assert!(
+            floor_bits(&again, &wavy) == floor_bits(&with, &wavy),
+            "nothing of the other is kept"
+        );
+        let shape = bake(displaced(AMPLITUDE_M), &settings);
+        assert_eq!(bumps_taken(&shape), (false, 0));
+    }
+}
+
+#[test]
+fn edited_waves_bake_as_if_they_had_been_there_from_the_start() {
+    let (first, second) = (bumped(AMPLITUDE_M), bumped(0.5 * AMPLITUDE_M));
+    for settings in [at(1e3, 32), settings(1e4, 32)] {
+        let mut session = BakeSession::new(Arc::new(first.clone())).expect("a session");
+        let run = |session: &mut BakeSession| {
+            let result = session.bake(&settings, &(), &Control::default());
+            floor_bits(&result.expect("a bake"), &first)
+        };
+        let before = run(&mut session);
+        let edit = Edit::MaterialWaves {
+            material: 1,
+            waves: second.materials[1].waves.clone(),
+        };
+        let (edited, inverse) = edit.apply(&first).expect("it is in range");
+        session
+            .set_scene(Arc::new(edited.clone()))
+            .expect("the same objects");
+        let after = run(&mut session);
+        assert!(after == floor_bits(&bake(second.clone(), &settings), &second));
+        let (restored, _) = inverse.apply(&edited).expect("what was, is in range");
+        session.set_scene(Arc::new(restored)).expect("the same objects");
+        assert!(run(&mut session) == before && before != after);
+    }
 }

@@ -11,11 +11,10 @@ use nephroid::study::agreement::caustic_luminance;
 use nephroid::units::Radiance;
 
 use crate::brute_force::brute;
-use crate::tools::{at, bake, builtin_scene, energy_fault, map_of, settings};
+use crate::tools::{at, bake, bits, builtin_scene, energy_fault, map_of, settings};
 
-/// A square lamp of a side [m] around a place, with the power [W] of a point light whose intensity downwards is that of
-/// the lamp on its axis.
-fn square_lamp(centre: DVec3, side_m: f64, axial_w_per_sr: f64) -> Light {
+/// A square lamp of a side [m] that shines downwards from a place, with the same intensity on its axis whatever its side.
+fn square_lamp(centre: DVec3, side_m: f64) -> Light {
     Light {
         name: "lamp".into(),
         colour: LinearSrgb::WHITE,
@@ -24,7 +23,7 @@ fn square_lamp(centre: DVec3, side_m: f64, axial_w_per_sr: f64) -> Light {
             across: DVec3::X * (0.5 * side_m),
             down: DVec3::Z * (0.5 * side_m),
             shape: PanelShape::Rectangle,
-            radiance: Radiance(axial_w_per_sr / (side_m * side_m)),
+            radiance: Radiance(8.0 / (side_m * side_m)),
         },
         size: LightSize::None,
     }
@@ -42,6 +41,73 @@ fn floor(result: &BakeResult, scene: &Scene) -> Vec<f64> {
     caustic_luminance(map_of(result, scene, "floor"))
 }
 
+/// Relative RMSE between a bake and brute force, without the latter's noise; the noise must not hide more than `most_noise`.
+fn off_brute_force(result: &BakeResult, scene: &Scene, rays: u64, most_noise: f64) -> f64 {
+    let side = map_of(result, scene, "floor").chart.width;
+    let reference = brute(scene, &settings(1.0, side), rays);
+    let map = map_of(&reference, scene, "floor");
+    let noise = map.estimated_relative_rmse.expect("a noise");
+    assert!(noise < most_noise, "noise {noise}");
+    let rmse = relative_rmse(&floor(result, scene), &caustic_luminance(map)).expect("light");
+    (rmse * rmse - noise * noise).max(0.0).sqrt()
+}
+
+#[test]
+fn a_square_lamp_tends_to_the_point_that_it_shrinks_to() {
+    let mut scene = builtin_scene("ring");
+    let place = scene.lights[0].kind.position().expect("a point light");
+    let map_at = |scene: &Scene| {
+        let result = bake(scene.clone(), &towards(0.02, 32));
+        assert_eq!(energy_fault(&result), None);
+        floor(&result, scene)
+    };
+    scene.lights = vec![square_lamp(place, 1e-6)];
+    let point = map_at(&scene);
+    let sides_m = [0.4, 0.2, 0.1];
+    let differences: Vec<f64> = sides_m
+        .iter()
+        .map(|&side_m| {
+            scene.lights = vec![square_lamp(place, side_m)];
+            relative_rmse(&map_at(&scene), &point).expect("light")
+        })
+        .collect();
+    println!("square lamp against its middle: {differences:?} for sides of {sides_m:?} m");
+    // The blur is as wide as the lamp: caustics of about a texel's width change by at least its 0.7th power.
+    assert!(differences[0] > 0.15, "{differences:?}");
+    for pair in differences.windows(2) {
+        assert!(pair[1] < 0.65 * pair[0], "{differences:?}");
+    }
+}
+
+#[test]
+fn large_lamps_are_as_brute_force_has_them_and_know_their_error() {
+    let mut ring = builtin_scene("ring");
+    let place = ring.lights[0].kind.position().expect("a point light");
+    ring.lights = vec![square_lamp(place, 0.3)];
+    let mut sun = builtin_scene("nephroid");
+    sun.lights[0].size = LightSize::Angle {
+        diameter_rad: 0.53_f64.to_radians(),
+    };
+    let mut ball = builtin_scene("mirror");
+    ball.lights[0].size = LightSize::Radius { radius_m: 0.15 };
+    for (what, scene) in [
+        ("square lamp", &ring),
+        ("sun of 0.53°", &sun),
+        ("ball lamp", &ball),
+    ] {
+        let result = bake(scene.clone(), &towards(0.03, 64));
+        assert_eq!(energy_fault(&result), None, "{what}");
+        let estimated = result.estimated_relative_rmse.expect("an estimate");
+        let off = off_brute_force(&result, scene, 2_000_000, 0.05);
+        println!(
+            "{what}: off by {off:.4}, estimated {estimated:.4}, {} rays",
+            result.counts.rays
+        );
+        assert!(estimated <= 0.03, "{what}: {estimated}");
+        assert!(off <= 0.03, "{what}: off by {off}, estimated {estimated}");
+    }
+}
+
 /// A scene whose specular materials have a roughness.
 fn roughened(name: &str, roughness: f64) -> Scene {
     let mut scene = builtin_scene(name);
@@ -54,35 +120,93 @@ fn roughened(name: &str, roughness: f64) -> Scene {
 }
 
 #[test]
-fn explore() {
-    for name in ["mirror", "ball"] {
-        for roughness in [0.05, 0.2, 0.5] {
-            let scene = roughened(name, roughness);
-            let cpu = cpu_time::ProcessTime::now();
-            let result = bake(scene.clone(), &towards(0.02, 64));
-            println!(
-                "{name} {roughness}: est {:?} rays {} cpu {:.2?} stop {:?} {:?} {:?}",
-                result.estimated_relative_rmse,
-                result.counts.rays,
-                cpu.elapsed(),
-                result.stop_reason,
-                energy_fault(&result),
-                result.ledgers[0].energy_w
-            );
-            for point in &result.course {
-                println!("   {} {} {}", point.rays, point.cpu_s, point.relative_rmse);
-            }
-            let cpu = cpu_time::ProcessTime::now();
-            let reference = brute(&scene, &settings(1.0, 64), 4_000_000);
-            let reference_noise = reference.maps[0].estimated_relative_rmse;
-            println!(
-                "   true {:?} noise {:?} brute {:.2?} cpu {:?} {:?}",
-                relative_rmse(&floor(&result, &scene), &floor(&reference, &scene)),
-                reference_noise,
-                cpu.elapsed(),
-                result.cpu_s.trace,
-                reference.ledgers[0].energy_w
-            );
+fn rough_mirrors_and_rough_glass_are_as_brute_force_has_them() {
+    for (name, roughness, target) in [
+        ("mirror", 0.05, 0.02),
+        ("mirror", 0.2, 0.02),
+        ("mirror", 0.5, 0.03),
+        ("ball", 0.05, 0.03),
+        ("ball", 0.2, 0.02),
+        ("ball", 0.5, 0.03),
+    ] {
+        let mut scene = roughened(name, roughness);
+        if name == "ball" {
+            // Fewer triangles: the lobes hide the mesh.
+            let coarse = nephroid::scene::builtin::shapes::sphere(DVec3::new(0.0, 0.8, 0.0), 0.5, 5);
+            scene.objects[1].mesh = std::sync::Arc::new(coarse);
         }
+        let result = bake(scene.clone(), &towards(target, 64));
+        assert_eq!(energy_fault(&result), None);
+        let truncated = result.ledgers[0].energy_w.truncated.total();
+        assert!(
+            truncated.abs() < 0.01 * result.ledgers[0].energy_w.emitted,
+            "{truncated} W"
+        );
+        let off = off_brute_force(&result, &scene, 4_000_000, 0.06);
+        println!(
+            "{name} of roughness {roughness}: off by {off:.4}, estimated {:?}, {} rays",
+            result.estimated_relative_rmse, result.counts.rays
+        );
+        assert!(off <= 0.03, "{name} of roughness {roughness}: off by {off}");
     }
+}
+
+#[test]
+fn nothing_is_lost_on_a_rough_white_mirror() {
+    // All that leaves it arrives somewhere: a closed white room.
+    let mut scene = roughened("mirror", 0.6);
+    let walls =
+        nephroid::scene::builtin::shapes::cuboid(DVec3::new(-1.0, -0.001, -1.0), DVec3::new(1.0, 2.0, 1.0));
+    let white = nephroid::scene::builtin::parts::matte("walls", LinearSrgb::WHITE);
+    nephroid::scene::builtin::parts::add(&mut scene, "walls", walls, white);
+    let result = bake(scene, &at(2_000.0, 16));
+    let energy = result.ledgers[0].energy_w;
+    assert_eq!(energy_fault(&result), None);
+    let lost = energy.emitted - energy.deposited - energy.truncated.total();
+    assert!(lost.abs() < 1e-9 * energy.emitted, "{energy:?}");
+    assert!(
+        energy.truncated.total().abs() < 1e-3 * energy.emitted,
+        "{energy:?}"
+    );
+    assert_eq!(energy.absorbed, 0.0);
+}
+
+#[test]
+fn soft_maps_are_the_same_for_any_number_of_threads() {
+    let mut scene = roughened("mirror", 0.2);
+    scene.lights[0].size = LightSize::Radius { radius_m: 0.1 };
+    let of = |threads| {
+        let settings = BakeSettings {
+            threads,
+            ..towards(0.1, 32)
+        };
+        bake(scene.clone(), &settings)
+    };
+    let (one, three) = (of(1), of(3));
+    let all = |result: &BakeResult| -> Vec<Vec<u32>> { result.maps.iter().map(bits).collect() };
+    assert_eq!(all(&one), all(&three));
+    assert_eq!(one.estimated_relative_rmse, three.estimated_relative_rmse);
+    assert_eq!(one.counts, three.counts);
+}
+
+#[test]
+fn as_many_wavefronts_as_are_asked_for() {
+    let scene = roughened("mirror", 0.2);
+    let rays = |wavefronts| {
+        let settings = BakeSettings {
+            wavefronts: Some(wavefronts),
+            ..at(2_000.0, 16)
+        };
+        let result = bake(scene.clone(), &settings);
+        assert_eq!(energy_fault(&result), None);
+        result.counts.rays
+    };
+    let (few, many) = (rays(32), rays(64));
+    assert!((1.8..2.2).contains(&(many as f64 / few as f64)), "{few}, {many}");
+    let refused = BakeSettings {
+        wavefronts: Some(48),
+        ..at(2_000.0, 16)
+    };
+    let error = refused.validate().expect_err("48 is no power of two");
+    assert!(error.to_string().contains("--wavefronts"), "{error}");
 }

@@ -7,7 +7,7 @@ use nephroid::effect::Effect;
 use nephroid::optics::LinearSrgb;
 use nephroid::scene::builtin::{parts, shapes};
 use nephroid::scene::texture::Wrap;
-use nephroid::scene::{Camera, Material, Mesh, Scene, Texture, TextureRef, Volume};
+use nephroid::scene::{Camera, LightSize, Material, Mesh, Scene, Texture, TextureRef, Volume};
 use nephroid::settings::LayerKind;
 use nephroid::units::Flux;
 use serde_json::{Value, json};
@@ -28,6 +28,8 @@ pub struct EffectScene {
 }
 
 const MIRRORS: &[Effect] = &[Effect::LightPass, Effect::Reflection];
+const ROUGH_MIRRORS: &[Effect] = &[Effect::LightPass, Effect::Reflection, Effect::Roughness];
+const LARGE_LAMPS: &[Effect] = &[Effect::LightPass, Effect::Reflection, Effect::AreaLights];
 const GLASS: &[Effect] = &[Effect::LightPass, Effect::Refraction, Effect::Reflection];
 const COLOURED_GLASS: &[Effect] = &[
     Effect::LightPass,
@@ -67,6 +69,16 @@ pub fn all() -> Vec<EffectScene> {
     add_ball(&mut coloured, coloured_glass());
     let mut rough = room();
     add_mirror(&mut rough, rough_metal());
+    let mut glossy = room();
+    add_mirror(
+        &mut glossy,
+        Material {
+            roughness: 0.25,
+            ..parts::mirror()
+        },
+    );
+    let mut wide = mirror.clone();
+    wide.lights[0].size = LightSize::Radius { radius_m: 0.2 };
     let mut turned_away = mirror.clone();
     turned_away.cameras = vec![camera(DVec3::new(0.0, 1.0, 3.0), DVec3::new(0.0, 1.0, 9.0))];
     let mut everything = room();
@@ -93,6 +105,8 @@ pub fn all() -> Vec<EffectScene> {
             true,
         ),
         scene("rough metal", rough, &[], false),
+        scene("rough mirror", glossy, ROUGH_MIRRORS, true),
+        scene("lamp with a size", wide, LARGE_LAMPS, true),
         scene("camera turned away", turned_away, MIRRORS, false),
         EffectScene {
             layers: vec![LayerKind::Caustic, LayerKind::Direct],
@@ -147,7 +161,7 @@ fn coloured_glass() -> Material {
 
 fn rough_metal() -> Material {
     let mut material = Material {
-        roughness: 0.6,
+        roughness: 0.9,
         ..parts::mirror()
     };
     material.surface = material.classified();

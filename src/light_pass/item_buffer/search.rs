@@ -258,6 +258,15 @@ impl<'a> Search<'a> {
         false
     }
 
+    /// Cells that a box may touch; `None` where it touches none.
+    pub(super) fn cells_of(&self, bounds: Bounds) -> Option<CellRange> {
+        match self.project(bounds) {
+            Projection::Outside => None,
+            Projection::Unbounded => Some(CellRange::ALL),
+            Projection::Cells { cells, .. } => Some(cells),
+        }
+    }
+
     /// Where a box lies on the face.
     fn project(&self, (from, to): Bounds) -> Projection {
         self.count();

@@ -1,10 +1,13 @@
 //! Bodies that are smaller than the cells of a lattice, and sharp corners of larger ones: the cells' own corners alone
 //! would miss them.
 
+use std::collections::HashMap;
+
 use glam::{DVec2, DVec3};
 
 use super::closeness::Closeness;
-use crate::light_pass::item_buffer::ItemBuffer;
+use crate::geometry::enclosure::Bounds;
+use crate::light_pass::item_buffer::{self, CELLS_PER_SIDE, ItemBuffer};
 use crate::light_pass::launch::Launch;
 use crate::transport::Tracer;
 
@@ -17,8 +20,8 @@ const CELLS_ACROSS_OTHERS: f64 = 8.0;
 /// How often a cell is divided at most for a body in it.
 const DEEPEST_BODY_LEVEL: u32 = 18;
 
-/// More small bodies than this are a texture of the scene that the lattice has to resolve by itself.
-const MOST_BODIES: usize = 256;
+/// Cells across each of very many casters: enough for their flux.
+const LEAST_ACROSS_CASTERS: f64 = 12.0;
 
 /// The sphere around an object.
 #[derive(Clone, Copy, Debug)]
@@ -29,12 +32,15 @@ struct Body {
     cells_across: f64,
 }
 
+/// Where something is to be looked for, by cells of the item buffer: face, column, row.
+type Bins<T> = HashMap<(u32, u32, u32), Vec<T>>;
+
 /// Small bodies as one light sees them.
 #[derive(Clone, Debug, Default)]
 pub struct SmallBodies {
-    bodies: Vec<Body>,
+    bodies: Bins<Body>,
     /// Sharp corners [m].
-    corners: Vec<DVec3>,
+    corners: Bins<DVec3>,
     /// How often a cell is divided for one of these.
     corner_levels: u32,
 }
@@ -50,15 +56,16 @@ impl SmallBodies {
         closeness: Closeness,
     ) -> Self {
         let scene = tracer.scene();
-        let mut corners: Vec<DVec3> = visible
+        let mut corners = Bins::default();
+        let seen = visible
             .casters
             .iter()
-            .flat_map(|&object| tracer.sharp_corners(object))
-            .copied()
-            .filter(|corner| visible.is_marked_towards(launch, (*corner, *corner)))
-            .collect();
-        if corners.len() > MOST_BODIES {
-            corners.clear();
+            .flat_map(|&object| tracer.sharp_corners(object));
+        for corner in seen.copied() {
+            let bounds = (corner, corner);
+            if visible.is_marked_towards(launch, bounds) {
+                book(launch, bounds, corner, &mut corners);
+            }
         }
         let middle = DVec2::splat(0.5);
         let origin = launch.ray(0, middle).origin;
@@ -68,7 +75,7 @@ impl SmallBodies {
                 .sqrt();
             body.radius_m > 0.0 && 2.0 * body.radius_m < SMALL_CELLS * width_m
         };
-        let mut bodies: Vec<Body> = scene
+        let mut small: Vec<(Body, Bounds)> = scene
             .objects
             .iter()
             .enumerate()
@@ -84,11 +91,21 @@ impl SmallBodies {
                     },
                 };
                 // The cheap question first: the other one searches the scene.
-                (is_small(&body) && visible.may_concern(launch, tracer, index)).then_some(body)
+                (is_small(&body) && visible.may_concern(launch, tracer, index)).then_some((body, (low, high)))
             })
             .collect();
-        if bodies.len() > MOST_BODIES {
-            bodies.clear();
+        // Each of many shows less on the maps: all together have as many cells as one alone.
+        let casters = small
+            .iter()
+            .filter(|(body, _)| body.cells_across > CELLS_ACROSS_OTHERS);
+        let crowd = (casters.count().max(1) as f64).sqrt();
+        let mut bodies = Bins::default();
+        for (body, bounds) in &mut small {
+            if body.cells_across > CELLS_ACROSS_OTHERS {
+                let least = LEAST_ACROSS_CASTERS.min(body.cells_across);
+                body.cells_across = (body.cells_across / crowd).max(least);
+            }
+            book(launch, *bounds, *body, &mut bodies);
         }
         Self {
             bodies,
@@ -127,15 +144,18 @@ impl SmallBodies {
                 .fold(0.0, f64::max)
         };
         let along_m = |point: DVec3| (point - middle.origin).dot(middle.direction);
+        // A little farther than the cell: bodies reach beyond what they are booked under.
+        let margin = (high - low) * 0.5;
+        let (low, high) = (low - margin, high + margin);
         let holds_corner = level < self.corner_levels
-            && self.corners.iter().any(|corner| {
+            && found(&self.corners, face, (low, high), |corner| {
                 let along_m = along_m(*corner);
                 along_m > 0.0
                     && along_m <= hidden_beyond_m
                     && middle.at(along_m).distance(*corner) <= reach_m(along_m)
             });
         holds_corner
-            || self.bodies.iter().any(|body| {
+            || found(&self.bodies, face, (low, high), |body| {
                 let along_m = along_m(body.centre);
                 if along_m <= -body.radius_m || along_m - body.radius_m > hidden_beyond_m {
                     return false;
@@ -147,4 +167,31 @@ impl SmallBodies {
                     && body.cells_across * reach_m > 2.0 * body.radius_m
             })
     }
+}
+
+/// Books something under all cells of the item buffer that its box may touch.
+fn book<T: Copy>(launch: &Launch, bounds: Bounds, what: T, bins: &mut Bins<T>) {
+    for face in 0..launch.face_count() {
+        let Some((columns, rows)) = item_buffer::cells_towards(launch, face, bounds) else {
+            continue;
+        };
+        for row in rows.0..=rows.1 {
+            for column in columns.0..=columns.1 {
+                let bin = (face as u32, column as u32, row as u32);
+                bins.entry(bin).or_default().push(what);
+            }
+        }
+    }
+}
+
+/// Whether anything that is booked between two corners of the unit square of a face passes a test.
+fn found<T>(bins: &Bins<T>, face: usize, (low, high): (DVec2, DVec2), test: impl Fn(&T) -> bool) -> bool {
+    let side = CELLS_PER_SIDE as f64;
+    let cell = |share: f64| ((share * side).max(0.0) as usize).min(CELLS_PER_SIDE - 1) as u32;
+    (cell(low.y)..=cell(high.y)).any(|row| {
+        (cell(low.x)..=cell(high.x)).any(|column| {
+            bins.get(&(face as u32, column, row))
+                .is_some_and(|booked| booked.iter().any(&test))
+        })
+    })
 }
