@@ -31,12 +31,12 @@ fn under(width: usize, height: usize, radiance: f32, scale: f64) -> Scene {
     scene
 }
 
-/// A bake of both layers; every number in it is finite and none is negative.
+/// A bake of direct light; every number in it is finite and none is negative.
 fn baked(scene: Scene) -> BakeResult {
     let settings = BakeSettings {
         density_per_sr: 300.0,
         max_error: None,
-        layers: vec![LayerKind::Caustic, LayerKind::Direct],
+        layers: vec![LayerKind::Direct],
         map_resolution: MapResolution::Fixed {
             width: 16,
             height: 16,
