@@ -64,6 +64,7 @@ fn leave_alike(a: &Material, b: &Material) -> bool {
         && a.ior == b.ior
         && a.volume.is_some() == b.volume.is_some()
         && a.bending_waves() == b.bending_waves()
+        && a.bending_map() == b.bending_map()
         && a.double_sided == b.double_sided
 }
 
