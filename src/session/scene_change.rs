@@ -22,6 +22,7 @@ impl SceneChange {
     pub(super) fn between(old: &Scene, new: &Scene) -> Option<Self> {
         let same_parts = old.objects.len() == new.objects.len()
             && old.lights.len() == new.lights.len()
+            && same_sky(old, new)
             && old.textures.len() == new.textures.len()
             && old
                 .textures
@@ -82,5 +83,13 @@ fn share_alike(a: &Material, b: &Material) -> bool {
 /// Whether both lights are one, but for strength and colour.
 fn shine_alike(a: &Light, b: &Light) -> bool {
     let unit = |light: &Light| -> LightKind { light.of_unit_strength().kind };
-    unit(a) == unit(b)
+    unit(a) == unit(b) && a.size == b.size
+}
+
+/// Whether both scenes have the same environment, or none.
+fn same_sky(a: &Scene, b: &Scene) -> bool {
+    match (&a.environment, &b.environment) {
+        (Some(a), Some(b)) => Arc::ptr_eq(a, b),
+        (a, b) => a.is_none() && b.is_none(),
+    }
 }

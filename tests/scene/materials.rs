@@ -35,12 +35,13 @@ fn surfaces_are_classified_by_metal_transmission_volume_and_roughness() {
     for (metallic, roughness, extensions, expected, warned) in [
         (1.0, 0.0, &none, SurfaceKind::Mirror, None),
         (0.5, 0.3, &none, SurfaceKind::Mirror, None),
+        (1.0, 0.6, &none, SurfaceKind::Mirror, None),
         (
             1.0,
-            0.31,
+            0.61,
             &none,
             SurfaceKind::Diffuse,
-            Some("is a metal of roughness 0.31"),
+            Some("is a metal of roughness 0.61"),
         ),
         (1.0, 1.0, &none, SurfaceKind::Diffuse, None),
         (0.0, 1.0, &none, SurfaceKind::Diffuse, None),
@@ -49,12 +50,14 @@ fn surfaces_are_classified_by_metal_transmission_volume_and_roughness() {
         (0.0, 0.0, &solid, SurfaceKind::Dielectric, None),
         (0.0, 0.0, &clear, SurfaceKind::ThinWall, Some("thin pane")),
         (0.0, 0.0, &flat, SurfaceKind::ThinWall, Some("thin pane")),
+        (0.0, 0.31, &none, SurfaceKind::Diffuse, None),
+        (0.0, 0.6, &solid, SurfaceKind::Dielectric, None),
         (
             0.0,
-            0.5,
+            0.7,
             &solid,
             SurfaceKind::Diffuse,
-            Some("transmits light at a roughness of 0.50"),
+            Some("transmits light at a roughness of 0.70"),
         ),
     ] {
         let json = json!({ "name": "m", "pbrMetallicRoughness": factors(metallic, roughness), "extensions": extensions });
