@@ -82,7 +82,7 @@ impl Effect {
                 "Rough mirrors and frosted glass spread the light that goes on from them (GGX)."
             }
             Self::Bumps => {
-                "Waves in the normals of water, glass and mirrors bend the light that goes on from them."
+                "Waves and normal textures of water, glass and mirrors bend the light that goes on from them."
             }
             Self::AreaLights => {
                 "Lamps, suns and skies with a size blur caustics; without it each shines from its middle."

@@ -208,6 +208,8 @@ pub struct BakeSettings {
     pub branch_threshold: Option<f64>,
     /// Layers to bake.
     pub layers: Vec<LayerKind>,
+    /// Whether files hold each light's part of each layer beside their sum.
+    pub per_light: bool,
     /// Effects that are forced on or off.
     pub effects: EffectSwitches,
     /// Of everything random.
@@ -256,6 +258,7 @@ impl Default for BakeSettings {
             max_depth: 16,
             branch_threshold: None,
             layers: vec![LayerKind::Caustic],
+            per_light: false,
             effects: EffectSwitches::default(),
             seed: 0,
             threads: 0,

@@ -8,6 +8,10 @@ mod accuracy;
 mod auto_or_everything;
 #[path = "bake/brute_force.rs"]
 mod brute_force;
+#[path = "support/bump_scenes.rs"]
+mod bump_scenes;
+#[path = "bake/bumps.rs"]
+mod bumps;
 #[path = "bake/collection.rs"]
 mod collection;
 #[path = "bake/coverage.rs"]

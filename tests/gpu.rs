@@ -9,6 +9,9 @@ mod support;
 mod against_cpu;
 #[path = "gpu/builtins.rs"]
 mod builtins;
+#[path = "support/bump_scenes.rs"]
+#[allow(dead_code)]
+mod bump_scenes;
 #[path = "gpu/caustic_images.rs"]
 mod caustic_images;
 #[path = "support/chain_laws.rs"]

@@ -2,6 +2,9 @@
 
 #![allow(clippy::print_stdout, reason = "figures, for those who ask by --nocapture")]
 
+#[path = "support/bump_scenes.rs"]
+#[allow(dead_code)]
+mod bump_scenes;
 #[path = "physics/colour.rs"]
 mod colour;
 #[path = "physics/differentials.rs"]

@@ -1,18 +1,28 @@
-// Normals bent by waves; twin of transport/bend.rs and scene/waves.rs. A record in the table of images is
-//   number of waves,
+// Normals bent by waves and by an image of normals; twin of transport/bend.rs, transport/normal_texture.rs and
+// scene/waves.rs. A record in the table of images is
+//   record of the image of normals, scale of its normals, number of waves,
 // and for each wave
 //   wave vector x, y, z [rad/m], phase [rad], amplitude [m].
 
 // Whether any surface that is drawn has bumps.
 override HAS_BUMPS: bool;
 
+const BUMP_WORDS: u32 = 3u;
 const WAVE_WORDS: u32 = 5u;
+const STEEPEST_TEXEL: f32 = 8.0;
+
+// A piece of a surface: two steps along it, of any unit, with the changes of texture coordinates along them.
+struct Piece {
+    steps: array<vec3f, 2>,
+    changes: array<vec2f, 2>,
+    uv: vec2f,
+}
 
 // What a height over a surface does at a place.
 struct Bump {
     // Its gradient [1].
     gradient: vec3f,
-    // Sum of its second derivatives along the surface [1/m].
+    // Sum of its second derivatives along the surface [1/m]; of waves alone.
     laplacian: f32,
 }
 
@@ -20,12 +30,56 @@ fn table_float(at: u32) -> f32 {
     return bitcast<f32>(image_table[at]);
 }
 
-// Of all waves at a place in scene coordinates [m], over a surface with a unit normal.
-fn bump_at(record: u32, place_m: vec3f, normal: vec3f) -> Bump {
+// Slope that a texel of normals stands for: -x/z and -y/z.
+fn texel_slope(texel: vec2i, layer: i32, scale: f32) -> vec2f {
+    // Tiles are decoded as colours are; the code itself is what counts.
+    let code = round(255.0 * srgb_from_linear(textureLoad(texture_tiles, texel, layer, 0).rgb));
+    let normal = code / 127.5 - 1.0;
+    let along = normal.xy * scale;
+    let up = max(normal.z, length(along) / STEEPEST_TEXEL);
+    return select(vec2f(0.0), -along / up, up > 0.0);
+}
+
+// Gradient of the height that an image of normals stands for, on a piece of a surface with a unit normal.
+fn image_gradient(image: u32, scale: f32, piece: Piece, normal: vec3f) -> vec3f {
+    let first = piece.changes[0];
+    let second = piece.changes[1];
+    let turn = select(-1.0, 1.0, first.x * second.y - first.y * second.x >= 0.0);
+    let by_u = (piece.steps[0] * second.y - piece.steps[1] * first.y) * turn;
+    let by_v = (piece.steps[1] * first.x - piece.steps[0] * second.x) * turn;
+    let along = by_u - normal * dot(normal, by_u);
+    let size = dot(along, along);
+    if size <= 0.0 {
+        return vec3f(0.0);
+    }
+    let x = along * inverseSqrt(size);
+    let across = cross(normal, x);
+    let y = select(across, -across, dot(by_v, across) > 0.0);
+    let spot = locate(image, 0u, piece.uv);
+    let top = mix(
+        texel_slope(spot.texel, spot.layer, scale),
+        texel_slope(spot.texel + vec2i(1, 0), spot.layer, scale),
+        spot.weight.x,
+    );
+    let bottom = mix(
+        texel_slope(spot.texel + vec2i(0, 1), spot.layer, scale),
+        texel_slope(spot.texel + vec2i(1, 1), spot.layer, scale),
+        spot.weight.x,
+    );
+    let slope = mix(top, bottom, spot.weight.y);
+    return x * slope.x + y * slope.y;
+}
+
+// Of all bumps at a place in scene coordinates [m], on a piece of a surface with a unit normal.
+fn bump_at(record: u32, place_m: vec3f, piece: Piece, normal: vec3f) -> Bump {
     var bump = Bump(vec3f(0.0), 0.0);
-    let count = image_table[record];
+    let image = image_table[record];
+    if image != NO_IMAGE {
+        bump.gradient = image_gradient(image, table_float(record + 1u), piece, normal);
+    }
+    let count = image_table[record + 2u];
     for (var wave = 0u; wave < count; wave += 1u) {
-        let at = record + 1u + wave * WAVE_WORDS;
+        let at = record + BUMP_WORDS + wave * WAVE_WORDS;
         let vector = vec3f(table_float(at), table_float(at + 1u), table_float(at + 2u));
         let phase = dot(vector, place_m) + table_float(at + 3u);
         let amplitude = table_float(at + 4u);

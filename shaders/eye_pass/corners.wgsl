@@ -66,19 +66,21 @@ fn surface_point(hit: Hit) -> SurfacePoint {
     point.curvature = (bend(triangle.a, triangle.b, normal_a, normal_b)
         + bend(triangle.b, triangle.c, normal_b, normal_c)
         + bend(triangle.c, triangle.a, normal_c, normal_a)) / 3.0;
-    if HAS_BUMPS {
-        let record = objects[triangle.object].bumps;
-        if record != NO_IMAGE {
-            let place_m = frame.camera_position + (point.place - start.eye) * start.unit_m;
-            let bump = bump_at(record, place_m, point.shading_normal);
-            point.shading_normal = bent(point.shading_normal, bump.gradient);
-            point.curvature -= 0.5 * bump.laplacian * start.unit_m;
-        }
-    }
     let uv_a = corners[2u * first + 1u].zw;
     let uv_b = corners[2u * second + 1u].zw;
     let uv_c = corners[2u * third + 1u].zw;
     point.uv = uv_a * weight.x + uv_b * weight.y + uv_c * weight.z;
+    if HAS_BUMPS {
+        let record = objects[triangle.object].bumps;
+        if record != NO_IMAGE {
+            let place_m = frame.camera_position + (point.place - start.eye) * start.unit_m;
+            let steps = array(triangle.b - triangle.a, triangle.c - triangle.a);
+            let piece = Piece(steps, array(uv_b - uv_a, uv_c - uv_a), point.uv);
+            let bump = bump_at(record, place_m, piece, point.shading_normal);
+            point.shading_normal = bent(point.shading_normal, bump.gradient);
+            point.curvature -= 0.5 * bump.laplacian * start.unit_m;
+        }
+    }
     point.uv_density = area_ratio(uv_a, uv_b, uv_c, twice_area);
     let map_a = corner_map_uvs[first];
     let map_b = corner_map_uvs[second];

@@ -28,9 +28,10 @@ fn own_polish(fragment: Fragment) -> f32 {
     if SURFACE == SURFACE_MIXED {
         var normal = normalize(fragment.normal);
         if HAS_BUMPS {
-            let record = objects[fragment.object].bumps;
+            let steps = array(dpdx(fragment.from_camera), dpdy(fragment.from_camera));
+            let piece = Piece(steps, array(dpdx(fragment.uv), dpdy(fragment.uv)), fragment.uv);
             let place_m = frame.camera_position + fragment.from_camera;
-            normal = bent(normal, bump_at(record, place_m, normal).gradient);
+            normal = bent(normal, bump_at(objects[fragment.object].bumps, place_m, piece, normal).gradient);
         }
         let cos_view = abs(dot(normal, normalize(fragment.from_camera)));
         return dielectric_reflectance(cos_view, objects[fragment.object].ior);

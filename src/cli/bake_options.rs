@@ -67,6 +67,9 @@ pub struct BakeOptions {
     /// Layers to bake [default: caustic for bake, caustic,direct for pictures]
     #[arg(long, value_enum, value_delimiter = ',', value_name = "LAYER,...")]
     layers: Option<Vec<LayerKind>>,
+    /// Adds each light's part of each layer to the files, so that lamps can be dimmed afterwards
+    #[arg(long)]
+    per_light: bool,
     /// Forces effects on or off, such as refraction=off [default: auto, on where the scene calls for it]
     #[arg(long, value_delimiter = ',', value_name = "NAME=auto|on|off", value_parser = values::effect_switch)]
     effects: Option<Vec<(Effect, EffectSwitch)>>,
@@ -115,6 +118,7 @@ impl BakeOptions {
             max_depth: self.max_depth.unwrap_or(defaults.max_depth),
             branch_threshold: self.branch_threshold,
             layers,
+            per_light: self.per_light,
             effects: self.switches(),
             seed: self.seed.unwrap_or(defaults.seed),
             threads,

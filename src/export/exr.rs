@@ -12,8 +12,8 @@ use crate::error::{Error, Result};
 use crate::eye_pass::Picture;
 use crate::illumination::IlluminationMap;
 
-/// Most channels that a file is read with: a map has at most 13.
-const MAX_CHANNELS: usize = 64;
+/// Most channels that a file is read with: a map has at most 13, and 6 for each light.
+const MAX_CHANNELS: usize = 4096;
 
 /// Whether a file starts as an OpenEXR file does.
 pub fn is_exr(bytes: &[u8]) -> bool {
@@ -48,6 +48,11 @@ pub fn image_of_picture(picture: &Picture) -> FloatImage {
         height: picture.height as usize,
         channels: rgb_channels("", &picture.radiance),
     }
+}
+
+/// Adds a light's part of a layer to the channels of its map, by a name such as `caustic.lamp`.
+pub fn add_light(image: &mut FloatImage, name: &str, irradiance: &[[f32; 3]]) {
+    image.channels.extend(rgb_channels(name, irradiance));
 }
 
 fn rgb_channels(prefix: &str, values: &[[f32; 3]]) -> Vec<Channel> {

@@ -135,12 +135,26 @@ pub struct MapEntry {
     pub uv_file: Option<String>,
     /// Layers in the file.
     pub layers: Vec<LayerKind>,
+    /// Each light's part of them, where it was asked for.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub lights: Vec<LightChannels>,
     /// Mean area of the texels that the surface covers [m²].
     pub texel_area_m2: f64,
     /// Of the file's values.
     pub units: String,
     /// Of this map; `None` where it was not estimated.
     pub estimated_relative_rmse: Option<f64>,
+}
+
+/// Where a file holds one light's part of a layer.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LightChannels {
+    /// The light's name.
+    pub light: String,
+    /// Which layer it is a part of.
+    pub layer: LayerKind,
+    /// Its channels are this and `.R`, `.G`, `.B`.
+    pub channels: String,
 }
 
 /// Side of a surface.
@@ -223,7 +237,13 @@ impl SceneSummary {
 
 impl MapEntry {
     /// The entry of a map that is stored in `file`.
-    pub fn new(scene: &Scene, map: &IlluminationMap, file: String, uv_file: Option<String>) -> Self {
+    pub fn new(
+        scene: &Scene,
+        map: &IlluminationMap,
+        lights: Vec<LightChannels>,
+        file: String,
+        uv_file: Option<String>,
+    ) -> Self {
         let object = &scene.objects[map.chart.object];
         Self {
             surface: object.name.clone(),
@@ -236,6 +256,7 @@ impl MapEntry {
             uv_set: map.chart.uv_set,
             uv_file,
             layers: map.layers.iter().map(|layer| layer.kind).collect(),
+            lights,
             texel_area_m2: mean_texel_area_m2(map),
             units: UNITS.into(),
             estimated_relative_rmse: map.estimated_relative_rmse,

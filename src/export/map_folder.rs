@@ -2,13 +2,13 @@
 
 use std::path::Path;
 
-use super::manifest::{self, Manifest, MapEntry};
+use super::manifest::{self, LightChannels, Manifest, MapEntry};
 use super::{exr, uv_file};
 use crate::error::{Error, Result};
 use crate::files::{self, OutputFolder};
 use crate::illumination::{IlluminationMap, UvSet};
-use crate::scene::Scene;
-use crate::session::BakeResult;
+use crate::scene::{Light, Scene};
+use crate::session::{BakeResult, LightLayer};
 use crate::settings::BakeSettings;
 
 /// Folder of the map files within ours.
@@ -63,7 +63,7 @@ impl MapFolder {
     pub fn write(self, scene: &Scene, settings: &BakeSettings, result: &BakeResult) -> Result<Manifest> {
         let mut entries = Vec::new();
         for map in &result.maps {
-            entries.push(self.write_map(scene, map)?);
+            entries.push(self.write_map(scene, map, &result.light_layers)?);
         }
         let manifest = Manifest::new(scene, settings, result, entries);
         let path = self.path().join(manifest::FILE_NAME);
@@ -81,7 +81,7 @@ impl MapFolder {
         Ok(manifest)
     }
 
-    fn write_map(&self, scene: &Scene, map: &IlluminationMap) -> Result<MapEntry> {
+    fn write_map(&self, scene: &Scene, map: &IlluminationMap, parts: &[LightLayer]) -> Result<MapEntry> {
         let object = map.chart.object;
         let stem = format!(
             "{object:04}_{}",
@@ -94,15 +94,40 @@ impl MapFolder {
         }
         let name = format!("{stem}.exr");
         let path = self.maps.path().join(&name);
+        let mut image = exr::image_of_map(map);
+        let mut lights = Vec::new();
+        for part in parts.iter().filter(|part| part.object == object) {
+            let channels = format!("{}.{}", part.kind.name(), light_slug(scene, part.light));
+            exr::add_light(&mut image, &channels, &part.irradiance);
+            lights.push(LightChannels {
+                light: scene.lights[part.light].name.clone(),
+                layer: part.kind,
+                channels,
+            });
+        }
         let bytes = exr::encode(
-            exr::image_of_map(map),
+            image,
             "irradiance in W/m^2 (lumens / 683 per m^2), linear sRGB; row 0 is v = 0",
             &path.display().to_string(),
         )?;
         files::write_atomically(&path, |writer| writer.write_all(&bytes))?;
         let in_maps = |name: String| format!("{MAPS}/{name}");
-        Ok(MapEntry::new(scene, map, in_maps(name), uv_name.map(in_maps)))
+        Ok(MapEntry::new(
+            scene,
+            map,
+            lights,
+            in_maps(name),
+            uv_name.map(in_maps),
+        ))
     }
+}
+
+/// A light's name as part of a channel's; with its number where others have the same, or none.
+fn light_slug(scene: &Scene, light: usize) -> String {
+    let slug_of = |light: &Light| files::slug(&light.name, "light");
+    let own = slug_of(&scene.lights[light]);
+    let is_alone = scene.lights.iter().filter(|other| slug_of(other) == own).count() == 1;
+    if is_alone { own } else { format!("{own}-{light}") }
 }
 
 impl Manifest {

@@ -66,8 +66,8 @@ pub fn decide(scene: &Scene, settings: &BakeSettings, sights: &[Sight]) -> Effec
         ),
         on_paths(
             Effect::Bumps,
-            &|material| material.bending_waves().is_some(),
-            "no lit mirror, glass or polish has waves",
+            &Material::has_bumps,
+            "no lit mirror, glass or polish has waves or a normal texture",
         ),
         decision.area_lights(pass.on),
         decision.direct(),

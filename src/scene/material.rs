@@ -1,7 +1,7 @@
 //! Materials, as glTF's metallic-roughness model and its extensions state them, and the class that transport treats
 //! each as.
 
-use super::{TextureRef, Waves};
+use super::{NormalMap, TextureRef, Waves};
 use crate::optics::LinearSrgb;
 
 /// Roughness (glTF's, α = roughness²) up to which polish over a diffuse body sends light on; above it the surface is
@@ -80,6 +80,8 @@ pub struct Material {
     pub emitted_radiance: LinearSrgb,
     /// What bends its normals where it is specular; light that a diffuse surface takes is that of the surface itself.
     pub waves: Option<Waves>,
+    /// The same by an image.
+    pub normal_map: Option<NormalMap>,
     /// Whether its back is drawn; transport always treats both sides.
     pub double_sided: bool,
 }
@@ -88,6 +90,22 @@ impl Material {
     /// The waves that bend its normals, if it is specular and has any.
     pub fn bending_waves(&self) -> Option<&Waves> {
         self.waves.as_ref().filter(|_| self.surface.is_specular())
+    }
+
+    /// The image that bends its normals, if it is specular and has one.
+    pub fn bending_map(&self) -> Option<&NormalMap> {
+        self.normal_map.as_ref().filter(|_| self.surface.is_specular())
+    }
+
+    /// The image whose texture coordinates all of its images follow.
+    pub fn coordinates(&self) -> Option<&TextureRef> {
+        let normals = self.bending_map().map(|map| &map.image);
+        self.base_colour_texture.as_ref().or(normals)
+    }
+
+    /// Whether anything bends its normals.
+    pub fn has_bumps(&self) -> bool {
+        self.bending_waves().is_some() || self.bending_map().is_some()
     }
 
     /// The class that its factors make it: how a file's material is read unless the file says otherwise (unlit).
@@ -130,6 +148,7 @@ impl Default for Material {
             volume: None,
             emitted_radiance: LinearSrgb::BLACK,
             waves: None,
+            normal_map: None,
             double_sided: true,
         }
     }

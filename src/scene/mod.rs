@@ -12,6 +12,7 @@ pub mod light;
 pub mod load;
 pub mod material;
 pub mod mesh;
+pub mod normal_map;
 pub mod texture;
 pub mod waves;
 
@@ -27,6 +28,7 @@ pub use light::{Light, LightKind, LightSize, PanelShape};
 pub use load::{LoadOptions, load};
 pub use material::{Material, SurfaceKind, Volume};
 pub use mesh::Mesh;
+pub use normal_map::NormalMap;
 pub use texture::{Texture, TextureRef};
 pub use waves::{Wave, Waves};
 

@@ -15,7 +15,7 @@ pub enum Wrap {
     ClampToEdge,
 }
 
-/// An sRGB-encoded 8-bit image, row 0 at v = 0.
+/// An 8-bit image, row 0 at v = 0: sRGB-encoded where it is a colour, linear where it holds normals.
 #[derive(Clone, Debug)]
 pub struct Texture {
     /// The file's name for it; `imageN` when it has none.
@@ -52,10 +52,15 @@ impl Texture {
         row(0.0) * (1.0 - fy) + row(1.0) * fy
     }
 
+    /// The texel of a column and a row, whole numbers that may lie anywhere.
+    pub fn code(&self, column: f64, row: f64) -> [u8; 4] {
+        let column = wrap_index(column, self.width, self.wrap[0]);
+        let row = wrap_index(row, self.height, self.wrap[1]);
+        self.rgba[row * self.width as usize + column]
+    }
+
     fn texel(&self, x: f64, y: f64) -> LinearSrgb {
-        let column = wrap_index(x, self.width, self.wrap[0]);
-        let row = wrap_index(y, self.height, self.wrap[1]);
-        let [r, g, b, _] = self.rgba[row * self.width as usize + column];
+        let [r, g, b, _] = self.code(x, y);
         LinearSrgb::new(
             LinearSrgb::decode_channel(r),
             LinearSrgb::decode_channel(g),

@@ -1,6 +1,7 @@
 //! From levels of lights of unit strength to finished maps.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 use std::sync::Arc;
 
 use rayon::prelude::*;
@@ -10,7 +11,7 @@ use super::direct_cache::DirectCache;
 use super::forecast::ForecastReport;
 use super::light_level::LightLevel;
 use super::sizes::{self, MapSizes};
-use super::{BakeResult, StopReason, Timings};
+use super::{BakeResult, LightLayer, StopReason, Timings};
 use crate::error::Result;
 use crate::illumination::accumulator::FluxAccumulator;
 use crate::illumination::gutter::fill_gutter;
@@ -75,6 +76,7 @@ impl Finish<'_> {
         BakeResult {
             estimated_relative_rmse: relative_rmse(&maps).map(|rmse| rmse.hypot(given_up)),
             maps,
+            light_layers: self.light_layers(charts, levels, direct),
             plan: self.plan.clone(),
             effects: Vec::new(),
             item_buffers: Vec::new(),
@@ -192,11 +194,45 @@ impl Finish<'_> {
         }
     }
 
-    /// `None` where that of a light is not known.
+    /// Each light's part of all layers, where that is asked for.
+    fn light_layers(&self, charts: &Charts, levels: &Levels, direct: &DirectCache) -> Vec<LightLayer> {
+        let mut layers = Vec::new();
+        if !self.settings.per_light {
+            return layers;
+        }
+        for (&object, chart) in charts {
+            let part = |light: usize, layer: Layer| LightLayer {
+                object,
+                light,
+                kind: layer.kind,
+                irradiance: layer.irradiance,
+            };
+            for (light, level) in levels {
+                if let Some(map) = level.maps.get(object) {
+                    let lit = [(&self.scene.lights[*light], *level, map)];
+                    layers.push(part(*light, self.caustic_layer(chart, &lit)));
+                }
+            }
+            if self.plan.is_on(Effect::Direct) {
+                let lights = 0..self.scene.lights.len();
+                layers.extend(lights.filter_map(|light| {
+                    let layer = self.direct_of(chart, direct, light..light + 1)?;
+                    Some(part(light, layer))
+                }));
+            }
+        }
+        layers
+    }
+
     fn direct_layer(&self, chart: &Chart, direct: &DirectCache) -> Option<Layer> {
+        self.direct_of(chart, direct, 0..self.scene.lights.len())
+    }
+
+    /// Direct light of some lights; `None` where that of one is not known.
+    fn direct_of(&self, chart: &Chart, direct: &DirectCache, lights: Range<usize>) -> Option<Layer> {
         let mut sums = vec![LinearSrgb::BLACK; chart.width * chart.height];
-        for (light, source) in self.scene.lights.iter().enumerate() {
-            let strength = source.strength();
+        for light in lights {
+            let strength = self.scene.lights[light].strength();
             for (sum, unit) in sums.iter_mut().zip(direct.layer(light, chart)?) {
                 *sum += LinearSrgb::from(unit.map(f64::from)) * strength;
             }

@@ -22,7 +22,9 @@ use std::sync::Arc;
 use std::time::Instant;
 
 pub use forecast::{CostPoint, Forecast, ForecastReport};
-pub use result::{BakeCounts, BakeResult, EffectCounts, EffectReport, ItemBufferReport, StopReason, Timings};
+pub use result::{
+    BakeCounts, BakeResult, EffectCounts, EffectReport, ItemBufferReport, LightLayer, StopReason, Timings,
+};
 pub use sizes::BYTES_PER_TEXEL;
 pub use survey::{PresetForecast, Survey};
 

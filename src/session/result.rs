@@ -7,6 +7,7 @@ use crate::error::Warning;
 use crate::illumination::IlluminationMap;
 use crate::light_pass::ledger::LightLedger;
 use crate::plan::{EffectLine, EffectPlan};
+use crate::settings::LayerKind;
 
 /// Why a bake ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -104,11 +105,26 @@ pub struct Timings {
     pub total: f64,
 }
 
+/// What one light gives to one layer of one map.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LightLayer {
+    /// Index into `Scene::objects`.
+    pub object: usize,
+    /// Index into `Scene::lights`.
+    pub light: usize,
+    /// Of which layer.
+    pub kind: LayerKind,
+    /// E per texel [W/m²], as in the map; all lights add up to its layer.
+    pub irradiance: Vec<[f32; 3]>,
+}
+
 /// Maps with everything that is known of how they came about.
 #[derive(Clone, Debug)]
 pub struct BakeResult {
     /// One per surface that received flux, in the order of `Scene::objects`.
     pub maps: Vec<IlluminationMap>,
+    /// What each light gives to them, where that is asked for: map by map, caustic before direct, in the order of lights.
+    pub light_layers: Vec<LightLayer>,
     /// Which effects were on, and why.
     pub plan: EffectPlan,
     /// What each effect took, in the order of the plan.

@@ -22,6 +22,7 @@ impl SceneChange {
     pub(super) fn between(old: &Scene, new: &Scene) -> Option<Self> {
         let same_parts = old.objects.len() == new.objects.len()
             && old.lights.len() == new.lights.len()
+            && same_sky(old, new)
             && old.textures.len() == new.textures.len()
             && old
                 .textures
@@ -67,6 +68,7 @@ fn leave_alike(a: &Material, b: &Material) -> bool {
         && a.ior == b.ior
         && a.volume.is_some() == b.volume.is_some()
         && a.bending_waves() == b.bending_waves()
+        && a.bending_map() == b.bending_map()
         && a.double_sided == b.double_sided
 }
 
@@ -92,5 +94,13 @@ fn glowing_object(light: &Light) -> Option<usize> {
     match light.kind {
         LightKind::Surface { object, .. } => Some(object),
         _ => None,
+    }
+}
+
+/// Whether both scenes have the same environment, or none.
+fn same_sky(a: &Scene, b: &Scene) -> bool {
+    match (&a.environment, &b.environment) {
+        (Some(a), Some(b)) => Arc::ptr_eq(a, b),
+        (a, b) => a.is_none() && b.is_none(),
     }
 }

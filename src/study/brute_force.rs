@@ -462,6 +462,7 @@ fn unit(scene: &Scene, lights: &[AimedLight]) -> Result<FluxUnit> {
 fn empty_result(plan: EffectPlan, nothing_to_do: bool) -> BakeResult {
     BakeResult {
         maps: Vec::new(),
+        light_layers: Vec::new(),
         plan,
         effects: Vec::new(),
         item_buffers: Vec::new(),

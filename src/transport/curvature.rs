@@ -95,7 +95,7 @@ fn of_triangle(mesh: &Mesh, triangle: usize) -> Option<(DMat3, f64)> {
 }
 
 /// Vectors in the plane of two edges whose products with (edge 1, edge 2) are (1, 0) and (0, 1) [1/m].
-fn dual_edges(e1: DVec3, e2: DVec3) -> Option<(DVec3, DVec3)> {
+pub(super) fn dual_edges(e1: DVec3, e2: DVec3) -> Option<(DVec3, DVec3)> {
     let normal = e1.cross(e2);
     let squared = normal.length_squared();
     (squared > 0.0 && squared.is_finite()).then(|| (e2.cross(normal) / squared, normal.cross(e1) / squared))

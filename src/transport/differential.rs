@@ -183,13 +183,16 @@ impl Tracer {
             }
             _ => curvature::turn_within(mesh, hit.triangle, hit.barycentric, step),
         };
-        let waves = self.waves_of(hit.object);
-        let change = match waves.filter(|_| detail == SurfaceDetail::Bumps) {
-            Some(waves) => bend::bent_change(
+        let gradient = match detail {
+            SurfaceDetail::Bumps => self.bump_gradient(hit),
+            SurfaceDetail::Mesh => None,
+        };
+        let change = match gradient {
+            Some(gradient) => bend::bent_change(
                 hit.interpolated_normal,
-                waves.gradient(hit.point),
+                gradient,
                 change,
-                waves.gradient_change(hit.point, step),
+                self.bump_gradient_change(hit, step),
             ),
             None => change,
         };

@@ -8,6 +8,7 @@ pub mod effects;
 pub mod interaction;
 pub mod medium;
 pub mod microfacets;
+mod normal_texture;
 pub mod smoothing;
 pub mod tracer;
 

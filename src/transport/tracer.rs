@@ -8,6 +8,7 @@ use rayon::prelude::*;
 use super::bend;
 use super::corners::sharp_corners;
 use super::curvature::NormalField;
+use super::normal_texture::{TextureBump, texel_m};
 use super::smoothing::smoothing_groups;
 use crate::geometry::{Ray, TriangleBvh, ray};
 use crate::optics::LinearSrgb;
@@ -20,7 +21,7 @@ pub struct Tracer {
     hierarchy: Arc<Hierarchy>,
     /// Of specular objects; `None` for the others.
     specular: Vec<Option<Arc<SpecularShape>>>,
-    /// Whether waves bend normals.
+    /// Whether waves and textures bend normals.
     has_bumps: bool,
 }
 
@@ -41,6 +42,8 @@ struct SpecularShape {
     groups: Vec<u32>,
     /// Its sharp corners [m].
     corners: Vec<DVec3>,
+    /// Side of a texel of its normal texture [m].
+    texel_m: Option<f64>,
 }
 
 impl Hierarchy {
@@ -92,7 +95,7 @@ pub struct SurfaceHit {
     pub geometric_normal: DVec3,
     /// Unit, interpolated from the vertices: of the surface that the mesh stands for.
     pub interpolated_normal: DVec3,
-    /// Unit, what turns light: the interpolated one, bent by the waves of a specular surface.
+    /// Unit, what turns light: the interpolated one, bent by the bumps of a specular surface.
     pub shading_normal: DVec3,
 }
 
@@ -166,21 +169,20 @@ impl Tracer {
         }
     }
 
-    /// What bends the normals of an object, if anything does.
-    pub fn waves_of(&self, object: usize) -> Option<&Waves> {
-        self.scene
-            .material_of(object)
-            .bending_waves()
-            .filter(|_| self.has_bumps)
+    /// Whether something bends the normals of an object.
+    pub fn is_bumpy(&self, object: usize) -> bool {
+        self.has_bumps && self.scene.material_of(object).has_bumps()
     }
 
     fn specular_shape(scene: &Scene, object: usize) -> Option<Arc<SpecularShape>> {
         let mesh = &scene.objects[object].mesh;
+        let bending_map = scene.material_of(object).bending_map();
         scene.material_of(object).surface.is_specular().then(|| {
             Arc::new(SpecularShape {
                 normals: NormalField::new(mesh),
                 groups: smoothing_groups(mesh),
                 corners: sharp_corners(mesh),
+                texel_m: bending_map.and_then(|map| texel_m(scene, mesh, &map.image)),
             })
         })
     }
@@ -242,7 +244,7 @@ impl Tracer {
         let interpolated_normal = (a * wa + b * wb + c * wc)
             .try_normalize()
             .unwrap_or(geometric_normal);
-        SurfaceHit {
+        let mut surface = SurfaceHit {
             object,
             triangle,
             barycentric: hit.barycentric,
@@ -251,21 +253,55 @@ impl Tracer {
             point_error,
             geometric_normal,
             interpolated_normal,
-            shading_normal: self.bent_normal(object, point, interpolated_normal),
+            shading_normal: interpolated_normal,
+        };
+        if let Some(gradient) = self.bump_gradient(&surface) {
+            surface.shading_normal = bend::bent(interpolated_normal, gradient);
         }
+        surface
     }
 
-    /// A normal of an object at a point [m] as its waves bend it.
-    fn bent_normal(&self, object: usize, point: DVec3, normal: DVec3) -> DVec3 {
-        match self.waves_of(object) {
-            Some(waves) => bend::bent(normal, waves.gradient(point)),
-            None => normal,
+    /// Gradient of the height that bends the normal at a hit [1]; `None` where nothing does.
+    pub(super) fn bump_gradient(&self, hit: &SurfaceHit) -> Option<DVec3> {
+        if !self.is_bumpy(hit.object) {
+            return None;
         }
+        let waves = self.scene.material_of(hit.object).bending_waves();
+        let of_waves = waves.map(|waves| waves.gradient(hit.point));
+        let of_texture = self.texture_bump(hit).map(|bump| bump.gradient());
+        Some(of_waves.unwrap_or_default() + of_texture.unwrap_or_default())
     }
 
-    /// Length of the finest detail of a specular object's normals, beyond what its mesh has [m]; infinite without.
+    /// Its change [1] for a step [m] along the surface.
+    pub(super) fn bump_gradient_change(&self, hit: &SurfaceHit, step: DVec3) -> DVec3 {
+        let waves = self.scene.material_of(hit.object).bending_waves();
+        let of_waves = waves.map(|waves| waves.gradient_change(hit.point, step));
+        let of_texture = self.texture_bump(hit).map(|bump| bump.gradient_change(step));
+        of_waves.unwrap_or_default() + of_texture.unwrap_or_default()
+    }
+
+    fn texture_bump(&self, hit: &SurfaceHit) -> Option<TextureBump> {
+        let map = self.scene.material_of(hit.object).bending_map()?;
+        let mesh = &self.scene.objects[hit.object].mesh;
+        let place = (hit.triangle, hit.barycentric);
+        TextureBump::at((&self.scene, mesh), map, place, hit.interpolated_normal)
+    }
+
+    /// Length of the finest waves of a specular object's normals, beyond what its mesh has [m]; infinite without.
     pub fn finest_bump_m(&self, object: usize) -> f64 {
-        self.waves_of(object).map_or(f64::INFINITY, Waves::shortest_m)
+        match &self.specular[object] {
+            Some(_) if !self.is_bumpy(object) => f64::INFINITY,
+            Some(shape) => {
+                let material = self.scene.material_of(object);
+                let of_waves = material.bending_waves().map_or(f64::INFINITY, Waves::shortest_m);
+                let detail = material.bending_map().map(|map| map.detail_texels);
+                let of_texture = detail
+                    .zip(shape.texel_m)
+                    .map(|(texels, texel_m)| texels * texel_m);
+                of_waves.min(of_texture.unwrap_or(f64::INFINITY))
+            }
+            None => f64::INFINITY,
+        }
     }
 
     /// Whether any surface lies on the ray before `distance_m`.

@@ -10,6 +10,7 @@ use nephroid::scene::{Edit, LightKind, Scene, Wave, Waves};
 use nephroid::session::{BakeResult, BakeSession};
 use nephroid::settings::BakeSettings;
 
+use crate::bump_scenes::{by_image, by_waves};
 use crate::tools::{at, bake, bits, caustic, energy_fault, map_of, settings};
 
 /// Relative RMSE of two maps of equal texels.
@@ -202,4 +203,30 @@ fn edited_waves_bake_as_if_they_had_been_there_from_the_start() {
         session.set_scene(Arc::new(restored)).expect("the same objects");
         assert!(run(&mut session) == before && before != after);
     }
+}
+
+#[test]
+fn an_image_of_normals_bends_light_as_the_waves_that_it_shows() {
+    let waves = floor(by_waves(), 2e4, 64);
+    for mirrored in [false, true] {
+        let image = floor(by_image(mirrored), 2e4, 64);
+        let (off, alike) = (difference(&image, &waves), correlation(&image, &waves));
+        let flux = image.iter().sum::<f64>() / waves.iter().sum::<f64>();
+        println!("mirrored {mirrored}: rmse {off:.4}, correlation {alike:.5}, flux {flux:.5}");
+        // Eight bits of a slope and straight lines between texels are left.
+        assert!(off < 0.05 && alike > 0.99, "{off} {alike}");
+        assert!((flux - 1.0).abs() < 2e-3, "{flux}");
+    }
+}
+
+#[test]
+fn both_estimators_agree_on_an_image_of_normals() {
+    let scene = by_image(false);
+    let patches = floor(scene.clone(), 2e4, 32);
+    let result = bake(scene.clone(), &settings(2e5, 32));
+    assert_eq!(energy_fault(&result), None);
+    let splats = caustic(map_of(&result, &scene, "floor"));
+    let off = difference(&patches, &splats);
+    println!("off by {off:.4}");
+    assert!(off < 0.05, "{off}");
 }

@@ -1,11 +1,14 @@
 //! Map sizes, and what is not baked.
 
+use glam::DVec3;
 use nephroid::plan::Effect;
 use nephroid::progress::Control;
+use nephroid::scene::builtin::parts;
 use nephroid::session::{BakeResult, BakeSession, StopReason};
 use nephroid::settings::{BakeSettings, LayerKind, MapResolution};
+use nephroid::units::Flux;
 
-use crate::tools::{bake, builtin_scene, energy_fault, map_of, settings};
+use crate::tools::{at, bake, builtin_scene, energy_fault, map_of, settings};
 
 #[test]
 fn automatic_maps_grow_with_the_density() {
@@ -113,4 +116,71 @@ fn maps_made_coarser_for_memory_say_so() {
     };
     assert_eq!(warning.location, "floor");
     assert!(warning.remedy.contains("--memory"), "{warning}");
+}
+
+#[test]
+fn each_light_has_its_part_of_each_layer_where_that_is_asked_for() {
+    let mut scene = builtin_scene("mirror");
+    let second = parts::point_light("second lamp", DVec3::new(0.1, 1.0, -0.2), Flux(30.0));
+    scene.lights.push(second);
+    let settings = BakeSettings {
+        per_light: true,
+        layers: vec![LayerKind::Caustic, LayerKind::Direct],
+        ..at(5_000.0, 32)
+    };
+    let result = bake(scene.clone(), &settings);
+    let map = map_of(&result, &scene, "floor");
+    for layer in &map.layers {
+        let parts: Vec<_> = result
+            .light_layers
+            .iter()
+            .filter(|part| part.object == map.chart.object && part.kind == layer.kind)
+            .collect();
+        assert_eq!(parts.iter().map(|part| part.light).collect::<Vec<_>>(), [0, 1]);
+        for (texel, whole) in layer.irradiance.iter().enumerate() {
+            let sum: f32 = parts.iter().map(|part| part.irradiance[texel][1]).sum();
+            assert!(
+                (sum - whole[1]).abs() <= 1e-5 * whole[1].max(1e-3),
+                "{:?} {texel}",
+                layer.kind
+            );
+        }
+    }
+    assert!(bake(scene.clone(), &at(5_000.0, 32)).light_layers.is_empty());
+
+    let folder = tempfile::tempdir().expect("a folder");
+    let target = nephroid::export::map_folder::MapFolder::open(folder.path(), false).expect("a place");
+    let manifest = target.write(&scene, &settings, &result).expect("written");
+    let entry = manifest
+        .maps
+        .iter()
+        .find(|entry| entry.surface == "floor")
+        .expect("the floor");
+    let names: Vec<&str> = entry.lights.iter().map(|part| part.channels.as_str()).collect();
+    assert_eq!(
+        names,
+        [
+            "caustic.light",
+            "caustic.second-lamp",
+            "direct.light",
+            "direct.second-lamp"
+        ]
+    );
+    let bytes = std::fs::read(folder.path().join(&entry.file)).expect("a file");
+    let image = nephroid::export::exr::decode(&bytes, "map").expect("an image");
+    let channel = |name: &str| {
+        let found = image.channels.iter().find(|channel| channel.name == name);
+        &found.unwrap_or_else(|| panic!("no {name}")).values
+    };
+    let part = result
+        .light_layers
+        .iter()
+        .find(|part| part.light == 1 && part.object == map.chart.object);
+    let expected: Vec<f32> = part
+        .expect("a part")
+        .irradiance
+        .iter()
+        .map(|rgb| rgb[1])
+        .collect();
+    assert_eq!(channel("caustic.second-lamp.G"), &expected);
 }

@@ -8,7 +8,6 @@ use nephroid::scene::builtin::{parts, shapes};
 use nephroid::units::Flux;
 use rand_pcg::Pcg64Mcg;
 use rand_pcg::rand_core::{Rng, SeedableRng};
-use rayon::prelude::*;
 
 use crate::tools::{at, bake, energy_fault};
 
@@ -102,7 +101,7 @@ fn a_thousand_tiny_mirrors_deposit_what_falls_on_them_one_by_one() {
     let mut random = generator(11);
     let mirrors: Vec<Tiny> = (0..COUNT).map(|_| tiny(&mut random, (0.01, 1.0))).collect();
     let faults: Vec<(usize, f64, f64)> = mirrors
-        .par_iter()
+        .iter()
         .enumerate()
         .map(|(index, mirror)| {
             let ratio = deposited_w(&[*mirror], 25_000.0) / mirror.seen_sr;

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use nephroid::effect::EffectSwitch;
 use nephroid::eye_pass::reference::{self, ChainLimits, ReferenceSettings};
 use nephroid::eye_pass::renderer::{EyeQuality, Renderer};
@@ -18,6 +18,7 @@ use nephroid::settings::{BakeSettings, LayerKind, MapResolution};
 use nephroid::transport::Tracer;
 use nephroid::units::Flux;
 
+use crate::bump_scenes::by_image;
 use crate::device::gpu;
 use crate::flip::mean_flip;
 
@@ -251,6 +252,19 @@ fn rippled() -> Scene {
     scene.lights.push(parts::point_light("light", lamp, Flux(100.0)));
     scene.name = "rippled".into();
     scene
+}
+
+#[test]
+fn images_of_normals_bend_chains_as_on_the_cpu() {
+    let mut scene = by_image(false);
+    // Polish as well, seen by itself.
+    let normal_map = scene.materials[1].normal_map.clone();
+    let floor = &mut scene.materials[0];
+    (floor.surface, floor.roughness, floor.normal_map) = (SurfaceKind::Mixed, 0.0, normal_map);
+    let mesh = Arc::make_mut(&mut scene.objects[0].mesh);
+    let uv = |place: &DVec3| DVec2::new(place.x, place.z);
+    mesh.uv0 = Some(mesh.positions.iter().map(uv).collect());
+    compare(scene);
 }
 
 #[test]

@@ -8,15 +8,16 @@ use nephroid::light_pass::caustic::setup::{Aim, Aiming};
 use nephroid::light_pass::wavefront::strand::{Landing, Strand};
 use nephroid::light_pass::wavefront::trace::StrandTracer;
 use nephroid::progress::Control;
-use nephroid::scene::builtin;
+use nephroid::scene::{Scene, builtin};
 use nephroid::settings::ItemBufferKind;
 use nephroid::transport::{EffectSet, Tracer};
 
+use crate::bump_scenes::by_image;
+
 /// Compares derivatives of the strand that carries most, at places over the domain, with central differences over a
 /// step of the unit square; returns the root mean square of the relative difference and how many places there were.
-fn mismatch(name: &str, step: f64) -> (f64, usize) {
-    let scene = Arc::new(builtin::build(name).expect("a built-in scene"));
-    let tracer = Tracer::new(scene);
+fn mismatch(scene: Scene, step: f64) -> (f64, usize) {
+    let tracer = Tracer::new(Arc::new(scene));
     let aim = Aim::take(&tracer, ItemBufferKind::Equal, Aiming::Everything, true);
     let launch = &aim.lights[0].launch;
     let limits = PathLimits {
@@ -73,9 +74,19 @@ fn derivatives_are_those_of_the_smooth_surface() {
         // One quad: what is left is the step of the differences.
         ("pool-bump", 1e-4, 1e-5),
     ] {
-        let (off, count) = mismatch(name, step);
+        let (off, count) = mismatch(builtin::build(name).expect("a built-in scene"), step);
         println!("{name}: {off:.2e} over {count} places");
         assert!(count > 20, "{name}: only {count} places");
         assert!(off < largest, "{name}: derivatives are off by {off:.2e}");
+    }
+}
+
+#[test]
+fn derivatives_of_images_of_normals_are_those_between_their_texels() {
+    for mirrored in [false, true] {
+        // So short a step rarely leaves a texel.
+        let (off, count) = mismatch(by_image(mirrored), 1e-7);
+        println!("{off:.2e} over {count} places");
+        assert!(count > 200 && off < 1e-3, "{off:.2e} over {count} places");
     }
 }

@@ -238,12 +238,14 @@ fn roughness_changes_the_class_as_loading_does() {
         edited.materials[material].surface
     };
     assert_eq!(class(&scene, 1, 0.3), SurfaceKind::Dielectric);
-    assert_eq!(class(&scene, 1, 0.31), SurfaceKind::Diffuse);
+    assert_eq!(class(&scene, 1, 0.6), SurfaceKind::Dielectric);
+    assert_eq!(class(&scene, 1, 0.61), SurfaceKind::Diffuse);
     assert_eq!(class(&scene, 0, 0.3), SurfaceKind::Mixed);
     let mut others = scene.clone();
     others.materials[0] = parts::mirror();
     assert_eq!(class(&others, 0, 0.2), SurfaceKind::Mirror);
-    assert_eq!(class(&others, 0, 0.5), SurfaceKind::Diffuse);
+    assert_eq!(class(&others, 0, 0.5), SurfaceKind::Mirror);
+    assert_eq!(class(&others, 0, 0.7), SurfaceKind::Diffuse);
     others.materials[0] = parts::dielectric("pane", 1.5);
     others.materials[0].volume = None;
     others.materials[0].surface = SurfaceKind::ThinWall;

@@ -35,12 +35,13 @@ fn surfaces_are_classified_by_metal_transmission_volume_and_roughness() {
     for (metallic, roughness, extensions, expected, warned) in [
         (1.0, 0.0, &none, SurfaceKind::Mirror, None),
         (0.5, 0.3, &none, SurfaceKind::Mirror, None),
+        (1.0, 0.6, &none, SurfaceKind::Mirror, None),
         (
             1.0,
-            0.31,
+            0.61,
             &none,
             SurfaceKind::Diffuse,
-            Some("is a metal of roughness 0.31"),
+            Some("is a metal of roughness 0.61"),
         ),
         (1.0, 1.0, &none, SurfaceKind::Diffuse, None),
         (0.0, 1.0, &none, SurfaceKind::Diffuse, None),
@@ -49,12 +50,14 @@ fn surfaces_are_classified_by_metal_transmission_volume_and_roughness() {
         (0.0, 0.0, &solid, SurfaceKind::Dielectric, None),
         (0.0, 0.0, &clear, SurfaceKind::ThinWall, Some("thin pane")),
         (0.0, 0.0, &flat, SurfaceKind::ThinWall, Some("thin pane")),
+        (0.0, 0.31, &none, SurfaceKind::Diffuse, None),
+        (0.0, 0.6, &solid, SurfaceKind::Dielectric, None),
         (
             0.0,
-            0.5,
+            0.7,
             &solid,
             SurfaceKind::Diffuse,
-            Some("transmits light at a roughness of 0.50"),
+            Some("transmits light at a roughness of 0.70"),
         ),
     ] {
         let json = json!({ "name": "m", "pbrMetallicRoughness": factors(metallic, roughness), "extensions": extensions });
@@ -397,4 +400,66 @@ fn waves_stay_where_they_are_in_a_scene_that_is_moved_to_its_own_origin() {
         assert!((a - b).abs() < 1e-12, "{a} {b}");
     }
     assert!(far.origin_world.x > 900.0);
+}
+
+/// A polished triangle with a normal texture.
+fn embossed(image: &[u8], normals: Value, more: Value) -> Glb {
+    let mut file = textured(image, json!({ "index": 0 }));
+    let material = json!({
+        "name": "m",
+        "pbrMetallicRoughness": more,
+        "normalTexture": normals,
+    });
+    let index = file.push("materials", material);
+    file.json["meshes"][0]["primitives"][0]["material"] = json!(index);
+    file
+}
+
+#[test]
+fn normal_textures_of_what_is_specular_are_read_and_others_named() {
+    let relief = [
+        [128, 128, 255, 255],
+        [200, 128, 220, 255],
+        [128, 90, 240, 255],
+        [60, 128, 220, 255],
+    ];
+    let image = png(&relief, 2);
+    let polish = factors(0.0, 0.0);
+    let transform = json!({ "offset": [0.5, 0.0], "scale": [2.0, 3.0] });
+    let normals = json!({
+        "index": 0, "scale": 0.5, "extensions": { "KHR_texture_transform": transform },
+    });
+    let scene = embossed(&image, normals, polish.clone()).scene();
+    let material = &scene.materials[scene.objects[0].material];
+    let map = material.bending_map().expect("it has one");
+    assert_eq!(map.scale, 0.5);
+    assert!((map.image.transform(glam::DVec2::new(0.25, 0.1)) - glam::DVec2::new(1.0, 0.3)).length() < 1e-6);
+    // At the middle of the second texel: the slope against its normal, at half its tilt.
+    let slope = map.slope(&scene.textures[map.image.texture], glam::DVec2::new(0.75, 0.25));
+    let [x, y, z] = [200.0, 128.0, 220.0].map(|code| code / 127.5 - 1.0);
+    let expected = glam::DVec2::new(-0.5 * x / z, -0.5 * y / z);
+    assert!((slope.value - expected).length() < 1e-12, "{slope:?}");
+
+    let left_out = |normals: Value, more: Value, image: &[u8], why: &str| {
+        let scene = embossed(image, normals, more).scene();
+        assert!(scene.materials[scene.objects[0].material].normal_map.is_none());
+        assert_warned(&scene, &["material `m`", why]);
+    };
+    let plain = json!({ "index": 0 });
+    left_out(
+        plain.clone(),
+        factors(0.0, 1.0),
+        &image,
+        "normal texture, as it is matte,",
+    );
+    left_out(plain.clone(), polish.clone(), b"no image", "the same everywhere");
+    left_out(
+        json!({ "index": 0, "texCoord": 3 }),
+        polish.clone(),
+        &image,
+        "TEXCOORD_3",
+    );
+    let mut coloured = polish;
+    coloured["baseColorTexture"] = json!({ "index": 0, "texCoord": 1 });
+    left_out(plain, coloured, &image, "other coordinates");
 }

@@ -45,6 +45,7 @@ pub fn finished(scene: &Arc<Scene>, settings: &BakeSettings) -> BakedLevel {
         level: 1,
         is_final: true,
         result: BakeResult {
+            light_layers: Vec::new(),
             maps: Vec::new(),
             plan: EffectPlan::default(),
             effects: Vec::new(),

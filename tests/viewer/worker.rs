@@ -19,6 +19,7 @@ const PATIENCE: Duration = Duration::from_secs(20);
 pub fn result(rays: u64, partial: bool) -> BakeResult {
     BakeResult {
         maps: Vec::new(),
+        light_layers: Vec::new(),
         plan: EffectPlan::default(),
         effects: Vec::new(),
         course: Vec::new(),

@@ -20,7 +20,7 @@ pub(super) struct Corner {
     position: [f32; 3],
     /// Unit.
     normal: [f32; 3],
-    /// Of the base colour texture, KHR_texture_transform applied.
+    /// Of the material's images, KHR_texture_transform applied.
     uv: [f32; 2],
 }
 
@@ -162,7 +162,7 @@ impl Geometry {
 
     fn write_corners(&self, gpu: &Gpu, scene: &Scene, index: usize) -> usize {
         let object = &scene.objects[index];
-        let image = scene.material_of(index).base_colour_texture.as_ref();
+        let image = scene.material_of(index).coordinates();
         let mut bytes = 0;
         for segment in &self.segments[index] {
             let corners = segment.corners(&object.mesh, image);
@@ -236,7 +236,7 @@ impl Packing<'_> {
     /// Where an object ended up. Surfaces without maps share the corners of neighbouring triangles.
     fn add(&mut self, scene: &Scene, object: &Object) -> Vec<Segment> {
         let material = &scene.materials[object.material];
-        let image = material.base_colour_texture.as_ref();
+        let image = material.coordinates();
         let mesh = &object.mesh;
         let largest = mesh.positions.len().max(3 * mesh.triangles.len());
         if !material.surface.is_receiver() && largest <= self.page_corners {

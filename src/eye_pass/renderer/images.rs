@@ -8,7 +8,7 @@ use super::paging::{PagedImage, TilePool, Uploaded};
 use super::storage::Storage;
 use super::textures;
 use crate::gpu::Gpu;
-use crate::scene::{Scene, Texture, Waves};
+use crate::scene::{Material, Scene, Texture};
 
 /// What an object refers to in place of an image that it does not have; `NO_IMAGE` in the shaders.
 pub(super) const NO_IMAGE: u32 = u32::MAX;
@@ -27,8 +27,8 @@ pub(super) struct Images {
     /// As `textures` hold them.
     sources: Vec<Arc<Texture>>,
     textures: Vec<PagedImage<textures::Texel>>,
-    /// What bends normals, by object.
-    waves: Vec<Option<Waves>>,
+    /// What bends normals, by object: the image of normals, if there is one, and the words that follow it.
+    bumps: Vec<Option<(Option<usize>, Vec<u32>)>>,
     /// Records of images and where their tiles are, and of what bends normals.
     pub(super) table: Storage,
     /// Where the record of each object's map, and of each texture, starts in the table.
@@ -47,7 +47,7 @@ impl Images {
             maps: (0..scene.objects.len()).map(|_| None).collect(),
             sources: Vec::new(),
             textures: Vec::new(),
-            waves: Vec::new(),
+            bumps: Vec::new(),
             table: Storage::new(gpu, "image table"),
             map_records: Vec::new(),
             texture_records: Vec::new(),
@@ -86,8 +86,8 @@ impl Images {
                 uploaded += bytes;
             }
         }
-        let waves = |object| scene.material_of(object).bending_waves().cloned();
-        self.waves = (0..scene.objects.len()).map(waves).collect();
+        let bumps = |object| bumps(scene.material_of(object));
+        self.bumps = (0..scene.objects.len()).map(bumps).collect();
         uploaded += self.write_table(gpu);
         uploaded
     }
@@ -227,9 +227,14 @@ impl Images {
         }
         (self.map_records, self.texture_records) = (map_records, texture_records);
         self.bump_records.clear();
-        for waves in &self.waves {
-            self.bump_records.push(match waves {
-                Some(waves) => write_waves(&mut words, waves),
+        for bumps in &self.bumps {
+            let record = words.len() as u32;
+            self.bump_records.push(match bumps {
+                Some((image, rest)) => {
+                    words.push(image.map_or(NO_IMAGE, |image| self.texture_record(image)));
+                    words.extend(rest);
+                    record
+                }
                 None => NO_IMAGE,
             });
         }
@@ -237,14 +242,19 @@ impl Images {
     }
 }
 
-/// Adds the record of waves to the table, as `bumps.wgsl` reads it, and tells where it begins.
-fn write_waves(words: &mut Vec<u32>, waves: &Waves) -> u32 {
-    let record = words.len() as u32;
-    words.push(waves.list().len() as u32);
-    for wave in waves.list() {
+/// What bends a material's normals, as `bumps.wgsl` reads it: the image of normals, and the words after it.
+fn bumps(material: &Material) -> Option<(Option<usize>, Vec<u32>)> {
+    if !material.has_bumps() {
+        return None;
+    }
+    let map = material.bending_map();
+    let waves = material.bending_waves().map_or(&[][..], |waves| waves.list());
+    let scale = map.map_or(0.0, |map| map.scale);
+    let mut words = vec![(scale as f32).to_bits(), waves.len() as u32];
+    for wave in waves {
         let [x, y, z] = wave.wave_vector().to_array();
         let numbers = [x, y, z, wave.phase_rad, wave.amplitude_m];
         words.extend(numbers.map(|number| (number as f32).to_bits()));
     }
-    record
+    Some((map.map(|map| map.image.texture), words))
 }

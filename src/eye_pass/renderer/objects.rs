@@ -151,7 +151,7 @@ impl Look {
         Self {
             surface: material.surface,
             double_sided: material.double_sided,
-            has_bumps: material.bending_waves().is_some(),
+            has_bumps: material.has_bumps(),
             bounds: object.mesh.bounds(),
             record: ObjectRecord {
                 base_colour: rgb(material.base_colour),

@@ -15,6 +15,7 @@ use crate::scene::SurfaceKind;
 pub(super) const SURFACE: Program = Program {
     name: "surface",
     sources: &[
+        shader_source!("shared/srgb"),
         shader_source!("shared/refraction"),
         shader_source!("shared/fresnel"),
         shader_source!("eye_pass/frame"),
@@ -31,6 +32,7 @@ pub(super) const SURFACE: Program = Program {
 pub(super) const TRACED: Program = Program {
     name: "traced",
     sources: &[
+        shader_source!("shared/srgb"),
         shader_source!("shared/refraction"),
         shader_source!("shared/fresnel"),
         shader_source!("shared/traversal"),
@@ -54,6 +56,7 @@ pub(super) const TRACED: Program = Program {
 pub(super) const TRACED_UNDER_SKY: Program = Program {
     name: "traced_under_sky",
     sources: &[
+        shader_source!("shared/srgb"),
         shader_source!("shared/refraction"),
         shader_source!("shared/fresnel"),
         shader_source!("shared/traversal"),
@@ -87,6 +90,7 @@ pub(super) const SKY: Program = Program {
 pub(super) const UNDER_LIGHTS: Program = Program {
     name: "under_lights",
     sources: &[
+        shader_source!("shared/srgb"),
         shader_source!("shared/refraction"),
         shader_source!("shared/fresnel"),
         shader_source!("shared/traversal"),

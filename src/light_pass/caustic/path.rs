@@ -170,7 +170,7 @@ impl<'a> PathTracer<'a> {
         let interaction = self
             .tracer
             .interact_with::<E>(&hit, segment.ray.direction, &segment.media, micro);
-        self.counts.bent += u64::from(self.tracer.waves_of(hit.object).is_some());
+        self.counts.bent += u64::from(self.tracer.is_bumpy(hit.object));
         if E::TEXTURES && self.tracer.is_textured(hit.object) {
             self.counts.textured += 1;
         }

@@ -117,7 +117,7 @@ impl<E: PathEffects> Spreader<'_, E> {
         out.deposits.attenuated += u64::from(self.absorbs(strand));
         out.deposits.scattered +=
             u64::from(E::LOBES && tracer.scene().material_of(strand.from as usize).is_rough());
-        out.deposits.bent += u64::from(tracer.waves_of(strand.from as usize).is_some());
+        out.deposits.bent += u64::from(tracer.is_bumpy(strand.from as usize));
         out.deposits.textured += u64::from(E::TEXTURES && tracer.is_textured(strand.from as usize));
     }
 

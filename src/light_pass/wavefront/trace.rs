@@ -205,7 +205,7 @@ impl<'a> StrandTracer<'a> {
             incident = incident * from.media.transmittance(self.tracer.scene(), hit.distance_m);
             sample.counts.attenuated += 1;
         }
-        sample.counts.bent += u64::from(self.tracer.waves_of(hit.object).is_some());
+        sample.counts.bent += u64::from(self.tracer.is_bumpy(hit.object));
         if E::TEXTURES && self.tracer.is_textured(hit.object) {
             sample.counts.textured += 1;
         }

@@ -85,6 +85,11 @@ impl<'a> Images<'a> {
         Ok(Some(self.textures.len() - 1))
     }
 
+    /// A texture by its index among the scene's textures.
+    pub fn get(&self, texture: usize) -> &Texture {
+        &self.textures[texture]
+    }
+
     /// Mean over a texture of what `value` makes of each texel; `None` where it has no image.
     ///
     /// # Errors

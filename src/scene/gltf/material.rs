@@ -2,10 +2,11 @@
 
 use glam::{DMat3, DVec2};
 use gltf::json::extensions::material as extension;
+use gltf::json::extensions::texture::TextureTransform;
 use gltf::json::material::{AlphaMode, Material as Source};
-use gltf::json::texture::Info;
 use gltf::json::validation::Checked;
 use gltf::json::{Index, Value};
+use serde::Deserialize;
 
 use super::document::Document;
 use super::images::Images;
@@ -14,7 +15,7 @@ use super::report::{Budget, Report};
 use super::{names, waves};
 use crate::error::Result;
 use crate::optics::LinearSrgb;
-use crate::scene::{Material, SurfaceKind, TextureRef, Volume};
+use crate::scene::{Material, NormalMap, SurfaceKind, TextureRef, Volume};
 use crate::units::LUMENS_PER_WATT;
 
 /// What a primitive without a material has: glTF's default material is a rough metal, which is taken for matte.
@@ -106,6 +107,7 @@ impl Reading<'_, '_> {
             ior: self.ior(extensions),
             volume: self.volume(extensions),
             emitted_radiance: self.emission(extensions)?,
+            normal_map: None,
             waves: self
                 .waves
                 .and_then(|waves| waves::read(waves, &self.owner, self.report)),
@@ -120,7 +122,8 @@ impl Reading<'_, '_> {
         if material.surface != SurfaceKind::Dielectric {
             material.volume = None;
         }
-        self.name_what_is_ignored(extensions);
+        material.normal_map = self.normal_map(&material)?;
+        self.name_what_is_ignored(extensions, !material.surface.is_specular());
         Ok(material)
     }
 
@@ -306,28 +309,104 @@ impl Reading<'_, '_> {
         surface
     }
 
+    /// Set and transform of a texture's coordinates; `None`, with a warning, for a set that is not read.
+    fn placed(
+        &mut self,
+        what: &str,
+        tex_coord: u32,
+        transform: Option<&TextureTransform>,
+    ) -> Option<(usize, DMat3)> {
+        let (uv_set, uv_transform) = coordinates(tex_coord, transform);
+        if uv_set > 1 {
+            self.warn(
+                format!("its {what} follows TEXCOORD_{uv_set} and was left out"),
+                "use TEXCOORD_0 or TEXCOORD_1",
+            );
+            return None;
+        }
+        if uv_transform.is_finite() {
+            return Some((uv_set, uv_transform));
+        }
+        self.warn(
+            "its texture transform is not finite and was ignored",
+            "export the file again",
+        );
+        Some((uv_set, DMat3::IDENTITY))
+    }
+
+    /// What bends the normals of a specular surface.
+    fn normal_map(&mut self, material: &Material) -> Result<Option<NormalMap>> {
+        let source = self.source;
+        let Some(stated) = source
+            .normal_texture
+            .as_ref()
+            .filter(|_| material.surface.is_specular())
+        else {
+            return Ok(None);
+        };
+        let others = stated.extensions.as_ref().map(|extensions| &extensions.others);
+        let transform = others
+            .and_then(|others| others.get("KHR_texture_transform"))
+            .and_then(|transform| TextureTransform::deserialize(transform).ok());
+        let Some((uv_set, uv_transform)) =
+            self.placed("normal texture", stated.tex_coord, transform.as_ref())
+        else {
+            return Ok(None);
+        };
+        let scale = widen(stated.scale);
+        let colour = material.base_colour_texture.as_ref();
+        // The graphics card has one set of coordinates for each surface.
+        if colour.is_some_and(|colour| (colour.uv_set, colour.uv_transform) != (uv_set, uv_transform)) {
+            self.warn(
+                "its normal texture follows other coordinates than its base colour and was left out",
+                "give both the same set and transform",
+            );
+            return Ok(None);
+        }
+        if !scale.is_finite() {
+            self.warn(
+                "its normal texture has a scale that is not finite and was left out",
+                "export the file again",
+            );
+            return Ok(None);
+        }
+        let index = Index::new(stated.index.value() as u32);
+        let texture = self
+            .images
+            .texture(index, &self.owner, self.budget, self.report)?;
+        let Some(texture) = texture else {
+            return Ok(None);
+        };
+        let image = TextureRef {
+            texture,
+            uv_set,
+            uv_transform,
+        };
+        let map = NormalMap::new(image, scale, self.images.get(texture));
+        // Also what stands in for an image that could not be read.
+        if map.detail_texels == f64::INFINITY {
+            self.warn(
+                "its normal texture is the same everywhere and was left out",
+                "give it some relief, or none",
+            );
+            return Ok(None);
+        }
+        Ok(Some(map))
+    }
+
     fn base_colour_texture(&mut self) -> Result<Option<TextureRef>> {
         let source = self.source;
         let Some(info) = &source.pbr_metallic_roughness.base_color_texture else {
             return Ok(None);
         };
-        let (uv_set, uv_transform) = coordinates(info);
-        if uv_set > 1 {
-            self.warn(
-                format!("its base colour texture follows TEXCOORD_{uv_set} and was left out"),
-                "use TEXCOORD_0 or TEXCOORD_1",
-            );
+        let transform = info
+            .extensions
+            .as_ref()
+            .and_then(|extensions| extensions.texture_transform.as_ref());
+        let Some((uv_set, uv_transform)) = self.placed("base colour texture", info.tex_coord, transform)
+        else {
             return Ok(None);
-        }
-        let uv_transform = uv_transform
-            .filter(|transform| transform.is_finite())
-            .unwrap_or_else(|| {
-                self.warn(
-                    "its texture transform is not finite and was ignored",
-                    "export the file again",
-                );
-                DMat3::IDENTITY
-            });
+        };
         let texture = Index::new(info.index.value() as u32);
         let texture = self
             .images
@@ -339,7 +418,7 @@ impl Reading<'_, '_> {
         }))
     }
 
-    fn name_what_is_ignored(&mut self, extensions: &extension::Material) {
+    fn name_what_is_ignored(&mut self, extensions: &extension::Material, is_matte: bool) {
         match self.source.alpha_mode {
             Checked::Valid(AlphaMode::Opaque) => {}
             Checked::Valid(mode) => {
@@ -364,8 +443,8 @@ impl Reading<'_, '_> {
         if changed_specular {
             ignored.push("KHR_materials_specular".to_owned());
         }
-        if self.source.normal_texture.is_some() {
-            ignored.push("normal texture".to_owned());
+        if is_matte && self.source.normal_texture.is_some() {
+            ignored.push("normal texture, as it is matte,".to_owned());
         }
         ignored.extend(
             extensions
@@ -382,14 +461,10 @@ impl Reading<'_, '_> {
     }
 }
 
-/// Set and transform of a texture's coordinates; no transform where it is broken.
-fn coordinates(info: &Info) -> (usize, Option<DMat3>) {
-    let transform = info
-        .extensions
-        .as_ref()
-        .and_then(|extensions| extensions.texture_transform.as_ref());
+/// Set and transform of a texture's coordinates.
+fn coordinates(tex_coord: u32, transform: Option<&TextureTransform>) -> (usize, DMat3) {
     let Some(transform) = transform else {
-        return (info.tex_coord as usize, Some(DMat3::IDENTITY));
+        return (tex_coord as usize, DMat3::IDENTITY);
     };
     let vector = |[x, y]: [f32; 2]| DVec2::new(widen(x), widen(y));
     // v runs downwards, so that the extension's counter-clockwise turn is a negative one in (u, v).
@@ -398,8 +473,5 @@ fn coordinates(info: &Info) -> (usize, Option<DMat3>) {
         -widen(transform.rotation.0),
         vector(transform.offset.0),
     );
-    (
-        transform.tex_coord.unwrap_or(info.tex_coord) as usize,
-        Some(matrix),
-    )
+    (transform.tex_coord.unwrap_or(tex_coord) as usize, matrix)
 }

@@ -77,9 +77,10 @@ const IOR: About = About {
 };
 const ROUGHNESS: About = About {
     label: "Roughness",
-    what: "Up to 0.3 a surface is smooth: glass, mirror or polish; above it is matte, as transport has no lobes.",
+    what: "How wide the lobe is in which mirrors, glass and polish send light on (GGX). Metal and glass above 0.6, and \
+           polish above 0.3, are matte.",
     range: "0 to 1",
-    accuracy: "none, except that rough glass and metal are taken for matte",
+    accuracy: "wide lobes need more wavefronts for the same error",
     cost: "light that meets this material is traced anew where the class changes",
 };
 const TINT: About = About {
