@@ -61,6 +61,8 @@ pub(super) struct SoftParts {
     pub(super) spread: Option<LightError>,
     /// By the lattice.
     pub(super) lattice: Option<LightError>,
+    /// The maps of all wavefronts on a coarser lattice.
+    pub(super) coarse: Option<ReceiverMaps>,
 }
 
 /// Levels that are kept whatever they take: an error needs them.

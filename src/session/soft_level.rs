@@ -12,7 +12,7 @@ use super::light_level::{KeptError, LevelKey, LightLevel, LightState, Sizes, Sof
 use crate::error::{Error, Result};
 use crate::geometry::sampling::even_point;
 use crate::illumination::accumulator::FluxUnit;
-use crate::light_pass::accuracy;
+use crate::light_pass::accuracy::{self, LightError};
 use crate::light_pass::caustic::pass::{PassReport, Seconds, Stopwatch};
 use crate::light_pass::caustic::setup::AimedLight;
 use crate::light_pass::emitter::Emitter;
@@ -31,7 +31,14 @@ const FIRST_WAVEFRONTS: u32 = 4;
 const USUAL_WAVEFRONTS: u32 = 64;
 
 /// Finer lattices than the usual last one.
-const MOST_FINER: usize = 5;
+const MOST_FINER: usize = 3;
+
+/// The lattice is refined where its part of the error is so many times that of the wavefronts: it costs four times as
+/// much, they twice.
+const FINER_FROM: f64 = 1.5;
+
+/// And so large a part of the target.
+const FINER_FROM_TARGET: f64 = 0.6;
 
 /// The strength of one place of a light may be so many times that of another: a blue pixel of a sky has that much more in
 /// one channel than in luminance.
@@ -41,7 +48,7 @@ const STRENGTH_MARGIN: f64 = 16.0;
 const LATTICE_SHARE: f64 = 0.2;
 
 /// Levels until both dimensions of the error are known.
-pub(super) const SOFT_BEGINNING: usize = 3;
+pub(super) const SOFT_BEGINNING: usize = 2;
 
 /// However fine a lattice, its triangles are no finer than so many times less than is usual.
 const LEAST_COARSE: f64 = 0.125;
@@ -53,6 +60,16 @@ pub(super) struct Resolved {
     lattice: usize,
     /// How many wavefronts, a power of two.
     wavefronts: u32,
+}
+
+impl Resolved {
+    /// The same wavefronts on the lattice that the error is taken from.
+    fn coarser(self) -> Self {
+        Self {
+            lattice: self.lattice.saturating_sub(1),
+            ..self
+        }
+    }
 }
 
 impl CausticLayer<'_> {
@@ -95,65 +112,61 @@ impl CausticLayer<'_> {
     /// Cells across and down of a lattice; beyond the usual last one each has half the steps.
     fn soft_lattice(&self, light: &AimedLight, index: usize) -> (usize, usize) {
         let lattices = self.lattices(light);
-        let (first, last) = self.soft_ends(light);
+        let last = lattices.len() - 1;
         let finer = index.saturating_sub(last);
         let (columns, rows) = lattices[index.min(last)];
-        if self.settings.estimator == Estimator::Splat && index == first {
+        if self.settings.estimator == Estimator::Splat && index < last {
             return (columns.div_ceil(2), rows.div_ceil(2));
         }
         (columns << finer, rows << finer)
     }
 
-    /// Where the first picture begins, and where a bake without a target ends.
+    /// Where the first picture begins, and the usual last lattice. Each has a coarser one beside it.
     fn soft_ends(&self, light: &AimedLight) -> (usize, usize) {
         let last = self.lattices(light).len() - 1;
-        if self.settings.max_error.is_some() {
-            (0, last)
+        let first = if self.settings.max_error.is_some() {
+            1
         } else {
-            (last.saturating_sub(1), last)
-        }
+            last
+        };
+        (first.min(last), last)
     }
 
-    /// What comes after the levels so far; `None` where they are enough.
+    /// What comes after the levels so far; `None` where there is nothing more.
     pub(super) fn next_resolved(&self, light: &AimedLight, climb: &Climb) -> Option<Resolved> {
         let (first, last) = self.soft_ends(light);
-        let most = self.settings.wavefronts.unwrap_or(MOST_WAVEFRONTS);
-        let start = Resolved {
-            lattice: first,
-            wavefronts: FIRST_WAVEFRONTS.min(most),
+        let wanted = self.settings.wavefronts.unwrap_or(USUAL_WAVEFRONTS);
+        let (most, target) = match self.settings.max_error {
+            Some(target) => (self.settings.wavefronts.unwrap_or(MOST_WAVEFRONTS), target),
+            None => (wanted, f64::INFINITY),
         };
         let Some(level) = climb.levels.last() else {
-            return Some(start);
+            return Some(Resolved {
+                lattice: first,
+                wavefronts: FIRST_WAVEFRONTS.min(most),
+            });
         };
         let at = level.key.resolved?;
-        let more = Resolved {
+        let more = (at.wavefronts < most).then_some(Resolved {
             wavefronts: at.wavefronts * 2,
             ..at
-        };
-        let finer = Resolved {
+        });
+        let rmse = |part: &Option<LightError>| part.as_ref().map(|part| part.relative_rmse);
+        let (spread, lattice) = (rmse(&level.parts.spread), rmse(&level.parts.lattice));
+        // More wavefronts help either: their lattices do not err alike.
+        let is_coarse = lattice.is_some_and(|lattice| {
+            let spread = if more.is_some() {
+                spread.unwrap_or(f64::INFINITY)
+            } else {
+                0.0
+            };
+            lattice > FINER_FROM * spread && lattice > FINER_FROM_TARGET * target
+        });
+        let finer = (is_coarse && at.lattice < last + MOST_FINER).then_some(Resolved {
             lattice: at.lattice + 1,
             ..at
-        };
-        let is_fixed = self.settings.max_error.is_none();
-        let wanted = self.settings.wavefronts.unwrap_or(USUAL_WAVEFRONTS);
-        match (&level.parts.spread, &level.parts.lattice) {
-            (None, _) if at.wavefronts < most => Some(more),
-            (_, None) => Some(finer),
-            _ if is_fixed && at.lattice < last => Some(finer),
-            _ if is_fixed => (at.wavefronts < wanted).then_some(more),
-            (spread, lattice) => {
-                let of = |part: &Option<accuracy::LightError>| {
-                    part.as_ref().map_or(0.0, |part| part.relative_rmse)
-                };
-                let can_more = at.wavefronts < most;
-                let can_finer = at.lattice < last + MOST_FINER;
-                if can_more && (of(spread) >= of(lattice) || !can_finer) {
-                    Some(more)
-                } else {
-                    can_finer.then_some(finer)
-                }
-            }
-        }
+        });
+        finer.or(more)
     }
 
     /// One level more of a soft light.
@@ -239,19 +252,25 @@ impl CausticLayer<'_> {
         let Some(resolved) = key.resolved else {
             return Ok(None);
         };
+        let coarse_key = self.soft_key(light, resolved.coarser(), 0, &key.sizes);
+        let (count, before_at) = (resolved.wavefronts, before.and_then(|before| before.key.resolved));
         // The wavefronts so far are the first of the new ones.
-        let before = before.filter(|before| {
-            let fewer = before.key.resolved.map(|before| before.wavefronts);
-            before.key.trace == key.trace
-                && before.key.sizes == key.sizes
-                && fewer < Some(resolved.wavefronts)
-        });
-        let first = before
-            .and_then(|before| before.key.resolved)
-            .map_or(0, |before| before.wavefronts);
+        let same = before.filter(|before| before.key.trace == key.trace && before.key.sizes == key.sizes);
+        let first = same.and(before_at).map_or(0, |before| before.wavefronts);
         let watch = Stopwatch::start();
-        let (mut report, mut maps) =
-            self.run_wavefronts(light, &key, unit, first..resolved.wavefronts, course);
+        let (mut report, mut maps) = self.run_wavefronts(light, &key, unit, first..count, course);
+        // What was fine before a finer lattice is what to compare with now.
+        let is_refined = before_at == Some(resolved.coarser());
+        let mut coarse = match before.filter(|_| is_refined) {
+            Some(before) => before.maps.clone(),
+            None => {
+                let (other, coarse) = self.run_wavefronts(light, &coarse_key, unit, first..count, course);
+                let ledger = report.ledger;
+                report.merge(other);
+                report.ledger = ledger;
+                coarse
+            }
+        };
         share_time(&mut report, watch.elapsed());
         course.outcome.count(&report, course.clock);
         if self.has_places(light) {
@@ -259,9 +278,12 @@ impl CausticLayer<'_> {
             course.outcome.meter.places.deposits += report.deposits.transmitted + report.deposits.reflected;
         }
         let mut ledger = report.ledger;
-        if let Some(before) = before {
-            maps.add(before.maps.clone());
-            ledger.merge(&before.ledger);
+        if let Some(same) = same {
+            maps.add(same.maps.clone());
+            ledger.merge(&same.ledger);
+            if let Some(earlier) = &same.parts.coarse {
+                coarse.add(earlier.clone());
+            }
         }
         Ok((!report.cancelled).then(|| LightLevel {
             unit: unit.shared(resolved.wavefronts),
@@ -272,7 +294,10 @@ impl CausticLayer<'_> {
             noise: None,
             error: None,
             traced: None,
-            parts: SoftParts::default(),
+            parts: SoftParts {
+                coarse: Some(coarse),
+                ..SoftParts::default()
+            },
         }))
     }
 
@@ -331,29 +356,30 @@ impl CausticLayer<'_> {
     /// Compares a level with the one before it.
     fn estimate_soft(&self, level: &mut LightLevel, before: Option<&LightLevel>, course: &mut Course) {
         let watch = Stopwatch::start();
-        level.parts = SoftParts::default();
-        level.error = None;
-        if let Some(before) = before
-            && let (Some(now), Some(then)) = (level.key.resolved, before.key.resolved)
-        {
-            let ledger = level.ledger.report("", level.unit, LinearSrgb::WHITE).energy_w;
-            let fine = accuracy::images(&level.maps, level.unit);
-            let coarse = accuracy::images(&before.maps, before.unit);
-            level.parts = before.parts.clone();
-            if now.lattice == then.lattice {
+        let ledger = level.ledger.report("", level.unit, LinearSrgb::WHITE).energy_w;
+        let fine = accuracy::images(&level.maps, level.unit);
+        let coarse = level.parts.coarse.as_ref();
+        level.parts.lattice = coarse.and_then(|coarse| {
+            let coarse = accuracy::images(coarse, level.unit);
+            accuracy::by_difference(&fine, &coarse, LATTICE_SHARE, &ledger)
+        });
+        let lattice_of = |level: &LightLevel| level.key.resolved.map(|resolved| resolved.lattice);
+        level.parts.spread = before.and_then(|before| {
+            if lattice_of(before) == lattice_of(level) {
                 // (A − B)/2 of two independent halves is as large as the error of their mean.
-                level.parts.spread = accuracy::by_difference(&fine, &coarse, 1.0, &ledger);
+                let half = accuracy::images(&before.maps, before.unit);
+                accuracy::by_difference(&fine, &half, 1.0, &ledger)
             } else {
-                level.parts.lattice = accuracy::by_difference(&fine, &coarse, LATTICE_SHARE, &ledger);
+                before.parts.spread.clone()
             }
-            level.error = match (&level.parts.spread, &level.parts.lattice) {
-                (Some(spread), Some(lattice)) => Some(KeptError {
-                    predecessors: 0,
-                    estimate: accuracy::together(spread, lattice),
-                }),
-                _ => None,
-            };
-        }
+        });
+        level.error = match (&level.parts.spread, &level.parts.lattice) {
+            (Some(spread), Some(lattice)) => Some(KeptError {
+                predecessors: 0,
+                estimate: accuracy::together(spread, lattice),
+            }),
+            _ => None,
+        };
         course.clock.deposit.add(watch.elapsed());
     }
 }
