@@ -5,6 +5,8 @@
 mod chain_laws;
 #[path = "stability/chains.rs"]
 mod chains;
+#[path = "stability/extreme_lamps.rs"]
+mod extreme_lamps;
 #[path = "stability/hidden_cells.rs"]
 mod hidden_cells;
 #[path = "stability/intersection.rs"]

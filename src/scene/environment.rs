@@ -122,6 +122,15 @@ impl Environment {
         along(row(low.y)) * (1.0 - share.y) + along(row(low.y + 1.0)) * share.y
     }
 
+    /// Density of the directions that [`sample`](Self::sample) gives, near one of them [1/sr]; 0 where all is black.
+    pub fn density_per_sr(&self, to_light: DVec3) -> f64 {
+        if self.total > 0.0 {
+            self.radiance(to_light).luminance() / self.total
+        } else {
+            0.0
+        }
+    }
+
     /// The direction of a point of the unit square: as many in any region as it sends light. `None` where all is black.
     pub fn sample(&self, square: DVec2) -> Option<EnvironmentSample> {
         if self.total <= 0.0 {

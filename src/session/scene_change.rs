@@ -13,7 +13,7 @@ pub(super) struct SceneChange {
     pub(super) directions: Vec<usize>,
     /// Whether surfaces take another share of the light, the directions included.
     pub(super) shares: bool,
-    /// Lights at another place, or that shine another way; another strength alone is no change.
+    /// Lights at another place or of another size, or that shine another way; another strength alone is no change.
     pub(super) lights: Vec<usize>,
 }
 
@@ -33,9 +33,12 @@ impl SceneChange {
             return None;
         }
         let objects = 0..new.objects.len();
-        let shapes = objects
+        let shapes: Vec<usize> = objects
             .clone()
-            .filter(|&object| !Arc::ptr_eq(&old.objects[object].mesh, &new.objects[object].mesh));
+            .filter(|&object| !Arc::ptr_eq(&old.objects[object].mesh, &new.objects[object].mesh))
+            .collect();
+        let is_moved_with =
+            |light: &Light| glowing_object(light).is_some_and(|object| shapes.contains(&object));
         let changed = |is_same: fn(&Material, &Material) -> bool| {
             let is_changed =
                 move |&object: &usize| !is_same(old.material_of(object), new.material_of(object));
@@ -43,13 +46,13 @@ impl SceneChange {
         };
         let lights = old.lights.iter().zip(&new.lights).enumerate();
         Some(Self {
-            shapes: shapes.collect(),
             directions: changed(leave_alike).collect(),
             shares: changed(share_alike).next().is_some(),
             lights: lights
-                .filter(|(_, (old, new))| !shine_alike(old, new))
+                .filter(|(_, (old, new))| !shine_alike(old, new) || is_moved_with(new))
                 .map(|(light, _)| light)
                 .collect(),
+            shapes,
         })
     }
 
@@ -85,6 +88,14 @@ fn share_alike(a: &Material, b: &Material) -> bool {
 fn shine_alike(a: &Light, b: &Light) -> bool {
     let unit = |light: &Light| -> LightKind { light.of_unit_strength().kind };
     unit(a) == unit(b) && a.size == b.size
+}
+
+/// The object that glows as a light.
+fn glowing_object(light: &Light) -> Option<usize> {
+    match light.kind {
+        LightKind::Surface { object, .. } => Some(object),
+        _ => None,
+    }
 }
 
 /// Whether both scenes have the same environment, or none.

@@ -8,10 +8,10 @@ use nephroid::optics::LinearSrgb;
 use nephroid::progress::Control;
 use nephroid::scene::builtin::{parts, shapes};
 use nephroid::scene::edit::Edit;
-use nephroid::scene::{LightKind, Scene};
+use nephroid::scene::{LightKind, LightSize, Scene};
 use nephroid::session::{BakeResult, BakeSession, StopReason};
 use nephroid::settings::{BakeSettings, LayerKind, MapResolution, Sigma};
-use nephroid::units::{Flux, RadiantIntensity};
+use nephroid::units::{Flux, Radiance, RadiantIntensity};
 use rand_pcg::Pcg64Mcg;
 use rand_pcg::rand_core::{Rng, SeedableRng};
 
@@ -229,6 +229,47 @@ fn a_moved_light_is_traced_again_and_the_other_is_not() {
     );
     let share = moved.counts.rays as f64 / first.counts.rays as f64;
     assert!((0.3..0.7).contains(&share), "{share} of the rays of both lights");
+}
+
+/// The size of a lamp, and the place of an object that glows, are as good as another light.
+#[test]
+fn a_light_of_another_size_or_whose_surface_moved_is_looked_for_again() {
+    let mut scene = builtin_scene("ball");
+    let patch = shapes::floor([-0.1, 0.1], [-0.1, 0.1], 1.5);
+    let mut glow = parts::matte("glow", LinearSrgb::BLACK);
+    glow.emitted_radiance = LinearSrgb::WHITE;
+    parts::add(&mut scene, "glow", patch, glow);
+    let object = scene.objects.len() - 1;
+    let mut lamp = scene.lights[0].clone();
+    lamp.kind = LightKind::Surface {
+        object,
+        radiance: Radiance(1.0),
+    };
+    scene.lights.push(lamp);
+    let settings = BakeSettings {
+        layers: vec![LayerKind::Direct],
+        ..at(1e3, 32)
+    };
+    let mut session = session(&scene);
+    let mut before = run(&mut session, &settings);
+    let size = LightSize::Radius { radius_m: 0.3 };
+    let larger = Edit::LightSize { light: 0, size };
+    let moved = Edit::ObjectMoved {
+        object,
+        rotation: DQuat::IDENTITY,
+        translation: DVec3::X * 0.3,
+    };
+    for change in [larger, moved] {
+        edit(&mut session, &change);
+        let after = run(&mut session, &settings);
+        let whole = fresh(&session.scene().clone(), &settings);
+        assert_eq!(difference(&after, &whole), None, "{change:?}");
+        assert!(
+            difference(&after, &before).is_some(),
+            "{change:?} changes something"
+        );
+        before = after;
+    }
 }
 
 #[test]

@@ -7,10 +7,13 @@ use nephroid::error::ErrorKind;
 use nephroid::optics::LinearSrgb;
 use nephroid::scene::builtin::{parts, shapes};
 use nephroid::scene::texture::Wrap;
-use nephroid::scene::{Edit, EditTarget, LightKind, Scene, SurfaceKind, Texture, Wave, Waves};
-use nephroid::units::{Flux, Irradiance, RadiantIntensity};
+use nephroid::scene::{
+    Edit, EditTarget, Light, LightKind, LightSize, PanelShape, Scene, SurfaceKind, Texture, Wave, Waves,
+};
+use nephroid::units::{Flux, Irradiance, Radiance, RadiantIntensity};
 
-/// A scene with a floor (object 0), a glass ball (object 1), an image, a lamp (light 0), a sun (1) and a spot (2).
+/// A scene with a floor (object 0), a glass ball (object 1), an image, a lamp (light 0), a sun (1), a spot (2), a panel (3),
+/// the floor as a lamp (4) and an environment (5).
 fn scene() -> Scene {
     let mut scene = parts::reference_scene(0.6);
     let ball = shapes::sphere(DVec3::new(0.0, 0.8, 0.0), 0.5, 2);
@@ -31,6 +34,28 @@ fn scene() -> Scene {
         outer_cone_rad: 0.4,
     };
     scene.lights.push(spot);
+    let kinds = [
+        LightKind::Panel {
+            centre: DVec3::Y * 2.0,
+            across: DVec3::X,
+            down: DVec3::Z,
+            shape: PanelShape::Disc,
+            radiance: Radiance(3.0),
+        },
+        LightKind::Surface {
+            object: 0,
+            radiance: Radiance(1.0),
+        },
+        LightKind::Environment { scale: 1.0 },
+    ];
+    for kind in kinds {
+        scene.lights.push(Light {
+            name: "large".into(),
+            colour: LinearSrgb::WHITE,
+            kind,
+            size: LightSize::None,
+        });
+    }
     scene.textures.push(Arc::new(Texture {
         name: "white".into(),
         width: 1,
@@ -84,6 +109,36 @@ fn edits() -> Vec<Edit> {
         Edit::LightColour {
             light: 0,
             colour: LinearSrgb::new(1.0, 0.5, 0.0),
+        },
+        Edit::LightSize {
+            light: 0,
+            size: LightSize::Radius { radius_m: 0.1 },
+        },
+        Edit::LightSize {
+            light: 1,
+            size: LightSize::Angle {
+                diameter_rad: std::f64::consts::PI,
+            },
+        },
+        Edit::LightSize {
+            light: 2,
+            size: LightSize::Radius { radius_m: 1.0 / 3.0 },
+        },
+        Edit::LightBrightness {
+            light: 3,
+            brightness: 0.7,
+        },
+        Edit::LightPosition {
+            light: 3,
+            position: DVec3::Y,
+        },
+        Edit::LightBrightness {
+            light: 4,
+            brightness: 1e9,
+        },
+        Edit::LightBrightness {
+            light: 5,
+            brightness: 0.1,
         },
         Edit::MaterialIor {
             material: 1,
@@ -251,6 +306,8 @@ fn values_out_of_range_are_refused_in_one_sentence() {
         light,
         normal_irradiance: Irradiance(value),
     };
+    let bright = |light, brightness| Edit::LightBrightness { light, brightness };
+    let sized = |light, size| Edit::LightSize { light, size };
     let place = |light, position| Edit::LightPosition { light, position };
     let towards = |light, direction| Edit::LightDirection { light, direction };
     let colour = |r| Edit::LightColour {
@@ -279,7 +336,29 @@ fn values_out_of_range_are_refused_in_one_sentence() {
     let mut broken = (*scene.objects[0].mesh).clone();
     broken.triangles[0][0] = 4;
     let refused = [
-        (light(3, 1.0), "light 3"),
+        (light(6, 1.0), "light 6"),
+        (light(3, 1.0), "light `large`"),
+        (bright(0, 1.0), "set its intensity"),
+        (bright(3, 0.0), "light `large`"),
+        (bright(5, nan), "light `large`"),
+        (
+            sized(0, LightSize::Radius { radius_m: 0.0 }),
+            "a radius above 0 m",
+        ),
+        (
+            sized(0, LightSize::Radius { radius_m: nan }),
+            "a radius above 0 m",
+        ),
+        (
+            sized(0, LightSize::Angle { diameter_rad: 0.1 }),
+            "a radius above 0 m",
+        ),
+        (
+            sized(1, LightSize::Angle { diameter_rad: 3.2 }),
+            "up to π for suns",
+        ),
+        (sized(1, LightSize::Radius { radius_m: 0.1 }), "up to π for suns"),
+        (sized(3, LightSize::None), "light `large`"),
         (light(0, nan), "light `light`"),
         (light(0, -1.0), "light `light`"),
         (light(0, 0.0), "light `light`"),

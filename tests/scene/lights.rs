@@ -346,6 +346,11 @@ fn environments_that_are_none_get_one_sentence() {
             "are no radiance",
         ),
         (
+            "blinding.exr",
+            exr(2, 1, |_, _| (2e36, 1.0, 1.0)),
+            "holds values above 1e36",
+        ),
+        (
             "infinite.exr",
             exr(2, 1, |_, _| (f32::INFINITY, 1.0, 1.0)),
             "are no radiance",

@@ -9,10 +9,10 @@ use glam::DVec3;
 use nephroid::light_pass::ledger::{EnergyLedger, LightLedger, Truncated};
 use nephroid::progress::Stage;
 use nephroid::scene::builtin::{self, parts, shapes};
-use nephroid::scene::{Edit, LightKind, Scene, Wave, Waves};
+use nephroid::scene::{Edit, Light, LightKind, LightSize, PanelShape, Scene, Wave, Waves};
 use nephroid::session::StopReason;
 use nephroid::settings::{BakeSettings, Footprint, Kernel, LEAST_MAX_ERROR, LayerKind, MapResolution, Sigma};
-use nephroid::units::{Flux, Irradiance, RadiantIntensity};
+use nephroid::units::{Flux, Irradiance, Radiance, RadiantIntensity};
 use nephroid::viewer::panel::{LayerShown, Quantity};
 use nephroid::viewer::worker::BakeState;
 
@@ -173,6 +173,90 @@ fn places_and_directions_are_typed_in_numbers() {
         panel.says("elev.: -90.0") && panel.says("y: 1.0"),
         "a spot has both"
     );
+}
+
+#[test]
+fn sizes_of_lamps_are_typed_and_0_is_none() {
+    let mut panel = Headless::with_scene(scene(), settings(), SIZE);
+    let sized = |panel: &mut Headless, label: &str, text: &str| {
+        let field = Headless::rect_of(panel.labelled(Role::SpinButton, label)).center();
+        panel.click(field);
+        panel.type_text(text);
+        panel.wishes.edit.take()
+    };
+    let radius = |light, radius_m| {
+        let size = LightSize::Radius { radius_m };
+        Some(Edit::LightSize { light, size })
+    };
+    assert_eq!(sized(&mut panel, "Radius [m]", "0.25"), radius(0, 0.25));
+    choose(&mut panel, "Light", "spot");
+    assert_eq!(sized(&mut panel, "Radius [m]", "0.5"), radius(2, 0.5));
+    choose(&mut panel, "Light", "sun");
+    let edit = sized(&mut panel, "Diameter [°]", "0.53").expect("an edit");
+    let size = LightSize::Angle {
+        diameter_rad: 0.53_f64.to_radians(),
+    };
+    assert_eq!(edit, Edit::LightSize { light: 1, size });
+    panel.scene = Arc::new(edit.apply(&panel.scene).expect("it is in range").0);
+    panel.settle();
+    let none = Edit::LightSize {
+        light: 1,
+        size: LightSize::None,
+    };
+    assert_eq!(sized(&mut panel, "Diameter [°]", "0"), Some(none));
+    let widest = Edit::LightSize {
+        light: 1,
+        size: LightSize::Angle {
+            diameter_rad: std::f64::consts::PI,
+        },
+    };
+    assert_eq!(sized(&mut panel, "Diameter [°]", "500"), Some(widest));
+}
+
+#[test]
+fn lamps_with_a_surface_have_a_brightness_and_a_panel_a_place() {
+    let mut scene = scene();
+    let kinds = [
+        (
+            "panel",
+            LightKind::Panel {
+                centre: DVec3::Y * 4.0,
+                across: DVec3::X,
+                down: DVec3::Z,
+                shape: PanelShape::Rectangle,
+                radiance: Radiance(3.0),
+            },
+        ),
+        ("sky", LightKind::Environment { scale: 1.0 }),
+    ];
+    for (name, kind) in kinds {
+        scene.lights.push(Light {
+            name: name.into(),
+            kind,
+            ..scene.lights[0].clone()
+        });
+    }
+    let mut panel = Headless::with_scene(scene, settings(), SIZE);
+    choose(&mut panel, "Light", "panel");
+    assert!(!panel.says("Radius [m]") && !panel.says("Diameter [°]"));
+    type_into(&mut panel, "y: 4", "3");
+    let position = DVec3::Y * 3.0;
+    assert_eq!(
+        panel.wishes.edit,
+        Some(Edit::LightPosition { light: 3, position })
+    );
+    drag(&mut panel, "Brightness", 0.5, 0.75);
+    let Some(Edit::LightBrightness { light: 3, brightness }) = panel.wishes.edit else {
+        panic!("{:?}", panel.wishes.edit)
+    };
+    assert!((15.0..60.0).contains(&brightness), "a decade: {brightness}");
+    choose(&mut panel, "Light", "sky");
+    assert!(!panel.says("Position [m]"));
+    drag(&mut panel, "Brightness", 0.5, 0.25);
+    let Some(Edit::LightBrightness { light: 4, brightness }) = panel.wishes.edit else {
+        panic!("{:?}", panel.wishes.edit)
+    };
+    assert!((0.05..0.2).contains(&brightness), "{brightness}");
 }
 
 #[test]

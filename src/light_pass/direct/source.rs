@@ -6,6 +6,7 @@
 
 use std::f64::consts::{PI, TAU};
 use std::ops::Range;
+use std::sync::Arc;
 
 use glam::{DVec2, DVec3};
 
@@ -15,11 +16,18 @@ use super::polygon::Polygon;
 use crate::geometry::sampling::even_point;
 use crate::optics::LinearSrgb;
 use crate::scene::emitter::{Emitter, Places};
-use crate::scene::{Light, LightKind, LightSize, Material, PanelShape, Scene};
+use crate::scene::{Environment, Light, LightKind, LightSize, Material, PanelShape, Scene};
 use crate::transport::Tracer;
 
 /// Places of a light that are ready: a power of 2.
 const READY: usize = 1 << 13;
+/// And of a sky, whose texels need more of them.
+const READY_OF_SKY: usize = 1 << 14;
+/// Samples of a light for a texel that is looked at by few places, up to `FEW_PLACES`, and for others.
+const COARSE: usize = 64;
+const FINE: usize = 256;
+const FINE_OF_SKY: usize = 512;
+const FEW_PLACES: usize = 16;
 /// Surfaces of more triangles are looked at by samples alone.
 const MOST_POLYGONS: usize = 16;
 /// Corners that stand for the edge of a disc.
@@ -41,13 +49,19 @@ pub struct Soft {
     places: ManyPlaces,
     /// What it is made of, where that is little: E without shadows is exact, and samples say only what is hidden.
     shape: Option<Shape>,
-    is_environment: bool,
     light: u64,
 }
 
 enum ManyPlaces {
     /// Each as if all light came from there.
     Emitters { all: Vec<Emitter>, area_m2: f64 },
+    /// Directions: half of them where the light comes from, half where the surface takes it from.
+    Sky {
+        sky: Arc<Environment>,
+        strength: LinearSrgb,
+        to_light: Vec<DVec3>,
+        squares: Vec<DVec2>,
+    },
     /// A ball, by points of its visible cap.
     Ball {
         centre: DVec3,
@@ -76,29 +90,48 @@ impl Source {
         if !light.has_extent() {
             return Emitter::middle(light, scene).map(Self::Single);
         }
-        let squares = (0..READY as u32).map(|place| even_point(place, 0, SEED + index as u64));
-        let places = match (light.kind, light.size) {
-            (LightKind::Point { position, .. }, LightSize::Radius { radius_m }) => ManyPlaces::Ball {
+        Some(Self::Soft(Soft {
+            places: ManyPlaces::new(light, scene, index)?,
+            shape: shape(light, scene),
+            light: index as u64,
+        }))
+    }
+}
+
+impl ManyPlaces {
+    fn new(light: &Light, scene: &Scene, index: usize) -> Option<Self> {
+        let sequence = |count: usize, pair| {
+            (0..count as u32).map(move |place| even_point(place, pair, SEED + index as u64))
+        };
+        let squares = || sequence(READY, 0);
+        Some(match (light.kind, light.size) {
+            (LightKind::Point { position, .. }, LightSize::Radius { radius_m }) => Self::Ball {
                 centre: position,
                 radius_m,
                 radiance: light.strength() / (PI * radius_m * radius_m),
-                squares: squares.collect(),
+                squares: squares().collect(),
             },
+            (LightKind::Environment { .. }, _) => {
+                let sky = scene.environment.as_ref()?;
+                let to_light: Option<Vec<DVec3>> = sequence(READY_OF_SKY, 0)
+                    .map(|square| sky.sample(square).map(|sample| sample.to_light))
+                    .collect();
+                Self::Sky {
+                    sky: Arc::clone(sky),
+                    strength: light.strength(),
+                    to_light: to_light?,
+                    squares: sequence(READY_OF_SKY, 1).collect(),
+                }
+            }
             _ => {
                 let places = Places::new(light, scene);
-                let all: Option<Vec<Emitter>> = squares.map(|square| places.sample(square)).collect();
-                ManyPlaces::Emitters {
+                let all: Option<Vec<Emitter>> = squares().map(|square| places.sample(square)).collect();
+                Self::Emitters {
                     all: all?,
                     area_m2: places.surface_m2(),
                 }
             }
-        };
-        Some(Self::Soft(Soft {
-            places,
-            shape: shape(light, scene),
-            is_environment: matches!(light.kind, LightKind::Environment { .. }),
-            light: index as u64,
-        }))
+        })
     }
 }
 
@@ -157,23 +190,17 @@ fn shape(light: &Light, scene: &Scene) -> Option<Shape> {
 }
 
 impl Soft {
-    /// Samples of the light for each of `places` places of a texel.
-    pub fn samples(&self, places: usize) -> usize {
-        let of_texel = match (self.is_environment, places > 16) {
-            (true, false) => 256,
-            (true, true) => 1024,
-            (false, false) => 64,
-            (false, true) => 256,
-        };
-        (of_texel / places.max(1)).max(1)
-    }
-
     /// The places of the light for one of the `places` of a texel.
     pub fn run(&self, texel: u64, place: usize, places: usize) -> Range<usize> {
-        let each = self.samples(places);
-        let runs = READY / (each * places.next_power_of_two());
+        let (ready, fine) = match self.places {
+            ManyPlaces::Sky { .. } => (2 * READY_OF_SKY, FINE_OF_SKY),
+            _ => (READY, FINE),
+        };
+        let of_texel = if places > FEW_PLACES { fine } else { COARSE };
+        let each = (of_texel / places.max(1)).max(2);
+        let runs = ready / (each * places.next_power_of_two());
         let run = (mixed(texel ^ mixed(self.light)) % runs.max(1) as u64) as usize;
-        let first = (run * places + place) * each % READY;
+        let first = (run * places + place) * each % ready;
         first..first + each
     }
 
@@ -187,9 +214,9 @@ impl Soft {
     ) -> Gathered {
         let count = run.len() as f64;
         let mut sum = Sum::default();
-        for index in run {
+        for index in run.clone() {
             let arriving = self
-                .beam(index, point.position, count)
+                .beam(index, &run, point, material)
                 .and_then(|beam| Arriving::from_beam(&beam, point, material));
             let Some(arriving) = arriving else { continue };
             sum.shadow_rays += 1;
@@ -212,23 +239,89 @@ impl Soft {
         }
     }
 
-    /// What would come from one of its places, of `count` that stand for all.
-    fn beam(&self, index: usize, point: DVec3, count: f64) -> Option<Beam> {
+    /// What would come from one place of a run that stands for all.
+    fn beam(
+        &self,
+        index: usize,
+        run: &Range<usize>,
+        point: &SurfacePoint,
+        material: &Material,
+    ) -> Option<Beam> {
         match &self.places {
             ManyPlaces::Emitters { all, area_m2 } => {
                 let patch_m2 = if self.shape.is_some() {
                     0.0
                 } else {
-                    area_m2 / count
+                    area_m2 / run.len() as f64
                 };
-                Beam::of_patch(&all[index], point, patch_m2)
+                Beam::of_patch(&all[index], point.position, patch_m2)
+            }
+            ManyPlaces::Sky {
+                sky,
+                strength,
+                to_light,
+                squares,
+            } => {
+                let surface = Cosines::of(point, material);
+                let half = run.len() / 2;
+                let place = run.start / 2 + (index - run.start) % half;
+                let to_light = if index - run.start < half {
+                    to_light[place]
+                } else {
+                    surface.sample(squares[place])
+                };
+                // Veach and Guibas, "Optimally combining sampling techniques", SIGGRAPH 1995: the balance heuristic.
+                let density_per_sr = 0.5 * (sky.density_per_sr(to_light) + surface.density_per_sr(to_light));
+                (density_per_sr > 0.0).then(|| Beam {
+                    to_light,
+                    distance_m: f64::INFINITY,
+                    across_beam: 1.0 / density_per_sr,
+                    strength: *strength * sky.radiance(to_light),
+                })
             }
             ManyPlaces::Ball {
                 centre,
                 radius_m,
                 radiance,
                 squares,
-            } => ball(*centre, *radius_m, *radiance, point, squares[index]),
+            } => ball(*centre, *radius_m, *radiance, point.position, squares[index]),
+        }
+    }
+}
+
+/// Directions from a surface, as many as it takes light from: by the cosine, on one side or both.
+struct Cosines {
+    normal: DVec3,
+    both_sides: bool,
+}
+
+impl Cosines {
+    fn of(point: &SurfacePoint, material: &Material) -> Self {
+        Self {
+            normal: point.shading_normal,
+            both_sides: material.double_sided,
+        }
+    }
+
+    fn sample(&self, mut square: DVec2) -> DVec3 {
+        let mut side = 1.0;
+        if self.both_sides {
+            square.x *= 2.0;
+            if square.x >= 1.0 {
+                (side, square.x) = (-1.0, square.x - 1.0);
+            }
+        }
+        let (x, y) = self.normal.any_orthonormal_pair();
+        let along = DVec2::from_angle(TAU * square.y) * square.x.sqrt();
+        x * along.x + y * along.y + self.normal * (side * (1.0 - square.x).sqrt())
+    }
+
+    fn density_per_sr(&self, direction: DVec3) -> f64 {
+        let cosine = self.normal.dot(direction);
+        if self.both_sides {
+            cosine.abs() / TAU
+        } else {
+            cosine.max(0.0) / PI
         }
     }
 }

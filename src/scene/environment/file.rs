@@ -15,12 +15,15 @@ use crate::scene::gltf::guard;
 /// Most pixels a side: the texture limit of common devices.
 const LARGEST_SIDE: u32 = 16384;
 
+/// Largest radiance that is read [W/(m² sr)]: what a map can hold, with room for several lights and their scales.
+const BRIGHTEST: f32 = 1e36;
+
 /// Reads an equirectangular image, told apart by its first bytes. Its values, linear sRGB, are taken as radiance
 /// [W/(m² sr)] as they are; those of a Radiance file are divided by the exposure that it states, as the format asks.
 ///
 /// # Errors
 /// A file that cannot be read, is neither format, is damaged, has an unusable size or takes more than
-/// `memory_limit_bytes`; values that are negative, infinite or not a number.
+/// `memory_limit_bytes`; values that are negative, infinite, not a number or above 1e36.
 pub fn read(path: &Path, memory_limit_bytes: u64) -> Result<Environment> {
     let bytes = files::read_file(path, memory_limit_bytes)?;
     let refused = |what: String| {
@@ -35,7 +38,16 @@ pub fn read(path: &Path, memory_limit_bytes: u64) -> Result<Environment> {
         .unwrap_or_else(|| Err("is damaged".into()))
         .map_err(refused)?;
     let (width, height) = (pixels.width() as usize, pixels.height() as usize);
-    let radiance = pixels.into_raw().as_chunks().0.to_vec();
+    let radiance: Vec<[f32; 3]> = pixels.into_raw().as_chunks().0.to_vec();
+    if radiance
+        .iter()
+        .flatten()
+        .any(|value| value.is_finite() && *value > BRIGHTEST)
+    {
+        return Err(refused(format!(
+            "holds values above {BRIGHTEST:e} W/(m² sr), of which sums are no number in a map"
+        )));
+    }
     Environment::new(width, height, radiance).ok_or_else(|| {
         refused("holds values that are no radiance: negative, infinite or not a number".into())
     })

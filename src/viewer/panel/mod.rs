@@ -8,6 +8,7 @@ mod effects;
 pub mod frame_graph;
 mod help;
 mod light_pass;
+mod light_size;
 mod scene;
 mod waves;
 mod worth;

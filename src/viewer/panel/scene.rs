@@ -4,7 +4,7 @@ use egui::{Button, ComboBox, DragValue, Response, Slider, SliderClamping, Ui};
 use glam::DVec3;
 
 use super::control::{About, CONTROL_WIDTH, row, rows, significant};
-use super::{Facts, Wishes, bake, waves};
+use super::{Facts, Wishes, bake, light_size, waves};
 use crate::optics::LinearSrgb;
 use crate::scene::{Edit, LightKind, Scene, SurfaceKind};
 use crate::units::{Irradiance, RadiantIntensity};
@@ -170,7 +170,8 @@ fn light(ui: &mut Ui, light: usize, facts: &Facts<'_>, wishes: &mut Wishes) {
         LightKind::Panel { .. } | LightKind::Surface { .. } | LightKind::Environment { .. } => &BRIGHTNESS,
     };
     row(ui, power_about, None, |ui| power(ui, light, facts, wishes));
-    if let LightKind::Point { position, .. } | LightKind::Spot { position, .. } = kind {
+    light_size::show(ui, light, &facts.scene.lights[light], wishes);
+    if let Some(position) = kind.position() {
         row(ui, &POSITION, None, |ui| {
             let mut moved = position;
             let response = place(ui, &mut moved, facts.scene);

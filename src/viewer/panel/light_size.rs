@@ -1,0 +1,73 @@
+//! The row of the section *Scene* for how large a lamp is.
+
+use egui::{DragValue, Response, Ui};
+
+use super::Wishes;
+use super::control::{About, row};
+use crate::scene::{Edit, Light, LightKind, LightSize};
+
+const RADIUS: About = About {
+    label: "Radius [m]",
+    what: "Of a point light, that makes it a ball, or of a spot, that makes it a disc across its axis; 0 makes it a \
+           point. Its power stays.",
+    range: "0 up",
+    accuracy: "soft caustics are means over many places of the lamp and need more rays for the same error",
+    cost: "this light is traced anew",
+};
+const ANGLE: About = About {
+    label: "Diameter [°]",
+    what: "Angle across the disc of a sun; 0 makes its light parallel. The real sun has 0.53°. Its irradiance stays.",
+    range: "0 to 180",
+    accuracy: RADIUS.accuracy,
+    cost: RADIUS.cost,
+};
+
+/// Drag of one point, as a share of the radius, or [m] where that is 0.
+const RADIUS_SPEED: f64 = 0.01;
+/// Drag of one point [°].
+const ANGLE_SPEED_DEG: f64 = 0.01;
+
+/// Shows the size of a light that can have one; what is changed goes to `wishes`.
+pub fn show(ui: &mut Ui, index: usize, light: &Light, wishes: &mut Wishes) {
+    let size = match light.kind {
+        LightKind::Point { .. } | LightKind::Spot { .. } => {
+            let mut radius_m = match light.size {
+                LightSize::Radius { radius_m } => radius_m,
+                _ => 0.0,
+            };
+            let speed = if radius_m > 0.0 {
+                RADIUS_SPEED * radius_m
+            } else {
+                RADIUS_SPEED
+            };
+            let response = row(ui, &RADIUS, None, |ui| number(ui, &mut radius_m, f64::MAX, speed));
+            (response, LightSize::Radius { radius_m }, radius_m)
+        }
+        LightKind::Sun { .. } => {
+            let mut angle_deg = match light.size {
+                LightSize::Angle { diameter_rad } => diameter_rad.to_degrees(),
+                _ => 0.0,
+            };
+            let response = row(ui, &ANGLE, None, |ui| {
+                number(ui, &mut angle_deg, 180.0, ANGLE_SPEED_DEG)
+            });
+            let diameter_rad = angle_deg.to_radians();
+            (response, LightSize::Angle { diameter_rad }, angle_deg)
+        }
+        LightKind::Panel { .. } | LightKind::Surface { .. } | LightKind::Environment { .. } => return,
+    };
+    let (response, size, number) = size;
+    if response.changed() {
+        let size = if number > 0.0 { size } else { LightSize::None };
+        wishes.edit = Some(Edit::LightSize { light: index, size });
+    }
+}
+
+fn number(ui: &mut Ui, value: &mut f64, most: f64, speed: f64) -> Response {
+    ui.add(
+        DragValue::new(value)
+            .range(0.0..=most)
+            .speed(speed)
+            .max_decimals(4),
+    )
+}
