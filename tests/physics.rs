@@ -13,6 +13,8 @@ mod differentials;
 mod fresnel;
 #[path = "physics/lights.rs"]
 mod lights;
+#[path = "physics/polish.rs"]
+mod polish;
 #[path = "physics/refraction.rs"]
 mod refraction;
 #[path = "physics/tone_maps.rs"]

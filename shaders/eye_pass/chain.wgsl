@@ -131,7 +131,7 @@ fn tint(gaze: Gaze, point: SurfacePoint, cos_view: f32) -> vec3f {
 
 fn lit_point(point: SurfacePoint) -> LitPoint {
     let margin = 2.0 * dot(abs(point.geometric_normal), point.error);
-    return LitPoint(point.place, margin, point.geometric_normal, point.shading_normal);
+    return LitPoint(point.place, margin, point.geometric_normal, point.interpolated_normal);
 }
 
 fn chain_radiance(first: Gaze) -> vec3f {

@@ -14,7 +14,9 @@ struct SurfacePoint {
     object: u32,
     // Unit, by the triangle's winding.
     geometric_normal: vec3f,
-    // Unit, interpolated, and bent where the surface has bumps.
+    // Unit, interpolated: what a matte surface takes light by.
+    interpolated_normal: vec3f,
+    // The same, bent where the surface has bumps.
     shading_normal: vec3f,
     // How much the normals spread per length, > 0 where the surface is convex.
     curvature: f32,
@@ -63,6 +65,7 @@ fn surface_point(hit: Hit) -> SurfacePoint {
     point.object = triangle.object;
     point.geometric_normal = across / twice_area;
     point.shading_normal = select(point.geometric_normal, normalize(mixed), dot(mixed, mixed) > 0.0);
+    point.interpolated_normal = point.shading_normal;
     point.curvature = (bend(triangle.a, triangle.b, normal_a, normal_b)
         + bend(triangle.b, triangle.c, normal_b, normal_c)
         + bend(triangle.c, triangle.a, normal_c, normal_a)) / 3.0;

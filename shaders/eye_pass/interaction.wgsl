@@ -113,7 +113,7 @@ fn interact(point: SurfacePoint, incident: vec3f, media: vec4u, tint: vec3f) -> 
             return Interaction(0.0, reflection(point, facing, incident, media, share), no_branch());
         }
         case SURFACE_MIXED: {
-            let reflectance = dielectric_reflectance(cos_incident, object.ior / medium_ior(media));
+            let reflectance = object.polish * dielectric_reflectance(cos_incident, object.ior / medium_ior(media));
             let back = reflection(point, facing, incident, media, vec3f(reflectance));
             return Interaction(1.0 - reflectance, back, no_branch());
         }

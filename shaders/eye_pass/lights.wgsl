@@ -72,7 +72,7 @@ fn direct_irradiance(point: LitPoint, object: ObjectRecord) -> vec3f {
         let cosine = side * dot(to_light, point.shading_normal);
         var taken = select(0.0, 1.0, is_front || object.double_sided != 0u);
         if object.surface == SURFACE_MIXED {
-            taken *= 1.0 - dielectric_reflectance(cosine, object.ior);
+            taken *= 1.0 - object.polish * dielectric_reflectance(cosine, object.ior);
         }
         let share = across_beam * cosine * taken;
         if share > 0.0 {

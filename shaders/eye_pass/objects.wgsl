@@ -11,6 +11,10 @@ struct ObjectRecord {
     texture: u32,
     lobe_rad: f32,
     bumps: u32,
+    polish: f32,
+    padding0: u32,
+    padding1: u32,
+    padding2: u32,
 }
 
 const SURFACE_DIFFUSE: u32 = 0u;

@@ -34,7 +34,8 @@ fn own_polish(fragment: Fragment) -> f32 {
             normal = bent(normal, bump_at(objects[fragment.object].bumps, place_m, piece, normal).gradient);
         }
         let cos_view = abs(dot(normal, normalize(fragment.from_camera)));
-        return dielectric_reflectance(cos_view, objects[fragment.object].ior);
+        let object = objects[fragment.object];
+        return object.polish * dielectric_reflectance(cos_view, object.ior);
     }
     return 0.0;
 }

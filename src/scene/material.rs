@@ -78,6 +78,8 @@ pub struct Material {
     pub volume: Option<Volume>,
     /// Emitted radiance [W/(m² sr)], luminous-equivalent: glTF's cd/m² divided by 683 lm/W.
     pub emitted_radiance: LinearSrgb,
+    /// What part of the surface its polish covers, [0, 1]: multiplies what a mixed surface reflects.
+    pub polish: f64,
     /// What bends its normals where it is specular; light that a diffuse surface takes is that of the surface itself.
     pub waves: Option<Waves>,
     /// The same by an image.
@@ -147,6 +149,7 @@ impl Default for Material {
             ior: 1.5,
             volume: None,
             emitted_radiance: LinearSrgb::BLACK,
+            polish: 1.0,
             waves: None,
             normal_map: None,
             double_sided: true,

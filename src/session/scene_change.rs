@@ -80,6 +80,7 @@ fn share_alike(a: &Material, b: &Material) -> bool {
         && a.metallic == b.metallic
         && a.roughness == b.roughness
         && a.transmission == b.transmission
+        && a.polish == b.polish
         && a.volume == b.volume
 }
 

@@ -238,10 +238,9 @@ impl Tracer {
                 }
             }
             SurfaceKind::Mixed => {
-                let share = LinearSrgb::grey(fresnel::dielectric_reflectance(
-                    cos_incident,
-                    material.ior / media.ior(self.scene()),
-                ));
+                let eta = material.ior / media.ior(self.scene());
+                let reflectance = fresnel::dielectric_reflectance(cos_incident, eta);
+                let share = LinearSrgb::grey(material.polish * reflectance);
                 let back = || reflection(hit, &facing, incident, media, share);
                 Interaction {
                     deposit: LinearSrgb::WHITE - share,

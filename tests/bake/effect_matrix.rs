@@ -10,13 +10,14 @@ use super::effect_scenes::{EffectScene, all};
 use super::tools::{at, bake, bits, energy_fault, settings};
 
 /// Effects that the light pass knows.
-const OF_THE_BAKE: [Effect; 8] = [
+const OF_THE_BAKE: [Effect; 9] = [
     Effect::LightPass,
     Effect::Refraction,
     Effect::Reflection,
     Effect::Absorption,
     Effect::Textures,
     Effect::Roughness,
+    Effect::Bumps,
     Effect::AreaLights,
     Effect::Direct,
 ];

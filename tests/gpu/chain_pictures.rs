@@ -237,7 +237,7 @@ fn rippled() -> Scene {
         .expect("gentle waves")
     };
     let floor = &mut scene.materials[0];
-    (floor.surface, floor.roughness) = (SurfaceKind::Mixed, 0.0);
+    (floor.surface, floor.roughness, floor.polish) = (SurfaceKind::Mixed, 0.0, 0.6);
     floor.waves = Some(waves(DVec3::X));
     let mirror = shapes::rectangle(DVec3::new(0.0, 0.5, -0.7), DVec3::X * 0.9, DVec3::Y * 0.48);
     let wavy = Material {

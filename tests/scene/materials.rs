@@ -463,3 +463,54 @@ fn normal_textures_of_what_is_specular_are_read_and_others_named() {
     coloured["baseColorTexture"] = json!({ "index": 0, "texCoord": 1 });
     left_out(plain, coloured, &image, "other coordinates");
 }
+
+#[test]
+fn a_lacquer_is_polish_over_what_is_matte_and_adds_to_metal() {
+    let lacquered = |metallic: f64, roughness: f64, coat: Value| {
+        let mut json = json!({ "name": "m", "pbrMetallicRoughness": factors(metallic, roughness) });
+        json["pbrMetallicRoughness"]["baseColorFactor"] = json!([0.5, 0.25, 0.0, 1.0]);
+        json["extensions"] = json!({ "KHR_materials_clearcoat": coat });
+        material(json)
+    };
+    let coat = json!({ "clearcoatFactor": 0.75, "clearcoatRoughnessFactor": 0.125 });
+    for metallic in [0.0, 1.0] {
+        let (matte, scene) = lacquered(metallic, 1.0, coat.clone());
+        assert_eq!(matte.surface, SurfaceKind::Mixed);
+        assert_eq!((matte.polish, matte.roughness, matte.ior), (0.75, 0.125, 1.5));
+        assert_eq!(matte.base_colour.to_array(), [0.5, 0.25, 0.0]);
+        assert_eq!(matte.classified(), SurfaceKind::Mixed, "edits keep it");
+        assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
+    }
+    // 1 - R = (1 - 0.75·0.04)(1 - metal).
+    let (metal, _) = lacquered(1.0, 0.0, coat.clone());
+    assert_eq!(metal.surface, SurfaceKind::Mirror);
+    for (found, bare) in metal.base_colour.to_array().into_iter().zip([0.5, 0.25, 0.0]) {
+        assert!((found - (1.0 - 0.97 * (1.0 - bare))).abs() < 1e-12, "{found}");
+    }
+    let (polished, _) = lacquered(0.0, 0.0, coat.clone());
+    assert_eq!((polished.surface, polished.polish), (SurfaceKind::Mixed, 1.0));
+    let dulled = |extensions: Value| {
+        material(json!({ "pbrMetallicRoughness": factors(0.0, 0.0), "extensions": extensions })).0
+    };
+    let dull = json!({ "specularFactor": 0.5 });
+    assert_eq!(dulled(json!({ "KHR_materials_specular": dull })).polish, 0.5);
+    let both = json!({ "KHR_materials_specular": dull, "KHR_materials_clearcoat": coat });
+    assert_eq!(dulled(both).polish, 0.875, "dull where no lacquer covers it");
+    for (coat, why) in [
+        (json!({ "clearcoatFactor": 2.0 }), "clearcoat factor of 2"),
+        (
+            json!({ "clearcoatFactor": 1.0, "clearcoatRoughnessFactor": 0.9 }),
+            "hardly shines",
+        ),
+        (json!({ "clearcoatFactor": "all" }), "cannot be read"),
+        (
+            json!({ "clearcoatFactor": 1.0, "clearcoatTexture": { "index": 0 } }),
+            "by its factors alone",
+        ),
+    ] {
+        let (_, scene) = lacquered(0.0, 1.0, coat);
+        assert_warned(&scene, &["material `m`", why]);
+    }
+    let (bare, _) = lacquered(0.0, 1.0, json!({}));
+    assert_eq!(bare.surface, SurfaceKind::Diffuse);
+}

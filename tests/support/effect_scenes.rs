@@ -7,7 +7,7 @@ use nephroid::effect::Effect;
 use nephroid::optics::LinearSrgb;
 use nephroid::scene::builtin::{parts, shapes};
 use nephroid::scene::texture::Wrap;
-use nephroid::scene::{Camera, LightSize, Material, Mesh, Scene, Texture, TextureRef, Volume};
+use nephroid::scene::{Camera, LightSize, Material, Mesh, Scene, Texture, TextureRef, Volume, Wave, Waves};
 use nephroid::settings::LayerKind;
 use nephroid::units::Flux;
 use serde_json::{Value, json};
@@ -29,6 +29,7 @@ pub struct EffectScene {
 
 const MIRRORS: &[Effect] = &[Effect::LightPass, Effect::Reflection];
 const ROUGH_MIRRORS: &[Effect] = &[Effect::LightPass, Effect::Reflection, Effect::Roughness];
+const WAVY_MIRRORS: &[Effect] = &[Effect::LightPass, Effect::Reflection, Effect::Bumps];
 const LARGE_LAMPS: &[Effect] = &[Effect::LightPass, Effect::Reflection, Effect::AreaLights];
 const GLASS: &[Effect] = &[Effect::LightPass, Effect::Refraction, Effect::Reflection];
 const COLOURED_GLASS: &[Effect] = &[
@@ -77,6 +78,8 @@ pub fn all() -> Vec<EffectScene> {
             ..parts::mirror()
         },
     );
+    let mut wavy = room();
+    add_mirror(&mut wavy, wavy_mirror());
     let mut wide = mirror.clone();
     wide.lights[0].size = LightSize::Radius { radius_m: 0.2 };
     let mut turned_away = mirror.clone();
@@ -106,6 +109,7 @@ pub fn all() -> Vec<EffectScene> {
         ),
         scene("rough metal", rough, &[], false),
         scene("rough mirror", glossy, ROUGH_MIRRORS, true),
+        scene("wavy mirror", wavy, WAVY_MIRRORS, true),
         scene("lamp with a size", wide, LARGE_LAMPS, true),
         scene("camera turned away", turned_away, MIRRORS, false),
         EffectScene {
@@ -166,6 +170,19 @@ fn rough_metal() -> Material {
     };
     material.surface = material.classified();
     material
+}
+
+fn wavy_mirror() -> Material {
+    let wave = Wave {
+        amplitude_m: 0.002,
+        wavelength_m: 0.2,
+        direction: DVec3::Y,
+        phase_rad: 0.5,
+    };
+    Material {
+        waves: Waves::new(vec![wave]).ok(),
+        ..parts::mirror()
+    }
 }
 
 fn textured_mirror() -> Material {

@@ -164,6 +164,10 @@ impl Look {
                 texture: NO_IMAGE,
                 lobe_rad: lobe_rad(material) as f32,
                 bumps: NO_IMAGE,
+                polish: material.polish as f32,
+                padding0: 0,
+                padding1: 0,
+                padding2: 0,
             },
             base_colour_texture: material.base_colour_texture.as_ref().map(|image| image.texture),
         }

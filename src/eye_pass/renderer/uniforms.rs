@@ -86,6 +86,11 @@ shader_struct! {
         lobe_rad: f32,
         /// Record of what bends its normals.
         bumps: u32,
+        /// Part of the surface that its polish covers.
+        polish: f32,
+        padding0: u32,
+        padding1: u32,
+        padding2: u32,
     }
 }
 

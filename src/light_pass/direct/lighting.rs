@@ -75,7 +75,7 @@ impl Arriving {
         };
         let cosine = side * beam.to_light.dot(point.shading_normal);
         let taken = match material.surface {
-            SurfaceKind::Mixed => 1.0 - dielectric_reflectance(cosine, material.ior),
+            SurfaceKind::Mixed => 1.0 - material.polish * dielectric_reflectance(cosine, material.ior),
             _ => 1.0,
         };
         let open = beam.across_beam * cosine;

@@ -4,10 +4,11 @@ use super::report::Report;
 use crate::error::{Error, Result};
 
 /// Read in full, or in the parts that say so in a warning.
-const READ: [&str; 10] = [
+const READ: [&str; 11] = [
     "EXT_lights_area",
     "EXT_texture_webp",
     "KHR_lights_punctual",
+    "KHR_materials_clearcoat",
     "KHR_materials_emissive_strength",
     "KHR_materials_ior",
     "KHR_materials_specular",
@@ -18,10 +19,9 @@ const READ: [&str; 10] = [
 ];
 
 /// Passed over with a warning even where the file requires them: what is left is still the same scene.
-const LEFT_OUT: [&str; 8] = [
+const LEFT_OUT: [&str; 7] = [
     "KHR_animation_pointer",
     "KHR_materials_anisotropy",
-    "KHR_materials_clearcoat",
     "KHR_materials_dispersion",
     "KHR_materials_iridescence",
     "KHR_materials_sheen",

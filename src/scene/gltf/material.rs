@@ -8,6 +8,7 @@ use gltf::json::validation::Checked;
 use gltf::json::{Index, Value};
 use serde::Deserialize;
 
+use super::coat::{self, Coat};
 use super::document::Document;
 use super::images::Images;
 use super::numbers::widen;
@@ -107,6 +108,7 @@ impl Reading<'_, '_> {
             ior: self.ior(extensions),
             volume: self.volume(extensions),
             emitted_radiance: self.emission(extensions)?,
+            polish: 1.0,
             normal_map: None,
             waves: self
                 .waves
@@ -122,8 +124,13 @@ impl Reading<'_, '_> {
         if material.surface != SurfaceKind::Dielectric {
             material.volume = None;
         }
+        if let (SurfaceKind::Mixed, Some(specular)) = (material.surface, &extensions.specular) {
+            material.polish = self.share(specular.specular_factor.0, "specular factor");
+        }
+        let is_polish = material.surface == SurfaceKind::Mixed;
+        self.coat(&mut material, extensions);
         material.normal_map = self.normal_map(&material)?;
-        self.name_what_is_ignored(extensions, !material.surface.is_specular());
+        self.name_what_is_ignored(extensions, &material, is_polish);
         Ok(material)
     }
 
@@ -334,6 +341,33 @@ impl Reading<'_, '_> {
         Some((uv_set, DMat3::IDENTITY))
     }
 
+    /// A lacquer over the surface, where the file has one.
+    fn coat(&mut self, material: &mut Material, extensions: &extension::Material) {
+        let Some(stated) = extensions.others.get(coat::NAME) else {
+            return;
+        };
+        let Ok(stated) = Coat::deserialize(stated) else {
+            return self.warn(
+                "its clearcoat cannot be read and was left out",
+                "export the file again",
+            );
+        };
+        let factor = self.share(stated.clearcoat_factor, "clearcoat factor");
+        let roughness = self.share(stated.clearcoat_roughness_factor, "clearcoat roughness");
+        if factor == 0.0 || extensions.unlit.is_some() {
+            return;
+        }
+        if stated.has_texture() {
+            self.warn(
+                "its clearcoat is read by its factors alone, without textures",
+                "split the mesh where the lacquer changes",
+            );
+        }
+        if let Err(why) = coat::put_on(material, factor, roughness) {
+            self.warn(why, "expect it to look and bake as if it were not there");
+        }
+    }
+
     /// What bends the normals of a specular surface.
     fn normal_map(&mut self, material: &Material) -> Result<Option<NormalMap>> {
         let source = self.source;
@@ -418,7 +452,13 @@ impl Reading<'_, '_> {
         }))
     }
 
-    fn name_what_is_ignored(&mut self, extensions: &extension::Material, is_matte: bool) {
+    fn name_what_is_ignored(
+        &mut self,
+        extensions: &extension::Material,
+        material: &Material,
+        is_polish: bool,
+    ) {
+        let is_matte = !material.surface.is_specular();
         match self.source.alpha_mode {
             Checked::Valid(AlphaMode::Opaque) => {}
             Checked::Valid(mode) => {
@@ -434,7 +474,7 @@ impl Reading<'_, '_> {
             ),
         }
         let changed_specular = extensions.specular.as_ref().is_some_and(|specular| {
-            specular.specular_factor.0 != 1.0
+            (specular.specular_factor.0 != 1.0 && !is_polish)
                 || specular.specular_color_factor.0 != [1.0; 3]
                 || specular.specular_texture.is_some()
                 || specular.specular_color_texture.is_some()
@@ -450,6 +490,7 @@ impl Reading<'_, '_> {
             extensions
                 .others
                 .keys()
+                .filter(|key| *key != coat::NAME)
                 .map(|key| names::name(Some(key), "extension", 0)),
         );
         if !ignored.is_empty() {

@@ -8,6 +8,7 @@ mod area_light;
 mod base64;
 mod buffers;
 mod closed;
+mod coat;
 mod container;
 mod document;
 mod extensions;
