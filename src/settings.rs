@@ -185,7 +185,7 @@ pub struct BakeSettings {
     /// Ends the light pass after so many seconds of wall-clock time, > 0, with the finest maps that were complete.
     pub max_time_s: Option<f64>,
     /// Wavefronts of lights with a size and on rough surfaces, a power of two up to [`MOST_WAVEFRONTS`]: as many exactly.
-    /// `None`: as the target needs, or 64 without one.
+    /// `None`: as the target needs, or 32 without one.
     pub wavefronts: Option<u32>,
     /// Lattice or jittered.
     pub rays: RayPlacement,

@@ -31,7 +31,7 @@ pub struct BakeOptions {
     /// --max-error, refines as far as that goes (wavefront)
     #[arg(long, value_name = "TIME", value_parser = values::seconds, allow_hyphen_values = true)]
     max_time: Option<f64>,
-    /// Wavefronts of lights with a size and on rough surfaces, a power of two [default: as the target needs, 64 without
+    /// Wavefronts of lights with a size and on rough surfaces, a power of two [default: as the target needs, 32 without
     /// one]
     #[arg(long, value_name = "N")]
     wavefronts: Option<u32>,

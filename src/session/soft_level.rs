@@ -28,7 +28,7 @@ use crate::transport::Microfacets;
 const FIRST_WAVEFRONTS: u32 = 4;
 
 /// Wavefronts of a bake without a target.
-const USUAL_WAVEFRONTS: u32 = 64;
+const USUAL_WAVEFRONTS: u32 = 32;
 
 /// Finer lattices than the usual last one.
 const MOST_FINER: usize = 3;

@@ -42,6 +42,7 @@ fn all_bits(result: &BakeResult) -> Vec<(usize, Vec<u32>)> {
 fn check(case: &EffectScene, settings: &BakeSettings, faults: &mut Vec<String>) {
     let settings = BakeSettings {
         layers: case.layers.clone(),
+        wavefronts: Some(4),
         ..settings.clone()
     };
     let whole = bake(case.scene.clone(), &settings);
