@@ -5,6 +5,7 @@ use nephroid::light_pass::item_buffer::CELLS_PER_SIDE;
 use nephroid::optics::LinearSrgb;
 use nephroid::scene::Scene;
 use nephroid::scene::builtin::{parts, shapes};
+use nephroid::settings::BakeSettings;
 use nephroid::units::Flux;
 use rand_pcg::Pcg64Mcg;
 use rand_pcg::rand_core::{Rng, SeedableRng};
@@ -12,6 +13,9 @@ use rand_pcg::rand_core::{Rng, SeedableRng};
 use crate::tools::{at, bake, energy_fault};
 
 const COUNT: usize = 1000;
+
+/// Of them, every so many-th is baked alone: a tenth of a second each.
+const EVERY: usize = 8;
 
 /// 1 W/sr.
 const POWER: Flux = Flux(4.0 * std::f64::consts::PI);
@@ -82,7 +86,11 @@ fn scene_of(mirrors: &[Tiny]) -> Scene {
 }
 
 fn deposited_w(mirrors: &[Tiny], density_per_sr: f64) -> f64 {
-    let result = bake(scene_of(mirrors), &at(density_per_sr, 16));
+    flux_w(scene_of(mirrors), &at(density_per_sr, 16))
+}
+
+fn flux_w(scene: Scene, settings: &BakeSettings) -> f64 {
+    let result = bake(scene, settings);
     assert_eq!(energy_fault(&result), None);
     result
         .ledgers
@@ -97,12 +105,13 @@ fn generator(seed: u64) -> impl FnMut() -> f64 {
 }
 
 #[test]
-fn a_thousand_tiny_mirrors_deposit_what_falls_on_them_one_by_one() {
+fn tiny_mirrors_deposit_what_falls_on_them_one_by_one() {
     let mut random = generator(11);
     let mirrors: Vec<Tiny> = (0..COUNT).map(|_| tiny(&mut random, (0.01, 1.0))).collect();
     let faults: Vec<(usize, f64, f64)> = mirrors
         .iter()
         .enumerate()
+        .step_by(EVERY)
         .map(|(index, mirror)| {
             let ratio = deposited_w(&[*mirror], 25_000.0) / mirror.seen_sr;
             (index, ratio, mirror.seen_sr)
@@ -112,17 +121,14 @@ fn a_thousand_tiny_mirrors_deposit_what_falls_on_them_one_by_one() {
         .iter()
         .map(|(_, ratio, _)| (ratio - 1.0).abs())
         .fold(0.0, f64::max);
-    println!("{COUNT} mirrors, one by one: off by {worst:.4} at worst");
-    assert!(
-        worst < 0.05,
-        "{:?}",
-        faults
-            .iter()
-            .filter(|(_, ratio, _)| (ratio - 1.0).abs() >= 0.05)
-            .collect::<Vec<_>>()
-    );
+    println!("{} mirrors, one by one: off by {worst:.4} at worst", faults.len());
+    let wrong: Vec<_> = faults
+        .iter()
+        .filter(|(_, ratio, _)| (ratio - 1.0).abs() >= 0.05)
+        .collect();
+    assert!(wrong.is_empty(), "{wrong:?}");
     // And as they are in a bake of sixteen times the rays.
-    for mirror in mirrors.iter().step_by(25) {
+    for mirror in mirrors.iter().step_by(100) {
         let (usual, fine) = (
             deposited_w(&[*mirror], 25_000.0),
             deposited_w(&[*mirror], 400_000.0),

@@ -188,7 +188,7 @@ fn an_edited_scene_shows_as_if_it_were_new_and_uploads_what_differs() {
     };
     let corners = |object: usize| 32 * scene.objects[object].mesh.positions.len() as u64;
     // All objects are written at once.
-    let uniform = 64 * scene.objects.len() as u64;
+    let uniform = 80 * scene.objects.len() as u64;
     let ball_corners = corners(1);
     let edits = [
         (

@@ -21,8 +21,8 @@ impl Closeness {
 
     /// One of many wavefronts: the borders of all lie beside each other, and their faults of either sign.
     pub const SOFT: Self = Self {
-        cut_bits: 4,
+        cut_bits: 5,
         corner_levels: 1,
-        cells_across_casters: 16.0,
+        cells_across_casters: 32.0,
     };
 }
