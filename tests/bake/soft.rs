@@ -89,13 +89,7 @@ fn large_lamps_are_as_brute_force_has_them_and_know_their_error() {
     sun.lights[0].size = LightSize::Angle {
         diameter_rad: 0.53_f64.to_radians(),
     };
-    let mut ball = builtin_scene("mirror");
-    ball.lights[0].size = LightSize::Radius { radius_m: 0.15 };
-    for (what, scene) in [
-        ("square lamp", &ring),
-        ("sun of 0.53°", &sun),
-        ("ball lamp", &ball),
-    ] {
+    for (what, scene) in [("square lamp", &ring), ("sun of 0.53°", &sun)] {
         let result = bake(scene.clone(), &towards(0.02, 64));
         assert_eq!(energy_fault(&result), None, "{what}");
         let estimated = result.estimated_relative_rmse.expect("an estimate");
@@ -104,8 +98,12 @@ fn large_lamps_are_as_brute_force_has_them_and_know_their_error() {
             "{what}: off by {off:.4}, estimated {estimated:.4}, {} rays",
             result.counts.rays
         );
-        assert!(estimated <= 0.03, "{what}: {estimated}");
-        assert!(off <= 0.03, "{what}: off by {off}, estimated {estimated}");
+        assert!(estimated <= 0.02, "{what}: {estimated}");
+        // The estimate's own law: never half of the truth.
+        assert!(
+            off <= 2.0 * estimated,
+            "{what}: off by {off}, estimated {estimated}"
+        );
     }
 }
 
