@@ -92,11 +92,6 @@ impl Effect {
             Self::Chains => "What the eye sees in mirrors and through glass.",
         }
     }
-
-    /// Whether this version simulates it.
-    pub fn is_available(self) -> bool {
-        self != Self::Indirect
-    }
 }
 
 /// Switch of one effect.
@@ -118,10 +113,9 @@ pub enum EffectSwitch {
 pub struct EffectSwitches(BTreeMap<Effect, EffectSwitch>);
 
 impl EffectSwitches {
-    /// Every effect of this version forced on.
+    /// Every effect forced on.
     pub fn all_on() -> Self {
-        let available = Effect::ALL.into_iter().filter(|effect| effect.is_available());
-        Self(available.map(|effect| (effect, EffectSwitch::On)).collect())
+        Self(Effect::ALL.map(|effect| (effect, EffectSwitch::On)).into())
     }
 
     /// The switch of an effect.

@@ -15,6 +15,8 @@ pub enum Stage {
     Caustic,
     /// Shadow rays of the direct layer.
     Direct,
+    /// Rays between diffuse surfaces.
+    Indirect,
     /// The eye pass on the CPU.
     Picture,
 }
@@ -27,6 +29,7 @@ impl Stage {
             Self::Plan => "plan",
             Self::Caustic => "caustic",
             Self::Direct => "direct",
+            Self::Indirect => "indirect",
             Self::Picture => "picture",
         }
     }

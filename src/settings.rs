@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::effect::{Effect, EffectSwitch, EffectSwitches};
+use crate::effect::EffectSwitches;
 use crate::error::{Error, Result};
 
 /// Which light a layer holds. The order is that of the files' channels.
@@ -16,11 +16,13 @@ pub enum LayerKind {
     /// LD: straight from the lights, stopped by every surface.
     Direct,
     /// LD+D: light that other diffuse surfaces send.
-    #[value(skip)]
     Indirect,
 }
 
 impl LayerKind {
+    /// All of them, in their order.
+    pub const ALL: [Self; 3] = [Self::Caustic, Self::Direct, Self::Indirect];
+
     /// Its name in files and on the command line.
     pub fn name(self) -> &'static str {
         match self {
@@ -378,23 +380,7 @@ impl BakeSettings {
             return Err(Error::usage(
                 "--layers",
                 "no layer is named",
-                "name at least one of caustic, direct",
-            ));
-        }
-        if self.layers.contains(&LayerKind::Indirect) {
-            return Err(Error::usage(
-                "--layers",
-                "the indirect layer is not available in this version",
-                "use caustic, direct or both",
-            ));
-        }
-        let unavailable =
-            |effect: &Effect| !effect.is_available() && self.effects.get(*effect) == EffectSwitch::On;
-        if let Some(effect) = Effect::ALL.into_iter().find(unavailable) {
-            return Err(Error::usage(
-                "--effects",
-                format!("{} is not available in this version", effect.name()),
-                format!("leave {}=on out", effect.name()),
+                "name at least one of caustic, direct, indirect",
             ));
         }
         Ok(())

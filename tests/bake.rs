@@ -29,6 +29,8 @@ mod glb;
 mod hard_cases;
 #[path = "support/hard_scenes.rs"]
 mod hard_scenes;
+#[path = "bake/indirect.rs"]
+mod indirect;
 #[path = "bake/invariance.rs"]
 mod invariance;
 #[path = "bake/kept.rs"]
@@ -39,18 +41,30 @@ mod lamps;
 mod layers;
 #[path = "bake/live.rs"]
 mod live;
+#[path = "eye/meshes.rs"]
+#[allow(dead_code)]
+mod meshes;
 #[path = "bake/nested.rs"]
 mod nested;
 #[path = "bake/reference.rs"]
 mod reference;
+#[path = "eye/scenes.rs"]
+#[allow(dead_code)]
+mod scenes;
 #[path = "bake/smoothing.rs"]
 mod smoothing;
 #[path = "bake/soft.rs"]
 mod soft;
+#[path = "bake/sparse.rs"]
+mod sparse;
 #[path = "support/mod.rs"]
 mod support;
+#[path = "bake/surfaces.rs"]
+mod surfaces;
 #[path = "bake/threshold.rs"]
 mod threshold;
+#[path = "bake/tiles.rs"]
+mod tiles;
 #[path = "bake/tiny.rs"]
 mod tiny;
 #[path = "bake/tools.rs"]

@@ -2,12 +2,17 @@
 
 #[path = "cli/bake.rs"]
 mod bake;
+#[path = "cli/cache.rs"]
+mod cache;
 #[path = "cli/compare.rs"]
 mod compare;
 #[path = "cli/errors.rs"]
 mod errors;
 #[path = "cli/folders.rs"]
 mod folders;
+#[path = "scene/glb.rs"]
+#[allow(dead_code)]
+mod glb;
 #[path = "cli/headless.rs"]
 mod headless;
 #[path = "cli/inspect.rs"]

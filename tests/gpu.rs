@@ -61,5 +61,7 @@ mod scenes;
 mod shaders;
 #[path = "gpu/skies.rs"]
 mod skies;
+#[path = "gpu/tiles.rs"]
+mod tiles;
 #[path = "gpu/uploads.rs"]
 mod uploads;

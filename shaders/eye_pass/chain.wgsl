@@ -129,9 +129,11 @@ fn tint(gaze: Gaze, point: SurfacePoint, cos_view: f32) -> vec3f {
     return object.base_colour * texture_colour(object.texture, point.uv, level);
 }
 
-fn lit_point(point: SurfacePoint) -> LitPoint {
+// The side of a point that is seen from somewhere.
+fn lit_point(point: SurfacePoint, is_front: bool) -> LitPoint {
+    let side = select(-1.0, 1.0, is_front);
     let margin = 2.0 * dot(abs(point.geometric_normal), point.error);
-    return LitPoint(point.place, margin, point.geometric_normal, point.interpolated_normal);
+    return LitPoint(point.place, margin, side * point.geometric_normal, side * point.interpolated_normal);
 }
 
 fn chain_radiance(first: Gaze) -> vec3f {
@@ -167,12 +169,14 @@ fn chain_radiance(first: Gaze) -> vec3f {
         var goes_on = false;
         if arrives {
             let gaze = walk.gaze;
-            let record = objects[point.object].map;
-            let cos_view = abs(dot(point.geometric_normal, gaze.direction));
+            let cos_signed = dot(point.geometric_normal, gaze.direction);
+            let is_front = cos_signed <= 0.0;
+            let record = map_of(objects[point.object], is_front);
+            let cos_view = abs(cos_signed);
             let level = footprint_level(record, point.map_density, gaze.width, cos_view);
             var lit = irradiance(record, point.map_uv, level);
             if TRACES_LIGHTS {
-                lit += direct_irradiance(lit_point(point), objects[point.object]);
+                lit += direct_irradiance(lit_point(point, is_front), objects[point.object]);
             }
             let own = tint(gaze, point, cos_view) * lit / PI;
             let next = interact(point, gaze.direction, gaze.media, vec3f(1.0));

@@ -11,6 +11,8 @@
 // In place of a record where there is no image.
 const NO_IMAGE: u32 = 0xffffffffu;
 const EMPTY: u32 = 0xffffffffu;
+// A tile that is no finer than the next level.
+const COARSER: u32 = 0xfffffffeu;
 const TILE: i32 = 64;
 const STORED: i32 = 65;
 const POOL_ACROSS: u32 = 31u;
@@ -27,6 +29,7 @@ struct Spot {
     texel: vec2i,
     layer: i32,
     is_empty: bool,
+    is_coarser: bool,
     weight: vec2f,
 }
 
@@ -66,13 +69,16 @@ fn locate(record: u32, level: u32, uv: vec2f) -> Spot {
     let per_layer = POOL_ACROSS * POOL_ACROSS;
     let within = page % per_layer;
     let corner = vec2i(i32(within % POOL_ACROSS), i32(within / POOL_ACROSS)) * STORED;
-    return Spot(corner + cell - tile * TILE, i32(page / per_layer), page == EMPTY, position - low);
+    return Spot(corner + cell - tile * TILE, i32(page / per_layer), page == EMPTY, page == COARSER, position - low);
 }
 
 // Bilinear between texel centres of one level.
 fn level_value(tiles: texture_2d_array<f32>, record: u32, level: u32, uv: vec2f) -> vec3f {
-    let spot = locate(record, level, uv);
-    if spot.is_empty {
+    var spot = locate(record, level, uv);
+    for (var next = level + 1u; spot.is_coarser && next < image_table[record + 1u]; next++) {
+        spot = locate(record, next, uv);
+    }
+    if spot.is_empty || spot.is_coarser {
         return vec3f(0.0);
     }
     // Weights in full precision: the steps of the 8-bit weights that samplers use show at the edge of a caustic.

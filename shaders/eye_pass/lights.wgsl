@@ -48,8 +48,8 @@ fn falloff(light: LightRecord, direction: vec3f) -> f32 {
     return ramp * ramp;
 }
 
-// E [W/m²] that a surface of an object takes there: on its front, and on its back where that is drawn. What polish
-// reflects is not taken.
+// E [W/m²] that a surface of an object takes there, on the side that its normals point to. What polish reflects is not
+// taken.
 fn direct_irradiance(point: LitPoint, object: ObjectRecord) -> vec3f {
     var sum = vec3f(0.0);
     for (var index = 0u; index < start.light_count; index += 1u) {
@@ -67,16 +67,14 @@ fn direct_irradiance(point: LitPoint, object: ObjectRecord) -> vec3f {
                 distance *= 1.0 - BEFORE_FACET;
             }
         }
-        let is_front = dot(to_light, point.geometric_normal) >= 0.0;
-        let side = select(-1.0, 1.0, is_front);
-        let cosine = side * dot(to_light, point.shading_normal);
-        var taken = select(0.0, 1.0, is_front || object.double_sided != 0u);
+        let cosine = dot(to_light, point.shading_normal);
+        var taken = select(0.0, 1.0, dot(to_light, point.geometric_normal) >= 0.0);
         if object.surface == SURFACE_MIXED {
             taken *= 1.0 - object.polish * dielectric_reflectance(cosine, object.ior);
         }
         let share = across_beam * cosine * taken;
         if share > 0.0 {
-            let origin = point.place + point.geometric_normal * (side * point.margin);
+            let origin = point.place + point.geometric_normal * point.margin;
             // Every surface stops it, clear ones included: what comes through those is in the caustic layer.
             if closest_hit(origin, to_light, distance).triangle == NO_TRIANGLE {
                 sum += light.strength * share;

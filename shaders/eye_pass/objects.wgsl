@@ -12,9 +12,9 @@ struct ObjectRecord {
     lobe_rad: f32,
     bumps: u32,
     polish: f32,
+    back_map: u32,
     padding0: u32,
     padding1: u32,
-    padding2: u32,
 }
 
 const SURFACE_DIFFUSE: u32 = 0u;
@@ -26,3 +26,8 @@ const SURFACE_MIXED: u32 = 4u;
 const PI: f32 = 3.14159265358979;
 
 @group(0) @binding(1) var<storage, read> objects: array<ObjectRecord>;
+
+// Record of the map of the side that is seen.
+fn map_of(object: ObjectRecord, is_front: bool) -> u32 {
+    return select(object.back_map, object.map, is_front);
+}

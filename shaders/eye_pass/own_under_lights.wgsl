@@ -1,18 +1,18 @@
 // Opaque surfaces without what they reflect, lit by their maps and, by shadow rays, straight from the lamps.
 
 @fragment
-fn own_under_lights(fragment: Fragment) -> @location(0) vec4f {
+fn own_under_lights(fragment: Fragment, @builtin(front_facing) is_front: bool) -> @location(0) vec4f {
     let object = objects[fragment.object];
     // The plane of the triangle; both derivatives lie in it.
     let across = cross(dpdx(fragment.from_camera), dpdy(fragment.from_camera));
-    let shading_normal = normalize(fragment.normal);
-    let towards_front = select(-1.0, 1.0, dot(across, shading_normal) >= 0.0);
+    let towards_eye = select(1.0, -1.0, dot(across, fragment.from_camera) > 0.0);
+    let shading_normal = select(-1.0, 1.0, is_front) * normalize(fragment.normal);
     let offset = fragment.from_camera / start.unit_m;
     let place = start.eye + offset;
     // Rasterisers interpolate to some 2⁻²⁰ of what they see.
     let margin = 4e-6 * (1.0 + length(offset));
-    let point = LitPoint(place, margin, towards_front * normalize(across), shading_normal);
-    let irradiance = own_irradiance(fragment) + direct_irradiance(point, object);
+    let point = LitPoint(place, margin, towards_eye * normalize(across), shading_normal);
+    let irradiance = own_irradiance(fragment, is_front) + direct_irradiance(point, object);
     let diffuse = own_base_colour(fragment) * irradiance / PI;
     return vec4f(scaled(object.emitted_radiance + (1.0 - own_polish(fragment)) * diffuse), 1.0);
 }

@@ -74,6 +74,9 @@ pub struct RunOptions {
     /// Print the result as one JSON document
     #[arg(long)]
     pub json: bool,
+    /// Neither read nor keep unwrapped texture coordinates in the user's cache folder
+    #[arg(long)]
+    pub no_cache: bool,
     /// Log messages of this level and above to stderr
     #[arg(long, value_enum, value_name = "LEVEL", default_value = "off")]
     pub log: LogLevel,
@@ -361,6 +364,9 @@ pub fn parse() -> Result<Parsed> {
     let arguments = Arguments::from_arg_matches(&matches).map_err(|error| in_one_sentence(&error))?;
     let run = arguments.run_options();
     start_log(run.log);
+    if !run.no_cache {
+        nephroid::files::cache::enable();
+    }
     let terminal = Terminal {
         quiet: run.quiet,
         json: run.json,

@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use cpu_time::ProcessTime;
 use nephroid::error::Result;
-use nephroid::export::manifest::Manifest;
+use nephroid::export::manifest::{Manifest, MapEntry};
 use nephroid::export::map_folder::MapFolder;
 use nephroid::scene::Scene;
 use nephroid::session::{BakeResult, BakeSession, StopReason};
@@ -16,6 +16,7 @@ use super::interrupt::Interrupt;
 use super::job::BakeJob;
 use super::progress_bar::StageBar;
 use super::scene_input::SceneInput;
+use super::survey_report::bytes;
 use super::terminal::Terminal;
 
 /// Clocks from the start of the run on.
@@ -111,6 +112,18 @@ fn summary(manifest: &Manifest, result: &BakeResult, folder: &str) -> String {
             format!("{} {}x{} of {}", map.file, map.width, map.height, map.surface),
         );
     }
+    let sum = |bytes: fn(&MapEntry) -> u64| manifest.maps.iter().map(bytes).sum::<u64>();
+    let (taken, dense) = (sum(|map| map.memory_bytes), sum(|map| map.dense_bytes));
+    if taken < dense {
+        let times = dense as f64 / taken as f64;
+        line(
+            "memory",
+            format!(
+                "{} of maps in tiles, {times:.1} times less than dense",
+                bytes(taken)
+            ),
+        );
+    }
     if manifest.maps.is_empty() {
         line("maps", format!("none: {}", why_nothing(result)));
     }
@@ -125,6 +138,7 @@ fn summary(manifest: &Manifest, result: &BakeResult, folder: &str) -> String {
         let why = match result.stop_reason {
             StopReason::MaxError => ": the target is met",
             StopReason::MaxTime => ": the time was up",
+            StopReason::Memory => ": the target takes more memory",
             _ => "",
         };
         line("error", format!("{percent:.2} % (relative RMSE, estimated){why}"));

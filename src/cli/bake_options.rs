@@ -76,7 +76,8 @@ pub struct BakeOptions {
     /// Seed of everything random [default: 0]
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
-    /// Largest memory for maps, such as 512M or 2G [default: 4G]
+    /// Largest memory for maps, such as 512M or 2G; where it is short, maps are made coarser, with a warning
+    /// [default: 4G]
     #[arg(long, value_name = "SIZE", value_parser = values::memory, allow_hyphen_values = true)]
     memory: Option<u64>,
 }

@@ -1,5 +1,7 @@
 //! What a bake would take, as `inspect` tells it.
 
+use nephroid::illumination::parametrisation::refused_sets;
+use nephroid::illumination::{Side, UvSet};
 use nephroid::plan::EffectLine;
 use nephroid::scene::Scene;
 use nephroid::session::{CostPoint, EffectReport, Forecast, ItemBufferReport, Survey};
@@ -20,6 +22,10 @@ pub struct SurveyReport {
 #[derive(Debug, Serialize)]
 struct MapReport {
     surface: String,
+    side: Side,
+    uv_set: UvSet,
+    /// Sets of the file that cannot serve, and why.
+    refused_uv_sets: Vec<String>,
     width: usize,
     height: usize,
     /// While it is baked.
@@ -46,10 +52,16 @@ impl SurveyReport {
     /// Of a survey of a scene; `chains` is the line of the eye pass.
     pub fn new(scene: &Scene, survey: &Survey, chains: EffectLine) -> Self {
         let maps = survey.pilot.maps.iter().map(|map| MapReport {
-            surface: scene.objects[map.chart.object].name.clone(),
+            surface: scene.objects[map.chart.object()].name.clone(),
+            side: map.chart.receiver.side(),
+            uv_set: map.chart.uv_set,
+            refused_uv_sets: refused_sets(&scene.objects[map.chart.object()].mesh)
+                .into_iter()
+                .map(|(set, refusal)| format!("{set}: {refusal}"))
+                .collect(),
             width: map.width(),
             height: map.height(),
-            bytes: (map.width() * map.height()) as u64 * nephroid::session::BYTES_PER_TEXEL,
+            bytes: map.chart.texel_count() as u64 * nephroid::session::BYTES_PER_TEXEL,
         });
         let mut effects = survey.pilot.effects.clone();
         effects.push(EffectReport {
@@ -82,14 +94,32 @@ impl SurveyReport {
             lines.push(("effect", effect_line(report)));
         }
         for map in &self.maps {
-            let size = format!("{} x {}, {}", map.width, map.height, bytes(map.bytes));
-            lines.push(("map", format!("{}: {size}", map.surface)));
+            lines.push(("map", map_line(map)));
         }
         for preset in &self.presets {
             lines.push((preset.preset.name(), preset_line(preset.forecast.as_ref())));
         }
         lines
     }
+}
+
+/// "floor, front: 512 x 512, 4.2 MB, generated (TEXCOORD_0: it overlaps itself)".
+fn map_line(map: &MapReport) -> String {
+    let side = match map.side {
+        Side::Front => "front",
+        Side::Back => "back",
+    };
+    let set = match map.uv_set {
+        UvSet::TexCoord0 => "TEXCOORD_0",
+        UvSet::TexCoord1 => "TEXCOORD_1",
+        UvSet::Generated => "generated",
+    };
+    let size = format!("{} x {}, {}", map.width, map.height, bytes(map.bytes));
+    let mut text = format!("{}, {side}: {size}, {set}", map.surface);
+    if !map.refused_uv_sets.is_empty() {
+        text += &format!(" ({})", map.refused_uv_sets.join("; "));
+    }
+    text
 }
 
 /// "refraction: on, `ball` is lit by `lamp` (24560 rays, 6838 deposits, 1.4 MB)".
@@ -128,7 +158,7 @@ fn preset_line(forecast: Option<&Forecast>) -> String {
 }
 
 /// A size with its unit.
-fn bytes(count: u64) -> String {
+pub fn bytes(count: u64) -> String {
     match count {
         0..1_000 => format!("{count} B"),
         1_000..1_000_000 => format!("{:.1} kB", count as f64 / 1e3),

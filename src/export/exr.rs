@@ -2,17 +2,23 @@
 
 use std::io::Cursor;
 
+use exr::block::lines::LineRefMut;
+use exr::image::write::samples::{SamplesWriter, WritableSamples};
+use exr::math::RoundingMode;
+use exr::meta::attribute::{LevelMode, SampleType};
+use exr::meta::header::Header;
 use exr::prelude as oxr;
 use exr::prelude::ReadChannels as _;
 use exr::prelude::ReadLayers as _;
 use exr::prelude::WritableImage as _;
 
 use super::float_image::{Channel, FloatImage, check_size, rgb_names};
+use super::map_rows::MapRows;
 use crate::error::{Error, Result};
 use crate::eye_pass::Picture;
 use crate::illumination::IlluminationMap;
 
-/// Most channels that a file is read with: a map has at most 13, and 6 for each light.
+/// Most channels that a file is read with: a map has at most 13, and 9 for each light.
 const MAX_CHANNELS: usize = 4096;
 
 /// Whether a file starts as an OpenEXR file does.
@@ -20,24 +26,87 @@ pub fn is_exr(bytes: &[u8]) -> bool {
     bytes.starts_with(&[0x76, 0x2f, 0x31, 0x01])
 }
 
-/// The channels of a map: `LAYER.R/G/B` for each layer, `error.Y` where it was estimated, and `R/G/B` = the sum of the
-/// layers [W/m²].
-pub fn image_of_map(map: &IlluminationMap) -> FloatImage {
+/// One channel of a map's file.
+struct MapChannel<'a> {
+    rows: MapRows<'a>,
+    value: MapValue<'a>,
+}
+
+/// Gives the value of a texel of a map.
+type MapValue<'a> = Box<dyn Fn(usize) -> f32 + Sync + 'a>;
+
+/// A light's part of a layer: the names of its channels but for `.R`, `.G`, `.B`, and E per texel [W/m²].
+pub type LightChannel<'a> = (&'a str, &'a [[f32; 3]]);
+
+/// The bytes of a map's OpenEXR file: `LAYER.R/G/B` for each layer, `error.Y` where it was estimated, `R/G/B` = the sum of
+/// the layers [W/m²], and parts of lights. Row by row: the dense map is never made. The same map always gives the same
+/// bytes; `comment` and `location` as for [`encode`].
+///
+/// # Errors
+/// An image that the format cannot hold.
+pub fn encode_map<'a>(
+    map: &'a IlluminationMap,
+    size: (usize, usize),
+    parts: &[LightChannel<'a>],
+    comment: &str,
+    location: &str,
+) -> Result<Vec<u8>> {
+    let rows = MapRows::new(&map.chart, size);
     let mut channels = Vec::new();
+    let mut add = |name: String, value: MapValue<'a>| {
+        channels.push(oxr::AnyChannel::new(name.as_str(), MapChannel { rows, value }));
+    };
     for layer in &map.layers {
-        channels.extend(rgb_channels(layer.kind.name(), &layer.irradiance));
+        for (channel, name) in rgb_names(layer.kind.name()).into_iter().enumerate() {
+            add(name, Box::new(move |texel| layer.irradiance[texel][channel]));
+        }
     }
     if let Some(error) = &map.error {
-        channels.push(Channel {
-            name: "error.Y".into(),
-            values: error.clone(),
-        });
+        add("error.Y".into(), Box::new(move |texel| error[texel]));
     }
-    channels.extend(rgb_channels("", &map.total()));
-    FloatImage {
-        width: map.width(),
-        height: map.height(),
-        channels,
+    for (channel, name) in rgb_names("").into_iter().enumerate() {
+        let sum = move |texel: usize| {
+            let of_layers = map.layers.iter().map(|layer| layer.irradiance[texel][channel]);
+            of_layers.fold(0.0, |sum, part| sum + part)
+        };
+        add(name, Box::new(sum));
+    }
+    for &(prefix, irradiance) in parts {
+        for (channel, name) in rgb_names(prefix).into_iter().enumerate() {
+            add(name, Box::new(move |texel| irradiance[texel][channel]));
+        }
+    }
+    let channels = oxr::AnyChannels::sort(channels.into());
+    let image = oxr::Image::from_layer(oxr::Layer::new(size, attributes(comment), ENCODING, channels));
+    let mut bytes = Cursor::new(Vec::new());
+    let written = image.write().to_buffered(&mut bytes);
+    written.map_err(|error| does_not_fit(location, &error))?;
+    Ok(bytes.into_inner())
+}
+
+impl<'a, 'm: 'a> WritableSamples<'a> for MapChannel<'m> {
+    type Writer = &'a Self;
+
+    fn sample_type(&self) -> SampleType {
+        SampleType::F32
+    }
+
+    fn infer_level_modes(&self) -> (LevelMode, RoundingMode) {
+        (LevelMode::Singular, RoundingMode::Down)
+    }
+
+    fn create_samples_writer(&'a self, _: &Header) -> &'a Self {
+        self
+    }
+}
+
+impl SamplesWriter for &MapChannel<'_> {
+    fn extract_line(&self, line: LineRefMut<'_>) {
+        let row = self.rows.row(line.location.position.y(), &self.value);
+        let begin = line.location.position.x();
+        let samples = &row[begin..begin + line.location.sample_count];
+        // Into memory of the line's own length: this cannot fail.
+        drop(line.write_samples_from_slice(samples));
     }
 }
 
@@ -48,11 +117,6 @@ pub fn image_of_picture(picture: &Picture) -> FloatImage {
         height: picture.height as usize,
         channels: rgb_channels("", &picture.radiance),
     }
-}
-
-/// Adds a light's part of a layer to the channels of its map, by a name such as `caustic.lamp`.
-pub fn add_light(image: &mut FloatImage, name: &str, irradiance: &[[f32; 3]]) {
-    image.channels.extend(rgb_channels(name, irradiance));
 }
 
 fn rgb_channels(prefix: &str, values: &[[f32; 3]]) -> Vec<Channel> {
@@ -78,29 +142,34 @@ pub fn encode(image: FloatImage, comment: &str, location: &str) -> Result<Vec<u8
         .into_iter()
         .map(|channel| oxr::AnyChannel::new(channel.name.as_str(), oxr::FlatSamples::F32(channel.values)))
         .collect();
-    let attributes = oxr::LayerAttributes {
+    let channels = oxr::AnyChannels::sort(channels);
+    let image = oxr::Image::from_layer(oxr::Layer::new(size, attributes(comment), ENCODING, channels));
+    let mut bytes = Cursor::new(Vec::new());
+    let written = image.write().to_buffered(&mut bytes);
+    written.map_err(|error| does_not_fit(location, &error))?;
+    Ok(bytes.into_inner())
+}
+
+const ENCODING: oxr::Encoding = oxr::Encoding {
+    compression: oxr::Compression::ZIP16,
+    blocks: oxr::Blocks::ScanLines,
+    line_order: oxr::LineOrder::Increasing,
+};
+
+fn attributes(comment: &str) -> oxr::LayerAttributes {
+    oxr::LayerAttributes {
         comments: Some(comment.into()),
         software_name: Some(concat!("nephroid ", env!("CARGO_PKG_VERSION")).into()),
         ..Default::default()
-    };
-    let encoding = oxr::Encoding {
-        compression: oxr::Compression::ZIP16,
-        blocks: oxr::Blocks::ScanLines,
-        line_order: oxr::LineOrder::Increasing,
-    };
-    let layer = oxr::Layer::new(size, attributes, encoding, oxr::AnyChannels::sort(channels));
-    let mut bytes = Cursor::new(Vec::new());
-    oxr::Image::from_layer(layer)
-        .write()
-        .to_buffered(&mut bytes)
-        .map_err(|error| {
-            Error::failure(
-                location,
-                format!("the image does not fit the format ({error})"),
-                "choose another size",
-            )
-        })?;
-    Ok(bytes.into_inner())
+    }
+}
+
+fn does_not_fit(location: &str, error: &exr::error::Error) -> Error {
+    Error::failure(
+        location,
+        format!("the image does not fit the format ({error})"),
+        "choose another size",
+    )
 }
 
 /// Decodes the first part of an OpenEXR file; `location` is named in errors.

@@ -3,11 +3,13 @@
 use serde::{Deserialize, Serialize};
 
 use crate::error::Warning;
-use crate::illumination::{IlluminationMap, UvSet};
+use crate::files::cache::ContentHash;
+use crate::illumination::{IlluminationMap, Side, UvSet};
 use crate::light_pass::ledger::{EnergyLedger, LightLedger, Truncated};
 use crate::scene::Scene;
 use crate::session::{
-    BakeCounts, BakeResult, CostPoint, EffectReport, ForecastReport, ItemBufferReport, StopReason, Timings,
+    BYTES_PER_TEXEL, BakeCounts, BakeResult, CostPoint, EffectReport, ForecastReport, ItemBufferReport,
+    StopReason, Timings,
 };
 use crate::settings::{BakeSettings, LayerKind};
 
@@ -144,6 +146,12 @@ pub struct MapEntry {
     pub units: String,
     /// Of this map; `None` where it was not estimated.
     pub estimated_relative_rmse: Option<f64>,
+    /// Memory that the map took in the bake [bytes].
+    #[serde(default)]
+    pub memory_bytes: u64,
+    /// Memory that it would take with all texels as fine as the file's [bytes].
+    #[serde(default)]
+    pub dense_bytes: u64,
 }
 
 /// Where a file holds one light's part of a layer.
@@ -155,14 +163,6 @@ pub struct LightChannels {
     pub layer: LayerKind,
     /// Its channels are this and `.R`, `.G`, `.B`.
     pub channels: String,
-}
-
-/// Side of a surface.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Side {
-    /// Light that falls on either side, summed.
-    Both,
 }
 
 /// Unit of the maps' values.
@@ -236,48 +236,54 @@ impl SceneSummary {
 }
 
 impl MapEntry {
-    /// The entry of a map that is stored in `file`.
+    /// The entry of a map that is stored in `file`, of a size [texels].
     pub fn new(
         scene: &Scene,
         map: &IlluminationMap,
+        (width, height): (usize, usize),
         lights: Vec<LightChannels>,
         file: String,
         uv_file: Option<String>,
     ) -> Self {
-        let object = &scene.objects[map.chart.object];
+        let object = &scene.objects[map.chart.object()];
         Self {
             surface: object.name.clone(),
             node: object.node,
             primitive: object.primitive,
-            side: Side::Both,
+            side: map.chart.receiver.side(),
             file,
-            width: map.width(),
-            height: map.height(),
+            width,
+            height,
             uv_set: map.chart.uv_set,
             uv_file,
             layers: map.layers.iter().map(|layer| layer.kind).collect(),
             lights,
-            texel_area_m2: mean_texel_area_m2(map),
+            texel_area_m2: mean_texel_area_m2(map, width * height),
             units: UNITS.into(),
             estimated_relative_rmse: map.estimated_relative_rmse,
+            memory_bytes: map.chart.texel_count() as u64 * BYTES_PER_TEXEL,
+            dense_bytes: (width * height) as u64 * BYTES_PER_TEXEL,
         }
     }
 }
 
-fn mean_texel_area_m2(map: &IlluminationMap) -> f64 {
-    let covered = || map.chart.texel_areas_m2.iter().filter(|area| **area > 0.0);
+/// Of the texels of a file with so many, whose map may have fewer.
+fn mean_texel_area_m2(map: &IlluminationMap, texels: usize) -> f64 {
+    let chart = &map.chart;
+    if chart.layout.is_some() {
+        return chart.texel_areas_m2.iter().sum::<f64>() / texels as f64;
+    }
+    let covered = || chart.texel_areas_m2.iter().filter(|area| **area > 0.0);
+    let larger = chart.texel_count() as f64 / texels as f64;
     match covered().count() {
         0 => 0.0,
-        count => covered().sum::<f64>() / count as f64,
+        count => covered().sum::<f64>() / count as f64 * larger,
     }
 }
 
-/// FNV-1a over 64-bit words (Fowler, Noll, Vo): the same on every machine and in every version.
 fn geometry_hash(scene: &Scene) -> u64 {
-    const OFFSET_BASIS: u64 = 0xcbf2_9ce4_8422_2325;
-    const PRIME: u64 = 0x0000_0100_0000_01b3;
-    let mut hash = OFFSET_BASIS;
-    let mut take = |word: u64| hash = (hash ^ word).wrapping_mul(PRIME);
+    let mut hash = ContentHash::default();
+    let mut take = |word: u64| hash.take(word);
     for object in &scene.objects {
         take(object.node as u64);
         take(object.primitive as u64);
@@ -291,5 +297,5 @@ fn geometry_hash(scene: &Scene) -> u64 {
             triangle.iter().for_each(|vertex| take(u64::from(*vertex)));
         }
     }
-    hash
+    hash.value()
 }

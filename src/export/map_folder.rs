@@ -6,10 +6,10 @@ use super::manifest::{self, LightChannels, Manifest, MapEntry};
 use super::{exr, uv_file};
 use crate::error::{Error, Result};
 use crate::files::{self, OutputFolder};
-use crate::illumination::{IlluminationMap, UvSet};
+use crate::illumination::{IlluminationMap, Side, UvSet};
 use crate::scene::{Light, Scene};
 use crate::session::{BakeResult, LightLayer};
-use crate::settings::BakeSettings;
+use crate::settings::{BakeSettings, MapResolution};
 
 /// Folder of the map files within ours.
 const MAPS: &str = "maps";
@@ -63,7 +63,7 @@ impl MapFolder {
     pub fn write(self, scene: &Scene, settings: &BakeSettings, result: &BakeResult) -> Result<Manifest> {
         let mut entries = Vec::new();
         for map in &result.maps {
-            entries.push(self.write_map(scene, map, &result.light_layers)?);
+            entries.push(self.write_map(scene, settings, map, &result.light_layers)?);
         }
         let manifest = Manifest::new(scene, settings, result, entries);
         let path = self.path().join(manifest::FILE_NAME);
@@ -81,12 +81,21 @@ impl MapFolder {
         Ok(manifest)
     }
 
-    fn write_map(&self, scene: &Scene, map: &IlluminationMap, parts: &[LightLayer]) -> Result<MapEntry> {
-        let object = map.chart.object;
-        let stem = format!(
+    fn write_map(
+        &self,
+        scene: &Scene,
+        settings: &BakeSettings,
+        map: &IlluminationMap,
+        parts: &[LightLayer],
+    ) -> Result<MapEntry> {
+        let object = map.chart.object();
+        let mut stem = format!(
             "{object:04}_{}",
             files::slug(&scene.objects[object].name, "surface")
         );
+        if map.chart.receiver.side() == Side::Back {
+            stem.push_str("_back");
+        }
         let uv_name = (map.chart.uv_set == UvSet::Generated).then(|| format!("{stem}.uv"));
         if let Some(name) = &uv_name {
             let bytes = uv_file::encode(&map.chart.corner_uvs);
@@ -94,19 +103,27 @@ impl MapFolder {
         }
         let name = format!("{stem}.exr");
         let path = self.maps.path().join(&name);
-        let mut image = exr::image_of_map(map);
         let mut lights = Vec::new();
-        for part in parts.iter().filter(|part| part.object == object) {
-            let channels = format!("{}.{}", part.kind.name(), light_slug(scene, part.light));
-            exr::add_light(&mut image, &channels, &part.irradiance);
+        let mut channels = Vec::new();
+        for part in parts.iter().filter(|part| part.receiver == map.chart.receiver) {
             lights.push(LightChannels {
                 light: scene.lights[part.light].name.clone(),
                 layer: part.kind,
-                channels,
+                channels: format!("{}.{}", part.kind.name(), light_slug(scene, part.light)),
             });
+            channels.push(&part.irradiance[..]);
         }
-        let bytes = exr::encode(
-            image,
+        let names = lights.iter().map(|light| light.channels.as_str());
+        let parts: Vec<exr::LightChannel> = names.zip(channels).collect();
+        // As it was asked for, though memory may have made the map coarser.
+        let size = match settings.map_resolution {
+            MapResolution::Fixed { width, height } => (width, height),
+            MapResolution::Auto => (map.width(), map.height()),
+        };
+        let bytes = exr::encode_map(
+            map,
+            size,
+            &parts,
             "irradiance in W/m^2 (lumens / 683 per m^2), linear sRGB; row 0 is v = 0",
             &path.display().to_string(),
         )?;
@@ -115,6 +132,7 @@ impl MapFolder {
         Ok(MapEntry::new(
             scene,
             map,
+            size,
             lights,
             in_maps(name),
             uv_name.map(in_maps),

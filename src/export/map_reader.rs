@@ -58,16 +58,19 @@ pub fn read(folder: &Path, scene: &Scene) -> Result<(Vec<IlluminationMap>, Vec<W
     let mut maps: Vec<IlluminationMap> = Vec::new();
     for entry in &stored.maps {
         let map = read_map(folder, entry, scene, &location)?;
-        if maps.iter().any(|other| other.chart.object == map.chart.object) {
+        if maps
+            .iter()
+            .any(|other| other.chart.receiver == map.chart.receiver)
+        {
             return Err(Error::failure(
                 &location,
-                format!("it names two maps of {}", entry.surface),
+                format!("it names two maps of one side of {}", entry.surface),
                 "bake the scene again",
             ));
         }
         maps.push(map);
     }
-    maps.sort_by_key(|map| map.chart.object);
+    maps.sort_by_key(|map| map.chart.receiver);
     let warnings = stored.partial.then(|| {
         Warning::new(
             location,
@@ -174,7 +177,9 @@ fn read_chart(
             "bake the scene again",
         )
     })?;
-    Ok(parametrisation.chart(entry.width, entry.height))
+    Ok(parametrisation
+        .chart(entry.width, entry.height)
+        .of_side(entry.side))
 }
 
 /// A file of the folder; names that lead out of it are refused.

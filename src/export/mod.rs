@@ -5,6 +5,7 @@ pub mod float_image;
 pub mod manifest;
 pub mod map_folder;
 pub mod map_reader;
+mod map_rows;
 pub mod pfm;
 pub mod picture;
 pub mod png;

@@ -1,5 +1,6 @@
 //! Reading and writing files: bounded reads, whole or not at all writes. The only place that opens files.
 
+pub mod cache;
 mod folder;
 mod read;
 mod slug;

@@ -100,6 +100,15 @@ impl TriangleBvh {
 
     /// The nearest triangle in front of the ray's origin, from either side.
     pub fn closest_hit(&self, ray: &Ray) -> Option<TriangleHit> {
+        self.closest_hit_where(ray, |_, _| true)
+    }
+
+    /// The same among those places of triangles, by their barycentric coordinates, where something is there.
+    pub fn closest_hit_where(
+        &self,
+        ray: &Ray,
+        is_there: impl Fn(u32, [f64; 3]) -> bool,
+    ) -> Option<TriangleHit> {
         let mut best: Option<TriangleHit> = None;
         let sheared = ShearedRay::new(ray);
         let (local, advanced_m) = self.local_ray(ray, f64::INFINITY);
@@ -110,6 +119,9 @@ impl TriangleBvh {
             let triangle = self.bvh.primitive_indices[slot];
             // Of surfaces at the same distance the first given, whatever the hierarchy looks like.
             if best.is_some_and(|hit| (hit.distance_m, hit.triangle) <= (distance_m, triangle)) {
+                return f32::INFINITY;
+            }
+            if !is_there(triangle, barycentric) {
                 return f32::INFINITY;
             }
             best = Some(TriangleHit {
@@ -124,12 +136,26 @@ impl TriangleBvh {
 
     /// Whether any triangle lies on the ray before `distance_m` (exclusive).
     pub fn is_blocked(&self, ray: &Ray, distance_m: f64) -> bool {
+        self.is_blocked_where(ray, distance_m, |_, _| true)
+    }
+
+    /// The same by those places of triangles where something is there.
+    pub fn is_blocked_where(
+        &self,
+        ray: &Ray,
+        distance_m: f64,
+        is_there: impl Fn(u32, [f64; 3]) -> bool,
+    ) -> bool {
         let sheared = ShearedRay::new(ray);
         let (local, _) = self.local_ray(ray, distance_m);
         !self
             .bvh
             .ray_traverse_miss(local, |_, slot| match sheared.intersect(&self.corners[slot]) {
-                Some((hit_m, _)) if hit_m < distance_m => 0.0,
+                Some((hit_m, barycentric))
+                    if hit_m < distance_m && is_there(self.bvh.primitive_indices[slot], barycentric) =>
+                {
+                    0.0
+                }
                 _ => f32::INFINITY,
             })
     }

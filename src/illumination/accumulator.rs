@@ -1,6 +1,7 @@
 //! Exact sums of flux: 64-bit integers in a fixed unit, so that neither the order of the deposits nor the number of
 //! threads changes a bit of the result.
 
+use super::Chart;
 use crate::optics::LinearSrgb;
 
 /// The unit that flux is counted in: a power of two of watts, 2⁻⁶⁰ of the power that can be deposited at most.
@@ -62,7 +63,7 @@ fn nearest(x: f64) -> i64 {
     towards_zero + i64::from(rest >= 0.5) - i64::from(rest <= -0.5)
 }
 
-/// Flux per texel of one map, row 0 at v = 0.
+/// Flux per texel of one map, row 0 at v = 0; that of a map in tiles is one row, tile after tile.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FluxAccumulator {
     width: usize,
@@ -77,6 +78,14 @@ impl FluxAccumulator {
             width,
             height,
             texels: vec![[0; 3]; width * height],
+        }
+    }
+
+    /// No flux yet on a chart.
+    pub fn for_chart(chart: &Chart) -> Self {
+        match &chart.layout {
+            Some(layout) => Self::new(layout.texel_count(), 1),
+            None => Self::new(chart.width, chart.height),
         }
     }
 

@@ -1,8 +1,14 @@
 //! How a surface lies in its map: the contract between the light pass (which deposits), the eye pass (which looks up)
 //! and the exporters.
 
+use std::sync::Arc;
+
 use glam::{DVec2, DVec3};
 use serde::{Deserialize, Serialize};
+
+use super::seams::{Joint, SeamTexel};
+use super::tiles::TileLayout;
+use super::{Receiver, Side};
 
 /// Which texture coordinates a map follows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -20,30 +26,100 @@ pub enum UvSet {
 
 /// Parametrisation of one object at one map size.
 ///
-/// Texel (i, j) covers u in [i/W, (i+1)/W] and v in [j/H, (j+1)/H]; v runs downwards as in glTF.
+/// Texel (i, j) covers u in [i/W, (i+1)/W] and v in [j/H, (j+1)/H]; v runs downwards as in glTF. All that is known of
+/// texels lies row by row or, where the chart is in tiles, as the tiles' [`TileLayout`] says; texel coordinates are those
+/// of the finest size always.
 #[derive(Clone, Debug)]
 pub struct Chart {
-    /// Index into `Scene::objects`.
-    pub object: usize,
+    /// Whose light it holds.
+    pub receiver: Receiver,
     /// Where the coordinates come from.
     pub uv_set: UvSet,
     /// Map coordinates in [0, 1] of the three corners of every triangle of the object's mesh.
     pub corner_uvs: Vec<[DVec2; 3]>,
-    /// Texels across, > 0.
+    /// Texels across, > 0; in tiles: of the finest size.
     pub width: usize,
-    /// Texels down, > 0.
+    /// Texels down, > 0; in tiles: of the finest size.
     pub height: usize,
     /// Surface area under each texel [m²]: a single value where all are alike, else one per texel (0 = uncovered).
     pub texel_areas_m2: Vec<f64>,
+    /// How fine each tile is; `None` where every texel is as fine. Only surfaces that fill their map evenly have tiles.
+    pub layout: Option<Arc<TileLayout>>,
+    /// Texels beside the surface that stand for where it goes on.
+    pub beyond: Vec<SeamTexel>,
+    /// Texels that touch where there is no room beside the surface.
+    pub joints: Vec<Joint>,
 }
 
 impl Chart {
-    /// Surface area under a texel [m²], 0 where the surface does not reach it; `texel` = row·width + column.
+    /// Number of texels.
+    pub fn texel_count(&self) -> usize {
+        match &self.layout {
+            Some(layout) => layout.texel_count(),
+            None => self.width * self.height,
+        }
+    }
+
+    /// The texel at a column and row of the finest size.
+    pub fn texel_at(&self, column: usize, row: usize) -> usize {
+        match &self.layout {
+            Some(layout) => layout.texel(column, row),
+            None => row * self.width + column,
+        }
+    }
+
+    /// Whether the surface fills the whole map, evenly.
+    pub fn is_full(&self) -> bool {
+        self.layout.is_some() || self.texel_areas_m2.len() == 1
+    }
+
+    /// The same chart with all texels as small as those of its finest size.
+    #[must_use]
+    pub fn without_tiles(&self) -> Self {
+        let texel_areas_m2 = match &self.layout {
+            Some(layout) => {
+                let finest = layout.tiles().map(|tile| tile.level).min().unwrap_or(0);
+                let least_m2 = self.texel_areas_m2.iter().copied().fold(f64::INFINITY, f64::min);
+                vec![least_m2 / f64::from(1_u32 << (2 * finest))]
+            }
+            None => self.texel_areas_m2.clone(),
+        };
+        Self {
+            texel_areas_m2,
+            layout: None,
+            ..self.clone()
+        }
+    }
+
+    /// Index into `Scene::objects`.
+    pub fn object(&self) -> usize {
+        self.receiver.object()
+    }
+
+    /// The same chart for a side of its object.
+    #[must_use]
+    pub fn of_side(self, side: Side) -> Self {
+        Self {
+            receiver: Receiver::new(self.object(), side),
+            ..self
+        }
+    }
+
+    /// Surface area under a texel [m²], 0 where the surface does not reach it; `texel` = row·width + column, or counted
+    /// tile after tile.
     pub fn texel_area_m2(&self, texel: usize) -> f64 {
         if self.texel_areas_m2.len() == 1 {
             self.texel_areas_m2[0]
         } else {
             self.texel_areas_m2[texel]
+        }
+    }
+
+    /// Area of the surface in the map [m²].
+    pub fn area_m2(&self) -> f64 {
+        match self.texel_areas_m2[..] {
+            [texel_m2] => texel_m2 * (self.width * self.height) as f64,
+            ref texels => texels.iter().sum(),
         }
     }
 
@@ -56,18 +132,22 @@ impl Chart {
     /// Rows of the linear map from a world displacement in a triangle's plane [m] to a displacement in texels:
     /// texel = (rows[0]·d, rows[1]·d). `None` where the triangle has no area.
     pub fn texel_from_world(&self, triangle: usize, corners: [DVec3; 3]) -> Option<[DVec3; 2]> {
-        let (e1, e2) = (corners[1] - corners[0], corners[2] - corners[0]);
-        // Dual basis of (e1, e2) within the plane.
-        let (g11, g12, g22) = (e1.dot(e1), e1.dot(e2), e2.dot(e2));
-        let determinant = g11 * g22 - g12 * g12;
-        if determinant.is_nan() || determinant <= 0.0 {
-            return None;
-        }
-        let dual1 = (e1 * g22 - e2 * g12) / determinant;
-        let dual2 = (e2 * g11 - e1 * g12) / determinant;
-        let [a, b, c] = self.corner_uvs[triangle];
-        let size = DVec2::new(self.width as f64, self.height as f64);
-        let (t1, t2) = ((b - a) * size, (c - a) * size);
-        Some([dual1 * t1.x + dual2 * t2.x, dual1 * t1.y + dual2 * t2.y])
+        let [across, down] = uv_from_world(self.corner_uvs[triangle], corners)?;
+        Some([across * self.width as f64, down * self.height as f64])
     }
+}
+
+/// The same for map coordinates in [0, 1]: rows [1/m] of the map from a displacement in a triangle's plane.
+pub fn uv_from_world([a, b, c]: [DVec2; 3], corners: [DVec3; 3]) -> Option<[DVec3; 2]> {
+    let (e1, e2) = (corners[1] - corners[0], corners[2] - corners[0]);
+    // Dual basis of (e1, e2) within the plane.
+    let (g11, g12, g22) = (e1.dot(e1), e1.dot(e2), e2.dot(e2));
+    let determinant = g11 * g22 - g12 * g12;
+    if determinant.is_nan() || determinant <= 0.0 {
+        return None;
+    }
+    let dual1 = (e1 * g22 - e2 * g12) / determinant;
+    let dual2 = (e2 * g11 - e1 * g12) / determinant;
+    let (t1, t2) = (b - a, c - a);
+    Some([dual1 * t1.x + dual2 * t2.x, dual1 * t1.y + dual2 * t2.y])
 }

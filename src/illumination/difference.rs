@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use super::{Chart, IlluminationMap};
+use super::{Chart, IlluminationMap, Receiver};
 use crate::error::{Error, Result};
 use crate::optics::LinearSrgb;
 
@@ -51,10 +51,10 @@ struct Sums {
 /// # Errors
 /// Maps of one surface of which neither's size divides the other's.
 pub fn difference(with: &[IlluminationMap], without: &[IlluminationMap]) -> Result<Difference> {
-    let mut pairs: BTreeMap<usize, [Option<&IlluminationMap>; 2]> = BTreeMap::new();
+    let mut pairs: BTreeMap<Receiver, [Option<&IlluminationMap>; 2]> = BTreeMap::new();
     for (side, maps) in [with, without].into_iter().enumerate() {
         for map in maps {
-            pairs.entry(map.chart.object).or_default()[side] = Some(map);
+            pairs.entry(map.chart.receiver).or_default()[side] = Some(map);
         }
     }
     let mut found = Difference {
@@ -65,7 +65,8 @@ pub fn difference(with: &[IlluminationMap], without: &[IlluminationMap]) -> Resu
     };
     let mut sums = Sums::default();
     for [with, without] in pairs.into_values() {
-        let sides = [with, without].map(|map| map.map(Side::of));
+        let dense = [with, without].map(|map| map.map(IlluminationMap::dense));
+        let sides = dense.each_ref().map(|map| map.as_ref().map(|map| Side::of(map)));
         let [with_w, without_w] = sides
             .each_ref()
             .map(|side| side.as_ref().map_or(0.0, Side::flux_w));
@@ -150,7 +151,7 @@ fn signed_map(sides: &[Option<Side<'_>>; 2], sums: &mut Sums) -> Result<Option<S
 fn sizes_do_not_meet(with: &Side<'_>, without: &Side<'_>) -> Error {
     let [a, b] = [with, without].map(|side| format!("{}×{}", side.chart.width, side.chart.height));
     Error::failure(
-        format!("map of object {}", with.chart.object),
+        format!("map of the {:?}", with.chart.receiver),
         format!("its sizes {a} and {b} cannot be compared texel by texel"),
         "bake both with the same map size",
     )
@@ -169,12 +170,15 @@ mod tests {
         assert_eq!(grey.len(), width * height);
         IlluminationMap {
             chart: Arc::new(Chart {
-                object,
+                receiver: Receiver::front(object),
                 uv_set: UvSet::Generated,
                 corner_uvs: vec![[DVec2::ZERO, DVec2::X, DVec2::Y]],
                 width,
                 height,
                 texel_areas_m2: vec![area_m2 / (width * height) as f64],
+                layout: None,
+                beyond: Vec::new(),
+                joints: Vec::new(),
             }),
             layers: vec![Layer {
                 kind: LayerKind::Caustic,

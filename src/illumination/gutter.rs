@@ -2,15 +2,24 @@
 //! does not mix in nothing.
 
 use super::Chart;
+use super::lookup::bilinear;
 
 /// Texels that a gutter reaches beyond the surface.
 pub const GUTTER_REACH_TEXELS: usize = 2;
 
+/// Rounds of exchange between texels that touch.
+const EXCHANGES: usize = 8;
+
+/// Rounds in which texels beyond a seam read each other's surroundings.
+const SEAM_ROUNDS: usize = 2;
+
 /// Fills the texels without area within [`GUTTER_REACH_TEXELS`] of covered ones: each takes the mean of those of its
-/// eight neighbours that are covered or were filled a step before. Covered texels keep their value, and as a gutter
-/// has no area, no flux is added.
+/// eight neighbours that are covered or were filled a step before; those beside a seam then the value of the place where
+/// the surface goes on. Covered texels keep their value, and as a gutter has no area, no flux is added; but those that
+/// touch at a seam without a gutter are made to agree.
 pub fn fill_gutter(chart: &Chart, irradiance: &mut [[f32; 3]]) {
-    if chart.texel_areas_m2.len() == 1 {
+    even_out(chart, irradiance);
+    if chart.is_full() {
         return;
     }
     let (width, height) = (chart.width, chart.height);
@@ -28,6 +37,36 @@ pub fn fill_gutter(chart: &Chart, irradiance: &mut [[f32; 3]]) {
         for (texel, value) in filled {
             irradiance[texel] = value;
             known[texel] = true;
+        }
+    }
+    for _ in 0..SEAM_ROUNDS {
+        let look = |uv| {
+            bilinear(irradiance, width, height, uv)
+                .to_array()
+                .map(|channel| channel as f32)
+        };
+        let values: Vec<[f32; 3]> = chart.beyond.iter().map(|beyond| look(beyond.uv)).collect();
+        for (beyond, value) in chart.beyond.iter().zip(values) {
+            irradiance[beyond.texel] = value;
+        }
+    }
+}
+
+/// Texels that touch at a seam without room between exchange flux until they agree: a look-up at the border of either
+/// reads nothing but its own. None is lost.
+fn even_out(chart: &Chart, irradiance: &mut [[f32; 3]]) {
+    for _ in 0..EXCHANGES {
+        for joint in &chart.joints {
+            let [a, b] = joint.texels;
+            let [area_a, area_b] = joint.texels.map(|texel| chart.texel_area_m2(texel));
+            let [here, there] = joint.texels.map(|texel| irradiance[texel].map(f64::from));
+            let passed_w: [f64; 3] = std::array::from_fn(|channel| {
+                0.5 * joint.share * (here[channel] - there[channel]) * area_a.min(area_b)
+            });
+            irradiance[a] =
+                std::array::from_fn(|channel| (here[channel] - passed_w[channel] / area_a) as f32);
+            irradiance[b] =
+                std::array::from_fn(|channel| (there[channel] + passed_w[channel] / area_b) as f32);
         }
     }
 }

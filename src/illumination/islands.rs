@@ -29,7 +29,11 @@ impl Islands {
         if of_triangle.iter().all(|&island| island == first) {
             return None;
         }
-        let (width, height) = (chart.width, chart.height);
+        // Tiles belong to surfaces that fill their map: only triangles are asked for.
+        let (width, height) = match chart.layout {
+            Some(_) => (1, 1),
+            None => (chart.width, chart.height),
+        };
         let size = DVec2::new(width as f64, height as f64);
         let mut of_texel = vec![NONE; width * height];
         for (corners, &island) in chart.corner_uvs.iter().zip(&of_triangle) {

@@ -1,12 +1,13 @@
 //! The finished map of one surface.
 
+use std::borrow::Cow;
 use std::sync::Arc;
 
 use super::Chart;
 use crate::optics::LinearSrgb;
 use crate::settings::LayerKind;
 
-/// One layer of a map: mean irradiance of each texel [W/m²], linear sRGB, row 0 at v = 0, `width × height` long.
+/// One layer of a map: mean irradiance of each texel of its chart [W/m²], linear sRGB; row 0 at v = 0.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Layer {
     /// Which light.
@@ -39,9 +40,9 @@ impl IlluminationMap {
         self.chart.height
     }
 
-    /// Sum of all layers: E per texel [W/m²], row 0 at v = 0.
+    /// Sum of all layers: E per texel of the chart [W/m²].
     pub fn total(&self) -> Vec<[f32; 3]> {
-        let mut sum = vec![[0.0; 3]; self.width() * self.height()];
+        let mut sum = vec![[0.0; 3]; self.chart.texel_count()];
         for layer in &self.layers {
             for (total, part) in sum.iter_mut().zip(&layer.irradiance) {
                 for channel in 0..3 {
@@ -50,6 +51,24 @@ impl IlluminationMap {
             }
         }
         sum
+    }
+
+    /// The map without tiles, row by row at its finest size: each texel's values wherever it reaches.
+    pub fn dense(&self) -> Cow<'_, Self> {
+        let Some(layout) = &self.chart.layout else {
+            return Cow::Borrowed(self);
+        };
+        let chart = self.chart.without_tiles();
+        let layers = self.layers.iter().map(|layer| Layer {
+            kind: layer.kind,
+            irradiance: layout.dense(&layer.irradiance),
+        });
+        Cow::Owned(Self {
+            chart: Arc::new(chart),
+            layers: layers.collect(),
+            error: self.error.as_ref().map(|error| layout.dense(error)),
+            ..*self
+        })
     }
 
     /// The layer of a kind, if it was baked.

@@ -10,8 +10,13 @@ pub mod islands;
 pub mod lookup;
 pub mod map;
 pub mod parametrisation;
+pub mod resolution;
+pub mod seams;
+pub mod side;
 pub mod smoothing;
+pub mod tiles;
 
 pub use chart::{Chart, UvSet};
 pub use map::{IlluminationMap, Layer};
 pub use parametrisation::{Parametrisation, parametrise};
+pub use side::{Receiver, Side};

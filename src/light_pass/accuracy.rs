@@ -9,14 +9,16 @@
 //! the way (threshold, depth, no place) is added by its watts.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use rayon::prelude::*;
 
 use super::ledger::EnergyLedger;
 use super::receiver_maps::ReceiverMaps;
 use super::wavefront::refine::{RoughTiles, TILE_SIDE, TileSet, tile_counts};
-use crate::illumination::Chart;
 use crate::illumination::accumulator::FluxUnit;
+use crate::illumination::tiles::TileLayout;
+use crate::illumination::{Chart, Receiver};
 
 /// Error ratio of neighbouring levels before it is measured: first order.
 const PRIOR_RATIO: f64 = 2.0;
@@ -36,18 +38,20 @@ const WINDOW_TEXELS: usize = 2;
 /// Irradiance of one map, for estimates.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Image {
-    /// Texels across.
+    /// Texels across; in tiles: of the finest size.
     pub width: usize,
     /// Texels down.
     pub height: usize,
-    /// Luminance of E, row by row [W/m², of a light of unit strength].
+    /// Luminance of E, texel by texel of the chart [W/m², of a light of unit strength].
     pub luminance: Vec<f64>,
     /// Area under each texel [m²]; a single value where all are alike.
     pub texel_areas_m2: Vec<f64>,
+    /// Where the chart is in tiles.
+    pub layout: Option<Arc<TileLayout>>,
 }
 
-/// Maps of one level, by object.
-pub type Images = BTreeMap<usize, Image>;
+/// Maps of one level.
+pub type Images = BTreeMap<Receiver, Image>;
 
 /// What is known of the error of one map.
 #[derive(Clone, Debug, PartialEq)]
@@ -63,8 +67,8 @@ pub struct MapError {
 /// What is known of the error of all maps of one light.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LightError {
-    /// By object.
-    pub maps: BTreeMap<usize, MapError>,
+    /// By receiver.
+    pub maps: BTreeMap<Receiver, MapError>,
     /// Root mean square of the error over the mean irradiance, over all texels by their area.
     pub relative_rmse: f64,
     /// How many times smaller the error became with the last level.
@@ -74,7 +78,7 @@ pub struct LightError {
 /// Luminance of all maps.
 pub fn images(maps: &ReceiverMaps, unit: FluxUnit) -> Images {
     maps.iter()
-        .map(|(object, map)| {
+        .map(|(receiver, map)| {
             let chart = &map.chart;
             let luminance = map
                 .flux()
@@ -90,7 +94,7 @@ pub fn images(maps: &ReceiverMaps, unit: FluxUnit) -> Images {
                     }
                 })
                 .collect();
-            (object, Image::new(chart, luminance))
+            (receiver, Image::new(chart, luminance))
         })
         .collect()
 }
@@ -102,6 +106,7 @@ impl Image {
             height: chart.height,
             luminance,
             texel_areas_m2: chart.texel_areas_m2.clone(),
+            layout: chart.layout.clone(),
         }
     }
 
@@ -113,9 +118,15 @@ impl Image {
         }
     }
 
-    fn tile_of(&self, texel: usize) -> usize {
-        let (columns, _) = tile_counts(self.width, self.height);
-        texel / self.width / TILE_SIDE * columns + texel % self.width / TILE_SIDE
+    /// The tile of [`TILE_SIDE`] that each texel lies in, or the first of several.
+    fn tiles(&self) -> TileOf {
+        match &self.layout {
+            Some(layout) => TileOf::Listed(layout.blocks(TILE_SIDE)),
+            None => TileOf::Counted {
+                width: self.width,
+                columns: tile_counts(self.width, self.height).0,
+            },
+        }
     }
 
     /// Flux [W] and area [m²] of all texels.
@@ -139,8 +150,25 @@ impl Image {
     fn tile_sums(&self, squares: &[f64]) -> Vec<f64> {
         let (columns, rows) = tile_counts(self.width, self.height);
         let mut sums = vec![0.0; columns * rows];
-        for (texel, square) in squares.iter().enumerate() {
-            sums[self.tile_of(texel)] += square * self.area_m2(texel);
+        let tiles = self.tiles();
+        let Some(layout) = &self.layout else {
+            for (texel, square) in squares.iter().enumerate() {
+                sums[tiles.of(texel)] += square * self.area_m2(texel);
+            }
+            return sums;
+        };
+        for tile in layout.tiles() {
+            // A large texel lies on several.
+            let side = (1_usize << tile.level).div_ceil(TILE_SIDE);
+            let share = 1.0 / (side * side) as f64;
+            for texel in tile.texels {
+                let part = squares[texel] * self.area_m2(texel) * share;
+                let first = tiles.of(texel);
+                for row in 0..side {
+                    let begin = first + row * columns;
+                    sums[begin..begin + side].iter_mut().for_each(|sum| *sum += part);
+                }
+            }
         }
         sums
     }
@@ -159,28 +187,67 @@ impl Image {
         tiles.iter().enumerate().map(least).collect()
     }
 
-    /// Means over a square window around each texel, as far as the map reaches.
+    /// Means over a square window around each texel, as far as the map, or its tile, reaches.
     fn windowed(&self, squares: &[f64]) -> Vec<f64> {
-        let near = |index: usize, count: usize| {
-            index.saturating_sub(WINDOW_TEXELS)..(index + WINDOW_TEXELS + 1).min(count)
-        };
-        let (width, height) = (self.width, self.height);
         let mut means = vec![0.0; squares.len()];
-        means.par_chunks_mut(width).enumerate().for_each(|(row, line)| {
-            let rows = near(row, height);
-            let mut columns = vec![0.0; width];
-            for row in rows.clone() {
-                for (sum, square) in columns.iter_mut().zip(&squares[row * width..][..width]) {
-                    *sum += square;
-                }
-            }
-            for (column, mean) in line.iter_mut().enumerate() {
-                let window = near(column, width);
-                let texels = (window.len() * rows.len()) as f64;
-                *mean = columns[window].iter().sum::<f64>() / texels;
+        let Some(layout) = &self.layout else {
+            let size = (self.width, self.height);
+            let lines = means.par_chunks_mut(self.width).enumerate();
+            lines.for_each(|(row, line)| window(squares, size, row, line));
+            return means;
+        };
+        let mut rest = &mut means[..];
+        let mut tiles = Vec::with_capacity(layout.tile_count());
+        for tile in layout.tiles() {
+            let (ours, others) = rest.split_at_mut(tile.texels.len());
+            tiles.push((tile, ours));
+            rest = others;
+        }
+        tiles.into_par_iter().for_each(|(tile, means)| {
+            let squares = &squares[tile.texels];
+            for (row, line) in means.chunks_mut(tile.size.0).enumerate() {
+                window(squares, tile.size, row, line);
             }
         });
         means
+    }
+}
+
+/// Means over a square window around each texel of one row of an image.
+fn window(squares: &[f64], (width, height): (usize, usize), row: usize, line: &mut [f64]) {
+    let near = |index: usize, count: usize| {
+        index.saturating_sub(WINDOW_TEXELS)..(index + WINDOW_TEXELS + 1).min(count)
+    };
+    let rows = near(row, height);
+    let mut columns = vec![0.0; width];
+    for row in rows.clone() {
+        for (sum, square) in columns.iter_mut().zip(&squares[row * width..][..width]) {
+            *sum += square;
+        }
+    }
+    for (column, mean) in line.iter_mut().enumerate() {
+        let window = near(column, width);
+        let texels = (window.len() * rows.len()) as f64;
+        *mean = columns[window].iter().sum::<f64>() / texels;
+    }
+}
+
+/// Finds the tile of a texel.
+enum TileOf {
+    /// Row by row.
+    Counted { width: usize, columns: usize },
+    /// As a layout says.
+    Listed(Vec<u32>),
+}
+
+impl TileOf {
+    fn of(&self, texel: usize) -> usize {
+        match self {
+            Self::Counted { width, columns } => {
+                texel / width / TILE_SIDE * columns + texel % width / TILE_SIDE
+            }
+            Self::Listed(tiles) => tiles[texel] as usize,
+        }
     }
 }
 
@@ -202,18 +269,18 @@ pub fn estimate(
     ledger: &EnergyLedger,
 ) -> Option<LightError> {
     let middle = coarser[0]?;
-    let is_refined = |object: usize, tile: usize| {
+    let is_refined = |receiver: Receiver, tile: usize| {
         before.is_none_or(|before| {
-            let tiles = before.refined.get(&object);
+            let tiles = before.refined.get(&receiver);
             tiles.is_some_and(|tiles| tiles.is_chosen(tile))
         })
     };
-    let differences: BTreeMap<usize, (Vec<f64>, Vec<f64>)> = fine
+    let differences: BTreeMap<Receiver, (Vec<f64>, Vec<f64>)> = fine
         .iter()
-        .map(|(&object, image)| {
-            let squares = image.squared_difference(middle.get(&object));
+        .map(|(&receiver, image)| {
+            let squares = image.squared_difference(middle.get(&receiver));
             let tiles = image.pooled(&image.tile_sums(&squares));
-            (object, (squares, tiles))
+            (receiver, (squares, tiles))
         })
         .collect();
     let ratio = match (coarser[1], before) {
@@ -228,18 +295,19 @@ pub fn estimate(
         ..LightError::default()
     };
     let (mut squares_sum, mut flux_w, mut area_m2) = (0.0, 0.0, 0.0);
-    for (&object, image) in fine {
-        let (squares, tile_sums) = &differences[&object];
-        let old = before.and_then(|before| before.error.maps.get(&object));
-        let older_tiles = older_differences(object, middle, coarser[1]);
+    for (&receiver, image) in fine {
+        let (squares, tile_sums) = &differences[&receiver];
+        let old = before.and_then(|before| before.error.maps.get(&receiver));
+        let older_tiles = older_differences(receiver, middle, coarser[1]);
         let windowed = image.windowed(squares);
+        let tiles_of = image.tiles();
         let texels = (0..windowed.len()).map(|texel| match old {
-            Some(old) if !is_refined(object, image.tile_of(texel)) => old.texels[texel],
+            Some(old) if !is_refined(receiver, tiles_of.of(texel)) => old.texels[texel],
             _ => (windowed[texel] * share).sqrt(),
         });
         let tiles: Vec<f64> = (0..tile_sums.len())
             .map(|tile| match old {
-                Some(old) if !is_refined(object, tile) => old.tiles[tile],
+                Some(old) if !is_refined(receiver, tile) => old.tiles[tile],
                 // A difference may vanish by chance, or because both levels miss the same.
                 Some(old) => (tile_sums[tile] * share).max(old.tiles[tile] * LEAST_GAIN),
                 None => {
@@ -253,7 +321,7 @@ pub fn estimate(
         (flux_w, area_m2) = (flux_w + map_w, area_m2 + map_m2);
         let texels = texels.collect();
         let size = (image.width, image.height);
-        error.maps.insert(object, MapError { size, texels, tiles });
+        error.maps.insert(receiver, MapError { size, texels, tiles });
     }
     let given_up = given_up_share(ledger);
     let mean = flux_w / area_m2;
@@ -262,19 +330,19 @@ pub fn estimate(
 }
 
 /// Squared differences of the two coarser levels, tile by tile.
-fn older_differences(object: usize, middle: &Images, coarse: Option<&Images>) -> Option<Vec<f64>> {
-    let image = middle.get(&object)?;
-    Some(image.tile_sums(&image.squared_difference(coarse?.get(&object))))
+fn older_differences(receiver: Receiver, middle: &Images, coarse: Option<&Images>) -> Option<Vec<f64>> {
+    let image = middle.get(&receiver)?;
+    Some(image.tile_sums(&image.squared_difference(coarse?.get(&receiver))))
 }
 
-/// Squared difference of half sets of rays, around each texel, by object [W²/m⁴ of a light of unit strength].
-pub type Noise = BTreeMap<usize, Vec<f64>>;
+/// Squared difference of half sets of rays, around each texel, by receiver [W²/m⁴ of a light of unit strength].
+pub type Noise = BTreeMap<Receiver, Vec<f64>>;
 
 /// The noise of the sum of two half sets: their difference has the same variance.
 pub fn half_set_noise(a: &Images, b: &Images) -> Noise {
-    let of = |(&object, image): (&usize, &Image)| {
-        let squares = image.squared_difference(b.get(&object));
-        (object, image.windowed(&squares))
+    let of = |(&receiver, image): (&Receiver, &Image)| {
+        let squares = image.squared_difference(b.get(&receiver));
+        (receiver, image.windowed(&squares))
     };
     a.iter().map(of).collect()
 }
@@ -298,9 +366,9 @@ pub fn estimate_splats(
     let blur = 1.0 / ((PRIOR_RATIO - 1.0) * (PRIOR_RATIO - 1.0));
     let share = 0.5 * (blur + 1.0 / (1.0 + PRIOR_RATIO * PRIOR_RATIO));
     let (mut squares_sum, mut flux_w, mut area_m2) = (0.0, 0.0, 0.0);
-    for (&object, image) in fine {
-        let differences = image.windowed(&image.squared_difference(thinner.get(&object)));
-        let noise = noise.get(&object)?;
+    for (&receiver, image) in fine {
+        let differences = image.windowed(&image.squared_difference(thinner.get(&receiver)));
+        let noise = noise.get(&receiver)?;
         let squares: Vec<f64> = differences
             .iter()
             .zip(noise)
@@ -315,7 +383,7 @@ pub fn estimate_splats(
             texels: squares.iter().map(|square| square.sqrt()).collect(),
             tiles,
         };
-        error.maps.insert(object, map);
+        error.maps.insert(receiver, map);
     }
     let mean = flux_w / area_m2;
     error.relative_rmse = (squares_sum / area_m2 / (mean * mean))
@@ -331,8 +399,8 @@ pub fn by_difference(fine: &Images, other: &Images, share: f64, ledger: &EnergyL
         ..LightError::default()
     };
     let (mut squares_sum, mut flux_w, mut area_m2) = (0.0, 0.0, 0.0);
-    for (&object, image) in fine {
-        let squares = image.windowed(&image.squared_difference(other.get(&object)));
+    for (&receiver, image) in fine {
+        let squares = image.windowed(&image.squared_difference(other.get(&receiver)));
         let squares: Vec<f64> = squares.iter().map(|square| square * share).collect();
         let tiles = image.tile_sums(&squares);
         squares_sum += tiles.iter().sum::<f64>();
@@ -343,7 +411,7 @@ pub fn by_difference(fine: &Images, other: &Images, share: f64, ledger: &EnergyL
             texels: squares.iter().map(|square| square.sqrt()).collect(),
             tiles,
         };
-        error.maps.insert(object, map);
+        error.maps.insert(receiver, map);
     }
     let mean = flux_w / area_m2;
     error.relative_rmse = (squares_sum / area_m2 / (mean * mean))
@@ -356,8 +424,8 @@ pub fn by_difference(fine: &Images, other: &Images, share: f64, ledger: &EnergyL
 pub fn together(a: &LightError, b: &LightError) -> LightError {
     let mut sum = a.clone();
     sum.relative_rmse = a.relative_rmse.hypot(b.relative_rmse);
-    for (object, part) in &b.maps {
-        match sum.maps.get_mut(object) {
+    for (receiver, part) in &b.maps {
+        match sum.maps.get_mut(receiver) {
             Some(map) if map.size == part.size => {
                 for (texel, more) in map.texels.iter_mut().zip(&part.texels) {
                     *texel = texel.hypot(*more);
@@ -367,7 +435,7 @@ pub fn together(a: &LightError, b: &LightError) -> LightError {
                 }
             }
             _ => {
-                sum.maps.insert(*object, part.clone());
+                sum.maps.insert(*receiver, part.clone());
             }
         }
     }
@@ -375,12 +443,12 @@ pub fn together(a: &LightError, b: &LightError) -> LightError {
 }
 
 /// R = e₂/e from three levels, half-way to the first-order ratio.
-fn measured_ratio(middle: &Images, coarse: &Images, fine: &BTreeMap<usize, (Vec<f64>, Vec<f64>)>) -> f64 {
+fn measured_ratio(middle: &Images, coarse: &Images, fine: &BTreeMap<Receiver, (Vec<f64>, Vec<f64>)>) -> f64 {
     let newer: f64 = fine.values().flat_map(|(_, tiles)| tiles).sum();
     let older: f64 = middle
         .iter()
-        .map(|(object, image)| {
-            let squares = image.squared_difference(coarse.get(object));
+        .map(|(receiver, image)| {
+            let squares = image.squared_difference(coarse.get(receiver));
             image.tile_sums(&squares).iter().sum::<f64>()
         })
         .sum();
@@ -410,10 +478,10 @@ pub fn given_up_share(ledger: &EnergyLedger) -> f64 {
 /// The roughest tiles, as many as have to be refined for a relative RMSE of `goal`: refining divides their error by the
 /// ratio of the levels. All that have some error, where that is not enough.
 pub fn rough_tiles(error: &LightError, goal: f64) -> RoughTiles {
-    let mut tiles: Vec<(f64, usize, usize)> = Vec::new();
-    for (&object, map) in &error.maps {
+    let mut tiles: Vec<(f64, Receiver, usize)> = Vec::new();
+    for (&receiver, map) in &error.maps {
         let with_error = map.tiles.iter().enumerate().filter(|(_, square)| **square > 0.0);
-        tiles.extend(with_error.map(|(tile, &square)| (square, object, tile)));
+        tiles.extend(with_error.map(|(tile, &square)| (square, receiver, tile)));
     }
     // The roughest first; equals by their place.
     tiles.sort_by(|a, b| b.0.total_cmp(&a.0).then((a.1, a.2).cmp(&(b.1, b.2))));
@@ -422,14 +490,14 @@ pub fn rough_tiles(error: &LightError, goal: f64) -> RoughTiles {
     let gain = 1.0 - 1.0 / (error.ratio * error.ratio);
     let mut chosen = RoughTiles::new();
     let mut left = total;
-    for (square, object, tile) in tiles {
+    for (square, receiver, tile) in tiles {
         if left <= wanted {
             break;
         }
         left -= square * gain;
-        let (width, height) = error.maps[&object].size;
+        let (width, height) = error.maps[&receiver].size;
         chosen
-            .entry(object)
+            .entry(receiver)
             .or_insert_with(|| TileSet::none(width, height))
             .choose(tile);
     }

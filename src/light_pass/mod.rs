@@ -3,6 +3,7 @@
 pub mod accuracy;
 pub mod caustic;
 pub mod direct;
+pub mod indirect;
 pub mod item_buffer;
 pub mod launch;
 pub mod ledger;

@@ -6,10 +6,10 @@ use std::sync::Arc;
 use super::caustic::footprint::TexelFromWorld;
 use super::caustic::path::Arrival;
 use super::caustic::splat::Coverage;
-use crate::illumination::Chart;
 use crate::illumination::accumulator::FluxAccumulator;
 use crate::illumination::islands::Islands;
 use crate::illumination::smoothing::smooth;
+use crate::illumination::{Chart, Receiver};
 use crate::scene::Scene;
 
 /// One surface's map with its flux.
@@ -18,16 +18,16 @@ pub struct ReceiverMap {
     /// How the surface lies in the map.
     pub chart: Arc<Chart>,
     /// The flux so far: `levels[0]` at the map's size, each further one at half the size of the one before, for
-    /// kernels that are smooth there.
+    /// kernels that are smooth there. Of a map in tiles there is but one.
     levels: Vec<FluxAccumulator>,
     /// Islands of the chart, where there is more than one.
     islands: Option<Islands>,
 }
 
-/// Gives the chart of an object at a size that suits it; `None` where the object cannot take a map.
-pub type ChartFor<'a> = dyn Fn(usize) -> Option<Arc<Chart>> + Sync + 'a;
+/// Gives the chart of a receiver at a size that suits it; `None` where it cannot take a map.
+pub type ChartFor<'a> = dyn Fn(Receiver) -> Option<Arc<Chart>> + Sync + 'a;
 
-/// Maps of all objects that received flux, by object.
+/// Maps of all receivers that received flux.
 #[derive(Clone, Debug)]
 pub struct ReceiverMaps {
     slots: Vec<Slot>,
@@ -43,19 +43,20 @@ enum Slot {
 }
 
 impl ReceiverMaps {
-    /// No map yet.
+    /// No map yet, for a scene of so many objects.
     pub fn new(objects: usize) -> Self {
         Self {
-            slots: (0..objects).map(|_| Slot::Untouched).collect(),
+            slots: Receiver::all(objects).map(|_| Slot::Untouched).collect(),
         }
     }
 
-    /// Allocates the map of an object unless that was tried before.
-    pub fn touch(&mut self, object: usize, chart_for: &ChartFor) {
-        if matches!(self.slots[object], Slot::Untouched) {
-            self.slots[object] = match chart_for(object) {
+    /// Allocates the map of a receiver unless that was tried before.
+    pub fn touch(&mut self, receiver: Receiver, chart_for: &ChartFor) {
+        let slot = &mut self.slots[receiver.index()];
+        if matches!(slot, Slot::Untouched) {
+            *slot = match chart_for(receiver) {
                 Some(chart) => {
-                    let flux = FluxAccumulator::new(chart.width, chart.height);
+                    let flux = FluxAccumulator::for_chart(&chart);
                     Slot::Allocated(Box::new(ReceiverMap::new(chart, flux)))
                 }
                 None => Slot::Refused,
@@ -63,20 +64,21 @@ impl ReceiverMaps {
         }
     }
 
-    /// The map of an object, if it has one.
-    pub fn get(&self, object: usize) -> Option<&ReceiverMap> {
-        match &self.slots[object] {
+    /// The map of a receiver, if it has one.
+    pub fn get(&self, receiver: Receiver) -> Option<&ReceiverMap> {
+        match &self.slots[receiver.index()] {
             Slot::Allocated(map) => Some(map),
             Slot::Untouched | Slot::Refused => None,
         }
     }
 
     /// Smooths all maps by a gaussian [texels, standard deviation]; nothing at 0. Maps with gaps are left as they are:
-    /// their borders are no mirrors.
+    /// their borders are no mirrors; and so are maps in tiles.
     pub fn smooth(&mut self, spread_texels: f64) {
         for slot in &mut self.slots {
             if let Slot::Allocated(map) = slot
-                && map.chart.texel_areas_m2.len() == 1
+                && map.chart.is_full()
+                && map.chart.layout.is_none()
             {
                 smooth(&mut map.levels[0], spread_texels);
             }
@@ -94,19 +96,50 @@ impl ReceiverMaps {
         }
     }
 
-    /// All maps with their objects, in the order of the objects.
-    pub fn iter(&self) -> impl Iterator<Item = (usize, &ReceiverMap)> {
-        (0..self.slots.len()).filter_map(|object| Some((object, self.get(object)?)))
+    /// Takes out maps that are a millionth as bright as all together: what strayed there between the traced rays. Returns
+    /// the flux on them.
+    pub fn take_strays(&mut self) -> [i128; 3] {
+        let fluxes: Vec<(Receiver, [i128; 3], f64)> = self
+            .iter()
+            .map(|(receiver, map)| (receiver, map.flux_counts(), map.chart.area_m2()))
+            .collect();
+        let brightness = |counts: &[i128; 3], area_m2: f64| counts.iter().sum::<i128>() as f64 / area_m2;
+        let all = fluxes
+            .iter()
+            .fold(([0; 3], 0.0), |(counts, area_m2), (_, more, more_m2)| {
+                (
+                    std::array::from_fn(|channel| counts[channel] + more[channel]),
+                    area_m2 + more_m2,
+                )
+            });
+        let least = STRAY_SHARE * brightness(&all.0, all.1);
+        let mut taken = [0; 3];
+        for (receiver, counts, _) in fluxes
+            .iter()
+            .filter(|(_, counts, m2)| brightness(counts, *m2) < least)
+        {
+            self.slots[receiver.index()] = Slot::Untouched;
+            taken = std::array::from_fn(|channel| taken[channel] + counts[channel]);
+        }
+        taken
     }
 
-    /// The map of an object, to be added to.
-    pub fn get_mut(&mut self, object: usize) -> Option<&mut ReceiverMap> {
-        match &mut self.slots[object] {
+    /// All maps with their receivers, in order.
+    pub fn iter(&self) -> impl Iterator<Item = (Receiver, &ReceiverMap)> {
+        Receiver::all(self.slots.len() / 2).filter_map(|receiver| Some((receiver, self.get(receiver)?)))
+    }
+
+    /// The map of a receiver, to be added to.
+    pub fn get_mut(&mut self, receiver: Receiver) -> Option<&mut ReceiverMap> {
+        match &mut self.slots[receiver.index()] {
             Slot::Allocated(map) => Some(map),
             Slot::Untouched | Slot::Refused => None,
         }
     }
 }
+
+/// Brightness of a map, as a share of that of all maps, below which its light is a stray.
+const STRAY_SHARE: f64 = 1e-6;
 
 /// Spreads that a kernel must have at a level [texels of the level]: linear interpolation between texels then adds less
 /// than one per cent to its variance.
@@ -119,7 +152,7 @@ impl ReceiverMap {
     fn new(chart: Arc<Chart>, flux: FluxAccumulator) -> Self {
         let islands = Islands::find(&chart);
         let mut levels = vec![flux];
-        let full = chart.texel_areas_m2.len() == 1;
+        let full = chart.is_full() && chart.layout.is_none();
         let halves = |side: usize| side.is_multiple_of(2) && side / 2 >= LEAST_LEVEL_SIDE;
         let (mut width, mut height) = (chart.width, chart.height);
         while full && halves(width) && halves(height) {
@@ -137,6 +170,14 @@ impl ReceiverMap {
     pub fn level_for(&self, spread_texels: f64) -> usize {
         let fits = |level: &usize| spread_texels / f64::from(1_u32 << level) >= LEAST_SPREAD_TEXELS;
         (1..self.levels.len()).take_while(fits).last().unwrap_or(0)
+    }
+
+    /// All that was added to it.
+    fn flux_counts(&self) -> [i128; 3] {
+        let texels = self.levels.iter().flat_map(|level| level.texels());
+        texels.fold([0; 3], |sum, texel| {
+            std::array::from_fn(|channel| sum[channel] + i128::from(texel[channel]))
+        })
     }
 
     fn add(&mut self, part: &Self) {
@@ -170,7 +211,7 @@ impl ReceiverMap {
         let [b, c] = arrival.barycentric.to_array();
         let uv = self.chart.uv(triangle, [1.0 - b - c, b, c]);
         let size = DVec2::new(self.chart.width as f64, self.chart.height as f64);
-        let corners = scene.objects[arrival.object as usize].mesh.corners(triangle);
+        let corners = scene.objects[arrival.receiver.object()].mesh.corners(triangle);
         let rows = self.chart.texel_from_world(triangle, corners)?;
         Some(((uv * size).clamp(DVec2::ZERO, size), rows))
     }
@@ -189,7 +230,7 @@ impl ReceiverMap {
         let flux = &mut self.levels[level];
         let size = (flux.width(), flux.height());
         // Coarser levels exist only where every texel is covered.
-        let chart = (self.chart.texel_areas_m2.len() > 1).then_some(&*self.chart);
+        let chart = (!self.chart.is_full()).then_some(&*self.chart);
         (
             flux,
             Covered {

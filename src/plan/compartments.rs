@@ -32,8 +32,7 @@ impl Compartments {
             encloses: vec![false; scene.objects.len()],
         };
         for (container, object) in scene.objects.iter().enumerate() {
-            let Some(around) = bounds[container].filter(|_| scene.material_of(container).surface.is_opaque())
-            else {
+            let Some(around) = bounds[container].filter(|_| scene.material_of(container).is_opaque()) else {
                 continue;
             };
             // What reaches through such a surface is on both sides of it.

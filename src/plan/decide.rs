@@ -79,17 +79,32 @@ pub fn decide(scene: &Scene, settings: &BakeSettings, sights: &[Sight]) -> Effec
     }
 }
 
-/// Whether the caustic layer is to be baked at all.
+/// Whether the caustic layer is to be baked at all: for itself, or since others gather from it.
 pub fn wants_caustics(settings: &BakeSettings) -> bool {
-    is_wanted(settings, Effect::LightPass, LayerKind::Caustic)
+    is_needed(settings, LayerKind::Caustic)
 }
 
-/// Whether a layer is to be baked: as its effect is switched, else as the layers say.
-fn is_wanted(settings: &BakeSettings, effect: Effect, layer: LayerKind) -> bool {
-    match settings.effects.get(effect) {
+/// Whether a layer is to be in the maps: as its effect is switched, else as the layers say.
+pub fn is_wanted(settings: &BakeSettings, layer: LayerKind) -> bool {
+    match settings.effects.get(effect_of(layer)) {
         EffectSwitch::On => true,
         EffectSwitch::Off => false,
         EffectSwitch::Auto => settings.layers.contains(&layer),
+    }
+}
+
+/// Whether a layer is to be baked, in the maps or not.
+fn is_needed(settings: &BakeSettings, layer: LayerKind) -> bool {
+    let is_off = settings.effects.get(effect_of(layer)) == EffectSwitch::Off;
+    !is_off && (is_wanted(settings, layer) || is_wanted(settings, LayerKind::Indirect))
+}
+
+/// The effect that makes a layer.
+fn effect_of(layer: LayerKind) -> Effect {
+    match layer {
+        LayerKind::Caustic => Effect::LightPass,
+        LayerKind::Direct => Effect::Direct,
+        LayerKind::Indirect => Effect::Indirect,
     }
 }
 
@@ -212,26 +227,48 @@ impl Decision<'_> {
 
     fn direct(&self) -> EffectLine {
         let effect = Effect::Direct;
-        let wanted = is_wanted(self.settings, effect, LayerKind::Direct);
+        let line = |on, reason: &str| self.line(effect, on, reason);
         match self.settings.effects.get(effect) {
-            EffectSwitch::Off => self.line(effect, false, SWITCHED_OFF),
-            _ if !wanted => self.line(effect, false, "the direct layer is not asked for"),
-            _ if self.scene.lights.is_empty() => self.line(effect, false, "the scene has no light"),
-            _ if !self.has(SurfaceKind::is_receiver) => {
-                self.line(effect, false, "nothing in the scene can receive light diffusely")
+            EffectSwitch::Off => line(false, SWITCHED_OFF),
+            _ if !is_needed(self.settings, LayerKind::Direct) => {
+                line(false, "the direct layer is not asked for")
             }
-            EffectSwitch::On => self.line(effect, true, "switched on by the user"),
-            EffectSwitch::Auto => self.line(effect, true, "the direct layer is asked for"),
+            switch => match self.why_dark() {
+                Some(why) => line(false, why),
+                None if switch == EffectSwitch::On => line(true, "switched on by the user"),
+                None if is_wanted(self.settings, LayerKind::Direct) => {
+                    line(true, "the direct layer is asked for")
+                }
+                None => line(true, "the indirect layer gathers from it"),
+            },
         }
     }
 
     fn indirect(&self) -> EffectLine {
-        // The settings refuse it where it is asked for.
-        self.line(
-            Effect::Indirect,
-            false,
-            "not asked for, and not available in this version",
-        )
+        let effect = Effect::Indirect;
+        let line = |on, reason: &str| self.line(effect, on, reason);
+        match self.settings.effects.get(effect) {
+            EffectSwitch::Off => line(false, SWITCHED_OFF),
+            _ if !is_wanted(self.settings, LayerKind::Indirect) => {
+                line(false, "the indirect layer is not asked for")
+            }
+            switch => match self.why_dark() {
+                Some(why) => line(false, why),
+                None if switch == EffectSwitch::On => line(true, "switched on by the user"),
+                None => line(true, "the indirect layer is asked for"),
+            },
+        }
+    }
+
+    /// Why no diffuse surface takes light, if none does.
+    fn why_dark(&self) -> Option<&'static str> {
+        if self.scene.lights.is_empty() {
+            Some("the scene has no light")
+        } else if !self.has(SurfaceKind::is_receiver) {
+            Some("nothing in the scene can receive light diffusely")
+        } else {
+            None
+        }
     }
 
     fn lights(&self) -> Vec<LightLine> {

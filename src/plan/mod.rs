@@ -5,7 +5,7 @@ mod decide;
 mod eye;
 mod reach;
 
-pub use decide::{Sight, decide, wants_caustics};
+pub use decide::{Sight, decide, is_wanted, wants_caustics};
 pub use eye::chains;
 pub use reach::Reach;
 

@@ -1,7 +1,7 @@
 //! Materials, as glTF's metallic-roughness model and its extensions state them, and the class that transport treats
 //! each as.
 
-use super::{NormalMap, TextureRef, Waves};
+use super::{AlphaMask, NormalMap, TextureRef, Waves};
 use crate::optics::LinearSrgb;
 
 /// Roughness (glTF's, α = roughness²) up to which polish over a diffuse body sends light on; above it the surface is
@@ -66,6 +66,8 @@ pub struct Material {
     pub base_colour: LinearSrgb,
     /// sRGB-encoded image that multiplies `base_colour`.
     pub base_colour_texture: Option<TextureRef>,
+    /// Where it is cut out.
+    pub alpha_mask: Option<AlphaMask>,
     /// [0, 1].
     pub metallic: f64,
     /// [0, 1]; GGX α is its square.
@@ -129,6 +131,11 @@ impl Material {
         }
     }
 
+    /// Whether no light goes through it anywhere.
+    pub fn is_opaque(&self) -> bool {
+        self.surface.is_opaque() && self.alpha_mask.is_none()
+    }
+
     /// Whether its specular part has a lobe.
     pub fn is_rough(&self) -> bool {
         self.surface.is_specular() && self.roughness > SMOOTH_ROUGHNESS
@@ -143,6 +150,7 @@ impl Default for Material {
             surface: SurfaceKind::Diffuse,
             base_colour: LinearSrgb::grey(0.8),
             base_colour_texture: None,
+            alpha_mask: None,
             metallic: 0.0,
             roughness: 1.0,
             transmission: 0.0,

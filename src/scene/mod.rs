@@ -1,9 +1,12 @@
 //! What is lit: surfaces, materials, lights, cameras. All coordinates are scene coordinates in metres, y up:
 //! world coordinates less [`Scene::origin_world`], which is zero unless the scene lies far from the world's origin.
 
+pub mod adjacency;
+pub mod alpha_mask;
 pub mod builtin;
 pub mod camera;
 pub mod camera_path;
+pub mod closed;
 pub mod edit;
 pub mod emitter;
 pub mod environment;
@@ -20,6 +23,8 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
+pub use adjacency::Adjacency;
+pub use alpha_mask::AlphaMask;
 pub use camera::Camera;
 pub use camera_path::CameraPath;
 pub use edit::{Edit, EditTarget};

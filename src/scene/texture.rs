@@ -52,6 +52,17 @@ impl Texture {
         row(0.0) * (1.0 - fy) + row(1.0) * fy
     }
 
+    /// Bilinear look-up of alpha, [0, 1], at a texture coordinate.
+    pub fn alpha(&self, uv: DVec2) -> f64 {
+        let x = uv.x * f64::from(self.width) - 0.5;
+        let y = uv.y * f64::from(self.height) - 0.5;
+        let (x0, y0) = (x.floor(), y.floor());
+        let (fx, fy) = (x - x0, y - y0);
+        let at = |dx: f64, dy: f64| f64::from(self.code(x0 + dx, y0 + dy)[3]) / 255.0;
+        let row = |dy: f64| at(0.0, dy) * (1.0 - fx) + at(1.0, dy) * fx;
+        row(0.0) * (1.0 - fy) + row(1.0) * fy
+    }
+
     /// The texel of a column and a row, whole numbers that may lie anywhere.
     pub fn code(&self, column: f64, row: f64) -> [u8; 4] {
         let column = wrap_index(column, self.width, self.wrap[0]);

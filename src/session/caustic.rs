@@ -8,7 +8,8 @@ use super::effects::EffectMeter;
 use super::finish::Shown;
 use super::forecast::{CostPoint, Forecast, forecast};
 use super::goals::Goal;
-use super::light_level::{KeptError, LevelKey, LightLevel, LightState, LightStates, Sizes};
+use super::light_level::{KeptError, LevelKey, LightLevel, LightState, LightStates};
+use super::map_size::Sizes;
 use super::sizes::MapSizes;
 use super::soft_level::SOFT_BEGINNING;
 use crate::error::{Result, Warning};
@@ -121,7 +122,7 @@ impl CausticLayer<'_> {
     /// than before, but for the last.
     ///
     /// # Errors
-    /// Maps that do not fit into memory; a light whose power is no number.
+    /// A light whose power is no number.
     pub(super) fn bake(
         &self,
         states: &mut LightStates,

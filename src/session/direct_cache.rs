@@ -3,13 +3,13 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use crate::illumination::Chart;
+use crate::illumination::{Chart, Receiver};
 use crate::light_pass::direct::bake_direct;
 use crate::progress::{Control, Progress};
 use crate::transport::Tracer;
 
-/// One light on one map: its place in the scene, the object, and the map's size.
-type Key = (usize, usize, (usize, usize));
+/// One light on one map: its place in the scene, the receiver, and the map's size.
+type Key = (usize, Receiver, (usize, usize));
 
 /// E of lights of unit strength [W/m²], by light and map.
 #[derive(Debug, Default)]
@@ -45,7 +45,7 @@ impl DirectCache {
     }
 
     /// Whether all lights are known on all charts.
-    pub(super) fn knows(&self, lights: usize, charts: &BTreeMap<usize, Arc<Chart>>) -> bool {
+    pub(super) fn knows(&self, lights: usize, charts: &BTreeMap<Receiver, Arc<Chart>>) -> bool {
         (0..lights).all(|light| {
             charts
                 .values()
@@ -57,13 +57,13 @@ impl DirectCache {
     pub(super) fn complete(
         &mut self,
         tracer: &Tracer,
-        charts: &BTreeMap<usize, Arc<Chart>>,
+        charts: &BTreeMap<Receiver, Arc<Chart>>,
         progress: &dyn Progress,
         control: &Control,
     ) -> DirectReport {
         let lights = &tracer.scene().lights;
-        let wanted = |(_, object, size): &Key| {
-            let chart = charts.get(object);
+        let wanted = |(_, receiver, size): &Key| {
+            let chart = charts.get(receiver);
             chart.is_some_and(|chart| (chart.width, chart.height) == *size)
         };
         self.layers.retain(|key, _| wanted(key));
@@ -96,5 +96,5 @@ impl DirectCache {
 }
 
 fn key(light: usize, chart: &Chart) -> Key {
-    (light, chart.object, (chart.width, chart.height))
+    (light, chart.receiver, (chart.width, chart.height))
 }

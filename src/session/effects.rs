@@ -26,6 +26,9 @@ pub(super) struct EffectMeter {
     pub(super) direct_bytes: u64,
     /// The direct layer alone.
     pub(super) direct_s: Seconds,
+    /// The indirect layer.
+    pub(super) indirect: EffectCounts,
+    pub(super) indirect_s: Seconds,
 }
 
 /// What all effects of a plan took.
@@ -119,13 +122,14 @@ impl Accounts<'_> {
                 cpu_ms: Some(1e3 * self.meter.direct_s.cpu),
                 ..EffectCounts::default()
             },
-            Effect::Indirect | Effect::Chains => EffectCounts::default(),
+            Effect::Indirect => self.meter.indirect,
+            Effect::Chains => EffectCounts::default(),
         }
     }
 
     /// Tracing light paths alone [s of CPU].
     fn trace_s(&self) -> f64 {
-        (self.clock.trace.cpu - self.meter.direct_s.cpu).max(0.0)
+        (self.clock.trace.cpu - self.meter.direct_s.cpu - self.meter.indirect_s.cpu).max(0.0)
     }
 
     /// One kind of branch, with its share of the loops that all branches share.

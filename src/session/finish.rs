@@ -4,24 +4,30 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
 
+use glam::DVec2;
 use rayon::prelude::*;
 
 use super::caustic::{CausticOutcome, Stopped};
 use super::direct_cache::DirectCache;
 use super::forecast::ForecastReport;
 use super::light_level::LightLevel;
-use super::sizes::{self, MapSizes};
-use super::{BakeResult, LightLayer, StopReason, Timings};
-use crate::error::Result;
+use super::map_plan::MEMORY;
+use super::map_size::{self, Wish};
+use super::sizes::{BYTES_PER_TEXEL, MapSizes};
+use super::{BakeResult, LightLayer, StopReason, Timings, map_plan};
+use crate::error::Warning;
 use crate::illumination::accumulator::FluxAccumulator;
 use crate::illumination::gutter::fill_gutter;
+use crate::illumination::lookup::bilinear;
+use crate::illumination::resolution::variance_within;
 use crate::illumination::smoothing::smooth;
-use crate::illumination::{Chart, IlluminationMap, Layer};
+use crate::illumination::tiles::{Tile, TileLayout};
+use crate::illumination::{Chart, IlluminationMap, Layer, Receiver};
 use crate::light_pass::accuracy;
 use crate::light_pass::ledger::LightLedger;
 use crate::light_pass::receiver_maps::ReceiverMap;
 use crate::optics::LinearSrgb;
-use crate::plan::{Effect, EffectPlan};
+use crate::plan::{self, Effect, EffectPlan};
 use crate::scene::{Light, Scene};
 use crate::settings::{BakeSettings, Estimator, LayerKind, Sigma};
 
@@ -39,44 +45,51 @@ pub(super) struct Finish<'a> {
 /// Levels of all lights that have maps, in the scene's order.
 pub(super) type Levels<'a> = [Shown<'a>];
 
-/// Charts of all maps, by object.
-pub(super) type Charts = BTreeMap<usize, Arc<Chart>>;
+/// Charts of all maps, by receiver.
+pub(super) type Charts = BTreeMap<Receiver, Arc<Chart>>;
 
 /// Light on one map.
 type Lit<'a> = (&'a Light, &'a LightLevel, &'a ReceiverMap);
 
 impl Finish<'_> {
-    /// Sums all lights at their strengths and puts everything together.
-    pub(super) fn run(
+    /// Puts everything together, but for layers that were baked only for others to gather from.
+    pub(super) fn result(
         &self,
+        (mut maps, mut light_layers): (Vec<IlluminationMap>, Vec<LightLayer>),
         levels: &Levels,
-        charts: &Charts,
-        direct: &DirectCache,
         outcome: &CausticOutcome,
     ) -> BakeResult {
-        let maps: Vec<IlluminationMap> = charts
-            .values()
-            .map(|chart| self.map(chart, levels, direct))
-            .collect();
+        let is_shown = |kind: LayerKind| plan::is_wanted(self.settings, kind);
+        for map in &mut maps {
+            map.layers.retain(|layer| is_shown(layer.kind));
+            map.estimated_relative_rmse = relative_rmse(std::slice::from_ref(map));
+        }
+        maps.retain(|map| !map.layers.is_empty());
+        light_layers.retain(|part| is_shown(part.kind));
+        let ledgers = levels.iter().map(|(light, level)| {
+            let light = &self.scene.lights[*light];
+            level.ledger.report(&light.name, level.unit, light.strength())
+        });
+        let ledgers: Vec<LightLedger> = ledgers.collect();
+        let estimated_relative_rmse = relative_rmse(&maps).map(|rmse| rmse.hypot(given_up_share(&ledgers)));
+        let is_scarce = outcome.warnings.iter().any(|warning| warning.location == MEMORY);
+        let target = self.settings.max_error.unwrap_or(f64::INFINITY);
         let stop_reason = match outcome.stopped {
             Some(Stopped::Cancelled) => StopReason::Cancelled,
             Some(Stopped::Time) => StopReason::MaxTime,
+            Some(Stopped::Target) if is_scarce && estimated_relative_rmse > Some(target) => {
+                StopReason::Memory
+            }
             Some(Stopped::Target) => StopReason::MaxError,
             None if self.plan.is_on(Effect::LightPass) || self.plan.is_on(Effect::Direct) => {
                 StopReason::Density
             }
             None => StopReason::NothingToDo,
         };
-        let ledgers = levels.iter().map(|(light, level)| {
-            let light = &self.scene.lights[*light];
-            level.ledger.report(&light.name, level.unit, light.strength())
-        });
-        let ledgers: Vec<LightLedger> = ledgers.collect();
-        let given_up = given_up_share(&ledgers);
         BakeResult {
-            estimated_relative_rmse: relative_rmse(&maps).map(|rmse| rmse.hypot(given_up)),
+            estimated_relative_rmse,
             maps,
-            light_layers: self.light_layers(charts, levels, direct),
+            light_layers,
             plan: self.plan.clone(),
             effects: Vec::new(),
             item_buffers: Vec::new(),
@@ -99,39 +112,75 @@ impl Finish<'_> {
         }
     }
 
-    /// Charts of all maps, by object: those that received flux, and every receiver where direct light is asked for.
-    ///
-    /// # Errors
-    /// Maps that do not fit into memory.
-    pub(super) fn charts(&self, levels: &Levels) -> Result<Charts> {
-        let mut charts = BTreeMap::new();
-        let mut texels = 0;
-        for object in 0..self.scene.objects.len() {
-            let lit = levels.iter().find_map(|(_, level)| level.maps.get(object));
-            let is_receiver = self.scene.material_of(object).surface.is_receiver();
-            let chart = if let Some(map) = lit {
-                Some(map.chart.clone())
-            } else if self.plan.is_on(Effect::Direct) && is_receiver {
-                let size = self.sizes.direct_size(object, self.settings);
-                texels += size.map_or(0, |(width, height)| width as u64 * height as u64);
-                sizes::check_memory(texels, self.settings)?;
-                size.and_then(|size| self.sizes.chart(object, size))
-            } else {
-                None
-            };
-            if let Some(chart) = chart {
-                texels += (chart.width * chart.height) as u64;
-                charts.insert(object, chart);
+    /// Caustic and direct light on all maps, all lights at their strengths, with the caustic's error; and each light's part
+    /// where that is asked for.
+    pub(super) fn maps(
+        &self,
+        levels: &Levels,
+        charts: &Charts,
+        direct: &DirectCache,
+    ) -> (Vec<IlluminationMap>, Vec<LightLayer>) {
+        let maps = charts
+            .values()
+            .map(|chart| self.map(chart, levels, direct))
+            .collect();
+        (maps, self.light_layers(charts, levels, direct))
+    }
+
+    /// Charts of all maps: those that received flux, and every receiver that direct light may reach where that or
+    /// indirect light is asked for; with a warning where the latter are coarser than they should be for want of memory.
+    pub(super) fn charts(&self, levels: &Levels) -> (Charts, Option<Warning>) {
+        let (mut charts, mut wishes) = (Charts::new(), BTreeMap::new());
+        let is_everywhere = self.plan.is_on(Effect::Direct) || self.plan.is_on(Effect::Indirect);
+        for receiver in Receiver::all(self.scene.objects.len()) {
+            let lit = levels.iter().find_map(|(_, level)| level.maps.get(receiver));
+            if let Some(map) = lit {
+                charts.insert(receiver, map.chart.clone());
+            } else if is_everywhere
+                && self.sizes.may_see_lights(receiver)
+                && let Some(size) = self.sizes.direct_size(receiver.object(), self.settings)
+            {
+                wishes.insert(receiver, Wish::dense(size));
             }
         }
-        Ok(charts)
+        let caustic: u64 = charts.values().map(|chart| chart.texel_count() as u64).sum();
+        let left = self
+            .settings
+            .memory_bytes
+            .saturating_sub(caustic * BYTES_PER_TEXEL);
+        let wished = map_size::fit(&wishes, u64::MAX);
+        let sizes = map_size::fit(&wishes, left);
+        for (&receiver, size) in &sizes {
+            if let Some(chart) = self.sizes.chart_of(receiver, size) {
+                charts.insert(receiver, chart);
+            }
+        }
+        let warning = (sizes != wished).then(|| map_plan::scarce(&wished, &sizes, left));
+        (charts, warning)
+    }
+
+    /// The charts that direct light is baked on: row by row, and no finer than it needs where a map is in tiles.
+    pub(super) fn direct_charts(&self, charts: &Charts) -> Charts {
+        let charts = charts.values();
+        charts
+            .filter_map(|chart| Some((chart.receiver, self.direct_chart(chart)?)))
+            .collect()
+    }
+
+    fn direct_chart(&self, chart: &Arc<Chart>) -> Option<Arc<Chart>> {
+        if chart.layout.is_none() {
+            return Some(Arc::clone(chart));
+        }
+        let size = (chart.width, chart.height);
+        let times = self.sizes.direct_halvings(chart.object(), size, self.settings);
+        self.sizes.chart(chart.receiver, map_size::halved(size, times))
     }
 
     fn map(&self, chart: &Arc<Chart>, levels: &Levels, direct: &DirectCache) -> IlluminationMap {
         let lit: Vec<Lit> = levels
             .iter()
             .filter_map(|(light, level)| {
-                let map = level.maps.get(chart.object)?;
+                let map = level.maps.get(chart.receiver)?;
                 Some((&self.scene.lights[*light], *level, map))
             })
             .collect();
@@ -142,15 +191,15 @@ impl Finish<'_> {
         if self.plan.is_on(Effect::Direct) {
             layers.extend(self.direct_layer(chart, direct));
         }
-        let error = error_of(chart, &lit);
-        let mut map = IlluminationMap {
+        let is_shown = plan::is_wanted(self.settings, LayerKind::Caustic);
+        let error = is_shown.then(|| error_of(chart, &lit)).flatten();
+        let error = error.map(|error| with_resolution(chart, &lit, &layers, error));
+        IlluminationMap {
             chart: Arc::clone(chart),
             layers,
             error,
             estimated_relative_rmse: None,
-        };
-        map.estimated_relative_rmse = relative_rmse(std::slice::from_ref(&map));
-        map
+        }
     }
 
     /// E = ΣΦ/A per texel; nothing where the surface does not reach, but for the gutter.
@@ -163,7 +212,7 @@ impl Finish<'_> {
                 (flux, light.strength() * level.unit.watts())
             })
             .collect();
-        let mut irradiance: Vec<[f32; 3]> = (0..chart.width * chart.height)
+        let mut irradiance: Vec<[f32; 3]> = (0..chart.texel_count())
             .into_par_iter()
             .map(|texel| {
                 let area_m2 = chart.texel_area_m2(texel);
@@ -187,7 +236,8 @@ impl Finish<'_> {
     /// Smooths a map of the wavefront by sigma; maps with gaps are left as they are: their borders are no mirrors.
     fn smooth(&self, chart: &Chart, flux: &mut FluxAccumulator) {
         if let (Estimator::Wavefront, Sigma::Constant(sigma)) = (self.settings.estimator, self.settings.sigma)
-            && chart.texel_areas_m2.len() == 1
+            && chart.is_full()
+            && chart.layout.is_none()
         {
             // A texel is a footprint of its own area: a disc of radius 1/√π.
             smooth(flux, (sigma / std::f64::consts::PI).sqrt());
@@ -200,15 +250,15 @@ impl Finish<'_> {
         if !self.settings.per_light {
             return layers;
         }
-        for (&object, chart) in charts {
+        for (&receiver, chart) in charts {
             let part = |light: usize, layer: Layer| LightLayer {
-                object,
+                receiver,
                 light,
                 kind: layer.kind,
                 irradiance: layer.irradiance,
             };
             for (light, level) in levels {
-                if let Some(map) = level.maps.get(object) {
+                if let Some(map) = level.maps.get(receiver) {
                     let lit = [(&self.scene.lights[*light], *level, map)];
                     layers.push(part(*light, self.caustic_layer(chart, &lit)));
                 }
@@ -224,27 +274,85 @@ impl Finish<'_> {
         layers
     }
 
-    fn direct_layer(&self, chart: &Chart, direct: &DirectCache) -> Option<Layer> {
+    fn direct_layer(&self, chart: &Arc<Chart>, direct: &DirectCache) -> Option<Layer> {
         self.direct_of(chart, direct, 0..self.scene.lights.len())
     }
 
     /// Direct light of some lights; `None` where that of one is not known.
-    fn direct_of(&self, chart: &Chart, direct: &DirectCache, lights: Range<usize>) -> Option<Layer> {
-        let mut sums = vec![LinearSrgb::BLACK; chart.width * chart.height];
+    fn direct_of(&self, chart: &Arc<Chart>, direct: &DirectCache, lights: Range<usize>) -> Option<Layer> {
+        let own = self.direct_chart(chart)?;
+        let mut sums = vec![LinearSrgb::BLACK; own.texel_count()];
         for light in lights {
             let strength = self.scene.lights[light].strength();
-            for (sum, unit) in sums.iter_mut().zip(direct.layer(light, chart)?) {
+            for (sum, unit) in sums.iter_mut().zip(direct.layer(light, &own)?) {
                 *sum += LinearSrgb::from(unit.map(f64::from)) * strength;
             }
         }
+        let irradiance: Vec<[f32; 3]> = sums
+            .iter()
+            .map(|sum| sum.to_array().map(|channel| channel as f32))
+            .collect();
         Some(Layer {
             kind: LayerKind::Direct,
-            irradiance: sums
-                .iter()
-                .map(|sum| sum.to_array().map(|channel| channel as f32))
-                .collect(),
+            irradiance: match &chart.layout {
+                Some(layout) => in_tiles(layout, &own, &irradiance),
+                None => irradiance,
+            },
         })
     }
+}
+
+/// Values of a chart at the middle of each texel of a map in tiles, means where the texels are larger than the chart's.
+fn in_tiles(layout: &TileLayout, own: &Chart, values: &[[f32; 3]]) -> Vec<[f32; 3]> {
+    let size = {
+        let (width, height) = layout.size();
+        DVec2::new(width as f64, height as f64)
+    };
+    let own_size = DVec2::new(own.width as f64, own.height as f64);
+    let value = |tile: &Tile, texel: usize| {
+        let across = tile.size.0;
+        let side = f64::from(1_u32 << tile.level);
+        let low = DVec2::new((texel % across) as f64, (texel / across) as f64) * side
+            + DVec2::new(tile.origin.0 as f64, tile.origin.1 as f64);
+        let times = (DVec2::splat(side) * own_size / size).ceil().max(DVec2::ONE);
+        let mut sum = LinearSrgb::BLACK;
+        for row in 0..times.y as usize {
+            for column in 0..times.x as usize {
+                let part = (DVec2::new(column as f64, row as f64) + 0.5) / times;
+                sum += bilinear(values, own.width, own.height, (low + part * side) / size);
+            }
+        }
+        (sum / (times.x * times.y))
+            .to_array()
+            .map(|channel| channel as f32)
+    };
+    layout
+        .tiles()
+        .flat_map(|tile| (0..tile.texels.len()).map(move |texel| (tile.clone(), texel)))
+        .map(|(tile, texel)| value(&tile, texel))
+        .collect()
+}
+
+/// The error with what texels larger than they should be leave out.
+fn with_resolution(chart: &Chart, lit: &[Lit], layers: &[Layer], error: Vec<f32>) -> Vec<f32> {
+    let halved = lit
+        .iter()
+        .find_map(|(_, level, _)| level.key.sizes.get(&chart.receiver))
+        .map_or(0, |size| size.halved);
+    let is_coarser = halved > 0
+        || chart
+            .layout
+            .as_ref()
+            .is_some_and(|layout| layout.tiles().any(|tile| tile.lost > 0));
+    let caustic = layers.iter().find(|layer| layer.kind == LayerKind::Caustic);
+    let Some(caustic) = caustic.filter(|_| is_coarser) else {
+        return error;
+    };
+    let luminance = |e: &[f32; 3]| LinearSrgb::from(e.map(f64::from)).luminance();
+    let values: Vec<f64> = caustic.irradiance.iter().map(luminance).collect();
+    let variances = variance_within(chart, &values, halved);
+    let both = |(error, variance): (f32, f64)| (f64::from(error).powi(2) + variance).sqrt() as f32;
+    error.into_iter().zip(variances).map(both).collect()
 }
 
 /// Share of all light that no map shows though it should.
@@ -264,11 +372,11 @@ fn given_up_share(ledgers: &[LightLedger]) -> f64 {
 
 /// Error of each texel's luminance [W/m²], of all lights together; `None` where one is not known.
 fn error_of(chart: &Chart, lit: &[Lit]) -> Option<Vec<f32>> {
-    let mut squares = vec![0.0; chart.width * chart.height];
+    let mut squares = vec![0.0; chart.texel_count()];
     for (light, level, _) in lit {
         let strength = light.strength().luminance();
         let error = &level.error.as_ref()?.estimate;
-        for (square, texel) in squares.iter_mut().zip(&error.maps.get(&chart.object)?.texels) {
+        for (square, texel) in squares.iter_mut().zip(&error.maps.get(&chart.receiver)?.texels) {
             *square += (texel * strength) * (texel * strength);
         }
     }
@@ -276,19 +384,23 @@ fn error_of(chart: &Chart, lit: &[Lit]) -> Option<Vec<f32>> {
     (!lit.is_empty()).then(|| squares.iter().map(root).collect())
 }
 
-/// Root mean square of the error over the mean irradiance of the caustic layer, by area; `None` where the error of a
-/// map is not known, or no light arrived.
+/// Root mean square of the error over the mean irradiance of the caustic and indirect layers, whose error it is, by area;
+/// `None` where the error of a map is not known, or no light arrived.
 fn relative_rmse(maps: &[IlluminationMap]) -> Option<f64> {
     let (mut squares, mut flux_w, mut area_m2) = (0.0, 0.0, 0.0);
     for map in maps {
-        let Some(layer) = map.layer(LayerKind::Caustic) else {
+        let estimated = [LayerKind::Caustic, LayerKind::Indirect];
+        let layers: Vec<&Layer> = estimated.iter().filter_map(|&kind| map.layer(kind)).collect();
+        if layers.is_empty() {
             continue;
-        };
+        }
         for (texel, error) in map.error.as_ref()?.iter().enumerate() {
             let texel_m2 = map.chart.texel_area_m2(texel);
-            let irradiance = LinearSrgb::from(layer.irradiance[texel].map(f64::from));
             squares += f64::from(*error) * f64::from(*error) * texel_m2;
-            flux_w += irradiance.luminance() * texel_m2;
+            for layer in &layers {
+                let irradiance = LinearSrgb::from(layer.irradiance[texel].map(f64::from));
+                flux_w += irradiance.luminance() * texel_m2;
+            }
             area_m2 += texel_m2;
         }
     }

@@ -1,14 +1,12 @@
 //! Which lattices and map sizes a bake goes through.
 
 use std::collections::BTreeMap;
-use std::sync::Arc;
 
 use super::caustic::{CausticLayer, Course, ESTIMATED_LEVELS};
-use super::light_level::{LevelKey, LightStates, Sizes, TraceKey};
-use super::sizes;
+use super::light_level::{LevelKey, LightStates, TraceKey};
+use super::map_size::Sizes;
 use super::splat_level::LEVEL_STRIDES;
-use crate::error::{Error, Result, Warning};
-use crate::illumination::Chart;
+use crate::error::{Error, Result};
 use crate::illumination::accumulator::FluxUnit;
 use crate::light_pass::caustic::lattice::Lattice;
 use crate::light_pass::caustic::path::PathLimits;
@@ -208,6 +206,7 @@ impl CausticLayer<'_> {
         let adaptive = settings.kernel == Kernel::Gaussian && settings.sigma == Sigma::Adaptive;
         let of_splats = adaptive || settings.footprint == Footprint::Fixed;
         settings.map_resolution == MapResolution::Auto
+            || !self.fits_anyway()
             || (settings.estimator == Estimator::Splat && of_splats)
     }
 
@@ -240,10 +239,8 @@ impl CausticLayer<'_> {
             }
         }
         let statistics = states.statistics.as_ref().map(|(_, statistics)| statistics);
-        let sizes = self.map_sizes(statistics)?;
-        if let (MapResolution::Auto, Some(statistics)) = (self.settings.map_resolution, statistics) {
-            course.outcome.warnings = self.coarse_maps(&sizes, statistics);
-        }
+        let (sizes, warnings) = self.map_sizes(statistics);
+        course.outcome.warnings = warnings;
         Ok(sizes)
     }
 
@@ -258,86 +255,6 @@ impl CausticLayer<'_> {
             .find(fine_enough)
             .copied()
             .unwrap_or(last)
-    }
-
-    /// Sizes of the maps that the coarse run saw lit.
-    pub(super) fn map_sizes(
-        &self,
-        statistics: Option<&FootprintStatistics>,
-    ) -> Result<BTreeMap<usize, (usize, usize)>> {
-        let mut sizes = BTreeMap::new();
-        for object in 0..self.tracer.scene().objects.len() {
-            let size = match (self.settings.map_resolution, statistics) {
-                (MapResolution::Fixed { width, height }, _) => Some((width, height)),
-                (MapResolution::Auto, Some(statistics)) => self.automatic_size(object, statistics),
-                (MapResolution::Auto, None) => None,
-            };
-            if let Some(size) = size {
-                sizes.insert(object, size);
-            }
-        }
-        if self.settings.map_resolution == MapResolution::Auto {
-            let texels = |(width, height): (usize, usize)| width as u64 * height as u64;
-            let total =
-                |sizes: &BTreeMap<usize, (usize, usize)>| sizes.values().copied().map(texels).sum::<u64>();
-            let limit = self.settings.memory_bytes / sizes::BYTES_PER_TEXEL;
-            // Halve the largest until all fit.
-            while total(&sizes) > limit {
-                let Some(largest) = sizes.values_mut().max_by_key(|size| texels(**size)) else {
-                    break;
-                };
-                if texels(*largest) <= 1 {
-                    break;
-                }
-                *largest = ((largest.0 / 2).max(1), (largest.1 / 2).max(1));
-            }
-        } else if let MapResolution::Fixed { width, height } = self.settings.map_resolution {
-            sizes::check_memory(width as u64 * height as u64, self.settings)?;
-        }
-        Ok(sizes)
-    }
-
-    /// Says which automatic maps stay coarser than their light, for the largest automatic size or for memory.
-    pub(super) fn coarse_maps(
-        &self,
-        sizes: &BTreeMap<usize, (usize, usize)>,
-        statistics: &FootprintStatistics,
-    ) -> Vec<Warning> {
-        let coarse = |(&object, &(width, height)): (&usize, &(usize, usize))| {
-            let footprint_texels = (width * height) as f64 * statistics.mean(object)?.map_share;
-            (footprint_texels < 1.0).then(|| {
-                Warning::new(
-                    &self.tracer.scene().objects[object].name,
-                    format!(
-                        "its map of {width} x {height} texels is coarser than the light it holds: a ray's mean \
-                         footprint is {footprint_texels:.2} texels"
-                    ),
-                    "ask for a larger --map-resolution, or allow more --memory",
-                )
-            })
-        };
-        sizes.iter().filter_map(coarse).collect()
-    }
-
-    fn automatic_size(&self, object: usize, statistics: &FootprintStatistics) -> Option<(usize, usize)> {
-        self.sizes
-            .doubled_size(object, self.sizes.doublings(object, statistics)?)
-    }
-
-    /// The chart of an object at its size among `sizes`.
-    pub(super) fn chart(&self, object: usize, sizes: &BTreeMap<usize, (usize, usize)>) -> Option<Arc<Chart>> {
-        let size = sizes
-            .get(&object)
-            .copied()
-            .or_else(|| self.default_size(object))?;
-        self.sizes.chart(object, size)
-    }
-
-    /// For a surface that only the full lattice reached.
-    pub(super) fn default_size(&self, object: usize) -> Option<(usize, usize)> {
-        Some(sizes::first_size(
-            self.sizes.parametrisation(object)?.suggested_aspect,
-        ))
     }
 }
 

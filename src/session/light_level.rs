@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use super::map_size::Sizes;
 use super::soft_level::Resolved;
 use crate::illumination::accumulator::{FluxCount, FluxUnit};
 use crate::light_pass::accuracy::{LightError, Noise};
@@ -16,9 +17,6 @@ use crate::light_pass::wavefront::pass::TracedLight;
 use crate::light_pass::wavefront::refine::Round;
 use crate::settings::BakeSettings;
 use crate::transport::EffectSet;
-
-/// Sizes of maps [texels across, down], by object.
-pub(super) type Sizes = BTreeMap<usize, (usize, usize)>;
 
 /// All that a light's paths depend on beside the scene.
 #[derive(Clone, Debug, PartialEq)]
@@ -80,7 +78,7 @@ pub(super) struct LightLevel {
     pub(super) ledger: LedgerSum,
     /// Patches that reach farther than their rays.
     pub(super) overreaches: Vec<Overreach>,
-    /// Of splats: the squared difference of half sets, by object.
+    /// Of splats: the squared difference of half sets, by receiver.
     pub(super) noise: Option<Noise>,
     /// By the levels before it; `None` where there are none, or no light arrived.
     pub(super) error: Option<KeptError>,
@@ -152,10 +150,7 @@ pub(super) struct LightState {
 impl LightLevel {
     /// Memory of its maps and paths [bytes].
     pub(super) fn bytes(&self) -> u64 {
-        let texels = self
-            .maps
-            .iter()
-            .map(|(_, map)| (map.chart.width * map.chart.height) as u64);
+        let texels = self.maps.iter().map(|(_, map)| map.chart.texel_count() as u64);
         texels.sum::<u64>() * size_of::<FluxCount>() as u64
             + self.traced.as_ref().map_or(0, TracedLight::bytes)
     }

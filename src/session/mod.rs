@@ -8,8 +8,12 @@ mod effects;
 mod finish;
 pub mod forecast;
 mod goals;
+mod indirect_cache;
+mod indirect_work;
 mod level_plan;
 mod light_level;
+mod map_plan;
+mod map_size;
 pub mod result;
 mod scene_change;
 mod sizes;
@@ -19,7 +23,7 @@ pub mod survey;
 mod wavefront_level;
 
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 pub use forecast::{CostPoint, Forecast, ForecastReport};
 pub use result::{
@@ -42,6 +46,8 @@ use clock::Clock;
 use direct_cache::DirectCache;
 use direct_work::DirectWork;
 use finish::{Finish, Shown};
+use indirect_cache::IndirectCache;
+use indirect_work::{Gathering, IndirectWork};
 use light_level::LightStates;
 use scene_change::SceneChange;
 use sizes::MapSizes;
@@ -56,6 +62,7 @@ pub struct BakeSession {
     sizes: MapSizes,
     lights: LightStates,
     direct: DirectCache,
+    indirect: IndirectCache,
 }
 
 /// What an [`Aim`] depends on beside the scene: how directions are divided, how thoroughly what cannot matter is left out,
@@ -103,6 +110,7 @@ impl BakeSession {
             sizes,
             lights: LightStates::default(),
             direct: DirectCache::default(),
+            indirect: IndirectCache::default(),
         })
     }
 
@@ -133,6 +141,7 @@ impl BakeSession {
         self.sizes = sizes.edited(scene.clone(), &change.shapes);
         if change.moves_paths() || change.shares {
             self.direct.clear();
+            self.indirect.clear();
             self.lights.statistics = None;
         }
         if change.moves_paths() || !change.lights.is_empty() {
@@ -202,7 +211,7 @@ impl BakeSession {
     /// Bakes. Cancelled bakes return what they have, marked partial.
     ///
     /// # Errors
-    /// Settings outside their ranges; maps that do not fit into the memory limit; no threads to be had.
+    /// Settings outside their ranges; no threads to be had.
     pub fn bake(
         &mut self,
         settings: &BakeSettings,
@@ -281,7 +290,7 @@ impl BakeSession {
             settings,
             plan: &plan,
         };
-        let (lights, direct) = (&mut self.lights, &mut self.direct);
+        let (lights, direct, indirect) = (&mut self.lights, &mut self.direct, &mut self.indirect);
         let item_buffer_tests = if is_new { aim.tests() } else { 0 };
         let mut outcome = CausticOutcome::default();
         let mut lamps = DirectWork::default();
@@ -302,16 +311,24 @@ impl BakeSession {
                 let Some(level) = &mut level else {
                     return Ok(());
                 };
-                let charts = finish.charts(levels)?;
+                let (charts, scarce) = finish.charts(levels);
+                let direct_charts = finish.direct_charts(&charts);
                 // The first picture is to come soon: direct light follows with the second.
                 let waits =
-                    std::mem::take(&mut is_first) && !direct.knows(finish.scene.lights.len(), &charts);
+                    std::mem::take(&mut is_first) && !direct.knows(finish.scene.lights.len(), &direct_charts);
                 if !waits && plan.is_on(Effect::Direct) {
-                    lamps.shine(&tracer, &charts, direct, (progress, control));
+                    lamps.shine(&tracer, &direct_charts, direct, (progress, control));
                 }
                 let mut so_far = lamps.added_to(so_far);
                 so_far.counts.item_buffer_tests = item_buffer_tests;
-                let mut result = finish.run(levels, &charts, direct, &so_far);
+                so_far.warnings.extend(scarce);
+                let (mut maps, mut parts) = finish.maps(levels, &charts, direct);
+                if plan.is_on(Effect::Indirect) && !waits {
+                    let mut known = IndirectWork::default();
+                    known.remember(indirect, &maps);
+                    known.add_to(indirect, &mut maps, &mut parts);
+                }
+                let mut result = finish.result((maps, parts), levels, &so_far);
                 clock.total = whole.elapsed();
                 account(&mut result, &finish, &aim, &so_far, &lamps.clock(clock));
                 level(result);
@@ -323,9 +340,11 @@ impl BakeSession {
             .iter()
             .filter_map(|&light| Some((light, lights.finest(light)?)))
             .collect();
-        let charts = finish.charts(&finished)?;
+        let (charts, scarce) = finish.charts(&finished);
+        outcome.warnings.extend(scarce);
         if plan.is_on(Effect::Direct) {
-            let complete = lamps.shine(&tracer, &charts, direct, (progress, control));
+            let direct_charts = finish.direct_charts(&charts);
+            let complete = lamps.shine(&tracer, &direct_charts, direct, (progress, control));
             if !complete {
                 outcome.stopped = Some(Stopped::Cancelled);
             }
@@ -336,8 +355,43 @@ impl BakeSession {
         outcome.meter.caustic_bytes = lights.bytes();
         let mut clock = lamps.clock(&clock);
         let watch = Stopwatch::start();
-        let mut result = finish.run(&finished, &charts, direct, &outcome);
+        let (mut maps, mut parts) = finish.maps(&finished, &charts, direct);
         clock.deposit.add(watch.elapsed());
+        if plan.is_on(Effect::Indirect) {
+            let mut gathered = IndirectWork::default();
+            let limited = match settings.max_time_s {
+                Some(limit_s) => control.with_deadline(began + Duration::from_secs_f64(limit_s)),
+                None => control.without_deadline(),
+            };
+            let gathering = Gathering {
+                tracer: &tracer,
+                sizes: &self.sizes,
+                settings,
+                progress,
+                control,
+                limited: &limited,
+            };
+            let complete = gathered.gather(&gathering, indirect, &maps, &mut |so_far, known| {
+                let Some(level) = &mut level else {
+                    return;
+                };
+                let (mut maps, mut parts) = (maps.clone(), parts.clone());
+                so_far.add_to(known, &mut maps, &mut parts);
+                let outcome = so_far.added_to(&outcome, known);
+                let mut result = finish.result((maps, parts), &finished, &outcome);
+                let mut clock = so_far.clock(&clock);
+                clock.total = whole.elapsed();
+                account(&mut result, &finish, &aim, &outcome, &clock);
+                level(result);
+            });
+            if !complete {
+                outcome.stopped = Some(Stopped::Cancelled);
+            }
+            gathered.add_to(indirect, &mut maps, &mut parts);
+            outcome = gathered.added_to(&outcome, indirect);
+            clock = gathered.clock(&clock);
+        }
+        let mut result = finish.result((maps, parts), &finished, &outcome);
         clock.total = whole.elapsed();
         account(&mut result, &finish, &aim, &outcome, &clock);
         Ok(result)

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::forecast::{CostPoint, ForecastReport};
 use crate::error::Warning;
-use crate::illumination::IlluminationMap;
+use crate::illumination::{IlluminationMap, Receiver};
 use crate::light_pass::ledger::LightLedger;
 use crate::plan::{EffectLine, EffectPlan};
 use crate::settings::LayerKind;
@@ -19,6 +19,8 @@ pub enum StopReason {
     MaxError,
     /// The time was up.
     MaxTime,
+    /// More rays do not help: the maps are as fine as memory allows, and the estimated error is above the target.
+    Memory,
     /// Nothing specular is lit, or nothing can receive it: there was nothing to do.
     NothingToDo,
     /// It was asked to stop.
@@ -38,6 +40,15 @@ pub struct BakeCounts {
     pub segments: u64,
     /// Any-hit queries of the direct layer.
     pub shadow_rays: u64,
+    /// Rays that diffuse surfaces sent out to gather indirect light.
+    #[serde(default)]
+    pub gather_rays: u64,
+    /// Closest-hit queries along them.
+    #[serde(default)]
+    pub gather_segments: u64,
+    /// How often indirect light was sent on until it stood.
+    #[serde(default)]
+    pub bounces: u32,
     /// Interpolated rays against candidate receivers.
     pub receiver_queries: u64,
     /// Kernels deposited.
@@ -108,8 +119,8 @@ pub struct Timings {
 /// What one light gives to one layer of one map.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LightLayer {
-    /// Index into `Scene::objects`.
-    pub object: usize,
+    /// Whose light it is.
+    pub receiver: Receiver,
     /// Index into `Scene::lights`.
     pub light: usize,
     /// Of which layer.
@@ -123,7 +134,8 @@ pub struct LightLayer {
 pub struct BakeResult {
     /// One per surface that received flux, in the order of `Scene::objects`.
     pub maps: Vec<IlluminationMap>,
-    /// What each light gives to them, where that is asked for: map by map, caustic before direct, in the order of lights.
+    /// What each light gives to them, where that is asked for: map by map, caustic before direct, in the order of lights, and all of
+    /// indirect after them.
     pub light_layers: Vec<LightLayer>,
     /// Which effects were on, and why.
     pub plan: EffectPlan,

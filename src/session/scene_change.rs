@@ -70,6 +70,8 @@ fn leave_alike(a: &Material, b: &Material) -> bool {
         && a.bending_waves() == b.bending_waves()
         && a.bending_map() == b.bending_map()
         && a.double_sided == b.double_sided
+        && a.alpha_mask == b.alpha_mask
+        && (a.alpha_mask.is_none() || a.base_colour_texture == b.base_colour_texture)
 }
 
 /// Whether both materials take and send on the same shares of light.

@@ -3,18 +3,24 @@
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-use crate::error::{Error, Result};
-use crate::illumination::Chart;
+use glam::DVec3;
+
+use super::map_size::MapSize;
 use crate::illumination::parametrisation::{DEFAULT_NOMINAL_SIDE, Parametrisation, parametrise};
+use crate::illumination::{Chart, Receiver, Side, UvSet};
 use crate::light_pass::caustic::statistics::FootprintStatistics;
-use crate::scene::Scene;
+use crate::scene::closed::is_closed;
+use crate::scene::{LightKind, Scene};
 use crate::settings::{BakeSettings, MapResolution};
 
 /// Side of a map before the first doubling [texels].
 pub const FIRST_SIDE: usize = 64;
 
-/// Largest side that doubling leads to by itself [texels]; larger maps have to be asked for.
-const LARGEST_AUTOMATIC_SIDE: usize = 2048;
+/// Largest side that doubling leads to by itself where all texels are as fine [texels]; larger maps have to be asked for.
+pub const LARGEST_AUTOMATIC_SIDE: usize = 2048;
+
+/// Largest side in tiles [texels of the finest size].
+pub const LARGEST_TILED_SIDE: usize = 4096;
 
 /// Memory per texel while flux is summed and finished [bytes]: three 64-bit sums, three floats per layer, an area.
 pub const BYTES_PER_TEXEL: u64 = 24 + 2 * 12 + 8;
@@ -23,25 +29,38 @@ pub const BYTES_PER_TEXEL: u64 = 24 + 2 * 12 + 8;
 #[derive(Debug)]
 pub struct MapSizes {
     scene: Arc<Scene>,
-    parametrisations: Vec<OnceLock<Option<Parametrisation>>>,
+    parametrisations: Vec<OnceLock<Option<Arc<Parametrisation>>>>,
+    /// Generated ones for maps of other sides than usual, by object and side.
+    laid_out: Mutex<BTreeMap<(usize, usize), Arc<Parametrisation>>>,
+    /// Whether each object's mesh bounds a solid.
+    closed: Vec<OnceLock<bool>>,
     /// Charts made so far, by object and size.
     charts: Mutex<BTreeMap<ChartKey, Arc<Chart>>>,
+    /// Those in tiles, the latest last.
+    tiled: Mutex<Vec<Arc<Chart>>>,
 }
 
-/// Object, texels across and down.
-type ChartKey = (usize, (usize, usize));
+/// Receiver, texels across and down.
+type ChartKey = (Receiver, (usize, usize));
 
 /// Charts that are kept; beyond it, all are made anew.
 const MOST_CHARTS: usize = 256;
+
+/// Charts in tiles that are kept.
+const MOST_TILED_CHARTS: usize = 16;
 
 impl MapSizes {
     /// Nothing made yet.
     pub fn new(scene: Arc<Scene>) -> Self {
         let parametrisations = scene.objects.iter().map(|_| OnceLock::new()).collect();
+        let closed = scene.objects.iter().map(|_| OnceLock::new()).collect();
         Self {
             scene,
             parametrisations,
+            closed,
+            laid_out: Mutex::default(),
             charts: Mutex::default(),
+            tiled: Mutex::default(),
         }
     }
 
@@ -50,31 +69,84 @@ impl MapSizes {
         let mut sizes = Self { scene, ..self };
         for &object in changed {
             sizes.parametrisations[object] = OnceLock::new();
+            sizes.closed[object] = OnceLock::new();
         }
+        let laid_out = sizes.laid_out.get_mut().unwrap_or_else(PoisonError::into_inner);
+        laid_out.retain(|(object, _), _| !changed.contains(object));
         let charts = sizes.charts.get_mut().unwrap_or_else(PoisonError::into_inner);
-        charts.retain(|(object, _), _| !changed.contains(object));
+        charts.retain(|(receiver, _), _| !changed.contains(&receiver.object()));
+        let tiled = sizes.tiled.get_mut().unwrap_or_else(PoisonError::into_inner);
+        tiled.retain(|chart| !changed.contains(&chart.object()));
         sizes
     }
 
     /// The parametrisation of an object; `None` where it has no area.
-    pub fn parametrisation(&self, object: usize) -> Option<&Parametrisation> {
+    pub fn parametrisation(&self, object: usize) -> Option<&Arc<Parametrisation>> {
         self.parametrisations[object]
             .get_or_init(|| {
                 let mesh = &self.scene.objects[object].mesh;
-                parametrise(object, mesh, DEFAULT_NOMINAL_SIDE)
+                parametrise(object, mesh, DEFAULT_NOMINAL_SIDE).map(Arc::new)
             })
             .as_ref()
     }
 
+    /// The parametrisation of an object for maps of a side: generated charts keep their gutters at that size.
+    fn laid_out(&self, object: usize, side: usize) -> Option<Arc<Parametrisation>> {
+        let usual = self.parametrisation(object)?;
+        if usual.uv_set != UvSet::Generated || side == DEFAULT_NOMINAL_SIDE {
+            return Some(Arc::clone(usual));
+        }
+        let known = || self.laid_out.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(known) = known().get(&(object, side)) {
+            return Some(Arc::clone(known));
+        }
+        let made = Arc::new(parametrise(object, &self.scene.objects[object].mesh, side)?);
+        known().insert((object, side), Arc::clone(&made));
+        Some(made)
+    }
+
+    /// Whether light straight from a lamp can reach a receiver that is seen: the front of a surface, the back of a
+    /// double-sided one. The inside of a closed body is lit from lamps within its box only.
+    pub fn may_see_lights(&self, receiver: Receiver) -> bool {
+        let object = receiver.object();
+        let material = self.scene.material_of(object);
+        let is_seen = receiver.side() == Side::Front || material.double_sided;
+        is_seen
+            && material.surface.is_receiver()
+            && (receiver.side() == Side::Front || !self.is_closed(object) || self.may_enclose_a_light(object))
+    }
+
+    fn is_closed(&self, object: usize) -> bool {
+        *self.closed[object].get_or_init(|| is_closed(&self.scene.objects[object].mesh))
+    }
+
+    fn may_enclose_a_light(&self, object: usize) -> bool {
+        let Some((low, high)) = self.scene.objects[object].mesh.bounds() else {
+            return false;
+        };
+        let overlaps = |(a, b): (DVec3, DVec3)| a.cmple(high).all() && b.cmpge(low).all();
+        self.scene.lights.iter().any(|light| {
+            let mesh_bounds = match light.kind {
+                LightKind::Surface { object, .. } => self.scene.objects[object].mesh.bounds(),
+                _ => None,
+            };
+            let place = light.kind.position().map(|position| (position, position));
+            mesh_bounds.or(place).is_some_and(overlaps)
+        })
+    }
+
     /// A chart of the given size.
-    pub fn chart(&self, object: usize, (width, height): (usize, usize)) -> Option<Arc<Chart>> {
-        let key = (object, (width, height));
+    pub fn chart(&self, receiver: Receiver, (width, height): (usize, usize)) -> Option<Arc<Chart>> {
+        let key = (receiver, (width, height));
         // Whatever panicked under the lock, the charts in the map are whole.
         let charts = || self.charts.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(chart) = charts().get(&key) {
             return Some(Arc::clone(chart));
         }
-        let chart = Arc::new(self.parametrisation(object)?.chart(width, height));
+        let chart = self
+            .laid_out(receiver.object(), width.min(height))?
+            .chart(width, height);
+        let chart = Arc::new(chart.of_side(receiver.side()));
         let mut charts = charts();
         if charts.len() >= MOST_CHARTS {
             charts.clear();
@@ -83,13 +155,41 @@ impl MapSizes {
         Some(chart)
     }
 
-    /// How often the map of an object doubles from its first size until texels are no larger than the mean footprint
-    /// (section 3.1.1 of the paper). `None` where no footprint was seen.
-    pub fn doublings(&self, object: usize, statistics: &FootprintStatistics) -> Option<u32> {
-        let share = statistics.mean(object)?.map_share;
-        let (width, height) = first_size(self.parametrisation(object)?.suggested_aspect);
+    /// A chart of a size that may be in tiles.
+    pub fn chart_of(&self, receiver: Receiver, size: &MapSize) -> Option<Arc<Chart>> {
+        let Some(layout) = &size.layout else {
+            return self.chart(receiver, size.size);
+        };
+        let mut tiled = self.tiled.lock().unwrap_or_else(PoisonError::into_inner);
+        let is_it = |chart: &&Arc<Chart>| {
+            let known = chart.layout.as_ref();
+            chart.receiver == receiver
+                && known.is_some_and(|known| Arc::ptr_eq(known, layout) || known == layout)
+        };
+        if let Some(chart) = tiled.iter().find(is_it) {
+            return Some(Arc::clone(chart));
+        }
+        let chart = self.parametrisation(receiver.object())?.tiled_chart(layout)?;
+        let chart = Arc::new(chart.of_side(receiver.side()));
+        if tiled.len() >= MOST_TILED_CHARTS {
+            tiled.remove(0);
+        }
+        tiled.push(Arc::clone(&chart));
+        Some(chart)
+    }
+
+    /// How often the map of a receiver doubles from its first size until texels are no larger than the mean footprint
+    /// (section 3.1.1 of the paper), or a side has so many texels. `None` where no footprint was seen.
+    pub fn doublings(
+        &self,
+        receiver: Receiver,
+        statistics: &FootprintStatistics,
+        largest_side: usize,
+    ) -> Option<u32> {
+        let share = statistics.mean(receiver)?.map_share;
+        let (width, height) = first_size(self.parametrisation(receiver.object())?.suggested_aspect);
         let coarse = |times: u32| ((width * height) << (2 * times)) as f64 * share < 1.0;
-        let small = |times: u32| width.max(height) << times < LARGEST_AUTOMATIC_SIDE;
+        let small = |times: u32| width.max(height) << times < largest_side;
         (0..).find(|&times| !(coarse(times) && small(times)))
     }
 
@@ -97,6 +197,15 @@ impl MapSizes {
     pub fn doubled_size(&self, object: usize, times: u32) -> Option<(usize, usize)> {
         let (width, height) = first_size(self.parametrisation(object)?.suggested_aspect);
         Some((width << times, height << times))
+    }
+
+    /// How often a map of a size can be halved until direct light on it would be coarser than on one that holds nothing
+    /// else.
+    pub fn direct_halvings(&self, object: usize, size: (usize, usize), settings: &BakeSettings) -> u32 {
+        let Some((width, height)) = self.direct_size(object, settings) else {
+            return 0;
+        };
+        (size.0 / width).min(size.1 / height).checked_ilog2().unwrap_or(0)
     }
 
     /// The size of a map that holds direct light only: texels of a 400th of the scene's diagonal, or what is asked.
@@ -112,32 +221,52 @@ impl MapSizes {
         let aspect = parametrisation.suggested_aspect;
         Some((side((texels * aspect).sqrt()), side((texels / aspect).sqrt())))
     }
+
+    /// The sizes of the grids that indirect light goes between, by receiver: texels of twice those of direct light or of
+    /// the maps that are asked for, larger where there would be more than `most_texels` of them.
+    pub fn grid_sizes(&self, settings: &BakeSettings, most_texels: u64) -> Vec<(Receiver, (usize, usize))> {
+        let automatic = BakeSettings {
+            map_resolution: MapResolution::Auto,
+            ..settings.clone()
+        };
+        let fine: Vec<(Receiver, (usize, usize))> = Receiver::all(self.scene.objects.len())
+            .filter(|&receiver| self.may_see_lights(receiver))
+            .filter_map(|receiver| Some((receiver, self.direct_size(receiver.object(), &automatic)?)))
+            .collect();
+        let most_side = match settings.map_resolution {
+            MapResolution::Auto => (usize::MAX, usize::MAX),
+            MapResolution::Fixed { width, height } => (width, height),
+        };
+        let halved = |times: u32| -> Vec<(Receiver, (usize, usize))> {
+            let side = |side: usize, most: usize| {
+                let least = (LEAST_GRID_SIDE >> (times - 1)).max(1);
+                (side >> times).max(least).min(most)
+            };
+            let size = |&(receiver, (width, height)): &(Receiver, (usize, usize))| {
+                (receiver, (side(width, most_side.0), side(height, most_side.1)))
+            };
+            fine.iter().map(size).collect()
+        };
+        let texels = |sizes: &[(Receiver, (usize, usize))]| -> u64 {
+            sizes
+                .iter()
+                .map(|(_, (width, height))| (width * height) as u64)
+                .sum()
+        };
+        // At eleven halvings every grid is a single texel.
+        (1..12)
+            .map(halved)
+            .find(|sizes| texels(sizes) <= most_texels)
+            .unwrap_or_else(|| halved(12))
+    }
 }
+
+/// Least side of a grid of indirect light, where there is room for it [texels].
+const LEAST_GRID_SIDE: usize = 8;
 
 /// A map of about FIRST_SIDE² texels whose sides have a power of two between them, at most 8:1.
 pub fn first_size(aspect: f64) -> (usize, usize) {
     let steps = aspect.log2().round().clamp(-3.0, 3.0) as i32;
     let stretch = |steps: i32| FIRST_SIDE << steps.max(0);
     (stretch(steps), stretch(-steps))
-}
-
-/// Refuses maps that do not fit.
-///
-/// # Errors
-/// Names the need and the limit.
-pub fn check_memory(texels: u64, settings: &BakeSettings) -> Result<()> {
-    let need = texels.saturating_mul(BYTES_PER_TEXEL);
-    if need <= settings.memory_bytes {
-        return Ok(());
-    }
-    let mebibytes = |bytes: u64| bytes.div_ceil(1 << 20);
-    Err(Error::failure(
-        "--memory",
-        format!(
-            "the maps need {} MiB, the limit is {} MiB",
-            mebibytes(need),
-            mebibytes(settings.memory_bytes)
-        ),
-        "ask for a smaller --map-resolution or allow more --memory",
-    ))
 }

@@ -8,9 +8,12 @@ use rayon::prelude::*;
 
 use super::caustic::{CausticLayer, Climb, Course};
 use super::level_plan;
-use super::light_level::{KeptError, LevelKey, LightLevel, LightState, Sizes, SoftParts};
+use super::light_level::{KeptError, LevelKey, LightLevel, LightState, SoftParts};
+use super::map_size::{MapSize, Sizes};
+use super::wavefront_level::take_strays;
 use crate::error::{Error, Result};
 use crate::geometry::sampling::even_point;
+use crate::illumination::Receiver;
 use crate::illumination::accumulator::FluxUnit;
 use crate::light_pass::accuracy::{self, LightError};
 use crate::light_pass::caustic::pass::{PassReport, Seconds, Stopwatch};
@@ -278,6 +281,7 @@ impl CausticLayer<'_> {
             course.outcome.meter.places.deposits += report.deposits.transmitted + report.deposits.reflected;
         }
         let mut ledger = report.ledger;
+        take_strays(&mut maps, &mut ledger);
         if let Some(same) = same {
             maps.add(same.maps.clone());
             ledger.merge(&same.ledger);
@@ -311,11 +315,7 @@ impl CausticLayer<'_> {
         course: &Course,
     ) -> (PassReport, ReceiverMaps) {
         let count = wavefronts.len();
-        let texels: u64 = key
-            .sizes
-            .values()
-            .map(|&(width, height)| (width * height) as u64)
-            .sum();
+        let texels: u64 = key.sizes.values().map(MapSize::texels).sum();
         // Each task has maps of its own.
         let room = self.settings.memory_bytes / 4 / (texels * super::BYTES_PER_TEXEL).max(1);
         let tasks = rayon::current_num_threads()
@@ -323,7 +323,7 @@ impl CausticLayer<'_> {
             .min((room as usize).max(1))
             .max(1);
         let done = std::sync::atomic::AtomicU64::new(0);
-        let chart_for = |object: usize| self.chart(object, &key.sizes);
+        let chart_for = |receiver: Receiver| self.chart(receiver, &key.sizes);
         let receivers = Receivers::new(self.tracer, &chart_for);
         let lit = (&receivers, &chart_for as &ChartFor);
         let parts: Vec<(PassReport, ReceiverMaps)> = (0..tasks)

@@ -2,6 +2,7 @@
 
 use super::caustic::{CausticLayer, Course};
 use super::light_level::{LevelKey, LightLevel, LightState, SoftParts, TraceKey};
+use crate::illumination::Receiver;
 use crate::illumination::accumulator::FluxUnit;
 use crate::light_pass::accuracy::{self, Images};
 use crate::light_pass::caustic::deposit::{Depositor, Halves};
@@ -96,7 +97,7 @@ impl CausticLayer<'_> {
             done: course.outcome.counts.rays,
             total: lattice.ray_count(),
         };
-        let chart_for = |object: usize| self.chart(object, &key.sizes);
+        let chart_for = |receiver: Receiver| self.chart(receiver, &key.sizes);
         pass::run(&depositor, source, halves, &chart_for, &listener)
     }
 
@@ -177,9 +178,9 @@ impl CausticLayer<'_> {
             done: 0,
             total: 0,
         };
-        let chart_for = |object: usize| {
-            let aspect = self.sizes.parametrisation(object)?.suggested_aspect;
-            self.sizes.chart(object, super::sizes::first_size(aspect))
+        let chart_for = |receiver: Receiver| {
+            let aspect = self.sizes.parametrisation(receiver.object())?.suggested_aspect;
+            self.sizes.chart(receiver, super::sizes::first_size(aspect))
         };
         let mut maps = self.no_maps();
         let mut all = Halves {

@@ -4,10 +4,12 @@ use glam::DVec2;
 
 use super::caustic::{CausticLayer, Course};
 use super::light_level::{LevelKey, LightLevel, LightState, SoftParts, TraceKey};
+use crate::illumination::Receiver;
 use crate::illumination::accumulator::FluxUnit;
 use crate::light_pass::caustic::pass::{Listener, PassReport};
 use crate::light_pass::caustic::setup::AimedLight;
 use crate::light_pass::caustic::statistics::FootprintStatistics;
+use crate::light_pass::ledger_sum::{Account, LedgerSum};
 use crate::light_pass::receiver_maps::{ChartFor, ReceiverMaps};
 use crate::light_pass::wavefront::bodies::SmallBodies;
 use crate::light_pass::wavefront::bumps::BumpCells;
@@ -31,7 +33,7 @@ impl CausticLayer<'_> {
         state: &mut LightState,
         course: &mut Course,
     ) -> Option<LightLevel> {
-        let chart_for = |object: usize| self.chart(object, &key.sizes);
+        let chart_for = |receiver: Receiver| self.chart(receiver, &key.sizes);
         let receivers = Receivers::new(self.tracer, &chart_for);
         let refinement = Refinement {
             receivers: &receivers,
@@ -62,6 +64,8 @@ impl CausticLayer<'_> {
             ),
             None => depositor.run(&mut state.rays, Some(&mut maps), &listener, self.room()),
         };
+        let mut report = report;
+        take_strays(&mut maps, &mut report.ledger);
         course.outcome.count(&report, course.clock);
         (!report.cancelled).then_some(LightLevel {
             key,
@@ -112,7 +116,8 @@ impl CausticLayer<'_> {
         state: &mut LightState,
         course: &mut Course,
     ) -> FootprintStatistics {
-        let chart_for: &ChartFor = &|object: usize| self.sizes.chart(object, self.default_size(object)?);
+        let chart_for: &ChartFor =
+            &|receiver: Receiver| self.sizes.chart(receiver, self.first_size(receiver.object())?);
         let receivers = Receivers::new(self.tracer, chart_for);
         let none = SmallBodies::default();
         let size = self.statistics_size(light);
@@ -217,6 +222,13 @@ impl CausticLayer<'_> {
             bodies,
         }
     }
+}
+
+/// Light on maps that next to none of it reaches is none that was traced: it is given up, and booked.
+pub(super) fn take_strays(maps: &mut ReceiverMaps, ledger: &mut LedgerSum) {
+    let strays = maps.take_strays();
+    ledger.book_sum(Account::Deposited, strays.map(|count| -count));
+    ledger.book_sum(Account::Unresolved, strays);
 }
 
 /// Flux that a light of unit strength sends to marked cells [W].

@@ -59,7 +59,9 @@ impl Agreement {
 pub fn pair_maps(maps: &[IlluminationMap], references: &[IlluminationMap]) -> Option<Vec<TexelPair>> {
     let mut pairs = Vec::new();
     let counterpart = |of: &IlluminationMap, among: &'_ [IlluminationMap]| {
-        among.iter().position(|map| map.chart.object == of.chart.object)
+        among
+            .iter()
+            .position(|map| map.chart.receiver == of.chart.receiver)
     };
     for map in maps {
         let reference = counterpart(map, references).map(|index| &references[index]);
@@ -74,9 +76,9 @@ pub fn pair_maps(maps: &[IlluminationMap], references: &[IlluminationMap]) -> Op
     Some(pairs)
 }
 
-/// Luminance of the caustic layer per texel [W/m²]; zero where the layer was not baked.
+/// Luminance of the caustic layer per texel [W/m²], row by row; zero where the layer was not baked.
 pub fn caustic_luminance(map: &IlluminationMap) -> Vec<f64> {
-    match map.layer(LayerKind::Caustic) {
+    match map.dense().layer(LayerKind::Caustic) {
         Some(layer) => layer
             .irradiance
             .iter()
@@ -98,6 +100,7 @@ fn pair(
         None => Some(vec![0.0; size.0 * size.1]),
     };
     let (image, reference) = (values(image)?, values(reference)?);
+    let of = of.dense();
     let texels = image.into_iter().zip(reference).enumerate();
     let covered = texels.filter_map(|(texel, (image, reference))| {
         let area_m2 = of.chart.texel_area_m2(texel);

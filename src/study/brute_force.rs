@@ -16,8 +16,8 @@ use rayon::prelude::*;
 use crate::error::{Error, Result};
 use crate::illumination::accumulator::{FluxCount, FluxUnit};
 use crate::illumination::gutter::fill_gutter;
-use crate::illumination::parametrisation::{DEFAULT_NOMINAL_SIDE, parametrise};
-use crate::illumination::{Chart, IlluminationMap, Layer};
+use crate::illumination::parametrisation::parametrise;
+use crate::illumination::{Chart, IlluminationMap, Layer, Receiver};
 use crate::light_pass::caustic::pass::Stopwatch;
 use crate::light_pass::caustic::path::{Arrival, PathLimits, PathTracer};
 use crate::light_pass::caustic::setup::{Aim, AimedLight, Aiming};
@@ -351,7 +351,7 @@ impl Run<'_> {
 
     /// Adds flux to the texel that an arrival hits; the account that it belongs to.
     fn deposit(&self, half: usize, arrival: &Arrival, count: FluxCount) -> Account {
-        match &self.targets[arrival.object as usize] {
+        match &self.targets[arrival.receiver.index()] {
             Some(target) if target.add(half, arrival, count) => Account::Deposited,
             _ => Account::Unresolved,
         }
@@ -417,16 +417,18 @@ impl Target {
 
 /// Empty maps of all surfaces that take light.
 fn targets(scene: &Scene, (width, height): (usize, usize)) -> Vec<Option<Target>> {
-    (0..scene.objects.len())
+    let receivers: Vec<Receiver> = Receiver::all(scene.objects.len()).collect();
+    receivers
         .into_par_iter()
-        .map(|object| {
+        .map(|receiver| {
+            let object = receiver.object();
             if !scene.material_of(object).surface.is_receiver() {
                 return None;
             }
-            let parametrisation = parametrise(object, &scene.objects[object].mesh, DEFAULT_NOMINAL_SIDE)?;
+            let parametrisation = parametrise(object, &scene.objects[object].mesh, width.min(height))?;
             let empty = || (0..width * height).map(|_| Default::default()).collect();
             Some(Target {
-                chart: Arc::new(parametrisation.chart(width, height)),
+                chart: Arc::new(parametrisation.chart(width, height).of_side(receiver.side())),
                 halves: [empty(), empty()],
             })
         })

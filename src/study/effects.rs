@@ -141,7 +141,7 @@ pub fn measure(
 fn forced(settings: &BakeSettings) -> EffectSwitches {
     let has_caustics = settings.layers.contains(&LayerKind::Caustic);
     let keeps_switch = |effect: &Effect| match effect {
-        Effect::Direct => true,
+        Effect::Direct | Effect::Indirect => true,
         Effect::LightPass if !has_caustics => true,
         _ => settings.effects.get(*effect) == EffectSwitch::Off,
     };
@@ -234,11 +234,13 @@ fn picture(scene: &Scene, found: &Difference) -> Option<DifferencePicture> {
             texels.map(|texel| map.chart.texel_area_m2(texel)).sum()
         };
         let by_area = || area_m2(a).total_cmp(&area_m2(b));
-        texels(a).cmp(&texels(b)).then_with(by_area)
+        // Both sides of a sheet are as large: its front.
+        let is_first = || b.chart.receiver.cmp(&a.chart.receiver);
+        texels(a).cmp(&texels(b)).then_with(by_area).then_with(is_first)
     })?;
     let rgba = difference_colours::of_map(map).flat_map(|[r, g, b]| [r, g, b, u8::MAX]);
     Some(DifferencePicture {
-        surface: scene.objects[map.chart.object].name.clone(),
+        surface: scene.objects[map.chart.object()].name.clone(),
         // Sides are at most 16384.
         width: map.chart.width as u32,
         height: map.chart.height as u32,

@@ -6,6 +6,7 @@ use crate::export::pfm;
 use crate::illumination::IlluminationMap;
 use crate::illumination::compare::{Grid, at_common_size};
 use crate::scene::Scene;
+use crate::settings::LayerKind;
 
 /// Built-in scenes with an analytic map of their floor, by an independent solver (`assets/SOURCES.md`).
 const ANALYTIC: [(&str, &str, &[u8]); 7] = [
@@ -154,7 +155,11 @@ fn only_receiver(scene: &Scene) -> Option<usize> {
 
 /// A surface that received nothing is dark.
 fn pair_with_grid(maps: &[IlluminationMap], object: usize, grid: &Grid) -> Option<Vec<TexelPair>> {
-    let image = maps.iter().find(|map| map.chart.object == object).map_or_else(
+    // Files may wind a floor either way: the reference is of the side that the light comes to.
+    let sides = maps.iter().filter(|map| map.chart.object() == object);
+    let flux_w = |map: &IlluminationMap| map.flux_w(LayerKind::Caustic).luminance();
+    let lit = sides.max_by(|a, b| flux_w(a).total_cmp(&flux_w(b)));
+    let image = lit.map_or_else(
         || Grid {
             values: vec![0.0; grid.values.len()],
             ..*grid

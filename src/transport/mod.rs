@@ -10,6 +10,7 @@ pub mod medium;
 pub mod microfacets;
 mod normal_texture;
 pub mod smoothing;
+mod surroundings;
 pub mod tracer;
 
 pub use differential::{RayDerivative, RayDifferential, SurfaceDetail, SurfaceScale};
@@ -17,4 +18,5 @@ pub use effects::{EffectSet, Everything, ForEffects, PathCounts, PathEffects, Sp
 pub use interaction::{Branch, Event, Interaction, TurnedBy};
 pub use medium::MediumStack;
 pub use microfacets::Microfacets;
+pub use surroundings::media_at;
 pub use tracer::{HitPlace, SurfaceHit, Tracer};

@@ -1,6 +1,6 @@
 //! Finds the next surface of a scene.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
@@ -12,7 +12,7 @@ use super::normal_texture::{TextureBump, texel_m};
 use super::smoothing::smoothing_groups;
 use crate::geometry::{Ray, TriangleBvh, ray};
 use crate::optics::LinearSrgb;
-use crate::scene::{Scene, SurfaceKind, Waves};
+use crate::scene::{Adjacency, Mesh, Scene, SurfaceKind, TextureRef, Waves};
 
 /// A scene with its hierarchy. What edits of the scene leave as it is, edited copies share.
 #[derive(Debug)]
@@ -23,6 +23,8 @@ pub struct Tracer {
     specular: Vec<Option<Arc<SpecularShape>>>,
     /// Whether waves and textures bend normals.
     has_bumps: bool,
+    /// Whether anything is cut out of a surface.
+    has_masks: bool,
 }
 
 /// The hierarchy over all triangles of a scene.
@@ -31,6 +33,8 @@ struct Hierarchy {
     bvh: TriangleBvh,
     /// Object and triangle within it, by the hierarchy's triangle index.
     triangles: Vec<(u32, u32)>,
+    /// How the triangles of each object hang together, found when it is asked for.
+    adjacencies: Vec<OnceLock<Adjacency>>,
 }
 
 /// What is known of the shape of a specular object.
@@ -59,6 +63,7 @@ impl Hierarchy {
         Self {
             bvh: TriangleBvh::build(&corners),
             triangles,
+            adjacencies: scene.objects.iter().map(|_| OnceLock::new()).collect(),
         }
     }
 }
@@ -118,6 +123,7 @@ impl Tracer {
             .map(|object| Self::specular_shape(&scene, object))
             .collect();
         Self {
+            has_masks: has_masks(&scene),
             scene,
             hierarchy,
             specular,
@@ -151,6 +157,7 @@ impl Tracer {
             })
             .collect();
         Self {
+            has_masks: has_masks(&scene),
             scene,
             hierarchy,
             specular,
@@ -166,6 +173,7 @@ impl Tracer {
             hierarchy: Arc::clone(&self.hierarchy),
             specular: self.specular.clone(),
             has_bumps: false,
+            has_masks: self.has_masks,
         }
     }
 
@@ -205,6 +213,11 @@ impl Tracer {
             .unwrap_or(0)
     }
 
+    /// How the triangles of an object hang together.
+    pub fn adjacency(&self, object: usize) -> &Adjacency {
+        self.hierarchy.adjacencies[object].get_or_init(|| Adjacency::of(&self.scene.objects[object].mesh))
+    }
+
     /// The scene.
     pub fn scene(&self) -> &Arc<Scene> {
         &self.scene
@@ -222,7 +235,12 @@ impl Tracer {
 
     /// Where the nearest surface in front of the ray's origin is met.
     pub fn closest_place(&self, ray: &Ray) -> Option<HitPlace> {
-        let hit = self.hierarchy.bvh.closest_hit(ray)?;
+        let bvh = &self.hierarchy.bvh;
+        let hit = if self.has_masks {
+            bvh.closest_hit_where(ray, |triangle, barycentric| self.is_there(triangle, barycentric))?
+        } else {
+            bvh.closest_hit(ray)?
+        };
         let (object, triangle) = self.hierarchy.triangles[hit.triangle as usize];
         Some(HitPlace {
             object,
@@ -306,7 +324,27 @@ impl Tracer {
 
     /// Whether any surface lies on the ray before `distance_m`.
     pub fn is_blocked(&self, ray: &Ray, distance_m: f64) -> bool {
-        self.hierarchy.bvh.is_blocked(ray, distance_m)
+        let bvh = &self.hierarchy.bvh;
+        if self.has_masks {
+            bvh.is_blocked_where(ray, distance_m, |triangle, at| self.is_there(triangle, at))
+        } else {
+            bvh.is_blocked(ray, distance_m)
+        }
+    }
+
+    /// Whether a surface is there at a place of the hierarchy's triangle, or cut out.
+    fn is_there(&self, triangle: u32, barycentric: [f64; 3]) -> bool {
+        let (object, triangle) = self.hierarchy.triangles[triangle as usize];
+        let object = &self.scene.objects[object as usize];
+        let material = &self.scene.materials[object.material];
+        let Some(mask) = &material.alpha_mask else {
+            return true;
+        };
+        let placed = material.base_colour_texture.as_ref().and_then(|reference| {
+            let uv = texture_uv(&object.mesh, reference, triangle as usize, barycentric)?;
+            Some((&*self.scene.textures[reference.texture], uv))
+        });
+        mask.is_there(placed)
     }
 
     /// Whether light that goes on from an object is tinted by a texture.
@@ -326,20 +364,29 @@ impl Tracer {
         let Some(reference) = &material.base_colour_texture else {
             return material.base_colour;
         };
-        let set = if reference.uv_set == 0 {
-            &object.mesh.uv0
-        } else {
-            &object.mesh.uv1
-        };
-        let Some(uvs) = set else {
-            return material.base_colour;
-        };
-        let uv = object.mesh.triangles[hit.triangle]
-            .iter()
-            .zip(hit.barycentric)
-            .fold(DVec2::ZERO, |sum, (&vertex, weight)| {
-                sum + uvs[vertex as usize] * weight
-            });
-        material.base_colour * self.scene.textures[reference.texture].sample(reference.transform(uv))
+        match texture_uv(&object.mesh, reference, hit.triangle, hit.barycentric) {
+            Some(uv) => material.base_colour * self.scene.textures[reference.texture].sample(uv),
+            None => material.base_colour,
+        }
     }
+}
+
+/// Where a texture is looked up at a place of a triangle; `None` where the mesh lacks its coordinates.
+fn texture_uv(mesh: &Mesh, reference: &TextureRef, triangle: usize, barycentric: [f64; 3]) -> Option<DVec2> {
+    let uvs = if reference.uv_set == 0 {
+        &mesh.uv0
+    } else {
+        &mesh.uv1
+    }
+    .as_ref()?;
+    let corners = mesh.triangles[triangle].iter().zip(barycentric);
+    let uv = corners.fold(DVec2::ZERO, |sum, (&vertex, weight)| {
+        sum + uvs[vertex as usize] * weight
+    });
+    Some(reference.transform(uv))
+}
+
+fn has_masks(scene: &Scene) -> bool {
+    let mut objects = 0..scene.objects.len();
+    objects.any(|object| scene.material_of(object).alpha_mask.is_some())
 }

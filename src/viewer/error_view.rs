@@ -70,7 +70,7 @@ fn mean_luminance(map: &IlluminationMap) -> f64 {
         .iter()
         .map(|layer| map.flux_w(layer.kind).luminance())
         .sum();
-    let texels = map.width() * map.height();
+    let texels = map.chart.texel_count();
     let area_m2: f64 = (0..texels).map(|texel| map.chart.texel_area_m2(texel)).sum();
     if area_m2 > 0.0 { flux_w / area_m2 } else { 0.0 }
 }

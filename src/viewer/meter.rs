@@ -14,7 +14,13 @@ pub(super) struct Meter {
     packed: AtomicU64,
 }
 
-const STAGES: [Stage; 4] = [Stage::Build, Stage::Plan, Stage::Caustic, Stage::Direct];
+const STAGES: [Stage; 5] = [
+    Stage::Build,
+    Stage::Plan,
+    Stage::Caustic,
+    Stage::Direct,
+    Stage::Indirect,
+];
 const WHOLE: f64 = (1_u64 << 31) as f64;
 
 impl Meter {

@@ -135,7 +135,10 @@ impl Model {
     /// Whether direct light is to be traced and not looked up: it is shown, and its layer is not baked yet, or a light or
     /// an object was moved since.
     pub fn traces_lights(&self) -> bool {
-        let shown = self.panel.display.layer != LayerShown::Only(LayerKind::Caustic);
+        let shown = matches!(
+            self.panel.display.layer,
+            LayerShown::All | LayerShown::Only(LayerKind::Direct)
+        );
         let Some(last) = self
             .last
             .as_ref()
@@ -166,7 +169,7 @@ impl Model {
         // Until the next maps come, an edit may have made a receiver clear, or a mirror.
         let receives = |map: &&IlluminationMap| {
             let scene = self.scene();
-            let object = scene.objects.get(map.chart.object);
+            let object = scene.objects.get(map.chart.object());
             object.is_none_or(|object| scene.materials[object.material].surface.is_receiver())
         };
         let in_colours = match self.quantity() {

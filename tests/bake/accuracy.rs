@@ -43,7 +43,7 @@ fn true_error(result: &BakeResult, truth: &BakeResult) -> f64 {
         let found = result
             .maps
             .iter()
-            .find(|found| found.chart.object == map.chart.object);
+            .find(|found| found.chart.receiver == map.chart.receiver);
         let values: Vec<f64> = match found {
             Some(found) => luminance(found).collect(),
             None => vec![0.0; map.width() * map.height()],

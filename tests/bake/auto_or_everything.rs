@@ -139,7 +139,7 @@ fn random_scene(seed: u64) -> Scene {
 /// Σ|E₁ − E₂|·A [W] over all maps; a map that one of them lacks counts as black.
 fn difference_w(a: &BakeResult, b: &BakeResult, objects: usize) -> f64 {
     let texels = |result: &BakeResult, object: usize| -> Option<Vec<f64>> {
-        let map = result.maps.iter().find(|map| map.chart.object == object)?;
+        let map = result.maps.iter().find(|map| map.chart.object() == object)?;
         let layer = map.layer(LayerKind::Caustic)?;
         let luminance = |(texel, e): (usize, &[f32; 3])| {
             LinearSrgb::from(e.map(f64::from)).luminance() * map.chart.texel_area_m2(texel)
@@ -186,7 +186,9 @@ fn compare(seed: u64, estimator: Estimator) -> Outcome {
     let forced = bake(
         scene.clone(),
         &BakeSettings {
-            effects: EffectSwitches::all_on().with(Effect::Direct, EffectSwitch::Auto),
+            effects: EffectSwitches::all_on()
+                .with(Effect::Direct, EffectSwitch::Auto)
+                .with(Effect::Indirect, EffectSwitch::Auto),
             ..settings
         },
     );

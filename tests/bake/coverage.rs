@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::DVec2;
 use nephroid::illumination::accumulator::{FluxAccumulator, FluxCount};
-use nephroid::illumination::{Chart, UvSet};
+use nephroid::illumination::{Chart, Receiver, UvSet};
 use nephroid::light_pass::receiver_maps::ReceiverMaps;
 use nephroid::light_pass::wavefront::coverage::{CoverageReport, FluxTriangle, deposit_triangles};
 use proptest::prelude::*;
@@ -28,19 +28,22 @@ fn grey(corners: [[f64; 2]; 3]) -> FluxTriangle {
 fn full_chart((width, height): (usize, usize)) -> Chart {
     let [a, b, c, d] = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(DVec2::from);
     Chart {
-        object: 0,
+        receiver: Receiver::front(0),
         uv_set: UvSet::Generated,
         corner_uvs: vec![[a, b, c], [a, c, d]],
         width,
         height,
         texel_areas_m2: vec![1.0],
+        layout: None,
+        beyond: Vec::new(),
+        joints: Vec::new(),
     }
 }
 
 fn deposit_on(chart: Chart, triangles: &[FluxTriangle]) -> (FluxAccumulator, CoverageReport) {
     let mut maps = ReceiverMaps::new(1);
-    maps.touch(0, &|_| Some(Arc::new(chart.clone())));
-    let map = maps.get_mut(0).expect("a map");
+    maps.touch(Receiver::front(0), &|_| Some(Arc::new(chart.clone())));
+    let map = maps.get_mut(Receiver::front(0)).expect("a map");
     let report = deposit_triangles(triangles, map);
     let flux = map.flux();
     check_sums(triangles, &flux, &report);
@@ -440,8 +443,8 @@ fn neither_threads_nor_calls_nor_order_change_a_count() {
             assert!(flux == expected && other == report, "{threads} threads");
         }
         let mut maps = ReceiverMaps::new(1);
-        maps.touch(0, &|_| Some(Arc::new(chart.clone())));
-        let map = maps.get_mut(0).expect("a map");
+        maps.touch(Receiver::front(0), &|_| Some(Arc::new(chart.clone())));
+        let map = maps.get_mut(Receiver::front(0)).expect("a map");
         let mut sum = CoverageReport::default();
         triangles.reverse();
         for part in triangles.chunks(997) {
@@ -468,14 +471,17 @@ fn gappy_chart((width, height): (usize, usize)) -> Chart {
         3.0 * column < width as f64 || 3.0 * (column + 1.0) > 2.0 * width as f64
     };
     Chart {
-        object: 0,
+        receiver: Receiver::front(0),
         uv_set: UvSet::Generated,
         corner_uvs: [third(0.0), third(2.0 / 3.0)].concat(),
         width,
         height,
+        layout: None,
         texel_areas_m2: (0..width * height)
             .map(|texel| f64::from(u8::from(covered(texel))))
             .collect(),
+        beyond: Vec::new(),
+        joints: Vec::new(),
     }
 }
 

@@ -35,7 +35,7 @@ fn all_bits(result: &BakeResult) -> Vec<(usize, Vec<u32>)> {
     result
         .maps
         .iter()
-        .map(|map| (map.chart.object, bits(map)))
+        .map(|map| (map.chart.object(), bits(map)))
         .collect()
 }
 
@@ -111,24 +111,6 @@ fn effects_that_are_off_take_nothing_and_those_that_are_on_change_the_maps() {
     }
 }
 
-#[test]
-fn the_indirect_layer_is_refused_with_what_to_do() {
-    let refused = [
-        BakeSettings {
-            layers: vec![LayerKind::Indirect],
-            ..BakeSettings::default()
-        },
-        BakeSettings {
-            effects: EffectSwitches::default().with(Effect::Indirect, EffectSwitch::On),
-            ..BakeSettings::default()
-        },
-    ];
-    for settings in refused {
-        let sentence = settings.validate().expect_err("not available").to_string();
-        assert!(sentence.contains("not available in this version"), "{sentence}");
-    }
-}
-
 /// Forced on, an effect that nothing calls for runs its code and changes no bit.
 #[test]
 fn forcing_on_what_nothing_calls_for_changes_no_bit() {
@@ -158,7 +140,9 @@ fn forcing_on_what_nothing_calls_for_changes_no_bit() {
 fn forced_on(settings: &BakeSettings) -> BakeSettings {
     BakeSettings {
         // The direct layer is a layer of its own.
-        effects: EffectSwitches::all_on().with(Effect::Direct, EffectSwitch::Auto),
+        effects: EffectSwitches::all_on()
+            .with(Effect::Direct, EffectSwitch::Auto)
+            .with(Effect::Indirect, EffectSwitch::Auto),
         ..settings.clone()
     }
 }

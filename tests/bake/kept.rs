@@ -26,8 +26,8 @@ fn assert_same(a: &BakeResult, b: &BakeResult, what: &str) {
     assert_eq!(a.maps.len(), b.maps.len(), "{what}");
     for (a, b) in a.maps.iter().zip(&b.maps) {
         assert_eq!(
-            (a.chart.object, a.chart.width, a.chart.height),
-            (b.chart.object, b.chart.width, b.chart.height),
+            (a.chart.receiver, a.chart.width, a.chart.height),
+            (b.chart.receiver, b.chart.width, b.chart.height),
             "{what}"
         );
         for (a, b) in a.layers.iter().zip(&b.layers) {

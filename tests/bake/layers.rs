@@ -114,7 +114,7 @@ fn maps_made_coarser_for_memory_say_so() {
     let [warning] = &scarce.warnings[..] else {
         panic!("{:?}", scarce.warnings)
     };
-    assert_eq!(warning.location, "floor");
+    assert_eq!(warning.location, "--memory");
     assert!(warning.remedy.contains("--memory"), "{warning}");
 }
 
@@ -134,7 +134,7 @@ fn each_light_has_its_part_of_each_layer_where_that_is_asked_for() {
         let parts: Vec<_> = result
             .light_layers
             .iter()
-            .filter(|part| part.object == map.chart.object && part.kind == layer.kind)
+            .filter(|part| part.receiver == map.chart.receiver && part.kind == layer.kind)
             .collect();
         assert_eq!(parts.iter().map(|part| part.light).collect::<Vec<_>>(), [0, 1]);
         for (texel, whole) in layer.irradiance.iter().enumerate() {
@@ -175,7 +175,7 @@ fn each_light_has_its_part_of_each_layer_where_that_is_asked_for() {
     let part = result
         .light_layers
         .iter()
-        .find(|part| part.light == 1 && part.object == map.chart.object);
+        .find(|part| part.light == 1 && part.receiver == map.chart.receiver);
     let expected: Vec<f32> = part
         .expect("a part")
         .irradiance

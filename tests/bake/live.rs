@@ -54,8 +54,8 @@ fn difference(a: &BakeResult, b: &BakeResult) -> Option<String> {
             let bits = |e: &Vec<f32>| e.iter().map(|e| e.to_bits()).collect::<Vec<_>>();
             map.error.as_ref().map(bits)
         };
-        let object = a.chart.object;
-        let same = object == b.chart.object
+        let object = a.chart.object();
+        let same = object == b.chart.object()
             && (a.width(), a.height()) == (b.width(), b.height())
             && a.layers.len() == b.layers.len()
             && bits(a) == bits(b);

@@ -69,7 +69,7 @@ pub fn store(scene: &Scene, rays: u64) {
     let folder = project_file(FOLDER);
     let mut maps = BTreeMap::new();
     for map in &result.maps {
-        let surface = &scene.objects[map.chart.object].name;
+        let surface = &scene.objects[map.chart.object()].name;
         let file = format!("{}_{}.pfm", scene.name, surface.replace(' ', "_"));
         let mut bytes = format!("Pf\n{SIDE} {SIDE}\n-1.0\n").into_bytes();
         for value in caustic_luminance(map) {

@@ -49,7 +49,7 @@ pub fn map_of<'a>(result: &'a BakeResult, scene: &Scene, name: &str) -> &'a Illu
     result
         .maps
         .iter()
-        .find(|map| scene.objects[map.chart.object].name == name)
+        .find(|map| scene.objects[map.chart.object()].name == name)
         .unwrap_or_else(|| panic!("{name} received no light"))
 }
 

@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use cpu_time::ProcessTime;
 use glam::DVec2;
-use nephroid::illumination::{Chart, UvSet};
+use nephroid::illumination::{Chart, Receiver, UvSet};
 use nephroid::light_pass::receiver_maps::{ReceiverMap, ReceiverMaps};
 use nephroid::light_pass::wavefront::coverage::{FluxTriangle, deposit_triangles};
 
@@ -52,12 +52,15 @@ fn triangles(area: f64, grey: bool) -> Vec<FluxTriangle> {
 fn chart() -> Chart {
     let [a, b, c, d] = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(DVec2::from);
     Chart {
-        object: 0,
+        receiver: Receiver::front(0),
         uv_set: UvSet::Generated,
         corner_uvs: vec![[a, b, c], [a, c, d]],
         width: SIDE,
         height: SIDE,
         texel_areas_m2: vec![1.0],
+        layout: None,
+        beyond: Vec::new(),
+        joints: Vec::new(),
     }
 }
 
@@ -79,8 +82,8 @@ fn measure(triangles: &[FluxTriangle], map: &mut ReceiverMap) -> [f64; 2] {
 
 fn main() {
     let mut maps = ReceiverMaps::new(1);
-    maps.touch(0, &|_| Some(Arc::new(chart())));
-    let map = maps.get_mut(0).expect("a map");
+    maps.touch(Receiver::front(0), &|_| Some(Arc::new(chart())));
+    let map = maps.get_mut(Receiver::front(0)).expect("a map");
     println!("texels colour  threads  CPU ns  wall ns");
     for grey in [true, false] {
         for area in [0.3, 2.0, 10.0, 50.0] {

@@ -82,6 +82,9 @@ fn the_manifest_has_every_field() {
             "item_buffer_tests",
             "segments",
             "shadow_rays",
+            "gather_rays",
+            "gather_segments",
+            "bounces",
             "receiver_queries",
             "splats",
             "cells",
@@ -110,6 +113,8 @@ fn the_manifest_has_every_field() {
             "texel_area_m2",
             "units",
             "estimated_relative_rmse",
+            "memory_bytes",
+            "dense_bytes",
         ],
     );
     assert_eq!((&map["width"], &map["height"]), (&64.into(), &32.into()));

@@ -1,5 +1,8 @@
 //! Output folders: ours are replaced file by file, other people's are left alone.
 
+use nephroid::export::float_image::FloatImage;
+use nephroid::export::map_folder::MapFolder;
+
 use crate::program::Sandbox;
 
 const QUICK: &str = "--density 1e3 --map-resolution 16";
@@ -51,9 +54,24 @@ fn folders_are_made_with_their_parents_and_only_for_a_result() {
     let sandbox = Sandbox::new();
     sandbox.succeed(&format!("bake builtin:mirror -o a/b/c {QUICK}"));
     assert_eq!(sandbox.files("a/b/c"), ["manifest.json", "maps"]);
-    // Too little memory for the map: the bake fails after the folder was tried.
-    sandbox
-        .run("bake builtin:mirror -o x/y --map-resolution 16384 --memory 1M")
-        .failed_in_one_sentence(1, &["memory"]);
+    // A bake that fails writes nothing to the folder that it tried.
+    let folder = MapFolder::open(&sandbox.path("x/y"), false).expect("writable");
+    assert_eq!(sandbox.files("."), ["a", "x"]);
+    drop(folder);
     assert_eq!(sandbox.files("."), ["a"]);
+}
+
+#[test]
+fn files_are_as_large_as_they_are_asked_to_be_however_little_memory_there_is() {
+    let sandbox = Sandbox::new();
+    let found =
+        sandbox.succeed("bake builtin:mirror -o out --density 1e3 --map-resolution 600x500 --memory 1M");
+    assert!(found.stderr.contains("--memory"), "{}", found.stderr);
+    let map = &sandbox.manifest("out")["maps"][0];
+    assert_eq!((&map["width"], &map["height"]), (&600.into(), &500.into()));
+    let bytes = |name: &str| map[name].as_u64().expect("a number");
+    assert!(bytes("memory_bytes") <= 1 << 20 && bytes("dense_bytes") == 600 * 500 * 56);
+    let file = map["file"].as_str().expect("a name");
+    let image = FloatImage::read(&sandbox.path("out").join(file)).expect("an image");
+    assert_eq!((image.width, image.height), (600, 500));
 }

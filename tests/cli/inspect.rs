@@ -130,8 +130,6 @@ fn effects_that_are_switched_off_say_so() {
     );
     let refused = sandbox.run("inspect builtin:ball --effects refraction=sideways");
     refused.failed_in_one_sentence(2, &["auto, on or off"]);
-    let refused = sandbox.run("inspect builtin:ball --effects indirect=on");
-    refused.failed_in_one_sentence(2, &["not available in this version"]);
 }
 
 #[test]

@@ -42,6 +42,7 @@ impl Sandbox {
             .current_dir(self.folder.path())
             // Without it, libraries of the window system complain on stderr.
             .env("XDG_RUNTIME_DIR", self.folder.path())
+            .env("XDG_CACHE_HOME", self.folder.path().join("cache"))
             .stdin(Stdio::null());
         for display in ["DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET"] {
             command.env_remove(display);

@@ -70,9 +70,9 @@ fn studies_are_listed_and_have_to_be_named() {
         ("study effects builtin:ball -o out --repeat -1", "--repeat"),
         ("study effects builtin:ball -o out --max-time 1s", "--max-time"),
         ("study effects builtin:ball -o out --density -5", "--density"),
-        ("study effects builtin:ball -o out --layers indirect", "--layers"),
+        ("study effects builtin:ball -o out --layers ambient", "--layers"),
         (
-            "study effects builtin:ball -o out --effects indirect=on",
+            "study effects builtin:ball -o out --effects indirect=maybe",
             "indirect",
         ),
         (

@@ -61,7 +61,7 @@ fn bad_usage_is_one_sentence_and_exit_2() {
         ),
         ("bake builtin:ring -o out --threads 0", "--threads"),
         ("bake builtin:ring -o out --memory 0", "--memory"),
-        ("bake builtin:ring -o out --layers indirect", "--layers"),
+        ("bake builtin:ring -o out --layers ambient", "--layers"),
         ("bake builtin:ring -o out --kernel round", "--kernel"),
         (
             "bake builtin:ring -o out --estimator splat --kernel box --sigma 2",

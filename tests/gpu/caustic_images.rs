@@ -87,7 +87,7 @@ impl Lit {
         let maps = baked.expect("it bakes").maps;
         let map = maps
             .iter()
-            .find(|map| map.chart.object == FLOOR)
+            .find(|map| map.chart.object() == FLOOR)
             .expect("the floor");
         let irradiance = map.total();
         let by_light = |a: &usize, b: &usize| irradiance[*a][1].total_cmp(&irradiance[*b][1]);

@@ -92,6 +92,7 @@ fn two_halves(size: usize, gutter: usize) -> (Scene, [IlluminationMap; 1]) {
     let area = 1.0 / (half * size) as f64;
     let chart = Chart {
         corner_uvs: mesh.triangles.iter().map(corners).collect(),
+        layout: None,
         texel_areas_m2: columns()
             .map(|column| {
                 if is_left(column) || is_right(column) {

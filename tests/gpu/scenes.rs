@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use glam::{DMat3, DVec2, DVec3};
 use nephroid::eye_pass::{ToneMap, View};
-use nephroid::illumination::{Chart, IlluminationMap, Layer, UvSet};
+use nephroid::illumination::{Chart, IlluminationMap, Layer, Receiver, UvSet};
 use nephroid::optics::LinearSrgb;
 use nephroid::scene::texture::Wrap;
 use nephroid::scene::{Camera, Material, Mesh, Object, Scene, Texture, TextureRef};
@@ -53,7 +53,7 @@ pub fn floor_scene(material: Material) -> Scene {
 pub fn floor_map(object: usize, width: usize, height: usize, irradiance: Vec<[f32; 3]>) -> IlluminationMap {
     IlluminationMap {
         chart: Arc::new(Chart {
-            object,
+            receiver: Receiver::front(object),
             uv_set: UvSet::TexCoord0,
             corner_uvs: TRIANGLES
                 .iter()
@@ -62,6 +62,9 @@ pub fn floor_map(object: usize, width: usize, height: usize, irradiance: Vec<[f3
             width,
             height,
             texel_areas_m2: vec![1.0 / (width * height) as f64],
+            layout: None,
+            beyond: Vec::new(),
+            joints: Vec::new(),
         }),
         layers: vec![Layer {
             kind: LayerKind::Caustic,

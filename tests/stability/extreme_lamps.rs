@@ -58,7 +58,7 @@ fn baked(scene: Scene) -> BakeResult {
 
 /// Largest E of the direct layer of the floor [W/m²].
 fn brightest(result: &BakeResult) -> f32 {
-    let floor = result.maps.iter().find(|map| map.chart.object == 0);
+    let floor = result.maps.iter().find(|map| map.chart.object() == 0);
     let layer = floor.and_then(|map| map.layer(LayerKind::Direct));
     let channels = layer
         .into_iter()

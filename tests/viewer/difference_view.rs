@@ -5,19 +5,22 @@ use std::sync::Arc;
 use glam::DVec2;
 use nephroid::illumination::difference::{Difference, SignedMap};
 use nephroid::illumination::difference_colours::colour;
-use nephroid::illumination::{Chart, UvSet};
+use nephroid::illumination::{Chart, Receiver, UvSet};
 use nephroid::optics::LinearSrgb;
 use nephroid::viewer::difference_view::maps;
 
 #[test]
 fn each_texel_shows_its_difference_relative_to_the_maps_mean() {
     let chart = Arc::new(Chart {
-        object: 0,
+        receiver: Receiver::front(0),
         uv_set: UvSet::Generated,
         corner_uvs: vec![[DVec2::ZERO, DVec2::X, DVec2::Y]],
         width: 3,
         height: 1,
         texel_areas_m2: vec![1.0],
+        layout: None,
+        beyond: Vec::new(),
+        joints: Vec::new(),
     });
     let difference = |mean_w_m2| Difference {
         maps: vec![SignedMap {

@@ -138,7 +138,7 @@ fn chains_are_those_of_the_picture() {
 #[test]
 fn every_effect_is_switched_by_pointer_and_by_keyboard() {
     let mut panel = panel(Vec::new());
-    for effect in Effect::ALL.into_iter().filter(|effect| effect.is_available()) {
+    for effect in Effect::ALL {
         let name = effect.name().replace('_', " ");
         for (switch, label) in [
             (EffectSwitch::On, "on"),
@@ -161,21 +161,6 @@ fn every_effect_is_switched_by_pointer_and_by_keyboard() {
     let effects = &panel.panel.settings.effects;
     assert_eq!(effects.get(Effect::Reflection), EffectSwitch::On);
     assert_eq!(effects.get(Effect::Refraction), EffectSwitch::Off);
-}
-
-#[test]
-fn what_this_version_does_not_simulate_cannot_be_switched() {
-    let mut panel = panel(Vec::new());
-    for label in ["auto", "on", "off"] {
-        let name = format!("indirect: {label}");
-        assert!(panel.named(Role::RadioButton, &name).is_disabled(), "{name}");
-    }
-    click(&mut panel, Role::RadioButton, "indirect: on");
-    assert_eq!(
-        panel.panel.settings.effects.get(Effect::Indirect),
-        EffectSwitch::Auto
-    );
-    assert!(panel.says("This version does not simulate it."));
 }
 
 #[test]

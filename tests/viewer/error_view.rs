@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use glam::DVec2;
-use nephroid::illumination::{Chart, IlluminationMap, Layer, UvSet};
+use nephroid::illumination::{Chart, IlluminationMap, Layer, Receiver, UvSet};
 use nephroid::optics::LinearSrgb;
 use nephroid::settings::LayerKind;
 use nephroid::viewer::error_view::{RANGE, colour, is_available, maps};
@@ -12,12 +12,15 @@ use nephroid::viewer::error_view::{RANGE, colour, is_available, maps};
 fn map(error: Option<Vec<f32>>) -> IlluminationMap {
     IlluminationMap {
         chart: Arc::new(Chart {
-            object: 0,
+            receiver: Receiver::front(0),
             uv_set: UvSet::Generated,
             corner_uvs: vec![[DVec2::ZERO, DVec2::X, DVec2::Y]],
             width: 2,
             height: 1,
             texel_areas_m2: vec![1.0, 3.0],
+            layout: None,
+            beyond: Vec::new(),
+            joints: Vec::new(),
         }),
         layers: vec![Layer {
             kind: LayerKind::Direct,

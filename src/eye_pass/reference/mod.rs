@@ -1,7 +1,6 @@
 //! The eye pass on the CPU: a ray tracer that follows every chain of mirrors and glass, the measure for the GPU's.
 
 mod radiance;
-mod start;
 
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -14,11 +13,10 @@ use crate::illumination::IlluminationMap;
 use crate::optics::LinearSrgb;
 use crate::progress::{Control, Progress, Stage};
 use crate::scene::Camera;
-use crate::transport::{MediumStack, Tracer};
+use crate::transport::{MediumStack, Tracer, media_at};
 use radiance::{LitScene, visible_hit};
 
 pub use radiance::{ChainLimits, EyeRays};
-pub use start::media_at;
 
 /// How well a picture is made.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -4,8 +4,8 @@ use glam::DVec3;
 
 use crate::effect::EffectSwitch;
 use crate::geometry::Ray;
-use crate::illumination::lookup::bilinear;
-use crate::illumination::{Chart, IlluminationMap};
+use crate::illumination::lookup::in_chart;
+use crate::illumination::{Chart, IlluminationMap, Receiver, Side};
 use crate::optics::LinearSrgb;
 use crate::scene::SurfaceKind;
 use crate::transport::{Branch, MediumStack, SurfaceHit, Tracer};
@@ -90,9 +90,10 @@ impl<'a> LitScene<'a> {
         background: LinearSrgb,
         limits: ChainLimits,
     ) -> Self {
-        let mut by_object: Vec<Option<MapTotal>> = (0..tracer.scene().objects.len()).map(|_| None).collect();
+        let objects = tracer.scene().objects.len();
+        let mut by_receiver: Vec<Option<MapTotal>> = Receiver::all(objects).map(|_| None).collect();
         for map in maps {
-            by_object[map.chart.object] = Some(MapTotal {
+            by_receiver[map.chart.receiver.index()] = Some(MapTotal {
                 chart: &map.chart,
                 irradiance: map.total(),
             });
@@ -100,7 +101,7 @@ impl<'a> LitScene<'a> {
         let emitted = (0..tracer.scene().objects.len()).map(|object| tracer.scene().emitted_radiance(object));
         Self {
             tracer,
-            maps: by_object,
+            maps: by_receiver,
             emitted: emitted.collect(),
             background,
             limits,
@@ -133,7 +134,8 @@ impl<'a> LitScene<'a> {
             }
             let incident = gaze.ray.direction;
             let interaction = self.tracer.interact(&hit, incident, &gaze.media);
-            seen += gaze.weight * self.own_radiance(&hit, interaction.deposit);
+            let side = Side::met(incident, hit.geometric_normal);
+            seen += gaze.weight * self.own_radiance(&hit, side, interaction.deposit);
             if !CHAINS {
                 break;
             }
@@ -163,9 +165,9 @@ impl<'a> LitScene<'a> {
     }
 
     /// What a surface sends by itself: emission, and the share of its map that its polish lets out, L = ρE/π.
-    fn own_radiance(&self, hit: &SurfaceHit, share: LinearSrgb) -> LinearSrgb {
+    fn own_radiance(&self, hit: &SurfaceHit, side: Side, share: LinearSrgb) -> LinearSrgb {
         let emitted = self.emitted[hit.object];
-        let Some(map) = self.maps[hit.object]
+        let Some(map) = self.maps[Receiver::new(hit.object, side).index()]
             .as_ref()
             .filter(|_| share != LinearSrgb::BLACK)
         else {
@@ -173,7 +175,7 @@ impl<'a> LitScene<'a> {
         };
         let chart = map.chart;
         let uv = chart.uv(hit.triangle, hit.barycentric);
-        let irradiance = bilinear(&map.irradiance, chart.width, chart.height, uv);
+        let irradiance = in_chart(chart, &map.irradiance, uv);
         emitted + share * self.tracer.base_colour(hit) * irradiance / std::f64::consts::PI
     }
 

@@ -12,12 +12,12 @@ use super::storage::Storage;
 use super::uniforms::{ChainStart, LightRecord, Node, Triangle, rgb};
 use crate::error::{Error, Result};
 use crate::eye_pass::View;
-use crate::eye_pass::reference::{ChainLimits, media_at};
+use crate::eye_pass::reference::ChainLimits;
 use crate::geometry::PackedBvh;
 use crate::gpu::Gpu;
 use crate::scene::Scene;
 use crate::scene::emitter::{Emitter, EmitterKind};
-use crate::transport::{MediumStack, Tracer};
+use crate::transport::{MediumStack, Tracer, media_at};
 
 /// Nodes that may wait while a ray is traced; `STACK` in the shader.
 const STACK: usize = 64;

@@ -140,7 +140,7 @@ impl Geometry {
         *self = Self::new(gpu, scene);
         let mut uploaded = Uploaded::other(self.bytes());
         for chart in charts.iter().flatten() {
-            if chart.corner_uvs.len() == self.meshes[chart.object].triangles.len() {
+            if chart.corner_uvs.len() == self.meshes[chart.object()].triangles.len() {
                 uploaded += self.set_chart(gpu, chart);
             }
         }
@@ -183,12 +183,12 @@ impl Geometry {
     /// Writes the map coordinates of one object, which takes light, unless they are there already.
     pub(super) fn set_chart(&mut self, gpu: &Gpu, chart: &Arc<Chart>) -> Uploaded {
         let is_there = |shown: &Arc<Chart>| Arc::ptr_eq(shown, chart) || shown.corner_uvs == chart.corner_uvs;
-        if self.charts[chart.object].as_ref().is_some_and(is_there) {
+        if self.charts[chart.object()].as_ref().is_some_and(is_there) {
             return Uploaded::default();
         }
-        self.charts[chart.object] = Some(Arc::clone(chart));
+        self.charts[chart.object()] = Some(Arc::clone(chart));
         let mut bytes = 0;
-        for segment in &self.segments[chart.object] {
+        for segment in &self.segments[chart.object()] {
             let triangles = &chart.corner_uvs[segment.triangles.clone()];
             let uvs: Vec<MapUv> = triangles.iter().flatten().map(|uv| single(*uv)).collect();
             let offset = (segment.first_corner * size_of::<MapUv>()) as u64;

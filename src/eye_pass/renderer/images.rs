@@ -8,6 +8,7 @@ use super::paging::{PagedImage, TilePool, Uploaded};
 use super::storage::Storage;
 use super::textures;
 use crate::gpu::Gpu;
+use crate::illumination::Receiver;
 use crate::scene::{Material, Scene, Texture};
 
 /// What an object refers to in place of an image that it does not have; `NO_IMAGE` in the shaders.
@@ -44,7 +45,7 @@ impl Images {
         let mut images = Self {
             map_pool: TilePool::new(gpu, "map tiles", wgpu::TextureFormat::Rgba16Float),
             texture_pool: TilePool::new(gpu, "texture tiles", wgpu::TextureFormat::Rgba8UnormSrgb),
-            maps: (0..scene.objects.len()).map(|_| None).collect(),
+            maps: (0..2 * scene.objects.len()).map(|_| None).collect(),
             sources: Vec::new(),
             textures: Vec::new(),
             bumps: Vec::new(),
@@ -61,12 +62,12 @@ impl Images {
     /// Takes over the images of an edited scene; maps stay where the number of objects does.
     pub(super) fn set_scene(&mut self, gpu: &Gpu, scene: &Scene) -> Uploaded {
         let mut uploaded = Uploaded::default();
-        if self.maps.len() != scene.objects.len() {
+        if self.maps.len() != 2 * scene.objects.len() {
             self.maps
                 .iter_mut()
                 .flatten()
                 .for_each(|map| map.image.release(&mut self.map_pool));
-            self.maps = (0..scene.objects.len()).map(|_| None).collect();
+            self.maps = (0..2 * scene.objects.len()).map(|_| None).collect();
         }
         let is_same = self.sources.len() == scene.textures.len()
             && self
@@ -92,7 +93,7 @@ impl Images {
         uploaded
     }
 
-    /// Shows these maps, by object, and no others.
+    /// Shows these maps, by receiver, and no others.
     pub(super) fn set_maps(&mut self, gpu: &Gpu, shown: &[Option<&ShownMap>]) -> Uploaded {
         let mut uploaded = Uploaded::default();
         for (map, shown) in self.maps.iter_mut().zip(shown) {
@@ -106,7 +107,7 @@ impl Images {
                     }
                     // A map beyond the budget starts with its coarsest level.
                     let finest = shown.map(|shown| {
-                        let tiles = budget::tiles_of(shown.map.width(), shown.map.height());
+                        let tiles = budget::tiles_of(shown.chart.width, shown.chart.height);
                         if tiles * MAP_TILE_BYTES > self.budget_bytes {
                             usize::MAX
                         } else {
@@ -192,8 +193,8 @@ impl Images {
     }
 
     /// Record of an object's map.
-    pub(super) fn map_record(&self, object: usize) -> u32 {
-        self.map_records[object]
+    pub(super) fn map_record(&self, receiver: Receiver) -> u32 {
+        self.map_records[receiver.index()]
     }
 
     /// Record of a texture.

@@ -9,7 +9,8 @@ use rayon::iter::{IndexedParallelIterator, ParallelIterator};
 use rayon::slice::{ParallelSlice, ParallelSliceMut};
 
 use super::minify::Minification;
-use super::paging::{Level, PagedImage, TilePool, Uploaded};
+use super::paging::{Level, PagedImage, Texels, TilePool, Uploaded};
+use super::tiled;
 use crate::gpu::Gpu;
 use crate::illumination::{Chart, IlluminationMap};
 use crate::scene::texture::Wrap;
@@ -38,7 +39,7 @@ pub(super) struct DeviceMap {
 /// What a map shows: the sum of its layers [W/m²], computed once for all who need it.
 #[derive(Clone, Debug)]
 pub(super) struct ShownMap<'a> {
-    pub(super) map: &'a IlluminationMap,
+    pub(super) chart: Arc<Chart>,
     pub(super) irradiance: Cow<'a, [[f32; 3]]>,
 }
 
@@ -48,21 +49,24 @@ impl<'a> ShownMap<'a> {
             [alone] => Cow::Borrowed(&alone.irradiance[..]),
             _ => Cow::Owned(map.total()),
         };
-        Self { map, irradiance }
+        Self {
+            chart: Arc::clone(&map.chart),
+            irradiance,
+        }
     }
 }
 
 impl DeviceMap {
     /// Uploads a map with its coarser levels, the finest of them aside where they are not to be held.
     pub(super) fn new(gpu: &Gpu, pool: &mut TilePool, map: &ShownMap, finest: usize) -> (Self, Uploaded) {
-        let minification = Minification::of(&map.map.chart);
+        let minification = Minification::of(&map.chart);
         let peak_w_m2 = peak(&map.irradiance);
         let irradiance_scale = scale_for_half_floats(peak_w_m2);
-        let levels = levels(&minification, &map.irradiance, irradiance_scale);
+        let levels = levels(map, &minification, irradiance_scale);
         let (image, uploaded) = PagedImage::new(gpu, pool, levels, [Wrap::ClampToEdge; 2], finest);
         let map = Self {
             image,
-            chart: Arc::clone(&map.map.chart),
+            chart: Arc::clone(&map.chart),
             minification,
             irradiance_scale,
             peak_w_m2,
@@ -72,11 +76,12 @@ impl DeviceMap {
 
     /// Whether a map can take this one's place: it lies in the same chart.
     pub(super) fn can_become(&self, map: &ShownMap) -> bool {
-        let (old, new) = (&self.chart, &map.map.chart);
+        let (old, new) = (&self.chart, &map.chart);
         Arc::ptr_eq(old, new)
             || ([old.width, old.height] == [new.width, new.height]
                 && old.corner_uvs == new.corner_uvs
-                && old.texel_areas_m2 == new.texel_areas_m2)
+                && old.texel_areas_m2 == new.texel_areas_m2
+                && old.layout == new.layout)
     }
 
     /// Replaces the map by another of the same chart and uploads the tiles that differ. The scale stays where the new
@@ -84,7 +89,7 @@ impl DeviceMap {
     pub(super) fn update(&mut self, gpu: &Gpu, pool: &mut TilePool, map: &ShownMap) -> Uploaded {
         self.peak_w_m2 = peak(&map.irradiance);
         self.irradiance_scale = kept_scale(self.irradiance_scale, self.peak_w_m2);
-        let levels = levels(&self.minification, &map.irradiance, self.irradiance_scale);
+        let levels = levels(map, &self.minification, self.irradiance_scale);
         self.image.update(gpu, pool, levels)
     }
 }
@@ -122,7 +127,11 @@ fn peak(irradiance: &[[f32; 3]]) -> f32 {
         .reduce(|| 0.0, f32::max)
 }
 
-fn levels(minification: &Minification, irradiance: &[[f32; 3]], scale: f32) -> Vec<Level<Texel>> {
+fn levels(map: &ShownMap, minification: &Minification, scale: f32) -> Vec<Level<Texel>> {
+    let irradiance = &map.irradiance[..];
+    if let Some(layout) = &map.chart.layout {
+        return tiled::levels(&map.chart, layout, irradiance, scale);
+    }
     let sizes = minification.sizes();
     let [width, height] = sizes[0].map(|side| side as f32);
     let coarser = minification.coarser(irradiance);
@@ -133,13 +142,13 @@ fn levels(minification: &Minification, irradiance: &[[f32; 3]], scale: f32) -> V
         .map(|((level, size), irradiance)| Level {
             size: *size,
             extent: [width, height].map(|side| side * (-level as f32).exp2()),
-            texels: texels(irradiance, scale),
+            texels: Texels::Rows(half_floats(irradiance, scale)),
         })
         .collect()
 }
 
 /// Half floats of a map, many at once: a window waits for them.
-fn texels(irradiance: &[[f32; 3]], scale: f32) -> Vec<Texel> {
+pub(super) fn half_floats(irradiance: &[[f32; 3]], scale: f32) -> Vec<Texel> {
     let mut texels = vec![[f16::ZERO; 4]; irradiance.len()];
     let blocks = texels.par_chunks_mut(BLOCK).zip(irradiance.par_chunks(BLOCK));
     blocks.for_each(|(texels, irradiance)| {

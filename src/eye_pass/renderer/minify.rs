@@ -11,7 +11,7 @@ use crate::illumination::islands::Islands;
 /// Irradiance per texel [W/m²].
 type Irradiance = Vec<[f32; 3]>;
 
-/// How the levels of a chart's map follow from each other.
+/// How the levels of a chart's map follow from each other; those of a map in tiles do by themselves.
 #[derive(Debug)]
 pub(super) struct Minification {
     /// Texels across and down of each level, from fine to coarse.
@@ -23,7 +23,7 @@ pub(super) struct Minification {
 impl Minification {
     pub(super) fn of(chart: &Chart) -> Self {
         let mut sizes = vec![[chart.width, chart.height]];
-        if chart.texel_areas_m2.len() == 1 {
+        if chart.is_full() {
             while let Some(&last) = sizes.last().filter(|size| is_halved(**size)) {
                 sizes.push(halved(last));
             }

@@ -33,6 +33,7 @@ mod sky;
 mod storage;
 mod targets;
 mod textures;
+mod tiled;
 mod timing;
 mod tone_mapping;
 mod uniforms;

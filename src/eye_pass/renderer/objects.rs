@@ -9,7 +9,7 @@ use super::storage::Storage;
 use super::uniforms::{ObjectRecord, rgb};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
-use crate::illumination::{Chart, IlluminationMap};
+use crate::illumination::{Chart, Receiver};
 use crate::scene::{Material, Mesh, Scene, SurfaceKind};
 
 /// What an object looks like but for its map.
@@ -33,7 +33,7 @@ pub(super) struct Objects {
     pub(super) list: Vec<Look>,
     pub(super) images: Images,
     pub(super) records: Storage,
-    /// Map texels per metre of each object that has a map.
+    /// Map texels per metre of each receiver that has a map.
     texels_per_m: Vec<Option<f64>>,
     /// Largest radiance that any surface sends out by itself or from its map [W/(m² sr)].
     pub(super) peak_radiance: f64,
@@ -45,7 +45,7 @@ impl Objects {
             list: Vec::new(),
             images: Images::new(gpu, scene, map_budget_bytes),
             records: Storage::new(gpu, "objects"),
-            texels_per_m: vec![None; scene.objects.len()],
+            texels_per_m: vec![None; 2 * scene.objects.len()],
             peak_radiance: 0.0,
         };
         objects.set_scene(gpu, scene);
@@ -55,7 +55,7 @@ impl Objects {
     /// Takes over an edited scene; the maps stay where it has as many objects.
     pub(super) fn set_scene(&mut self, gpu: &Gpu, scene: &Scene) -> Uploaded {
         let mut uploaded = self.images.set_scene(gpu, scene);
-        self.texels_per_m.resize(scene.objects.len(), None);
+        self.texels_per_m.resize(2 * scene.objects.len(), None);
         self.list = (0..scene.objects.len())
             .map(|object| Look::of(scene, object))
             .collect();
@@ -68,14 +68,17 @@ impl Objects {
     /// # Errors
     /// A map of an object that the scene lacks; the old maps stay.
     pub(super) fn set_maps(&mut self, gpu: &Gpu, scene: &Scene, maps: &[ShownMap]) -> Result<Uploaded> {
-        let mut map_of: Vec<Option<&ShownMap>> = vec![None; self.list.len()];
+        let mut map_of: Vec<Option<&ShownMap>> = vec![None; 2 * self.list.len()];
         for shown in maps {
-            check_chart(scene, shown.map)?;
-            map_of[shown.map.chart.object] = Some(shown);
+            check_chart(scene, &shown.chart)?;
+            map_of[shown.chart.receiver.index()] = Some(shown);
         }
         let mut uploaded = self.images.set_maps(gpu, &map_of);
-        for ((density, object), map) in self.texels_per_m.iter_mut().zip(&scene.objects).zip(&map_of) {
-            *density = map.map(|shown| texels_per_m(&shown.map.chart, &object.mesh));
+        for (density, map) in self.texels_per_m.iter_mut().zip(&map_of) {
+            *density = map.map(|shown| {
+                let chart = &shown.chart;
+                texels_per_m(chart, &scene.objects[chart.object()].mesh)
+            });
         }
         uploaded += self.write_records(gpu);
         Ok(uploaded)
@@ -92,9 +95,10 @@ impl Objects {
         if !self.images.may_exceed_budget() && self.images.coarse_maps() == 0 {
             return Uploaded::default();
         }
-        let need = |index: usize| {
-            let (Some(density), Some((low, high))) = (self.texels_per_m[index], self.list[index].bounds)
-            else {
+        let need = |receiver: Receiver| {
+            let index = receiver.object();
+            let density = self.texels_per_m[receiver.index()];
+            let (Some(density), Some((low, high))) = (density, self.list[index].bounds) else {
                 return 0.0;
             };
             let distance_m = (eye.clamp(low, high) - eye).length();
@@ -106,7 +110,7 @@ impl Objects {
                 level + 2.0
             }
         };
-        let needs: Vec<f64> = (0..self.list.len()).map(need).collect();
+        let needs: Vec<f64> = Receiver::all(self.list.len()).map(need).collect();
         let mut uploaded = self.images.keep_budget(gpu, &needs);
         uploaded += self.write_records(gpu);
         uploaded
@@ -127,7 +131,8 @@ impl Objects {
         let records: Vec<ObjectRecord> = (0..)
             .zip(&self.list)
             .map(|(index, look)| ObjectRecord {
-                map: self.images.map_record(index),
+                map: self.images.map_record(Receiver::front(index)),
+                back_map: self.images.map_record(Receiver::back(index)),
                 texture: look
                     .base_colour_texture
                     .map_or(NO_IMAGE, |texture| self.images.texture_record(texture)),
@@ -165,9 +170,9 @@ impl Look {
                 lobe_rad: lobe_rad(material) as f32,
                 bumps: NO_IMAGE,
                 polish: material.polish as f32,
+                back_map: NO_IMAGE,
                 padding0: 0,
                 padding1: 0,
-                padding2: 0,
             },
             base_colour_texture: material.base_colour_texture.as_ref().map(|image| image.texture),
         }
@@ -230,16 +235,16 @@ fn texels_per_m(chart: &Chart, mesh: &Mesh) -> f64 {
 }
 
 /// Maps come from files too: one of another scene must be refused, not drawn.
-fn check_chart(scene: &Scene, map: &IlluminationMap) -> Result<()> {
-    let belongs = scene.objects.get(map.chart.object).is_some_and(|object| {
+fn check_chart(scene: &Scene, chart: &Chart) -> Result<()> {
+    let belongs = scene.objects.get(chart.object()).is_some_and(|object| {
         scene.materials[object.material].surface.is_receiver()
-            && object.mesh.triangles.len() == map.chart.corner_uvs.len()
+            && object.mesh.triangles.len() == chart.corner_uvs.len()
     });
     if belongs {
         return Ok(());
     }
     Err(Error::failure(
-        format!("map of object {}", map.chart.object),
+        format!("map of the {:?}", chart.receiver),
         format!("does not belong to the scene {}", scene.name),
         "bake the scene again",
     ))

@@ -1,6 +1,6 @@
 //! Base colour images on the device, with their coarser levels.
 
-use super::paging::{Level, PagedImage, TilePool, Uploaded, is_halved};
+use super::paging::{Level, PagedImage, Texels, TilePool, Uploaded, is_halved};
 use crate::gpu::Gpu;
 use crate::optics::LinearSrgb;
 use crate::scene::Texture;
@@ -14,35 +14,36 @@ pub(super) fn upload(gpu: &Gpu, pool: &mut TilePool, texture: &Texture) -> (Page
     (image, Uploaded::other(uploaded.tile_bytes as usize))
 }
 
+/// Texels across and down, and row by row.
+type Image = ([usize; 2], Vec<Texel>);
+
 /// The image and its halvings down to a few texels.
 fn mip_chain(texture: &Texture) -> Vec<Level<Texel>> {
-    let mut levels = vec![level(texture.width, texture.height, texture.rgba.clone())];
-    while let Some(last) = levels.last().filter(|level| is_halved(level.size)) {
-        levels.push(halved(last));
+    let size = [texture.width as usize, texture.height as usize];
+    let mut images: Vec<Image> = vec![(size, texture.rgba.clone())];
+    while let Some(last) = images.last().filter(|(size, _)| is_halved(*size)) {
+        images.push(halved(last));
     }
-    levels
-}
-
-fn level(width: u32, height: u32, texels: Vec<Texel>) -> Level<Texel> {
-    Level {
-        size: [width as usize, height as usize],
-        extent: [width as f32, height as f32],
-        texels,
-    }
+    let level = |(size, texels): Image| Level {
+        size,
+        extent: size.map(|side| side as f32),
+        texels: Texels::Rows(texels),
+    };
+    images.into_iter().map(level).collect()
 }
 
 /// Means of 2×2 texels in linear light; an odd last row or column is left out of its neighbour's mean.
-fn halved(fine: &Level<Texel>) -> Level<Texel> {
-    let [fine_width, fine_height] = fine.size.map(|side| side as u32);
+fn halved((fine_size, fine): &Image) -> Image {
+    let [fine_width, fine_height] = *fine_size;
     let (width, height) = ((fine_width / 2).max(1), (fine_height / 2).max(1));
     let linear: Vec<f32> = (0..=u8::MAX)
         .map(|code| LinearSrgb::decode_channel(code) as f32)
         .collect();
-    let texel = |x: u32, y: u32| {
+    let texel = |x: usize, y: usize| {
         let (x, y) = (x.min(fine_width - 1), y.min(fine_height - 1));
-        fine.texels[y as usize * fine_width as usize + x as usize]
+        fine[y * fine_width + x]
     };
-    let mean = |x: u32, y: u32| {
+    let mean = |x: usize, y: usize| {
         let four = [
             texel(2 * x, 2 * y),
             texel(2 * x + 1, 2 * y),
@@ -62,5 +63,5 @@ fn halved(fine: &Level<Texel>) -> Level<Texel> {
         .flat_map(|y| (0..width).map(move |x| (x, y)))
         .map(|(x, y)| mean(x, y))
         .collect();
-    level(width, height, texels)
+    ([width, height], texels)
 }

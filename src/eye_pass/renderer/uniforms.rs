@@ -78,7 +78,7 @@ shader_struct! {
         absorption_per_m: [f32; 3],
         /// Whether its back is drawn.
         double_sided: u32,
-        /// Record of its illumination map.
+        /// Record of the illumination map of its front.
         map: u32,
         /// Record of its base colour texture.
         texture: u32,
@@ -88,9 +88,10 @@ shader_struct! {
         bumps: u32,
         /// Part of the surface that its polish covers.
         polish: f32,
+        /// Record of the illumination map of its back.
+        back_map: u32,
         padding0: u32,
         padding1: u32,
-        padding2: u32,
     }
 }
 

@@ -37,13 +37,7 @@ impl Polygon {
 
     /// Area [texel²], not negative.
     pub fn area(&self) -> f64 {
-        let corners = self.corners();
-        let Some(&first) = corners.first() else { return 0.0 };
-        let twice: f64 = corners
-            .windows(2)
-            .map(|pair| (pair[0] - first).perp_dot(pair[1] - first))
-            .sum();
-        0.5 * twice.abs()
+        convex_area(self.corners())
     }
 
     /// Centre of gravity; the mean of the corners where there is no area.
@@ -125,6 +119,16 @@ impl Polygon {
                 (low.min(corner[axis]), high.max(corner[axis]))
             })
     }
+}
+
+/// Area of a convex polygon, not negative.
+pub fn convex_area(corners: &[DVec2]) -> f64 {
+    let Some(&first) = corners.first() else { return 0.0 };
+    let twice: f64 = corners
+        .windows(2)
+        .map(|pair| (pair[0] - first).perp_dot(pair[1] - first))
+        .sum();
+    0.5 * twice.abs()
 }
 
 /// Cells of a line of `count` unit cells that an interval within 0..=count reaches.

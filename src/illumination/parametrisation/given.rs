@@ -23,10 +23,33 @@ const COVERING_TOLERANCE: f64 = 1e-3;
 /// Side of the overlap raster for a whole mesh.
 const RASTER_SIDE: usize = 256;
 
-/// Corner coordinates of a set that gives every point of the surface its own place in the unit square, else `None`.
-pub fn light_map_set(mesh: &Mesh, uvs: Option<&Vec<DVec2>>) -> Option<Vec<[DVec2; 3]>> {
-    let corners = corner_coordinates(mesh, uvs?)?;
+/// Why a set of the file cannot serve as map coordinates.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Refusal {
+    /// Some coordinate is no number, or beyond 0..1.
+    #[error("coordinates lie outside 0..1")]
+    Outside,
+    /// Less than a twentieth of the map would be used.
+    #[error("it uses less than a twentieth of the map")]
+    Sparse,
+    /// Some triangle has area on the surface and none in the map.
+    #[error("some triangles have no area in it")]
+    Collapsed,
+    /// Some place of the map would belong to several of the surface.
+    #[error("it overlaps itself")]
+    Overlapping,
+}
+
+/// Corner coordinates of a set that gives every point of the surface its own place in the unit square.
+///
+/// # Errors
+/// Why it does not.
+pub fn light_map_set(mesh: &Mesh, uvs: &[DVec2]) -> Result<Vec<[DVec2; 3]>, Refusal> {
+    let corners = corner_coordinates(mesh, uvs).ok_or(Refusal::Outside)?;
     let covered = covered_share(&corners);
+    if covered < LEAST_COVERAGE {
+        return Err(Refusal::Sparse);
+    }
     let surface_m2 = mesh.area_m2();
     let dense = |triangle: usize| {
         let [a, b, c] = mesh.corners(triangle);
@@ -34,10 +57,13 @@ pub fn light_map_set(mesh: &Mesh, uvs: Option<&Vec<DVec2>>) -> Option<Vec<[DVec2
         let share_of_map = 0.5 * twice_signed_area(corners[triangle]).abs() / covered;
         share_of_surface == 0.0 || share_of_map > LEAST_DENSITY * share_of_surface
     };
-    let valid = (LEAST_COVERAGE..1.0 + COVERING_TOLERANCE).contains(&covered)
-        && (0..corners.len()).all(dense)
-        && !overlaps(&corners, RASTER_SIDE);
-    valid.then_some(corners)
+    if !(0..corners.len()).all(dense) {
+        return Err(Refusal::Collapsed);
+    }
+    if covered >= 1.0 + COVERING_TOLERANCE || overlaps(&corners, RASTER_SIDE) {
+        return Err(Refusal::Overlapping);
+    }
+    Ok(corners)
 }
 
 /// Whether a valid set of a planar mesh is one affine image of the plane that covers the whole unit square.

@@ -3,13 +3,19 @@
 pub mod coverage;
 mod given;
 mod overlap;
-mod packing;
 mod plane;
-mod regions;
+mod unwrap;
+
+use std::sync::Arc;
 
 use glam::DVec2;
 
+pub use given::Refusal;
+
+use super::Receiver;
 use super::chart::{Chart, UvSet};
+use super::seams::{self, Seam};
+use super::tiles::TileLayout;
 use crate::scene::Mesh;
 use coverage::twice_signed_area;
 use plane::{common_normal, smallest_rectangle};
@@ -32,45 +38,60 @@ pub struct Parametrisation {
     pub suggested_aspect: f64,
     /// Whether all texels have the same area at any map size.
     uniform: bool,
+    /// Where charts end and the surface goes on.
+    seams: Vec<Seam>,
 }
 
-/// Map coordinates for the mesh of an object; `None` where the mesh has no area.
+/// Map coordinates for the mesh of an object; `None` where the mesh has no area or cannot be unwrapped.
 ///
 /// In this order: TEXCOORD_0 where the mesh is planar and the set is affine and covers the unit square; TEXCOORD_1,
 /// then TEXCOORD_0, where every point has its own place in the unit square (finite, inside, no overlap beyond
 /// borders, every triangle with its share of area, a twentieth of the map covered at least); else generated: a planar
-/// mesh by the smallest rectangle around it, any other cut into nearly flat pieces, laid side by side at one scale
-/// with gutters of two texels at a map of `nominal_side` texels. Deterministic.
+/// mesh by the smallest rectangle around it, any other unwrapped into charts with gutters of two texels
+/// at a map of `nominal_side` texels. Deterministic.
 pub fn parametrise(object: usize, mesh: &Mesh, nominal_side: usize) -> Option<Parametrisation> {
     let has_area = mesh.area_m2() > 0.0;
-    has_area.then(|| {
-        let (uv_set, corner_uvs) = choose(mesh, nominal_side);
-        Parametrisation::new(object, mesh, uv_set, corner_uvs)
-    })
+    let (uv_set, corner_uvs) = has_area.then(|| choose(mesh, nominal_side))??;
+    Some(Parametrisation::new(object, mesh, uv_set, corner_uvs))
 }
 
-fn choose(mesh: &Mesh, nominal_side: usize) -> (UvSet, Vec<[DVec2; 3]>) {
+fn choose(mesh: &Mesh, nominal_side: usize) -> Option<(UvSet, Vec<[DVec2; 3]>)> {
     let normal = common_normal(mesh);
-    let first = given::light_map_set(mesh, mesh.uv0.as_ref());
+    let usable = |uvs: Option<&Vec<DVec2>>| given::light_map_set(mesh, uvs?).ok();
+    let first = usable(mesh.uv0.as_ref());
     match (first, normal) {
         (Some(set), Some(normal)) if given::is_affine_and_covering(mesh, &set, normal) => {
-            return (UvSet::TexCoord0, set);
+            return Some((UvSet::TexCoord0, set));
         }
         (first, _) => {
-            if let Some(set) = given::light_map_set(mesh, mesh.uv1.as_ref()) {
-                return (UvSet::TexCoord1, set);
+            if let Some(set) = usable(mesh.uv1.as_ref()) {
+                return Some((UvSet::TexCoord1, set));
             }
             if let Some(set) = first {
-                return (UvSet::TexCoord0, set);
+                return Some((UvSet::TexCoord0, set));
             }
         }
     }
     let flat = normal.map(|normal| project_flat(mesh, normal));
     let generated = match flat {
         Some(set) if !overlap::overlaps(&set, 256) => set,
-        _ => unwrap_regions(mesh, nominal_side),
+        _ => unwrap::unwrap(mesh, nominal_side)?,
     };
-    (UvSet::Generated, generated)
+    Some((UvSet::Generated, generated))
+}
+
+/// Sets of a mesh that cannot serve as map coordinates, and why.
+pub fn refused_sets(mesh: &Mesh) -> Vec<(&'static str, Refusal)> {
+    let sets = [
+        ("TEXCOORD_0", mesh.uv0.as_ref()),
+        ("TEXCOORD_1", mesh.uv1.as_ref()),
+    ];
+    let refusal = |(name, set): (&'static str, Option<&Vec<DVec2>>)| {
+        given::light_map_set(mesh, set?)
+            .err()
+            .map(|refusal| (name, refusal))
+    };
+    sets.into_iter().filter_map(refusal).collect()
 }
 
 /// A planar mesh, by the smallest rectangle around it.
@@ -87,23 +108,9 @@ fn project_flat(mesh: &Mesh, normal: glam::DVec3) -> Vec<[DVec2; 3]> {
         .collect()
 }
 
-/// Any mesh, in nearly flat pieces.
-fn unwrap_regions(mesh: &Mesh, nominal_side: usize) -> Vec<[DVec2; 3]> {
-    let regions = regions::grow(mesh);
-    let sizes: Vec<DVec2> = regions.iter().map(|region| region.rectangle.size).collect();
-    let packing = packing::pack(&sizes, nominal_side);
-    let mut corner_uvs = vec![[DVec2::ZERO; 3]; mesh.triangles.len()];
-    for (region, corner) in regions.iter().zip(&packing.low) {
-        let rectangle = &region.rectangle;
-        for &triangle in &region.triangles {
-            corner_uvs[triangle as usize] = mesh.corners(triangle as usize).map(|point| {
-                let local = rectangle.frame.project(point) - rectangle.low;
-                (*corner + local * packing.scale_per_m).clamp(DVec2::ZERO, DVec2::ONE)
-            });
-        }
-    }
-    corner_uvs
-}
+/// Share of a mean texel up to which its covered area is rounding, and up to which it is too little to be looked at.
+const ROUNDING: f64 = 1e-9;
+const SLIVER: f64 = 1e-3;
 
 impl Parametrisation {
     /// Map coordinates that are known already: [0, 1], three corners per triangle of the mesh.
@@ -120,6 +127,7 @@ impl Parametrisation {
             uv_set,
             suggested_aspect: aspect(mesh, &corner_uvs, &triangle_areas_m2),
             uniform,
+            seams: seams::find(mesh, &corner_uvs),
             corner_uvs,
             triangle_areas_m2,
         }
@@ -135,7 +143,7 @@ impl Parametrisation {
         self.triangle_areas_m2[triangle]
     }
 
-    /// The chart of a map of `width` × `height` texels, both > 0, with the exact area of the surface under every
+    /// The chart of a map for the front of the object, of `width` × `height` texels, both > 0, with the exact area of the surface under every
     /// texel: triangles cut by texels, times the triangle's m² per texel².
     pub fn chart(&self, width: usize, height: usize) -> Chart {
         let texel_areas_m2 = if self.uniform {
@@ -143,14 +151,46 @@ impl Parametrisation {
         } else {
             self.texel_areas_m2(width, height)
         };
+        let mean_m2 = self.area_m2() / (width * height) as f64;
+        let covers =
+            |texel: usize, share: f64| texel_areas_m2.get(texel).is_none_or(|m2| *m2 > share * mean_m2);
         Chart {
-            object: self.object,
+            beyond: seams::texels(&self.seams, (width, height), |texel| covers(texel, ROUNDING)),
+            joints: seams::joints(&self.seams, (width, height), |texel| covers(texel, SLIVER)),
+            receiver: Receiver::front(self.object),
             uv_set: self.uv_set,
             corner_uvs: self.corner_uvs.clone(),
             width,
             height,
             texel_areas_m2,
+            layout: None,
         }
+    }
+
+    /// The chart of a map in tiles; `None` where the surface does not fill its map evenly.
+    pub fn tiled_chart(&self, layout: &Arc<TileLayout>) -> Option<Chart> {
+        if !self.uniform {
+            return None;
+        }
+        let (width, height) = layout.size();
+        let finest_m2 = self.area_m2() / (width * height) as f64;
+        let areas = layout.tiles().flat_map(|tile| {
+            let area_m2 = finest_m2 * f64::from(1_u32 << (2 * tile.level));
+            std::iter::repeat_n(area_m2, tile.texels.len())
+        });
+        Some(Chart {
+            texel_areas_m2: areas.collect(),
+            layout: Some(Arc::clone(layout)),
+            // Of a map row by row.
+            beyond: Vec::new(),
+            joints: Vec::new(),
+            ..self.chart(width, height)
+        })
+    }
+
+    /// Whether the surface fills its map evenly, so that it may lie in tiles.
+    pub fn is_uniform(&self) -> bool {
+        self.uniform
     }
 
     fn texel_areas_m2(&self, width: usize, height: usize) -> Vec<f64> {

@@ -12,6 +12,7 @@ use super::path::Arrival;
 use super::splat::Splat;
 use super::statistics::FootprintStatistics;
 use super::surface::{Surface, Surfaces};
+use crate::illumination::Receiver;
 use crate::light_pass::ledger_sum::{Account, LedgerSum};
 use crate::light_pass::receiver_maps::{ChartFor, ReceiverMaps};
 use crate::settings::{BakeSettings, Kernel, KernelSampling, Sigma};
@@ -60,11 +61,11 @@ impl Halves<'_> {
         }
     }
 
-    /// Allocates the maps of an object unless that was tried before.
-    pub fn touch(&mut self, object: usize, chart_for: &ChartFor) {
-        self.first.touch(object, chart_for);
+    /// Allocates the maps of a receiver unless that was tried before.
+    pub fn touch(&mut self, receiver: Receiver, chart_for: &ChartFor) {
+        self.first.touch(receiver, chart_for);
         if let Some(second) = &mut self.second {
-            second.touch(object, chart_for);
+            second.touch(receiver, chart_for);
         }
     }
 }
@@ -83,7 +84,7 @@ pub struct DepositReport {
 }
 
 impl Depositor<'_> {
-    /// Deposits rows of one face. Maps must have been touched for every object of the arrivals. Of neighbouring rays every
+    /// Deposits rows of one face. Maps must have been touched for every receiver of the arrivals. Of neighbouring rays every
     /// other one goes to the second half set, where there is one.
     pub fn deposit(&self, rows: &[RowContext], halves: &mut Halves) -> DepositReport {
         let parts: Vec<RowSplats> = rows
@@ -91,7 +92,7 @@ impl Depositor<'_> {
             .map(|row| self.splats_of(row, halves.first))
             .collect();
         let mut report = DepositReport::default();
-        let mut groups: BTreeMap<(bool, u32, u32), Vec<&Placed>> = BTreeMap::new();
+        let mut groups: BTreeMap<(bool, Receiver, u32), Vec<&Placed>> = BTreeMap::new();
         for part in &parts {
             report.ledger.merge(&part.ledger);
             report.statistics.merge(&part.statistics);
@@ -100,23 +101,23 @@ impl Depositor<'_> {
             // Neighbours mostly go to the same map.
             for run in part
                 .splats
-                .chunk_by(|a, b| (a.object, a.level) == (b.object, b.level))
+                .chunk_by(|a, b| (a.receiver, a.level) == (b.receiver, b.level))
             {
                 if halves.second.is_none() {
-                    let group = groups.entry((false, run[0].object, run[0].level)).or_default();
+                    let group = groups.entry((false, run[0].receiver, run[0].level)).or_default();
                     group.extend(run);
                     continue;
                 }
                 for splat in run {
-                    let key = (splat.is_second, splat.object, splat.level);
+                    let key = (splat.is_second, splat.receiver, splat.level);
                     groups.entry(key).or_default().push(splat);
                 }
             }
         }
-        for ((is_second, object, level), splats) in groups {
+        for ((is_second, receiver, level), splats) in groups {
             let map = halves
                 .maps(is_second)
-                .get_mut(object as usize)
+                .get_mut(receiver)
                 .expect("splats are made only for allocated maps");
             let (flux, covered) = map.level(level as usize);
             let ledger = blocks::add(&splats, flux, &covered, self.settings.kernel_sampling);
@@ -165,9 +166,10 @@ impl Depositor<'_> {
         unbent_area_m2: &dyn Fn() -> f64,
         made: &mut RowSplats,
     ) -> Option<Placed> {
-        let object = arrival.object as usize;
         let map = surface.map;
-        let mean = self.statistics.and_then(|statistics| statistics.mean(object));
+        let mean = self
+            .statistics
+            .and_then(|statistics| statistics.mean(arrival.receiver));
         let fixed_area_m2 = || match mean {
             Some(mean) => mean.area_m2,
             // A surface that the coarse run missed.
@@ -189,7 +191,7 @@ impl Depositor<'_> {
             let texels = (map.chart.width * map.chart.height) as f64;
             let share = ellipse.area_texels() / texels;
             made.statistics
-                .add(object, arrival.flux_w.luminance(), area_m2(), share);
+                .add(arrival.receiver, arrival.flux_w.luminance(), area_m2(), share);
         }
         let sigma = match (self.settings.kernel, self.settings.sigma) {
             (Kernel::Gaussian, Sigma::Constant(sigma)) => sigma,
@@ -217,7 +219,7 @@ impl Depositor<'_> {
         let splat = if level > 0 { splat.at_level(level) } else { splat };
         let reach = Reach::of(&splat, (map.chart.width >> level, map.chart.height >> level));
         Some(Placed {
-            object: arrival.object,
+            receiver: arrival.receiver,
             level: level as u32,
             is_second: false,
             reach,
@@ -229,8 +231,8 @@ impl Depositor<'_> {
 /// A splat with where it goes.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Placed {
-    object: u32,
-    /// Of the object's map.
+    receiver: Receiver,
+    /// Of its map.
     level: u32,
     /// Whether its ray belongs to the second half set.
     is_second: bool,

@@ -5,6 +5,7 @@ use rayon::prelude::*;
 
 use super::lattice::{Lattice, Points, TracedRow};
 use super::path::{Arrival, PathSignature};
+use crate::illumination::Receiver;
 use crate::light_pass::ledger_sum::LedgerSum;
 use crate::optics::LinearSrgb;
 use crate::transport::Event;
@@ -36,7 +37,7 @@ struct Kept {
     /// First channel of the flux [W].
     flux_w: f64,
     column: u32,
-    object: u32,
+    receiver: Receiver,
     triangle: u32,
     event: Event,
 }
@@ -98,7 +99,7 @@ impl KeptRow {
             path_m: arrival.path_m,
             flux_w: arrival.flux_w.to_array()[0],
             column,
-            object: arrival.object,
+            receiver: arrival.receiver,
             triangle: arrival.triangle,
             event: arrival.event,
         };
@@ -130,7 +131,7 @@ impl KeptRow {
             .copied()
             .unwrap_or([kept.flux_w, kept.flux_w]);
         Arrival {
-            object: kept.object,
+            receiver: kept.receiver,
             triangle: kept.triangle,
             signature: PathSignature(kept.signature),
             barycentric: DVec2::from_array(kept.barycentric),

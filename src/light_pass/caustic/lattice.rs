@@ -64,7 +64,7 @@ impl TracedRow {
             .zip(&self.arrivals[start..])
             .take_while(|(c, _)| **c == column)
             .map(|(_, arrival)| arrival)
-            .find(|arrival| arrival.object == like.object && arrival.signature == like.signature)
+            .find(|arrival| arrival.receiver == like.receiver && arrival.signature == like.signature)
     }
 }
 
@@ -72,7 +72,7 @@ impl TracedRow {
 pub(super) struct Points<'a> {
     scene: &'a Scene,
     /// Object, triangle, its corners.
-    last: Option<(u32, u32, [DVec3; 3])>,
+    last: Option<(usize, u32, [DVec3; 3])>,
 }
 
 impl<'a> Points<'a> {
@@ -82,11 +82,11 @@ impl<'a> Points<'a> {
 
     /// Where an arrival is [m], by nothing but its triangle and barycentric coordinates.
     pub(super) fn of(&mut self, arrival: &Arrival) -> DVec3 {
-        let (object, triangle) = (arrival.object, arrival.triangle);
+        let (object, triangle) = (arrival.receiver.object(), arrival.triangle);
         let [a, b, c] = match self.last {
             Some((o, t, corners)) if o == object && t == triangle => corners,
             _ => {
-                let mesh = &self.scene.objects[object as usize].mesh;
+                let mesh = &self.scene.objects[object].mesh;
                 let corners = mesh.corners(triangle as usize);
                 self.last = Some((object, triangle, corners));
                 corners

@@ -10,6 +10,7 @@ use super::deposit::{DepositReport, Depositor, Halves, RowContext};
 use super::kept::KeptLight;
 use super::lattice::{Lattice, TracedRow};
 use super::statistics::FootprintStatistics;
+use crate::illumination::Receiver;
 use crate::light_pass::ledger_sum::LedgerSum;
 use crate::light_pass::receiver_maps::ChartFor;
 use crate::light_pass::wavefront::overreach::Overreach;
@@ -257,13 +258,13 @@ fn deposit_band(
             after: rows.get(position + 1),
         })
         .collect();
-    let objects: BTreeSet<u32> = contexts
+    let receivers: BTreeSet<Receiver> = contexts
         .iter()
-        .flat_map(|context| context.row.arrivals.chunk_by(|a, b| a.object == b.object))
-        .map(|run| run[0].object)
+        .flat_map(|context| context.row.arrivals.chunk_by(|a, b| a.receiver == b.receiver))
+        .map(|run| run[0].receiver)
         .collect();
-    for object in objects {
-        halves.touch(object as usize, chart_for);
+    for receiver in receivers {
+        halves.touch(receiver, chart_for);
     }
     report.add(&depositor.deposit(&contexts, halves));
     let keep = rows.len().saturating_sub(2);

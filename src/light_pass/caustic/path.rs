@@ -5,6 +5,7 @@ use glam::{DVec2, DVec3};
 use super::super::ledger_sum::{Account, LedgerSum};
 use crate::geometry::Ray;
 use crate::illumination::accumulator::FluxUnit;
+use crate::illumination::{Receiver, Side};
 use crate::optics::LinearSrgb;
 use crate::transport::{
     Branch, EffectSet, Event, MediumStack, Microfacets, PathCounts, PathEffects, SurfaceHit, Tracer,
@@ -45,8 +46,8 @@ impl PathSignature {
 /// Flux that reached a diffuse surface.
 #[derive(Clone, Copy, Debug)]
 pub struct Arrival {
-    /// Index into `Scene::objects`.
-    pub object: u32,
+    /// Whose light it becomes.
+    pub receiver: Receiver,
     /// Index into the object's triangles.
     pub triangle: u32,
     /// How it came here.
@@ -183,7 +184,7 @@ impl<'a> PathTracer<'a> {
             self.book(Account::NotEmitted, deposit_w);
             self.book(Account::Emitted, flux_w - deposit_w);
         } else if let (Some(event), true) = (segment.event, deposit_w.max_channel() > 0.0) {
-            arrive(arrival(&hit, segment.signature, event, deposit_w, path_m));
+            arrive(arrival(&hit, &segment, event, deposit_w, path_m));
         }
         self.book(Account::Absorbed, flux_w * interaction.absorbed);
         self.book(Account::SwitchedOff, flux_w * interaction.switched_off);
@@ -232,17 +233,11 @@ impl<'a> PathTracer<'a> {
     }
 }
 
-fn arrival(
-    hit: &SurfaceHit,
-    signature: PathSignature,
-    event: Event,
-    flux_w: LinearSrgb,
-    path_m: f64,
-) -> Arrival {
+fn arrival(hit: &SurfaceHit, segment: &Segment, event: Event, flux_w: LinearSrgb, path_m: f64) -> Arrival {
     Arrival {
-        object: hit.object as u32,
+        receiver: Receiver::new(hit.object, Side::met(segment.ray.direction, hit.geometric_normal)),
         triangle: hit.triangle as u32,
-        signature,
+        signature: segment.signature,
         barycentric: DVec2::new(hit.barycentric[1], hit.barycentric[2]),
         point: hit.point,
         flux_w,

@@ -1,11 +1,28 @@
 //! Mean sizes of footprints per receiver: they set automatic map sizes, the fixed footprint and the adaptive sigma.
 
+use crate::illumination::Receiver;
 use std::collections::BTreeMap;
 
-/// Flux-weighted sums over footprints, by object.
+use glam::DVec2;
+
+/// Flux-weighted sums over footprints, by receiver; and, where that is asked for, where on the maps they lie.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FootprintStatistics {
-    objects: BTreeMap<usize, Sums>,
+    receivers: BTreeMap<Receiver, Sums>,
+    spots: Vec<Spot>,
+}
+
+/// Light on a part of a map.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Spot {
+    /// Whose map it is.
+    pub receiver: Receiver,
+    /// Least and largest map coordinates that it reaches; both within the map.
+    pub bounds: (DVec2, DVec2),
+    /// What it carries [W].
+    pub flux_w: f64,
+    /// Share of the whole map that its details cover, > 0.
+    pub map_share: f64,
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -15,7 +32,7 @@ struct Sums {
     log_area_share: f64,
 }
 
-/// Flux-weighted geometric means of one object's footprints.
+/// Flux-weighted geometric means of one receiver's footprints.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MeanFootprint {
     /// Area on the surface [m²].
@@ -29,7 +46,7 @@ const LEAST_SHARE: f64 = 1e-10;
 
 impl FootprintStatistics {
     /// One more footprint, with the flux [W] it carries.
-    pub fn add(&mut self, object: usize, flux_w: f64, area_m2: f64, map_share: f64) {
+    pub fn add(&mut self, receiver: Receiver, flux_w: f64, area_m2: f64, map_share: f64) {
         let share = map_share.max(LEAST_SHARE);
         // Both areas are cut alike, as their ratio is the map's own.
         let area_m2 = if map_share > 0.0 {
@@ -37,25 +54,48 @@ impl FootprintStatistics {
         } else {
             return;
         };
-        let sums = self.objects.entry(object).or_default();
+        let sums = self.receivers.entry(receiver).or_default();
         sums.flux += flux_w;
         sums.log_area_m2 += flux_w * area_m2.ln();
         sums.log_area_share += flux_w * share.ln();
     }
 
+    /// Notes where light lies: what covers nothing, or lies off the map, is left out.
+    pub fn add_spot(&mut self, spot: Spot) {
+        let (low, high) = spot.bounds;
+        let bounds = (
+            low.clamp(DVec2::ZERO, DVec2::ONE),
+            high.clamp(DVec2::ZERO, DVec2::ONE),
+        );
+        let is_on_map = low.cmple(DVec2::ONE).all() && high.cmpge(DVec2::ZERO).all();
+        if is_on_map && spot.flux_w > 0.0 && spot.map_share > 0.0 {
+            self.spots.push(Spot {
+                bounds,
+                map_share: spot.map_share.max(LEAST_SHARE),
+                ..spot
+            });
+        }
+    }
+
+    /// Where light lies on the map of a receiver.
+    pub fn spots(&self, receiver: Receiver) -> impl Iterator<Item = &Spot> {
+        self.spots.iter().filter(move |spot| spot.receiver == receiver)
+    }
+
     /// Adds the sums of another part of the run.
     pub fn merge(&mut self, other: &Self) {
-        for (&object, part) in &other.objects {
-            let sums = self.objects.entry(object).or_default();
+        self.spots.extend_from_slice(&other.spots);
+        for (&receiver, part) in &other.receivers {
+            let sums = self.receivers.entry(receiver).or_default();
             sums.flux += part.flux;
             sums.log_area_m2 += part.log_area_m2;
             sums.log_area_share += part.log_area_share;
         }
     }
 
-    /// The mean footprint of an object; `None` where none was seen.
-    pub fn mean(&self, object: usize) -> Option<MeanFootprint> {
-        let sums = self.objects.get(&object).filter(|sums| sums.flux > 0.0)?;
+    /// The mean footprint on a receiver; `None` where none was seen.
+    pub fn mean(&self, receiver: Receiver) -> Option<MeanFootprint> {
+        let sums = self.receivers.get(&receiver).filter(|sums| sums.flux > 0.0)?;
         Some(MeanFootprint {
             area_m2: (sums.log_area_m2 / sums.flux).exp(),
             map_share: (sums.log_area_share / sums.flux).exp(),
@@ -65,9 +105,12 @@ impl FootprintStatistics {
     /// For a lattice with `ratio` times the cells: every footprint shrinks by as much.
     #[must_use]
     pub fn refined(mut self, ratio: f64) -> Self {
-        for sums in self.objects.values_mut() {
+        for sums in self.receivers.values_mut() {
             sums.log_area_m2 -= sums.flux * ratio.ln();
             sums.log_area_share -= sums.flux * ratio.ln();
+        }
+        for spot in &mut self.spots {
+            spot.map_share = (spot.map_share / ratio).max(LEAST_SHARE);
         }
         self
     }

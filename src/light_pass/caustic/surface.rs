@@ -4,6 +4,7 @@ use glam::DVec2;
 
 use super::footprint::TexelFromWorld;
 use super::path::Arrival;
+use crate::illumination::Receiver;
 use crate::light_pass::receiver_maps::{ReceiverMap, ReceiverMaps};
 use crate::scene::Scene;
 
@@ -22,9 +23,9 @@ pub(super) struct Surface<'a> {
 impl<'a> Surface<'a> {
     /// `None` without a map, and on a triangle without area.
     fn new(scene: &Scene, maps: &'a ReceiverMaps, arrival: &Arrival) -> Option<Self> {
-        let (object, triangle) = (arrival.object as usize, arrival.triangle as usize);
-        let map = maps.get(object)?;
-        let corners = scene.objects[object].mesh.corners(triangle);
+        let triangle = arrival.triangle as usize;
+        let map = maps.get(arrival.receiver)?;
+        let corners = scene.objects[arrival.receiver.object()].mesh.corners(triangle);
         let texel_from_world = map.chart.texel_from_world(triangle, corners)?;
         Some(Self {
             map,
@@ -44,8 +45,8 @@ impl<'a> Surface<'a> {
     }
 }
 
-/// Object and triangle.
-type Key = (u32, u32);
+/// Receiver and triangle.
+type Key = (Receiver, u32);
 
 /// The last few triangles: neighbouring rays mostly arrive on the same ones.
 pub(super) struct Surfaces<'a> {
@@ -67,7 +68,7 @@ impl<'a> Surfaces<'a> {
 
     /// The triangle of an arrival; `None` where nothing can be deposited.
     pub(super) fn of(&mut self, arrival: &Arrival) -> Option<&Surface<'a>> {
-        let key = (arrival.object, arrival.triangle);
+        let key = (arrival.receiver, arrival.triangle);
         let slot = &mut self.slots[arrival.triangle as usize % SLOTS];
         if slot.as_ref().is_none_or(|(held, _)| *held != key) {
             *slot = Some((key, Surface::new(self.scene, self.maps, arrival)));

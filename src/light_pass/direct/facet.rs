@@ -14,6 +14,8 @@ pub struct Facet {
     corners: [DVec3; 3],
     corner_normals: [DVec3; 3],
     geometric_normal: DVec3,
+    /// Of the side that is lit.
+    sign: f64,
     /// Corners in texels.
     pub corners_texels: [DVec2; 3],
     /// Surface area per map area.
@@ -26,9 +28,9 @@ pub struct SurfacePoint {
     pub position: DVec3,
     /// Bound of its rounding error per axis [m].
     error: DVec3,
-    /// Unit, by the triangle's winding.
+    /// Unit, across the triangle, on the side that is lit.
     pub geometric_normal: DVec3,
-    /// Unit, interpolated from the vertices.
+    /// Unit, interpolated from the vertices, for that side.
     pub shading_normal: DVec3,
 }
 
@@ -56,6 +58,7 @@ impl Facet {
             corners,
             corner_normals: mesh.corner_normals(index),
             geometric_normal: mesh.face_normal(index),
+            sign: chart.receiver.side().sign(),
             corners_texels,
             m2_per_texel2: twice_m2 / twice_texel2.abs(),
         })
@@ -75,8 +78,8 @@ impl Facet {
             position,
             // Barycentric coordinates from the map add up to 1 only within their own rounding.
             error: error * 2.0,
-            geometric_normal: self.geometric_normal,
-            shading_normal: normal.try_normalize().unwrap_or(self.geometric_normal),
+            geometric_normal: self.geometric_normal * self.sign,
+            shading_normal: normal.try_normalize().unwrap_or(self.geometric_normal) * self.sign,
         }
     }
 }

@@ -66,14 +66,10 @@ impl Arriving {
     /// What a beam gives a point; `None` where it is nothing, or comes to the wrong side. A mixed surface takes what its
     /// polish does not reflect.
     pub fn from_beam(beam: &Beam, point: &SurfacePoint, material: &Material) -> Option<Self> {
-        let side = if beam.to_light.dot(point.geometric_normal) >= 0.0 {
-            1.0
-        } else if material.double_sided {
-            -1.0
-        } else {
+        if beam.to_light.dot(point.geometric_normal) < 0.0 {
             return None;
-        };
-        let cosine = side * beam.to_light.dot(point.shading_normal);
+        }
+        let cosine = beam.to_light.dot(point.shading_normal);
         let taken = match material.surface {
             SurfaceKind::Mixed => 1.0 - material.polish * dielectric_reflectance(cosine, material.ior),
             _ => 1.0,

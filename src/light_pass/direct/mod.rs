@@ -1,10 +1,10 @@
 //! Light straight from the lamps (LD), as irradiance of every texel.
 //!
 //! E = I cos θ/r² for points and spots, E⊥ cos θ for suns, θ by the interpolated normal, stopped by every surface,
-//! clear glass included: what comes through that is caustic light (LS+D). A surface takes light on its front, a
-//! double-sided one on either side, into the same map. Lights with extent are means over their places.
+//! clear glass included: what comes through that is caustic light (LS+D). Each side of a surface has a
+//! map of its own. Lights with extent are means over their places.
 
-mod facet;
+pub(super) mod facet;
 mod lighting;
 mod polygon;
 mod source;
@@ -106,7 +106,7 @@ impl<'a> Baker<'a> {
             tracer,
             sources,
             chart,
-            material: tracer.scene().material_of(chart.object),
+            material: tracer.scene().material_of(chart.object()),
             first,
             triangles,
         }
@@ -282,11 +282,11 @@ impl<'a> Baker<'a> {
 
     /// Tells texels of all maps apart.
     fn hash(&self, texel: usize) -> u64 {
-        (self.chart.object as u64) << 40 ^ texel as u64
+        (self.chart.receiver.index() as u64) << 40 ^ texel as u64
     }
 
     fn facet(&self, triangle: u32) -> Option<Facet> {
-        let mesh = &self.tracer.scene().objects[self.chart.object].mesh;
+        let mesh = &self.tracer.scene().objects[self.chart.object()].mesh;
         Facet::new(mesh, self.chart, triangle)
     }
 }

@@ -229,7 +229,7 @@ impl Soft {
         }
         let irradiance = match &self.shape {
             // Heitz, Hill and McGuire, "Combining analytic direct illumination and stochastic shadows", I3D 2018.
-            Some(shape) if sum.open > 0.0 => shape.irradiance(point, material) * (sum.taken / sum.open),
+            Some(shape) if sum.open > 0.0 => shape.irradiance(point) * (sum.taken / sum.open),
             Some(_) => LinearSrgb::BLACK,
             None => sum.irradiance / count,
         };
@@ -337,21 +337,12 @@ struct Sum {
 
 impl Shape {
     /// E at a point without shadows [W/m²].
-    fn irradiance(&self, point: &SurfacePoint, material: &Material) -> LinearSrgb {
-        let sides: &[f64] = if material.double_sided {
-            &[1.0, -1.0]
-        } else {
-            &[1.0]
-        };
-        let seen_sr: f64 = sides
+    fn irradiance(&self, point: &SurfacePoint) -> LinearSrgb {
+        let seen_sr: f64 = self
+            .polygons
             .iter()
-            .flat_map(|side| self.polygons.iter().map(move |polygon| (side, polygon)))
-            .map(|(side, polygon)| {
-                polygon.projected_solid_angle_sr(
-                    point.position,
-                    point.geometric_normal * *side,
-                    point.shading_normal * *side,
-                )
+            .map(|polygon| {
+                polygon.projected_solid_angle_sr(point.position, point.geometric_normal, point.shading_normal)
             })
             .sum();
         self.radiance * seen_sr

@@ -116,7 +116,7 @@ impl Builder<'_> {
         let mut tests = 0;
         let mut hiders = Vec::new();
         for (object, item) in scene.objects.iter().enumerate() {
-            if !scene.material_of(object).surface.is_opaque() || self.is_the_only_caster(object) {
+            if !scene.material_of(object).is_opaque() || self.is_the_only_caster(object) {
                 continue;
             }
             for triangle in 0..item.mesh.triangles.len() {

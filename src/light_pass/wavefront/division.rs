@@ -1,10 +1,12 @@
 //! How finely a patch is divided into triangles, from nine rays between its traced ones.
 
-use glam::DVec2;
+use glam::{DVec2, DVec3};
 
 use super::patch::PatchShape;
 use super::spread::{SpreadOutput, Spreader};
 use super::virtual_vertex::{VirtualRays, VirtualVertex};
+use crate::illumination::Receiver;
+use crate::light_pass::caustic::statistics::Spot;
 use crate::optics::LinearSrgb;
 use crate::transport::PathEffects;
 
@@ -21,6 +23,13 @@ const COARSEST_TOLERANCE: f64 = 10.0;
 /// Most triangles along a patch.
 const MOST_STEPS: usize = 128;
 
+/// Height of a surface over its middle facet, as a share of what the patch lights, from which it is taken for a jump or a
+/// sharp edge.
+const JUMP_SHARE: f64 = 0.25;
+
+/// How much the height of a surface above its middle facet counts beside its way along it.
+const HEIGHT_WEIGHT: f64 = 0.5;
+
 /// Steps along a patch whose rays do not all go to one surface.
 const MIXED_STEPS: usize = 6;
 
@@ -33,8 +42,8 @@ const DETAILS_PER_PATCH: f64 = 64.0;
 
 impl<E: PathEffects> Spreader<'_, E> {
     /// Whether nine rays of a patch meet a plane within its map.
-    pub(super) fn stays_on_map(&self, shape: &PatchShape, object: u32) -> bool {
-        let Some(surface) = self.receivers.get(object) else {
+    pub(super) fn stays_on_map(&self, shape: &PatchShape, receiver: Receiver) -> bool {
+        let Some(surface) = self.receivers.get(receiver) else {
             return false;
         };
         let Some(plane) = surface.plane else {
@@ -62,21 +71,29 @@ impl<E: PathEffects> Spreader<'_, E> {
             std::array::from_fn(|j| std::array::from_fn(|i| rays.vertex(probe_place(shape, i, j))));
         let first = probes[0][0].place;
         let is_one = probes.iter().flatten().all(|vertex| vertex.place.is_same(&first));
-        let Some(object) = first.object().filter(|_| is_one) else {
-            let lit = probes.iter().flatten().find_map(|vertex| vertex.place.object());
-            let tolerance = lit.map_or(1.0, |object| {
-                self.tolerance(object, flux_w.luminance(), MIXED_TEXELS)
+        let Some(receiver) = first.receiver().filter(|_| is_one) else {
+            if self.gathers {
+                self.note_part(&probes, flux_w, out);
+            }
+            let lit = probes.iter().flatten().find_map(|vertex| vertex.place.receiver());
+            let tolerance = lit.map_or(1.0, |receiver| {
+                self.tolerance(receiver, flux_w.luminance(), MIXED_TEXELS)
             });
             return mixed_steps(&probes, is_plane, tolerance);
         };
-        let texel = |i: usize, j: usize| probes[j][i].place.texel();
-        self.count_area(object, &texel, flux_w, out);
-        let bend = |a: DVec2, b: DVec2, c: DVec2| (a - b * 2.0 + c).length() * 0.25;
+        let local = self.laid_flat(receiver, &probes);
+        let place = |i: usize, j: usize| local[j][i];
+        let texel = |i: usize, j: usize| local[j][i].truncate();
+        self.count_area(receiver, &texel, flux_w, out);
+        let detail = self.detail(receiver, &probes);
+        let place = |i: usize, j: usize| place(i, j) * detail;
+        let texel = |i: usize, j: usize| texel(i, j) * detail;
+        let bend = |a: DVec3, b: DVec3, c: DVec3| (a - b * 2.0 + c).length() * 0.25;
         let across = (0..3)
-            .map(|j| bend(texel(0, j), texel(1, j), texel(2, j)))
+            .map(|j| bend(place(0, j), place(1, j), place(2, j)))
             .fold(0.0, f64::max);
         let down = (0..3)
-            .map(|i| bend(texel(i, 0), texel(i, 1), texel(i, 2)))
+            .map(|i| bend(place(i, 0), place(i, 1), place(i, 2)))
             .fold(0.0, f64::max);
         let corner = |i: usize, j: usize| {
             let (a, b, c) = (texel(i, j), texel(i + 1, j), texel(i, j + 1));
@@ -91,8 +108,8 @@ impl<E: PathEffects> Spreader<'_, E> {
                 0.0
             }
         };
-        let lit_texels = 0.5 * areas.iter().map(|area| area.abs()).sum::<f64>();
-        let tolerance = self.tolerance(object, flux_w.luminance(), lit_texels);
+        let lit_texels = 0.5 * areas.iter().map(|area| area.abs()).sum::<f64>() / (detail * detail);
+        let tolerance = self.tolerance(receiver, flux_w.luminance(), lit_texels);
         let length = |a: DVec2, b: DVec2, c: DVec2| a.distance(b) + b.distance(c);
         let width = (0..3)
             .map(|j| length(texel(0, j), texel(1, j), texel(2, j)))
@@ -100,6 +117,11 @@ impl<E: PathEffects> Spreader<'_, E> {
         let height = (0..3)
             .map(|i| length(texel(i, 0), texel(i, 1), texel(i, 2)))
             .fold(0.0, f64::max);
+        let heights = local.as_flattened().iter().map(|place| place.z * detail);
+        let (low, high) = heights.fold((0.0_f64, 0.0_f64), |(low, high), z| (low.min(z), high.max(z)));
+        if high - low > JUMP_SHARE * width.max(height) {
+            return mixed_steps(&probes, is_plane, tolerance);
+        }
         let steps = |bend: f64, change: f64, length: f64| {
             let straight = (bend / (CHORD_TEXELS * tolerance)).sqrt();
             let even = change / (DENSITY_STEP * tolerance);
@@ -121,10 +143,39 @@ impl<E: PathEffects> Spreader<'_, E> {
         )
     }
 
+    /// Where rays of a patch meet a receiver, in texels as they lie around the middle one: charts may end and turn between
+    /// them. The third coordinate is the height above that facet.
+    fn laid_flat(&self, receiver: Receiver, probes: &[[VirtualVertex; 3]; 3]) -> [[DVec3; 3]; 3] {
+        let middle = probes[1][1].place.facet();
+        let flat = self
+            .receivers
+            .facets(receiver)
+            .zip(middle)
+            .and_then(|(facets, (facet, point))| {
+                let triangle = facet.triangle as usize;
+                let rows = facets
+                    .surface
+                    .chart
+                    .texel_from_world(triangle, facets.mesh.corners(triangle))?;
+                let height = facets.mesh.face_normal(triangle) * rows[0].cross(rows[1]).length().sqrt();
+                Some((rows, height, point, facet.texel))
+            });
+        probes.map(|row| {
+            row.map(|vertex| match (flat, vertex.place.facet()) {
+                (Some((rows, height, middle, texel)), Some((_, point))) => {
+                    let step = point - middle;
+                    let on = texel + DVec2::new(rows[0].dot(step), rows[1].dot(step));
+                    on.extend(HEIGHT_WEIGHT * height.dot(step))
+                }
+                _ => vertex.place.texel().extend(0.0),
+            })
+        })
+    }
+
     /// How much coarser than the finest a patch may be divided: where it adds little to its map, what it adds need not
     /// be as exact.
-    fn tolerance(&self, object: u32, flux_w: f64, lit_texels: f64) -> f64 {
-        let Some(surface) = self.receivers.get(object) else {
+    fn tolerance(&self, receiver: Receiver, flux_w: f64, lit_texels: f64) -> f64 {
+        let Some(surface) = self.receivers.get(receiver) else {
             return 1.0;
         };
         let texels = (surface.chart.width * surface.chart.height) as f64;
@@ -140,24 +191,97 @@ impl<E: PathEffects> Spreader<'_, E> {
     /// Notes how large an area a patch lights.
     fn count_area(
         &self,
-        object: u32,
+        receiver: Receiver,
         texel: &impl Fn(usize, usize) -> DVec2,
         flux_w: LinearSrgb,
         out: &mut SpreadOutput,
     ) {
-        let Some(surface) = self.receivers.get(object) else {
+        let Some(surface) = self.receivers.get(receiver) else {
             return;
         };
         let (a, b, c, d) = (texel(0, 0), texel(2, 0), texel(2, 2), texel(0, 2));
         let texels = 0.5 * ((b - a).perp_dot(c - a).abs() + (c - a).perp_dot(d - a).abs());
         let share = texels / (surface.chart.width * surface.chart.height) as f64;
         out.statistics.add(
-            object as usize,
+            receiver,
             flux_w.luminance(),
             share * surface.area_m2 / DETAILS_PER_PATCH,
             share / DETAILS_PER_PATCH,
         );
+        if self.gathers {
+            let all = (0..9).map(|index| texel(index % 3, index / 3));
+            self.note(receiver, all, flux_w.luminance(), share, out);
+        }
     }
+
+    /// Notes where a patch lies of which only some rays meet one surface.
+    fn note_part(&self, probes: &[[VirtualVertex; 3]; 3], flux_w: LinearSrgb, out: &mut SpreadOutput) {
+        let places = || probes.iter().flatten().map(|vertex| &vertex.place);
+        let Some(receiver) = places().find_map(|place| place.receiver()) else {
+            return;
+        };
+        let Some(surface) = self.receivers.get(receiver) else {
+            return;
+        };
+        let lit = || places().filter(|place| place.receiver() == Some(receiver));
+        let (low, high) = bounds(lit().map(|place| place.texel()));
+        let extent = (high - low) / DVec2::new(surface.chart.width as f64, surface.chart.height as f64);
+        let part = lit().count() as f64 / 9.0;
+        let share = extent.x * extent.y;
+        self.note(
+            receiver,
+            lit().map(|place| place.texel()),
+            flux_w.luminance() * part,
+            share,
+            out,
+        );
+    }
+
+    /// Notes where light lies that covers a share of its map.
+    fn note(
+        &self,
+        receiver: Receiver,
+        texels: impl Iterator<Item = DVec2>,
+        flux_w: f64,
+        share: f64,
+        out: &mut SpreadOutput,
+    ) {
+        let Some(surface) = self.receivers.get(receiver) else {
+            return;
+        };
+        let size = DVec2::new(surface.chart.width as f64, surface.chart.height as f64);
+        let (low, high) = bounds(texels);
+        out.statistics.add_spot(Spot {
+            receiver,
+            bounds: (low / size, high / size),
+            flux_w,
+            map_share: share / DETAILS_PER_PATCH,
+        });
+    }
+
+    /// Finest texels over the texels that a patch falls on: 1, or less where all of it falls on coarser tiles.
+    fn detail(&self, receiver: Receiver, probes: &[[VirtualVertex; 3]; 3]) -> f64 {
+        let Some(chart) = self.receivers.get(receiver).map(|surface| &surface.chart) else {
+            return 1.0;
+        };
+        let Some(layout) = &chart.layout else {
+            return 1.0;
+        };
+        let (low, high) = bounds(probes.iter().flatten().map(|vertex| vertex.place.texel()));
+        let last = DVec2::new((chart.width - 1) as f64, (chart.height - 1) as f64);
+        let within = |place: DVec2| {
+            let place = place.clamp(DVec2::ZERO, last);
+            (place.x as usize, place.y as usize)
+        };
+        1.0 / f64::from(1_u32 << layout.finest_between(within(low), within(high)))
+    }
+}
+
+/// Least and largest coordinates.
+fn bounds(places: impl Iterator<Item = DVec2>) -> (DVec2, DVec2) {
+    places.fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(low, high), place| {
+        (low.min(place), high.max(place))
+    })
 }
 
 /// One of nine places over a patch; those of a triangle are drawn together at its last corner.
@@ -175,7 +299,7 @@ fn mixed_steps(probes: &[[VirtualVertex; 3]; 3], is_plane: bool, tolerance: f64)
     let lost = probes
         .iter()
         .flatten()
-        .all(|vertex| vertex.place.object().is_none());
+        .all(|vertex| vertex.place.receiver().is_none());
     let steps = match (is_plane, lost) {
         // Far off the map with every ray.
         (true, true) => 2,

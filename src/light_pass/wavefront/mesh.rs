@@ -3,10 +3,13 @@
 use glam::DVec2;
 
 use super::coverage::FluxTriangle;
+use super::facets::Piece;
 use super::patch::PatchShape;
-use super::shares::{Shares, difference, mean, scaled};
+use super::receivers::Receivers;
+use super::shares::{Shares, difference, mean, parted, scaled};
 use super::spread::SpreadOutput;
 use super::virtual_vertex::{Place, VirtualRays, VirtualVertex};
+use crate::illumination::Receiver;
 use crate::illumination::accumulator::FluxCount;
 use crate::light_pass::ledger_sum::Account;
 use crate::optics::LinearSrgb;
@@ -15,12 +18,36 @@ use crate::transport::PathEffects;
 /// Bisections of a virtual edge between rays that go to different surfaces.
 const CUT_STEPS: u32 = 10;
 
-/// How often a triangle is cut that meets several surfaces.
-const DEEPEST_CUT: u32 = 4;
+/// How often a triangle may be divided.
+#[derive(Clone, Copy)]
+struct Divisions {
+    /// Since it meets several surfaces.
+    cuts: u32,
+    /// Since light falls on its corners at very different angles.
+    bends: u32,
+}
+
+impl Divisions {
+    const WHOLE: Self = Self { cuts: 4, bends: 4 };
+
+    fn after_cut(self) -> Self {
+        Self {
+            cuts: self.cuts - 1,
+            ..self
+        }
+    }
+
+    fn after_bend(self) -> Self {
+        Self {
+            bends: self.bends - 1,
+            ..self
+        }
+    }
+}
 
 /// The triangles of a whole grid on one plane.
 pub(super) fn even_grid(
-    object: u32,
+    receiver: Receiver,
     grid: &[DVec2],
     (across, down): (usize, usize),
     colours: &[LinearSrgb],
@@ -29,7 +56,7 @@ pub(super) fn even_grid(
 ) {
     let (width, height) = ((across as f64).recip(), (down as f64).recip());
     let mut share = Shares::new(flux, 2 * across * down, mean(colours.iter().copied()));
-    let list = out.list(object);
+    let list = out.list(receiver);
     list.reserve(2 * across * down);
     for j in 0..down {
         let t = (j as f64 + 0.5) * height;
@@ -54,8 +81,21 @@ pub(super) fn even_grid(
     }
 }
 
+/// Largest ratio of the cosines at which light falls on the corners of a triangle.
+const MOST_BENT: f64 = 1.2;
+
+/// Cosine below which light grazes a surface: elsewhere a patch is divided finely enough by its nine rays.
+const GRAZING: f64 = 0.3;
+
+/// Triangles within this size do not show [texels].
+const LEAST_BENT_TEXELS: f64 = 0.75;
+
+/// Triangles within this size need not be divided between facets that lie alike in the map [texels].
+const TINY_TEXELS: f64 = 0.5;
+
 /// One patch while it is spread.
 pub(super) struct PatchMesh<'a, 'b, E> {
+    pub(super) receivers: &'a Receivers<'a>,
     pub(super) shape: &'a PatchShape,
     pub(super) rays: VirtualRays<'a, E>,
     /// Flux density at the patch's corners.
@@ -101,7 +141,7 @@ impl<E: PathEffects> PatchMesh<'_, '_, E> {
                 let middle = self.colour((corners[0].at + corners[2].at) * 0.5);
                 for triangle in [[0, 1, 2], [0, 2, 3]] {
                     let flux = share.next(middle);
-                    self.settle(triangle.map(|corner| corners[corner]), flux, DEEPEST_CUT);
+                    self.settle(triangle.map(|corner| corners[corner]), flux, Divisions::WHOLE);
                 }
             }
             row = next;
@@ -122,7 +162,7 @@ impl<E: PathEffects> PatchMesh<'_, '_, E> {
                 for piece in pieces {
                     let middle = (piece[0].at + piece[1].at + piece[2].at) / 3.0;
                     let flux = share.next(self.colour(middle));
-                    self.settle(piece, flux, DEEPEST_CUT);
+                    self.settle(piece, flux, Divisions::WHOLE);
                 }
             }
             row = next;
@@ -130,22 +170,34 @@ impl<E: PathEffects> PatchMesh<'_, '_, E> {
     }
 
     /// Gives a triangle's flux to where its rays go.
-    fn settle(&mut self, knots: [Knot; 3], flux: FluxCount, cuts_left: u32) {
+    fn settle(&mut self, knots: [Knot; 3], flux: FluxCount, budget: Divisions) {
         if flux == [0; 3] {
             return;
         }
         let places = knots.map(|knot| knot.vertex.place);
-        if places[0].is_same(&places[1]) && places[0].is_same(&places[2]) {
-            return self.place(&knots, flux);
+        let is_one = places[0].is_same(&places[1]) && places[0].is_same(&places[2]);
+        if is_one && budget.bends > 0 && self.is_bent(&knots) {
+            return self.quarter(knots, flux, budget.after_bend());
         }
-        if cuts_left == 0 {
+        if is_one {
+            match self.over_facets(&knots) {
+                Over::One => return self.place(&knots, None, flux),
+                Over::Several(pieces, is_whole) if is_whole || (budget.cuts == 0 && !pieces.is_empty()) => {
+                    return self.place(&knots, Some(&pieces), flux);
+                }
+                Over::Several(..) => {}
+            }
+        }
+        if budget.cuts == 0 {
             // A corner where many surfaces meet, some thousandth of a patch wide: all of it goes where its first ray
             // goes.
-            return self.place(&[knots[0]; 3], flux);
+            return self.place(&[knots[0]; 3], None, flux);
         }
-        let lone = (0..3)
-            .find(|&i| places[(i + 1) % 3].is_same(&places[(i + 2) % 3]))
-            .unwrap_or(0);
+        let joined = [0, 1, 2].map(|i| self.is_joined(&knots[(i + 1) % 3], &knots[(i + 2) % 3]));
+        if joined == [true; 3] {
+            return self.quarter(knots, flux, budget.after_cut());
+        }
+        let lone = joined.iter().position(|joined| *joined).unwrap_or(0);
         let [apex, left, right] = [knots[lone], knots[(lone + 1) % 3], knots[(lone + 2) % 3]];
         let (t1, near1, far1) = self.bracket(apex, left);
         let (t2, near2, far2) = self.bracket(apex, right);
@@ -156,9 +208,74 @@ impl<E: PathEffects> PatchMesh<'_, '_, E> {
             LinearSrgb::grey(parts[1] / (1.0 - parts[0]).max(f64::MIN_POSITIVE)),
         );
         let third = difference(difference(flux, first), second);
-        self.settle([apex, near1, near2], first, cuts_left - 1);
-        self.settle([far1, left, right], second, cuts_left - 1);
-        self.settle([far1, right, far2], third, cuts_left - 1);
+        self.settle([apex, near1, near2], first, budget.after_cut());
+        self.settle([far1, left, right], second, budget.after_cut());
+        self.settle([far1, right, far2], third, budget.after_cut());
+    }
+
+    /// Four triangles in place of one.
+    fn quarter(&mut self, [a, b, c]: [Knot; 3], flux: FluxCount, budget: Divisions) {
+        let mut middle = |a: Knot, b: Knot| self.knot(a.at.lerp(b.at, 0.5));
+        let [ab, bc, ca] = [middle(a, b), middle(b, c), middle(c, a)];
+        let children = [[ab, bc, ca], [a, ab, ca], [ab, b, bc], [ca, bc, c]];
+        for (child, flux) in children.into_iter().zip(parted(flux, [0.25; 4].into_iter())) {
+            self.settle(child, flux, budget);
+        }
+    }
+
+    /// Whether light falls on a bent receiver at angles that differ too much between three rays to be spread evenly between
+    /// them: towards the rim of a body the same light covers more and more of it.
+    fn is_bent(&self, knots: &[Knot; 3]) -> bool {
+        let facets = (knots[0].vertex.place.receiver()).and_then(|receiver| self.receivers.facets(receiver));
+        let Some(facets) = facets else {
+            return false;
+        };
+        let places = knots.map(|knot| knot.vertex.place.texel());
+        let reach = (places[1] - places[0]).abs().max((places[2] - places[0]).abs());
+        if reach.max_element() <= LEAST_BENT_TEXELS {
+            return false;
+        }
+        let (mut least, mut most) = (1.0_f64, 0.0_f64);
+        for knot in knots {
+            if let Some((place, _)) = knot.vertex.place.facet() {
+                let normal = facets.mesh.face_normal(place.triangle as usize);
+                let direction = knot.vertex.ray.direction;
+                let cosine = direction.dot(normal).abs() / direction.length();
+                (least, most) = (least.min(cosine), most.max(cosine));
+            }
+        }
+        least < GRAZING && most > MOST_BENT * least
+    }
+
+    /// Whether two rays meet one surface, with nothing between that would part their light on the map.
+    fn is_joined(&self, a: &Knot, b: &Knot) -> bool {
+        let (a, b) = (&a.vertex.place, &b.vertex.place);
+        let (Some(receiver), true) = (a.receiver(), a.is_same(b)) else {
+            return a.is_same(b);
+        };
+        match (self.receivers.facets(receiver), a.facet(), b.facet()) {
+            (Some(facets), Some(a), Some(b)) => facets.is_even(a, b),
+            _ => true,
+        }
+    }
+
+    /// How the facets between rays that meet one receiver take them.
+    fn over_facets(&self, knots: &[Knot; 3]) -> Over {
+        let places = knots.map(|knot| knot.vertex.place.facet());
+        let facets = (knots[0].vertex.place.receiver()).and_then(|receiver| self.receivers.facets(receiver));
+        let (Some(facets), [Some(a), Some(b), Some(c)]) = (facets, places) else {
+            return Over::One;
+        };
+        let triangles = [a, b, c].map(|(place, _)| place.triangle);
+        let is_tiny = || {
+            let reach = (b.0.texel - a.0.texel).abs().max((c.0.texel - a.0.texel).abs());
+            reach.max_element() <= TINY_TEXELS && facets.is_even(a, b) && facets.is_even(a, c)
+        };
+        if triangles[1..] == [triangles[0]; 2] || is_tiny() {
+            return Over::One;
+        }
+        let (pieces, is_whole) = facets.pieces(knots.map(|knot| knot.vertex.ray), triangles);
+        Over::Several(pieces, is_whole)
     }
 
     /// Where between two knots the rays stop going where the first goes: the place between them [0, 1], the last knot
@@ -169,7 +286,7 @@ impl<E: PathEffects> PatchMesh<'_, '_, E> {
         for _ in 0..CUT_STEPS {
             let middle = 0.5 * (low + high);
             let knot = self.knot(from.at.lerp(to.at, middle));
-            if knot.vertex.place.is_same(&from.vertex.place) {
+            if self.is_joined(&near, &knot) {
                 (low, near) = (middle, knot);
             } else {
                 (high, far) = (middle, knot);
@@ -178,8 +295,8 @@ impl<E: PathEffects> PatchMesh<'_, '_, E> {
         (0.5 * (low + high), near, far)
     }
 
-    /// All three rays go to the same surface, or nowhere.
-    fn place(&mut self, knots: &[Knot; 3], flux: FluxCount) {
+    /// All three rays go to the same receiver, or nowhere.
+    fn place(&mut self, knots: &[Knot; 3], pieces: Option<&[Piece]>, flux: FluxCount) {
         let mut arrived = flux;
         if E::ABSORPTION && self.absorbs {
             let left = knots
@@ -195,7 +312,7 @@ impl<E: PathEffects> PatchMesh<'_, '_, E> {
             Place::Nowhere => self.out.ledger.book(Account::Unresolved, arrived),
             Place::Onward => self.out.ledger.book(Account::Quadrature, arrived),
             Place::Refused => self.out.ledger.book(Account::Unresolved, arrived),
-            Place::On { object, island, .. } => {
+            Place::On { receiver, island, .. } => {
                 let share = knots.iter().map(|knot| knot.vertex.deposit).sum::<f64>() / 3.0;
                 let deposit = if share < 1.0 {
                     scaled(arrived, LinearSrgb::grey(share))
@@ -205,13 +322,42 @@ impl<E: PathEffects> PatchMesh<'_, '_, E> {
                 self.out
                     .ledger
                     .book(Account::Quadrature, difference(arrived, deposit));
-                let triangle = FluxTriangle {
-                    corners: knots.map(|knot| knot.vertex.place.texel()),
-                    flux: deposit,
-                    island,
-                };
-                self.out.list(object).push(triangle);
+                let list = self.out.list(receiver);
+                match pieces {
+                    Some(pieces) => list.extend(flux_triangles(pieces, deposit)),
+                    None => list.push(FluxTriangle {
+                        corners: knots.map(|knot| knot.vertex.place.texel()),
+                        flux: deposit,
+                        island,
+                    }),
+                }
             }
         }
     }
+}
+
+/// What a triangle of rays meets of one receiver.
+enum Over {
+    /// Facets that count as one.
+    One,
+    /// Parts on several, and whether they take all of it.
+    Several(Vec<Piece>, bool),
+}
+
+/// The parts of a triangle's flux on several facets.
+fn flux_triangles(pieces: &[Piece], flux: FluxCount) -> impl Iterator<Item = FluxTriangle> {
+    let triangles = pieces.iter().flat_map(|piece| {
+        let triangles = piece.triangles();
+        triangles.map(|(corners, share)| (corners, piece.island, share * piece.share))
+    });
+    let shares = triangles.clone().map(|(.., share)| share);
+    let fluxes = parted(flux, shares);
+    let parts = triangles
+        .zip(fluxes)
+        .map(|((corners, island, _), flux)| FluxTriangle {
+            corners,
+            flux,
+            island,
+        });
+    parts.filter(|triangle| triangle.flux != [0; 3])
 }

@@ -10,6 +10,7 @@ pub mod coverage;
 mod division;
 mod doubt;
 pub mod edge;
+mod facets;
 pub mod kept_rays;
 pub mod lattice;
 mod mesh;

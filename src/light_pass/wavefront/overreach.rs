@@ -1,6 +1,7 @@
 //! Patches that light places which none of their traced rays reaches: near silhouettes and foci a smooth patch may swing
 //! far out. Who refines those places has to divide these patches' cells.
 
+use crate::illumination::Receiver;
 use glam::DVec2;
 
 use super::coverage::FluxTriangle;
@@ -15,8 +16,8 @@ pub struct Overreach {
     pub face: u32,
     /// Its middle in the unit square.
     pub middle: DVec2,
-    /// Whose map it reaches; index into `Scene::objects`.
-    pub object: u32,
+    /// Whose map it reaches.
+    pub receiver: Receiver,
     /// Box around its light on the map [texels].
     pub low: DVec2,
     /// The other corner.
@@ -29,7 +30,7 @@ impl Overreach {
     pub fn of(
         face: u32,
         middle: DVec2,
-        object: u32,
+        receiver: Receiver,
         triangles: &[FluxTriangle],
         traced: impl Iterator<Item = DVec2>,
     ) -> Option<Self> {
@@ -40,7 +41,7 @@ impl Overreach {
         (!triangles.is_empty() && !keeps).then_some(Self {
             face,
             middle,
-            object,
+            receiver,
             low,
             high,
         })

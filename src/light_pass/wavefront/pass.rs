@@ -8,6 +8,7 @@ use super::kept_rays::KeptRays;
 use super::lattice::{TracedBand, WavefrontLattice};
 use super::receivers::Receivers;
 use super::spread::{SpreadOutput, Spreader};
+use crate::illumination::Receiver;
 use crate::light_pass::caustic::pass::{Listener, PassReport, Stopwatch};
 use crate::light_pass::ledger_sum::Account;
 use crate::light_pass::receiver_maps::{ChartFor, ReceiverMaps};
@@ -19,6 +20,12 @@ const PATCHES_PER_TASK: usize = 128;
 
 /// Tasks whose triangles wait together to be deposited: memory does not grow with the light.
 const TASKS_AT_ONCE: usize = 64;
+
+/// The same before it is known how many triangles they give.
+const FIRST_AT_ONCE: usize = 4;
+
+/// Triangles that wait together, about: 72 bytes each.
+const MOST_TRIANGLES: usize = 1 << 21;
 
 /// Triangles that are deposited between two looks at whether to stop.
 const TRIANGLES_AT_ONCE: usize = 1 << 13;
@@ -140,12 +147,16 @@ impl WavefrontDepositor<'_> {
             .flat_map(|row| row.chunks(PATCHES_PER_TASK))
             .collect();
         let mut maps = maps;
-        for tasks in tasks.chunks(TASKS_AT_ONCE) {
+        let (mut rest, mut at_once) = (&tasks[..], FIRST_AT_ONCE);
+        while !rest.is_empty() {
+            let (tasks, later) = rest.split_at(at_once.min(rest.len()));
+            rest = later;
             let parts = self.lattice.tracer.limits.effects.specialise(SpreadTasks {
                 depositor: self,
                 band,
                 tasks,
                 control,
+                gathers: maps.is_none(),
             });
             for part in &parts {
                 report.ledger.merge(&part.ledger);
@@ -154,14 +165,17 @@ impl WavefrontDepositor<'_> {
                 report.statistics.merge(&part.statistics);
                 report.overreaches.extend_from_slice(&part.overreaches);
             }
+            let triangles: usize = parts.iter().map(SpreadOutput::triangle_count).sum();
+            // Neighbouring patches are divided alike.
+            at_once = (MOST_TRIANGLES * tasks.len() / triangles.max(1)).clamp(1, TASKS_AT_ONCE);
             if let Some(maps) = maps.as_deref_mut() {
                 let lists = parts.iter().flat_map(|part| &part.triangles);
-                let pieces = lists.flat_map(|(object, triangles)| {
+                let pieces = lists.flat_map(|(receiver, triangles)| {
                     let pieces = triangles.chunks(TRIANGLES_AT_ONCE);
-                    pieces.map(|piece| (*object, piece))
+                    pieces.map(|piece| (*receiver, piece))
                 });
-                for (object, piece) in pieces.take_while(|_| !control.is_cancelled()) {
-                    self.place(object, piece, maps, report);
+                for (receiver, piece) in pieces.take_while(|_| !control.is_cancelled()) {
+                    self.place(receiver, piece, maps, report);
                 }
             }
         }
@@ -175,6 +189,8 @@ struct SpreadTasks<'a> {
     band: &'a TracedBand,
     tasks: &'a [&'a [Patch]],
     control: &'a Control,
+    /// Whether the places of footprints are wanted.
+    gathers: bool,
 }
 
 impl ForEffects for SpreadTasks<'_> {
@@ -190,6 +206,7 @@ impl ForEffects for SpreadTasks<'_> {
             effects: E::default(),
             reference_w: depositor.reference_w,
             coarseness: depositor.coarseness,
+            gathers: self.gathers,
         };
         let spread = |patches: &&[Patch]| {
             let mut output = SpreadOutput::default();
@@ -206,13 +223,13 @@ impl WavefrontDepositor<'_> {
     /// Adds triangles to a map.
     fn place(
         &self,
-        object: u32,
+        receiver: Receiver,
         triangles: &[FluxTriangle],
         maps: &mut ReceiverMaps,
         report: &mut PassReport,
     ) {
-        maps.touch(object as usize, self.chart_for);
-        let Some(map) = maps.get_mut(object as usize) else {
+        maps.touch(receiver, self.chart_for);
+        let Some(map) = maps.get_mut(receiver) else {
             return;
         };
         let placed = deposit_triangles(triangles, map);

@@ -4,9 +4,10 @@ use std::sync::{Arc, OnceLock};
 
 use glam::{DVec2, DVec3};
 
+use super::facets::Facets;
 use crate::geometry::Ray;
-use crate::illumination::Chart;
 use crate::illumination::islands::Islands;
+use crate::illumination::{Chart, Receiver};
 use crate::light_pass::receiver_maps::ChartFor;
 use crate::scene::{Mesh, SurfaceKind};
 use crate::transport::Tracer;
@@ -33,15 +34,23 @@ pub struct PlaneChart {
 
 impl PlaneChart {
     /// Texel coordinates where a ray (of any length) meets the extended plane, and the distance in units of the
-    /// direction; `None` where it does not, or too far off the map to matter.
+    /// direction; `None` where it does not, comes from behind, or too far off the map to matter.
     pub fn meet(&self, ray: &Ray) -> Option<(DVec2, f64)> {
         let slope = ray.direction.dot(self.normal);
+        if slope > 0.0 {
+            return None;
+        }
         let distance = (self.offset_m - ray.origin.dot(self.normal)) / slope;
         let point = ray.origin + ray.direction * distance;
         let texel = DVec2::new(self.rows[0].dot(point), self.rows[1].dot(point)) + self.origin;
         let near = (texel - self.middle).abs().max_element() <= self.farthest_texels;
         // Also false for NaN.
         (distance > 0.0 && near).then_some((texel, distance))
+    }
+
+    /// Whether a point lies behind the plane: light that starts there does not come to this side.
+    pub fn hides(&self, point: DVec3) -> bool {
+        point.dot(self.normal) < self.offset_m
     }
 
     fn of(mesh: &Mesh, chart: &Chart) -> Option<Self> {
@@ -53,7 +62,8 @@ impl PlaneChart {
             .reduce(|a, b| if b.0 > a.0 { b } else { a })?
             .1;
         let corners = mesh.corners(largest);
-        let normal = mesh.face_normal(largest);
+        // Light comes against it.
+        let normal = mesh.face_normal(largest) * chart.receiver.side().sign();
         let rows = chart.texel_from_world(largest, corners)?;
         let size = DVec2::new(chart.width as f64, chart.height as f64);
         let origin = chart.corner_uvs[largest][0] * size
@@ -78,7 +88,7 @@ impl PlaneChart {
             origin,
             middle: size * 0.5,
             farthest_texels: FARTHEST_SIDES * size.max_element(),
-            fills_map: chart.texel_areas_m2.len() == 1,
+            fills_map: chart.is_full(),
         })
     }
 }
@@ -137,7 +147,9 @@ impl<'a> Receivers<'a> {
         Self {
             tracer,
             chart_for,
-            slots: scene.objects.iter().map(|_| OnceLock::new()).collect(),
+            slots: Receiver::all(scene.objects.len())
+                .map(|_| OnceLock::new())
+                .collect(),
             bounds: scene
                 .objects
                 .iter()
@@ -147,16 +159,27 @@ impl<'a> Receivers<'a> {
         }
     }
 
-    /// A receiver; `None` where the object cannot take a map.
-    pub fn get(&self, object: u32) -> Option<&ReceiverSurface> {
-        self.slots[object as usize]
-            .get_or_init(|| self.prepare(object as usize))
+    /// A receiver; `None` where it cannot take a map.
+    pub fn get(&self, receiver: Receiver) -> Option<&ReceiverSurface> {
+        self.slots[receiver.index()]
+            .get_or_init(|| self.prepare(receiver))
             .as_ref()
     }
 
-    fn prepare(&self, object: usize) -> Option<ReceiverSurface> {
+    /// The facets of a receiver that is bent, or whose chart is; `None` of one that is flat and even.
+    pub fn facets(&self, receiver: Receiver) -> Option<Facets<'_>> {
+        let surface = self.get(receiver).filter(|surface| surface.plane.is_none())?;
+        Some(Facets {
+            surface,
+            mesh: &self.tracer.scene().objects[receiver.object()].mesh,
+            adjacency: self.tracer.adjacency(receiver.object()),
+        })
+    }
+
+    fn prepare(&self, receiver: Receiver) -> Option<ReceiverSurface> {
         let scene = self.tracer.scene();
-        let chart = (self.chart_for)(object)?;
+        let object = receiver.object();
+        let chart = (self.chart_for)(receiver)?;
         let mesh = &scene.objects[object].mesh;
         Some(ReceiverSurface {
             islands: Islands::find(&chart),

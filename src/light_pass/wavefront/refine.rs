@@ -10,6 +10,7 @@ use glam::DVec2;
 use super::overreach::Overreach;
 use super::receivers::Receivers;
 use super::strand::{Landing, LightSample, Strand};
+use crate::illumination::Receiver;
 use crate::light_pass::caustic::path::PathSignature;
 
 /// Side of a tile [texels].
@@ -26,7 +27,7 @@ pub struct TileSet {
 }
 
 /// Tiles of all maps, by object.
-pub type RoughTiles = BTreeMap<usize, TileSet>;
+pub type RoughTiles = BTreeMap<Receiver, TileSet>;
 
 impl TileSet {
     /// No tile of a map of the given size [texels].
@@ -84,7 +85,7 @@ impl Round {
     /// For these tiles, after a level with these patches.
     pub fn new(tiles: RoughTiles, overreaches: &[Overreach]) -> Self {
         let meets = |patch: &&Overreach| {
-            let tiles = tiles.get(&(patch.object as usize));
+            let tiles = tiles.get(&patch.receiver);
             tiles.is_some_and(|tiles| tiles.meets(patch.low, patch.high))
         };
         let mut places: Vec<(u32, DVec2)> = overreaches
@@ -169,10 +170,10 @@ impl Refinement<'_> {
 
     /// Whether a strand's light may fall on chosen tiles: they meet the box around the places that its corners light.
     fn falls_on(&self, corners: &[&Strand], tiles: &RoughTiles) -> bool {
-        let mut lit: Vec<(u32, DVec2, DVec2)> = Vec::new();
+        let mut lit: Vec<(Receiver, DVec2, DVec2)> = Vec::new();
         for strand in corners {
             let Landing::Receiver {
-                object,
+                receiver,
                 triangle,
                 barycentric,
                 ..
@@ -180,20 +181,17 @@ impl Refinement<'_> {
             else {
                 continue;
             };
-            let Some(surface) = self.receivers.get(object) else {
+            let Some(surface) = self.receivers.get(receiver) else {
                 continue;
             };
             let texel = surface.texel(triangle, barycentric);
-            match lit.iter_mut().find(|(lit, ..)| *lit == object) {
+            match lit.iter_mut().find(|(lit, ..)| *lit == receiver) {
                 Some((_, low, high)) => (*low, *high) = (low.min(texel), high.max(texel)),
-                None => lit.push((object, texel, texel)),
+                None => lit.push((receiver, texel, texel)),
             }
         }
-        lit.into_iter().any(|(object, low, high)| {
-            tiles
-                .get(&(object as usize))
-                .is_some_and(|tiles| tiles.meets(low, high))
-        })
+        lit.into_iter()
+            .any(|(receiver, low, high)| tiles.get(&receiver).is_some_and(|tiles| tiles.meets(low, high)))
     }
 }
 

@@ -23,6 +23,18 @@ pub fn difference(a: FluxCount, b: FluxCount) -> FluxCount {
     std::array::from_fn(|channel| a[channel] - b[channel])
 }
 
+/// A count in parts of given shares, which add up to 1, whose sum is exact but for rounding of the last.
+pub fn parted(flux: FluxCount, shares: impl Iterator<Item = f64>) -> impl Iterator<Item = FluxCount> {
+    let (mut given, mut sum) = ([0; 3], 0.0);
+    shares.map(move |share| {
+        sum += share;
+        let upto = scaled(flux, LinearSrgb::grey(if sum > 1.0 - 1e-9 { 1.0 } else { sum }));
+        let part = difference(upto, given);
+        given = upto;
+        part
+    })
+}
+
 /// Hands out a count in parts whose sum is exact.
 pub struct Shares {
     flux: FluxCount,

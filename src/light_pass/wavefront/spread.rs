@@ -13,6 +13,7 @@ use super::receivers::Receivers;
 use super::shares::{difference, mean, scaled};
 use super::strand::{Landing, Strand};
 use super::virtual_vertex::VirtualRays;
+use crate::illumination::Receiver;
 use crate::illumination::accumulator::{FluxCount, FluxUnit};
 use crate::light_pass::caustic::statistics::FootprintStatistics;
 use crate::light_pass::ledger_sum::{Account, LedgerSum};
@@ -36,13 +37,15 @@ pub struct Spreader<'a, E> {
     pub reference_w: f64,
     /// How much coarser (> 1) or finer triangles may be than is usual.
     pub coarseness: f64,
+    /// Whether the places of footprints are wanted.
+    pub gathers: bool,
 }
 
 /// What patches became.
 #[derive(Clone, Debug, Default)]
 pub struct SpreadOutput {
-    /// By object: triangles on its map.
-    pub triangles: Vec<(u32, Vec<FluxTriangle>)>,
+    /// By receiver: triangles on its map.
+    pub triangles: Vec<(Receiver, Vec<FluxTriangle>)>,
     /// Escaped, absorbed on the way, passed on.
     pub ledger: LedgerSum,
     /// Rays between traced ones that were intersected with receivers.
@@ -56,13 +59,18 @@ pub struct SpreadOutput {
 }
 
 impl SpreadOutput {
-    /// Triangles on the map of an object.
-    pub(super) fn list(&mut self, object: u32) -> &mut Vec<FluxTriangle> {
-        // A handful of objects, most often the last one.
-        match self.triangles.iter().rposition(|(of, _)| *of == object) {
+    /// Triangles on all maps.
+    pub fn triangle_count(&self) -> usize {
+        self.triangles.iter().map(|(_, list)| list.len()).sum()
+    }
+
+    /// Triangles on a map.
+    pub(super) fn list(&mut self, receiver: Receiver) -> &mut Vec<FluxTriangle> {
+        // A handful of receivers, most often the last one.
+        match self.triangles.iter().rposition(|(of, _)| *of == receiver) {
             Some(index) => &mut self.triangles[index].1,
             None => {
-                self.triangles.push((object, Vec::new()));
+                self.triangles.push((receiver, Vec::new()));
                 let last = self.triangles.len() - 1;
                 &mut self.triangles[last].1
             }
@@ -77,7 +85,7 @@ enum Course {
     /// Out of the scene.
     Escapes,
     /// Onto one plane, or past its border.
-    Plane(u32),
+    Plane(Receiver),
     /// The hierarchy has to tell.
     Mixed,
 }
@@ -96,7 +104,7 @@ impl<E: PathEffects> Spreader<'_, E> {
         match self.course(strands) {
             Course::Escapes => out.ledger.book(Account::Escaped, flux),
             Course::Onward => self.onward(strands, flux, out),
-            Course::Plane(object) => self.over(patch, strands, flux, flux_w, Some(object), out),
+            Course::Plane(receiver) => self.over(patch, strands, flux, flux_w, Some(receiver), out),
             Course::Mixed => self.over(patch, strands, flux, flux_w, None, out),
         }
         self.count(strands[0], &before, out);
@@ -106,7 +114,7 @@ impl<E: PathEffects> Spreader<'_, E> {
     /// Counts a patch that came to a map, by what took part in it.
     fn count(&self, strand: &Strand, before: &[usize], out: &mut SpreadOutput) {
         let lists = out.triangles.iter().enumerate();
-        let is_deposited = |(index, (_, list)): (usize, &(u32, Vec<FluxTriangle>))| {
+        let is_deposited = |(index, (_, list)): (usize, &(Receiver, Vec<FluxTriangle>))| {
             list.len() > before.get(index).copied().unwrap_or(0)
         };
         if !lists.into_iter().any(is_deposited) {
@@ -130,18 +138,18 @@ impl<E: PathEffects> Spreader<'_, E> {
     fn note_overreach(&self, patch: &Patch, strands: &[&Strand], before: &[usize], out: &mut SpreadOutput) {
         let squares = &patch.squares[..patch.corner_count().max(3)];
         let middle = squares.iter().sum::<DVec2>() / squares.len() as f64;
-        for (index, (object, list)) in out.triangles.iter().enumerate() {
+        for (index, (receiver, list)) in out.triangles.iter().enumerate() {
             let new = &list[before.get(index).copied().unwrap_or(0)..];
             let traced = strands.iter().filter_map(|strand| match strand.landing {
                 Landing::Receiver {
-                    object: lit,
+                    receiver: lit,
                     triangle,
                     barycentric,
                     ..
-                } if lit == *object => Some(self.receivers.get(lit)?.texel(triangle, barycentric)),
+                } if lit == *receiver => Some(self.receivers.get(lit)?.texel(triangle, barycentric)),
                 _ => None,
             });
-            let found = Overreach::of(self.face, middle, *object, new, traced);
+            let found = Overreach::of(self.face, middle, *receiver, new, traced);
             out.overreaches.extend(found);
         }
     }
@@ -151,31 +159,30 @@ impl<E: PathEffects> Spreader<'_, E> {
         if landing(|landing| matches!(landing, Landing::Specular { .. })) {
             return Course::Onward;
         }
-        let receiver = strands.iter().find_map(|strand| match strand.landing {
-            Landing::Receiver { object, .. } => Some(object),
-            Landing::Escaped | Landing::Specular { .. } => None,
-        });
+        let receiver = strands.iter().find_map(|strand| strand.landing.receiver());
         let (low, high) = self.beam_bounds(strands);
         let from = strands[0].from;
-        let Some(object) = receiver else {
+        let Some(receiver) = receiver else {
             let escapes = landing(|landing| matches!(landing, Landing::Escaped))
                 && !self.receivers.meets_others(low, high, [from; 2]);
             return if escapes { Course::Escapes } else { Course::Mixed };
         };
-        let Some(surface) = self.receivers.get(object) else {
+        let Some(surface) = self.receivers.get(receiver) else {
             return Course::Mixed;
         };
         let Some(plane) = surface.plane.filter(|_| surface.is_diffuse) else {
             return Course::Mixed;
         };
-        let only = strands
-            .iter()
-            .all(|strand| strand.landing.object().is_none_or(|landed| landed == object));
+        let only = strands.iter().all(|strand| {
+            matches!(strand.landing, Landing::Escaped) || strand.landing.receiver() == Some(receiver)
+        });
         if only
             && (plane.fills_map || !goes_out(strands))
-            && !self.receivers.meets_others(low, high, [from, object])
+            && !self
+                .receivers
+                .meets_others(low, high, [from, receiver.object() as u32])
         {
-            Course::Plane(object)
+            Course::Plane(receiver)
         } else {
             Course::Mixed
         }
@@ -216,24 +223,25 @@ impl<E: PathEffects> Spreader<'_, E> {
         strands: &[&Strand],
         flux: FluxCount,
         flux_w: LinearSrgb,
-        plane: Option<u32>,
+        plane: Option<Receiver>,
         out: &mut SpreadOutput,
     ) {
         let shape = shape_of(patch, strands);
         // Light past the border of a plane goes out only where traced light does.
         let goes_out = goes_out(strands);
-        let plane = plane.filter(|&object| goes_out || self.stays_on_map(&shape, object));
+        let plane = plane.filter(|&receiver| goes_out || self.stays_on_map(&shape, receiver));
         let colours: Vec<LinearSrgb> = strands.iter().map(|strand| strand.flux_w).collect();
         let mut rays = VirtualRays::new(self, &shape, strands, plane);
         let steps = self.steps(&shape, &mut rays, plane.is_some(), flux_w, out);
-        if let (PatchShape::Coons(coons), Some(object)) = (&shape, plane)
+        if let (PatchShape::Coons(coons), Some(receiver)) = (&shape, plane)
             && !self.absorbs(strands[0])
-            && let Some(grid) = self.plane_grid(coons, object, steps)
+            && let Some(grid) = self.plane_grid(coons, receiver, steps)
         {
             out.queries += rays.queries + grid.len() as u64;
-            return even_grid(object, &grid, steps, &colours, flux, out);
+            return even_grid(receiver, &grid, steps, &colours, flux, out);
         }
         let mut mesh = PatchMesh {
+            receivers: self.receivers,
             shape: &shape,
             rays,
             colours: &colours,
@@ -251,8 +259,13 @@ impl<E: PathEffects> Spreader<'_, E> {
     }
 
     /// Texel coordinates of a grid of rays, row by row, where all of them meet one plane.
-    fn plane_grid(&self, coons: &CoonsPatch, object: u32, steps: (usize, usize)) -> Option<Vec<DVec2>> {
-        let plane = self.receivers.get(object)?.plane?;
+    fn plane_grid(
+        &self,
+        coons: &CoonsPatch,
+        receiver: Receiver,
+        steps: (usize, usize),
+    ) -> Option<Vec<DVec2>> {
+        let plane = self.receivers.get(receiver)?.plane?;
         let mut grid = Vec::with_capacity((steps.0 + 1) * (steps.1 + 1));
         let mut all = true;
         coons.for_each_row(steps, |_, rays| {

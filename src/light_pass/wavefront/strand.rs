@@ -4,6 +4,7 @@ use glam::{DVec2, DVec3};
 
 use super::kept_rays::FreshRay;
 use crate::geometry::Ray;
+use crate::illumination::Receiver;
 use crate::light_pass::caustic::path::PathSignature;
 use crate::optics::LinearSrgb;
 use crate::transport::{Event, MediumStack, PathCounts, RayDifferential};
@@ -45,8 +46,8 @@ pub enum Landing {
     },
     /// A surface with an illumination map.
     Receiver {
-        /// Index into `Scene::objects`.
-        object: u32,
+        /// Which.
+        receiver: Receiver,
         /// Index into the object's triangles.
         triangle: u32,
         /// Of the triangle's second and third corner.
@@ -65,11 +66,20 @@ impl Landing {
         }
     }
 
+    /// The receiver that is met.
+    pub fn receiver(&self) -> Option<Receiver> {
+        match *self {
+            Self::Escaped | Self::Specular { .. } => None,
+            Self::Receiver { receiver, .. } => Some(receiver),
+        }
+    }
+
     /// The object that is met.
     pub fn object(&self) -> Option<u32> {
         match *self {
             Self::Escaped => None,
-            Self::Specular { object, .. } | Self::Receiver { object, .. } => Some(object),
+            Self::Specular { object, .. } => Some(object),
+            Self::Receiver { receiver, .. } => Some(receiver.object() as u32),
         }
     }
 }

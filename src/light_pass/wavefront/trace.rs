@@ -1,12 +1,13 @@
 //! Traces one light ray with its derivatives through every specular surface that matters.
 
-use glam::DVec2;
+use glam::{DVec2, DVec3};
 
 use super::bumps::BumpCells;
 use super::closeness::Closeness;
 use super::kept_rays::{FreshRay, KeptHit, KeptRays, Known, RayKey};
 use super::strand::{Landing, LightSample, Strand, SurfaceNode};
 use crate::geometry::Ray;
+use crate::illumination::{Receiver, Side};
 use crate::light_pass::caustic::path::{PathLimits, PathSignature};
 use crate::light_pass::launch::Launch;
 use crate::optics::LinearSrgb;
@@ -190,9 +191,13 @@ impl<'a> StrandTracer<'a> {
         let material = self.tracer.scene().material_of(hit.object);
         match from.strand {
             Some(strand) => {
-                sample.strands[strand].landing = landing(&hit, material.surface.is_receiver());
+                sample.strands[strand].landing = landing(
+                    &hit,
+                    sample.strands[strand].ray.direction,
+                    material.surface.is_receiver(),
+                );
             }
-            None => sample.stopped_m = material.surface.is_opaque().then_some(hit.distance_m),
+            None => sample.stopped_m = material.is_opaque().then_some(hit.distance_m),
         }
         if !material.surface.is_specular() {
             if from.strand.is_none() {
@@ -377,10 +382,10 @@ impl Search<'_> {
     }
 }
 
-fn landing(hit: &SurfaceHit, is_receiver: bool) -> Landing {
+fn landing(hit: &SurfaceHit, direction: DVec3, is_receiver: bool) -> Landing {
     if is_receiver {
         Landing::Receiver {
-            object: hit.object as u32,
+            receiver: Receiver::new(hit.object, Side::met(direction, hit.geometric_normal)),
             triangle: hit.triangle as u32,
             barycentric: DVec2::new(hit.barycentric[1], hit.barycentric[2]),
             distance_m: hit.distance_m,

@@ -2,13 +2,15 @@
 
 use std::marker::PhantomData;
 
-use glam::DVec2;
+use glam::{DVec2, DVec3};
 
+use super::facets::FacetPlace;
 use super::patch::PatchShape;
-use super::receivers::Receivers;
+use super::receivers::{ReceiverSurface, Receivers};
 use super::spread::Spreader;
 use super::strand::{Landing, Strand};
 use crate::geometry::Ray;
+use crate::illumination::{Receiver, Side};
 use crate::optics::LinearSrgb;
 use crate::scene::SurfaceKind;
 use crate::transport::PathEffects;
@@ -21,32 +23,39 @@ pub enum Place {
     Nowhere,
     /// On a surface that only sends on or absorbs.
     Onward,
-    /// On a receiver that cannot take a map.
+    /// On a receiver that cannot take a map, or where no light of the patch can come.
     Refused,
     /// On a map.
     On {
-        /// Index into `Scene::objects`.
-        object: u32,
+        /// Whose.
+        receiver: Receiver,
         /// Of the chart.
         island: u32,
         /// Texel coordinates.
         texel: DVec2,
+        /// Facet of the mesh that is met, and where [m]; `None` on an extended plane, which is one facet.
+        facet: Option<(u32, DVec3)>,
     },
 }
 
 impl Place {
-    /// Whether two rays land on the same piece of a map, or share another fate.
+    /// Whether two rays land on the same receiver, or share another fate.
     pub fn is_same(&self, other: &Self) -> bool {
         match (self, other) {
-            (
-                Self::On { object, island, .. },
-                Self::On {
-                    object: other_object,
-                    island: other_island,
-                    ..
-                },
-            ) => object == other_object && island == other_island,
+            (Self::On { receiver, .. }, Self::On { receiver: other, .. }) => receiver == other,
             _ => std::mem::discriminant(self) == std::mem::discriminant(other),
+        }
+    }
+
+    /// The facet that is met, with where [m]; `None` off the maps and on extended planes.
+    pub fn facet(&self) -> Option<(FacetPlace, DVec3)> {
+        match *self {
+            Self::On {
+                texel,
+                facet: Some((triangle, point)),
+                ..
+            } => Some((FacetPlace { triangle, texel }, point)),
+            _ => None,
         }
     }
 
@@ -58,10 +67,10 @@ impl Place {
         }
     }
 
-    /// The object whose map it is.
-    pub fn object(&self) -> Option<u32> {
+    /// Whose map it is.
+    pub fn receiver(&self) -> Option<Receiver> {
         match self {
-            Self::On { object, .. } => Some(*object),
+            Self::On { receiver, .. } => Some(*receiver),
             _ => None,
         }
     }
@@ -72,6 +81,8 @@ impl Place {
 pub struct VirtualVertex {
     /// Where it lands.
     pub place: Place,
+    /// The ray, not normalised.
+    pub ray: Ray,
     /// Share of the light that is left on arrival [0, 1].
     pub transmittance: LinearSrgb,
     /// Share that the surface takes into its map [0, 1].
@@ -82,8 +93,8 @@ pub struct VirtualVertex {
 pub struct VirtualRays<'a, E> {
     receivers: &'a Receivers<'a>,
     shape: &'a PatchShape,
-    /// Object whose extended plane all rays are for.
-    plane: Option<u32>,
+    /// Whose extended plane all rays are for.
+    plane: Option<Receiver>,
     media: MediumStack,
     /// Whether light is absorbed on the way.
     absorbs: bool,
@@ -92,6 +103,8 @@ pub struct VirtualRays<'a, E> {
     from: (u32, u32),
     /// Within this distance of its origin a ray may meet the surface it leaves, since its origin is interpolated [m].
     skin_m: f64,
+    /// Where the traced rays start [m].
+    origins: Vec<DVec3>,
     /// Rays so far.
     pub queries: u64,
 }
@@ -102,7 +115,7 @@ impl<'a, E: PathEffects> VirtualRays<'a, E> {
         spreader: &Spreader<'a, E>,
         shape: &'a PatchShape,
         strands: &[&Strand],
-        plane: Option<u32>,
+        plane: Option<Receiver>,
     ) -> Self {
         let first = strands[0];
         let spread_m = strands
@@ -126,6 +139,7 @@ impl<'a, E: PathEffects> VirtualRays<'a, E> {
             effects: PhantomData,
             from: (first.from, first.from_group),
             skin_m: spread_m.min(0.5 * nearest_own_m),
+            origins: strands.iter().map(|strand| strand.ray.origin).collect(),
             queries: 0,
         }
     }
@@ -135,28 +149,30 @@ impl<'a, E: PathEffects> VirtualRays<'a, E> {
         self.queries += 1;
         let ray = self.shape.ray(at);
         match self.plane {
-            Some(object) => self.on_plane(object, &ray),
+            Some(receiver) => self.on_plane(receiver, &ray),
             None => self.anywhere(ray),
         }
     }
 
-    fn on_plane(&self, object: u32, ray: &Ray) -> VirtualVertex {
+    fn on_plane(&self, receiver: Receiver, ray: &Ray) -> VirtualVertex {
         let met = self
             .receivers
-            .get(object)
+            .get(receiver)
             .and_then(|surface| surface.plane)
             .and_then(|plane| plane.meet(ray));
         match met {
             Some((texel, distance)) => VirtualVertex {
                 place: Place::On {
-                    object,
+                    receiver,
                     island: 0,
                     texel,
+                    facet: None,
                 },
+                ray: *ray,
                 transmittance: self.transmittance(distance * ray.direction.length()),
                 deposit: 1.0,
             },
-            None => nowhere(),
+            None => nowhere(*ray),
         }
     }
 
@@ -171,11 +187,11 @@ impl<'a, E: PathEffects> VirtualRays<'a, E> {
 
     fn anywhere(&self, ray: Ray) -> VirtualVertex {
         let Some(direction) = ray.direction.try_normalize() else {
-            return nowhere();
+            return nowhere(ray);
         };
         let ray = Ray { direction, ..ray };
         let Some((hit, distance_m)) = self.closest_hit(ray) else {
-            return nowhere();
+            return nowhere(ray);
         };
         let tracer = self.receivers.tracer;
         let kind = tracer.scene().material_of(hit.object).surface;
@@ -185,12 +201,13 @@ impl<'a, E: PathEffects> VirtualRays<'a, E> {
             _ => 0.0,
         };
         let place = if kind.is_receiver() {
-            self.place_on(&hit)
+            self.place_on(&hit, direction)
         } else {
             Place::Onward
         };
         VirtualVertex {
             place,
+            ray,
             transmittance: self.transmittance(distance_m),
             deposit,
         }
@@ -213,25 +230,35 @@ impl<'a, E: PathEffects> VirtualRays<'a, E> {
         Some((hit, before_m + hit.distance_m))
     }
 
-    fn place_on(&self, hit: &SurfaceHit) -> Place {
-        let object = hit.object as u32;
-        match self.receivers.get(object) {
+    fn place_on(&self, hit: &SurfaceHit, direction: DVec3) -> Place {
+        let receiver = Receiver::new(hit.object, Side::met(direction, hit.geometric_normal));
+        // Interpolated rays may start behind a plane that no traced one starts behind.
+        let is_astray = |surface: &ReceiverSurface| {
+            let mut origins = self.origins.iter();
+            surface
+                .plane
+                .is_some_and(|plane| origins.all(|origin| plane.hides(*origin)))
+        };
+        match self.receivers.get(receiver) {
+            Some(surface) if is_astray(surface) => Place::Refused,
             Some(surface) => Place::On {
-                object,
+                receiver,
                 island: surface.island(hit.triangle as u32),
                 texel: surface.texel(
                     hit.triangle as u32,
                     DVec2::new(hit.barycentric[1], hit.barycentric[2]),
                 ),
+                facet: Some((hit.triangle as u32, hit.point)),
             },
             None => Place::Refused,
         }
     }
 }
 
-fn nowhere() -> VirtualVertex {
+fn nowhere(ray: Ray) -> VirtualVertex {
     VirtualVertex {
         place: Place::Nowhere,
+        ray,
         transmittance: LinearSrgb::WHITE,
         deposit: 0.0,
     }

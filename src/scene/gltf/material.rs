@@ -16,7 +16,7 @@ use super::report::{Budget, Report};
 use super::{names, waves};
 use crate::error::Result;
 use crate::optics::LinearSrgb;
-use crate::scene::{Material, NormalMap, SurfaceKind, TextureRef, Volume};
+use crate::scene::{AlphaMask, Material, NormalMap, SurfaceKind, TextureRef, Volume};
 use crate::units::LUMENS_PER_WATT;
 
 /// What a primitive without a material has: glTF's default material is a rough metal, which is taken for matte.
@@ -99,6 +99,7 @@ impl Reading<'_, '_> {
             surface: SurfaceKind::Diffuse,
             base_colour: self.colour([red, green, blue], "base colour"),
             base_colour_texture: self.base_colour_texture()?,
+            alpha_mask: self.alpha_mask(),
             metallic: self.share(pbr.metallic_factor.0, "metallic factor"),
             roughness: self.share(pbr.roughness_factor.0, "roughness factor"),
             transmission: self.share(
@@ -452,6 +453,15 @@ impl Reading<'_, '_> {
         }))
     }
 
+    /// Where the surface is cut out, if it is.
+    fn alpha_mask(&mut self) -> Option<AlphaMask> {
+        let is_mask = matches!(self.source.alpha_mode, Checked::Valid(AlphaMode::Mask));
+        is_mask.then(|| AlphaMask {
+            cutoff: self.source.alpha_cutoff.map_or(0.5, |cutoff| f64::from(cutoff.0)),
+            factor: self.share(self.source.pbr_metallic_roughness.base_color_factor.0[3], "alpha"),
+        })
+    }
+
     fn name_what_is_ignored(
         &mut self,
         extensions: &extension::Material,
@@ -461,11 +471,14 @@ impl Reading<'_, '_> {
         let is_matte = !material.surface.is_specular();
         match self.source.alpha_mode {
             Checked::Valid(AlphaMode::Opaque) => {}
-            Checked::Valid(mode) => {
-                let mode = if mode == AlphaMode::Mask { "MASK" } else { "BLEND" };
+            Checked::Valid(AlphaMode::Mask) => self.warn(
+                "light goes through where its alpha mask cuts it out, but the window draws it whole",
+                "render it by --backend cpu for a picture with the cuts",
+            ),
+            Checked::Valid(AlphaMode::Blend) => {
                 self.warn(
-                    format!("its alpha mode {mode} was read as opaque"),
-                    "use transmission for glass",
+                    "its alpha mode BLEND was read as opaque",
+                    "use transmission for glass, or MASK to cut it out",
                 );
             }
             Checked::Invalid => self.warn(

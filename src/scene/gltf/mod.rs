@@ -7,7 +7,6 @@ mod accessor;
 mod area_light;
 mod base64;
 mod buffers;
-mod closed;
 mod coat;
 mod container;
 mod document;

@@ -6,8 +6,9 @@ use super::accessor::Reader;
 use super::buffers::Buffers;
 use super::nodes::Placed;
 use super::report::{Budget, Report};
-use super::{closed, material, names, primitive};
+use super::{material, names, primitive};
 use crate::error::{Error, Result};
+use crate::scene::closed::is_closed;
 use crate::scene::{Material, Mesh, Object, Scene, SurfaceKind};
 
 /// What objects are read from.
@@ -146,7 +147,7 @@ impl Materials {
         if self.all[material].surface != SurfaceKind::ThinWall {
             return material;
         }
-        if !closed::is_closed(mesh) {
+        if !is_closed(mesh) {
             report.warn(
                 format!("node `{name}`"),
                 "is not closed, so that it stays a pane without thickness",

@@ -6,8 +6,9 @@ use egui::{Color32, Grid, ProgressBar, RichText, Ui};
 
 use super::control::{counted, grouped};
 use super::{Facts, Panel, Wishes};
+use crate::illumination::IlluminationMap;
 use crate::light_pass::ledger::EnergyLedger;
-use crate::session::StopReason;
+use crate::session::{BYTES_PER_TEXEL, StopReason};
 use crate::viewer::worker::{BakeRequest, BakeState, BakedLevel};
 
 /// Text of what went wrong.
@@ -102,9 +103,12 @@ fn last_bake(ui: &mut Ui, last: &BakedLevel) {
         result.timings_s.deposit,
         result.cpu_s.total,
     );
+    let texels = |map: &IlluminationMap| map.chart.texel_count() as u64;
+    let bytes = result.maps.iter().map(texels).sum::<u64>() * BYTES_PER_TEXEL;
     ui.label(format!(
-        "{}, {} rays traced, {} {}",
+        "{} in {:.1} MB, {} rays traced, {} {}",
         counted(result.maps.len(), "map"),
+        bytes as f64 / 1e6,
         grouped(result.counts.rays),
         grouped(result.counts.cells.max(result.counts.splats)),
         if result.counts.cells > 0 {
@@ -137,6 +141,7 @@ fn level_line(last: &BakedLevel) -> String {
         (false, _) => format!("level {}, goes on", last.level),
         (true, StopReason::Density | StopReason::MaxError) => "done".into(),
         (true, StopReason::MaxTime) => "time is up".into(),
+        (true, StopReason::Memory) => "memory is short".into(),
         (true, StopReason::NothingToDo) => "nothing to do".into(),
         (true, StopReason::Cancelled) => "stopped".into(),
     };

@@ -115,9 +115,12 @@ fn quantity(ui: &mut Ui, shown: &mut Quantity, facts: &Facts<'_>) -> Response {
 
 fn layer(ui: &mut Ui, shown: &mut LayerShown, baked: &[LayerKind]) -> Response {
     ui.horizontal(|ui| {
+        // Four words in a narrow row.
+        ui.spacing_mut().item_spacing.x = 3.0;
+        ui.spacing_mut().icon_spacing = 2.0;
         ui.radio_value(shown, LayerShown::All, "all")
             .on_hover_text("The sum of what was baked.");
-        for kind in [LayerKind::Caustic, LayerKind::Direct] {
+        for kind in LayerKind::ALL {
             ui.add_enabled_ui(baked.contains(&kind), |ui| {
                 ui.radio_value(shown, LayerShown::Only(kind), kind.name())
                     .on_hover_text(LAYER.what)

@@ -33,7 +33,6 @@ const SWITCHES: [(EffectSwitch, &str, &str); 3] = [
         "Never: the light that would need it is missing, and booked as switched off. Less time and memory.",
     ),
 ];
-const UNAVAILABLE: &str = "This version does not simulate it.";
 
 /// What is known of an effect.
 #[derive(Clone, Copy, Debug, Default)]
@@ -78,7 +77,7 @@ fn known<'a>(effect: Effect, facts: &Facts<'a>) -> Known<'a> {
 /// Shows one effect; tells whether it was asked what it is worth.
 fn entry(ui: &mut Ui, effect: Effect, switch: &mut EffectSwitch, facts: &Facts<'_>) -> bool {
     let known = known(effect, facts);
-    let is_on = known.line.map(|line| line.on).filter(|_| effect.is_available());
+    let is_on = known.line.map(|line| line.on);
     let name = effect.name().replace('_', " ");
     let has_worth = is_on == Some(true) && effect != Effect::Chains;
     let mut is_asked = false;
@@ -88,17 +87,16 @@ fn entry(ui: &mut Ui, effect: Effect, switch: &mut EffectSwitch, facts: &Facts<'
             is_asked = worth::button(ui, effect, facts);
         }
         ui.add_space((ui.available_width() - SWITCHES_WIDTH).max(0.0));
-        ui.add_enabled_ui(effect.is_available(), |ui| segments(ui, &name, switch));
+        segments(ui, &name, switch);
     });
     detail(ui, &name, |ui| {
         let reason = match known.line {
-            _ if !effect.is_available() => UNAVAILABLE,
             Some(line) => &line.reason,
             None if effect == Effect::Chains => "Known with the first picture.",
             None => "Known after the first bake.",
         };
         ui.label(RichText::new(reason).weak());
-        if let Some(counts) = known.counts.filter(|_| effect.is_available()) {
+        if let Some(counts) = known.counts {
             counters(ui, counts);
         }
         if has_worth {
@@ -134,8 +132,7 @@ fn segments(ui: &mut Ui, name: &str, switch: &mut EffectSwitch) {
             let is_chosen = *switch == candidate;
             let response = ui
                 .add(Button::selectable(is_chosen, label).min_size(SWITCH))
-                .on_hover_text(hover)
-                .on_disabled_hover_text(UNAVAILABLE);
+                .on_hover_text(hover);
             // Three of each kind stand in the panel: told apart by the effect.
             let is_enabled = ui.is_enabled();
             response.widget_info(|| {

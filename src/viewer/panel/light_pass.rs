@@ -27,10 +27,12 @@ const ESTIMATOR: About = About {
 };
 const LAYERS: About = About {
     label: "Layers",
-    what: "Which light is baked. Caustic: light that met glass, mirrors or water. Direct: straight from the lights.",
-    range: "at least one; default here both",
-    accuracy: "a layer that is not baked is missing from the picture",
-    cost: "direct takes one shadow ray per texel and light",
+    what: "Which light is baked. Caustic: light that met glass, mirrors or water. Direct: straight from the lights. \
+           Indirect: what diffuse surfaces send each other of both, any number of times.",
+    range: "at least one; default here caustic and direct",
+    accuracy: "a layer that is not baked is missing from the picture; indirect stops at the max error, 3 % without one",
+    cost: "direct takes one shadow ray per texel and light; indirect 64 to 4,096 rays per texel of a coarser grid, and \
+           the other two layers though they be hidden; they are kept while only lamps are dimmed",
 };
 const DENSITY: About = About {
     label: "Ray density [rays/sr]",
@@ -94,7 +96,7 @@ const ITEM_BUFFER: About = About {
 };
 const MAP_RESOLUTION: About = About {
     label: "Map size [texels]",
-    what: "Texels across and down of every map.",
+    what: "Texels across and down of every map; automatic maps of flat surfaces are finer where light is finer.",
     range: "auto, 64 to 4096; default auto",
     accuracy: "details finer than a texel are averaged",
     cost: "memory and the direct layer's time grow with its square",
@@ -237,7 +239,7 @@ fn listed<T: PartialEq + Copy>(
 
 fn layers(ui: &mut Ui, layers: &mut Vec<LayerKind>) -> Response {
     ui.horizontal(|ui| {
-        for kind in [LayerKind::Caustic, LayerKind::Direct] {
+        for kind in LayerKind::ALL {
             let mut on = layers.contains(&kind);
             let is_last = on && layers.len() == 1;
             ui.add_enabled_ui(!is_last, |ui| {

@@ -2,9 +2,11 @@
 //! by tile, and dropped from it level by level where memory is short.
 
 mod image;
+mod level;
 mod pool;
 
-pub(super) use image::{Level, PagedImage};
+pub(super) use image::PagedImage;
+pub(super) use level::{Level, Texels, stored};
 pub(super) use pool::TilePool;
 
 /// Side of a tile [texels]; `TILE` in the shader.

@@ -83,7 +83,7 @@ pub fn deposit(
 }
 
 /// Books all flux as outside, but for that of triangles without place.
-fn book_outside(triangles: &[FluxTriangle], report: &mut CoverageReport) {
+pub(super) fn book_outside(triangles: &[FluxTriangle], report: &mut CoverageReport) {
     for triangle in triangles {
         let account = if is_finite(&triangle.corners) {
             &mut report.outside

@@ -13,6 +13,7 @@ mod report;
 mod row;
 mod shape;
 mod sides;
+mod tiles;
 
 use glam::DVec2;
 
@@ -41,6 +42,9 @@ pub struct FluxTriangle {
 ///
 /// [`FluxUnit`]: crate::illumination::accumulator::FluxUnit
 pub fn deposit_triangles(triangles: &[FluxTriangle], map: &mut ReceiverMap) -> CoverageReport {
+    if let Some(layout) = map.chart.layout.clone() {
+        return tiles::deposit(triangles, &layout, map.level(0).0.texels_mut());
+    }
     let (flux, covered) = map.level(0);
     deposit_covered(triangles, flux, &covered)
 }

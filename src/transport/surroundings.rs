@@ -1,12 +1,12 @@
-//! Which bodies the eye is inside of.
+//! Which bodies a point is inside of.
 
 use glam::DVec3;
 
+use super::{MediumStack, Tracer};
 use crate::geometry::Ray;
 use crate::scene::SurfaceKind;
-use crate::transport::{MediumStack, Tracer};
 
-/// Surfaces that are looked at above the eye before it is taken to be outside of all others.
+/// Surfaces that are looked at above the point before it is taken to be outside of all others.
 const MOST_CROSSINGS: usize = 100_000;
 
 /// The media around a point: bodies of which a ray straight up leaves the inside more often than it enters, outermost

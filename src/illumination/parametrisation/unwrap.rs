@@ -1,0 +1,134 @@
+//! Gives every point of a bent surface its place in a map: charts by uvunwrap, laid side by side with gutters.
+
+use glam::DVec2;
+use uvunwrap::{Density, MeshInput, Options};
+
+use crate::files::cache::{self, ContentHash};
+use crate::scene::Mesh;
+
+/// Uncovered texels around every chart: a bilinear look-up at a border reads one of them.
+const PADDING_TEXELS: u32 = 1;
+
+/// Largest angle between a facet and the mean of its chart [degrees].
+const CHART_ANGLE_DEG: f32 = 50.0;
+
+/// Largest ratio between a facet's share of the map and of the surface, either way.
+const DISTORTION: f32 = 1.5;
+
+/// Meshes of fewer triangles are unwrapped in no time.
+const LEAST_KEPT: usize = 2000;
+
+/// Changes with whatever changes the coordinates of a mesh: a new version of uvunwrap, other options.
+const LAYOUT_VERSION: u64 = 1;
+
+/// Least and largest side of a map that charts are laid out for [texels].
+const SIDES: (usize, usize) = (16, 8192);
+
+/// Map coordinates in [0, 1] of all triangles for a map of `side` texels at least: more where it cannot hold all charts
+/// with their gutters. `None` where the mesh cannot be unwrapped.
+pub fn unwrap(mesh: &Mesh, side: usize) -> Option<Vec<[DVec2; 3]>> {
+    if mesh.triangles.len() < LEAST_KEPT {
+        return lay_out(mesh, side);
+    }
+    let name = format!("{:016x}.uv", content_hash(mesh, side));
+    let bytes = (mesh.triangles.len() * size_of::<[[f32; 2]; 3]>()) as u64;
+    if let Some(known) = cache::load(&name, bytes).and_then(|bytes| decode(&bytes, mesh.triangles.len())) {
+        return Some(known);
+    }
+    let made = lay_out(mesh, side)?;
+    cache::store(&name, &encode(&made));
+    Some(made)
+}
+
+/// Of everything that the coordinates depend on.
+fn content_hash(mesh: &Mesh, side: usize) -> u64 {
+    let mut hash = ContentHash::default();
+    hash.take(LAYOUT_VERSION);
+    hash.take(side as u64);
+    for position in &mesh.positions {
+        position
+            .to_array()
+            .iter()
+            .for_each(|value| hash.take(value.to_bits()));
+    }
+    let corners = mesh.triangles.iter().flatten();
+    corners.for_each(|vertex| hash.take(u64::from(*vertex)));
+    hash.value()
+}
+
+/// Single precision, as they are made; little-endian.
+fn encode(corner_uvs: &[[DVec2; 3]]) -> Vec<u8> {
+    let corners = corner_uvs.iter().flatten();
+    corners
+        .flat_map(|uv| uv.as_vec2().to_array().map(f32::to_le_bytes))
+        .flatten()
+        .collect()
+}
+
+/// `None` where they are not those of so many triangles within the unit square.
+fn decode(bytes: &[u8], triangles: usize) -> Option<Vec<[DVec2; 3]>> {
+    let (numbers, rest) = bytes.as_chunks::<4>();
+    let numbers: Vec<f64> = numbers
+        .iter()
+        .map(|bytes| f64::from(f32::from_le_bytes(*bytes)))
+        .collect();
+    let (corners, left) = numbers.as_chunks::<6>();
+    let is_sound = rest.is_empty()
+        && left.is_empty()
+        && corners.len() == triangles
+        && numbers.iter().all(|number| (0.0..=1.0).contains(number));
+    let triangle = |n: &[f64; 6]| {
+        [
+            DVec2::new(n[0], n[1]),
+            DVec2::new(n[2], n[3]),
+            DVec2::new(n[4], n[5]),
+        ]
+    };
+    is_sound.then(|| corners.iter().map(triangle).collect())
+}
+
+/// Unwraps, whatever was done before.
+fn lay_out(mesh: &Mesh, side: usize) -> Option<Vec<[DVec2; 3]>> {
+    let (low, high) = mesh.bounds()?;
+    let size_m = (high - low).max_element();
+    // Single precision is for what lies around zero.
+    let local = |point: &glam::DVec3| ((*point - (low + high) * 0.5) / size_m).as_vec3().to_array();
+    let positions: Vec<[f32; 3]> = mesh.positions.iter().map(local).collect();
+    let indices: Vec<u32> = mesh.triangles.iter().flatten().copied().collect();
+    let input = MeshInput::new(&positions, &indices);
+    let mut side = side.clamp(SIDES.0, SIDES.1);
+    loop {
+        let options = Options {
+            max_chart_angle: CHART_ANGLE_DEG,
+            max_area_distortion: DISTORTION,
+            density: Density::Auto {
+                page_size: side as u32,
+            },
+            padding: PADDING_TEXELS,
+            ..Options::default()
+        };
+        match uvunwrap::generate(&[input], &options) {
+            Ok(atlas) if atlas.page_count <= 1 => {
+                let made = atlas.meshes.first()?;
+                let uv = |vertex: u32| DVec2::from(made.vertices[vertex as usize].uv.map(f64::from));
+                let (triangles, _) = made.indices.as_chunks::<3>();
+                return Some(triangles.iter().map(|triangle| triangle.map(uv)).collect());
+            }
+            Ok(_) if side < SIDES.1 => side *= 2,
+            Ok(_) => {
+                log::warn!(
+                    "a mesh of {} triangles has too many charts for one map",
+                    mesh.triangles.len()
+                );
+                return None;
+            }
+            Err(error) => {
+                log::warn!(
+                    "a mesh of {} triangles cannot be unwrapped: {error}",
+                    mesh.triangles.len()
+                );
+                return None;
+            }
+        }
+    }
+}

@@ -1,0 +1,198 @@
+//! Where a chart ends but the surface goes on, in another chart or elsewhere in the same: texels beyond the border stand
+//! for what lies there, so that a look-up at the border reads the same light on both sides.
+
+use glam::{DMat2, DVec2, DVec3};
+
+use super::chart::uv_from_world;
+use crate::scene::{Adjacency, Mesh};
+
+/// Texels beyond the border that are looked after: a bilinear look-up reaches one, a coarser level of the map two.
+const REACH_TEXELS: f64 = 2.5;
+
+/// Ends of an edge count as one place in the map up to this distance, in units of its side.
+const SAME_PLACE: f64 = 1e-9;
+
+/// An edge of a triangle at which its chart ends, though the mesh does not.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Seam {
+    /// Its ends in the map [0, 1].
+    ends: [DVec2; 2],
+    /// The triangle's third corner in the map [0, 1]: beyond the edge is away from it.
+    inner: DVec2,
+    /// Map coordinates of the edge's first end in the neighbour's chart.
+    there: DVec2,
+    /// From steps in the map on this side to steps on the other, the surface unfolded at the edge.
+    steps: DMat2,
+}
+
+/// A texel that the surface does not reach, with the place of the map that lies where it would be.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SeamTexel {
+    /// Row·width + column.
+    pub texel: usize,
+    /// Map coordinates [0, 1].
+    pub uv: DVec2,
+}
+
+/// Two texels that touch on the surface, and in the map have no room between them and its border, or another chart, for
+/// one to stand for the other.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Joint {
+    /// Row·width + column of both.
+    pub texels: [usize; 2],
+    /// How much of a texel's side they touch along.
+    pub share: f64,
+}
+
+/// The seams of a mesh with given map coordinates.
+pub fn find(mesh: &Mesh, corner_uvs: &[[DVec2; 3]]) -> Vec<Seam> {
+    let adjacency = Adjacency::of(mesh);
+    let edges = (0..mesh.triangles.len()).flat_map(|triangle| (0..3).map(move |edge| (triangle, edge)));
+    edges
+        .filter_map(|(triangle, edge)| {
+            let beyond = adjacency.beyond(triangle, edge)?;
+            Seam::at(mesh, corner_uvs, (triangle, edge), beyond)
+        })
+        .collect()
+}
+
+impl Seam {
+    /// `None` where the chart goes on.
+    fn at(
+        mesh: &Mesh,
+        corner_uvs: &[[DVec2; 3]],
+        (triangle, edge): (usize, usize),
+        (beyond, second): (usize, usize),
+    ) -> Option<Self> {
+        let here = mesh.corners(triangle);
+        let there = mesh.corners(beyond);
+        let (next, first) = ((edge + 1) % 3, (second + 1) % 3);
+        let uvs = corner_uvs[triangle];
+        let other = corner_uvs[beyond];
+        let goes_on =
+            uvs[edge].distance(other[first]) <= SAME_PLACE && uvs[next].distance(other[second]) <= SAME_PLACE;
+        if goes_on {
+            return None;
+        }
+        let along = (here[next] - here[edge]).try_normalize()?;
+        // Away from a triangle's third corner, within its plane.
+        let away =
+            |third: DVec3| (along * (third - here[edge]).dot(along) - (third - here[edge])).try_normalize();
+        let inner = (edge + 2) % 3;
+        let out_here = away(here[inner])?;
+        let out_there = -away(there[(second + 2) % 3])?;
+        let map = |uvs, corners, out| {
+            let rows = uv_from_world(uvs, corners)?;
+            let column = |step: DVec3| DVec2::new(rows[0].dot(step), rows[1].dot(step));
+            Some(DMat2::from_cols(column(along), column(out)))
+        };
+        let (near, far) = (map(uvs, here, out_here)?, map(other, there, out_there)?);
+        let steps = far * near.inverse();
+        steps.is_finite().then_some(Self {
+            ends: [uvs[edge], uvs[next]],
+            inner: uvs[inner],
+            there: other[first],
+            steps,
+        })
+    }
+}
+
+/// A seam in texels: its ends, and unit steps along it and out of the chart.
+struct Laid {
+    a: DVec2,
+    b: DVec2,
+    along: DVec2,
+    out: DVec2,
+}
+
+impl Seam {
+    /// `None` where it has no length in the map.
+    fn laid(&self, size: DVec2) -> Option<Laid> {
+        let [a, b] = self.ends.map(|end| end * size);
+        let along = (b - a).try_normalize()?;
+        let mut out = along.perp();
+        if out.dot(self.inner * size - a) > 0.0 {
+            out = -out;
+        }
+        Some(Laid { a, b, along, out })
+    }
+}
+
+/// Texels that touch along seams without room, each pair once, ascending.
+pub fn joints(
+    seams: &[Seam],
+    (width, height): (usize, usize),
+    is_covered: impl Fn(usize) -> bool,
+) -> Vec<Joint> {
+    let size = DVec2::new(width as f64, height as f64);
+    let texel_at = |place: DVec2| {
+        let inside = place.cmpge(DVec2::ZERO).all() && place.cmplt(size).all();
+        inside.then(|| place.y as usize * width + place.x as usize)
+    };
+    let mut found: Vec<([usize; 2], f64)> = Vec::new();
+    for seam in seams {
+        let Some(Laid { a, b, along, out }) = seam.laid(size) else {
+            continue;
+        };
+        let length = a.distance(b);
+        let count = (4.0 * length).ceil().max(1.0);
+        for index in 0..count as usize {
+            let place = a + along * (length * (index as f64 + 0.5) / count);
+            let beyond = texel_at(place + out * 0.5);
+            let has_room = beyond.is_some_and(|texel| !is_covered(texel));
+            let here = texel_at(place - out * 1e-3);
+            let other = (seam.there + seam.steps * ((place + out * 1e-3 - a) / size)) * size;
+            if let (false, Some(here), Some(there)) = (has_room, here, texel_at(other)) {
+                let texels = [here.min(there), here.max(there)];
+                if here != there && texels.iter().all(|texel| is_covered(*texel)) {
+                    // Both sides of a seam are seams.
+                    found.push((texels, 0.5 * length / count));
+                }
+            }
+        }
+    }
+    found.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
+    let pairs = found.chunk_by(|a, b| a.0 == b.0);
+    let joint = |pair: &[([usize; 2], f64)]| Joint {
+        texels: pair[0].0,
+        share: pair.iter().map(|(_, share)| share).sum::<f64>().min(1.0),
+    };
+    pairs.map(joint).collect()
+}
+
+/// The texels beside the seams of a map that the surface does not reach, each by its nearest seam, ascending.
+pub fn texels(
+    seams: &[Seam],
+    (width, height): (usize, usize),
+    is_covered: impl Fn(usize) -> bool,
+) -> Vec<SeamTexel> {
+    let size = DVec2::new(width as f64, height as f64);
+    // Distance, texel, place.
+    let mut found: Vec<(f64, SeamTexel)> = Vec::new();
+    for seam in seams {
+        let Some(Laid { a, b, along, out }) = seam.laid(size) else {
+            continue;
+        };
+        let length = a.distance(b);
+        let low = (a.min(b) - REACH_TEXELS - 0.5).floor().max(DVec2::ZERO);
+        let high = (a.max(b) + REACH_TEXELS + 0.5).ceil().min(size);
+        for row in low.y as usize..(high.y.max(0.0)) as usize {
+            for column in low.x as usize..(high.x.max(0.0)) as usize {
+                let texel = row * width + column;
+                let step = DVec2::new(column as f64, row as f64) + 0.5 - a;
+                let (beside, beyond) = (step.dot(along), step.dot(out));
+                let past = (-beside).max(beside - length).max(0.0);
+                if !(0.0..=REACH_TEXELS).contains(&beyond) || past > REACH_TEXELS || is_covered(texel) {
+                    continue;
+                }
+                let uv = seam.there + seam.steps * (step / size);
+                if uv.cmpge(DVec2::ZERO).all() && uv.cmple(DVec2::ONE).all() {
+                    found.push((beyond.hypot(past), SeamTexel { texel, uv }));
+                }
+            }
+        }
+    }
+    found.sort_by(|a, b| a.1.texel.cmp(&b.1.texel).then(a.0.total_cmp(&b.0)));
+    found.dedup_by_key(|(_, texel)| texel.texel);
+    found.into_iter().map(|(_, texel)| texel).collect()
+}

@@ -1,0 +1,66 @@
+//! How far the light of each element may be off.
+
+use super::grid::Grid;
+use super::network::Network;
+use super::solve::Solution;
+
+impl Network {
+    /// Expected error of the luminance of the elements of one grid [W/m²]: the root of the squared noise and the
+    /// squared bend of E from element to element, which a straight line between them misses.
+    pub fn errors(&self, grid: &Grid, solution: &Solution) -> Vec<f64> {
+        let value = |element: usize| solution.irradiance[grid.first + element].luminance();
+        let noise = |element: usize| solution.noise[grid.first + element];
+        (0..grid.elements.all().len())
+            .map(|element| {
+                let bends = [(1, 0), (0, 1)].map(|step| bend(grid, element, step, &value));
+                noise(element).hypot(bends.iter().sum())
+            })
+            .collect()
+    }
+
+    /// Noise of single elements, which is one difference each, as the root mean square of what is found around: as if all
+    /// had as many rays.
+    pub(super) fn pooled(&self, noise: &[f64], passes: &[u8]) -> Vec<f64> {
+        let mut pooled = Vec::with_capacity(noise.len());
+        for grid in self.grids() {
+            pooled.extend((0..grid.elements.all().len()).map(|element| {
+                let rays = |element: usize| f64::from(Self::rays_after(passes[grid.first + element]));
+                let (mut sum, mut count) = (0.0, 0.0);
+                for near in around(grid, element) {
+                    sum += noise[grid.first + near].powi(2) * rays(near);
+                    count += 1.0;
+                }
+                (sum / (count * rays(element))).sqrt()
+            }));
+        }
+        pooled
+    }
+}
+
+/// An element and those of its piece at the eight texels around it.
+fn around(grid: &Grid, element: usize) -> impl Iterator<Item = usize> {
+    let steps = (-1..=1).flat_map(|down| (-1..=1).map(move |right| (right, down)));
+    steps.filter_map(move |step| beside(grid, element, step))
+}
+
+fn beside(grid: &Grid, element: usize, (right, down): (i64, i64)) -> Option<usize> {
+    let own = grid.elements.all()[element];
+    let (width, height) = (grid.chart.width as i64, grid.chart.height as i64);
+    let column = i64::from(own.texel) % width + right;
+    let row = i64::from(own.texel) / width + down;
+    let inside = (0..width).contains(&column) && (0..height).contains(&row);
+    inside
+        .then(|| grid.elements.find((row * width + column) as usize, own.piece))
+        .flatten()
+}
+
+/// Error of a straight line between neighbours: an eighth of the second difference; at a border, where nothing lies
+/// beyond, an eighth of the first.
+fn bend(grid: &Grid, element: usize, (right, down): (i64, i64), value: &impl Fn(usize) -> f64) -> f64 {
+    let ends = [(right, down), (-right, -down)].map(|step| beside(grid, element, step));
+    match ends {
+        [Some(a), Some(b)] => (value(a) - 2.0 * value(element) + value(b)).abs() / 8.0,
+        [Some(one), None] | [None, Some(one)] => (value(one) - value(element)).abs() / 8.0,
+        [None, None] => 0.0,
+    }
+}

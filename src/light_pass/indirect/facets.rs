@@ -1,0 +1,55 @@
+//! Which triangles of a map go on smoothly into each other: light is not interpolated over a crease or a cut.
+
+use std::collections::HashMap;
+
+use glam::DVec2;
+
+use crate::illumination::Chart;
+use crate::scene::Mesh;
+
+/// Neighbouring triangles of one smooth piece lie at less than 30° to each other.
+const LEAST_COSINE: f64 = 0.866;
+
+/// Both ends of a side in the map, the lower one first.
+type Side = [(u64, u64); 2];
+
+/// The smooth piece of each triangle, counted from 0: triangles with a common side in the map, without a crease there.
+/// Both the map and the surface count: pieces touch on both.
+pub fn smooth_pieces(mesh: &Mesh, chart: &Chart) -> Vec<u32> {
+    let count = chart.corner_uvs.len();
+    let mut parent: Vec<u32> = (0..count as u32).collect();
+    let mut at: HashMap<Side, u32> = HashMap::with_capacity(count * 2);
+    for (triangle, corners) in chart.corner_uvs.iter().enumerate() {
+        for (from, to) in [(0, 1), (1, 2), (2, 0)] {
+            let side = side(corners[from], corners[to]);
+            let other = *at.entry(side).or_insert(triangle as u32);
+            let cosine = mesh.face_normal(triangle).dot(mesh.face_normal(other as usize));
+            if cosine >= LEAST_COSINE {
+                let (a, b) = (root(&mut parent, triangle as u32), root(&mut parent, other));
+                parent[a.max(b) as usize] = a.min(b);
+            }
+        }
+    }
+    let mut number = HashMap::new();
+    (0..count as u32)
+        .map(|triangle| {
+            let next = number.len() as u32;
+            *number.entry(root(&mut parent, triangle)).or_insert(next)
+        })
+        .collect()
+}
+
+fn side(a: DVec2, b: DVec2) -> Side {
+    // Adding zero makes both zeros alike.
+    let [a, b] = [a, b].map(|corner| ((corner.x + 0.0).to_bits(), (corner.y + 0.0).to_bits()));
+    [a.min(b), a.max(b)]
+}
+
+fn root(parent: &mut [u32], mut triangle: u32) -> u32 {
+    while parent[triangle as usize] != triangle {
+        let above = parent[parent[triangle as usize] as usize];
+        parent[triangle as usize] = above;
+        triangle = above;
+    }
+    triangle
+}

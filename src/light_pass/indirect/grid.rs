@@ -1,0 +1,92 @@
+//! The grid of one receiver.
+
+use std::sync::Arc;
+
+use glam::{DVec2, DVec3};
+
+use super::element::{Elements, point_in};
+use super::facets::smooth_pieces;
+use crate::illumination::Chart;
+use crate::illumination::parametrisation::coverage::Polygon;
+use crate::light_pass::direct::facet::{Facet, SurfacePoint};
+use crate::scene::{Mesh, Scene};
+
+/// Elements of one receiver.
+#[derive(Clone, Debug)]
+pub struct Grid {
+    /// How the surface lies in the grid.
+    pub chart: Arc<Chart>,
+    /// Smooth piece of each triangle.
+    pub pieces: Vec<u32>,
+    /// Its elements.
+    pub elements: Elements,
+    /// Number of its first element among those of all grids.
+    pub first: usize,
+    /// Area of an element, as a rule [m²].
+    pub usual_m2: f64,
+}
+
+impl Grid {
+    /// Of a receiver by a chart of the grid's size; `first`: elements of the grids before it.
+    pub fn new(scene: &Scene, chart: &Arc<Chart>, first: usize) -> Self {
+        let mesh = &scene.objects[chart.object()].mesh;
+        let pieces = smooth_pieces(mesh, chart);
+        let elements = Elements::new(mesh, chart, &pieces);
+        let texels = elements.all().chunk_by(|a, b| a.texel == b.texel).count();
+        Self {
+            chart: Arc::clone(chart),
+            usual_m2: mesh.area_m2() / texels.max(1) as f64,
+            pieces,
+            elements,
+            first,
+        }
+    }
+
+    /// The element at a point of a triangle, among those of all grids.
+    pub fn element_at(&self, triangle: usize, barycentric: [f64; 3]) -> Option<usize> {
+        let uv = self.chart.uv(triangle, barycentric);
+        let texel_of = |coordinate: f64, count: usize| {
+            ((coordinate * count as f64).floor().max(0.0) as usize).min(count - 1)
+        };
+        let (width, height) = (self.chart.width, self.chart.height);
+        let (column, row) = (texel_of(uv.x, width), texel_of(uv.y, height));
+        let piece = self.pieces[triangle];
+        let own = self.elements.find(row * width + column, piece);
+        // By rounding, the point may lie beside the border of its texel.
+        let beside = || {
+            let rows = row.saturating_sub(1)..(row + 2).min(height);
+            let mut texels = rows.flat_map(|row| {
+                (column.saturating_sub(1)..(column + 2).min(width)).map(move |column| row * width + column)
+            });
+            texels.find_map(|texel| self.elements.find(texel, piece))
+        };
+        own.or_else(beside).map(|index| self.first + index)
+    }
+
+    /// A point of an element, evenly by its area, for a point of the unit square; `None` where its triangle has no area.
+    pub fn point(&self, mesh: &Mesh, element: usize, square: DVec2) -> Option<SurfacePoint> {
+        let (triangle, within) = self.elements.triangle_at(element, square.x);
+        let facet = Facet::new(mesh, &self.chart, triangle)?;
+        let texel = self.elements.all()[element].texel as usize;
+        let [column, row] = [texel % self.chart.width, texel / self.chart.width].map(|index| index as f64);
+        let part = Polygon::triangle(facet.corners_texels)
+            .clipped(1, row, row + 1.0)
+            .clipped(0, column, column + 1.0);
+        Some(facet.at(point_in(&part, DVec2::new(within, square.y))))
+    }
+
+    /// Memory that it takes, but for its chart [bytes].
+    pub fn bytes(&self) -> u64 {
+        self.elements.bytes() + size_of_val(&self.pieces[..]) as u64
+    }
+}
+
+/// A direction on the side of a surface that its geometric normal is on, by the cosine to its shading normal; what that
+/// would send through the surface is mirrored at it.
+pub fn cosine_direction(point: &SurfacePoint, square: DVec2) -> DVec3 {
+    let (x, y) = point.shading_normal.any_orthonormal_pair();
+    let along = DVec2::from_angle(std::f64::consts::TAU * square.y) * square.x.sqrt();
+    let direction = x * along.x + y * along.y + point.shading_normal * (1.0 - square.x).sqrt();
+    let below = direction.dot(point.geometric_normal).min(0.0);
+    (direction - point.geometric_normal * (2.0 * below)).normalize()
+}

@@ -1,0 +1,194 @@
+//! The elements of all receivers, and the rays between them.
+
+use std::sync::Arc;
+
+use rayon::prelude::*;
+
+use super::grid::Grid;
+use super::path::{Follower, Limits};
+use super::trace::{Batch, Link, Pass, Row, Stance, TraceCounts};
+use crate::geometry::enclosure;
+use crate::illumination::{Chart, Receiver, Side};
+use crate::progress::{Control, Progress};
+use crate::scene::Scene;
+use crate::transport::{SurfaceHit, Tracer};
+
+/// Rays of an element in the first pass. The second has as many, and each further one as many as all before it.
+const FIRST_RAYS: u32 = 16;
+
+/// Passes that every element needs, 64 rays: less may miss a small bright spot altogether, and see no error either.
+pub const LEAST_PASSES: u8 = 3;
+
+/// Passes of an element at most: 4,096 rays.
+pub const MOST_PASSES: u8 = 9;
+
+/// Which grid a surface's light comes from.
+#[derive(Clone, Debug)]
+pub struct Places {
+    /// Number of the grid, by receiver.
+    by_receiver: Vec<Option<u32>>,
+}
+
+impl Places {
+    /// The grid that a ray meets.
+    pub fn grid_of(&self, hit: &SurfaceHit, side: Side) -> Option<usize> {
+        self.by_receiver[Receiver::new(hit.object, side).index()].map(|grid| grid as usize)
+    }
+}
+
+/// Elements with their rays.
+#[derive(Clone, Debug)]
+pub struct Network {
+    grids: Vec<Grid>,
+    places: Places,
+    stances: Vec<Stance>,
+    closed: Vec<bool>,
+    batches: Vec<Vec<Link>>,
+    /// By pass, then by element: the batch that it is in, and where.
+    rows: Vec<Vec<Option<(u32, Row)>>>,
+    counts: TraceCounts,
+}
+
+impl Network {
+    /// Elements of all receivers, one chart each, of the grids' sizes; no rays yet.
+    pub fn new(scene: &Scene, charts: &[Arc<Chart>]) -> Self {
+        let unnumbered: Vec<Grid> = charts
+            .par_iter()
+            .map(|chart| Grid::new(scene, chart, 0))
+            .collect();
+        let mut by_receiver = vec![None; Receiver::all(scene.objects.len()).count()];
+        let mut first = 0;
+        let mut grids = Vec::with_capacity(unnumbered.len());
+        for (number, grid) in unnumbered.into_iter().enumerate() {
+            by_receiver[grid.chart.receiver.index()] = Some(number as u32);
+            let count = grid.elements.all().len();
+            grids.push(Grid { first, ..grid });
+            first += count;
+        }
+        let is_closed = |object: usize| {
+            let mesh = &scene.objects[object].mesh;
+            enclosure::is_closed(&mesh.positions, &mesh.triangles)
+        };
+        Self {
+            grids,
+            places: Places { by_receiver },
+            stances: vec![Stance::Unknown; first],
+            closed: (0..scene.objects.len()).into_par_iter().map(is_closed).collect(),
+            batches: Vec::new(),
+            rows: Vec::new(),
+            counts: TraceCounts::default(),
+        }
+    }
+
+    /// Grids of all receivers.
+    pub fn grids(&self) -> &[Grid] {
+        &self.grids
+    }
+
+    /// Number of elements.
+    pub fn element_count(&self) -> usize {
+        self.stances.len()
+    }
+
+    /// Whether an element lies within a solid, or nothing was seen from it: its light is not for others to go by.
+    pub fn is_hidden(&self, element: usize) -> bool {
+        let sees_nothing = |pass: u8| self.row(element, pass).is_none_or(|(_, kept)| kept == 0);
+        self.stances[element] == Stance::Inside || (0..LEAST_PASSES).all(sees_nothing)
+    }
+
+    /// Links of an element in a pass, and its rays that count; `None` where it was not traced.
+    pub fn row(&self, element: usize, pass: u8) -> Option<(&[Link], u32)> {
+        let (batch, row) = (*self.rows.get(usize::from(pass))?.get(element)?)?;
+        let first = row.first as usize;
+        let links = &self.batches[batch as usize][first..first + row.links as usize];
+        Some((links, row.kept))
+    }
+
+    /// Rays of an element after so many passes, as a rule.
+    pub fn rays_after(passes: u8) -> u32 {
+        FIRST_RAYS << passes.saturating_sub(1)
+    }
+
+    /// What all passes counted.
+    pub fn counts(&self) -> TraceCounts {
+        self.counts
+    }
+
+    /// Links of all passes.
+    pub fn link_count(&self) -> u64 {
+        self.batches.iter().map(|links| links.len() as u64).sum()
+    }
+
+    /// Memory [bytes].
+    pub fn bytes(&self) -> u64 {
+        let rows = self.rows.iter().map(|rows| size_of_val(&rows[..]) as u64);
+        let links = self.link_count() * size_of::<Link>() as u64;
+        self.grids.iter().map(Grid::bytes).sum::<u64>() + rows.sum::<u64>() + links
+    }
+
+    /// Memory once every element has so many passes, about [bytes].
+    pub fn bytes_after(&self, passes: &[u8]) -> u64 {
+        let missing: u64 = (0..MOST_PASSES)
+            .map(|pass| {
+                let rays = u64::from(Self::rays_after(pass.max(1)));
+                self.missing(passes, pass).len() as u64 * rays
+            })
+            .sum();
+        self.bytes() + missing * size_of::<Link>() as u64
+    }
+
+    /// Elements that are to have a pass and do not.
+    fn missing(&self, passes: &[u8], pass: u8) -> Vec<u32> {
+        (0..passes.len() as u32)
+            .filter(|&element| passes[element as usize] > pass && self.row(element as usize, pass).is_none())
+            .collect()
+    }
+
+    /// Traces what is missing for every element to have so many passes. False where it was cancelled: whole passes stay.
+    /// The same for any number of threads, and whatever was traced before.
+    pub fn trace(
+        &mut self,
+        tracer: &Tracer,
+        passes: &[u8],
+        (max_depth, seed): (u32, u64),
+        (progress, control): (&dyn Progress, &Control),
+    ) -> bool {
+        for pass in 0..passes.iter().copied().max().unwrap_or(0) {
+            let elements = self.missing(passes, pass);
+            if elements.is_empty() {
+                continue;
+            }
+            let rays = if pass == 0 { 0 } else { Self::rays_after(pass) };
+            let work = Pass {
+                follower: Follower {
+                    tracer,
+                    limits: Limits { max_depth },
+                },
+                grids: &self.grids,
+                places: &self.places,
+                stances: &self.stances,
+                closed: &self.closed,
+                seed,
+                rays: (rays, Self::rays_after(pass + 1)),
+            };
+            let Some(batch) = work.run(&elements, (progress, control)) else {
+                return false;
+            };
+            self.keep(pass, &elements, batch);
+        }
+        true
+    }
+
+    fn keep(&mut self, pass: u8, elements: &[u32], batch: Batch) {
+        let number = self.batches.len() as u32;
+        while self.rows.len() <= usize::from(pass) {
+            self.rows.push(vec![None; self.stances.len()]);
+        }
+        for (&element, (row, stance)) in elements.iter().zip(batch.rows) {
+            self.rows[usize::from(pass)][element as usize] = Some((number, row));
+            self.stances[element as usize] = stance;
+        }
+        self.batches.push(batch.links);
+        self.counts += batch.counts;
+    }
+}

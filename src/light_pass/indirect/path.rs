@@ -1,0 +1,127 @@
+//! A ray on its way from a diffuse surface to those that send light along it.
+
+use glam::DVec2;
+
+use crate::geometry::Ray;
+use crate::illumination::Side;
+use crate::optics::LinearSrgb;
+use crate::optics::fresnel::dielectric_reflectance;
+use crate::scene::SurfaceKind;
+use crate::transport::{Branch, Everything, Interaction, MediumStack, SurfaceHit, Tracer};
+
+/// Rays that carry less than this share of what they could are given up, and counted.
+const LEAST_WEIGHT: f64 = 1e-4;
+
+/// How far rays are followed.
+#[derive(Clone, Copy, Debug)]
+pub struct Limits {
+    /// Most specular surfaces on the way.
+    pub max_depth: u32,
+}
+
+/// What a ray found.
+#[derive(Clone, Debug, Default)]
+pub struct Found {
+    /// Segments that were searched.
+    pub segments: u64,
+    /// Share of the radiance that was given up.
+    pub truncated: f64,
+    /// Whether the first surface was the back of an opaque one: (object, whether its back is drawn).
+    pub first_back: Option<(usize, bool)>,
+}
+
+/// Follows rays through a scene.
+pub struct Follower<'a> {
+    pub tracer: &'a Tracer,
+    pub limits: Limits,
+}
+
+impl Follower<'_> {
+    /// Follows a ray; `choice` gives an even point of the unit square for each surface on the way, `land` takes each
+    /// diffuse surface that is met, with what its E counts for at the ray's start: L·π there, over E here.
+    ///
+    /// Where light could go two ways, one is taken by chance, as likely as it carries light.
+    pub fn follow(
+        &self,
+        mut ray: Ray,
+        mut media: MediumStack,
+        choice: impl Fn(u32) -> DVec2,
+        mut land: impl FnMut(&SurfaceHit, Side, LinearSrgb),
+    ) -> Found {
+        let scene = self.tracer.scene();
+        let mut found = Found::default();
+        let mut weight = LinearSrgb::WHITE;
+        for depth in 0..=self.limits.max_depth {
+            found.segments += 1;
+            let Some(hit) = self.tracer.closest_hit(&ray) else {
+                return found;
+            };
+            let material = scene.material_of(hit.object);
+            let side = Side::met(ray.direction, hit.geometric_normal);
+            let is_back = side == Side::Back;
+            if depth == 0 && is_back && material.is_opaque() {
+                found.first_back = Some((hit.object, material.double_sided));
+            }
+            weight = weight * media.transmittance(scene, hit.distance_m);
+            let micro = material.is_rough().then(|| choice(2 * depth + 1));
+            let interaction = self
+                .tracer
+                .interact_with::<Everything>(&hit, ray.direction, &media, micro);
+            if material.surface.is_receiver() {
+                if is_back && !material.double_sided {
+                    // Nothing is drawn there, and nothing sends light.
+                    return found;
+                }
+                land(
+                    &hit,
+                    side,
+                    weight * interaction.deposit * self.tracer.base_colour(&hit),
+                );
+            }
+            let Some((branch, share)) = chosen(&interaction, material.surface, choice(2 * depth).x) else {
+                return found;
+            };
+            weight = weight * share * (branch.ior_ratio * branch.ior_ratio);
+            (ray, media) = (branch.ray, branch.media);
+            if weight.max_channel() < LEAST_WEIGHT {
+                break;
+            }
+        }
+        found.truncated = weight.luminance();
+        found
+    }
+}
+
+/// One way on, with its share over how likely it was chosen; `None` where the ray ends.
+fn chosen(interaction: &Interaction, surface: SurfaceKind, at: f64) -> Option<(Branch, LinearSrgb)> {
+    let [back, through] = [interaction.reflection, interaction.transmission];
+    match (back, through) {
+        (Some(back), Some(through)) => {
+            let [a, b] = [back.share.max_channel(), through.share.max_channel()];
+            let likely = a / (a + b);
+            if at < likely {
+                Some((back, back.share / likely))
+            } else if likely < 1.0 {
+                Some((through, through.share / (1.0 - likely)))
+            } else {
+                None
+            }
+        }
+        (Some(back), None) if surface == SurfaceKind::Mixed => {
+            let likely = back.share.max_channel();
+            (at < likely).then(|| (back, back.share / likely))
+        }
+        (Some(only), None) | (None, Some(only)) => Some((only, only.share)),
+        (None, None) => None,
+    }
+    .filter(|(_, share)| share.max_channel() > 0.0)
+}
+
+/// Share of the light from a direction that a surface takes: what its polish does not reflect.
+pub fn taken(tracer: &Tracer, object: usize, cosine: f64) -> f64 {
+    let material = tracer.scene().material_of(object);
+    match material.surface {
+        SurfaceKind::Mixed => 1.0 - material.polish * dielectric_reflectance(cosine, material.ior),
+        _ => 1.0,
+    }
+}

@@ -1,0 +1,274 @@
+//! From maps to grids, keeping flux, and back, without crossing creases or the borders of solids.
+
+use std::ops::Range;
+
+use glam::DVec2;
+use rayon::prelude::*;
+
+use super::grid::Grid;
+use crate::illumination::Chart;
+use crate::illumination::gutter::fill_gutter;
+use crate::illumination::parametrisation::coverage::{for_each_texel_in_row, rows};
+use crate::illumination::tiles::Tile;
+use crate::optics::LinearSrgb;
+
+/// How the map of a receiver and its grid lie over each other.
+#[derive(Debug)]
+pub struct Resampling<'a> {
+    grid: &'a Grid,
+    chart: &'a Chart,
+    /// The piece that has most of each texel of the map; empty where there is one piece.
+    pieces: Vec<u32>,
+}
+
+impl<'a> Resampling<'a> {
+    /// Between a grid and a map of the same receiver.
+    pub fn new(grid: &'a Grid, chart: &'a Chart) -> Self {
+        let is_one = grid.pieces.iter().all(|&piece| piece == 0);
+        let pieces = if is_one {
+            Vec::new()
+        } else {
+            pieces_of_texels(grid, chart)
+        };
+        Self { grid, chart, pieces }
+    }
+
+    fn piece(&self, texel: usize) -> u32 {
+        self.pieces.get(texel).copied().unwrap_or(0)
+    }
+
+    /// The map as rectangles of texels that lie row by row: the whole map, or its tiles.
+    fn blocks(&self) -> Vec<Block> {
+        let (width, height) = (self.chart.width, self.chart.height);
+        match &self.chart.layout {
+            None => vec![Block {
+                texels: 0..width * height,
+                origin: (0, 0),
+                across: width,
+                side: 1,
+            }],
+            Some(layout) => {
+                let block = |tile: Tile| Block {
+                    texels: tile.texels,
+                    origin: tile.origin,
+                    across: tile.size.0,
+                    side: 1 << tile.level,
+                };
+                layout.tiles().map(block).collect()
+            }
+        }
+    }
+
+    /// Mean E of each element [W/m²], from that of the map's texels: each gives its flux to the elements that it lies on.
+    pub fn to_grid(&self, irradiance: &[[f32; 3]]) -> Vec<LinearSrgb> {
+        let elements = self.grid.elements.all();
+        let mut flux = vec![LinearSrgb::BLACK; elements.len()];
+        let mut area_m2 = vec![0.0; elements.len()];
+        let (width, height) = (self.chart.width, self.chart.height);
+        for block in self.blocks() {
+            let lines = |first: usize, count: usize, from: usize, to: usize| -> Vec<Vec<(usize, f64)>> {
+                let low = |index: usize| first + index * block.side;
+                (0..count)
+                    .map(|index| shares(low(index)..low(index + 1), from, to))
+                    .collect()
+            };
+            let columns = lines(block.origin.0, block.across, width, self.grid.chart.width);
+            let rows = lines(
+                block.origin.1,
+                block.texels.len() / block.across,
+                height,
+                self.grid.chart.height,
+            );
+            let places = rows
+                .iter()
+                .flat_map(|rows| columns.iter().map(move |columns| (rows, columns)));
+            for (texel, (rows, columns)) in block.texels.zip(places) {
+                let texel_m2 = self.chart.texel_area_m2(texel);
+                if texel_m2 <= 0.0 {
+                    continue;
+                }
+                let e = LinearSrgb::from(irradiance[texel].map(f64::from));
+                for &(grid_row, down) in rows {
+                    for &(grid_column, across) in columns {
+                        let place = grid_row * self.grid.chart.width + grid_column;
+                        if let Some(element) = self.grid.elements.find(place, self.piece(texel)) {
+                            let part_m2 = texel_m2 * across * down;
+                            flux[element] += e * part_m2;
+                            area_m2[element] += part_m2;
+                        }
+                    }
+                }
+            }
+        }
+        let at_middle = |element: usize| {
+            let size = DVec2::new(self.grid.chart.width as f64, self.grid.chart.height as f64);
+            let place = elements[element].middle / size * DVec2::new(width as f64, height as f64);
+            let [column, row] = [(place.x, width), (place.y, height)]
+                .map(|(coordinate, count)| (coordinate.max(0.0) as usize).min(count - 1));
+            LinearSrgb::from(irradiance[self.chart.texel_at(column, row)].map(f64::from))
+        };
+        (0..elements.len())
+            .map(|element| match area_m2[element] {
+                // A sliver that no texel of the map mostly belongs to.
+                0.0 => at_middle(element),
+                covered => flux[element] / covered,
+            })
+            .collect()
+    }
+
+    /// Values of the map's texels, between those of the elements around each; `is_hidden` elements count only where there
+    /// are no others: what is seen goes on a little beneath what hides it. The gutter is filled.
+    pub fn to_map(&self, values: &[[f64; 3]], is_hidden: impl Fn(usize) -> bool + Sync) -> Vec<[f32; 3]> {
+        let (width, height) = (self.chart.width, self.chart.height);
+        let scale = DVec2::new(
+            self.grid.chart.width as f64 / width as f64,
+            self.grid.chart.height as f64 / height as f64,
+        );
+        let mut map = vec![[0.0; 3]; self.chart.texel_count()];
+        for block in self.blocks() {
+            let (first, side) = (block.texels.start, block.side as f64);
+            let origin = DVec2::new(block.origin.0 as f64, block.origin.1 as f64);
+            let lines = map[block.texels].par_chunks_mut(block.across).enumerate();
+            lines.for_each(|(row, line)| {
+                for (column, value) in line.iter_mut().enumerate() {
+                    let texel = first + row * block.across + column;
+                    if self.chart.texel_area_m2(texel) > 0.0 {
+                        let middle = DVec2::new(column as f64 + 0.5, row as f64 + 0.5) * side + origin;
+                        let found = self.between(middle * scale, self.piece(texel), values, &is_hidden);
+                        *value = found.map(|channel| channel as f32);
+                    }
+                }
+            });
+        }
+        fill_gutter(self.chart, &mut map);
+        map
+    }
+
+    /// Between the four elements around a place [texels of the grid] that belong to a piece.
+    fn between(
+        &self,
+        place: DVec2,
+        piece: u32,
+        values: &[[f64; 3]],
+        is_hidden: &impl Fn(usize) -> bool,
+    ) -> [f64; 3] {
+        let (width, height) = (self.grid.chart.width as i64, self.grid.chart.height as i64);
+        let element = |column: i64, row: i64| {
+            let inside = (0..width).contains(&column) && (0..height).contains(&row);
+            inside
+                .then(|| self.grid.elements.find((row * width + column) as usize, piece))
+                .flatten()
+        };
+        let own = element(place.x.floor() as i64, place.y.floor() as i64);
+        let low = (place - 0.5).floor();
+        let part = place - 0.5 - low;
+        // Of what is seen, and of what is hidden.
+        let mut sums = [([0.0; 3], 0.0); 2];
+        for (right, across) in [(0, 1.0 - part.x), (1, part.x)] {
+            for (down, along) in [(0, 1.0 - part.y), (1, part.y)] {
+                let weight = across * along;
+                let Some(found) = element(low.x as i64 + right, low.y as i64 + down) else {
+                    continue;
+                };
+                let (sum, weights) = &mut sums[usize::from(is_hidden(found))];
+                for channel in 0..3 {
+                    sum[channel] += weight * values[found][channel];
+                }
+                *weights += weight;
+            }
+        }
+        if let Some((sum, weights)) = sums.into_iter().find(|(_, weights)| *weights > 0.0) {
+            return sum.map(|channel| channel / weights);
+        }
+        // A sliver beyond the last centre of its piece.
+        let around = (-1..=1).flat_map(|down| (-1..=1).map(move |right| (right, down)));
+        let nearest = own.or_else(|| {
+            let mut near = around.filter_map(|(right, down)| {
+                element(place.x.floor() as i64 + right, place.y.floor() as i64 + down)
+            });
+            near.next()
+        });
+        nearest.map_or([0.0; 3], |found| values[found])
+    }
+}
+
+/// Texels of a map that lie row by row.
+struct Block {
+    texels: Range<usize>,
+    /// First column and row [texels of the finest size].
+    origin: (usize, usize),
+    /// Texels in a row.
+    across: usize,
+    /// Of each texel [texels of the finest size].
+    side: usize,
+}
+
+/// Texels of a line of `to` that some of `from` lie on, each with its share of them.
+fn shares(texels: Range<usize>, from: usize, to: usize) -> Vec<(usize, f64)> {
+    // In units of 1/(from·to) of the line, all borders are whole.
+    let count = texels.len();
+    let (low, high) = (texels.start * to, texels.end * to);
+    (low / from..high.div_ceil(from))
+        .map(|texel| {
+            let overlap = high.min((texel + 1) * from) - low.max(texel * from);
+            (texel, overlap as f64 / (to * count) as f64)
+        })
+        .collect()
+}
+
+fn pieces_of_texels(grid: &Grid, chart: &Chart) -> Vec<u32> {
+    let (width, height) = (chart.width, chart.height);
+    let size = DVec2::new(width as f64, height as f64);
+    let mut best = vec![(0.0_f32, 0_u32); width * height];
+    for (uvs, &piece) in chart.corner_uvs.iter().zip(&grid.pieces) {
+        let corners = uvs.map(|uv| uv * size);
+        for row in rows(corners, height) {
+            for_each_texel_in_row(corners, row, width, |column, part| {
+                let (most, owner) = &mut best[row * width + column];
+                let area = part.area() as f32;
+                if *owner == piece {
+                    *most += area;
+                } else if area > *most {
+                    (*most, *owner) = (area, piece);
+                }
+            });
+        }
+    }
+    let piece = |texel: usize| best[texel].1;
+    match &chart.layout {
+        None => (0..best.len()).map(piece).collect(),
+        Some(layout) => {
+            // That of the middle of a larger texel.
+            let middles = layout.tiles().flat_map(|tile| {
+                let side = 1_usize << tile.level;
+                (0..tile.texels.len()).map(move |index| {
+                    let column = tile.origin.0 + index % tile.size.0 * side + side / 2;
+                    let row = tile.origin.1 + index / tile.size.0 * side + side / 2;
+                    row * width + column
+                })
+            });
+            middles.map(piece).collect()
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::shares;
+
+    #[test]
+    fn shares_of_a_texel_add_up_to_it() {
+        for (from, to) in [(64, 16), (16, 64), (10, 7), (7, 10), (1, 1), (5, 5)] {
+            let mut into = vec![0.0; to];
+            for index in 0..from {
+                let shares = shares(index..index + 1, from, to);
+                assert!((shares.iter().map(|(_, share)| share).sum::<f64>() - 1.0).abs() < 1e-12);
+                shares.iter().for_each(|(texel, share)| into[*texel] += share);
+            }
+            assert!(
+                into.iter()
+                    .all(|sum| (sum - from as f64 / to as f64).abs() < 1e-12)
+            );
+        }
+    }
+}

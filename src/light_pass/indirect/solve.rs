@@ -1,0 +1,153 @@
+//! Light that goes to and fro until it stands.
+
+use rayon::prelude::*;
+
+use super::network::{MOST_PASSES, Network};
+use crate::optics::LinearSrgb;
+
+/// Most times that light is sent on.
+pub const MOST_BOUNCES: u32 = 1000;
+
+/// What is still to come may be this part of the mean.
+const TOLERANCE: f64 = 1e-5;
+
+/// What the elements receive from each other.
+#[derive(Clone, Debug)]
+pub struct Solution {
+    /// E from other elements [W/m²].
+    pub irradiance: Vec<LinearSrgb>,
+    /// Standard error of its luminance by the rays, element by element, from it and those around it [W/m²].
+    pub noise: Vec<f64>,
+    /// Mean of E by area [W/m²].
+    pub mean: f64,
+    /// How many times light was sent on.
+    pub bounces: u32,
+    /// False where [`MOST_BOUNCES`] did not do.
+    pub converged: bool,
+    /// Root mean square of the noise over the mean of E, by area; 0 without light.
+    pub relative_noise: f64,
+}
+
+impl Network {
+    /// Solves E = K (S + E) for the E that sources S [W/m²] of all elements give, by the first so many passes of each
+    /// element, at least [`LEAST_PASSES`](super::LEAST_PASSES).
+    pub fn solve(&self, sources: &[LinearSrgb], passes: &[u8]) -> Solution {
+        let count = self.element_count();
+        let mut irradiance = vec![LinearSrgb::BLACK; count];
+        let (mut bounces, mut converged, mut last_change) = (0, false, f64::INFINITY);
+        while bounces < MOST_BOUNCES {
+            let sent: Vec<LinearSrgb> = sources.iter().zip(&irradiance).map(|(s, e)| *s + *e).collect();
+            let next: Vec<LinearSrgb> = (0..count)
+                .into_par_iter()
+                .map(|element| self.gathered(element, &sent, 0..passes[element]))
+                .collect();
+            bounces += 1;
+            let (change, mean) = self.change(&irradiance, &next);
+            irradiance = next;
+            // Changes shrink by a ratio; all that are to come add up to a geometric series.
+            let ratio = (change / last_change).clamp(0.0, 1.0);
+            last_change = change;
+            if change == 0.0 || change * ratio <= TOLERANCE * mean * (1.0 - ratio) && bounces > 2 {
+                converged = true;
+                break;
+            }
+        }
+        let sent: Vec<LinearSrgb> = sources.iter().zip(&irradiance).map(|(s, e)| *s + *e).collect();
+        let lone: Vec<f64> = (0..count)
+            .into_par_iter()
+            .map(|element| self.noise(element, &sent, passes[element]))
+            .collect();
+        let noise = self.pooled(&lone, passes);
+        let (mean, relative_noise) = self.relative(&noise, &irradiance);
+        Solution {
+            irradiance,
+            noise,
+            mean,
+            bounces,
+            converged,
+            relative_noise,
+        }
+    }
+
+    /// E of an element by the rays of some passes.
+    fn gathered(&self, element: usize, sent: &[LinearSrgb], passes: std::ops::Range<u8>) -> LinearSrgb {
+        let (mut sum, mut rays) = ([0.0; 3], 0_u32);
+        for (links, kept) in passes.filter_map(|pass| self.row(element, pass)) {
+            rays += kept;
+            for link in links {
+                let from = sent[link.element as usize].to_array();
+                for channel in 0..3 {
+                    sum[channel] += f64::from(link.weight[channel]) * from[channel];
+                }
+            }
+        }
+        if rays == 0 {
+            LinearSrgb::BLACK
+        } else {
+            LinearSrgb::from(sum) / f64::from(rays)
+        }
+    }
+
+    /// Half of the difference between the last pass and all before it, which have as many rays.
+    fn noise(&self, element: usize, sent: &[LinearSrgb], passes: u8) -> f64 {
+        let last = passes.saturating_sub(1);
+        let halves = [0..last, last..passes];
+        let [first, second] = halves.map(|half| self.gathered(element, sent, half).luminance());
+        0.5 * (second - first).abs()
+    }
+
+    /// Mean change and mean, by area, of the largest channel.
+    fn change(&self, old: &[LinearSrgb], new: &[LinearSrgb]) -> (f64, f64) {
+        let (mut change, mut mean) = ([0.0; 3], [0.0; 3]);
+        for grid in self.grids() {
+            for (index, element) in grid.elements.all().iter().enumerate() {
+                let (old, new) = (
+                    old[grid.first + index].to_array(),
+                    new[grid.first + index].to_array(),
+                );
+                for channel in 0..3 {
+                    change[channel] += (new[channel] - old[channel]).abs() * element.area_m2;
+                    mean[channel] += new[channel] * element.area_m2;
+                }
+            }
+        }
+        let largest = |sums: [f64; 3]| sums.into_iter().fold(0.0, f64::max);
+        (largest(change), largest(mean))
+    }
+
+    /// Mean of E, and the root mean square of the noise over it, by area.
+    fn relative(&self, noise: &[f64], irradiance: &[LinearSrgb]) -> (f64, f64) {
+        let (mut squares, mut flux_w, mut area_m2) = (0.0, 0.0, 0.0);
+        for grid in self.grids() {
+            for (index, element) in grid.elements.all().iter().enumerate() {
+                let number = grid.first + index;
+                squares += noise[number] * noise[number] * element.area_m2;
+                flux_w += irradiance[number].luminance() * element.area_m2;
+                area_m2 += element.area_m2;
+            }
+        }
+        if flux_w > 0.0 {
+            (flux_w / area_m2, (squares * area_m2).sqrt() / flux_w)
+        } else {
+            (0.0, 0.0)
+        }
+    }
+}
+
+impl Solution {
+    /// Elements that need more rays for a relative error, ascending. Each is to have that error by its own E, dark ones by
+    /// half of the mean; and while the error of all is larger, those that have most part in it are to do better than that.
+    pub fn wanting(&self, target: f64, passes: &[u8]) -> Vec<usize> {
+        let is_rough = self.relative_noise > target;
+        let most = |element: usize| {
+            let own = self.irradiance[element].luminance() / self.mean;
+            let alone = own.max(0.5);
+            // Errors like the root of E add up to the target.
+            let together = (0.5 * own.max(0.25)).sqrt();
+            target * self.mean * if is_rough { alone.min(together) } else { alone }
+        };
+        (0..passes.len())
+            .filter(|&element| passes[element] < MOST_PASSES && self.noise[element] > most(element))
+            .collect()
+    }
+}

@@ -1,0 +1,276 @@
+//! Rays from every element, and what they found, as rows of a sparse matrix.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use rayon::prelude::*;
+
+use super::grid::{Grid, cosine_direction};
+use super::network::Places;
+use super::path::{Follower, taken};
+use crate::geometry::sampling::even_point;
+use crate::optics::LinearSrgb;
+use crate::progress::{Control, Progress, Stage};
+use crate::scene::{Mesh, SurfaceKind};
+use crate::transport::{MediumStack, Tracer, media_at};
+
+/// What one ray weighs where it ended.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Link {
+    /// Number of the element that sends the light.
+    pub element: u32,
+    /// E at the start over E there, per channel, for this ray alone.
+    pub weight: [f32; 3],
+}
+
+/// Where the links of one element in one pass are.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Row {
+    /// Place of the first within its batch.
+    pub first: u64,
+    /// Their number.
+    pub links: u32,
+    /// Rays that count, those that found nothing included.
+    pub kept: u32,
+}
+
+/// What was traced for some elements.
+#[derive(Clone, Debug, Default)]
+pub struct Batch {
+    /// Links of all of them.
+    pub links: Vec<Link>,
+    /// One for each of them, in their order, with how it is looked from.
+    pub rows: Vec<(Row, Stance)>,
+    /// What it took.
+    pub counts: TraceCounts,
+}
+
+/// Which of an element's points are looked from: a surface may go on within a solid, where nobody sees it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Stance {
+    /// Nothing was looked at yet.
+    #[default]
+    Unknown,
+    /// Those outside of solids.
+    Outside,
+    /// Those within a solid: there are no others, or few.
+    Inside,
+}
+
+/// What a pass counted.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct TraceCounts {
+    /// Rays that left an element.
+    pub rays: u64,
+    /// Segments that were searched for them.
+    pub segments: u64,
+    /// Share of what they carried that was given up on the way (rays' weights).
+    pub truncated: f64,
+    /// Rays that ended on a grid without an element there.
+    pub lost: u64,
+}
+
+impl std::ops::AddAssign for TraceCounts {
+    fn add_assign(&mut self, other: Self) {
+        self.rays += other.rays;
+        self.segments += other.segments;
+        self.truncated += other.truncated;
+        self.lost += other.lost;
+    }
+}
+
+/// Elements that a thread works on at a time.
+const CHUNK: usize = 32;
+
+/// An element far smaller than is usual on its grid takes up to so many times fewer rays.
+const MOST_HALVINGS: u32 = 3;
+
+/// All that tracing needs.
+pub struct Pass<'a> {
+    pub follower: Follower<'a>,
+    pub grids: &'a [Grid],
+    pub places: &'a Places,
+    pub stances: &'a [Stance],
+    /// Whether each object's mesh encloses space.
+    pub closed: &'a [bool],
+    pub seed: u64,
+    /// Rays of an element, as a rule: from so many to so many, powers of two or 0.
+    pub rays: (u32, u32),
+}
+
+/// One ray with what it found.
+struct RayEnd {
+    links: std::ops::Range<usize>,
+    /// Whether it began within a solid, and whether the inside of that is drawn.
+    within: Option<bool>,
+}
+
+impl Pass<'_> {
+    /// Traces for some elements; `None` where it was cancelled.
+    pub fn run(&self, elements: &[u32], (progress, control): (&dyn Progress, &Control)) -> Option<Batch> {
+        let has_bodies = self.has_bodies();
+        let chunks = elements.len().div_ceil(CHUNK);
+        let done = AtomicU64::new(0);
+        let parts: Option<Vec<Batch>> = elements
+            .par_chunks(CHUNK)
+            .map(|chunk| {
+                if control.is_cancelled() {
+                    return None;
+                }
+                let mut part = Batch::default();
+                for &element in chunk {
+                    self.element(element as usize, has_bodies, &mut part);
+                }
+                let done = done.fetch_add(1, Ordering::Relaxed) + 1;
+                progress.advance(Stage::Indirect, done, chunks as u64);
+                Some(part)
+            })
+            .collect();
+        let mut all = Batch::default();
+        for part in parts? {
+            let before = all.links.len() as u64;
+            let moved = |(row, stance): (Row, Stance)| {
+                let first = row.first + before;
+                (Row { first, ..row }, stance)
+            };
+            all.rows.extend(part.rows.into_iter().map(moved));
+            all.links.extend(part.links);
+            all.counts += part.counts;
+        }
+        Some(all)
+    }
+
+    fn tracer(&self) -> &Tracer {
+        self.follower.tracer
+    }
+
+    fn has_bodies(&self) -> bool {
+        let scene = self.tracer().scene();
+        (0..scene.objects.len()).any(|object| scene.material_of(object).surface == SurfaceKind::Dielectric)
+    }
+
+    fn element(&self, number: usize, has_bodies: bool, part: &mut Batch) {
+        let grid = &self.grids[self.grids.partition_point(|grid| grid.first <= number) - 1];
+        let element = number - grid.first;
+        let mesh = &self.tracer().scene().objects[grid.chart.object()].mesh;
+        let media = if has_bodies {
+            self.media(grid, mesh, element)
+        } else {
+            MediumStack::default()
+        };
+        let seed = self.seed_of(grid, element);
+        let halvings = (grid.usual_m2 / grid.elements.all()[element].area_m2)
+            .log2()
+            .floor();
+        let halvings = halvings.clamp(0.0, f64::from(MOST_HALVINGS)) as u32;
+        let first_link = part.links.len();
+        let mut ends = Vec::new();
+        for index in self.rays.0 >> halvings..self.rays.1 >> halvings {
+            if let Some(end) = self.ray((grid, mesh, element), index, (seed, media), part) {
+                ends.push(end);
+            }
+        }
+        let stance = match self.stances[number] {
+            Stance::Unknown => stance(&ends),
+            known => known,
+        };
+        let kept = self.keep(stance, &ends, first_link, part);
+        let row = Row {
+            first: first_link as u64,
+            links: (part.links.len() - first_link) as u32,
+            kept,
+        };
+        part.rows.push((row, stance));
+    }
+
+    /// Drops the links of rays that began on the wrong side; returns how many rays are left.
+    fn keep(&self, stance: Stance, ends: &[RayEnd], first_link: usize, part: &mut Batch) -> u32 {
+        let wanted = |end: &RayEnd| end.within.is_some() == (stance == Stance::Inside);
+        if !ends.iter().all(wanted) {
+            let links: Vec<Link> = ends
+                .iter()
+                .filter(|end| wanted(end))
+                .flat_map(|end| part.links[end.links.clone()].iter().copied())
+                .collect();
+            part.links.truncate(first_link);
+            part.links.extend(links);
+        }
+        ends.iter().filter(|end| wanted(end)).count() as u32
+    }
+
+    fn ray(
+        &self,
+        (grid, mesh, element): (&Grid, &Mesh, usize),
+        index: u32,
+        (seed, media): (u64, MediumStack),
+        part: &mut Batch,
+    ) -> Option<RayEnd> {
+        let point = grid.point(mesh, element, even_point(index, 0, seed))?;
+        let direction = cosine_direction(&point, even_point(index, 1, seed));
+        let own = grid.chart.object();
+        let share = taken(self.tracer(), own, direction.dot(point.shading_normal));
+        let first = part.links.len();
+        let (links, counts) = (&mut part.links, &mut part.counts);
+        let found = self.follower.follow(
+            point.spawn(direction),
+            media,
+            |choice| even_point(index, 2 + choice, seed),
+            |hit, side, weight| {
+                let Some(sender) = self.places.grid_of(hit, side) else {
+                    return;
+                };
+                match self.grids[sender].element_at(hit.triangle, hit.barycentric) {
+                    Some(element) if weight != LinearSrgb::BLACK => links.push(Link {
+                        element: element as u32,
+                        weight: (weight * share).to_array().map(|channel| channel as f32),
+                    }),
+                    Some(_) => {}
+                    None => counts.lost += 1,
+                }
+            },
+        );
+        counts.rays += 1;
+        counts.segments += found.segments;
+        counts.truncated += found.truncated;
+        let within = found
+            .first_back
+            .filter(|&(object, _)| object != own && self.closed[object]);
+        Some(RayEnd {
+            links: first..part.links.len(),
+            within: within.map(|(_, is_drawn)| is_drawn),
+        })
+    }
+
+    fn media(&self, grid: &Grid, mesh: &Mesh, element: usize) -> MediumStack {
+        let middle = glam::DVec2::splat(0.5);
+        match grid.point(mesh, element, middle) {
+            Some(point) => media_at(self.tracer(), point.spawn(point.geometric_normal).origin),
+            None => MediumStack::default(),
+        }
+    }
+
+    /// Tells elements of all grids apart, whatever else lies in the scene.
+    fn seed_of(&self, grid: &Grid, element: usize) -> u64 {
+        let element = grid.elements.all()[element];
+        let place = (grid.chart.receiver.index() as u64) << 40 ^ u64::from(element.texel);
+        mixed(place ^ mixed(u64::from(element.piece) ^ mixed(self.seed)))
+    }
+}
+
+/// Outside, unless all points lie within a solid, or most do and its inside is drawn.
+fn stance(ends: &[RayEnd]) -> Stance {
+    let within = ends.iter().filter(|end| end.within.is_some()).count();
+    let is_drawn = ends.iter().any(|end| end.within == Some(true));
+    if within > 0 && (within == ends.len() || is_drawn && 2 * within > ends.len()) {
+        Stance::Inside
+    } else {
+        Stance::Outside
+    }
+}
+
+/// A hash of 64 bits (the finaliser of SplitMix64: Steele, Lea and Flood 2014).
+fn mixed(code: u64) -> u64 {
+    let mut code = code.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    code = (code ^ (code >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    code = (code ^ (code >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    code ^ (code >> 31)
+}

@@ -1,0 +1,193 @@
+//! A triangle of rays over the facets of a mesh: charts may end, turn and stretch from one facet to the next. Each facet
+//! gets the part of the triangle that lies on it, in its own map coordinates.
+
+use glam::{DVec2, DVec3};
+
+use super::receivers::ReceiverSurface;
+use crate::geometry::Ray;
+use crate::illumination::Chart;
+use crate::illumination::parametrisation::coverage::convex_area;
+use crate::scene::{Adjacency, Mesh};
+
+/// Facets that one triangle of rays may reach; beyond it, it has to be cut.
+const MOST_FACETS: usize = 1024;
+
+/// A part of the triangle's area below this is left to its neighbours.
+const LEAST_SHARE: f64 = 1e-9;
+
+/// How far from its place on the next facet a ray may be expected, as a share of the triangle's size, while facets count
+/// as one [1], and in any case [texels].
+const EVEN_SHARE: f64 = 0.1;
+const EVEN_TEXELS: f64 = 0.25;
+
+/// How far from 1 the shares of the facets may add up to.
+const MOST_AMISS: f64 = 0.05;
+
+/// Corners of a triangle cut by the three sides of another.
+const MOST_CORNERS: usize = 6;
+
+/// A part of a triangle of rays on one facet.
+#[derive(Clone, Copy, Debug)]
+pub struct Piece {
+    corners: [DVec2; MOST_CORNERS],
+    len: usize,
+    /// Island of the chart that the facet lies on.
+    pub island: u32,
+    /// Of the triangle's flux.
+    pub share: f64,
+}
+
+impl Piece {
+    /// The triangles that it consists of, in texels, with their shares of it.
+    pub fn triangles(&self) -> impl Iterator<Item = ([DVec2; 3], f64)> + Clone {
+        let corners = &self.corners[..self.len];
+        let whole = convex_area(corners);
+        corners[1..].windows(2).map(move |pair| {
+            let triangle = [corners[0], pair[0], pair[1]];
+            (triangle, convex_area(&triangle) / whole)
+        })
+    }
+}
+
+/// Where a ray meets a facet.
+#[derive(Clone, Copy, Debug)]
+pub struct FacetPlace {
+    /// Index into the mesh's triangles.
+    pub triangle: u32,
+    /// Texel coordinates.
+    pub texel: DVec2,
+}
+
+/// The facets of one receiver.
+#[derive(Clone, Copy, Debug)]
+pub struct Facets<'a> {
+    /// Its map.
+    pub surface: &'a ReceiverSurface,
+    /// Its mesh.
+    pub mesh: &'a Mesh,
+    /// How that hangs together.
+    pub adjacency: &'a Adjacency,
+}
+
+impl Facets<'_> {
+    /// Whether rays that meet two facets may be taken to meet one surface that is flat and even in the map between them.
+    pub fn is_even(&self, a: (FacetPlace, DVec3), b: (FacetPlace, DVec3)) -> bool {
+        if a.0.triangle == b.0.triangle {
+            return true;
+        }
+        if self.surface.island(a.0.triangle) != self.surface.island(b.0.triangle) {
+            return false;
+        }
+        let triangle = a.0.triangle as usize;
+        let Some(rows) = self
+            .chart()
+            .texel_from_world(triangle, self.mesh.corners(triangle))
+        else {
+            return false;
+        };
+        let step = b.1 - a.1;
+        let expected = DVec2::new(rows[0].dot(step), rows[1].dot(step));
+        let met = b.0.texel - a.0.texel;
+        (met - expected).length() <= EVEN_TEXELS + EVEN_SHARE * met.length()
+    }
+
+    /// The parts of a triangle of rays on the facets around those that its rays meet, their shares adding up to 1, and
+    /// whether they cover all of it, once: not where part of it falls beside them, or on surfaces behind each other.
+    pub fn pieces(&self, rays: [Ray; 3], triangles: [u32; 3]) -> (Vec<Piece>, bool) {
+        let mut found: Vec<Piece> = Vec::new();
+        let mut seen: Vec<u32> = triangles.to_vec();
+        seen.sort_unstable();
+        seen.dedup();
+        let seeds = seen.len();
+        let mut next = 0;
+        while next < seen.len() {
+            let triangle = seen[next] as usize;
+            next += 1;
+            match self.piece(&rays, triangle) {
+                Some(piece) => found.push(piece),
+                // A ray may just touch its facet.
+                None if next <= seeds => {}
+                None => continue,
+            }
+            for neighbour in self.adjacency.around(triangle) {
+                if !seen.contains(&(neighbour as u32)) {
+                    seen.push(neighbour as u32);
+                }
+            }
+            if found.len() > MOST_FACETS {
+                break;
+            }
+        }
+        let whole: f64 = found.iter().map(|piece| piece.share).sum();
+        found.iter_mut().for_each(|piece| piece.share /= whole);
+        // Between facets that bend away from each other light is counted twice, or not at all, by second order.
+        (found, (whole - 1.0).abs() <= MOST_AMISS)
+    }
+
+    fn chart(&self) -> &Chart {
+        &self.surface.chart
+    }
+
+    /// The part on one facet; `None` where there is none.
+    fn piece(&self, rays: &[Ray; 3], triangle: usize) -> Option<Piece> {
+        let chart = self.chart();
+        let corners = self.mesh.corners(triangle);
+        let normal = self.mesh.face_normal(triangle) * chart.receiver.side().sign();
+        let rows = chart.texel_from_world(triangle, corners)?;
+        let size = DVec2::new(chart.width as f64, chart.height as f64);
+        let facet = chart.corner_uvs[triangle].map(|uv| uv * size);
+        let mut places = [DVec2::ZERO; 3];
+        for (place, ray) in places.iter_mut().zip(rays) {
+            let slope = ray.direction.dot(normal);
+            let distance = (corners[0] - ray.origin).dot(normal) / slope;
+            // Also for NaN.
+            if !(slope < 0.0 && distance > 0.0) {
+                return None;
+            }
+            let step = ray.origin + ray.direction * distance - corners[0];
+            *place = facet[0] + DVec2::new(rows[0].dot(step), rows[1].dot(step));
+        }
+        let whole = convex_area(&places);
+        let mut piece = Piece {
+            corners: [DVec2::ZERO; MOST_CORNERS],
+            len: 3,
+            island: self.surface.island(triangle as u32),
+            share: 0.0,
+        };
+        piece.corners[..3].copy_from_slice(&places);
+        let winding = (facet[1] - facet[0]).perp_dot(facet[2] - facet[0]).signum();
+        for side in 0..3 {
+            piece.cut(facet[side], facet[(side + 1) % 3], winding);
+        }
+        piece.share = convex_area(&piece.corners[..piece.len]) / whole;
+        (piece.share > LEAST_SHARE).then_some(piece)
+    }
+}
+
+impl Piece {
+    /// Keeps what lies on one side of a line (Sutherland and Hodgman).
+    fn cut(&mut self, from: DVec2, to: DVec2, winding: f64) {
+        let distance = |corner: DVec2| (to - from).perp_dot(corner - from) * winding;
+        let before = self.corners;
+        let count = self.len;
+        self.len = 0;
+        for index in 0..count {
+            let (corner, next) = (before[index], before[(index + 1) % count]);
+            let (here, there) = (distance(corner), distance(next));
+            if here >= 0.0 {
+                self.push(corner);
+            }
+            if (here > 0.0 && there < 0.0) || (here < 0.0 && there > 0.0) {
+                self.push(corner + (next - corner) * (here / (here - there)));
+            }
+        }
+    }
+
+    fn push(&mut self, corner: DVec2) {
+        // A convex polygon gains at most one corner per line; rounding may repeat a corner, which adds no area.
+        if self.len < MOST_CORNERS {
+            self.corners[self.len] = corner;
+            self.len += 1;
+        }
+    }
+}

@@ -1,0 +1,75 @@
+//! Which triangles of a mesh go on into each other.
+
+use std::collections::HashMap;
+
+use glam::DVec3;
+use rayon::slice::ParallelSliceMut;
+
+use super::Mesh;
+
+/// Beyond this edge is nothing, or more than one thing.
+const BORDER: u32 = u32::MAX;
+
+/// Neighbours across the edges of each triangle.
+#[derive(Clone, Debug)]
+pub struct Adjacency {
+    /// Four times the neighbour and which of its edges it is.
+    across: Vec<[u32; 3]>,
+}
+
+/// One direction of an edge: its welded ends in ascending order, whether it runs that way, triangle, corner it starts at.
+type HalfEdge = (u32, u32, bool, u32, u8);
+
+impl Adjacency {
+    /// Of a mesh. Vertices at the same position are one, since normals and texture coordinates split them. An edge of
+    /// more than two triangles, or of two that are wound against each other, is a border: there is no telling which side
+    /// goes on into which.
+    pub fn of(mesh: &Mesh) -> Self {
+        let vertices = weld(&mesh.positions);
+        let mut edges: Vec<HalfEdge> = Vec::with_capacity(3 * mesh.triangles.len());
+        for (index, triangle) in mesh.triangles.iter().enumerate() {
+            let welded = triangle.map(|vertex| vertices[vertex as usize]);
+            for corner in 0..3u8 {
+                let (a, b) = (welded[usize::from(corner)], welded[usize::from(corner + 1) % 3]);
+                edges.push((a.min(b), a.max(b), a < b, index as u32, corner));
+            }
+        }
+        edges.par_sort_unstable();
+        let mut across = vec![[BORDER; 3]; mesh.triangles.len()];
+        for edge in edges.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
+            if let [a, b] = edge
+                && a.2 != b.2
+            {
+                across[a.3 as usize][usize::from(a.4)] = b.3 << 2 | u32::from(b.4);
+                across[b.3 as usize][usize::from(b.4)] = a.3 << 2 | u32::from(a.4);
+            }
+        }
+        Self { across }
+    }
+
+    /// The triangle beyond the edge of a triangle from corner `edge` to the next one, and its corner at the end of that
+    /// edge, from which the same edge runs back.
+    pub fn beyond(&self, triangle: usize, edge: usize) -> Option<(usize, usize)> {
+        let next = self.across[triangle][edge];
+        (next != BORDER).then_some(((next >> 2) as usize, (next & 3) as usize))
+    }
+
+    /// All neighbours of a triangle.
+    pub fn around(&self, triangle: usize) -> impl Iterator<Item = usize> {
+        (0..3).filter_map(move |edge| Some(self.beyond(triangle, edge)?.0))
+    }
+}
+
+/// For every vertex the first one at the same position.
+fn weld(positions: &[DVec3]) -> Vec<u32> {
+    let mut first_at: HashMap<[u32; 3], u32> = HashMap::with_capacity(positions.len());
+    positions
+        .iter()
+        .enumerate()
+        .map(|(index, position)| {
+            // Computed positions may differ by rounding; files hold single precision. Adding zero makes −0 and +0 alike.
+            let key = (*position + DVec3::ZERO).as_vec3().to_array().map(f32::to_bits);
+            *first_at.entry(key).or_insert(index as u32)
+        })
+        .collect()
+}

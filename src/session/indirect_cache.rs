@@ -1,0 +1,99 @@
+//! Rays between diffuse surfaces that were traced before: lamps may change without a new one.
+
+use std::sync::Arc;
+
+use super::sizes::MapSizes;
+use crate::illumination::{Chart, Receiver};
+use crate::light_pass::indirect::Network;
+use crate::progress::{Control, Progress};
+use crate::settings::BakeSettings;
+use crate::transport::Tracer;
+
+/// What the rays depend on beside the scene: grids by receiver, most surfaces on the way, seed.
+#[derive(Clone, Debug, PartialEq, Eq)]
+struct Key {
+    grids: Vec<(Receiver, (usize, usize))>,
+    max_depth: u32,
+    seed: u64,
+}
+
+/// Elements of all grids for a draft, and for each better preset four times as many.
+const DRAFT_TEXELS: u64 = 8_000;
+
+/// Rays that are kept from bake to bake.
+#[derive(Debug, Default)]
+pub(super) struct IndirectCache {
+    network: Option<(Key, Network)>,
+    /// Passes of each element that the last maps were made of.
+    pub(super) passes: Vec<u8>,
+}
+
+impl IndirectCache {
+    /// Shapes or materials are not what they were.
+    pub(super) fn clear(&mut self) {
+        *self = Self::default();
+    }
+
+    /// Memory that it holds [bytes].
+    pub(super) fn bytes(&self) -> u64 {
+        self.network().map_or(0, Network::bytes)
+    }
+
+    /// The elements with what was traced, if anything was.
+    pub(super) fn network(&self) -> Option<&Network> {
+        self.network.as_ref().map(|(_, network)| network)
+    }
+
+    /// Makes ready for settings: what was traced for others goes.
+    pub(super) fn prepare(&mut self, tracer: &Tracer, sizes: &MapSizes, settings: &BakeSettings) {
+        let key = Key {
+            grids: sizes.grid_sizes(settings, most_texels(settings)),
+            max_depth: settings.max_depth,
+            seed: settings.seed,
+        };
+        if self.network.as_ref().is_some_and(|(known, _)| *known == key) {
+            return;
+        }
+        let charts: Vec<Arc<Chart>> = key
+            .grids
+            .iter()
+            .filter_map(|&(receiver, size)| sizes.chart(receiver, size))
+            .collect();
+        let network = Network::new(tracer.scene(), &charts);
+        (self.network, self.passes) = (Some((key, network)), Vec::new());
+    }
+
+    /// Traces what is missing for every element to have so many passes; false where it was cancelled.
+    pub(super) fn trace(
+        &mut self,
+        tracer: &Tracer,
+        passes: &[u8],
+        (progress, control): (&dyn Progress, &Control),
+    ) -> bool {
+        match &mut self.network {
+            Some((key, network)) => {
+                let (max_depth, seed) = (key.max_depth, key.seed);
+                network.trace(tracer, passes, (max_depth, seed), (progress, control))
+            }
+            None => false,
+        }
+    }
+}
+
+/// Most texels of all grids: as the target needs, and as memory allows for.
+fn most_texels(settings: &BakeSettings) -> u64 {
+    let wanted = match settings.max_error {
+        Some(target) if target >= 0.1 => DRAFT_TEXELS,
+        Some(target) if target <= 0.01 => 16 * DRAFT_TEXELS,
+        _ => 4 * DRAFT_TEXELS,
+    };
+    wanted.min(link_bytes(settings) / BYTES_OF_FIRST_PASSES).max(1)
+}
+
+/// Memory of one texel with its first rays [bytes].
+const BYTES_OF_FIRST_PASSES: u64 = 1 << 10;
+
+/// Memory that rays between diffuse surfaces may take [bytes]: a quarter of all.
+pub(super) fn link_bytes(settings: &BakeSettings) -> u64 {
+    settings.memory_bytes / 4
+}

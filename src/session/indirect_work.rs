@@ -1,0 +1,324 @@
+//! Light between diffuse surfaces in the course of a bake: after the layers that it is gathered from.
+
+use super::caustic::CausticOutcome;
+use super::clock::Clock;
+use super::indirect_cache::{IndirectCache, link_bytes};
+use super::result::{EffectCounts, LightLayer};
+use super::sizes::MapSizes;
+use crate::error::Warning;
+use crate::illumination::{IlluminationMap, Layer, Receiver};
+use crate::light_pass::caustic::pass::{Seconds, Stopwatch};
+use crate::light_pass::indirect::{
+    Grid, LEAST_PASSES, MOST_BOUNCES, Network, Resampling, Solution, TraceCounts,
+};
+use crate::optics::LinearSrgb;
+use crate::progress::{Control, Progress};
+use crate::settings::{BakeSettings, LayerKind};
+use crate::transport::Tracer;
+
+/// Relative error of the rays that is aimed at without a target [1].
+const USUAL_TARGET: f64 = 0.03;
+
+/// Share of what rays carry that may be given up without a word.
+const UNSPOKEN_LOSS: f64 = 1e-3;
+
+/// Indirect light in the course of a bake.
+#[derive(Clone, Debug, Default)]
+pub(super) struct IndirectWork {
+    /// What was traced this time.
+    counts: TraceCounts,
+    seconds: Seconds,
+    /// What the last maps are made of.
+    solution: Option<Solution>,
+    /// Passes of each element.
+    passes: Vec<u8>,
+    links: u64,
+    /// Error that was aimed at.
+    target: f64,
+    /// Whether memory did not allow more rays.
+    is_cramped: bool,
+    /// Share of what all rays carried that was given up.
+    loss: f64,
+    /// Whether no more rays follow.
+    is_done: bool,
+}
+
+/// What the gathering needs of a bake.
+pub(super) struct Gathering<'a> {
+    pub(super) tracer: &'a Tracer,
+    pub(super) sizes: &'a MapSizes,
+    pub(super) settings: &'a BakeSettings,
+    pub(super) progress: &'a dyn Progress,
+    /// What the user asks.
+    pub(super) control: &'a Control,
+    /// The same with the time limit: after the first rays, no more are begun beyond it.
+    pub(super) limited: &'a Control,
+}
+
+impl IndirectWork {
+    /// Traces rays between the elements until their error is below the target, and solves for the light of maps; false
+    /// where it was cancelled before there was anything. `better` is called for each solution but the last.
+    pub(super) fn gather(
+        &mut self,
+        gathering: &Gathering,
+        cache: &mut IndirectCache,
+        maps: &[IlluminationMap],
+        better: &mut dyn FnMut(&Self, &IndirectCache),
+    ) -> bool {
+        let watch = Stopwatch::start();
+        cache.prepare(gathering.tracer, gathering.sizes, gathering.settings);
+        self.seconds.add(watch.elapsed());
+        let target = gathering.settings.max_error.unwrap_or(USUAL_TARGET);
+        (self.target, self.solution) = (target, None);
+        let elements = cache.network().map_or(0, Network::element_count);
+        let mut passes = vec![LEAST_PASSES; elements];
+        loop {
+            let watch = Stopwatch::start();
+            let is_there = self.step(gathering, cache, maps, &passes);
+            let wanting = match &self.solution {
+                Some(solution) if is_there && !gathering.control.is_cancelled() => {
+                    solution.wanting(target, &passes)
+                }
+                _ => Vec::new(),
+            };
+            self.seconds.add(watch.elapsed());
+            self.is_done = wanting.is_empty();
+            if self.is_done {
+                cache.passes.clone_from(&self.passes);
+                return self.solution.is_some();
+            }
+            better(self, cache);
+            wanting.into_iter().for_each(|element| passes[element] += 1);
+        }
+    }
+
+    /// One solution by as many passes as are asked for; whether there is one.
+    fn step(
+        &mut self,
+        gathering: &Gathering,
+        cache: &mut IndirectCache,
+        maps: &[IlluminationMap],
+        passes: &[u8],
+    ) -> bool {
+        let has_solution = self.solution.is_some();
+        let Some(network) = cache.network() else {
+            return false;
+        };
+        let before = network.counts();
+        self.is_cramped = has_solution && network.bytes_after(passes) > link_bytes(gathering.settings);
+        let control = if has_solution {
+            gathering.limited
+        } else {
+            gathering.control
+        };
+        let is_traced =
+            !self.is_cramped && cache.trace(gathering.tracer, passes, (gathering.progress, control));
+        let Some(network) = cache.network() else {
+            return false;
+        };
+        let after = network.counts();
+        self.counts.rays += after.rays - before.rays;
+        self.counts.segments += after.segments - before.segments;
+        self.links = network.link_count();
+        self.loss = (after.truncated + after.lost as f64) / (after.rays as f64).max(1.0);
+        if is_traced {
+            self.solution = Some(network.solve(&sources(network, maps), passes));
+            self.passes = passes.to_vec();
+        }
+        is_traced
+    }
+
+    /// Solves with what was traced for maps before, if anything was: for pictures on the way.
+    pub(super) fn remember(&mut self, cache: &IndirectCache, maps: &[IlluminationMap]) {
+        if let Some(network) = cache.network().filter(|_| !cache.passes.is_empty()) {
+            self.passes.clone_from(&cache.passes);
+            self.solution = Some(network.solve(&sources(network, maps), &self.passes));
+        }
+    }
+
+    /// Adds the layer to the maps, and its error to theirs; each light's part where there are parts of the other layers.
+    pub(super) fn add_to(
+        &self,
+        cache: &IndirectCache,
+        maps: &mut [IlluminationMap],
+        light_layers: &mut Vec<LightLayer>,
+    ) {
+        let (Some(network), Some(solution)) = (cache.network(), &self.solution) else {
+            return;
+        };
+        let mut parts = self.parts(network, maps, light_layers);
+        light_layers.append(&mut parts);
+        for map in maps {
+            let Some(grid) = grid_of(network, map) else {
+                continue;
+            };
+            let resampling = Resampling::new(grid, &map.chart);
+            let is_hidden = |element: usize| network.is_hidden(grid.first + element);
+            let own = grid.first..grid.first + grid.elements.all().len();
+            let values: Vec<[f64; 3]> = solution.irradiance[own].iter().map(|e| e.to_array()).collect();
+            let errors: Vec<[f64; 3]> = network.errors(grid, solution).iter().map(|e| [*e; 3]).collect();
+            let error = resampling.to_map(&errors, is_hidden);
+            let has_caustic = map.layer(LayerKind::Caustic).is_some();
+            map.error = match map.error.take() {
+                Some(other) => Some(other.iter().zip(&error).map(|(a, b)| a.hypot(b[0])).collect()),
+                // The error of the caustic is not known: neither is that of both.
+                None if has_caustic => None,
+                None => Some(error.iter().map(|e| e[0]).collect()),
+            };
+            map.layers.push(Layer {
+                kind: LayerKind::Indirect,
+                irradiance: resampling.to_map(&values, is_hidden),
+            });
+        }
+    }
+
+    /// What each light gives to the layer: the same rays, its own sources.
+    fn parts(
+        &self,
+        network: &Network,
+        maps: &[IlluminationMap],
+        light_layers: &[LightLayer],
+    ) -> Vec<LightLayer> {
+        let mut lights: Vec<usize> = light_layers.iter().map(|part| part.light).collect();
+        lights.sort_unstable();
+        lights.dedup();
+        let mut parts = Vec::new();
+        for light in lights {
+            let of_light = |receiver: Receiver| {
+                let own = light_layers.iter();
+                own.filter(move |part| part.light == light && part.receiver == receiver)
+                    .map(|part| &part.irradiance[..])
+            };
+            let mut sources = vec![LinearSrgb::BLACK; network.element_count()];
+            for map in maps {
+                add_sources(network, map, of_light(map.chart.receiver), &mut sources);
+            }
+            let solution = network.solve(&sources, &self.passes);
+            for map in maps {
+                let Some(grid) = grid_of(network, map) else {
+                    continue;
+                };
+                let own = grid.first..grid.first + grid.elements.all().len();
+                let values: Vec<[f64; 3]> = solution.irradiance[own].iter().map(|e| e.to_array()).collect();
+                let is_hidden = |element: usize| network.is_hidden(grid.first + element);
+                parts.push(LightLayer {
+                    receiver: map.chart.receiver,
+                    light,
+                    kind: LayerKind::Indirect,
+                    irradiance: Resampling::new(grid, &map.chart).to_map(&values, is_hidden),
+                });
+            }
+        }
+        parts
+    }
+
+    /// The bake with this.
+    pub(super) fn added_to(&self, outcome: &CausticOutcome, cache: &IndirectCache) -> CausticOutcome {
+        let mut both = outcome.clone();
+        both.counts.gather_rays += self.counts.rays;
+        both.counts.gather_segments += self.counts.segments;
+        both.counts.bounces = self.solution.as_ref().map_or(0, |solution| solution.bounces);
+        both.meter.indirect = EffectCounts {
+            rays: self.counts.segments,
+            deposits: self.links,
+            bytes: cache.bytes(),
+            cpu_ms: Some(1e3 * self.seconds.cpu),
+            ..EffectCounts::default()
+        };
+        both.meter.indirect_s = self.seconds;
+        both.warnings.extend(self.warnings());
+        both
+    }
+
+    fn warnings(&self) -> Vec<Warning> {
+        let mut warnings = Vec::new();
+        let Some(solution) = &self.solution else {
+            return warnings;
+        };
+        let percent = |share: f64| format!("{:.2} %", 100.0 * share);
+        if !solution.converged {
+            warnings.push(Warning::new(
+                "indirect layer",
+                format!(
+                    "after {MOST_BOUNCES} bounces light is still to come: surfaces give back nearly all of it"
+                ),
+                "use albedos below 1",
+            ));
+        }
+        if self.is_done && solution.relative_noise > self.target {
+            let rays = Network::rays_after(self.passes.iter().copied().max().unwrap_or(0));
+            let remedy = if self.is_cramped {
+                "allow more --memory"
+            } else {
+                "allow more --max-time or --max-error"
+            };
+            warnings.push(Warning::new(
+                "indirect layer",
+                format!(
+                    "its estimated error is {}, above the {} that are aimed at, with up to {rays} rays per texel of its grid",
+                    percent(solution.relative_noise),
+                    percent(self.target)
+                ),
+                remedy,
+            ));
+        }
+        if self.loss > UNSPOKEN_LOSS {
+            warnings.push(Warning::new(
+                "indirect layer",
+                format!(
+                    "{} of what its rays carry was given up between mirrors or in glass",
+                    percent(self.loss)
+                ),
+                "allow more --max-depth",
+            ));
+        }
+        warnings
+    }
+
+    /// The clock with this.
+    pub(super) fn clock(&self, clock: &Clock) -> Clock {
+        let mut both = *clock;
+        both.trace.add(self.seconds);
+        both
+    }
+}
+
+/// Sums of all layers on all elements [W/m²].
+fn sources(network: &Network, maps: &[IlluminationMap]) -> Vec<LinearSrgb> {
+    let mut sources = vec![LinearSrgb::BLACK; network.element_count()];
+    for map in maps {
+        let layers = map
+            .layers
+            .iter()
+            .filter(|layer| layer.kind != LayerKind::Indirect);
+        add_sources(
+            network,
+            map,
+            layers.map(|layer| &layer.irradiance[..]),
+            &mut sources,
+        );
+    }
+    sources
+}
+
+fn add_sources<'a>(
+    network: &Network,
+    map: &IlluminationMap,
+    layers: impl Iterator<Item = &'a [[f32; 3]]>,
+    sources: &mut [LinearSrgb],
+) {
+    let Some(grid) = grid_of(network, map) else {
+        return;
+    };
+    let resampling = Resampling::new(grid, &map.chart);
+    for layer in layers {
+        for (index, e) in resampling.to_grid(layer).into_iter().enumerate() {
+            sources[grid.first + index] += e;
+        }
+    }
+}
+
+fn grid_of<'a>(network: &'a Network, map: &IlluminationMap) -> Option<&'a Grid> {
+    let is_own = |grid: &&Grid| grid.chart.receiver == map.chart.receiver;
+    network.grids().iter().find(is_own)
+}

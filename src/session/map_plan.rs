@@ -1,0 +1,200 @@
+//! Which map each surface gets, from the light that a thin lattice saw on it.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use super::caustic::CausticLayer;
+use super::map_size::{self, MapSize, Sizes, Wish};
+use super::sizes::{self, BYTES_PER_TEXEL, LARGEST_AUTOMATIC_SIDE, LARGEST_TILED_SIDE};
+use crate::error::Warning;
+use crate::illumination::tiles::COARSEST;
+use crate::illumination::{Chart, Receiver};
+use crate::light_pass::caustic::statistics::FootprintStatistics;
+use crate::plan::Effect;
+use crate::settings::{Estimator, MapResolution, Sigma};
+
+impl CausticLayer<'_> {
+    /// Whether maps of the size that is set fit into memory, whatever is lit.
+    pub(super) fn fits_anyway(&self) -> bool {
+        let MapResolution::Fixed { width, height } = self.settings.map_resolution else {
+            return true;
+        };
+        let scene = self.tracer.scene();
+        let is_receiver = |&object: &usize| scene.material_of(object).surface.is_receiver();
+        // Both sides of each.
+        let receivers = 2 * (0..scene.objects.len()).filter(is_receiver).count() as u64;
+        let texels = width as u64 * height as u64;
+        texels.saturating_mul(BYTES_PER_TEXEL).saturating_mul(receivers) <= self.settings.memory_bytes
+    }
+
+    /// Sizes of the maps that the coarse run saw lit, with what is to be said of them.
+    pub(super) fn map_sizes(&self, statistics: Option<&FootprintStatistics>) -> (Sizes, Vec<Warning>) {
+        let receivers = Receiver::all(self.tracer.scene().objects.len());
+        if let (MapResolution::Fixed { width, height }, true) =
+            (self.settings.map_resolution, self.fits_anyway())
+        {
+            let even = |receiver| (receiver, MapSize::dense((width, height)));
+            return (receivers.map(even).collect(), Vec::new());
+        }
+        let wish = |receiver: Receiver| {
+            let wish = match (self.settings.map_resolution, statistics) {
+                (MapResolution::Fixed { width, height }, None) => Some(Wish::dense((width, height))),
+                (MapResolution::Fixed { width, height }, Some(seen)) => {
+                    self.fixed_wish(receiver, (width, height), seen)
+                }
+                (MapResolution::Auto, Some(seen)) => self.automatic_wish(receiver, seen),
+                (MapResolution::Auto, None) => None,
+            };
+            wish.map(|wish| (receiver, wish))
+        };
+        let wishes: BTreeMap<Receiver, Wish> = receivers.filter_map(wish).collect();
+        let wished = map_size::fit(&wishes, u64::MAX);
+        let mut sizes = map_size::fit(&wishes, self.settings.memory_bytes);
+        let is_scarce = sizes != wished;
+        if let (MapResolution::Fixed { width, height }, false) = (self.settings.map_resolution, is_scarce) {
+            // What only the full lattice lights.
+            for receiver in Receiver::all(self.tracer.scene().objects.len()) {
+                sizes.entry(receiver).or_insert(MapSize::dense((width, height)));
+            }
+        }
+        let warnings = if is_scarce {
+            vec![scarce(&wished, &sizes, self.settings.memory_bytes)]
+        } else if let (MapResolution::Auto, Some(statistics)) = (self.settings.map_resolution, statistics) {
+            self.coarse_maps(&sizes, statistics)
+        } else {
+            Vec::new()
+        };
+        (sizes, warnings)
+    }
+
+    /// As large as it is set, and as fine everywhere if memory allows.
+    fn fixed_wish(
+        &self,
+        receiver: Receiver,
+        size: (usize, usize),
+        seen: &FootprintStatistics,
+    ) -> Option<Wish> {
+        let share = seen.mean(receiver)?.map_share;
+        let texels = size.0 as f64 * size.1 as f64;
+        Some(Wish {
+            fineness: 0.5 * (texels * share).log2(),
+            tiles: self
+                .may_be_tiled(receiver.object(), size)
+                .then(|| map_size::needs(size, seen.spots(receiver))),
+            ..Wish::dense(size)
+        })
+    }
+
+    /// As fine as its light asks for; in tiles where that takes less.
+    fn automatic_wish(&self, receiver: Receiver, seen: &FootprintStatistics) -> Option<Wish> {
+        let object = receiver.object();
+        let times = self.sizes.doublings(receiver, seen, LARGEST_TILED_SIDE)?;
+        for times in (0..=times).rev() {
+            let size = self.sizes.doubled_size(object, times)?;
+            let is_small = size.0.max(size.1) <= LARGEST_AUTOMATIC_SIDE;
+            let coarsest = self.coarsest_tile(object, size);
+            if self.may_be_tiled(object, size) && coarsest > 0 {
+                let wish = Wish {
+                    is_even: false,
+                    tiles: Some(map_size::needs(size, seen.spots(receiver))),
+                    coarsest,
+                    ..Wish::dense(size)
+                };
+                let texels = wish.granted(map_size::Sparing::Nothing).texels();
+                if is_small || texels <= (LARGEST_AUTOMATIC_SIDE * LARGEST_AUTOMATIC_SIDE) as u64 {
+                    return Some(wish);
+                }
+            }
+            if is_small {
+                return Some(Wish::dense(size));
+            }
+        }
+        None
+    }
+
+    /// Whether a map of a size can be in tiles: the wavefront's, on surfaces that fill their maps, without smoothing,
+    /// which goes from texel to texel.
+    fn may_be_tiled(&self, object: usize, size: (usize, usize)) -> bool {
+        self.settings.estimator == Estimator::Wavefront
+            && self.settings.sigma == Sigma::Constant(0.0)
+            && map_size::is_divisible(size)
+            && self
+                .sizes
+                .parametrisation(object)
+                .is_some_and(|parametrisation| parametrisation.is_uniform())
+    }
+
+    /// The coarsest level of tiles on which direct light is no coarser than without caustics.
+    fn coarsest_tile(&self, object: usize, size: (usize, usize)) -> u8 {
+        if !self.plan.is_on(Effect::Direct) {
+            return COARSEST;
+        }
+        self.sizes
+            .direct_halvings(object, size, self.settings)
+            .min(u32::from(COARSEST)) as u8
+    }
+
+    /// Says which automatic maps stay coarser than their light, for the largest automatic size.
+    fn coarse_maps(&self, sizes: &Sizes, statistics: &FootprintStatistics) -> Vec<Warning> {
+        let coarse = |(&receiver, MapSize { size, .. }): (&Receiver, &MapSize)| {
+            let (width, height) = *size;
+            let footprint_texels = (width * height) as f64 * statistics.mean(receiver)?.map_share;
+            (footprint_texels < 1.0).then(|| {
+                Warning::new(
+                    &self.tracer.scene().objects[receiver.object()].name,
+                    format!(
+                        "its map of {width} x {height} texels is coarser than the light it holds: a ray's mean \
+                         footprint is {footprint_texels:.2} texels"
+                    ),
+                    "ask for a larger --map-resolution",
+                )
+            })
+        };
+        sizes.iter().filter_map(coarse).collect()
+    }
+
+    /// The chart of a receiver at its size among `sizes`.
+    pub(super) fn chart(&self, receiver: Receiver, sizes: &Sizes) -> Option<Arc<Chart>> {
+        match sizes.get(&receiver) {
+            Some(size) => self.sizes.chart_of(receiver, size),
+            None => self.sizes.chart(receiver, self.default_size(receiver.object())?),
+        }
+    }
+
+    /// For a surface that only the full lattice reached.
+    fn default_size(&self, object: usize) -> Option<(usize, usize)> {
+        let (width, height) = self.first_size(object)?;
+        Some(match self.settings.map_resolution {
+            MapResolution::Auto => (width, height),
+            MapResolution::Fixed {
+                width: most,
+                height: highest,
+            } => (width.min(most), height.min(highest)),
+        })
+    }
+
+    /// The size of a map before the first doubling.
+    pub(super) fn first_size(&self, object: usize) -> Option<(usize, usize)> {
+        Some(sizes::first_size(
+            self.sizes.parametrisation(object)?.suggested_aspect,
+        ))
+    }
+}
+
+/// Where warnings of scarce memory belong.
+pub(super) const MEMORY: &str = "--memory";
+
+/// Says that maps are coarser than wished for, for want of memory [bytes].
+pub(super) fn scarce(wished: &Sizes, granted: &Sizes, limit: u64) -> Warning {
+    let mebibytes = |bytes: u64| bytes as f64 / f64::from(1 << 20);
+    Warning::new(
+        MEMORY,
+        format!(
+            "the maps need {:.1} MiB, the limit is {:.1} MiB: they are coarser than they should be and take {:.1} MiB",
+            mebibytes(map_size::bytes(wished)),
+            mebibytes(limit),
+            mebibytes(map_size::bytes(granted)),
+        ),
+        "allow more --memory, or ask for a smaller --map-resolution",
+    )
+}

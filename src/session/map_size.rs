@@ -1,0 +1,298 @@
+//! How large and how fine each map is: as its light asks for, and no larger than memory allows.
+//!
+//! A tile's texels are to be no larger than the footprints that fall on it (section 3.1.1 of the paper). Where memory is
+//! short, all texels grow alike beside their footprints: those that are far finer than their light are spared first.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use super::sizes::BYTES_PER_TEXEL;
+use crate::illumination::Receiver;
+use crate::illumination::tiles::{self, COARSEST, TileLayout};
+use crate::light_pass::caustic::statistics::Spot;
+
+/// Size of one map.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct MapSize {
+    /// Texels across and down; of the finest size.
+    pub(super) size: (usize, usize),
+    /// Where it is in tiles.
+    pub(super) layout: Option<Arc<TileLayout>>,
+    /// How often it was halved for memory.
+    pub(super) halved: u32,
+}
+
+/// Sizes of maps, by receiver.
+pub(super) type Sizes = BTreeMap<Receiver, MapSize>;
+
+impl MapSize {
+    /// As large as it is, all texels alike.
+    pub(super) fn dense(size: (usize, usize)) -> Self {
+        Self {
+            size,
+            layout: None,
+            halved: 0,
+        }
+    }
+
+    /// Number of texels.
+    pub(super) fn texels(&self) -> u64 {
+        match &self.layout {
+            Some(layout) => layout.texel_count() as u64,
+            None => self.size.0 as u64 * self.size.1 as u64,
+        }
+    }
+}
+
+/// Memory of maps of the given sizes [bytes].
+pub(super) fn bytes(sizes: &Sizes) -> u64 {
+    let texels: u64 = sizes.values().map(MapSize::texels).sum();
+    texels.saturating_mul(BYTES_PER_TEXEL)
+}
+
+/// Half the size, so many times; never nothing.
+pub(super) fn halved((width, height): (usize, usize), times: u32) -> (usize, usize) {
+    let half = |side: usize| (0..times).fold(side, |side, _| side.div_ceil(2));
+    (half(width), half(height))
+}
+
+/// Maps with fewer tiles than this are not worth them.
+const LEAST_TILES: usize = 32;
+
+/// Tiles are worth their trouble where they take less than this share of a dense map.
+const WORTH: f64 = 0.75;
+
+/// A part of a tile's light that may lie on footprints smaller than its texels.
+const FINER_PART: f64 = 0.25;
+
+/// What a tile asks for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct TileNeed {
+    /// Levels by which texels of the finest size are finer than its footprints.
+    fineness: f64,
+    /// Mean irradiance of the map over that of the tile, as levels: where light is half as bright, twice as much of it may
+    /// be missed.
+    dimness: f64,
+}
+
+impl TileNeed {
+    /// Where no light was seen.
+    const NOTHING: Self = Self {
+        fineness: MOST_LEVELS,
+        dimness: 0.0,
+    };
+
+    /// The level at which nothing is missed.
+    fn wished(&self) -> f64 {
+        self.fineness + self.dimness.clamp(0.0, MOST_DIM)
+    }
+
+    /// The level at which as much is missed everywhere, but for a number of levels.
+    fn spared(&self) -> f64 {
+        self.fineness + self.dimness
+    }
+}
+
+/// Dim light has texels that are larger than its footprints by so many levels at most.
+const MOST_DIM: f64 = 1.0;
+
+/// What one map wants.
+#[derive(Clone, Debug)]
+pub(super) struct Wish {
+    /// Texels across and down that are asked for, or that the finest light asks for.
+    pub(super) size: (usize, usize),
+    /// Whether each texel is to be as fine, if memory allows.
+    pub(super) is_even: bool,
+    /// What each tile asks for, row by row; `None` where the map cannot be in tiles.
+    pub(super) tiles: Option<Vec<TileNeed>>,
+    /// Levels by which texels of the size are finer than the footprints of the whole map.
+    pub(super) fineness: f64,
+    /// No tile's texels are to be larger than at this level, if memory allows.
+    pub(super) coarsest: u8,
+}
+
+/// By how many levels texels may be larger than footprints: more takes less memory.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Sparing {
+    /// As is wished for.
+    Nothing,
+    /// So many levels.
+    Levels(f64),
+}
+
+impl Wish {
+    /// A map of one level.
+    pub(super) fn dense(size: (usize, usize)) -> Self {
+        Self {
+            size,
+            is_even: true,
+            tiles: None,
+            fineness: 0.0,
+            coarsest: COARSEST,
+        }
+    }
+
+    /// The size that it gets.
+    pub(super) fn granted(&self, sparing: Sparing) -> MapSize {
+        match (sparing, &self.tiles) {
+            (Sparing::Nothing, Some(tiles)) if !self.is_even => self.in_tiles(tiles, None),
+            (Sparing::Nothing, _) => MapSize::dense(self.size),
+            (Sparing::Levels(levels), Some(tiles)) => {
+                let finest = tiles.iter().map(TileNeed::spared).fold(f64::INFINITY, f64::min);
+                if finest + levels < f64::from(COARSEST) {
+                    self.in_tiles(tiles, Some(levels))
+                } else {
+                    self.in_one(finest + levels)
+                }
+            }
+            (Sparing::Levels(levels), None) => self.in_one(self.fineness + levels),
+        }
+    }
+
+    /// Every texel as large.
+    fn in_one(&self, levels: f64) -> MapSize {
+        let halved_times = levels.clamp(0.0, 32.0) as u32;
+        MapSize {
+            size: halved(self.size, halved_times),
+            layout: None,
+            halved: halved_times,
+        }
+    }
+
+    /// As it is wished for, or with so many levels spared.
+    fn in_tiles(&self, tiles: &[TileNeed], sparing: Option<f64>) -> MapSize {
+        let (columns, _) = tiles::tile_counts(self.size.0, self.size.1);
+        let balanced = |level: &dyn Fn(&TileNeed) -> f64, coarsest: u8| {
+            let level = |tile: &TileNeed| level(tile).clamp(0.0, f64::from(coarsest)) as u8;
+            let mut levels: Vec<u8> = tiles.iter().map(level).collect();
+            tiles::balance(&mut levels, columns);
+            levels
+        };
+        let wanted = if self.is_even {
+            vec![0; tiles.len()]
+        } else {
+            balanced(&TileNeed::wished, self.coarsest)
+        };
+        let mut levels = wanted.clone();
+        if let Some(spared) = sparing {
+            let coarser = balanced(&|tile| tile.spared() + spared, COARSEST);
+            // Nothing gets finer than it asks for.
+            levels = wanted
+                .iter()
+                .zip(coarser)
+                .map(|(own, coarser)| coarser.max(*own))
+                .collect();
+        }
+        let layout = TileLayout::new(self.size, &levels, &wanted);
+        let dense = self.size.0 * self.size.1;
+        if layout.texel_count() as f64 > WORTH * dense as f64 {
+            return MapSize::dense(self.size);
+        }
+        MapSize {
+            size: self.size,
+            layout: Some(Arc::new(layout)),
+            halved: 0,
+        }
+    }
+}
+
+/// Whether a map of a size may be in tiles.
+pub(super) fn is_divisible((width, height): (usize, usize)) -> bool {
+    let (columns, rows) = tiles::tile_counts(width, height);
+    columns * rows >= LEAST_TILES
+}
+
+/// Steps in which texels grow where memory is short [levels].
+const SPARING_STEP: f64 = 0.125;
+
+/// Most that texels of whole maps are finer, or coarser, than their light.
+const MOST_LEVELS: f64 = 20.0;
+
+/// Sizes of all maps in so many bytes: as they are wished for, or as little coarser as can be.
+pub(super) fn fit(wishes: &BTreeMap<Receiver, Wish>, limit_bytes: u64) -> Sizes {
+    let granted = |sparing: Sparing| -> Sizes {
+        wishes
+            .iter()
+            .map(|(&receiver, wish)| (receiver, wish.granted(sparing)))
+            .collect()
+    };
+    let wished = granted(Sparing::Nothing);
+    if bytes(&wished) <= limit_bytes {
+        return wished;
+    }
+    // Tiles with far more texels than light needs come first; then every other.
+    let steps = (2.0 * MOST_LEVELS / SPARING_STEP) as i32;
+    let sparing = |step: i32| Sparing::Levels(f64::from(step) * SPARING_STEP - MOST_LEVELS);
+    let (mut low, mut high) = (0, steps);
+    while low < high {
+        let middle = low + (high - low) / 2;
+        if bytes(&granted(sparing(middle))) <= limit_bytes {
+            high = middle;
+        } else {
+            low = middle + 1;
+        }
+    }
+    granted(sparing(high))
+}
+
+/// Cells across and down that light is sorted into, at most.
+const MOST_CELLS: usize = 64;
+
+/// Powers of two that shares of a map are told apart by: from the whole map on.
+const BINS: usize = 36;
+
+/// What each tile of a map asks for, row by row.
+pub(super) fn needs<'a>(size: (usize, usize), spots: impl Iterator<Item = &'a Spot>) -> Vec<TileNeed> {
+    let (columns, rows) = tiles::tile_counts(size.0, size.1);
+    let (across, down) = (columns.min(MOST_CELLS), rows.min(MOST_CELLS));
+    let mut cells = vec![[0.0_f64; BINS]; across * down];
+    for spot in spots {
+        let bin = (-spot.map_share.log2()).clamp(0.0, (BINS - 1) as f64) as usize;
+        let (low, high) = spot.bounds;
+        let in_columns = parts(low.x, high.x, across);
+        for (row, height) in parts(low.y, high.y, down) {
+            for &(column, width) in &in_columns {
+                cells[row * across + column][bin] += spot.flux_w * width * height;
+            }
+        }
+    }
+    let texels = ((size.0 * size.1) as f64).log2();
+    let mean = cells.iter().flatten().sum::<f64>() / cells.len() as f64;
+    let of_cell = |bins: &[f64; BINS]| {
+        finer_bin(bins).map_or(TileNeed::NOTHING, |bin| TileNeed {
+            // Half the logarithm of the footprint's texels.
+            fineness: 0.5 * (texels - (bin as f64 + 0.5)),
+            dimness: (mean / bins.iter().sum::<f64>()).log2(),
+        })
+    };
+    let cells: Vec<TileNeed> = cells.iter().map(of_cell).collect();
+    (0..columns * rows)
+        .map(|tile| {
+            let (column, row) = (tile % columns, tile / columns);
+            cells[row * down / rows * across + column * across / columns]
+        })
+        .collect()
+}
+
+/// The bin up to which, from the finest on, [`FINER_PART`] of the light lies; `None` without light.
+fn finer_bin(bins: &[f64; BINS]) -> Option<usize> {
+    let all: f64 = bins.iter().sum();
+    let mut sum = 0.0;
+    (0..BINS).rev().find(|&bin| {
+        sum += bins[bin];
+        sum > 0.0 && sum >= FINER_PART * all
+    })
+}
+
+/// Cells of a line of `count` that an interval within [0, 1] reaches, each with its part of it.
+fn parts(low: f64, high: f64, count: usize) -> Vec<(usize, f64)> {
+    let cell = |place: f64| ((place * count as f64) as usize).min(count - 1);
+    let length = high - low;
+    (cell(low)..=cell(high))
+        .map(|index| {
+            let [begin, end] = [index, index + 1].map(|border| border as f64 / count as f64);
+            let inside = high.min(end) - low.max(begin);
+            (index, if length > 0.0 { inside / length } else { 1.0 })
+        })
+        .collect()
+}
