@@ -11,14 +11,20 @@ mod colour;
 mod differentials;
 #[path = "physics/fresnel.rs"]
 mod fresnel;
+#[path = "physics/glass.rs"]
+mod glass;
 #[path = "physics/lights.rs"]
 mod lights;
+#[path = "physics/metals.rs"]
+mod metals;
 #[path = "physics/polish.rs"]
 mod polish;
 #[path = "physics/refraction.rs"]
 mod refraction;
 #[path = "physics/spectrum.rs"]
 mod spectrum;
+#[path = "support/mod.rs"]
+mod support;
 #[path = "physics/tone_maps.rs"]
 mod tone_maps;
 #[path = "physics/upsampling.rs"]
