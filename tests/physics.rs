@@ -17,8 +17,12 @@ mod lights;
 mod polish;
 #[path = "physics/refraction.rs"]
 mod refraction;
+#[path = "physics/spectrum.rs"]
+mod spectrum;
 #[path = "physics/tone_maps.rs"]
 mod tone_maps;
+#[path = "physics/upsampling.rs"]
+mod upsampling;
 
 /// How a law is tried: many cases, the same ones in every run, so that a failure can be looked at.
 fn law() -> proptest::test_runner::Config {

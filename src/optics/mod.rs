@@ -2,6 +2,10 @@
 
 pub mod colour;
 pub mod fresnel;
+mod names;
 pub mod refraction;
+pub mod spectrum;
+pub mod wavelength;
 
 pub use colour::LinearSrgb;
+pub use wavelength::Nanometres;

@@ -1,0 +1,113 @@
+//! What can be wrong with a spectrum.
+
+use crate::error::Error;
+
+/// A fault in a spectrum, in the user's terms; [`remedy`](Self::remedy) says what to do.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SpectrumError {
+    /// A row of a file is no pair of numbers.
+    #[error("line {line}: `{text}` is no wavelength and value")]
+    NotARow {
+        /// Line of the file, from 1.
+        line: usize,
+        /// What stands there.
+        text: String,
+    },
+    /// A wavelength or value that is not finite.
+    #[error("line {line}: {value} is not a finite number")]
+    NotFinite {
+        /// Line of the file, or row of the table, from 1.
+        line: usize,
+        /// The number.
+        value: f64,
+    },
+    /// Less than no light.
+    #[error("line {line}: {value} is negative")]
+    Negative {
+        /// Line of the file, or row of the table, from 1.
+        line: usize,
+        /// The value.
+        value: f64,
+    },
+    /// A wavelength that does not come after the one before.
+    #[error("line {line}: {wavelength_nm} nm does not come after {before_nm} nm")]
+    NotIncreasing {
+        /// Line of the file, or row of the table, from 1.
+        line: usize,
+        /// The wavelength of this row [nm].
+        wavelength_nm: f64,
+        /// That of the row before [nm].
+        before_nm: f64,
+    },
+    /// A table of fewer than two rows.
+    #[error("a spectrum of {rows} rows says nothing between wavelengths")]
+    TooFewRows {
+        /// How many there are.
+        rows: usize,
+    },
+    /// Every wavelength lies where nobody sees.
+    #[error("its wavelengths {first_nm} to {last_nm} nm lie outside of the visible 360 to 830 nm")]
+    Invisible {
+        /// The shortest [nm].
+        first_nm: f64,
+        /// The longest [nm].
+        last_nm: f64,
+    },
+    /// No light at any visible wavelength.
+    #[error("it has no light between 360 and 830 nm")]
+    Dark,
+    /// A name that no spectrum has.
+    #[error("no spectrum is named `{name}`; the nearest names are {nearest}")]
+    UnknownName {
+        /// What was asked for.
+        name: String,
+        /// Names most like it.
+        nearest: String,
+    },
+    /// A temperature or wavelength in a name that is no number or lies outside of its range.
+    #[error("`{text}` is no number from {least} to {most} {unit}")]
+    OutOfRange {
+        /// What was asked for.
+        text: String,
+        /// Least value.
+        least: f64,
+        /// Largest value.
+        most: f64,
+        /// What they are counted in.
+        unit: &'static str,
+    },
+    /// A colour with a negative or non-finite channel, or a factor above 1, has no spectrum.
+    #[error("the colour {r}, {g}, {b} {fault}")]
+    NoSuchColour {
+        /// Red, linear.
+        r: f64,
+        /// Green, linear.
+        g: f64,
+        /// Blue, linear.
+        b: f64,
+        /// What is wrong with it.
+        fault: &'static str,
+    },
+}
+
+impl SpectrumError {
+    /// What the user can do about it.
+    pub fn remedy(&self) -> &'static str {
+        match self {
+            Self::NotARow { .. } => "write two columns, wavelength in nm and value, between commas",
+            Self::NotFinite { .. } | Self::Negative { .. } => "give a finite value of 0 or more",
+            Self::NotIncreasing { .. } => "sort the rows by wavelength and name each once",
+            Self::TooFewRows { .. } => "give two rows or more",
+            Self::Invisible { .. } => "give wavelengths in nanometres, 360 to 830",
+            Self::Dark => "give at least one visible wavelength a value above 0",
+            Self::UnknownName { .. } => "choose one of them, blackbody:KELVIN, line:NM or a CSV file",
+            Self::OutOfRange { .. } => "choose a number in that range",
+            Self::NoSuchColour { .. } => "give finite channels that no light could contradict",
+        }
+    }
+
+    /// The same fault as an error of the command: where it was met, what it is, what to do.
+    pub fn at(self, location: impl Into<String>) -> Error {
+        Error::usage(location, self.to_string(), self.remedy())
+    }
+}

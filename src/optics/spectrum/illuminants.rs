@@ -1,0 +1,114 @@
+//! Lamps by name.
+
+use std::sync::LazyLock;
+
+use super::csv::columns;
+use super::temperature::planck;
+use super::{Spectrum, SpectrumError};
+use crate::optics::Nanometres;
+use crate::optics::names::{key, nearest};
+
+/// Names of CIE that need a table or formula, apart from the tables in [`TABLES`].
+const OWN: [&str; 3] = ["A", "D65", "E"];
+/// Tables every nanometre from 380 to 780 (CIE 15:2018; see assets/SOURCES.md).
+const TABLES: &str = include_str!("../../../assets/spectra/illuminants.csv");
+/// Temperatures [K] of `blackbody:`.
+const KELVIN: [f64; 2] = [500.0, 25_000.0];
+/// Wavelengths [nm] of `line:`, whose whole width is visible.
+const LINE_NM: [f64; 2] = [361.0, 829.0];
+
+/// Every name without a number in it; `blackbody:KELVIN` and `line:NM` (or `laser:NM`) come besides.
+pub fn names() -> impl Iterator<Item = &'static str> {
+    let headings = TABLES.lines().next().unwrap_or_default();
+    OWN.into_iter().chain(headings.split(',').skip(1))
+}
+
+/// A lamp by name, scaled to one luminous-equivalent watt (∫ Φ ȳ dλ = 1, which is 683 lm).
+///
+/// One of [`names`], in any case and with or without its hyphen: CIE illuminants A, D50, D65, E (equal energy),
+/// fluorescent FL2, FL7, FL11, and LED-B1 to B5, BH1, RGB1, V1, V2. Or `blackbody:KELVIN` (500 to 25,000 K), or
+/// `line:NM` and `laser:NM` (361 to 829 nm): a triangle ±1 nm wide. A, D65, E and black bodies reach from 360 to
+/// 830 nm, the others from 380 to 780 nm, as published.
+///
+/// # Errors
+/// [`SpectrumError::UnknownName`] with the nearest names, [`SpectrumError::OutOfRange`] for a number.
+pub fn illuminant(name: &str) -> Result<Spectrum, SpectrumError> {
+    let relative = match name.trim().split_once(':') {
+        Some((kind, number)) => with_number(&key(kind), number).unwrap_or_else(|| Err(unknown(name)))?,
+        None => plain(name)?,
+    };
+    relative.to_luminous_equivalent(1.0)
+}
+
+/// D65, scaled to one luminous-equivalent watt.
+pub fn d65() -> &'static Spectrum {
+    static D65: LazyLock<Spectrum> = LazyLock::new(|| {
+        let rows = columns(include_str!("../../../assets/spectra/d65.csv"));
+        Spectrum::new(rows.map(|row| (Nanometres(row[0]), row[1])).collect())
+            .and_then(|table| table.to_luminous_equivalent(1.0))
+            .expect("our own table is a spectrum")
+    });
+    &D65
+}
+
+fn plain(name: &str) -> Result<Spectrum, SpectrumError> {
+    match key(name).as_str() {
+        "a" => Spectrum::from_fn(illuminant_a),
+        "d65" => Ok(d65().clone()),
+        "e" => Spectrum::from_fn(|_| 1.0),
+        wanted => {
+            let column = names().skip(OWN.len()).position(|known| key(known) == wanted);
+            let column = 1 + column.ok_or_else(|| unknown(name))?;
+            Spectrum::new(
+                columns(TABLES)
+                    .map(|row| (Nanometres(row[0]), row[column]))
+                    .collect(),
+            )
+        }
+    }
+}
+
+/// Illuminant A by its formula, whose constants are kept from 1931 (CIE 15:2018, 4.1.1), relative to 560 nm.
+fn illuminant_a(Nanometres(nm): Nanometres) -> f64 {
+    let exponent = |nm: f64| (1.435e7 / (2848.0 * nm)).exp_m1();
+    (560.0 / nm).powi(5) * exponent(560.0) / exponent(nm)
+}
+
+/// A kind of lamp with a number; `None` where there is no such kind.
+fn with_number(kind: &str, number: &str) -> Option<Result<Spectrum, SpectrumError>> {
+    match kind {
+        "blackbody" | "planck" => {
+            let kelvin = parse(number, KELVIN, "K");
+            Some(kelvin.and_then(|kelvin| Spectrum::from_fn(|wavelength| planck(wavelength, kelvin))))
+        }
+        "line" | "laser" => {
+            let nm = parse(number, LINE_NM, "nm");
+            let triangle = |nm| [(nm - 1.0, 0.0), (nm, 1.0), (nm + 1.0, 0.0)];
+            Some(
+                nm.and_then(|nm| {
+                    Spectrum::new(triangle(nm).map(|(nm, value)| (Nanometres(nm), value)).into())
+                }),
+            )
+        }
+        _ => None,
+    }
+}
+
+fn parse(text: &str, [least, most]: [f64; 2], unit: &'static str) -> Result<f64, SpectrumError> {
+    let number = text.trim().parse().ok();
+    number
+        .filter(|number| (least..=most).contains(number))
+        .ok_or_else(|| SpectrumError::OutOfRange {
+            text: text.into(),
+            least,
+            most,
+            unit,
+        })
+}
+
+fn unknown(name: &str) -> SpectrumError {
+    SpectrumError::UnknownName {
+        name: name.into(),
+        nearest: nearest(name, names()),
+    }
+}

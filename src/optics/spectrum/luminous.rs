@@ -1,0 +1,142 @@
+//! Which wavelengths to follow: as many of each as the eye gets out of them.
+
+use std::ops::RangeInclusive;
+use std::sync::LazyLock;
+
+use super::quadrature::knots_within;
+use super::{Spectrum, SpectrumError, xyz_bar};
+use crate::optics::Nanometres;
+
+/// Where the colours of the rainbow meet [nm]: violet, indigo, blue, green, yellow, orange, red. The limits between
+/// the six spectral colours are those in common use (T. J. Bruno and P. D. N. Svoronos, CRC Handbook of Fundamental
+/// Spectroscopic Correlation Charts, 2005); indigo is the half of their violet that is next to blue.
+const RAINBOW_NM: [f64; 8] = [360.0, 415.0, 450.0, 495.0, 570.0, 590.0, 620.0, 830.0];
+
+/// Wavelengths by importance: their density is proportional to Φ(λ) (x̄ + 2ȳ + z̄)/4, half by luminous efficiency and
+/// half by what red and blue are made of, so that no colour is starved; linear between the knots of the two tables.
+#[derive(Clone, Debug, PartialEq)]
+pub struct WavelengthSampler {
+    knots_nm: Vec<f64>,
+    density_per_nm: Vec<f64>,
+    cumulative: Vec<f64>,
+}
+
+/// One of several wavelengths that stand for a whole spectrum.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Band {
+    /// The wavelengths that it stands for; bands of one set meet without gap.
+    pub range: RangeInclusive<Nanometres>,
+    /// The one that is followed: the median of the band's importance.
+    pub place: Nanometres,
+}
+
+impl WavelengthSampler {
+    /// By importance for the light of one lamp.
+    ///
+    /// # Errors
+    /// [`SpectrumError::Dark`] or [`SpectrumError::Invisible`] for one that nobody sees.
+    pub fn for_lamp(lamp: &Spectrum) -> Result<Self, SpectrumError> {
+        lamp.check_visible()?;
+        let knots_nm = knots_within(lamp.range(), lamp.wavelengths_nm());
+        let importance = |nm: &f64| {
+            let [x, y, z] = xyz_bar(Nanometres(*nm));
+            lamp.at(Nanometres(*nm)) * (x + 2.0 * y + z) / 4.0
+        };
+        let mut density_per_nm: Vec<f64> = knots_nm.iter().map(importance).collect();
+        let mut cumulative = vec![0.0];
+        let mut sum = 0.0;
+        for i in 1..knots_nm.len() {
+            sum += 0.5 * (density_per_nm[i - 1] + density_per_nm[i]) * (knots_nm[i] - knots_nm[i - 1]);
+            cumulative.push(sum);
+        }
+        for value in density_per_nm.iter_mut().chain(&mut cumulative) {
+            *value /= sum;
+        }
+        Ok(Self {
+            knots_nm,
+            density_per_nm,
+            cumulative,
+        })
+    }
+
+    /// By importance for light of equal energy at every wavelength.
+    pub fn equal_energy() -> &'static Self {
+        static EQUAL: LazyLock<WavelengthSampler> = LazyLock::new(|| {
+            Spectrum::from_fn(|_| 1.0)
+                .and_then(|lamp| WavelengthSampler::for_lamp(&lamp))
+                .expect("equal energy is light")
+        });
+        &EQUAL
+    }
+
+    /// The wavelength below which the share `u` [0, 1] of importance lies, and its density there [1/nm].
+    pub fn sample(&self, u: f64) -> (Nanometres, f64) {
+        let above = self.cumulative.partition_point(|share| *share <= u);
+        let above = above.clamp(1, self.knots_nm.len() - 1);
+        let width = self.knots_nm[above] - self.knots_nm[above - 1];
+        let (from, to) = (self.density_per_nm[above - 1], self.density_per_nm[above]);
+        // The root of from·s + (to − from) s²/(2 width) = rest, in the form without cancellation.
+        let rest = u - self.cumulative[above - 1];
+        let root = (from * from + 2.0 * (to - from) * rest / width).max(0.0).sqrt();
+        let step = if rest > 0.0 {
+            (2.0 * rest / (from + root)).min(width)
+        } else {
+            0.0
+        };
+        let density = from + (to - from) * step / width;
+        (Nanometres(self.knots_nm[above - 1] + step), density)
+    }
+
+    /// Density of [`sample`](Self::sample) at a wavelength [1/nm]; 0 where the lamp has no light.
+    pub fn density_per_nm(&self, wavelength: Nanometres) -> f64 {
+        self.piece(wavelength).map_or(0.0, |(index, along)| {
+            let (from, to) = (self.density_per_nm[index], self.density_per_nm[index + 1]);
+            from + along * (to - from)
+        })
+    }
+
+    /// Share [0, 1] of importance below a wavelength, the inverse of [`sample`](Self::sample).
+    pub fn cumulative(&self, wavelength: Nanometres) -> f64 {
+        match self.piece(wavelength) {
+            Some((index, along)) => {
+                let (from, to) = (self.density_per_nm[index], self.density_per_nm[index + 1]);
+                let width = self.knots_nm[index + 1] - self.knots_nm[index];
+                self.cumulative[index] + along * width * (from + 0.5 * along * (to - from))
+            }
+            None if wavelength.0 < self.knots_nm[0] => 0.0,
+            None => 1.0,
+        }
+    }
+
+    /// `count` bands of equal importance, in order of wavelength; together they are all the light of the lamp.
+    pub fn bands(&self, count: usize) -> Vec<Band> {
+        let edge = |i: usize| i as f64 / count as f64;
+        (0..count).map(|i| self.band([edge(i), edge(i + 1)])).collect()
+    }
+
+    /// Seven bands, one for each colour of the rainbow, violet first. One that this lamp has no light in is left out.
+    pub fn rainbow_seven(&self) -> Vec<Band> {
+        let shares = RAINBOW_NM.map(|nm| self.cumulative(Nanometres(nm)));
+        let lit = shares.windows(2).filter(|edge| edge[0] < edge[1]);
+        lit.map(|edge| self.band([edge[0], edge[1]])).collect()
+    }
+
+    fn band(&self, [from, to]: [f64; 2]) -> Band {
+        let [first, place, last] = [from, 0.5 * (from + to), to].map(|share| self.sample(share).0);
+        Band {
+            range: first..=last,
+            place,
+        }
+    }
+
+    /// The piece a wavelength lies in, and how far along it [0, 1].
+    fn piece(&self, Nanometres(nm): Nanometres) -> Option<(usize, f64)> {
+        let last = self.knots_nm.len() - 1;
+        if !(self.knots_nm[0]..=self.knots_nm[last]).contains(&nm) {
+            return None;
+        }
+        let index = self.knots_nm.partition_point(|knot| *knot <= nm).clamp(1, last) - 1;
+        let (from, to) = (self.knots_nm[index], self.knots_nm[index + 1]);
+        Some((index, (nm - from) / (to - from)))
+    }
+}

@@ -1,0 +1,25 @@
+//! Spectra: how much light at each wavelength, what colour that is, and which wavelengths to follow.
+//!
+//! ```text
+//!  CSV, name, colour ─► Spectrum ─► Xyz ─► LinearSrgb ─► display
+//!                          └─► WavelengthSampler ─► wavelengths to trace
+//! ```
+
+pub mod csv;
+pub mod error;
+pub mod illuminants;
+pub mod luminous;
+pub mod matching;
+pub mod quadrature;
+pub mod table;
+pub mod temperature;
+pub mod upsample;
+pub mod xyz;
+
+pub use error::SpectrumError;
+pub use illuminants::illuminant;
+pub use luminous::{Band, WavelengthSampler};
+pub use matching::xyz_bar;
+pub use table::Spectrum;
+pub use upsample::{Emission, SmoothSpectrum};
+pub use xyz::Xyz;

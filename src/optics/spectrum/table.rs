@@ -1,0 +1,170 @@
+//! A spectrum as a table, linear between its rows.
+
+use std::ops::RangeInclusive;
+
+use super::quadrature::{integrate, knots_within};
+use super::{SpectrumError, Xyz, xyz_bar};
+use crate::optics::Nanometres;
+use crate::optics::wavelength::VISIBLE;
+use crate::units::LUMENS_PER_WATT;
+
+/// Light, or a factor on light, by wavelength: linear between rows, and zero outside of them.
+///
+/// As light its values are W/nm (or that per m², per sr), unless they are said to be relative; as a factor they have
+/// no unit.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Spectrum {
+    wavelengths_nm: Vec<f64>,
+    values: Vec<f64>,
+}
+
+impl Spectrum {
+    /// From rows of wavelength and value.
+    ///
+    /// # Errors
+    /// Where there are fewer than two rows, where wavelengths do not increase, or where a number is not finite or a
+    /// value is negative; the line in the error is the row, counted from 1.
+    pub fn new(rows: Vec<(Nanometres, f64)>) -> Result<Self, SpectrumError> {
+        if rows.len() < 2 {
+            return Err(SpectrumError::TooFewRows { rows: rows.len() });
+        }
+        let mut before_nm = f64::NEG_INFINITY;
+        for (index, (Nanometres(wavelength_nm), value)) in rows.iter().copied().enumerate() {
+            let line = index + 1;
+            if let Some(value) = [wavelength_nm, value].into_iter().find(|x| !x.is_finite()) {
+                return Err(SpectrumError::NotFinite { line, value });
+            }
+            if let Some(value) = [wavelength_nm, value].into_iter().find(|x| *x < 0.0) {
+                return Err(SpectrumError::Negative { line, value });
+            }
+            if wavelength_nm <= before_nm {
+                return Err(SpectrumError::NotIncreasing {
+                    line,
+                    wavelength_nm,
+                    before_nm,
+                });
+            }
+            before_nm = wavelength_nm;
+        }
+        let (wavelengths_nm, values) = rows
+            .into_iter()
+            .map(|(Nanometres(nm), value)| (nm, value))
+            .unzip();
+        Ok(Self {
+            wavelengths_nm,
+            values,
+        })
+    }
+
+    /// A function of wavelength, finite and not negative, as a table of every visible whole nanometre.
+    ///
+    /// # Errors
+    /// Where a value is negative or not finite.
+    pub fn from_fn(f: impl Fn(Nanometres) -> f64) -> Result<Self, SpectrumError> {
+        let knots = knots_within(VISIBLE, &[]);
+        Self::new(
+            knots
+                .into_iter()
+                .map(|nm| (Nanometres(nm), f(Nanometres(nm))))
+                .collect(),
+        )
+    }
+
+    /// First and last wavelength of the table.
+    pub fn range(&self) -> RangeInclusive<Nanometres> {
+        let [first, last] = [0, self.wavelengths_nm.len() - 1].map(|i| Nanometres(self.wavelengths_nm[i]));
+        first..=last
+    }
+
+    /// Wavelengths of the rows [nm], increasing.
+    pub fn wavelengths_nm(&self) -> &[f64] {
+        &self.wavelengths_nm
+    }
+
+    /// The value at a wavelength: linear between rows, 0 outside of the table.
+    pub fn at(&self, wavelength: Nanometres) -> f64 {
+        if !self.range().contains(&wavelength) {
+            return 0.0;
+        }
+        let above = self.wavelengths_nm.partition_point(|nm| *nm <= wavelength.0);
+        let above = above.clamp(1, self.values.len() - 1);
+        let (from, to) = (self.wavelengths_nm[above - 1], self.wavelengths_nm[above]);
+        let along = (wavelength.0 - from) / (to - from);
+        self.values[above - 1] + along * (self.values[above] - self.values[above - 1])
+    }
+
+    /// ∫ Φ(λ) w(λ) dλ over the visible part of a range, by the rule of [`quadrature`](super::quadrature): exact
+    /// where `weight` is linear or quadratic between whole nanometres.
+    pub fn integral_times<const N: usize>(
+        &self,
+        range: RangeInclusive<Nanometres>,
+        weight: impl Fn(Nanometres) -> [f64; N],
+    ) -> [f64; N] {
+        let [first, last] = [
+            range.start().0.max(self.range().start().0),
+            range.end().0.min(self.range().end().0),
+        ];
+        let knots = knots_within(Nanometres(first)..=Nanometres(last), &self.wavelengths_nm);
+        integrate(&knots, |wavelength| {
+            let value = self.at(wavelength);
+            weight(wavelength).map(|weight| weight * value)
+        })
+    }
+
+    /// Radiant flux between 360 and 830 nm, ∫ Φ dλ [W, where values are W/nm].
+    pub fn radiant(&self) -> f64 {
+        self.integral_times(VISIBLE, |_| [1.0])[0]
+    }
+
+    /// Luminous flux 683 ∫ Φ ȳ dλ [lm, where values are W/nm].
+    pub fn luminous_flux_lm(&self) -> f64 {
+        LUMENS_PER_WATT * self.xyz().y
+    }
+
+    /// ∫ Φ (x̄, ȳ, z̄) dλ, without the 683: Y is in luminous-equivalent watts.
+    pub fn xyz(&self) -> Xyz {
+        self.xyz_within(VISIBLE)
+    }
+
+    /// The part of [`xyz`](Self::xyz) that a range of wavelengths gives. Ranges that meet add up to the whole.
+    pub fn xyz_within(&self, range: RangeInclusive<Nanometres>) -> Xyz {
+        Xyz::from(self.integral_times(range, xyz_bar))
+    }
+
+    /// Every value times a factor, finite and 0 or more.
+    ///
+    /// # Errors
+    /// Where a product is negative or not finite.
+    pub fn scaled(&self, factor: f64) -> Result<Self, SpectrumError> {
+        let rows = self.wavelengths_nm.iter().zip(&self.values);
+        Self::new(
+            rows.map(|(nm, value)| (Nanometres(*nm), value * factor))
+                .collect(),
+        )
+    }
+
+    /// The same light, made as bright as so many luminous-equivalent watts: ∫ Φ ȳ dλ = `watts`, 683 times that in lm.
+    ///
+    /// # Errors
+    /// [`SpectrumError::Dark`] where nobody sees it, and where `watts` is negative or not finite.
+    pub fn to_luminous_equivalent(&self, watts: f64) -> Result<Self, SpectrumError> {
+        self.check_visible()?;
+        self.scaled(watts / self.xyz().y)
+    }
+
+    /// Whether anybody sees it as light.
+    ///
+    /// # Errors
+    /// [`SpectrumError::Invisible`] by its wavelengths, [`SpectrumError::Dark`] by its values.
+    pub fn check_visible(&self) -> Result<(), SpectrumError> {
+        let (Nanometres(first_nm), Nanometres(last_nm)) = self.range().into_inner();
+        if last_nm <= VISIBLE.start().0 || first_nm >= VISIBLE.end().0 {
+            return Err(SpectrumError::Invisible { first_nm, last_nm });
+        }
+        if self.xyz().y > 0.0 {
+            Ok(())
+        } else {
+            Err(SpectrumError::Dark)
+        }
+    }
+}

@@ -1,0 +1,87 @@
+//! Black bodies, and the temperature of the one whose colour is nearest to a lamp's.
+
+use super::quadrature::{integrate, visible_knots};
+use super::{Xyz, xyz_bar};
+use crate::optics::Nanometres;
+
+/// hc/k [nm K], exact in the SI of 2019.
+const SECOND_RADIATION_CONSTANT_NM_K: f64 = 1.438_776_877e7;
+/// A lamp farther than this from every black body has no correlated temperature (CIE 15:2018, 9.5).
+const MOST_DISTANCE_UV: f64 = 0.05;
+/// Temperatures [K] among which the nearest is looked for, as reciprocals [1/K].
+const RECIPROCALS: [f64; 2] = [1.0 / 100_000.0, 1.0 / 500.0];
+/// Places of the first, coarse search; colours move evenly with the reciprocal of temperature.
+const PLACES: u32 = 64;
+
+/// Radiance of a black body by wavelength, relative to that at 560 nm (Planck's law).
+pub fn planck(wavelength: Nanometres, kelvin: f64) -> f64 {
+    let exponent = |nm: f64| (SECOND_RADIATION_CONSTANT_NM_K / (nm * kelvin)).exp_m1();
+    (560.0 / wavelength.0).powi(5) * exponent(560.0) / exponent(wavelength.0)
+}
+
+/// The black body nearest to a colour.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CorrelatedTemperature {
+    /// Its temperature [K].
+    pub kelvin: f64,
+    /// How far the colour lies from it in (u, v) of CIE 1960 [1].
+    pub distance_uv: f64,
+}
+
+/// Correlated colour temperature by its definition: the black body of 500 to 100,000 K nearest in (u, v) of CIE 1960.
+/// `None` for a colour without chromaticity, farther than 0.05 from all of them, or nearest to an end.
+pub fn correlated_temperature(colour: Xyz) -> Option<CorrelatedTemperature> {
+    let wanted = uv(colour)?;
+    let distance = |reciprocal: f64| {
+        let [u, v] = black_body_uv(1.0 / reciprocal);
+        (u - wanted[0]).hypot(v - wanted[1])
+    };
+    let step = (RECIPROCALS[1] - RECIPROCALS[0]) / f64::from(PLACES);
+    let places = (0..=PLACES).map(|i| RECIPROCALS[0] + step * f64::from(i));
+    let (nearest, _) = places
+        .map(|place| (place, distance(place)))
+        .min_by(|a, b| a.1.total_cmp(&b.1))?;
+    let reciprocal = least_between(
+        (nearest - step).max(0.5 * RECIPROCALS[0]),
+        nearest + step,
+        distance,
+    );
+    let distance_uv = distance(reciprocal);
+    let is_inside = (RECIPROCALS[0]..=RECIPROCALS[1]).contains(&reciprocal);
+    (is_inside && distance_uv <= MOST_DISTANCE_UV).then_some(CorrelatedTemperature {
+        kelvin: 1.0 / reciprocal,
+        distance_uv,
+    })
+}
+
+fn black_body_uv(kelvin: f64) -> [f64; 2] {
+    let colour = integrate(&visible_knots(), |wavelength| {
+        xyz_bar(wavelength).map(|weight| weight * planck(wavelength, kelvin))
+    });
+    uv(colour.into()).expect("a black body shines")
+}
+
+/// (u, v) of CIE 1960.
+fn uv(Xyz { x, y, z }: Xyz) -> Option<[f64; 2]> {
+    let sum = x + 15.0 * y + 3.0 * z;
+    (sum > 0.0).then(|| [4.0 * x / sum, 6.0 * y / sum])
+}
+
+/// Where a function with one minimum has it, to 1e-9 of the interval (golden section).
+fn least_between(mut from: f64, mut to: f64, f: impl Fn(f64) -> f64) -> f64 {
+    let golden = 0.5 * (5f64.sqrt() - 1.0);
+    let (mut left, mut right) = (to - golden * (to - from), from + golden * (to - from));
+    let (mut at_left, mut at_right) = (f(left), f(right));
+    for _ in 0..43 {
+        if at_left <= at_right {
+            (to, right, at_right) = (right, left, at_left);
+            left = to - golden * (to - from);
+            at_left = f(left);
+        } else {
+            (from, left, at_left) = (left, right, at_right);
+            right = from + golden * (to - from);
+            at_right = f(right);
+        }
+    }
+    0.5 * (from + to)
+}
