@@ -37,16 +37,16 @@ fn coordinates_are_kept_by_content_and_never_trusted_blindly() {
         })
     };
     let fresh = maps(" --no-cache");
-    assert!(sandbox.files("cache/nephroid").is_empty());
+    assert!(sandbox.files(sandbox.cache()).is_empty());
     assert!(maps("") == fresh);
-    let kept = sandbox.files("cache/nephroid");
+    let kept = sandbox.files(sandbox.cache());
     assert!(!kept.is_empty());
     assert!(maps("") == fresh, "what was kept is what was made");
     for file in &kept {
-        let path = sandbox.path("cache/nephroid").join(file);
+        let path = sandbox.cache().join(file);
         let bytes = std::fs::read(&path).expect("kept");
         std::fs::write(&path, &bytes[..bytes.len() / 2]).expect("writable");
     }
     assert!(maps("") == fresh, "half a file is none");
-    assert_eq!(sandbox.files("cache/nephroid"), kept);
+    assert_eq!(sandbox.files(sandbox.cache()), kept);
 }

@@ -6,9 +6,10 @@ use std::process::{Command, Output, Stdio};
 use serde_json::Value;
 use tempfile::TempDir;
 
-/// An empty folder in which the program runs; removed at the end.
+/// An empty folder in which the program runs, and one for what it and its drivers keep; both removed at the end.
 pub struct Sandbox {
     folder: TempDir,
+    cache: TempDir,
 }
 
 /// How a run ended.
@@ -20,8 +21,8 @@ pub struct Run {
 
 impl Sandbox {
     pub fn new() -> Self {
-        let folder = tempfile::tempdir().expect("a temporary folder");
-        Self { folder }
+        let [folder, cache] = [(); 2].map(|()| tempfile::tempdir().expect("a temporary folder"));
+        Self { folder, cache }
     }
 
     pub fn path(&self, name: &str) -> PathBuf {
@@ -42,7 +43,7 @@ impl Sandbox {
             .current_dir(self.folder.path())
             // Without it, libraries of the window system complain on stderr.
             .env("XDG_RUNTIME_DIR", self.folder.path())
-            .env("XDG_CACHE_HOME", self.folder.path().join("cache"))
+            .env("XDG_CACHE_HOME", self.cache.path())
             .stdin(Stdio::null());
         for display in ["DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET"] {
             command.env_remove(display);
@@ -64,9 +65,14 @@ impl Sandbox {
         run
     }
 
+    /// Where the program keeps what took long to make.
+    pub fn cache(&self) -> PathBuf {
+        self.cache.path().join("nephroid")
+    }
+
     /// Names of the files in a folder, sorted; none where there is no such folder.
-    pub fn files(&self, folder: &str) -> Vec<String> {
-        let mut names: Vec<String> = std::fs::read_dir(self.path(folder))
+    pub fn files(&self, folder: impl AsRef<Path>) -> Vec<String> {
+        let mut names: Vec<String> = std::fs::read_dir(self.folder.path().join(folder))
             .into_iter()
             .flatten()
             .map(|entry| {
