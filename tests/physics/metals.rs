@@ -90,7 +90,7 @@ fn p_polarised_light_has_a_least_reflectance_between() {
 
 #[test]
 fn metals_reflect_as_much_as_was_measured() {
-    // G. Hass, in American Institute of Physics Handbook (1957), 6g: evaporated films, per cent. Gold and copper are
+    // G. Hass, in American Institute of Physics Handbook, 3rd edition (1972), 6g: evaporated films, per cent. Gold and copper are
     // compared away from their edges, where a few nanometres matter.
     for (name, wavelengths, tolerance) in [
         (

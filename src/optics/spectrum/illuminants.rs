@@ -68,7 +68,7 @@ fn plain(name: &str) -> Result<Spectrum, SpectrumError> {
     }
 }
 
-/// Illuminant A by its formula, whose constants are kept from 1931 (CIE 15:2018, 4.1.1), relative to 560 nm.
+/// Illuminant A by its formula, whose constants are kept from 1931 (CIE 15:2018), relative to 560 nm.
 fn illuminant_a(Nanometres(nm): Nanometres) -> f64 {
     let exponent = |nm: f64| (1.435e7 / (2848.0 * nm)).exp_m1();
     (560.0 / nm).powi(5) * exponent(560.0) / exponent(nm)

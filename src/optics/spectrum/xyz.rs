@@ -46,7 +46,7 @@ const SRGB_FROM_XYZ: Matrix3 = [
     ],
 ];
 
-/// XYZ to the cone-like responses in which Bradford adapts (CIE 159:2004, CAT of CIECAM97s without its exponent).
+/// XYZ to the cone-like responses in which Bradford adapts (linear, as in ICC.1:2010, annex E).
 const BRADFORD_FROM_XYZ: Matrix3 = [
     [0.8951, 0.2664, -0.1614],
     [-0.7502, 1.7135, 0.0367],
