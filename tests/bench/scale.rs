@@ -40,6 +40,30 @@ fn a_million_triangles() -> Scene {
     scene
 }
 
+/// A thousand glass balls over the floor, each an object of its own: 25 rows of 40.
+fn a_thousand_balls() -> Scene {
+    let mut scene = over_a_floor("a thousand balls");
+    let material = scene.materials.len();
+    let count: i32 = std::env::var("BALLS").map_or(1000, |text| text.parse().unwrap());
+    for index in 0..count {
+        let (column, row) = (index % 40, index / 40);
+        let centre = DVec3::new(
+            (f64::from(column) - 19.5) * 0.08,
+            0.4,
+            (f64::from(row) - 12.0) * 0.08,
+        );
+        let ball = shapes::sphere(centre, 0.03, 2);
+        parts::add(
+            &mut scene,
+            &format!("ball {index}"),
+            ball,
+            parts::dielectric("glass", 1.5),
+        );
+    }
+    assert!(scene.materials.len() > material);
+    scene
+}
+
 /// Rays of light paths, in the order of a lattice over the directions that may see a caster.
 fn paths(tracer: &Tracer, side: usize) -> Vec<Ray> {
     let rows: Vec<Vec<Ray>> = (0..side)
@@ -131,8 +155,18 @@ fn measure(scene: Scene, density_per_sr: f64, max_depth: u32) {
         result.cpu_s.trace,
         result.cpu_s.deposit
     );
+    println!(
+        "queries {} splats {} {:?}",
+        result.counts.receiver_queries,
+        result.counts.splats,
+        nephroid::light_pass::wavefront::cell::DBG
+    );
 }
 
 fn main() {
-    measure(a_million_triangles(), 200_000.0, 16);
+    let only = std::env::args().nth(1).unwrap_or_default();
+    if !only.starts_with('1') {
+        measure(a_million_triangles(), 200_000.0, 16);
+    }
+    measure(a_thousand_balls(), 1_000.0, 16);
 }

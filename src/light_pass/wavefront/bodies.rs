@@ -6,6 +6,7 @@ use std::collections::HashMap;
 use glam::{DVec2, DVec3};
 
 use super::closeness::Closeness;
+use crate::geometry::Ray;
 use crate::geometry::enclosure::Bounds;
 use crate::light_pass::item_buffer::{self, CELLS_PER_SIDE, ItemBuffer};
 use crate::light_pass::launch::Launch;
@@ -133,39 +134,80 @@ impl SmallBodies {
         if level >= DEEPEST_BODY_LEVEL || self.is_empty() {
             return false;
         }
-        let middle = launch.ray(face, (low + high) * 0.5);
-        let corners = [low, high, DVec2::new(low.x, high.y), DVec2::new(high.x, low.y)]
-            .map(|corner| launch.ray(face, corner));
-        let reach_m = |along_m: f64| {
-            let centre = middle.at(along_m);
-            corners
-                .iter()
-                .map(|corner| corner.at(along_m).distance(centre))
-                .fold(0.0, f64::max)
-        };
-        let along_m = |point: DVec3| (point - middle.origin).dot(middle.direction);
+        let beam = Beam::new(launch, face, (low, high));
         // A little farther than the cell: bodies reach beyond what they are booked under.
         let margin = (high - low) * 0.5;
         let (low, high) = (low - margin, high + margin);
         let holds_corner = level < self.corner_levels
             && found(&self.corners, face, (low, high), |corner| {
-                let along_m = along_m(*corner);
+                let along_m = beam.along_m(*corner);
                 along_m > 0.0
                     && along_m <= hidden_beyond_m
-                    && middle.at(along_m).distance(*corner) <= reach_m(along_m)
+                    && beam.middle.at(along_m).distance(*corner) <= beam.reach_m(along_m)
             });
         holds_corner
             || found(&self.bodies, face, (low, high), |body| {
-                let along_m = along_m(body.centre);
-                if along_m <= -body.radius_m || along_m - body.radius_m > hidden_beyond_m {
-                    return false;
-                }
-                let along_m = along_m.max(0.0);
-                let centre = middle.at(along_m);
-                let reach_m = reach_m(along_m);
-                centre.distance(body.centre) <= body.radius_m + 1.5 * reach_m
-                    && body.cells_across * reach_m > 2.0 * body.radius_m
+                beam.reach_at_m(body, hidden_beyond_m)
+                    .is_some_and(|reach_m| body.cells_across * reach_m > 2.0 * body.radius_m)
             })
+    }
+
+    /// About how many cells a cell of a lattice becomes for the small bodies in it; at least 1.
+    pub fn cells_within(&self, launch: &Launch, face: usize, (low, high): (DVec2, DVec2)) -> f64 {
+        if self.bodies.is_empty() {
+            return 1.0;
+        }
+        let beam = Beam::new(launch, face, (low, high));
+        let mut cells = 1.0;
+        for_each(&self.bodies, face, (low, high), |body| {
+            if let Some(reach_m) = beam.reach_at_m(body, f64::INFINITY) {
+                // The whole cell, or the body and what is divided to get there.
+                let across = body.cells_across * (reach_m / body.radius_m).min(1.0);
+                cells += across.powi(2);
+            }
+        });
+        cells
+    }
+}
+
+/// What a cell of a lattice sees: its middle ray and those through its corners.
+struct Beam {
+    middle: Ray,
+    corners: [Ray; 4],
+}
+
+impl Beam {
+    fn new(launch: &Launch, face: usize, (low, high): (DVec2, DVec2)) -> Self {
+        Self {
+            middle: launch.ray(face, (low + high) * 0.5),
+            corners: [low, high, DVec2::new(low.x, high.y), DVec2::new(high.x, low.y)]
+                .map(|corner| launch.ray(face, corner)),
+        }
+    }
+
+    fn along_m(&self, point: DVec3) -> f64 {
+        (point - self.middle.origin).dot(self.middle.direction)
+    }
+
+    /// Half the width of the beam at a distance [m].
+    fn reach_m(&self, along_m: f64) -> f64 {
+        let centre = self.middle.at(along_m);
+        let corners = self.corners.iter();
+        corners
+            .map(|corner| corner.at(along_m).distance(centre))
+            .fold(0.0, f64::max)
+    }
+
+    /// Half the width of the beam at a body that it may hold [m]; `None` where it does not.
+    fn reach_at_m(&self, body: &Body, hidden_beyond_m: f64) -> Option<f64> {
+        let along_m = self.along_m(body.centre);
+        if along_m <= -body.radius_m || along_m - body.radius_m > hidden_beyond_m {
+            return None;
+        }
+        let along_m = along_m.max(0.0);
+        let centre = self.middle.at(along_m);
+        let reach_m = self.reach_m(along_m);
+        (centre.distance(body.centre) <= body.radius_m + 1.5 * reach_m).then_some(reach_m)
     }
 }
 
@@ -185,13 +227,21 @@ fn book<T: Copy>(launch: &Launch, bounds: Bounds, what: T, bins: &mut Bins<T>) {
 }
 
 /// Whether anything that is booked between two corners of the unit square of a face passes a test.
-fn found<T>(bins: &Bins<T>, face: usize, (low, high): (DVec2, DVec2), test: impl Fn(&T) -> bool) -> bool {
+fn found<T>(bins: &Bins<T>, face: usize, square: (DVec2, DVec2), test: impl Fn(&T) -> bool) -> bool {
+    bins_between(face, square).any(|bin| bins.get(&bin).is_some_and(|booked| booked.iter().any(&test)))
+}
+
+/// All that is booked between two corners of the unit square of a face, what lies in several bins as often.
+fn for_each<T>(bins: &Bins<T>, face: usize, square: (DVec2, DVec2), mut act: impl FnMut(&T)) {
+    for bin in bins_between(face, square) {
+        bins.get(&bin).into_iter().flatten().for_each(&mut act);
+    }
+}
+
+fn bins_between(face: usize, (low, high): (DVec2, DVec2)) -> impl Iterator<Item = (u32, u32, u32)> {
     let side = CELLS_PER_SIDE as f64;
-    let cell = |share: f64| ((share * side).max(0.0) as usize).min(CELLS_PER_SIDE - 1) as u32;
-    (cell(low.y)..=cell(high.y)).any(|row| {
-        (cell(low.x)..=cell(high.x)).any(|column| {
-            bins.get(&(face as u32, column, row))
-                .is_some_and(|booked| booked.iter().any(&test))
-        })
-    })
+    let cell = move |share: f64| ((share * side).max(0.0) as usize).min(CELLS_PER_SIDE - 1) as u32;
+    let columns = cell(low.x)..=cell(high.x);
+    (cell(low.y)..=cell(high.y))
+        .flat_map(move |row| columns.clone().map(move |column| (face as u32, column, row)))
 }

@@ -40,6 +40,14 @@ const MIXED_TEXELS: f64 = 16.0;
 /// corners.
 const DETAILS_PER_PATCH: f64 = 64.0;
 
+/// How a patch is divided.
+pub(super) struct Steps {
+    /// Across and down.
+    pub(super) count: (usize, usize),
+    /// How much more coarsely than is usual.
+    pub(super) tolerance: f64,
+}
+
 impl<E: PathEffects> Spreader<'_, E> {
     /// Whether nine rays of a patch meet a plane within its map.
     pub(super) fn stays_on_map(&self, shape: &PatchShape, receiver: Receiver) -> bool {
@@ -66,7 +74,7 @@ impl<E: PathEffects> Spreader<'_, E> {
         is_plane: bool,
         flux_w: LinearSrgb,
         out: &mut SpreadOutput,
-    ) -> (usize, usize) {
+    ) -> Steps {
         let probes: [[VirtualVertex; 3]; 3] =
             std::array::from_fn(|j| std::array::from_fn(|i| rays.vertex(probe_place(shape, i, j))));
         let first = probes[0][0].place;
@@ -129,7 +137,7 @@ impl<E: PathEffects> Spreader<'_, E> {
             let even = even.min((even * length).sqrt());
             (straight.max(even).ceil() as usize).clamp(1, MOST_STEPS)
         };
-        (
+        let count = (
             steps(
                 across,
                 change(areas[0], areas[1]).max(change(areas[3], areas[2])),
@@ -140,7 +148,8 @@ impl<E: PathEffects> Spreader<'_, E> {
                 change(areas[0], areas[3]).max(change(areas[1], areas[2])),
                 height,
             ),
-        )
+        );
+        Steps { count, tolerance }
     }
 
     /// Where rays of a patch meet a receiver, in texels as they lie around the middle one: charts may end and turn between
@@ -295,7 +304,7 @@ fn probe_place(shape: &PatchShape, i: usize, j: usize) -> DVec2 {
 }
 
 /// Rays that do not all meet one surface: enough to see the border between.
-fn mixed_steps(probes: &[[VirtualVertex; 3]; 3], is_plane: bool, tolerance: f64) -> (usize, usize) {
+fn mixed_steps(probes: &[[VirtualVertex; 3]; 3], is_plane: bool, tolerance: f64) -> Steps {
     let lost = probes
         .iter()
         .flatten()
@@ -307,5 +316,8 @@ fn mixed_steps(probes: &[[VirtualVertex; 3]; 3], is_plane: bool, tolerance: f64)
         (false, _) => MIXED_STEPS,
     };
     let steps = (steps as f64 / tolerance.sqrt()).ceil().max(2.0) as usize;
-    (steps, steps)
+    Steps {
+        count: (steps, steps),
+        tolerance,
+    }
 }

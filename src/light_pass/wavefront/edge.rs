@@ -13,7 +13,8 @@ const MANY_CHANGES: usize = 12;
 /// Bisections then.
 const SHATTERED_BITS: i32 = 3;
 
-/// Bisections that decide whether two ends of one signature lie on one sheet of the wavefront.
+/// Bisections that decide whether two ends of the brightest light lie on one sheet of the wavefront; dimmer light is
+/// looked at as much less closely.
 const JUMP_BITS: i32 = 6;
 
 /// Mismatch of chord and tangents, as a share of the chord, from which derivatives are not to be trusted.
@@ -114,6 +115,12 @@ fn is_stretched(a: &LightSample, b: &LightSample, signature: PathSignature, step
     }
 }
 
+/// Width of the narrowest bracket of a jump, as a share of its edge, for light of so much of the edge's brightest.
+fn narrowest(share: f64) -> f64 {
+    let bits = JUMP_BITS + share.log2().floor().max(-60.0) as i32;
+    (-f64::from(bits.clamp(0, JUMP_BITS))).exp2()
+}
+
 /// Whether two samples saw light go the same ways.
 fn same_ways(a: &LightSample, b: &LightSample) -> bool {
     a.strands.len() == b.strands.len()
@@ -179,15 +186,23 @@ impl Edge {
 
     /// How far a strand reaches from the first end (or, `backwards`, from the last); the strand must be there.
     pub fn reach(&self, work: &Workspace, signature: PathSignature, step: DVec2, backwards: bool) -> Reach {
+        let narrowest = narrowest(self.share(work, signature));
         self.reach_where(
             work,
             backwards,
             |sample| sample.find(signature).is_some(),
-            |a, b, width| {
-                width <= (-f64::from(JUMP_BITS)).exp2()
-                    && is_stretched(a, b, signature, step * width, TORN_STRETCH)
-            },
+            |a, b, width| width <= narrowest && is_stretched(a, b, signature, step * width, TORN_STRETCH),
         )
+    }
+
+    /// Flux of a strand at the first end that has it, as a share of the brightest at either; 1 where neither has it.
+    fn share(&self, work: &Workspace, signature: PathSignature) -> f64 {
+        let ends = [0, self.samples.len() - 1].map(|end| work.get(self.samples[end].1));
+        let brightest_w = ends[0].brightest_w.max(ends[1].brightest_w);
+        let flux_w = |sample: &LightSample| Some(sample.strands[sample.find(signature)?].flux_w.luminance());
+        ends.into_iter()
+            .find_map(flux_w)
+            .map_or(1.0, |flux_w| flux_w / brightest_w)
     }
 
     /// How far a surface reaches that light meets.
@@ -387,7 +402,7 @@ impl EdgeCutter<'_> {
         step: DVec2,
         work: &mut Workspace,
     ) {
-        let width = (-f64::from(JUMP_BITS)).exp2();
+        let width = narrowest(edge.share(work, signature));
         loop {
             let gap = |pair: &[(f64, SampleId)]| pair[1].0 - pair[0].0;
             let worst = edge.samples.windows(2).position(|pair| {

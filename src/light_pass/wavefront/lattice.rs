@@ -17,7 +17,19 @@ use crate::light_pass::ledger_sum::{Account, LedgerSum};
 use crate::transport::PathCounts;
 
 /// Cells that a band aims at: enough for all cores, and no more memory than some ten megabytes.
-const CELLS_PER_BAND: usize = 1 << 12;
+const CELLS_PER_BAND: f64 = 4096.0;
+
+/// Cells of a row from which on it is traced in parts.
+const MOST_CELLS_OF_ROW: f64 = 4.0 * CELLS_PER_BAND;
+
+/// What is traced together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Band {
+    /// Half-open range of rows.
+    pub rows: (usize, usize),
+    /// Half-open range of columns.
+    pub columns: (usize, usize),
+}
 
 /// The lattice of one light.
 #[derive(Clone, Copy, Debug)]
@@ -102,23 +114,80 @@ impl WavefrontLattice<'_> {
             .lattice_cells(self.tracer.launch.face_count(), self.size)
     }
 
-    /// Rows of the bands of one face: half-open ranges that cover it.
-    pub fn bands(&self, face: usize) -> Vec<(usize, usize)> {
-        let rows = self.size.1;
+    /// The bands of one face, which cover it.
+    pub fn bands(&self, face: usize) -> Vec<Band> {
         let mut bands = Vec::new();
-        let (mut start, mut cells) = (0, 0);
-        for row in 0..rows {
-            cells += self.spans(face, row).iter().map(|(a, b)| b - a).sum::<usize>();
-            if cells >= CELLS_PER_BAND || (row + 1 == rows && cells > 0) {
-                bands.push((start, row + 1));
-                (start, cells) = (row + 1, 0);
+        let (mut start, mut cells) = (0, 0.0);
+        for row in 0..self.size.1 {
+            let of_row = self.expected_cells(face, row);
+            if of_row.iter().sum::<f64>() > MOST_CELLS_OF_ROW {
+                if cells > 0.0 {
+                    bands.push(self.whole_rows((start, row)));
+                }
+                bands.extend(self.parts_of_row(face, row, &of_row));
+                (start, cells) = (row + 1, 0.0);
+                continue;
             }
+            cells += of_row.iter().sum::<f64>();
+            if cells >= CELLS_PER_BAND {
+                bands.push(self.whole_rows((start, row + 1)));
+                (start, cells) = (row + 1, 0.0);
+            }
+        }
+        if cells > 0.0 {
+            bands.push(self.whole_rows((start, self.size.1)));
         }
         bands
     }
 
-    fn spans(&self, face: usize, row: usize) -> Vec<(usize, usize)> {
-        self.item_buffer.lattice_spans(face, row, self.size)
+    fn whole_rows(&self, rows: (usize, usize)) -> Band {
+        Band {
+            rows,
+            columns: (0, self.size.0),
+        }
+    }
+
+    /// About how many cells the lattice cells of a row will become, span by span.
+    fn expected_cells(&self, face: usize, row: usize) -> Vec<f64> {
+        let spans = self.item_buffer.lattice_spans(face, row, self.size);
+        let columns = spans.into_iter().flat_map(|(start, end)| start..end);
+        columns
+            .map(|column| {
+                let corners = (self.square(column, row), self.square(column + 1, row + 1));
+                self.bodies.cells_within(self.tracer.launch, face, corners)
+            })
+            .collect()
+    }
+
+    /// A row of very many cells, in parts; `expected` cells span by span.
+    fn parts_of_row(&self, face: usize, row: usize, expected: &[f64]) -> Vec<Band> {
+        let spans = self.item_buffer.lattice_spans(face, row, self.size);
+        let columns = spans.into_iter().flat_map(|(start, end)| start..end);
+        let mut parts = Vec::new();
+        let (mut start, mut cells) = (0, 0.0);
+        for (column, expected) in columns.zip(expected) {
+            if cells > 0.0 && cells + expected > CELLS_PER_BAND {
+                parts.push((start, column));
+                (start, cells) = (column, 0.0);
+            }
+            cells += expected;
+        }
+        parts.push((start, self.size.0));
+        let band = |columns| Band {
+            rows: (row, row + 1),
+            columns,
+        };
+        parts.into_iter().map(band).collect()
+    }
+
+    /// Spans of columns of a row that belong to a band.
+    fn spans(&self, face: usize, row: usize, columns: (usize, usize)) -> Vec<(usize, usize)> {
+        let spans = self.item_buffer.lattice_spans(face, row, self.size);
+        spans
+            .into_iter()
+            .map(|(start, end)| (start.max(columns.0), end.min(columns.1)))
+            .filter(|(start, end)| start < end)
+            .collect()
     }
 
     fn square(&self, column: usize, row: usize) -> DVec2 {
@@ -128,12 +197,13 @@ impl WavefrontLattice<'_> {
         )
     }
 
-    /// Traces rows `band` of a face and cuts their cells into patches.
+    /// Traces a band of a face and cuts its cells into patches.
     ///
     /// A row of corners between two bands is traced for each: the rays are few, and bands stay independent.
-    pub fn trace(&self, face: usize, band: (usize, usize)) -> TracedBand {
-        let rows = band.1 - band.0;
-        let corner_rows: Vec<CornerRow> = (band.0..=band.1)
+    pub fn trace(&self, face: usize, band: Band) -> TracedBand {
+        let first_row = band.rows.0;
+        let rows = band.rows.1 - first_row;
+        let corner_rows: Vec<CornerRow> = (first_row..=band.rows.1)
             .into_par_iter()
             .map(|row| self.trace_corners(face, row, band))
             .collect();
@@ -147,7 +217,7 @@ impl WavefrontLattice<'_> {
             .into_par_iter()
             .map(|row| {
                 let mut work = Workspace::new(&samples, rows + 1 + row);
-                let edges = self.edges_across(face, (band.0, row), &index, &mut work);
+                let edges = self.edges_across(face, (first_row, row), &index, &mut work);
                 (edges, work.own)
             })
             .collect();
@@ -162,7 +232,7 @@ impl WavefrontLattice<'_> {
                 let mut work = Workspace::new(&samples, 2 * (rows + 1) + row);
                 let output = self.cut_row(
                     face,
-                    (band.0, row),
+                    (first_row, row, band.columns),
                     &index,
                     [&edges[row], &edges[row + 1]],
                     &mut work,
@@ -192,15 +262,15 @@ impl WavefrontLattice<'_> {
     }
 
     /// Corners of the cells above and below a row of corners, as far as they belong to the band.
-    fn trace_corners(&self, face: usize, row: usize, band: (usize, usize)) -> CornerRow {
+    fn trace_corners(&self, face: usize, row: usize, band: Band) -> CornerRow {
         let mut traced = CornerRow {
             index: vec![NONE; self.size.0 + 1],
             samples: Vec::new(),
         };
         let mut wanted = vec![false; self.size.0 + 1];
         for cell_row in [row.wrapping_sub(1), row] {
-            if cell_row >= band.0 && cell_row < band.1 {
-                for (start, end) in self.spans(face, cell_row) {
+            if cell_row >= band.rows.0 && cell_row < band.rows.1 {
+                for (start, end) in self.spans(face, cell_row, band.columns) {
                     wanted[start..=end].fill(true);
                 }
             }
@@ -262,7 +332,7 @@ impl WavefrontLattice<'_> {
     fn cut_row(
         &self,
         face: usize,
-        (first_row, row): (usize, usize),
+        (first_row, row, columns): (usize, usize, (usize, usize)),
         index: &[Vec<u32>],
         across: [&[Option<Edge>]; 2],
         work: &mut Workspace,
@@ -286,7 +356,7 @@ impl WavefrontLattice<'_> {
                 .any(|column| may_bulge_over(ends, [corner(row, column), corner(row + 1, column)], work));
             cutter.edges.edge(ends, bulges, work)
         };
-        for (start, end) in self.spans(face, first_row + row) {
+        for (start, end) in self.spans(face, first_row + row, columns) {
             let mut left = down(start, work);
             #[allow(clippy::needless_range_loop, reason = "columns name corners of both rows")]
             for column in start..end {

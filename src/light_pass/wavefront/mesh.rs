@@ -15,8 +15,11 @@ use crate::light_pass::ledger_sum::Account;
 use crate::optics::LinearSrgb;
 use crate::transport::PathEffects;
 
-/// Bisections of a virtual edge between rays that go to different surfaces.
-const CUT_STEPS: u32 = 10;
+/// Bisections of a virtual edge between rays that go to different surfaces, where a patch's light is worth it.
+const CUT_STEPS: f64 = 10.0;
+
+/// The same where it is not.
+const LEAST_CUT_STEPS: f64 = 4.0;
 
 /// How often a triangle may be divided.
 #[derive(Clone, Copy)]
@@ -28,7 +31,14 @@ struct Divisions {
 }
 
 impl Divisions {
-    const WHOLE: Self = Self { cuts: 4, bends: 4 };
+    /// For a patch that may be divided so much more coarsely than is usual.
+    fn at(tolerance: f64) -> Self {
+        let fewer = tolerance.max(1.0).log2().floor() as u32;
+        Self {
+            cuts: 4_u32.saturating_sub(fewer).max(1),
+            bends: 4_u32.saturating_sub(fewer).max(1),
+        }
+    }
 
     fn after_cut(self) -> Self {
         Self {
@@ -105,6 +115,8 @@ pub(super) struct PatchMesh<'a, 'b, E> {
     pub(super) absorbs: bool,
     /// Whether any traced ray of the patch leaves the scene.
     pub(super) goes_out: bool,
+    /// How much more coarsely it may be divided than is usual.
+    pub(super) tolerance: f64,
 }
 
 /// A virtual ray with its place on the patch.
@@ -141,7 +153,11 @@ impl<E: PathEffects> PatchMesh<'_, '_, E> {
                 let middle = self.colour((corners[0].at + corners[2].at) * 0.5);
                 for triangle in [[0, 1, 2], [0, 2, 3]] {
                     let flux = share.next(middle);
-                    self.settle(triangle.map(|corner| corners[corner]), flux, Divisions::WHOLE);
+                    self.settle(
+                        triangle.map(|corner| corners[corner]),
+                        flux,
+                        Divisions::at(self.tolerance),
+                    );
                 }
             }
             row = next;
@@ -162,7 +178,7 @@ impl<E: PathEffects> PatchMesh<'_, '_, E> {
                 for piece in pieces {
                     let middle = (piece[0].at + piece[1].at + piece[2].at) / 3.0;
                     let flux = share.next(self.colour(middle));
-                    self.settle(piece, flux, Divisions::WHOLE);
+                    self.settle(piece, flux, Divisions::at(self.tolerance));
                 }
             }
             row = next;
@@ -283,7 +299,8 @@ impl<E: PathEffects> PatchMesh<'_, '_, E> {
     fn bracket(&mut self, from: Knot, to: Knot) -> (f64, Knot, Knot) {
         let (mut low, mut high) = (0.0, 1.0);
         let (mut near, mut far) = (from, to);
-        for _ in 0..CUT_STEPS {
+        let steps = CUT_STEPS - 2.0 * self.tolerance.max(1.0).log2();
+        for _ in 0..steps.max(LEAST_CUT_STEPS) as u32 {
             let middle = 0.5 * (low + high);
             let knot = self.knot(from.at.lerp(to.at, middle));
             if self.is_joined(&near, &knot) {

@@ -83,9 +83,9 @@ impl WavefrontDepositor<'_> {
         let mut kept_bytes = 0;
         let mut maps = maps;
         for face in 0..self.lattice.tracer.launch.face_count() {
-            for rows in self.lattice.bands(face) {
+            for band in self.lattice.bands(face) {
                 let watch = Stopwatch::start();
-                let mut band = self.lattice.knowing(rays).trace(face, rows);
+                let mut band = self.lattice.knowing(rays).trace(face, band);
                 for fresh in band.fresh.drain(..) {
                     rays.insert(fresh, room.rays_bytes);
                 }

@@ -190,10 +190,14 @@ impl<'a> Receivers<'a> {
         })
     }
 
-    /// Whether the box around some beam meets the box of any object but the given ones.
-    pub fn meets_others(&self, low: DVec3, high: DVec3, except: [u32; 2]) -> bool {
+    /// Whether a beam, by the ends of its traced rays, may meet any object but the given ones: their boxes against boxes
+    /// around parts of it.
+    pub fn meets_others(&self, beam: &Beam, except: [u32; 2]) -> bool {
+        let whole = beam.bounds(0.0, 1.0);
         self.bounds.iter().enumerate().any(|(object, bounds)| {
-            !except.contains(&(object as u32)) && low.cmple(bounds.1).all() && high.cmpge(bounds.0).all()
+            !except.contains(&(object as u32))
+                && overlap(whole, *bounds)
+                && beam.meets(*bounds, (0.0, 1.0), BEAM_HALVINGS)
         })
     }
 
@@ -214,4 +218,59 @@ impl<'a> Receivers<'a> {
             ray.origin
         }
     }
+}
+
+/// How often a beam is halved to look closer.
+const BEAM_HALVINGS: u32 = 5;
+
+/// Light between traced rays may run this share of their distance beside them.
+const BEAM_MARGIN: f64 = 0.25;
+
+/// The traced rays of a patch, from where they start to where they end [m].
+#[derive(Clone, Copy, Debug)]
+pub struct Beam {
+    ends: [[DVec3; 2]; 4],
+}
+
+impl Beam {
+    /// Of one to four rays.
+    pub fn new(ends: impl Iterator<Item = [DVec3; 2]>) -> Self {
+        let mut beam = Self {
+            ends: [[DVec3::ZERO; 2]; 4],
+        };
+        let mut last = None;
+        let mut ends = ends;
+        for slot in &mut beam.ends {
+            last = ends.next().or(last);
+            *slot = last.unwrap_or_default();
+        }
+        beam
+    }
+
+    /// Box around the part between two shares of the way [m].
+    fn bounds(&self, from: f64, to: f64) -> (DVec3, DVec3) {
+        let mut bounds = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        for share in [from, to] {
+            let points = self.ends.map(|[start, end]| start.lerp(end, share));
+            let low = points.into_iter().fold(DVec3::INFINITY, DVec3::min);
+            let high = points.into_iter().fold(DVec3::NEG_INFINITY, DVec3::max);
+            let margin = (high - low).length() * BEAM_MARGIN;
+            bounds = (bounds.0.min(low - margin), bounds.1.max(high + margin));
+        }
+        bounds
+    }
+
+    fn meets(&self, others: (DVec3, DVec3), (from, to): (f64, f64), halvings: u32) -> bool {
+        overlap(self.bounds(from, to), others)
+            && (halvings == 0 || {
+                let middle = 0.5 * (from + to);
+                [(from, middle), (middle, to)]
+                    .into_iter()
+                    .any(|part| self.meets(others, part, halvings - 1))
+            })
+    }
+}
+
+fn overlap(a: (DVec3, DVec3), b: (DVec3, DVec3)) -> bool {
+    a.0.cmple(b.1).all() && a.1.cmpge(b.0).all()
 }

@@ -1,15 +1,16 @@
 //! Spreads a patch over the surfaces it lights: rays between the traced ones meet the receivers, and the triangles
 //! between them carry the patch's flux.
 
-use glam::{DVec2, DVec3};
+use glam::DVec2;
 
 use super::band::Samples;
 use super::cell::{Patch, PatchKind};
 use super::coverage::FluxTriangle;
+use super::division::Steps;
 use super::mesh::{PatchMesh, even_grid};
 use super::overreach::Overreach;
 use super::patch::{CoonsPatch, PatchShape};
-use super::receivers::Receivers;
+use super::receivers::{Beam, Receivers};
 use super::shares::{difference, mean, scaled};
 use super::strand::{Landing, Strand};
 use super::virtual_vertex::VirtualRays;
@@ -160,11 +161,11 @@ impl<E: PathEffects> Spreader<'_, E> {
             return Course::Onward;
         }
         let receiver = strands.iter().find_map(|strand| strand.landing.receiver());
-        let (low, high) = self.beam_bounds(strands);
+        let beam = self.beam(strands);
         let from = strands[0].from;
         let Some(receiver) = receiver else {
             let escapes = landing(|landing| matches!(landing, Landing::Escaped))
-                && !self.receivers.meets_others(low, high, [from; 2]);
+                && !self.receivers.meets_others(&beam, [from; 2]);
             return if escapes { Course::Escapes } else { Course::Mixed };
         };
         let Some(surface) = self.receivers.get(receiver) else {
@@ -180,7 +181,7 @@ impl<E: PathEffects> Spreader<'_, E> {
             && (plane.fills_map || !goes_out(strands))
             && !self
                 .receivers
-                .meets_others(low, high, [from, receiver.object() as u32])
+                .meets_others(&beam, [from, receiver.object() as u32])
         {
             Course::Plane(receiver)
         } else {
@@ -188,19 +189,15 @@ impl<E: PathEffects> Spreader<'_, E> {
         }
     }
 
-    /// Box around the traced rays from their origins to where they land or leave the scene [m].
-    fn beam_bounds(&self, strands: &[&Strand]) -> (DVec3, DVec3) {
-        let mut low = DVec3::INFINITY;
-        let mut high = DVec3::NEG_INFINITY;
-        for strand in strands {
-            let end = strand
-                .landing_point()
-                .unwrap_or_else(|| self.receivers.exit_point(&strand.ray));
-            for point in [strand.ray.origin, end] {
-                (low, high) = (low.min(point), high.max(point));
-            }
-        }
-        (low, high)
+    /// The traced rays from their origins to where they land or leave the scene.
+    fn beam(&self, strands: &[&Strand]) -> Beam {
+        Beam::new(strands.iter().map(|strand| {
+            let end = strand.landing_point();
+            [
+                strand.ray.origin,
+                end.unwrap_or_else(|| self.receivers.exit_point(&strand.ray)),
+            ]
+        }))
     }
 
     /// All of it goes on; volumes take their share.
@@ -232,7 +229,10 @@ impl<E: PathEffects> Spreader<'_, E> {
         let plane = plane.filter(|&receiver| goes_out || self.stays_on_map(&shape, receiver));
         let colours: Vec<LinearSrgb> = strands.iter().map(|strand| strand.flux_w).collect();
         let mut rays = VirtualRays::new(self, &shape, strands, plane);
-        let steps = self.steps(&shape, &mut rays, plane.is_some(), flux_w, out);
+        let Steps {
+            count: steps,
+            tolerance,
+        } = self.steps(&shape, &mut rays, plane.is_some(), flux_w, out);
         if let (PatchShape::Coons(coons), Some(receiver)) = (&shape, plane)
             && !self.absorbs(strands[0])
             && let Some(grid) = self.plane_grid(coons, receiver, steps)
@@ -248,6 +248,7 @@ impl<E: PathEffects> Spreader<'_, E> {
             out,
             absorbs: self.absorbs(strands[0]),
             goes_out,
+            tolerance,
         };
         if shape.is_rectangle() {
             mesh.rectangle(steps, flux);
