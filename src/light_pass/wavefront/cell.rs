@@ -14,10 +14,6 @@ use crate::light_pass::caustic::path::PathSignature;
 use crate::light_pass::ledger_sum::{Account, LedgerSum};
 use crate::optics::LinearSrgb;
 
-pub static DBG: [std::sync::atomic::AtomicU64; 12] = [const { std::sync::atomic::AtomicU64::new(0) }; 12];
-fn dbg(i: usize, n: u64) {
-    DBG[i].fetch_add(n, std::sync::atomic::Ordering::Relaxed);
-}
 /// How often a cell is split whose cuts are ambiguous; what is then left goes on as one small patch per ray.
 const DEEPEST_SPLIT: u32 = 2;
 
@@ -145,7 +141,6 @@ impl CellCutter<'_> {
     fn cut_at(&self, cell: &Cell, depth: Depth, work: &mut Workspace, out: &mut CellOutput) {
         out.cells += 1;
         if self.holds_small_body(cell, depth.bodies, work) {
-            dbg(0, 1);
             let bodies = depth.bodies + 1;
             return self.split(cell, Depth { bodies, ..depth }, work, out);
         }
@@ -161,24 +156,16 @@ impl CellCutter<'_> {
             return self.scatter(cell, work, out);
         }
         if cell.edges.iter().all(Option::is_none) {
-            dbg(1, 1);
             return if depth.ambiguous < DEEPEST_SPLIT && self.is_doubtful(cell, work) {
-                dbg(2, 1);
                 let ambiguous = depth.ambiguous + 1;
                 self.split(cell, Depth { ambiguous, ..depth }, work, out)
             } else {
                 self.whole(cell, work, out)
             };
         }
-        dbg(3, 1);
-
-        dbg(
-            7,
-            cell.edges.iter().flatten().map(|e| e.samples.len() as u64).sum(),
-        );
         if self.is_ambiguous(cell, work) {
-            dbg(4 + depth.ambiguous as usize, 1);
-            return if depth.ambiguous < DEEPEST_SPLIT {
+            // What was divided for a small body is fine already.
+            return if depth.ambiguous + depth.bodies.min(1) < DEEPEST_SPLIT {
                 let ambiguous = depth.ambiguous + 1;
                 self.split(cell, Depth { ambiguous, ..depth }, work, out)
             } else {

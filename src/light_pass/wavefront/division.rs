@@ -75,6 +75,9 @@ impl<E: PathEffects> Spreader<'_, E> {
         flux_w: LinearSrgb,
         out: &mut SpreadOutput,
     ) -> Steps {
+        if let Some(steps) = self.steps_around_one(rays, flux_w) {
+            return steps;
+        }
         let probes: [[VirtualVertex; 3]; 3] =
             std::array::from_fn(|j| std::array::from_fn(|i| rays.vertex(probe_place(shape, i, j))));
         let first = probes[0][0].place;
@@ -150,6 +153,16 @@ impl<E: PathEffects> Spreader<'_, E> {
             ),
         );
         Steps { count, tolerance }
+    }
+
+    /// One step, where a patch is the surroundings of a single ray: it is one of very many, and as straight as that ray's
+    /// derivatives.
+    fn steps_around_one(&self, rays: &VirtualRays<E>, flux_w: LinearSrgb) -> Option<Steps> {
+        let tolerance = |receiver| self.tolerance(receiver, flux_w.luminance(), 1.0);
+        (rays.are_around_one() && !self.gathers).then(|| Steps {
+            count: (1, 1),
+            tolerance: rays.lit().map_or(COARSEST_TOLERANCE, tolerance),
+        })
     }
 
     /// Where rays of a patch meet a receiver, in texels as they lie around the middle one: charts may end and turn between

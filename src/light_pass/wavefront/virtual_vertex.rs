@@ -105,6 +105,8 @@ pub struct VirtualRays<'a, E> {
     skin_m: f64,
     /// Where the traced rays start [m].
     origins: Vec<DVec3>,
+    /// What a traced ray lights.
+    lit: Option<Receiver>,
     /// Rays so far.
     pub queries: u64,
 }
@@ -140,8 +142,19 @@ impl<'a, E: PathEffects> VirtualRays<'a, E> {
             from: (first.from, first.from_group),
             skin_m: spread_m.min(0.5 * nearest_own_m),
             origins: strands.iter().map(|strand| strand.ray.origin).collect(),
+            lit: strands.iter().find_map(|strand| strand.landing.receiver()),
             queries: 0,
         }
+    }
+
+    /// What a traced ray of the patch lights.
+    pub fn lit(&self) -> Option<Receiver> {
+        self.lit
+    }
+
+    /// Whether all are taken from one traced ray.
+    pub fn are_around_one(&self) -> bool {
+        self.origins.len() == 1
     }
 
     /// The ray at a place of the patch, landed.
