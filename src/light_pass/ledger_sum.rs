@@ -63,6 +63,19 @@ impl LedgerSum {
         }
     }
 
+    /// The same accounts in other channels: each triple of counts through a linear function, to the nearest count.
+    #[must_use]
+    pub fn transformed(&self, f: impl Fn(LinearSrgb) -> LinearSrgb) -> Self {
+        let transform = |counts: [i128; 3]| {
+            f(LinearSrgb::from(counts.map(|count| count as f64)))
+                .to_array()
+                .map(|channel| channel.round() as i128)
+        };
+        Self {
+            counts: self.counts.map(transform),
+        }
+    }
+
     /// Luminous-equivalent watts of an account, of a light of the given strength where the counts are of one of unit
     /// strength.
     pub fn watts(&self, account: Account, unit: FluxUnit, strength: LinearSrgb) -> f64 {

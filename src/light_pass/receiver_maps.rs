@@ -1,6 +1,7 @@
 //! Maps while flux is added to them: allocated when a surface first receives some.
 
 use glam::DVec2;
+use rayon::prelude::*;
 use std::sync::Arc;
 
 use super::caustic::footprint::TexelFromWorld;
@@ -10,6 +11,7 @@ use crate::illumination::accumulator::FluxAccumulator;
 use crate::illumination::islands::Islands;
 use crate::illumination::smoothing::smooth;
 use crate::illumination::{Chart, Receiver};
+use crate::optics::LinearSrgb;
 use crate::scene::Scene;
 
 /// One surface's map with its flux.
@@ -81,6 +83,22 @@ impl ReceiverMaps {
                 && map.chart.layout.is_none()
             {
                 smooth(&mut map.levels[0], spread_texels);
+            }
+        }
+    }
+
+    /// Puts all flux into other channels: each triple of counts through a linear function, to the nearest count.
+    pub fn transform(&mut self, f: impl Fn(LinearSrgb) -> LinearSrgb + Sync) {
+        for slot in &mut self.slots {
+            if let Slot::Allocated(map) = slot {
+                for level in &mut map.levels {
+                    level.texels_mut().par_iter_mut().for_each(|count| {
+                        if *count != [0; 3] {
+                            let flux = LinearSrgb::from(count.map(|channel| channel as f64));
+                            *count = f(flux).to_array().map(|channel| channel.round() as i64);
+                        }
+                    });
+                }
             }
         }
     }

@@ -1,6 +1,7 @@
 //! What light does at an interface, and what colour it has.
 
 pub mod colour;
+pub mod colour_basis;
 pub mod conductor;
 pub mod fresnel;
 pub mod glass;
@@ -11,6 +12,7 @@ pub mod spectrum;
 pub mod wavelength;
 
 pub use colour::LinearSrgb;
+pub use colour_basis::ColourBasis;
 pub use glass::Glass;
 pub use metal::Metal;
 pub use wavelength::Nanometres;

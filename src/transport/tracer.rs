@@ -11,7 +11,7 @@ use super::curvature::NormalField;
 use super::normal_texture::{TextureBump, texel_m};
 use super::smoothing::smoothing_groups;
 use crate::geometry::{Ray, TriangleBvh, ray};
-use crate::optics::LinearSrgb;
+use crate::optics::{LinearSrgb, Nanometres};
 use crate::scene::{Adjacency, Mesh, Scene, SurfaceKind, TextureRef, Waves};
 
 /// A scene with its hierarchy. What edits of the scene leave as it is, edited copies share.
@@ -175,6 +175,17 @@ impl Tracer {
             has_bumps: false,
             has_masks: self.has_masks,
         }
+    }
+
+    /// The same scene as light of one wavelength meets it: refractive indices are those of that wavelength. Colours stay
+    /// as they are.
+    #[must_use]
+    pub fn at_wavelength(&self, wavelength: Nanometres) -> Self {
+        let mut scene = Scene::clone(&self.scene);
+        for material in &mut scene.materials {
+            material.ior = material.index_at(wavelength);
+        }
+        self.edited(Arc::new(scene))
     }
 
     /// Whether something bends the normals of an object.

@@ -52,30 +52,41 @@ pub struct Workspace<'a> {
     pub chunk: u32,
     /// Traced by this task.
     pub own: Vec<LightSample>,
-    /// Where this task traced already: cells share corners and edges.
-    known: HashMap<[u64; 2], SampleId>,
+    /// Rows of the lattice's own corners, which come first, once for each wavelength.
+    corner_rows: u32,
+    /// Where this task traced already, by wavelength: cells share corners and edges.
+    known: HashMap<(u32, [u64; 2]), SampleId>,
 }
 
 impl<'a> Workspace<'a> {
     /// An empty own chunk.
-    pub fn new(shared: &'a Samples, chunk: usize) -> Self {
+    pub fn new(shared: &'a Samples, chunk: usize, corner_rows: usize) -> Self {
         Self {
             shared,
             chunk: chunk as u32,
             own: Vec::new(),
+            corner_rows: corner_rows as u32,
             known: HashMap::new(),
         }
     }
 
-    /// The sample at a place of the unit square; traced unless this task did so before.
-    pub fn sample_at(&mut self, square: DVec2, trace: impl FnOnce() -> LightSample) -> SampleId {
-        let key = square.to_array().map(f64::to_bits);
+    /// The sample at a place of the unit square, of one of the wavelengths; traced unless this task did so before.
+    pub fn sample_at(&mut self, node: u32, square: DVec2, trace: impl FnOnce() -> LightSample) -> SampleId {
+        let key = (node, square.to_array().map(f64::to_bits));
         if let Some(id) = self.known.get(&key) {
             return *id;
         }
         let id = self.add(trace());
         self.known.insert(key, id);
         id
+    }
+
+    /// The sample at another wavelength of a corner of the lattice itself; `None` where it is none.
+    pub fn at_node(&self, id: SampleId, node: usize) -> Option<SampleId> {
+        (id.chunk < self.corner_rows).then(|| SampleId {
+            chunk: id.chunk + node as u32 * self.corner_rows,
+            index: id.index,
+        })
     }
 
     /// A sample, shared or own.

@@ -8,6 +8,7 @@ use super::doubt::worst_mismatch;
 use super::edge::{Edge, EdgeCutter, Reach, SUSPICION, may_bulge, mismatch};
 use super::refine::{Refinement, RoundSet};
 use super::regions::{Outline, regions, triangles};
+use super::spectrum::{LightSpectrum, NODES};
 use super::strand::LightSample;
 use crate::illumination::accumulator::FluxUnit;
 use crate::light_pass::caustic::path::PathSignature;
@@ -15,7 +16,7 @@ use crate::light_pass::ledger_sum::{Account, LedgerSum};
 use crate::optics::LinearSrgb;
 
 /// How often a cell is split whose cuts are ambiguous; what is then left goes on as one small patch per ray.
-const DEEPEST_SPLIT: u32 = 2;
+pub(super) const DEEPEST_SPLIT: u32 = 2;
 
 /// Mismatch along an edge from which a check ray decides between the cubic and the bilinear patch.
 pub(super) const CHECK_MISMATCH: f64 = 0.08;
@@ -29,6 +30,19 @@ pub struct Patch {
     pub squares: [DVec2; 4],
     /// What it is.
     pub kind: PatchKind,
+    /// What part of the spectrum it carries.
+    pub tone: Tone,
+}
+
+/// The part of a light's spectrum that a patch carries.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Tone {
+    /// All of a light without wavelengths.
+    White,
+    /// What one of the traced wavelengths stands for.
+    Node(u8),
+    /// All of a spectral light; the same strands of these samples at the other wavelengths.
+    Spectrum([[SampleId; 4]; NODES - 1]),
 }
 
 /// Shape of a patch in the unit square.
@@ -91,11 +105,17 @@ pub struct CellCutter<'a> {
     pub refinement: Option<&'a Refinement<'a>>,
     /// What corners alone would miss.
     pub bodies: &'a SmallBodies,
+    /// Of a spectral light, before its wavelengths part.
+    pub spectrum: Option<&'a LightSpectrum>,
+    /// What patches carry.
+    pub tone: Tone,
+    /// What that is in the light's channels.
+    pub colour: LinearSrgb,
 }
 
 /// How often a cell was divided.
 #[derive(Clone, Copy, Debug, Default)]
-struct Depth {
+pub(super) struct Depth {
     /// Because it, or a cell around it, holds a small body.
     bodies: u32,
     /// For detail of the normals.
@@ -103,7 +123,7 @@ struct Depth {
     /// In rounds of refinement.
     rounds: usize,
     /// Because its cuts were ambiguous.
-    ambiguous: u32,
+    pub(super) ambiguous: u32,
 }
 
 /// A cell with its corners (0,0), (1,0), (1,1), (0,1) and the edges between them, each in the direction of its growing
@@ -138,7 +158,7 @@ impl CellCutter<'_> {
         self.cut_at(cell, Depth::default(), work, out);
     }
 
-    fn cut_at(&self, cell: &Cell, depth: Depth, work: &mut Workspace, out: &mut CellOutput) {
+    pub(super) fn cut_at(&self, cell: &Cell, depth: Depth, work: &mut Workspace, out: &mut CellOutput) {
         out.cells += 1;
         if self.holds_small_body(cell, depth.bodies, work) {
             let bodies = depth.bodies + 1;
@@ -154,6 +174,9 @@ impl CellCutter<'_> {
         }
         if cell.corners.iter().any(|corner| work.get(corner.sample).is_rough) {
             return self.scatter(cell, work, out);
+        }
+        if let Some(spectrum) = self.spectrum {
+            return self.cut_spectrum(spectrum, cell, depth, work, out);
         }
         if cell.edges.iter().all(Option::is_none) {
             return if depth.ambiguous < DEEPEST_SPLIT && self.is_doubtful(cell, work) {
@@ -239,8 +262,12 @@ impl CellCutter<'_> {
         // Near a silhouette light goes much farther between the corners than at them.
         let along = cell.edges.iter().flatten().flat_map(|edge| &edge.samples);
         let corners = cell.corners.iter().map(|corner| corner.sample);
+        let nodes = 1..self.spectrum.map_or(1, |spectrum| spectrum.nodes.len());
+        let others = (cell.corners.iter())
+            .flat_map(|corner| nodes.clone().filter_map(|node| work.at_node(corner.sample, node)));
         let samples: Vec<&LightSample> = corners
             .chain(along.map(|(_, sample)| *sample))
+            .chain(others)
             .map(|sample| work.get(sample))
             .collect();
         beside >> depth.rounds & 1 == 1 || refinement.is_too_coarse(place, &samples, depth.rounds)
@@ -257,12 +284,21 @@ impl CellCutter<'_> {
 
     /// All corners agree in everything.
     fn whole(&self, cell: &Cell, work: &mut Workspace, out: &mut CellOutput) {
+        self.patches(cell, work, out);
+        self.book_whole(cell, cell.corners.map(|corner| corner.sample), work, out);
+    }
+
+    /// The patches of a cell whose corners agree.
+    pub(super) fn patches(&self, cell: &Cell, work: &mut Workspace, out: &mut CellOutput) {
         let ids = cell.corners.map(|corner| corner.sample);
-        let count = work.get(ids[0]).strands.len();
-        for strand in 0..count {
+        for strand in 0..work.get(ids[0]).strands.len() {
             let corners = ids.map(|id| (id, strand as u16));
             self.rectangle(cell, corners, work, out);
         }
+    }
+
+    /// Books what surfaces did with the light of a cell whose corners agree.
+    pub(super) fn book_whole(&self, cell: &Cell, ids: [SampleId; 4], work: &Workspace, out: &mut CellOutput) {
         let area = cell.step().x * cell.step().y;
         for node in 0..work.get(ids[0]).nodes.len() {
             let weighted = ids.map(|id| (id, node, 0.25 * area));
@@ -287,11 +323,12 @@ impl CellCutter<'_> {
             corners,
             squares: cell.corners.map(|corner| corner.square),
             kind,
+            tone: self.tone,
         });
     }
 
     /// Four cells of the given depth in place of one.
-    fn split(&self, cell: &Cell, depth: Depth, work: &mut Workspace, out: &mut CellOutput) {
+    pub(super) fn split(&self, cell: &Cell, depth: Depth, work: &mut Workspace, out: &mut CellOutput) {
         let [a, b, c, d] = cell.corners;
         let middles: [Corner; 4] = std::array::from_fn(|edge| {
             let (from, to) = EDGE_ENDS[edge];
@@ -406,6 +443,7 @@ impl CellCutter<'_> {
                     corners: [(corner.sample, strand as u16); 4],
                     squares: [corner.square, low, high, high],
                     kind: PatchKind::Around,
+                    tone: self.tone,
                 });
             }
             for node in 0..sample.nodes.len() {
@@ -464,6 +502,7 @@ impl CellCutter<'_> {
                 } else {
                     PatchKind::Triangle
                 },
+                tone: self.tone,
             });
         }
     }
@@ -496,7 +535,7 @@ impl CellCutter<'_> {
         let sum = |of: fn(&super::strand::SurfaceNode) -> LinearSrgb| {
             weighted.iter().fold(LinearSrgb::BLACK, |sum, &(id, node, area)| {
                 sum + of(&work.get(id).nodes[node]) * area
-            })
+            }) * self.colour
         };
         let first = work.get(weighted[0].0).nodes[weighted[0].1].first;
         let incident = self.unit.count(sum(|node| node.incident));

@@ -122,7 +122,7 @@ fn narrowest(share: f64) -> f64 {
 }
 
 /// Whether two samples saw light go the same ways.
-fn same_ways(a: &LightSample, b: &LightSample) -> bool {
+pub fn same_ways(a: &LightSample, b: &LightSample) -> bool {
     a.strands.len() == b.strands.len()
         && a.nodes.len() == b.nodes.len()
         && a.strands
@@ -430,7 +430,7 @@ impl EdgeCutter<'_> {
     pub fn corner(&self, square: DVec2, work: &mut Workspace) -> Corner {
         Corner {
             square,
-            sample: work.sample_at(square, || self.tracer.trace(self.face, square)),
+            sample: work.sample_at(self.tracer.node, square, || self.tracer.trace(self.face, square)),
         }
     }
 }

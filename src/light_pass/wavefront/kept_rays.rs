@@ -12,18 +12,21 @@ use crate::geometry::Ray;
 use crate::light_pass::caustic::path::PathSignature;
 use crate::transport::HitPlace;
 
-/// The start of a light ray: the face of the launch domain and the bits of its place in the unit square.
+/// The start of a light ray: the face of the launch domain, the bits of its place in the unit square, and which of a
+/// spectral light's wavelengths it has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct RayKey {
     face: u32,
+    node: u32,
     square: [u64; 2],
 }
 
 impl RayKey {
-    /// Of a ray that starts at a point of the unit square of a face.
-    pub fn new(face: usize, square: DVec2) -> Self {
+    /// Of a ray that starts at a point of the unit square of a face; `node` is 0 where it has no wavelength of its own.
+    pub fn new(face: usize, node: u32, square: DVec2) -> Self {
         Self {
             face: face as u32,
+            node,
             square: square.to_array().map(f64::to_bits),
         }
     }

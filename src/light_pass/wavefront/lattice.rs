@@ -5,15 +5,17 @@ use rayon::prelude::*;
 
 use super::band::{Corner, SampleId, Samples, Workspace};
 use super::bodies::SmallBodies;
-use super::cell::{Cell, CellCutter, CellOutput, Patch};
+use super::cell::{Cell, CellCutter, CellOutput, Patch, Tone};
 use super::edge::{Edge, EdgeCutter, may_bulge};
 use super::kept_rays::{FreshRay, KeptRays};
 use super::refine::Refinement;
+use super::spectrum::LightSpectrum;
 use super::strand::LightSample;
 use super::trace::StrandTracer;
 use crate::illumination::accumulator::FluxUnit;
 use crate::light_pass::item_buffer::ItemBuffer;
 use crate::light_pass::ledger_sum::{Account, LedgerSum};
+use crate::optics::LinearSrgb;
 use crate::transport::PathCounts;
 
 /// Cells that a band aims at: enough for all cores, and no more memory than some ten megabytes.
@@ -46,6 +48,8 @@ pub struct WavefrontLattice<'a> {
     pub refinement: Option<&'a Refinement<'a>>,
     /// What corners alone would miss.
     pub bodies: &'a SmallBodies,
+    /// Of a light whose wavelengths go different ways; `tracer` is then that of its first node.
+    pub spectrum: Option<&'a LightSpectrum>,
 }
 
 /// Some traced rows of cells of one face.
@@ -203,9 +207,13 @@ impl WavefrontLattice<'_> {
     pub fn trace(&self, face: usize, band: Band) -> TracedBand {
         let first_row = band.rows.0;
         let rows = band.rows.1 - first_row;
-        let corner_rows: Vec<CornerRow> = (first_row..=band.rows.1)
+        let nodes = self.spectrum.map_or(1, |spectrum| spectrum.nodes.len());
+        let corner_rows: Vec<CornerRow> = (0..nodes * (rows + 1))
             .into_par_iter()
-            .map(|row| self.trace_corners(face, row, band))
+            .map(|row| {
+                let (node, row) = (row / (rows + 1), first_row + row % (rows + 1));
+                self.trace_corners(face, node, row, band)
+            })
             .collect();
         let mut samples = Samples::default();
         let mut index = Vec::with_capacity(rows + 1);
@@ -216,7 +224,7 @@ impl WavefrontLattice<'_> {
         let edges_of_rows: Vec<(Vec<Option<Edge>>, Vec<LightSample>)> = (0..=rows)
             .into_par_iter()
             .map(|row| {
-                let mut work = Workspace::new(&samples, rows + 1 + row);
+                let mut work = Workspace::new(&samples, nodes * (rows + 1) + row, rows + 1);
                 let edges = self.edges_across(face, (first_row, row), &index, &mut work);
                 (edges, work.own)
             })
@@ -229,7 +237,7 @@ impl WavefrontLattice<'_> {
         let cut: Vec<(CellOutput, Vec<LightSample>)> = (0..rows)
             .into_par_iter()
             .map(|row| {
-                let mut work = Workspace::new(&samples, 2 * (rows + 1) + row);
+                let mut work = Workspace::new(&samples, (nodes + 1) * (rows + 1) + row, rows + 1);
                 let output = self.cut_row(
                     face,
                     (first_row, row, band.columns),
@@ -262,7 +270,11 @@ impl WavefrontLattice<'_> {
     }
 
     /// Corners of the cells above and below a row of corners, as far as they belong to the band.
-    fn trace_corners(&self, face: usize, row: usize, band: Band) -> CornerRow {
+    fn trace_corners(&self, face: usize, node: usize, row: usize, band: Band) -> CornerRow {
+        let tracer = match self.spectrum {
+            Some(spectrum) => self.tracer.at_node(spectrum, node),
+            None => self.tracer,
+        };
         let mut traced = CornerRow {
             index: vec![NONE; self.size.0 + 1],
             samples: Vec::new(),
@@ -279,7 +291,7 @@ impl WavefrontLattice<'_> {
             traced.index[column] = traced.samples.len() as u32;
             traced
                 .samples
-                .push(self.tracer.trace(face, self.square(column, row)));
+                .push(tracer.trace(face, self.square(column, row)));
         }
         traced
     }
@@ -343,6 +355,9 @@ impl WavefrontLattice<'_> {
             unit: self.unit,
             refinement: self.refinement,
             bodies: self.bodies,
+            spectrum: self.spectrum,
+            tone: Tone::White,
+            colour: self.spectrum.map_or(LinearSrgb::WHITE, |spectrum| spectrum.xyz),
         };
         let corner = |row: usize, column: usize| self.corner_at(first_row, row, column, index);
         let down = |column: usize, work: &mut Workspace| {
@@ -409,8 +424,9 @@ impl WavefrontLattice<'_> {
     fn book_not_emitted(&self, cell: &Cell, work: &Workspace, output: &mut CellOutput) {
         let step = cell.corners[2].square - cell.corners[0].square;
         let quarter = 0.25 * step.x * step.y;
+        let colour = self.spectrum.map_or(LinearSrgb::WHITE, |spectrum| spectrum.xyz);
         for corner in &cell.corners {
-            let missed_w = work.get(corner.sample).not_emitted * quarter;
+            let missed_w = work.get(corner.sample).not_emitted * colour * quarter;
             output.ledger.book(Account::NotEmitted, self.unit.count(missed_w));
         }
     }

@@ -21,6 +21,8 @@ pub mod receivers;
 pub mod refine;
 mod regions;
 mod shares;
+mod spectral_cell;
+pub mod spectrum;
 pub mod spread;
 pub mod strand;
 pub mod trace;

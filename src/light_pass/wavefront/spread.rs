@@ -3,8 +3,8 @@
 
 use glam::DVec2;
 
-use super::band::Samples;
-use super::cell::{Patch, PatchKind};
+use super::band::{SampleId, Samples};
+use super::cell::{Patch, PatchKind, Tone};
 use super::coverage::FluxTriangle;
 use super::division::Steps;
 use super::mesh::{PatchMesh, even_grid};
@@ -12,13 +12,14 @@ use super::overreach::Overreach;
 use super::patch::{CoonsPatch, PatchShape};
 use super::receivers::{Beam, Receivers};
 use super::shares::{difference, mean, scaled};
+use super::spectrum::{LightSpectrum, NODES, lands_alike};
 use super::strand::{Landing, Strand};
 use super::virtual_vertex::VirtualRays;
 use crate::illumination::Receiver;
 use crate::illumination::accumulator::{FluxCount, FluxUnit};
 use crate::light_pass::caustic::statistics::FootprintStatistics;
 use crate::light_pass::ledger_sum::{Account, LedgerSum};
-use crate::optics::LinearSrgb;
+use crate::optics::{ColourBasis, LinearSrgb};
 use crate::transport::{PathCounts, PathEffects};
 
 /// Spreads patches.
@@ -40,6 +41,8 @@ pub struct Spreader<'a, E> {
     pub coarseness: f64,
     /// Whether the places of footprints are wanted.
     pub gathers: bool,
+    /// Of a spectral light.
+    pub spectrum: Option<&'a LightSpectrum>,
 }
 
 /// What patches became.
@@ -79,6 +82,29 @@ impl SpreadOutput {
     }
 }
 
+/// What part of a light a patch is.
+#[derive(Clone, Copy)]
+struct Tint {
+    /// In the light's channels.
+    colour: LinearSrgb,
+    /// What factors in RGB are at its wavelength; `None` of light without one.
+    basis: Option<ColourBasis>,
+    /// Whether all that it is made from lands on one surface.
+    lands_alike: bool,
+}
+
+impl Tint {
+    const WHITE: Self = Self {
+        colour: LinearSrgb::WHITE,
+        basis: None,
+        lands_alike: true,
+    };
+
+    fn toned(&self, factor: LinearSrgb) -> LinearSrgb {
+        self.basis.map_or(factor, |basis| basis.tone(factor))
+    }
+}
+
 /// Where all of a patch goes, as its traced corners say.
 enum Course {
     /// On to other specular surfaces.
@@ -97,16 +123,94 @@ impl<E: PathEffects> Spreader<'_, E> {
         let strands: [&Strand; 4] = patch
             .corners
             .map(|(sample, strand)| self.samples.strand(sample, strand));
-        let strands = &strands[..patch.corner_count()];
-        let flux_w = mean(strands.iter().map(|strand| strand.flux_w)) * patch.area();
-        let flux = self.unit.count(flux_w);
+        match (patch.tone, self.spectrum) {
+            (Tone::White, _) | (_, None) => {
+                self.spread_strands(patch, &strands[..patch.corner_count()], Tint::WHITE, out);
+            }
+            (Tone::Node(node), Some(spectrum)) => {
+                let node = &spectrum.nodes[usize::from(node)];
+                let tint = Tint {
+                    colour: node.xyz,
+                    basis: Some(node.basis),
+                    lands_alike: true,
+                };
+                self.spread_strands(patch, &strands[..patch.corner_count()], tint, out);
+            }
+            (Tone::Spectrum(others), Some(spectrum)) => {
+                self.spread_spectrum(patch, strands, others, spectrum, out);
+            }
+        }
+    }
+
+    /// Spreads a patch slice by slice of the spectrum.
+    fn spread_spectrum(
+        &self,
+        patch: &Patch,
+        first: [&Strand; 4],
+        others: [[SampleId; 4]; NODES - 1],
+        spectrum: &LightSpectrum,
+        out: &mut SpreadOutput,
+    ) {
+        let nodes: [[&Strand; NODES]; 4] = std::array::from_fn(|corner| {
+            std::array::from_fn(|node| match node.checked_sub(1) {
+                None => first[corner],
+                Some(other) => self
+                    .samples
+                    .strand(others[other][corner], patch.corners[corner].1),
+            })
+        });
+        let lands_alike = nodes.iter().all(|nodes| lands_alike(*nodes));
+        for slice in spectrum.slices(self.smear(&nodes)) {
+            let strands = nodes.map(|nodes| slice.strand(nodes));
+            let strands = strands.each_ref();
+            let tint = Tint {
+                colour: slice.xyz,
+                basis: Some(slice.basis),
+                lands_alike,
+            };
+            self.spread_strands(patch, &strands[..patch.corner_count()], tint, out);
+        }
+    }
+
+    /// How far the outer wavelengths of a patch land from each other [texels].
+    fn smear(&self, nodes: &[[&Strand; NODES]; 4]) -> f64 {
+        let of_corner = |nodes: &[&Strand; NODES]| {
+            let texel_m = nodes.iter().find_map(|strand| {
+                let surface = self.receivers.get(strand.landing.receiver()?)?;
+                let texels = (surface.chart.width * surface.chart.height) as f64;
+                Some((surface.area_m2 / texels).sqrt())
+            });
+            let ends = [nodes[1], nodes[2]].map(Strand::landing_point);
+            match (texel_m, ends) {
+                (Some(texel_m), [Some(a), Some(b)]) => a.distance(b) / texel_m,
+                // Some leave, some land: as finely as can be.
+                (Some(_), _) => f64::INFINITY,
+                (None, _) => 0.0,
+            }
+        };
+        nodes.iter().map(of_corner).fold(0.0, f64::max) / self.coarseness.max(1.0)
+    }
+
+    fn spread_strands(&self, patch: &Patch, strands: &[&Strand], tint: Tint, out: &mut SpreadOutput) {
+        let grey_w = mean(strands.iter().map(|strand| strand.flux_w)) * patch.area();
+        let flux = self.unit.count(grey_w * tint.colour);
+        let flux_w = match tint.basis {
+            None => grey_w,
+            // As bright as it looks.
+            Some(_) => grey_w * tint.colour.g,
+        };
         out.ledger.book(Account::Quadrature, flux.map(|count| -count));
         let before: Vec<usize> = out.triangles.iter().map(|(_, list)| list.len()).collect();
-        match self.course(strands) {
+        let course = if tint.lands_alike {
+            self.course(strands)
+        } else {
+            Course::Mixed
+        };
+        match course {
             Course::Escapes => out.ledger.book(Account::Escaped, flux),
-            Course::Onward => self.onward(strands, flux, out),
-            Course::Plane(receiver) => self.over(patch, strands, flux, flux_w, Some(receiver), out),
-            Course::Mixed => self.over(patch, strands, flux, flux_w, None, out),
+            Course::Onward => self.onward(strands, flux, tint, out),
+            Course::Plane(receiver) => self.over(patch, strands, (flux, flux_w), tint, Some(receiver), out),
+            Course::Mixed => self.over(patch, strands, (flux, flux_w), tint, None, out),
         }
         self.count(strands[0], &before, out);
         self.note_overreach(patch, strands, &before, out);
@@ -201,13 +305,13 @@ impl<E: PathEffects> Spreader<'_, E> {
     }
 
     /// All of it goes on; volumes take their share.
-    fn onward(&self, strands: &[&Strand], flux: FluxCount, out: &mut SpreadOutput) {
+    fn onward(&self, strands: &[&Strand], flux: FluxCount, tint: Tint, out: &mut SpreadOutput) {
         let mut passed = flux;
         if self.absorbs(strands[0]) {
             let scene = self.receivers.tracer.scene();
             let transmittance =
                 |strand: &&Strand| strand.media.transmittance(scene, strand.landing.distance_m());
-            let left = mean(strands.iter().map(transmittance));
+            let left = tint.toned(mean(strands.iter().map(transmittance)));
             passed = scaled(flux, left);
             out.ledger.book(Account::Absorbed, difference(flux, passed));
         }
@@ -218,8 +322,8 @@ impl<E: PathEffects> Spreader<'_, E> {
         &self,
         patch: &Patch,
         strands: &[&Strand],
-        flux: FluxCount,
-        flux_w: LinearSrgb,
+        (flux, flux_w): (FluxCount, LinearSrgb),
+        tint: Tint,
         plane: Option<Receiver>,
         out: &mut SpreadOutput,
     ) {
@@ -228,7 +332,7 @@ impl<E: PathEffects> Spreader<'_, E> {
         let goes_out = goes_out(strands);
         let plane = plane.filter(|&receiver| goes_out || self.stays_on_map(&shape, receiver));
         let colours: Vec<LinearSrgb> = strands.iter().map(|strand| strand.flux_w).collect();
-        let mut rays = VirtualRays::new(self, &shape, strands, plane);
+        let mut rays = VirtualRays::new(self, &shape, strands, plane, tint.basis);
         let Steps {
             count: steps,
             tolerance,

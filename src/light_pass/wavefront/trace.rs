@@ -5,12 +5,13 @@ use glam::{DVec2, DVec3};
 use super::bumps::BumpCells;
 use super::closeness::Closeness;
 use super::kept_rays::{FreshRay, KeptHit, KeptRays, Known, RayKey};
+use super::spectrum::LightSpectrum;
 use super::strand::{Landing, LightSample, Strand, SurfaceNode};
 use crate::geometry::Ray;
 use crate::illumination::{Receiver, Side};
 use crate::light_pass::caustic::path::{PathLimits, PathSignature};
 use crate::light_pass::launch::Launch;
-use crate::optics::LinearSrgb;
+use crate::optics::{ColourBasis, LinearSrgb};
 use crate::progress::Control;
 use crate::transport::{
     Branch, Event, ForEffects, HitPlace, Interaction, MediumStack, PathCounts, PathEffects, RayDerivative,
@@ -36,6 +37,10 @@ pub struct StrandTracer<'a> {
     pub steps: [f64; 2],
     /// What becomes of detail of normals.
     pub bumps: BumpCells,
+    /// Which wavelength of a spectral light; 0 for the first, or for light without one.
+    pub node: u32,
+    /// What factors in RGB are at that wavelength.
+    pub basis: Option<ColourBasis>,
     /// What was traced before.
     pub kept: Option<&'a KeptRays>,
     /// How closely borders are looked for.
@@ -102,6 +107,8 @@ impl<'a> StrandTracer<'a> {
             limits,
             steps,
             bumps: BumpCells::EXACT,
+            node: 0,
+            basis: None,
             kept: None,
             closeness: Closeness::SHARP,
             control,
@@ -113,6 +120,22 @@ impl<'a> StrandTracer<'a> {
     #[must_use]
     pub fn with_closeness(self, closeness: Closeness) -> Self {
         Self { closeness, ..self }
+    }
+
+    /// The same at one wavelength of a spectral light.
+    #[must_use]
+    pub fn at_node(&self, spectrum: &'a LightSpectrum, node: usize) -> Self {
+        Self {
+            tracer: &spectrum.nodes[node].tracer,
+            node: node as u32,
+            basis: Some(spectrum.nodes[node].basis),
+            ..*self
+        }
+    }
+
+    /// A factor in RGB, as the ray's wavelength has it.
+    fn toned(&self, factor: LinearSrgb) -> LinearSrgb {
+        self.basis.map_or(factor, |basis| basis.tone(factor))
     }
 
     /// Traces the ray that starts at a point of the unit square of a face.
@@ -127,7 +150,7 @@ impl<'a> StrandTracer<'a> {
         if self.control.is_cancelled() {
             return sample;
         }
-        let key = RayKey::new(face, square);
+        let key = RayKey::new(face, self.node, square);
         let mut search = Search {
             known: self.kept.and_then(|kept| kept.get(&key)),
             hits: Vec::new(),
@@ -135,7 +158,7 @@ impl<'a> StrandTracer<'a> {
             counts: PathCounts::default(),
         };
         let (ray, differential) = self.launch.ray_with_differential(face, square);
-        let flux_w = self.launch.flux_density_w(square, ray.direction);
+        let flux_w = self.toned(self.launch.flux_density_w(square, ray.direction));
         if !(flux_w.is_finite() && flux_w.max_channel() > 0.0) {
             return sample;
         }
@@ -207,7 +230,8 @@ impl<'a> StrandTracer<'a> {
         }
         let mut incident = from.flux_w;
         if E::ABSORPTION && from.media.absorbs(self.tracer.scene()) {
-            incident = incident * from.media.transmittance(self.tracer.scene(), hit.distance_m);
+            let transmittance = from.media.transmittance(self.tracer.scene(), hit.distance_m);
+            incident = incident * self.toned(transmittance);
             sample.counts.attenuated += 1;
         }
         sample.counts.bent += u64::from(self.tracer.is_bumpy(hit.object));
@@ -221,6 +245,10 @@ impl<'a> StrandTracer<'a> {
         let interaction = self
             .tracer
             .interact_with::<E>(&hit, from.ray.direction, &from.media, micro);
+        let interaction = match self.basis {
+            Some(basis) => interaction.map_shares(|share| basis.tone(share)),
+            None => interaction,
+        };
         self.scatter(from, &hit, incident, &interaction, floor_w, sample, waiting);
     }
 

@@ -11,7 +11,7 @@ use super::spread::Spreader;
 use super::strand::{Landing, Strand};
 use crate::geometry::Ray;
 use crate::illumination::{Receiver, Side};
-use crate::optics::LinearSrgb;
+use crate::optics::{ColourBasis, LinearSrgb};
 use crate::scene::SurfaceKind;
 use crate::transport::PathEffects;
 use crate::transport::{MediumStack, SurfaceHit};
@@ -95,6 +95,8 @@ pub struct VirtualRays<'a, E> {
     shape: &'a PatchShape,
     /// Whose extended plane all rays are for.
     plane: Option<Receiver>,
+    /// What factors in RGB are at the rays' wavelength.
+    basis: Option<ColourBasis>,
     media: MediumStack,
     /// Whether light is absorbed on the way.
     absorbs: bool,
@@ -118,6 +120,7 @@ impl<'a, E: PathEffects> VirtualRays<'a, E> {
         shape: &'a PatchShape,
         strands: &[&Strand],
         plane: Option<Receiver>,
+        basis: Option<ColourBasis>,
     ) -> Self {
         let first = strands[0];
         let spread_m = strands
@@ -136,6 +139,7 @@ impl<'a, E: PathEffects> VirtualRays<'a, E> {
             receivers: spreader.receivers,
             shape,
             plane,
+            basis,
             media: first.media,
             absorbs: spreader.absorbs(first),
             effects: PhantomData,
@@ -191,8 +195,10 @@ impl<'a, E: PathEffects> VirtualRays<'a, E> {
 
     fn transmittance(&self, distance_m: f64) -> LinearSrgb {
         if E::ABSORPTION && self.absorbs {
-            self.media
-                .transmittance(self.receivers.tracer.scene(), distance_m)
+            let left = self
+                .media
+                .transmittance(self.receivers.tracer.scene(), distance_m);
+            self.basis.map_or(left, |basis| basis.tone(left))
         } else {
             LinearSrgb::WHITE
         }
