@@ -24,3 +24,5 @@ mod meshes;
 mod oracle;
 #[path = "scene/refusals.rs"]
 mod refusals;
+#[path = "scene/spectral.rs"]
+mod spectral;

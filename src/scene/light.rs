@@ -1,8 +1,11 @@
 //! Light sources.
 
+use std::sync::Arc;
+
 use glam::DVec3;
 
 use crate::optics::LinearSrgb;
+use crate::optics::spectrum::Spectrum;
 use crate::units::{Irradiance, Radiance, RadiantIntensity};
 
 /// Where a light is and how strong: KHR_lights_punctual, EXT_lights_area, what glows, and what lies around.
@@ -94,8 +97,12 @@ pub enum LightSize {
 pub struct Light {
     /// The node's name in the file; `lightN` when it has none.
     pub name: String,
-    /// Multiplies the intensity per channel; a light's luminous-equivalent strength is intensity × its luminance.
+    /// Multiplies the intensity per channel; a light's luminous-equivalent strength is intensity × its luminance. That
+    /// of a spectrum has the luminance 1, and a channel below 0 where the spectrum lies outside of sRGB.
     pub colour: LinearSrgb,
+    /// Its light by wavelength, scaled to one luminous-equivalent watt, of which `colour` is the colour; `None` where
+    /// that is all that is known.
+    pub spectrum: Option<Arc<Spectrum>>,
     /// Where and how strong.
     pub kind: LightKind,
     /// How large, where the kind does not say it.
@@ -108,7 +115,14 @@ impl Light {
         self.colour * self.kind.strength()
     }
 
-    /// The same light, white and of strength 1.
+    /// Gives it a spectrum, scaled to one luminous-equivalent watt, and the spectrum's colour; as bright as it was
+    /// if its colour had the luminance 1.
+    pub fn set_spectrum(&mut self, spectrum: Arc<Spectrum>) {
+        self.colour = spectrum.xyz().to_linear_srgb();
+        self.spectrum = Some(spectrum);
+    }
+
+    /// The same light, white and of strength 1; its spectrum stays.
     #[must_use]
     pub fn of_unit_strength(&self) -> Self {
         let mut kind = self.kind;
@@ -127,6 +141,7 @@ impl Light {
         Self {
             name: self.name.clone(),
             colour: LinearSrgb::WHITE,
+            spectrum: self.spectrum.clone(),
             kind,
             size: self.size,
         }

@@ -68,6 +68,7 @@ fn add_environment(scene: &mut Scene, path: &Path, memory_limit_bytes: u64) -> R
         scene.lights.push(Light {
             name: "environment".into(),
             colour: LinearSrgb::WHITE,
+            spectrum: None,
             kind: LightKind::Environment { scale: 1.0 },
             size: LightSize::None,
         });
@@ -89,6 +90,7 @@ fn add_default_light(scene: &mut Scene) {
     scene.lights.push(Light {
         name: "default sun".into(),
         colour: LinearSrgb::WHITE,
+        spectrum: None,
         kind: LightKind::Sun {
             direction: DVec3::new(0.4, -0.8, -0.45).normalize(),
             normal_irradiance: DEFAULT_SUN,

@@ -1,8 +1,11 @@
 //! Materials, as glTF's metallic-roughness model and its extensions state them, and the class that transport treats
 //! each as.
 
+use std::sync::Arc;
+
 use super::{AlphaMask, NormalMap, TextureRef, Waves};
-use crate::optics::LinearSrgb;
+use crate::optics::wavelength::D_LINE;
+use crate::optics::{Glass, LinearSrgb, Metal, Nanometres};
 
 /// Roughness (glTF's, α = roughness²) up to which polish over a diffuse body sends light on; above it the surface is
 /// pure Lambert.
@@ -76,6 +79,10 @@ pub struct Material {
     pub transmission: f64,
     /// Refractive index at 587.56 nm, at least 1.
     pub ior: f64,
+    /// Its index by wavelength, which is `ior` at 587.56 nm; `None` where it is `ior` at all of them.
+    pub glass: Option<Arc<Glass>>,
+    /// Its reflectance by wavelength, of which `base_colour` is the colour; `None` where that is all that is known.
+    pub metal: Option<&'static Metal>,
     /// Set where the surface bounds a solid body.
     pub volume: Option<Volume>,
     /// Emitted radiance [W/(m² sr)], luminous-equivalent: glTF's cd/m² divided by 683 lm/W.
@@ -110,6 +117,42 @@ impl Material {
     /// Whether anything bends its normals.
     pub fn has_bumps(&self) -> bool {
         self.bending_waves().is_some() || self.bending_map().is_some()
+    }
+
+    /// Refractive index at a wavelength, at least 1.
+    pub fn index_at(&self, wavelength: Nanometres) -> f64 {
+        match &self.glass {
+            Some(glass) => glass.dispersion.index(wavelength),
+            None => self.ior,
+        }
+    }
+
+    /// Whether it is the surface of a solid in which light goes another way at another wavelength.
+    pub fn is_dispersive(&self) -> bool {
+        self.surface == SurfaceKind::Dielectric
+            && self
+                .glass
+                .as_ref()
+                .is_some_and(|glass| glass.dispersion.is_dispersive())
+    }
+
+    /// Makes it of a glass, with that one's index at 587.56 nm; what else it has stays.
+    pub fn set_glass(&mut self, glass: Arc<Glass>) {
+        self.ior = glass.dispersion.index(D_LINE);
+        self.glass = Some(glass);
+    }
+
+    /// Makes it of a metal: nothing goes through, and `base_colour` is that of the metal seen head on under D65, as
+    /// bright as a reflectance of at most 1 per channel can have it. Gives the factor that this took where it is
+    /// not 1, as for gold, which is redder than sRGB's reddest white.
+    pub fn set_metal(&mut self, metal: &'static Metal) -> Option<f64> {
+        let colour = metal.reflectance_srgb(1.0);
+        let most = colour.max_channel();
+        self.base_colour = if most > 1.0 { colour / most } else { colour };
+        self.metallic = 1.0;
+        self.transmission = 0.0;
+        self.metal = Some(metal);
+        (most > 1.0).then(|| 1.0 / most)
     }
 
     /// The class that its factors make it: how a file's material is read unless the file says otherwise (unlit).
@@ -155,6 +198,8 @@ impl Default for Material {
             roughness: 1.0,
             transmission: 0.0,
             ior: 1.5,
+            glass: None,
+            metal: None,
             volume: None,
             emitted_radiance: LinearSrgb::BLACK,
             polish: 1.0,

@@ -107,6 +107,7 @@ fn lamp(dice: &mut Dice, index: u32) -> Light {
         1 => Light {
             name,
             colour: LinearSrgb::WHITE,
+            spectrum: None,
             kind: LightKind::Spot {
                 position: place,
                 direction: (dice.place([0.0, 0.6]) - place).normalize(),

@@ -42,6 +42,7 @@ fn lights_that_see_nothing_specular_change_no_bit() {
         with_lamps.lights.push(Light {
             name: format!("cellar {lamp}"),
             colour: LinearSrgb::WHITE,
+            spectrum: None,
             kind: LightKind::Spot {
                 position: glam::DVec3::new(0.1 * f64::from(lamp), -1.0, 0.0),
                 direction: glam::DVec3::NEG_Y,

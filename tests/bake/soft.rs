@@ -19,6 +19,7 @@ fn square_lamp(centre: DVec3, side_m: f64) -> Light {
     Light {
         name: "lamp".into(),
         colour: LinearSrgb::WHITE,
+        spectrum: None,
         kind: LightKind::Panel {
             centre,
             across: DVec3::X * (0.5 * side_m),

@@ -51,6 +51,7 @@ fn spot(name: &str, position: DVec3, direction: DVec3) -> Light {
     Light {
         name: name.into(),
         colour: LinearSrgb::WHITE,
+        spectrum: None,
         kind: LightKind::Spot {
             position,
             direction: direction.normalize(),

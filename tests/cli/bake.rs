@@ -265,7 +265,7 @@ fn any_number_of_threads_gives_the_same_bytes() {
         sandbox.succeed(&format!(
             "bake builtin:ball -o {threads} {QUICK} --threads {threads} --layers caustic,direct"
         ));
-        assert_eq!(sandbox.files("1/maps"), sandbox.files(&format!("{threads}/maps")));
+        assert_eq!(sandbox.files("1/maps"), sandbox.files(format!("{threads}/maps")));
         for file in sandbox.files("1/maps") {
             let read =
                 |folder: &str| std::fs::read(sandbox.path(folder).join("maps").join(&file)).expect("there");

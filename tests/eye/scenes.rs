@@ -57,6 +57,7 @@ pub fn light(kind: LightKind) -> Light {
     Light {
         name: "light".into(),
         colour: LinearSrgb::WHITE,
+        spectrum: None,
         kind,
         size: nephroid::scene::LightSize::None,
     }

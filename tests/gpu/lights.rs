@@ -20,6 +20,7 @@ fn lamp(colour: LinearSrgb, kind: LightKind) -> Light {
     Light {
         name: "lamp".into(),
         colour,
+        spectrum: None,
         kind,
         size: nephroid::scene::LightSize::None,
     }

@@ -34,6 +34,7 @@ fn light(scale: f64, colour: LinearSrgb) -> Light {
     Light {
         name: "environment".into(),
         colour,
+        spectrum: None,
         kind: LightKind::Environment { scale },
         size: LightSize::None,
     }

@@ -52,6 +52,7 @@ fn scene() -> Scene {
         scene.lights.push(Light {
             name: "large".into(),
             colour: LinearSrgb::WHITE,
+            spectrum: None,
             kind,
             size: LightSize::None,
         });

@@ -82,11 +82,12 @@ fn required_extensions_are_refused_by_name_unless_they_can_be_read_or_left_out()
         &["KHR_animation_pointer is not supported"],
     );
     // Materials say it where they have it.
-    let extensions = json!({ "KHR_materials_dispersion": { "dispersion": 1.0 } });
-    let dispersive = requiring("KHR_materials_dispersion").with_material(json!({ "extensions": extensions }));
+    let extensions = json!({ "KHR_materials_iridescence": { "iridescenceFactor": 1.0 } });
+    let iridescent =
+        requiring("KHR_materials_iridescence").with_material(json!({ "extensions": extensions }));
     assert_warned(
-        &dispersive.scene(),
-        &["material0", "KHR_materials_dispersion was ignored"],
+        &iridescent.scene(),
+        &["material0", "KHR_materials_iridescence was ignored"],
     );
 }
 

@@ -18,6 +18,7 @@ fn scene(kind: LightKind) -> Scene {
     scene.lights.push(Light {
         name: "lamp".into(),
         colour: LinearSrgb::WHITE,
+        spectrum: None,
         kind,
         size: LightSize::None,
     });

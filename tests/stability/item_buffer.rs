@@ -19,6 +19,7 @@ fn lamp(position: DVec3) -> Light {
     Light {
         name: "lamp".into(),
         colour: LinearSrgb::WHITE,
+        spectrum: None,
         kind: LightKind::Point {
             position,
             intensity: RadiantIntensity(1.0),

@@ -28,6 +28,16 @@ pub struct Glass {
 }
 
 impl Glass {
+    /// A glass by its index at 587.56 nm and its Abbe number; none that disperses where that is infinite.
+    pub fn with_abbe_number(n_d: f64, v_d: f64) -> Self {
+        Self {
+            name: format!("abbe:{n_d:.4},{v_d:.2}"),
+            dispersion: Dispersion::from_gltf(n_d, 20.0 / v_d),
+            range: None,
+            source: String::new(),
+        }
+    }
+
     /// Whether the formula was fitted to a wavelength; any wavelength will do where nobody said.
     pub fn is_within(&self, wavelength: Nanometres) -> bool {
         self.range

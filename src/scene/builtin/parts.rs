@@ -52,6 +52,7 @@ pub fn point_light(name: &str, position: DVec3, power: Flux) -> Light {
     Light {
         name: name.into(),
         colour: LinearSrgb::WHITE,
+        spectrum: None,
         kind: LightKind::Point { position, intensity },
         size: crate::scene::LightSize::None,
     }
@@ -62,6 +63,7 @@ pub fn sun(name: &str, direction: DVec3, normal_irradiance: Irradiance) -> Light
     Light {
         name: name.into(),
         colour: LinearSrgb::WHITE,
+        spectrum: None,
         kind: LightKind::Sun {
             direction: direction.normalize(),
             normal_irradiance,

@@ -76,13 +76,45 @@ pub(super) fn apply(edit: &Edit, index: usize, light: &mut Light) -> Result<Edit
         }
         Edit::LightColour { colour: new, .. } => {
             check_colour(*new, &owner)?;
-            Edit::LightColour {
-                light: index,
-                colour: replace(&mut light.colour, *new),
+            let inverse = match light.spectrum {
+                Some(_) => spectrum(index, light),
+                None => Edit::LightColour {
+                    light: index,
+                    colour: light.colour,
+                },
+            };
+            (light.colour, light.spectrum) = (*new, None);
+            inverse
+        }
+        Edit::LightSpectrum {
+            colour,
+            spectrum: new,
+            ..
+        } => {
+            if !(colour.is_finite() && colour.luminance() > 0.0) {
+                let value = format!("{:?}", colour.to_array());
+                return Err(out_of_range(
+                    &owner,
+                    "colour",
+                    value,
+                    "what has a luminance above 0",
+                ));
             }
+            let inverse = spectrum(index, light);
+            (light.colour, light.spectrum) = (*colour, new.clone());
+            inverse
         }
         _ => return Err(lacks("such property", "edit what it has")),
     })
+}
+
+/// A light's spectrum and colour, as the edit that gives it those.
+fn spectrum(index: usize, light: &Light) -> Edit {
+    Edit::LightSpectrum {
+        light: index,
+        colour: light.colour,
+        spectrum: light.spectrum.clone(),
+    }
 }
 
 fn intensity(kind: &mut LightKind) -> Option<&mut RadiantIntensity> {

@@ -1,10 +1,13 @@
 //! Edits of materials.
 
 use std::mem::replace;
+use std::sync::Arc;
 
 use super::Edit;
 use super::ranges::out_of_range;
 use crate::error::{Error, Result};
+use crate::optics::LinearSrgb;
+use crate::optics::glass::{Dispersion, Glass};
 use crate::scene::Material;
 
 /// Edits a material, and gives the edit that undoes this one.
@@ -14,24 +17,46 @@ pub(super) fn apply(edit: &Edit, index: usize, material: &mut Material) -> Resul
     let follows = material.surface == material.classified();
     let inverse = match edit {
         Edit::MaterialIor { ior, .. } => {
-            if !(*ior >= 1.0 && ior.is_finite()) {
-                return Err(out_of_range(&owner, "refractive index", ior, "1 up"));
-            }
-            Edit::MaterialIor {
-                material: index,
-                ior: replace(&mut material.ior, *ior),
-            }
+            check_index(*ior, &owner)?;
+            let glass = material
+                .glass
+                .as_deref()
+                .map(|glass| Arc::new(of_index(glass, *ior)));
+            let inverse = match glass {
+                Some(_) => substance(index, material),
+                None => Edit::MaterialIor {
+                    material: index,
+                    ior: material.ior,
+                },
+            };
+            (material.ior, material.glass) = (*ior, glass);
+            inverse
         }
         Edit::MaterialTint { base_colour, .. } => {
-            let channels = base_colour.to_array();
-            if !channels.iter().all(|channel| (0.0..=1.0).contains(channel)) {
-                let value = format!("{channels:?}");
-                return Err(out_of_range(&owner, "base colour", value, "0 to 1"));
-            }
-            Edit::MaterialTint {
-                material: index,
-                base_colour: replace(&mut material.base_colour, *base_colour),
-            }
+            check_colour(*base_colour, &owner)?;
+            let inverse = match material.metal {
+                Some(_) => substance(index, material),
+                None => Edit::MaterialTint {
+                    material: index,
+                    base_colour: material.base_colour,
+                },
+            };
+            (material.base_colour, material.metal) = (*base_colour, None);
+            inverse
+        }
+        Edit::MaterialSubstance {
+            ior,
+            glass,
+            base_colour,
+            metal,
+            ..
+        } => {
+            check_index(*ior, &owner)?;
+            check_colour(*base_colour, &owner)?;
+            let inverse = substance(index, material);
+            (material.ior, material.glass) = (*ior, glass.clone());
+            (material.base_colour, material.metal) = (*base_colour, *metal);
+            inverse
         }
         Edit::MaterialRoughness { roughness, .. } => {
             if !(0.0..=1.0).contains(roughness) {
@@ -54,4 +79,45 @@ pub(super) fn apply(edit: &Edit, index: usize, material: &mut Material) -> Resul
         material.surface = material.classified();
     }
     Ok(inverse)
+}
+
+/// What a material is made of, as the edit that makes it so.
+fn substance(index: usize, material: &Material) -> Edit {
+    Edit::MaterialSubstance {
+        material: index,
+        ior: material.ior,
+        glass: material.glass.clone(),
+        base_colour: material.base_colour,
+        metal: material.metal,
+    }
+}
+
+/// A glass of another index at 587.56 nm and the same Abbe number.
+fn of_index(glass: &Glass, n_d: f64) -> Glass {
+    let v_d = match glass.dispersion {
+        // What the formula gives says nothing where n_d is 1.
+        Dispersion::Abbe { v_d, .. } => v_d,
+        other => other.abbe_number(),
+    };
+    Glass::with_abbe_number(n_d, v_d)
+}
+
+fn check_index(ior: f64, owner: &str) -> Result<()> {
+    if ior >= 1.0 && ior.is_finite() {
+        return Ok(());
+    }
+    Err(out_of_range(owner, "refractive index", ior, "1 up"))
+}
+
+fn check_colour(colour: LinearSrgb, owner: &str) -> Result<()> {
+    let channels = colour.to_array();
+    if channels.iter().all(|channel| (0.0..=1.0).contains(channel)) {
+        return Ok(());
+    }
+    Err(out_of_range(
+        owner,
+        "base colour",
+        format!("{channels:?}"),
+        "0 to 1",
+    ))
 }

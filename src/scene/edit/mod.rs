@@ -11,7 +11,8 @@ use glam::{DQuat, DVec3};
 
 use super::{LightSize, Mesh, Scene, Waves};
 use crate::error::{Error, Result};
-use crate::optics::LinearSrgb;
+use crate::optics::spectrum::Spectrum;
+use crate::optics::{Glass, LinearSrgb, Metal};
 use crate::units::{Irradiance, RadiantIntensity};
 
 /// One change of a scene. Indices are those of [`Scene::lights`], [`Scene::materials`] and [`Scene::objects`].
@@ -59,21 +60,43 @@ pub enum Edit {
         /// Of any length but 0; made unit.
         direction: DVec3,
     },
-    /// Colour of a light.
+    /// Colour of a light, which takes the place of a spectrum.
     LightColour {
         /// Which light.
         light: usize,
         /// Each channel ≥ 0, not all 0.
         colour: LinearSrgb,
     },
-    /// Refractive index of a material.
+    /// Spectrum of a light, with its colour.
+    LightSpectrum {
+        /// Which light.
+        light: usize,
+        /// The spectrum's; channels may be negative, but its luminance is above 0.
+        colour: LinearSrgb,
+        /// Scaled to one luminous-equivalent watt; `None` for none.
+        spectrum: Option<Arc<Spectrum>>,
+    },
+    /// Refractive index of a material; a glass keeps its Abbe number.
     MaterialIor {
         /// Which material.
         material: usize,
         /// At least 1.
         ior: f64,
     },
-    /// Base colour of a material: the tint of glass, the albedo of what is matte.
+    /// What a material is made of.
+    MaterialSubstance {
+        /// Which material.
+        material: usize,
+        /// At least 1: the glass's at 587.56 nm.
+        ior: f64,
+        /// `None` for one index at every wavelength.
+        glass: Option<Arc<Glass>>,
+        /// Each channel in [0, 1].
+        base_colour: LinearSrgb,
+        /// `None` for no metal of a table.
+        metal: Option<&'static Metal>,
+    },
+    /// Base colour of a material: the tint of glass, the albedo of what is matte; it takes the place of a metal's table.
     MaterialTint {
         /// Which material.
         material: usize,
@@ -131,6 +154,8 @@ pub enum EditTarget {
     MaterialIor(usize),
     /// Base colour of a material.
     MaterialTint(usize),
+    /// What a material is made of.
+    MaterialSubstance(usize),
     /// Roughness of a material.
     MaterialRoughness(usize),
     /// Waves of a material.
@@ -175,9 +200,12 @@ impl Edit {
             Self::LightSize { light, .. } => EditTarget::LightSize(*light),
             Self::LightPosition { light, .. } => EditTarget::LightPosition(*light),
             Self::LightDirection { light, .. } => EditTarget::LightDirection(*light),
-            Self::LightColour { light, .. } => EditTarget::LightColour(*light),
+            Self::LightColour { light, .. } | Self::LightSpectrum { light, .. } => {
+                EditTarget::LightColour(*light)
+            }
             Self::MaterialIor { material, .. } => EditTarget::MaterialIor(*material),
             Self::MaterialTint { material, .. } => EditTarget::MaterialTint(*material),
+            Self::MaterialSubstance { material, .. } => EditTarget::MaterialSubstance(*material),
             Self::MaterialRoughness { material, .. } => EditTarget::MaterialRoughness(*material),
             Self::MaterialWaves { material, .. } => EditTarget::MaterialWaves(*material),
             Self::ObjectMoved { object, .. } | Self::ObjectMesh { object, .. } => {
@@ -195,11 +223,13 @@ impl Edit {
             | Self::LightSize { light, .. }
             | Self::LightPosition { light, .. }
             | Self::LightDirection { light, .. }
-            | Self::LightColour { light, .. } => {
+            | Self::LightColour { light, .. }
+            | Self::LightSpectrum { light, .. } => {
                 let found = existing(&mut scene.lights, *light, "light")?;
                 light::apply(self, *light, found)
             }
             Self::MaterialIor { material, .. }
+            | Self::MaterialSubstance { material, .. }
             | Self::MaterialTint { material, .. }
             | Self::MaterialRoughness { material, .. }
             | Self::MaterialWaves { material, .. } => {

@@ -3,13 +3,18 @@
 //! A lamp lies in the node's xy plane around its origin and shines along −z. Its size is scaled by the largest scale of
 //! the node, the same way in all directions.
 
+use std::path::Path;
+
 use glam::DVec3;
-use gltf::json::{Root, Value};
+use gltf::json::Value;
 use serde::Deserialize;
 
+use super::document::Document;
 use super::light::{left_out, light_name};
 use super::nodes::Placed;
 use super::report::Report;
+use super::spectrum;
+use crate::error::Result;
 use crate::optics::LinearSrgb;
 use crate::scene::{Light, LightKind, LightSize, PanelShape};
 use crate::units::{LUMENS_PER_WATT, Radiance};
@@ -58,7 +63,17 @@ impl Default for Rect {
 
 /// Adds the flat lamps of the placed nodes that have some power, node by node. One that cannot be read is left out with
 /// a warning.
-pub fn add_all(lights: &mut Vec<Light>, root: &Root, placed: &[Placed], report: &mut Report) {
+///
+/// # Errors
+/// As [`spectrum::apply`].
+pub fn add_all(
+    lights: &mut Vec<Light>,
+    document: &Document,
+    placed: &[Placed],
+    folder: &Path,
+    report: &mut Report,
+) -> Result<()> {
+    let root = &document.root;
     let extension = root
         .extensions
         .as_ref()
@@ -74,22 +89,35 @@ pub fn add_all(lights: &mut Vec<Light>, root: &Root, placed: &[Placed], report: 
         };
         let owner = format!("light `{}`", placed.name);
         match lamp(on_node, sources, placed) {
-            Ok((colour, kind)) => lights.push(Light {
-                name: light_name(placed, lights.len()),
-                colour,
-                kind,
-                size: LightSize::None,
-            }),
+            Ok((index, colour, kind)) => {
+                let mut light = Light {
+                    name: light_name(placed, lights.len()),
+                    colour,
+                    spectrum: None,
+                    kind,
+                    size: LightSize::None,
+                };
+                let stated = spectrum::stated(document, placed.node, &document.area_light_spectra, index);
+                spectrum::apply(&mut light, stated, folder, &owner, report)?;
+                lights.push(light);
+            }
             Err(why) => left_out(report, &owner, &why),
         }
     }
+    Ok(())
 }
 
-fn lamp(on_node: &Value, sources: &[Value], placed: &Placed) -> Result<(LinearSrgb, LightKind), String> {
+/// Index of a lamp in the file's list, colour and kind.
+fn lamp(
+    on_node: &Value,
+    sources: &[Value],
+    placed: &Placed,
+) -> std::result::Result<(usize, LinearSrgb, LightKind), String> {
     let index = on_node.get("light").and_then(Value::as_u64);
     let index = index.ok_or("does not say which area light it is")?;
-    let source = usize::try_from(index).ok().and_then(|index| sources.get(index));
-    let source = source.ok_or_else(|| format!("is area light {index}, which does not exist"))?;
+    let missing = || format!("is area light {index}, which does not exist");
+    let index = usize::try_from(index).map_err(|_| missing())?;
+    let source = sources.get(index).ok_or_else(missing)?;
     let source = Source::deserialize(source).map_err(|error| format!("does not follow {NAME} ({error})"))?;
     let colour = LinearSrgb::from(source.color);
     if !colour.is_finite() || source.color.iter().any(|channel| *channel < 0.0) {
@@ -109,6 +137,7 @@ fn lamp(on_node: &Value, sources: &[Value], placed: &Placed) -> Result<(LinearSr
     };
     let (across, down) = half_axes(placed, source.size, aspect).ok_or("has no area")?;
     Ok((
+        index,
         colour,
         LightKind::Panel {
             centre: placed.world_from_node.translation,

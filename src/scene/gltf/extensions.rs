@@ -4,11 +4,12 @@ use super::report::Report;
 use crate::error::{Error, Result};
 
 /// Read in full, or in the parts that say so in a warning.
-const READ: [&str; 11] = [
+const READ: [&str; 12] = [
     "EXT_lights_area",
     "EXT_texture_webp",
     "KHR_lights_punctual",
     "KHR_materials_clearcoat",
+    "KHR_materials_dispersion",
     "KHR_materials_emissive_strength",
     "KHR_materials_ior",
     "KHR_materials_specular",
@@ -19,10 +20,9 @@ const READ: [&str; 11] = [
 ];
 
 /// Passed over with a warning even where the file requires them: what is left is still the same scene.
-const LEFT_OUT: [&str; 7] = [
+const LEFT_OUT: [&str; 6] = [
     "KHR_animation_pointer",
     "KHR_materials_anisotropy",
-    "KHR_materials_dispersion",
     "KHR_materials_iridescence",
     "KHR_materials_sheen",
     "KHR_materials_variants",

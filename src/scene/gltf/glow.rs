@@ -13,6 +13,7 @@ pub fn add_lights(scene: &mut Scene) {
             scene.lights.push(Light {
                 name: part.name.clone(),
                 colour: emitted / luminance,
+                spectrum: None,
                 kind: LightKind::Surface {
                     object,
                     radiance: Radiance(luminance),

@@ -1,6 +1,7 @@
 //! Lights of KHR_lights_punctual.
 
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
+use std::path::Path;
 
 use glam::DVec3;
 use gltf::json::extensions::scene::khr_lights_punctual::{Light as Source, Spot, Type};
@@ -11,13 +12,23 @@ use super::nodes::Placed;
 use super::numbers::{widen, widen_all};
 use super::report::Report;
 use super::sizes::StatedSize;
+use super::spectrum;
+use crate::error::Result;
 use crate::optics::LinearSrgb;
 use crate::scene::{Light, LightKind};
 use crate::units::{Irradiance, LUMENS_PER_WATT, RadiantIntensity};
 
 /// All lights of the placed nodes that have some power, node by node. A light that cannot be read is left out with a
 /// warning.
-pub fn read_all(document: &Document, placed: &[Placed], report: &mut Report) -> Vec<Light> {
+///
+/// # Errors
+/// As [`spectrum::apply`].
+pub fn read_all(
+    document: &Document,
+    placed: &[Placed],
+    folder: &Path,
+    report: &mut Report,
+) -> Result<Vec<Light>> {
     let root = &document.root;
     let extension = root
         .extensions
@@ -37,21 +48,27 @@ pub fn read_all(document: &Document, placed: &[Placed], report: &mut Report) -> 
             left_out(report, &owner, &format!("is light {index}, which does not exist"));
             continue;
         };
-        match read(source, placed, &owner, report) {
-            Ok(kind) => lights.push(Light {
-                name: light_name(placed, lights.len()),
-                colour: widen_all(source.color).into(),
-                kind,
-                size: {
-                    let of_node = document.node_sizes.get(placed.node).unwrap_or(&unstated);
-                    let of_light = document.light_sizes.get(index).unwrap_or(&unstated);
-                    of_node.read(of_light, &kind, &owner, report)
-                },
-            }),
-            Err(why) => left_out(report, &owner, &why),
-        }
+        let kind = match read(source, placed, &owner, report) {
+            Ok(kind) => kind,
+            Err(why) => {
+                left_out(report, &owner, &why);
+                continue;
+            }
+        };
+        let of_node = document.node_sizes.get(placed.node).unwrap_or(&unstated);
+        let of_light = document.light_sizes.get(index).unwrap_or(&unstated);
+        let mut light = Light {
+            name: light_name(placed, lights.len()),
+            colour: widen_all(source.color).into(),
+            spectrum: None,
+            kind,
+            size: of_node.read(of_light, &kind, &owner, report),
+        };
+        let stated = spectrum::stated(document, placed.node, &document.light_spectra, index);
+        spectrum::apply(&mut light, stated, folder, &owner, report)?;
+        lights.push(light);
     }
-    lights
+    Ok(lights)
 }
 
 /// The node's name; `lightN` where the file gives none.
@@ -73,7 +90,12 @@ pub(super) fn left_out(report: &mut Report, owner: &str, why: &str) {
     );
 }
 
-fn read(source: &Source, placed: &Placed, owner: &str, report: &mut Report) -> Result<LightKind, String> {
+fn read(
+    source: &Source,
+    placed: &Placed,
+    owner: &str,
+    report: &mut Report,
+) -> std::result::Result<LightKind, String> {
     let colour = LinearSrgb::from(widen_all(source.color));
     if !colour.is_finite() || colour.to_array().iter().any(|channel| *channel < 0.0) {
         return Err("has a colour that is negative or not finite".into());

@@ -1,5 +1,7 @@
 //! Materials: glTF's factors and extensions, checked, and the class that transport treats each as.
 
+use std::sync::Arc;
+
 use glam::{DMat3, DVec2};
 use gltf::json::extensions::material as extension;
 use gltf::json::extensions::texture::TextureTransform;
@@ -13,6 +15,7 @@ use super::document::Document;
 use super::images::Images;
 use super::numbers::widen;
 use super::report::{Budget, Report};
+use super::substance::{self, Substance};
 use super::{names, waves};
 use crate::error::Result;
 use crate::optics::LinearSrgb;
@@ -68,6 +71,8 @@ pub fn read_all(
                 owner: format!("material `{name}`"),
                 source,
                 waves: document.waves.get(index).and_then(Option::as_ref),
+                glass: document.glasses.get(index).and_then(Option::as_ref),
+                metal: document.metals.get(index).and_then(Option::as_ref),
                 images: &mut *images,
                 budget: &mut *budget,
                 report: &mut *report,
@@ -82,6 +87,8 @@ struct Reading<'a, 'b> {
     source: &'a Source,
     /// As its extras state them.
     waves: Option<&'a Value>,
+    glass: Option<&'a Value>,
+    metal: Option<&'a Value>,
     images: &'a mut Images<'b>,
     budget: &'a mut Budget,
     report: &'a mut Report,
@@ -107,6 +114,8 @@ impl Reading<'_, '_> {
                 "transmission factor",
             ),
             ior: self.ior(extensions),
+            glass: None,
+            metal: None,
             volume: self.volume(extensions),
             emitted_radiance: self.emission(extensions)?,
             polish: 1.0,
@@ -117,6 +126,7 @@ impl Reading<'_, '_> {
             double_sided: self.source.double_sided,
         };
         self.take_means(&mut material, transmission)?;
+        self.substance(&mut material, extensions)?;
         material.surface = if extensions.unlit.is_some() {
             SurfaceKind::Diffuse
         } else {
@@ -292,6 +302,32 @@ impl Reading<'_, '_> {
         Ok(())
     }
 
+    /// What it is made of: as its extras say, else by KHR_materials_dispersion.
+    fn substance(&mut self, material: &mut Material, extensions: &extension::Material) -> Result<()> {
+        match substance::read(self.glass, self.metal, &self.owner)? {
+            Some(Substance::Glass(glass)) => material.set_glass(Arc::new(glass)),
+            Some(Substance::Metal(metal)) => {
+                if let Some(factor) = material.set_metal(metal) {
+                    self.warn(
+                        format!(
+                            "{} lies outside of sRGB, and its colour was multiplied by {factor:.3}",
+                            metal.name()
+                        ),
+                        "nothing needs to be done: light that is traced by wavelength is not dimmed",
+                    );
+                }
+            }
+            None => {
+                let stated = extensions.others.get(substance::NAME);
+                match stated.map_or(Ok(None), |stated| substance::dispersion(material.ior, stated)) {
+                    Ok(glass) => material.glass = glass.map(Arc::new),
+                    Err(why) => self.warn(why, "state 20 by the Abbe number, or 0"),
+                }
+            }
+        }
+        Ok(())
+    }
+
     /// The material's class, with a word on what is not as the file has it.
     fn classify(&mut self, material: &Material) -> SurfaceKind {
         let surface = material.classified();
@@ -300,7 +336,7 @@ impl Reading<'_, '_> {
         let is_metal = material.metallic >= 0.5;
         match surface {
             // Metallic 1 with roughness 1 is what glTF assumes where a file says nothing.
-            SurfaceKind::Diffuse if is_metal && roughness < 1.0 => self.warn(
+            SurfaceKind::Diffuse if is_metal && (roughness < 1.0 || material.metal.is_some()) => self.warn(
                 format!("is a metal of roughness {roughness:.2}, treated as matte"),
                 as_matte,
             ),
@@ -312,6 +348,12 @@ impl Reading<'_, '_> {
                 "transmits light but has no thickness, so that it is a thin pane that does not refract",
                 "give it a volume, or read closed meshes as solid with --solid-glass",
             ),
+            SurfaceKind::Mirror | SurfaceKind::Diffuse | SurfaceKind::Mixed if material.glass.is_some() => {
+                self.warn(
+                    "is of a glass but lets no light through, so that none is dispersed",
+                    "give it transmission and a volume",
+                )
+            }
             _ => {}
         }
         surface
@@ -503,7 +545,7 @@ impl Reading<'_, '_> {
             extensions
                 .others
                 .keys()
-                .filter(|key| *key != coat::NAME)
+                .filter(|key| ![coat::NAME, substance::NAME].contains(&key.as_str()))
                 .map(|key| names::name(Some(key), "extension", 0)),
         );
         if !ignored.is_empty() {

@@ -9,7 +9,7 @@ use super::report::Report;
 use crate::scene::{Wave, Waves};
 
 /// Where waves stand in a material's extras.
-const KEY: &str = "nephroid_waves";
+pub const KEY: &str = "nephroid_waves";
 
 /// A wave as the file states it.
 #[derive(Debug, Deserialize)]
@@ -20,13 +20,6 @@ struct Stated {
     direction: Vec<f64>,
     #[serde(default)]
     phase_rad: f64,
-}
-
-/// What the extras of each material state of waves, in file order; to be called before extras are thrown away.
-pub fn collect(file: &Value) -> Vec<Option<Value>> {
-    let materials = file.get("materials").and_then(Value::as_array);
-    let stated = |material: &Value| material.get("extras")?.get(KEY).cloned();
-    materials.into_iter().flatten().map(stated).collect()
 }
 
 /// The waves that a material states; those that cannot be are left out with a warning.

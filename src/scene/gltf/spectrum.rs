@@ -1,0 +1,76 @@
+//! Spectra of lamps: `spectrum` in the `extras` of the node or else of the light, by name or as a CSV file beside the
+//! scene.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use gltf::json::Value;
+
+use super::document::Document;
+use super::extras::{of_file, text};
+use super::report::Report;
+use super::uri;
+use crate::error::{Error, Result};
+use crate::optics::LinearSrgb;
+use crate::optics::spectrum::csv::read_lamp;
+use crate::optics::spectrum::{Spectrum, illuminant};
+use crate::scene::Light;
+
+/// Where a spectrum stands in extras.
+pub const KEY: &str = "spectrum";
+
+/// More than any table of a lamp takes [bytes].
+const MOST_CSV_BYTES: u64 = 16 << 20;
+
+/// What is stated for a light: by its node, or else by its entry in a list of lights.
+pub fn stated<'a>(
+    document: &'a Document,
+    node: usize,
+    of_lights: &'a [Option<Value>],
+    light: usize,
+) -> Option<&'a Value> {
+    let of_node = document.node_spectra.get(node).and_then(Option::as_ref);
+    of_node.or_else(|| of_lights.get(light).and_then(Option::as_ref))
+}
+
+/// Gives a lamp the spectrum that is stated for it, if any, in place of its colour.
+///
+/// # Errors
+/// A spectrum that does not exist or that nobody could see, a file that cannot be read or lies elsewhere than in
+/// `folder` or below.
+pub fn apply(
+    light: &mut Light,
+    stated: Option<&Value>,
+    folder: &Path,
+    owner: &str,
+    report: &mut Report,
+) -> Result<()> {
+    let Some(stated) = stated else {
+        return Ok(());
+    };
+    let spectrum = read(text(stated, KEY, owner)?, folder, owner)?;
+    if light.colour != LinearSrgb::WHITE {
+        report.warn(
+            owner,
+            format!("its colour was left out, since it has a `{KEY}`"),
+            "leave the colour white",
+        );
+    }
+    light.set_spectrum(Arc::new(spectrum));
+    Ok(())
+}
+
+fn read(stated: &str, folder: &Path, owner: &str) -> Result<Spectrum> {
+    let is_file = Path::new(stated)
+        .extension()
+        .is_some_and(|extension| extension.eq_ignore_ascii_case("csv"));
+    if !is_file {
+        return illuminant(stated).map_err(|error| of_file(error.at(owner)));
+    }
+    let bytes = uri::read(stated, folder, MOST_CSV_BYTES, owner)?;
+    let no_text = |_| Error::failure(owner, format!("its `{KEY}` is no text file"), "save it as UTF-8");
+    let table = String::from_utf8(bytes).map_err(no_text)?;
+    read_lamp(&table)
+        .and_then(|lamp| lamp.to_luminous_equivalent(1.0))
+        .map_err(|error| of_file(error.at(format!("{owner}, `{stated}`"))))
+}
