@@ -12,6 +12,7 @@ use super::light_level::{KeptError, LevelKey, LightLevel, LightState, LightState
 use super::map_size::Sizes;
 use super::sizes::MapSizes;
 use super::soft_level::SOFT_BEGINNING;
+use super::spectra::Spectra;
 use crate::error::{Result, Warning};
 use crate::illumination::accumulator::FluxUnit;
 use crate::light_pass::accuracy::{self, Before, Images, LightError};
@@ -43,6 +44,8 @@ pub(super) struct CausticLayer<'a> {
     pub(super) aim: &'a Aim,
     pub(super) settings: &'a BakeSettings,
     pub(super) sizes: &'a MapSizes,
+    /// Of lights whose wavelengths go different ways.
+    pub(super) spectra: &'a Spectra,
     pub(super) plan: &'a EffectPlan,
     pub(super) progress: &'a dyn Progress,
     /// What the user asks.

@@ -68,7 +68,9 @@ impl Finish<'_> {
         light_layers.retain(|part| is_shown(part.kind));
         let ledgers = levels.iter().map(|(light, level)| {
             let light = &self.scene.lights[*light];
-            level.ledger.report(&light.name, level.unit, light.strength())
+            level
+                .ledger
+                .report(&light.name, level.unit, level.strength(light))
         });
         let ledgers: Vec<LightLedger> = ledgers.collect();
         let estimated_relative_rmse = relative_rmse(&maps).map(|rmse| rmse.hypot(given_up_share(&ledgers)));
@@ -209,7 +211,7 @@ impl Finish<'_> {
             .map(|(light, level, map)| {
                 let mut flux = map.flux();
                 self.smooth(chart, &mut flux);
-                (flux, light.strength() * level.unit.watts())
+                (flux, level.strength(light) * level.unit.watts())
             })
             .collect();
         let mut irradiance: Vec<[f32; 3]> = (0..chart.texel_count())

@@ -86,7 +86,7 @@ impl CausticLayer<'_> {
         let scene = self.tracer.scene();
         let of = |(index, (light, climb)): (usize, (&&AimedLight, &Climb))| {
             let level = climb.levels.last()?;
-            let strength = scene.lights[light.light].strength();
+            let strength = level.strength(&scene.lights[light.light]);
             let flux_w = level.ledger.watts(Account::Deposited, level.unit, strength);
             Some((index, climb.error()?.relative_rmse, flux_w))
         };

@@ -99,7 +99,7 @@ impl CausticLayer<'_> {
         // Coarse lattices are deposited as coarsely, so that their difference shows both kinds of error.
         let before_last = (lattices.len() - 1).saturating_sub(step);
         LevelKey {
-            trace: self.trace_key(size, before_last as i32, rounds),
+            trace: self.trace_key(light, size, before_last as i32, rounds),
             resolved: None,
             is_dim: self.is_dim(light),
             sizes: sizes.clone(),
@@ -114,7 +114,13 @@ impl CausticLayer<'_> {
     }
 
     /// For a lattice of a size, so many lattices before the usual finest.
-    pub(super) fn trace_key(&self, size: (usize, usize), coarser: i32, rounds: &[Round]) -> TraceKey {
+    pub(super) fn trace_key(
+        &self,
+        light: &AimedLight,
+        size: (usize, usize),
+        coarser: i32,
+        rounds: &[Round],
+    ) -> TraceKey {
         let settings = self.settings;
         let mut paths = BakeSettings {
             estimator: settings.estimator,
@@ -136,6 +142,7 @@ impl CausticLayer<'_> {
                 0
             },
             rounds: rounds.to_vec(),
+            lamp: self.spectra.lamp(light.light).cloned(),
         }
     }
 
@@ -165,7 +172,9 @@ impl CausticLayer<'_> {
         let power_w = light.launch.power_bound_w();
         let real_w = power_w * source.strength().max_channel();
         if power_w.is_finite() && power_w > 0.0 && real_w.is_finite() {
-            return Ok(FluxUnit::for_power(power_w));
+            return Ok(FluxUnit::for_power(
+                power_w * self.spectra.most_of_a_channel(light.light),
+            ));
         }
         Err(Error::failure(
             &self.tracer.scene().source,
@@ -221,7 +230,12 @@ impl CausticLayer<'_> {
         if self.wants_statistics() {
             let keys: BTreeMap<usize, TraceKey> = lights
                 .iter()
-                .map(|light| (light.light, self.trace_key(self.lattice_size(light), 0, &[])))
+                .map(|light| {
+                    (
+                        light.light,
+                        self.trace_key(light, self.lattice_size(light), 0, &[]),
+                    )
+                })
                 .collect();
             if states.statistics.as_ref().is_none_or(|(known, _)| *known != keys) {
                 let mut statistics = FootprintStatistics::default();

@@ -1,6 +1,7 @@
 //! What a session keeps of one light: rays, and the maps of the levels of the last bake.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use super::map_size::Sizes;
 use super::soft_level::Resolved;
@@ -15,6 +16,9 @@ use crate::light_pass::wavefront::kept_rays::KeptRays;
 use crate::light_pass::wavefront::overreach::Overreach;
 use crate::light_pass::wavefront::pass::TracedLight;
 use crate::light_pass::wavefront::refine::Round;
+use crate::optics::LinearSrgb;
+use crate::optics::spectrum::Spectrum;
+use crate::scene::Light;
 use crate::settings::BakeSettings;
 use crate::transport::EffectSet;
 
@@ -31,6 +35,8 @@ pub(super) struct TraceKey {
     pub(super) coarser: i32,
     /// Where cells are divided further, round by round.
     pub(super) rounds: Vec<Round>,
+    /// Its spectrum, where its wavelengths go different ways.
+    pub(super) lamp: Option<Arc<Spectrum>>,
 }
 
 /// All that a light's maps depend on beside the scene.
@@ -84,6 +90,8 @@ pub(super) struct LightLevel {
     pub(super) error: Option<KeptError>,
     /// To be deposited again; `None` where that was too much to keep.
     pub(super) traced: Option<TracedLight>,
+    /// Whether the maps have the light's colour already.
+    pub(super) has_own_colour: bool,
     /// Of a soft light: what its error is made of.
     pub(super) parts: SoftParts,
 }
@@ -148,6 +156,15 @@ pub(super) struct LightState {
 }
 
 impl LightLevel {
+    /// What its maps are multiplied by per channel.
+    pub(super) fn strength(&self, light: &Light) -> LinearSrgb {
+        if self.has_own_colour {
+            LinearSrgb::grey(light.strength().luminance())
+        } else {
+            light.strength()
+        }
+    }
+
     /// Memory of its maps and paths [bytes].
     pub(super) fn bytes(&self) -> u64 {
         let texels = self.maps.iter().map(|(_, map)| map.chart.texel_count() as u64);

@@ -18,6 +18,7 @@ pub mod result;
 mod scene_change;
 mod sizes;
 mod soft_level;
+mod spectra;
 mod splat_level;
 pub mod survey;
 mod wavefront_level;
@@ -51,6 +52,7 @@ use indirect_work::{Gathering, IndirectWork};
 use light_level::LightStates;
 use scene_change::SceneChange;
 use sizes::MapSizes;
+use spectra::Spectra;
 
 /// Owns a scene with all that is derived from it, and bakes it as often as scene or settings change. What a change does
 /// not touch is kept: hierarchy, parametrisations, item buffers, what rays met, patches, maps, and their errors.
@@ -296,8 +298,11 @@ impl BakeSession {
         let mut lamps = DirectWork::default();
         if plan.is_on(Effect::LightPass) {
             let smooth = (!plan.is_on(Effect::Bumps)).then(|| tracer.without_bumps());
+            let seen = smooth.as_ref().unwrap_or(&tracer);
+            let spectra = Spectra::new(seen, &aim, &plan)?;
             let layer = CausticLayer {
-                tracer: smooth.as_ref().unwrap_or(&tracer),
+                tracer: seen,
+                spectra: &spectra,
                 aim: &aim,
                 settings,
                 sizes: &self.sizes,

@@ -205,7 +205,7 @@ impl CausticLayer<'_> {
         let size = self.soft_lattice(light, resolved.lattice);
         let (_, last) = self.soft_ends(light);
         let coarser = last as i32 - resolved.lattice as i32;
-        let mut trace = self.trace_key(size, coarser, &[]);
+        let mut trace = self.trace_key(light, size, coarser, &[]);
         // It chooses the points of all wavefronts.
         trace.settings.seed = self.settings.seed;
         LevelKey {
@@ -298,6 +298,7 @@ impl CausticLayer<'_> {
             noise: None,
             error: None,
             traced: None,
+            has_own_colour: false,
             parts: SoftParts {
                 coarse: Some(coarse),
                 ..SoftParts::default()

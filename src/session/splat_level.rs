@@ -73,6 +73,7 @@ impl CausticLayer<'_> {
             overreaches: Vec::new(),
             error: None,
             traced: None,
+            has_own_colour: false,
             parts: SoftParts::default(),
         })
     }
@@ -187,7 +188,7 @@ impl CausticLayer<'_> {
             first: &mut maps,
             second: None,
         };
-        let source = source_of(state, &self.trace_key(lattice.size, 0, &[]));
+        let source = source_of(state, &self.trace_key(light, lattice.size, 0, &[]));
         let (mut report, _) = pass::run(&depositor, source, &mut all, &chart_for, &listener);
         // The kernels of the coarse run are in no map.
         report.splats = 0;

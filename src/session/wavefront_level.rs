@@ -19,6 +19,7 @@ use crate::light_pass::wavefront::lattice::WavefrontLattice;
 use crate::light_pass::wavefront::pass::{Room, WavefrontDepositor};
 use crate::light_pass::wavefront::receivers::Receivers;
 use crate::light_pass::wavefront::refine::Refinement;
+use crate::light_pass::wavefront::spectrum::to_linear_srgb;
 use crate::light_pass::wavefront::trace::StrandTracer;
 use crate::progress::Control;
 use crate::settings::Estimator;
@@ -65,6 +66,11 @@ impl CausticLayer<'_> {
             None => depositor.run(&mut state.rays, Some(&mut maps), &listener, self.room()),
         };
         let mut report = report;
+        let has_own_colour = self.spectra.of(light.light).is_some();
+        if has_own_colour {
+            maps.transform(to_linear_srgb);
+            report.ledger = report.ledger.transformed(to_linear_srgb);
+        }
         take_strays(&mut maps, &mut report.ledger);
         course.outcome.count(&report, course.clock);
         (!report.cancelled).then_some(LightLevel {
@@ -76,6 +82,7 @@ impl CausticLayer<'_> {
             noise: None,
             error: None,
             traced,
+            has_own_colour,
             parts: SoftParts::default(),
         })
     }
@@ -213,6 +220,10 @@ impl CausticLayer<'_> {
         );
         let mut tracer = tracer.with_closeness(self.closeness(light));
         tracer.bumps = BumpCells::UNDIVIDED;
+        let spectrum = self.spectra.of(light.light);
+        if let Some(spectrum) = spectrum {
+            tracer = tracer.at_node(spectrum, 0);
+        }
         WavefrontLattice {
             tracer,
             item_buffer: &light.item_buffer,
@@ -220,6 +231,7 @@ impl CausticLayer<'_> {
             unit,
             refinement: None,
             bodies,
+            spectrum,
         }
     }
 }

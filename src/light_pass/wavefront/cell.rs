@@ -111,17 +111,19 @@ pub struct CellCutter<'a> {
     pub tone: Tone,
     /// What that is in the light's channels.
     pub colour: LinearSrgb,
+    /// Light that has patches already, ascending.
+    pub done: &'a [PathSignature],
 }
 
 /// How often a cell was divided.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Depth {
     /// Because it, or a cell around it, holds a small body.
-    bodies: u32,
+    pub(super) bodies: u32,
     /// For detail of the normals.
-    bumps: u32,
+    pub(super) bumps: u32,
     /// In rounds of refinement.
-    rounds: usize,
+    pub(super) rounds: usize,
     /// Because its cuts were ambiguous.
     pub(super) ambiguous: u32,
 }
@@ -198,7 +200,7 @@ impl CellCutter<'_> {
         let strands = signatures(cell, work, |sample, found| {
             found.extend(sample.strands.iter().map(|strand| strand.signature));
         });
-        for signature in strands {
+        for signature in strands.into_iter().filter(|signature| !self.is_done(*signature)) {
             for region in regions(
                 cell,
                 &|edge, backwards| reach_of(cell, edge, work, signature, backwards),
@@ -292,9 +294,30 @@ impl CellCutter<'_> {
     pub(super) fn patches(&self, cell: &Cell, work: &mut Workspace, out: &mut CellOutput) {
         let ids = cell.corners.map(|corner| corner.sample);
         for strand in 0..work.get(ids[0]).strands.len() {
-            let corners = ids.map(|id| (id, strand as u16));
-            self.rectangle(cell, corners, work, out);
+            if !self.is_done(work.get(ids[0]).strands[strand].signature) {
+                let corners = ids.map(|id| (id, strand as u16));
+                self.rectangle(cell, corners, work, out);
+            }
         }
+    }
+
+    /// The patch of one strand that all corners have.
+    pub(super) fn patch(
+        &self,
+        cell: &Cell,
+        signature: PathSignature,
+        work: &mut Workspace,
+        out: &mut CellOutput,
+    ) {
+        let corners = cell.corners.map(|corner| {
+            let strand = work.get(corner.sample).find(signature);
+            (corner.sample, strand.expect("all corners have it") as u16)
+        });
+        self.rectangle(cell, corners, work, out);
+    }
+
+    fn is_done(&self, signature: PathSignature) -> bool {
+        self.done.binary_search(&signature).is_ok()
     }
 
     /// Books what surfaces did with the light of a cell whose corners agree.
@@ -431,13 +454,16 @@ impl CellCutter<'_> {
     }
 
     /// Each corner stands for its quarter of the cell.
-    fn scatter(&self, cell: &Cell, work: &Workspace, out: &mut CellOutput) {
+    pub(super) fn scatter(&self, cell: &Cell, work: &Workspace, out: &mut CellOutput) {
         let centre = cell.corners[0].square.lerp(cell.corners[2].square, 0.5);
         for corner in cell.corners {
             let (low, high) = (corner.square.min(centre), corner.square.max(centre));
             let area = (high.x - low.x) * (high.y - low.y);
             let sample = work.get(corner.sample);
             for strand in 0..sample.strands.len() {
+                if self.is_done(sample.strands[strand].signature) {
+                    continue;
+                }
                 out.splats += 1;
                 out.patches.push(Patch {
                     corners: [(corner.sample, strand as u16); 4],

@@ -121,6 +121,11 @@ fn narrowest(share: f64) -> f64 {
     (-f64::from(bits.clamp(0, JUMP_BITS))).exp2()
 }
 
+/// Whether a step of a strand is so long that it may hide a jump.
+pub fn is_suspicious(a: &LightSample, b: &LightSample, signature: PathSignature, step: DVec2) -> bool {
+    is_stretched(a, b, signature, step, SUSPICIOUS_STRETCH)
+}
+
 /// Whether two samples saw light go the same ways.
 pub fn same_ways(a: &LightSample, b: &LightSample) -> bool {
     a.strands.len() == b.strands.len()

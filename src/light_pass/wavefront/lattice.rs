@@ -289,9 +289,7 @@ impl WavefrontLattice<'_> {
         }
         for (column, _) in wanted.iter().enumerate().filter(|(_, wanted)| **wanted) {
             traced.index[column] = traced.samples.len() as u32;
-            traced
-                .samples
-                .push(tracer.trace(face, self.square(column, row)));
+            traced.samples.push(tracer.trace(face, self.square(column, row)));
         }
         traced
     }
@@ -358,6 +356,7 @@ impl WavefrontLattice<'_> {
             spectrum: self.spectrum,
             tone: Tone::White,
             colour: self.spectrum.map_or(LinearSrgb::WHITE, |spectrum| spectrum.xyz),
+            done: &[],
         };
         let corner = |row: usize, column: usize| self.corner_at(first_row, row, column, index);
         let down = |column: usize, work: &mut Workspace| {

@@ -28,8 +28,6 @@ pub struct SpectralNode {
     /// CIE XYZ of the light that the node stands for where nothing is interpolated, of a lamp of 1 W
     /// (luminous-equivalent).
     pub xyz: LinearSrgb,
-    /// 1/λ² [nm⁻²].
-    place: f64,
 }
 
 /// Light of a narrow band.
@@ -96,7 +94,6 @@ impl LightSpectrum {
                 tracer: tracer.at_wavelength(wavelength),
                 basis: ColourBasis::at(wavelength),
                 xyz: as_channels(lamp.xyz_within(ranges[node].clone())),
-                place: places[node],
             }
         });
         let ladder = (0..=MOST_SLICES_LOG2)
@@ -193,7 +190,9 @@ impl Slice {
     pub fn strand(&self, nodes: [&Strand; NODES]) -> Strand {
         let mix = |of: &dyn Fn(&Strand) -> glam::DVec3| {
             let weighted = nodes.iter().zip(self.weights);
-            weighted.fold(glam::DVec3::ZERO, |sum, (strand, weight)| sum + of(strand) * weight)
+            weighted.fold(glam::DVec3::ZERO, |sum, (strand, weight)| {
+                sum + of(strand) * weight
+            })
         };
         let derivative = |of: &dyn Fn(&Strand) -> RayDerivative| RayDerivative {
             origin: mix(&|strand| of(strand).origin),
@@ -202,7 +201,9 @@ impl Slice {
         let flux_w = nodes
             .iter()
             .zip(self.weights)
-            .fold(LinearSrgb::BLACK, |sum, (strand, weight)| sum + strand.flux_w * weight);
+            .fold(LinearSrgb::BLACK, |sum, (strand, weight)| {
+                sum + strand.flux_w * weight
+            });
         let nearest = (0..NODES)
             .max_by(|a, b| self.weights[*a].total_cmp(&self.weights[*b]))
             .unwrap_or(0);

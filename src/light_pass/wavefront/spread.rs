@@ -152,11 +152,14 @@ impl<E: PathEffects> Spreader<'_, E> {
         out: &mut SpreadOutput,
     ) {
         let nodes: [[&Strand; NODES]; 4] = std::array::from_fn(|corner| {
+            let first = first[corner];
             std::array::from_fn(|node| match node.checked_sub(1) {
-                None => first[corner],
-                Some(other) => self
-                    .samples
-                    .strand(others[other][corner], patch.corners[corner].1),
+                None => first,
+                Some(other) => {
+                    let sample = self.samples.get(others[other][corner]);
+                    let strand = sample.find(first.signature);
+                    &sample.strands[strand.expect("the patch has it at all wavelengths")]
+                }
             })
         });
         let lands_alike = nodes.iter().all(|nodes| lands_alike(*nodes));
@@ -188,7 +191,7 @@ impl<E: PathEffects> Spreader<'_, E> {
                 (None, _) => 0.0,
             }
         };
-        nodes.iter().map(of_corner).fold(0.0, f64::max) / self.coarseness.max(1.0)
+        nodes.iter().map(of_corner).fold(0.0, f64::max)
     }
 
     fn spread_strands(&self, patch: &Patch, strands: &[&Strand], tint: Tint, out: &mut SpreadOutput) {
