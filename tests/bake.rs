@@ -57,6 +57,8 @@ mod smoothing;
 mod soft;
 #[path = "bake/sparse.rs"]
 mod sparse;
+#[path = "bake/spectral.rs"]
+mod spectral;
 #[path = "support/mod.rs"]
 mod support;
 #[path = "bake/surfaces.rs"]

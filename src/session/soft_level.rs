@@ -234,7 +234,8 @@ impl CausticLayer<'_> {
         let source = &self.tracer.scene().lights[light.light];
         let real_w = power_w * source.strength().max_channel();
         if power_w.is_finite() && power_w > 0.0 && real_w.is_finite() {
-            return Ok(FluxUnit::for_power(power_w * f64::from(MOST_WAVEFRONTS)));
+            let bound_w = power_w * self.spectra.most_of_a_channel(light.light);
+            return Ok(FluxUnit::for_power(bound_w * f64::from(MOST_WAVEFRONTS)));
         }
         Err(Error::failure(
             &self.tracer.scene().source,
@@ -298,7 +299,7 @@ impl CausticLayer<'_> {
             noise: None,
             error: None,
             traced: None,
-            has_own_colour: false,
+            has_own_colour: self.spectra.of(light.light).is_some(),
             parts: SoftParts {
                 coarse: Some(coarse),
                 ..SoftParts::default()
@@ -351,6 +352,8 @@ impl CausticLayer<'_> {
             sum.0.merge(report);
             sum.1.add(maps);
         }
+        self.spectra
+            .to_linear_srgb(light.light, &mut sum.1, &mut sum.0.ledger);
         sum
     }
 

@@ -5,10 +5,13 @@ use std::sync::Arc;
 
 use crate::error::Result;
 use crate::light_pass::caustic::setup::Aim;
-use crate::light_pass::wavefront::spectrum::LightSpectrum;
+use crate::light_pass::ledger_sum::LedgerSum;
+use crate::light_pass::receiver_maps::ReceiverMaps;
+use crate::light_pass::wavefront::spectrum::{LightSpectrum, to_linear_srgb};
 use crate::optics::spectrum::{Emission, Spectrum};
 use crate::plan::{Effect, EffectPlan};
 use crate::scene::{Light, LightKind};
+use crate::settings::{BakeSettings, Estimator};
 use crate::transport::Tracer;
 
 /// Room above a lamp's largest channel for what becomes of it in linear sRGB: the largest coefficient from XYZ.
@@ -25,10 +28,15 @@ impl Spectra {
     ///
     /// # Errors
     /// A light's colour has no spectrum.
-    pub(super) fn new(tracer: &Tracer, aim: &Aim, plan: &EffectPlan) -> Result<Self> {
+    pub(super) fn new(
+        tracer: &Tracer,
+        aim: &Aim,
+        plan: &EffectPlan,
+        settings: &BakeSettings,
+    ) -> Result<Self> {
         let scene = tracer.scene();
         let mut of_lights = BTreeMap::new();
-        if !plan.is_on(Effect::Refraction) {
+        if !plan.is_on(Effect::Refraction) || settings.estimator == Estimator::Splat {
             return Ok(Self { of_lights });
         }
         for aimed in &aim.lights {
@@ -54,6 +62,14 @@ impl Spectra {
     /// Its lamp, of 1 luminous-equivalent watt.
     pub(super) fn lamp(&self, light: usize) -> Option<&Arc<Spectrum>> {
         self.of_lights.get(&light).map(|(lamp, _)| lamp)
+    }
+
+    /// Puts what was summed of a light's XYZ into linear sRGB; nothing of a light without wavelengths.
+    pub(super) fn to_linear_srgb(&self, light: usize, maps: &mut ReceiverMaps, ledger: &mut LedgerSum) {
+        if self.of(light).is_some() {
+            maps.transform(to_linear_srgb);
+            *ledger = ledger.transformed(to_linear_srgb);
+        }
     }
 
     /// How many times its luminance a light may have in one channel.

@@ -19,7 +19,6 @@ use crate::light_pass::wavefront::lattice::WavefrontLattice;
 use crate::light_pass::wavefront::pass::{Room, WavefrontDepositor};
 use crate::light_pass::wavefront::receivers::Receivers;
 use crate::light_pass::wavefront::refine::Refinement;
-use crate::light_pass::wavefront::spectrum::to_linear_srgb;
 use crate::light_pass::wavefront::trace::StrandTracer;
 use crate::progress::Control;
 use crate::settings::Estimator;
@@ -66,11 +65,8 @@ impl CausticLayer<'_> {
             None => depositor.run(&mut state.rays, Some(&mut maps), &listener, self.room()),
         };
         let mut report = report;
-        let has_own_colour = self.spectra.of(light.light).is_some();
-        if has_own_colour {
-            maps.transform(to_linear_srgb);
-            report.ledger = report.ledger.transformed(to_linear_srgb);
-        }
+        self.spectra
+            .to_linear_srgb(light.light, &mut maps, &mut report.ledger);
         take_strays(&mut maps, &mut report.ledger);
         course.outcome.count(&report, course.clock);
         (!report.cancelled).then_some(LightLevel {
@@ -82,7 +78,7 @@ impl CausticLayer<'_> {
             noise: None,
             error: None,
             traced,
-            has_own_colour,
+            has_own_colour: self.spectra.of(light.light).is_some(),
             parts: SoftParts::default(),
         })
     }

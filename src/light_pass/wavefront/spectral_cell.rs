@@ -38,7 +38,7 @@ impl CellCutter<'_> {
         for (node, corners) in nodes.iter().enumerate() {
             if is_one {
                 let of_node = CellCutter {
-                    colour: spectrum.nodes[node].xyz,
+                    colour: spectrum.nodes[node].interpolated_xyz,
                     ..*self
                 };
                 of_node.book_whole(cell, *corners, work, out);

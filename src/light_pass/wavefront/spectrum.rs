@@ -28,6 +28,8 @@ pub struct SpectralNode {
     /// CIE XYZ of the light that the node stands for where nothing is interpolated, of a lamp of 1 W
     /// (luminous-equivalent).
     pub xyz: LinearSrgb,
+    /// What the node counts for where light is interpolated: the sum of that over all wavelengths.
+    pub interpolated_xyz: LinearSrgb,
 }
 
 /// Light of a narrow band.
@@ -88,17 +90,21 @@ impl LightSpectrum {
             between[1]..=*whole.end(),
             *whole.start()..=between[0],
         ];
+        let ladder: Vec<Vec<Slice>> = (0..=MOST_SLICES_LOG2)
+            .map(|log2| slices(lamp, (low, high), 1 << log2, places))
+            .collect();
+        let finest = &ladder[ladder.len() - 1];
         let nodes = std::array::from_fn(|node| {
             let wavelength = wavelength_at(places[node]);
             SpectralNode {
                 tracer: tracer.at_wavelength(wavelength),
                 basis: ColourBasis::at(wavelength),
                 xyz: as_channels(lamp.xyz_within(ranges[node].clone())),
+                interpolated_xyz: finest.iter().fold(LinearSrgb::BLACK, |sum, slice| {
+                    sum + slice.xyz * slice.weights[node]
+                }),
             }
         });
-        let ladder = (0..=MOST_SLICES_LOG2)
-            .map(|log2| slices(lamp, (low, high), 1 << log2, places))
-            .collect();
         Self {
             nodes,
             ladder,
