@@ -12,18 +12,12 @@ use crate::units::Flux;
 /// Flint glass, a third of it lead.
 const GLASS: &str = "F2";
 /// Corners of the cut outside, around.
-const CORNERS: u32 = 20;
+const CORNERS: u32 = 14;
 /// Segments of the smooth inside around for each corner.
 const FINER: u32 = 6;
 /// Radius and height above the foot of each ring of corners, from the foot to the rim [m]; every other ring is turned by
 /// half a corner.
-const RINGS_M: [[f64; 2]; 5] = [
-    [0.055, 0.0],
-    [0.09, 0.022],
-    [0.119, 0.05],
-    [0.136, 0.078],
-    [0.14, 0.1],
-];
+const RINGS_M: [[f64; 2]; 4] = [[0.055, 0.0], [0.1, 0.03], [0.13, 0.068], [0.14, 0.1]];
 /// Radius of the inside at the rim [m].
 const INSIDE_M: f64 = 0.128;
 /// Depth of the inside [m].
@@ -34,7 +28,7 @@ const GAP_M: f64 = 0.001;
 /// The bowl, 28 cm wide and 10 cm high, and a lamp of 20 W (13,660 lm) of daylight behind it.
 pub fn build() -> Scene {
     let mut scene = Scene::default();
-    let table = shapes::floor([-0.9, 0.9], [-0.7, 0.7], 0.0);
+    let table = shapes::floor([-1.5, 1.5], [-1.5, 1.0], 0.0);
     parts::add(
         &mut scene,
         "floor",
@@ -42,13 +36,13 @@ pub fn build() -> Scene {
         parts::matte("white", LinearSrgb::grey(0.8)),
     );
     parts::add(&mut scene, "bowl", bowl(), parts::glass(GLASS));
-    let lamp = parts::point_light("lamp", DVec3::new(0.45, 0.5, -0.35), Flux(20.0));
+    let lamp = parts::point_light("lamp", DVec3::new(0.5, 0.62, -0.4), Flux(20.0));
     scene.lights.push(parts::daylight(lamp));
     scene.cameras = vec![
         Camera::look_at(
             "camera",
-            DVec3::new(-0.15, 0.5, 0.62),
-            DVec3::new(-0.06, 0.0, 0.03),
+            DVec3::new(-0.12, 0.52, 0.58),
+            DVec3::new(-0.07, 0.0, 0.02),
             0.7,
         ),
         Camera::look_at(
@@ -138,7 +132,7 @@ fn add_rim(mesh: &mut Mesh) {
 
 /// The lower half of an ellipsoid, hollow side up.
 fn inside() -> Mesh {
-    shapes::sheet(CORNERS * FINER, 32, inside_at)
+    shapes::sheet(CORNERS * FINER, 20, inside_at)
 }
 
 /// Position and normal of the inside: `u` around, `v` from the rim to the bottom.

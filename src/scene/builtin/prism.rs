@@ -67,8 +67,7 @@ pub fn build() -> Scene {
     let glass = parts::glass(GLASS);
     let direction = prism.incoming(glass.ior);
     let mut scene = Scene::default();
-    let mut wall = shapes::rectangle(DVec3::new(1.5, 0.5, 0.0), DVec3::Z * 0.7, DVec3::Y * 0.7);
-    wall.normals.fill(DVec3::NEG_X);
+    let wall = shapes::rectangle(DVec3::new(1.5, 0.5, 0.0), DVec3::Z * 0.7, DVec3::Y * 0.7);
     parts::add(
         &mut scene,
         "wall",

@@ -78,10 +78,15 @@ pub fn prism(outline: [DVec3; 3], along: DVec3) -> Mesh {
     append(&mut mesh, &facet([a, c, b]));
     append(&mut mesh, &facet(outline.map(|corner| corner + along)));
     for (from, to) in [(a, b), (b, c), (c, a)] {
-        let (half_side, half_along) = ((to - from) * 0.5, along * 0.5);
+        let side = [from, to, to + along, from + along];
         append(
             &mut mesh,
-            &rectangle(from + half_side + half_along, half_side, half_along),
+            &Mesh {
+                positions: side.to_vec(),
+                normals: vec![(to - from).cross(along).normalize(); 4],
+                triangles: vec![[0, 1, 2], [0, 2, 3]],
+                ..Mesh::default()
+            },
         );
     }
     mesh

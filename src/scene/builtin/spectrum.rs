@@ -18,21 +18,21 @@ const BALL_M: f64 = 0.06;
 /// What both stand above the table: faces in the same place would have no order [m].
 const GAP_M: f64 = 0.001;
 
-/// A white table of 2 m × 1.3 m before a white wall, dimly lit by a lamp above.
+/// A white table of 2.6 m × 1.6 m before a white wall, dimly lit by a lamp above.
 pub fn build() -> Scene {
     let mut scene = Scene::default();
     let white = || parts::matte("white", LinearSrgb::grey(0.8));
     parts::add(
         &mut scene,
         "floor",
-        shapes::floor([-1.0, 1.0], [WALL_Z, 0.7], 0.0),
+        shapes::floor([-1.3, 1.3], [WALL_Z, 1.0], 0.0),
         white(),
     );
-    let wall = shapes::rectangle(DVec3::new(0.0, 0.4, WALL_Z), DVec3::X, DVec3::Y * 0.4);
+    let wall = shapes::rectangle(DVec3::new(0.0, 0.5, WALL_Z), DVec3::X * 1.3, DVec3::Y * 0.5);
     parts::add(&mut scene, "wall", wall, white());
     let glass = parts::glass(GLASS);
     let n = glass.ior;
-    let (prism, ball) = (prism(), DVec3::new(0.25, BALL_M + GAP_M, 0.25));
+    let (prism, ball) = (prism(n), DVec3::new(0.25, BALL_M + GAP_M, 0.25));
     parts::add(&mut scene, "prism", prism.mesh(0.1), glass);
     let glass = scene.materials.len() - 1;
     parts::add_with(&mut scene, "ball", shapes::sphere(ball, BALL_M, 6), glass);
@@ -44,9 +44,9 @@ pub fn build() -> Scene {
     scene.cameras = vec![
         Camera::look_at(
             "camera",
-            DVec3::new(0.1, 0.45, 1.05),
-            DVec3::new(0.12, 0.02, -0.3),
-            0.75,
+            DVec3::new(0.05, 0.5, 1.2),
+            DVec3::new(0.07, 0.0, -0.2),
+            0.72,
         ),
         Camera::look_at(
             "spectrum",
@@ -65,8 +65,7 @@ pub fn build() -> Scene {
 }
 
 /// Upright, turned so that yellow light leaves it to the wall at 50 degrees from the wall's normal.
-fn prism() -> Prism {
-    let n: f64 = 1.635;
+fn prism(n: f64) -> Prism {
     let turn = (0.5 * n).asin() - 30.0_f64.to_radians();
     let (sine, cosine) = (50.0_f64.to_radians() + turn).sin_cos();
     Prism {
