@@ -36,7 +36,7 @@ impl Spectra {
     ) -> Result<Self> {
         let scene = tracer.scene();
         let mut of_lights = BTreeMap::new();
-        if !plan.is_on(Effect::Refraction) || settings.estimator == Estimator::Splat {
+        if !plan.is_on(Effect::Dispersion) || settings.estimator == Estimator::Splat {
             return Ok(Self { of_lights });
         }
         for aimed in &aim.lights {
