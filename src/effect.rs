@@ -15,6 +15,8 @@ pub enum Effect {
     LightPass,
     /// Light that goes through a surface: solid bodies and panes.
     Refraction,
+    /// Refraction by wavelength: spectra.
+    Dispersion,
     /// Light that a surface sends back.
     Reflection,
     /// Beer and Lambert's absorption within bodies.
@@ -37,9 +39,10 @@ pub enum Effect {
 
 impl Effect {
     /// All of them, as they are listed.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 12] = [
         Self::LightPass,
         Self::Refraction,
+        Self::Dispersion,
         Self::Reflection,
         Self::Absorption,
         Self::Textures,
@@ -56,6 +59,7 @@ impl Effect {
         match self {
             Self::LightPass => "light_pass",
             Self::Refraction => "refraction",
+            Self::Dispersion => "dispersion",
             Self::Reflection => "reflection",
             Self::Absorption => "absorption",
             Self::Textures => "textures",
@@ -75,6 +79,7 @@ impl Effect {
                 "Light that meets glass, mirrors or water before it falls on diffuse surfaces."
             }
             Self::Refraction => "Light that goes through glass, water and panes.",
+            Self::Dispersion => "Glass bends each colour another way, and light is traced by wavelength.",
             Self::Reflection => "Light that mirrors, polish and glass send back.",
             Self::Absorption => "Coloured bodies take light along the way through them (Beer and Lambert).",
             Self::Textures => "Images on mirrors and glass tint the light that goes on from them.",

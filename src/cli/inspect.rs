@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use nephroid::effect::Effect;
 use nephroid::error::{Result, Warning};
 use nephroid::light_pass::emitter::Emitter;
+use nephroid::optics::Metal;
 use nephroid::plan::{self, EffectLine, EffectPlan};
 use nephroid::scene::{Light, LightKind, LightSize, Scene, SurfaceKind};
 use nephroid::session::{BakeSession, Survey};
@@ -13,6 +14,7 @@ use serde::Serialize;
 use super::bake::{self, Clock};
 use super::interrupt::Interrupt;
 use super::job::InspectJob;
+use super::spectral_report::{GlassReport, SpectrumReport};
 use super::survey_report::SurveyReport;
 use super::terminal::Terminal;
 
@@ -54,6 +56,9 @@ struct MaterialReport {
     surface: &'static str,
     objects: usize,
     ior: Option<f64>,
+    glass: Option<GlassReport>,
+    /// Of a table by wavelength.
+    metal: Option<&'static str>,
 }
 
 #[derive(Debug, Serialize)]
@@ -72,6 +77,8 @@ struct LightReport {
     angular_diameter_deg: Option<f64>,
     /// Of what glows, all its glowing sides.
     area_m2: Option<f64>,
+    /// Of a lamp that has one.
+    spectrum: Option<SpectrumReport>,
 }
 
 /// Width over height of the picture that eye-pass effects are told for.
@@ -153,6 +160,8 @@ fn material_reports(scene: &Scene) -> Vec<MaterialReport> {
                 SurfaceKind::Dielectric | SurfaceKind::ThinWall | SurfaceKind::Mixed
             )
             .then_some(material.ior),
+            glass: material.glass.as_deref().map(GlassReport::new),
+            metal: material.metal.map(Metal::name),
         })
         .filter(|report| report.objects > 0)
         .collect()
@@ -172,6 +181,7 @@ fn light_report(light: &Light, scene: &Scene) -> LightReport {
         radius_m: None,
         angular_diameter_deg: None,
         area_m2: None,
+        spectrum: light.spectrum.as_deref().map(SpectrumReport::new),
     };
     match light.kind {
         LightKind::Point { .. } => report.power_w = Some(beam_w),
@@ -214,7 +224,12 @@ impl LightReport {
         let stated = parts
             .iter()
             .filter_map(|(value, unit)| value.map(|value| format!(", {value:.4} {unit}")));
-        format!("{}: {}{}", self.name, self.kind, stated.collect::<String>())
+        let spectrum = self
+            .spectrum
+            .as_ref()
+            .map(|spectrum| format!(", {}", spectrum.line()));
+        let stated: String = stated.chain(spectrum).collect();
+        format!("{}: {}{stated}", self.name, self.kind)
     }
 }
 
@@ -272,12 +287,15 @@ fn text(report: &Report) -> String {
         );
     }
     for material in &report.materials {
-        let ior = material
-            .ior
-            .map_or(String::new(), |ior| format!(", ior {ior:.4}"));
+        let made_of = [
+            material.ior.map(|ior| format!(", ior {ior:.4}")),
+            material.glass.as_ref().map(|glass| format!(", {}", glass.line())),
+            material.metal.map(|metal| format!(", {metal} by wavelength")),
+        ];
+        let made_of: String = made_of.into_iter().flatten().collect();
         line(
             "material",
-            format!("{}: {}{ior}", material.name, material.surface),
+            format!("{}: {}{made_of}", material.name, material.surface),
         );
     }
     for light in &report.lights {

@@ -13,6 +13,7 @@ mod render;
 #[cfg(feature = "gpu")]
 mod render_path;
 mod scene_input;
+mod spectral_report;
 mod study;
 mod study_effects;
 mod study_values;

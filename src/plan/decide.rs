@@ -44,6 +44,7 @@ pub fn decide(scene: &Scene, settings: &BakeSettings, sights: &[Sight]) -> Effec
             &lets_through,
             "no lit surface lets light through",
         ),
+        decision.dispersion(pass.on),
         on_paths(
             Effect::Reflection,
             &|material| material.surface.is_specular(),
@@ -202,6 +203,27 @@ impl Decision<'_> {
             (_, Some((object, light, way))) => self.line(effect, true, self.lit_by(object, light, way)),
             (EffectSwitch::On, None) => self.line(effect, true, FORCED_ON),
             (EffectSwitch::Auto, None) => self.line(effect, false, none),
+        }
+    }
+
+    /// Called for by what is lit and bends each wavelength another way, of whatever colour the light is.
+    fn dispersion(&self, pass: bool) -> EffectLine {
+        let none = "no lit solid bends one wavelength more than another";
+        let line = self.on_paths(Effect::Dispersion, pass, &Material::is_dispersive, none);
+        let glasses = self.lit_objects().find_map(|(object, ..)| {
+            let material = self.scene.material_of(object);
+            material.glass.as_ref().filter(|_| material.is_dispersive())
+        });
+        match glasses {
+            Some(glass) if line.on => EffectLine {
+                reason: format!(
+                    "{}, and its glass has an Abbe number of {:.1}",
+                    line.reason,
+                    glass.dispersion.abbe_number()
+                ),
+                ..line
+            },
+            _ => line,
         }
     }
 

@@ -123,7 +123,7 @@ impl Accounts<'_> {
                 ..EffectCounts::default()
             },
             Effect::Indirect => self.meter.indirect,
-            Effect::Chains => EffectCounts::default(),
+            Effect::Dispersion | Effect::Chains => EffectCounts::default(),
         }
     }
 

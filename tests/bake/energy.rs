@@ -8,7 +8,9 @@ use crate::tools::{bake, builtin_scene, energy_fault, settings};
 #[test]
 fn ledgers_close_on_every_built_in_scene() {
     for name in builtin::NAMES {
-        let result = bake(builtin_scene(name), &settings(3e3, 64));
+        // A slit of a millimetre lets one ray of hundreds through.
+        let density = if name == "prism" { 2e6 } else { 3e3 };
+        let result = bake(builtin_scene(name), &settings(density, 64));
         assert_eq!(energy_fault(&result), None, "{name}");
         assert!(
             result

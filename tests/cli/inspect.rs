@@ -149,3 +149,47 @@ fn a_bake_tells_what_was_expected_and_what_it_took() {
     assert!((0.2..5.0).contains(&ratio), "{forecast}");
     assert!(manifest["course"].as_array().expect("points").len() >= 2);
 }
+
+#[test]
+fn glasses_metals_and_spectra_are_told() {
+    let sandbox = Sandbox::new();
+    sandbox.write("glasses.gltf", scenes::glasses());
+    let command = "inspect glasses.gltf --map-resolution 16";
+    let report = sandbox.succeed(&format!("{command} --json")).json();
+    let glass = &report["materials"][0]["glass"];
+    let number = |value: &serde_json::Value| value.as_f64().expect("a number");
+    assert_eq!(
+        (&glass["name"], &glass["range_nm"][0]),
+        (&"N-SF11".into(), &370.0.into())
+    );
+    // SCHOTT's data sheet of N-SF11.
+    assert!((number(&glass["n_d"]) - 1.78472).abs() < 1e-5);
+    assert!((number(&glass["abbe_number"]) - 25.68).abs() < 5e-3);
+    assert_eq!(report["materials"][1]["metal"], "Gold");
+    let spectrum = &report["lights"][0]["spectrum"];
+    // CIE 15:2018: illuminant A is a black body of 2856 K.
+    assert!((number(&spectrum["correlated_temperature_k"]) - 2856.0).abs() < 2.0);
+    assert_eq!(report["lights"][1]["spectrum"], serde_json::Value::Null);
+    let text = sandbox.succeed(command).stdout;
+    for word in [
+        "ior 1.7847, N-SF11 (V_d 25.7, measured from 370 to 2500 nm)",
+        "Gold by wavelength",
+        "spectrum of 2856 K, 360 to 830 nm, ",
+        " lm/W",
+        "dispersion: ",
+    ] {
+        assert!(text.contains(word), "no {word:?} in: {text}");
+    }
+    // Light of one colour alone has the largest efficacy there is: 683 lm/W at 555 nm.
+    let line = spectrum_of_a_line(&sandbox);
+    assert!((line - 683.0).abs() < 1.0, "{line} lm/W");
+}
+
+fn spectrum_of_a_line(sandbox: &Sandbox) -> f64 {
+    sandbox.write("line.gltf", scenes::glasses().replace("\"A\"", "\"line:555\""));
+    let report = sandbox
+        .succeed("inspect line.gltf --json --map-resolution 16")
+        .json();
+    let efficacy = report["lights"][0]["spectrum"]["lumens_per_watt"].as_f64();
+    efficacy.expect("a number")
+}

@@ -56,6 +56,39 @@ pub fn lamps_with_extent() -> String {
     scene.to_string()
 }
 
+/// Two triangles, one of N-SF11 and one of gold, under a lamp with the spectrum of illuminant A and one without.
+pub fn glasses() -> String {
+    let mut scene = triangle();
+    scene["materials"] = json!([
+        {"name": "flint", "pbrMetallicRoughness": {"metallicFactor": 0.0, "roughnessFactor": 0.0},
+         "extensions": {"KHR_materials_transmission": {"transmissionFactor": 1.0},
+                        "KHR_materials_volume": {"thicknessFactor": 0.1}},
+         "extras": {"glass": "N-SF11"}},
+        {"name": "leaf", "pbrMetallicRoughness": {"roughnessFactor": 0.0}, "extras": {"metal": "gold"}},
+    ]);
+    let mut leaf = scene["meshes"][0].clone();
+    leaf["primitives"][0]["material"] = json!(1);
+    scene["meshes"][0]["primitives"][0]["material"] = json!(0);
+    scene["meshes"] = json!([scene["meshes"][0], leaf]);
+    scene["extensionsUsed"] = json!([
+        "KHR_lights_punctual",
+        "KHR_materials_transmission",
+        "KHR_materials_volume"
+    ]);
+    scene["extensions"] = json!({"KHR_lights_punctual": {"lights": [
+        {"type": "point", "extras": {"spectrum": "A"}},
+        {"type": "point"},
+    ]}});
+    scene["nodes"] = json!([
+        {"mesh": 0, "name": "pane"},
+        {"mesh": 1, "name": "leaf", "translation": [0.0, 0.5, 0.0]},
+        {"translation": [0.0, 1.0, 0.0], "extensions": {"KHR_lights_punctual": {"light": 0}}},
+        {"translation": [0.0, 2.0, 0.0], "extensions": {"KHR_lights_punctual": {"light": 1}}},
+    ]);
+    scene["scenes"] = json!([{"nodes": [0, 1, 2, 3]}]);
+    scene.to_string()
+}
+
 /// A Radiance image of 2 × 1 pixels of 1 W/(m² sr): 128 · 2^(129 − 136) in each channel.
 pub fn grey_sky() -> Vec<u8> {
     let mut bytes = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 2\n".to_vec();

@@ -4,6 +4,9 @@ use std::collections::HashMap;
 use std::f64::consts::PI;
 
 use glam::DVec3;
+use nephroid::optics::Nanometres;
+use nephroid::optics::refraction::{reflect, refract};
+use nephroid::optics::wavelength::D_LINE;
 use nephroid::scene::builtin::{NAMES, build};
 use nephroid::scene::{LightKind, Mesh, Object, Scene, SurfaceKind};
 
@@ -60,8 +63,11 @@ fn every_name_builds_and_no_other() {
         assert_eq!(scene.name, name);
         assert_eq!(scene.source, format!("builtin:{name}"));
         assert!(
-            scene.objects.iter().any(|object| object.name == "floor"),
-            "{name} has no floor"
+            scene
+                .objects
+                .iter()
+                .any(|object| ["floor", "wall"].contains(&object.name.as_str())),
+            "{name} has neither floor nor wall"
         );
         assert!(!scene.lights.is_empty() && !scene.cameras.is_empty(), "{name}");
         assert!(
@@ -224,7 +230,7 @@ fn paraboloid_gathers_the_sun_in_its_focus() {
     };
     let focus = DVec3::new(0.0, -0.5, 0.0);
     for (position, normal) in dish.mesh.positions.iter().zip(&dish.mesh.normals) {
-        let reflected = nephroid::optics::refraction::reflect(direction, *normal);
+        let reflected = reflect(direction, *normal);
         let miss = (focus - *position).cross(reflected).length();
         assert!(miss < 1e-14, "misses the focus by {miss} m");
         assert!(reflected.dot(focus - *position) > 0.0);
@@ -324,4 +330,170 @@ fn showrooms_receivers_are_plane_with_coordinates_of_their_own() {
             .sum();
         assert_close(covered, 1.0, 1e-14, name);
     }
+}
+
+/// At minimum deviation light goes through a prism along its base, in and out at the same angle.
+#[test]
+fn prism_stands_at_minimum_deviation_for_yellow_light() {
+    let scene = scene("prism");
+    let prism = object(&scene, "prism");
+    assert_eq!(open_edges(&prism.mesh), 0);
+    // Equilateral, 6 cm each way.
+    let volume = 0.06 * 0.06 * 3.0_f64.sqrt() / 4.0 * 0.06;
+    assert_close(volume_m3(&prism.mesh), volume, 1e-12, "volume");
+    let LightKind::Sun { direction, .. } = scene.lights[0].kind else {
+        panic!("prism is lit by a sun");
+    };
+    let glass = &scene.materials[prism.material];
+    assert!(glass.is_dispersive());
+    let deviation = |n: f64| {
+        let (first, second) = (
+            DVec3::new(-0.75_f64.sqrt(), 0.5, 0.0),
+            DVec3::new(0.75_f64.sqrt(), 0.5, 0.0),
+        );
+        let inside = refract(direction, first, n).expect("it enters");
+        let out = refract(inside, -second, 1.0 / n).expect("it leaves");
+        (inside, direction.angle_between(out))
+    };
+    let (inside, yellow) = deviation(glass.index_at(D_LINE));
+    assert!((inside - DVec3::X).length() < 1e-12, "{inside}");
+    assert_close(
+        yellow.to_degrees(),
+        2.0 * (0.8175_f64).asin().to_degrees() - 60.0,
+        1e-12,
+        "deviation",
+    );
+    // As the solver's table of this scene has it.
+    for (nm, degrees) in [(400.0, 51.637_754_065_4), (700.0, 49.182_654_092_7)] {
+        let (_, found) = deviation(glass.index_at(Nanometres(nm)));
+        assert_close(found.to_degrees(), degrees, 1e-6, "deviation");
+    }
+}
+
+/// Where a ray meets the wall of `spectrum`.
+fn at_wall(origin: DVec3, direction: DVec3) -> DVec3 {
+    origin + direction * ((-0.6 - origin.z) / direction.z)
+}
+
+/// On the way through a flat face of a mesh, from where it is met.
+fn through_face(mesh: &Mesh, origin: DVec3, direction: DVec3, eta: f64) -> (DVec3, DVec3) {
+    let ray = |triangle: usize| {
+        let [a, b, c] = mesh.corners(triangle);
+        let normal = (b - a).cross(c - a).normalize();
+        let distance = (a - origin).dot(normal) / direction.dot(normal);
+        let point = origin + direction * distance;
+        let is_inside = [(a, b), (b, c), (c, a)]
+            .iter()
+            .all(|(from, to)| (*to - *from).cross(point - *from).dot(normal) >= 0.0);
+        (distance > 1e-9 && is_inside).then_some((distance, point, normal))
+    };
+    let hits = (0..mesh.triangles.len()).filter_map(ray);
+    let (_, point, normal) = hits.min_by(|a, b| a.0.total_cmp(&b.0)).expect("it meets a face");
+    let facing = if direction.dot(normal) > 0.0 {
+        -normal
+    } else {
+        normal
+    };
+    (point, refract(direction, facing, eta).expect("it goes through"))
+}
+
+/// One reflection within a ball, from where a ray meets it: the way of a rainbow's light.
+fn through_ball(centre: DVec3, radius: f64, origin: DVec3, direction: DVec3, n: f64) -> (DVec3, DVec3) {
+    let meet = |origin: DVec3, direction: DVec3, first: bool| {
+        let to = origin - centre;
+        let half = to.dot(direction);
+        let root = (half * half - to.length_squared() + radius * radius).sqrt();
+        let point = origin + direction * (if first { -half - root } else { -half + root });
+        (point, (point - centre).normalize())
+    };
+    let (point, normal) = meet(origin, direction, true);
+    let inside = refract(direction, normal, n).expect("it enters");
+    let (point, normal) = meet(point, inside, false);
+    let back = reflect(inside, normal);
+    let (point, normal) = meet(point, back, false);
+    (point, refract(back, -normal, 1.0 / n).expect("it leaves"))
+}
+
+/// Whether a point is in the picture of the scene's first camera, 3 wide and 2 high.
+fn is_in_view(scene: &Scene, point: DVec3) -> bool {
+    let camera = &scene.cameras[0];
+    let to = point - camera.position;
+    let (depth, half) = (to.dot(camera.forward), (0.5 * camera.vertical_fov_rad).tan());
+    let (x, y) = (to.dot(camera.right()) / depth, to.dot(camera.up) / depth);
+    depth > 0.0 && y.abs() < half && x.abs() < 1.5 * half
+}
+
+#[test]
+fn prism_and_ball_throw_their_spectra_onto_the_wall_in_view() {
+    let scene = scene("spectrum");
+    let (prism, ball) = (object(&scene, "prism"), object(&scene, "ball"));
+    let glass = &scene.materials[prism.material];
+    assert_eq!((open_edges(&prism.mesh), open_edges(&ball.mesh)), (0, 0));
+    assert_close(
+        volume_m3(&prism.mesh),
+        0.06 * 0.06 * 0.75_f64.sqrt() / 2.0 * 0.1,
+        1e-12,
+        "volume",
+    );
+    let (low, high) = ball.mesh.bounds().expect("has vertices");
+    let centre = 0.5 * (low + high);
+    let beam = |index: usize| match scene.lights[index].kind {
+        LightKind::Spot {
+            position, direction, ..
+        } => (position, direction),
+        other => panic!("{other:?} is no beam"),
+    };
+    let hits = |nm: f64| {
+        let n = glass.index_at(Nanometres(nm));
+        let (origin, direction) = beam(0);
+        let (entry, inside) = through_face(&prism.mesh, origin, direction, n);
+        let (exit, out) = through_face(&prism.mesh, entry, inside, 1.0 / n);
+        let (origin, direction) = beam(1);
+        let (last, back) = through_ball(centre, 0.06, origin, direction, n);
+        [at_wall(exit, out), at_wall(last, back)]
+    };
+    let [violet, green, red] = [400.0, 550.0, 700.0].map(hits);
+    for (index, what, least_m) in [(0, "prism", 0.08), (1, "ball", 0.015)] {
+        let places = [violet[index], green[index], red[index]];
+        for place in places {
+            assert!(
+                (0.0..1.0).contains(&place.y) && place.x.abs() < 1.3,
+                "{what}: {place} is off the wall"
+            );
+            assert!(is_in_view(&scene, place), "{what}: {place}");
+        }
+        let spread = places[0].distance(places[2]);
+        assert!(spread > least_m, "{what}: {spread} m from violet to red");
+        let share = places[0].distance(places[1]) / spread;
+        assert!(
+            (0.5..0.9).contains(&share),
+            "{what}: green at {share}, nearer to red"
+        );
+    }
+    // Rays beside the middle of the ball's beam leave it alike: a rainbow, not a blur.
+    let n = glass.index_at(D_LINE);
+    let (origin, direction) = beam(1);
+    let way = |aside_m: f64| through_ball(centre, 0.06, origin + DVec3::X * aside_m, direction, n).1;
+    assert!(way(0.001).angle_between(way(-0.001)) < 1e-3);
+}
+
+#[test]
+fn bowl_is_closed_cut_glass_under_daylight() {
+    let scene = scene("bowl");
+    let bowl = object(&scene, "bowl");
+    assert_eq!(open_edges(&bowl.mesh), 0);
+    // Between the ellipsoid's half that is missing and the cone frustums around: rather thick.
+    let hollow = 2.0 / 3.0 * PI * 0.128 * 0.128 * 0.084;
+    let filled = volume_m3(&bowl.mesh) + hollow;
+    assert!((0.0033..0.0040).contains(&filled), "{filled} m³");
+    let (low, _) = bowl.mesh.bounds().expect("has vertices");
+    assert!(low.y > 0.0, "it does not stand in the table");
+    let glass = &scene.materials[bowl.material];
+    assert!(glass.is_dispersive());
+    // F2 by SCHOTT's data sheet.
+    assert_close(glass.ior, 1.62004, 1e-5, "index");
+    assert!(scene.lights[0].spectrum.is_some());
+    assert!(
+        is_in_view(&scene, DVec3::new(0.14, 0.1, 0.0)) && is_in_view(&scene, DVec3::new(-0.14, 0.1, 0.0))
+    );
 }

@@ -1,6 +1,7 @@
 //! The references' own meshes, read from their files, are those of the built-in scenes.
 
 use glam::DVec3;
+use nephroid::optics::Nanometres;
 use nephroid::scene::builtin::build;
 use nephroid::scene::{LightKind, LoadOptions, Mesh, Scene};
 
@@ -146,4 +147,56 @@ fn references_are_whole() {
         );
     }
     project_file("assets/reference/S2_profile.csv");
+}
+
+/// The corners of a mesh, triangle by triangle, in an order that says nothing of the file's.
+fn corners(mesh: &Mesh) -> Vec<[i64; 3]> {
+    // The file states 32-bit numbers: to 1 µm.
+    let round = |point: DVec3| point.to_array().map(|x| (x * 1e6).round() as i64);
+    let all = (0..mesh.triangles.len()).flat_map(|triangle| mesh.corners(triangle));
+    let mut all: Vec<_> = all.map(round).collect();
+    all.sort_unstable();
+    all.dedup();
+    all
+}
+
+#[test]
+fn the_prisms_file_and_the_built_in_scene_agree() {
+    let Some(path) = shared_or_skip("oracle/S4.glb") else {
+        return;
+    };
+    let scene = load_path(&path, &LoadOptions::default()).unwrap_or_else(|error| panic!("{error}"));
+    let ours = build("prism").expect("is built in");
+    assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
+    assert_same_light(&scene, &ours);
+    assert_eq!(scene.objects.len(), ours.objects.len());
+    for (index, (theirs, own)) in scene.objects.iter().zip(&ours.objects).enumerate() {
+        assert_eq!(corners(&theirs.mesh), corners(&own.mesh), "{}", own.name);
+        assert_close(theirs.mesh.area_m2(), own.mesh.area_m2(), 1e-4, &own.name);
+        let (theirs, own) = (scene.material_of(index), ours.material_of(index));
+        assert_eq!(
+            (theirs.surface, theirs.base_colour),
+            (own.surface, own.base_colour)
+        );
+        for nm in [400.0, 486.13, 587.56, 656.27, 700.0] {
+            let [a, b] = [theirs, own].map(|material| material.index_at(Nanometres(nm)));
+            assert_close(a, b, 1e-12, "refractive index");
+        }
+    }
+    let uvs = |scene: &Scene| {
+        scene.objects[0]
+            .mesh
+            .uv0
+            .clone()
+            .expect("the wall has TEXCOORD_0")
+    };
+    assert_eq!(scene.objects[0].mesh.positions.len(), 4);
+    for (position, uv) in scene.objects[0].mesh.positions.iter().zip(uvs(&scene)) {
+        let own = &ours.objects[0].mesh;
+        let near = own
+            .positions
+            .iter()
+            .position(|own| own.distance(*position) < 1e-6);
+        assert_eq!(uvs(&ours)[near.expect("the same corner")], uv);
+    }
 }

@@ -1,12 +1,19 @@
 //! Glass, metals and spectra of lamps, as files state them.
 
 use std::path::Path;
+use std::sync::Arc;
 
+use glam::DVec3;
+use nephroid::effect::{Effect, EffectSwitch, EffectSwitches};
 use nephroid::optics::glass::{Dispersion, catalogue};
 use nephroid::optics::spectrum::{Spectrum, illuminant};
 use nephroid::optics::wavelength::{C_LINE, D_LINE, F_LINE};
 use nephroid::optics::{LinearSrgb, Metal, Nanometres};
-use nephroid::scene::{Light, LoadOptions, Material, Scene, SurfaceKind};
+use nephroid::plan::EffectLine;
+use nephroid::scene::builtin::{self, parts, shapes};
+use nephroid::scene::{Edit, Light, LoadOptions, Material, Scene, SurfaceKind};
+use nephroid::session::BakeSession;
+use nephroid::settings::BakeSettings;
 use serde_json::{Value, json};
 
 use crate::glb::{Glb, assert_warned, load_path};
@@ -352,4 +359,160 @@ fn every_glass_of_the_catalogue_can_be_in_a_file() {
         assert_close(material(&scene).ior, glass.dispersion.n_d(), 1e-15, &glass.name);
         assert_eq!(material(&scene).base_colour, LinearSrgb::WHITE);
     }
+}
+
+#[test]
+fn an_edited_index_keeps_the_abbe_number_and_is_taken_back_exactly() {
+    let scene = solid(json!({}), json!({ "glass": "F2" })).scene();
+    let (there, back) = undone(
+        &scene,
+        &Edit::MaterialIor {
+            material: 0,
+            ior: 1.9,
+        },
+    );
+    let v_d = |scene: &Scene| {
+        material(scene)
+            .glass
+            .as_ref()
+            .map(|glass| glass.dispersion.abbe_number())
+    };
+    assert_eq!(material(&there).ior, 1.9);
+    assert_close(
+        v_d(&there).expect("a glass"),
+        v_d(&scene).expect("a glass"),
+        1e-9,
+        "Abbe number",
+    );
+    assert_eq!(material(&back).glass, material(&scene).glass);
+    assert_eq!(material(&back).ior, material(&scene).ior);
+    // By way of 1, where nothing disperses, the number is still known.
+    let (without, _) = undone(
+        &there,
+        &Edit::MaterialIor {
+            material: 0,
+            ior: 1.0,
+        },
+    );
+    let (again, _) = undone(
+        &without,
+        &Edit::MaterialIor {
+            material: 0,
+            ior: 1.9,
+        },
+    );
+    assert!(!material(&without).is_dispersive() && v_d(&again).is_some_and(|v_d| (v_d - 36.4).abs() < 0.1));
+}
+
+#[test]
+fn an_edited_colour_takes_the_place_of_a_table_and_is_taken_back_exactly() {
+    let factors = json!({ "roughnessFactor": 0.0 });
+    let gold = json!({ "pbrMetallicRoughness": factors, "extras": { "metal": "gold" } });
+    let spectrum = json!({ "type": "point", "extras": { "spectrum": "FL11" } });
+    let scene = Glb::triangle()
+        .with_material(gold)
+        .with_light("lamp", spectrum)
+        .scene();
+    let base_colour = LinearSrgb::new(0.1, 0.2, 0.3);
+    let (there, back) = undone(
+        &scene,
+        &Edit::MaterialTint {
+            material: 0,
+            base_colour,
+        },
+    );
+    assert_eq!(
+        (material(&there).base_colour, material(&there).metal),
+        (base_colour, None)
+    );
+    assert_eq!(material(&back).metal, material(&scene).metal);
+    assert_eq!(material(&back).base_colour, material(&scene).base_colour);
+    let edit = Edit::LightColour {
+        light: 0,
+        colour: base_colour,
+    };
+    let (there, back) = undone(&scene, &edit);
+    assert_eq!(
+        (there.lights[0].colour, &there.lights[0].spectrum),
+        (base_colour, &None)
+    );
+    assert_eq!(back.lights, scene.lights);
+}
+
+/// The edited scene, and that with the edit taken back.
+fn undone(scene: &Scene, edit: &Edit) -> (Scene, Scene) {
+    let (there, inverse) = edit.apply(scene).expect("it is in range");
+    let (back, _) = inverse.apply(&there).expect("what was, is in range");
+    (there, back)
+}
+
+fn dispersion_of(scene: Scene, settings: &BakeSettings) -> EffectLine {
+    let mut session = BakeSession::new(Arc::new(scene)).expect("a session");
+    let plan = session.plan(settings).expect("a plan");
+    let line = plan
+        .effects
+        .into_iter()
+        .find(|line| line.effect == Effect::Dispersion);
+    line.expect("dispersion is planned")
+}
+
+fn built_in(name: &str) -> Scene {
+    builtin::build(name).expect("is built in")
+}
+
+fn switched(switch: EffectSwitch) -> BakeSettings {
+    BakeSettings {
+        effects: EffectSwitches::default().with(Effect::Dispersion, switch),
+        ..BakeSettings::default()
+    }
+}
+
+#[test]
+fn dispersion_is_called_for_by_a_lit_solid_that_disperses() {
+    for (name, object, light) in [("prism", "prism", "light"), ("bowl", "bowl", "lamp")] {
+        let line = dispersion_of(built_in(name), &BakeSettings::default());
+        assert!(line.on, "{line:?}");
+        for part in [format!("`{object}`"), format!("`{light}`"), "Abbe number".into()] {
+            assert!(line.reason.contains(&part), "{line:?}");
+        }
+    }
+    for name in ["ball", "mirror", "pool"] {
+        let line = dispersion_of(built_in(name), &BakeSettings::default());
+        assert!(
+            !line.on && line.reason.contains("no lit solid bends"),
+            "{name}: {line:?}"
+        );
+    }
+    // What no light reaches calls for nothing.
+    let mut sealed = built_in("bowl");
+    let safe = shapes::cuboid(DVec3::new(-0.2, -0.1, -0.2), DVec3::new(0.2, 0.2, 0.2));
+    parts::add(
+        &mut sealed,
+        "safe",
+        safe,
+        parts::matte("steel", LinearSrgb::grey(0.5)),
+    );
+    let line = dispersion_of(sealed, &BakeSettings::default());
+    assert!(!line.on, "{line:?}");
+    // The same for a pane of the same glass: it does not bend light.
+    let mut pane = built_in("prism");
+    let material = pane.objects[1].material;
+    pane.materials[material].volume = None;
+    pane.materials[material].surface = SurfaceKind::ThinWall;
+    assert!(!dispersion_of(pane, &BakeSettings::default()).on);
+}
+
+#[test]
+fn dispersion_is_switched_like_any_effect() {
+    let off = dispersion_of(built_in("prism"), &switched(EffectSwitch::Off));
+    assert_eq!((off.on, off.switch), (false, EffectSwitch::Off));
+    assert!(off.reason.contains("switched off by the user"));
+    let forced = dispersion_of(built_in("ball"), &switched(EffectSwitch::On));
+    assert!(
+        forced.on && forced.reason.contains("nothing calls for it"),
+        "{forced:?}"
+    );
+    let mut settings = switched(EffectSwitch::On);
+    settings.effects.set(Effect::LightPass, EffectSwitch::Off);
+    assert!(!dispersion_of(built_in("prism"), &settings).on);
 }

@@ -1,20 +1,23 @@
-//! Procedural scenes. All but `showroom` and `pool-bump` have a reference solution in `assets/reference/` and are meshes of the exact
-//! surfaces that it was computed on.
+//! Procedural scenes. All but `showroom`, `pool-bump`, `spectrum` and `bowl` have a reference solution and are meshes of
+//! the exact surfaces that it was computed on: in `assets/reference/`, or for `prism` by wavelength in closed form.
 
 mod ball;
+mod bowl;
 mod mirror;
 mod paraboloid;
 pub mod parts;
 pub mod pool;
+mod prism;
 mod ring;
 pub mod shapes;
 mod showroom;
 mod slab;
+mod spectrum;
 
 use super::Scene;
 
 /// Names of all built-in scenes, the program's default first.
-pub const NAMES: [&str; 9] = [
+pub const NAMES: [&str; 12] = [
     "showroom",
     "ring",
     "ball",
@@ -24,6 +27,9 @@ pub const NAMES: [&str; 9] = [
     "slab",
     "paraboloid",
     "nephroid",
+    "prism",
+    "spectrum",
+    "bowl",
 ];
 
 /// The scene of that name; `None` where there is none.
@@ -38,6 +44,9 @@ pub fn build(name: &str) -> Option<Scene> {
         "slab" => slab::build(),
         "paraboloid" => paraboloid::build(),
         "nephroid" => ring::nephroid(),
+        "prism" => prism::build(),
+        "spectrum" => spectrum::build(),
+        "bowl" => bowl::build(),
         _ => return None,
     };
     scene.name = name.into();

@@ -1,8 +1,11 @@
 //! What the built-in scenes have in common.
 
+use std::sync::Arc;
+
 use glam::DVec3;
 
-use crate::optics::LinearSrgb;
+use crate::optics::spectrum::illuminants;
+use crate::optics::{Glass, LinearSrgb};
 use crate::scene::{Camera, Light, LightKind, Material, Mesh, Object, Scene, SurfaceKind, Volume};
 use crate::units::{Flux, Irradiance, RadiantIntensity, SolidAngle};
 
@@ -45,6 +48,23 @@ pub fn dielectric(name: &str, ior: f64) -> Material {
     }
 }
 
+/// Clear solid of a glass, as [`Glass::parse`] reads it.
+///
+/// # Panics
+/// Where there is no such glass.
+pub fn glass(text: &str) -> Material {
+    let glass = Glass::parse(text).expect("a built-in scene names a glass");
+    let mut material = dielectric(text, glass.dispersion.n_d());
+    material.set_glass(Arc::new(glass));
+    material
+}
+
+/// Gives a light the spectrum of D65.
+pub fn daylight(mut light: Light) -> Light {
+    light.set_spectrum(Arc::new(illuminants::d65().clone()));
+    light
+}
+
 /// White light that sends `power` evenly into all directions.
 pub fn point_light(name: &str, position: DVec3, power: Flux) -> Light {
     let sphere = SolidAngle(4.0 * std::f64::consts::PI);
@@ -67,6 +87,27 @@ pub fn sun(name: &str, direction: DVec3, normal_irradiance: Irradiance) -> Light
         kind: LightKind::Sun {
             direction: direction.normalize(),
             normal_irradiance,
+        },
+        size: crate::scene::LightSize::None,
+    }
+}
+
+/// White light that sends `power` in all into a narrow cone, even within three quarters of its half-angle [rad].
+pub fn beam(name: &str, position: DVec3, direction: DVec3, half_angle_rad: f64, power: Flux) -> Light {
+    let inner_cone_rad = 0.75 * half_angle_rad;
+    let (cos_inner, cos_outer) = (inner_cone_rad.cos(), half_angle_rad.cos());
+    // The mean of the squared ramp at the edge is a third.
+    let cone = SolidAngle(std::f64::consts::TAU * (1.0 - cos_inner + (cos_inner - cos_outer) / 3.0));
+    Light {
+        name: name.into(),
+        colour: LinearSrgb::WHITE,
+        spectrum: None,
+        kind: LightKind::Spot {
+            position,
+            direction: direction.normalize(),
+            intensity: power / cone,
+            inner_cone_rad,
+            outer_cone_rad: half_angle_rad,
         },
         size: crate::scene::LightSize::None,
     }

@@ -71,6 +71,38 @@ pub fn sheet(columns: u32, rows: u32, surface: impl Fn(f64, f64) -> (DVec3, DVec
     mesh
 }
 
+/// Closed prism with flat faces: a triangle [m], counter-clockwise about `along`, and the same moved by `along` [m].
+pub fn prism(outline: [DVec3; 3], along: DVec3) -> Mesh {
+    let mut mesh = Mesh::default();
+    let [a, b, c] = outline;
+    append(&mut mesh, &facet([a, c, b]));
+    append(&mut mesh, &facet(outline.map(|corner| corner + along)));
+    for (from, to) in [(a, b), (b, c), (c, a)] {
+        let side = [from, to, to + along, from + along];
+        append(
+            &mut mesh,
+            &Mesh {
+                positions: side.to_vec(),
+                normals: vec![(to - from).cross(along).normalize(); 4],
+                triangles: vec![[0, 1, 2], [0, 2, 3]],
+                ..Mesh::default()
+            },
+        );
+    }
+    mesh
+}
+
+/// One flat triangle [m] with corners of its own.
+pub fn facet(corners: [DVec3; 3]) -> Mesh {
+    let [a, b, c] = corners;
+    Mesh {
+        positions: corners.to_vec(),
+        normals: vec![(b - a).cross(c - a).normalize(); 3],
+        triangles: vec![[0, 1, 2]],
+        ..Mesh::default()
+    }
+}
+
 /// Closed sphere [m]: an icosahedron whose edges are halved `levels` times (20·4^levels triangles), scaled to enclose
 /// exactly the volume of the sphere, so that the mesh lies half inside, half outside.
 pub fn sphere(centre: DVec3, radius: f64, levels: u32) -> Mesh {
@@ -96,7 +128,7 @@ pub fn sphere(centre: DVec3, radius: f64, levels: u32) -> Mesh {
 }
 
 /// Adds a mesh to another, without its texture coordinates.
-fn append(mesh: &mut Mesh, part: &Mesh) {
+pub fn append(mesh: &mut Mesh, part: &Mesh) {
     let offset = mesh.positions.len() as u32;
     mesh.positions.extend(&part.positions);
     mesh.normals.extend(&part.normals);

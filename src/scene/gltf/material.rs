@@ -313,7 +313,7 @@ impl Reading<'_, '_> {
                             "{} lies outside of sRGB, and its colour was multiplied by {factor:.3}",
                             metal.name()
                         ),
-                        "nothing needs to be done: light that is traced by wavelength is not dimmed",
+                        "nothing needs to be done",
                     );
                 }
             }

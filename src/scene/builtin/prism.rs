@@ -1,0 +1,118 @@
+//! `prism`: a glass prism at minimum deviation behind a slit; where each wavelength goes has a closed form.
+
+use glam::DVec3;
+
+use super::{parts, shapes};
+use crate::optics::LinearSrgb;
+use crate::scene::{Camera, Scene};
+use crate::units::Irradiance;
+
+/// Silicate flint glass: n_d = 1.635, V_d = 57.7.
+pub const GLASS: &str = "635577";
+
+/// An equilateral prism, in the plane across its edges.
+#[derive(Clone, Copy, Debug)]
+pub struct Prism {
+    /// Middle of its cross-section [m].
+    pub centroid: DVec3,
+    /// Unit, the way that light goes in it at minimum deviation: along the base.
+    pub along_base: DVec3,
+    /// Unit, from the apex to the base: the way that light is bent to.
+    pub to_base: DVec3,
+    /// Of its cross-section [m].
+    pub side_m: f64,
+}
+
+impl Prism {
+    /// Where light enters at minimum deviation: the middle of its first face [m].
+    pub fn entry(&self) -> DVec3 {
+        let apothem_m = self.side_m / 12.0_f64.sqrt();
+        self.centroid - self.along_base * (0.25 * self.side_m) - self.to_base * (0.5 * apothem_m)
+    }
+
+    /// Direction of light that comes in at minimum deviation, in glass of the index `n`: it goes along the base, 30
+    /// degrees from the normals of both faces.
+    pub fn incoming(&self, n: f64) -> DVec3 {
+        let turn_rad = (0.5 * n).asin() - 30.0_f64.to_radians();
+        self.along_base * turn_rad.cos() - self.to_base * turn_rad.sin()
+    }
+
+    /// As a closed body of a length [m].
+    pub fn mesh(&self, length_m: f64) -> crate::scene::Mesh {
+        let edge = self.to_base.cross(self.along_base) * length_m;
+        let apothem_m = self.side_m / 12.0_f64.sqrt();
+        let end = self.centroid - edge * 0.5;
+        let base = end + self.to_base * apothem_m;
+        let half_base = self.along_base * (0.5 * self.side_m);
+        let apex = end - self.to_base * (2.0 * apothem_m);
+        shapes::prism([base - half_base, base + half_base, apex], edge)
+    }
+}
+
+/// Half the sides of the slit, across and along the prism's edges [m].
+const SLIT_HALF_M: [f64; 2] = [0.0005, 0.01];
+/// From the slit to the prism, along the beam [m].
+const SLIT_DISTANCE_M: f64 = 0.3;
+/// Half the side of the black plate that the slit is in [m].
+const PLATE_HALF_M: f64 = 0.5;
+
+/// Edges of 6 cm along z, apex up; a sun of 1 W/m² through a slit of 1 mm × 20 mm; a wall of 1.4 m × 1.4 m.
+pub fn build() -> Scene {
+    let prism = Prism {
+        centroid: DVec3::Y,
+        along_base: DVec3::X,
+        to_base: DVec3::NEG_Y,
+        side_m: 0.06,
+    };
+    let glass = parts::glass(GLASS);
+    let direction = prism.incoming(glass.ior);
+    let mut scene = Scene::default();
+    let wall = shapes::rectangle(DVec3::new(1.5, 0.5, 0.0), DVec3::Z * 0.7, DVec3::Y * 0.7);
+    parts::add(
+        &mut scene,
+        "wall",
+        wall,
+        parts::matte("wall", LinearSrgb::grey(0.5)),
+    );
+    parts::add(&mut scene, "prism", prism.mesh(0.06), glass);
+    add_slit(&mut scene, prism.entry() - direction * SLIT_DISTANCE_M, direction);
+    scene.lights.push(parts::sun("light", direction, Irradiance(1.0)));
+    scene.cameras = vec![
+        Camera::look_at(
+            "camera",
+            DVec3::new(0.2, 1.0, 1.8),
+            DVec3::new(0.6, 0.7, 0.0),
+            0.9,
+        ),
+        Camera::look_at(
+            "spectrum",
+            DVec3::new(1.2, 0.4, 0.2),
+            DVec3::new(1.5, 0.3, 0.0),
+            0.6,
+        ),
+    ];
+    scene
+}
+
+/// Four black plates around a slit across the light, whose long side is z.
+fn add_slit(scene: &mut Scene, centre: DVec3, direction: DVec3) {
+    scene.materials.push(parts::matte("plate", LinearSrgb::BLACK));
+    let material = scene.materials.len() - 1;
+    let across = DVec3::Z.cross(direction);
+    let ([near, along], far) = (SLIT_HALF_M, PLATE_HALF_M);
+    let plates = [
+        ([near, far], [-far, far]),
+        ([-far, -near], [-far, far]),
+        ([-near, near], [along, far]),
+        ([-near, near], [-far, -along]),
+    ];
+    for (index, (u, z)) in plates.into_iter().enumerate() {
+        let middle = centre + across * (0.5 * (u[0] + u[1])) + DVec3::Z * (0.5 * (z[0] + z[1]));
+        let plate = shapes::rectangle(
+            middle,
+            DVec3::Z * (0.5 * (z[1] - z[0])),
+            across * (0.5 * (u[1] - u[0])),
+        );
+        parts::add_with(scene, &format!("plate {}", index + 1), plate, material);
+    }
+}
