@@ -144,7 +144,8 @@ impl CausticLayer<'_> {
         for light in &lights {
             let state = states.of_mut(light.light);
             let has_bumps = self.plan.is_on(Effect::Bumps);
-            state.begin(&light.launch, has_bumps, self.settings.kept_light_bytes());
+            let lamp = self.spectra.lamp(light.light);
+            state.begin(&light.launch, (has_bumps, lamp), self.settings.kept_light_bytes());
         }
         let sizes = self.sizes_of_maps(states, &lights, &mut course)?;
         course.statistics = states.statistics.as_ref().map(|(_, known)| known.clone());

@@ -123,7 +123,12 @@ impl Accounts<'_> {
                 ..EffectCounts::default()
             },
             Effect::Indirect => self.meter.indirect,
-            Effect::Dispersion | Effect::Chains => EffectCounts::default(),
+            Effect::Dispersion => EffectCounts {
+                rays: paths.of_a_wavelength,
+                deposits: deposits.of_a_wavelength,
+                ..EffectCounts::default()
+            },
+            Effect::Chains => EffectCounts::default(),
         }
     }
 

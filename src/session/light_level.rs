@@ -147,6 +147,8 @@ pub(super) struct LightState {
     launch: Option<Launch>,
     /// Whether bumps bent them.
     has_bumps: bool,
+    /// The lamp that chose their wavelengths.
+    lamp: Option<Arc<Spectrum>>,
     /// What its rays met.
     pub(super) rays: KeptRays,
     /// Levels of the last bake, the coarsest first.
@@ -182,14 +184,20 @@ impl LightState {
     }
 
     /// Forgets rays that start elsewhere or went otherwise, and what is more than so many bytes.
-    pub(super) fn begin(&mut self, launch: &Launch, has_bumps: bool, kept_bytes: u64) {
+    pub(super) fn begin(
+        &mut self,
+        launch: &Launch,
+        (has_bumps, lamp): (bool, Option<&Arc<Spectrum>>),
+        kept_bytes: u64,
+    ) {
         if self.launch.as_ref() != Some(launch) {
             *self = Self {
                 launch: Some(launch.clone()),
                 ..Self::default()
             };
         }
-        let went_alike = std::mem::replace(&mut self.has_bumps, has_bumps) == has_bumps;
+        let went_alike = self.has_bumps == has_bumps && self.lamp.as_ref() == lamp;
+        (self.has_bumps, self.lamp) = (has_bumps, lamp.cloned());
         if self.rays.bytes() > kept_bytes || !went_alike {
             self.rays = KeptRays::default();
         }

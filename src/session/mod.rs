@@ -299,7 +299,7 @@ impl BakeSession {
         if plan.is_on(Effect::LightPass) {
             let smooth = (!plan.is_on(Effect::Bumps)).then(|| tracer.without_bumps());
             let seen = smooth.as_ref().unwrap_or(&tracer);
-            let spectra = Spectra::new(seen, &aim, &plan, settings)?;
+            let spectra = Spectra::new(seen, &aim, &plan)?;
             let layer = CausticLayer {
                 tracer: seen,
                 spectra: &spectra,

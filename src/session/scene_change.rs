@@ -66,6 +66,7 @@ impl SceneChange {
 fn leave_alike(a: &Material, b: &Material) -> bool {
     a.surface == b.surface
         && a.ior == b.ior
+        && a.glass == b.glass
         && a.volume.is_some() == b.volume.is_some()
         && a.bending_waves() == b.bending_waves()
         && a.bending_map() == b.bending_map()

@@ -11,7 +11,6 @@ use crate::light_pass::wavefront::spectrum::{LightSpectrum, to_linear_srgb};
 use crate::optics::spectrum::{Emission, Spectrum};
 use crate::plan::{Effect, EffectPlan};
 use crate::scene::{Light, LightKind};
-use crate::settings::{BakeSettings, Estimator};
 use crate::transport::Tracer;
 
 /// Room above a lamp's largest channel for what becomes of it in linear sRGB: the largest coefficient from XYZ.
@@ -28,15 +27,10 @@ impl Spectra {
     ///
     /// # Errors
     /// A light's colour has no spectrum.
-    pub(super) fn new(
-        tracer: &Tracer,
-        aim: &Aim,
-        plan: &EffectPlan,
-        settings: &BakeSettings,
-    ) -> Result<Self> {
+    pub(super) fn new(tracer: &Tracer, aim: &Aim, plan: &EffectPlan) -> Result<Self> {
         let scene = tracer.scene();
         let mut of_lights = BTreeMap::new();
-        if !plan.is_on(Effect::Dispersion) || settings.estimator == Estimator::Splat {
+        if !plan.is_on(Effect::Dispersion) {
             return Ok(Self { of_lights });
         }
         for aimed in &aim.lights {

@@ -146,6 +146,8 @@ pub struct PathCounts {
     pub bent: u64,
     /// Micro-facets met on rough surfaces.
     pub scattered: u64,
+    /// Light rays of one wavelength.
+    pub of_a_wavelength: u64,
 }
 
 impl PathCounts {
@@ -166,5 +168,6 @@ impl AddAssign for PathCounts {
         self.textured += other.textured;
         self.bent += other.bent;
         self.scattered += other.scattered;
+        self.of_a_wavelength += other.of_a_wavelength;
     }
 }

@@ -10,9 +10,10 @@ use super::effect_scenes::{EffectScene, all};
 use super::tools::{at, bake, bits, energy_fault, settings};
 
 /// Effects that the light pass knows.
-const OF_THE_BAKE: [Effect; 9] = [
+const OF_THE_BAKE: [Effect; 10] = [
     Effect::LightPass,
     Effect::Refraction,
+    Effect::Dispersion,
     Effect::Reflection,
     Effect::Absorption,
     Effect::Textures,
@@ -50,7 +51,9 @@ fn check(case: &EffectScene, settings: &BakeSettings, faults: &mut Vec<String>) 
         let what = format!("{} of `{}`, {:?}", effect.name(), case.name, settings.estimator);
         let took = counts(&whole, effect);
         let line = whole.plan.effects.iter().find(|line| line.effect == effect);
-        let is_called = case.calls_for.contains(&effect);
+        // Splats know no wavelengths, and the plan says so.
+        let is_known = effect != Effect::Dispersion || settings.estimator == Estimator::Wavefront;
+        let is_called = case.calls_for.contains(&effect) && is_known;
         if line.is_none_or(|line| line.on != is_called) {
             faults.push(format!("{what}: {line:?}"));
         }

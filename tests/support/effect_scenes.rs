@@ -32,6 +32,12 @@ const ROUGH_MIRRORS: &[Effect] = &[Effect::LightPass, Effect::Reflection, Effect
 const WAVY_MIRRORS: &[Effect] = &[Effect::LightPass, Effect::Reflection, Effect::Bumps];
 const LARGE_LAMPS: &[Effect] = &[Effect::LightPass, Effect::Reflection, Effect::AreaLights];
 const GLASS: &[Effect] = &[Effect::LightPass, Effect::Refraction, Effect::Reflection];
+const DISPERSIVE_GLASS: &[Effect] = &[
+    Effect::LightPass,
+    Effect::Refraction,
+    Effect::Reflection,
+    Effect::Dispersion,
+];
 const COLOURED_GLASS: &[Effect] = &[
     Effect::LightPass,
     Effect::Refraction,
@@ -64,6 +70,8 @@ pub fn all() -> Vec<EffectScene> {
     add_mirror(&mut mirror, parts::mirror());
     let mut glass = room();
     add_ball(&mut glass, parts::dielectric("glass", 1.5));
+    let mut parting = room();
+    add_ball(&mut parting, parts::glass("N-SF11"));
     let mut unlit = glass.clone();
     add_box(&mut unlit, "safe", BALL, 0.35);
     let mut coloured = room();
@@ -93,6 +101,7 @@ pub fn all() -> Vec<EffectScene> {
         scene("nothing specular", room(), &[], false),
         scene("mirror", mirror, MIRRORS, true),
         scene("glass", glass, GLASS, true),
+        scene("dispersive glass", parting, DISPERSIVE_GLASS, true),
         scene("glass unlit", unlit, &[], true),
         scene("absorption", coloured, COLOURED_GLASS, true),
         scene(

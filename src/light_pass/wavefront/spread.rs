@@ -215,12 +215,12 @@ impl<E: PathEffects> Spreader<'_, E> {
             Course::Plane(receiver) => self.over(patch, strands, (flux, flux_w), tint, Some(receiver), out),
             Course::Mixed => self.over(patch, strands, (flux, flux_w), tint, None, out),
         }
-        self.count(strands[0], &before, out);
+        self.count(strands[0], tint, &before, out);
         self.note_overreach(patch, strands, &before, out);
     }
 
     /// Counts a patch that came to a map, by what took part in it.
-    fn count(&self, strand: &Strand, before: &[usize], out: &mut SpreadOutput) {
+    fn count(&self, strand: &Strand, tint: Tint, before: &[usize], out: &mut SpreadOutput) {
         let lists = out.triangles.iter().enumerate();
         let is_deposited = |(index, (_, list)): (usize, &(Receiver, Vec<FluxTriangle>))| {
             list.len() > before.get(index).copied().unwrap_or(0)
@@ -230,6 +230,7 @@ impl<E: PathEffects> Spreader<'_, E> {
         }
         let tracer = self.receivers.tracer;
         out.deposits.count_segment(strand.event);
+        out.deposits.of_a_wavelength += u64::from(tint.basis.is_some());
         out.deposits.attenuated += u64::from(self.absorbs(strand));
         out.deposits.scattered +=
             u64::from(E::LOBES && tracer.scene().material_of(strand.from as usize).is_rough());

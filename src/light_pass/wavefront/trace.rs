@@ -177,6 +177,7 @@ impl<'a> StrandTracer<'a> {
         while let Some(next) = waiting.pop() {
             self.step::<E>(next, floor_w, &mut search, &mut sample, &mut waiting);
         }
+        sample.counts.of_a_wavelength += u64::from(self.basis.is_some());
         sample.segments = search.searches;
         sample.counts += search.counts;
         if search.searches > 0 {
