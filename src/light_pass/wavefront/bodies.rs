@@ -24,6 +24,9 @@ const DEEPEST_BODY_LEVEL: u32 = 18;
 /// Cells across each of very many casters: enough for their flux.
 const LEAST_ACROSS_CASTERS: f64 = 12.0;
 
+/// Small casters from which on each is looked at less closely.
+const MANY_CASTERS: usize = 8;
+
 /// The sphere around an object.
 #[derive(Clone, Copy, Debug)]
 struct Body {
@@ -44,6 +47,8 @@ pub struct SmallBodies {
     corners: Bins<DVec3>,
     /// How often a cell is divided for one of these.
     corner_levels: u32,
+    /// Casters among the bodies.
+    casters: usize,
 }
 
 impl SmallBodies {
@@ -99,7 +104,8 @@ impl SmallBodies {
         let casters = small
             .iter()
             .filter(|(body, _)| body.cells_across > CELLS_ACROSS_OTHERS);
-        let crowd = (casters.count().max(1) as f64).sqrt();
+        let casters = casters.count();
+        let crowd = (casters.max(1) as f64).sqrt();
         let mut bodies = Bins::default();
         for (body, bounds) in &mut small {
             if body.cells_across > CELLS_ACROSS_OTHERS {
@@ -112,7 +118,13 @@ impl SmallBodies {
             bodies,
             corners,
             corner_levels: closeness.corner_levels,
+            casters,
         }
+    }
+
+    /// 1 where no single body shows much beside the others, else 0.
+    pub fn are_many(&self) -> u32 {
+        u32::from(self.casters >= MANY_CASTERS)
     }
 
     /// Whether there is nothing to look for.

@@ -189,8 +189,8 @@ impl CellCutter<'_> {
             };
         }
         if self.is_ambiguous(cell, work) {
-            // What was divided for a small body is fine already.
-            return if depth.ambiguous + depth.bodies.min(1) < DEEPEST_SPLIT {
+            // What was divided for one of many small bodies is fine already.
+            return if depth.ambiguous + depth.bodies.min(self.bodies.are_many()) < DEEPEST_SPLIT {
                 let ambiguous = depth.ambiguous + 1;
                 self.split(cell, Depth { ambiguous, ..depth }, work, out)
             } else {

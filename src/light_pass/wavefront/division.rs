@@ -20,6 +20,9 @@ const DENSITY_STEP: f64 = 0.01;
 /// How much coarser patches are divided that add next to nothing to their map.
 const COARSEST_TOLERANCE: f64 = 10.0;
 
+/// How much coarser the surroundings of a single ray may be divided that are not divided at all.
+const DUST_TOLERANCE: f64 = 2.0;
+
 /// Most triangles along a patch.
 const MOST_STEPS: usize = 128;
 
@@ -39,14 +42,6 @@ const MIXED_TEXELS: f64 = 16.0;
 /// Patches of a wavefront cell that a map resolves details of, along each side: a cubic patch says more than its
 /// corners.
 const DETAILS_PER_PATCH: f64 = 64.0;
-
-/// How a patch is divided.
-pub(super) struct Steps {
-    /// Across and down.
-    pub(super) count: (usize, usize),
-    /// How much more coarsely than is usual.
-    pub(super) tolerance: f64,
-}
 
 impl<E: PathEffects> Spreader<'_, E> {
     /// Whether nine rays of a patch meet a plane within its map.
@@ -74,7 +69,7 @@ impl<E: PathEffects> Spreader<'_, E> {
         is_plane: bool,
         flux_w: LinearSrgb,
         out: &mut SpreadOutput,
-    ) -> Steps {
+    ) -> (usize, usize) {
         if let Some(steps) = self.steps_around_one(rays, flux_w) {
             return steps;
         }
@@ -140,7 +135,7 @@ impl<E: PathEffects> Spreader<'_, E> {
             let even = even.min((even * length).sqrt());
             (straight.max(even).ceil() as usize).clamp(1, MOST_STEPS)
         };
-        let count = (
+        (
             steps(
                 across,
                 change(areas[0], areas[1]).max(change(areas[3], areas[2])),
@@ -151,18 +146,15 @@ impl<E: PathEffects> Spreader<'_, E> {
                 change(areas[0], areas[3]).max(change(areas[1], areas[2])),
                 height,
             ),
-        );
-        Steps { count, tolerance }
+        )
     }
 
-    /// One step, where a patch is the surroundings of a single ray: it is one of very many, and as straight as that ray's
-    /// derivatives.
-    fn steps_around_one(&self, rays: &VirtualRays<E>, flux_w: LinearSrgb) -> Option<Steps> {
+    /// One step, where a patch is the surroundings of a single ray that adds next to nothing: one of very many.
+    fn steps_around_one(&self, rays: &VirtualRays<E>, flux_w: LinearSrgb) -> Option<(usize, usize)> {
         let tolerance = |receiver| self.tolerance(receiver, flux_w.luminance(), 1.0);
-        (rays.are_around_one() && !self.gathers).then(|| Steps {
-            count: (1, 1),
-            tolerance: rays.lit().map_or(COARSEST_TOLERANCE, tolerance),
-        })
+        let tolerance = rays.lit().map_or(COARSEST_TOLERANCE, tolerance);
+        let is_dust = rays.are_around_one() && !self.gathers && tolerance >= DUST_TOLERANCE;
+        is_dust.then_some((1, 1))
     }
 
     /// Where rays of a patch meet a receiver, in texels as they lie around the middle one: charts may end and turn between
@@ -317,7 +309,7 @@ fn probe_place(shape: &PatchShape, i: usize, j: usize) -> DVec2 {
 }
 
 /// Rays that do not all meet one surface: enough to see the border between.
-fn mixed_steps(probes: &[[VirtualVertex; 3]; 3], is_plane: bool, tolerance: f64) -> Steps {
+fn mixed_steps(probes: &[[VirtualVertex; 3]; 3], is_plane: bool, tolerance: f64) -> (usize, usize) {
     let lost = probes
         .iter()
         .flatten()
@@ -329,8 +321,5 @@ fn mixed_steps(probes: &[[VirtualVertex; 3]; 3], is_plane: bool, tolerance: f64)
         (false, _) => MIXED_STEPS,
     };
     let steps = (steps as f64 / tolerance.sqrt()).ceil().max(2.0) as usize;
-    Steps {
-        count: (steps, steps),
-        tolerance,
-    }
+    (steps, steps)
 }

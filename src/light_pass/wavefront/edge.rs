@@ -13,8 +13,8 @@ const MANY_CHANGES: usize = 12;
 /// Bisections then.
 const SHATTERED_BITS: i32 = 3;
 
-/// Bisections that decide whether two ends of the brightest light lie on one sheet of the wavefront; dimmer light is
-/// looked at as much less closely.
+/// Bisections that decide whether two ends of the brightest light lie on one sheet of the wavefront; where it goes very
+/// many ways, dimmer light is looked at as much less closely.
 const JUMP_BITS: i32 = 6;
 
 /// Mismatch of chord and tangents, as a share of the chord, from which derivatives are not to be trusted.
@@ -200,11 +200,15 @@ impl Edge {
         )
     }
 
-    /// Flux of a strand at the first end that has it, as a share of the brightest at either; 1 where neither has it.
+    /// Flux of a strand at the first end that has it, as a share of the brightest at either; 1 where neither has it, and
+    /// where light goes so few ways that each counts.
     fn share(&self, work: &Workspace, signature: PathSignature) -> f64 {
         let ends = [0, self.samples.len() - 1].map(|end| work.get(self.samples[end].1));
         let brightest_w = ends[0].brightest_w.max(ends[1].brightest_w);
         let flux_w = |sample: &LightSample| Some(sample.strands[sample.find(signature)?].flux_w.luminance());
+        if ends.iter().all(|sample| sample.strands.len() <= MANY_CHANGES) {
+            return 1.0;
+        }
         ends.into_iter()
             .find_map(flux_w)
             .map_or(1.0, |flux_w| flux_w / brightest_w)

@@ -15,11 +15,8 @@ use crate::light_pass::ledger_sum::Account;
 use crate::optics::LinearSrgb;
 use crate::transport::PathEffects;
 
-/// Bisections of a virtual edge between rays that go to different surfaces, where a patch's light is worth it.
-const CUT_STEPS: f64 = 10.0;
-
-/// The same where it is not.
-const LEAST_CUT_STEPS: f64 = 4.0;
+/// Bisections of a virtual edge between rays that go to different surfaces.
+const CUT_STEPS: u32 = 10;
 
 /// How often a triangle may be divided.
 #[derive(Clone, Copy)]
@@ -31,14 +28,7 @@ struct Divisions {
 }
 
 impl Divisions {
-    /// For a patch that may be divided so much more coarsely than is usual.
-    fn at(tolerance: f64) -> Self {
-        let fewer = tolerance.max(1.0).log2().floor() as u32;
-        Self {
-            cuts: 4_u32.saturating_sub(fewer).max(1),
-            bends: 4_u32.saturating_sub(fewer).max(1),
-        }
-    }
+    const WHOLE: Self = Self { cuts: 4, bends: 4 };
 
     fn after_cut(self) -> Self {
         Self {
@@ -115,8 +105,6 @@ pub(super) struct PatchMesh<'a, 'b, E> {
     pub(super) absorbs: bool,
     /// Whether any traced ray of the patch leaves the scene.
     pub(super) goes_out: bool,
-    /// How much more coarsely it may be divided than is usual.
-    pub(super) tolerance: f64,
 }
 
 /// A virtual ray with its place on the patch.
@@ -153,11 +141,7 @@ impl<E: PathEffects> PatchMesh<'_, '_, E> {
                 let middle = self.colour((corners[0].at + corners[2].at) * 0.5);
                 for triangle in [[0, 1, 2], [0, 2, 3]] {
                     let flux = share.next(middle);
-                    self.settle(
-                        triangle.map(|corner| corners[corner]),
-                        flux,
-                        Divisions::at(self.tolerance),
-                    );
+                    self.settle(triangle.map(|corner| corners[corner]), flux, Divisions::WHOLE);
                 }
             }
             row = next;
@@ -178,7 +162,7 @@ impl<E: PathEffects> PatchMesh<'_, '_, E> {
                 for piece in pieces {
                     let middle = (piece[0].at + piece[1].at + piece[2].at) / 3.0;
                     let flux = share.next(self.colour(middle));
-                    self.settle(piece, flux, Divisions::at(self.tolerance));
+                    self.settle(piece, flux, Divisions::WHOLE);
                 }
             }
             row = next;
@@ -299,8 +283,7 @@ impl<E: PathEffects> PatchMesh<'_, '_, E> {
     fn bracket(&mut self, from: Knot, to: Knot) -> (f64, Knot, Knot) {
         let (mut low, mut high) = (0.0, 1.0);
         let (mut near, mut far) = (from, to);
-        let steps = CUT_STEPS - 2.0 * self.tolerance.max(1.0).log2();
-        for _ in 0..steps.max(LEAST_CUT_STEPS) as u32 {
+        for _ in 0..CUT_STEPS {
             let middle = 0.5 * (low + high);
             let knot = self.knot(from.at.lerp(to.at, middle));
             if self.is_joined(&near, &knot) {

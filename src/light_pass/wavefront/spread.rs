@@ -6,7 +6,6 @@ use glam::DVec2;
 use super::band::{SampleId, Samples};
 use super::cell::{Patch, PatchKind, Tone};
 use super::coverage::FluxTriangle;
-use super::division::Steps;
 use super::mesh::{PatchMesh, even_grid};
 use super::overreach::Overreach;
 use super::patch::{CoonsPatch, PatchShape};
@@ -337,10 +336,7 @@ impl<E: PathEffects> Spreader<'_, E> {
         let plane = plane.filter(|&receiver| goes_out || self.stays_on_map(&shape, receiver));
         let colours: Vec<LinearSrgb> = strands.iter().map(|strand| strand.flux_w).collect();
         let mut rays = VirtualRays::new(self, &shape, strands, plane, tint.basis);
-        let Steps {
-            count: steps,
-            tolerance,
-        } = self.steps(&shape, &mut rays, plane.is_some(), flux_w, out);
+        let steps = self.steps(&shape, &mut rays, plane.is_some(), flux_w, out);
         if let (PatchShape::Coons(coons), Some(receiver)) = (&shape, plane)
             && !self.absorbs(strands[0])
             && let Some(grid) = self.plane_grid(coons, receiver, steps)
@@ -356,7 +352,6 @@ impl<E: PathEffects> Spreader<'_, E> {
             out,
             absorbs: self.absorbs(strands[0]),
             goes_out,
-            tolerance,
         };
         if shape.is_rectangle() {
             mesh.rectangle(steps, flux);
