@@ -97,7 +97,8 @@ fn connect(corner_uvs: &[[DVec2; 3]]) -> Vec<u32> {
         .collect()
 }
 
-fn root(parent: &mut [u32], mut triangle: u32) -> u32 {
+/// The triangle that stands for the set that one belongs to; shortens the way there.
+pub(crate) fn root(parent: &mut [u32], mut triangle: u32) -> u32 {
     while parent[triangle as usize] != triangle {
         let above = parent[parent[triangle as usize] as usize];
         parent[triangle as usize] = above;

@@ -5,6 +5,7 @@ use std::collections::HashMap;
 use glam::DVec2;
 
 use crate::illumination::Chart;
+use crate::illumination::islands::root;
 use crate::scene::Mesh;
 
 /// Neighbouring triangles of one smooth piece lie at less than 30° to each other.
@@ -43,13 +44,4 @@ fn side(a: DVec2, b: DVec2) -> Side {
     // Adding zero makes both zeros alike.
     let [a, b] = [a, b].map(|corner| ((corner.x + 0.0).to_bits(), (corner.y + 0.0).to_bits()));
     [a.min(b), a.max(b)]
-}
-
-fn root(parent: &mut [u32], mut triangle: u32) -> u32 {
-    while parent[triangle as usize] != triangle {
-        let above = parent[parent[triangle as usize] as usize];
-        parent[triangle as usize] = above;
-        triangle = above;
-    }
-    triangle
 }
