@@ -177,15 +177,20 @@ impl Tracer {
         }
     }
 
-    /// The same scene as light of one wavelength meets it: refractive indices are those of that wavelength. Colours stay
-    /// as they are.
+    /// The same scene with the refractive indices of one wavelength; colours stay as they are.
     #[must_use]
-    pub fn at_wavelength(&self, wavelength: Nanometres) -> Self {
+    pub fn with_indices_at(&self, wavelength: Nanometres) -> Self {
         let mut scene = Scene::clone(&self.scene);
         for material in &mut scene.materials {
             material.ior = material.index_at(wavelength);
         }
         self.edited(Arc::new(scene))
+    }
+
+    /// The same scene as light of one wavelength meets it.
+    #[must_use]
+    pub fn at_wavelength(&self, wavelength: Nanometres) -> Self {
+        self.with_indices_at(wavelength)
     }
 
     /// Whether something bends the normals of an object.
