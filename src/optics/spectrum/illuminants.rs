@@ -35,9 +35,7 @@ pub fn names() -> impl Iterator<Item = &'static str> {
 pub fn illuminant(name: &str) -> Result<Spectrum, SpectrumError> {
     let name = name.trim();
     let relative = match name.split_once(':') {
-        Some((kind, number)) => with_number(&key(kind), number)
-            .unwrap_or_else(|| Err(unknown(name)))?
-            .named(name),
+        Some((kind, number)) => with_number(&key(kind), number).unwrap_or_else(|| Err(unknown(name)))?,
         None => plain(name)?,
     };
     relative.to_luminous_equivalent(1.0)
@@ -78,21 +76,21 @@ fn illuminant_a(Nanometres(nm): Nanometres) -> f64 {
 /// A kind of lamp with a number; `None` where there is no such kind.
 fn with_number(kind: &str, number: &str) -> Option<Result<Spectrum, SpectrumError>> {
     match kind {
-        "blackbody" | "planck" => {
-            let kelvin = parse(number, KELVIN, "K");
-            Some(kelvin.and_then(|kelvin| Spectrum::from_fn(|wavelength| planck(wavelength, kelvin))))
-        }
-        "line" | "laser" => {
-            let nm = parse(number, LINE_NM, "nm");
-            let triangle = |nm| [(nm - 1.0, 0.0), (nm, 1.0), (nm + 1.0, 0.0)];
-            Some(
-                nm.and_then(|nm| {
-                    Spectrum::new(triangle(nm).map(|(nm, value)| (Nanometres(nm), value)).into())
-                }),
-            )
-        }
+        "blackbody" | "planck" => Some(parse(number, KELVIN, "K").and_then(black_body)),
+        "line" | "laser" => Some(parse(number, LINE_NM, "nm").and_then(line)),
         _ => None,
     }
+}
+
+fn black_body(kelvin: f64) -> Result<Spectrum, SpectrumError> {
+    let light = Spectrum::from_fn(|wavelength| planck(wavelength, kelvin))?;
+    Ok(light.named(&format!("blackbody:{kelvin}")))
+}
+
+fn line(nm: f64) -> Result<Spectrum, SpectrumError> {
+    let triangle = [(nm - 1.0, 0.0), (nm, 1.0), (nm + 1.0, 0.0)];
+    let light = Spectrum::new(triangle.map(|(nm, value)| (Nanometres(nm), value)).into())?;
+    Ok(light.named(&format!("line:{nm}")))
 }
 
 fn parse(text: &str, [least, most]: [f64; 2], unit: &'static str) -> Result<f64, SpectrumError> {
