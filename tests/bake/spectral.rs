@@ -326,12 +326,16 @@ fn kept_bands_add_up_to_the_colour_they_make() {
                 let map = (result.maps.iter()).find(|map| map.chart.receiver == layer.receiver);
                 let chart = &map.expect("its map").chart;
                 let texels = layer.irradiance.iter().enumerate();
-                let flux = texels.map(|(texel, irradiance)| f64::from(*irradiance) * chart.texel_area_m2(texel));
+                let flux =
+                    texels.map(|(texel, irradiance)| f64::from(*irradiance) * chart.texel_area_m2(texel));
                 flux.sum::<f64>() * (layer.band.to_nm - layer.band.from_nm)
             })
             .sum();
         let stated = ledger.deposited_radiant_w.expect("bands are kept");
-        println!("{estimator:?}: {radiant_w} W in maps, {stated} W stated, {:?} W emitted", ledger.emitted_radiant_w);
+        println!(
+            "{estimator:?}: {radiant_w} W in maps, {stated} W stated, {:?} W emitted",
+            ledger.emitted_radiant_w
+        );
         assert!((radiant_w / stated - 1.0).abs() < 1e-4);
         assert!(stated < ledger.emitted_radiant_w.expect("a spectrum"));
     }
@@ -345,7 +349,10 @@ fn one_wavelength_parts_nothing() {
         let (_, texels) = caustic(&result, &scene, "floor");
         let white = texels.iter().map(|texel| texel[1]).fold(0.0, f32::max);
         for [r, g, b] in texels {
-            assert!((r - g).abs() < 1e-4 * white && (b - g).abs() < 1e-4 * white, "{r} {g} {b}");
+            assert!(
+                (r - g).abs() < 1e-4 * white && (b - g).abs() < 1e-4 * white,
+                "{r} {g} {b}"
+            );
         }
     }
 }
