@@ -81,6 +81,12 @@ impl<'a> Workspace<'a> {
         id
     }
 
+    /// The sample at a place of the unit square, where this task traced one of that wavelength.
+    pub fn known(&self, node: u32, square: DVec2) -> Option<SampleId> {
+        let key = (node, square.to_array().map(f64::to_bits));
+        self.known.get(&key).copied()
+    }
+
     /// The sample at another wavelength of a corner of the lattice itself; `None` where it is none.
     pub fn at_node(&self, id: SampleId, node: usize) -> Option<SampleId> {
         (id.chunk < self.corner_rows).then(|| SampleId {

@@ -118,6 +118,8 @@ pub struct CellCutter<'a> {
     pub channels: ColourMatrix,
     /// Light that has patches already, ascending.
     pub done: &'a [PathSignature],
+    /// Surfaces whose light is booked already, ascending.
+    pub booked: &'a [PathSignature],
 }
 
 /// How often a cell was divided.
@@ -206,31 +208,15 @@ impl CellCutter<'_> {
             found.extend(sample.strands.iter().map(|strand| strand.signature));
         });
         for signature in strands.into_iter().filter(|signature| !self.is_done(*signature)) {
-            for region in regions(
-                cell,
-                &|edge, backwards| reach_of(cell, edge, work, signature, backwards),
-                &|corner| work.get(cell.corners[corner].sample).find(signature).is_some(),
-            ) {
+            for region in light_regions(cell, signature, work) {
                 self.emit(cell, &region, signature, work, out);
             }
         }
         let nodes = signatures(cell, work, |sample, found| {
             found.extend(sample.nodes.iter().map(|node| node.signature));
         });
-        for signature in nodes {
-            let is_there = |corner: usize| {
-                work.get(cell.corners[corner].sample)
-                    .find_node(signature)
-                    .is_some()
-            };
-            for region in regions(
-                cell,
-                &|edge, backwards| match &cell.edges[edge] {
-                    Some(edge) => edge.reach_of_node(work, signature, backwards),
-                    None => Reach::Whole,
-                },
-                &is_there,
-            ) {
+        for signature in nodes.into_iter().filter(|signature| !self.is_booked(*signature)) {
+            for region in surface_regions(cell, signature, work) {
                 self.book_region(&region, signature, work, out);
             }
         }
@@ -323,6 +309,10 @@ impl CellCutter<'_> {
 
     fn is_done(&self, signature: PathSignature) -> bool {
         self.done.binary_search(&signature).is_ok()
+    }
+
+    fn is_booked(&self, signature: PathSignature) -> bool {
+        self.booked.binary_search(&signature).is_ok()
     }
 
     /// Books what surfaces did with the light of a cell whose corners agree.
@@ -478,13 +468,15 @@ impl CellCutter<'_> {
                 });
             }
             for node in 0..sample.nodes.len() {
-                self.book(&[(corner.sample, node, area)], work, out);
+                if !self.is_booked(sample.nodes[node].signature) {
+                    self.book(&[(corner.sample, node, area)], work, out);
+                }
             }
         }
     }
 
     /// A region's patches.
-    fn emit(
+    pub(super) fn emit(
         &self,
         cell: &Cell,
         region: &[Outline],
@@ -562,7 +554,7 @@ impl CellCutter<'_> {
 
     /// Books what a surface did with the light of some samples, each by its area of the unit square. What it passed on
     /// is booked against what the strands carry.
-    fn book(&self, weighted: &[(SampleId, usize, f64)], work: &Workspace, out: &mut CellOutput) {
+    pub(super) fn book(&self, weighted: &[(SampleId, usize, f64)], work: &Workspace, out: &mut CellOutput) {
         let sum = |of: fn(&super::strand::SurfaceNode) -> LinearSrgb| {
             let sum = weighted.iter().fold(LinearSrgb::BLACK, |sum, &(id, node, area)| {
                 sum + of(&work.get(id).nodes[node]) * area
@@ -613,8 +605,33 @@ pub(super) fn reach_of(
     }
 }
 
+/// The parts of a cell that light of a signature fills.
+pub(super) fn light_regions(cell: &Cell, signature: PathSignature, work: &Workspace) -> Vec<Vec<Outline>> {
+    regions(
+        cell,
+        &|edge, backwards| reach_of(cell, edge, work, signature, backwards),
+        &|corner| work.get(cell.corners[corner].sample).find(signature).is_some(),
+    )
+}
+
+/// The parts of a cell whose light meets a surface by way of a signature.
+pub(super) fn surface_regions(cell: &Cell, signature: PathSignature, work: &Workspace) -> Vec<Vec<Outline>> {
+    let is_there = |corner: usize| {
+        let sample = work.get(cell.corners[corner].sample);
+        sample.find_node(signature).is_some()
+    };
+    regions(
+        cell,
+        &|edge, backwards| match &cell.edges[edge] {
+            Some(edge) => edge.reach_of_node(work, signature, backwards),
+            None => Reach::Whole,
+        },
+        &is_there,
+    )
+}
+
 /// All signatures at the corners, ascending.
-fn signatures(
+pub(super) fn signatures(
     cell: &Cell,
     work: &Workspace,
     collect: impl Fn(&LightSample, &mut Vec<PathSignature>),

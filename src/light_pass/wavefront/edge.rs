@@ -435,6 +435,16 @@ impl EdgeCutter<'_> {
         edge.samples.insert(index + 1, (place, corner.sample));
     }
 
+    /// What another wavelength's light does where a sample was traced.
+    pub fn again(&self, square: DVec2, other: SampleId, work: &mut Workspace) -> SampleId {
+        let node = self.tracer.wavelength.unwrap_or(0);
+        if let Some(known) = work.known(node, square) {
+            return known;
+        }
+        let sample = self.tracer.trace_again(self.face, square, work.get(other));
+        work.sample_at(node, square, || sample)
+    }
+
     /// A corner at a place of the unit square.
     pub fn corner(&self, square: DVec2, work: &mut Workspace) -> Corner {
         Corner {

@@ -376,6 +376,7 @@ impl WavefrontLattice<'_> {
             },
             channels: self.light.channels(),
             done: &[],
+            booked: &[],
         };
         let corner = |row: usize, column: usize| self.corner_at(first_row, row, column, index);
         let down = |column: usize, work: &mut Workspace| {

@@ -1,15 +1,29 @@
-//! Cells of a spectral light: one patch for all wavelengths where they go the same ways, one for each traced wavelength
-//! where they do not.
+//! Cells of a spectral light: patches for all wavelengths where they go the same ways, up to the same borders; one for
+//! each traced wavelength where they do not.
 
 use super::band::{Corner, SampleId, Workspace};
 use super::bodies::SmallBodies;
-use super::cell::{Cell, CellCutter, CellOutput, DEEPEST_SPLIT, Depth, EDGE_ENDS, Tone, reach_of};
+use super::cell::{
+    Cell, CellCutter, CellOutput, DEEPEST_SPLIT, Depth, EDGE_ENDS, Patch, Tone, light_regions, reach_of,
+    signatures, surface_regions,
+};
 use super::edge::{Edge, EdgeCutter, Reach, is_suspicious, same_ways};
+use super::regions::{Outline, triangles};
 use super::spectrum::{LightPart, LightSpectrum, NODES};
+use super::strand::LightSample;
 use crate::light_pass::caustic::path::PathSignature;
 
 /// Samples at a cell's corners, wavelength by wavelength.
 type NodeCorners = [[SampleId; 4]; NODES];
+
+/// What of a cell is dealt with for all wavelengths at once.
+#[derive(Default)]
+struct Shared {
+    /// Light that has patches, ascending.
+    done: Vec<PathSignature>,
+    /// Surfaces whose light is booked, ascending.
+    booked: Vec<PathSignature>,
+}
 
 impl CellCutter<'_> {
     /// Cuts a cell that is not divided further.
@@ -23,50 +37,190 @@ impl CellCutter<'_> {
     ) {
         let nodes = self.node_corners(cell, work);
         let is_one = is_one(cell, &nodes, work);
-        if is_one && depth.ambiguous < DEEPEST_SPLIT && self.is_doubtful(cell, work) {
+        let is_unclear = |work: &mut Workspace| {
+            if cell.edges.iter().all(Option::is_none) {
+                is_one && self.is_doubtful(cell, work)
+            } else {
+                self.is_ambiguous(cell, work)
+            }
+        };
+        if depth.ambiguous < DEEPEST_SPLIT && is_unclear(work) {
             let ambiguous = depth.ambiguous + 1;
             return self.split(cell, Depth { ambiguous, ..depth }, work, out);
         }
-        let alike = alike(cell, &nodes, work);
-        let all = CellCutter {
-            tone: Tone::Spectrum {
-                others: std::array::from_fn(|other| nodes[other + 1]),
-                parted: !is_one,
-            },
-            ..*self
+        let mut shared = Shared {
+            done: alike(cell, &nodes, work),
+            booked: Vec::new(),
         };
-        for &signature in &alike {
-            all.patch(cell, signature, work, out);
+        for &signature in &shared.done {
+            let first = out.patches.len();
+            self.patch(cell, signature, work, out);
+            let others = std::array::from_fn(|other| nodes[other + 1]);
+            for patch in &mut out.patches[first..] {
+                patch.tone = Tone::Spectrum {
+                    others,
+                    parted: !is_one,
+                };
+            }
         }
-        for (node, corners) in nodes.iter().enumerate() {
-            if is_one {
+        if is_one {
+            for (node, corners) in nodes.iter().enumerate() {
                 let of_node = CellCutter {
                     channels: spectrum.interpolated[node],
                     ..*self
                 };
                 of_node.book_whole(cell, *corners, work, out);
-            } else {
-                self.cut_node(spectrum, node, cell, (*corners, &alike), depth, work, out);
             }
+            return;
+        }
+        if !self.is_ambiguous(cell, work) {
+            self.cut_shared(spectrum, cell, &nodes, &mut shared, work, out);
+        }
+        for (node, corners) in nodes.iter().enumerate() {
+            self.cut_node(spectrum, node, cell, (*corners, &shared), depth, work, out);
         }
     }
 
     fn node_corners(&self, cell: &Cell, work: &mut Workspace) -> NodeCorners {
-        std::array::from_fn(|node| {
-            cell.corners
-                .map(|corner| match (node, work.at_node(corner.sample, node)) {
-                    (0, _) => corner.sample,
-                    (_, Some(sample)) => sample,
-                    (_, None) => {
-                        let tracer = self.edges.tracer.at_node(self.light, node);
-                        let edges = EdgeCutter {
-                            tracer: &tracer,
-                            face: self.edges.face,
-                        };
-                        edges.corner(corner.square, work).sample
-                    }
-                })
-        })
+        std::array::from_fn(|node| cell.corners.map(|corner| self.sample_of(node, corner, work)))
+    }
+
+    /// The sample of a wavelength where one of the first was traced.
+    fn sample_of(&self, node: usize, at: Corner, work: &mut Workspace) -> SampleId {
+        match (node, work.at_node(at.sample, node)) {
+            (0, _) => at.sample,
+            (_, Some(sample)) => sample,
+            (_, None) => {
+                let tracer = self.edges.tracer.at_node(self.light, node);
+                let edges = EdgeCutter {
+                    tracer: &tracer,
+                    face: self.edges.face,
+                };
+                edges.again(at.square, at.sample, work)
+            }
+        }
+    }
+
+    /// Patches and accounts of what all wavelengths share up to the same borders, as those of surfaces that light meets
+    /// before it parts.
+    fn cut_shared(
+        &self,
+        spectrum: &LightSpectrum,
+        cell: &Cell,
+        nodes: &NodeCorners,
+        shared: &mut Shared,
+        work: &mut Workspace,
+        out: &mut CellOutput,
+    ) {
+        let strands = signatures(cell, work, |sample, found| {
+            found.extend(sample.strands.iter().map(|strand| strand.signature));
+        });
+        let has_strand = |sample: &LightSample, signature| sample.find(signature).is_some();
+        for signature in strands {
+            if shared.done.binary_search(&signature).is_err()
+                && is_at_the_same_corners(nodes, work, |sample| has_strand(sample, signature))
+            {
+                self.emit_shared(cell, signature, work, out, &mut shared.done);
+            }
+        }
+        let surfaces = signatures(cell, work, |sample, found| {
+            found.extend(sample.nodes.iter().map(|node| node.signature));
+        });
+        let has_surface = |sample: &LightSample, signature| sample.find_node(signature).is_some();
+        for signature in surfaces {
+            if is_at_the_same_corners(nodes, work, |sample| has_surface(sample, signature))
+                && self.book_shared(spectrum, cell, signature, work, out)
+            {
+                shared.booked.push(signature);
+            }
+        }
+        shared.done.sort_unstable();
+    }
+
+    /// The patches of light that all wavelengths have in the same parts of the cell; nothing where that is not so.
+    fn emit_shared(
+        &self,
+        cell: &Cell,
+        signature: PathSignature,
+        work: &mut Workspace,
+        out: &mut CellOutput,
+        done: &mut Vec<PathSignature>,
+    ) {
+        let mut made = CellOutput::default();
+        for region in light_regions(cell, signature, work) {
+            self.emit(cell, &region, signature, work, &mut made);
+        }
+        for patch in &mut made.patches {
+            let Some(others) = self.others_of(patch, signature, work) else {
+                return;
+            };
+            patch.tone = Tone::Spectrum { others, parted: true };
+        }
+        out.patches.append(&mut made.patches);
+        done.push(signature);
+    }
+
+    /// Samples of the other wavelengths at a patch's corners; `None` where not all have its light.
+    fn others_of(
+        &self,
+        patch: &Patch,
+        signature: PathSignature,
+        work: &mut Workspace,
+    ) -> Option<[[SampleId; 4]; NODES - 1]> {
+        let mut others = [[patch.corners[0].0; 4]; NODES - 1];
+        for (node, others) in others.iter_mut().enumerate() {
+            for (corner, other) in others.iter_mut().enumerate() {
+                let at = Corner {
+                    square: patch.squares[corner],
+                    sample: patch.corners[corner].0,
+                };
+                *other = self.sample_of(node + 1, at, work);
+                work.get(*other).find(signature)?;
+            }
+        }
+        Some(others)
+    }
+
+    /// Books what a surface did with light that meets it in the same parts of the cell at all wavelengths; false, and
+    /// nothing is booked, where that is not so.
+    fn book_shared(
+        &self,
+        spectrum: &LightSpectrum,
+        cell: &Cell,
+        signature: PathSignature,
+        work: &mut Workspace,
+        out: &mut CellOutput,
+    ) -> bool {
+        let regions = surface_regions(cell, signature, work);
+        let triangles: Vec<[Outline; 3]> = regions.iter().flat_map(|region| triangles(region)).collect();
+        let mut found = Vec::new();
+        for node in 0..NODES {
+            for triangle in &triangles {
+                let [a, b, c] = triangle.map(|outline| outline.square);
+                let area = 0.5 * (b - a).perp_dot(c - a).abs();
+                let mut weighted = [(triangle[0].sample, 0, area / 3.0); 3];
+                for (outline, weighted) in triangle.iter().zip(&mut weighted) {
+                    let at = Corner {
+                        square: outline.square,
+                        sample: outline.sample,
+                    };
+                    let sample = self.sample_of(node, at, work);
+                    let Some(surface) = work.get(sample).find_node(signature) else {
+                        return false;
+                    };
+                    (weighted.0, weighted.1) = (sample, surface);
+                }
+                found.push((node, weighted));
+            }
+        }
+        for (node, weighted) in found {
+            let of_node = CellCutter {
+                channels: spectrum.nodes[node].channels,
+                ..*self
+            };
+            of_node.book(&weighted, work, out);
+        }
+        true
     }
 
     /// Cuts the cell as one wavelength sees it, but for the light that all wavelengths share.
@@ -79,7 +233,7 @@ impl CellCutter<'_> {
         spectrum: &LightSpectrum,
         node: usize,
         cell: &Cell,
-        (corners, alike): ([SampleId; 4], &[PathSignature]),
+        (corners, shared): ([SampleId; 4], &Shared),
         depth: Depth,
         work: &mut Workspace,
         out: &mut CellOutput,
@@ -98,26 +252,26 @@ impl CellCutter<'_> {
             light: LightPart::White,
             tone: Tone::Node(node as u8),
             channels: spectrum.nodes[node].channels,
-            done: alike,
+            done: &shared.done,
+            booked: &shared.booked,
         };
         let corners: [Corner; 4] = std::array::from_fn(|corner| Corner {
             square: cell.corners[corner].square,
             sample: corners[corner],
         });
-        let is_dim = is_dim_but_for(alike, &corners, work);
-        let edges = if node == 0 {
-            cell.edges.clone()
-        } else if is_dim {
-            Default::default()
-        } else {
-            EDGE_ENDS.map(|(from, to)| edges.edge([corners[from], corners[to]], false, work))
+        let rest = Rest::of(shared, &corners, work);
+        let edges = match rest {
+            Rest::Nothing => return,
+            _ if node == 0 => cell.edges.clone(),
+            Rest::Dim => Default::default(),
+            Rest::Bright => EDGE_ENDS.map(|(from, to)| edges.edge([corners[from], corners[to]], false, work)),
         };
         let seen = Cell {
             corners,
             edges,
             beside: [0; 4],
         };
-        if is_dim {
+        if rest == Rest::Dim {
             cutter.scatter(&seen, work, out);
         } else {
             cutter.cut_at(&seen, depth, work, out);
@@ -128,17 +282,48 @@ impl CellCutter<'_> {
 /// Light below this share of the brightest is not cut wavelength by wavelength.
 const DIM_SHARE: f64 = 0.01;
 
-/// Whether what corners have beside some light is dim.
-fn is_dim_but_for(alike: &[PathSignature], corners: &[Corner; 4], work: &Workspace) -> bool {
-    let samples = corners.map(|corner| work.get(corner.sample));
-    let brightest_w = samples
-        .iter()
-        .map(|sample| sample.brightest_w)
-        .fold(0.0, f64::max);
-    let strands = samples.iter().flat_map(|sample| &sample.strands);
-    strands
-        .filter(|strand| alike.binary_search(&strand.signature).is_err())
-        .all(|strand| strand.flux_w.luminance() <= DIM_SHARE * brightest_w)
+/// What corners have beside what all wavelengths share.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Rest {
+    Nothing,
+    Dim,
+    Bright,
+}
+
+impl Rest {
+    fn of(shared: &Shared, corners: &[Corner; 4], work: &Workspace) -> Self {
+        let samples = corners.map(|corner| work.get(corner.sample));
+        let brightest_w = samples
+            .iter()
+            .map(|sample| sample.brightest_w)
+            .fold(0.0, f64::max);
+        let strands = samples.iter().flat_map(|sample| &sample.strands);
+        let rest = strands.filter(|strand| shared.done.binary_search(&strand.signature).is_err());
+        let most_w = rest.map(|strand| strand.flux_w.luminance()).reduce(f64::max);
+        let is_booked = samples
+            .iter()
+            .flat_map(|sample| &sample.nodes)
+            .all(|node| shared.booked.binary_search(&node.signature).is_ok());
+        match most_w {
+            None if is_booked => Self::Nothing,
+            None => Self::Dim,
+            Some(most_w) if most_w <= DIM_SHARE * brightest_w => Self::Dim,
+            Some(_) => Self::Bright,
+        }
+    }
+}
+
+/// Whether something is there at the same corners at all wavelengths.
+fn is_at_the_same_corners(
+    nodes: &NodeCorners,
+    work: &Workspace,
+    is_there: impl Fn(&LightSample) -> bool,
+) -> bool {
+    (0..4).all(|corner| {
+        let first = is_there(work.get(nodes[0][corner]));
+        let mut others = nodes[1..].iter();
+        others.all(|corners| is_there(work.get(corners[corner])) == first)
+    })
 }
 
 /// Whether light of all wavelengths goes the same ways at all corners, on one sheet.
