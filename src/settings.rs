@@ -128,6 +128,30 @@ pub enum MapResolution {
     },
 }
 
+/// Which wavelengths are traced of light that meets dispersive glass.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Wavelengths {
+    /// The whole spectrum without bands: the wavefront is interpolated between wavelengths; splats have
+    /// [`CONTINUOUS_BANDS`] of them.
+    #[default]
+    Continuous,
+    /// Seven, one for each colour of the rainbow (section 4.1 of the paper).
+    Rainbow,
+    /// So many, 1 to [`MOST_WAVELENGTHS`], each for a band of equal importance to the eye.
+    Fixed(u32),
+}
+
+/// How rays and wavelengths go together (section 4.1 of the paper).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum SpectralSampling {
+    /// Every ray is traced at every wavelength.
+    Split,
+    /// Every ray has one wavelength: rays are dealt out among the wavelengths evenly.
+    Stochastic,
+}
+
 /// How carefully to bake, by name.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "lowercase")]
@@ -212,6 +236,12 @@ pub struct BakeSettings {
     pub layers: Vec<LayerKind>,
     /// Whether files hold each light's part of each layer beside their sum.
     pub per_light: bool,
+    /// Which wavelengths are traced where glass is dispersive.
+    pub wavelengths: Wavelengths,
+    /// How rays and wavelengths go together; `None`: each ray is split, but by splats over the whole spectrum.
+    pub spectral_sampling: Option<SpectralSampling>,
+    /// Whether files hold the light of each wavelength beside the colour it makes; for a number of wavelengths.
+    pub keep_spectrum: bool,
     /// Effects that are forced on or off.
     pub effects: EffectSwitches,
     /// Of everything random.
@@ -238,6 +268,12 @@ pub const LEAST_MAX_ERROR: f64 = 1e-4;
 /// Most wavefronts of one light.
 pub const MOST_WAVEFRONTS: u32 = 1 << 14;
 
+/// Most wavelengths of a bake.
+pub const MOST_WAVELENGTHS: u32 = 1000;
+
+/// Wavelengths that splats take for the whole spectrum.
+pub const CONTINUOUS_BANDS: u32 = 64;
+
 /// Largest map side [texels].
 pub const MAX_MAP_SIDE: usize = 16384;
 
@@ -261,6 +297,9 @@ impl Default for BakeSettings {
             branch_threshold: None,
             layers: vec![LayerKind::Caustic],
             per_light: false,
+            wavelengths: Wavelengths::Continuous,
+            spectral_sampling: None,
+            keep_spectrum: false,
             effects: EffectSwitches::default(),
             seed: 0,
             threads: 0,
@@ -316,6 +355,29 @@ impl BakeSettings {
             // No target, or as much as time allows.
             _ => USUAL_THRESHOLD,
         })
+    }
+
+    /// How rays and wavelengths go together: as it is set, or as suits the estimator.
+    pub fn ray_sampling(&self) -> SpectralSampling {
+        self.spectral_sampling
+            .unwrap_or(match (self.estimator, self.wavelengths) {
+                (Estimator::Splat, Wavelengths::Continuous) => SpectralSampling::Stochastic,
+                _ => SpectralSampling::Split,
+            })
+    }
+
+    /// Memory that maps may take but for those of bands [bytes].
+    pub fn map_memory_bytes(&self) -> u64 {
+        if !self.keep_spectrum {
+            return self.memory_bytes;
+        }
+        let bands = match self.wavelengths {
+            Wavelengths::Continuous => 0,
+            Wavelengths::Rainbow => 7,
+            Wavelengths::Fixed(count) => u64::from(count),
+        };
+        // A texel takes 24 of 56 bytes while it is summed.
+        self.memory_bytes / (1 + bands.div_ceil(2))
     }
 
     /// Memory that traced light may take until the next bake [bytes]: a quarter of all.
@@ -374,6 +436,7 @@ impl BakeSettings {
             finite_in("--map-resolution", width as f64, 1.0, MAX_MAP_SIDE as f64)?;
             finite_in("--map-resolution", height as f64, 1.0, MAX_MAP_SIDE as f64)?;
         }
+        self.validate_wavelengths()?;
         finite_in("--max-depth", f64::from(self.max_depth), 1.0, 100_000.0)?;
         finite_in("--threads", self.threads as f64, 0.0, 1024.0)?;
         if self.layers.is_empty() {
@@ -381,6 +444,34 @@ impl BakeSettings {
                 "--layers",
                 "no layer is named",
                 "name at least one of caustic, direct, indirect",
+            ));
+        }
+        Ok(())
+    }
+
+    fn validate_wavelengths(&self) -> Result<()> {
+        if let Wavelengths::Fixed(count) = self.wavelengths
+            && !(1..=MOST_WAVELENGTHS).contains(&count)
+        {
+            return Err(Error::usage(
+                "--wavelengths",
+                format!("{count} is outside 1 to {MOST_WAVELENGTHS}"),
+                "give a number in that range, rainbow or continuous",
+            ));
+        }
+        let is_continuous = self.wavelengths == Wavelengths::Continuous;
+        if self.spectral_sampling.is_some() && is_continuous && self.estimator == Estimator::Wavefront {
+            return Err(Error::usage(
+                "--spectral-sampling",
+                "a wavefront over the whole spectrum is interpolated, not sampled",
+                "add --wavelengths N, or --estimator splat",
+            ));
+        }
+        if self.keep_spectrum && is_continuous {
+            return Err(Error::usage(
+                "--keep-spectrum",
+                "the whole spectrum has no bands to keep",
+                "add --wavelengths N, such as 7, or --wavelengths rainbow",
             ));
         }
         Ok(())

@@ -245,6 +245,8 @@ pub enum Study {
     Reference(ReferenceArguments),
     /// What each effect costs and what it is worth, by bakes with and without it
     Effects(EffectsArguments),
+    /// Split and stochastic rays, few wavelengths, many and all: how right and how dear
+    Spectrum(SpectrumArguments),
 }
 
 #[derive(Debug, Args)]
@@ -335,6 +337,39 @@ pub struct EffectsArguments {
     pub run: RunOptions,
 }
 
+#[derive(Debug, Args)]
+pub struct SpectrumArguments {
+    /// .glb, .gltf or builtin:NAME; of a scene with thin beams, those alone shine [default: builtin:spectrum]
+    pub scene: Option<String>,
+    /// Folder for spectrum.csv and spectrum.png
+    #[arg(short, long, value_name = "DIR")]
+    pub output: PathBuf,
+    /// Write into the folder even if it holds other files
+    #[arg(long)]
+    pub force: bool,
+    /// Numbers of wavelengths [default: 1,4,7,13]
+    #[arg(
+        long,
+        value_delimiter = ',',
+        value_name = "N,...",
+        allow_negative_numbers = true
+    )]
+    pub wavelengths: Option<Vec<u32>>,
+    /// Light rays per steradian; beams are thin [default: 1e8]
+    #[arg(long, value_name = "RAYS_PER_SR", allow_negative_numbers = true)]
+    pub density: Option<f64>,
+    /// Texels of every map: N by N, or W by H [default: 1024]
+    #[arg(long, value_name = "N|WxH", value_parser = study_values::fixed_map_resolution, allow_hyphen_values = true)]
+    pub map_resolution: Option<MapResolution>,
+    /// Bakes of each kind, whose median CPU time counts [default: 5]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    pub repeat: Option<usize>,
+    #[command(flatten)]
+    pub scene_options: SceneOptions,
+    #[command(flatten)]
+    pub run: RunOptions,
+}
+
 /// What the arguments ask for.
 pub enum Parsed {
     /// A job to run.
@@ -388,6 +423,7 @@ impl Arguments {
                 Some(Study::Convergence(convergence)) => &convergence.run,
                 Some(Study::Reference(reference)) => &reference.run,
                 Some(Study::Effects(effects)) => &effects.run,
+                Some(Study::Spectrum(spectrum)) => &spectrum.run,
             },
         }
     }

@@ -5,7 +5,7 @@ use nephroid::effect::{Effect, EffectSwitch, EffectSwitches};
 use nephroid::error::{Error, Result};
 use nephroid::settings::{
     BakeSettings, Estimator, Footprint, ItemBufferKind, Kernel, KernelSampling, LEAST_MAX_ERROR, LayerKind,
-    MapResolution, Preset, RayPlacement, Sigma,
+    MapResolution, Preset, RayPlacement, Sigma, SpectralSampling, Wavelengths,
 };
 
 use super::values;
@@ -70,6 +70,17 @@ pub struct BakeOptions {
     /// Adds each light's part of each layer to the files, so that lamps can be dimmed afterwards
     #[arg(long)]
     per_light: bool,
+    /// Wavelengths of light that meets dispersive glass: the whole spectrum, one for each colour of the rainbow, or so
+    /// many [default: continuous]
+    #[arg(long, value_name = "continuous|rainbow|N", value_parser = values::wavelengths, allow_negative_numbers = true)]
+    wavelengths: Option<Wavelengths>,
+    /// Every ray at every wavelength, or each ray at one of them [default: split; stochastic for splats over the whole
+    /// spectrum]
+    #[arg(long, value_enum, value_name = "SAMPLING")]
+    spectral_sampling: Option<SpectralSampling>,
+    /// Adds the light of each wavelength to the files [W/(m² nm)], with --wavelengths N
+    #[arg(long)]
+    keep_spectrum: bool,
     /// Forces effects on or off, such as refraction=off [default: auto, on where the scene calls for it]
     #[arg(long, value_delimiter = ',', value_name = "NAME=auto|on|off", value_parser = values::effect_switch)]
     effects: Option<Vec<(Effect, EffectSwitch)>>,
@@ -120,6 +131,9 @@ impl BakeOptions {
             branch_threshold: self.branch_threshold,
             layers,
             per_light: self.per_light,
+            wavelengths: self.wavelengths.unwrap_or(defaults.wavelengths),
+            spectral_sampling: self.spectral_sampling,
+            keep_spectrum: self.keep_spectrum,
             effects: self.switches(),
             seed: self.seed.unwrap_or(defaults.seed),
             threads,

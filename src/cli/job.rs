@@ -2,20 +2,15 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::ValueEnum;
 #[cfg(feature = "gpu")]
 use nephroid::effect::{Effect, EffectSwitch};
 use nephroid::error::{Error, Result};
 use nephroid::eye_pass::ToneMap;
-use nephroid::settings::{BakeSettings, Estimator, LayerKind, MapResolution};
-use nephroid::study::brute_force;
-use nephroid::study::convergence::{DEFAULT_DENSITIES, Ladder};
-use nephroid::study::effects::EffectStudy;
+use nephroid::settings::{BakeSettings, LayerKind};
 
 use super::args::{
-    Arguments, Backend, BakeArguments, Command, CompareArguments, ConvergenceArguments, EffectsArguments,
-    InspectArguments, MapsOption, PictureOptions, ReferenceArguments, RenderArguments, RunOptions,
-    SceneOptions, Study, StudyArguments, ViewArguments,
+    Arguments, Backend, BakeArguments, Command, CompareArguments, InspectArguments, MapsOption,
+    PictureOptions, RenderArguments, RunOptions, SceneOptions, ViewArguments,
 };
 use super::bake_options::BakeOptions;
 use super::compare::{self, LayerChoice};
@@ -23,9 +18,10 @@ use super::interrupt::Interrupt;
 #[cfg(feature = "gpu")]
 use super::render_path;
 use super::scene_input::{MissingLight, SceneInput};
+use super::study_jobs::{ConvergenceJob, EffectsJob, ReferenceJob, SpectrumJob, study_job};
 use super::terminal::Terminal;
 use super::values::Exposure;
-use super::{bake, inspect, render, study, study_effects, view};
+use super::{bake, inspect, render, study, study_effects, study_spectrum, view};
 
 /// Scene of `view` when none is named.
 const DEFAULT_SCENE: &str = "builtin:showroom";
@@ -50,6 +46,8 @@ pub enum Job {
     Convergence(ConvergenceJob),
     Reference(ReferenceJob),
     Effects(EffectsJob),
+    /// What sampling the spectrum costs.
+    Spectrum(SpectrumJob),
 }
 
 /// `view`.
@@ -115,36 +113,6 @@ pub struct CompareJob {
     pub difference: Option<PathBuf>,
     /// Largest relative RMSE [1].
     pub max_rmse: Option<f64>,
-}
-
-/// `study convergence`.
-#[derive(Debug)]
-pub struct ConvergenceJob {
-    pub scene: SceneInput,
-    pub ladder: Ladder,
-    pub reference: Option<PathBuf>,
-    pub surface: Option<String>,
-    pub output: PathBuf,
-    pub force: bool,
-}
-
-/// `study reference`.
-#[derive(Debug)]
-pub struct ReferenceJob {
-    pub scene: SceneInput,
-    pub settings: BakeSettings,
-    pub rays: u64,
-    pub output: PathBuf,
-    pub force: bool,
-}
-
-/// `study effects`.
-#[derive(Debug)]
-pub struct EffectsJob {
-    pub scene: SceneInput,
-    pub study: EffectStudy,
-    pub output: PathBuf,
-    pub force: bool,
 }
 
 /// Where illumination comes from.
@@ -221,6 +189,7 @@ impl Job {
             Self::Convergence(job) => study::convergence(&job, terminal, interrupt),
             Self::Reference(job) => study::reference(&job, terminal, interrupt),
             Self::Effects(job) => study_effects::run(&job, terminal, interrupt),
+            Self::Spectrum(job) => study_spectrum::run(&job, terminal, interrupt),
         }
     }
 }
@@ -397,150 +366,7 @@ fn compare_job(arguments: CompareArguments) -> Result<Job> {
     }))
 }
 
-fn study_job(arguments: StudyArguments) -> Result<Job> {
-    match arguments.study {
-        Some(Study::Convergence(convergence)) => convergence_job(convergence),
-        Some(Study::Reference(reference)) => reference_job(reference),
-        Some(Study::Effects(effects)) => effects_job(effects),
-        None if arguments.list => Ok(Job::ListStudies),
-        None => Err(Error::usage(
-            "study",
-            "no study is named",
-            "name one, or use --list to see which there are",
-        )),
-    }
-}
-
-/// Texels across and down of a study's maps where none are asked for.
-const STUDY_RESOLUTION: MapResolution = MapResolution::Fixed {
-    width: 256,
-    height: 256,
-};
-
-/// Bakes of each kind where no number is asked for.
-const DEFAULT_REPEATS: usize = 5;
-
-/// Most bakes of each kind.
-const MAX_REPEATS: usize = 1000;
-
-/// Densest lattice of `--quick` [1/sr].
-const QUICK_DENSITY: f64 = 1e5;
-
-fn convergence_job(arguments: ConvergenceArguments) -> Result<Job> {
-    let settings = BakeSettings {
-        map_resolution: arguments.map_resolution.unwrap_or(STUDY_RESOLUTION),
-        threads: threads(&arguments.run)?,
-        ..BakeSettings::default()
-    };
-    let densities = arguments.densities.unwrap_or_else(|| {
-        let wanted = |density: &f64| !arguments.quick || *density <= QUICK_DENSITY;
-        DEFAULT_DENSITIES.into_iter().filter(wanted).collect()
-    });
-    check_ladder(&densities, &settings)?;
-    let mut estimators: Vec<Estimator> = Vec::new();
-    for estimator in arguments
-        .estimators
-        .unwrap_or_else(|| Estimator::value_variants().to_vec())
-    {
-        if !estimators.contains(&estimator) {
-            estimators.push(estimator);
-        }
-    }
-    let repeats = match arguments.repeat {
-        None if arguments.quick => 1,
-        asked => repeats(asked)?,
-    };
-    let scene = arguments.scene.unwrap_or_else(|| "builtin:ring".to_string());
-    Ok(Job::Convergence(ConvergenceJob {
-        scene: scene_input(scene, &arguments.scene_options, MissingLight::Fail),
-        ladder: Ladder {
-            estimators,
-            densities,
-            repeats,
-            settings,
-        },
-        reference: arguments.reference,
-        surface: arguments.surface,
-        output: arguments.output,
-        force: arguments.force,
-    }))
-}
-
-/// Bakes of each kind.
-fn repeats(asked: Option<usize>) -> Result<usize> {
-    match asked {
-        None => Ok(DEFAULT_REPEATS),
-        Some(repeats) if (1..=MAX_REPEATS).contains(&repeats) => Ok(repeats),
-        Some(repeats) => Err(Error::usage(
-            "--repeat",
-            format!("{repeats} is outside 1 to {MAX_REPEATS}"),
-            "give a number in that range",
-        )),
-    }
-}
-
-fn check_ladder(densities: &[f64], settings: &BakeSettings) -> Result<()> {
-    if densities.is_empty() || !densities.is_sorted_by(|a, b| a < b) {
-        return Err(Error::usage(
-            "--densities",
-            "they have to be in ascending order, each once",
-            "give numbers such as 1e3,1e4,1e5",
-        ));
-    }
-    for &density_per_sr in densities {
-        let rung = BakeSettings {
-            density_per_sr,
-            ..settings.clone()
-        };
-        rung.validate().map_err(|error| Error {
-            location: "--densities".into(),
-            ..error
-        })?;
-    }
-    Ok(())
-}
-
-fn reference_job(arguments: ReferenceArguments) -> Result<Job> {
-    let settings = BakeSettings {
-        map_resolution: arguments.map_resolution.unwrap_or(STUDY_RESOLUTION),
-        seed: arguments.seed.unwrap_or(0),
-        threads: threads(&arguments.run)?,
-        ..BakeSettings::default()
-    };
-    settings.validate()?;
-    brute_force::check_rays(arguments.rays)?;
-    Ok(Job::Reference(ReferenceJob {
-        scene: scene_input(arguments.scene, &arguments.scene_options, MissingLight::Fail),
-        settings,
-        rays: arguments.rays,
-        output: arguments.output,
-        force: arguments.force,
-    }))
-}
-
-fn effects_job(arguments: EffectsArguments) -> Result<Job> {
-    let settings = arguments
-        .bake
-        .settings(&[LayerKind::Caustic], threads(&arguments.run)?)?;
-    if settings.max_time_s.is_some() {
-        return Err(Error::usage(
-            "--max-time",
-            "bakes that a clock ends do not differ by their effects alone",
-            "leave it out, or use --max-error or --density",
-        ));
-    }
-    Ok(Job::Effects(EffectsJob {
-        scene: scene_input(arguments.scene, &arguments.scene_options, MissingLight::Fail),
-        study: EffectStudy {
-            settings,
-            repeats: repeats(arguments.repeat)?,
-        },
-        output: arguments.output,
-        force: arguments.force,
-    }))
-}
-
-fn scene_input(source: String, options: &SceneOptions, otherwise: MissingLight) -> SceneInput {
+pub(super) fn scene_input(source: String, options: &SceneOptions, otherwise: MissingLight) -> SceneInput {
     SceneInput {
         source,
         missing_light: if options.default_light {
@@ -563,7 +389,7 @@ fn map_source(option: MapsOption, bake: &BakeOptions, run: &RunOptions) -> Resul
 }
 
 /// Threads asked for; 0 = one per core.
-fn threads(run: &RunOptions) -> Result<usize> {
+pub(super) fn threads(run: &RunOptions) -> Result<usize> {
     match run.threads {
         None => Ok(0),
         Some(threads) if (1..=MAX_THREADS).contains(&threads) => Ok(threads),

@@ -16,6 +16,8 @@ mod scene_input;
 mod spectral_report;
 mod study;
 mod study_effects;
+mod study_jobs;
+mod study_spectrum;
 mod study_values;
 mod survey_report;
 mod terminal;

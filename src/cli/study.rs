@@ -19,13 +19,13 @@ use serde::Serialize;
 
 use super::compare::read_luminance;
 use super::interrupt::Interrupt;
-use super::job::{ConvergenceJob, ReferenceJob};
 use super::progress_bar::StageBar;
 use super::scene_input::SceneInput;
+use super::study_jobs::{ConvergenceJob, ReferenceJob};
 use super::terminal::Terminal;
 
 /// Name and one line of each study.
-const STUDIES: [(&str, &str); 3] = [
+const STUDIES: [(&str, &str); 4] = [
     (
         "convergence",
         "error against light rays and CPU time, for every estimator",
@@ -37,6 +37,10 @@ const STUDIES: [(&str, &str); 3] = [
     (
         "effects",
         "what each effect costs and what it is worth, by bakes with and without it",
+    ),
+    (
+        "spectrum",
+        "split and stochastic rays, few wavelengths, many and all: how right and how dear",
     ),
 ];
 

@@ -10,9 +10,9 @@ use nephroid::study::effects::{self, DifferencePicture, EffectRow, EffectTable};
 use serde::Serialize;
 
 use super::interrupt::Interrupt;
-use super::job::EffectsJob;
 use super::progress_bar::StageBar;
 use super::study::{csv_of, load, open_folder, write};
+use super::study_jobs::EffectsJob;
 use super::terminal::Terminal;
 
 const CSV: &str = "effects.csv";

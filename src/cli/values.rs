@@ -1,7 +1,7 @@
 //! Values of options: how they are written.
 
 use nephroid::effect::{Effect, EffectSwitch};
-use nephroid::settings::{MapResolution, Sigma};
+use nephroid::settings::{MapResolution, Sigma, Wavelengths};
 
 /// `1.5` or `adaptive`.
 pub fn sigma(text: &str) -> Result<Sigma, String> {
@@ -11,6 +11,18 @@ pub fn sigma(text: &str) -> Result<Sigma, String> {
             .parse()
             .map(Sigma::Constant)
             .map_err(|_| "give a number or `adaptive`".to_string()),
+    }
+}
+
+/// `continuous`, `rainbow` or a number.
+pub fn wavelengths(text: &str) -> Result<Wavelengths, String> {
+    match text {
+        "continuous" => Ok(Wavelengths::Continuous),
+        "rainbow" => Ok(Wavelengths::Rainbow),
+        number => number
+            .parse()
+            .map(Wavelengths::Fixed)
+            .map_err(|_| "give a number, `rainbow` or `continuous`".to_string()),
     }
 }
 

@@ -38,8 +38,11 @@ type MapValue<'a> = Box<dyn Fn(usize) -> f32 + Sync + 'a>;
 /// A light's part of a layer: the names of its channels but for `.R`, `.G`, `.B`, and E per texel [W/m²].
 pub type LightChannel<'a> = (&'a str, &'a [[f32; 3]]);
 
+/// A band of the spectrum: the name of its channel, and E per texel [W/(m² nm)].
+pub type BandChannel<'a> = (&'a str, &'a [f32]);
+
 /// The bytes of a map's OpenEXR file: `LAYER.R/G/B` for each layer, `error.Y` where it was estimated, `R/G/B` = the sum of
-/// the layers [W/m²], and parts of lights. Row by row: the dense map is never made. The same map always gives the same
+/// the layers [W/m²], and parts of lights and bands of the spectrum. Row by row: the dense map is never made. The same map always gives the same
 /// bytes; `comment` and `location` as for [`encode`].
 ///
 /// # Errors
@@ -47,7 +50,7 @@ pub type LightChannel<'a> = (&'a str, &'a [[f32; 3]]);
 pub fn encode_map<'a>(
     map: &'a IlluminationMap,
     size: (usize, usize),
-    parts: &[LightChannel<'a>],
+    (parts, bands): (&[LightChannel<'a>], &[BandChannel<'a>]),
     comment: &str,
     location: &str,
 ) -> Result<Vec<u8>> {
@@ -75,6 +78,9 @@ pub fn encode_map<'a>(
         for (channel, name) in rgb_names(prefix).into_iter().enumerate() {
             add(name, Box::new(move |texel| irradiance[texel][channel]));
         }
+    }
+    for &(name, irradiance) in bands {
+        add(name.into(), Box::new(move |texel| irradiance[texel]));
     }
     let channels = oxr::AnyChannels::sort(channels.into());
     let image = oxr::Image::from_layer(oxr::Layer::new(size, attributes(comment), ENCODING, channels));

@@ -9,7 +9,7 @@ use crate::light_pass::ledger::{EnergyLedger, LightLedger, Truncated};
 use crate::scene::Scene;
 use crate::session::{
     BYTES_PER_TEXEL, BakeCounts, BakeResult, CostPoint, EffectReport, ForecastReport, ItemBufferReport,
-    StopReason, Timings,
+    SpectralBand, StopReason, Timings,
 };
 use crate::settings::{BakeSettings, LayerKind};
 
@@ -105,6 +105,12 @@ pub struct LedgerEntry {
     pub energy_w: EnergyAccounts,
     /// Flux of launched rays whose first hit was not specular [W].
     pub not_emitted_w: f64,
+    /// What was emitted, as radiant flux [W]; of light that is traced by wavelength.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub emitted_radiant_w: Option<f64>,
+    /// What was deposited, as radiant flux [W]; where the bands of the spectrum are kept.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub deposited_radiant_w: Option<f64>,
 }
 
 /// An estimate without a reference.
@@ -140,6 +146,9 @@ pub struct MapEntry {
     /// Each light's part of them, where it was asked for.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub lights: Vec<LightChannels>,
+    /// Each band of the caustic layer's spectrum, where it was asked for.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub bands: Vec<BandChannel>,
     /// Mean area of the texels that the surface covers [m²].
     pub texel_area_m2: f64,
     /// Of the file's values.
@@ -163,6 +172,31 @@ pub struct LightChannels {
     pub layer: LayerKind,
     /// Its channels are this and `.R`, `.G`, `.B`.
     pub channels: String,
+}
+
+/// Where a file holds one band of the caustic layer's spectrum.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct BandChannel {
+    /// The wavelengths.
+    #[serde(flatten)]
+    pub band: SpectralBand,
+    /// Its channel.
+    pub channel: String,
+    /// Of its values: radiant, and by nanometre.
+    pub units: String,
+}
+
+impl BandChannel {
+    /// Named as Fichet, Pacanowski and Wilkie propose (An OpenEXR layout for spectral images, JCGT 10(3), 2021): the
+    /// wavelength with a comma.
+    pub fn new(band: &SpectralBand) -> Self {
+        let wavelength = format!("{:.3}", band.wavelength_nm).replace('.', ",");
+        Self {
+            band: band.clone(),
+            channel: format!("caustic.S0.{wavelength}nm"),
+            units: "W/(m^2 nm)".into(),
+        }
+    }
 }
 
 /// Unit of the maps' values.
@@ -217,6 +251,8 @@ impl From<&LightLedger> for LedgerEntry {
             layer: LayerKind::Caustic,
             energy_w: ledger.energy_w.into(),
             not_emitted_w: ledger.not_emitted_w,
+            emitted_radiant_w: ledger.emitted_radiant_w,
+            deposited_radiant_w: ledger.deposited_radiant_w,
         }
     }
 }
@@ -241,7 +277,7 @@ impl MapEntry {
         scene: &Scene,
         map: &IlluminationMap,
         (width, height): (usize, usize),
-        lights: Vec<LightChannels>,
+        (lights, bands): (Vec<LightChannels>, Vec<BandChannel>),
         file: String,
         uv_file: Option<String>,
     ) -> Self {
@@ -258,6 +294,7 @@ impl MapEntry {
             uv_file,
             layers: map.layers.iter().map(|layer| layer.kind).collect(),
             lights,
+            bands,
             texel_area_m2: mean_texel_area_m2(map, width * height),
             units: UNITS.into(),
             estimated_relative_rmse: map.estimated_relative_rmse,

@@ -2,13 +2,13 @@
 
 use std::path::Path;
 
-use super::manifest::{self, LightChannels, Manifest, MapEntry};
+use super::manifest::{self, BandChannel, LightChannels, Manifest, MapEntry};
 use super::{exr, uv_file};
 use crate::error::{Error, Result};
 use crate::files::{self, OutputFolder};
 use crate::illumination::{IlluminationMap, Side, UvSet};
 use crate::scene::{Light, Scene};
-use crate::session::{BakeResult, LightLayer};
+use crate::session::{BakeResult, BandLayer, LightLayer};
 use crate::settings::{BakeSettings, MapResolution};
 
 /// Folder of the map files within ours.
@@ -63,7 +63,7 @@ impl MapFolder {
     pub fn write(self, scene: &Scene, settings: &BakeSettings, result: &BakeResult) -> Result<Manifest> {
         let mut entries = Vec::new();
         for map in &result.maps {
-            entries.push(self.write_map(scene, settings, map, &result.light_layers)?);
+            entries.push(self.write_map(scene, settings, map, result)?);
         }
         let manifest = Manifest::new(scene, settings, result, entries);
         let path = self.path().join(manifest::FILE_NAME);
@@ -86,7 +86,7 @@ impl MapFolder {
         scene: &Scene,
         settings: &BakeSettings,
         map: &IlluminationMap,
-        parts: &[LightLayer],
+        result: &BakeResult,
     ) -> Result<MapEntry> {
         let object = map.chart.object();
         let mut stem = format!(
@@ -105,7 +105,8 @@ impl MapFolder {
         let path = self.maps.path().join(&name);
         let mut lights = Vec::new();
         let mut channels = Vec::new();
-        for part in parts.iter().filter(|part| part.receiver == map.chart.receiver) {
+        let is_of_map = |part: &&LightLayer| part.receiver == map.chart.receiver;
+        for part in result.light_layers.iter().filter(is_of_map) {
             lights.push(LightChannels {
                 light: scene.lights[part.light].name.clone(),
                 layer: part.kind,
@@ -115,6 +116,14 @@ impl MapFolder {
         }
         let names = lights.iter().map(|light| light.channels.as_str());
         let parts: Vec<exr::LightChannel> = names.zip(channels).collect();
+        let of_map = result.band_layers.iter();
+        let of_map: Vec<&BandLayer> = of_map
+            .filter(|layer| layer.receiver == map.chart.receiver)
+            .collect();
+        let bands: Vec<BandChannel> = of_map.iter().map(|layer| BandChannel::new(&layer.band)).collect();
+        let names = bands.iter().map(|band| band.channel.as_str());
+        let single = names.zip(of_map.iter().map(|layer| &layer.irradiance[..]));
+        let single: Vec<exr::BandChannel> = single.collect();
         // As it was asked for, though memory may have made the map coarser.
         let size = match settings.map_resolution {
             MapResolution::Fixed { width, height } => (width, height),
@@ -123,7 +132,7 @@ impl MapFolder {
         let bytes = exr::encode_map(
             map,
             size,
-            &parts,
+            (&parts, &single),
             "irradiance in W/m^2 (lumens / 683 per m^2), linear sRGB; row 0 is v = 0",
             &path.display().to_string(),
         )?;
@@ -133,7 +142,7 @@ impl MapFolder {
             scene,
             map,
             size,
-            lights,
+            (lights, bands),
             in_maps(name),
             uv_name.map(in_maps),
         ))

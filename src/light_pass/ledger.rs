@@ -94,4 +94,20 @@ pub struct LightLedger {
     pub energy_w: EnergyLedger,
     /// Flux of launched rays whose first hit was not specular [W].
     pub not_emitted_w: f64,
+    /// What was emitted, as radiant flux [W]; `None` of light that is not traced by wavelength.
+    pub emitted_radiant_w: Option<f64>,
+    /// What was deposited, as radiant flux [W]; `None` where the bands of the spectrum are not kept.
+    pub deposited_radiant_w: Option<f64>,
+}
+
+impl LightLedger {
+    /// With radiant flux: that of the light over its luminous-equivalent watts, and what its bands deposited [W].
+    #[must_use]
+    pub fn with_radiant(self, radiant: Option<f64>, deposited_radiant_w: Option<f64>) -> Self {
+        Self {
+            emitted_radiant_w: radiant.map(|radiant| radiant * self.energy_w.emitted),
+            deposited_radiant_w,
+            ..self
+        }
+    }
 }

@@ -104,6 +104,8 @@ impl LedgerSum {
                 },
             },
             not_emitted_w: watts(Account::NotEmitted),
+            emitted_radiant_w: None,
+            deposited_radiant_w: None,
         }
     }
 }

@@ -9,6 +9,7 @@ pub mod launch;
 pub mod ledger;
 pub mod ledger_sum;
 pub mod receiver_maps;
+pub mod spectral_node;
 pub mod wavefront;
 
 pub use crate::scene::emitter;

@@ -191,7 +191,7 @@ impl ReceiverMap {
     }
 
     /// All that was added to it.
-    fn flux_counts(&self) -> [i128; 3] {
+    pub fn flux_counts(&self) -> [i128; 3] {
         let texels = self.levels.iter().flat_map(|level| level.texels());
         texels.fold([0; 3], |sum, texel| {
             std::array::from_fn(|channel| sum[channel] + i128::from(texel[channel]))

@@ -2,6 +2,7 @@
 
 pub mod colour;
 pub mod colour_basis;
+pub mod colour_matrix;
 pub mod conductor;
 pub mod fresnel;
 pub mod glass;
@@ -13,6 +14,7 @@ pub mod wavelength;
 
 pub use colour::LinearSrgb;
 pub use colour_basis::ColourBasis;
+pub use colour_matrix::ColourMatrix;
 pub use glass::Glass;
 pub use metal::Metal;
 pub use wavelength::Nanometres;

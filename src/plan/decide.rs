@@ -2,7 +2,7 @@
 
 use super::{Effect, EffectLine, EffectPlan, EffectSwitch, LightLine};
 use crate::scene::{Material, Scene, SurfaceKind};
-use crate::settings::{BakeSettings, Estimator, LayerKind};
+use crate::settings::{BakeSettings, LayerKind};
 
 /// What a light sees of the specular objects in the scene.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -210,10 +210,6 @@ impl Decision<'_> {
     fn dispersion(&self, pass: bool) -> EffectLine {
         let none = "no lit solid bends one wavelength more than another";
         let line = self.on_paths(Effect::Dispersion, pass, &Material::is_dispersive, none);
-        if line.on && self.settings.estimator == Estimator::Splat {
-            let reason = "splats know no wavelengths: glass bends all light as at 587.56 nm";
-            return self.line(Effect::Dispersion, false, reason);
-        }
         let glasses = self.lit_objects().find_map(|(object, ..)| {
             let material = self.scene.material_of(object);
             material.glass.as_ref().filter(|_| material.is_dispersive())

@@ -144,8 +144,9 @@ impl CausticLayer<'_> {
         for light in &lights {
             let state = states.of_mut(light.light);
             let has_bumps = self.plan.is_on(Effect::Bumps);
-            let lamp = self.spectra.lamp(light.light);
-            state.begin(&light.launch, (has_bumps, lamp), self.settings.kept_light_bytes());
+            let spectrum = self.spectra.key(light.light);
+            let bytes = self.settings.kept_light_bytes();
+            state.begin(&light.launch, (has_bumps, spectrum), bytes);
         }
         let sizes = self.sizes_of_maps(states, &lights, &mut course)?;
         course.statistics = states.statistics.as_ref().map(|(_, known)| known.clone());

@@ -68,9 +68,10 @@ impl Finish<'_> {
         light_layers.retain(|part| is_shown(part.kind));
         let ledgers = levels.iter().map(|(light, level)| {
             let light = &self.scene.lights[*light];
-            level
+            let ledger = level
                 .ledger
-                .report(&light.name, level.unit, level.strength(light))
+                .report(&light.name, level.unit, level.strength(light));
+            ledger.with_radiant(level.radiant, level.deposited_radiant_w(light))
         });
         let ledgers: Vec<LightLedger> = ledgers.collect();
         let estimated_relative_rmse = relative_rmse(&maps).map(|rmse| rmse.hypot(given_up_share(&ledgers)));
@@ -90,6 +91,7 @@ impl Finish<'_> {
         };
         BakeResult {
             estimated_relative_rmse,
+            band_layers: self.band_layers(&maps, levels),
             maps,
             light_layers,
             plan: self.plan.clone(),
@@ -236,7 +238,7 @@ impl Finish<'_> {
     }
 
     /// Smooths a map of the wavefront by sigma; maps with gaps are left as they are: their borders are no mirrors.
-    fn smooth(&self, chart: &Chart, flux: &mut FluxAccumulator) {
+    pub(super) fn smooth(&self, chart: &Chart, flux: &mut FluxAccumulator) {
         if let (Estimator::Wavefront, Sigma::Constant(sigma)) = (self.settings.estimator, self.settings.sigma)
             && chart.is_full()
             && chart.layout.is_none()

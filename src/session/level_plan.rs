@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use glam::DVec2;
+
 use super::caustic::{CausticLayer, Course, ESTIMATED_LEVELS};
 use super::light_level::{LevelKey, LightStates, TraceKey};
 use super::map_size::Sizes;
@@ -142,7 +144,7 @@ impl CausticLayer<'_> {
                 0
             },
             rounds: rounds.to_vec(),
-            lamp: self.spectra.lamp(light.light).cloned(),
+            spectrum: self.spectra.key(light.light).cloned(),
         }
     }
 
@@ -187,11 +189,13 @@ impl CausticLayer<'_> {
     pub(super) fn lattice<'a>(&'a self, light: &'a AimedLight, unit: FluxUnit) -> Lattice<'a> {
         Lattice {
             tracer: self.tracer,
+            band: None,
             launch: &light.launch,
             item_buffer: &light.item_buffer,
             size: self.lattice_size(light),
             strides: (1, 1),
             placement: self.settings.rays,
+            centre: DVec2::splat(0.5),
             seed: self.settings.seed,
             limits: self.limits(light),
             unit,

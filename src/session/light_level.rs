@@ -1,10 +1,11 @@
 //! What a session keeps of one light: rays, and the maps of the levels of the last bake.
 
 use std::collections::BTreeMap;
-use std::sync::Arc;
 
+use super::band_layers::LevelBand;
 use super::map_size::Sizes;
 use super::soft_level::Resolved;
+use super::spectra::SpectralKey;
 use crate::illumination::accumulator::{FluxCount, FluxUnit};
 use crate::light_pass::accuracy::{LightError, Noise};
 use crate::light_pass::caustic::kept::KeptLight;
@@ -17,7 +18,6 @@ use crate::light_pass::wavefront::overreach::Overreach;
 use crate::light_pass::wavefront::pass::TracedLight;
 use crate::light_pass::wavefront::refine::Round;
 use crate::optics::LinearSrgb;
-use crate::optics::spectrum::Spectrum;
 use crate::scene::Light;
 use crate::settings::BakeSettings;
 use crate::transport::EffectSet;
@@ -35,8 +35,8 @@ pub(super) struct TraceKey {
     pub(super) coarser: i32,
     /// Where cells are divided further, round by round.
     pub(super) rounds: Vec<Round>,
-    /// Its spectrum, where its wavelengths go different ways.
-    pub(super) lamp: Option<Arc<Spectrum>>,
+    /// What chose its wavelengths, where it is traced by wavelength.
+    pub(super) spectrum: Option<SpectralKey>,
 }
 
 /// All that a light's maps depend on beside the scene.
@@ -78,6 +78,10 @@ pub(super) struct LightLevel {
     pub(super) key: LevelKey,
     /// Flux per texel.
     pub(super) maps: ReceiverMaps,
+    /// The same by band of its spectrum, as X, Y and Z; none unless that is to be kept.
+    pub(super) bands: Vec<LevelBand>,
+    /// Radiant watts of the light over its luminous-equivalent ones, where it has a spectrum.
+    pub(super) radiant: Option<f64>,
     /// Of the flux.
     pub(super) unit: FluxUnit,
     /// Of all paths.
@@ -147,8 +151,8 @@ pub(super) struct LightState {
     launch: Option<Launch>,
     /// Whether bumps bent them.
     has_bumps: bool,
-    /// The lamp that chose their wavelengths.
-    lamp: Option<Arc<Spectrum>>,
+    /// What chose their wavelengths.
+    spectrum: Option<SpectralKey>,
     /// What its rays met.
     pub(super) rays: KeptRays,
     /// Levels of the last bake, the coarsest first.
@@ -167,9 +171,24 @@ impl LightLevel {
         }
     }
 
+    /// Radiant flux on all maps [W], where bands are kept.
+    pub(super) fn deposited_radiant_w(&self, light: &Light) -> Option<f64> {
+        if self.bands.is_empty() {
+            return None;
+        }
+        let of_band = |band: &LevelBand| {
+            let counts = band.maps.iter().map(|(_, map)| map.flux_counts()[band.channel]);
+            counts.sum::<i128>() as f64 * band.radiant
+        };
+        let flux: f64 = self.bands.iter().map(of_band).sum();
+        Some(flux * self.unit.watts() * self.strength(light).luminance())
+    }
+
     /// Memory of its maps and paths [bytes].
     pub(super) fn bytes(&self) -> u64 {
-        let texels = self.maps.iter().map(|(_, map)| map.chart.texel_count() as u64);
+        let all = std::iter::once(&self.maps).chain(self.bands.iter().map(|band| &band.maps));
+        let maps = all.flat_map(ReceiverMaps::iter);
+        let texels = maps.map(|(_, map)| map.chart.texel_count() as u64);
         texels.sum::<u64>() * size_of::<FluxCount>() as u64
             + self.traced.as_ref().map_or(0, TracedLight::bytes)
     }
@@ -187,7 +206,7 @@ impl LightState {
     pub(super) fn begin(
         &mut self,
         launch: &Launch,
-        (has_bumps, lamp): (bool, Option<&Arc<Spectrum>>),
+        (has_bumps, spectrum): (bool, Option<&SpectralKey>),
         kept_bytes: u64,
     ) {
         if self.launch.as_ref() != Some(launch) {
@@ -196,8 +215,8 @@ impl LightState {
                 ..Self::default()
             };
         }
-        let went_alike = self.has_bumps == has_bumps && self.lamp.as_ref() == lamp;
-        (self.has_bumps, self.lamp) = (has_bumps, lamp.cloned());
+        let went_alike = self.has_bumps == has_bumps && self.spectrum.as_ref() == spectrum;
+        (self.has_bumps, self.spectrum) = (has_bumps, spectrum.cloned());
         if self.rays.bytes() > kept_bytes || !went_alike {
             self.rays = KeptRays::default();
         }

@@ -24,7 +24,7 @@ impl CausticLayer<'_> {
         // Both sides of each.
         let receivers = 2 * (0..scene.objects.len()).filter(is_receiver).count() as u64;
         let texels = width as u64 * height as u64;
-        texels.saturating_mul(BYTES_PER_TEXEL).saturating_mul(receivers) <= self.settings.memory_bytes
+        texels.saturating_mul(BYTES_PER_TEXEL).saturating_mul(receivers) <= self.settings.map_memory_bytes()
     }
 
     /// Sizes of the maps that the coarse run saw lit, with what is to be said of them.
@@ -49,7 +49,7 @@ impl CausticLayer<'_> {
         };
         let wishes: BTreeMap<Receiver, Wish> = receivers.filter_map(wish).collect();
         let wished = map_size::fit(&wishes, u64::MAX);
-        let mut sizes = map_size::fit(&wishes, self.settings.memory_bytes);
+        let mut sizes = map_size::fit(&wishes, self.settings.map_memory_bytes());
         let is_scarce = sizes != wished;
         if let (MapResolution::Fixed { width, height }, false) = (self.settings.map_resolution, is_scarce) {
             // What only the full lattice lights.
@@ -58,7 +58,7 @@ impl CausticLayer<'_> {
             }
         }
         let warnings = if is_scarce {
-            vec![scarce(&wished, &sizes, self.settings.memory_bytes)]
+            vec![scarce(&wished, &sizes, self.settings.map_memory_bytes())]
         } else if let (MapResolution::Auto, Some(statistics)) = (self.settings.map_resolution, statistics) {
             self.coarse_maps(&sizes, statistics)
         } else {

@@ -1,5 +1,6 @@
 //! A bake as a session: scene and settings in, maps out. The command line's `bake` is a session that runs once.
 
+mod band_layers;
 mod caustic;
 mod clock;
 mod direct_cache;
@@ -14,6 +15,7 @@ mod level_plan;
 mod light_level;
 mod map_plan;
 mod map_size;
+mod part_maps;
 pub mod result;
 mod scene_change;
 mod sizes;
@@ -26,11 +28,13 @@ mod wavefront_level;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+pub use band_layers::BandLayer;
 pub use forecast::{CostPoint, Forecast, ForecastReport};
 pub use result::{
     BakeCounts, BakeResult, EffectCounts, EffectReport, ItemBufferReport, LightLayer, StopReason, Timings,
 };
 pub use sizes::BYTES_PER_TEXEL;
+pub use spectra::SpectralBand;
 pub use survey::{PresetForecast, Survey};
 
 use crate::effect::EffectSwitch;
@@ -299,7 +303,7 @@ impl BakeSession {
         if plan.is_on(Effect::LightPass) {
             let smooth = (!plan.is_on(Effect::Bumps)).then(|| tracer.without_bumps());
             let seen = smooth.as_ref().unwrap_or(&tracer);
-            let spectra = Spectra::new(seen, &aim, &plan)?;
+            let spectra = Spectra::new(seen, &aim, &plan, settings)?;
             let layer = CausticLayer {
                 tracer: seen,
                 spectra: &spectra,

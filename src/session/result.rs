@@ -1,5 +1,6 @@
 //! What a bake gives.
 
+use super::band_layers::BandLayer;
 use serde::{Deserialize, Serialize};
 
 use super::forecast::{CostPoint, ForecastReport};
@@ -137,6 +138,8 @@ pub struct BakeResult {
     /// What each light gives to them, where that is asked for: map by map, caustic before direct, in the order of lights, and all of
     /// indirect after them.
     pub light_layers: Vec<LightLayer>,
+    /// What each band of the spectrum gives to them, where that is asked for: map by map, from the shortest wavelength on.
+    pub band_layers: Vec<BandLayer>,
     /// Which effects were on, and why.
     pub plan: EffectPlan,
     /// What each effect took, in the order of the plan.

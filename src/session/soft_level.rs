@@ -10,6 +10,7 @@ use super::caustic::{CausticLayer, Climb, Course};
 use super::level_plan;
 use super::light_level::{KeptError, LevelKey, LightLevel, LightState, SoftParts};
 use super::map_size::{MapSize, Sizes};
+use super::part_maps::PartMaps;
 use super::wavefront_level::take_strays;
 use crate::error::{Error, Result};
 use crate::geometry::sampling::even_point;
@@ -262,13 +263,13 @@ impl CausticLayer<'_> {
         let same = before.filter(|before| before.key.trace == key.trace && before.key.sizes == key.sizes);
         let first = same.and(before_at).map_or(0, |before| before.wavefronts);
         let watch = Stopwatch::start();
-        let (mut report, mut maps) = self.run_wavefronts(light, &key, unit, first..count, course);
+        let (mut report, mut maps, mut bands) = self.run_wavefronts(light, &key, unit, first..count, course);
         // What was fine before a finer lattice is what to compare with now.
         let is_refined = before_at == Some(resolved.coarser());
         let mut coarse = match before.filter(|_| is_refined) {
             Some(before) => before.maps.clone(),
             None => {
-                let (other, coarse) = self.run_wavefronts(light, &coarse_key, unit, first..count, course);
+                let (other, coarse, _) = self.run_wavefronts(light, &coarse_key, unit, first..count, course);
                 let ledger = report.ledger;
                 report.merge(other);
                 report.ledger = ledger;
@@ -285,6 +286,9 @@ impl CausticLayer<'_> {
         take_strays(&mut maps, &mut ledger);
         if let Some(same) = same {
             maps.add(same.maps.clone());
+            for earlier in &same.bands {
+                bands[earlier.index].add(earlier.maps.clone());
+            }
             ledger.merge(&same.ledger);
             if let Some(earlier) = &same.parts.coarse {
                 coarse.add(earlier.clone());
@@ -294,12 +298,14 @@ impl CausticLayer<'_> {
             unit: unit.shared(resolved.wavefronts),
             key,
             maps,
+            bands: self.spectra.level_bands(light.light, bands),
+            radiant: self.spectra.radiant(light.light),
             ledger,
             overreaches: Vec::new(),
             noise: None,
             error: None,
             traced: None,
-            has_own_colour: self.spectra.of(light.light).is_some(),
+            has_own_colour: self.spectra.has(light.light),
             parts: SoftParts {
                 coarse: Some(coarse),
                 ..SoftParts::default()
@@ -315,9 +321,10 @@ impl CausticLayer<'_> {
         unit: FluxUnit,
         wavefronts: std::ops::Range<u32>,
         course: &Course,
-    ) -> (PassReport, ReceiverMaps) {
+    ) -> (PassReport, ReceiverMaps, Vec<ReceiverMaps>) {
         let count = wavefronts.len();
-        let texels: u64 = key.sizes.values().map(MapSize::texels).sum();
+        let sets = self.spectra.kept_bands().max(1) as u64;
+        let texels: u64 = sets * key.sizes.values().map(MapSize::texels).sum::<u64>();
         // Each task has maps of its own.
         let room = self.settings.memory_bytes / 4 / (texels * super::BYTES_PER_TEXEL).max(1);
         let tasks = rayon::current_num_threads()
@@ -328,11 +335,11 @@ impl CausticLayer<'_> {
         let chart_for = |receiver: Receiver| self.chart(receiver, &key.sizes);
         let receivers = Receivers::new(self.tracer, &chart_for);
         let lit = (&receivers, &chart_for as &ChartFor);
-        let parts: Vec<(PassReport, ReceiverMaps)> = (0..tasks)
+        let parts: Vec<(PassReport, PartMaps)> = (0..tasks)
             .into_par_iter()
             .map(|task| {
                 let mut report = PassReport::default();
-                let mut maps = self.no_maps();
+                let mut maps = self.part_maps();
                 for index in wavefronts.clone().skip(task).step_by(tasks) {
                     if course.control.is_cancelled() {
                         report.cancelled = true;
@@ -347,14 +354,15 @@ impl CausticLayer<'_> {
                 (report, maps)
             })
             .collect();
-        let mut sum = (PassReport::default(), self.no_maps());
-        for (report, maps) in parts {
-            sum.0.merge(report);
-            sum.1.add(maps);
+        let (mut report, mut sum) = (PassReport::default(), self.part_maps());
+        for (part, maps) in parts {
+            report.merge(part);
+            sum.add(maps);
         }
+        let (mut maps, bands) = sum.into_sum();
         self.spectra
-            .to_linear_srgb(light.light, &mut sum.1, &mut sum.0.ledger);
-        sum
+            .to_linear_srgb(light.light, &mut maps, &mut report.ledger);
+        (report, maps, bands)
     }
 
     /// Compares a level with the one before it.
@@ -410,7 +418,7 @@ impl CausticLayer<'_> {
         key: &LevelKey,
         unit: FluxUnit,
         lit: (&Receivers, &ChartFor),
-        maps: &mut ReceiverMaps,
+        maps: &mut PartMaps,
         course: &Course,
     ) -> PassReport {
         match self.settings.estimator {

@@ -2,6 +2,7 @@
 
 use super::caustic::{CausticLayer, Course};
 use super::light_level::{LevelKey, LightLevel, LightState, SoftParts, TraceKey};
+use super::part_maps::PartMaps;
 use crate::illumination::Receiver;
 use crate::illumination::accumulator::FluxUnit;
 use crate::light_pass::accuracy::{self, Images};
@@ -11,6 +12,7 @@ use crate::light_pass::caustic::lattice::Lattice;
 use crate::light_pass::caustic::pass::{self, Listener, PassReport, Source};
 use crate::light_pass::caustic::setup::AimedLight;
 use crate::light_pass::caustic::statistics::FootprintStatistics;
+use crate::light_pass::ledger_sum::LedgerSum;
 use crate::light_pass::receiver_maps::ReceiverMaps;
 use crate::settings::{BakeSettings, Footprint, Sigma};
 
@@ -34,7 +36,7 @@ impl CausticLayer<'_> {
         state: &mut LightState,
         course: &mut Course,
     ) -> Option<LightLevel> {
-        let (mut maps, mut second) = (self.no_maps(), self.no_maps());
+        let (mut maps, mut second) = (self.part_maps(), self.part_maps());
         let lattice = Lattice {
             strides: (key.stride, key.stride),
             ..self.lattice(light, unit)
@@ -45,14 +47,17 @@ impl CausticLayer<'_> {
             },
             source => source,
         };
-        let mut halves = Halves {
-            first: &mut maps,
-            second: Some(&mut second),
-        };
-        let (report, arrived) = self.deposit_splats(lattice, source, &key, &mut halves, course);
+        let halves = (&mut maps, Some(&mut second));
+        let (mut report, arrived) = self.deposit_parts(light, lattice, source, &key, halves, course);
         if let Some(arrived) = arrived {
             state.arrivals = Some((key.trace.clone(), arrived));
         }
+        let (mut maps, mut bands) = maps.into_sum();
+        let (mut second, more) = second.into_sum();
+        let mut none = LedgerSum::default();
+        self.spectra
+            .to_linear_srgb(light.light, &mut maps, &mut report.ledger);
+        self.spectra.to_linear_srgb(light.light, &mut second, &mut none);
         course.outcome.count(&report, course.clock);
         let noise = (!report.cancelled).then(|| {
             course.clock.time(
@@ -64,18 +69,60 @@ impl CausticLayer<'_> {
             )
         });
         maps.add(second);
+        for (band, more) in bands.iter_mut().zip(more) {
+            band.add(more);
+        }
         (!report.cancelled).then_some(LightLevel {
             key,
             noise,
             maps,
+            bands: self.spectra.level_bands(light.light, bands),
+            radiant: self.spectra.radiant(light.light),
             unit,
             ledger: report.ledger,
             overreaches: Vec::new(),
             error: None,
             traced: None,
-            has_own_colour: false,
+            has_own_colour: self.spectra.has(light.light),
             parts: SoftParts::default(),
         })
+    }
+
+    /// Every part of a light's spectrum, one after the other. What arrived is given back of light without one.
+    fn deposit_parts(
+        &self,
+        light: &AimedLight,
+        lattice: Lattice,
+        source: Source,
+        key: &LevelKey,
+        (first, mut second): (&mut PartMaps, Option<&mut PartMaps>),
+        course: &Course,
+    ) -> (PassReport, Option<KeptLight>) {
+        let (mut report, mut kept) = (PassReport::default(), None);
+        for (band, part) in self.spectra.parts(light.light) {
+            let mut halves = Halves {
+                first: first.of(band),
+                second: second.as_deref_mut().map(|second| second.of(band)),
+            };
+            let lattice = Lattice {
+                band: part.node(0),
+                size: self.spectra.part_size(light.light, lattice.size),
+                centre: self.spectra.ray_place(light.light, band),
+                ..lattice
+            };
+            let source = if band.is_some() {
+                Source::Rays { keep_bytes: 0 }
+            } else {
+                source
+            };
+            let (of_part, arrived) = self.deposit_splats(lattice, source, key, &mut halves, course);
+            report.merge(of_part);
+            kept = arrived;
+            if report.cancelled {
+                break;
+            }
+        }
+        (report, kept)
     }
 
     fn deposit_splats(
@@ -108,18 +155,15 @@ impl CausticLayer<'_> {
         light: &AimedLight,
         key: &LevelKey,
         unit: FluxUnit,
-        maps: &mut ReceiverMaps,
+        maps: &mut PartMaps,
         course: &Course,
     ) -> PassReport {
         let lattice = Lattice {
             size: key.trace.size,
             ..self.lattice(light, unit)
         };
-        let mut all = Halves {
-            first: maps,
-            second: None,
-        };
-        self.deposit_splats(lattice, Source::Rays { keep_bytes: 0 }, key, &mut all, course)
+        let source = Source::Rays { keep_bytes: 0 };
+        self.deposit_parts(light, lattice, source, key, (maps, None), course)
             .0
     }
 
@@ -138,15 +182,20 @@ impl CausticLayer<'_> {
             strides: (ERROR_STRIDE, ERROR_STRIDE),
             ..self.lattice(light, level.unit)
         };
-        let mut maps = self.no_maps();
+        let mut maps = self.part_maps();
         let source = source_of(state, &level.key.trace);
-        let mut all = Halves {
-            first: &mut maps,
-            second: None,
-        };
-        let (report, _) = self.deposit_splats(lattice, source, &level.key, &mut all, course);
+        let (mut report, _) =
+            self.deposit_parts(light, lattice, source, &level.key, (&mut maps, None), course);
+        let (mut maps, _) = maps.into_sum();
+        self.spectra
+            .to_linear_srgb(light.light, &mut maps, &mut report.ledger);
         course.outcome.count(&report, course.clock);
         Some(accuracy::images(&maps, level.unit))
+    }
+
+    /// Maps without light, by band where those are kept.
+    pub(super) fn part_maps(&self) -> PartMaps {
+        PartMaps::new(self.tracer.scene().objects.len(), self.spectra.kept_bands())
     }
 
     pub(super) fn no_maps(&self) -> ReceiverMaps {

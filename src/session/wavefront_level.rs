@@ -4,6 +4,7 @@ use glam::DVec2;
 
 use super::caustic::{CausticLayer, Course};
 use super::light_level::{LevelKey, LightLevel, LightState, SoftParts, TraceKey};
+use super::part_maps::PartMaps;
 use crate::illumination::Receiver;
 use crate::illumination::accumulator::FluxUnit;
 use crate::light_pass::caustic::pass::{Listener, PassReport};
@@ -19,6 +20,7 @@ use crate::light_pass::wavefront::lattice::WavefrontLattice;
 use crate::light_pass::wavefront::pass::{Room, WavefrontDepositor};
 use crate::light_pass::wavefront::receivers::Receivers;
 use crate::light_pass::wavefront::refine::Refinement;
+use crate::light_pass::wavefront::spectrum::LightPart;
 use crate::light_pass::wavefront::trace::StrandTracer;
 use crate::progress::Control;
 use crate::settings::Estimator;
@@ -39,32 +41,53 @@ impl CausticLayer<'_> {
             receivers: &receivers,
             rounds: &key.trace.rounds,
         };
-        let bodies = self.small_bodies(light, key.trace.size);
-        let depositor = WavefrontDepositor {
-            receivers: &receivers,
-            chart_for: &chart_for,
-            lattice: WavefrontLattice {
-                refinement: Some(&refinement),
-                ..self.bumpy_lattice(light, &key.trace, &bodies, unit, course.control)
-            },
-            reference_w: reference_w(light),
-            coarseness: key.coarseness,
+        let mut maps = self.part_maps();
+        let mut report = PassReport::default();
+        let mut traced = None;
+        // Bands are too many to be kept.
+        let (mut taken, room) = if self.spectra.has_bands(light) {
+            (
+                None,
+                Room {
+                    bands_bytes: 0,
+                    ..self.room()
+                },
+            )
+        } else {
+            (state.take_traced(&key), self.room())
         };
-        let listener = Listener {
-            progress: self.progress,
-            control: course.control,
-            done: course.outcome.counts.rays,
-            total: depositor.lattice.cell_count(),
-        };
-        let mut maps = ReceiverMaps::new(self.tracer.scene().objects.len());
-        let (report, traced) = match state.take_traced(&key) {
-            Some(traced) => (
-                depositor.deposit_again(&traced, &mut maps, &listener),
-                Some(traced),
-            ),
-            None => depositor.run(&mut state.rays, Some(&mut maps), &listener, self.room()),
-        };
-        let mut report = report;
+        for (band, part) in self.spectra.parts(light.light) {
+            let size = self.spectra.part_size(light.light, key.trace.size);
+            let bodies = self.small_bodies(light, size);
+            let depositor = WavefrontDepositor {
+                receivers: &receivers,
+                chart_for: &chart_for,
+                lattice: WavefrontLattice {
+                    refinement: Some(&refinement),
+                    ..self.bumpy_lattice(light, part, &key.trace, &bodies, unit, course.control)
+                },
+                reference_w: reference_w(light),
+                coarseness: key.coarseness,
+            };
+            let listener = Listener {
+                progress: self.progress,
+                control: course.control,
+                done: course.outcome.counts.rays + report.rays,
+                total: depositor.lattice.cell_count(),
+            };
+            let maps = maps.of(band);
+            let (of_part, kept) = match taken.take() {
+                Some(taken) => (depositor.deposit_again(&taken, maps, &listener), Some(taken)),
+                None => depositor.run(&mut state.rays, Some(maps), &listener, room),
+            };
+            report.merge(of_part);
+            traced = kept;
+            if report.cancelled {
+                break;
+            }
+        }
+        let (mut maps, bands) = maps.into_sum();
+        let traced = traced.filter(|_| !self.spectra.has_bands(light));
         self.spectra
             .to_linear_srgb(light.light, &mut maps, &mut report.ledger);
         take_strays(&mut maps, &mut report.ledger);
@@ -72,13 +95,15 @@ impl CausticLayer<'_> {
         (!report.cancelled).then_some(LightLevel {
             key,
             maps,
+            bands: self.spectra.level_bands(light.light, bands),
+            radiant: self.spectra.radiant(light.light),
             unit,
             ledger: report.ledger,
             overreaches: report.overreaches,
             noise: None,
             error: None,
             traced,
-            has_own_colour: self.spectra.of(light.light).is_some(),
+            has_own_colour: self.spectra.has(light.light),
             parts: SoftParts::default(),
         })
     }
@@ -90,25 +115,31 @@ impl CausticLayer<'_> {
         key: &LevelKey,
         unit: FluxUnit,
         (receivers, chart_for): (&Receivers, &ChartFor),
-        maps: &mut ReceiverMaps,
+        maps: &mut PartMaps,
         course: &Course,
     ) -> PassReport {
-        let bodies = self.small_bodies(light, key.trace.size);
-        let depositor = WavefrontDepositor {
-            receivers,
-            chart_for,
-            lattice: self.bumpy_lattice(light, &key.trace, &bodies, unit, course.control),
-            reference_w: reference_w(light),
-            coarseness: key.coarseness,
-        };
+        let size = self.spectra.part_size(light.light, key.trace.size);
+        let bodies = self.small_bodies(light, size);
         let listener = Listener {
             progress: &(),
             control: course.control,
             done: 0,
             total: 0,
         };
-        let mut rays = KeptRays::default();
-        depositor.run(&mut rays, Some(maps), &listener, Room::default()).0
+        let mut report = PassReport::default();
+        for (band, part) in self.spectra.parts(light.light) {
+            let depositor = WavefrontDepositor {
+                receivers,
+                chart_for,
+                lattice: self.bumpy_lattice(light, part, &key.trace, &bodies, unit, course.control),
+                reference_w: reference_w(light),
+                coarseness: key.coarseness,
+            };
+            let mut rays = KeptRays::default();
+            let maps = Some(maps.of(band));
+            report.merge(depositor.run(&mut rays, maps, &listener, Room::default()).0);
+        }
+        report
     }
 
     /// Sizes of lit areas at the density that maps are meant for, from a thinner lattice.
@@ -127,7 +158,7 @@ impl CausticLayer<'_> {
         let depositor = WavefrontDepositor {
             receivers: &receivers,
             chart_for,
-            lattice: self.wavefront_lattice(light, size, &none, unit, course.control),
+            lattice: self.wavefront_lattice(light, LightPart::White, size, &none, unit, course.control),
             reference_w: reference_w(light),
             coarseness: 1.0,
         };
@@ -188,12 +219,14 @@ impl CausticLayer<'_> {
     fn bumpy_lattice<'a>(
         &'a self,
         light: &'a AimedLight,
+        part: LightPart<'a>,
         trace: &TraceKey,
         bodies: &'a SmallBodies,
         unit: FluxUnit,
         control: &'a Control,
     ) -> WavefrontLattice<'a> {
-        let mut lattice = self.wavefront_lattice(light, trace.size, bodies, unit, control);
+        let size = self.spectra.part_size(light.light, trace.size);
+        let mut lattice = self.wavefront_lattice(light, part, size, bodies, unit, control);
         lattice.tracer.bumps = BumpCells::for_lattice(lattice.cell_count(), trace.coarser);
         lattice
     }
@@ -202,6 +235,7 @@ impl CausticLayer<'_> {
     fn wavefront_lattice<'a>(
         &'a self,
         light: &'a AimedLight,
+        part: LightPart<'a>,
         size: (usize, usize),
         bodies: &'a SmallBodies,
         unit: FluxUnit,
@@ -216,18 +250,14 @@ impl CausticLayer<'_> {
         );
         let mut tracer = tracer.with_closeness(self.closeness(light));
         tracer.bumps = BumpCells::UNDIVIDED;
-        let spectrum = self.spectra.of(light.light);
-        if let Some(spectrum) = spectrum {
-            tracer = tracer.at_node(spectrum, 0);
-        }
         WavefrontLattice {
-            tracer,
+            tracer: tracer.at_node(part, 0),
             item_buffer: &light.item_buffer,
             size,
             unit,
             refinement: None,
             bodies,
-            spectrum,
+            light: part,
         }
     }
 }

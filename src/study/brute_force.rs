@@ -465,6 +465,7 @@ fn empty_result(plan: EffectPlan, nothing_to_do: bool) -> BakeResult {
     BakeResult {
         maps: Vec::new(),
         light_layers: Vec::new(),
+        band_layers: Vec::new(),
         plan,
         effects: Vec::new(),
         item_buffers: Vec::new(),

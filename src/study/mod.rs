@@ -11,3 +11,4 @@ pub mod frame_times;
 pub mod plot;
 pub mod references;
 mod repeats;
+pub mod spectrum;

@@ -80,24 +80,6 @@ impl Interaction {
     };
 }
 
-impl Interaction {
-    /// The same with every share through a function that keeps their sum.
-    #[must_use]
-    pub fn map_shares(self, f: impl Fn(LinearSrgb) -> LinearSrgb) -> Self {
-        let branch = |branch: Branch| Branch {
-            share: f(branch.share),
-            ..branch
-        };
-        Self {
-            reflection: self.reflection.map(branch),
-            transmission: self.transmission.map(branch),
-            deposit: f(self.deposit),
-            absorbed: f(self.absorbed),
-            switched_off: f(self.switched_off),
-        }
-    }
-}
-
 /// Orientation of a hit: normals on the side of the incoming ray.
 struct Facing {
     /// Whether the outside was met.

@@ -46,6 +46,7 @@ pub fn finished(scene: &Arc<Scene>, settings: &BakeSettings) -> BakedLevel {
         is_final: true,
         result: BakeResult {
             light_layers: Vec::new(),
+            band_layers: Vec::new(),
             maps: Vec::new(),
             plan: EffectPlan::default(),
             effects: Vec::new(),

@@ -606,6 +606,8 @@ fn the_ledger_is_summed_over_lights_and_tells_an_open_account() {
             light: "lamp".into(),
             energy_w: account(escaped),
             not_emitted_w: 0.0,
+            emitted_radiant_w: None,
+            deposited_radiant_w: None,
         })
         .to_vec();
     last.result.counts.rays = 1_234_567;

@@ -20,6 +20,7 @@ pub fn result(rays: u64, partial: bool) -> BakeResult {
     BakeResult {
         maps: Vec::new(),
         light_layers: Vec::new(),
+        band_layers: Vec::new(),
         plan: EffectPlan::default(),
         effects: Vec::new(),
         course: Vec::new(),

@@ -145,6 +145,7 @@ impl Depositor<'_> {
             match placed {
                 Some(placed) => {
                     made.deposits.count_segment(arrival.event);
+                    made.deposits.of_a_wavelength += u64::from(self.lattice.band.is_some());
                     made.splats.push(Placed {
                         is_second: (column + context.index) % 2 == 1,
                         ..placed

@@ -10,6 +10,7 @@ use crate::illumination::accumulator::FluxUnit;
 use crate::light_pass::item_buffer::ItemBuffer;
 use crate::light_pass::launch::Launch;
 use crate::light_pass::ledger_sum::LedgerSum;
+use crate::light_pass::spectral_node::SpectralNode;
 use crate::scene::Scene;
 use crate::settings::RayPlacement;
 use crate::transport::{ForEffects, PathCounts, PathEffects, Tracer};
@@ -19,6 +20,8 @@ use crate::transport::{ForEffects, PathCounts, PathEffects, Tracer};
 pub struct Lattice<'a> {
     /// The scene.
     pub tracer: &'a Tracer,
+    /// The wavelength of its rays; `None` of light without one.
+    pub band: Option<&'a SpectralNode>,
     /// Where rays start.
     pub launch: &'a Launch,
     /// Which cells are worth a ray.
@@ -30,6 +33,8 @@ pub struct Lattice<'a> {
     pub strides: (usize, usize),
     /// Where in its cell a ray starts.
     pub placement: RayPlacement,
+    /// Where that is where all rays start alike, [0, 1)².
+    pub centre: DVec2,
     /// Of the jitter.
     pub seed: u64,
     /// Of the paths.
@@ -191,7 +196,10 @@ impl Lattice<'_> {
             strides: (1, 1),
             ..*self
         };
-        let mut paths = PathTracer::new(self.tracer, self.limits, self.unit);
+        let mut paths = match self.band {
+            Some(band) => PathTracer::new(&band.tracer, self.limits, self.unit).with_channels(band.channels),
+            None => PathTracer::new(self.tracer, self.limits, self.unit),
+        };
         for (start, end) in self.item_buffer.lattice_spans(face, fine_row, self.size) {
             for fine_column in start..end {
                 let Some(column) = self.coarse_column(fine_column) else {
@@ -216,13 +224,16 @@ impl Lattice<'_> {
         traced.ledger = paths.ledger;
         traced.segments = paths.segments;
         traced.paths = paths.counts;
+        if self.band.is_some() {
+            traced.paths.of_a_wavelength = traced.rays;
+        }
         traced
     }
 
     /// Place of the ray within its cell, [0, 1)².
     fn place(&self, face: usize, column: usize, row: usize) -> DVec2 {
         match self.placement {
-            RayPlacement::Lattice => DVec2::splat(0.5),
+            RayPlacement::Lattice => self.centre,
             RayPlacement::Jittered => {
                 // A generator per cell: the same whatever the order of tracing.
                 let cell = (face as u64) << 60 ^ (row as u64) << 30 ^ column as u64;

@@ -6,7 +6,7 @@ use super::super::ledger_sum::{Account, LedgerSum};
 use crate::geometry::Ray;
 use crate::illumination::accumulator::FluxUnit;
 use crate::illumination::{Receiver, Side};
-use crate::optics::LinearSrgb;
+use crate::optics::{ColourMatrix, LinearSrgb};
 use crate::transport::{
     Branch, EffectSet, Event, MediumStack, Microfacets, PathCounts, PathEffects, SurfaceHit, Tracer,
 };
@@ -56,7 +56,7 @@ pub struct Arrival {
     pub barycentric: DVec2,
     /// Where [m].
     pub point: DVec3,
-    /// Incident flux [W per channel], before the albedo.
+    /// Incident flux [W per channel of the light], before the albedo.
     pub flux_w: LinearSrgb,
     /// From the light to here [m].
     pub path_m: f64,
@@ -97,6 +97,8 @@ pub struct PathTracer<'a> {
     /// Of paths.
     pub limits: PathLimits,
     unit: FluxUnit,
+    /// From paths to the light's channels.
+    channels: ColourMatrix,
     waiting: Vec<Segment>,
     /// Accounts of all rays so far.
     pub ledger: LedgerSum,
@@ -113,11 +115,18 @@ impl<'a> PathTracer<'a> {
             tracer,
             limits,
             unit,
+            channels: ColourMatrix::IDENTITY,
             waiting: Vec::new(),
             ledger: LedgerSum::default(),
             segments: 0,
             counts: PathCounts::default(),
         }
+    }
+
+    /// The same for light of other channels than linear sRGB.
+    #[must_use]
+    pub fn with_channels(self, channels: ColourMatrix) -> Self {
+        Self { channels, ..self }
     }
 
     /// Follows a ray that carries `flux_w` from the light; arrivals on diffuse surfaces after at least one specular
@@ -144,7 +153,8 @@ impl<'a> PathTracer<'a> {
     }
 
     fn book(&mut self, account: Account, flux_w: LinearSrgb) {
-        self.ledger.book(account, self.unit.count(flux_w));
+        self.ledger
+            .book(account, self.unit.count(self.channels.apply(flux_w)));
     }
 
     fn step<E: PathEffects>(&mut self, segment: Segment, floor_w: f64, arrive: &mut impl FnMut(Arrival)) {
@@ -184,7 +194,8 @@ impl<'a> PathTracer<'a> {
             self.book(Account::NotEmitted, deposit_w);
             self.book(Account::Emitted, flux_w - deposit_w);
         } else if let (Some(event), true) = (segment.event, deposit_w.max_channel() > 0.0) {
-            arrive(arrival(&hit, &segment, event, deposit_w, path_m));
+            let arriving_w = self.channels.apply(deposit_w);
+            arrive(arrival(&hit, &segment, event, arriving_w, path_m));
         }
         self.book(Account::Absorbed, flux_w * interaction.absorbed);
         self.book(Account::SwitchedOff, flux_w * interaction.switched_off);

@@ -8,12 +8,12 @@ use super::doubt::worst_mismatch;
 use super::edge::{Edge, EdgeCutter, Reach, SUSPICION, may_bulge, mismatch};
 use super::refine::{Refinement, RoundSet};
 use super::regions::{Outline, regions, triangles};
-use super::spectrum::{LightSpectrum, NODES};
+use super::spectrum::{LightPart, NODES};
 use super::strand::LightSample;
 use crate::illumination::accumulator::FluxUnit;
 use crate::light_pass::caustic::path::PathSignature;
 use crate::light_pass::ledger_sum::{Account, LedgerSum};
-use crate::optics::LinearSrgb;
+use crate::optics::{ColourMatrix, LinearSrgb};
 
 /// How often a cell is split whose cuts are ambiguous; what is then left goes on as one small patch per ray.
 pub(super) const DEEPEST_SPLIT: u32 = 2;
@@ -41,8 +41,13 @@ pub enum Tone {
     White,
     /// What one of the traced wavelengths stands for.
     Node(u8),
-    /// All of a spectral light; the same strands of these samples at the other wavelengths.
-    Spectrum([[SampleId; 4]; NODES - 1]),
+    /// All of a spectral light.
+    Spectrum {
+        /// Samples at the other wavelengths that have the same strands.
+        others: [[SampleId; 4]; NODES - 1],
+        /// Whether each wavelength stands for those around it: other light of the cell goes other ways.
+        parted: bool,
+    },
 }
 
 /// Shape of a patch in the unit square.
@@ -105,12 +110,12 @@ pub struct CellCutter<'a> {
     pub refinement: Option<&'a Refinement<'a>>,
     /// What corners alone would miss.
     pub bodies: &'a SmallBodies,
-    /// Of a spectral light, before its wavelengths part.
-    pub spectrum: Option<&'a LightSpectrum>,
+    /// The light, before its wavelengths part.
+    pub light: LightPart<'a>,
     /// What patches carry.
     pub tone: Tone,
-    /// What that is in the light's channels.
-    pub colour: LinearSrgb,
+    /// From paths to the light's channels.
+    pub channels: ColourMatrix,
     /// Light that has patches already, ascending.
     pub done: &'a [PathSignature],
 }
@@ -177,7 +182,7 @@ impl CellCutter<'_> {
         if cell.corners.iter().any(|corner| work.get(corner.sample).is_rough) {
             return self.scatter(cell, work, out);
         }
-        if let Some(spectrum) = self.spectrum {
+        if let Some(spectrum) = self.light.spectrum() {
             return self.cut_spectrum(spectrum, cell, depth, work, out);
         }
         if cell.edges.iter().all(Option::is_none) {
@@ -264,7 +269,7 @@ impl CellCutter<'_> {
         // Near a silhouette light goes much farther between the corners than at them.
         let along = cell.edges.iter().flatten().flat_map(|edge| &edge.samples);
         let corners = cell.corners.iter().map(|corner| corner.sample);
-        let nodes = 1..self.spectrum.map_or(1, |spectrum| spectrum.nodes.len());
+        let nodes = 1..self.light.node_count();
         let others = (cell.corners.iter())
             .flat_map(|corner| nodes.clone().filter_map(|node| work.at_node(corner.sample, node)));
         let samples: Vec<&LightSample> = corners
@@ -559,9 +564,10 @@ impl CellCutter<'_> {
     /// is booked against what the strands carry.
     fn book(&self, weighted: &[(SampleId, usize, f64)], work: &Workspace, out: &mut CellOutput) {
         let sum = |of: fn(&super::strand::SurfaceNode) -> LinearSrgb| {
-            weighted.iter().fold(LinearSrgb::BLACK, |sum, &(id, node, area)| {
+            let sum = weighted.iter().fold(LinearSrgb::BLACK, |sum, &(id, node, area)| {
                 sum + of(&work.get(id).nodes[node]) * area
-            }) * self.colour
+            });
+            self.channels.apply(sum)
         };
         let first = work.get(weighted[0].0).nodes[weighted[0].1].first;
         let incident = self.unit.count(sum(|node| node.incident));

@@ -439,7 +439,9 @@ impl EdgeCutter<'_> {
     pub fn corner(&self, square: DVec2, work: &mut Workspace) -> Corner {
         Corner {
             square,
-            sample: work.sample_at(self.tracer.node, square, || self.tracer.trace(self.face, square)),
+            sample: work.sample_at(self.tracer.wavelength.unwrap_or(0), square, || {
+                self.tracer.trace(self.face, square)
+            }),
         }
     }
 }

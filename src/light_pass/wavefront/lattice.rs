@@ -9,13 +9,12 @@ use super::cell::{Cell, CellCutter, CellOutput, Patch, Tone};
 use super::edge::{Edge, EdgeCutter, may_bulge};
 use super::kept_rays::{FreshRay, KeptRays};
 use super::refine::Refinement;
-use super::spectrum::LightSpectrum;
+use super::spectrum::LightPart;
 use super::strand::LightSample;
 use super::trace::StrandTracer;
 use crate::illumination::accumulator::FluxUnit;
 use crate::light_pass::item_buffer::ItemBuffer;
 use crate::light_pass::ledger_sum::{Account, LedgerSum};
-use crate::optics::LinearSrgb;
 use crate::transport::PathCounts;
 
 /// Cells that a band aims at: enough for all cores, and no more memory than some ten megabytes.
@@ -49,7 +48,7 @@ pub struct WavefrontLattice<'a> {
     /// What corners alone would miss.
     pub bodies: &'a SmallBodies,
     /// Of a light whose wavelengths go different ways; `tracer` is then that of its first node.
-    pub spectrum: Option<&'a LightSpectrum>,
+    pub light: LightPart<'a>,
 }
 
 /// Some traced rows of cells of one face.
@@ -207,14 +206,19 @@ impl WavefrontLattice<'_> {
     pub fn trace(&self, face: usize, band: Band) -> TracedBand {
         let first_row = band.rows.0;
         let rows = band.rows.1 - first_row;
-        let nodes = self.spectrum.map_or(1, |spectrum| spectrum.nodes.len());
-        let corner_rows: Vec<CornerRow> = (0..nodes * (rows + 1))
+        let nodes = self.light.node_count();
+        let mut corner_rows: Vec<CornerRow> = (0..=rows)
+            .into_par_iter()
+            .map(|row| self.trace_corners(face, first_row + row, band))
+            .collect();
+        let others: Vec<CornerRow> = (rows + 1..nodes * (rows + 1))
             .into_par_iter()
             .map(|row| {
-                let (node, row) = (row / (rows + 1), first_row + row % (rows + 1));
-                self.trace_corners(face, node, row, band)
+                let (node, row) = (row / (rows + 1), row % (rows + 1));
+                self.trace_again(face, node, first_row + row, &corner_rows[row])
             })
             .collect();
+        corner_rows.extend(others);
         let mut samples = Samples::default();
         let mut index = Vec::with_capacity(rows + 1);
         for row in corner_rows {
@@ -270,11 +274,7 @@ impl WavefrontLattice<'_> {
     }
 
     /// Corners of the cells above and below a row of corners, as far as they belong to the band.
-    fn trace_corners(&self, face: usize, node: usize, row: usize, band: Band) -> CornerRow {
-        let tracer = match self.spectrum {
-            Some(spectrum) => self.tracer.at_node(spectrum, node),
-            None => self.tracer,
-        };
+    fn trace_corners(&self, face: usize, row: usize, band: Band) -> CornerRow {
         let mut traced = CornerRow {
             index: vec![NONE; self.size.0 + 1],
             samples: Vec::new(),
@@ -289,9 +289,25 @@ impl WavefrontLattice<'_> {
         }
         for (column, _) in wanted.iter().enumerate().filter(|(_, wanted)| **wanted) {
             traced.index[column] = traced.samples.len() as u32;
-            traced.samples.push(tracer.trace(face, self.square(column, row)));
+            let square = self.square(column, row);
+            traced.samples.push(self.tracer.trace(face, square));
         }
         traced
+    }
+
+    /// The same corners at another wavelength.
+    fn trace_again(&self, face: usize, node: usize, row: usize, first: &CornerRow) -> CornerRow {
+        let tracer = self.tracer.at_node(self.light, node);
+        let columns = first.index.iter().enumerate();
+        let wanted = columns.filter(|(_, index)| **index != NONE);
+        let samples = wanted.map(|(column, &index)| {
+            let other = &first.samples[index as usize];
+            tracer.trace_again(face, self.square(column, row), other)
+        });
+        CornerRow {
+            index: first.index.clone(),
+            samples: samples.collect(),
+        }
     }
 
     /// Edges along row `row` of the band's corners; `None` where nothing changes along one.
@@ -353,9 +369,12 @@ impl WavefrontLattice<'_> {
             unit: self.unit,
             refinement: self.refinement,
             bodies: self.bodies,
-            spectrum: self.spectrum,
-            tone: Tone::White,
-            colour: self.spectrum.map_or(LinearSrgb::WHITE, |spectrum| spectrum.xyz),
+            light: self.light,
+            tone: match self.light {
+                LightPart::White => Tone::White,
+                LightPart::Spectrum(_) | LightPart::Band(_) => Tone::Node(0),
+            },
+            channels: self.light.channels(),
             done: &[],
         };
         let corner = |row: usize, column: usize| self.corner_at(first_row, row, column, index);
@@ -423,9 +442,9 @@ impl WavefrontLattice<'_> {
     fn book_not_emitted(&self, cell: &Cell, work: &Workspace, output: &mut CellOutput) {
         let step = cell.corners[2].square - cell.corners[0].square;
         let quarter = 0.25 * step.x * step.y;
-        let colour = self.spectrum.map_or(LinearSrgb::WHITE, |spectrum| spectrum.xyz);
+        let channels = self.light.channels();
         for corner in &cell.corners {
-            let missed_w = work.get(corner.sample).not_emitted * colour * quarter;
+            let missed_w = channels.apply(work.get(corner.sample).not_emitted) * quarter;
             output.ledger.book(Account::NotEmitted, self.unit.count(missed_w));
         }
     }

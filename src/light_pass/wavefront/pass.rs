@@ -207,7 +207,7 @@ impl ForEffects for SpreadTasks<'_> {
             reference_w: depositor.reference_w,
             coarseness: depositor.coarseness,
             gathers: self.gathers,
-            spectrum: depositor.lattice.spectrum,
+            light: depositor.lattice.light,
         };
         let spread = |patches: &&[Patch]| {
             let mut output = SpreadOutput::default();

@@ -5,7 +5,7 @@ use super::band::{Corner, SampleId, Workspace};
 use super::bodies::SmallBodies;
 use super::cell::{Cell, CellCutter, CellOutput, DEEPEST_SPLIT, Depth, EDGE_ENDS, Tone, reach_of};
 use super::edge::{Edge, EdgeCutter, Reach, is_suspicious, same_ways};
-use super::spectrum::{LightSpectrum, NODES};
+use super::spectrum::{LightPart, LightSpectrum, NODES};
 use crate::light_pass::caustic::path::PathSignature;
 
 /// Samples at a cell's corners, wavelength by wavelength.
@@ -21,7 +21,7 @@ impl CellCutter<'_> {
         work: &mut Workspace,
         out: &mut CellOutput,
     ) {
-        let nodes = self.node_corners(spectrum, cell, work);
+        let nodes = self.node_corners(cell, work);
         let is_one = is_one(cell, &nodes, work);
         if is_one && depth.ambiguous < DEEPEST_SPLIT && self.is_doubtful(cell, work) {
             let ambiguous = depth.ambiguous + 1;
@@ -29,7 +29,10 @@ impl CellCutter<'_> {
         }
         let alike = alike(cell, &nodes, work);
         let all = CellCutter {
-            tone: Tone::Spectrum(std::array::from_fn(|other| nodes[other + 1])),
+            tone: Tone::Spectrum {
+                others: std::array::from_fn(|other| nodes[other + 1]),
+                parted: !is_one,
+            },
             ..*self
         };
         for &signature in &alike {
@@ -38,7 +41,7 @@ impl CellCutter<'_> {
         for (node, corners) in nodes.iter().enumerate() {
             if is_one {
                 let of_node = CellCutter {
-                    colour: spectrum.nodes[node].interpolated_xyz,
+                    channels: spectrum.interpolated[node],
                     ..*self
                 };
                 of_node.book_whole(cell, *corners, work, out);
@@ -48,14 +51,14 @@ impl CellCutter<'_> {
         }
     }
 
-    fn node_corners(&self, spectrum: &LightSpectrum, cell: &Cell, work: &mut Workspace) -> NodeCorners {
+    fn node_corners(&self, cell: &Cell, work: &mut Workspace) -> NodeCorners {
         std::array::from_fn(|node| {
             cell.corners
                 .map(|corner| match (node, work.at_node(corner.sample, node)) {
                     (0, _) => corner.sample,
                     (_, Some(sample)) => sample,
                     (_, None) => {
-                        let tracer = self.edges.tracer.at_node(spectrum, node);
+                        let tracer = self.edges.tracer.at_node(self.light, node);
                         let edges = EdgeCutter {
                             tracer: &tracer,
                             face: self.edges.face,
@@ -81,7 +84,7 @@ impl CellCutter<'_> {
         work: &mut Workspace,
         out: &mut CellOutput,
     ) {
-        let tracer = self.edges.tracer.at_node(spectrum, node);
+        let tracer = self.edges.tracer.at_node(self.light, node);
         let edges = EdgeCutter {
             tracer: &tracer,
             face: self.edges.face,
@@ -92,9 +95,9 @@ impl CellCutter<'_> {
             unit: self.unit,
             refinement: None,
             bodies: &none,
-            spectrum: None,
+            light: LightPart::White,
             tone: Tone::Node(node as u8),
-            colour: spectrum.nodes[node].xyz,
+            channels: spectrum.nodes[node].channels,
             done: alike,
         };
         let corners: [Corner; 4] = std::array::from_fn(|corner| Corner {

@@ -1,12 +1,16 @@
 //! Wavelength as one more smooth dimension of the wavefront: a ray is traced at three wavelengths, and where all three go
 //! the same ways the light between them is interpolated along 1/λ².
+//!
+//! Paths carry factors in RGB whatever their wavelength; what those are at a wavelength is asked where light becomes
+//! colour. So a light without dispersion on its way is the same in RGB and by wavelength.
 
 use std::ops::RangeInclusive;
 
 use super::strand::{Landing, Strand};
 use crate::geometry::Ray;
-use crate::optics::spectrum::{Spectrum, Xyz, xyz_bar};
-use crate::optics::{ColourBasis, LinearSrgb, Nanometres};
+use crate::light_pass::spectral_node::{SpectralNode, channels_within, place_of, wavelength_at};
+use crate::optics::spectrum::{Spectrum, xyz_bar};
+use crate::optics::{ColourMatrix, LinearSrgb, Nanometres};
 use crate::transport::{RayDerivative, Tracer};
 
 /// Wavelengths that every ray of a spectral light is traced at.
@@ -18,29 +22,15 @@ const MOST_SLICES_LOG2: u32 = 7;
 /// Share of a lamp's colour, at either end, beyond the outermost nodes: Chebyshev's places over the rest.
 const TAIL: f64 = 0.002;
 
-/// What is traced at one wavelength.
-#[derive(Debug)]
-pub struct SpectralNode {
-    /// The scene as that wavelength meets it.
-    pub tracer: Tracer,
-    /// What a factor in RGB is there.
-    pub basis: ColourBasis,
-    /// CIE XYZ of the light that the node stands for where nothing is interpolated, of a lamp of 1 W
-    /// (luminous-equivalent).
-    pub xyz: LinearSrgb,
-    /// What the node counts for where light is interpolated: the sum of that over all wavelengths.
-    pub interpolated_xyz: LinearSrgb,
-}
-
 /// Light of a narrow band.
 #[derive(Clone, Copy, Debug)]
 pub struct Slice {
     /// Of the three nodes: Lagrange's.
     weights: [f64; NODES],
-    /// CIE XYZ of its light, of a lamp of 1 W (luminous-equivalent).
-    pub xyz: LinearSrgb,
-    /// What a factor in RGB is there.
-    pub basis: ColourBasis,
+    /// From what arrives at each node to CIE XYZ, where light is interpolated between them.
+    interpolated: [ColourMatrix; NODES],
+    /// The same where each node stands for the wavelengths around it.
+    own: [ColourMatrix; NODES],
 }
 
 /// How the light of one lamp is traced and spread over the spectrum.
@@ -48,31 +38,58 @@ pub struct Slice {
 pub struct LightSpectrum {
     /// The middle one first: what does not depend on wavelength is traced there alone.
     pub nodes: [SpectralNode; NODES],
+    /// What each node counts for where light is interpolated.
+    pub interpolated: [ColourMatrix; NODES],
     /// By the logarithm of their number.
     ladder: Vec<Vec<Slice>>,
     /// Length of the whole spectrum over that between the outer nodes, along 1/λ².
     reach: f64,
     /// Of the whole lamp.
-    pub xyz: LinearSrgb,
+    pub channels: ColourMatrix,
 }
 
-/// X, Y and Z in the place of red, green and blue: never negative, whatever the wavelength.
-pub fn as_channels(xyz: Xyz) -> LinearSrgb {
-    LinearSrgb::new(xyz.x, xyz.y, xyz.z)
+/// What of a light's spectrum one lattice traces.
+#[derive(Clone, Copy, Debug)]
+pub enum LightPart<'a> {
+    /// All of a light without wavelengths.
+    White,
+    /// All of a light whose wavelengths part.
+    Spectrum(&'a LightSpectrum),
+    /// What one wavelength stands for.
+    Band(&'a SpectralNode),
 }
 
-/// Back from [`as_channels`].
-pub fn to_linear_srgb(channels: LinearSrgb) -> LinearSrgb {
-    let [x, y, z] = channels.to_array();
-    Xyz { x, y, z }.to_linear_srgb()
-}
+impl<'a> LightPart<'a> {
+    /// The whole spectrum.
+    pub fn spectrum(self) -> Option<&'a LightSpectrum> {
+        match self {
+            Self::Spectrum(spectrum) => Some(spectrum),
+            Self::White | Self::Band(_) => None,
+        }
+    }
 
-fn place_of(wavelength: Nanometres) -> f64 {
-    wavelength.0.powi(-2)
-}
+    /// One of its wavelengths; `None` of light without.
+    pub fn node(self, node: usize) -> Option<&'a SpectralNode> {
+        match self {
+            Self::White => None,
+            Self::Spectrum(spectrum) => spectrum.nodes.get(node),
+            Self::Band(band) => Some(band),
+        }
+    }
 
-fn wavelength_at(place: f64) -> Nanometres {
-    Nanometres(place.powf(-0.5))
+    /// How many wavelengths every ray is traced at; 1 of light without.
+    pub fn node_count(self) -> usize {
+        self.spectrum().map_or(1, |spectrum| spectrum.nodes.len())
+    }
+
+    /// From light that met nothing yet to the light's channels.
+    pub fn channels(self) -> ColourMatrix {
+        match self {
+            Self::White => ColourMatrix::IDENTITY,
+            Self::Spectrum(spectrum) => spectrum.channels,
+            Self::Band(band) => band.channels,
+        }
+    }
 }
 
 impl LightSpectrum {
@@ -83,33 +100,26 @@ impl LightSpectrum {
         let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
         let outer = half * (std::f64::consts::PI / 6.0).cos();
         let places = [middle, middle - outer, middle + outer];
-        let between = [middle + 0.5 * outer, middle - 0.5 * outer].map(wavelength_at);
-        let whole = lamp.range();
-        let ranges = [
-            between[0]..=between[1],
-            between[1]..=*whole.end(),
-            *whole.start()..=between[0],
-        ];
-        let ladder: Vec<Vec<Slice>> = (0..=MOST_SLICES_LOG2)
-            .map(|log2| slices(lamp, (low, high), 1 << log2, places))
-            .collect();
-        let finest = &ladder[ladder.len() - 1];
+        let mut ladder = vec![finest(lamp, (low, high), places)];
+        while ladder[0].len() > 1 {
+            let coarser = coarser(lamp, (low, high), places, &ladder[0]);
+            ladder.insert(0, coarser);
+        }
+        let whole = &ladder[0][0];
         let nodes = std::array::from_fn(|node| {
             let wavelength = wavelength_at(places[node]);
             SpectralNode {
-                tracer: tracer.at_wavelength(wavelength),
-                basis: ColourBasis::at(wavelength),
-                xyz: as_channels(lamp.xyz_within(ranges[node].clone())),
-                interpolated_xyz: finest.iter().fold(LinearSrgb::BLACK, |sum, slice| {
-                    sum + slice.xyz * slice.weights[node]
-                }),
+                tracer: tracer.with_indices_at(wavelength),
+                channels: whole.own[node],
+                number: node as u32,
             }
         });
         Self {
             nodes,
-            ladder,
+            interpolated: whole.interpolated,
+            channels: whole.own.into_iter().sum(),
             reach: half / outer,
-            xyz: as_channels(lamp.xyz()),
+            ladder,
         }
     }
 
@@ -144,8 +154,8 @@ fn ends(lamp: &Spectrum) -> (Nanometres, Nanometres) {
     (quantile(TAIL), quantile(1.0 - TAIL))
 }
 
-/// So many bands of equal width along 1/λ²; the outermost hold the tails.
-fn slices(lamp: &Spectrum, (low, high): (f64, f64), count: usize, nodes: [f64; NODES]) -> Vec<Slice> {
+/// The band at an index among so many of equal width along 1/λ²; the outermost hold the tails.
+fn band(lamp: &Spectrum, (low, high): (f64, f64), index: usize, count: usize) -> RangeInclusive<Nanometres> {
     let border = |index: usize| {
         if index == 0 {
             *lamp.range().end()
@@ -155,14 +165,44 @@ fn slices(lamp: &Spectrum, (low, high): (f64, f64), count: usize, nodes: [f64; N
             wavelength_at(low + (high - low) * index as f64 / count as f64)
         }
     };
-    (0..count)
-        .map(|index| {
-            let range = border(index + 1)..=border(index);
-            let place = centre(lamp, range.clone()).clamp(low, high);
+    border(index + 1)..=border(index)
+}
+
+/// The narrowest slices.
+fn finest(lamp: &Spectrum, ends: (f64, f64), nodes: [f64; NODES]) -> Vec<Slice> {
+    let count = 1 << MOST_SLICES_LOG2;
+    let slice = |index: usize| {
+        let range = band(lamp, ends, index, count);
+        let within = |weight: &dyn Fn(f64) -> f64| {
+            channels_within(lamp, range.clone(), |wavelength| {
+                weight(place_of(wavelength).clamp(ends.0, ends.1))
+            })
+        };
+        Slice {
+            weights: lagrange(nodes, centre(lamp, range.clone()).clamp(ends.0, ends.1)),
+            interpolated: std::array::from_fn(|node| within(&|place| lagrange(nodes, place)[node])),
+            own: std::array::from_fn(|node| {
+                within(&|place| f64::from(u8::from(nearest(nodes, place) == node)))
+            }),
+        }
+    };
+    (0..count).map(slice).collect()
+}
+
+/// Half as many.
+fn coarser(lamp: &Spectrum, ends: (f64, f64), nodes: [f64; NODES], finer: &[Slice]) -> Vec<Slice> {
+    let count = finer.len() / 2;
+    let sum = |pair: &[Slice], of: fn(&Slice, usize) -> ColourMatrix| {
+        std::array::from_fn(|node| pair.iter().map(|slice| of(slice, node)).sum())
+    };
+    let pairs = finer.chunks_exact(2).enumerate();
+    pairs
+        .map(|(index, pair)| {
+            let place = centre(lamp, band(lamp, ends, index, count));
             Slice {
-                weights: lagrange(nodes, place),
-                xyz: as_channels(lamp.xyz_within(range)),
-                basis: ColourBasis::at(wavelength_at(place)),
+                weights: lagrange(nodes, place.clamp(ends.0, ends.1)),
+                interpolated: sum(pair, |slice, node| slice.interpolated[node]),
+                own: sum(pair, |slice, node| slice.own[node]),
             }
         })
         .collect()
@@ -191,9 +231,16 @@ fn lagrange(nodes: [f64; NODES], place: f64) -> [f64; NODES] {
     })
 }
 
+fn nearest(nodes: [f64; NODES], place: f64) -> usize {
+    let far = |node: usize| (nodes[node] - place).abs();
+    (0..NODES).min_by(|a, b| far(*a).total_cmp(&far(*b))).unwrap_or(0)
+}
+
 impl Slice {
-    /// The strand of its wavelength between those of one signature at the nodes.
-    pub fn strand(&self, nodes: [&Strand; NODES]) -> Strand {
+    /// The strand of its wavelength between those of one signature at the nodes; its flux is in the light's channels.
+    ///
+    /// `parted`: whether each node stands for the wavelengths around it, as where the others of its light do.
+    pub fn strand(&self, nodes: [&Strand; NODES], parted: bool) -> Strand {
         let mix = |of: &dyn Fn(&Strand) -> glam::DVec3| {
             let weighted = nodes.iter().zip(self.weights);
             weighted.fold(glam::DVec3::ZERO, |sum, (strand, weight)| {
@@ -204,12 +251,10 @@ impl Slice {
             origin: mix(&|strand| of(strand).origin),
             direction: mix(&|strand| of(strand).direction),
         };
-        let flux_w = nodes
-            .iter()
-            .zip(self.weights)
-            .fold(LinearSrgb::BLACK, |sum, (strand, weight)| {
-                sum + strand.flux_w * weight
-            });
+        let parts = nodes.iter().zip(self.matrices(parted));
+        let flux_w = parts.fold(LinearSrgb::BLACK, |sum, (strand, matrix)| {
+            sum + matrix.apply(strand.flux_w)
+        });
         let nearest = (0..NODES)
             .max_by(|a, b| self.weights[*a].total_cmp(&self.weights[*b]))
             .unwrap_or(0);
@@ -223,6 +268,17 @@ impl Slice {
         // Beyond the outer nodes a share that falls to nothing would go on below it; the ledger's quadrature has the rest.
         strand.flux_w = flux_w.map(|channel| channel.max(0.0));
         strand
+    }
+
+    /// What a factor in RGB on the light of such strands is in each of the light's channels.
+    pub fn factors(&self, nodes: [&Strand; NODES], parted: bool) -> ColourMatrix {
+        let parts = nodes.iter().zip(self.matrices(parted));
+        let parts = parts.map(|(strand, matrix)| matrix.weighing(strand.flux_w));
+        parts.sum::<ColourMatrix>().per_channel()
+    }
+
+    fn matrices(&self, parted: bool) -> &[ColourMatrix; NODES] {
+        if parted { &self.own } else { &self.interpolated }
     }
 }
 

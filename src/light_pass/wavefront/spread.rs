@@ -11,14 +11,14 @@ use super::overreach::Overreach;
 use super::patch::{CoonsPatch, PatchShape};
 use super::receivers::{Beam, Receivers};
 use super::shares::{difference, mean, scaled};
-use super::spectrum::{LightSpectrum, NODES, lands_alike};
+use super::spectrum::{LightPart, LightSpectrum, NODES, lands_alike};
 use super::strand::{Landing, Strand};
 use super::virtual_vertex::VirtualRays;
 use crate::illumination::Receiver;
 use crate::illumination::accumulator::{FluxCount, FluxUnit};
 use crate::light_pass::caustic::statistics::FootprintStatistics;
 use crate::light_pass::ledger_sum::{Account, LedgerSum};
-use crate::optics::{ColourBasis, LinearSrgb};
+use crate::optics::{ColourMatrix, LinearSrgb};
 use crate::transport::{PathCounts, PathEffects};
 
 /// Spreads patches.
@@ -40,8 +40,8 @@ pub struct Spreader<'a, E> {
     pub coarseness: f64,
     /// Whether the places of footprints are wanted.
     pub gathers: bool,
-    /// Of a spectral light.
-    pub spectrum: Option<&'a LightSpectrum>,
+    /// The light.
+    pub light: LightPart<'a>,
 }
 
 /// What patches became.
@@ -84,23 +84,33 @@ impl SpreadOutput {
 /// What part of a light a patch is.
 #[derive(Clone, Copy)]
 struct Tint {
-    /// In the light's channels.
-    colour: LinearSrgb,
-    /// What factors in RGB are at its wavelength; `None` of light without one.
-    basis: Option<ColourBasis>,
+    /// From strands to the light's channels.
+    channels: ColourMatrix,
+    /// What factors in RGB are in those.
+    factors: ColourMatrix,
+    /// Whether it has a wavelength.
+    is_spectral: bool,
     /// Whether all that it is made from lands on one surface.
     lands_alike: bool,
 }
 
 impl Tint {
     const WHITE: Self = Self {
-        colour: LinearSrgb::WHITE,
-        basis: None,
+        channels: ColourMatrix::IDENTITY,
+        factors: ColourMatrix::IDENTITY,
+        is_spectral: false,
         lands_alike: true,
     };
 
-    fn toned(&self, factor: LinearSrgb) -> LinearSrgb {
-        self.basis.map_or(factor, |basis| basis.tone(factor))
+    /// Of what one wavelength stands for.
+    fn of_node(channels: ColourMatrix, strands: &[&Strand]) -> Self {
+        let grey_w = mean(strands.iter().map(|strand| strand.flux_w));
+        Self {
+            channels,
+            factors: channels.weighing(grey_w).per_channel(),
+            is_spectral: true,
+            lands_alike: true,
+        }
     }
 }
 
@@ -122,22 +132,17 @@ impl<E: PathEffects> Spreader<'_, E> {
         let strands: [&Strand; 4] = patch
             .corners
             .map(|(sample, strand)| self.samples.strand(sample, strand));
-        match (patch.tone, self.spectrum) {
-            (Tone::White, _) | (_, None) => {
-                self.spread_strands(patch, &strands[..patch.corner_count()], Tint::WHITE, out);
+        let own = &strands[..patch.corner_count()];
+        match (patch.tone, self.light) {
+            (Tone::Spectrum { others, parted }, LightPart::Spectrum(spectrum)) => {
+                self.spread_spectrum(patch, strands, (others, parted), spectrum, out);
             }
-            (Tone::Node(node), Some(spectrum)) => {
-                let node = &spectrum.nodes[usize::from(node)];
-                let tint = Tint {
-                    colour: node.xyz,
-                    basis: Some(node.basis),
-                    lands_alike: true,
-                };
-                self.spread_strands(patch, &strands[..patch.corner_count()], tint, out);
+            (Tone::Node(node), light) => {
+                let node = light.node(usize::from(node));
+                let tint = node.map_or(Tint::WHITE, |node| Tint::of_node(node.channels, own));
+                self.spread_strands(patch, own, tint, out);
             }
-            (Tone::Spectrum(others), Some(spectrum)) => {
-                self.spread_spectrum(patch, strands, others, spectrum, out);
-            }
+            (Tone::White | Tone::Spectrum { .. }, _) => self.spread_strands(patch, own, Tint::WHITE, out),
         }
     }
 
@@ -146,7 +151,7 @@ impl<E: PathEffects> Spreader<'_, E> {
         &self,
         patch: &Patch,
         first: [&Strand; 4],
-        others: [[SampleId; 4]; NODES - 1],
+        (others, parted): ([[SampleId; 4]; NODES - 1], bool),
         spectrum: &LightSpectrum,
         out: &mut SpreadOutput,
     ) {
@@ -163,11 +168,12 @@ impl<E: PathEffects> Spreader<'_, E> {
         });
         let lands_alike = nodes.iter().all(|nodes| lands_alike(*nodes));
         for slice in spectrum.slices(self.smear(&nodes)) {
-            let strands = nodes.map(|nodes| slice.strand(nodes));
+            let strands = nodes.map(|nodes| slice.strand(nodes, parted));
             let strands = strands.each_ref();
             let tint = Tint {
-                colour: slice.xyz,
-                basis: Some(slice.basis),
+                channels: ColourMatrix::IDENTITY,
+                factors: slice.factors(nodes[0], parted),
+                is_spectral: true,
                 lands_alike,
             };
             self.spread_strands(patch, &strands[..patch.corner_count()], tint, out);
@@ -194,12 +200,17 @@ impl<E: PathEffects> Spreader<'_, E> {
     }
 
     fn spread_strands(&self, patch: &Patch, strands: &[&Strand], tint: Tint, out: &mut SpreadOutput) {
-        let grey_w = mean(strands.iter().map(|strand| strand.flux_w)) * patch.area();
-        let flux = self.unit.count(grey_w * tint.colour);
-        let flux_w = match tint.basis {
-            None => grey_w,
-            // As bright as it looks.
-            Some(_) => grey_w * tint.colour.g,
+        let colours = strands
+            .iter()
+            .map(|strand| tint.channels.apply(strand.flux_w))
+            .collect::<Vec<_>>();
+        let channels_w = mean(colours.iter().copied()) * patch.area();
+        let flux = self.unit.count(channels_w);
+        let flux_w = if tint.is_spectral {
+            // As bright as it looks: Y.
+            LinearSrgb::grey(channels_w.g)
+        } else {
+            channels_w
         };
         out.ledger.book(Account::Quadrature, flux.map(|count| -count));
         let before: Vec<usize> = out.triangles.iter().map(|(_, list)| list.len()).collect();
@@ -211,8 +222,11 @@ impl<E: PathEffects> Spreader<'_, E> {
         match course {
             Course::Escapes => out.ledger.book(Account::Escaped, flux),
             Course::Onward => self.onward(strands, flux, tint, out),
-            Course::Plane(receiver) => self.over(patch, strands, (flux, flux_w), tint, Some(receiver), out),
-            Course::Mixed => self.over(patch, strands, (flux, flux_w), tint, None, out),
+            Course::Plane(receiver) => {
+                let light = (flux, flux_w, &colours[..]);
+                self.over(patch, strands, light, tint, Some(receiver), out);
+            }
+            Course::Mixed => self.over(patch, strands, (flux, flux_w, &colours), tint, None, out),
         }
         self.count(strands[0], tint, &before, out);
         self.note_overreach(patch, strands, &before, out);
@@ -229,7 +243,7 @@ impl<E: PathEffects> Spreader<'_, E> {
         }
         let tracer = self.receivers.tracer;
         out.deposits.count_segment(strand.event);
-        out.deposits.of_a_wavelength += u64::from(tint.basis.is_some());
+        out.deposits.of_a_wavelength += u64::from(tint.is_spectral);
         out.deposits.attenuated += u64::from(self.absorbs(strand));
         out.deposits.scattered +=
             u64::from(E::LOBES && tracer.scene().material_of(strand.from as usize).is_rough());
@@ -314,7 +328,7 @@ impl<E: PathEffects> Spreader<'_, E> {
             let scene = self.receivers.tracer.scene();
             let transmittance =
                 |strand: &&Strand| strand.media.transmittance(scene, strand.landing.distance_m());
-            let left = tint.toned(mean(strands.iter().map(transmittance)));
+            let left = tint.factors.apply(mean(strands.iter().map(transmittance)));
             passed = scaled(flux, left);
             out.ledger.book(Account::Absorbed, difference(flux, passed));
         }
@@ -325,7 +339,7 @@ impl<E: PathEffects> Spreader<'_, E> {
         &self,
         patch: &Patch,
         strands: &[&Strand],
-        (flux, flux_w): (FluxCount, LinearSrgb),
+        (flux, flux_w, colours): (FluxCount, LinearSrgb, &[LinearSrgb]),
         tint: Tint,
         plane: Option<Receiver>,
         out: &mut SpreadOutput,
@@ -334,21 +348,20 @@ impl<E: PathEffects> Spreader<'_, E> {
         // Light past the border of a plane goes out only where traced light does.
         let goes_out = goes_out(strands);
         let plane = plane.filter(|&receiver| goes_out || self.stays_on_map(&shape, receiver));
-        let colours: Vec<LinearSrgb> = strands.iter().map(|strand| strand.flux_w).collect();
-        let mut rays = VirtualRays::new(self, &shape, strands, plane, tint.basis);
+        let mut rays = VirtualRays::new(self, &shape, strands, plane, tint.factors);
         let steps = self.steps(&shape, &mut rays, plane.is_some(), flux_w, out);
         if let (PatchShape::Coons(coons), Some(receiver)) = (&shape, plane)
             && !self.absorbs(strands[0])
             && let Some(grid) = self.plane_grid(coons, receiver, steps)
         {
             out.queries += rays.queries + grid.len() as u64;
-            return even_grid(receiver, &grid, steps, &colours, flux, out);
+            return even_grid(receiver, &grid, steps, colours, flux, out);
         }
         let mut mesh = PatchMesh {
             receivers: self.receivers,
             shape: &shape,
             rays,
-            colours: &colours,
+            colours,
             out,
             absorbs: self.absorbs(strands[0]),
             goes_out,

@@ -5,13 +5,13 @@ use glam::{DVec2, DVec3};
 use super::bumps::BumpCells;
 use super::closeness::Closeness;
 use super::kept_rays::{FreshRay, KeptHit, KeptRays, Known, RayKey};
-use super::spectrum::LightSpectrum;
+use super::spectrum::LightPart;
 use super::strand::{Landing, LightSample, Strand, SurfaceNode};
 use crate::geometry::Ray;
 use crate::illumination::{Receiver, Side};
 use crate::light_pass::caustic::path::{PathLimits, PathSignature};
 use crate::light_pass::launch::Launch;
-use crate::optics::{ColourBasis, LinearSrgb};
+use crate::optics::LinearSrgb;
 use crate::progress::Control;
 use crate::transport::{
     Branch, Event, ForEffects, HitPlace, Interaction, MediumStack, PathCounts, PathEffects, RayDerivative,
@@ -37,10 +37,8 @@ pub struct StrandTracer<'a> {
     pub steps: [f64; 2],
     /// What becomes of detail of normals.
     pub bumps: BumpCells,
-    /// Which wavelength of a spectral light; 0 for the first, or for light without one.
-    pub node: u32,
-    /// What factors in RGB are at that wavelength.
-    pub basis: Option<ColourBasis>,
+    /// Which wavelength of a spectral light; `None` of light without.
+    pub wavelength: Option<u32>,
     /// What was traced before.
     pub kept: Option<&'a KeptRays>,
     /// How closely borders are looked for.
@@ -52,7 +50,7 @@ pub struct StrandTracer<'a> {
 }
 
 /// Follows the ray that starts at a point of the unit square of a face.
-type Follow = for<'t, 'a> fn(&'t StrandTracer<'a>, usize, DVec2) -> LightSample;
+type Follow = for<'t, 'a, 'h> fn(&'t StrandTracer<'a>, usize, DVec2, &'h [KeptHit]) -> LightSample;
 
 /// Chooses the code for a set of effects.
 struct FollowFor;
@@ -61,7 +59,7 @@ impl ForEffects for FollowFor {
     type Output = Follow;
 
     fn run<E: PathEffects>(self) -> Follow {
-        |tracer, face, square| tracer.follow::<E>(face, square)
+        |tracer, face, square, common| tracer.follow::<E>(face, square, common)
     }
 }
 
@@ -80,11 +78,15 @@ struct Waiting {
     strand: Option<usize>,
     /// Whether it is the very ray that a kept one was, as long as there is a kept one.
     is_known: bool,
+    /// Whether no dispersive surface bent it yet: then it is the same at all wavelengths.
+    is_common: bool,
 }
 
 /// What a light ray meets: as it is kept, or as a search finds it.
 struct Search<'a> {
     known: Option<Known<'a>>,
+    /// What the same light ray met at another wavelength.
+    common: &'a [KeptHit],
     hits: Vec<KeptHit>,
     /// Closest-hit queries.
     searches: u32,
@@ -107,8 +109,7 @@ impl<'a> StrandTracer<'a> {
             limits,
             steps,
             bumps: BumpCells::EXACT,
-            node: 0,
-            basis: None,
+            wavelength: None,
             kept: None,
             closeness: Closeness::SHARP,
             control,
@@ -122,43 +123,48 @@ impl<'a> StrandTracer<'a> {
         Self { closeness, ..self }
     }
 
-    /// The same at one wavelength of a spectral light.
+    /// The same at one wavelength of a light.
     #[must_use]
-    pub fn at_node(&self, spectrum: &'a LightSpectrum, node: usize) -> Self {
-        Self {
-            tracer: &spectrum.nodes[node].tracer,
-            node: node as u32,
-            basis: Some(spectrum.nodes[node].basis),
-            ..*self
+    pub fn at_node(&self, part: LightPart<'a>, node: usize) -> Self {
+        match part.node(node) {
+            Some(node) => Self {
+                tracer: &node.tracer,
+                wavelength: Some(node.number),
+                ..*self
+            },
+            None => *self,
         }
-    }
-
-    /// A factor in RGB, as the ray's wavelength has it.
-    fn toned(&self, factor: LinearSrgb) -> LinearSrgb {
-        self.basis.map_or(factor, |basis| basis.tone(factor))
     }
 
     /// Traces the ray that starts at a point of the unit square of a face.
     pub fn trace(&self, face: usize, square: DVec2) -> LightSample {
-        (self.follow)(self, face, square)
+        (self.follow)(self, face, square, &[])
     }
 
-    fn follow<E: PathEffects>(&self, face: usize, square: DVec2) -> LightSample {
+    /// The same where it was traced at another wavelength: the stretch before the first dispersive surface is not
+    /// searched again.
+    pub fn trace_again(&self, face: usize, square: DVec2, other: &LightSample) -> LightSample {
+        let hits = other.fresh.as_ref().map_or(&[][..], |fresh| &fresh.hits);
+        (self.follow)(self, face, square, hits)
+    }
+
+    fn follow<E: PathEffects>(&self, face: usize, square: DVec2, common: &[KeptHit]) -> LightSample {
         // Just within the domain: its border may be the very border of a surface.
         let square = square.clamp(DVec2::splat(DOMAIN_MARGIN), DVec2::splat(1.0 - DOMAIN_MARGIN));
         let mut sample = LightSample::default();
         if self.control.is_cancelled() {
             return sample;
         }
-        let key = RayKey::new(face, self.node, square);
+        let key = RayKey::new(face, self.wavelength.unwrap_or(0), square);
         let mut search = Search {
             known: self.kept.and_then(|kept| kept.get(&key)),
+            common,
             hits: Vec::new(),
             searches: 0,
             counts: PathCounts::default(),
         };
         let (ray, differential) = self.launch.ray_with_differential(face, square);
-        let flux_w = self.toned(self.launch.flux_density_w(square, ray.direction));
+        let flux_w = self.launch.flux_density_w(square, ray.direction);
         if !(flux_w.is_finite() && flux_w.max_channel() > 0.0) {
             return sample;
         }
@@ -173,11 +179,12 @@ impl<'a> StrandTracer<'a> {
             depth: 0,
             strand: None,
             is_known: search.known.is_some(),
+            is_common: !common.is_empty(),
         }];
         while let Some(next) = waiting.pop() {
             self.step::<E>(next, floor_w, &mut search, &mut sample, &mut waiting);
         }
-        sample.counts.of_a_wavelength += u64::from(self.basis.is_some());
+        sample.counts.of_a_wavelength += u64::from(self.wavelength.is_some());
         sample.segments = search.searches;
         sample.counts += search.counts;
         if search.searches > 0 {
@@ -232,7 +239,7 @@ impl<'a> StrandTracer<'a> {
         let mut incident = from.flux_w;
         if E::ABSORPTION && from.media.absorbs(self.tracer.scene()) {
             let transmittance = from.media.transmittance(self.tracer.scene(), hit.distance_m);
-            incident = incident * self.toned(transmittance);
+            incident = incident * transmittance;
             sample.counts.attenuated += 1;
         }
         sample.counts.bent += u64::from(self.tracer.is_bumpy(hit.object));
@@ -246,10 +253,6 @@ impl<'a> StrandTracer<'a> {
         let interaction = self
             .tracer
             .interact_with::<E>(&hit, from.ray.direction, &from.media, micro);
-        let interaction = match self.basis {
-            Some(basis) => interaction.map_shares(|share| basis.tone(share)),
-            None => interaction,
-        };
         self.scatter(from, &hit, incident, &interaction, floor_w, sample, waiting);
     }
 
@@ -276,6 +279,7 @@ impl<'a> StrandTracer<'a> {
             }
         };
         let is_too_fine = self.is_too_fine(hit, &at_hit, sample);
+        let is_dispersive = self.tracer.scene().material_of(hit.object).is_dispersive();
         let group = self.tracer.smoothing_group(hit.object, hit.triangle);
         let at_surface = from.signature.at(hit.object, group);
         let mut node = SurfaceNode {
@@ -326,6 +330,7 @@ impl<'a> StrandTracer<'a> {
                     flux_w,
                     differential,
                     signature,
+                    is_dispersive,
                     sample,
                     waiting,
                 );
@@ -359,6 +364,7 @@ fn push(
     flux_w: LinearSrgb,
     differential: RayDifferential,
     signature: PathSignature,
+    is_dispersive: bool,
     sample: &mut LightSample,
     waiting: &mut Vec<Waiting>,
 ) {
@@ -372,6 +378,7 @@ fn push(
         depth: from.depth + 1,
         strand: Some(sample.strands.len()),
         is_known: from.is_known,
+        is_common: from.is_common && (!is_dispersive || branch.event == Event::Reflection),
     });
     sample.strands.push(Strand {
         signature,
@@ -391,8 +398,13 @@ impl Search<'_> {
     fn closest(&mut self, tracer: &Tracer, from: &Waiting) -> (Option<HitPlace>, bool) {
         let known = self.known.filter(|_| from.is_known);
         let kept = known.and_then(|known| known.hit(from.signature));
+        let common = || {
+            let mut met = self.common.iter().filter(|_| from.is_common);
+            met.find(|hit| hit.signature == from.signature)
+        };
         let place = match (known, kept) {
             (Some(known), Some(kept)) if known.holds(&from.ray, kept) => kept,
+            _ if let Some(hit) = common() => hit.place,
             _ => {
                 self.searches += 1;
                 if let Some(event) = from.event {

@@ -11,7 +11,7 @@ use super::spread::Spreader;
 use super::strand::{Landing, Strand};
 use crate::geometry::Ray;
 use crate::illumination::{Receiver, Side};
-use crate::optics::{ColourBasis, LinearSrgb};
+use crate::optics::{ColourMatrix, LinearSrgb};
 use crate::scene::SurfaceKind;
 use crate::transport::PathEffects;
 use crate::transport::{MediumStack, SurfaceHit};
@@ -95,8 +95,8 @@ pub struct VirtualRays<'a, E> {
     shape: &'a PatchShape,
     /// Whose extended plane all rays are for.
     plane: Option<Receiver>,
-    /// What factors in RGB are at the rays' wavelength.
-    basis: Option<ColourBasis>,
+    /// What factors in RGB are in the light's channels.
+    factors: ColourMatrix,
     media: MediumStack,
     /// Whether light is absorbed on the way.
     absorbs: bool,
@@ -120,7 +120,7 @@ impl<'a, E: PathEffects> VirtualRays<'a, E> {
         shape: &'a PatchShape,
         strands: &[&Strand],
         plane: Option<Receiver>,
-        basis: Option<ColourBasis>,
+        factors: ColourMatrix,
     ) -> Self {
         let first = strands[0];
         let spread_m = strands
@@ -139,7 +139,7 @@ impl<'a, E: PathEffects> VirtualRays<'a, E> {
             receivers: spreader.receivers,
             shape,
             plane,
-            basis,
+            factors,
             media: first.media,
             absorbs: spreader.absorbs(first),
             effects: PhantomData,
@@ -198,7 +198,7 @@ impl<'a, E: PathEffects> VirtualRays<'a, E> {
             let left = self
                 .media
                 .transmittance(self.receivers.tracer.scene(), distance_m);
-            self.basis.map_or(left, |basis| basis.tone(left))
+            self.factors.apply(left)
         } else {
             LinearSrgb::WHITE
         }

@@ -1,0 +1,47 @@
+//! Light of one traced wavelength, and what it stands for.
+
+use std::ops::RangeInclusive;
+
+use crate::optics::spectrum::{Spectrum, Xyz, xyz_bar};
+use crate::optics::{ColourMatrix, LinearSrgb, Nanometres};
+use crate::transport::Tracer;
+
+/// What is traced at one wavelength.
+#[derive(Debug)]
+pub struct SpectralNode {
+    /// The scene as that wavelength meets it.
+    pub tracer: Tracer,
+    /// From light in RGB to the CIE XYZ of all wavelengths that it stands for, of a lamp of 1 W (luminous-equivalent).
+    pub channels: ColourMatrix,
+    /// Tells its rays from those of the light's other wavelengths.
+    pub number: u32,
+}
+
+/// ∫ Φ(λ) w(λ) (x̄, ȳ, z̄)(λ) dλ over a range, for light that has factors in RGB on its way.
+pub fn channels_within(
+    lamp: &Spectrum,
+    range: RangeInclusive<Nanometres>,
+    weight: impl Fn(Nanometres) -> f64,
+) -> ColourMatrix {
+    ColourMatrix::from_array(lamp.integral_times(range, |wavelength| {
+        let weight = weight(wavelength);
+        let channels = xyz_bar(wavelength).map(|channel| channel * weight);
+        ColourMatrix::of_wavelength(channels, wavelength).to_array()
+    }))
+}
+
+/// Back to linear sRGB from X, Y and Z in the place of red, green and blue.
+pub fn to_linear_srgb(channels: LinearSrgb) -> LinearSrgb {
+    let [x, y, z] = channels.to_array();
+    Xyz { x, y, z }.to_linear_srgb()
+}
+
+/// Along which refractive indices are smoothest [nm⁻²].
+pub fn place_of(wavelength: Nanometres) -> f64 {
+    wavelength.0.powi(-2)
+}
+
+/// The inverse of [`place_of`].
+pub fn wavelength_at(place: f64) -> Nanometres {
+    Nanometres(place.powf(-0.5))
+}

@@ -1,0 +1,82 @@
+//! What each band of the spectrum gives to the maps, where that is to be kept: the paper's n-band illumination map.
+
+use rayon::prelude::*;
+
+use super::finish::{Finish, Levels};
+use super::spectra::SpectralBand;
+use crate::illumination::{IlluminationMap, Receiver};
+use crate::light_pass::receiver_maps::ReceiverMaps;
+
+/// Maps of one band of one light at one level.
+#[derive(Clone, Debug)]
+pub(super) struct LevelBand {
+    /// Place among the bake's bands.
+    pub(super) index: usize,
+    pub(super) band: SpectralBand,
+    /// Flux as X, Y and Z per texel.
+    pub(super) maps: ReceiverMaps,
+    /// Which of these tells its light best.
+    pub(super) channel: usize,
+    /// Radiant watts for one of it.
+    pub(super) radiant: f64,
+}
+
+/// What one band gives to the caustic layer of one map.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BandLayer {
+    /// Whose light it is.
+    pub receiver: Receiver,
+    /// The wavelengths.
+    pub band: SpectralBand,
+    /// Mean of E over the band's wavelengths, per texel [W/(m² nm), radiant].
+    pub irradiance: Vec<f32>,
+}
+
+impl Finish<'_> {
+    /// Bands of all maps: map by map, from the shortest wavelength on; none where they are not kept.
+    pub(super) fn band_layers(&self, maps: &[IlluminationMap], levels: &Levels) -> Vec<BandLayer> {
+        let mut bands: Vec<(usize, &SpectralBand)> = levels
+            .iter()
+            .flat_map(|(_, level)| &level.bands)
+            .map(|band| (band.index, &band.band))
+            .collect();
+        bands.sort_by_key(|(index, _)| *index);
+        bands.dedup_by_key(|(index, _)| *index);
+        let of_map = |map: &IlluminationMap| -> Vec<BandLayer> {
+            let of_band = |(index, band): &(usize, &SpectralBand)| BandLayer {
+                receiver: map.chart.receiver,
+                band: (*band).clone(),
+                irradiance: self.band_of_map(map, *index, levels),
+            };
+            bands.iter().map(of_band).collect()
+        };
+        maps.iter().flat_map(of_map).collect()
+    }
+
+    fn band_of_map(&self, map: &IlluminationMap, index: usize, levels: &Levels) -> Vec<f32> {
+        let chart = &map.chart;
+        let mut sums = vec![0.0; chart.texel_count()];
+        for (light, level) in levels.iter() {
+            let band = level.bands.iter().find(|band| band.index == index);
+            let Some((band, lit)) = band.and_then(|band| Some((band, band.maps.get(chart.receiver)?))) else {
+                continue;
+            };
+            let mut flux = lit.flux();
+            self.smooth(chart, &mut flux);
+            let strength = level.strength(&self.scene.lights[*light]).luminance();
+            let width_nm = band.band.to_nm - band.band.from_nm;
+            let scale = strength * level.unit.watts() * band.radiant / width_nm;
+            let texels = sums.par_iter_mut().zip(flux.texels());
+            texels.for_each(|(sum, counts)| *sum += counts[band.channel] as f64 * scale);
+        }
+        let per_area = |(texel, flux): (usize, f64)| {
+            let area_m2 = chart.texel_area_m2(texel);
+            if area_m2 > 0.0 {
+                (flux / area_m2) as f32
+            } else {
+                0.0
+            }
+        };
+        sums.into_iter().enumerate().map(per_area).collect()
+    }
+}

@@ -1,0 +1,39 @@
+//! Maps of one light while they are made: all of it on one set, or band by band of its spectrum.
+
+use crate::light_pass::receiver_maps::ReceiverMaps;
+
+/// One set of maps, or one for each band that is kept.
+#[derive(Clone, Debug)]
+pub(super) struct PartMaps(Vec<ReceiverMaps>);
+
+impl PartMaps {
+    /// No light yet; `kept_bands`: how many bands have maps of their own.
+    pub(super) fn new(objects: usize, kept_bands: usize) -> Self {
+        Self(vec![ReceiverMaps::new(objects); kept_bands.max(1)])
+    }
+
+    /// Where light of a band goes.
+    pub(super) fn of(&mut self, band: Option<usize>) -> &mut ReceiverMaps {
+        let only = self.0.len() == 1;
+        &mut self.0[band.filter(|_| !only).unwrap_or(0)]
+    }
+
+    /// Adds other light.
+    pub(super) fn add(&mut self, other: Self) {
+        for (sum, part) in self.0.iter_mut().zip(other.0) {
+            sum.add(part);
+        }
+    }
+
+    /// The sum of all, and the bands where they are kept.
+    pub(super) fn into_sum(mut self) -> (ReceiverMaps, Vec<ReceiverMaps>) {
+        if self.0.len() == 1 {
+            return (self.0.remove(0), Vec::new());
+        }
+        let mut sum = self.0[0].clone();
+        for band in &self.0[1..] {
+            sum.add(band.clone());
+        }
+        (sum, self.0)
+    }
+}
