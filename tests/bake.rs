@@ -59,6 +59,8 @@ mod soft;
 mod sparse;
 #[path = "bake/spectral.rs"]
 mod spectral;
+#[path = "bake/spectral_metals.rs"]
+mod spectral_metals;
 #[path = "support/mod.rs"]
 mod support;
 #[path = "bake/surfaces.rs"]

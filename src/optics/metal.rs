@@ -2,10 +2,14 @@
 
 use std::sync::LazyLock;
 
+use glam::{DMat3, DVec3};
+
 use super::conductor::conductor_reflectance;
 use super::names::{key, nearest};
 use super::spectrum::xyz::colour_under_d65;
-use super::{LinearSrgb, Nanometres};
+use super::spectrum::{Spectrum, xyz_bar};
+use super::wavelength::VISIBLE;
+use super::{ColourBasis, LinearSrgb, Nanometres};
 use crate::error::Error;
 
 /// Name and table of each: columns wavelength [nm], n, k; from below 360 to above 830 nm (see assets/SOURCES.md).
@@ -15,6 +19,9 @@ const TABLES: [(&str, &str); 4] = [
     ("Copper", include_str!("../../assets/metals/copper.csv")),
     ("Aluminium", include_str!("../../assets/metals/aluminium.csv")),
 ];
+
+/// How much a difference from the usual colour counts beside one of what is seen, squared.
+const HOLD: f64 = 1e-6;
 
 static METALS: LazyLock<Vec<Metal>> = LazyLock::new(|| {
     let row = |line: &str| -> Option<[f64; 3]> {
@@ -110,5 +117,26 @@ impl Metal {
     /// that white light keeps its luminance but red light would gain.
     pub fn reflectance_srgb(&self, cos_incident: f64) -> LinearSrgb {
         colour_under_d65(|wavelength| self.reflectance(cos_incident, wavelength))
+    }
+
+    /// The factor in RGB that stands for its reflectance head on where a lamp's light is followed by wavelength and
+    /// factors are what [`ColourBasis`] makes of them: the lamp's reflected light has the XYZ that the table gives it.
+    /// Channels may lie above 1, as gold's red does. What the lamp does not tell, as one line tells nothing of three
+    /// channels, stays near to [`reflectance_srgb`](Self::reflectance_srgb).
+    pub fn factor_under(&self, lamp: &Spectrum) -> LinearSrgb {
+        let seen_of = |factor: &dyn Fn(Nanometres) -> f64| {
+            let seen = |wavelength| xyz_bar(wavelength).map(|channel| channel * factor(wavelength));
+            DVec3::from_array(lamp.integral_times(VISIBLE, seen))
+        };
+        let part = |index: usize| seen_of(&|wavelength| ColourBasis::at(wavelength).row()[index]);
+        let parts = DMat3::from_cols(part(0), part(1), part(2));
+        let wanted = seen_of(&|wavelength| self.reflectance(1.0, wavelength));
+        let usual = DVec3::from_array(self.reflectance_srgb(1.0).to_array());
+        // Least squares, held to the usual factor where the parts look alike.
+        let squares = parts.transpose() * parts;
+        let trace = squares.x_axis.x + squares.y_axis.y + squares.z_axis.z;
+        let held = squares + DMat3::from_diagonal(DVec3::splat(HOLD * trace));
+        let step = held.inverse() * (parts.transpose() * (wanted - parts * usual));
+        LinearSrgb::from((usual + step).to_array())
     }
 }

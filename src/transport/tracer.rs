@@ -11,6 +11,7 @@ use super::curvature::NormalField;
 use super::normal_texture::{TextureBump, texel_m};
 use super::smoothing::smoothing_groups;
 use crate::geometry::{Ray, TriangleBvh, ray};
+use crate::optics::spectrum::Spectrum;
 use crate::optics::{LinearSrgb, Nanometres};
 use crate::scene::{Adjacency, Mesh, Scene, SurfaceKind, TextureRef, Waves};
 
@@ -189,6 +190,19 @@ impl Tracer {
         let mut scene = Scene::clone(&self.scene);
         for material in &mut scene.materials {
             material.ior = material.index_at(wavelength);
+        }
+        self.edited(Arc::new(scene))
+    }
+
+    /// The same scene for the light of a lamp that is followed at some of its wavelengths, with factors in RGB on its
+    /// way: metals of a known substance have the factor of [`Metal::factor_under`](crate::optics::Metal::factor_under).
+    #[must_use]
+    pub fn with_metals_under(&self, lamp: &Spectrum) -> Self {
+        let mut scene = Scene::clone(&self.scene);
+        for material in &mut scene.materials {
+            if let Some(metal) = material.metal {
+                material.base_colour = metal.factor_under(lamp);
+            }
         }
         self.edited(Arc::new(scene))
     }

@@ -7,7 +7,7 @@ use nephroid::geometry::Ray;
 use nephroid::optics::fresnel::{dielectric_reflectance, metal_reflectance};
 use nephroid::optics::spectrum::{Spectrum, WavelengthSampler, Xyz, illuminant, xyz_bar};
 use nephroid::optics::wavelength::VISIBLE;
-use nephroid::optics::{LinearSrgb, Metal, Nanometres};
+use nephroid::optics::{ColourBasis, LinearSrgb, Metal, Nanometres};
 use nephroid::scene::builtin::{parts, shapes};
 use nephroid::scene::texture::Wrap;
 use nephroid::scene::{Material, Mesh, Scene, Texture, TextureRef};
@@ -142,6 +142,42 @@ fn a_lamps_reflected_colour_is_the_mean_over_its_wavelengths() {
             let found = followed(&lamp, reflected);
             println!("{name} under {lamp_name}: {found:.5?}, {expected:.5?}");
             assert_same_colour(found, expected, &format!("{name} under {lamp_name}"));
+        }
+    }
+}
+
+#[test]
+fn a_metals_factor_under_a_lamp_gives_its_reflected_colour() {
+    for metal in Metal::all() {
+        let tracer = Tracer::new(Arc::new(scene_with(mirror_of(metal.name()))));
+        for name in [
+            "D65",
+            "A",
+            "FL2",
+            "FL11",
+            "LED-B1",
+            "LED-RGB1",
+            "line:589.3",
+            "line:500",
+        ] {
+            let lamp = illuminant(name).expect("a lamp");
+            let factor = share(&tracer.with_metals_under(&lamp), 1.0);
+            let found = integrated(&lamp, |wavelength| ColourBasis::at(wavelength).tone(factor).r);
+            let expected = integrated(&lamp, |wavelength| metal.reflectance(1.0, wavelength));
+            let usual = metal.reflectance_srgb(1.0);
+            let off = (factor - usual).map(f64::abs).max_channel();
+            println!(
+                "{} under {name}: {factor:.3?}, {found:.5?} for {expected:.5?}",
+                metal.name()
+            );
+            for (found, expected) in found.into_iter().zip(expected) {
+                assert!((found - expected).abs() < 1e-4, "{} under {name}", metal.name());
+            }
+            assert!(
+                off < 0.25,
+                "{} under {name}: {factor:?} is far from {usual:?}",
+                metal.name()
+            );
         }
     }
 }

@@ -106,6 +106,7 @@ impl LightSpectrum {
             ladder.insert(0, coarser);
         }
         let whole = &ladder[0][0];
+        let tracer = tracer.with_metals_under(lamp);
         let nodes = std::array::from_fn(|node| {
             let wavelength = wavelength_at(places[node]);
             SpectralNode {
