@@ -23,7 +23,7 @@ pub const DEFAULT_WAVELENGTHS: [u32; 4] = [1, 4, 7, 13];
 pub const REFERENCE_WAVELENGTHS: u32 = 300;
 
 /// The reference's lattice is so many times as dense as the others.
-const REFERENCE_DENSITY_FACTOR: f64 = 4.0;
+const REFERENCE_DENSITY_FACTOR: f64 = 2.0;
 
 /// A spot of less than this half-angle is a thin beam [rad].
 const THIN_RAD: f64 = 0.05;

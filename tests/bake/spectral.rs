@@ -402,5 +402,43 @@ fn the_stretch_before_the_glass_is_traced_once() {
     let [with, without] = ["N-BK7", "cauchy:1.5168,0"].map(|text| bake(ball_of(text), &settings(64)).counts);
     println!("{with:?}\n{without:?}");
     assert!(with.rays <= 3 * without.rays && with.rays > without.rays);
-    assert!((with.segments as f64) < 2.8 * without.segments as f64);
+    // A ray at another wavelength begins where light enters the glass.
+    let of_others = (with.segments - without.segments) as f64 / (with.rays - without.rays) as f64;
+    let of_first = without.segments as f64 / without.rays as f64;
+    assert!(
+        of_others < 0.95 * of_first,
+        "{of_others} queries a ray, {of_first} of the first"
+    );
+}
+
+#[test]
+fn a_prism_throws_a_spectrum_without_bands() {
+    let scene = builtin::build("prism").expect("a built-in scene");
+    let wall = |wavelengths: Wavelengths| {
+        let result = bake(
+            scene.clone(),
+            &BakeSettings {
+                density_per_sr: 1.2e7,
+                wavelengths,
+                ..settings(512)
+            },
+        );
+        caustic(&result, &scene, "wall").1.to_vec()
+    };
+    let split = wall(Wavelengths::Fixed(128));
+    let norm = |texels: &[[f32; 3]]| {
+        let squares = texels.iter().flatten().map(|value| f64::from(*value).powi(2));
+        squares.sum::<f64>().sqrt()
+    };
+    let off = |texels: &[[f32; 3]]| {
+        let pairs = texels.iter().zip(&split);
+        let differences: Vec<[f32; 3]> = pairs
+            .map(|(a, b)| std::array::from_fn(|channel| a[channel] - b[channel]))
+            .collect();
+        norm(&differences) / norm(&split)
+    };
+    let [continuous, three] = [Wavelengths::Continuous, Wavelengths::Fixed(3)].map(|way| off(&wall(way)));
+    println!("off 128 wavelengths: {continuous} of the whole spectrum, {three} of three wavelengths");
+    assert!(three > 1.0, "three lines are no spectrum");
+    assert!(continuous < 0.15, "{continuous}");
 }

@@ -273,3 +273,49 @@ fn any_number_of_threads_gives_the_same_bytes() {
         }
     }
 }
+
+#[test]
+fn bands_of_the_spectrum_are_kept_where_asked_for() {
+    let sandbox = Sandbox::new();
+    sandbox.succeed(
+        "bake builtin:prism -o out --density 1.2e7 --map-resolution 64 --wavelengths rainbow --keep-spectrum",
+    );
+    let manifest = sandbox.manifest("out");
+    let ledger = &manifest["ledgers"][0];
+    let [emitted, deposited] =
+        ["emitted_radiant_w", "deposited_radiant_w"].map(|key| ledger[key].as_f64().expect("watts"));
+    assert!(0.0 < deposited && deposited < emitted, "{ledger}");
+    let maps = manifest["maps"].as_array().expect("maps");
+    let wall = maps
+        .iter()
+        .find(|map| map["surface"] == "wall")
+        .expect("the wall's");
+    let bands = wall["bands"].as_array().expect("bands");
+    assert_eq!(bands.len(), 7);
+    let edges = |key: &str| {
+        bands
+            .iter()
+            .map(|band| band[key].as_f64().expect("nm"))
+            .collect::<Vec<_>>()
+    };
+    let (from, to) = (edges("from_nm"), edges("to_nm"));
+    assert_eq!(from[1..], to[..6], "bands meet");
+    let file = wall["file"].as_str().expect("a file");
+    let image = FloatImage::read(&sandbox.path("out").join(file)).expect("a map");
+    for band in bands {
+        let name = band["channel"].as_str().expect("a channel");
+        let channel = image.channels.iter().find(|channel| channel.name == name);
+        let values = &channel.unwrap_or_else(|| panic!("no {name}")).values;
+        assert!(values.iter().any(|value| *value > 0.0), "{name} is dark");
+    }
+    for (arguments, words) in [
+        ("--keep-spectrum", "no bands to keep"),
+        ("--wavelengths 0", "outside 1 to 1000"),
+        ("--wavelengths many", "a number, `rainbow` or `continuous`"),
+        ("--spectral-sampling split", "interpolated, not sampled"),
+    ] {
+        let run = sandbox.run(&format!("bake builtin:prism -o no {arguments}"));
+        assert_eq!(run.code, 2, "{arguments}: {}", run.stderr);
+        assert!(run.stderr.contains(words), "{}", run.stderr);
+    }
+}

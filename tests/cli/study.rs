@@ -35,7 +35,7 @@ fn rmse(run: &Run) -> f64 {
 fn studies_are_listed_and_have_to_be_named() {
     let sandbox = Sandbox::new();
     let list = sandbox.succeed("study --list");
-    for study in ["convergence", "reference", "effects"] {
+    for study in ["convergence", "reference", "effects", "spectrum"] {
         assert!(list.stdout.contains(study), "{}", list.stdout);
     }
     assert_eq!(
@@ -356,4 +356,55 @@ fn pictures_of_effects_are_warm_where_light_is_added() {
     sandbox
         .run(&format!("study effects builtin:mirror -o photos {QUICK}"))
         .failed_in_one_sentence(1, &["photos", "--force"]);
+}
+
+#[test]
+fn the_whole_spectrum_beats_few_wavelengths() {
+    let sandbox = Sandbox::new();
+    let run = sandbox.succeed(
+        "study spectrum builtin:prism -o out --wavelengths 1,7 --density 1.2e7 --map-resolution 128 --repeat 1 --json",
+    );
+    assert_eq!(sandbox.files("out"), ["spectrum.csv", "spectrum.png"]);
+    let table = read_table(&sandbox, "out/spectrum.csv");
+    let columns = ["estimator", "sampling", "wavelengths"].map(|name| column(&table, name));
+    let ways: Vec<String> = (0..columns[0].len())
+        .map(|row| columns.each_ref().map(|column| column[row].clone()).join(" "))
+        .collect();
+    assert_eq!(
+        ways,
+        [
+            "splat split 1",
+            "splat split 7",
+            "splat stochastic 1",
+            "splat stochastic 7",
+            "splat stochastic continuous",
+            "wavefront split 1",
+            "wavefront split 7",
+            "wavefront stochastic 1",
+            "wavefront stochastic 7",
+            "wavefront interpolated continuous",
+        ]
+    );
+    let [errors, rays, flux] = ["colour_error", "rays", "flux_ratio"].map(|name| numbers(&table, name));
+    assert!(rays[1] > 6.0 * rays[0] && rays[3] < 2.0 * rays[2], "{rays:?}");
+    assert!(errors[6] < errors[5] && errors[9] < 0.5 * errors[6], "{errors:?}");
+    assert!(flux.iter().all(|flux| (flux - 1.0).abs() < 0.05), "{flux:?}");
+    assert_eq!(run.json()["surface"], "wall");
+    // Eleven strips of one size, the reference first, each with a line below.
+    let strips = image::open(sandbox.path("out/spectrum.png"))
+        .expect("a PNG")
+        .to_rgb8();
+    assert_eq!(strips.height() % 11, 0);
+    let strip = strips.height() / 11;
+    let colourful = |first: u32| {
+        let pixels = (first * strip..(first + 1) * strip - 1)
+            .flat_map(|row| (0..strips.width()).map(move |column| (column, row)));
+        let spread = pixels.map(|(column, row)| {
+            let pixel = strips.get_pixel(column, row).0;
+            pixel.iter().max().expect("channels") - pixel.iter().min().expect("channels")
+        });
+        spread.max().expect("pixels")
+    };
+    assert!(colourful(0) > 100 && colourful(10) > 100, "spectra are coloured");
+    assert!(colourful(6) < 30, "one wavelength leaves a white line");
 }

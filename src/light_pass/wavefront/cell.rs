@@ -181,11 +181,12 @@ impl CellCutter<'_> {
             let rounds = depth.rounds + 1;
             return self.split(cell, Depth { rounds, ..depth }, work, out);
         }
-        if cell.corners.iter().any(|corner| work.get(corner.sample).is_rough) {
-            return self.scatter(cell, work, out);
-        }
-        if let Some(spectrum) = self.light.spectrum() {
-            return self.cut_spectrum(spectrum, cell, depth, work, out);
+        let is_rough = cell.corners.iter().any(|corner| work.get(corner.sample).is_rough);
+        match self.light.spectrum() {
+            Some(spectrum) if is_rough => return self.scatter_spectrum(spectrum, cell, work, out),
+            Some(spectrum) => return self.cut_spectrum(spectrum, cell, depth, work, out),
+            None if is_rough => return self.scatter(cell, work, out),
+            None => {}
         }
         if cell.edges.iter().all(Option::is_none) {
             return if depth.ambiguous < DEEPEST_SPLIT && self.is_doubtful(cell, work) {
@@ -452,25 +453,36 @@ impl CellCutter<'_> {
     pub(super) fn scatter(&self, cell: &Cell, work: &Workspace, out: &mut CellOutput) {
         let centre = cell.corners[0].square.lerp(cell.corners[2].square, 0.5);
         for corner in cell.corners {
-            let (low, high) = (corner.square.min(centre), corner.square.max(centre));
-            let area = (high.x - low.x) * (high.y - low.y);
-            let sample = work.get(corner.sample);
-            for strand in 0..sample.strands.len() {
-                if self.is_done(sample.strands[strand].signature) {
-                    continue;
-                }
-                out.splats += 1;
-                out.patches.push(Patch {
-                    corners: [(corner.sample, strand as u16); 4],
-                    squares: [corner.square, low, high, high],
-                    kind: PatchKind::Around,
-                    tone: self.tone,
-                });
+            self.scatter_corner(corner, centre, work, out);
+        }
+    }
+
+    /// A corner for the quarter of its cell up to the cell's centre.
+    pub(super) fn scatter_corner(
+        &self,
+        corner: Corner,
+        centre: DVec2,
+        work: &Workspace,
+        out: &mut CellOutput,
+    ) {
+        let (low, high) = (corner.square.min(centre), corner.square.max(centre));
+        let area = (high.x - low.x) * (high.y - low.y);
+        let sample = work.get(corner.sample);
+        for strand in 0..sample.strands.len() {
+            if self.is_done(sample.strands[strand].signature) {
+                continue;
             }
-            for node in 0..sample.nodes.len() {
-                if !self.is_booked(sample.nodes[node].signature) {
-                    self.book(&[(corner.sample, node, area)], work, out);
-                }
+            out.splats += 1;
+            out.patches.push(Patch {
+                corners: [(corner.sample, strand as u16); 4],
+                squares: [corner.square, low, high, high],
+                kind: PatchKind::Around,
+                tone: self.tone,
+            });
+        }
+        for node in 0..sample.nodes.len() {
+            if !self.is_booked(sample.nodes[node].signature) {
+                self.book(&[(corner.sample, node, area)], work, out);
             }
         }
     }

@@ -73,11 +73,68 @@ impl CellCutter<'_> {
             }
             return;
         }
-        if !self.is_ambiguous(cell, work) {
-            self.cut_shared(spectrum, cell, &nodes, &mut shared, work, out);
+        if self.is_ambiguous(cell, work) {
+            return self.scatter_nodes(spectrum, cell, (&nodes, &shared.done), work, out);
         }
+        self.cut_shared(spectrum, cell, &nodes, &mut shared, work, out);
         for (node, corners) in nodes.iter().enumerate() {
             self.cut_node(spectrum, node, cell, (*corners, &shared), depth, work, out);
+        }
+    }
+
+    /// Each corner stands for its quarter of the cell.
+    pub(super) fn scatter_spectrum(
+        &self,
+        spectrum: &LightSpectrum,
+        cell: &Cell,
+        work: &mut Workspace,
+        out: &mut CellOutput,
+    ) {
+        let nodes = self.node_corners(cell, work);
+        self.scatter_nodes(spectrum, cell, (&nodes, &[]), work, out);
+    }
+
+    /// The same but for light that has patches already.
+    fn scatter_nodes(
+        &self,
+        spectrum: &LightSpectrum,
+        cell: &Cell,
+        (nodes, done): (&NodeCorners, &[PathSignature]),
+        work: &Workspace,
+        out: &mut CellOutput,
+    ) {
+        let centre = cell.corners[0].square.lerp(cell.corners[2].square, 0.5);
+        for (index, corner) in cell.corners.iter().enumerate() {
+            let ids = nodes.map(|corners| corners[index]);
+            let common = common_light(ids, work);
+            for (node, id) in ids.into_iter().enumerate() {
+                // What all have is spread with the first.
+                let mut without = done.to_vec();
+                if node > 0 {
+                    without.extend(&common);
+                    without.sort_unstable();
+                }
+                let of_node = CellCutter {
+                    tone: Tone::Node(node as u8),
+                    channels: spectrum.nodes[node].channels,
+                    done: &without,
+                    ..*self
+                };
+                let first = out.patches.len();
+                let at = Corner {
+                    sample: id,
+                    square: corner.square,
+                };
+                of_node.scatter_corner(at, centre, work, out);
+                for patch in &mut out.patches[first..] {
+                    let (sample, strand) = patch.corners[0];
+                    let signature = work.get(sample).strands[usize::from(strand)].signature;
+                    if node == 0 && common.binary_search(&signature).is_ok() {
+                        let others = std::array::from_fn(|other| [ids[other + 1]; 4]);
+                        patch.tone = Tone::Spectrum { others, parted: true };
+                    }
+                }
+            }
         }
     }
 
@@ -277,6 +334,14 @@ impl CellCutter<'_> {
             cutter.cut_at(&seen, depth, work, out);
         }
     }
+}
+
+/// Light that a ray has at all wavelengths, ascending.
+fn common_light(ids: [SampleId; NODES], work: &Workspace) -> Vec<PathSignature> {
+    let [first, others @ ..] = ids.map(|id| work.get(id));
+    let signatures = first.strands.iter().map(|strand| strand.signature);
+    let is_common = |signature: &PathSignature| others.iter().all(|other| other.find(*signature).is_some());
+    signatures.filter(is_common).collect()
 }
 
 /// Light below this share of the brightest is not cut wavelength by wavelength.
