@@ -6,6 +6,8 @@ mod chains;
 mod charts;
 #[path = "eye/direct.rs"]
 mod direct;
+#[path = "eye/dispersion.rs"]
+mod dispersion;
 #[path = "eye/meshes.rs"]
 mod meshes;
 #[path = "eye/pictures.rs"]

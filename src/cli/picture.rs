@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use nephroid::effect::{Effect, EffectSwitch};
+use nephroid::effect::{Effect, EffectSwitches};
 use nephroid::error::{Error, Result};
 use nephroid::export::picture;
 use nephroid::eye_pass::reference::{self, ChainLimits, ReferenceSettings};
@@ -48,7 +48,7 @@ impl MadePicture {
     }
 }
 
-/// Makes the picture, by the card where there is one and no other wish; `settings` switch the eye's chains.
+/// Makes the picture, by the card where there is one and no other wish; `settings` switch what the eye sees in mirrors and glass.
 ///
 /// # Errors
 /// No such camera; a card that was asked for and is not there; a signal.
@@ -69,16 +69,16 @@ pub fn make(
         tone_map: request.tone_map,
         background: LinearSrgb::BLACK,
     };
-    let chains = settings.effects.get(Effect::Chains);
+    let effects = &settings.effects;
     interrupt.check("picture")?;
     let (picture, made_by) = match request.backend {
-        Some(Backend::Cpu) => by_cpu(scene, maps, &view, chains, terminal, interrupt)?,
-        Some(Backend::Gpu) => by_gpu(scene, maps, &view, chains)?,
-        None => match by_gpu(scene, maps, &view, chains) {
+        Some(Backend::Cpu) => by_cpu(scene, maps, &view, effects, terminal, interrupt)?,
+        Some(Backend::Gpu) => by_gpu(scene, maps, &view, effects)?,
+        None => match by_gpu(scene, maps, &view, effects) {
             Ok(made) => made,
             Err(error) => {
                 terminal.print_note(&format!("{error}: the CPU makes the picture"));
-                by_cpu(scene, maps, &view, chains, terminal, interrupt)?
+                by_cpu(scene, maps, &view, effects, terminal, interrupt)?
             }
         },
     };
@@ -98,7 +98,7 @@ fn by_cpu(
     scene: &Arc<Scene>,
     maps: &[IlluminationMap],
     view: &View,
-    chains: EffectSwitch,
+    effects: &EffectSwitches,
     terminal: &Terminal,
     interrupt: &Interrupt,
 ) -> Result<(Picture, String)> {
@@ -106,9 +106,10 @@ fn by_cpu(
     let settings = ReferenceSettings {
         samples_per_side: SAMPLES_PER_SIDE,
         limits: ChainLimits {
-            switch: chains,
+            switch: effects.get(Effect::Chains),
             ..ChainLimits::default()
         },
+        ..ReferenceSettings::switched(effects.get(Effect::Dispersion))
     };
     let bar = StageBar::new(terminal);
     let picture = reference::render(&tracer, maps, view, &settings, &bar, interrupt.control())?;
@@ -120,17 +121,24 @@ fn by_gpu(
     scene: &Scene,
     maps: &[IlluminationMap],
     view: &View,
-    chains: EffectSwitch,
+    effects: &EffectSwitches,
 ) -> Result<(Picture, String)> {
     use nephroid::eye_pass::renderer::render_counted;
 
     let gpu = nephroid::gpu::Gpu::headless()?;
-    let (picture, _) = render_counted(&gpu, scene, maps, view, SAMPLES_PER_SIDE, chains)?;
+    let (picture, _) = render_counted(
+        &gpu,
+        scene,
+        maps,
+        view,
+        SAMPLES_PER_SIDE,
+        effects.get(Effect::Chains),
+    )?;
     Ok((picture, gpu.adapter_name()))
 }
 
 #[cfg(not(feature = "gpu"))]
-fn by_gpu(_: &Scene, _: &[IlluminationMap], _: &View, _: EffectSwitch) -> Result<(Picture, String)> {
+fn by_gpu(_: &Scene, _: &[IlluminationMap], _: &View, _: &EffectSwitches) -> Result<(Picture, String)> {
     Err(Error::failure(
         "--backend gpu",
         "this program was built without the gpu feature",

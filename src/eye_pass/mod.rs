@@ -5,5 +5,6 @@ pub mod reference;
 pub mod renderer;
 pub mod tone_mapping;
 pub mod view;
+pub mod wavelengths;
 
 pub use view::{Picture, ToneMap, View};

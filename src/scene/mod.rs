@@ -86,6 +86,11 @@ impl Scene {
         &self.materials[self.objects[object].material]
     }
 
+    /// Whether anything in it sends light of different wavelengths different ways.
+    pub fn parts_wavelengths(&self) -> bool {
+        (0..self.objects.len()).any(|object| self.material_of(object).is_dispersive())
+    }
+
     /// What an object's surface sends by itself [W/(m² sr)]: that of its light, where it has one, as edited.
     pub fn emitted_radiance(&self, object: usize) -> LinearSrgb {
         let is_of_it =

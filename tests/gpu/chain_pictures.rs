@@ -84,6 +84,7 @@ impl Exhibit {
                 branching_depth,
                 ..Default::default()
             },
+            ..Default::default()
         };
         let control = Default::default();
         reference::render(&self.tracer, &self.maps, &self.view, &settings, &(), &control)
