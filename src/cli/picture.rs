@@ -126,14 +126,7 @@ fn by_gpu(
     use nephroid::eye_pass::renderer::render_counted;
 
     let gpu = nephroid::gpu::Gpu::headless()?;
-    let (picture, _) = render_counted(
-        &gpu,
-        scene,
-        maps,
-        view,
-        SAMPLES_PER_SIDE,
-        effects.get(Effect::Chains),
-    )?;
+    let (picture, _) = render_counted(&gpu, scene, maps, view, SAMPLES_PER_SIDE, effects)?;
     Ok((picture, gpu.adapter_name()))
 }
 

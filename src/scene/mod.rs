@@ -15,6 +15,7 @@ pub mod light;
 pub mod load;
 pub mod material;
 pub mod mesh;
+mod middle_light;
 pub mod normal_map;
 pub mod texture;
 pub mod waves;

@@ -105,6 +105,7 @@ pub struct Renderer {
     drawn_view: Option<View>,
     map_style: MapStyle,
     chains: EffectSwitch,
+    dispersion: EffectSwitch,
     quality: EyeQuality,
     /// Whether light straight from the lamps is traced.
     traces_lights: bool,
@@ -156,6 +157,7 @@ impl Renderer {
             drawn_view: None,
             map_style: MapStyle::default(),
             chains: EffectSwitch::default(),
+            dispersion: EffectSwitch::default(),
             quality: EyeQuality::default(),
             traces_lights: false,
             timing: Timing::new(gpu),
@@ -253,6 +255,13 @@ impl Renderer {
             }
         }
         gpu.take_error().map_or(Ok(()), Err)
+    }
+
+    /// Switches what glass that parts wavelengths does to what is seen through it, from the next picture on; off, it
+    /// bends all light as at 587.56 nm. Auto and on are the same here: without such glass there is nothing to prepare.
+    pub fn set_dispersion(&mut self, switch: EffectSwitch) {
+        self.dispersion = switch;
+        self.drawn_view = None;
     }
 
     /// Why mirrors and glass are drawn without what is seen in them though that was called for: the scene is too large
@@ -385,6 +394,7 @@ impl Renderer {
             has_tinted_glass: self.objects.has_tinted_glass(),
             has_bumps: self.objects.has_bumps(),
             has_sky: self.shows_sky(),
+            parts_wavelengths: self.dispersion != EffectSwitch::Off && !self.objects.glasses.is_empty(),
         }
     }
 }

@@ -1,7 +1,9 @@
 //! What is handed to the shaders; names and order are those of `shaders/eye_pass/`.
 
+use crate::eye_pass::wavelengths::SeenWavelength;
 use crate::gpu::layout::shader_struct;
 use crate::optics::LinearSrgb;
+use crate::optics::glass::Dispersion;
 
 shader_struct! {
     /// One picture.
@@ -64,6 +66,21 @@ shader_struct! {
 }
 
 shader_struct! {
+    /// The wavelengths that a picture follows light at.
+    SeenWavelengths {
+        /// From radiance in linear sRGB to what is seen of it, column by column; a fourth number fills each.
+        shares: [[[f32; 4]; 3]; 4],
+        /// How many there are.
+        count: u32,
+        padding0: u32,
+        padding1: u32,
+        padding2: u32,
+        /// Index of each glass at each wavelength, in groups.
+        indices: [[[f32; 4]; 16]; 8],
+    }
+}
+
+shader_struct! {
     /// One object.
     ObjectRecord {
         /// [`Material::base_colour`](crate::scene::Material::base_colour).
@@ -90,8 +107,9 @@ shader_struct! {
         polish: f32,
         /// Record of the illumination map of its back.
         back_map: u32,
+        /// Number of its glass from 1 on, where that parts wavelengths; else 0.
+        glass: u32,
         padding0: u32,
-        padding1: u32,
     }
 }
 
@@ -176,6 +194,27 @@ shader_struct! {
         /// Local.
         distance: f32,
         padding: [u32; 2],
+    }
+}
+
+impl SeenWavelengths {
+    /// A picture's set, with the indices of the scene's glasses, as many as there is room for.
+    pub(crate) fn of(set: &[SeenWavelength], glasses: &[Dispersion]) -> Self {
+        let mut seen = Self {
+            count: set.len() as u32,
+            ..Self::default()
+        };
+        for (share, at) in seen.shares.iter_mut().zip(set) {
+            let columns = at.share.to_cols_array_2d();
+            *share = columns.map(|[r, g, b]| [r as f32, g as f32, b as f32, 0.0]);
+        }
+        let rooms = seen.indices.as_flattened_mut().iter_mut();
+        for (room, glass) in rooms.zip(glasses) {
+            for (index, at) in room.iter_mut().zip(set) {
+                *index = glass.index(at.wavelength) as f32;
+            }
+        }
+        seen
     }
 }
 
