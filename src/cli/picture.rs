@@ -9,6 +9,7 @@ use nephroid::eye_pass::reference::{self, ChainLimits, ReferenceSettings};
 use nephroid::eye_pass::{Picture, View, tone_mapping};
 use nephroid::illumination::IlluminationMap;
 use nephroid::optics::LinearSrgb;
+use nephroid::optics::spectrum::xyz::Matrix3;
 use nephroid::scene::{Camera, Scene};
 use nephroid::settings::BakeSettings;
 use nephroid::transport::Tracer;
@@ -28,6 +29,8 @@ pub struct MadePicture {
     pub picture: Picture,
     /// With the exposure that was used.
     pub view: View,
+    /// What radiance is multiplied by before tone mapping.
+    pub white_balance: Matrix3,
     /// The graphics card's name, or `cpu`.
     pub made_by: String,
 }
@@ -41,7 +44,8 @@ impl MadePicture {
         match format {
             PictureFormat::Png => {
                 let view = &self.view;
-                picture::display_png(&self.picture, view.exposure_stops, view.tone_map, location)
+                let white = &self.white_balance;
+                picture::display_png(&self.picture, view.exposure_stops, view.tone_map, white, location)
             }
             PictureFormat::Exr => picture::radiance_exr(&self.picture, location),
         }
@@ -90,6 +94,7 @@ pub fn make(
     Ok(MadePicture {
         picture,
         view,
+        white_balance: request.white_balance.matrix(scene),
         made_by,
     })
 }

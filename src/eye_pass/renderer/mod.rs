@@ -64,6 +64,7 @@ use crate::effect::EffectSwitch;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::illumination::IlluminationMap;
+use crate::optics::spectrum::xyz::Matrix3;
 use crate::scene::Scene;
 
 /// Most that illumination maps take on the device unless it is told otherwise [bytes].
@@ -262,6 +263,14 @@ impl Renderer {
     pub fn set_dispersion(&mut self, switch: EffectSwitch) {
         self.dispersion = switch;
         self.drawn_view = None;
+    }
+
+    /// Multiplies radiance by a matrix of [`WhiteBalance::matrix`](super::WhiteBalance::matrix) before tone mapping,
+    /// from the next picture on. Radiance that is read back stays as it is.
+    pub fn set_white_balance(&mut self, gpu: &Gpu, matrix: &Matrix3) {
+        if self.tone_mapping.set_white_balance(gpu, matrix) {
+            self.drawn_view = None;
+        }
     }
 
     /// Why mirrors and glass are drawn without what is seen in them though that was called for: the scene is too large

@@ -4,8 +4,8 @@ use super::geometry::{CORNER_LAYOUT, MAP_UV_LAYOUT};
 use super::pipelines::{DrawnHow, Faces, PipelineKey, Writes};
 use super::tone_mapping;
 use super::uniforms::{
-    Accumulation, ChainStart, Frame, LightRecord, Node, ObjectRecord, ProbeHit, ProbeRay, SeenWavelengths,
-    Triangle,
+    Accumulation, ChainStart, DisplayWhite, Frame, LightRecord, Node, ObjectRecord, ProbeHit, ProbeRay,
+    SeenWavelengths, Triangle,
 };
 use crate::eye_pass::ToneMap;
 use crate::gpu::layout::StructLayout;
@@ -225,6 +225,7 @@ pub fn shared_structs() -> Vec<StructLayout> {
         SeenWavelengths::layout(),
         Node::layout(),
         Triangle::layout(),
+        DisplayWhite::layout(),
         Accumulation::layout(),
         ProbeRay::layout(),
         ProbeHit::layout(),

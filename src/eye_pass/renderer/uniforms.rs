@@ -4,6 +4,7 @@ use crate::eye_pass::wavelengths::SeenWavelength;
 use crate::gpu::layout::shader_struct;
 use crate::optics::LinearSrgb;
 use crate::optics::glass::Dispersion;
+use crate::optics::spectrum::xyz::Matrix3;
 
 shader_struct! {
     /// One picture.
@@ -164,6 +165,14 @@ shader_struct! {
 }
 
 shader_struct! {
+    /// Which light the display shows as white.
+    DisplayWhite {
+        /// What radiance is multiplied by, column by column; a fourth number fills each.
+        balance: [[f32; 4]; 3],
+    }
+}
+
+shader_struct! {
     /// How a mean of pictures takes up another one.
     Accumulation {
         /// Share of the new picture in the mean.
@@ -194,6 +203,19 @@ shader_struct! {
         /// Local.
         distance: f32,
         padding: [u32; 2],
+    }
+}
+
+impl DisplayWhite {
+    /// By a matrix of [`WhiteBalance::matrix`](crate::eye_pass::WhiteBalance::matrix).
+    pub(crate) fn new(matrix: &Matrix3) -> Self {
+        let column = |column: usize| {
+            let [r, g, b] = matrix.map(|row| row[column] as f32);
+            [r, g, b, 0.0]
+        };
+        Self {
+            balance: std::array::from_fn(column),
+        }
     }
 }
 
