@@ -113,13 +113,13 @@ impl SeenSpectrum {
             .map(|piece| {
                 let columns = integrate(piece, |wavelength| {
                     let seen = colour(wavelength) / white;
-                    let [r, g, b] = ColourBasis::at(wavelength).parts().map(|part| seen * part);
+                    let [r, g, b] = ColourBasis::at(wavelength).row().map(|part| seen * part);
                     DMat3::from_cols(r, g, b).to_cols_array()
                 });
                 DMat3::from_cols_array(&columns)
             })
             .collect();
-        // What the basis makes of the primaries is not quite them: colours are looked up as those that become them.
+        // The basis has the primaries' colours but for the rounding of its table; what is left is taken out here.
         let whole: DMat3 = pieces.iter().fold(DMat3::ZERO, |sum, piece| sum + *piece);
         let exact = whole.inverse();
         let mut below = vec![DMat3::ZERO];

@@ -42,11 +42,6 @@ impl ColourBasis {
         self.0
     }
 
-    /// The parts of red, green and blue.
-    pub fn parts(&self) -> [f64; 3] {
-        self.0
-    }
-
     /// A factor [0, 1] per channel, as the same grey in all channels.
     pub fn tone(&self, factor: LinearSrgb) -> LinearSrgb {
         if factor.r == factor.g && factor.g == factor.b {

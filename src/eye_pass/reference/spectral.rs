@@ -31,7 +31,7 @@ impl SpectralScene {
             }
             let bands = wavelengths::bands(count, wavelengths::shift_of_sample(index));
             let at = |seen: SeenWavelength| SceneAtWavelength {
-                tracer: tracer.at_wavelength(seen.wavelength),
+                tracer: tracer.with_indices_at(seen.wavelength),
                 seen,
             };
             Self {
