@@ -154,7 +154,7 @@ fn chain_radiance(first: Gaze) -> vec3f {
             }
             point = surface_point(seen.hit);
             let object = objects[point.object];
-            part(&walk, object);
+            part(&walk, point.object);
             walk.gaze.weight *= medium_transmittance(walk.gaze.media, seen.distance * start.unit_m);
             walk.gaze.width += walk.gaze.spread * seen.distance;
             walk.radiance += shown(walk.gaze.weight * object.emitted_radiance, walk.gaze.wavelength);

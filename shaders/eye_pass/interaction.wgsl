@@ -51,7 +51,7 @@ fn reflection(point: SurfacePoint, facing: Facing, gaze: Gaze, share: vec3f) -> 
 
 fn thin_wall(point: SurfacePoint, facing: Facing, gaze: Gaze, tint: vec3f) -> Interaction {
     let object = objects[point.object];
-    let eta = ior_of(object, gaze.wavelength) / medium_ior(gaze.media, gaze.wavelength);
+    let eta = ior_of(point.object, gaze.wavelength) / medium_ior(gaze.media, gaze.wavelength);
     let reflectance = thin_wall_reflectance(-dot(gaze.direction, facing.shading), eta);
     return Interaction(
         0.0,
@@ -63,7 +63,7 @@ fn thin_wall(point: SurfacePoint, facing: Facing, gaze: Gaze, tint: vec3f) -> In
 fn dielectric(point: SurfacePoint, facing: Facing, gaze: Gaze, tint: vec3f) -> Interaction {
     let incident = gaze.direction;
     let media = gaze.media;
-    let ior = ior_of(objects[point.object], gaze.wavelength);
+    let ior = ior_of(point.object, gaze.wavelength);
     var beyond = left(media, point.object);
     // Where bodies overlap, the one that was entered last is the medium until it is left; an open sheet was never entered.
     var ior_near = select(medium_ior(media, gaze.wavelength), ior, all(beyond == media));
@@ -117,7 +117,7 @@ fn interact(point: SurfacePoint, gaze: Gaze, tint: vec3f) -> Interaction {
             return Interaction(0.0, reflection(point, facing, gaze, share), no_branch());
         }
         case SURFACE_MIXED: {
-            let eta = ior_of(object, gaze.wavelength) / medium_ior(gaze.media, gaze.wavelength);
+            let eta = ior_of(point.object, gaze.wavelength) / medium_ior(gaze.media, gaze.wavelength);
             let reflectance = object.polish * dielectric_reflectance(cos_incident, eta);
             let back = reflection(point, facing, gaze, vec3f(reflectance));
             return Interaction(1.0 - reflectance, back, no_branch());

@@ -49,7 +49,7 @@ fn medium_ior(media: vec4u, wavelength: u32) -> f32 {
     if number == 0u {
         return 1.0;
     }
-    return ior_of(objects[number - 1u], wavelength);
+    return ior_of(number - 1u, wavelength);
 }
 
 // Share of light that is left after a distance [m] in the innermost body (Beer and Lambert).

@@ -19,11 +19,12 @@ struct SeenWavelengths {
 @group(1) @binding(7) var<uniform> wavelengths: SeenWavelengths;
 
 // A wavelength is its number from 1; 0 is all of them, by the index at 587.56 nm.
-fn ior_of(object: ObjectRecord, wavelength: u32) -> f32 {
-    if wavelength == 0u || object.glass == 0u {
-        return object.ior;
+fn ior_of(object: u32, wavelength: u32) -> f32 {
+    let glass = objects[object].glass;
+    if wavelength == 0u || glass == 0u {
+        return objects[object].ior;
     }
-    return wavelengths.indices[object.glass - 1u][wavelength - 1u];
+    return wavelengths.indices[glass - 1u][wavelength - 1u];
 }
 
 // What is seen of a radiance.
@@ -49,12 +50,13 @@ fn is_within_parting_glass(media: vec4u) -> bool {
 
 // Where light goes on from a surface another way at another wavelength, the gaze goes on at the first one; those at the
 // others wait, and will meet the surface again.
-fn part(walk: ptr<function, Walk>, object: ObjectRecord) {
-    let goes_by_index = is_clear(object.surface) || object.surface == SURFACE_MIXED;
+fn part(walk: ptr<function, Walk>, object: u32) {
+    let surface = objects[object].surface;
+    let goes_by_index = is_clear(surface) || surface == SURFACE_MIXED;
     if (*walk).gaze.wavelength != 0u || !goes_by_index {
         return;
     }
-    if object.glass == 0u && !is_within_parting_glass((*walk).gaze.media) {
+    if objects[object].glass == 0u && !is_within_parting_glass((*walk).gaze.media) {
         return;
     }
     for (var wavelength = wavelengths.count; wavelength > 0u; wavelength -= 1u) {

@@ -134,11 +134,10 @@ fn nothing_is_followed_by_wavelength_without_dispersive_glass_on_the_way() {
     let parting = tracer(vec![(ball(), parts::glass("N-SF11"))], vec![]);
     let away = from(DVec3::new(0.0, 1.5, 3.0), DVec3::new(0.0, 1.0, 9.0));
     assert_eq!(seen(&parting, &away, 16, 1).1.rays_by_wavelength, 0);
-    let (of_one, unparted) = seen(&parting, &ahead, 0, 1);
+    let (_, unparted) = seen(&parting, &ahead, 0, 1);
     assert_eq!(unparted.rays_by_wavelength, 0);
-    let (of_many, parted) = seen(&parting, &ahead, 16, 1);
+    let (_, parted) = seen(&parting, &ahead, 16, 1);
     assert!(parted.rays_by_wavelength > 10 * unparted.chain_rays, "{parted:?}");
-    assert!(bits(&of_one) != bits(&of_many));
 }
 
 #[test]

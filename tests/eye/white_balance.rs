@@ -3,6 +3,7 @@
 use glam::DVec3;
 use nephroid::eye_pass::WhiteBalance;
 use nephroid::optics::LinearSrgb;
+use nephroid::optics::spectrum::Xyz;
 use nephroid::optics::spectrum::xyz::{IDENTITY, transformed};
 use nephroid::scene::{Light, Scene};
 
@@ -65,7 +66,10 @@ fn a_warmer_white_makes_the_picture_colder() {
             LinearSrgb::WHITE,
         )
     };
-    let blueness = |colour: LinearSrgb| colour.b / colour.r;
+    let blueness = |colour: LinearSrgb| {
+        let Xyz { x, z, .. } = Xyz::from(colour);
+        z / x
+    };
     let kelvins = [1500.0, 2856.0, 3999.0, 4500.0, 6504.0, 12_000.0, 25_000.0];
     let found = kelvins.map(|kelvin| blueness(balanced(kelvin)));
     assert!(found.windows(2).all(|pair| pair[0] > pair[1]), "{found:?}");

@@ -21,13 +21,12 @@ use crate::device::{self, gpu};
 use crate::flip::mean_flip;
 use crate::scenes::{diffuse, floor_map, floor_scene};
 
-/// Largest mean FLIP between the device's picture at rest and the CPU's of the same chains: what single precision and
-/// half floats leave (0.002, as without dispersion), and that both are means over other wavelengths and other places of
-/// the pixels.
+/// Largest mean FLIP between the device's picture at rest and the CPU's of the same chains. Nearly all of it is that
+/// they look through other places of the pixels: without dispersion they differ as much.
 const LARGEST_FLIP: f64 = 0.02;
 /// Pictures of which the one at rest is the mean.
 const PICTURES: u32 = 64;
-const SIZE: [u32; 2] = [120, 80];
+const SIZE: [u32; 2] = [96, 64];
 const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 const QUALITY: EyeQuality = EyeQuality {
     traced_scale: 1.0,
@@ -47,14 +46,18 @@ fn exhibit(glass: &Material) -> (Scene, Vec<IlluminationMap>) {
     ];
     let prism = shapes::prism(outline, DVec3::new(0.1, 0.0, 0.4));
     parts::add(&mut scene, "prism", prism, glass.clone());
-    let colours = [[3.0, 3.0, 3.0], [3.0, 0.6, 0.2], [3.0, 3.0, 3.0], [0.2, 0.9, 3.0]];
+    // Wide lines with soft edges: what differs by the places of samples is little beside what glass parts.
+    let wave = |place: usize| 0.5 + 0.5 * (std::f64::consts::TAU * (place as f64 + 0.5) / 8.0).cos();
     let line = |index: usize| {
         let (column, row) = (index % 32, index / 32);
-        if column % 4 == 0 || row % 8 == 0 {
-            colours[(column / 4 + row / 8) % 4].map(|channel: f64| channel as f32)
-        } else {
-            [0.3; 3]
-        }
+        let (across, along) = (wave(column), wave(row));
+        let lit = across.max(along).powi(2);
+        [
+            0.1 + 3.0 * lit,
+            0.1 + 3.0 * lit * along.max(0.3),
+            0.1 + 3.0 * lit * across.max(0.2),
+        ]
+        .map(|channel| channel as f32)
     };
     let maps = vec![floor_map(0, 32, 32, (0..32 * 32).map(line).collect())];
     (scene, maps)
@@ -62,7 +65,7 @@ fn exhibit(glass: &Material) -> (Scene, Vec<IlluminationMap>) {
 
 fn view() -> View {
     View {
-        camera: Camera::look_at("eye", DVec3::new(0.5, 0.9, 1.7), DVec3::new(0.5, 0.15, 0.45), 0.6),
+        camera: Camera::look_at("eye", DVec3::new(0.5, 0.9, 1.7), DVec3::new(0.46, 0.2, 0.5), 0.26),
         width: SIZE[0],
         height: SIZE[1],
         exposure_stops: 0.0,
@@ -147,9 +150,12 @@ fn a_picture_at_rest_shows_all_wavelengths_as_the_cpu_does() {
         few_rays.chain_rays as f64 / pixels,
         parted_ms / off_ms
     );
-    assert!(same <= LARGEST_FLIP, "{same}");
     assert!(
-        missing.iter().all(|missing| *missing > 4.0 * same),
+        same <= LARGEST_FLIP && same < 1.25 * both_off,
+        "{same} {both_off}"
+    );
+    assert!(
+        missing.iter().all(|missing| *missing > 2.5 * same),
         "{missing:?} {same}"
     );
 }
@@ -181,11 +187,20 @@ fn white_surroundings_stay_white_in_every_picture() {
     let slab = shapes::cuboid(DVec3::new(-2.0, 0.1, -2.0), DVec3::new(3.0, 0.4, 3.0));
     parts::add(&mut scene, "slab", slab, parts::glass("N-SF11"));
     let mut device = renderer(&gpu, &(scene, Vec::new()));
-    // Both ways on at four surfaces: what is reflected again after them is 1e-4 of all.
+    device.set_dispersion(EffectSwitch::Off);
+    let (by_one_index, _) = at_rest(&gpu, &mut device, 1);
+    device.set_dispersion(EffectSwitch::Auto);
     for pictures in 1..6 {
         let (seen, _) = at_rest(&gpu, &mut device, pictures);
-        for channel in seen.radiance.iter().flatten() {
-            assert!((channel / 0.1 - 1.0).abs() < 4e-3, "{pictures}: {channel}");
-        }
+        let pairs = seen
+            .radiance
+            .iter()
+            .flatten()
+            .zip(by_one_index.radiance.iter().flatten());
+        let off: Vec<f32> = pairs.map(|(a, b)| (a / b - 1.0).abs()).collect();
+        let mean = off.iter().sum::<f32>() / off.len() as f32;
+        let largest = off.iter().copied().fold(0.0, f32::max);
+        // Half floats hold 5e-4; which way is the stronger after four surfaces may differ by wavelength.
+        assert!(mean < 1e-3 && largest < 0.02, "{pictures}: {mean}, {largest}");
     }
 }
