@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use glam::{DMat3, DVec3};
+use nephroid::effect::{Effect, EffectSwitch};
 use nephroid::eye_pass::reference::{ChainLimits, EyeRays, ReferenceSettings, render_counted};
 use nephroid::eye_pass::wavelengths::{
     MOST_PER_PICTURE, SeenWavelength, bands, of_picture, share_below, shift_of_sample,
@@ -10,10 +11,11 @@ use nephroid::eye_pass::wavelengths::{
 use nephroid::eye_pass::{Picture, ToneMap, View};
 use nephroid::optics::wavelength::VISIBLE;
 use nephroid::optics::{Glass, LinearSrgb, Nanometres};
+use nephroid::plan::{self, EffectLine};
 use nephroid::progress::Control;
 use nephroid::scene::builtin::prism::{GLASS, Prism};
-use nephroid::scene::builtin::{parts, shapes};
-use nephroid::scene::{Camera, Material};
+use nephroid::scene::builtin::{self, parts, shapes};
+use nephroid::scene::{Camera, Material, Scene};
 use nephroid::transport::Tracer;
 
 use crate::meshes::sphere;
@@ -271,4 +273,34 @@ fn a_line_behind_a_prism_is_seen_where_snells_law_puts_each_wavelength() {
     let off = found.iter().zip(&expected).filter(is_off).count();
     // Each wavelength has two edges, which rounding may put into the next pixel.
     assert!(off <= 8, "{off} of {PIXELS} pixels");
+}
+
+#[test]
+fn the_plan_says_in_which_passes_light_is_parted() {
+    let prism = builtin::build("prism").expect("a built-in scene");
+    let ball = builtin::build("ball").expect("a built-in scene");
+    let of_light = |switch| EffectLine {
+        effect: Effect::Dispersion,
+        switch,
+        on: false,
+        reason: "no lit solid bends one wavelength more than another".into(),
+    };
+    let line = |scene: &Scene, chains, switch| {
+        let camera = Some((&scene.cameras[0], 1.5));
+        let chains = plan::chains(scene, camera, chains);
+        plan::dispersion(of_light(switch), scene, camera, &chains)
+    };
+    let (auto, off) = (EffectSwitch::Auto, EffectSwitch::Off);
+    let by_eye = line(&prism, auto, auto);
+    assert!(
+        by_eye.on && by_eye.reason.ends_with("eye pass: `prism` parts wavelengths"),
+        "{by_eye:?}"
+    );
+    let blind = line(&prism, off, auto);
+    assert!(
+        !blind.on && blind.reason.ends_with("eye pass: its chains are off"),
+        "{blind:?}"
+    );
+    assert_eq!(line(&prism, auto, off), of_light(off));
+    assert_eq!(line(&ball, auto, auto), of_light(auto));
 }
