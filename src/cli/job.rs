@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 #[cfg(feature = "gpu")]
 use nephroid::effect::{Effect, EffectSwitch};
 use nephroid::error::{Error, Result};
-use nephroid::eye_pass::ToneMap;
+use nephroid::eye_pass::{ToneMap, WhiteBalance};
 use nephroid::settings::{BakeSettings, LayerKind};
 
 use super::args::{
@@ -142,6 +142,7 @@ pub struct PictureRequest {
     pub size: (u32, u32),
     pub exposure: Exposure,
     pub tone_map: ToneMap,
+    pub white_balance: WhiteBalance,
     /// `None`: gpu where there is one, else cpu.
     pub backend: Option<Backend>,
 }
@@ -211,6 +212,7 @@ fn view_job(arguments: ViewArguments) -> Result<Job> {
             size: arguments.picture.size.unwrap_or(DEFAULT_SIZE),
             exposure: arguments.picture.exposure.unwrap_or_default(),
             tone_map: ToneMap::default(),
+            white_balance: WhiteBalance::default(),
             backend: None,
         },
         #[cfg(feature = "viewer")]
@@ -252,7 +254,7 @@ fn render_job(arguments: RenderArguments) -> Result<Job> {
         let radiance_only = |option: &str| {
             Err(Error::usage(
                 option,
-                "an .exr picture holds radiance, which neither exposure nor tone mapping changes",
+                "an .exr picture holds radiance, which neither exposure nor white balance nor tone mapping changes",
                 "leave it out or write a .png",
             ))
         };
@@ -261,6 +263,9 @@ fn render_job(arguments: RenderArguments) -> Result<Job> {
         }
         if arguments.tone_map.is_some() {
             return radiance_only("--tone-map");
+        }
+        if arguments.white_balance.is_some() {
+            return radiance_only("--white-balance");
         }
     }
     Ok(Job::Render(RenderJob {
@@ -271,6 +276,7 @@ fn render_job(arguments: RenderArguments) -> Result<Job> {
             size: size.unwrap_or(DEFAULT_SIZE),
             exposure: exposure.unwrap_or_default(),
             tone_map: arguments.tone_map.unwrap_or_default(),
+            white_balance: arguments.white_balance.unwrap_or_default(),
             backend: arguments.backend,
         },
         output,
@@ -312,6 +318,7 @@ fn path_job(arguments: RenderArguments, path: PathBuf) -> Result<Job> {
             size: arguments.picture.size.unwrap_or(DEFAULT_SIZE),
             exposure: arguments.picture.exposure.unwrap_or_default(),
             tone_map: arguments.tone_map.unwrap_or_default(),
+            white_balance: arguments.white_balance.unwrap_or_default(),
             backend: arguments.backend,
         },
         path,
