@@ -370,7 +370,7 @@ fn more_wavelengths_come_nearer_to_all_of_them() {
     };
     let errors = [1, 4, 16].map(|count| error(&sampled(count, Estimator::Wavefront, side)));
     println!("1, 4 and 16 wavelengths: {errors:?}");
-    assert!(errors[1] < 0.5 * errors[0] && errors[2] < 0.5 * errors[1]);
+    assert!(errors[1] < errors[0] && errors[2] < 0.3 * errors[0]);
     // Splats over the whole spectrum see the same colours, as far as kernels are sharp.
     let splats = |wavelengths: Wavelengths| BakeSettings {
         density_per_sr: 4e5,
@@ -399,14 +399,14 @@ fn wavelengths_are_traced_only_where_glass_is_dispersive() {
 
 #[test]
 fn the_stretch_before_the_glass_is_traced_once() {
-    let [with, without] = ["N-BK7", "cauchy:1.5168,0"].map(|text| bake(ball_of(text), &settings(64)).counts);
+    let [with, without] = ["N-BK7", "cauchy:1.5168,0"].map(|text| bake(slab(text), &settings(64)).counts);
     println!("{with:?}\n{without:?}");
-    assert!(with.rays <= 3 * without.rays && with.rays > without.rays);
+    assert!(with.rays > 2 * without.rays && with.rays <= 3 * without.rays);
     // A ray at another wavelength begins where light enters the glass.
     let of_others = (with.segments - without.segments) as f64 / (with.rays - without.rays) as f64;
     let of_first = without.segments as f64 / without.rays as f64;
     assert!(
-        of_others < 0.95 * of_first,
+        of_others < 0.9 * of_first,
         "{of_others} queries a ray, {of_first} of the first"
     );
 }

@@ -458,13 +458,7 @@ impl CellCutter<'_> {
     }
 
     /// A corner for the quarter of its cell up to the cell's centre.
-    pub(super) fn scatter_corner(
-        &self,
-        corner: Corner,
-        centre: DVec2,
-        work: &Workspace,
-        out: &mut CellOutput,
-    ) {
+    fn scatter_corner(&self, corner: Corner, centre: DVec2, work: &Workspace, out: &mut CellOutput) {
         let (low, high) = (corner.square.min(centre), corner.square.max(centre));
         let area = (high.x - low.x) * (high.y - low.y);
         let sample = work.get(corner.sample);

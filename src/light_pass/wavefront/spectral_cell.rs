@@ -94,7 +94,7 @@ impl CellCutter<'_> {
         self.scatter_nodes(spectrum, cell, (&nodes, &[]), work, out);
     }
 
-    /// The same but for light that has patches already.
+    /// The same but for light that has patches already: dust, of each wavelength on its own.
     fn scatter_nodes(
         &self,
         spectrum: &LightSpectrum,
@@ -103,38 +103,22 @@ impl CellCutter<'_> {
         work: &Workspace,
         out: &mut CellOutput,
     ) {
-        let centre = cell.corners[0].square.lerp(cell.corners[2].square, 0.5);
-        for (index, corner) in cell.corners.iter().enumerate() {
-            let ids = nodes.map(|corners| corners[index]);
-            let common = common_light(ids, work);
-            for (node, id) in ids.into_iter().enumerate() {
-                // What all have is spread with the first.
-                let mut without = done.to_vec();
-                if node > 0 {
-                    without.extend(&common);
-                    without.sort_unstable();
-                }
-                let of_node = CellCutter {
-                    tone: Tone::Node(node as u8),
-                    channels: spectrum.nodes[node].channels,
-                    done: &without,
-                    ..*self
-                };
-                let first = out.patches.len();
-                let at = Corner {
-                    sample: id,
-                    square: corner.square,
-                };
-                of_node.scatter_corner(at, centre, work, out);
-                for patch in &mut out.patches[first..] {
-                    let (sample, strand) = patch.corners[0];
-                    let signature = work.get(sample).strands[usize::from(strand)].signature;
-                    if node == 0 && common.binary_search(&signature).is_ok() {
-                        let others = std::array::from_fn(|other| [ids[other + 1]; 4]);
-                        patch.tone = Tone::Spectrum { others, parted: true };
-                    }
-                }
-            }
+        for (node, samples) in nodes.iter().enumerate() {
+            let of_node = CellCutter {
+                tone: Tone::Node(node as u8),
+                channels: spectrum.nodes[node].channels,
+                done,
+                ..*self
+            };
+            let seen = Cell {
+                corners: std::array::from_fn(|corner| Corner {
+                    sample: samples[corner],
+                    square: cell.corners[corner].square,
+                }),
+                edges: Default::default(),
+                beside: [0; 4],
+            };
+            of_node.scatter(&seen, work, out);
         }
     }
 
@@ -334,14 +318,6 @@ impl CellCutter<'_> {
             cutter.cut_at(&seen, depth, work, out);
         }
     }
-}
-
-/// Light that a ray has at all wavelengths, ascending.
-fn common_light(ids: [SampleId; NODES], work: &Workspace) -> Vec<PathSignature> {
-    let [first, others @ ..] = ids.map(|id| work.get(id));
-    let signatures = first.strands.iter().map(|strand| strand.signature);
-    let is_common = |signature: &PathSignature| others.iter().all(|other| other.find(*signature).is_some());
-    signatures.filter(is_common).collect()
 }
 
 /// Light below this share of the brightest is not cut wavelength by wavelength.

@@ -17,7 +17,7 @@ use crate::transport::{RayDerivative, Tracer};
 pub const NODES: usize = 3;
 
 /// Most slices of a spectrum, as a power of two.
-const MOST_SLICES_LOG2: u32 = 7;
+const MOST_SLICES_LOG2: u32 = 9;
 
 /// Share of a lamp's colour, at either end, beyond the outermost nodes: Chebyshev's places over the rest.
 const TAIL: f64 = 0.002;

@@ -21,6 +21,10 @@ use crate::light_pass::ledger_sum::{Account, LedgerSum};
 use crate::optics::{ColourMatrix, LinearSrgb};
 use crate::transport::{PathCounts, PathEffects};
 
+/// Slices of the brightest light over a texel that its wavelengths part over, at least: beams may be thinner than texels.
+/// Dim light has fewer.
+const SLICES_PER_TEXEL: f64 = 4.0;
+
 /// Spreads patches.
 #[derive(Clone, Copy, Debug)]
 pub struct Spreader<'a, E> {
@@ -167,7 +171,10 @@ impl<E: PathEffects> Spreader<'_, E> {
             })
         });
         let lands_alike = nodes.iter().all(|nodes| lands_alike(*nodes));
-        for slice in spectrum.slices(self.smear(&nodes)) {
+        let brightest_w = self.samples.get(patch.corners[0].0).brightest_w;
+        let share = (first[0].flux_w.luminance() / brightest_w).clamp(0.0, 1.0);
+        let apart = self.smear(&nodes) * SLICES_PER_TEXEL * share.sqrt();
+        for slice in spectrum.slices(apart) {
             let strands = nodes.map(|nodes| slice.strand(nodes, parted));
             let strands = strands.each_ref();
             let tint = Tint {
