@@ -3,6 +3,8 @@
 #[path = "support/chain_laws.rs"]
 #[allow(dead_code)]
 mod chain_laws;
+#[path = "stability/catalogue.rs"]
+mod catalogue;
 #[path = "stability/chains.rs"]
 mod chains;
 #[path = "stability/extreme_lamps.rs"]

@@ -1,0 +1,4 @@
+//! To come.
+use super::Case;
+/// Cases.
+pub const CASES: &[Case] = &[];
