@@ -327,6 +327,22 @@ fn the_rainbow_has_seven_colours_in_order() {
 fn names_are_found_in_any_case_and_misspelt_ones_are_answered() {
     assert_eq!(lamp(" led-b1 "), lamp("LEDB1"));
     assert_eq!(lamp("LASER: 532"), lamp("line:532"));
+    // Each goes by the name that the list has, and keeps it however bright it is made.
+    let called = |name: &str| {
+        let twice = lamp(name).to_luminous_equivalent(2.0).expect("a lamp");
+        twice.name().map(str::to_owned)
+    };
+    for (asked, known) in [
+        (" led-b1 ", "LED-B1"),
+        ("d65", "D65"),
+        ("a", "A"),
+        ("e", "E"),
+        ("Laser: 532", "line:532"),
+        ("Planck:2856.0", "blackbody:2856"),
+    ] {
+        assert_eq!(called(asked).as_deref(), Some(known));
+    }
+    assert_eq!(read_lamp("400,1\n500,2\n").expect("a lamp").name(), None);
     let message = |name: &str| illuminant(name).expect_err("no such lamp").to_string();
     assert!(
         message("D56").contains("D65") && message("D56").contains("D50"),
