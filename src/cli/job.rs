@@ -555,7 +555,11 @@ fn effects_job(arguments: EffectsArguments) -> Result<Job> {
 }
 
 fn stability_job(arguments: StabilityArguments) -> Result<Job> {
-    let effort = if arguments.long { Effort::Long } else { Effort::Quick };
+    let effort = if arguments.long {
+        Effort::Long
+    } else {
+        Effort::Quick
+    };
     Ok(Job::Stability(StabilityJob {
         cases: study_stability::chosen(arguments.case.as_deref(), effort)?,
         effort,

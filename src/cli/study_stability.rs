@@ -54,7 +54,11 @@ pub fn run(job: &StabilityJob, terminal: &Terminal, interrupt: &Interrupt) -> Re
     let rows = rows(&reports);
     write(&folder, CSV, &csv_of(CSV, &rows)?)?;
     write(&folder, MARKDOWN, markdown(&reports).as_bytes())?;
-    let broken: Vec<&str> = reports.iter().filter(|report| !report.holds()).map(|report| report.case).collect();
+    let broken: Vec<&str> = reports
+        .iter()
+        .filter(|report| !report.holds())
+        .map(|report| report.case)
+        .collect();
     let report = Report {
         folder: job.output.display().to_string(),
         cases: reports.len(),

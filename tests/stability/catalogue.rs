@@ -14,7 +14,9 @@ const README: &str = include_str!("../../README.md");
 
 fn of(group: Group) -> impl Iterator<Item = Case> {
     let is_quick = |case: &Case| case.effort == Effort::Quick;
-    cases().into_iter().filter(move |case| case.group == group && is_quick(case))
+    cases()
+        .into_iter()
+        .filter(move |case| case.group == group && is_quick(case))
 }
 
 /// Every law of a group holds, and stands in the README with its bound.
@@ -40,7 +42,10 @@ fn faults_of(report: &CaseReport) -> Vec<String> {
             cells.next() == Some(finding.law.as_str()) && cells.nth(1) == Some(number(finding.bound).as_str())
         });
         if !is_listed {
-            faults.push(format!("{}: the README does not say `{}`", report.case, finding.law));
+            faults.push(format!(
+                "{}: the README does not say `{}`",
+                report.case, finding.law
+            ));
         }
     }
     faults
@@ -80,7 +85,11 @@ fn the_readme_lists_every_case_and_none_that_fails() {
     let known: Vec<&str> = cases().iter().map(|case| case.name).collect();
     for name in &known {
         assert!(listed.contains(name), "the README's table lacks {name}");
-        assert_eq!(known.iter().filter(|other| *other == name).count(), 1, "{name} twice");
+        assert_eq!(
+            known.iter().filter(|other| *other == name).count(),
+            1,
+            "{name} twice"
+        );
     }
     assert!(!README.contains("**fails**"));
 }

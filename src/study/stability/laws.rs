@@ -11,7 +11,11 @@ use crate::study::agreement::{Agreement, TexelPair, pair_maps};
 
 /// Deposited on all surfaces, over all lights [W].
 pub fn deposited_w(result: &BakeResult) -> f64 {
-    result.ledgers.iter().map(|ledger| ledger.energy_w.deposited).sum()
+    result
+        .ledgers
+        .iter()
+        .map(|ledger| ledger.energy_w.deposited)
+        .sum()
 }
 
 /// Emitted towards specular surfaces, over all lights [W].
@@ -38,7 +42,10 @@ pub fn maps_apart(maps: &[IlluminationMap], references: &[IlluminationMap], fact
     for pair in &mut pairs {
         pair.reference *= factor;
     }
-    if pairs.iter().all(|pair| pair.image == 0.0 && pair.reference == 0.0) {
+    if pairs
+        .iter()
+        .all(|pair| pair.image == 0.0 && pair.reference == 0.0)
+    {
         return 0.0;
     }
     Agreement::of(&pairs).map_or(f64::INFINITY, |agreement| agreement.relative_rmse)
@@ -53,7 +60,10 @@ pub fn estimates(a: &BakeResult, b: &BakeResult) -> f64 {
 /// Whether two bakes gave the same maps, bit for bit.
 pub fn same_bits(a: &BakeResult, b: &BakeResult) -> bool {
     let bits = |map: &IlluminationMap| -> Vec<u32> {
-        let values = map.layers.iter().flat_map(|layer| layer.irradiance.iter().flatten());
+        let values = map
+            .layers
+            .iter()
+            .flat_map(|layer| layer.irradiance.iter().flatten());
         values.map(|e| e.to_bits()).collect()
     };
     a.maps.len() == b.maps.len() && a.maps.iter().zip(&b.maps).all(|(a, b)| bits(a) == bits(b))
@@ -75,26 +85,10 @@ pub fn luminance(map: Option<&IlluminationMap>, kind: LayerKind) -> Vec<f64> {
 
 /// Relative RMSE of the caustic layer of a floor, or of another rectangle whose TEXCOORD_0 run along its edges, against
 /// what theory says of every point [W/m²]; each texel against the mean of 4 × 4 of its points.
-pub fn against_theory(
-    result: &BakeResult,
-    scene: &Scene,
-    name: &str,
-    theory: impl Fn(DVec3) -> f64,
-) -> f64 {
-    layer_against_theory(result, scene, name, LayerKind::Caustic, theory)
-}
-
-/// The same of any layer.
-pub fn layer_against_theory(
-    result: &BakeResult,
-    scene: &Scene,
-    name: &str,
-    kind: LayerKind,
-    theory: impl Fn(DVec3) -> f64,
-) -> f64 {
+pub fn against_theory(result: &BakeResult, scene: &Scene, name: &str, theory: impl Fn(DVec3) -> f64) -> f64 {
     const POINTS: usize = 4;
     let map = map_of(result, scene, name);
-    let values = luminance(map, kind);
+    let values = luminance(map, LayerKind::Caustic);
     let (Some(map), Some(object)) = (map, scene.objects.iter().find(|object| object.name == name)) else {
         return f64::INFINITY;
     };
@@ -107,8 +101,10 @@ pub fn layer_against_theory(
         .enumerate()
         .map(|(texel, image)| {
             let mean = (0..POINTS * POINTS).map(|point| {
-                let u = ((texel % width) as f64 + ((point % POINTS) as f64 + 0.5) / POINTS as f64) / width as f64;
-                let v = ((texel / width) as f64 + ((point / POINTS) as f64 + 0.5) / POINTS as f64) / height as f64;
+                let u =
+                    ((texel % width) as f64 + ((point % POINTS) as f64 + 0.5) / POINTS as f64) / width as f64;
+                let v = ((texel / width) as f64 + ((point / POINTS) as f64 + 0.5) / POINTS as f64)
+                    / height as f64;
                 theory(low + (high - low) * DVec3::new(u, 0.0, v))
             });
             TexelPair {

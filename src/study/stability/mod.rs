@@ -93,7 +93,8 @@ pub struct CaseReport {
 impl CaseReport {
     /// Whether every law holds and all books are closed.
     pub fn holds(&self) -> bool {
-        self.findings.iter().all(Finding::holds) && self.books_open.is_none_or(|open| open <= bench::BOOKS_BOUND)
+        self.findings.iter().all(Finding::holds)
+            && self.books_open.is_none_or(|open| open <= bench::BOOKS_BOUND)
     }
 }
 

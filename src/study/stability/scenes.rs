@@ -36,7 +36,9 @@ pub fn thoroughly(density_per_sr: f64, side: usize) -> BakeSettings {
 
 /// A lamp of 1 W/sr.
 pub fn lamp(scene: &mut Scene, position: DVec3) {
-    scene.lights.push(parts::point_light("lamp", position, ONE_W_PER_SR));
+    scene
+        .lights
+        .push(parts::point_light("lamp", position, ONE_W_PER_SR));
 }
 
 /// A sun of 1 W/m² across its beam.
@@ -75,7 +77,10 @@ pub const UPRIGHT_LAMP: DVec3 = DVec3::new(-0.1, 1.0, 0.05);
 
 /// E on the floor before the upright mirror by its mirrored lamp [W/m²].
 pub fn upright_theory(point: DVec3) -> f64 {
-    from_lamp(point, DVec3::new(1.2 - UPRIGHT_LAMP.x, UPRIGHT_LAMP.y, UPRIGHT_LAMP.z))
+    from_lamp(
+        point,
+        DVec3::new(1.2 - UPRIGHT_LAMP.x, UPRIGHT_LAMP.y, UPRIGHT_LAMP.z),
+    )
 }
 
 /// E of a lamp of 1 W/sr on a horizontal surface [W/m²].

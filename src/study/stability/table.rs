@@ -53,14 +53,21 @@ pub fn markdown(reports: &[CaseReport]) -> String {
     for report in reports {
         for (index, finding) in report.findings.iter().enumerate() {
             let is_first = index == 0;
-            let name = if is_first { format!("`{}`", report.case) } else { String::new() };
+            let name = if is_first {
+                format!("`{}`", report.case)
+            } else {
+                String::new()
+            };
             let books = match report.books_open {
                 Some(open) if is_first => number(open),
                 _ => String::new(),
             };
             let fails = if finding.holds() { "" } else { " **fails**" };
             let (worst, bound) = (number(finding.worst), number(finding.bound));
-            text += &format!("| {name} | {} | {worst}{fails} | {bound} | {books} |\n", finding.law);
+            text += &format!(
+                "| {name} | {} | {worst}{fails} | {bound} | {books} |\n",
+                finding.law
+            );
         }
     }
     text
