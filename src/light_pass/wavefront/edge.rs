@@ -67,14 +67,8 @@ impl Step {
             .into_iter()
             .filter(|distance| distance.is_finite())
             .fold(0.0, f64::max);
-        // What flies away on both sides differs by its directions: no distance is its scale.
-        let length = |origin: DVec3, direction: DVec3| {
-            if reach_m > 0.0 {
-                origin.length() + reach_m * direction.length()
-            } else {
-                direction.length()
-            }
-        };
+        let reach_m = if reach_m > 0.0 { reach_m } else { 1.0 };
+        let length = |origin: DVec3, direction: DVec3| origin.length() + reach_m * direction.length();
         let tangent = |strand: &Strand| {
             let d = &strand.differential;
             (

@@ -255,7 +255,7 @@ fn slabs(borders: &[[f64; 2]]) -> Scene {
 
 fn as_one(bench: &mut Bench, borders: &[[f64; 2]]) -> Result<f64> {
     let settings = BakeSettings {
-        branch_threshold: Some(1e-5),
+        branch_threshold: Some(1e-4),
         ..at(1e3, 16)
     };
     let one = bench.bake(&slabs(&[[0.3, 0.7]]), &settings)?;
@@ -297,7 +297,7 @@ fn open_volume(bench: &mut Bench) -> Result<()> {
         block.triangles.remove(missing);
         parts::add(&mut scene, "block", block, parts::dielectric("glass", 1.5));
         lamp(&mut scene, DVec3::new(0.1, 1.5, 0.05));
-        let result = bench.bake(&scene, &at(300.0, 16))?;
+        let result = bench.bake(&scene, &at(60.0, 16))?;
         bench.law(
             "no more arrives than was sent",
             deposited_w(&result) / emitted_w(&result),

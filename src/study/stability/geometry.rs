@@ -180,7 +180,7 @@ fn receiver_edge_on(bench: &mut Bench) -> Result<()> {
         let mut scene = Scene::default();
         let (sine, cosine) = f64::sin_cos(tilt_rad);
         let along = DVec3::new(cosine, sine, 0.0);
-        let receiver = shapes::rectangle(DVec3::new(1.0, 0.5, 0.0), along * 0.4, DVec3::Z * 0.4);
+        let receiver = shapes::rectangle(DVec3::new(-1.0, 0.5, 0.0), along * 0.4, DVec3::Z * 0.4);
         parts::add(
             &mut scene,
             "floor",
