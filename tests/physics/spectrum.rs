@@ -1,7 +1,7 @@
 //! Lamps, their colours, and the wavelengths to follow.
 
 use nephroid::optics::spectrum::csv::read_lamp;
-use nephroid::optics::spectrum::temperature::correlated_temperature;
+use nephroid::optics::spectrum::temperature::{correlated_temperature, white_of_kelvin};
 use nephroid::optics::spectrum::xyz::{to_display_gamut, transformed, white_balance};
 use nephroid::optics::spectrum::{
     Spectrum, SpectrumError, WavelengthSampler, Xyz, illuminant, illuminants, xyz_bar,
@@ -207,6 +207,26 @@ fn white_balance_makes_a_lamp_white() {
         }
     }
     assert!(white_balance(Xyz::default()).is_none());
+}
+
+#[test]
+fn light_of_a_temperature_has_its_published_chromaticity() {
+    // CIE 15:2018, tables of the D illuminants, and illuminant A by its temperature.
+    for (kelvin, x, y) in [
+        (2856.0, 0.4476, 0.4074),
+        (5003.0, 0.3457, 0.3585),
+        (5503.0, 0.3324, 0.3474),
+        (6504.0, 0.3127, 0.3290),
+        (7504.0, 0.2990, 0.3149),
+    ] {
+        let white = white_of_kelvin(kelvin);
+        let [found_x, found_y] = white.chromaticity().expect("light");
+        assert!(
+            (found_x - x).abs() < 3e-4 && (found_y - y).abs() < 3e-4,
+            "{kelvin}: {found_x} {found_y}"
+        );
+        assert!((white.y - 1.0).abs() < 1e-12);
+    }
 }
 
 #[test]
