@@ -143,8 +143,8 @@ fn soft_scene() -> Scene {
     scene
 }
 
-/// At a power of two in size, E of lamps is divided by its square; of suns and panels it stays. Borders of light that
-/// leaves the scene are looked for a little differently, since it has no distance of its own.
+/// E of lamps is divided by the square of the size; of suns and panels it stays. Where light divides, a few of its
+/// borders are found elsewhere at another size.
 fn uniform_scale(bench: &mut Bench) -> Result<()> {
     let mut tinted = glass_ball(3);
     tinted.materials[1].volume = Some(Volume {
