@@ -57,7 +57,7 @@ fn beyond_the_middle(bench: &BakeResult, scene: &Scene, whole_w: f64) -> f64 {
 }
 
 /// z² + x² = 4f(y + f): a sun from above meets in one point of the floor's lower side.
-fn focus_of_paraboloid(bench: &mut Bench) -> Result<()> {
+pub fn paraboloid() -> Scene {
     let mut scene = parts::reference_scene(0.5);
     let mirror = shapes::sheet(64, 64, |u, v| {
         let (x, z) = (0.8 * (u - 0.5) + 1.0, 0.8 * (v - 0.5));
@@ -66,6 +66,11 @@ fn focus_of_paraboloid(bench: &mut Bench) -> Result<()> {
     });
     parts::add(&mut scene, "mirror", mirror, parts::mirror());
     sun(&mut scene, DVec3::NEG_Y);
+    scene
+}
+
+fn focus_of_paraboloid(bench: &mut Bench) -> Result<()> {
+    let scene = paraboloid();
     let result = bench.bake(&scene, &at(400.0, 33))?;
     bench.law(
         "what arrives is E times the aperture",
