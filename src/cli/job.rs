@@ -11,11 +11,12 @@ use nephroid::settings::{BakeSettings, Estimator, LayerKind, MapResolution};
 use nephroid::study::brute_force;
 use nephroid::study::convergence::{DEFAULT_DENSITIES, Ladder};
 use nephroid::study::effects::EffectStudy;
+use nephroid::study::stability::{Case, Effort};
 
 use super::args::{
     Arguments, Backend, BakeArguments, Command, CompareArguments, ConvergenceArguments, EffectsArguments,
     InspectArguments, MapsOption, PictureOptions, ReferenceArguments, RenderArguments, RunOptions,
-    SceneOptions, Study, StudyArguments, ViewArguments,
+    SceneOptions, StabilityArguments, Study, StudyArguments, ViewArguments,
 };
 use super::bake_options::BakeOptions;
 use super::compare::{self, LayerChoice};
@@ -25,7 +26,7 @@ use super::render_path;
 use super::scene_input::{MissingLight, SceneInput};
 use super::terminal::Terminal;
 use super::values::Exposure;
-use super::{bake, inspect, render, study, study_effects, view};
+use super::{bake, inspect, render, study, study_effects, study_stability, view};
 
 /// Scene of `view` when none is named.
 const DEFAULT_SCENE: &str = "builtin:showroom";
@@ -50,6 +51,7 @@ pub enum Job {
     Convergence(ConvergenceJob),
     Reference(ReferenceJob),
     Effects(EffectsJob),
+    Stability(StabilityJob),
 }
 
 /// `view`.
@@ -147,6 +149,16 @@ pub struct EffectsJob {
     pub force: bool,
 }
 
+/// `study stability`.
+#[derive(Debug)]
+pub struct StabilityJob {
+    pub cases: Vec<Case>,
+    pub effort: Effort,
+    pub threads: usize,
+    pub output: PathBuf,
+    pub force: bool,
+}
+
 /// Where illumination comes from.
 #[derive(Debug)]
 pub enum MapSource {
@@ -222,6 +234,7 @@ impl Job {
             Self::Convergence(job) => study::convergence(&job, terminal, interrupt),
             Self::Reference(job) => study::reference(&job, terminal, interrupt),
             Self::Effects(job) => study_effects::run(&job, terminal, interrupt),
+            Self::Stability(job) => study_stability::run(&job, terminal, interrupt),
         }
     }
 }
@@ -409,6 +422,7 @@ fn study_job(arguments: StudyArguments) -> Result<Job> {
         Some(Study::Convergence(convergence)) => convergence_job(convergence),
         Some(Study::Reference(reference)) => reference_job(reference),
         Some(Study::Effects(effects)) => effects_job(effects),
+        Some(Study::Stability(stability)) => stability_job(stability),
         None if arguments.list => Ok(Job::ListStudies),
         None => Err(Error::usage(
             "study",
@@ -542,6 +556,21 @@ fn effects_job(arguments: EffectsArguments) -> Result<Job> {
             settings,
             repeats: repeats(arguments.repeat)?,
         },
+        output: arguments.output,
+        force: arguments.force,
+    }))
+}
+
+fn stability_job(arguments: StabilityArguments) -> Result<Job> {
+    let effort = if arguments.long {
+        Effort::Long
+    } else {
+        Effort::Quick
+    };
+    Ok(Job::Stability(StabilityJob {
+        cases: study_stability::chosen(arguments.case.as_deref(), effort)?,
+        effort,
+        threads: threads(&arguments.run)?,
         output: arguments.output,
         force: arguments.force,
     }))

@@ -16,6 +16,7 @@ mod scene_input;
 mod spectral_report;
 mod study;
 mod study_effects;
+mod study_stability;
 mod study_values;
 mod survey_report;
 mod terminal;

@@ -25,7 +25,7 @@ use super::scene_input::SceneInput;
 use super::terminal::Terminal;
 
 /// Name and one line of each study.
-const STUDIES: [(&str, &str); 3] = [
+const STUDIES: [(&str, &str); 4] = [
     (
         "convergence",
         "error against light rays and CPU time, for every estimator",
@@ -37,6 +37,10 @@ const STUDIES: [(&str, &str); 3] = [
     (
         "effects",
         "what each effect costs and what it is worth, by bakes with and without it",
+    ),
+    (
+        "stability",
+        "hard cases, each with a law that must hold, how far off it is and its bound",
     ),
 ];
 
