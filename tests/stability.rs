@@ -1,5 +1,7 @@
 //! Hard cases: each has a law that must hold.
 
+#[path = "stability/catalogue.rs"]
+mod catalogue;
 #[path = "support/chain_laws.rs"]
 #[allow(dead_code)]
 mod chain_laws;
@@ -15,5 +17,7 @@ mod intersection;
 mod item_buffer;
 #[path = "stability/sums.rs"]
 mod sums;
+#[path = "stability/surroundings.rs"]
+mod surroundings;
 #[path = "stability/wavefront.rs"]
 mod wavefront;

@@ -251,6 +251,8 @@ pub enum Study {
     Effects(EffectsArguments),
     /// Split and stochastic rays, few wavelengths, many and all: how right and how dear
     Spectrum(SpectrumArguments),
+    /// Hard cases, each with a law that must hold, how far off it is and its bound
+    Stability(StabilityArguments),
 }
 
 #[derive(Debug, Args)]
@@ -374,6 +376,24 @@ pub struct SpectrumArguments {
     pub run: RunOptions,
 }
 
+#[derive(Debug, Args)]
+pub struct StabilityArguments {
+    /// Folder for stability.csv and stability.md
+    #[arg(short, long, value_name = "DIR")]
+    pub output: PathBuf,
+    /// Write into the folder even if it holds other files
+    #[arg(long)]
+    pub force: bool,
+    /// Only the case of that name
+    #[arg(long, value_name = "NAME")]
+    pub case: Option<String>,
+    /// Also what takes long: millions of triangles, the largest maps, many more seeds
+    #[arg(long)]
+    pub long: bool,
+    #[command(flatten)]
+    pub run: RunOptions,
+}
+
 /// What the arguments ask for.
 pub enum Parsed {
     /// A job to run.
@@ -428,6 +448,7 @@ impl Arguments {
                 Some(Study::Reference(reference)) => &reference.run,
                 Some(Study::Effects(effects)) => &effects.run,
                 Some(Study::Spectrum(spectrum)) => &spectrum.run,
+                Some(Study::Stability(stability)) => &stability.run,
             },
         }
     }

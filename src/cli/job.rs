@@ -18,10 +18,10 @@ use super::interrupt::Interrupt;
 #[cfg(feature = "gpu")]
 use super::render_path;
 use super::scene_input::{MissingLight, SceneInput};
-use super::study_jobs::{ConvergenceJob, EffectsJob, ReferenceJob, SpectrumJob, study_job};
+use super::study_jobs::{ConvergenceJob, EffectsJob, ReferenceJob, SpectrumJob, StabilityJob, study_job};
 use super::terminal::Terminal;
 use super::values::Exposure;
-use super::{bake, inspect, render, study, study_effects, study_spectrum, view};
+use super::{bake, inspect, render, study, study_effects, study_spectrum, study_stability, view};
 
 /// Scene of `view` when none is named.
 const DEFAULT_SCENE: &str = "builtin:showroom";
@@ -46,8 +46,8 @@ pub enum Job {
     Convergence(ConvergenceJob),
     Reference(ReferenceJob),
     Effects(EffectsJob),
-    /// What sampling the spectrum costs.
     Spectrum(SpectrumJob),
+    Stability(StabilityJob),
 }
 
 /// `view`.
@@ -191,6 +191,7 @@ impl Job {
             Self::Reference(job) => study::reference(&job, terminal, interrupt),
             Self::Effects(job) => study_effects::run(&job, terminal, interrupt),
             Self::Spectrum(job) => study_spectrum::run(&job, terminal, interrupt),
+            Self::Stability(job) => study_stability::run(&job, terminal, interrupt),
         }
     }
 }

@@ -18,6 +18,7 @@ mod study;
 mod study_effects;
 mod study_jobs;
 mod study_spectrum;
+mod study_stability;
 mod study_values;
 mod survey_report;
 mod terminal;

@@ -25,7 +25,7 @@ use super::study_jobs::{ConvergenceJob, ReferenceJob};
 use super::terminal::Terminal;
 
 /// Name and one line of each study.
-const STUDIES: [(&str, &str); 4] = [
+const STUDIES: [(&str, &str); 5] = [
     (
         "convergence",
         "error against light rays and CPU time, for every estimator",
@@ -41,6 +41,10 @@ const STUDIES: [(&str, &str); 4] = [
     (
         "spectrum",
         "split and stochastic rays, few wavelengths, many and all: how right and how dear",
+    ),
+    (
+        "stability",
+        "hard cases, each with a law that must hold, how far off it is and its bound",
     ),
 ];
 

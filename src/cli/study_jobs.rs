@@ -9,12 +9,15 @@ use nephroid::study::brute_force;
 use nephroid::study::convergence::{DEFAULT_DENSITIES, Ladder};
 use nephroid::study::effects::EffectStudy;
 use nephroid::study::spectrum::{DEFAULT_WAVELENGTHS, SpectrumStudy};
+use nephroid::study::stability::{Case, Effort};
 
 use super::args::{
-    ConvergenceArguments, EffectsArguments, ReferenceArguments, SpectrumArguments, Study, StudyArguments,
+    ConvergenceArguments, EffectsArguments, ReferenceArguments, SpectrumArguments, StabilityArguments, Study,
+    StudyArguments,
 };
 use super::job::{Job, scene_input, threads};
 use super::scene_input::{MissingLight, SceneInput};
+use super::study_stability;
 
 /// `study convergence`.
 #[derive(Debug)]
@@ -56,6 +59,16 @@ pub struct SpectrumJob {
     pub force: bool,
 }
 
+/// `study stability`.
+#[derive(Debug)]
+pub struct StabilityJob {
+    pub cases: Vec<Case>,
+    pub effort: Effort,
+    pub threads: usize,
+    pub output: PathBuf,
+    pub force: bool,
+}
+
 /// The job of a study.
 ///
 /// # Errors
@@ -66,6 +79,7 @@ pub fn study_job(arguments: StudyArguments) -> Result<Job> {
         Some(Study::Reference(reference)) => reference_job(reference),
         Some(Study::Effects(effects)) => effects_job(effects),
         Some(Study::Spectrum(spectrum)) => spectrum_job(spectrum),
+        Some(Study::Stability(stability)) => stability_job(stability),
         None if arguments.list => Ok(Job::ListStudies),
         None => Err(Error::usage(
             "study",
@@ -235,6 +249,21 @@ fn spectrum_job(arguments: SpectrumArguments) -> Result<Job> {
             wavelengths,
             repeats: repeats(arguments.repeat)?,
         },
+        output: arguments.output,
+        force: arguments.force,
+    }))
+}
+
+fn stability_job(arguments: StabilityArguments) -> Result<Job> {
+    let effort = if arguments.long {
+        Effort::Long
+    } else {
+        Effort::Quick
+    };
+    Ok(Job::Stability(StabilityJob {
+        cases: study_stability::chosen(arguments.case.as_deref(), effort)?,
+        effort,
+        threads: threads(&arguments.run)?,
         output: arguments.output,
         force: arguments.force,
     }))

@@ -8,12 +8,14 @@ use crate::geometry::cube_face::{self, FaceMapping};
 use crate::optics::LinearSrgb;
 use crate::scene::Scene;
 use crate::settings::ItemBufferKind;
+use crate::transport::MediumStack;
 
 /// Start domain of one wavefront.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Launch {
     emitter: Emitter,
     domain: Domain,
+    media: MediumStack,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -63,7 +65,22 @@ impl Launch {
             | EmitterKind::Facet { position, .. } => Domain::Sphere { position, mapping },
             EmitterKind::Parallel { direction } => sun_domain(direction, scene, casters)?,
         };
-        Some(Self { emitter, domain })
+        Some(Self {
+            emitter,
+            domain,
+            media: MediumStack::default(),
+        })
+    }
+
+    /// The same light from within these bodies.
+    #[must_use]
+    pub fn within(self, media: MediumStack) -> Self {
+        Self { media, ..self }
+    }
+
+    /// The bodies that its rays start in; none of parallel light.
+    pub fn media(&self) -> &MediumStack {
+        &self.media
     }
 
     /// Where the light comes from.

@@ -56,6 +56,14 @@ impl<'a> Reach<'a> {
     /// Specular objects that a light may meet first and whose light may end on a receiver, ascending.
     pub fn casters(&self, light: usize) -> Vec<usize> {
         let source = &self.scene.lights[light];
+        // What opaque bodies seal from the light itself, no way of it leads to.
+        if !self
+            .receivers
+            .iter()
+            .any(|&receiver| self.compartments.light_meets(light, receiver))
+        {
+            return Vec::new();
+        }
         let goes_on = |&object: &usize| {
             self.compartments.light_meets(light, object)
                 && (self.sends_to_any(object, Some(source), &self.receivers)

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::{Light, LightKind, LightSize, Scene, builtin, environment, gltf};
+use super::{Light, LightKind, LightSize, Scene, builtin, contact, environment, gltf};
 use crate::error::{Error, Result, Warning};
 use crate::optics::LinearSrgb;
 use crate::units::Irradiance;
@@ -48,6 +48,8 @@ pub fn load(source: &str, options: &LoadOptions) -> Result<Scene> {
     if let Some(path) = &options.environment {
         add_environment(&mut scene, path, options.memory_limit_bytes)?;
     }
+    let touching = contact::warnings(&scene);
+    scene.warnings.extend(touching);
     if options.default_light && scene.lights.is_empty() {
         add_default_light(&mut scene);
     }

@@ -7,6 +7,7 @@ pub mod builtin;
 pub mod camera;
 pub mod camera_path;
 pub mod closed;
+pub mod contact;
 pub mod edit;
 pub mod emitter;
 pub mod environment;

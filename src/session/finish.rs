@@ -89,6 +89,8 @@ impl Finish<'_> {
             }
             None => StopReason::NothingToDo,
         };
+        let mut warnings = outcome.warnings.clone();
+        warnings.extend(beyond_single(&maps));
         BakeResult {
             estimated_relative_rmse,
             band_layers: self.band_layers(&maps, levels),
@@ -112,7 +114,7 @@ impl Finish<'_> {
             cpu_s: Timings::default(),
             stop_reason,
             partial: stop_reason == StopReason::Cancelled,
-            warnings: outcome.warnings.clone(),
+            warnings,
         }
     }
 
@@ -227,7 +229,7 @@ impl Finish<'_> {
                     let counts = flux.texels()[texel].map(|count| count as f64);
                     sum + LinearSrgb::from(counts) * *scale
                 });
-                (sum / area_m2).to_array().map(|channel| channel as f32)
+                (sum / area_m2).to_array().map(single)
             })
             .collect();
         fill_gutter(chart, &mut irradiance);
@@ -292,10 +294,7 @@ impl Finish<'_> {
                 *sum += LinearSrgb::from(unit.map(f64::from)) * strength;
             }
         }
-        let irradiance: Vec<[f32; 3]> = sums
-            .iter()
-            .map(|sum| sum.to_array().map(|channel| channel as f32))
-            .collect();
+        let irradiance: Vec<[f32; 3]> = sums.iter().map(|sum| sum.to_array().map(single)).collect();
         Some(Layer {
             kind: LayerKind::Direct,
             irradiance: match &chart.layout {
@@ -304,6 +303,30 @@ impl Finish<'_> {
             },
         })
     }
+}
+
+/// In the precision of maps; what is beyond its range is the most that it holds, and is named by [`beyond_single`].
+fn single(value: f64) -> f32 {
+    value.min(f64::from(f32::MAX)) as f32
+}
+
+/// Says where light is too strong for maps.
+fn beyond_single(maps: &[IlluminationMap]) -> Option<Warning> {
+    let values = maps
+        .iter()
+        .flat_map(|map| &map.layers)
+        .flat_map(|layer| &layer.irradiance);
+    let texels = values.filter(|texel| texel.contains(&f32::MAX)).count();
+    (texels > 0).then(|| {
+        Warning::new(
+            "maps",
+            format!(
+                "{texels} texels are brighter than {:.1e} W/m², the most that a map holds; they hold that",
+                f32::MAX
+            ),
+            "make the lights weaker",
+        )
+    })
 }
 
 /// Values of a chart at the middle of each texel of a map in tiles, means where the texels are larger than the chart's.
@@ -326,9 +349,7 @@ fn in_tiles(layout: &TileLayout, own: &Chart, values: &[[f32; 3]]) -> Vec<[f32; 
                 sum += bilinear(values, own.width, own.height, (low + part * side) / size);
             }
         }
-        (sum / (times.x * times.y))
-            .to_array()
-            .map(|channel| channel as f32)
+        (sum / (times.x * times.y)).to_array().map(single)
     };
     layout
         .tiles()
@@ -355,7 +376,7 @@ fn with_resolution(chart: &Chart, lit: &[Lit], layers: &[Layer], error: Vec<f32>
     let luminance = |e: &[f32; 3]| LinearSrgb::from(e.map(f64::from)).luminance();
     let values: Vec<f64> = caustic.irradiance.iter().map(luminance).collect();
     let variances = variance_within(chart, &values, halved);
-    let both = |(error, variance): (f32, f64)| (f64::from(error).powi(2) + variance).sqrt() as f32;
+    let both = |(error, variance): (f32, f64)| single((f64::from(error).powi(2) + variance).sqrt());
     error.into_iter().zip(variances).map(both).collect()
 }
 
@@ -384,7 +405,7 @@ fn error_of(chart: &Chart, lit: &[Lit]) -> Option<Vec<f32>> {
             *square += (texel * strength) * (texel * strength);
         }
     }
-    let root = |square: &f64| square.sqrt() as f32;
+    let root = |square: &f64| single(square.sqrt());
     (!lit.is_empty()).then(|| squares.iter().map(root).collect())
 }
 

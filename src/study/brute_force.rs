@@ -323,7 +323,7 @@ impl Run<'_> {
                     paths.limits.microfacets = Some(facets);
                 }
                 tally.rays += 1;
-                paths.trace::<Everything>(ray, flux_w, |arrival| {
+                paths.trace::<Everything>(ray, flux_w, light.launch.media(), |arrival| {
                     let count = self.unit.count(arrival.flux_w);
                     deposited.book(self.deposit(half, &arrival, count), count);
                 });

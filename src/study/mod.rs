@@ -1,5 +1,5 @@
 //! Accuracy against cost: references by brute force, agreement of maps, how errors fall with rays and seconds, what
-//! each effect costs and is worth, and how long frames take.
+//! each effect costs and is worth, how long frames take, and hard cases with their laws.
 
 pub mod agreement;
 pub mod brute_force;
@@ -12,3 +12,4 @@ pub mod plot;
 pub mod references;
 mod repeats;
 pub mod spectrum;
+pub mod stability;

@@ -34,6 +34,13 @@ pub fn media_at(tracer: &Tracer, point: DVec3) -> MediumStack {
         }
         ray = hit.spawn(ray.direction);
     }
+    // A body that is inside out is left before it is entered: the point is in neither.
+    let mut is_within = |object: &usize| {
+        let is_balanced = entered[*object] > 0;
+        entered[*object] -= u32::from(is_balanced);
+        !is_balanced
+    };
+    left_from_inside.retain(&mut is_within);
     // What is left first is innermost.
     left_from_inside
         .into_iter()

@@ -51,9 +51,7 @@ fn check(case: &EffectScene, settings: &BakeSettings, faults: &mut Vec<String>) 
         let what = format!("{} of `{}`, {:?}", effect.name(), case.name, settings.estimator);
         let took = counts(&whole, effect);
         let line = whole.plan.effects.iter().find(|line| line.effect == effect);
-        // Splats know no wavelengths, and the plan says so.
-        let is_known = effect != Effect::Dispersion || settings.estimator == Estimator::Wavefront;
-        let is_called = case.calls_for.contains(&effect) && is_known;
+        let is_called = case.calls_for.contains(&effect);
         if line.is_none_or(|line| line.on != is_called) {
             faults.push(format!("{what}: {line:?}"));
         }

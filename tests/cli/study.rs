@@ -35,7 +35,7 @@ fn rmse(run: &Run) -> f64 {
 fn studies_are_listed_and_have_to_be_named() {
     let sandbox = Sandbox::new();
     let list = sandbox.succeed("study --list");
-    for study in ["convergence", "reference", "effects", "spectrum"] {
+    for study in ["convergence", "reference", "effects", "spectrum", "stability"] {
         assert!(list.stdout.contains(study), "{}", list.stdout);
     }
     assert_eq!(
@@ -64,6 +64,9 @@ fn studies_are_listed_and_have_to_be_named() {
             "study reference builtin:ring -o out --rays 1e4 --map-resolution auto",
             "--map-resolution",
         ),
+        ("study stability", "--output"),
+        ("study stability -o out --case rainbow", "focus-paraboloid"),
+        ("study stability -o out --threads many", "--threads"),
         ("study effects -o out", "SCENE"),
         ("study effects builtin:ball", "--output"),
         ("study effects builtin:ball -o out --repeat 0", "--repeat"),
@@ -407,4 +410,22 @@ fn the_whole_spectrum_beats_few_wavelengths() {
     };
     assert!(colourful(0) > 100 && colourful(10) > 100, "spectra are coloured");
     assert!(colourful(6) < 30, "one wavelength leaves a white line");
+}
+
+#[test]
+fn a_hard_case_is_named_and_its_laws_stand_in_the_table() {
+    let sandbox = Sandbox::new();
+    let run = sandbox.succeed("study stability -o out --case normal-incidence");
+    assert_eq!(sandbox.files("out"), ["stability.csv", "stability.md"]);
+    assert!(run.stdout.contains("normal-incidence (optics)"), "{}", run.stdout);
+    let table = read_table(&sandbox, "out/stability.csv");
+    assert_eq!(column(&table, "case"), ["normal-incidence"]);
+    assert_eq!(column(&table, "holds"), ["true"]);
+    let (worst, bound) = (numbers(&table, "worst"), numbers(&table, "bound"));
+    assert!(worst[0] <= bound[0] && bound[0] <= 1e-6, "{worst:?} of {bound:?}");
+    let json = sandbox
+        .succeed("study stability -o out --case normal-incidence --json")
+        .json();
+    assert_eq!(json["broken"].as_array().map(Vec::len), Some(0));
+    assert_eq!(json["rows"][0]["law"], column(&table, "law")[0]);
 }

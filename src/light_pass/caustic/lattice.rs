@@ -213,7 +213,7 @@ impl Lattice<'_> {
                     continue;
                 }
                 traced.rays += 1;
-                paths.trace::<E>(ray, flux_w, |mut arrival| {
+                paths.trace::<E>(ray, flux_w, self.launch.media(), |mut arrival| {
                     arrival.point = points.of(&arrival);
                     arrival.flux_w = arrival.flux_w * self.cells_of(column, row);
                     traced.columns.push(column as u32);

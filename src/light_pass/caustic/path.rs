@@ -129,18 +129,23 @@ impl<'a> PathTracer<'a> {
         Self { channels, ..self }
     }
 
-    /// Follows a ray that carries `flux_w` from the light; arrivals on diffuse surfaces after at least one specular
-    /// event are handed to `arrive`. `Deposited` is not booked here but by who places the flux.
-    pub fn trace<E: PathEffects>(&mut self, ray: Ray, flux_w: LinearSrgb, mut arrive: impl FnMut(Arrival)) {
+    /// Follows a ray that carries `flux_w` from the light, which lies within `media`; arrivals on diffuse surfaces after
+    /// at least one specular event are handed to `arrive`. `Deposited` is not booked here but by who places the flux.
+    pub fn trace<E: PathEffects>(
+        &mut self,
+        ray: Ray,
+        flux_w: LinearSrgb,
+        media: &MediumStack,
+        mut arrive: impl FnMut(Arrival),
+    ) {
         if !flux_w.is_finite() {
             return;
         }
         let floor_w = flux_w.luminance() * self.limits.branch_threshold;
-        let media = MediumStack::default();
         let first = Segment {
             ray,
             flux_w,
-            media,
+            media: *media,
             signature: PathSignature::default(),
             event: None,
             depth: 0,

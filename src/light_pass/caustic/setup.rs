@@ -12,7 +12,7 @@ use crate::light_pass::launch::Launch;
 use crate::plan::{Reach, Sight};
 use crate::scene::{Scene, SurfaceKind};
 use crate::settings::ItemBufferKind;
-use crate::transport::{Microfacets, Tracer};
+use crate::transport::{Microfacets, Tracer, media_at};
 
 /// A light that sees something specular: one wavefront of it.
 #[derive(Clone, Debug)]
@@ -192,7 +192,11 @@ impl Aimer<'_> {
     }
 
     fn launch(&self, emitter: &Emitter, casters: &[usize]) -> Option<Launch> {
-        Launch::new(emitter.clone(), self.tracer.scene(), casters, self.item_buffer)
+        let launch = Launch::new(emitter.clone(), self.tracer.scene(), casters, self.item_buffer)?;
+        Some(match emitter.kind.position() {
+            Some(position) => launch.within(media_at(self.tracer, position)),
+            None => launch,
+        })
     }
 
     fn at_reachable(&self, emitter: &Emitter, casters: &[usize]) -> Option<View> {

@@ -173,7 +173,7 @@ impl<'a> StrandTracer<'a> {
             ray,
             differential,
             flux_w,
-            media: MediumStack::default(),
+            media: *self.launch.media(),
             signature: PathSignature::default(),
             event: None,
             depth: 0,

@@ -13,6 +13,9 @@ use crate::scene::Mesh;
 /// Beyond this [m], squares and volumes leave the range in which they are exact enough to be of use.
 const FARTHEST_M: f64 = 1e12;
 
+/// Share of a mesh's extent by which its vertices may be rounded without a word [1].
+const LARGEST_ROUNDING: f64 = 1e-5;
+
 /// Bytes of a vertex and a triangle while they are read.
 const VERTEX_BYTES: u64 = 2 * 80;
 const TRIANGLE_BYTES: u64 = 2 * 12;
@@ -34,6 +37,7 @@ pub fn read(
     let Some((mut mesh, has_normals)) = read_local(reader, primitive, owner, budget, report)? else {
         return Ok(None);
     };
+    warn_of_rounding(&mesh, world_from_node, owner, report);
     let lengths: Vec<f64> = mesh.normals.iter().map(|normal| normal.length()).collect();
     place(&mut mesh, world_from_node, owner)?;
     let before = mesh.triangles.len();
@@ -195,6 +199,36 @@ fn finite_uvs(mut uvs: Vec<DVec2>, owner: &str, report: &mut Report) -> Vec<DVec
         );
     }
     uvs
+}
+
+/// Single precision places vertices to a share of their distance from their node's origin: says so, with the figure,
+/// where that is much of the mesh itself.
+fn warn_of_rounding(mesh: &Mesh, world_from_node: &DAffine3, owner: &str, report: &mut Report) {
+    let Some((low, high)) = mesh.bounds() else {
+        return;
+    };
+    let far = low.abs().max(high.abs()).max_element();
+    let rounding = 0.5 * f64::from(f32::EPSILON) * far.log2().floor().exp2();
+    let extent = (high - low).max_element();
+    // Not finite: refused when it is placed.
+    if !(rounding.is_finite() && extent.is_finite() && rounding > LARGEST_ROUNDING * extent) {
+        return;
+    }
+    let linear = world_from_node.matrix3;
+    let scale = linear
+        .x_axis
+        .length()
+        .max(linear.y_axis.length())
+        .max(linear.z_axis.length());
+    report.warn(
+        owner,
+        format!(
+            "its vertices lie {:.1e} m from their node's origin, where single precision rounds them by up to {:.1e} m",
+            far * scale,
+            rounding * scale
+        ),
+        "put that distance into the node's translation, which is read in double precision",
+    );
 }
 
 /// Brings positions and normals into the world; a mirroring transform turns the triangles, so that they stay wound

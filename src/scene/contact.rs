@@ -1,0 +1,139 @@
+//! Bodies of glass that touch in a face of both: light cannot leave one and enter the other at the same place.
+
+use std::collections::BTreeMap;
+
+use glam::DVec3;
+
+use super::{Scene, SurfaceKind};
+use crate::error::Warning;
+
+/// How finely planes are told apart: parts of a unit normal, and of the largest coordinate.
+const STEPS: f64 = 1e9;
+
+/// Pairs that a scene is told of.
+const MOST_WARNINGS: usize = 8;
+
+/// Comparisons of triangles that are worth making; what is beyond is not looked at.
+const MOST_TESTS: usize = 1 << 22;
+
+/// A plane in steps, the same from both sides.
+type Plane = [i64; 4];
+
+/// A triangle of a body: whose it is, and the box around it [m].
+#[derive(Clone, Copy, Debug)]
+struct Face {
+    object: usize,
+    /// Whether it faces to the side that its plane counts as the front.
+    is_front: bool,
+    low: DVec3,
+    high: DVec3,
+}
+
+/// Pairs of solid dielectrics, by their indices, that have parts of faces in common, with how many triangles of the
+/// first lie on the second.
+pub fn touching(scene: &Scene) -> BTreeMap<(usize, usize), usize> {
+    let mut pairs = BTreeMap::new();
+    let mut tests = 0;
+    for faces in planes(scene).values() {
+        for (index, face) in faces.iter().enumerate() {
+            // Bodies come one after another.
+            let next = faces[index..].partition_point(|other| other.object == face.object);
+            let others = &faces[index + next..];
+            tests += others.len() + 1;
+            if tests > MOST_TESTS {
+                return pairs;
+            }
+            let touched = others
+                .iter()
+                .filter(|other| touch(face, other))
+                .map(|other| other.object);
+            let mut touched: Vec<usize> = touched.collect();
+            touched.dedup();
+            for other in touched {
+                *pairs.entry((face.object, other)).or_insert(0) += 1;
+            }
+        }
+    }
+    pairs
+}
+
+/// One warning for each of the first few pairs.
+pub fn warnings(scene: &Scene) -> Vec<Warning> {
+    let name = |object: usize| &scene.objects[object].name;
+    let warning = |((a, b), faces): ((usize, usize), usize)| {
+        Warning::new(
+            format!("nodes `{}` and `{}`", name(a), name(b)),
+            format!("touch in {faces} triangles, where light passes a gap of air that is not there"),
+            "let one body reach a little into the other",
+        )
+    };
+    touching(scene)
+        .into_iter()
+        .take(MOST_WARNINGS)
+        .map(warning)
+        .collect()
+}
+
+/// Triangles of all solid dielectrics by their planes; nothing where there is only one such body.
+fn planes(scene: &Scene) -> BTreeMap<Plane, Vec<Face>> {
+    let is_solid = |object: &usize| scene.material_of(*object).surface == SurfaceKind::Dielectric;
+    let bodies: Vec<usize> = (0..scene.objects.len()).filter(is_solid).collect();
+    let mut planes: BTreeMap<Plane, Vec<Face>> = BTreeMap::new();
+    let Some((low, high)) = scene.bounds().filter(|_| bodies.len() > 1) else {
+        return planes;
+    };
+    let size_m = low.abs().max(high.abs()).max_element();
+    for object in bodies {
+        let mesh = &scene.objects[object].mesh;
+        for triangle in 0..mesh.triangles.len() {
+            let [a, b, c] = mesh.corners(triangle);
+            let normal = mesh.face_normal(triangle);
+            if normal == DVec3::ZERO {
+                continue;
+            }
+            let (plane, is_front) = plane(normal, a / size_m);
+            let face = Face {
+                object,
+                is_front,
+                low: a.min(b).min(c),
+                high: a.max(b).max(c),
+            };
+            planes.entry(plane).or_default().push(face);
+        }
+    }
+    planes
+}
+
+/// The plane of a triangle, and whether its normal is on the front of it; `point` in units of the scene.
+fn plane(normal: DVec3, point: DVec3) -> (Plane, bool) {
+    let numbers = [normal.x, normal.y, normal.z, normal.dot(point)];
+    let numbers = numbers.map(|number| (number * STEPS).round() as i64);
+    // On the front, the first number that is not 0 is above it.
+    let is_front = numbers
+        .iter()
+        .find(|number| **number != 0)
+        .is_none_or(|number| *number > 0);
+    let plane = if is_front {
+        numbers
+    } else {
+        numbers.map(|number| -number)
+    };
+    (plane, is_front)
+}
+
+/// Whether two faces of one plane face each other, and their boxes have more than an edge in common.
+fn touch(a: &Face, b: &Face) -> bool {
+    if a.is_front == b.is_front {
+        return false;
+    }
+    let common = (a.high.min(b.high) - a.low.max(b.low)).to_array();
+    let extent = (a.high - a.low).min(b.high - b.low).to_array();
+    let wide = common
+        .iter()
+        .zip(extent)
+        .filter(|(common, extent)| **common > 1e-6 * extent && *extent > 0.0);
+    wide.count() >= 2
+        && common
+            .iter()
+            .all(|common| *common >= -1e-9 * (a.high - a.low).max_element())
+}
