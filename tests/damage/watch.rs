@@ -3,14 +3,15 @@
 use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Mutex, PoisonError};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
+use cpu_time::ProcessTime;
 use nephroid::error::{Error, ErrorKind, Result};
 
 use crate::MEMORY;
 use crate::support::evidence::keep_bytes;
 
-/// Far more than any input here needs: a test for endless loops, not for speed.
+/// CPU time, far more than any input here needs: a test for endless loops, not for speed.
 const PATIENCE: Duration = Duration::from_secs(20);
 
 /// One after the other: memory is counted over the whole process.
@@ -63,7 +64,7 @@ pub fn watched<T>(
     let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
     MEMORY.reset_peak_usage();
     let before = MEMORY.current_usage();
-    let start = Instant::now();
+    let start = ProcessTime::now();
     let outcome = catch_unwind(AssertUnwindSafe(work)).map_err(|_| "it panicked".to_owned())?;
     let (took, bytes) = (start.elapsed(), MEMORY.peak_usage().saturating_sub(before));
     if took > PATIENCE {
@@ -96,13 +97,15 @@ fn what_goes_wrong_is_noticed() {
     let refused = |what: &str| Err::<(), Error>(Error::failure("a.glb", what, "export it again"));
     assert!(watched(1 << 20, || Ok(())).is_ok());
     assert!(watched(1 << 20, || refused("is broken")).is_ok());
-    let fault = |outcome: std::result::Result<_, String>| outcome.map(|_| ()).expect_err("it went wrong");
+    fn fault<T>(outcome: std::result::Result<Result<T>, String>) -> String {
+        outcome.map(|_| ()).expect_err("it went wrong")
+    }
     assert!(fault(watched(1 << 20, || refused(" "))).contains("refused with"));
     assert!(
         fault(watched(1 << 20, || refused("its contents cannot be understood"))).contains("refused with")
     );
     assert!(fault(watched(1 << 20, || Err::<(), _>(Error::cancelled("bake")))).contains("refused with"));
-    let greedy = || Ok(drop(std::hint::black_box(vec![1_u8; 2 << 20])));
+    let greedy = || Ok(std::hint::black_box(vec![1_u8; 2 << 20]).len());
     assert!(fault(watched(1 << 20, greedy)).contains("bytes of memory"));
     let panicking = || {
         if std::hint::black_box(true) {
