@@ -217,51 +217,6 @@ fn a_killed_run_leaves_no_torn_file() {
     assert_eq!(torn(&sandbox.path("out")), None);
 }
 
-/// Whatever is going on, Ctrl-C ends it soon, with one sentence or a partial result, and the shell's exit code.
-#[cfg(unix)]
-#[test]
-fn every_long_command_ends_at_a_signal() {
-    let long = "--density 1e9 --map-resolution 32";
-    for line in [
-        format!("render builtin:ring -o a.png --backend cpu {long}"),
-        "render builtin:showroom -o a.png --backend cpu --size 8000x8000 --density 1e3 --map-resolution 16"
-            .to_owned(),
-        "study convergence builtin:ring -o study --densities 1e6,1e9 --map-resolution 32".to_owned(),
-        "study reference builtin:ring -o study --rays 1e11 --map-resolution 32".to_owned(),
-        format!("study effects builtin:ring -o study {long}"),
-    ] {
-        for (signal, code) in [("-INT", 130), ("-TERM", 143)] {
-            let sandbox = Sandbox::new();
-            let arguments: Vec<&str> = line.split_whitespace().collect();
-            let mut command = sandbox.command(&arguments);
-            command.stdout(Stdio::piped()).stderr(Stdio::piped());
-            let child = command.spawn().expect("the program starts");
-            std::thread::sleep(Duration::from_millis(1500));
-            let pid = child.id().to_string();
-            let sent = Command::new("kill")
-                .args([signal, &pid])
-                .status()
-                .expect("kill starts");
-            assert!(sent.success(), "{line}: it had ended already");
-            let start = Instant::now();
-            let output = child.wait_with_output().expect("it ends");
-            let stderr = String::from_utf8_lossy(&output.stderr);
-            assert_eq!(output.status.code(), Some(code), "{line}: {stderr}");
-            assert!(
-                start.elapsed() < Duration::from_secs(30),
-                "{line}: {:?}",
-                start.elapsed()
-            );
-            assert!(stderr.lines().count() <= 1, "{line}: {stderr}");
-            let pictures = sandbox
-                .files(".")
-                .into_iter()
-                .filter(|name| name.starts_with("a."));
-            assert_eq!(pictures.count(), 0, "{line}: half a picture");
-        }
-    }
-}
-
 /// The second signal does not wait for anything.
 #[cfg(unix)]
 #[test]
