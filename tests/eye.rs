@@ -6,6 +6,8 @@ mod chains;
 mod charts;
 #[path = "eye/direct.rs"]
 mod direct;
+#[path = "eye/dispersion.rs"]
+mod dispersion;
 #[path = "eye/meshes.rs"]
 mod meshes;
 #[path = "eye/pictures.rs"]
@@ -16,6 +18,8 @@ mod scenes;
 mod soft_light;
 #[path = "eye/texel_areas.rs"]
 mod texel_areas;
+#[path = "eye/white_balance.rs"]
+mod white_balance;
 
 /// How a law is tried: many cases, the same ones in every run, so that a failure can be looked at.
 fn law() -> proptest::test_runner::Config {

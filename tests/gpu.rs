@@ -47,6 +47,8 @@ mod nearby;
 mod numbers;
 #[path = "gpu/on_demand.rs"]
 mod on_demand;
+#[path = "gpu/parted.rs"]
+mod parted;
 #[path = "gpu/radiance.rs"]
 mod radiance;
 #[path = "gpu/rays.rs"]

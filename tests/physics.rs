@@ -7,6 +7,8 @@
 mod bump_scenes;
 #[path = "physics/colour.rs"]
 mod colour;
+#[path = "physics/colour_basis.rs"]
+mod colour_basis;
 #[path = "physics/differentials.rs"]
 mod differentials;
 #[path = "physics/fresnel.rs"]
@@ -15,6 +17,8 @@ mod fresnel;
 mod glass;
 #[path = "physics/lights.rs"]
 mod lights;
+#[path = "physics/metal_paths.rs"]
+mod metal_paths;
 #[path = "physics/metals.rs"]
 mod metals;
 #[path = "physics/polish.rs"]

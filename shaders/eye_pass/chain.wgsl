@@ -6,7 +6,7 @@ override HAS_TINTED_GLASS: bool;
 // Whether light straight from the lamps is traced, and not in the maps.
 override TRACES_LIGHTS: bool;
 
-// Gazes that may wait: one for each surface at which both ways on are followed.
+// Surfaces at which both ways on can be followed.
 const MOST_BRANCHING: u32 = 4u;
 // Backs of single-sided surfaces that a gaze passes before it is taken to have left the scene.
 const MOST_BACKS: u32 = 64u;
@@ -22,6 +22,8 @@ struct Gaze {
     weight: vec3f,
     spread: f32,
     media: vec4u,
+    // The one that it is followed at; 0 where it stands for all.
+    wavelength: u32,
 }
 
 struct Seen {
@@ -82,6 +84,7 @@ fn onward(gaze: Gaze, point: SurfacePoint, branch: Branch) -> Gaze {
         gaze.weight * branch.share,
         gaze.spread * branch.spread_factor + bent + branch.spread_added,
         branch.media,
+        gaze.wavelength,
     );
 }
 
@@ -97,7 +100,7 @@ struct Walk {
     count: u32,
 }
 
-var<private> waiting: array<Gaze, MOST_BRANCHING>;
+var<private> waiting: array<Gaze, MOST_WAITING>;
 
 // Goes on from a surface, both ways at the first ones and then the stronger; false where the gaze ends here.
 fn go_on(walk: ptr<function, Walk>, point: SurfacePoint, next: Interaction) -> bool {
@@ -107,7 +110,7 @@ fn go_on(walk: ptr<function, Walk>, point: SurfacePoint, next: Interaction) -> b
     let is_back = is_followed(reflected);
     let is_through = is_followed(transmitted);
     let is_stronger = largest(transmitted.weight) >= largest(reflected.weight);
-    if is_back && is_through && gaze.depth < start.branching_depth && (*walk).count < MOST_BRANCHING {
+    if is_back && is_through && gaze.depth < start.branching_depth && (*walk).count < MOST_WAITING {
         waiting[(*walk).count] = reflected;
         (*walk).count += 1u;
         (*walk).gaze = transmitted;
@@ -145,14 +148,16 @@ fn chain_radiance(first: Gaze) -> vec3f {
         loop {
             let seen = nearest(walk.gaze);
             if seen.hit.triangle == NO_TRIANGLE {
-                walk.radiance += walk.gaze.weight * background(walk.gaze.direction);
+                let beyond = walk.gaze.weight * background(walk.gaze.direction);
+                walk.radiance += shown(beyond, walk.gaze.wavelength);
                 break;
             }
             point = surface_point(seen.hit);
             let object = objects[point.object];
+            part(&walk, point.object);
             walk.gaze.weight *= medium_transmittance(walk.gaze.media, seen.distance * start.unit_m);
             walk.gaze.width += walk.gaze.spread * seen.distance;
-            walk.radiance += walk.gaze.weight * object.emitted_radiance;
+            walk.radiance += shown(walk.gaze.weight * object.emitted_radiance, walk.gaze.wavelength);
             if has_map(object.surface) {
                 arrives = true;
                 break;
@@ -162,7 +167,7 @@ fn chain_radiance(first: Gaze) -> vec3f {
                 let cos_view = abs(dot(point.geometric_normal, walk.gaze.direction));
                 colour = tint(walk.gaze, point, cos_view);
             }
-            if !go_on(&walk, point, interact(point, walk.gaze.direction, walk.gaze.media, colour)) {
+            if !go_on(&walk, point, interact(point, walk.gaze, colour)) {
                 break;
             }
         }
@@ -179,8 +184,8 @@ fn chain_radiance(first: Gaze) -> vec3f {
                 lit += direct_irradiance(lit_point(point, is_front), objects[point.object]);
             }
             let own = tint(gaze, point, cos_view) * lit / PI;
-            let next = interact(point, gaze.direction, gaze.media, vec3f(1.0));
-            walk.radiance += gaze.weight * next.own * own;
+            let next = interact(point, gaze, vec3f(1.0));
+            walk.radiance += shown(gaze.weight * next.own * own, gaze.wavelength);
             goes_on = go_on(&walk, point, next);
         }
         if !goes_on {

@@ -39,41 +39,45 @@ fn no_branch() -> Branch {
     return Branch(vec3f(0.0), vec3f(0.0), vec4u(0u), 0.0, 1.0, 0.0);
 }
 
-fn reflection(point: SurfacePoint, facing: Facing, incident: vec3f, media: vec4u, share: vec3f) -> Branch {
+fn reflection(point: SurfacePoint, facing: Facing, gaze: Gaze, share: vec3f) -> Branch {
+    let incident = gaze.direction;
     var direction = mirrored(incident, facing.shading);
     if dot(direction, facing.geometric) <= 0.0 {
         direction = mirrored(incident, facing.geometric);
     }
     let curvature = select(-point.curvature, point.curvature, facing.front);
-    return Branch(direction, share, media, 2.0 * curvature, 1.0, objects[point.object].lobe_rad);
+    return Branch(direction, share, gaze.media, 2.0 * curvature, 1.0, objects[point.object].lobe_rad);
 }
 
-fn thin_wall(point: SurfacePoint, facing: Facing, incident: vec3f, media: vec4u, tint: vec3f) -> Interaction {
+fn thin_wall(point: SurfacePoint, facing: Facing, gaze: Gaze, tint: vec3f) -> Interaction {
     let object = objects[point.object];
-    let reflectance = thin_wall_reflectance(-dot(incident, facing.shading), object.ior / medium_ior(media));
+    let eta = ior_of(point.object, gaze.wavelength) / medium_ior(gaze.media, gaze.wavelength);
+    let reflectance = thin_wall_reflectance(-dot(gaze.direction, facing.shading), eta);
     return Interaction(
         0.0,
-        reflection(point, facing, incident, media, vec3f(reflectance)),
-        Branch(incident, tint * (1.0 - reflectance), media, 0.0, 1.0, object.lobe_rad),
+        reflection(point, facing, gaze, vec3f(reflectance)),
+        Branch(gaze.direction, tint * (1.0 - reflectance), gaze.media, 0.0, 1.0, object.lobe_rad),
     );
 }
 
-fn dielectric(point: SurfacePoint, facing: Facing, incident: vec3f, media: vec4u, tint: vec3f) -> Interaction {
-    let ior = objects[point.object].ior;
+fn dielectric(point: SurfacePoint, facing: Facing, gaze: Gaze, tint: vec3f) -> Interaction {
+    let incident = gaze.direction;
+    let media = gaze.media;
+    let ior = ior_of(point.object, gaze.wavelength);
     var beyond = left(media, point.object);
     // Where bodies overlap, the one that was entered last is the medium until it is left; an open sheet was never entered.
-    var ior_near = select(medium_ior(media), ior, all(beyond == media));
-    var ior_far = medium_ior(beyond);
+    var ior_near = select(medium_ior(media, gaze.wavelength), ior, all(beyond == media));
+    var ior_far = medium_ior(beyond, gaze.wavelength);
     if facing.front {
         beyond = entered(media, point.object);
-        ior_near = medium_ior(media);
+        ior_near = medium_ior(media, gaze.wavelength);
         ior_far = ior;
     }
     let eta = ior_far / ior_near;
     let cos_incident = -dot(incident, facing.shading);
     let cos_clamped = clamp(cos_incident, 0.0, 1.0);
     let cos_geometric = clamp(-dot(incident, facing.geometric), 0.0, 1.0);
-    let whole = Interaction(0.0, reflection(point, facing, incident, media, vec3f(1.0)), no_branch());
+    let whole = Interaction(0.0, reflection(point, facing, gaze, vec3f(1.0)), no_branch());
     if eta != 1.0 && scaled_cos2_transmitted(cos_clamped, eta) <= 0.0 {
         return whole;
     }
@@ -90,7 +94,7 @@ fn dielectric(point: SurfacePoint, facing: Facing, incident: vec3f, media: vec4u
     let curvature = select(-point.curvature, point.curvature, facing.front);
     return Interaction(
         0.0,
-        reflection(point, facing, incident, media, vec3f(reflectance)),
+        reflection(point, facing, gaze, vec3f(reflectance)),
         // A tilted facet turns a refracted ray by |1/eta - 1| of its tilt, and a reflected one by twice that tilt.
         Branch(
             direction,
@@ -103,25 +107,26 @@ fn dielectric(point: SurfacePoint, facing: Facing, incident: vec3f, media: vec4u
     );
 }
 
-fn interact(point: SurfacePoint, incident: vec3f, media: vec4u, tint: vec3f) -> Interaction {
+fn interact(point: SurfacePoint, gaze: Gaze, tint: vec3f) -> Interaction {
     let object = objects[point.object];
-    let facing = face(point, incident);
-    let cos_incident = -dot(incident, facing.shading);
+    let facing = face(point, gaze.direction);
+    let cos_incident = -dot(gaze.direction, facing.shading);
     switch object.surface {
         case SURFACE_MIRROR: {
             let share = metal_reflectance(cos_incident, tint);
-            return Interaction(0.0, reflection(point, facing, incident, media, share), no_branch());
+            return Interaction(0.0, reflection(point, facing, gaze, share), no_branch());
         }
         case SURFACE_MIXED: {
-            let reflectance = object.polish * dielectric_reflectance(cos_incident, object.ior / medium_ior(media));
-            let back = reflection(point, facing, incident, media, vec3f(reflectance));
+            let eta = ior_of(point.object, gaze.wavelength) / medium_ior(gaze.media, gaze.wavelength);
+            let reflectance = object.polish * dielectric_reflectance(cos_incident, eta);
+            let back = reflection(point, facing, gaze, vec3f(reflectance));
             return Interaction(1.0 - reflectance, back, no_branch());
         }
         case SURFACE_THIN_WALL: {
-            return thin_wall(point, facing, incident, media, tint);
+            return thin_wall(point, facing, gaze, tint);
         }
         case SURFACE_DIELECTRIC: {
-            return dielectric(point, facing, incident, media, tint);
+            return dielectric(point, facing, gaze, tint);
         }
         default: {
             return Interaction(1.0, no_branch(), no_branch());

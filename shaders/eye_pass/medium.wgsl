@@ -44,12 +44,12 @@ fn left(media: vec4u, object: u32) -> vec4u {
     return kept;
 }
 
-fn medium_ior(media: vec4u) -> f32 {
+fn medium_ior(media: vec4u, wavelength: u32) -> f32 {
     let number = innermost(media);
     if number == 0u {
         return 1.0;
     }
-    return objects[number - 1u].ior;
+    return ior_of(number - 1u, wavelength);
 }
 
 // Share of light that is left after a distance [m] in the innermost body (Beer and Lambert).

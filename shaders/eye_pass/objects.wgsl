@@ -13,8 +13,9 @@ struct ObjectRecord {
     bumps: u32,
     polish: f32,
     back_map: u32,
+    // Number of its glass, where that parts wavelengths; else 0.
+    glass: u32,
     padding0: u32,
-    padding1: u32,
 }
 
 const SURFACE_DIFFUSE: u32 = 0u;

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::error::ErrorKind as ClapErrorKind;
 use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand, ValueEnum};
 use nephroid::error::{Error, Result};
-use nephroid::eye_pass::ToneMap;
+use nephroid::eye_pass::{ToneMap, WhiteBalance};
 use nephroid::settings::{Estimator, MapResolution};
 
 use super::bake_options::BakeOptions;
@@ -181,6 +181,10 @@ pub struct RenderArguments {
     /// How radiance becomes display colour [default: neutral]
     #[arg(long, value_enum)]
     pub tone_map: Option<ToneMap>,
+    /// Which light is shown as white: the display's, the lamps', or light of a temperature or chromaticity
+    /// [default: none]
+    #[arg(long, value_name = "none|lamps|KELVIN|X,Y", value_parser = values::white_balance)]
+    pub white_balance: Option<WhiteBalance>,
     /// What makes the picture [default: gpu where there is one, else cpu]
     #[arg(long, value_enum)]
     pub backend: Option<Backend>,

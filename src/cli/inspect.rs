@@ -7,7 +7,7 @@ use nephroid::error::{Result, Warning};
 use nephroid::light_pass::emitter::Emitter;
 use nephroid::optics::Metal;
 use nephroid::plan::{self, EffectLine, EffectPlan};
-use nephroid::scene::{Light, LightKind, LightSize, Scene, SurfaceKind};
+use nephroid::scene::{Camera, Light, LightKind, LightSize, Scene, SurfaceKind};
 use nephroid::session::{BakeSession, Survey};
 use serde::Serialize;
 
@@ -94,13 +94,18 @@ pub fn run(job: &InspectJob, terminal: &Terminal, interrupt: &Interrupt) -> Resu
     let survey = BakeSession::new(scene.clone())?.survey(&job.settings, interrupt.control())?;
     let camera = scene.cameras.first().map(|camera| (camera, PICTURE_ASPECT));
     let chains = plan::chains(scene, camera, job.settings.effects.get(Effect::Chains));
-    let report = Report::new(scene, &survey, chains);
+    let report = Report::new(scene, &survey, camera, chains);
     terminal.print_result(&text(&report), &report)
 }
 
 impl Report {
-    fn new(scene: &Scene, survey: &Survey, chains: EffectLine) -> Self {
+    fn new(scene: &Scene, survey: &Survey, camera: Option<(&Camera, f64)>, chains: EffectLine) -> Self {
         let mut plan = survey.estimate.plan.clone();
+        for line in &mut plan.effects {
+            if line.effect == Effect::Dispersion {
+                *line = plan::dispersion(line.clone(), scene, camera, &chains);
+            }
+        }
         plan.effects.push(chains.clone());
         Self {
             scene: scene.source.clone(),

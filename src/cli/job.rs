@@ -6,7 +6,7 @@ use clap::ValueEnum;
 #[cfg(feature = "gpu")]
 use nephroid::effect::{Effect, EffectSwitch};
 use nephroid::error::{Error, Result};
-use nephroid::eye_pass::ToneMap;
+use nephroid::eye_pass::{ToneMap, WhiteBalance};
 use nephroid::settings::{BakeSettings, Estimator, LayerKind, MapResolution};
 use nephroid::study::brute_force;
 use nephroid::study::convergence::{DEFAULT_DENSITIES, Ladder};
@@ -174,6 +174,7 @@ pub struct PictureRequest {
     pub size: (u32, u32),
     pub exposure: Exposure,
     pub tone_map: ToneMap,
+    pub white_balance: WhiteBalance,
     /// `None`: gpu where there is one, else cpu.
     pub backend: Option<Backend>,
 }
@@ -242,6 +243,7 @@ fn view_job(arguments: ViewArguments) -> Result<Job> {
             size: arguments.picture.size.unwrap_or(DEFAULT_SIZE),
             exposure: arguments.picture.exposure.unwrap_or_default(),
             tone_map: ToneMap::default(),
+            white_balance: WhiteBalance::default(),
             backend: None,
         },
         #[cfg(feature = "viewer")]
@@ -283,7 +285,7 @@ fn render_job(arguments: RenderArguments) -> Result<Job> {
         let radiance_only = |option: &str| {
             Err(Error::usage(
                 option,
-                "an .exr picture holds radiance, which neither exposure nor tone mapping changes",
+                "an .exr picture holds radiance, which neither exposure nor white balance nor tone mapping changes",
                 "leave it out or write a .png",
             ))
         };
@@ -292,6 +294,9 @@ fn render_job(arguments: RenderArguments) -> Result<Job> {
         }
         if arguments.tone_map.is_some() {
             return radiance_only("--tone-map");
+        }
+        if arguments.white_balance.is_some() {
+            return radiance_only("--white-balance");
         }
     }
     Ok(Job::Render(RenderJob {
@@ -302,6 +307,7 @@ fn render_job(arguments: RenderArguments) -> Result<Job> {
             size: size.unwrap_or(DEFAULT_SIZE),
             exposure: exposure.unwrap_or_default(),
             tone_map: arguments.tone_map.unwrap_or_default(),
+            white_balance: arguments.white_balance.unwrap_or_default(),
             backend: arguments.backend,
         },
         output,
@@ -343,6 +349,7 @@ fn path_job(arguments: RenderArguments, path: PathBuf) -> Result<Job> {
             size: arguments.picture.size.unwrap_or(DEFAULT_SIZE),
             exposure: arguments.picture.exposure.unwrap_or_default(),
             tone_map: arguments.tone_map.unwrap_or_default(),
+            white_balance: arguments.white_balance.unwrap_or_default(),
             backend: arguments.backend,
         },
         path,

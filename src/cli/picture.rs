@@ -2,13 +2,14 @@
 
 use std::sync::Arc;
 
-use nephroid::effect::{Effect, EffectSwitch};
+use nephroid::effect::{Effect, EffectSwitches};
 use nephroid::error::{Error, Result};
 use nephroid::export::picture;
 use nephroid::eye_pass::reference::{self, ChainLimits, ReferenceSettings};
 use nephroid::eye_pass::{Picture, View, tone_mapping};
 use nephroid::illumination::IlluminationMap;
 use nephroid::optics::LinearSrgb;
+use nephroid::optics::spectrum::xyz::Matrix3;
 use nephroid::scene::{Camera, Scene};
 use nephroid::settings::BakeSettings;
 use nephroid::transport::Tracer;
@@ -28,6 +29,8 @@ pub struct MadePicture {
     pub picture: Picture,
     /// With the exposure that was used.
     pub view: View,
+    /// What radiance is multiplied by before tone mapping.
+    pub white_balance: Matrix3,
     /// The graphics card's name, or `cpu`.
     pub made_by: String,
 }
@@ -41,14 +44,15 @@ impl MadePicture {
         match format {
             PictureFormat::Png => {
                 let view = &self.view;
-                picture::display_png(&self.picture, view.exposure_stops, view.tone_map, location)
+                let white = &self.white_balance;
+                picture::display_png(&self.picture, view.exposure_stops, view.tone_map, white, location)
             }
             PictureFormat::Exr => picture::radiance_exr(&self.picture, location),
         }
     }
 }
 
-/// Makes the picture, by the card where there is one and no other wish; `settings` switch the eye's chains.
+/// Makes the picture, by the card where there is one and no other wish; `settings` switch what the eye sees in mirrors and glass.
 ///
 /// # Errors
 /// No such camera; a card that was asked for and is not there; a signal.
@@ -69,16 +73,16 @@ pub fn make(
         tone_map: request.tone_map,
         background: LinearSrgb::BLACK,
     };
-    let chains = settings.effects.get(Effect::Chains);
+    let effects = &settings.effects;
     interrupt.check("picture")?;
     let (picture, made_by) = match request.backend {
-        Some(Backend::Cpu) => by_cpu(scene, maps, &view, chains, terminal, interrupt)?,
-        Some(Backend::Gpu) => by_gpu(scene, maps, &view, chains)?,
-        None => match by_gpu(scene, maps, &view, chains) {
+        Some(Backend::Cpu) => by_cpu(scene, maps, &view, effects, terminal, interrupt)?,
+        Some(Backend::Gpu) => by_gpu(scene, maps, &view, effects)?,
+        None => match by_gpu(scene, maps, &view, effects) {
             Ok(made) => made,
             Err(error) => {
                 terminal.print_note(&format!("{error}: the CPU makes the picture"));
-                by_cpu(scene, maps, &view, chains, terminal, interrupt)?
+                by_cpu(scene, maps, &view, effects, terminal, interrupt)?
             }
         },
     };
@@ -90,6 +94,7 @@ pub fn make(
     Ok(MadePicture {
         picture,
         view,
+        white_balance: request.white_balance.matrix(scene),
         made_by,
     })
 }
@@ -98,7 +103,7 @@ fn by_cpu(
     scene: &Arc<Scene>,
     maps: &[IlluminationMap],
     view: &View,
-    chains: EffectSwitch,
+    effects: &EffectSwitches,
     terminal: &Terminal,
     interrupt: &Interrupt,
 ) -> Result<(Picture, String)> {
@@ -106,9 +111,10 @@ fn by_cpu(
     let settings = ReferenceSettings {
         samples_per_side: SAMPLES_PER_SIDE,
         limits: ChainLimits {
-            switch: chains,
+            switch: effects.get(Effect::Chains),
             ..ChainLimits::default()
         },
+        ..ReferenceSettings::switched(effects.get(Effect::Dispersion))
     };
     let bar = StageBar::new(terminal);
     let picture = reference::render(&tracer, maps, view, &settings, &bar, interrupt.control())?;
@@ -120,17 +126,17 @@ fn by_gpu(
     scene: &Scene,
     maps: &[IlluminationMap],
     view: &View,
-    chains: EffectSwitch,
+    effects: &EffectSwitches,
 ) -> Result<(Picture, String)> {
     use nephroid::eye_pass::renderer::render_counted;
 
     let gpu = nephroid::gpu::Gpu::headless()?;
-    let (picture, _) = render_counted(&gpu, scene, maps, view, SAMPLES_PER_SIDE, chains)?;
+    let (picture, _) = render_counted(&gpu, scene, maps, view, SAMPLES_PER_SIDE, effects)?;
     Ok((picture, gpu.adapter_name()))
 }
 
 #[cfg(not(feature = "gpu"))]
-fn by_gpu(_: &Scene, _: &[IlluminationMap], _: &View, _: EffectSwitch) -> Result<(Picture, String)> {
+fn by_gpu(_: &Scene, _: &[IlluminationMap], _: &View, _: &EffectSwitches) -> Result<(Picture, String)> {
     Err(Error::failure(
         "--backend gpu",
         "this program was built without the gpu feature",

@@ -75,6 +75,8 @@ pub fn run(job: &PathJob, terminal: &Terminal, interrupt: &Interrupt) -> Result<
         maps: &maps,
         view,
         cameras: &cameras,
+        effects: &job.maps.settings().effects,
+        white_balance: job.picture.white_balance.matrix(&loaded.scene),
     };
     walk.view.exposure_stops = match job.picture.exposure {
         Exposure::Stops(stops) => stops,

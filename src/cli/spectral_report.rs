@@ -22,6 +22,8 @@ pub struct GlassReport {
 /// The spectrum of a lamp, as `--json` prints it.
 #[derive(Debug, Serialize)]
 pub struct SpectrumReport {
+    /// Of an illuminant or a file; `None` where it has none.
+    name: Option<String>,
     /// Of the nearest black body; `None` where none is near.
     correlated_temperature_k: Option<f64>,
     /// Luminous flux by radiant flux between 360 and 830 nm.
@@ -62,21 +64,23 @@ impl SpectrumReport {
     pub fn new(spectrum: &Spectrum) -> Self {
         let range = spectrum.range();
         Self {
+            name: spectrum.name().map(str::to_owned),
             correlated_temperature_k: correlated_temperature(spectrum.xyz()).map(|nearest| nearest.kelvin),
             lumens_per_watt: spectrum.luminous_flux_lm() / spectrum.radiant(),
             range_nm: [range.start().0, range.end().0],
         }
     }
 
-    /// "spectrum of 6504 K, 360 to 830 nm, 204 lm/W".
+    /// "spectrum `D65` of 6504 K, 360 to 830 nm, 204 lm/W".
     pub fn line(&self) -> String {
+        let name = (self.name.as_ref()).map_or_else(String::new, |name| format!(" `{name}`"));
         let colour = match self.correlated_temperature_k {
-            Some(kelvin) => format!("spectrum of {kelvin:.0} K"),
-            None => "spectrum far from any black body".into(),
+            Some(kelvin) => format!("of {kelvin:.0} K"),
+            None => "far from any black body".into(),
         };
         let [first, last] = self.range_nm;
         format!(
-            "{colour}, {first:.0} to {last:.0} nm, {:.0} lm/W",
+            "spectrum{name} {colour}, {first:.0} to {last:.0} nm, {:.0} lm/W",
             self.lumens_per_watt
         )
     }

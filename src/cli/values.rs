@@ -1,6 +1,7 @@
 //! Values of options: how they are written.
 
 use nephroid::effect::{Effect, EffectSwitch};
+use nephroid::eye_pass::WhiteBalance;
 use nephroid::settings::{MapResolution, Sigma};
 
 /// `1.5` or `adaptive`.
@@ -112,6 +113,11 @@ pub fn exposure(text: &str) -> Result<Exposure, String> {
         .filter(|stops| (-64.0..=64.0).contains(stops))
         .map(Exposure::Stops)
         .ok_or_else(|| "give `auto` or a number of stops from -64 to 64".to_string())
+}
+
+/// `none`, `lamps`, a temperature [K] or a chromaticity.
+pub fn white_balance(text: &str) -> Result<WhiteBalance, String> {
+    text.parse()
 }
 
 /// How bright a picture is shown.

@@ -3,8 +3,10 @@
 use super::{exr, png};
 use crate::error::Result;
 use crate::eye_pass::{Picture, ToneMap, tone_mapping};
+use crate::optics::spectrum::xyz::Matrix3;
 
-/// The bytes of a PNG file: radiance × 2^`exposure_stops`, tone-mapped and sRGB-encoded; `location` is named in errors.
+/// The bytes of a PNG file: radiance times `white_balance` × 2^`exposure_stops`, tone-mapped and sRGB-encoded; `location`
+/// is named in errors.
 ///
 /// # Errors
 /// A size that the format cannot hold.
@@ -12,9 +14,11 @@ pub fn display_png(
     picture: &Picture,
     exposure_stops: f64,
     tone_map: ToneMap,
+    white_balance: &Matrix3,
     location: &str,
 ) -> Result<Vec<u8>> {
-    let rgba = tone_mapping::display_rgba8(picture, exposure_stops, tone_map);
+    let balanced = picture.clone().white_balanced(white_balance);
+    let rgba = tone_mapping::display_rgba8(&balanced, exposure_stops, tone_map);
     png::encode(picture.width, picture.height, rgba, location)
 }
 

@@ -5,5 +5,8 @@ pub mod reference;
 pub mod renderer;
 pub mod tone_mapping;
 pub mod view;
+pub mod wavelengths;
+pub mod white_balance;
 
 pub use view::{Picture, ToneMap, View};
+pub use white_balance::WhiteBalance;

@@ -1,12 +1,13 @@
-//! Whether the eye needs its specular chains.
+//! Whether the eye needs its specular chains, and wavelengths for them.
 
 use super::{Effect, EffectLine, EffectSwitch};
-use crate::scene::{Camera, Scene};
+use crate::scene::{Camera, Material, Scene};
 
 /// Decides [`Effect::Chains`] for a camera and the `aspect` = width/height of its picture: on where the box of a
 /// specular surface may be seen. Without a camera, where there is a specular surface at all.
 pub fn chains(scene: &Scene, camera: Option<(&Camera, f64)>, switch: EffectSwitch) -> EffectLine {
-    let seen = first_specular(scene, camera).map(|object| &scene.objects[object].name);
+    let is_specular = |material: &Material| material.surface.is_specular();
+    let seen = first_seen(scene, camera, is_specular).map(|object| &scene.objects[object].name);
     let (on, reason) = match (switch, seen, camera) {
         (EffectSwitch::Off, _, _) => (false, "switched off by the user".into()),
         (_, Some(name), Some((camera, _))) => (true, format!("`{name}` is in view of `{}`", camera.name)),
@@ -23,13 +24,47 @@ pub fn chains(scene: &Scene, camera: Option<(&Camera, f64)>, switch: EffectSwitc
     }
 }
 
-fn first_specular(scene: &Scene, camera: Option<(&Camera, f64)>) -> Option<usize> {
+/// The line of [`Effect::Dispersion`] for both passes, where the scene has glass that parts wavelengths: `light` is the
+/// light pass's, and the eye's chains are on as `chains` says.
+pub fn dispersion(
+    light: EffectLine,
+    scene: &Scene,
+    camera: Option<(&Camera, f64)>,
+    chains: &EffectLine,
+) -> EffectLine {
+    let anywhere = first_seen(scene, None, Material::is_dispersive);
+    let Some(object) = anywhere.filter(|_| light.switch != EffectSwitch::Off) else {
+        return light;
+    };
+    let (on, by_eye) = match first_seen(scene, camera, Material::is_dispersive) {
+        _ if !chains.on => (false, "its chains are off".into()),
+        Some(object) => (
+            true,
+            format!("`{}` parts wavelengths", scene.objects[object].name),
+        ),
+        None => (
+            true,
+            format!("`{}` may be seen in a mirror", scene.objects[object].name),
+        ),
+    };
+    EffectLine {
+        on: light.on || on,
+        reason: format!("light pass: {}; eye pass: {by_eye}", light.reason),
+        ..light
+    }
+}
+
+fn first_seen(
+    scene: &Scene,
+    camera: Option<(&Camera, f64)>,
+    wanted: impl Fn(&Material) -> bool,
+) -> Option<usize> {
     let frustum = camera.map(|(camera, aspect)| camera.frustum(aspect));
     let is_seen = |object: &usize| {
         let bounds = scene.objects[*object].mesh.bounds();
         bounds.is_some_and(|bounds| frustum.is_none_or(|frustum| frustum.may_see(bounds)))
     };
     (0..scene.objects.len())
-        .filter(|object| scene.material_of(*object).surface.is_specular())
+        .filter(|object| wanted(scene.material_of(*object)))
         .find(is_seen)
 }

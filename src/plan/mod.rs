@@ -6,7 +6,7 @@ mod eye;
 mod reach;
 
 pub use decide::{Sight, decide, is_wanted, wants_caustics};
-pub use eye::chains;
+pub use eye::{chains, dispersion};
 pub use reach::Reach;
 
 use serde::{Deserialize, Serialize};

@@ -4,6 +4,7 @@
 use std::sync::Arc;
 
 use super::{AlphaMask, NormalMap, TextureRef, Waves};
+use crate::optics::spectrum::Spectrum;
 use crate::optics::wavelength::D_LINE;
 use crate::optics::{Glass, LinearSrgb, Metal, Nanometres};
 
@@ -87,6 +88,9 @@ pub struct Material {
     pub volume: Option<Volume>,
     /// Emitted radiance [W/(m² sr)], luminous-equivalent: glTF's cd/m² divided by 683 lm/W.
     pub emitted_radiance: LinearSrgb,
+    /// That light by wavelength, scaled to one luminous-equivalent watt, of which `emitted_radiance` has the colour;
+    /// `None` where that is all that is known.
+    pub emission_spectrum: Option<Arc<Spectrum>>,
     /// What part of the surface its polish covers, [0, 1]: multiplies what a mixed surface reflects.
     pub polish: f64,
     /// What bends its normals where it is specular; light that a diffuse surface takes is that of the surface itself.
@@ -202,6 +206,7 @@ impl Default for Material {
             metal: None,
             volume: None,
             emitted_radiance: LinearSrgb::BLACK,
+            emission_spectrum: None,
             polish: 1.0,
             waves: None,
             normal_map: None,

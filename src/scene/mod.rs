@@ -15,6 +15,7 @@ pub mod light;
 pub mod load;
 pub mod material;
 pub mod mesh;
+mod middle_light;
 pub mod normal_map;
 pub mod texture;
 pub mod waves;
@@ -84,6 +85,11 @@ impl Scene {
     /// The material of an object.
     pub fn material_of(&self, object: usize) -> &Material {
         &self.materials[self.objects[object].material]
+    }
+
+    /// Whether anything in it sends light of different wavelengths different ways.
+    pub fn parts_wavelengths(&self) -> bool {
+        (0..self.objects.len()).any(|object| self.material_of(object).is_dispersive())
     }
 
     /// What an object's surface sends by itself [W/(m² sr)]: that of its light, where it has one, as edited.

@@ -6,12 +6,13 @@ use std::time::Instant;
 use serde::Serialize;
 
 use super::repeats::median;
-use crate::effect::EffectSwitch;
+use crate::effect::{Effect, EffectSwitch, EffectSwitches};
 use crate::error::{Error, Result};
 use crate::eye_pass::renderer::{GpuMs, Renderer};
 use crate::eye_pass::{View, tone_mapping};
 use crate::gpu::{Gpu, readback};
 use crate::illumination::IlluminationMap;
+use crate::optics::spectrum::xyz::Matrix3;
 use crate::progress::{Control, Progress, Stage};
 use crate::scene::{Camera, Scene};
 
@@ -36,6 +37,10 @@ pub struct Walk<'a> {
     pub view: View,
     /// One for each frame.
     pub cameras: &'a [Camera],
+    /// Whether what is seen through glass is parted by wavelength.
+    pub effects: &'a EffectSwitches,
+    /// What radiance is multiplied by before tone mapping.
+    pub white_balance: Matrix3,
 }
 
 /// Three figures of many.
@@ -233,6 +238,8 @@ impl Manner {
         let mut renderer = Renderer::new(gpu, walk.scene, FORMAT, SAMPLES)?;
         renderer.set_maps(gpu, walk.scene, walk.maps)?;
         renderer.set_chains(gpu, chains)?;
+        renderer.set_dispersion(walk.effects.get(Effect::Dispersion));
+        renderer.set_white_balance(gpu, &walk.white_balance);
         gpu.wait()?;
         Ok(Self {
             chains,

@@ -248,7 +248,7 @@ impl Tracer {
                 ..Interaction::NOTHING
             },
             SurfaceKind::Mirror => {
-                let share = fresnel::metal_reflectance(cos_incident, self.tint::<E>(hit, material));
+                let share = self.metal_share::<E>(hit, material, cos_incident);
                 let back = || reflection(hit, &facing, incident, media, share);
                 Interaction {
                     absorbed: LinearSrgb::WHITE - share,
@@ -277,6 +277,27 @@ impl Tracer {
         } else {
             material.base_colour
         }
+    }
+
+    /// What a metal sends back: by the table of its substance where that and the wavelength are known, else by
+    /// Schlick's formula.
+    fn metal_share<E: PathEffects>(
+        &self,
+        hit: &SurfaceHit,
+        material: &Material,
+        cos_incident: f64,
+    ) -> LinearSrgb {
+        let (Some(metal), Some(wavelength)) = (material.metal, self.wavelength()) else {
+            return fresnel::metal_reflectance(cos_incident, self.tint::<E>(hit, material));
+        };
+        let clean = LinearSrgb::grey(metal.reflectance(cos_incident, wavelength));
+        if !E::TEXTURES {
+            return clean;
+        }
+        // Schlick's formula is linear in what the texture multiplies: the metal where it is white, else the rise alone.
+        let kept = self.texture_colour(hit);
+        let rise = fresnel::metal_reflectance(cos_incident, LinearSrgb::BLACK);
+        clean * kept + rise * (LinearSrgb::WHITE - kept)
     }
 
     fn thin_wall<E: PathEffects>(

@@ -25,6 +25,8 @@ pub struct Tracer {
     has_bumps: bool,
     /// Whether anything is cut out of a surface.
     has_masks: bool,
+    /// The wavelength of all light, where it has but one.
+    wavelength: Option<Nanometres>,
 }
 
 /// The hierarchy over all triangles of a scene.
@@ -128,10 +130,12 @@ impl Tracer {
             hierarchy,
             specular,
             has_bumps: true,
+            wavelength: None,
         }
     }
 
-    /// For an edited copy of the scene, with the same objects: builds only what the edits changed.
+    /// For an edited copy of the scene, with the same objects and for light of all wavelengths: builds only what the
+    /// edits changed.
     #[must_use]
     pub fn edited(&self, scene: Arc<Scene>) -> Self {
         let is_same = |object: usize| {
@@ -162,6 +166,7 @@ impl Tracer {
             hierarchy,
             specular,
             has_bumps: self.has_bumps,
+            wavelength: None,
         }
     }
 
@@ -174,18 +179,34 @@ impl Tracer {
             specular: self.specular.clone(),
             has_bumps: false,
             has_masks: self.has_masks,
+            wavelength: self.wavelength,
         }
     }
 
-    /// The same scene as light of one wavelength meets it: refractive indices are those of that wavelength. Colours stay
-    /// as they are.
+    /// The same scene with the refractive indices of one wavelength; colours stay as they are.
     #[must_use]
-    pub fn at_wavelength(&self, wavelength: Nanometres) -> Self {
+    pub fn with_indices_at(&self, wavelength: Nanometres) -> Self {
         let mut scene = Scene::clone(&self.scene);
         for material in &mut scene.materials {
             material.ior = material.index_at(wavelength);
         }
         self.edited(Arc::new(scene))
+    }
+
+    /// The same scene as light of one wavelength meets it: metals of a known substance reflect as they do there, the
+    /// same in all channels. All other colours stay as they are: [`ColourBasis`](crate::optics::ColourBasis) tells what
+    /// they are there.
+    #[must_use]
+    pub fn at_wavelength(&self, wavelength: Nanometres) -> Self {
+        Self {
+            wavelength: Some(wavelength),
+            ..self.with_indices_at(wavelength)
+        }
+    }
+
+    /// The wavelength of the light that this is for; `None` where it is red, green and blue at once.
+    pub fn wavelength(&self) -> Option<Nanometres> {
+        self.wavelength
     }
 
     /// Whether something bends the normals of an object.
@@ -370,14 +391,18 @@ impl Tracer {
 
     /// Base colour of the surface at a hit, its texture included.
     pub fn base_colour(&self, hit: &SurfaceHit) -> LinearSrgb {
+        self.scene.material_of(hit.object).base_colour * self.texture_colour(hit)
+    }
+
+    /// What the texture at a hit multiplies the base colour by: white where there is none.
+    pub(super) fn texture_colour(&self, hit: &SurfaceHit) -> LinearSrgb {
         let object = &self.scene.objects[hit.object];
-        let material = &self.scene.materials[object.material];
-        let Some(reference) = &material.base_colour_texture else {
-            return material.base_colour;
+        let Some(reference) = &self.scene.materials[object.material].base_colour_texture else {
+            return LinearSrgb::WHITE;
         };
         match texture_uv(&object.mesh, reference, hit.triangle, hit.barycentric) {
-            Some(uv) => material.base_colour * self.scene.textures[reference.texture].sample(uv),
-            None => material.base_colour,
+            Some(uv) => self.scene.textures[reference.texture].sample(uv),
+            None => LinearSrgb::WHITE,
         }
     }
 }

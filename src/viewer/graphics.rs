@@ -17,6 +17,7 @@ use crate::eye_pass::renderer::{EyeCounts, EyeQuality, GpuMs, MapStyle, Renderer
 use crate::eye_pass::{self, View, tone_mapping};
 use crate::gpu::Gpu;
 use crate::illumination::IlluminationMap;
+use crate::optics::spectrum::xyz::{IDENTITY, Matrix3};
 use crate::scene::Scene;
 
 /// Smallest inner size of the window [logical pixels]: the panel and a picture of its width.
@@ -46,6 +47,10 @@ pub struct Graphics {
     scene: Arc<Scene>,
     /// As the renderer has it.
     chains: EffectSwitch,
+    /// As the renderer has it.
+    dispersion: EffectSwitch,
+    /// As the renderer has it.
+    white_balance: Matrix3,
     screen: Screen,
     gpu: Gpu,
 }
@@ -90,6 +95,8 @@ impl Graphics {
             renderer,
             scene: Arc::clone(scene),
             chains: EffectSwitch::default(),
+            dispersion: EffectSwitch::default(),
+            white_balance: IDENTITY,
             screen,
             gpu,
         })
@@ -164,6 +171,24 @@ impl Graphics {
         self.chains = switch;
         self.picture.invalidate();
         self.renderer.set_chains(&self.gpu, switch)
+    }
+
+    /// Switches what glass that parts wavelengths does to the picture, from the next one on.
+    pub fn set_dispersion(&mut self, switch: EffectSwitch) {
+        if self.dispersion != switch {
+            self.dispersion = switch;
+            self.picture.invalidate();
+            self.renderer.set_dispersion(switch);
+        }
+    }
+
+    /// What radiance is multiplied by before tone mapping, from the next picture on.
+    pub fn set_white_balance(&mut self, matrix: &Matrix3) {
+        if self.white_balance != *matrix {
+            self.white_balance = *matrix;
+            self.picture.invalidate();
+            self.renderer.set_white_balance(&self.gpu, matrix);
+        }
     }
 
     /// What the picture takes.

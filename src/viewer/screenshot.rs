@@ -6,11 +6,12 @@ use crate::error::{Error, Result};
 use crate::export::picture::{display_png, radiance_exr};
 use crate::eye_pass::{Picture, View};
 use crate::files;
+use crate::optics::spectrum::xyz::Matrix3;
 
 /// Numbers that are tried before the folder counts as full.
 const NUMBERS: std::ops::RangeInclusive<u32> = 1..=9999;
 
-/// Writes `nephroid-SCENE-NNNN.png`, `picture` as `view` shows it, and with `has_radiance` `.exr`, its radiance
+/// Writes `nephroid-SCENE-NNNN.png`, `picture` as `view` shows it in this white balance, and with `has_radiance` `.exr`, its radiance
 /// [W/(m² sr)]. The number is the first of which the folder holds neither. Returns what was written.
 ///
 /// # Errors
@@ -20,11 +21,18 @@ pub fn save(
     scene: &str,
     picture: &Picture,
     view: &View,
+    white_balance: &Matrix3,
     has_radiance: bool,
 ) -> Result<Vec<PathBuf>> {
     let [png, exr] = free_names(folder, scene)?;
     let location = png.display().to_string();
-    let shown = display_png(picture, view.exposure_stops, view.tone_map, &location)?;
+    let shown = display_png(
+        picture,
+        view.exposure_stops,
+        view.tone_map,
+        white_balance,
+        &location,
+    )?;
     if !has_radiance {
         files::write_atomically(&png, |writer| writer.write_all(&shown))?;
         return Ok(vec![png]);

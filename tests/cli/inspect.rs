@@ -167,6 +167,7 @@ fn glasses_metals_and_spectra_are_told() {
     assert!((number(&glass["abbe_number"]) - 25.68).abs() < 5e-3);
     assert_eq!(report["materials"][1]["metal"], "Gold");
     let spectrum = &report["lights"][0]["spectrum"];
+    assert_eq!(spectrum["name"], "A");
     // CIE 15:2018: illuminant A is a black body of 2856 K.
     assert!((number(&spectrum["correlated_temperature_k"]) - 2856.0).abs() < 2.0);
     assert_eq!(report["lights"][1]["spectrum"], serde_json::Value::Null);
@@ -174,7 +175,7 @@ fn glasses_metals_and_spectra_are_told() {
     for word in [
         "ior 1.7847, N-SF11 (V_d 25.7, measured from 370 to 2500 nm)",
         "Gold by wavelength",
-        "spectrum of 2856 K, 360 to 830 nm, ",
+        "spectrum `A` of 2856 K, 360 to 830 nm, ",
         " lm/W",
         "dispersion: ",
     ] {

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use nephroid::export::FloatImage;
-use nephroid::eye_pass::{Picture, ToneMap, View, reference, tone_mapping};
+use nephroid::eye_pass::{Picture, ToneMap, View, WhiteBalance, reference, tone_mapping};
 use nephroid::optics::LinearSrgb;
 use nephroid::scene::builtin;
 use nephroid::transport::Tracer;
@@ -93,6 +93,53 @@ fn every_tone_map_shows_the_same_radiance_in_its_own_way() {
     let help = sandbox.succeed("render -h").stdout;
     let words: Vec<&str> = help.split_whitespace().collect();
     assert!(words.join(" ").contains("none, neutral, agx, aces]"), "{help}");
+}
+
+#[test]
+fn white_balance_makes_the_lamps_light_white_in_pictures_for_display() {
+    let sandbox = Sandbox::new();
+    let render = |file: &str, options: &str| {
+        sandbox.succeed(&format!(
+            "render builtin:mirror -o {file} {SMALL} {QUICK} {options}"
+        ));
+        sandbox.path(file)
+    };
+    render("radiance.exr", "");
+    let picture = Picture {
+        width: 40,
+        height: 30,
+        radiance: pixels(&sandbox, "radiance.exr"),
+    };
+    let shown = |path| image::open(path).expect("a PNG").to_rgba8().into_raw();
+    let plain = shown(render("plain.png", "--exposure 1"));
+    // Its lamp is white.
+    assert_eq!(
+        shown(render("lamps.png", "--exposure 1 --white-balance lamps")),
+        plain
+    );
+    let scene = nephroid::scene::Scene::default();
+    for white in ["3000", "0.4,0.38"] {
+        let found = shown(render(
+            "white.png",
+            &format!("--exposure 1 --white-balance {white}"),
+        ));
+        let matrix = white.parse::<WhiteBalance>().expect("a white").matrix(&scene);
+        let balanced = picture.clone().white_balanced(&matrix);
+        assert!(
+            found == tone_mapping::display_rgba8(&balanced, 1.0, ToneMap::default()),
+            "{white}"
+        );
+        assert!(found != plain, "{white}");
+    }
+    sandbox
+        .run(&format!(
+            "render builtin:mirror -o a.exr {SMALL} --white-balance 3000"
+        ))
+        .failed_in_one_sentence(2, &["--white-balance", "radiance"]);
+    for wrong in ["warm", "300", "0.8,0.4", "0.3"] {
+        let run = sandbox.run(&format!("render builtin:mirror -o a.png --white-balance {wrong}"));
+        assert_eq!(run.code, 2, "{wrong}");
+    }
 }
 
 #[test]

@@ -64,6 +64,7 @@ fn exact() -> ReferenceSettings {
             branch_threshold: 1e-10,
             ..ChainLimits::default()
         },
+        ..ReferenceSettings::default()
     }
 }
 

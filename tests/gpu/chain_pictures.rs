@@ -84,6 +84,7 @@ impl Exhibit {
                 branching_depth,
                 ..Default::default()
             },
+            ..Default::default()
         };
         let control = Default::default();
         reference::render(&self.tracer, &self.maps, &self.view, &settings, &(), &control)
@@ -142,7 +143,7 @@ fn shifted(picture: &Picture) -> Picture {
 }
 
 /// Writes a picture as it is shown where `NEPHROID_TEST_PICTURES` names a folder to look into.
-fn keep(name: &str, shown: &[u8], view: &View) {
+pub fn keep(name: &str, shown: &[u8], view: &View) {
     if let Some(folder) = std::env::var_os("NEPHROID_TEST_PICTURES") {
         let path = std::path::Path::new(&folder).join(format!("{name}.png"));
         image::save_buffer(path, shown, view.width, view.height, image::ColorType::Rgba8)

@@ -2,9 +2,10 @@
 
 use nephroid::eye_pass::renderer::Renderer;
 use nephroid::eye_pass::tone_mapping::{auto_exposure_stops, display_rgba8};
-use nephroid::eye_pass::{Picture, ToneMap, View};
+use nephroid::eye_pass::{Picture, ToneMap, View, WhiteBalance};
 use nephroid::gpu::{Gpu, readback};
 use nephroid::optics::LinearSrgb;
+use nephroid::optics::spectrum::xyz::{IDENTITY, Matrix3};
 use nephroid::scene::Scene;
 
 use crate::device::gpu;
@@ -23,9 +24,10 @@ fn ramp() -> (Scene, Vec<nephroid::illumination::IlluminationMap>) {
     (floor_scene(diffuse(LinearSrgb::WHITE)), maps)
 }
 
-fn shown(gpu: &Gpu, format: wgpu::TextureFormat, view: &View) -> Vec<u8> {
+fn shown(gpu: &Gpu, format: wgpu::TextureFormat, view: &View, white_balance: &Matrix3) -> Vec<u8> {
     let (scene, maps) = ramp();
     let mut renderer = Renderer::new(gpu, &scene, format, 1).expect("the scene is uploaded");
+    renderer.set_white_balance(gpu, white_balance);
     renderer.set_maps(gpu, &scene, &maps).expect("the maps fit");
     let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
         label: None,
@@ -67,7 +69,7 @@ fn device_and_processor_show_the_same_on_every_kind_of_target() {
                 wgpu::TextureFormat::Rgba8Unorm,
                 wgpu::TextureFormat::Rgba8UnormSrgb,
             ] {
-                let found = shown(&gpu, format, &view);
+                let found = shown(&gpu, format, &view, &IDENTITY);
                 assert_eq!(found.len(), expected.len());
                 let differences: Vec<u8> = found.iter().zip(&expected).map(|(a, b)| a.abs_diff(*b)).collect();
                 let sum: f64 = differences.iter().map(|difference| f64::from(*difference)).sum();
@@ -83,6 +85,31 @@ fn device_and_processor_show_the_same_on_every_kind_of_target() {
         }
     }
     assert!(brightest_seen >= 250, "the ramp reaches white: {brightest_seen}");
+}
+
+#[test]
+fn device_and_processor_balance_white_alike() {
+    let Some(gpu) = gpu() else { return };
+    let (scene, maps) = ramp();
+    let view = View {
+        tone_map: ToneMap::AgX,
+        ..from_above(SIZE)
+    };
+    let picture =
+        nephroid::eye_pass::renderer::render_offscreen(&gpu, &scene, &maps, &view).expect("it renders");
+    let as_it_is = display_rgba8(&picture, 0.0, ToneMap::AgX);
+    for white in ["2856", "9000K", "0.38,0.42"] {
+        let white: WhiteBalance = white.parse().expect("a white");
+        let matrix = white.matrix(&scene);
+        let expected = display_rgba8(&picture.clone().white_balanced(&matrix), 0.0, ToneMap::AgX);
+        let found = shown(&gpu, wgpu::TextureFormat::Rgba8Unorm, &view, &matrix);
+        let apart = |shown: &[u8]| {
+            let pairs = shown.iter().zip(&expected);
+            pairs.map(|(a, b)| a.abs_diff(*b)).max().unwrap_or(0)
+        };
+        assert!(apart(&found) <= 1, "{white}: {}", apart(&found));
+        assert!(apart(&as_it_is) > 8, "{white}: {}", apart(&as_it_is));
+    }
 }
 
 #[test]

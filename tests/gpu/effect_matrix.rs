@@ -3,7 +3,7 @@
 
 use std::sync::{Arc, LazyLock};
 
-use nephroid::effect::EffectSwitch;
+use nephroid::effect::{Effect, EffectSwitch, EffectSwitches};
 use nephroid::eye_pass::reference::{self, ChainLimits, EyeRays, ReferenceSettings};
 use nephroid::eye_pass::renderer::{EyeCounts, render_counted};
 use nephroid::eye_pass::{Picture, ToneMap, View};
@@ -72,7 +72,8 @@ impl Shown {
     }
 
     fn by_gpu(&self, gpu: &Gpu, chains: EffectSwitch) -> (Picture, EyeCounts) {
-        render_counted(gpu, &self.scene, &self.maps, &self.view, 1, chains).expect("it renders")
+        let effects = EffectSwitches::default().with(Effect::Chains, chains);
+        render_counted(gpu, &self.scene, &self.maps, &self.view, 1, &effects).expect("it renders")
     }
 
     fn by_cpu(&self, switch: EffectSwitch) -> (Picture, EyeRays) {

@@ -1,7 +1,7 @@
 //! Devices that are too small: what they cannot do is refused in a sentence, and the rest is drawn.
 
 use glam::DVec3;
-use nephroid::effect::EffectSwitch;
+use nephroid::effect::{Effect, EffectSwitch, EffectSwitches};
 use nephroid::eye_pass::renderer::{Renderer, render_counted};
 use nephroid::eye_pass::{Picture, ToneMap, View};
 use nephroid::gpu::Gpu;
@@ -37,8 +37,12 @@ fn view() -> View {
     }
 }
 
+fn switched(chains: EffectSwitch) -> EffectSwitches {
+    EffectSwitches::default().with(Effect::Chains, chains)
+}
+
 fn picture(gpu: &Gpu, (scene, maps): &(Scene, Vec<IlluminationMap>), chains: EffectSwitch) -> Picture {
-    let (picture, _) = render_counted(gpu, scene, maps, &view(), 1, chains).expect("it renders");
+    let (picture, _) = render_counted(gpu, scene, maps, &view(), 1, &switched(chains)).expect("it renders");
     assert_eq!(gpu.take_error(), None);
     picture
 }

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use glam::DVec3;
-use nephroid::effect::EffectSwitch;
+use nephroid::effect::{Effect, EffectSwitch, EffectSwitches};
 use nephroid::eye_pass::reference::{self, ChainLimits, ReferenceSettings};
 use nephroid::eye_pass::renderer::{MapStyle, Renderer, render_counted};
 use nephroid::eye_pass::{Picture, ToneMap, View};
@@ -236,7 +236,9 @@ fn built_in_scenes_look_the_same_on_auto_and_on() {
                 },
                 ..to_matte()
             };
-            let shown = |switch| render_counted(&gpu, &scene, &[], &view, 1, switch).expect("it renders");
+            let switched = |switch| EffectSwitches::default().with(Effect::Chains, switch);
+            let shown =
+                |switch| render_counted(&gpu, &scene, &[], &view, 1, &switched(switch)).expect("it renders");
             let ((auto, counts), (on, _)) = (shown(EffectSwitch::Auto), shown(EffectSwitch::On));
             assert!(bits(&auto) == bits(&on), "{name}");
             let line = plan::chains(&scene, Some((&view.camera, 1.5)), EffectSwitch::Auto);

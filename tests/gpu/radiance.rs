@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use glam::DVec2;
-use nephroid::effect::EffectSwitch;
+use nephroid::effect::{Effect, EffectSwitch, EffectSwitches};
 use nephroid::eye_pass::renderer::{Renderer, render_counted, render_offscreen, render_sampled};
 use nephroid::eye_pass::{Picture, View};
 use nephroid::gpu::Gpu;
@@ -396,8 +396,8 @@ fn meshes_beyond_a_small_devices_buffers_are_drawn_whole() {
         "{refusal}"
     );
     assert_eq!(renderer.counts().specular_pipelines, 0);
-    let (bare, _) =
-        render_counted(&gpu, &scene, &maps, &from_above(48), 1, EffectSwitch::Off).expect("it renders");
+    let off = EffectSwitches::default().with(Effect::Chains, EffectSwitch::Off);
+    let (bare, _) = render_counted(&gpu, &scene, &maps, &from_above(48), 1, &off).expect("it renders");
     assert_eq!(shown.radiance, bare.radiance);
     assert_eq!(small.take_error(), None);
 }

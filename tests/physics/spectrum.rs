@@ -1,7 +1,7 @@
 //! Lamps, their colours, and the wavelengths to follow.
 
 use nephroid::optics::spectrum::csv::read_lamp;
-use nephroid::optics::spectrum::temperature::correlated_temperature;
+use nephroid::optics::spectrum::temperature::{correlated_temperature, white_of_kelvin};
 use nephroid::optics::spectrum::xyz::{to_display_gamut, transformed, white_balance};
 use nephroid::optics::spectrum::{
     Spectrum, SpectrumError, WavelengthSampler, Xyz, illuminant, illuminants, xyz_bar,
@@ -210,6 +210,26 @@ fn white_balance_makes_a_lamp_white() {
 }
 
 #[test]
+fn light_of_a_temperature_has_its_published_chromaticity() {
+    // CIE 15:2018, tables of the D illuminants, and illuminant A by its temperature.
+    for (kelvin, x, y) in [
+        (2856.0, 0.4476, 0.4074),
+        (5003.0, 0.3457, 0.3585),
+        (5503.0, 0.3324, 0.3474),
+        (6504.0, 0.3127, 0.3290),
+        (7504.0, 0.2990, 0.3149),
+    ] {
+        let white = white_of_kelvin(kelvin);
+        let [found_x, found_y] = white.chromaticity().expect("light");
+        assert!(
+            (found_x - x).abs() < 3e-4 && (found_y - y).abs() < 3e-4,
+            "{kelvin}: {found_x} {found_y}"
+        );
+        assert!((white.y - 1.0).abs() < 1e-12);
+    }
+}
+
+#[test]
 fn correlated_temperatures_are_those_published() {
     // CIE 15:2018, which rounds the fluorescent lamps' to tens; a black body is as hot as itself.
     for (name, kelvin, tolerance) in [
@@ -327,6 +347,22 @@ fn the_rainbow_has_seven_colours_in_order() {
 fn names_are_found_in_any_case_and_misspelt_ones_are_answered() {
     assert_eq!(lamp(" led-b1 "), lamp("LEDB1"));
     assert_eq!(lamp("LASER: 532"), lamp("line:532"));
+    // Each goes by the name that the list has, and keeps it however bright it is made.
+    let called = |name: &str| {
+        let twice = lamp(name).to_luminous_equivalent(2.0).expect("a lamp");
+        twice.name().map(str::to_owned)
+    };
+    for (asked, known) in [
+        (" led-b1 ", "LED-B1"),
+        ("d65", "D65"),
+        ("a", "A"),
+        ("e", "E"),
+        ("Laser: 532", "line:532"),
+        ("Planck:2856.0", "blackbody:2856"),
+    ] {
+        assert_eq!(called(asked).as_deref(), Some(known));
+    }
+    assert_eq!(read_lamp("400,1\n500,2\n").expect("a lamp").name(), None);
     let message = |name: &str| illuminant(name).expect_err("no such lamp").to_string();
     assert!(
         message("D56").contains("D65") && message("D56").contains("D50"),

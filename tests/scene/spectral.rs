@@ -11,7 +11,7 @@ use nephroid::optics::wavelength::{C_LINE, D_LINE, F_LINE};
 use nephroid::optics::{LinearSrgb, Metal, Nanometres};
 use nephroid::plan::EffectLine;
 use nephroid::scene::builtin::{self, parts, shapes};
-use nephroid::scene::{Edit, Light, LoadOptions, Material, Scene, SurfaceKind};
+use nephroid::scene::{Edit, Light, LightKind, LoadOptions, Material, Scene, SurfaceKind};
 use nephroid::session::BakeSession;
 use nephroid::settings::BakeSettings;
 use serde_json::{Value, json};
@@ -235,6 +235,7 @@ fn a_lamp_takes_the_spectrum_of_its_node_or_else_of_its_light() {
         let light = &scene.lights[0];
         let named = illuminant(name).expect("a lamp");
         assert_eq!(spectrum_of(light), &named, "{name}");
+        assert_eq!(spectrum_of(light).name(), Some(name));
         assert_close(spectrum_of(light).luminous_flux_lm(), 683.0, 1e-12, "one watt");
         // Candela stay luminous, and the colour is that of the spectrum.
         assert_close(light.strength().luminance(), 100.0 / 683.0, 1e-9, name);
@@ -262,6 +263,60 @@ fn flat_lamps_have_spectra_too() {
     let scene = file.scene();
     assert_eq!(spectrum_of(&scene.lights[0]), &illuminant("FL2").expect("a lamp"));
     assert_close(scene.lights[0].strength().luminance(), 1.0, 1e-9, "radiance");
+}
+
+/// A triangle that glows with 683 cd/m² per channel of its emissive factor, and a spectrum.
+fn glowing(spectrum: Value, factor: [f64; 3]) -> Glb {
+    Glb::triangle().with_material(json!({
+        "name": "glow",
+        "pbrMetallicRoughness": { "metallicFactor": 0.0 },
+        "emissiveFactor": factor,
+        "extensions": { "KHR_materials_emissive_strength": { "emissiveStrength": 683.0 } },
+        "extras": { "spectrum": spectrum },
+    }))
+}
+
+#[test]
+fn what_glows_has_a_spectrum_too() {
+    let scene = glowing(json!("FL2"), [0.5; 3]).scene();
+    let light = &scene.lights[0];
+    let named = illuminant("FL2").expect("a lamp");
+    assert!(matches!(light.kind, LightKind::Surface { .. }));
+    assert_eq!(spectrum_of(light), &named);
+    // As bright as stated, in the colour of the spectrum.
+    assert_close(light.strength().luminance(), 0.5, 1e-9, "radiance");
+    let off = light.colour - named.xyz().to_linear_srgb();
+    assert!(off.map(f64::abs).max_channel() < 1e-9, "{:?}", light.colour);
+    let seen = scene.emitted_radiance(0) - scene.material_of(0).emitted_radiance;
+    assert!(
+        seen.map(f64::abs).max_channel() < 1e-9,
+        "what is seen is what lights"
+    );
+    assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
+}
+
+#[test]
+fn a_glow_says_what_its_spectrum_takes_the_place_of() {
+    let coloured = glowing(json!("E"), [0.5, 0.25, 0.1]).scene();
+    assert_warned(
+        &coloured,
+        &["material `glow`", "colour of its light was left out"],
+    );
+    let expected = LinearSrgb::new(0.5, 0.25, 0.1).luminance();
+    assert_close(
+        coloured.lights[0].strength().luminance(),
+        expected,
+        1e-6,
+        "radiance",
+    );
+    let dark = glowing(json!("E"), [0.0; 3]).scene();
+    assert!(dark.lights.is_empty());
+    assert_warned(&dark, &["material `glow`", "sends no light"]);
+    let refusal = glowing(json!("D66"), [1.0; 3]).refusal();
+    assert!(
+        refusal.contains("material `glow`") && refusal.contains("D65"),
+        "{refusal}"
+    );
 }
 
 #[test]
@@ -293,6 +348,7 @@ fn a_lamp_may_be_measured_in_a_table_beside_the_scene() {
     let scene = beside("my lamp.CSV", &[("my lamp.CSV", table)]).expect("a sound lamp");
     let spectrum = spectrum_of(&scene.lights[0]);
     assert_eq!(spectrum.wavelengths_nm(), [500.0, 600.0]);
+    assert_eq!(spectrum.name(), Some("my lamp.CSV"));
     let [first, last] = [500.0, 600.0].map(|nm| spectrum.at(Nanometres(nm)));
     assert_close(last / first, 3.0, 1e-12, "shape");
     assert_close(spectrum.luminous_flux_lm(), 683.0, 1e-12, "one watt");

@@ -17,6 +17,7 @@ fn chains_keep_to_their_laws() {
                 branch_threshold: 1e-10,
                 ..Default::default()
             },
+            ..Default::default()
         };
         let picture = render(&tracer, &[], &law.view, &settings, &(), &Default::default());
         law.assert_kept(&picture.expect("nobody cancels"), 1e-6);

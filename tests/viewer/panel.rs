@@ -709,6 +709,7 @@ fn every_control_says_what_it_does_to_accuracy_and_cost() {
         "Item buffer",
         "Map size [texels]",
         "Exposure [stops]",
+        "White balance",
         "Tone map",
         "Light shown",
         "Map shown",

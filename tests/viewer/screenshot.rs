@@ -5,6 +5,7 @@ use std::path::Path;
 use nephroid::export::FloatImage;
 use nephroid::eye_pass::{Picture, ToneMap, View, tone_mapping};
 use nephroid::optics::LinearSrgb;
+use nephroid::optics::spectrum::xyz::IDENTITY;
 use nephroid::scene::Camera;
 use nephroid::viewer::screenshot;
 
@@ -32,7 +33,8 @@ fn view() -> View {
 }
 
 fn save(folder: &Path, scene: &str, has_radiance: bool) -> Vec<String> {
-    let files = screenshot::save(folder, scene, &picture(), &view(), has_radiance).expect("it is saved");
+    let files =
+        screenshot::save(folder, scene, &picture(), &view(), &IDENTITY, has_radiance).expect("it is saved");
     let name = |file: &std::path::PathBuf| {
         assert_eq!(file.parent(), Some(folder), "nothing leads elsewhere");
         assert!(file.is_file(), "{}", file.display());
@@ -84,7 +86,7 @@ fn a_scenes_name_forms_no_path() {
 fn a_place_that_cannot_be_written_is_told_in_one_sentence() {
     let folder = tempfile::tempdir().expect("a folder");
     let gone = folder.path().join("gone");
-    let error = screenshot::save(&gone, "ring", &picture(), &view(), true).expect_err("no folder");
+    let error = screenshot::save(&gone, "ring", &picture(), &view(), &IDENTITY, true).expect_err("no folder");
     let sentence = error.to_string();
     assert!(
         sentence.contains("gone") && sentence.contains("folder does not exist"),

@@ -1,6 +1,8 @@
 //! The eye pass on the CPU: a ray tracer that follows every chain of mirrors and glass, the measure for the GPU's.
+//! Chains are one path in RGB until they meet glass that parts wavelengths, and from there one for each of several.
 
 mod radiance;
+mod spectral;
 
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -15,6 +17,7 @@ use crate::progress::{Control, Progress, Stage};
 use crate::scene::Camera;
 use crate::transport::{MediumStack, Tracer, media_at};
 use radiance::{LitScene, visible_hit};
+use spectral::SpectralScene;
 
 pub use radiance::{ChainLimits, EyeRays};
 
@@ -25,6 +28,23 @@ pub struct ReferenceSettings {
     pub samples_per_side: u32,
     /// How far chains are followed.
     pub limits: ChainLimits,
+    /// Wavelengths at which each sample is followed from where it meets glass that parts them; 0 for one path by the
+    /// index at 587.56 nm.
+    pub wavelengths: u32,
+}
+
+impl ReferenceSettings {
+    /// The default, or without wavelengths where dispersion is switched off.
+    pub fn switched(dispersion: EffectSwitch) -> Self {
+        let settings = Self::default();
+        match dispersion {
+            EffectSwitch::Auto | EffectSwitch::On => settings,
+            EffectSwitch::Off => Self {
+                wavelengths: 0,
+                ..settings
+            },
+        }
+    }
 }
 
 impl Default for ReferenceSettings {
@@ -32,6 +52,7 @@ impl Default for ReferenceSettings {
         Self {
             samples_per_side: 1,
             limits: ChainLimits::default(),
+            wavelengths: 16,
         }
     }
 }
@@ -67,30 +88,42 @@ pub fn render_counted(
 ) -> Result<(Picture, EyeRays)> {
     let lit = LitScene::new(tracer, maps, view.background, settings.limits);
     let sides = settings.samples_per_side.max(1);
+    let spectra = SpectralScene::of_samples(tracer, settings.wavelengths, sides * sides);
+    let looks = Looks { view, sides, spectra };
     match settings.limits.switch {
         EffectSwitch::Auto | EffectSwitch::On => {
             let media = media_at(tracer, view.camera.position);
-            trace::<true>(&lit, media, view, sides, progress, control)
+            trace::<true>(&lit, media, &looks, progress, control)
         }
         // Bodies that are left out surround nobody.
-        EffectSwitch::Off => trace::<false>(&lit, MediumStack::default(), view, sides, progress, control),
+        EffectSwitch::Off => trace::<false>(&lit, MediumStack::default(), &looks, progress, control),
     }
+}
+
+/// How the samples of a picture look.
+struct Looks<'a> {
+    view: &'a View,
+    /// Samples across and down a pixel.
+    sides: u32,
+    /// By sample.
+    spectra: Vec<SpectralScene>,
 }
 
 fn trace<const CHAINS: bool>(
     lit: &LitScene<'_>,
     media: MediumStack,
-    view: &View,
-    side: u32,
+    looks: &Looks<'_>,
     progress: &dyn Progress,
     control: &Control,
 ) -> Result<(Picture, EyeRays)> {
+    let (view, side) = (looks.view, looks.sides);
     let done = AtomicU64::new(0);
     let pixel = |column: u32, row: u32, rays: &mut EyeRays| {
         let mut sum = LinearSrgb::BLACK;
-        for sample in 0..side * side {
+        for (sample, spectrum) in (0..).zip(&looks.spectra) {
             let within = [sample % side, sample / side].map(|s| (f64::from(s) + 0.5) / f64::from(side));
-            sum += lit.radiance::<CHAINS>(eye_ray(view, [column, row], within), media, rays);
+            let ray = eye_ray(view, [column, row], within);
+            sum += lit.radiance::<CHAINS>(ray, media, spectrum, rays);
         }
         let mean = sum / f64::from(side * side);
         mean.to_array().map(|channel| channel as f32)

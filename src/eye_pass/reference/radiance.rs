@@ -10,6 +10,8 @@ use crate::optics::LinearSrgb;
 use crate::scene::SurfaceKind;
 use crate::transport::{Branch, MediumStack, SurfaceHit, Tracer};
 
+use super::spectral::{SceneAtWavelength, SpectralScene};
+
 /// How far chains are followed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ChainLimits {
@@ -42,6 +44,8 @@ pub struct EyeRays {
     pub camera_rays: u64,
     /// Further ones, each after a specular surface.
     pub chain_rays: u64,
+    /// Those of them that were followed at one wavelength.
+    pub rays_by_wavelength: u64,
 }
 
 impl std::ops::Add for EyeRays {
@@ -51,6 +55,7 @@ impl std::ops::Add for EyeRays {
         Self {
             camera_rays: self.camera_rays + other.camera_rays,
             chain_rays: self.chain_rays + other.chain_rays,
+            rays_by_wavelength: self.rays_by_wavelength + other.rays_by_wavelength,
         }
     }
 }
@@ -73,13 +78,27 @@ struct MapTotal<'a> {
 }
 
 /// A ray on its way from the eye.
-struct Gaze {
+#[derive(Clone, Copy)]
+struct Gaze<'a> {
     ray: Ray,
     media: MediumStack,
     /// Share of the pixel's radiance that the ray brings, per channel.
     weight: LinearSrgb,
     /// Specular surfaces met so far.
     depth: u32,
+    /// The wavelength that it is followed at; `None` where it stands for all of them.
+    at: Option<&'a SceneAtWavelength>,
+}
+
+impl Gaze<'_> {
+    /// What a radiance at its end adds to the pixel's.
+    fn brings(&self, radiance: LinearSrgb) -> LinearSrgb {
+        let brought = self.weight * radiance;
+        match self.at {
+            Some(at) => at.seen.of(brought),
+            None => brought,
+        }
+    }
 }
 
 impl<'a> LitScene<'a> {
@@ -108,12 +127,13 @@ impl<'a> LitScene<'a> {
         }
     }
 
-    /// Radiance [W/(m² sr)] that arrives against a ray which starts within `media`. Without `CHAINS` the ray ends at the
-    /// first surface that is not clear.
+    /// Radiance [W/(m² sr)] that arrives against a ray which starts within `media`, at the wavelengths of `spectrum`
+    /// where it is parted. Without `CHAINS` the ray ends at the first surface that is not clear.
     pub fn radiance<const CHAINS: bool>(
         &self,
         ray: Ray,
         media: MediumStack,
+        spectrum: &SpectralScene,
         rays: &mut EyeRays,
     ) -> LinearSrgb {
         rays.camera_rays += 1;
@@ -123,35 +143,57 @@ impl<'a> LitScene<'a> {
             media,
             weight: LinearSrgb::WHITE,
             depth: 0,
+            at: None,
         }];
         while let Some(mut gaze) = waiting.pop() {
             let Some((hit, distance_m)) = nearest::<CHAINS>(self.tracer, gaze.ray) else {
-                seen += gaze.weight * self.beyond(gaze.ray.direction);
+                seen += gaze.brings(self.beyond(gaze.ray.direction));
                 continue;
             };
             if CHAINS {
                 gaze.weight = gaze.weight * gaze.media.transmittance(self.tracer.scene(), distance_m);
             }
-            let incident = gaze.ray.direction;
-            let interaction = self.tracer.interact(&hit, incident, &gaze.media);
-            let side = Side::met(incident, hit.geometric_normal);
-            seen += gaze.weight * self.own_radiance(&hit, side, interaction.deposit);
-            if !CHAINS {
-                break;
+            if CHAINS && gaze.at.is_none() && spectrum.parts(self.tracer, &hit, &gaze.media) {
+                for at in &spectrum.wavelengths {
+                    let at = Some(at);
+                    seen += self.meet::<CHAINS>(Gaze { at, ..gaze }, &hit, &mut waiting, rays);
+                }
+            } else {
+                seen += self.meet::<CHAINS>(gaze, &hit, &mut waiting, rays);
             }
-            let [back, through] = [interaction.reflection, interaction.transmission]
-                .map(|branch| branch.and_then(|branch| self.followed(&gaze, &branch)));
-            let is_through_stronger = match (&back, &through) {
-                (Some(back), Some(through)) => through.weight.max_channel() >= back.weight.max_channel(),
-                _ => through.is_some(),
-            };
-            let follows_both = gaze.depth < self.limits.branching_depth;
-            let back = back.filter(|_| follows_both || !is_through_stronger);
-            let through = through.filter(|_| follows_both || is_through_stronger);
-            for next in [back, through].into_iter().flatten() {
-                rays.chain_rays += 1;
-                waiting.push(next);
-            }
+        }
+        seen
+    }
+
+    /// What a gaze sees of the surface that it meets; the ways on wait.
+    fn meet<'b, const CHAINS: bool>(
+        &self,
+        gaze: Gaze<'b>,
+        hit: &SurfaceHit,
+        waiting: &mut Vec<Gaze<'b>>,
+        rays: &mut EyeRays,
+    ) -> LinearSrgb {
+        let incident = gaze.ray.direction;
+        let tracer = gaze.at.map_or(self.tracer, |at| &at.tracer);
+        let interaction = tracer.interact(hit, incident, &gaze.media);
+        let side = Side::met(incident, hit.geometric_normal);
+        let seen = gaze.brings(self.own_radiance(hit, side, interaction.deposit));
+        if !CHAINS {
+            return seen;
+        }
+        let [back, through] = [interaction.reflection, interaction.transmission]
+            .map(|branch| branch.and_then(|branch| self.followed(&gaze, &branch)));
+        let is_through_stronger = match (&back, &through) {
+            (Some(back), Some(through)) => through.weight.max_channel() >= back.weight.max_channel(),
+            _ => through.is_some(),
+        };
+        let follows_both = gaze.depth < self.limits.branching_depth;
+        let back = back.filter(|_| follows_both || !is_through_stronger);
+        let through = through.filter(|_| follows_both || is_through_stronger);
+        for next in [back, through].into_iter().flatten() {
+            rays.chain_rays += 1;
+            rays.rays_by_wavelength += u64::from(next.at.is_some());
+            waiting.push(next);
         }
         seen
     }
@@ -181,7 +223,7 @@ impl<'a> LitScene<'a> {
 
     /// The gaze along a branch, unless it lies beyond the limits. Radiance through a refraction scales by the square
     /// of n on the eye's side over n on the far side.
-    fn followed(&self, gaze: &Gaze, branch: &Branch) -> Option<Gaze> {
+    fn followed<'b>(&self, gaze: &Gaze<'b>, branch: &Branch) -> Option<Gaze<'b>> {
         let weight = gaze.weight * branch.share * (branch.ior_ratio * branch.ior_ratio);
         let within = gaze.depth < self.limits.max_depth
             && weight.max_channel() > 0.0
@@ -191,6 +233,7 @@ impl<'a> LitScene<'a> {
             media: branch.media,
             weight,
             depth: gaze.depth + 1,
+            at: gaze.at,
         })
     }
 }

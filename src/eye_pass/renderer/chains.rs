@@ -9,7 +9,7 @@ use wgpu::util::DeviceExt;
 use super::bindings::bind_group;
 use super::geometry::Geometry;
 use super::storage::Storage;
-use super::uniforms::{ChainStart, LightRecord, Node, Triangle, rgb};
+use super::uniforms::{ChainStart, LightRecord, Node, SeenWavelengths, Triangle, rgb};
 use crate::error::{Error, Result};
 use crate::eye_pass::View;
 use crate::eye_pass::reference::ChainLimits;
@@ -123,21 +123,27 @@ impl ChainScene {
         layout: &wgpu::BindGroupLayout,
         geometry: &Geometry,
         start: &ChainStart,
+        wavelengths: &SeenWavelengths,
     ) -> Option<wgpu::BindGroup> {
-        let buffer = gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-            label: Some("start of chains"),
-            contents: bytemuck::bytes_of(start),
-            usage: wgpu::BufferUsages::UNIFORM,
-        });
+        let uniform = |label, contents| {
+            gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+                label: Some(label),
+                contents,
+                usage: wgpu::BufferUsages::UNIFORM,
+            })
+        };
+        let start = uniform("start of chains", bytemuck::bytes_of(start));
+        let wavelengths = uniform("wavelengths", bytemuck::bytes_of(wavelengths));
         let page = geometry.pages.first()?;
         let resources = [
-            buffer.as_entire_binding(),
+            start.as_entire_binding(),
             self.nodes.binding(),
             self.triangles.binding(),
             page.corners.as_entire_binding(),
             page.map_uvs.as_entire_binding(),
             page.indices.as_entire_binding(),
             self.lights.binding(),
+            wavelengths.as_entire_binding(),
         ];
         Some(bind_group(gpu, "chains", layout, resources))
     }

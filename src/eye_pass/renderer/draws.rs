@@ -29,6 +29,8 @@ pub(super) struct Manner {
     pub(super) traces_lights: bool,
     /// Whether an environment is seen.
     pub(super) has_sky: bool,
+    /// Whether anything that chains may meet parts wavelengths.
+    pub(super) parts_wavelengths: bool,
 }
 
 impl Manner {
@@ -75,6 +77,7 @@ impl Manner {
                 _ => look.has_bumps,
             },
             has_sky: self.has_sky,
+            parts_wavelengths: self.parts_wavelengths,
         };
         PipelineKey::new(writes, look.surface, faces, how)
     }

@@ -64,6 +64,7 @@ use crate::effect::EffectSwitch;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::illumination::IlluminationMap;
+use crate::optics::spectrum::xyz::Matrix3;
 use crate::scene::Scene;
 
 /// Most that illumination maps take on the device unless it is told otherwise [bytes].
@@ -105,6 +106,7 @@ pub struct Renderer {
     drawn_view: Option<View>,
     map_style: MapStyle,
     chains: EffectSwitch,
+    dispersion: EffectSwitch,
     quality: EyeQuality,
     /// Whether light straight from the lamps is traced.
     traces_lights: bool,
@@ -156,6 +158,7 @@ impl Renderer {
             drawn_view: None,
             map_style: MapStyle::default(),
             chains: EffectSwitch::default(),
+            dispersion: EffectSwitch::default(),
             quality: EyeQuality::default(),
             traces_lights: false,
             timing: Timing::new(gpu),
@@ -253,6 +256,21 @@ impl Renderer {
             }
         }
         gpu.take_error().map_or(Ok(()), Err)
+    }
+
+    /// Switches what glass that parts wavelengths does to what is seen through it, from the next picture on; off, it
+    /// bends all light as at 587.56 nm. Auto and on are the same here: without such glass there is nothing to prepare.
+    pub fn set_dispersion(&mut self, switch: EffectSwitch) {
+        self.dispersion = switch;
+        self.drawn_view = None;
+    }
+
+    /// Multiplies radiance by a matrix of [`WhiteBalance::matrix`](super::WhiteBalance::matrix) before tone mapping,
+    /// from the next picture on. Radiance that is read back stays as it is.
+    pub fn set_white_balance(&mut self, gpu: &Gpu, matrix: &Matrix3) {
+        if self.tone_mapping.set_white_balance(gpu, matrix) {
+            self.drawn_view = None;
+        }
     }
 
     /// Why mirrors and glass are drawn without what is seen in them though that was called for: the scene is too large
@@ -385,6 +403,7 @@ impl Renderer {
             has_tinted_glass: self.objects.has_tinted_glass(),
             has_bumps: self.objects.has_bumps(),
             has_sky: self.shows_sky(),
+            parts_wavelengths: self.dispersion != EffectSwitch::Off && !self.objects.glasses.is_empty(),
         }
     }
 }

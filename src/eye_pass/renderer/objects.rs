@@ -10,6 +10,7 @@ use super::uniforms::{ObjectRecord, rgb};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::illumination::{Chart, Receiver};
+use crate::optics::glass::Dispersion;
 use crate::scene::{Material, Mesh, Scene, SurfaceKind};
 
 /// What an object looks like but for its map.
@@ -27,12 +28,17 @@ pub(super) struct Look {
     base_colour_texture: Option<usize>,
 }
 
+/// Glasses that can part wavelengths in one scene; as many as the shader's uniform has room for.
+const MOST_GLASSES: usize = 128;
+
 /// All objects with the images they share.
 #[derive(Debug)]
 pub(super) struct Objects {
     pub(super) list: Vec<Look>,
     pub(super) images: Images,
     pub(super) records: Storage,
+    /// Each glass that parts wavelengths once.
+    pub(super) glasses: Vec<Dispersion>,
     /// Map texels per metre of each receiver that has a map.
     texels_per_m: Vec<Option<f64>>,
     /// Largest radiance that any surface sends out by itself or from its map [W/(m² sr)].
@@ -45,6 +51,7 @@ impl Objects {
             list: Vec::new(),
             images: Images::new(gpu, scene, map_budget_bytes),
             records: Storage::new(gpu, "objects"),
+            glasses: Vec::new(),
             texels_per_m: vec![None; 2 * scene.objects.len()],
             peak_radiance: 0.0,
         };
@@ -59,8 +66,33 @@ impl Objects {
         self.list = (0..scene.objects.len())
             .map(|object| Look::of(scene, object))
             .collect();
+        self.number_glasses(scene);
         uploaded += self.write_records(gpu);
         uploaded
+    }
+
+    /// Tells the glasses that part wavelengths apart.
+    fn number_glasses(&mut self, scene: &Scene) {
+        self.glasses.clear();
+        for (object, look) in self.list.iter_mut().enumerate() {
+            let material = scene.material_of(object);
+            let Some(glass) = material.glass.as_ref().filter(|_| material.is_dispersive()) else {
+                continue;
+            };
+            let known = self.glasses.iter().position(|known| *known == glass.dispersion);
+            let place = known.unwrap_or(self.glasses.len());
+            if place == MOST_GLASSES {
+                log::warn!(
+                    "`{}` is one glass more than the {MOST_GLASSES} seen by wavelength",
+                    glass.name
+                );
+                continue;
+            }
+            if known.is_none() {
+                self.glasses.push(glass.dispersion);
+            }
+            look.record.glass = place as u32 + 1;
+        }
     }
 
     /// Replaces all maps; objects without one turn dark. Only what differs from the maps before is uploaded.
@@ -171,8 +203,8 @@ impl Look {
                 bumps: NO_IMAGE,
                 polish: material.polish as f32,
                 back_map: NO_IMAGE,
+                glass: 0,
                 padding0: 0,
-                padding1: 0,
             },
             base_colour_texture: material.base_colour_texture.as_ref().map(|image| image.texture),
         }

@@ -3,9 +3,10 @@
 use half::f16;
 
 use super::accumulation::Mean;
+use super::draws::visible_objects;
 use super::quality::Sample;
 use super::{EyeCounts, EyeQuality, Renderer};
-use crate::effect::EffectSwitch;
+use crate::effect::{Effect, EffectSwitches};
 use crate::error::Result;
 use crate::eye_pass::{Picture, View};
 use crate::gpu::{Gpu, readback};
@@ -24,6 +25,8 @@ const LARGEST_OVER_SURFACES: f64 = 1024.0;
 const CUT_SCALED: f64 = 500.0;
 /// Places across and down a pixel of a picture that is drawn anew to be kept.
 const ANEW_SIDE: u32 = 2;
+/// Least pictures of a view in which chains go on by wavelength: 48 wavelengths.
+const LEAST_PARTED: u32 = 16;
 
 impl Renderer {
     /// Radiance per pixel [W/(m² sr)] of a view, looked at through the centres of its pixels, in the precision of half
@@ -35,7 +38,8 @@ impl Renderer {
         self.radiance_sampled(gpu, view, 1)
     }
 
-    /// Mean radiance of `samples_per_side`² places of each pixel, those of the CPU eye pass.
+    /// Mean radiance of `samples_per_side`² places of each pixel, those of the CPU eye pass; of at least 16 pictures
+    /// where chains go on by wavelength, which each of them follows few of.
     ///
     /// # Errors
     /// Those of [`radiance`](Self::radiance).
@@ -43,7 +47,8 @@ impl Renderer {
         let side = samples_per_side.max(1);
         self.make_sky(gpu);
         let scale = self.scale(view);
-        for index in 0..side * side {
+        let pictures = self.pictures(view, side * side);
+        for index in 0..pictures {
             let mut encoder = gpu
                 .device
                 .create_command_encoder(&wgpu::CommandEncoderDescriptor {
@@ -51,7 +56,7 @@ impl Renderer {
                 });
             let sample = Sample::of_grid(index, side);
             self.draw_radiance(gpu, &mut encoder, view, scale, sample)?;
-            if side > 1 {
+            if pictures > 1 {
                 self.add_to_mean(gpu, &mut encoder, index == 0);
             }
             let has_specular = self.drawn[1] > 0;
@@ -60,7 +65,7 @@ impl Renderer {
             }
             gpu.queue.submit([encoder.finish()]);
         }
-        let radiance = if side > 1 {
+        let radiance = if pictures > 1 {
             self.read_mean(gpu, scale)?
         } else {
             self.read_resolved(gpu, scale)?
@@ -98,6 +103,18 @@ impl Renderer {
             height: view.height,
             radiance,
         })
+    }
+
+    /// Pictures of a view, of whose pixels so many places are looked at: enough for all colours.
+    fn pictures(&self, view: &View, places: u32) -> u32 {
+        let manner = self.manner();
+        let is_chain = |object: &usize| manner.is_specular(&self.objects.list[*object]);
+        let has_chains = || visible_objects(&self.objects, view).iter().any(is_chain);
+        if manner.parts_wavelengths && has_chains() {
+            LEAST_PARTED.div_ceil(places) * places
+        } else {
+            places
+        }
     }
 
     /// By which radiance fits half floats.
@@ -190,11 +207,18 @@ pub fn render_sampled(
     view: &View,
     samples_per_side: u32,
 ) -> Result<Picture> {
-    let counted = render_counted(gpu, scene, maps, view, samples_per_side, EffectSwitch::Auto)?;
+    let counted = render_counted(
+        gpu,
+        scene,
+        maps,
+        view,
+        samples_per_side,
+        &EffectSwitches::default(),
+    )?;
     Ok(counted.0)
 }
 
-/// [`render_sampled`] with chains switched, and what was made and drawn for it.
+/// [`render_sampled`] with chains and dispersion switched, and what was made and drawn for it.
 ///
 /// # Errors
 /// Those of [`render_offscreen`].
@@ -204,12 +228,13 @@ pub fn render_counted(
     maps: &[IlluminationMap],
     view: &View,
     samples_per_side: u32,
-    chains: EffectSwitch,
+    effects: &EffectSwitches,
 ) -> Result<(Picture, EyeCounts)> {
     let mut renderer = Renderer::new(gpu, scene, wgpu::TextureFormat::Rgba8Unorm, 1)?;
     renderer.set_quality(EyeQuality::STILL);
     renderer.set_maps(gpu, scene, maps)?;
-    renderer.set_chains(gpu, chains)?;
+    renderer.set_chains(gpu, effects.get(Effect::Chains))?;
+    renderer.set_dispersion(effects.get(Effect::Dispersion));
     let picture = renderer.radiance_sampled(gpu, view, samples_per_side)?;
     Ok((picture, renderer.counts()))
 }

@@ -11,12 +11,13 @@ use super::quality::{EyeQuality, Sample};
 use super::sky::Sky;
 use super::targets::{Targets, TracedTargets};
 use super::timing::Timing;
-use super::uniforms::{Frame, rgb};
+use super::uniforms::{Frame, SeenWavelengths, rgb};
 use super::{MapStyle, Renderer};
 use crate::effect::EffectSwitch;
 use crate::error::Result;
 use crate::eye_pass::View;
 use crate::eye_pass::reference::ChainLimits;
+use crate::eye_pass::wavelengths;
 use crate::gpu::Gpu;
 use crate::optics::LinearSrgb;
 
@@ -50,7 +51,7 @@ impl Renderer {
         let frame = self.frame(view, radiance_scale, sample, quality);
         let needs_scene = list.all().any(|draw| draw.key.writes.goes_through_scene());
         let through_scene = needs_scene
-            .then(|| self.bind_chains(gpu, view, quality))
+            .then(|| self.bind_chains(gpu, view, quality, sample))
             .flatten();
         if let Some(chains) = &through_scene {
             let traced = Frame {
@@ -88,14 +89,25 @@ impl Renderer {
     }
 
     /// Binds what rays are traced through; `None` where nothing traces.
-    fn bind_chains(&self, gpu: &Gpu, view: &View, quality: EyeQuality) -> Option<wgpu::BindGroup> {
+    fn bind_chains(
+        &self,
+        gpu: &Gpu,
+        view: &View,
+        quality: EyeQuality,
+        sample: Sample,
+    ) -> Option<wgpu::BindGroup> {
         let (scene, layout) = (self.chain_scene.as_ref()?, self.surfaces.traced_layout()?);
         let limits = ChainLimits {
             branching_depth: quality.branching_depth,
             ..ChainLimits::default()
         };
         let start = scene.start(view, &limits, self.traces_lights);
-        scene.bind(gpu, layout, &self.geometry, &start)
+        let wavelengths = if self.manner().parts_wavelengths {
+            SeenWavelengths::of(&wavelengths::of_picture(sample.picture), &self.objects.glasses)
+        } else {
+            SeenWavelengths::default()
+        };
+        scene.bind(gpu, layout, &self.geometry, &start, &wavelengths)
     }
 
     /// Traces the chains of what is specular in view.

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use super::bindings::{bind_group_layout, pipeline_layout, storage, texture, uniform};
 use super::geometry::{CORNER_LAYOUT, MAP_UV_LAYOUT};
 use super::objects::surface_code;
-use super::shaders::{COMPOSED, SURFACE, TRACED, TRACED_UNDER_SKY, UNDER_LIGHTS};
+use super::shaders::{COMPOSED, PARTED, PARTED_UNDER_SKY, SURFACE, TRACED, TRACED_UNDER_SKY, UNDER_LIGHTS};
 use super::sky;
 use crate::gpu::Gpu;
 use crate::gpu::shader::Program;
@@ -101,6 +101,8 @@ pub(super) struct DrawnHow {
     pub(super) has_bumps: bool,
     /// Whether chains that leave the scene end in an environment.
     pub(super) has_sky: bool,
+    /// Whether chains go on by wavelength where glass parts light.
+    pub(super) parts_wavelengths: bool,
 }
 
 impl PipelineKey {
@@ -132,6 +134,7 @@ impl PipelineKey {
                 has_bumps: how.has_bumps
                     && (writes == Writes::Traced || (shows_itself && surface == SurfaceKind::Mixed)),
                 has_sky: how.has_sky && writes == Writes::Traced,
+                parts_wavelengths: how.parts_wavelengths && writes == Writes::Traced,
             },
         }
     }
@@ -141,8 +144,12 @@ impl PipelineKey {
         match self.writes {
             Writes::Own | Writes::MapValue | Writes::Depth => SURFACE,
             Writes::OwnUnderLights => UNDER_LIGHTS,
-            Writes::Traced if self.how.has_sky => TRACED_UNDER_SKY,
-            Writes::Traced => TRACED,
+            Writes::Traced => match (self.how.parts_wavelengths, self.how.has_sky) {
+                (false, false) => TRACED,
+                (false, true) => TRACED_UNDER_SKY,
+                (true, false) => PARTED,
+                (true, true) => PARTED_UNDER_SKY,
+            },
             Writes::Composed => COMPOSED,
         }
     }
@@ -252,6 +259,7 @@ impl SurfacePipelines {
             storage(),
             storage(),
             storage(),
+            uniform(wgpu::ShaderStages::FRAGMENT),
         ];
         self.traced_layout
             .get_or_insert_with(|| bind_group_layout(gpu, "chains", &chains));

@@ -56,6 +56,8 @@ pub(super) struct Sample {
     pub(super) offset: [f64; 2],
     /// Added to the level of images.
     pub(super) level_bias: f64,
+    /// Number of the picture among those of its view, which chooses its wavelengths.
+    pub(super) picture: u32,
 }
 
 impl Sample {
@@ -63,6 +65,7 @@ impl Sample {
     pub(super) const CENTRE: Self = Self {
         offset: [0.0; 2],
         level_bias: 0.0,
+        picture: 0,
     };
 
     /// The same for the traced picture: where it is coarser than the picture, its own pixels are shared out.
@@ -70,12 +73,14 @@ impl Sample {
         self.offset.map(|offset| offset / quality.traced_scale.min(1.0))
     }
 
-    /// One of `side`² places that share out a pixel evenly, those of the CPU eye pass.
+    /// One of `side`² places that share out a pixel evenly, those of the CPU eye pass, in turn.
     pub(super) fn of_grid(index: u32, side: u32) -> Self {
         let place = |index: u32| (f64::from(index) + 0.5) / f64::from(side) - 0.5;
         Self {
-            offset: [place(index % side), place(index / side)],
+            offset: [place(index % side), place(index / side % side)],
             level_bias: -f64::from(side).log2(),
+            // Many pictures are made: none has to show all colours by itself.
+            picture: index + 1,
         }
     }
 
@@ -87,6 +92,7 @@ impl Sample {
             offset: STEPS.map(|step| (0.5 + step * f64::from(index)).fract() - 0.5),
             // A pixel's mean blurs enough by itself.
             level_bias: -1.0,
+            picture: index,
         }
     }
 }

@@ -4,7 +4,8 @@ use super::geometry::{CORNER_LAYOUT, MAP_UV_LAYOUT};
 use super::pipelines::{DrawnHow, Faces, PipelineKey, Writes};
 use super::tone_mapping;
 use super::uniforms::{
-    Accumulation, ChainStart, Frame, LightRecord, Node, ObjectRecord, ProbeHit, ProbeRay, Triangle,
+    Accumulation, ChainStart, DisplayWhite, Frame, LightRecord, Node, ObjectRecord, ProbeHit, ProbeRay,
+    SeenWavelengths, Triangle,
 };
 use crate::eye_pass::ToneMap;
 use crate::gpu::layout::StructLayout;
@@ -44,6 +45,7 @@ pub(super) const TRACED: Program = Program {
         shader_source!("eye_pass/start"),
         shader_source!("eye_pass/lights"),
         shader_source!("eye_pass/corners"),
+        shader_source!("eye_pass/one_index"),
         shader_source!("eye_pass/medium"),
         shader_source!("eye_pass/interaction"),
         shader_source!("eye_pass/plain_background"),
@@ -68,6 +70,57 @@ pub(super) const TRACED_UNDER_SKY: Program = Program {
         shader_source!("eye_pass/start"),
         shader_source!("eye_pass/lights"),
         shader_source!("eye_pass/corners"),
+        shader_source!("eye_pass/one_index"),
+        shader_source!("eye_pass/medium"),
+        shader_source!("eye_pass/interaction"),
+        shader_source!("eye_pass/sky"),
+        shader_source!("eye_pass/chain"),
+        shader_source!("eye_pass/traced"),
+    ],
+};
+
+/// Chains of specular surfaces, by wavelength from where glass parts light.
+pub(super) const PARTED: Program = Program {
+    name: "parted",
+    sources: &[
+        shader_source!("shared/srgb"),
+        shader_source!("shared/refraction"),
+        shader_source!("shared/fresnel"),
+        shader_source!("shared/traversal"),
+        shader_source!("eye_pass/frame"),
+        shader_source!("eye_pass/objects"),
+        shader_source!("eye_pass/images"),
+        shader_source!("eye_pass/bumps"),
+        shader_source!("eye_pass/place"),
+        shader_source!("eye_pass/start"),
+        shader_source!("eye_pass/lights"),
+        shader_source!("eye_pass/corners"),
+        shader_source!("eye_pass/wavelengths"),
+        shader_source!("eye_pass/medium"),
+        shader_source!("eye_pass/interaction"),
+        shader_source!("eye_pass/plain_background"),
+        shader_source!("eye_pass/chain"),
+        shader_source!("eye_pass/traced"),
+    ],
+};
+
+/// The same in an environment.
+pub(super) const PARTED_UNDER_SKY: Program = Program {
+    name: "parted_under_sky",
+    sources: &[
+        shader_source!("shared/srgb"),
+        shader_source!("shared/refraction"),
+        shader_source!("shared/fresnel"),
+        shader_source!("shared/traversal"),
+        shader_source!("eye_pass/frame"),
+        shader_source!("eye_pass/objects"),
+        shader_source!("eye_pass/images"),
+        shader_source!("eye_pass/bumps"),
+        shader_source!("eye_pass/place"),
+        shader_source!("eye_pass/start"),
+        shader_source!("eye_pass/lights"),
+        shader_source!("eye_pass/corners"),
+        shader_source!("eye_pass/wavelengths"),
         shader_source!("eye_pass/medium"),
         shader_source!("eye_pass/interaction"),
         shader_source!("eye_pass/sky"),
@@ -152,6 +205,8 @@ pub fn programs() -> Vec<Program> {
         UNDER_LIGHTS,
         TRACED,
         TRACED_UNDER_SKY,
+        PARTED,
+        PARTED_UNDER_SKY,
         SKY,
         COMPOSED,
         ACCUMULATED,
@@ -167,8 +222,10 @@ pub fn shared_structs() -> Vec<StructLayout> {
         ChainStart::layout(),
         LightRecord::layout(),
         ObjectRecord::layout(),
+        SeenWavelengths::layout(),
         Node::layout(),
         Triangle::layout(),
+        DisplayWhite::layout(),
         Accumulation::layout(),
         ProbeRay::layout(),
         ProbeHit::layout(),
@@ -212,13 +269,14 @@ pub fn specialisations() -> Vec<Specialisation> {
     let mut all = vec![alone(ACCUMULATED, "accumulated"), alone(SKY, "sky_drawn")];
     for writes in Writes::ALL {
         for kind in KINDS {
-            for flags in 0..16 {
+            for flags in 0..32 {
                 let manner = DrawnHow {
                     has_texture: flags & 1 > 0,
                     is_scaled: flags & 1 > 0,
                     traces_lights: flags & 2 > 0,
                     has_bumps: flags & 8 > 0,
                     has_sky: flags & 4 > 0,
+                    parts_wavelengths: flags & 16 > 0,
                 };
                 let key = PipelineKey::new(writes, kind, Faces::Both, manner);
                 all.extend(key.writes.entry_point().map(|entry_point| Specialisation {

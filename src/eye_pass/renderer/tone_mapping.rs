@@ -1,12 +1,16 @@
-//! The last pass: from exposed radiance to the target's colours, by one pipeline for each tone map in use.
+//! The last pass: from exposed radiance, white-balanced, to the target's colours, by one pipeline for each tone map in use.
 
 use std::collections::HashMap;
 
-use super::bindings::{bind_group, bind_group_layout, texture};
+use wgpu::util::DeviceExt;
+
+use super::bindings::{bind_group, bind_group_layout, texture, uniform};
 use super::cover;
 use super::shaders::TONE_MAPPING;
+use super::uniforms::DisplayWhite;
 use crate::eye_pass::ToneMap;
 use crate::gpu::Gpu;
+use crate::optics::spectrum::xyz::{IDENTITY, Matrix3};
 
 /// The pipelines that were called for so far.
 #[derive(Debug)]
@@ -14,19 +18,36 @@ pub(super) struct ToneMappingPipelines {
     module: wgpu::ShaderModule,
     target: wgpu::TextureFormat,
     layout: wgpu::BindGroupLayout,
+    white_balance: Matrix3,
+    white: wgpu::Buffer,
     made: HashMap<ToneMap, wgpu::RenderPipeline>,
 }
 
 impl ToneMappingPipelines {
     /// For targets of a format.
     pub(super) fn new(gpu: &Gpu, target: wgpu::TextureFormat) -> Self {
-        let radiance = [texture(false, wgpu::TextureViewDimension::D2)];
+        let bindings = [
+            texture(false, wgpu::TextureViewDimension::D2),
+            uniform(wgpu::ShaderStages::FRAGMENT),
+        ];
         Self {
             module: TONE_MAPPING.module(&gpu.device),
             target,
-            layout: bind_group_layout(gpu, "tone mapping", &radiance),
+            layout: bind_group_layout(gpu, "tone mapping", &bindings),
+            white_balance: IDENTITY,
+            white: white(gpu, &IDENTITY),
             made: HashMap::new(),
         }
+    }
+
+    /// Multiplies radiance by a matrix from the next picture on; tells whether it is another one.
+    pub(super) fn set_white_balance(&mut self, gpu: &Gpu, matrix: &Matrix3) -> bool {
+        let is_new = self.white_balance != *matrix;
+        if is_new {
+            self.white_balance = *matrix;
+            self.white = white(gpu, matrix);
+        }
+        is_new
     }
 
     /// How many there are.
@@ -56,7 +77,10 @@ impl ToneMappingPipelines {
             );
             self.made.insert(tone_map, pipeline);
         }
-        let resources = [wgpu::BindingResource::TextureView(radiance)];
+        let resources = [
+            wgpu::BindingResource::TextureView(radiance),
+            self.white.as_entire_binding(),
+        ];
         let bind_group = bind_group(gpu, "tone mapping", &self.layout, resources);
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("tone mapping"),
@@ -76,6 +100,14 @@ impl ToneMappingPipelines {
         pass.set_bind_group(0, &bind_group, &[]);
         pass.draw(0..3, 0..1);
     }
+}
+
+fn white(gpu: &Gpu, matrix: &Matrix3) -> wgpu::Buffer {
+    gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+        label: Some("white balance"),
+        contents: bytemuck::bytes_of(&DisplayWhite::new(matrix)),
+        usage: wgpu::BufferUsages::UNIFORM,
+    })
 }
 
 /// The values of the shader's overrides. Formats that encode sRGB by themselves take linear light.

@@ -1,7 +1,10 @@
 //! What is handed to the shaders; names and order are those of `shaders/eye_pass/`.
 
+use crate::eye_pass::wavelengths::SeenWavelength;
 use crate::gpu::layout::shader_struct;
 use crate::optics::LinearSrgb;
+use crate::optics::glass::Dispersion;
+use crate::optics::spectrum::xyz::Matrix3;
 
 shader_struct! {
     /// One picture.
@@ -64,6 +67,21 @@ shader_struct! {
 }
 
 shader_struct! {
+    /// The wavelengths that a picture follows light at.
+    SeenWavelengths {
+        /// From radiance in linear sRGB to what is seen of it, column by column; a fourth number fills each.
+        shares: [[[f32; 4]; 3]; 4],
+        /// How many there are.
+        count: u32,
+        padding0: u32,
+        padding1: u32,
+        padding2: u32,
+        /// Index of each glass at each wavelength, in groups.
+        indices: [[[f32; 4]; 16]; 8],
+    }
+}
+
+shader_struct! {
     /// One object.
     ObjectRecord {
         /// [`Material::base_colour`](crate::scene::Material::base_colour).
@@ -90,8 +108,9 @@ shader_struct! {
         polish: f32,
         /// Record of the illumination map of its back.
         back_map: u32,
+        /// Number of its glass from 1 on, where that parts wavelengths; else 0.
+        glass: u32,
         padding0: u32,
-        padding1: u32,
     }
 }
 
@@ -146,6 +165,14 @@ shader_struct! {
 }
 
 shader_struct! {
+    /// Which light the display shows as white.
+    DisplayWhite {
+        /// What radiance is multiplied by, column by column; a fourth number fills each.
+        balance: [[f32; 4]; 3],
+    }
+}
+
+shader_struct! {
     /// How a mean of pictures takes up another one.
     Accumulation {
         /// Share of the new picture in the mean.
@@ -176,6 +203,40 @@ shader_struct! {
         /// Local.
         distance: f32,
         padding: [u32; 2],
+    }
+}
+
+impl DisplayWhite {
+    /// By a matrix of [`WhiteBalance::matrix`](crate::eye_pass::WhiteBalance::matrix).
+    pub(crate) fn new(matrix: &Matrix3) -> Self {
+        let column = |column: usize| {
+            let [r, g, b] = matrix.map(|row| row[column] as f32);
+            [r, g, b, 0.0]
+        };
+        Self {
+            balance: std::array::from_fn(column),
+        }
+    }
+}
+
+impl SeenWavelengths {
+    /// A picture's set, with the indices of the scene's glasses, as many as there is room for.
+    pub(crate) fn of(set: &[SeenWavelength], glasses: &[Dispersion]) -> Self {
+        let mut seen = Self {
+            count: set.len() as u32,
+            ..Self::default()
+        };
+        for (share, at) in seen.shares.iter_mut().zip(set) {
+            let columns = at.share.to_cols_array_2d();
+            *share = columns.map(|[r, g, b]| [r as f32, g as f32, b as f32, 0.0]);
+        }
+        let rooms = seen.indices.as_flattened_mut().iter_mut();
+        for (room, glass) in rooms.zip(glasses) {
+            for (index, at) in room.iter_mut().zip(set) {
+                *index = glass.index(at.wavelength) as f32;
+            }
+        }
+        seen
     }
 }
 

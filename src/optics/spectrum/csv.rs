@@ -61,7 +61,7 @@ fn with_line(mut error: SpectrumError, lines: &[usize]) -> SpectrumError {
 }
 
 /// The rows of a table of our own, all numbers, without its headings.
-pub(super) fn columns(text: &str) -> impl Iterator<Item = Vec<f64>> {
+pub(in crate::optics) fn columns(text: &str) -> impl Iterator<Item = Vec<f64>> {
     text.lines().skip(1).map(|line| {
         line.split(',')
             .map(|field| field.parse().expect("our own tables hold numbers"))

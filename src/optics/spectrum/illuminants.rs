@@ -23,7 +23,7 @@ pub fn names() -> impl Iterator<Item = &'static str> {
     OWN.into_iter().chain(headings.split(',').skip(1))
 }
 
-/// A lamp by name, scaled to one luminous-equivalent watt (∫ Φ ȳ dλ = 1, which is 683 lm).
+/// A lamp by name, which it keeps, scaled to one luminous-equivalent watt (∫ Φ ȳ dλ = 1, which is 683 lm).
 ///
 /// One of [`names`], in any case and with or without its hyphen: CIE illuminants A, D50, D65, E (equal energy),
 /// fluorescent FL2, FL7, FL11, and LED-B1 to B5, BH1, RGB1, V1, V2. Or `blackbody:KELVIN` (500 to 25,000 K), or
@@ -33,7 +33,8 @@ pub fn names() -> impl Iterator<Item = &'static str> {
 /// # Errors
 /// [`SpectrumError::UnknownName`] with the nearest names, [`SpectrumError::OutOfRange`] for a number.
 pub fn illuminant(name: &str) -> Result<Spectrum, SpectrumError> {
-    let relative = match name.trim().split_once(':') {
+    let name = name.trim();
+    let relative = match name.split_once(':') {
         Some((kind, number)) => with_number(&key(kind), number).unwrap_or_else(|| Err(unknown(name)))?,
         None => plain(name)?,
     };
@@ -45,7 +46,7 @@ pub fn d65() -> &'static Spectrum {
     static D65: LazyLock<Spectrum> = LazyLock::new(|| {
         let rows = columns(include_str!("../../../assets/spectra/d65.csv"));
         Spectrum::new(rows.map(|row| (Nanometres(row[0]), row[1])).collect())
-            .and_then(|table| table.to_luminous_equivalent(1.0))
+            .and_then(|table| table.named("D65").to_luminous_equivalent(1.0))
             .expect("our own table is a spectrum")
     });
     &D65
@@ -53,17 +54,15 @@ pub fn d65() -> &'static Spectrum {
 
 fn plain(name: &str) -> Result<Spectrum, SpectrumError> {
     match key(name).as_str() {
-        "a" => Spectrum::from_fn(illuminant_a),
+        "a" => Ok(Spectrum::from_fn(illuminant_a)?.named("A")),
         "d65" => Ok(d65().clone()),
-        "e" => Spectrum::from_fn(|_| 1.0),
+        "e" => Ok(Spectrum::from_fn(|_| 1.0)?.named("E")),
         wanted => {
-            let column = names().skip(OWN.len()).position(|known| key(known) == wanted);
-            let column = 1 + column.ok_or_else(|| unknown(name))?;
-            Spectrum::new(
-                columns(TABLES)
-                    .map(|row| (Nanometres(row[0]), row[column]))
-                    .collect(),
-            )
+            let mut columns_named = names().skip(OWN.len()).zip(1..);
+            let found = columns_named.find(|(known, _)| key(known) == wanted);
+            let (known, column) = found.ok_or_else(|| unknown(name))?;
+            let rows = columns(TABLES).map(|row| (Nanometres(row[0]), row[column]));
+            Ok(Spectrum::new(rows.collect())?.named(known))
         }
     }
 }
@@ -77,21 +76,21 @@ fn illuminant_a(Nanometres(nm): Nanometres) -> f64 {
 /// A kind of lamp with a number; `None` where there is no such kind.
 fn with_number(kind: &str, number: &str) -> Option<Result<Spectrum, SpectrumError>> {
     match kind {
-        "blackbody" | "planck" => {
-            let kelvin = parse(number, KELVIN, "K");
-            Some(kelvin.and_then(|kelvin| Spectrum::from_fn(|wavelength| planck(wavelength, kelvin))))
-        }
-        "line" | "laser" => {
-            let nm = parse(number, LINE_NM, "nm");
-            let triangle = |nm| [(nm - 1.0, 0.0), (nm, 1.0), (nm + 1.0, 0.0)];
-            Some(
-                nm.and_then(|nm| {
-                    Spectrum::new(triangle(nm).map(|(nm, value)| (Nanometres(nm), value)).into())
-                }),
-            )
-        }
+        "blackbody" | "planck" => Some(parse(number, KELVIN, "K").and_then(black_body)),
+        "line" | "laser" => Some(parse(number, LINE_NM, "nm").and_then(line)),
         _ => None,
     }
+}
+
+fn black_body(kelvin: f64) -> Result<Spectrum, SpectrumError> {
+    let light = Spectrum::from_fn(|wavelength| planck(wavelength, kelvin))?;
+    Ok(light.named(&format!("blackbody:{kelvin}")))
+}
+
+fn line(nm: f64) -> Result<Spectrum, SpectrumError> {
+    let triangle = [(nm - 1.0, 0.0), (nm, 1.0), (nm + 1.0, 0.0)];
+    let light = Spectrum::new(triangle.map(|(nm, value)| (Nanometres(nm), value)).into())?;
+    Ok(light.named(&format!("line:{nm}")))
 }
 
 fn parse(text: &str, [least, most]: [f64; 2], unit: &'static str) -> Result<f64, SpectrumError> {

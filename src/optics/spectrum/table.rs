@@ -1,6 +1,7 @@
 //! A spectrum as a table, linear between its rows.
 
 use std::ops::RangeInclusive;
+use std::sync::Arc;
 
 use super::quadrature::{integrate, knots_within};
 use super::{SpectrumError, Xyz, xyz_bar};
@@ -14,6 +15,7 @@ use crate::units::LUMENS_PER_WATT;
 /// no unit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Spectrum {
+    name: Option<Arc<str>>,
     wavelengths_nm: Vec<f64>,
     values: Vec<f64>,
 }
@@ -51,9 +53,24 @@ impl Spectrum {
             .map(|(Nanometres(nm), value)| (nm, value))
             .unzip();
         Ok(Self {
+            name: None,
             wavelengths_nm,
             values,
         })
+    }
+
+    /// The same with a name: of an illuminant, or of the file that it was read from.
+    #[must_use]
+    pub fn named(self, name: &str) -> Self {
+        Self {
+            name: Some(name.into()),
+            ..self
+        }
+    }
+
+    /// What it is called, where it has a name.
+    pub fn name(&self) -> Option<&str> {
+        self.name.as_deref()
     }
 
     /// A function of wavelength, finite and not negative, as a table of every visible whole nanometre.
@@ -131,16 +148,20 @@ impl Spectrum {
         Xyz::from(self.integral_times(range, xyz_bar))
     }
 
-    /// Every value times a factor, finite and 0 or more.
+    /// Every value times a factor, finite and 0 or more; the name stays.
     ///
     /// # Errors
     /// Where a product is negative or not finite.
     pub fn scaled(&self, factor: f64) -> Result<Self, SpectrumError> {
         let rows = self.wavelengths_nm.iter().zip(&self.values);
-        Self::new(
+        let scaled = Self::new(
             rows.map(|(nm, value)| (Nanometres(*nm), value * factor))
                 .collect(),
-        )
+        )?;
+        Ok(Self {
+            name: self.name.clone(),
+            ..scaled
+        })
     }
 
     /// The same light, made as bright as so many luminous-equivalent watts: ∫ Φ ȳ dλ = `watts`, 683 times that in lm.

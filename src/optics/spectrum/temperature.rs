@@ -13,6 +13,37 @@ const RECIPROCALS: [f64; 2] = [1.0 / 100_000.0, 1.0 / 500.0];
 /// Places of the first, coarse search; colours move evenly with the reciprocal of temperature.
 const PLACES: u32 = 64;
 
+/// Temperatures [K] that light can be said to have: black bodies from the first on, daylight to the second.
+pub const CAMERA_KELVIN: [f64; 2] = [1000.0, 25_000.0];
+/// From here on [K] such light is daylight; CIE has none that is redder.
+const DAYLIGHT_KELVIN: f64 = 4000.0;
+
+/// The colour of light of a temperature [K], Y = 1: a phase of daylight by its correlated temperature from 4000 K on
+/// (CIE 15:2018), below that a black body. 6504 K is D65.
+pub fn white_of_kelvin(kelvin: f64) -> Xyz {
+    if kelvin < DAYLIGHT_KELVIN {
+        let body = black_body(kelvin);
+        return body * (1.0 / body.y);
+    }
+    let [x, y] = daylight_chromaticity(kelvin);
+    Xyz {
+        x: x / y,
+        y: 1.0,
+        z: (1.0 - x - y) / y,
+    }
+}
+
+/// x, y of daylight of 4000 to 25,000 K (CIE 15:2018).
+fn daylight_chromaticity(kelvin: f64) -> [f64; 2] {
+    let [a, b, c, d] = if kelvin <= 7000.0 {
+        [-4.6070e9, 2.9678e6, 0.099_11e3, 0.244_063]
+    } else {
+        [-2.0064e9, 1.9018e6, 0.247_48e3, 0.237_040]
+    };
+    let x = ((a / kelvin + b) / kelvin + c) / kelvin + d;
+    [x, (-3.000 * x + 2.870) * x - 0.275]
+}
+
 /// Radiance of a black body by wavelength, relative to that at 560 nm (Planck's law).
 pub fn planck(wavelength: Nanometres, kelvin: f64) -> f64 {
     let exponent = |nm: f64| (SECOND_RADIATION_CONSTANT_NM_K / (nm * kelvin)).exp_m1();
@@ -54,11 +85,15 @@ pub fn correlated_temperature(colour: Xyz) -> Option<CorrelatedTemperature> {
     })
 }
 
-fn black_body_uv(kelvin: f64) -> [f64; 2] {
+fn black_body(kelvin: f64) -> Xyz {
     let colour = integrate(&visible_knots(), |wavelength| {
         xyz_bar(wavelength).map(|weight| weight * planck(wavelength, kelvin))
     });
-    uv(colour.into()).expect("a black body shines")
+    colour.into()
+}
+
+fn black_body_uv(kelvin: f64) -> [f64; 2] {
+    uv(black_body(kelvin)).expect("a black body shines")
 }
 
 /// (u, v) of CIE 1960.

@@ -7,6 +7,9 @@ use crate::optics::{LinearSrgb, Nanometres};
 /// Rows of three.
 pub type Matrix3 = [[f64; 3]; 3];
 
+/// Leaves every colour as it is.
+pub const IDENTITY: Matrix3 = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+
 /// Linear sRGB to XYZ, Y = 1 for white (IEC 61966-2-1, to double precision from its primaries and D65 at
 /// (0.3127, 0.3290)); the second row is [`LinearSrgb::luminance`].
 const XYZ_FROM_SRGB: Matrix3 = [

@@ -7,7 +7,7 @@ mod mirror;
 mod paraboloid;
 pub mod parts;
 pub mod pool;
-mod prism;
+pub mod prism;
 mod ring;
 pub mod shapes;
 mod showroom;

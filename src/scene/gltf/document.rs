@@ -22,6 +22,8 @@ pub struct Document {
     pub glasses: Vec<Option<Value>>,
     /// Metal of each material, as its extras state it.
     pub metals: Vec<Option<Value>>,
+    /// Spectrum of the light of each material, as its extras state it.
+    pub emission_spectra: Vec<Option<Value>>,
     /// One per node: what its `extras` say of the size of its light.
     pub node_sizes: Vec<StatedSize>,
     /// One per light of KHR_lights_punctual.
@@ -65,6 +67,7 @@ pub fn parse(json: &[u8], report: &mut Report) -> Result<Document> {
     let waves = of_materials(waves::KEY);
     let glasses = of_materials(substance::GLASS_KEY);
     let metals = of_materials(substance::METAL_KEY);
+    let emission_spectra = of_materials(spectrum::KEY);
     let node_sizes = StatedSize::of_each(value.get("nodes"));
     let light_sizes = StatedSize::of_each(value.pointer("/extensions/KHR_lights_punctual/lights"));
     let node_spectra = extras::of_each(value.get("nodes"), spectrum::KEY);
@@ -85,6 +88,7 @@ pub fn parse(json: &[u8], report: &mut Report) -> Result<Document> {
         waves,
         glasses,
         metals,
+        emission_spectra,
         node_sizes,
         light_sizes,
         node_spectra,

@@ -1,5 +1,6 @@
 //! Materials: glTF's factors and extensions, checked, and the class that transport treats each as.
 
+use std::path::Path;
 use std::sync::Arc;
 
 use glam::{DMat3, DVec2};
@@ -16,7 +17,7 @@ use super::images::Images;
 use super::numbers::widen;
 use super::report::{Budget, Report};
 use super::substance::{self, Substance};
-use super::{names, waves};
+use super::{names, spectrum, waves};
 use crate::error::Result;
 use crate::optics::LinearSrgb;
 use crate::scene::{AlphaMask, Material, NormalMap, SurfaceKind, TextureRef, Volume};
@@ -59,6 +60,7 @@ const DARKEST_ATTENUATION: f64 = 1e-6;
 /// Images that do not fit the memory budget.
 pub fn read_all(
     document: &Document,
+    folder: &Path,
     images: &mut Images,
     budget: &mut Budget,
     report: &mut Report,
@@ -73,6 +75,8 @@ pub fn read_all(
                 waves: document.waves.get(index).and_then(Option::as_ref),
                 glass: document.glasses.get(index).and_then(Option::as_ref),
                 metal: document.metals.get(index).and_then(Option::as_ref),
+                spectrum: document.emission_spectra.get(index).and_then(Option::as_ref),
+                folder,
                 images: &mut *images,
                 budget: &mut *budget,
                 report: &mut *report,
@@ -89,6 +93,9 @@ struct Reading<'a, 'b> {
     waves: Option<&'a Value>,
     glass: Option<&'a Value>,
     metal: Option<&'a Value>,
+    spectrum: Option<&'a Value>,
+    /// Where the file is.
+    folder: &'a Path,
     images: &'a mut Images<'b>,
     budget: &'a mut Budget,
     report: &'a mut Report,
@@ -118,6 +125,7 @@ impl Reading<'_, '_> {
             metal: None,
             volume: self.volume(extensions),
             emitted_radiance: self.emission(extensions)?,
+            emission_spectrum: None,
             polish: 1.0,
             normal_map: None,
             waves: self
@@ -126,6 +134,7 @@ impl Reading<'_, '_> {
             double_sided: self.source.double_sided,
         };
         self.take_means(&mut material, transmission)?;
+        self.emission_spectrum(&mut material)?;
         self.substance(&mut material, extensions)?;
         material.surface = if extensions.unlit.is_some() {
             SurfaceKind::Diffuse
@@ -258,6 +267,33 @@ impl Reading<'_, '_> {
             );
         }
         Ok(factor * (strength / LUMENS_PER_WATT))
+    }
+
+    /// Gives what it emits the spectrum that is stated for it, if any, in place of its colour.
+    fn emission_spectrum(&mut self, material: &mut Material) -> Result<()> {
+        let Some(stated) = self.spectrum else {
+            return Ok(());
+        };
+        let spectrum = spectrum::read(stated, self.folder, &self.owner)?;
+        let LinearSrgb { r, g, b } = material.emitted_radiance;
+        if material.emitted_radiance == LinearSrgb::BLACK {
+            self.warn(
+                format!("has a `{}` but sends no light", spectrum::KEY),
+                "give it an emissive factor",
+            );
+        } else if r != g || g != b {
+            self.warn(
+                format!(
+                    "the colour of its light was left out, since it has a `{}`",
+                    spectrum::KEY
+                ),
+                "leave the emissive factor grey",
+            );
+        }
+        let luminance = material.emitted_radiance.luminance();
+        material.emitted_radiance = spectrum.xyz().to_linear_srgb() * luminance;
+        material.emission_spectrum = Some(spectrum);
+        Ok(())
     }
 
     /// Multiplies factors by the means of their textures.

@@ -84,7 +84,7 @@ fn read_scene(bytes: &[u8], path: &Path, options: &LoadOptions) -> Result<Scene>
         buffers::Buffers::resolve(&document.root, container.binary, folder, &mut budget, &mut report)?;
 
     let mut images = images::Images::new(&document.root, &buffers, folder);
-    let materials = material::read_all(&document, &mut images, &mut budget, &mut report)?;
+    let materials = material::read_all(&document, folder, &mut images, &mut budget, &mut report)?;
     let mut materials = surface::Materials::new(materials);
     let placed = nodes::place(&document, &mut report)?;
 

@@ -1,5 +1,5 @@
-//! Spectra of lamps: `spectrum` in the `extras` of the node or else of the light, by name or as a CSV file beside the
-//! scene.
+//! Spectra of lamps: `spectrum` in the `extras` of the node or else of the light, or of a material that glows; by name or
+//! as a CSV file beside the scene.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -48,7 +48,7 @@ pub fn apply(
     let Some(stated) = stated else {
         return Ok(());
     };
-    let spectrum = read(text(stated, KEY, owner)?, folder, owner)?;
+    let spectrum = read(stated, folder, owner)?;
     if light.colour != LinearSrgb::WHITE {
         report.warn(
             owner,
@@ -56,11 +56,19 @@ pub fn apply(
             "leave the colour white",
         );
     }
-    light.set_spectrum(Arc::new(spectrum));
+    light.set_spectrum(spectrum);
     Ok(())
 }
 
-fn read(stated: &str, folder: &Path, owner: &str) -> Result<Spectrum> {
+/// The spectrum that is stated, scaled to one luminous-equivalent watt.
+///
+/// # Errors
+/// As [`apply`].
+pub fn read(stated: &Value, folder: &Path, owner: &str) -> Result<Arc<Spectrum>> {
+    by_name_or_file(text(stated, KEY, owner)?, folder, owner).map(Arc::new)
+}
+
+fn by_name_or_file(stated: &str, folder: &Path, owner: &str) -> Result<Spectrum> {
     let is_file = Path::new(stated)
         .extension()
         .is_some_and(|extension| extension.eq_ignore_ascii_case("csv"));
@@ -71,6 +79,6 @@ fn read(stated: &str, folder: &Path, owner: &str) -> Result<Spectrum> {
     let no_text = |_| Error::failure(owner, format!("its `{KEY}` is no text file"), "save it as UTF-8");
     let table = String::from_utf8(bytes).map_err(no_text)?;
     read_lamp(&table)
-        .and_then(|lamp| lamp.to_luminous_equivalent(1.0))
+        .and_then(|lamp| lamp.named(stated).to_luminous_equivalent(1.0))
         .map_err(|error| of_file(error.at(format!("{owner}, `{stated}`"))))
 }

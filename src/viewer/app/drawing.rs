@@ -6,8 +6,9 @@ use super::{App, MOST_REPORTS};
 use crate::effect::{Effect, EffectSwitch};
 use crate::error::Result;
 use crate::eye_pass::renderer::{MapStyle, Uploaded};
-use crate::eye_pass::{ToneMap, View};
+use crate::eye_pass::{ToneMap, View, WhiteBalance};
 use crate::optics::LinearSrgb;
+use crate::optics::spectrum::xyz::Matrix3;
 use crate::viewer::event_log::Event;
 use crate::viewer::eye_report;
 use crate::viewer::frame_times::Made;
@@ -23,6 +24,8 @@ impl App {
             return Ok(());
         };
         let (wants_exposure, chains) = (self.wants_exposure(), self.chains_switch());
+        let dispersion = self.model.panel.settings.effects.get(Effect::Dispersion);
+        let white_balance = self.white_balance();
         let Some(graphics) = &mut self.graphics else {
             return Ok(());
         };
@@ -53,6 +56,8 @@ impl App {
             self.model.log.write(&Event::Uploaded { uploaded, seconds });
         }
         graphics.set_chains(chains)?;
+        graphics.set_dispersion(dispersion);
+        graphics.set_white_balance(&white_balance);
         if wants_exposure {
             self.must_measure_exposure = false;
             view.exposure_stops = graphics.measure_exposure(&view)?;
@@ -175,6 +180,15 @@ impl App {
             self.notice.clone_from(&refusal);
             self.told_refusal = refusal;
         }
+    }
+
+    /// What radiance is multiplied by before tone mapping; colours of a legend are shown as they are.
+    pub(super) fn white_balance(&self) -> Matrix3 {
+        let chosen = match self.model.quantity() {
+            Quantity::Light => self.model.panel.display.white_balance,
+            Quantity::Error | Quantity::Difference => WhiteBalance::None,
+        };
+        chosen.matrix(self.model.scene())
     }
 
     pub(super) fn chains_switch(&self) -> EffectSwitch {

@@ -28,6 +28,7 @@ impl App {
     }
 
     pub(super) fn written_picture(&mut self) -> Result<Vec<PathBuf>> {
+        let white_balance = self.white_balance();
         let (Some(view), Some(graphics)) = (self.view(), &mut self.graphics) else {
             return Err(Error::failure(
                 "picture",
@@ -40,6 +41,7 @@ impl App {
         let folder = std::env::current_dir().unwrap_or_else(|_| PathBuf::from("."));
         // False colours are no radiance.
         let has_radiance = self.model.quantity() == Quantity::Light;
-        screenshot::save(&folder, &self.model.scene().name, &picture, &view, has_radiance)
+        let scene = &self.model.scene().name;
+        screenshot::save(&folder, scene, &picture, &view, &white_balance, has_radiance)
     }
 }

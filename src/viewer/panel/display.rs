@@ -4,7 +4,8 @@ use egui::{Response, Slider, SliderClamping, Ui};
 
 use super::control::{About, choice, chosen, row, rows};
 use super::{Display, Facts, LayerShown, Quantity, Wishes};
-use crate::eye_pass::ToneMap;
+use crate::eye_pass::{ToneMap, WhiteBalance};
+use crate::optics::spectrum::temperature::CAMERA_KELVIN;
 use crate::settings::LayerKind;
 
 const EXPOSURE: About = About {
@@ -20,6 +21,14 @@ const TONE_MAP: About = About {
     label: "Tone map",
     what: "How radiance beyond what the display shows is brought into its range.",
     range: "neutral, AgX, ACES, none; default neutral",
+    accuracy: "none: only the picture changes",
+    cost: "none",
+};
+const WHITE_BALANCE: About = About {
+    label: "White balance",
+    what: "Which light is shown as white, by chromatic adaptation (Bradford): the display's own (D65), what the lamps \
+           send to the middle of the scene, or light of a colour temperature, as on a camera.",
+    range: "none, from the lamps, 1000 to 25,000 K; default none",
     accuracy: "none: only the picture changes",
     cost: "none",
 };
@@ -62,6 +71,9 @@ const TONE_MAPS: [(ToneMap, &str, &str); 4] = [
     (ToneMap::None, "none", "cut at the display's white"),
 ];
 
+/// What the slider of the white balance begins at: D65.
+const DAYLIGHT_KELVIN: f64 = 6504.0;
+
 /// Shows the section.
 pub fn show(ui: &mut Ui, display: &mut Display, facts: &Facts<'_>, wishes: &mut Wishes) {
     let baked = facts.layers;
@@ -74,6 +86,9 @@ pub fn show(ui: &mut Ui, display: &mut Display, facts: &Facts<'_>, wishes: &mut 
                 slider
             })
             .inner
+        });
+        row(ui, &WHITE_BALANCE, None, |ui| {
+            white_balance(ui, &mut display.white_balance)
         });
         row(ui, &TONE_MAP, None, |ui| {
             let selected = chosen(&display.tone_map, &TONE_MAPS);
@@ -93,6 +108,41 @@ fn exposure(ui: &mut Ui, stops: &mut f64) -> Response {
             .clamping(SliderClamping::Edits)
             .fixed_decimals(2),
     )
+}
+
+fn white_balance(ui: &mut Ui, white: &mut WhiteBalance) -> Response {
+    let kelvin = match *white {
+        WhiteBalance::Kelvin(kelvin) => kelvin,
+        _ => DAYLIGHT_KELVIN,
+    };
+    let choices = [
+        (WhiteBalance::None, "none", "Colours as they are: D65 is white."),
+        (
+            WhiteBalance::Lamps,
+            "from the lamps",
+            "What a grey card in the middle of the scene would show.",
+        ),
+        (
+            WhiteBalance::Kelvin(kelvin),
+            "temperature",
+            "Daylight, or below 4000 K a black body.",
+        ),
+    ];
+    ui.vertical(|ui| {
+        let selected = chosen(white, &choices);
+        let response = choice(ui, "white balance", white, selected, &choices);
+        if let WhiteBalance::Kelvin(kelvin) = white {
+            let [least, most] = CAMERA_KELVIN;
+            let slider = Slider::new(kelvin, least..=most)
+                .logarithmic(true)
+                .clamping(SliderClamping::Edits)
+                .fixed_decimals(0)
+                .suffix(" K");
+            ui.add(slider).on_hover_text(WHITE_BALANCE.what);
+        }
+        response
+    })
+    .inner
 }
 
 fn quantity(ui: &mut Ui, shown: &mut Quantity, facts: &Facts<'_>) -> Response {

@@ -1,11 +1,13 @@
 //! Section *Effects*: what can be simulated or left out, how it is switched, why it is on or off, and what it takes.
 
+use std::borrow::Cow;
+
 use egui::{Button, Frame, RichText, Role, Ui, WidgetInfo, vec2};
 
 use super::control::{bytes, counted, grouped};
 use super::{Facts, Wishes, worth};
 use crate::effect::{Effect, EffectSwitch, EffectSwitches};
-use crate::plan::EffectLine;
+use crate::plan::{self, EffectLine};
 use crate::session::EffectCounts;
 
 /// Width of the three switches of an effect [points].
@@ -35,9 +37,9 @@ const SWITCHES: [(EffectSwitch, &str, &str); 3] = [
 ];
 
 /// What is known of an effect.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Debug, Default)]
 struct Known<'a> {
-    line: Option<&'a EffectLine>,
+    line: Option<Cow<'a, EffectLine>>,
     counts: Option<&'a EffectCounts>,
 }
 
@@ -57,7 +59,8 @@ pub fn show(ui: &mut Ui, switches: &mut EffectSwitches, facts: &Facts<'_>, wishe
     }
 }
 
-/// The reports of the last level, the eye's chains from the picture; before there are reports, the plan.
+/// The reports of the last level, the eye's chains from the picture; before there are reports, the plan. Dispersion is
+/// of both passes.
 fn known<'a>(effect: Effect, facts: &Facts<'a>) -> Known<'a> {
     let result = facts.last.map(|last| &last.result);
     let reports = result.into_iter().flat_map(|result| &result.effects);
@@ -68,8 +71,18 @@ fn known<'a>(effect: Effect, facts: &Facts<'a>) -> Known<'a> {
     };
     let plan = result.map(|result| &result.plan);
     let planned = plan.and_then(|plan| plan.effects.iter().find(|line| line.effect == effect));
+    let line = report.map(|report| &report.line).or(planned).map(Cow::Borrowed);
+    let in_both = |line: Cow<'a, EffectLine>| match facts.chains {
+        Some(chains) if effect == Effect::Dispersion => Cow::Owned(plan::dispersion(
+            line.into_owned(),
+            facts.scene,
+            None,
+            &chains.line,
+        )),
+        _ => line,
+    };
     Known {
-        line: report.map(|report| &report.line).or(planned),
+        line: line.map(in_both),
         counts: report.map(|report| &report.counts),
     }
 }
@@ -77,7 +90,7 @@ fn known<'a>(effect: Effect, facts: &Facts<'a>) -> Known<'a> {
 /// Shows one effect; tells whether it was asked what it is worth.
 fn entry(ui: &mut Ui, effect: Effect, switch: &mut EffectSwitch, facts: &Facts<'_>) -> bool {
     let known = known(effect, facts);
-    let is_on = known.line.map(|line| line.on);
+    let is_on = known.line.as_ref().map(|line| line.on);
     let name = effect.name().replace('_', " ");
     let has_worth = is_on == Some(true) && effect != Effect::Chains;
     let mut is_asked = false;
@@ -90,8 +103,8 @@ fn entry(ui: &mut Ui, effect: Effect, switch: &mut EffectSwitch, facts: &Facts<'
         segments(ui, &name, switch);
     });
     detail(ui, &name, |ui| {
-        let reason = match known.line {
-            Some(line) => &line.reason,
+        let reason = match &known.line {
+            Some(line) => line.reason.as_str(),
             None if effect == Effect::Chains => "Known with the first picture.",
             None => "Known after the first bake.",
         };

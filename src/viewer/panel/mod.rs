@@ -21,7 +21,7 @@ use super::frame_times::FrameTimes;
 use super::worker::{BakeState, BakedLevel, Worth};
 use crate::effect::Effect;
 use crate::error::Warning;
-use crate::eye_pass::ToneMap;
+use crate::eye_pass::{ToneMap, WhiteBalance};
 use crate::scene::{Edit, Scene};
 use crate::session::EffectReport;
 use crate::settings::{BakeSettings, LayerKind};
@@ -30,7 +30,7 @@ use crate::settings::{BakeSettings, LayerKind};
 pub const WIDTH: f32 = 344.0;
 
 const SAVE: &str = "Writes the picture without the panel into the working folder (F12): a .png as it is seen, and an .exr \
-                    with its radiance in W/(m² sr), which neither exposure nor tone map changes.";
+                    with its radiance in W/(m² sr), which neither exposure nor white balance nor tone map changes.";
 
 /// Which layer the picture shows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -72,6 +72,8 @@ pub struct Display {
     pub exposure_stops: f64,
     /// After the exposure.
     pub tone_map: ToneMap,
+    /// Before it.
+    pub white_balance: WhiteBalance,
     /// Which light.
     pub layer: LayerShown,
     /// The light, its error or a difference.
