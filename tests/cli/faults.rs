@@ -110,9 +110,9 @@ fn a_disk_that_gets_full_leaves_what_was_there() {
 }
 
 #[test]
-fn too_little_memory_makes_maps_coarser_and_ends_no_run() {
+fn little_address_space_is_told_and_ends_no_run() {
     let sandbox = Sandbox::new();
-    let line = "bake builtin:ring -o out --density 500 --map-resolution 4096 --threads 2";
+    let line = "bake builtin:ring -o out --density 100 --map-resolution 256 --threads 2";
     let run = run_under("ulimit -v 1500000", &sandbox, line);
     assert_eq!(run.code, 0, "{}", run.stderr);
     let told = run
