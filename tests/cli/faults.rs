@@ -188,35 +188,6 @@ fn streams_that_take_nothing_stop_no_work() {
     assert_eq!(command.status().expect("the program starts").code(), Some(1));
 }
 
-/// Kills a bake that replaces another one at twelve moments of its life, most of them while it writes.
-#[test]
-fn a_killed_run_leaves_no_torn_file() {
-    let sandbox = Sandbox::new();
-    let line =
-        |side: u32| format!("bake builtin:showroom -o out --density 1e3 --map-resolution {side} --quiet");
-    sandbox.succeed(&line(256));
-    let start = Instant::now();
-    sandbox.succeed(&line(300));
-    let whole = start.elapsed();
-    let mut killed = 0;
-    for moment in 1..=12_u32 {
-        let line = line(256 + 4 * moment);
-        let arguments: Vec<&str> = line.split_whitespace().collect();
-        let mut command = sandbox.command(&arguments);
-        command.stdout(Stdio::null()).stderr(Stdio::null());
-        let mut child = command.spawn().expect("the program starts");
-        std::thread::sleep(whole.mul_f64(0.3 + 0.06 * f64::from(moment)));
-        killed += u32::from(child.try_wait().expect("it can be asked").is_none());
-        child.kill().expect("it is ours");
-        child.wait().expect("it ends");
-        assert_eq!(torn(&sandbox.path("out")), None, "killed at moment {moment}");
-    }
-    assert!(killed >= 4, "{killed} of 12 were still at work");
-    // And the next run goes on as if nothing had been.
-    sandbox.succeed(&line(256));
-    assert_eq!(torn(&sandbox.path("out")), None);
-}
-
 /// The second signal does not wait for anything.
 #[cfg(unix)]
 #[test]

@@ -73,7 +73,7 @@ fn folders_of_maps() {
         let folder = Folder::of(name);
         let maps = folder.read().expect("nothing is damaged yet");
         assert!(!maps.is_empty() && maps.iter().all(|map| map_fault(map, &folder.scene).is_none()));
-        for number in 0..600 * effort() {
+        for number in 0..40 * effort() {
             let mut damage = Damage::to(name, number);
             // The manifest leads to everything else.
             let hit = if damage.below(2) == 0 {
@@ -107,7 +107,7 @@ fn folders_of_maps() {
         }
     }
     println!("folders of maps: {tally:?}");
-    assert!(tally.taken.get() > 50 && tally.refused.get() > 50, "{tally:?}");
+    assert!(tally.taken.get() > 3 && tally.refused.get() > 3, "{tally:?}");
 }
 
 #[test]
