@@ -27,6 +27,22 @@ pub struct Error {
     pub remedy: String,
 }
 
+/// Most characters of a part of a sentence, and those of its end that are kept where there are more: what files and
+/// users call things may have any length.
+const MOST_CHARACTERS: usize = 600;
+const KEPT_END: usize = 150;
+
+/// The text without its middle, where it is too long for a sentence.
+fn shortened(text: String) -> String {
+    let count = text.chars().count();
+    if count <= MOST_CHARACTERS {
+        return text;
+    }
+    let start: String = text.chars().take(MOST_CHARACTERS - KEPT_END).collect();
+    let end: String = text.chars().skip(count - KEPT_END).collect();
+    format!("{start} … {end}")
+}
+
 /// Shorthand for a result with our [`Error`].
 pub type Result<T> = std::result::Result<T, Error>;
 
@@ -35,8 +51,8 @@ impl Error {
     pub fn failure(location: impl Into<String>, what: impl Into<String>, remedy: impl Into<String>) -> Self {
         Self {
             kind: ErrorKind::Failure,
-            location: location.into(),
-            what: what.into(),
+            location: shortened(location.into()),
+            what: shortened(what.into()),
             remedy: remedy.into(),
         }
     }
@@ -45,8 +61,8 @@ impl Error {
     pub fn usage(location: impl Into<String>, what: impl Into<String>, remedy: impl Into<String>) -> Self {
         Self {
             kind: ErrorKind::Usage,
-            location: location.into(),
-            what: what.into(),
+            location: shortened(location.into()),
+            what: shortened(what.into()),
             remedy: remedy.into(),
         }
     }
@@ -77,8 +93,8 @@ impl Warning {
     /// A warning of what was met, where, and what to do.
     pub fn new(location: impl Into<String>, what: impl Into<String>, remedy: impl Into<String>) -> Self {
         Self {
-            location: location.into(),
-            what: what.into(),
+            location: shortened(location.into()),
+            what: shortened(what.into()),
             remedy: remedy.into(),
         }
     }
@@ -87,5 +103,19 @@ impl Warning {
 impl std::fmt::Display for Warning {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{}: {}; {}", self.location, self.what, self.remedy)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sentence_has_an_end_whatever_things_are_called() {
+        let long = "名".repeat(5000);
+        let sentence = Error::failure(long.clone(), format!("is {long}"), "rename it").to_string();
+        assert!(sentence.chars().count() < 1300, "{}", sentence.chars().count());
+        assert!(sentence.contains(" … ") && sentence.ends_with("; rename it"));
+        assert_eq!(Error::usage("a", "b".repeat(600), "c").what, "b".repeat(600));
     }
 }

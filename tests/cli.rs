@@ -8,6 +8,9 @@ mod cache;
 mod compare;
 #[path = "cli/errors.rs"]
 mod errors;
+#[cfg(unix)]
+#[path = "cli/faults.rs"]
+mod faults;
 #[path = "cli/folders.rs"]
 mod folders;
 #[path = "scene/glb.rs"]

@@ -12,6 +12,7 @@ use nephroid::scene::Scene;
 use nephroid::session::{BakeResult, BakeSession, StopReason};
 use nephroid::settings::BakeSettings;
 
+use super::address_space;
 use super::interrupt::Interrupt;
 use super::job::BakeJob;
 use super::progress_bar::StageBar;
@@ -76,9 +77,10 @@ pub fn bake(
     interrupt: &Interrupt,
 ) -> Result<BakeResult> {
     interrupt.check(&loaded.scene.source)?;
+    let settings = address_space::within_reach(settings, terminal);
     let mut session = BakeSession::new(loaded.scene.clone())?;
     let bar = StageBar::new(terminal);
-    let mut result = session.bake(settings, &bar, interrupt.control())?;
+    let mut result = session.bake(&settings, &bar, interrupt.control())?;
     drop(bar);
     terminal.print_warnings(&result.warnings);
     (result.timings_s.load, result.cpu_s.load) = loaded.load_s;

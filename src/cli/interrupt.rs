@@ -1,11 +1,14 @@
-//! Ctrl-C and SIGTERM: the first stops the work, what there is is kept; the second stops at once.
+//! Ctrl-C and SIGTERM: the first stops the work, what there is is kept; the second stops at once. A file beyond the
+//! system's limit fails as a full disk does.
 
 use std::process::ExitCode;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU8, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 
 use nephroid::error::{Error, Result};
 use nephroid::progress::Control;
+#[cfg(unix)]
+use signal_hook::consts::SIGXFSZ;
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
 
@@ -36,6 +39,9 @@ impl Interrupt {
             control: Arc::new(Control::default()),
             exit_code: Arc::new(AtomicU8::new(0)),
         };
+        // Else the system ends the process in the middle of a file; so the write fails, with a sentence.
+        #[cfg(unix)]
+        signal_hook::flag::register(SIGXFSZ, Arc::new(AtomicBool::new(false))).map_err(refused)?;
         let mut signals = Signals::new([SIGINT, SIGTERM]).map_err(refused)?;
         let (control, exit_code) = (interrupt.control.clone(), interrupt.exit_code.clone());
         std::thread::Builder::new()

@@ -1,5 +1,6 @@
 //! The command line: parse, a validated [`Job`] before any long work, run, exit code.
 
+mod address_space;
 mod args;
 mod bake;
 mod bake_options;

@@ -12,6 +12,7 @@ use crate::error::{Error, Result, Warning};
 use crate::files;
 use crate::illumination::parametrisation::DEFAULT_NOMINAL_SIDE;
 use crate::illumination::{Chart, IlluminationMap, Layer, Parametrisation, UvSet, parametrise};
+use crate::optics::LinearSrgb;
 use crate::scene::{Object, Scene};
 
 /// The parts of a manifest that maps are read by.
@@ -130,11 +131,7 @@ fn read_layers(image: &FloatImage, entry: &MapEntry, location: &str) -> Result<V
                 "bake the scene again",
             )
         })?;
-        if !irradiance
-            .iter()
-            .flatten()
-            .all(|value| value.is_finite() && *value >= 0.0)
-        {
+        if !irradiance.iter().all(is_light) {
             return Err(Error::failure(
                 location,
                 format!("its {} layer holds values that are no irradiance", kind.name()),
@@ -144,6 +141,17 @@ fn read_layers(image: &FloatImage, entry: &MapEntry, location: &str) -> Result<V
         layers.push(Layer { kind, irradiance });
     }
     Ok(layers)
+}
+
+/// Whether a texel holds finite light of no negative luminance, but for rounding. A channel below 0 is a colour outside
+/// of sRGB, as dispersion makes it.
+fn is_light(texel: &[f32; 3]) -> bool {
+    let channels = texel.map(f64::from);
+    let largest = channels
+        .iter()
+        .fold(0.0_f64, |largest, value| largest.max(value.abs()));
+    let luminance = LinearSrgb::from(channels).luminance();
+    largest.is_finite() && luminance >= -f64::from(f32::EPSILON) * largest
 }
 
 fn read_chart(

@@ -68,6 +68,10 @@ fn unwritable(path: &Path, error: &io::Error) -> Error {
             "does not fit on the disk".into(),
             "free some space or choose another place",
         ),
+        io::ErrorKind::FileTooLarge => (
+            "is larger than files may be there".into(),
+            "raise the limit (ulimit -f) or choose another place",
+        ),
         _ => (
             format!("cannot be written ({error})"),
             "choose another place or check the disk",

@@ -1,6 +1,9 @@
 //! The adapter that the tests share the need of.
 
+use nephroid::eye_pass::renderer::Renderer;
+use nephroid::eye_pass::{ToneMap, View};
 use nephroid::gpu::Gpu;
+use nephroid::scene::builtin;
 
 use crate::support::skip;
 
@@ -44,6 +47,38 @@ fn a_destroyed_device_is_lost_and_says_so() {
     gpu.device.destroy();
     let _ = gpu.wait();
     assert!(gpu.is_lost());
+}
+
+/// Whatever is asked of a renderer whose device is gone: an answer or one sentence, and never a panic.
+#[test]
+fn a_renderer_on_a_lost_device_says_so() {
+    let Some(gpu) = gpu() else { return };
+    let scene = builtin::build("mirror").expect("it is built in");
+    let view = View {
+        camera: scene.cameras[0].clone(),
+        width: 32,
+        height: 24,
+        exposure_stops: 0.0,
+        tone_map: ToneMap::Neutral,
+        background: nephroid::optics::LinearSrgb::BLACK,
+    };
+    let mut renderer = Renderer::new(&gpu, &scene, wgpu::TextureFormat::Rgba8Unorm, 1).expect("a renderer");
+    assert!(renderer.radiance(&gpu, &view).is_ok());
+    gpu.device.destroy();
+    let told = renderer.radiance(&gpu, &view).map(|_| ());
+    let error = told.expect_err("nothing can be read from it").to_string();
+    assert!(
+        error.starts_with("graphics device: ") && !error.contains('\n'),
+        "{error}"
+    );
+    let _ = renderer.set_scene(&gpu, &scene);
+    let _ = renderer.set_maps(&gpu, &scene, &[]);
+    let _ = renderer.radiance(&gpu, &view);
+    assert!(gpu.is_lost());
+    // Another device takes its place.
+    let Some(gpu) = self::gpu() else { return };
+    let mut renderer = Renderer::new(&gpu, &scene, wgpu::TextureFormat::Rgba8Unorm, 1).expect("a renderer");
+    assert!(renderer.radiance(&gpu, &view).is_ok());
 }
 
 #[test]

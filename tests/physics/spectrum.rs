@@ -436,3 +436,27 @@ fn each_fault_of_a_csv_file_names_its_line() {
         assert_eq!(error.location, "lamp.csv");
     }
 }
+
+#[test]
+fn lamps_in_any_unit_are_as_bright_as_asked() {
+    let lamp = |scale: f64| {
+        let rows = [(400.0, 0.25), (550.0, 1.0), (700.0, 0.5)];
+        Spectrum::new(rows.map(|(nm, value)| (Nanometres(nm), value * scale)).to_vec()).expect("a table")
+    };
+    let usual = lamp(1.0).to_luminous_equivalent(2.0).expect("a lamp");
+    for scale in [1e-305, 1e-30, 1e30, 1e305, 1.7e308] {
+        let scaled = lamp(scale).to_luminous_equivalent(2.0).expect("a lamp");
+        assert!(
+            (scaled.xyz().y - 2.0).abs() < 1e-12,
+            "{scale:e}: {}",
+            scaled.xyz().y
+        );
+        for nm in [400.0, 475.0, 550.0, 700.0] {
+            let [value, expected] = [&scaled, &usual].map(|lamp| lamp.at(Nanometres(nm)));
+            assert!(
+                (value - expected).abs() <= 1e-12 * expected,
+                "{scale:e}: {value} and {expected}"
+            );
+        }
+    }
+}

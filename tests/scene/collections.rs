@@ -8,6 +8,7 @@ use nephroid::scene::{LoadOptions, Scene, load};
 use serde_json::{Value, json};
 
 use crate::support::shared_or_skip;
+use crate::support::sound::scene_fault;
 
 /// Far more than any of the small files needs: a test for endless loops, not for speed.
 const PATIENCE: Duration = Duration::from_secs(20);
@@ -22,57 +23,9 @@ fn load_in_time(path: &Path) -> Result<Scene> {
         start.elapsed()
     );
     if let Ok(scene) = &result {
-        assert_sound(scene, path);
+        assert_eq!(scene_fault(scene), None, "{}", path.display());
     }
     result
-}
-
-/// What `Scene` promises: every number finite, every index valid.
-#[track_caller]
-fn assert_sound(scene: &Scene, path: &Path) {
-    let at = path.display();
-    for object in &scene.objects {
-        let mesh = &object.mesh;
-        assert!(object.material < scene.materials.len(), "{at}");
-        assert!(
-            !mesh.triangles.is_empty() && mesh.positions.len() == mesh.normals.len(),
-            "{at}"
-        );
-        assert!(mesh.positions.iter().all(|p| p.is_finite()), "{at}");
-        assert!(
-            mesh.normals.iter().all(|n| (n.length() - 1.0).abs() < 1e-12),
-            "{at}: unit normals"
-        );
-        assert!(
-            mesh.triangles
-                .iter()
-                .flatten()
-                .all(|v| (*v as usize) < mesh.positions.len()),
-            "{at}"
-        );
-        for uvs in [&mesh.uv0, &mesh.uv1].into_iter().flatten() {
-            assert!(
-                uvs.len() == mesh.positions.len() && uvs.iter().all(|uv| uv.is_finite()),
-                "{at}"
-            );
-        }
-    }
-    for material in &scene.materials {
-        assert!(material.ior >= 1.0 && material.ior.is_finite(), "{at}");
-        assert!(material.emitted_radiance.is_finite(), "{at}");
-        let texture = material.base_colour_texture.as_ref();
-        assert!(
-            texture.is_none_or(|texture| texture.texture < scene.textures.len()),
-            "{at}"
-        );
-    }
-    for texture in &scene.textures {
-        assert_eq!(
-            texture.rgba.len(),
-            texture.width as usize * texture.height as usize,
-            "{at}"
-        );
-    }
 }
 
 struct Case {

@@ -1,7 +1,9 @@
 //! What the test binaries share. Each uses a part of it.
 #![allow(dead_code)]
 
+pub mod evidence;
 pub mod skip;
+pub mod sound;
 
 use std::path::{Path, PathBuf};
 

@@ -72,6 +72,7 @@ pub const AT_ONCE: f64 = 1000.0;
 /// Bakes until it is cancelled.
 pub const ENDLESS: f64 = 2000.0;
 pub const PANICKING: f64 = 3000.0;
+pub const PANICKING_BELOW: f64 = 3500.0;
 pub const FAILING: f64 = 4000.0;
 /// Ignores cancelling and ends when the gate opens.
 pub const STUBBORN: f64 = 5000.0;
@@ -109,6 +110,14 @@ impl Baker for Scripted {
                 Ok(result(rays, true))
             }
             PANICKING => panic!("the script says so"),
+            // In a thread of its own pool, as a bake's.
+            PANICKING_BELOW => std::thread::scope(|scope| {
+                let thread = scope.spawn(|| panic!("a thread of the bake gave up"));
+                match thread.join() {
+                    Ok(()) => Ok(result(rays, false)),
+                    Err(payload) => std::panic::resume_unwind(payload),
+                }
+            }),
             FAILING => Err(Error::failure("floor", "it is too large", "make it smaller")),
             STUBBORN => {
                 wait();
@@ -397,6 +406,31 @@ fn failures_and_panics_become_sentences_and_the_next_bake_works() {
         2,
         "a fresh session after the panic"
     );
+}
+
+#[test]
+fn maps_of_an_earlier_bake_are_kept_when_a_later_one_panics() {
+    for (panicking, sentence) in [
+        (PANICKING, "the script says so"),
+        (PANICKING_BELOW, "a thread of the bake gave up"),
+    ] {
+        let bench = bench();
+        bench.worker.request(asked(AT_ONCE));
+        settled(&bench.worker);
+        bench.worker.request(asked(panicking));
+        let BakeState::Failed(told) = settled(&bench.worker) else {
+            panic!("it did not fail")
+        };
+        assert!(told.contains(sentence) && !told.contains('\n'), "{told}");
+        assert_eq!(rays(bench.worker.take_level()), AT_ONCE as u64);
+        assert!(
+            bench.worker.take_level().is_none(),
+            "nothing of the bake that panicked"
+        );
+        bench.worker.request(asked(88.0));
+        assert_eq!(settled(&bench.worker), BakeState::Done);
+        assert_eq!(rays(bench.worker.take_level()), 88);
+    }
 }
 
 #[test]

@@ -170,7 +170,18 @@ impl Spectrum {
     /// [`SpectrumError::Dark`] where nobody sees it, and where `watts` is negative or not finite.
     pub fn to_luminous_equivalent(&self, watts: f64) -> Result<Self, SpectrumError> {
         self.check_visible()?;
-        self.scaled(watts / self.xyz().y)
+        let luminous = self.xyz().y;
+        if luminous.is_normal() {
+            return self.scaled(watts / luminous);
+        }
+        // Values near the ends of what numbers can hold: as shares of the largest they add up.
+        let largest = self.values.iter().copied().fold(0.0, f64::max);
+        let rows = self.wavelengths_nm.iter().zip(&self.values);
+        let shares = Self::new(
+            rows.map(|(nm, value)| (Nanometres(*nm), value / largest))
+                .collect(),
+        )?;
+        shares.scaled(watts / shares.xyz().y)
     }
 
     /// Whether anybody sees it as light.
