@@ -23,7 +23,7 @@ use crate::transport::{PathCounts, PathEffects};
 
 /// Slices of the brightest light over a texel that its wavelengths part over, at least: beams may be thinner than texels.
 /// Dim light has fewer.
-const SLICES_PER_TEXEL: f64 = 4.0;
+const SLICES_PER_TEXEL: f64 = 2.0;
 
 /// Spreads patches.
 #[derive(Clone, Copy, Debug)]
@@ -173,7 +173,7 @@ impl<E: PathEffects> Spreader<'_, E> {
         let lands_alike = nodes.iter().all(|nodes| lands_alike(*nodes));
         let brightest_w = self.samples.get(patch.corners[0].0).brightest_w;
         let share = (first[0].flux_w.luminance() / brightest_w).clamp(0.0, 1.0);
-        let apart = self.smear(&nodes) * SLICES_PER_TEXEL * share.sqrt();
+        let apart = self.smear(&nodes) * SLICES_PER_TEXEL * share;
         for slice in spectrum.slices(apart) {
             let strands = nodes.map(|nodes| slice.strand(nodes, parted));
             let strands = strands.each_ref();
