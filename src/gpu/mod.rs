@@ -1,6 +1,7 @@
 //! The graphics device: adapter, shaders, struct layouts, read-back. Knows no scene and no pass.
 
 mod faults;
+mod filled;
 pub mod layout;
 pub mod readback;
 pub mod shader;

@@ -1,8 +1,6 @@
 //! The mean of several pictures of the same view: edges of what is seen in mirrors and through glass become as smooth
 //! as all others.
 
-use wgpu::util::DeviceExt;
-
 use super::bindings::{bind_group, bind_group_layout, texture, uniform};
 use super::cover;
 use super::shaders::ACCUMULATED;
@@ -88,11 +86,11 @@ impl Mean {
             share: 1.0 / (self.count + 1) as f32,
             ..Default::default()
         };
-        let buffer = gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-            label: Some("share"),
-            contents: bytemuck::bytes_of(&accumulation),
-            usage: wgpu::BufferUsages::UNIFORM,
-        });
+        let buffer = gpu.filled_buffer(
+            "share",
+            bytemuck::bytes_of(&accumulation),
+            wgpu::BufferUsages::UNIFORM,
+        );
         let (before, after) = (self.count as usize % 2, (self.count as usize + 1) % 2);
         let resources = [
             buffer.as_entire_binding(),

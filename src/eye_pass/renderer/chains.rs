@@ -4,7 +4,6 @@
 use std::sync::Arc;
 
 use glam::DVec3;
-use wgpu::util::DeviceExt;
 
 use super::bindings::bind_group;
 use super::geometry::Geometry;
@@ -125,13 +124,7 @@ impl ChainScene {
         start: &ChainStart,
         wavelengths: &SeenWavelengths,
     ) -> Option<wgpu::BindGroup> {
-        let uniform = |label, contents| {
-            gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-                label: Some(label),
-                contents,
-                usage: wgpu::BufferUsages::UNIFORM,
-            })
-        };
+        let uniform = |label, contents| gpu.filled_buffer(label, contents, wgpu::BufferUsages::UNIFORM);
         let start = uniform("start of chains", bytemuck::bytes_of(start));
         let wavelengths = uniform("wavelengths", bytemuck::bytes_of(wavelengths));
         let page = geometry.pages.first()?;

@@ -5,7 +5,6 @@ use std::sync::Arc;
 
 use bytemuck::{Pod, Zeroable};
 use glam::DVec2;
-use wgpu::util::DeviceExt;
 
 use super::paging::Uploaded;
 use crate::gpu::Gpu;
@@ -282,14 +281,7 @@ impl Packing<'_> {
         if self.indices.is_empty() {
             return;
         }
-        let filled = |label, contents, usage| {
-            let descriptor = wgpu::util::BufferInitDescriptor {
-                label: Some(label),
-                contents,
-                usage,
-            };
-            self.gpu.device.create_buffer_init(&descriptor)
-        };
+        let filled = |label, contents, usage| self.gpu.filled_buffer(label, contents, usage);
         self.pages.push(Page {
             corners: filled(
                 "corners",

@@ -1,7 +1,5 @@
 //! The passes of one picture: what is traced, then all surfaces.
 
-use wgpu::util::DeviceExt;
-
 use super::bindings::bind_group;
 use super::camera;
 use super::chains::ChainScene;
@@ -284,11 +282,7 @@ impl Renderer {
     }
 
     fn bind_frame(&self, gpu: &Gpu, frame: &Frame) -> wgpu::BindGroup {
-        let buffer = gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-            label: Some("frame"),
-            contents: bytemuck::bytes_of(frame),
-            usage: wgpu::BufferUsages::UNIFORM,
-        });
+        let buffer = gpu.filled_buffer("frame", bytemuck::bytes_of(frame), wgpu::BufferUsages::UNIFORM);
         let [maps, textures] = self.objects.images.views();
         let resources = [
             buffer.as_entire_binding(),

@@ -2,8 +2,6 @@
 
 use std::sync::Arc;
 
-use wgpu::util::DeviceExt;
-
 use super::chains::ChainScene;
 use super::geometry::Geometry;
 use super::shaders::PROBE;
@@ -74,11 +72,7 @@ fn run(gpu: &Gpu, chains: &ChainScene, rays: &[ProbeRay], groups: u32) -> Result
             compilation_options: Default::default(),
             cache: None,
         });
-    let given = gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-        label: Some("rays"),
-        contents: bytemuck::cast_slice(rays),
-        usage: wgpu::BufferUsages::STORAGE,
-    });
+    let given = gpu.filled_buffer("rays", bytemuck::cast_slice(rays), wgpu::BufferUsages::STORAGE);
     let found = gpu.device.create_buffer(&wgpu::BufferDescriptor {
         label: Some("hits"),
         size: size_of_val(rays) as u64 / 2,

@@ -2,8 +2,6 @@
 
 use std::collections::HashMap;
 
-use wgpu::util::DeviceExt;
-
 use super::bindings::{bind_group, bind_group_layout, texture, uniform};
 use super::cover;
 use super::shaders::TONE_MAPPING;
@@ -103,11 +101,12 @@ impl ToneMappingPipelines {
 }
 
 fn white(gpu: &Gpu, matrix: &Matrix3) -> wgpu::Buffer {
-    gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-        label: Some("white balance"),
-        contents: bytemuck::bytes_of(&DisplayWhite::new(matrix)),
-        usage: wgpu::BufferUsages::UNIFORM,
-    })
+    let white = DisplayWhite::new(matrix);
+    gpu.filled_buffer(
+        "white balance",
+        bytemuck::bytes_of(&white),
+        wgpu::BufferUsages::UNIFORM,
+    )
 }
 
 /// The values of the shader's overrides. Formats that encode sRGB by themselves take linear light.
