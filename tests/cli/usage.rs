@@ -68,7 +68,7 @@ fn bad_usage_is_one_sentence_and_exit_2() {
             "--sigma",
         ),
         // Options whose feature is not there are no options.
-        ("bake builtin:ring -o out --wavelengths 8", "--wavelengths"),
+        ("bake builtin:ring -o out --wavelengths 0", "--wavelengths"),
         ("bake builtin:ring -o out --shard 1/2", "--shard"),
         ("render builtin:ring -o picture", ".png"),
         ("render builtin:ring -o picture.gif", ".png"),
