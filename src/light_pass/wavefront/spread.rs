@@ -23,7 +23,7 @@ use crate::transport::{PathCounts, PathEffects};
 
 /// Slices of the brightest light over a texel that its wavelengths part over, at least: beams may be thinner than texels.
 /// Dim light has fewer.
-const SLICES_PER_TEXEL: f64 = 2.0;
+const SLICES_PER_TEXEL: f64 = 4.0;
 
 /// Spreads patches.
 #[derive(Clone, Copy, Debug)]
