@@ -25,6 +25,9 @@ use crate::transport::{PathCounts, PathEffects};
 /// Dim light has fewer.
 const SLICES_PER_TEXEL: f64 = 4.0;
 
+/// How far wavelengths count as parted of which some leave the scene [texels].
+const FAR_TEXELS: f64 = 32.0;
+
 /// Spreads patches.
 #[derive(Clone, Copy, Debug)]
 pub struct Spreader<'a, E> {
@@ -198,8 +201,8 @@ impl<E: PathEffects> Spreader<'_, E> {
             let ends = [nodes[1], nodes[2]].map(Strand::landing_point);
             match (texel_m, ends) {
                 (Some(texel_m), [Some(a), Some(b)]) => a.distance(b) / texel_m,
-                // Some leave, some land: as finely as can be.
-                (Some(_), _) => f64::INFINITY,
+                // Some leave, some land: past the horizon of what is lit.
+                (Some(_), _) => FAR_TEXELS,
                 (None, _) => 0.0,
             }
         };
