@@ -130,7 +130,7 @@ mod tests {
             seconds: 1.0,
         };
         assert!(!report.holds());
-        let text = markdown(&[report.clone()]);
+        let text = markdown(std::slice::from_ref(&report));
         assert!(text.contains("| `case` | law | 0.1 | 0.5 | 0 |"), "{text}");
         assert!(text.contains("|  | law | ∞ **fails** | 0.5 |  |"), "{text}");
         let open = CaseReport {
