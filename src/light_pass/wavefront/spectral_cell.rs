@@ -158,10 +158,11 @@ impl CellCutter<'_> {
         });
         let has_strand = |sample: &LightSample, signature| sample.find(signature).is_some();
         for signature in strands {
-            if shared.done.binary_search(&signature).is_err()
+            if let Err(place) = shared.done.binary_search(&signature)
                 && is_at_the_same_corners(nodes, work, |sample| has_strand(sample, signature))
+                && self.emit_shared(cell, signature, work, out)
             {
-                self.emit_shared(cell, signature, work, out, &mut shared.done);
+                shared.done.insert(place, signature);
             }
         }
         let surfaces = signatures(cell, work, |sample, found| {
@@ -175,30 +176,29 @@ impl CellCutter<'_> {
                 shared.booked.push(signature);
             }
         }
-        shared.done.sort_unstable();
     }
 
-    /// The patches of light that all wavelengths have in the same parts of the cell; nothing where that is not so.
+    /// The patches of light that all wavelengths have in the same parts of the cell; false, and none, where that is not
+    /// so.
     fn emit_shared(
         &self,
         cell: &Cell,
         signature: PathSignature,
         work: &mut Workspace,
         out: &mut CellOutput,
-        done: &mut Vec<PathSignature>,
-    ) {
+    ) -> bool {
         let mut made = CellOutput::default();
         for region in light_regions(cell, signature, work) {
             self.emit(cell, &region, signature, work, &mut made);
         }
         for patch in &mut made.patches {
             let Some(others) = self.others_of(patch, signature, work) else {
-                return;
+                return false;
             };
             patch.tone = Tone::Spectrum { others, parted: true };
         }
         out.patches.append(&mut made.patches);
-        done.push(signature);
+        true
     }
 
     /// Samples of the other wavelengths at a patch's corners; `None` where not all have its light.
