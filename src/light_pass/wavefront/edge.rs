@@ -436,12 +436,14 @@ impl EdgeCutter<'_> {
     }
 
     /// What another wavelength's light does where a sample was traced.
-    pub fn again(&self, square: DVec2, other: SampleId, work: &mut Workspace) -> SampleId {
+    pub fn again(&self, other: SampleId, work: &mut Workspace) -> SampleId {
         let node = self.tracer.wavelength.unwrap_or(0);
+        // Not where a patch has it: what stands for a border lies beside it.
+        let square = work.get(other).square;
         if let Some(known) = work.known(node, square) {
             return known;
         }
-        let sample = self.tracer.trace_again(self.face, square, work.get(other));
+        let sample = self.tracer.trace_again(self.face, work.get(other));
         work.sample_at(node, square, || sample)
     }
 

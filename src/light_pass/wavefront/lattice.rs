@@ -215,7 +215,7 @@ impl WavefrontLattice<'_> {
             .into_par_iter()
             .map(|row| {
                 let (node, row) = (row / (rows + 1), row % (rows + 1));
-                self.trace_again(face, node, first_row + row, &corner_rows[row])
+                self.trace_again(face, node, &corner_rows[row])
             })
             .collect();
         corner_rows.extend(others);
@@ -296,14 +296,10 @@ impl WavefrontLattice<'_> {
     }
 
     /// The same corners at another wavelength.
-    fn trace_again(&self, face: usize, node: usize, row: usize, first: &CornerRow) -> CornerRow {
+    fn trace_again(&self, face: usize, node: usize, first: &CornerRow) -> CornerRow {
         let tracer = self.tracer.at_node(self.light, node);
-        let columns = first.index.iter().enumerate();
-        let wanted = columns.filter(|(_, index)| **index != NONE);
-        let samples = wanted.map(|(column, &index)| {
-            let other = &first.samples[index as usize];
-            tracer.trace_again(face, self.square(column, row), other)
-        });
+        let samples = first.samples.iter();
+        let samples = samples.map(|other| tracer.trace_again(face, other));
         CornerRow {
             index: first.index.clone(),
             samples: samples.collect(),

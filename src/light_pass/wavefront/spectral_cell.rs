@@ -123,13 +123,16 @@ impl CellCutter<'_> {
     }
 
     fn node_corners(&self, cell: &Cell, work: &mut Workspace) -> NodeCorners {
-        std::array::from_fn(|node| cell.corners.map(|corner| self.sample_of(node, corner, work)))
+        std::array::from_fn(|node| {
+            cell.corners
+                .map(|corner| self.sample_of(node, corner.sample, work))
+        })
     }
 
     /// The sample of a wavelength where one of the first was traced.
-    fn sample_of(&self, node: usize, at: Corner, work: &mut Workspace) -> SampleId {
-        match (node, work.at_node(at.sample, node)) {
-            (0, _) => at.sample,
+    fn sample_of(&self, node: usize, first: SampleId, work: &mut Workspace) -> SampleId {
+        match (node, work.at_node(first, node)) {
+            (0, _) => first,
             (_, Some(sample)) => sample,
             (_, None) => {
                 let tracer = self.edges.tracer.at_node(self.light, node);
@@ -137,7 +140,7 @@ impl CellCutter<'_> {
                     tracer: &tracer,
                     face: self.edges.face,
                 };
-                edges.again(at.square, at.sample, work)
+                edges.again(first, work)
             }
         }
     }
@@ -211,11 +214,7 @@ impl CellCutter<'_> {
         let mut others = [[patch.corners[0].0; 4]; NODES - 1];
         for (node, others) in others.iter_mut().enumerate() {
             for (corner, other) in others.iter_mut().enumerate() {
-                let at = Corner {
-                    square: patch.squares[corner],
-                    sample: patch.corners[corner].0,
-                };
-                *other = self.sample_of(node + 1, at, work);
+                *other = self.sample_of(node + 1, patch.corners[corner].0, work);
                 work.get(*other).find(signature)?;
             }
         }
@@ -241,11 +240,7 @@ impl CellCutter<'_> {
                 let area = 0.5 * (b - a).perp_dot(c - a).abs();
                 let mut weighted = [(triangle[0].sample, 0, area / 3.0); 3];
                 for (outline, weighted) in triangle.iter().zip(&mut weighted) {
-                    let at = Corner {
-                        square: outline.square,
-                        sample: outline.sample,
-                    };
-                    let sample = self.sample_of(node, at, work);
+                    let sample = self.sample_of(node, outline.sample, work);
                     let Some(surface) = work.get(sample).find_node(signature) else {
                         return false;
                     };

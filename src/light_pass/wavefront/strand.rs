@@ -119,6 +119,8 @@ pub struct SurfaceNode {
 /// One traced light ray.
 #[derive(Clone, Debug, Default)]
 pub struct LightSample {
+    /// Where it was traced, in the unit square of its face.
+    pub square: DVec2,
     /// Outgoing rays, in ascending order of their signatures.
     pub strands: Vec<Strand>,
     /// Specular surfaces met, in ascending order of their signatures.

@@ -143,15 +143,18 @@ impl<'a> StrandTracer<'a> {
 
     /// The same where it was traced at another wavelength: the stretch before the first dispersive surface is not
     /// searched again.
-    pub fn trace_again(&self, face: usize, square: DVec2, other: &LightSample) -> LightSample {
+    pub fn trace_again(&self, face: usize, other: &LightSample) -> LightSample {
         let hits = other.fresh.as_ref().map_or(&[][..], |fresh| &fresh.hits);
-        (self.follow)(self, face, square, hits)
+        (self.follow)(self, face, other.square, hits)
     }
 
     fn follow<E: PathEffects>(&self, face: usize, square: DVec2, common: &[KeptHit]) -> LightSample {
+        let mut sample = LightSample {
+            square,
+            ..LightSample::default()
+        };
         // Just within the domain: its border may be the very border of a surface.
         let square = square.clamp(DVec2::splat(DOMAIN_MARGIN), DVec2::splat(1.0 - DOMAIN_MARGIN));
-        let mut sample = LightSample::default();
         if self.control.is_cancelled() {
             return sample;
         }
