@@ -157,7 +157,10 @@ impl App {
 
     fn open(&mut self, event_loop: &ActiveEventLoop) {
         match Graphics::new(event_loop, self.proxy.clone(), self.model.scene(), self.size) {
-            Ok(graphics) => {
+            Ok(mut graphics) => {
+                if self.model.log.is_kept() {
+                    graphics.interface().watch_controls();
+                }
                 let adapter = graphics.gpu().adapter_name();
                 let scene = Arc::clone(self.model.scene());
                 self.model.log.write(&Event::Started {
@@ -308,6 +311,7 @@ impl App {
             last,
             worth,
             refusal,
+            log,
             ..
         } = model;
         let facts = Facts {
@@ -325,10 +329,14 @@ impl App {
             speed_m_per_s,
             adapter: &adapter,
         };
-        Some(graphics.interface().run(&window, |ui| {
+        let painting = graphics.interface().run(&window, |ui| {
             *wishes = std::mem::take(wishes).and(panel.show(ui, &facts));
             *picture_rect = overlay::show(ui, picture, &facts, quantity, notice.as_deref());
-        }))
+        });
+        if let Some(controls) = &painting.moved_controls {
+            log.write(&Event::Controls(controls));
+        }
+        Some(painting)
     }
 
     /// Decides when the next frame comes.

@@ -7,6 +7,7 @@ use std::time::Instant;
 
 use serde_json::{Value, json};
 
+use super::controls::Control;
 use super::worker::{BakedLevel, Worth};
 use crate::error::{Error, Result};
 use crate::eye_pass::renderer::Uploaded;
@@ -44,6 +45,8 @@ pub enum Event<'a> {
         /// How long the window's thread took to find and send that [s].
         seconds: f64,
     },
+    /// Controls of the panel are elsewhere than before.
+    Controls(&'a [Control]),
     /// The scene was edited.
     Edited(&'a Edit),
     /// The last edit was taken back.
@@ -104,6 +107,10 @@ impl Event<'_> {
                     "other_bytes": uploaded.other_bytes,
                     "upload_s": seconds,
                 })
+            }
+            Self::Controls(controls) => {
+                let control = |c: &Control| json!({"role": c.role, "name": c.name, "rect_pixels": c.rect});
+                json!({"event": "controls", "controls": controls.iter().map(control).collect::<Vec<_>>()})
             }
             Self::Edited(edit) => json!({"event": "edit", "target": format!("{:?}", edit.target())}),
             Self::Undone => json!({"event": "undo"}),
@@ -190,6 +197,11 @@ impl EventLog {
             file: path.map(create).transpose()?,
             start: Instant::now(),
         })
+    }
+
+    /// Whether anything that is told is kept.
+    pub fn is_kept(&self) -> bool {
+        self.file.is_some()
     }
 
     /// Writes one line. A log that can no longer be written is given up with a warning: the window matters more.

@@ -7,11 +7,15 @@ use winit::event::WindowEvent;
 use winit::event_loop::{ActiveEventLoop, EventLoopProxy};
 use winit::window::Window;
 
+use super::controls::{self, Control};
+
 /// egui's state for one window, and what paints it.
 pub struct Interface {
     context: egui::Context,
     state: egui_winit::State,
     renderer: egui_wgpu::Renderer,
+    /// Where controls were last; `None` where nobody asks.
+    controls: Option<Vec<Control>>,
 }
 
 /// What one pass of the interface gave: to be painted once.
@@ -21,6 +25,8 @@ pub struct Painting {
     pixels_per_point: f32,
     /// When egui wants to be shown again; zero at once.
     pub repaint_after: Duration,
+    /// Where controls are, where somebody asks and they moved.
+    pub moved_controls: Option<Vec<Control>>,
 }
 
 impl Interface {
@@ -48,7 +54,14 @@ impl Interface {
             context,
             state,
             renderer,
+            controls: None,
         }
+    }
+
+    /// Tells from now on where controls are.
+    pub fn watch_controls(&mut self) {
+        self.context.enable_accesskit();
+        self.controls = Some(Vec::new());
     }
 
     /// egui's own state.
@@ -73,7 +86,10 @@ impl Interface {
             accesskit_winit::WindowEvent::ActionRequested(request) => {
                 self.state.on_accesskit_action_request(request);
             }
-            accesskit_winit::WindowEvent::AccessibilityDeactivated => self.context.disable_accesskit(),
+            accesskit_winit::WindowEvent::AccessibilityDeactivated if self.controls.is_none() => {
+                self.context.disable_accesskit();
+            }
+            accesskit_winit::WindowEvent::AccessibilityDeactivated => {}
         }
     }
 
@@ -81,6 +97,7 @@ impl Interface {
     pub fn run(&mut self, window: &Window, show: impl FnMut(&mut egui::Ui)) -> Painting {
         let input = self.state.take_egui_input(window);
         let output = self.context.run_ui(input, show);
+        let moved_controls = self.moved_controls(&output);
         self.state.handle_platform_output(window, output.platform_output);
         let repaint_after = output
             .viewport_output
@@ -91,7 +108,19 @@ impl Interface {
             textures: output.textures_delta,
             pixels_per_point: output.pixels_per_point,
             repaint_after,
+            moved_controls,
         }
+    }
+
+    fn moved_controls(&mut self, output: &egui::FullOutput) -> Option<Vec<Control>> {
+        let known = self.controls.as_mut()?;
+        let update = output.platform_output.accesskit_update.as_ref()?;
+        let found = controls::of(update, f64::from(output.pixels_per_point));
+        if *known == found {
+            return None;
+        }
+        known.clone_from(&found);
+        Some(found)
     }
 
     /// Takes over new textures. Has to be called for every painting, shown or not: textures come only once.

@@ -1,6 +1,7 @@
 //! The window: fly through a scene, change a setting, see it baked anew.
 
 mod app;
+pub mod controls;
 pub mod debounce;
 pub mod difference_view;
 pub mod edits;

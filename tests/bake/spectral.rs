@@ -382,6 +382,37 @@ fn more_wavelengths_come_nearer_to_all_of_them() {
     assert!(all < 0.5 * one);
 }
 
+/// Around the focus of a ball, light of all wavelengths at once against that of many traced one by one. The ball's
+/// silhouette cuts cells here, and their light reaches far: what is wrong at a border shows.
+#[test]
+fn light_of_all_wavelengths_at_once_is_that_of_many_beside_borders_too() {
+    let scene = ball_of("N-BK7");
+    let side = 128;
+    let way = |wavelengths: Wavelengths| BakeSettings {
+        density_per_sr: 4e3,
+        wavelengths,
+        ..settings(side)
+    };
+    let [all, many] = [Wavelengths::Continuous, Wavelengths::Fixed(10)].map(|wavelengths| {
+        let result = bake(scene.clone(), &way(wavelengths));
+        caustic(&result, &scene, "floor").1.to_vec()
+    });
+    let middle = 0.5 * side as f64;
+    let is_around = |texel: usize| {
+        let place = |index: usize| (index as f64 + 0.5 - middle) / side as f64;
+        (0.05..0.2).contains(&place(texel % side).hypot(place(texel / side)))
+    };
+    let around: Vec<usize> = (0..side * side).filter(|texel| is_around(*texel)).collect();
+    let rms = |channel: usize| {
+        let off = |texel: &usize| f64::from(all[*texel][channel] / many[*texel][channel] - 1.0).powi(2);
+        (around.iter().map(off).sum::<f64>() / around.len() as f64).sqrt()
+    };
+    let rms = [0, 1, 2].map(rms);
+    println!("{rms:?} off in {} texels", around.len());
+    // A ray traced again a bracket beside its border moves red by 45 % here; ten wavelengths are off by about 1 % themselves.
+    assert!(rms.iter().all(|rms| *rms < 0.03), "{rms:?}");
+}
+
 #[test]
 fn wavelengths_are_traced_only_where_glass_is_dispersive() {
     let scene = ball_of("cauchy:1.5,0");

@@ -199,6 +199,49 @@ impl<'a> Viewer<'a> {
         }
     }
 
+    /// Left, top, right and bottom of the first control of the panel that fits, by its role and name [pixels]; waits until
+    /// it is there and rests.
+    pub fn control(&self, what: &str, fits: impl Fn(&str, &str) -> bool) -> [f64; 4] {
+        let start = Instant::now();
+        let mut last = None;
+        loop {
+            let controls = self.all("controls").pop().unwrap_or_default();
+            let text = |control: &Value, key: &str| control[key].as_str().unwrap_or_default().to_owned();
+            let mut all = controls["controls"].as_array().into_iter().flatten();
+            let found = all.find(|control| fits(&text(control, "role"), &text(control, "name")));
+            let rect = found.map(|control| {
+                let side = |side| control["rect_pixels"][side].as_f64().expect("a number");
+                [0, 1, 2, 3].map(side)
+            });
+            match rect {
+                Some(rect) if last == Some(rect) => return rect,
+                _ => last = rect,
+            }
+            assert!(start.elapsed() < PATIENCE, "no {what} in {controls:#}");
+            std::thread::sleep(Duration::from_millis(200));
+        }
+    }
+
+    /// The middle of a control of the panel [pixels].
+    pub fn centre(&self, role: &str, name: &str) -> (i32, i32) {
+        let [left, top, right, bottom] = self.control(name, |r, n| r == role && n == name);
+        ((0.5 * (left + right)) as i32, (0.5 * (top + bottom)) as i32)
+    }
+
+    /// A share of the way along a slider of the panel [pixels].
+    pub fn on_slider(&self, name: &str, share: f64) -> (i32, i32) {
+        let [left, top, _, bottom] = self.control(name, |r, n| r == "Slider" && n == name);
+        ((left + 4.0 + share * 104.0) as i32, (0.5 * (top + bottom)) as i32)
+    }
+
+    /// Clicks a control of the panel as a person would, and leaves it.
+    pub fn click(&self, role: &str, name: &str) {
+        let (x, y) = self.centre(role, name);
+        self.hands(&format!(
+            "mousemove {x} {y} sleep 0.3 mousedown 1 sleep 0.3 mouseup 1 sleep 0.3 mousemove 900 300"
+        ));
+    }
+
     /// Forgets the events so far.
     pub fn forget(&mut self) {
         self.read = self.events().len();

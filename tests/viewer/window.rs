@@ -4,23 +4,17 @@
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use egui::accesskit::Role;
 use glam::DVec3;
 use image::RgbImage;
-use nephroid::effect::{Effect, EffectSwitch};
 use nephroid::export::FloatImage;
 use nephroid::eye_pass::tone_mapping::display_rgba8;
 use nephroid::eye_pass::{Picture, ToneMap};
 use nephroid::gpu::Gpu;
-use nephroid::plan::EffectLine;
 use nephroid::scene::builtin;
-use nephroid::settings::{BakeSettings, LayerKind};
 use nephroid::viewer::navigation::Navigator;
 use nephroid::viewer::panel::WIDTH;
-use nephroid::viewer::worker::BakeState;
 
 use super::desktop::{SIZE, Screen, Viewer};
-use super::headless::{Headless, finished};
 
 /// The caustic alone, coarse enough to be baked in a second.
 const RING: [&str; 9] = [
@@ -73,19 +67,6 @@ fn difference(a: &RgbImage, b: &RgbImage) -> f64 {
     count as f64 / (f64::from(SIZE.0 - left) * f64::from(SIZE.1))
 }
 
-/// Where the sigma slider is at its default and at ten times that [pixels].
-fn sigma_slider() -> ((i32, i32), (i32, i32)) {
-    let settings = BakeSettings {
-        layers: vec![LayerKind::Caustic],
-        ..BakeSettings::splat()
-    };
-    let scene = builtin::build("ring").expect("it is built in");
-    let panel = Headless::with_scene(scene, settings, (SIZE.0 as f32, SIZE.1 as f32));
-    let rect = Headless::rect_of(panel.labelled(Role::Slider, "Sigma [radii²]"));
-    let at = |share: f32| ((rect.left() + 4.0 + share * 104.0) as i32, rect.center().y as i32);
-    (at(0.5), at(0.75))
-}
-
 /// The first screenshot that fits: what the log tells takes a moment to reach the screen.
 fn screenshot_that(viewer: &Viewer<'_>, what: &str, fits: impl Fn(&RgbImage) -> bool) -> RgbImage {
     let start = Instant::now();
@@ -126,7 +107,7 @@ fn a_user_sees_the_caustic_drags_sigma_flies_looks_and_closes() {
     assert!(cusp > 0.5 && cusp > 5.0 * beside, "cusp {cusp}, beside {beside}");
 
     // Sigma is dragged: a bake with it, and another picture.
-    let ((x0, y), (x1, _)) = sigma_slider();
+    let [(x0, y), (x1, _)] = [0.5, 0.75].map(|share| viewer.on_slider("Sigma [radii²]", share));
     viewer.hands(&format!(
         "mousemove {x0} {y} sleep 0.2 mousedown 1 sleep 0.2 mousemove {} {y}",
         (x0 + x1) / 2
@@ -231,37 +212,12 @@ const REFINED: [&str; 7] = [
     "caustic",
 ];
 
-/// The panel once such a bake is done.
-fn panel_when_done() -> Headless {
-    let settings = BakeSettings {
-        layers: vec![LayerKind::Caustic],
-        max_error: Some(0.03),
-        ..BakeSettings::default()
-    };
-    let scene = builtin::build("ring").expect("it is built in");
-    let mut panel = Headless::with_scene(scene, settings.clone(), (SIZE.0 as f32, SIZE.1 as f32));
-    panel.layers = vec![LayerKind::Caustic];
-    panel.has_errors = true;
-    panel.last = Some(finished(&panel.scene, &settings));
-    panel.state = BakeState::Done;
-    panel.settle();
-    panel
-}
-
-/// A share of the way along a slider [pixels].
-fn on_slider(panel: &Headless, label: &str, share: f32) -> (i32, i32) {
-    let rect = Headless::rect_of(panel.labelled(Role::Slider, label));
-    ((rect.left() + 4.0 + share * 104.0) as i32, rect.center().y as i32)
-}
-
 #[test]
 fn levels_come_before_the_end_edits_are_baked_while_dragged_and_errors_are_shown() {
     let Some(screen) = Screen::start("viewer edits") else {
         return;
     };
     let mut viewer = Viewer::open(&screen, &REFINED);
-    let panel = panel_when_done();
-
     // The last maps are not the first.
     let done = viewer.wait_for("done", |_| true);
     assert!(done["level"].as_u64() > Some(1), "{done}");
@@ -271,12 +227,9 @@ fn levels_come_before_the_end_edits_are_baked_while_dragged_and_errors_are_shown
     let baked = viewer.screenshot();
 
     // The lamp is moved: coarse maps are shown before the last ones.
-    let field = panel.nodes().find(|node| {
-        let is_x = |text: Option<&str>| text.is_some_and(|text| text.starts_with("x: -0.7"));
-        is_x(node.value()) || is_x(node.label())
-    });
-    let field = Headless::rect_of(field.expect("the lamp has a place")).center();
-    let (x, y) = (field.x as i32, field.y as i32);
+    let [left, top, right, bottom] =
+        viewer.control("place of the lamp", |_, name| name.starts_with("x: -0.7"));
+    let (x, y) = ((0.5 * (left + right)) as i32, (0.5 * (top + bottom)) as i32);
     viewer.hands(&format!(
         "mousemove {x} {y} sleep 0.2 mousedown 1 sleep 0.2 mousemove {} {y} sleep 0.2 mouseup 1",
         x + 60
@@ -294,8 +247,8 @@ fn levels_come_before_the_end_edits_are_baked_while_dragged_and_errors_are_shown
     viewer.wait_for("rest", |_| true);
 
     // Four times the power, at the place where the mouse is held: no ray is traced for it.
-    let (x0, y) = on_slider(&panel, "Intensity [W/sr]", 0.5);
-    let (x1, _) = on_slider(&panel, "Intensity [W/sr]", 0.65);
+    let (x0, y) = viewer.on_slider("Intensity [W/sr]", 0.5);
+    let (x1, _) = viewer.on_slider("Intensity [W/sr]", 0.65);
     viewer.forget();
     viewer.hands(&format!(
         "mousemove {x0} {y} sleep 0.2 mousedown 1 sleep 0.2 mousemove {x1} {y}"
@@ -319,14 +272,7 @@ fn levels_come_before_the_end_edits_are_baked_while_dragged_and_errors_are_shown
     screenshot_that(&viewer, "is as before", |shot| difference(&baked, shot) < ALIKE);
 
     // The error takes the place of the light, with a legend, and goes again.
-    let click = |panel: &Headless, name: &str| {
-        let centre = Headless::rect_of(panel.named(Role::RadioButton, name)).center();
-        format!(
-            "mousemove {} {} sleep 0.3 mousedown 1 sleep 0.3 mouseup 1 sleep 0.3 mousemove 900 300",
-            centre.x as i32, centre.y as i32
-        )
-    };
-    viewer.hands(&click(&panel, "error"));
+    viewer.click("RadioButton", "error");
     viewer.wait_for("shows", |shows| shows["what"] == "error");
     let false_colours = screenshot_that(&viewer, "shows errors", |shot| difference(&baked, shot) > 0.1);
     let coloured = |shot: &RgbImage| {
@@ -339,7 +285,7 @@ fn levels_come_before_the_end_edits_are_baked_while_dragged_and_errors_are_shown
     };
     assert_eq!(coloured(&baked), 0, "the light is white");
     assert!(coloured(&false_colours) > 20_000, "{}", coloured(&false_colours));
-    viewer.hands(&click(&panel, "light"));
+    viewer.click("RadioButton", "light");
     viewer.wait_for("shows", |shows| shows["what"] == "light");
     screenshot_that(&viewer, "shows light again", |shot| {
         difference(&baked, shot) < ALIKE
@@ -392,35 +338,10 @@ fn the_worth_of_the_light_pass_is_found_beside_the_maps_and_shown_in_false_colou
     viewer.wait_for("rest", |_| true);
     let baked = viewer.screenshot();
 
-    // The same panel without a window tells where everything is.
-    let settings = BakeSettings {
-        layers: vec![LayerKind::Caustic],
-        ..BakeSettings::splat()
-    };
-    let scene = builtin::build("ring").expect("it is built in");
-    let mut panel = Headless::with_scene(scene, settings.clone(), (SIZE.0 as f32, SIZE.1 as f32));
-    let mut last = finished(&panel.scene, &settings);
-    last.result.plan.effects = vec![EffectLine {
-        effect: Effect::LightPass,
-        switch: EffectSwitch::Auto,
-        on: true,
-        reason: "`mirror` is lit by `lamp`".into(),
-    }];
-    panel.last = Some(last);
-    panel.state = BakeState::Done;
-    panel.settle();
-    let mut click = |role: Role, name: &str| {
-        let centre = Headless::rect_of(panel.named(role, name)).center();
-        panel.click(centre);
-        viewer.hands(&format!(
-            "mousemove {} {} sleep 0.3 click 1 sleep 0.3",
-            centre.x as i32, centre.y as i32
-        ));
-    };
     for section in ["Scene", "Light pass", "Effects"] {
-        click(Role::DisclosureTriangle, section);
+        viewer.click("DisclosureTriangle", section);
     }
-    click(Role::Button, "light pass: worth");
+    viewer.click("Button", "light pass: worth");
     let compared = viewer.wait_for("compared", |_| true);
     assert_eq!(compared["effect"], "light_pass");
     assert!(compared["with_w"].as_f64() > Some(0.0), "{compared}");
@@ -485,17 +406,7 @@ fn the_picture_is_saved_as_it_is_seen_and_as_radiance() {
     screenshot_that(&viewer, "is clear again", |shot| difference(&seen, shot) == 0.0);
 
     // By the button: the next number.
-    let settings = BakeSettings {
-        layers: vec![LayerKind::Caustic],
-        ..BakeSettings::splat()
-    };
-    let scene = builtin::build("ring").expect("it is built in");
-    let panel = Headless::with_scene(scene, settings, (SIZE.0 as f32, SIZE.1 as f32));
-    let button = Headless::rect_of(panel.named(Role::Button, "Save picture")).center();
-    viewer.hands(&format!(
-        "mousemove {} {} sleep 0.3 mousedown 1 sleep 0.3 mouseup 1",
-        button.x as i32, button.y as i32
-    ));
+    viewer.click("Button", "Save picture");
     let event = viewer.wait_for("saved", |_| true);
     assert!(
         event["files"][1]
