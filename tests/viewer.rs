@@ -29,6 +29,8 @@ mod screenshot;
 #[cfg(target_os = "linux")]
 #[path = "support/mod.rs"]
 mod support;
+#[path = "viewer/walking.rs"]
+mod walking;
 #[cfg(target_os = "linux")]
 #[path = "viewer/window.rs"]
 mod window;

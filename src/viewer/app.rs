@@ -238,9 +238,7 @@ impl App {
     fn fly(&mut self) {
         let now = Instant::now();
         let step = now.duration_since(self.moved_until).min(LONGEST_STEP);
-        if self.model.navigator.is_moving() {
-            self.model.navigator.advance(step.as_secs_f64());
-        }
+        self.model.advance(step.as_secs_f64());
         self.moved_until = now;
     }
 
@@ -301,7 +299,7 @@ impl App {
         );
         let (window, picture) = (Arc::clone(graphics.window()), graphics.picture_id());
         let tells_times = graphics.tells_times();
-        let speed_m_per_s = model.navigator.speed_m_per_s();
+        let (travel, speed_m_per_s) = (model.navigator.travel(), model.navigator.speed_m_per_s());
         let edits = model.edits();
         let (scene, loaded) = (Arc::clone(edits.scene()), Arc::clone(edits.loaded()));
         let undoable = edits.undoable();
@@ -326,6 +324,7 @@ impl App {
             has_errors,
             chains: chains.as_ref(),
             frame_times: tells_times.then_some(&*frame_times),
+            travel,
             speed_m_per_s,
             adapter: &adapter,
         };

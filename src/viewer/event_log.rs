@@ -55,6 +55,15 @@ pub enum Event<'a> {
     Compared(&'a Worth),
     /// The picture shows the light, how far it may be off, or what an effect is worth.
     Shows(&'a str),
+    /// The camera gets about in another way.
+    Travel(&'a str),
+    /// A view was kept, or gone to.
+    Bookmark {
+        /// From 0 on.
+        number: usize,
+        /// Kept now; gone to otherwise.
+        kept: bool,
+    },
     /// The bake was stopped.
     Cancelled,
     /// The bake failed.
@@ -116,6 +125,10 @@ impl Event<'_> {
             Self::Undone => json!({"event": "undo"}),
             Self::Compared(worth) => compared(worth),
             Self::Shows(what) => json!({"event": "shows", "what": what}),
+            Self::Travel(way) => json!({"event": "travel", "way": way}),
+            Self::Bookmark { number, kept } => {
+                json!({"event": "bookmark", "number": number + 1, "kept": kept})
+            }
             Self::Cancelled => json!({"event": "cancelled"}),
             Self::Failed(sentence) => json!({"event": "failed", "sentence": sentence}),
             Self::SettingsChanged(settings) => json!({"event": "settings", "settings": settings}),

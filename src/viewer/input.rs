@@ -3,7 +3,7 @@
 use winit::event::ElementState;
 use winit::keyboard::{Key, KeyCode, NamedKey};
 
-use super::navigation::HeldKeys;
+use super::navigation::{BOOKMARKS, HeldKeys};
 
 /// A key that does something once.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -16,6 +16,12 @@ pub enum Shortcut {
     Rebake,
     /// H
     Help,
+    /// V
+    NextTravel,
+    /// M
+    Look,
+    /// 1 to 9, from 0 on
+    Bookmark(usize),
     /// F12
     SavePicture,
     /// Esc
@@ -33,6 +39,7 @@ pub fn hold(keys: &mut HeldKeys, key: KeyCode, state: ElementState) -> bool {
         KeyCode::KeyE => &mut keys.up,
         KeyCode::KeyQ => &mut keys.down,
         KeyCode::ShiftLeft | KeyCode::ShiftRight => &mut keys.run,
+        KeyCode::ControlLeft | KeyCode::ControlRight => &mut keys.creep,
         _ => return false,
     };
     *held = state.is_pressed();
@@ -48,11 +55,19 @@ pub fn shortcut(key: &Key) -> Option<Shortcut> {
             "c" => Some(Shortcut::NextCamera),
             "f" => Some(Shortcut::Frame),
             "r" => Some(Shortcut::Rebake),
-            "h" => Some(Shortcut::Help),
-            _ => None,
+            "h" | "?" => Some(Shortcut::Help),
+            "v" => Some(Shortcut::NextTravel),
+            "m" => Some(Shortcut::Look),
+            digit => bookmark(digit).map(Shortcut::Bookmark),
         },
         _ => None,
     }
+}
+
+/// Which kept view a key with a digit means, from 0 on.
+pub fn bookmark(digit: &str) -> Option<usize> {
+    let number: usize = digit.parse().ok()?;
+    (1..=BOOKMARKS).contains(&number).then(|| number - 1)
 }
 
 /// Whether a key, with Ctrl held, takes the last edit back.

@@ -20,7 +20,9 @@ pub mod pace;
 pub mod panel;
 mod picture;
 pub mod screenshot;
+pub mod solid;
 mod surface;
+pub mod walking;
 pub mod worker;
 
 use std::path::PathBuf;

@@ -7,8 +7,9 @@ use std::time::Instant;
 use super::debounce::Debounce;
 use super::edits::EditedScene;
 use super::event_log::{Event, EventLog};
-use super::navigation::Navigator;
+use super::navigation::{Navigator, Travel};
 use super::panel::{LayerShown, Panel, Quantity, Wishes};
+use super::solid::{Solid, Surroundings};
 use super::worker::{BakeRequest, BakeState, BakedLevel, Worker, Worth};
 use super::{ViewerOptions, difference_view, error_view};
 use crate::effect::Effect;
@@ -18,6 +19,7 @@ use crate::illumination::difference::Difference;
 use crate::scene::Scene;
 use crate::session::BakeSession;
 use crate::settings::LayerKind;
+use crate::transport::Tracer;
 
 /// The state behind the window.
 #[derive(Debug)]
@@ -31,6 +33,7 @@ pub struct Model {
     /// What happened.
     pub log: EventLog,
     worker: Worker,
+    surroundings: Surroundings,
     state: BakeState,
     /// The maps that the picture shows.
     pub last: Option<Arc<BakedLevel>>,
@@ -55,13 +58,16 @@ impl Model {
     /// The event log cannot be written; the system gives no thread.
     pub fn new(options: &ViewerOptions, wake: impl Fn() + Send + Sync + 'static) -> Result<Self> {
         let scene = Arc::clone(&options.scene);
-        let worker = Worker::spawn(BakeSession::new, wake)?;
+        let wake: Arc<dyn Fn() + Send + Sync> = Arc::new(wake);
+        let wake_too = Arc::clone(&wake);
+        let worker = Worker::spawn(BakeSession::new, move || wake_too())?;
         let wanted = BakeRequest::new(Arc::clone(&scene), options.settings.clone());
         let mut model = Self {
             navigator: Navigator::new(&scene, options.camera.as_deref()),
             panel: Panel::new(options.settings.clone()),
             log: EventLog::open(options.event_log.as_deref())?,
             worker,
+            surroundings: Surroundings::new(wake),
             state: BakeState::Idle,
             last: None,
             worth: None,
@@ -78,6 +84,34 @@ impl Model {
             model.rebake();
         }
         Ok(model)
+    }
+
+    /// The surfaces of what is shown, for whoever walks; `None` until they are found.
+    pub fn surfaces(&mut self) -> Option<Arc<Tracer>> {
+        self.surroundings.of(self.edits.scene())
+    }
+
+    /// Gets about in another way from now on.
+    pub fn travel(&mut self, travel: Travel) {
+        let surfaces = self.surfaces();
+        let solid = surfaces.as_deref().map(|tracer| tracer as &dyn Solid);
+        self.navigator.set_travel(travel, solid);
+        self.log.write(&Event::Travel(travel.name()));
+    }
+
+    /// Moves the camera by some time [s].
+    pub fn advance(&mut self, seconds: f64) {
+        if !self.navigator.is_moving() {
+            return;
+        }
+        if self.navigator.travel() == Travel::Walk {
+            // Stands until there is something to stand on.
+            if let Some(surfaces) = self.surfaces() {
+                self.navigator.advance_among(seconds, &*surfaces);
+            }
+        } else {
+            self.navigator.advance(seconds);
+        }
     }
 
     /// What is shown, as it is now.

@@ -1,9 +1,11 @@
-//! A fly camera that moves the same at every frame rate: pure, without a window.
+//! A camera that flies, walks or orbits, and moves the same at every frame rate: pure, without a window.
 
 use std::f64::consts::FRAC_PI_2;
 
 use glam::{DVec2, DVec3};
 
+use super::solid::Solid;
+use super::walking::{self, Walker};
 use crate::scene::{Camera, Scene};
 
 /// Time after which the velocity has closed 1 − 1/e of its gap to what the keys ask for [s].
@@ -26,6 +28,51 @@ const DEFAULT_FOV_RAD: f64 = std::f64::consts::FRAC_PI_4;
 /// Shape of picture (width/height) that cameras are composed for: a narrower one still shows all that this would.
 const COMPOSED_FOR: f64 = 16.0 / 9.0;
 
+/// Speed factor while taking care.
+const CREEP_FACTOR: f64 = 0.25;
+/// Slowest and fastest walking speed [m/s].
+const WALKING_RANGE: (f64, f64) = (0.1, 20.0);
+/// Nearest that an orbit comes, in scene radii.
+const NEAREST_ORBIT: f64 = 1e-3;
+/// Views that can be kept.
+pub const BOOKMARKS: usize = 9;
+
+/// How the camera gets about.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Travel {
+    /// Anywhere, through walls.
+    #[default]
+    Fly,
+    /// On foot: eyes 1.6 m above the ground, stopped by walls.
+    Walk,
+    /// Around a point.
+    Orbit,
+}
+
+impl Travel {
+    /// All, in the order in which a key goes through them.
+    pub const ALL: [Self; 3] = [Self::Fly, Self::Walk, Self::Orbit];
+
+    /// Its name in the panel and in the event log.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Fly => "fly",
+            Self::Walk => "walk",
+            Self::Orbit => "orbit",
+        }
+    }
+
+    /// The one after it.
+    #[must_use]
+    pub fn next(self) -> Self {
+        match self {
+            Self::Fly => Self::Walk,
+            Self::Walk => Self::Orbit,
+            Self::Orbit => Self::Fly,
+        }
+    }
+}
+
 /// Which movement keys are held.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct HeldKeys {
@@ -43,6 +90,8 @@ pub struct HeldKeys {
     pub down: bool,
     /// Shift
     pub run: bool,
+    /// Ctrl
+    pub creep: bool,
 }
 
 impl HeldKeys {
@@ -78,6 +127,12 @@ pub struct Navigator {
     cameras: Vec<Camera>,
     /// Which of the file's cameras `C` shows next.
     next_camera: usize,
+    travel: Travel,
+    walker: Walker,
+    walking_m_per_s: f64,
+    /// Distance of the point that is orbited, straight ahead [m].
+    orbit_m: f64,
+    bookmarks: [Option<Camera>; BOOKMARKS],
 }
 
 impl Navigator {
@@ -104,6 +159,11 @@ impl Navigator {
             radius_m,
             cameras: scene.cameras.clone(),
             next_camera: 0,
+            travel: Travel::Fly,
+            walker: Walker::default(),
+            walking_m_per_s: walking::SPEED_M_PER_S,
+            orbit_m: radius_m,
+            bookmarks: [const { None }; BOOKMARKS],
         };
         if let Some(name) = camera {
             let found = scene.cameras.iter().position(|candidate| candidate.name == name);
@@ -143,39 +203,139 @@ impl Navigator {
         2.0 * ((0.5 * self.vertical_fov_rad).tan() * widened).atan()
     }
 
-    /// Flying speed without running [m/s].
+    /// Speed without running [m/s].
     pub fn speed_m_per_s(&self) -> f64 {
-        self.speed_m_per_s
+        match self.travel {
+            Travel::Walk => self.walking_m_per_s,
+            Travel::Fly | Travel::Orbit => self.speed_m_per_s,
+        }
+    }
+
+    /// How it gets about.
+    pub fn travel(&self) -> Travel {
+        self.travel
+    }
+
+    /// Gets about in another way from now on; an orbit is around what is straight ahead, or else around the scene.
+    pub fn set_travel(&mut self, travel: Travel, solid: Option<&dyn Solid>) {
+        if travel == self.travel {
+            return;
+        }
+        self.travel = travel;
+        self.velocity_m_per_s = DVec3::ZERO;
+        self.walker = Walker::default();
+        if travel != Travel::Fly {
+            self.roll_rad = 0.0;
+        }
+        let (_, _, forward) = self.level_axes();
+        let met = solid.and_then(|solid| solid.meets(self.position, forward, f64::INFINITY));
+        let along_m = (self.centre - self.position).dot(forward);
+        let nearest_m = NEAREST_ORBIT * self.radius_m;
+        self.orbit_m = match met {
+            Some((distance_m, _)) => distance_m.max(nearest_m),
+            None if along_m > nearest_m => along_m,
+            None => self.radius_m,
+        };
+    }
+
+    /// Keeps the present view under a number from 0 on; false where there is no such number.
+    pub fn set_bookmark(&mut self, number: usize) -> bool {
+        let camera = self.camera();
+        let kept = self.bookmarks.get_mut(number);
+        kept.map(|kept| *kept = Some(camera)).is_some()
+    }
+
+    /// Goes to a view that was kept; false where there is none.
+    pub fn go_to_bookmark(&mut self, number: usize) -> bool {
+        let Some(camera) = self.bookmarks.get(number).cloned().flatten() else {
+            return false;
+        };
+        self.stand_at(&camera);
+        true
     }
 
     /// Whether the next [`advance`](Self::advance) would move the camera.
     pub fn is_moving(&self) -> bool {
-        self.keys.direction() != DVec3::ZERO || self.velocity_m_per_s != DVec3::ZERO
+        self.keys.direction() != DVec3::ZERO
+            || self.velocity_m_per_s != DVec3::ZERO
+            || (self.travel == Travel::Walk && self.walker.is_moving())
     }
 
-    /// Lets time pass [s, ≥ 0]. The velocity approaches what the keys ask for exponentially and the path is its exact
-    /// integral, so that one long frame ends where many short ones do.
+    /// Lets time pass [s, ≥ 0] where nothing is in the way. The velocity approaches what the keys ask for exponentially and
+    /// the path is its exact integral, so that one long frame ends where many short ones do.
     pub fn advance(&mut self, seconds: f64) {
+        let path = self.drift(seconds);
+        match self.travel {
+            Travel::Fly | Travel::Walk => self.position += path,
+            Travel::Orbit => self.move_pivot(path),
+        }
+    }
+
+    /// The same among surfaces: those who walk stand on them and are stopped by them.
+    pub fn advance_among(&mut self, seconds: f64, solid: &dyn Solid) {
+        if self.travel != Travel::Walk || seconds <= 0.0 {
+            return self.advance(seconds);
+        }
+        let path = self.drift(seconds);
+        let asked_m_per_s = path / seconds;
+        let (eye, left_m_per_s) = self.walker.step(self.position, asked_m_per_s, seconds, solid);
+        self.position = eye;
+        if left_m_per_s != asked_m_per_s {
+            // A wall took some of it.
+            self.velocity_m_per_s = left_m_per_s;
+        }
+    }
+
+    /// The path of some time, and the velocity after it.
+    fn drift(&mut self, seconds: f64) -> DVec3 {
         let wanted = self.wanted_velocity();
         let remaining = (-seconds / SETTLING_S).exp();
         let gap = self.velocity_m_per_s - wanted;
-        self.position += wanted * seconds + gap * (SETTLING_S * (1.0 - remaining));
         self.velocity_m_per_s = wanted + gap * remaining;
-        if wanted == DVec3::ZERO && self.velocity_m_per_s.length() < STILL * self.speed_m_per_s {
+        if wanted == DVec3::ZERO && self.velocity_m_per_s.length() < STILL * self.speed_m_per_s() {
             self.velocity_m_per_s = DVec3::ZERO;
         }
+        wanted * seconds + gap * (SETTLING_S * (1.0 - remaining))
+    }
+
+    /// Steps towards the point that is orbited, or moves it aside with the camera.
+    fn move_pivot(&mut self, path: DVec3) {
+        let (_, _, forward) = self.level_axes();
+        let ahead_m = path.dot(forward);
+        let pivot = self.position + forward * self.orbit_m + (path - forward * ahead_m);
+        self.orbit_m = (self.orbit_m - ahead_m).max(NEAREST_ORBIT * self.radius_m);
+        self.position = pivot - forward * self.orbit_m;
     }
 
     /// Turns the gaze by a movement of the mouse [counts, x to the right, y down].
     pub fn look(&mut self, counts: DVec2) {
+        let pivot = self.position + self.level_axes().2 * self.orbit_m;
         self.yaw_rad = (self.yaw_rad + counts.x * LOOK_RAD_PER_COUNT).rem_euclid(std::f64::consts::TAU);
         self.pitch_rad = (self.pitch_rad - counts.y * LOOK_RAD_PER_COUNT).clamp(-FRAC_PI_2, FRAC_PI_2);
+        if self.travel == Travel::Orbit {
+            self.position = pivot - self.level_axes().2 * self.orbit_m;
+        }
     }
 
-    /// Changes the flying speed by notches of the wheel, 5 % each; it stays within 0.001 to 100 scene radii per second.
+    /// Changes the speed by notches of the wheel, 5 % each: when flying it stays within 0.001 to 100 scene radii per second,
+    /// on foot within 0.1 to 20 m/s. In orbit the same notches bring the camera nearer.
     pub fn wheel(&mut self, notches: f64) {
+        let factor = WHEEL_FACTOR.powf(notches);
+        match self.travel {
+            Travel::Fly => {}
+            Travel::Walk => {
+                let (slowest, fastest) = WALKING_RANGE;
+                self.walking_m_per_s = (self.walking_m_per_s * factor).clamp(slowest, fastest);
+                return;
+            }
+            Travel::Orbit => {
+                let (_, _, forward) = self.level_axes();
+                let ahead_m = self.orbit_m * (1.0 - 1.0 / factor);
+                return self.move_pivot(forward * ahead_m);
+            }
+        }
         let (slowest, fastest) = (SPEED_RANGE.0 * self.radius_m, SPEED_RANGE.1 * self.radius_m);
-        self.speed_m_per_s = (self.speed_m_per_s * WHEEL_FACTOR.powf(notches)).clamp(slowest, fastest);
+        self.speed_m_per_s = (self.speed_m_per_s * factor).clamp(slowest, fastest);
     }
 
     /// Releases every key and stands still: the window lost the keyboard.
@@ -201,12 +361,15 @@ impl Navigator {
         let (_, _, forward) = self.level_axes();
         self.velocity_m_per_s = DVec3::ZERO;
         self.position = self.centre - forward * distance_m;
+        self.orbit_m = distance_m;
+        self.walker.look_again();
     }
 
     fn stand_at(&mut self, camera: &Camera) {
         let forward = camera.forward;
         let across = DVec2::new(forward.x, forward.z);
         self.velocity_m_per_s = DVec3::ZERO;
+        self.walker.look_again();
         self.position = camera.position;
         self.pitch_rad = forward.y.clamp(-1.0, 1.0).asin();
         self.yaw_rad = if across.length() > 1e-9 {
@@ -234,12 +397,17 @@ impl Navigator {
         (right, up, forward)
     }
 
-    /// What the held keys ask for [m/s]: along the gaze, sideways, and straight up.
+    /// What the held keys ask for [m/s]: along the gaze, sideways, and straight up; on foot along the ground.
     fn wanted_velocity(&self) -> DVec3 {
         let keys = self.keys.direction();
         let (right, _, forward) = self.level_axes();
-        let direction = right * keys.x + DVec3::Y * keys.y + forward * keys.z;
+        let direction = if self.travel == Travel::Walk {
+            right * keys.x + DVec3::Y.cross(right) * keys.z
+        } else {
+            right * keys.x + DVec3::Y * keys.y + forward * keys.z
+        };
         let run = if self.keys.run { RUN_FACTOR } else { 1.0 };
-        direction.normalize_or_zero() * (self.speed_m_per_s * run)
+        let creep = if self.keys.creep { CREEP_FACTOR } else { 1.0 };
+        direction.normalize_or_zero() * (self.speed_m_per_s() * run * creep)
     }
 }

@@ -168,13 +168,10 @@ fn turned(turns: f64) -> (f64, f64) {
     (std::f64::consts::TAU * turns.fract()).sin_cos()
 }
 
-/// Scenes with an estimate and a truth each.
-const RANDOM_SCENES: u64 = 25;
-
 #[test]
 fn estimates_of_random_scenes_are_within_a_factor_of_two() {
     let (mut ratios, mut faults) = (Vec::new(), Vec::new());
-    for seed in 0..RANDOM_SCENES {
+    for seed in 0..50 {
         let scene = random_scene(seed);
         let result = bake(scene.clone(), &exactly(4e3));
         let Some(estimate) = result.estimated_relative_rmse else {
@@ -201,8 +198,8 @@ fn estimates_of_random_scenes_are_within_a_factor_of_two() {
         ratios[ratios.len() / 2]
     );
     // Half of these errors are above 20 %: the light of a bowl, say, on a floor that most of it misses.
-    assert!(ratios.len() >= 22, "{} scenes are lit", ratios.len());
-    assert!(faults.len() <= 1, "{faults:#?}");
+    assert!(ratios.len() >= 45, "{} scenes are lit", ratios.len());
+    assert!(faults.len() <= 2, "{faults:#?}");
     assert!(ratios[0] > 0.33 && ratios[ratios.len() - 1] < 3.0, "{ratios:?}");
 }
 /// A splat bake of randomly placed rays against the mean of many such: what is left is noise.

@@ -26,7 +26,7 @@ use crate::scenes::{diffuse, floor_map, floor_scene};
 const LARGEST_FLIP: f64 = 0.02;
 /// Pictures of which the one at rest is the mean.
 const PICTURES: u32 = 64;
-const SIZE: [u32; 2] = [48, 32];
+const SIZE: [u32; 2] = [96, 64];
 const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 const QUALITY: EyeQuality = EyeQuality {
     traced_scale: 1.0,

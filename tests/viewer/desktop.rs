@@ -222,10 +222,17 @@ impl<'a> Viewer<'a> {
         }
     }
 
-    /// The middle of a control of the panel [pixels].
+    /// The middle of a control of the panel [pixels], scrolled into the window where it is not.
     pub fn centre(&self, role: &str, name: &str) -> (i32, i32) {
-        let [left, top, right, bottom] = self.control(name, |r, n| r == role && n == name);
-        ((0.5 * (left + right)) as i32, (0.5 * (top + bottom)) as i32)
+        for _ in 0..20 {
+            let [left, top, right, bottom] = self.control(name, |r, n| r == role && n == name);
+            if bottom < f64::from(SIZE.1) && top > 0.0 {
+                return ((0.5 * (left + right)) as i32, (0.5 * (top + bottom)) as i32);
+            }
+            let wheel = if top > 0.0 { 5 } else { 4 };
+            self.hands(&format!("mousemove 20 300 click {wheel} sleep 0.3"));
+        }
+        panic!("{role} {name} cannot be scrolled to");
     }
 
     /// A share of the way along a slider of the panel [pixels].

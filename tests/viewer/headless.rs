@@ -9,6 +9,7 @@ use nephroid::scene::Scene;
 use nephroid::session::{BakeCounts, BakeResult, EffectReport, StopReason, Timings};
 use nephroid::settings::{BakeSettings, LayerKind};
 use nephroid::viewer::frame_times::FrameTimes;
+use nephroid::viewer::navigation::Travel;
 use nephroid::viewer::panel::{Facts, Panel, WIDTH, Wishes};
 use nephroid::viewer::worker::{BakeRequest, BakeState, BakedLevel, Worth};
 
@@ -143,6 +144,7 @@ impl Headless {
             worth: worth.as_ref(),
             chains: chains.as_ref(),
             frame_times: frame_times.as_ref(),
+            travel: Travel::Fly,
             speed_m_per_s: 1.0,
             adapter: "no adapter",
         };

@@ -13,6 +13,7 @@ use nephroid::gpu::Gpu;
 use nephroid::scene::builtin;
 use nephroid::viewer::navigation::Navigator;
 use nephroid::viewer::panel::WIDTH;
+use nephroid::viewer::walking::EYE_M;
 
 use super::desktop::{SIZE, Screen, Viewer};
 
@@ -156,6 +157,59 @@ fn a_user_sees_the_caustic_drags_sigma_flies_looks_and_closes() {
 }
 
 #[test]
+fn who_walks_falls_to_the_ground_stops_at_walls_and_finds_a_kept_view_again() {
+    let Some(screen) = Screen::start("viewer on foot") else {
+        return;
+    };
+    let mut viewer = Viewer::open(
+        &screen,
+        &["builtin:showroom", "--density", "100", "--map-resolution", "32"],
+    );
+    viewer.wait_for("done", |_| true);
+    let position = |event: &serde_json::Value| {
+        let axis = |index: usize| event["position_m"][index].as_f64().expect("a number");
+        DVec3::new(axis(0), axis(1), axis(2))
+    };
+    let start = position(&viewer.wait_for("rest", |_| true));
+    viewer.hands("mousemove 900 300 key ctrl+1");
+    viewer.wait_for("bookmark", |event| event["number"] == 1 && event["kept"] == true);
+    viewer.hands("key v");
+    viewer.wait_for("travel", |event| event["way"] == "walk");
+    let standing = position(&viewer.wait_for("rest", |event| position(event) != start));
+    let floor = builtin::build("showroom")
+        .expect("it is built in")
+        .bounds()
+        .expect("a room");
+    assert!(
+        (standing.y - floor.0.y - EYE_M).abs() < 0.01,
+        "{standing} in {floor:?}"
+    );
+    // Through the room and on, at a run: ten seconds would be fifty metres.
+    viewer.hands("keydown shift keydown w sleep 10 keyup w keyup shift");
+    let stopped = position(&viewer.wait_for("rest", |event| position(event) != standing));
+    let walked_m = standing.distance(stopped);
+    assert!(walked_m > 0.3, "it walked {walked_m} m");
+    let (low, high) = floor;
+    assert!(
+        stopped.cmpge(low).all() && stopped.cmple(high).all(),
+        "{stopped} in {floor:?}"
+    );
+    // A wall that is pressed against does not let go on.
+    viewer.hands("keydown w sleep 2 keyup w");
+    std::thread::sleep(Duration::from_millis(500));
+    let shot = viewer.screenshot();
+    viewer.hands("key 1");
+    viewer.wait_for("bookmark", |event| event["number"] == 1 && event["kept"] == false);
+    let back = position(&viewer.wait_for("rest", |event| position(event).distance(stopped) > 0.1));
+    // On foot again: over the place that was kept, on the ground.
+    assert!((back - start).with_y(0.0).length() < 1e-6, "{back}, {start}");
+    screenshot_that(&viewer, "from elsewhere", |seen| difference(&shot, seen) > 0.05);
+    let (status, stderr) = viewer.close();
+    assert_eq!(status.code(), Some(0), "{stderr}");
+    assert!(!stderr.contains("panicked"), "{stderr}");
+}
+
+#[test]
 fn a_window_at_rest_takes_no_time_and_survives_every_size() {
     let Some(screen) = Screen::start("viewer at rest") else {
         return;
@@ -227,9 +281,7 @@ fn levels_come_before_the_end_edits_are_baked_while_dragged_and_errors_are_shown
     let baked = viewer.screenshot();
 
     // The lamp is moved: coarse maps are shown before the last ones.
-    let [left, top, right, bottom] =
-        viewer.control("place of the lamp", |_, name| name.starts_with("x: -0.7"));
-    let (x, y) = ((0.5 * (left + right)) as i32, (0.5 * (top + bottom)) as i32);
+    let (x, y) = viewer.centre("SpinButton", "Position [m]");
     viewer.hands(&format!(
         "mousemove {x} {y} sleep 0.2 mousedown 1 sleep 0.2 mousemove {} {y} sleep 0.2 mouseup 1",
         x + 60

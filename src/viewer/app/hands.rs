@@ -2,11 +2,25 @@
 
 use winit::dpi::PhysicalPosition;
 use winit::event::{ElementState, KeyEvent, MouseButton, MouseScrollDelta};
-use winit::keyboard::PhysicalKey;
+use winit::keyboard::{Key, NamedKey, PhysicalKey};
 use winit::window::CursorGrabMode;
 
 use super::{App, PIXELS_PER_NOTCH};
+use crate::viewer::event_log::Event;
 use crate::viewer::input::{self, Shortcut};
+use crate::viewer::navigation::Travel;
+
+/// What a way to get about means, when it was chosen.
+fn travel_notice(travel: Travel) -> String {
+    match travel {
+        Travel::Fly => "Flying: W A S D E Q, through walls too.",
+        Travel::Walk => "Walking: W A S D, eyes 1.6 m above the ground, stopped by walls.",
+        Travel::Orbit => {
+            "Orbiting what is straight ahead: drag with the right mouse button, wheel for nearer and farther."
+        }
+    }
+    .to_owned()
+}
 
 impl App {
     pub(super) fn on_key(&mut self, event: &KeyEvent) {
@@ -22,6 +36,17 @@ impl App {
             // Nothing flies or bakes by a chord.
             self.pressed.undo |= event.state.is_pressed() && input::is_undo(&event.logical_key);
             if event.state.is_pressed() {
+                if let Key::Character(digit) = &event.logical_key
+                    && let Some(number) = input::bookmark(digit)
+                {
+                    self.model.navigator.set_bookmark(number);
+                    self.model.log.write(&Event::Bookmark { number, kept: true });
+                    self.notice = Some(format!("View kept as {}: press {0} to come back.", number + 1));
+                }
+                // What was held before goes on, more slowly.
+                if matches!(event.logical_key, Key::Named(NamedKey::Control)) {
+                    self.model.navigator.keys.creep = true;
+                }
                 return;
             }
         }
@@ -37,6 +62,21 @@ impl App {
                 Some(Shortcut::Frame) => {
                     let aspect = self.picture_rect.aspect_ratio();
                     self.model.navigator.frame(f64::from(aspect));
+                }
+                Some(Shortcut::NextTravel) => {
+                    let next = self.model.navigator.travel().next();
+                    self.model.travel(next);
+                    self.notice = Some(travel_notice(next));
+                }
+                Some(Shortcut::Look) if self.looking_from.is_some() => self.stop_looking(),
+                Some(Shortcut::Look) => self.start_looking(),
+                Some(Shortcut::Bookmark(number)) => {
+                    if self.model.navigator.go_to_bookmark(number) {
+                        self.model.log.write(&Event::Bookmark { number, kept: false });
+                    } else {
+                        let key = number + 1;
+                        self.notice = Some(format!("No view is kept as {key}: Ctrl+{key} keeps this one."));
+                    }
                 }
                 Some(Shortcut::Rebake) => self.pressed.rebake = true,
                 Some(Shortcut::SavePicture) => self.pressed.save_picture = true,

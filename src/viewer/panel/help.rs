@@ -2,22 +2,33 @@
 
 use egui::{Grid, RichText, Ui};
 
-/// Shows the keys; `speed_m_per_s` is the present flying speed.
-pub fn show(ui: &mut Ui, speed_m_per_s: f64) {
-    let speed = format!("speed ±5 % a notch, now {speed_m_per_s:.3} m/s");
+use crate::viewer::navigation::Travel;
+
+/// Shows the keys for a way to get about at a speed [m/s].
+pub fn show(ui: &mut Ui, travel: Travel, speed_m_per_s: f64) {
+    let (way, wheel) = match travel {
+        Travel::Fly | Travel::Walk => (
+            "hold to look around",
+            format!("speed ±5 % a notch, now {speed_m_per_s:.3} m/s"),
+        ),
+        Travel::Orbit => ("hold to turn around it", "nearer, farther".to_owned()),
+    };
+    let now = format!("fly, walk, orbit; now {}", travel.name());
     let lines = [
-        ("W A S D", "fly forward, left, back, right"),
-        ("E  Q", "fly up, down"),
-        ("Shift", "four times as fast"),
-        ("Right mouse", "hold to look around"),
-        ("Wheel", speed.as_str()),
+        ("V", now.as_str()),
+        ("W A S D", "forward, left, back, right"),
+        ("E  Q", "up, down, but on foot"),
+        ("Shift  Ctrl", "four times as fast, a quarter"),
+        ("Right mouse, M", way),
+        ("Wheel", wheel.as_str()),
+        ("1 … 9", "views kept with Ctrl+1 … Ctrl+9"),
         ("C", "next camera of the file"),
         ("F", "frame the whole scene"),
         ("R", "re-bake"),
         ("Ctrl+Z", "take the last change of the scene back"),
         ("F12", "save the picture as .png and .exr"),
         ("Esc", "let go of the mouse, cancel the bake"),
-        ("H", "open or close this list"),
+        ("H  ?", "open or close this list"),
     ];
     Grid::new("keys")
         .num_columns(2)

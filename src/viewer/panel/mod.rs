@@ -18,6 +18,7 @@ use std::sync::Arc;
 use egui::{Align, CollapsingHeader, Frame, Label, Layout, Margin, RichText, ScrollArea, Ui};
 
 use super::frame_times::FrameTimes;
+use super::navigation::Travel;
 use super::worker::{BakeState, BakedLevel, Worth};
 use crate::effect::Effect;
 use crate::error::Warning;
@@ -121,7 +122,9 @@ pub struct Facts<'a> {
     pub chains: Option<&'a EffectReport>,
     /// How long the last pictures took; `None` where the device cannot tell.
     pub frame_times: Option<&'a FrameTimes>,
-    /// Flying speed [m/s].
+    /// How the camera gets about.
+    pub travel: Travel,
+    /// Its speed [m/s].
     pub speed_m_per_s: f64,
     /// What draws the picture.
     pub adapter: &'a str,
@@ -240,7 +243,7 @@ impl Panel {
         }
         let help = CollapsingHeader::new(RichText::new("Help").strong())
             .open(Some(self.help_open))
-            .show(ui, |ui| help::show(ui, facts.speed_m_per_s));
+            .show(ui, |ui| help::show(ui, facts.travel, facts.speed_m_per_s));
         if help.header_response.on_hover_text("The keys (H).").clicked() {
             self.help_open = !self.help_open;
         }

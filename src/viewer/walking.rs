@@ -1,0 +1,143 @@
+//! A person on foot: eyes above the ground, stopped by walls, up and down steps. Pure: surfaces come by a trait.
+
+use glam::DVec3;
+
+use super::solid::Solid;
+
+/// Height of the eyes above the ground [m].
+pub const EYE_M: f64 = 1.6;
+/// Walking speed [m/s], of people on even ground (Bohannon 1997).
+pub const SPEED_M_PER_S: f64 = 1.4;
+/// Steps up to this height are climbed [m].
+const STEP_M: f64 = 0.35;
+/// Walls stay so far from the eyes [m].
+const BODY_M: f64 = 0.25;
+/// Acceleration of what falls [m/s²].
+const GRAVITY_M_PER_S2: f64 = 9.81;
+/// Fastest fall [m/s]: a floor is not missed between two looks.
+const FASTEST_FALL_M_PER_S: f64 = 50.0;
+/// Time after which feet have closed 1 − 1/e of a step's height [s].
+const CLIMBING_S: f64 = 0.08;
+/// Longest time between two looks around [s].
+const LOOK_S: f64 = 1.0 / 120.0;
+/// Ground farther down than this is none [m]: nobody falls out of the world.
+const DEEPEST_M: f64 = 1e4;
+/// Feet this near to the ground stand on it [m].
+const STANDING_M: f64 = 1e-4;
+/// Most that a wall pushes somebody back who is too near to it already [m per look].
+const PUSH_M: f64 = 0.01;
+
+/// How someone on foot moves; where is told and kept by others.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Walker {
+    fall_m_per_s: f64,
+    stands: bool,
+}
+
+impl Walker {
+    /// Whether the next step would move the eyes though nobody walks: they fall, or climb.
+    pub fn is_moving(&self) -> bool {
+        !self.stands
+    }
+
+    /// The ground may have gone: looks again.
+    pub fn look_again(&mut self) {
+        self.stands = false;
+    }
+
+    /// The eyes after some time [s, ≥ 0] at a velocity along the ground [m/s], and what walls left of that.
+    pub fn step(
+        &mut self,
+        mut eye: DVec3,
+        velocity_m_per_s: DVec3,
+        seconds: f64,
+        solid: &dyn Solid,
+    ) -> (DVec3, DVec3) {
+        let looks = (seconds / LOOK_S).ceil().max(1.0);
+        let each_s = seconds / looks;
+        let mut velocity = velocity_m_per_s;
+        for _ in 0..looks as u32 {
+            if velocity != DVec3::ZERO {
+                let wanted = velocity * each_s;
+                let allowed = beside_walls(eye, wanted, solid);
+                if allowed != wanted && each_s > 0.0 {
+                    velocity = allowed / each_s;
+                }
+                eye += allowed;
+            }
+            eye.y += self.settle(eye, each_s, solid);
+        }
+        (eye, velocity)
+    }
+
+    /// How far the eyes rise or fall.
+    fn settle(&mut self, eye: DVec3, seconds: f64, solid: &dyn Solid) -> f64 {
+        let hip = eye - DVec3::Y * (EYE_M - STEP_M);
+        let Some((below_m, _)) = solid.meets(hip, DVec3::NEG_Y, DEEPEST_M) else {
+            // Over nothing.
+            self.fall_m_per_s = 0.0;
+            self.stands = true;
+            return 0.0;
+        };
+        // Of the feet over the ground; negative on a step.
+        let over_m = below_m - STEP_M;
+        self.stands = over_m.abs() < STANDING_M;
+        if over_m > STEP_M || (self.fall_m_per_s > 0.0 && over_m > 0.0) {
+            self.fall_m_per_s = (self.fall_m_per_s + GRAVITY_M_PER_S2 * seconds).min(FASTEST_FALL_M_PER_S);
+            return -(self.fall_m_per_s * seconds).min(over_m);
+        }
+        self.fall_m_per_s = 0.0;
+        -over_m * (1.0 - (-seconds / CLIMBING_S).exp())
+    }
+}
+
+/// The part of a step along the ground that walls leave.
+fn beside_walls(eye: DVec3, wanted: DVec3, solid: &dyn Solid) -> DVec3 {
+    let mut step = wanted;
+    // A corner takes two walls.
+    for _ in 0..3 {
+        let Some(forward) = step.try_normalize() else {
+            return DVec3::ZERO;
+        };
+        let right = DVec3::new(-forward.z, 0.0, forward.x);
+        let reach_m = BODY_M + step.length();
+        let fan = [
+            forward,
+            (forward + right).normalize(),
+            (forward - right).normalize(),
+            right,
+            -right,
+        ];
+        // Eyes, chest, knees: what is lower is climbed.
+        let heights = [0.0, 0.5 * EYE_M, EYE_M - STEP_M - 0.05];
+        let mut worst: Option<(f64, DVec3)> = None;
+        for down_m in heights {
+            for direction in fan {
+                let Some((distance_m, normal)) =
+                    solid.meets(eye - DVec3::Y * down_m, direction, 2.0 * reach_m)
+                else {
+                    continue;
+                };
+                // Floors, ceilings and ramps are no walls.
+                let Some(wall) = DVec3::new(normal.x, 0.0, normal.z).try_normalize() else {
+                    continue;
+                };
+                if normal.y.abs() > 0.7 {
+                    continue;
+                }
+                let away_m = distance_m * -direction.dot(wall) + step.dot(wall);
+                let missing_m = BODY_M - away_m;
+                if missing_m > 1e-9 && worst.is_none_or(|(most_m, _)| missing_m > most_m) {
+                    worst = Some((missing_m, wall));
+                }
+            }
+        }
+        let Some((missing_m, wall)) = worst else {
+            return step;
+        };
+        let inward_m = (-step.dot(wall)).max(0.0);
+        step += wall * missing_m.min(inward_m + PUSH_M);
+    }
+    // In a narrow corner: nowhere.
+    DVec3::ZERO
+}
