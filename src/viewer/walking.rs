@@ -72,15 +72,15 @@ impl Walker {
 
     /// How far the eyes rise or fall.
     fn settle(&mut self, eye: DVec3, seconds: f64, solid: &dyn Solid) -> f64 {
-        let hip = eye - DVec3::Y * (EYE_M - STEP_M);
-        let Some((below_m, _)) = solid.meets(hip, DVec3::NEG_Y, DEEPEST_M) else {
+        // From the eyes: who comes flying lands on whatever is below.
+        let Some((below_m, _)) = solid.meets(eye, DVec3::NEG_Y, DEEPEST_M) else {
             // Over nothing.
             self.fall_m_per_s = 0.0;
             self.stands = true;
             return 0.0;
         };
         // Of the feet over the ground; negative on a step.
-        let over_m = below_m - STEP_M;
+        let over_m = below_m - EYE_M;
         self.stands = over_m.abs() < STANDING_M;
         if over_m > STEP_M || (self.fall_m_per_s > 0.0 && over_m > 0.0) {
             self.fall_m_per_s = (self.fall_m_per_s + GRAVITY_M_PER_S2 * seconds).min(FASTEST_FALL_M_PER_S);

@@ -150,6 +150,14 @@ fn steps_are_climbed_and_tables_are_not() {
 }
 
 #[test]
+fn who_comes_flying_low_is_lifted_to_standing_height() {
+    let ground = Boxes(vec![floor()]);
+    let mut navigator = walker(DVec3::new(0.0, 0.3, 0.0), DVec3::NEG_Z, &ground);
+    pass(&mut navigator, &ground, 2.0, 120);
+    assert!((eye(&navigator).y - EYE_M).abs() < 1e-3, "{}", eye(&navigator));
+}
+
+#[test]
 fn nobody_falls_out_of_the_world() {
     let nothing = Boxes(Vec::new());
     let start = DVec3::new(1.0, 2.0, 3.0);

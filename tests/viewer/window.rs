@@ -170,8 +170,11 @@ fn who_walks_falls_to_the_ground_stops_at_walls_and_finds_a_kept_view_again() {
         let axis = |index: usize| event["position_m"][index].as_f64().expect("a number");
         DVec3::new(axis(0), axis(1), axis(2))
     };
-    let start = position(&viewer.wait_for("rest", |_| true));
-    viewer.hands("mousemove 900 300 key ctrl+1");
+    let outside = position(&viewer.wait_for("rest", |_| true));
+    // Over the floor, lower than eyes are.
+    viewer.hands("mousemove 900 300 keydown w sleep 1 keyup w");
+    let start = position(&viewer.wait_for("rest", |event| position(event) != outside));
+    viewer.hands("key ctrl+1");
     viewer.wait_for("bookmark", |event| event["number"] == 1 && event["kept"] == true);
     viewer.hands("key v");
     viewer.wait_for("travel", |event| event["way"] == "walk");
