@@ -316,6 +316,25 @@ fn loops_shared_nodes_and_deep_chains_end() {
 }
 
 #[test]
+fn a_childs_transform_is_within_its_parents() {
+    let mut file = Glb::triangle();
+    file.json["nodes"][0]["translation"] = json!([1.0, 0.0, 0.0]);
+    // A quarter turn about y takes x to −z.
+    let half = std::f64::consts::FRAC_1_SQRT_2;
+    let turned = json!({ "rotation": [0.0, half, 0.0, half], "scale": [2.0, 2.0, 2.0] });
+    let scene = below_again(below(file, turned), json!({ "translation": [0.0, 5.0, 0.0] })).scene();
+    let own = only_mesh(&Glb::triangle().scene()).positions.clone();
+    for (placed, own) in only_mesh(&scene).positions.iter().zip(own) {
+        let within = (own + DVec3::X) * 2.0;
+        let expected = DVec3::new(within.z, within.y + 5.0, -within.x);
+        assert!(
+            (*placed + scene.origin_world - expected).length() < 1e-6,
+            "{placed}, {expected}"
+        );
+    }
+}
+
+#[test]
 fn without_scenes_all_top_nodes_are_read() {
     let mut file = below(Glb::triangle(), json!({ "translation": [0.0, 0.0, 2.0] }));
     let fields = file.json.as_object_mut().expect("is an object");
