@@ -230,7 +230,8 @@ impl<'a> Viewer<'a> {
                 return ((0.5 * (left + right)) as i32, (0.5 * (top + bottom)) as i32);
             }
             let wheel = if top > 0.0 { 5 } else { 4 };
-            self.hands(&format!("mousemove 20 300 click {wheel} sleep 0.3"));
+            // The panel glides, picture by picture, and pictures may take half a second.
+            self.hands(&format!("mousemove 20 300 click {wheel} sleep 3"));
         }
         panic!("{role} {name} cannot be scrolled to");
     }
