@@ -39,10 +39,20 @@ impl Stage {
 pub trait Progress: Sync {
     /// `done` of `total` of a stage; totals of different stages are not comparable.
     fn advance(&self, _stage: Stage, _done: u64, _total: u64) {}
+
+    /// What the target is expected to take by now, in one line; comes with every level.
+    fn expect(&self, _line: &str) {}
 }
 
 /// Hears nothing.
 impl Progress for () {}
+
+/// Hears of stages alone.
+impl<F: Fn(Stage, u64, u64) + Sync> Progress for F {
+    fn advance(&self, stage: Stage, done: u64, total: u64) {
+        self(stage, done, total);
+    }
+}
 
 /// A request to stop: any thread may set it, or a time may be set for it.
 #[derive(Debug, Default)]

@@ -12,6 +12,8 @@ mod brute_force;
 mod bump_scenes;
 #[path = "bake/bumps.rs"]
 mod bumps;
+#[path = "bake/closed_forms.rs"]
+mod closed_forms;
 #[path = "bake/collection.rs"]
 mod collection;
 #[path = "bake/coverage.rs"]
@@ -22,6 +24,8 @@ mod effect_matrix;
 mod effect_scenes;
 #[path = "bake/energy.rs"]
 mod energy;
+#[path = "bake/forecast.rs"]
+mod forecast;
 #[path = "scene/glb.rs"]
 #[allow(dead_code)]
 mod glb;
@@ -41,11 +45,15 @@ mod lamps;
 mod layers;
 #[path = "bake/live.rs"]
 mod live;
+#[path = "bake/map_files.rs"]
+mod map_files;
 #[path = "eye/meshes.rs"]
 #[allow(dead_code)]
 mod meshes;
 #[path = "bake/nested.rs"]
 mod nested;
+#[path = "bake/probe.rs"]
+mod probe;
 #[path = "bake/reference.rs"]
 mod reference;
 #[path = "eye/scenes.rs"]

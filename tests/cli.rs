@@ -8,6 +8,12 @@ mod cache;
 mod compare;
 #[path = "cli/errors.rs"]
 mod errors;
+#[path = "cli/export.rs"]
+mod export;
+#[path = "cli/export_ktx2.rs"]
+mod export_ktx2;
+#[path = "cli/export_textures.rs"]
+mod export_textures;
 #[cfg(unix)]
 #[path = "cli/faults.rs"]
 mod faults;
@@ -36,5 +42,7 @@ mod signals;
 mod skip;
 #[path = "cli/study.rs"]
 mod study;
+#[path = "cli/study_pages.rs"]
+mod study_pages;
 #[path = "cli/usage.rs"]
 mod usage;

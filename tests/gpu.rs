@@ -67,3 +67,5 @@ mod skies;
 mod tiles;
 #[path = "gpu/uploads.rs"]
 mod uploads;
+#[path = "gpu/views.rs"]
+mod views;

@@ -11,16 +11,22 @@ mod colour;
 mod colour_basis;
 #[path = "physics/differentials.rs"]
 mod differentials;
+#[path = "physics/false_colours.rs"]
+mod false_colours;
 #[path = "physics/fresnel.rs"]
 mod fresnel;
 #[path = "physics/glass.rs"]
 mod glass;
+#[path = "physics/interfaces.rs"]
+mod interfaces;
 #[path = "physics/lights.rs"]
 mod lights;
 #[path = "physics/metal_paths.rs"]
 mod metal_paths;
 #[path = "physics/metals.rs"]
 mod metals;
+#[path = "physics/microfacets.rs"]
+mod microfacets;
 #[path = "physics/polish.rs"]
 mod polish;
 #[path = "physics/refraction.rs"]

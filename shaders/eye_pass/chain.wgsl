@@ -179,11 +179,15 @@ fn chain_radiance(first: Gaze) -> vec3f {
             let record = map_of(objects[point.object], is_front);
             let cos_view = abs(cos_signed);
             let level = footprint_level(record, point.map_density, gaze.width, cos_view);
-            var lit = irradiance(record, point.map_uv, level);
+            let baked = irradiance(record, point.map_uv, level);
+            var lit = baked.rgb;
             if TRACES_LIGHTS {
                 lit += direct_irradiance(lit_point(point, is_front), objects[point.object]);
             }
-            let own = tint(gaze, point, cos_view) * lit / PI;
+            var own = tint(gaze, point, cos_view) * lit / PI;
+            if baked.a > 0.0 {
+                own = fault_colour() / frame.radiance_scale;
+            }
             let next = interact(point, gaze, vec3f(1.0));
             walk.radiance += shown(gaze.weight * next.own * own, gaze.wavelength);
             goes_on = go_on(&walk, point, next);

@@ -15,13 +15,22 @@ struct Frame {
     jitter: vec2f,
     traced_per_pixel: vec2f,
     traced_offset: vec2f,
-    padding: vec2f,
+    colour_scale: vec2f,
+    fault: f32,
+    padding0: f32,
+    padding1: f32,
+    padding2: f32,
 }
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 
 // Largest value written [scaled radiance]: half floats end at 65504.
 const LARGEST: f32 = 32768.0;
+
+// Shown in place of what is no number: magenta, whatever the exposure.
+fn fault_colour() -> vec3f {
+    return vec3f(frame.fault, 0.0, frame.fault);
+}
 
 fn scaled(radiance: vec3f) -> vec3f {
     return clamp(radiance * frame.radiance_scale, vec3f(0.0), vec3f(LARGEST));

@@ -73,23 +73,23 @@ fn locate(record: u32, level: u32, uv: vec2f) -> Spot {
 }
 
 // Bilinear between texel centres of one level.
-fn level_value(tiles: texture_2d_array<f32>, record: u32, level: u32, uv: vec2f) -> vec3f {
+fn level_value(tiles: texture_2d_array<f32>, record: u32, level: u32, uv: vec2f) -> vec4f {
     var spot = locate(record, level, uv);
     for (var next = level + 1u; spot.is_coarser && next < image_table[record + 1u]; next++) {
         spot = locate(record, next, uv);
     }
     if spot.is_empty || spot.is_coarser {
-        return vec3f(0.0);
+        return vec4f(0.0);
     }
     // Weights in full precision: the steps of the 8-bit weights that samplers use show at the edge of a caustic.
     let top = mix(
-        textureLoad(tiles, spot.texel, spot.layer, 0).rgb,
-        textureLoad(tiles, spot.texel + vec2i(1, 0), spot.layer, 0).rgb,
+        textureLoad(tiles, spot.texel, spot.layer, 0),
+        textureLoad(tiles, spot.texel + vec2i(1, 0), spot.layer, 0),
         spot.weight.x,
     );
     let bottom = mix(
-        textureLoad(tiles, spot.texel + vec2i(0, 1), spot.layer, 0).rgb,
-        textureLoad(tiles, spot.texel + vec2i(1, 1), spot.layer, 0).rgb,
+        textureLoad(tiles, spot.texel + vec2i(0, 1), spot.layer, 0),
+        textureLoad(tiles, spot.texel + vec2i(1, 1), spot.layer, 0),
         spot.weight.x,
     );
     return mix(top, bottom, spot.weight.y);
@@ -111,7 +111,7 @@ fn levels(record: u32, level: f32) -> Levels {
 }
 
 // Blended between the two levels that are nearest to the wanted one.
-fn value_at(tiles: texture_2d_array<f32>, record: u32, uv: vec2f, level: f32) -> vec3f {
+fn value_at(tiles: texture_2d_array<f32>, record: u32, uv: vec2f, level: f32) -> vec4f {
     let at = levels(record, level);
     var value = level_value(tiles, record, at.fine, uv);
     if at.share > 0.0 {
@@ -120,12 +120,14 @@ fn value_at(tiles: texture_2d_array<f32>, record: u32, uv: vec2f, level: f32) ->
     return value;
 }
 
-// E [W/m²] at a place of a map, seen at a level; black without a map.
-fn irradiance(record: u32, uv: vec2f, level: f32) -> vec3f {
+// E [W/m²] at a place of a map, seen at a level, and how much of what it is blended from is no number; black without
+// a map.
+fn irradiance(record: u32, uv: vec2f, level: f32) -> vec4f {
     if record == NO_IMAGE {
-        return vec3f(0.0);
+        return vec4f(0.0);
     }
-    return value_at(map_tiles, record, uv, level) * bitcast<f32>(image_table[record + 2u]);
+    let value = value_at(map_tiles, record, uv, level);
+    return vec4f(value.rgb * bitcast<f32>(image_table[record + 2u]), value.a);
 }
 
 // Linear colour at a place of a texture, seen at a level; white without one.
@@ -133,7 +135,7 @@ fn texture_colour(record: u32, uv: vec2f, level: f32) -> vec3f {
     if record == NO_IMAGE {
         return vec3f(1.0);
     }
-    return value_at(texture_tiles, record, uv, level);
+    return value_at(texture_tiles, record, uv, level).rgb;
 }
 
 // The level at which a texel is as large as a parallelogram of coordinates.

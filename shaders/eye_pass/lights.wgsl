@@ -11,6 +11,9 @@ struct LightRecord {
     // Of a spot or of what glows, away from the lamp.
     axis: vec3f,
     cos_outer: f32,
+    // Of what is around the lamp: the light stays within that [1/m].
+    absorption_per_m: vec3f,
+    ior: f32,
 }
 
 const LIGHT_POINT: u32 = 0u;
@@ -57,12 +60,14 @@ fn direct_irradiance(point: LitPoint, object: ObjectRecord) -> vec3f {
         var to_light = -light.place;
         var distance = FAR_AWAY;
         var across_beam = 1.0;
+        var left = vec3f(1.0);
         if light.kind != LIGHT_SUN {
             let offset = light.place - point.place;
             distance = length(offset);
             to_light = offset / max(distance, 1e-20);
             let distance_m = distance * start.unit_m;
             across_beam = falloff(light, -to_light) / max(distance_m * distance_m, 1e-20);
+            left = exp(-light.absorption_per_m * distance_m);
             if light.kind == LIGHT_FACET {
                 distance *= 1.0 - BEFORE_FACET;
             }
@@ -70,14 +75,14 @@ fn direct_irradiance(point: LitPoint, object: ObjectRecord) -> vec3f {
         let cosine = dot(to_light, point.shading_normal);
         var taken = select(0.0, 1.0, dot(to_light, point.geometric_normal) >= 0.0);
         if object.surface == SURFACE_MIXED {
-            taken *= 1.0 - object.polish * dielectric_reflectance(cosine, object.ior);
+            taken *= 1.0 - object.polish * dielectric_reflectance(cosine, object.ior / light.ior);
         }
         let share = across_beam * cosine * taken;
         if share > 0.0 {
             let origin = point.place + point.geometric_normal * point.margin;
             // Every surface stops it, clear ones included: what comes through those is in the caustic layer.
             if closest_hit(origin, to_light, distance).triangle == NO_TRIANGLE {
-                sum += light.strength * share;
+                sum += light.strength * left * share;
             }
         }
     }

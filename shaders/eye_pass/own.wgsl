@@ -2,15 +2,19 @@
 @fragment
 fn own(fragment: Fragment, @builtin(front_facing) is_front: bool) -> @location(0) vec4f {
     var radiance = objects[fragment.object].emitted_radiance;
+    var is_fault = false;
     if SURFACE != SURFACE_MIRROR {
-        let diffuse = own_base_colour(fragment) * own_irradiance(fragment, is_front) / PI;
+        let lit = own_irradiance(fragment, is_front);
+        is_fault = lit.a > 0.0;
+        let diffuse = own_base_colour(fragment) * lit.rgb / PI;
         radiance += (1.0 - own_polish(fragment)) * diffuse;
     }
-    return vec4f(scaled(radiance), 1.0);
+    return vec4f(select(scaled(radiance), fault_colour(), is_fault), 1.0);
 }
 
 // Maps as they are, neither lit nor reflected.
 @fragment
 fn map_value(fragment: Fragment, @builtin(front_facing) is_front: bool) -> @location(0) vec4f {
-    return vec4f(scaled(own_irradiance(fragment, is_front)), 1.0);
+    let value = own_irradiance(fragment, is_front);
+    return vec4f(select(scaled(value.rgb), fault_colour(), value.a > 0.0), 1.0);
 }

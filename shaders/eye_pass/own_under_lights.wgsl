@@ -12,7 +12,9 @@ fn own_under_lights(fragment: Fragment, @builtin(front_facing) is_front: bool) -
     // Rasterisers interpolate to some 2⁻²⁰ of what they see.
     let margin = 4e-6 * (1.0 + length(offset));
     let point = LitPoint(place, margin, towards_eye * normalize(across), shading_normal);
-    let irradiance = own_irradiance(fragment, is_front) + direct_irradiance(point, object);
+    let baked = own_irradiance(fragment, is_front);
+    let irradiance = baked.rgb + direct_irradiance(point, object);
     let diffuse = own_base_colour(fragment) * irradiance / PI;
-    return vec4f(scaled(object.emitted_radiance + (1.0 - own_polish(fragment)) * diffuse), 1.0);
+    let radiance = object.emitted_radiance + (1.0 - own_polish(fragment)) * diffuse;
+    return vec4f(select(scaled(radiance), fault_colour(), baked.a > 0.0), 1.0);
 }

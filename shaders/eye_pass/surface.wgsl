@@ -17,7 +17,7 @@ fn own_base_colour(fragment: Fragment) -> vec3f {
     return colour;
 }
 
-fn own_irradiance(fragment: Fragment, is_front: bool) -> vec3f {
+fn own_irradiance(fragment: Fragment, is_front: bool) -> vec4f {
     let record = map_of(objects[fragment.object], is_front);
     let level = level_of(record, dpdx(fragment.map_uv), dpdy(fragment.map_uv));
     return irradiance(record, fragment.map_uv, level);

@@ -10,6 +10,10 @@ use nephroid::settings::{Estimator, MapResolution};
 
 use super::bake_options::BakeOptions;
 use super::compare::LayerChoice;
+use super::export::{
+    BitsChoice, CarrierChoice, ContentChoice, ExportFormat, LightsChoice, PackingChoice, TransferChoice,
+    UnitsChoice,
+};
 use super::job::Job;
 use super::study_values;
 use super::terminal::{self, Terminal};
@@ -44,6 +48,8 @@ pub enum Command {
     Inspect(InspectArguments),
     /// Measure a map against a reference: relative RMSE, ARD, peak, flux
     Compare(CompareArguments),
+    /// Write baked maps for other programs
+    Export(ExportArguments),
     /// Study what accuracy costs
     Study(StudyArguments),
 }
@@ -122,6 +128,14 @@ pub struct ViewArguments {
     #[cfg(feature = "viewer")]
     #[arg(long, value_name = "FILE")]
     pub event_log: Option<PathBuf>,
+    /// Read the scene again whenever its files are written
+    #[cfg(feature = "viewer")]
+    #[arg(long)]
+    pub watch: bool,
+    /// Leave camera, settings and edits of the last time alone
+    #[cfg(feature = "viewer")]
+    #[arg(long)]
+    pub fresh: bool,
     /// Without a display: write into ./nephroid-out even if it holds other files
     #[arg(long)]
     pub force: bool,
@@ -164,17 +178,22 @@ pub enum Backend {
 }
 
 #[derive(Debug, Args)]
+#[command(group = clap::ArgGroup::new("motion").args(["path", "turntable"]))]
 pub struct RenderArguments {
     /// .glb, .gltf or builtin:NAME
     pub scene: String,
-    /// Picture: .png for display, .exr for radiance in W/(m² sr); with --path a folder for its frames as .png
-    #[arg(short, long, value_name = "FILE", required_unless_present = "path")]
+    /// Picture: .png for display, .exr for radiance in W/(m² sr); with --path or --turntable a folder for the frames as
+    /// .png
+    #[arg(short, long, value_name = "FILE", required_unless_present_any = ["path", "turntable"])]
     pub output: Option<PathBuf>,
     /// Draw the frames of a camera's path, a JSON file, on the graphics card
     #[arg(long, value_name = "FILE", conflicts_with = "camera")]
     pub path: Option<PathBuf>,
-    /// With --path: time every frame with and without what is seen in mirrors and through glass
-    #[arg(long, requires = "path")]
+    /// Draw so many frames of a camera that goes once around the middle of the scene, beginning where --camera is
+    #[arg(long, value_name = "FRAMES", conflicts_with = "path", value_parser = values::frames)]
+    pub turntable: Option<usize>,
+    /// With --path or --turntable: time every frame with and without what is seen in mirrors and through glass
+    #[arg(long, requires = "motion")]
     pub stats: bool,
     #[command(flatten)]
     pub maps: MapsOption,
@@ -230,6 +249,65 @@ pub struct CompareArguments {
 }
 
 #[derive(Debug, Args)]
+pub struct ExportArguments {
+    /// Folder that `bake` wrote
+    pub maps: PathBuf,
+    /// Kind of file: the scene with its maps, or its maps as textures with an index
+    #[arg(long, value_enum, default_value_t = ExportFormat::Glb)]
+    pub format: ExportFormat,
+    /// File to write, or folder for the textures [default: the scene's or the format's name in the folder of the maps]
+    #[arg(short, long, value_name = "FILE|FOLDER")]
+    pub output: Option<PathBuf>,
+    /// Of textures: write into the folder even if it holds other files
+    #[arg(long)]
+    pub force: bool,
+    /// Scene of the maps [default: the one that the folder names]
+    #[arg(long, value_name = "SCENE")]
+    pub scene: Option<String>,
+    /// What numbers mean: E and E/pi in W/m^2 (Blender), lux and lux/pi beside lights in candela (three.js)
+    /// [default: lux for a .glb, E for textures]
+    #[arg(long, value_enum)]
+    pub units: Option<UnitsChoice>,
+    /// Of a .glb: how materials carry the light: for programs that know light maps, that know none, or that shall not
+    /// light at all [default: lightmap]
+    #[arg(long = "as", value_enum)]
+    pub carrier: Option<CarrierChoice>,
+    /// Of a .glb: keep the scene's lights and write the caustic layer, or remove them and write every layer
+    /// [default: remove where the direct layer was baked]
+    #[arg(long, value_enum)]
+    pub lights: Option<LightsChoice>,
+    /// Of textures: which light they hold [default: sum]
+    #[arg(long, value_enum)]
+    pub layer: Option<ContentChoice>,
+    /// Bits a channel: 8 or 16 of the images of a .glb, 16 of .png, 16 or 32 of .exr [default: 16, but 8 for a .glb with
+    /// light maps or unlit, which is what browsers read]
+    #[arg(long, value_enum)]
+    pub bits: Option<BitsChoice>,
+    /// Of .png: how numbers between black and white are coded [default: srgb]
+    #[arg(long, value_enum)]
+    pub transfer: Option<TransferChoice>,
+    /// Of textures: many maps in one file, with sides of up to so many texels [default: one file for each; N: 4096]
+    #[arg(long, value_name = "N", num_args = 0..=1, default_missing_value = "4096", value_parser = values::atlas_side)]
+    pub atlas: Option<usize>,
+    /// Of .ktx2: how texels are packed [default: rgb9e5]
+    #[arg(long, value_enum)]
+    pub packing: Option<PackingChoice>,
+    /// Of .ktx2: all sizes down to one texel; else the image alone
+    #[arg(long)]
+    pub mips: bool,
+    /// Of a .glb or .png: share of a map's light that its brightest texels may lose so that dim ones have finer steps
+    /// [default: 0.5%]
+    #[arg(long, value_name = "PERCENT", value_parser = values::share, allow_hyphen_values = true)]
+    pub cut: Option<f64>,
+    /// Stops by which light is multiplied: of a .glb with --as unlit [default: the brightest hundredth is white], of
+    /// textures [default: 0; of .png as --cut allows]
+    #[arg(long, value_name = "STOPS", allow_negative_numbers = true)]
+    pub exposure: Option<f64>,
+    #[command(flatten)]
+    pub run: RunOptions,
+}
+
+#[derive(Debug, Args)]
 #[command(args_conflicts_with_subcommands = true)]
 pub struct StudyArguments {
     /// Name all studies
@@ -240,6 +318,9 @@ pub struct StudyArguments {
     #[command(flatten)]
     pub run: RunOptions,
 }
+
+/// Stands for every study whose result is a page.
+pub const ALL_PAGES: &str = "pages";
 
 #[derive(Debug, Subcommand)]
 pub enum Study {
@@ -253,6 +334,92 @@ pub enum Study {
     Spectrum(SpectrumArguments),
     /// Hard cases, each with a law that must hold, how far off it is and its bound
     Stability(StabilityArguments),
+    /// What accuracy costs, for every built-in scene, and how well that was predicted
+    Accuracy(PageArguments),
+    /// Table 1 of the paper: error, rays and times at its three densities
+    Table1(PageArguments),
+    /// Figure 6a: error against the number of light rays
+    Rays(PageArguments),
+    /// Figure 6b: error against sigma
+    Sigma(PageArguments),
+    /// Plate 6: maps of 30, 100 and 300 texels across
+    Resolution(PageArguments),
+    /// Figure 5, Plates 1 and 2: shapes and sizes of kernels
+    Kernels(PageArguments),
+    /// Figure 3: density of nearest hits against areas between neighbouring rays
+    Connectivity(PageArguments),
+    /// The cube's bias against cells of equal solid angle
+    ItemBuffer(PageArguments),
+    /// Plates 7 and 8: a pool from above and from below
+    Pool(PageArguments),
+    /// Plate 9: how the polygons of a complex object show in its caustic
+    Complex(PageArguments),
+    /// How cost grows with rays, triangles, texels and threads
+    Scaling(PageArguments),
+    /// All of the pages from `accuracy` to `scaling`, each in a folder of its name
+    Pages(PageArguments),
+}
+
+impl Study {
+    /// Of a study whose result is a page: its name on the command line, and its arguments.
+    pub fn as_page(&self) -> Option<(&'static str, &PageArguments)> {
+        Some(match self {
+            Self::Accuracy(page) => ("accuracy", page),
+            Self::Table1(page) => ("table1", page),
+            Self::Rays(page) => ("rays", page),
+            Self::Sigma(page) => ("sigma", page),
+            Self::Resolution(page) => ("resolution", page),
+            Self::Kernels(page) => ("kernels", page),
+            Self::Connectivity(page) => ("connectivity", page),
+            Self::ItemBuffer(page) => ("item-buffer", page),
+            Self::Pool(page) => ("pool", page),
+            Self::Complex(page) => ("complex", page),
+            Self::Scaling(page) => ("scaling", page),
+            Self::Pages(page) => (ALL_PAGES, page),
+            Self::Convergence(_)
+            | Self::Reference(_)
+            | Self::Effects(_)
+            | Self::Spectrum(_)
+            | Self::Stability(_) => return None,
+        })
+    }
+
+    fn run(&self) -> &RunOptions {
+        match self {
+            Self::Convergence(convergence) => &convergence.run,
+            Self::Reference(reference) => &reference.run,
+            Self::Effects(effects) => &effects.run,
+            Self::Spectrum(spectrum) => &spectrum.run,
+            Self::Stability(stability) => &stability.run,
+            Self::Accuracy(page)
+            | Self::Table1(page)
+            | Self::Rays(page)
+            | Self::Sigma(page)
+            | Self::Resolution(page)
+            | Self::Kernels(page)
+            | Self::Connectivity(page)
+            | Self::ItemBuffer(page)
+            | Self::Pool(page)
+            | Self::Complex(page)
+            | Self::Scaling(page)
+            | Self::Pages(page) => &page.run,
+        }
+    }
+}
+
+#[derive(Debug, Args)]
+pub struct PageArguments {
+    /// Folder for the page: NAME.md, NAME.csv, plots (.svg) and pictures (.png)
+    #[arg(short, long, value_name = "DIR")]
+    pub output: PathBuf,
+    /// Write into the folder even if it holds other files
+    #[arg(long)]
+    pub force: bool,
+    /// Small maps and few of everything, to see that it works
+    #[arg(long)]
+    pub quick: bool,
+    #[command(flatten)]
+    pub run: RunOptions,
 }
 
 #[derive(Debug, Args)]
@@ -442,14 +609,8 @@ impl Arguments {
             Some(Command::Render(render)) => &render.run,
             Some(Command::Inspect(inspect)) => &inspect.run,
             Some(Command::Compare(compare)) => &compare.run,
-            Some(Command::Study(study)) => match &study.study {
-                None => &study.run,
-                Some(Study::Convergence(convergence)) => &convergence.run,
-                Some(Study::Reference(reference)) => &reference.run,
-                Some(Study::Effects(effects)) => &effects.run,
-                Some(Study::Spectrum(spectrum)) => &spectrum.run,
-                Some(Study::Stability(stability)) => &stability.run,
-            },
+            Some(Command::Export(export)) => &export.run,
+            Some(Command::Study(study)) => study.study.as_ref().map_or(&study.run, Study::run),
         }
     }
 }

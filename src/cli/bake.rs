@@ -9,8 +9,9 @@ use nephroid::error::Result;
 use nephroid::export::manifest::{Manifest, MapEntry};
 use nephroid::export::map_folder::MapFolder;
 use nephroid::scene::Scene;
-use nephroid::session::{BakeResult, BakeSession, StopReason};
-use nephroid::settings::BakeSettings;
+use nephroid::session::forecast::forecast;
+use nephroid::session::{BakeResult, BakeSession, Forecast, ForecastReport, StopReason};
+use nephroid::settings::{BakeSettings, Estimator};
 
 use super::address_space;
 use super::interrupt::Interrupt;
@@ -19,6 +20,9 @@ use super::progress_bar::StageBar;
 use super::scene_input::SceneInput;
 use super::survey_report::bytes;
 use super::terminal::Terminal;
+
+/// Errors that people ask for [1].
+const ROUND_TARGETS: [f64; 9] = [0.2, 0.1, 0.05, 0.03, 0.02, 0.01, 0.005, 0.002, 0.001];
 
 /// Clocks from the start of the run on.
 pub struct Clock {
@@ -146,14 +150,10 @@ fn summary(manifest: &Manifest, result: &BakeResult, folder: &str) -> String {
         line("error", format!("{percent:.2} % (relative RMSE, estimated){why}"));
     }
     if let Some(report) = &result.forecast {
-        let (expected, actual) = (&report.expected, &report.actual);
-        line(
-            "forecast",
-            format!(
-                "{} rays and {:.2} s of CPU were expected after {} rays; it took {} and {:.2} s",
-                expected.rays, expected.cpu_s, report.made_at.rays, actual.rays, actual.cpu_s
-            ),
-        );
+        line("forecast", told(report));
+    }
+    if let Some(next) = next_target(result, manifest.settings.estimator) {
+        line("next", next.in_words());
     }
     let energy = &manifest.energy_w;
     line(
@@ -174,6 +174,25 @@ fn summary(manifest: &Manifest, result: &BakeResult, folder: &str) -> String {
         line("partial", "stopped before it was done".to_string());
     }
     text
+}
+
+/// What was expected when the error was first known, and what it took.
+fn told(report: &ForecastReport) -> String {
+    let (made_at, actual) = (&report.made_at, &report.actual);
+    format!(
+        "{}, was expected at {:.1} %; it took {:.2} s, {} rays",
+        report.expected.in_words(),
+        100.0 * made_at.relative_rmse,
+        actual.wall_s,
+        actual.rays
+    )
+}
+
+/// What the next better round target would take.
+fn next_target(result: &BakeResult, estimator: Estimator) -> Option<Forecast> {
+    let reached = result.course.last()?.relative_rmse;
+    let target = ROUND_TARGETS.into_iter().find(|target| *target < 0.9 * reached)?;
+    forecast(&result.course, target, estimator)
 }
 
 /// The plan's reason for having nothing to do.

@@ -11,7 +11,7 @@ use nephroid::settings::{
 use super::values;
 
 /// Flags of a bake; those not given keep the defaults of [`BakeSettings`].
-#[derive(Clone, Debug, Default, Args)]
+#[derive(Clone, Debug, Default, PartialEq, Args)]
 #[command(next_help_heading = "Bake options")]
 pub struct BakeOptions {
     /// Target error by name [default: preview, unless density, error or time is given]
@@ -149,6 +149,12 @@ impl BakeOptions {
         named.fold(EffectSwitches::default(), |switches, &(effect, switch)| {
             switches.with(effect, switch)
         })
+    }
+
+    /// Whether any of them is given.
+    #[cfg(feature = "viewer")]
+    pub fn names_any(&self) -> bool {
+        *self != Self::default()
     }
 
     /// Whether an option says how good maps are to be, or how long they may take.

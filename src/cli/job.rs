@@ -14,14 +14,19 @@ use super::args::{
 };
 use super::bake_options::BakeOptions;
 use super::compare::{self, LayerChoice};
+use super::export::{self, ExportJob};
 use super::interrupt::Interrupt;
 #[cfg(feature = "gpu")]
 use super::render_path;
 use super::scene_input::{MissingLight, SceneInput};
-use super::study_jobs::{ConvergenceJob, EffectsJob, ReferenceJob, SpectrumJob, StabilityJob, study_job};
+use super::study_jobs::{
+    ConvergenceJob, EffectsJob, PageJob, ReferenceJob, SpectrumJob, StabilityJob, study_job,
+};
 use super::terminal::Terminal;
 use super::values::Exposure;
-use super::{bake, inspect, render, study, study_effects, study_spectrum, study_stability, view};
+use super::{
+    bake, inspect, render, study, study_effects, study_pages, study_spectrum, study_stability, view,
+};
 
 /// Scene of `view` when none is named.
 const DEFAULT_SCENE: &str = "builtin:showroom";
@@ -42,12 +47,14 @@ pub enum Job {
     RenderPath(PathJob),
     Inspect(InspectJob),
     Compare(CompareJob),
+    Export(ExportJob),
     ListStudies,
     Convergence(ConvergenceJob),
     Reference(ReferenceJob),
     Effects(EffectsJob),
     Spectrum(SpectrumJob),
     Stability(StabilityJob),
+    Page(PageJob),
 }
 
 /// `view`.
@@ -58,6 +65,15 @@ pub struct ViewJob {
     pub picture: PictureRequest,
     #[cfg(feature = "viewer")]
     pub event_log: Option<PathBuf>,
+    /// The scene is read again when its files change.
+    #[cfg(feature = "viewer")]
+    pub watch: bool,
+    /// What was kept of the scene is left alone.
+    #[cfg(feature = "viewer")]
+    pub fresh: bool,
+    /// The bake's settings are those of the command line, not kept ones.
+    #[cfg(feature = "viewer")]
+    pub settings_given: bool,
     pub force: bool,
     /// No option says how good the maps are to be: without a window nobody should wait long for them.
     pub hurries: bool,
@@ -82,15 +98,25 @@ pub struct RenderJob {
     pub format: PictureFormat,
 }
 
+/// How the camera moves from frame to frame.
+#[cfg(feature = "gpu")]
+#[derive(Debug)]
+pub enum Motion {
+    /// As a file says.
+    Path(PathBuf),
+    /// Once around the scene, in so many frames.
+    Turntable(usize),
+}
+
 /// `render` of a camera's path.
 #[cfg(feature = "gpu")]
 #[derive(Debug)]
 pub struct PathJob {
     pub scene: SceneInput,
     pub maps: MapSource,
-    /// Of every frame; it names no camera.
+    /// Of every frame; its camera is where a turntable begins.
     pub picture: PictureRequest,
-    pub path: PathBuf,
+    pub motion: Motion,
     /// Whether frames are timed with and without chains.
     pub stats: bool,
     /// Folder for the frames.
@@ -169,6 +195,7 @@ impl Job {
             Some(Command::Render(render)) => render_job(render),
             Some(Command::Inspect(inspect)) => inspect_job(inspect),
             Some(Command::Compare(compare)) => compare_job(compare),
+            Some(Command::Export(export)) => Ok(Job::Export(ExportJob::new(export)?)),
             Some(Command::Study(study)) => study_job(study),
         }
     }
@@ -186,12 +213,14 @@ impl Job {
             Self::RenderPath(job) => render_path::run(&job, terminal, interrupt),
             Self::Inspect(job) => inspect::run(&job, terminal, interrupt),
             Self::Compare(job) => compare::run(&job, terminal),
+            Self::Export(job) => export::run(&job, terminal, interrupt),
             Self::ListStudies => study::list(terminal),
             Self::Convergence(job) => study::convergence(&job, terminal, interrupt),
             Self::Reference(job) => study::reference(&job, terminal, interrupt),
             Self::Effects(job) => study_effects::run(&job, terminal, interrupt),
             Self::Spectrum(job) => study_spectrum::run(&job, terminal, interrupt),
             Self::Stability(job) => study_stability::run(&job, terminal, interrupt),
+            Self::Page(job) => study_pages::run(&job, terminal, interrupt),
         }
     }
 }
@@ -218,6 +247,12 @@ fn view_job(arguments: ViewArguments) -> Result<Job> {
         },
         #[cfg(feature = "viewer")]
         event_log: arguments.event_log,
+        #[cfg(feature = "viewer")]
+        watch: arguments.watch,
+        #[cfg(feature = "viewer")]
+        fresh: arguments.fresh,
+        #[cfg(feature = "viewer")]
+        settings_given: arguments.bake.names_any() || arguments.run.threads.is_some(),
         force: arguments.force,
         hurries: !arguments.bake.names_quality(),
     }))
@@ -235,8 +270,8 @@ fn bake_job(arguments: BakeArguments) -> Result<Job> {
 }
 
 fn render_job(arguments: RenderArguments) -> Result<Job> {
-    if let Some(path) = arguments.path.clone() {
-        return path_job(arguments, path);
+    if arguments.path.is_some() || arguments.turntable.is_some() {
+        return path_job(arguments);
     }
     let Some(output) = arguments.output else {
         return Err(Error::usage(
@@ -286,8 +321,12 @@ fn render_job(arguments: RenderArguments) -> Result<Job> {
 }
 
 #[cfg(feature = "gpu")]
-fn path_job(arguments: RenderArguments, path: PathBuf) -> Result<Job> {
+fn path_job(arguments: RenderArguments) -> Result<Job> {
     let RenderArguments { stats, output, .. } = arguments;
+    let motion = match (arguments.path, arguments.turntable) {
+        (Some(path), _) => Motion::Path(path),
+        (None, frames) => Motion::Turntable(frames.unwrap_or(1)),
+    };
     let refused = |option: &str, what: &str, remedy: &str| Err(Error::usage(option, what, remedy));
     if arguments.backend == Some(Backend::Cpu) {
         return refused(
@@ -298,7 +337,10 @@ fn path_job(arguments: RenderArguments, path: PathBuf) -> Result<Job> {
     }
     if !stats && output.is_none() {
         return refused(
-            "--path",
+            match motion {
+                Motion::Path(_) => "--path",
+                Motion::Turntable(_) => "--turntable",
+            },
             "nothing is wanted of its frames",
             "add --stats to time them, or -o DIR to keep them",
         );
@@ -315,23 +357,27 @@ fn path_job(arguments: RenderArguments, path: PathBuf) -> Result<Job> {
         scene: scene_input(arguments.scene, &arguments.scene_options, MissingLight::Add),
         maps,
         picture: PictureRequest {
-            camera: None,
+            camera: arguments.picture.camera,
             size: arguments.picture.size.unwrap_or(DEFAULT_SIZE),
             exposure: arguments.picture.exposure.unwrap_or_default(),
             tone_map: arguments.tone_map.unwrap_or_default(),
             white_balance: arguments.white_balance.unwrap_or_default(),
             backend: arguments.backend,
         },
-        path,
+        motion,
         stats,
         output,
     }))
 }
 
 #[cfg(not(feature = "gpu"))]
-fn path_job(_: RenderArguments, _: PathBuf) -> Result<Job> {
+fn path_job(arguments: RenderArguments) -> Result<Job> {
+    let option = match arguments.path {
+        Some(_) => "--path",
+        None => "--turntable",
+    };
     Err(Error::usage(
-        "--path",
+        option,
         "this program was built without the gpu feature, which draws the frames",
         "render single pictures",
     ))

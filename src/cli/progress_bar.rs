@@ -26,8 +26,10 @@ impl StageBar {
             ProgressDrawTarget::hidden()
         };
         let bar = ProgressBar::with_draw_target(Some(0), target);
-        let style = ProgressStyle::with_template("{msg:8} {wide_bar} {percent:>3} %  {elapsed} (left {eta})")
-            .unwrap_or_else(|_| ProgressStyle::default_bar());
+        let style = ProgressStyle::with_template(
+            "{prefix:8} {wide_bar} {percent:>3} %  {elapsed} (left {eta}) {msg}",
+        )
+        .unwrap_or_else(|_| ProgressStyle::default_bar());
         bar.set_style(style);
         if terminal.shows_progress() {
             bar.enable_steady_tick(Duration::from_millis(250));
@@ -45,11 +47,15 @@ impl Progress for StageBar {
             && *current != Some(stage)
         {
             *current = Some(stage);
-            self.bar.set_message(stage.name());
+            self.bar.set_prefix(stage.name());
             self.bar.reset_eta();
         }
         self.bar.set_length(total);
         self.bar.set_position(done);
+    }
+
+    fn expect(&self, line: &str) {
+        self.bar.set_message(line.to_string());
     }
 }
 

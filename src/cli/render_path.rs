@@ -1,29 +1,29 @@
-//! `render --path`: the frames of a camera's path, kept as pictures or timed.
+//! `render --path` and `--turntable`: the frames of a camera that moves, kept as pictures or timed.
 
 use std::fmt::Write as _;
 
 use nephroid::effect::{Effect, EffectSwitch};
-use nephroid::error::{Error, Result};
-use nephroid::export::png;
+use nephroid::error::Result;
+use nephroid::export::frame_folder::FrameFolder;
 use nephroid::eye_pass::{ToneMap, View};
-use nephroid::files::{self, OutputFolder};
 use nephroid::gpu::Gpu;
 use nephroid::optics::LinearSrgb;
-use nephroid::scene::CameraPath;
+use nephroid::scene::{CameraPath, turntable};
 use nephroid::study::frame_times::{self, Keep, MannerTimes, Ratio, SAMPLES, Spread, Walk};
 use serde::Serialize;
 
 use super::bake::{self, Clock};
 use super::interrupt::Interrupt;
-use super::job::PathJob;
+use super::job::{Motion, PathJob};
 use super::progress_bar::StageBar;
-use super::render;
 use super::terminal::Terminal;
 use super::values::Exposure;
+use super::{picture, render};
 
 /// The result, as `--json` prints it.
 #[derive(Debug, Serialize)]
 struct Report {
+    /// The file, or `turntable`.
     path: String,
     scene: String,
     adapter: String,
@@ -41,6 +41,12 @@ struct Report {
     stats: Option<Stats>,
 }
 
+/// How the camera moves, read.
+enum Way {
+    Path(CameraPath),
+    Turntable(usize),
+}
+
 #[derive(Debug, Serialize)]
 struct Stats {
     raster_alone: MannerTimes,
@@ -55,12 +61,22 @@ struct Stats {
 /// Input, output, a bake or a frame that failed; no graphics card; a signal.
 pub fn run(job: &PathJob, terminal: &Terminal, interrupt: &Interrupt) -> Result<()> {
     let clock = Clock::start();
-    let path = CameraPath::read(&job.path)?;
+    // What cannot be read is told before anything is baked.
+    let way = match &job.motion {
+        Motion::Path(file) => Way::Path(CameraPath::read(file)?),
+        Motion::Turntable(frames) => Way::Turntable(*frames),
+    };
     let loaded = bake::load(&job.scene, &clock, terminal)?;
     let gpu = Gpu::headless()?;
-    let folder = job.output.as_deref().map(open_folder).transpose()?;
+    let folder = job.output.as_deref().map(FrameFolder::open).transpose()?;
     let maps = render::maps(&job.maps, &loaded, &clock, terminal, interrupt)?;
-    let cameras = path.cameras(loaded.scene.origin_world);
+    let cameras = match way {
+        Way::Path(path) => path.cameras(loaded.scene.origin_world),
+        Way::Turntable(frames) => {
+            let first = picture::choose_camera(&loaded.scene, &job.picture)?;
+            turntable::around(&loaded.scene, &first, frames)
+        }
+    };
     let (width, height) = job.picture.size;
     let view = View {
         camera: cameras[0].clone(),
@@ -83,7 +99,10 @@ pub fn run(job: &PathJob, terminal: &Terminal, interrupt: &Interrupt) -> Result<
         Exposure::Auto => frame_times::auto_exposure_stops(&gpu, &walk)?,
     };
     let mut report = Report {
-        path: job.path.display().to_string(),
+        path: match &job.motion {
+            Motion::Path(file) => file.display().to_string(),
+            Motion::Turntable(_) => "turntable".into(),
+        },
         scene: loaded.scene.source.clone(),
         adapter: gpu.adapter_name(),
         frames: cameras.len(),
@@ -105,7 +124,7 @@ fn draw(
     gpu: &Gpu,
     walk: &Walk<'_>,
     job: &PathJob,
-    folder: Option<&OutputFolder>,
+    folder: Option<&FrameFolder>,
     terminal: &Terminal,
     interrupt: &Interrupt,
 ) -> Result<Option<Stats>> {
@@ -113,12 +132,7 @@ fn draw(
     let both = [EffectSwitch::Off, wanted];
     let switches = if job.stats { &both[..] } else { &both[1..] };
     let mut write = |frame: usize, rgba: Vec<u8>| match folder {
-        Some(folder) => {
-            let file = folder.path().join(file_name(frame));
-            let location = file.display().to_string();
-            let bytes = png::encode(walk.view.width, walk.view.height, rgba, &location)?;
-            files::write_atomically(&file, |writer| writer.write_all(&bytes))
-        }
+        Some(folder) => folder.write(frame, (walk.view.width, walk.view.height), rgba),
         None => Ok(()),
     };
     let keep = folder.map(|_| &mut write as &mut Keep<'_>);
@@ -134,24 +148,6 @@ fn draw(
         with_chains,
         with_chains_over_raster_alone: ratio,
     }))
-}
-
-/// From 1 on, as people count.
-fn file_name(frame: usize) -> String {
-    format!("frame-{:05}.png", frame + 1)
-}
-
-/// A folder that is empty or holds the frames of an earlier path, which are replaced.
-fn open_folder(path: &std::path::Path) -> Result<OutputFolder> {
-    let folder = OutputFolder::open(path)?;
-    if path.join(file_name(0)).is_file() || folder.is_empty()? {
-        return Ok(folder);
-    }
-    Err(Error::failure(
-        path.display().to_string(),
-        "the folder holds files that are not frames of a path",
-        "choose another folder",
-    ))
 }
 
 impl Report {

@@ -28,18 +28,22 @@ pub struct SceneInput {
 }
 
 impl SceneInput {
+    /// How its file is read.
+    pub fn load_options(&self) -> LoadOptions {
+        LoadOptions {
+            solid_glass: self.solid_glass,
+            default_light: self.missing_light == MissingLight::Add,
+            environment: self.environment.clone(),
+            ..LoadOptions::default()
+        }
+    }
+
     /// The scene, with a light where one was missing and is to be added.
     ///
     /// # Errors
     /// A scene that cannot be read, is unknown, or has no light where one is needed.
     pub fn load(&self) -> Result<Scene> {
-        let options = LoadOptions {
-            solid_glass: self.solid_glass,
-            default_light: self.missing_light == MissingLight::Add,
-            environment: self.environment.clone(),
-            ..LoadOptions::default()
-        };
-        let scene = scene::load(&self.source, &options)?;
+        let scene = scene::load(&self.source, &self.load_options())?;
         if scene.lights.is_empty() && self.missing_light == MissingLight::Fail {
             return Err(Error::failure(
                 &self.source,

@@ -12,11 +12,13 @@ use nephroid::scene::Scene;
 use nephroid::study::brute_force::{brute_force, relative_noise};
 use nephroid::study::convergence::{self, Axis, Measurement, Price};
 use nephroid::study::cost::{self, Cost};
+use nephroid::study::pages::STUDIES as PAGES;
 use nephroid::study::plot::convergence_svg;
 use nephroid::study::references::Reference;
 use nephroid::transport::Tracer;
 use serde::Serialize;
 
+use super::args::ALL_PAGES;
 use super::compare::read_luminance;
 use super::interrupt::Interrupt;
 use super::progress_bar::StageBar;
@@ -24,8 +26,8 @@ use super::scene_input::SceneInput;
 use super::study_jobs::{ConvergenceJob, ReferenceJob};
 use super::terminal::Terminal;
 
-/// Name and one line of each study.
-const STUDIES: [(&str, &str); 5] = [
+/// Name and one line of each study that is no page.
+const STUDIES: [(&str, &str); 6] = [
     (
         "convergence",
         "error against light rays and CPU time, for every estimator",
@@ -46,6 +48,7 @@ const STUDIES: [(&str, &str); 5] = [
         "stability",
         "hard cases, each with a law that must hold, how far off it is and its bound",
     ),
+    (ALL_PAGES, "all that follow, each in a folder of its name"),
 ];
 
 const CSV: &str = "convergence.csv";
@@ -62,8 +65,10 @@ pub fn list(terminal: &Terminal) -> Result<()> {
         name: &'static str,
         what: &'static str,
     }
-    let lines = STUDIES.map(|(name, what)| Line { name, what });
-    let text: Vec<String> = STUDIES
+    let pages = PAGES.iter().map(|study| (study.name, study.what));
+    let studies: Vec<(&'static str, &'static str)> = STUDIES.into_iter().chain(pages).collect();
+    let lines: Vec<Line> = studies.iter().map(|&(name, what)| Line { name, what }).collect();
+    let text: Vec<String> = studies
         .iter()
         .map(|(name, what)| format!("{name:<12} {what}"))
         .collect();

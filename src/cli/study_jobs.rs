@@ -8,12 +8,13 @@ use nephroid::settings::{BakeSettings, Estimator, LayerKind, MapResolution, Wave
 use nephroid::study::brute_force;
 use nephroid::study::convergence::{DEFAULT_DENSITIES, Ladder};
 use nephroid::study::effects::EffectStudy;
+use nephroid::study::pages::{PageStudy, STUDIES as PAGES};
 use nephroid::study::spectrum::{DEFAULT_WAVELENGTHS, SpectrumStudy};
 use nephroid::study::stability::{Case, Effort};
 
 use super::args::{
-    ConvergenceArguments, EffectsArguments, ReferenceArguments, SpectrumArguments, StabilityArguments, Study,
-    StudyArguments,
+    ALL_PAGES, ConvergenceArguments, EffectsArguments, PageArguments, ReferenceArguments, SpectrumArguments,
+    StabilityArguments, Study, StudyArguments,
 };
 use super::job::{Job, scene_input, threads};
 use super::scene_input::{MissingLight, SceneInput};
@@ -69,11 +70,24 @@ pub struct StabilityJob {
     pub force: bool,
 }
 
+/// Studies whose result is a page.
+#[derive(Debug)]
+pub struct PageJob {
+    /// Each with its folder.
+    pub studies: Vec<(PageStudy, PathBuf)>,
+    pub quick: bool,
+    pub threads: usize,
+    pub force: bool,
+}
+
 /// The job of a study.
 ///
 /// # Errors
 /// No study is named; a value outside its range.
 pub fn study_job(arguments: StudyArguments) -> Result<Job> {
+    if let Some((name, page)) = arguments.study.as_ref().and_then(Study::as_page) {
+        return page_job(name, page);
+    }
     match arguments.study {
         Some(Study::Convergence(convergence)) => convergence_job(convergence),
         Some(Study::Reference(reference)) => reference_job(reference),
@@ -81,12 +95,29 @@ pub fn study_job(arguments: StudyArguments) -> Result<Job> {
         Some(Study::Spectrum(spectrum)) => spectrum_job(spectrum),
         Some(Study::Stability(stability)) => stability_job(stability),
         None if arguments.list => Ok(Job::ListStudies),
-        None => Err(Error::usage(
+        _ => Err(Error::usage(
             "study",
             "no study is named",
             "name one, or use --list to see which there are",
         )),
     }
+}
+
+fn page_job(name: &'static str, arguments: &PageArguments) -> Result<Job> {
+    let studies = if name == ALL_PAGES {
+        let in_its_folder = |study: PageStudy| (study, arguments.output.join(study.name));
+        PAGES.into_iter().map(in_its_folder).collect()
+    } else {
+        let study = PageStudy::named(name)
+            .ok_or_else(|| Error::usage("study", format!("there is no study {name}"), "use --list"))?;
+        vec![(study, arguments.output.clone())]
+    };
+    Ok(Job::Page(PageJob {
+        studies,
+        quick: arguments.quick,
+        threads: threads(&arguments.run)?,
+        force: arguments.force,
+    }))
 }
 
 /// Texels across and down of a study's maps where none are asked for.

@@ -2,7 +2,26 @@
 
 use nephroid::effect::{Effect, EffectSwitch};
 use nephroid::eye_pass::WhiteBalance;
-use nephroid::settings::{MapResolution, Sigma, Wavelengths};
+use nephroid::scene::camera_path::MAX_FRAMES;
+use nephroid::settings::{MAX_MAP_SIDE, MapResolution, Sigma, Wavelengths};
+
+/// A number of frames.
+pub fn frames(text: &str) -> Result<usize, String> {
+    let frames = text.parse().ok();
+    frames
+        .filter(|frames| (1..=MAX_FRAMES).contains(frames))
+        .ok_or_else(|| format!("give 1 to {MAX_FRAMES} frames"))
+}
+
+/// The longest side of an atlas [texels].
+pub fn atlas_side(text: &str) -> Result<usize, String> {
+    let side = text.parse().ok();
+    side.filter(|side| (LEAST_ATLAS_SIDE..=MAX_MAP_SIDE).contains(side))
+        .ok_or_else(|| format!("give {LEAST_ATLAS_SIDE} to {MAX_MAP_SIDE} texels"))
+}
+
+/// Below, gutters take most of an atlas [texels].
+const LEAST_ATLAS_SIDE: usize = 16;
 
 /// `1.5` or `adaptive`.
 pub fn sigma(text: &str) -> Result<Sigma, String> {

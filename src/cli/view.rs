@@ -79,6 +79,13 @@ fn window(job: &ViewJob, loaded: &LoadedScene, terminal: &Terminal, interrupt: &
         },
         stop: Some(interrupt.shared_control()),
         event_log: job.event_log.clone(),
+        files: viewer::files::FilesOptions {
+            load: job.scene.load_options(),
+            watch: job.watch,
+            config: viewer::files::config::ConfigFolder::of_user(),
+            fresh: job.fresh,
+            settings_given: job.settings_given,
+        },
     };
     match viewer::run(options) {
         Ok(()) => Ok(Shown::Closed),

@@ -1,4 +1,4 @@
-//! OpenEXR: single part, 32-bit float, ZIP.
+//! OpenEXR: single part, ZIP, 32-bit floats or halves.
 
 use std::io::Cursor;
 
@@ -11,6 +11,7 @@ use exr::prelude as oxr;
 use exr::prelude::ReadChannels as _;
 use exr::prelude::ReadLayers as _;
 use exr::prelude::WritableImage as _;
+use half::f16;
 
 use super::float_image::{Channel, FloatImage, check_size, rgb_names};
 use super::map_rows::MapRows;
@@ -125,7 +126,8 @@ pub fn image_of_picture(picture: &Picture) -> FloatImage {
     }
 }
 
-fn rgb_channels(prefix: &str, values: &[[f32; 3]]) -> Vec<Channel> {
+/// Channels `PREFIX.R/G/B` of values.
+pub(super) fn rgb_channels(prefix: &str, values: &[[f32; 3]]) -> Vec<Channel> {
     rgb_names(prefix)
         .into_iter()
         .enumerate()
@@ -143,12 +145,36 @@ fn rgb_channels(prefix: &str, values: &[[f32; 3]]) -> Vec<Channel> {
 /// An image that the format cannot hold.
 pub fn encode(image: FloatImage, comment: &str, location: &str) -> Result<Vec<u8>> {
     let size = (image.width, image.height);
-    let channels = image
-        .channels
-        .into_iter()
-        .map(|channel| oxr::AnyChannel::new(channel.name.as_str(), oxr::FlatSamples::F32(channel.values)))
-        .collect();
-    let channels = oxr::AnyChannels::sort(channels);
+    let channels = image.channels.into_iter();
+    let channels = channels.map(|channel| (channel.name, oxr::FlatSamples::F32(channel.values)));
+    encode_channels(channels, size, comment, location)
+}
+
+/// The same of halves, as `R/G/B`.
+///
+/// # Errors
+/// An image that the format cannot hold.
+pub fn encode_half(
+    values: &[[f16; 3]],
+    size: (usize, usize),
+    comment: &str,
+    location: &str,
+) -> Result<Vec<u8>> {
+    let channels = rgb_names("").into_iter().enumerate().map(|(channel, name)| {
+        let values = values.iter().map(|rgb| rgb[channel]).collect();
+        (name, oxr::FlatSamples::F16(values))
+    });
+    encode_channels(channels, size, comment, location)
+}
+
+fn encode_channels(
+    channels: impl Iterator<Item = (String, oxr::FlatSamples)>,
+    size: (usize, usize),
+    comment: &str,
+    location: &str,
+) -> Result<Vec<u8>> {
+    let channels = channels.map(|(name, samples)| oxr::AnyChannel::new(name.as_str(), samples));
+    let channels = oxr::AnyChannels::sort(channels.collect());
     let image = oxr::Image::from_layer(oxr::Layer::new(size, attributes(comment), ENCODING, channels));
     let mut bytes = Cursor::new(Vec::new());
     let written = image.write().to_buffered(&mut bytes);

@@ -1,6 +1,6 @@
 //! A folder of maps: `maps/NNNN_slug.exr`, their generated coordinates, and the manifest, written last.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::manifest::{self, BandChannel, LightChannels, Manifest, MapEntry};
 use super::{exr, uv_file};
@@ -88,65 +88,93 @@ impl MapFolder {
         map: &IlluminationMap,
         result: &BakeResult,
     ) -> Result<MapEntry> {
-        let object = map.chart.object();
-        let mut stem = format!(
-            "{object:04}_{}",
-            files::slug(&scene.objects[object].name, "surface")
-        );
-        if map.chart.receiver.side() == Side::Back {
-            stem.push_str("_back");
-        }
-        let uv_name = (map.chart.uv_set == UvSet::Generated).then(|| format!("{stem}.uv"));
-        if let Some(name) = &uv_name {
-            let bytes = uv_file::encode(&map.chart.corner_uvs);
-            files::write_atomically(&self.maps.path().join(name), |writer| writer.write_all(&bytes))?;
-        }
-        let name = format!("{stem}.exr");
+        let name = format!("{}.exr", stem(scene, map));
         let path = self.maps.path().join(&name);
-        let mut lights = Vec::new();
-        let mut channels = Vec::new();
-        let is_of_map = |part: &&LightLayer| part.receiver == map.chart.receiver;
-        for part in result.light_layers.iter().filter(is_of_map) {
-            lights.push(LightChannels {
-                light: scene.lights[part.light].name.clone(),
-                layer: part.kind,
-                channels: format!("{}.{}", part.kind.name(), light_slug(scene, part.light)),
-            });
-            channels.push(&part.irradiance[..]);
-        }
-        let names = lights.iter().map(|light| light.channels.as_str());
-        let parts: Vec<exr::LightChannel> = names.zip(channels).collect();
-        let of_map = result.band_layers.iter();
-        let of_map: Vec<&BandLayer> = of_map
-            .filter(|layer| layer.receiver == map.chart.receiver)
-            .collect();
-        let bands: Vec<BandChannel> = of_map.iter().map(|layer| BandChannel::new(&layer.band)).collect();
-        let names = bands.iter().map(|band| band.channel.as_str());
-        let single = names.zip(of_map.iter().map(|layer| &layer.irradiance[..]));
-        let single: Vec<exr::BandChannel> = single.collect();
-        // As it was asked for, though memory may have made the map coarser.
-        let size = match settings.map_resolution {
-            MapResolution::Fixed { width, height } => (width, height),
-            MapResolution::Auto => (map.width(), map.height()),
+        let (parts, uv_path) = write_map(&path, scene, settings, map, result)?;
+        let in_maps = |path: &Path| {
+            let name = path.file_name().unwrap_or_default();
+            format!("{MAPS}/{}", name.to_string_lossy())
         };
-        let bytes = exr::encode_map(
-            map,
-            size,
-            (&parts, &single),
-            "irradiance in W/m^2 (lumens / 683 per m^2), linear sRGB; row 0 is v = 0",
-            &path.display().to_string(),
-        )?;
-        files::write_atomically(&path, |writer| writer.write_all(&bytes))?;
-        let in_maps = |name: String| format!("{MAPS}/{name}");
         Ok(MapEntry::new(
             scene,
             map,
-            size,
-            (lights, bands),
-            in_maps(name),
-            uv_name.map(in_maps),
+            size(settings, map),
+            parts,
+            in_maps(&path),
+            uv_path.as_deref().map(in_maps),
         ))
     }
+}
+
+/// Parts of lights and bands of the spectrum that a map's file holds.
+pub type Parts = (Vec<LightChannels>, Vec<BandChannel>);
+
+/// The name of a map's file without its extension.
+pub fn stem(scene: &Scene, map: &IlluminationMap) -> String {
+    let object = map.chart.object();
+    let name = files::slug(&scene.objects[object].name, "surface");
+    let back = match map.chart.receiver.side() {
+        Side::Front => "",
+        Side::Back => "_back",
+    };
+    format!("{object:04}_{name}{back}")
+}
+
+/// As it was asked for, though memory may have made the map coarser [texels].
+fn size(settings: &BakeSettings, map: &IlluminationMap) -> (usize, usize) {
+    match settings.map_resolution {
+        MapResolution::Fixed { width, height } => (width, height),
+        MapResolution::Auto => (map.width(), map.height()),
+    }
+}
+
+/// Writes one map of a bake to an OpenEXR file and, where its coordinates were made here, those to a `.uv` file beside it.
+/// Returns which parts of lights and which bands the file holds, and where the coordinates are.
+///
+/// # Errors
+/// A disk that is full, a place that cannot be written.
+pub fn write_map(
+    path: &Path,
+    scene: &Scene,
+    settings: &BakeSettings,
+    map: &IlluminationMap,
+    result: &BakeResult,
+) -> Result<(Parts, Option<PathBuf>)> {
+    let uv_path = (map.chart.uv_set == UvSet::Generated).then(|| path.with_extension("uv"));
+    if let Some(uv_path) = &uv_path {
+        let bytes = uv_file::encode(&map.chart.corner_uvs);
+        files::write_atomically(uv_path, |writer| writer.write_all(&bytes))?;
+    }
+    let mut lights = Vec::new();
+    let mut channels = Vec::new();
+    let is_of_map = |part: &&LightLayer| part.receiver == map.chart.receiver;
+    for part in result.light_layers.iter().filter(is_of_map) {
+        lights.push(LightChannels {
+            light: scene.lights[part.light].name.clone(),
+            layer: part.kind,
+            channels: format!("{}.{}", part.kind.name(), light_slug(scene, part.light)),
+        });
+        channels.push(&part.irradiance[..]);
+    }
+    let names = lights.iter().map(|light| light.channels.as_str());
+    let parts: Vec<exr::LightChannel> = names.zip(channels).collect();
+    let of_map = result.band_layers.iter();
+    let of_map: Vec<&BandLayer> = of_map
+        .filter(|layer| layer.receiver == map.chart.receiver)
+        .collect();
+    let bands: Vec<BandChannel> = of_map.iter().map(|layer| BandChannel::new(&layer.band)).collect();
+    let names = bands.iter().map(|band| band.channel.as_str());
+    let single = names.zip(of_map.iter().map(|layer| &layer.irradiance[..]));
+    let single: Vec<exr::BandChannel> = single.collect();
+    let bytes = exr::encode_map(
+        map,
+        size(settings, map),
+        (&parts, &single),
+        "irradiance in W/m^2 (lumens / 683 per m^2), linear sRGB; row 0 is v = 0",
+        &path.display().to_string(),
+    )?;
+    files::write_atomically(path, |writer| writer.write_all(&bytes))?;
+    Ok(((lights, bands), uv_path))
 }
 
 /// A light's name as part of a channel's; with its number where others have the same, or none.

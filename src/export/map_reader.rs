@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use serde::Deserialize;
 
-use super::manifest::{self, MapEntry, SceneSummary};
+use super::manifest::{self, LightChannels, MapEntry, SceneSummary};
 use super::map_folder::{MAX_MANIFEST_BYTES, is_map_file};
 use super::{FloatImage, float_image, uv_file};
 use crate::error::{Error, Result, Warning};
@@ -16,7 +16,7 @@ use crate::optics::LinearSrgb;
 use crate::scene::{Object, Scene};
 
 /// The parts of a manifest that maps are read by.
-#[derive(Deserialize)]
+#[derive(Debug, Deserialize)]
 struct StoredMaps {
     schema: u32,
     scene: SceneSummary,
@@ -24,11 +24,171 @@ struct StoredMaps {
     maps: Vec<MapEntry>,
 }
 
+/// A map as its folder has it.
+#[derive(Clone, Debug)]
+pub struct StoredMap {
+    /// What the manifest says of it.
+    pub entry: MapEntry,
+    /// The map.
+    pub map: IlluminationMap,
+    /// What lights give to it, where that was baked.
+    pub lights: Vec<StoredLight>,
+}
+
+/// What one light gives to one layer of a map.
+#[derive(Clone, Debug)]
+pub struct StoredLight {
+    /// Which light and layer.
+    pub channels: LightChannels,
+    /// E per texel [W/m²], linear sRGB.
+    pub irradiance: Vec<[f32; 3]>,
+}
+
+/// A folder of maps beside their scene; maps are read one at a time.
+#[derive(Debug)]
+pub struct MapReader<'a> {
+    folder: &'a Path,
+    scene: &'a Scene,
+    stored: StoredMaps,
+    location: String,
+}
+
+impl<'a> MapReader<'a> {
+    /// Reads the manifest.
+    ///
+    /// # Errors
+    /// No manifest, one of another format or scene.
+    pub fn open(folder: &'a Path, scene: &'a Scene) -> Result<Self> {
+        let (stored, location) = read_manifest(folder)?;
+        if stored.scene.geometry_hash != SceneSummary::of(scene).geometry_hash {
+            return Err(Error::failure(
+                &location,
+                format!(
+                    "its maps are of {}, whose geometry is not that of {}",
+                    stored.scene.source, scene.source
+                ),
+                "bake this scene or name the one of the maps",
+            ));
+        }
+        Ok(Self {
+            folder,
+            scene,
+            stored,
+            location,
+        })
+    }
+
+    /// What there is.
+    pub fn entries(&self) -> &[MapEntry] {
+        &self.stored.maps
+    }
+
+    /// The scene, as the maps' bake knew it.
+    pub fn scene_summary(&self) -> &SceneSummary {
+        &self.stored.scene
+    }
+
+    /// What the user should know of the maps' state.
+    pub fn warnings(&self) -> Vec<Warning> {
+        let partial = self.stored.partial.then(|| {
+            Warning::new(
+                &self.location,
+                "its bake was stopped before it was done",
+                "bake the scene again for all of its light",
+            )
+        });
+        partial.into_iter().collect()
+    }
+
+    /// Reads one of the maps.
+    ///
+    /// # Errors
+    /// Files that are missing, damaged or do not fit the manifest.
+    pub fn read(&self, entry: &MapEntry) -> Result<StoredMap> {
+        let (map, image) = read_map(self.folder, entry, self.scene, &self.location)?;
+        let mut lights = Vec::new();
+        for channels in &entry.lights {
+            let irradiance = image.rgb(&channels.channels).ok_or_else(|| {
+                Error::failure(
+                    self.folder.join(&entry.file).display().to_string(),
+                    format!(
+                        "the channels {} that the manifest names are not in it",
+                        channels.channels
+                    ),
+                    "bake the scene again",
+                )
+            })?;
+            check_light(
+                &irradiance,
+                &channels.channels,
+                &self.folder.join(&entry.file).display().to_string(),
+            )?;
+            lights.push(StoredLight {
+                channels: channels.clone(),
+                irradiance,
+            });
+        }
+        Ok(StoredMap {
+            entry: entry.clone(),
+            map,
+            lights,
+        })
+    }
+
+    /// The file of generated coordinates that a map follows, whole; `None` where it follows the scene's own.
+    ///
+    /// # Errors
+    /// A file that cannot be read.
+    pub fn read_coordinates(&self, entry: &MapEntry) -> Result<Option<Vec<u8>>> {
+        let Some(file) = &entry.uv_file else {
+            return Ok(None);
+        };
+        let triangles = object_of(self.scene, entry, &self.location)?
+            .1
+            .mesh
+            .triangles
+            .len();
+        let path = inside(self.folder, file, &self.location)?;
+        files::read_file(&path, uv_file::size_bytes(triangles)).map(Some)
+    }
+}
+
 /// Maps of a scene from a folder, with warnings about their state.
 ///
 /// # Errors
 /// No manifest, one of another format or scene, files that are missing, damaged or do not fit the manifest.
 pub fn read(folder: &Path, scene: &Scene) -> Result<(Vec<IlluminationMap>, Vec<Warning>)> {
+    let reader = MapReader::open(folder, scene)?;
+    let mut maps: Vec<IlluminationMap> = Vec::new();
+    for entry in reader.entries() {
+        let (map, _) = read_map(folder, entry, scene, &reader.location)?;
+        if maps
+            .iter()
+            .any(|other| other.chart.receiver == map.chart.receiver)
+        {
+            return Err(Error::failure(
+                &reader.location,
+                format!("it names two maps of one side of {}", entry.surface),
+                "bake the scene again",
+            ));
+        }
+        maps.push(map);
+    }
+    maps.sort_by_key(|map| map.chart.receiver);
+    let warnings = reader.warnings();
+    Ok((maps, warnings))
+}
+
+/// What the user named as the scene of the maps in a folder: a path as given, or `builtin:NAME`.
+///
+/// # Errors
+/// No manifest, or one of another format.
+pub fn source_of(folder: &Path) -> Result<String> {
+    read_manifest(folder).map(|(stored, _)| stored.scene.source)
+}
+
+/// The manifest of a folder, and where it is for errors.
+fn read_manifest(folder: &Path) -> Result<(StoredMaps, String)> {
     let path = folder.join(manifest::FILE_NAME);
     let location = path.display().to_string();
     let bytes = files::read_file(&path, MAX_MANIFEST_BYTES)?;
@@ -46,47 +206,13 @@ pub fn read(folder: &Path, scene: &Scene) -> Result<(Vec<IlluminationMap>, Vec<W
             "bake the scene again",
         ));
     }
-    if stored.scene.geometry_hash != SceneSummary::of(scene).geometry_hash {
-        return Err(Error::failure(
-            &location,
-            format!(
-                "its maps are of {}, whose geometry is not that of {}",
-                stored.scene.source, scene.source
-            ),
-            "bake this scene or name the one of the maps",
-        ));
-    }
-    let mut maps: Vec<IlluminationMap> = Vec::new();
-    for entry in &stored.maps {
-        let map = read_map(folder, entry, scene, &location)?;
-        if maps
-            .iter()
-            .any(|other| other.chart.receiver == map.chart.receiver)
-        {
-            return Err(Error::failure(
-                &location,
-                format!("it names two maps of one side of {}", entry.surface),
-                "bake the scene again",
-            ));
-        }
-        maps.push(map);
-    }
-    maps.sort_by_key(|map| map.chart.receiver);
-    let warnings = stored.partial.then(|| {
-        Warning::new(
-            location,
-            "its bake was stopped before it was done",
-            "bake the scene again for all of its light",
-        )
-    });
-    Ok((maps, warnings.into_iter().collect()))
+    Ok((stored, location))
 }
 
-fn read_map(folder: &Path, entry: &MapEntry, scene: &Scene, manifest: &str) -> Result<IlluminationMap> {
-    let (object, surface) = scene
-        .objects
-        .iter()
-        .enumerate()
+/// The object that a map is of, with its index.
+fn object_of<'a>(scene: &'a Scene, entry: &MapEntry, manifest: &str) -> Result<(usize, &'a Object)> {
+    let mut objects = scene.objects.iter().enumerate();
+    objects
         .find(|(_, object)| object.node == entry.node && object.primitive == entry.primitive)
         .ok_or_else(|| {
             Error::failure(
@@ -94,7 +220,17 @@ fn read_map(folder: &Path, entry: &MapEntry, scene: &Scene, manifest: &str) -> R
                 format!("the scene has no surface {}", entry.surface),
                 "bake the scene again",
             )
-        })?;
+        })
+}
+
+/// A map, and all that is in its file.
+fn read_map(
+    folder: &Path,
+    entry: &MapEntry,
+    scene: &Scene,
+    manifest: &str,
+) -> Result<(IlluminationMap, FloatImage)> {
+    let object = object_of(scene, entry, manifest)?;
     let path = inside(folder, &entry.file, manifest)?;
     let location = path.display().to_string();
     let image = FloatImage::read(&path)?;
@@ -109,13 +245,14 @@ fn read_map(folder: &Path, entry: &MapEntry, scene: &Scene, manifest: &str) -> R
         ));
     }
     let layers = read_layers(&image, entry, &location)?;
-    let chart = read_chart(folder, entry, (object, surface), manifest)?;
-    Ok(IlluminationMap {
+    let chart = read_chart(folder, entry, object, manifest)?;
+    let map = IlluminationMap {
         chart: Arc::new(chart),
         layers,
         error: image.channel("error.Y").map(<[f32]>::to_vec),
         estimated_relative_rmse: entry.estimated_relative_rmse,
-    })
+    };
+    Ok((map, image))
 }
 
 fn read_layers(image: &FloatImage, entry: &MapEntry, location: &str) -> Result<Vec<Layer>> {
@@ -131,16 +268,21 @@ fn read_layers(image: &FloatImage, entry: &MapEntry, location: &str) -> Result<V
                 "bake the scene again",
             )
         })?;
-        if !irradiance.iter().all(is_light) {
-            return Err(Error::failure(
-                location,
-                format!("its {} layer holds values that are no irradiance", kind.name()),
-                "bake the scene again",
-            ));
-        }
+        check_light(&irradiance, kind.name(), location)?;
         layers.push(Layer { kind, irradiance });
     }
     Ok(layers)
+}
+
+fn check_light(irradiance: &[[f32; 3]], what: &str, location: &str) -> Result<()> {
+    if irradiance.iter().all(is_light) {
+        return Ok(());
+    }
+    Err(Error::failure(
+        location,
+        format!("its {what} layer holds values that are no irradiance"),
+        "bake the scene again",
+    ))
 }
 
 /// Whether a texel holds finite light of no negative luminance, but for rounding. A channel below 0 is a colour outside

@@ -41,7 +41,7 @@ impl<'a> MapRows<'a> {
 }
 
 /// Which of `coarse` cells of a line one of `fine` cells covers, and with which part of itself.
-fn shares(index: usize, fine: usize, coarse: usize) -> Vec<(usize, f64)> {
+pub(super) fn shares(index: usize, fine: usize, coarse: usize) -> Vec<(usize, f64)> {
     // In units that are a whole number of both.
     let (begin, end) = (index * coarse, (index + 1) * coarse);
     let part = |cell: usize| end.min((cell + 1) * fine) - begin.max(cell * fine);

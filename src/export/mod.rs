@@ -2,6 +2,8 @@
 
 pub mod exr;
 pub mod float_image;
+pub mod frame_folder;
+pub mod glb;
 pub mod manifest;
 pub mod map_folder;
 pub mod map_reader;
@@ -9,6 +11,10 @@ mod map_rows;
 pub mod pfm;
 pub mod picture;
 pub mod png;
+mod quantity;
+pub mod textures;
 pub mod uv_file;
+mod white;
 
 pub use float_image::FloatImage;
+pub use quantity::Quantity;

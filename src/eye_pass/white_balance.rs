@@ -3,6 +3,8 @@
 use std::fmt;
 use std::str::FromStr;
 
+use serde::{Deserialize, Serialize};
+
 use super::Picture;
 use crate::optics::LinearSrgb;
 use crate::optics::spectrum::Xyz;
@@ -11,7 +13,8 @@ use crate::optics::spectrum::xyz::{IDENTITY, Matrix3, transformed, white_balance
 use crate::scene::Scene;
 
 /// The light that is to look white.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum WhiteBalance {
     /// That of the display, D65: colours stay as they are.
     #[default]

@@ -4,9 +4,11 @@ pub mod cache;
 mod folder;
 mod read;
 mod slug;
+mod staged;
 mod write;
 
 pub use folder::{OutputFolder, check_output_file, remove_file};
 pub use read::read_file;
 pub use slug::slug;
+pub use staged::StagedFolder;
 pub use write::write_atomically;

@@ -49,7 +49,8 @@ fn create_aside(folder: &Path) -> io::Result<NamedTempFile> {
     builder.tempfile_in(folder)
 }
 
-fn unwritable(path: &Path, error: &io::Error) -> Error {
+/// Why a file cannot be written, in the user's terms.
+pub(super) fn unwritable(path: &Path, error: &io::Error) -> Error {
     let (what, remedy) = match error.kind() {
         io::ErrorKind::NotFound => (
             "its folder does not exist".into(),

@@ -5,6 +5,7 @@ pub mod chart;
 pub mod compare;
 pub mod difference;
 pub mod difference_colours;
+pub mod false_colours;
 pub mod gutter;
 pub mod islands;
 pub mod lookup;

@@ -460,7 +460,8 @@ fn measured_ratio(middle: &Images, coarse: &Images, fine: &BTreeMap<Receiver, (V
     }
 }
 
-/// Share of the light that no map shows though it should.
+/// Share of the light that no map shows though it should: what was given up is taken to go where the rest of it went, to
+/// maps, into surfaces and out of the scene.
 pub fn given_up_share(ledger: &EnergyLedger) -> f64 {
     let truncated = &ledger.truncated;
     let lost = truncated.depth
@@ -469,7 +470,7 @@ pub fn given_up_share(ledger: &EnergyLedger) -> f64 {
         + truncated.unresolved
         + truncated.quadrature.abs();
     if ledger.deposited > 0.0 {
-        lost / ledger.deposited
+        lost / (ledger.deposited + ledger.absorbed + ledger.escaped)
     } else {
         0.0
     }

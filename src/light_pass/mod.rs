@@ -3,12 +3,14 @@
 pub mod accuracy;
 pub mod caustic;
 pub mod direct;
+pub mod explain;
 pub mod indirect;
 pub mod item_buffer;
 pub mod launch;
 pub mod ledger;
 pub mod ledger_sum;
 pub mod receiver_maps;
+pub mod sketch;
 pub mod spectral_node;
 pub mod wavefront;
 

@@ -3,6 +3,8 @@
 use std::sync::LazyLock;
 
 use glam::{DMat3, DVec3};
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use super::conductor::conductor_reflectance;
 use super::names::{key, nearest};
@@ -83,6 +85,30 @@ impl Metal {
             name: name.into(),
             known: nearest(name, METALS.iter().map(|metal| metal.name)),
         })
+    }
+
+    /// Written down by its name; none where there is none.
+    ///
+    /// # Errors
+    /// Those of `serializer`.
+    pub(crate) fn write_name<S: Serializer>(
+        metal: &Option<&'static Self>,
+        serializer: S,
+    ) -> Result<S::Ok, S::Error> {
+        metal.map(Self::name).serialize(serializer)
+    }
+
+    /// Found again by its name.
+    ///
+    /// # Errors
+    /// A name that no metal has; those of `deserializer`.
+    pub(crate) fn read_name<'de, D: Deserializer<'de>>(
+        deserializer: D,
+    ) -> Result<Option<&'static Self>, D::Error> {
+        let name = Option::<String>::deserialize(deserializer)?;
+        name.map(|name| Self::by_name(&name))
+            .transpose()
+            .map_err(D::Error::custom)
     }
 
     /// Its name.

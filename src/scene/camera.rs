@@ -1,6 +1,7 @@
 //! Cameras.
 
 use glam::DVec3;
+use serde::{Deserialize, Serialize};
 
 use crate::geometry::Frustum;
 
@@ -8,7 +9,7 @@ use crate::geometry::Frustum;
 const FRAMING_FOV_RAD: f64 = 0.8;
 
 /// A perspective camera.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Camera {
     /// The node's name in the file; `cameraN` when it has none.
     pub name: String,
@@ -25,6 +26,20 @@ pub struct Camera {
 }
 
 impl Camera {
+    /// Whether its numbers are those of a camera: finite, its axes unit and perpendicular, its angle in range.
+    pub fn is_sound(&self) -> bool {
+        let is_unit = |axis: DVec3| (axis.length() - 1.0).abs() < 1e-6;
+        let is_angle = self.vertical_fov_rad > 0.0 && self.vertical_fov_rad < std::f64::consts::PI;
+        let is_near = self.near_m > 0.0 && self.near_m.is_finite();
+        let is_square = self.forward.dot(self.up).abs() < 1e-6;
+        self.position.is_finite()
+            && is_unit(self.forward)
+            && is_unit(self.up)
+            && is_square
+            && is_angle
+            && is_near
+    }
+
     /// A camera at `position` that looks at `target`, y up (z where it looks straight up or down).
     pub fn look_at(name: impl Into<String>, position: DVec3, target: DVec3, vertical_fov_rad: f64) -> Self {
         let forward = (target - position).normalize_or(DVec3::NEG_Z);

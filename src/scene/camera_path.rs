@@ -1,19 +1,20 @@
 //! A way for a camera through a scene, from a file: straight lines between keys, which are equally long in time.
 //!
-//! The file is JSON: `{"frames": N, "vertical_fov_deg": F, "keys": [{"position_m": [x, y, z], "target_m": [x, y, z]},
-//! ...]}`, positions in the coordinates of the scene's file. Nothing else may stand in it.
+//! The file is JSON: `{"frames": N, "vertical_fov_deg": F, "keys": [{"position_m": [x, y, z], "target_m": [x, y, z],
+//! "roll_deg": R}, ...]}`, positions in the coordinates of the scene's file; `roll_deg` may be left out. Nothing else may
+//! stand in it.
 
 use std::path::Path;
 
 use glam::DVec3;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use super::Camera;
 use crate::error::{Error, Result};
 use crate::files;
 
 /// Most frames of a path, and most keys.
-const MAX_FRAMES: usize = 10_000;
+pub const MAX_FRAMES: usize = 10_000;
 /// Largest file that is read: far beyond what so many keys take [bytes].
 const MAX_BYTES: u64 = 8_000_000;
 /// Farthest from the origin that a coordinate may lie [m].
@@ -21,20 +22,29 @@ const MAX_COORDINATE_M: f64 = 1e9;
 /// Angles of view that make a picture [degrees].
 const FOV_DEG: std::ops::RangeInclusive<f64> = 0.1..=170.0;
 
-#[derive(Debug, Deserialize)]
+/// What a file holds.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Document {
-    frames: usize,
-    vertical_fov_deg: f64,
-    keys: Vec<Key>,
+pub struct PathPlan {
+    /// From the first key to the last, 1 to [`MAX_FRAMES`].
+    pub frames: usize,
+    /// 0.1 to 170.
+    pub vertical_fov_deg: f64,
+    /// 2 to [`MAX_FRAMES`].
+    pub keys: Vec<Key>,
 }
 
-/// Where the eye is at some time, and what it looks at [m].
-#[derive(Clone, Copy, Debug, Deserialize)]
+/// Where the eye is at some time, and what it looks at.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Key {
-    position_m: DVec3,
-    target_m: DVec3,
+pub struct Key {
+    /// In the coordinates of the scene's file [m].
+    pub position_m: DVec3,
+    /// In the same [m]; another point.
+    pub target_m: DVec3,
+    /// How far the camera leans to its right, −180 to 180 [degrees].
+    #[serde(default, skip_serializing_if = "is_level")]
+    pub roll_deg: f64,
 }
 
 impl Key {
@@ -42,15 +52,111 @@ impl Key {
         Self {
             position_m: self.position_m.lerp(other.position_m, share),
             target_m: self.target_m.lerp(other.target_m, share),
+            roll_deg: self.roll_deg + share * shorter_way_deg(other.roll_deg - self.roll_deg),
         }
+    }
+
+    /// From there to the target, in scene coordinates.
+    pub fn camera(&self, name: String, origin_world: DVec3, vertical_fov_rad: f64) -> Camera {
+        let (position, target) = (self.position_m - origin_world, self.target_m - origin_world);
+        let mut camera = Camera::look_at(name, position, target, vertical_fov_rad);
+        let (sine, cosine) = self.roll_deg.to_radians().sin_cos();
+        camera.up = camera.up * cosine + camera.right() * sine;
+        camera
     }
 
     fn is_in_range(self) -> bool {
         let coordinates = [self.position_m, self.target_m].map(|point| point.to_array());
         // Not a number is in no range.
         let is_in_range = |coordinate: &f64| coordinate.abs() <= MAX_COORDINATE_M;
-        coordinates.as_flattened().iter().all(is_in_range)
+        coordinates.as_flattened().iter().all(is_in_range) && self.roll_deg.abs() <= 360.0
     }
+}
+
+fn is_level(roll_deg: &f64) -> bool {
+    *roll_deg == 0.0
+}
+
+/// A turn by the same angle, at most half a turn.
+fn shorter_way_deg(turn_deg: f64) -> f64 {
+    turn_deg - 360.0 * (turn_deg / 360.0).round()
+}
+
+impl PathPlan {
+    /// Reads a file; what its numbers mean together is not looked at yet.
+    ///
+    /// # Errors
+    /// A file that cannot be read; no JSON of this form.
+    pub fn read(path: &Path) -> Result<Self> {
+        let bytes = files::read_file(path, MAX_BYTES)?;
+        Self::parse(&bytes, &path.display().to_string())
+    }
+
+    fn parse(json: &[u8], location: &str) -> Result<Self> {
+        serde_json::from_slice(json).map_err(|error| {
+            refused(
+                location,
+                &error.to_string(),
+                "give frames, vertical_fov_deg and keys with position_m and target_m, as README.md shows",
+            )
+        })
+    }
+
+    /// Writes a file that [`read`](Self::read) reads.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn write(&self, path: &Path) -> Result<()> {
+        let text = serde_json::to_string_pretty(self)
+            .map_err(|error| Error::failure("camera path", error.to_string(), "report this"))?;
+        files::write_atomically(path, |writer| writeln!(writer, "{text}"))
+    }
+
+    /// The way itself; `location` is named in errors.
+    ///
+    /// # Errors
+    /// Fewer than 2 keys; frames, angle or coordinates out of range; an eye at its target.
+    pub fn path(&self, location: &str) -> Result<CameraPath> {
+        let Self {
+            frames,
+            vertical_fov_deg,
+            ref keys,
+        } = *self;
+        let refused = |what: String, remedy: &str| Err(refused(location, &what, remedy));
+        if !(1..=MAX_FRAMES).contains(&frames) {
+            return refused(format!("{frames} frames"), "give 1 to 10000 frames");
+        }
+        if !(2..=MAX_FRAMES).contains(&keys.len()) {
+            return refused(format!("number of keys: {}", keys.len()), "give 2 to 10000 keys");
+        }
+        if !FOV_DEG.contains(&vertical_fov_deg) {
+            return refused(
+                format!("vertical_fov_deg is {vertical_fov_deg}"),
+                "give an angle of 0.1 to 170 degrees",
+            );
+        }
+        if let Some(key) = keys.iter().position(|key| !key.is_in_range()) {
+            return refused(
+                format!("key {} lies beyond 1e9 m, or leans by more than a turn", key + 1),
+                "give coordinates in metres within the scene, and an angle in degrees",
+            );
+        }
+        let frames: Vec<Key> = (0..frames).map(|frame| at(keys, frame, frames)).collect();
+        if let Some(frame) = frames.iter().position(|key| key.position_m == key.target_m) {
+            return refused(
+                format!("in frame {} the eye is at its target", frame + 1),
+                "move one of the two",
+            );
+        }
+        Ok(CameraPath {
+            frames,
+            vertical_fov_rad: vertical_fov_deg.to_radians(),
+        })
+    }
+}
+
+fn refused(location: &str, what: &str, remedy: &str) -> Error {
+    Error::failure(location, format!("is no camera path ({what})"), remedy)
 }
 
 /// A camera for each frame.
@@ -66,75 +172,24 @@ impl CameraPath {
     /// # Errors
     /// A file that cannot be read; those of [`parse`](Self::parse).
     pub fn read(path: &Path) -> Result<Self> {
-        let bytes = files::read_file(path, MAX_BYTES)?;
-        Self::parse(&bytes, &path.display().to_string())
+        PathPlan::read(path)?.path(&path.display().to_string())
     }
 
     /// Reads the contents of a file; `location` is named in errors.
     ///
     /// # Errors
-    /// No JSON of this form; fewer than 2 keys; frames, angle or coordinates out of range; an eye at its target.
+    /// No JSON of this form; those of [`PathPlan::path`].
     pub fn parse(json: &[u8], location: &str) -> Result<Self> {
-        let refused = |what: String, remedy: &str| {
-            Err(Error::failure(
-                location,
-                format!("is no camera path ({what})"),
-                remedy,
-            ))
-        };
-        let document: Document = match serde_json::from_slice(json) {
-            Ok(document) => document,
-            Err(error) => {
-                return refused(
-                    error.to_string(),
-                    "give frames, vertical_fov_deg and keys with position_m and target_m, as README.md shows",
-                );
-            }
-        };
-        let Document {
-            frames,
-            vertical_fov_deg,
-            keys,
-        } = document;
-        if !(1..=MAX_FRAMES).contains(&frames) {
-            return refused(format!("{frames} frames"), "give 1 to 10000 frames");
-        }
-        if !(2..=MAX_FRAMES).contains(&keys.len()) {
-            return refused(format!("number of keys: {}", keys.len()), "give 2 to 10000 keys");
-        }
-        if !FOV_DEG.contains(&vertical_fov_deg) {
-            return refused(
-                format!("vertical_fov_deg is {vertical_fov_deg}"),
-                "give an angle of 0.1 to 170 degrees",
-            );
-        }
-        if let Some(key) = keys.iter().position(|key| !key.is_in_range()) {
-            return refused(
-                format!("key {} lies beyond 1e9 m", key + 1),
-                "give coordinates in metres within the scene",
-            );
-        }
-        let frames: Vec<Key> = (0..frames).map(|frame| at(&keys, frame, frames)).collect();
-        if let Some(frame) = frames.iter().position(|key| key.position_m == key.target_m) {
-            return refused(
-                format!("in frame {} the eye is at its target", frame + 1),
-                "move one of the two",
-            );
-        }
-        Ok(Self {
-            frames,
-            vertical_fov_rad: vertical_fov_deg.to_radians(),
-        })
+        PathPlan::parse(json, location)?.path(location)
     }
 
     /// A camera for each frame, at least one; `origin_world` is that of the scene: see [`super::Scene::origin_world`].
     pub fn cameras(&self, origin_world: DVec3) -> Vec<Camera> {
         let frames = self.frames.iter().enumerate();
         let camera = |(frame, key): (usize, &Key)| {
-            Camera::look_at(
+            key.camera(
                 format!("frame {}", frame + 1),
-                key.position_m - origin_world,
-                key.target_m - origin_world,
+                origin_world,
                 self.vertical_fov_rad,
             )
         };

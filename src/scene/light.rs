@@ -3,13 +3,14 @@
 use std::sync::Arc;
 
 use glam::DVec3;
+use serde::{Deserialize, Serialize};
 
 use crate::optics::LinearSrgb;
 use crate::optics::spectrum::Spectrum;
 use crate::units::{Irradiance, Radiance, RadiantIntensity};
 
 /// Where a light is and how strong: KHR_lights_punctual, EXT_lights_area, what glows, and what lies around.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum LightKind {
     /// The same in every direction.
     Point {
@@ -66,7 +67,7 @@ pub enum LightKind {
 }
 
 /// Outline of a flat lamp.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum PanelShape {
     /// The parallelogram of its half-axes.
     Rectangle,
@@ -75,7 +76,7 @@ pub enum PanelShape {
 }
 
 /// How large a lamp is that would else be a point, or a sun that would else be one direction.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub enum LightSize {
     /// Not at all.
     #[default]
@@ -93,7 +94,7 @@ pub enum LightSize {
 }
 
 /// A light with its colour.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Light {
     /// The node's name in the file; `lightN` when it has none.
     pub name: String,
@@ -107,6 +108,15 @@ pub struct Light {
     pub kind: LightKind,
     /// How large, where the kind does not say it.
     pub size: LightSize,
+}
+
+/// What edits did to the list of lights: those of the file come first, in its order, and then those that were added.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct LightList {
+    /// Places of lights that were taken out, among those of the scene as it was loaded, ascending.
+    pub removed: Vec<usize>,
+    /// Lights that were added, as they were then.
+    pub added: Vec<Arc<Light>>,
 }
 
 impl Light {

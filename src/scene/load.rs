@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::{Light, LightKind, LightSize, Scene, builtin, contact, environment, gltf};
+use super::{Light, LightKind, LightSize, Opened, Scene, builtin, contact, environment, gltf};
 use crate::error::{Error, Result, Warning};
 use crate::optics::LinearSrgb;
 use crate::units::Irradiance;
@@ -56,6 +56,62 @@ pub fn load(source: &str, options: &LoadOptions) -> Result<Scene> {
     Ok(scene)
 }
 
+/// Writes an edited scene as a `.glb`: the file that it was loaded from, in which only what was edited is changed, so that
+/// whatever the program does not know survives.
+///
+/// # Errors
+/// A built-in scene, which has no file; a file that changed since; an edit that no file can hold, such as another shape, the
+/// brightness of an environment, or a glass without a name; a place that cannot be written.
+pub fn save(target: &Path, loaded: &Scene, edited: &Scene, options: &LoadOptions) -> Result<()> {
+    if loaded.source.starts_with("builtin:") {
+        return Err(Error::failure(
+            &loaded.source,
+            "is built in and has no file that could be changed",
+            "its edits are kept by the program; open a .glb or .gltf file to save one",
+        ));
+    }
+    gltf::save(Path::new(&loaded.source), target, loaded, edited, options)
+}
+
+/// A scene's document, to be changed and written elsewhere: its file as it is, with all that lies beside it, or for a
+/// built-in one a document made for it, whose node `i` is object `i`.
+///
+/// # Errors
+/// A file that cannot be read any more, or one to which nothing can be added.
+pub fn open_document(scene: &Scene, options: &LoadOptions) -> Result<Opened> {
+    gltf::open(scene, options.memory_limit_bytes)
+}
+
+/// The files that a scene is read from: the file itself and what it refers to beside it, as far as that can be told; none
+/// for a built-in.
+pub fn files_of(source: &str, options: &LoadOptions) -> Vec<PathBuf> {
+    if source.starts_with("builtin:") {
+        return Vec::new();
+    }
+    let mut files = gltf::files_of(Path::new(source), options.memory_limit_bytes);
+    files.extend(options.environment.clone());
+    files
+}
+
+/// Gives a scene that was read again the meshes and images of the time before where they are the same, so that who knows
+/// those does nothing anew; tells whether all of its objects have the shape that they had.
+pub fn share(before: &Scene, now: &mut Scene) -> bool {
+    let mut is_same = before.objects.len() == now.objects.len();
+    for (was, is) in before.objects.iter().zip(&mut now.objects) {
+        if was.mesh == is.mesh {
+            is.mesh = Arc::clone(&was.mesh);
+        } else {
+            is_same = false;
+        }
+    }
+    for (was, is) in before.textures.iter().zip(&mut now.textures) {
+        if was == is {
+            *is = Arc::clone(was);
+        }
+    }
+    is_same
+}
+
 fn unknown_builtin(source: &str) -> Error {
     Error::failure(
         source,
@@ -88,9 +144,17 @@ fn add_environment(scene: &mut Scene, path: &Path, memory_limit_bytes: u64) -> R
 /// A grey floor then sends a radiance of about 0.5 W/(m² sr): neither dark nor overexposed at exposure 0.
 const DEFAULT_SUN: Irradiance = Irradiance(4.0);
 
+/// Name of the sun of scenes without light.
+const DEFAULT_SUN_NAME: &str = "default sun";
+
+/// Whether a scene, as it was loaded, had no light of its own and was given a sun.
+pub fn was_dark(loaded: &Scene) -> bool {
+    loaded.lights.iter().any(|light| light.name == DEFAULT_SUN_NAME)
+}
+
 fn add_default_light(scene: &mut Scene) {
     scene.lights.push(Light {
-        name: "default sun".into(),
+        name: DEFAULT_SUN_NAME.into(),
         colour: LinearSrgb::WHITE,
         spectrum: None,
         kind: LightKind::Sun {
@@ -102,7 +166,7 @@ fn add_default_light(scene: &mut Scene) {
     scene.warnings.push(Warning::new(
         scene.source.clone(),
         format!(
-            "the scene has no light, so a sun of {} W/m² was added, called `default sun`",
+            "the scene has no light, so a sun of {} W/m² was added, called `{DEFAULT_SUN_NAME}`",
             DEFAULT_SUN.0
         ),
         "add a light to the scene to choose your own",

@@ -6,6 +6,7 @@ pub mod alpha_mask;
 pub mod builtin;
 pub mod camera;
 pub mod camera_path;
+pub mod changes;
 pub mod closed;
 pub mod contact;
 pub mod edit;
@@ -19,6 +20,7 @@ pub mod mesh;
 mod middle_light;
 pub mod normal_map;
 pub mod texture;
+pub mod turntable;
 pub mod waves;
 
 use std::sync::Arc;
@@ -28,11 +30,12 @@ use glam::DVec3;
 pub use adjacency::Adjacency;
 pub use alpha_mask::AlphaMask;
 pub use camera::Camera;
-pub use camera_path::CameraPath;
-pub use edit::{Edit, EditTarget};
+pub use camera_path::{CameraPath, PathPlan};
+pub use edit::{Edit, EditTarget, LightOrigin, why_light_stays};
 pub use environment::Environment;
-pub use light::{Light, LightKind, LightSize, PanelShape};
-pub use load::{LoadOptions, load};
+pub use gltf::{Glb, Opened};
+pub use light::{Light, LightKind, LightList, LightSize, PanelShape};
+pub use load::{LoadOptions, load, open_document};
 pub use material::{Material, SurfaceKind, Volume};
 pub use mesh::Mesh;
 pub use normal_map::NormalMap;
@@ -74,6 +77,8 @@ pub struct Scene {
     pub textures: Vec<Arc<Texture>>,
     /// Lights with some power.
     pub lights: Vec<Light>,
+    /// Which of them were there when the scene was loaded.
+    pub light_list: LightList,
     /// What lies infinitely far around everything; black where there is none.
     pub environment: Option<Arc<Environment>>,
     /// Cameras, in file order.
@@ -86,6 +91,21 @@ impl Scene {
     /// The material of an object.
     pub fn material_of(&self, object: usize) -> &Material {
         &self.materials[self.objects[object].material]
+    }
+
+    /// The place of a light among those of the scene as it was loaded; `None` for one that was added since.
+    pub fn light_when_loaded(&self, light: usize) -> Option<usize> {
+        let list = &self.light_list;
+        let loaded = 0..self.lights.len() - list.added.len() + list.removed.len();
+        loaded.filter(|place| !list.removed.contains(place)).nth(light)
+    }
+
+    /// A light as it was when `loaded` was loaded, or when it was added.
+    pub fn light_at_first<'a>(&'a self, light: usize, loaded: &'a Self) -> &'a Light {
+        match self.light_when_loaded(light) {
+            Some(place) => &loaded.lights[place],
+            None => &self.light_list.added[light + self.light_list.added.len() - self.lights.len()],
+        }
     }
 
     /// Whether anything in it sends light of different wavelengths different ways.

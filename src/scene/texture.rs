@@ -16,7 +16,7 @@ pub enum Wrap {
 }
 
 /// An 8-bit image, row 0 at v = 0: sRGB-encoded where it is a colour, linear where it holds normals.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Texture {
     /// The file's name for it; `imageN` when it has none.
     pub name: String,

@@ -6,6 +6,7 @@
 //! object that is moved moves through them.
 
 use glam::DVec3;
+use serde::{Deserialize, Serialize};
 
 /// Most waves of one material.
 pub const MOST_WAVES: usize = 8;
@@ -15,7 +16,7 @@ pub const MOST_WAVES: usize = 8;
 pub const STEEPEST_SLOPE: f64 = 1.0;
 
 /// One wave.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Wave {
     /// A, half of the height between trough and crest [m]; ≥ 0.
     pub amplitude_m: f64,
@@ -55,9 +56,24 @@ impl Wave {
 }
 
 /// The waves of a material: one at least, all of them valid.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "Vec<Wave>", into = "Vec<Wave>")]
 pub struct Waves {
     waves: Vec<Wave>,
+}
+
+impl TryFrom<Vec<Wave>> for Waves {
+    type Error = String;
+
+    fn try_from(waves: Vec<Wave>) -> Result<Self, String> {
+        Self::new(waves)
+    }
+}
+
+impl From<Waves> for Vec<Wave> {
+    fn from(waves: Waves) -> Self {
+        waves.waves
+    }
 }
 
 impl Waves {

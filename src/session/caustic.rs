@@ -91,8 +91,10 @@ pub(super) struct Climb {
     pub(super) levels: Vec<LightLevel>,
     pub(super) rounds: Vec<Round>,
     /// Relative RMSE that the last round aims at.
-    goal: Option<f64>,
+    pub(super) goal: Option<f64>,
     pub(super) done: bool,
+    /// Whether it was taken to be dim and is not.
+    pub(super) is_underrated: bool,
 }
 
 impl Climb {
@@ -161,6 +163,14 @@ impl CausticLayer<'_> {
             for (light, climb) in lights.iter().zip(&mut climbs).filter(|(_, climb)| !climb.done) {
                 self.climb(light, &sizes, states.of_mut(light.light), climb, &mut course)?;
             }
+            for index in self.underrated(&lights, &climbs) {
+                climbs[index] = Climb {
+                    is_underrated: true,
+                    ..Climb::default()
+                };
+                let state = states.of_mut(lights[index].light);
+                self.climb(lights[index], &sizes, state, &mut climbs[index], &mut course)?;
+            }
             self.decide(&lights, &mut climbs);
             self.note_cost(states, &lights, &climbs, &mut course);
             // The first picture is worth waiting for, the others have their time.
@@ -203,6 +213,7 @@ impl CausticLayer<'_> {
         let point = CostPoint {
             rays: course.outcome.counts.rays,
             cpu_s: clock.plan.cpu + clock.trace.cpu + clock.deposit.cpu,
+            wall_s: clock.plan.wall + clock.trace.wall + clock.deposit.wall,
             bytes: states.bytes() + held.sum::<u64>(),
             relative_rmse,
             is_coarse: lights.iter().zip(climbs).any(|(light, climb)| {
@@ -212,13 +223,16 @@ impl CausticLayer<'_> {
                 } else {
                     begins
                 };
-                climb.levels.len() < begins
+                !climb.done && climb.levels.len() < begins
             }),
         };
         course.outcome.course.push(point);
-        if let (None, Some(target)) = (course.outcome.forecast, self.settings.max_error) {
-            let expected = forecast(&course.outcome.course, target);
-            course.outcome.forecast = expected.map(|expected| (point, expected));
+        let Some(target) = self.settings.max_error else {
+            return;
+        };
+        if let Some(expected) = forecast(&course.outcome.course, target, self.settings.estimator) {
+            self.progress.expect(&expected.in_words());
+            course.outcome.forecast.get_or_insert((point, expected));
         }
     }
 
@@ -256,8 +270,7 @@ impl CausticLayer<'_> {
         }
         let unit = self.unit(light)?;
         let step = climb.levels.len();
-        let key = self.key(light, step, (&climb.rounds, climb.goal), sizes);
-        let key_is_dim = key.is_dim;
+        let key = self.key(light, step, climb, sizes);
         let made = match state.take(&key) {
             Some(level) => Some(level),
             None => self.make(light, key, unit, state, course),
@@ -265,7 +278,7 @@ impl CausticLayer<'_> {
         let Some(mut level) = made else {
             return Ok(());
         };
-        if key_is_dim {
+        if level.key.trace.is_dim {
             // Not known better, and not worth knowing.
             let whole = accuracy::images(&level.maps, level.unit);
             let ledger = level.ledger.report("", level.unit, LinearSrgb::WHITE).energy_w;

@@ -1,9 +1,11 @@
 //! What a target will cost, from what a bake cost so far; and, afterwards, how that compares with what happened.
 //!
-//! Error falls with a power of the work. The exponent is measured over the last levels and drawn half way to the usual
-//! one, since two levels alone say little.
+//! Error falls with a power of the work, once the lattice that refinement begins from is through. The exponent is measured
+//! over the levels since then and drawn towards the usual one, since two levels alone say little.
 
 use serde::{Deserialize, Serialize};
+
+use crate::settings::Estimator;
 
 /// Where a bake stood after a level.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -12,6 +14,9 @@ pub struct CostPoint {
     pub rays: u64,
     /// CPU seconds of the light pass so far: plan, trace, deposit.
     pub cpu_s: f64,
+    /// The same on the wall [s].
+    #[serde(default)]
+    pub wall_s: f64,
     /// Memory held for maps, rays and patches [bytes].
     pub bytes: u64,
     /// Of all maps, estimated.
@@ -29,6 +34,9 @@ pub struct Forecast {
     pub rays: u64,
     /// CPU seconds of the light pass.
     pub cpu_s: f64,
+    /// The same on the wall [s], with threads as busy as so far.
+    #[serde(default)]
+    pub wall_s: f64,
     /// Memory for maps, rays and patches [bytes].
     pub bytes: u64,
     /// It may be this many times more or less; 1 where it was measured.
@@ -46,60 +54,160 @@ pub struct ForecastReport {
     pub actual: CostPoint,
 }
 
-/// Work grows with this power of 1/error as a rule: it did on the reference scenes, between 10 and 1 %.
-const USUAL_EXPONENT: f64 = 0.6;
+/// How a cost grows while a bake goes on.
+#[derive(Clone, Copy, Debug)]
+struct Growth {
+    /// With this power of 1/error as a rule.
+    usual_exponent: f64,
+    /// So many times with the lattice that refinement begins from.
+    beginning: f64,
+}
 
-/// Measured exponents are taken no farther than this.
-const EXPONENTS: (f64, f64) = (0.3, 2.0);
+/// Medians of the built-in scenes for targets of 10 to 0.5 %.
+const RAYS: Growth = Growth {
+    usual_exponent: 1.4,
+    beginning: 2.2,
+};
+/// The same; texels take time whatever the rays.
+const SECONDS: Growth = Growth {
+    usual_exponent: 0.85,
+    beginning: 2.0,
+};
+/// Splats are many rays: all grows with them, and their error about with the square root.
+const SPLATS: Growth = Growth {
+    usual_exponent: 1.8,
+    beginning: 1.0,
+};
 
-/// Logarithm of the uncertainty per logarithm of the ratio of errors that is bridged.
+/// The error falls so many times with the lattice that refinement begins from, as a rule.
+const BEGINNING_GAIN: f64 = 3.0;
+
+/// Exponents are taken no farther than this.
+const EXPONENTS: (f64, f64) = (0.3, 3.0);
+
+/// The usual exponent counts as much as measurements with this sum of squared distances from their mean error's logarithm.
+const WEIGHT_OF_USUAL: f64 = 2.0;
+
+/// Spread of exponents among scenes.
 const DOUBT: f64 = 0.35;
 
 /// Rounds of refinement come whole, and one may double the work: no forecast is better than this.
 const WHOLE_ROUND: f64 = 2.0;
 
-/// What `target` is expected to cost; `None` where nothing is known of the error yet.
-pub fn forecast(course: &[CostPoint], target: f64) -> Option<Forecast> {
-    let met = course
-        .iter()
-        .find(|point| !point.is_coarse && point.relative_rmse <= target);
-    if let Some(point) = met {
-        return Some(Forecast {
-            target,
-            rays: point.rays,
-            cpu_s: point.cpu_s,
-            bytes: point.bytes,
-            factor: 1.0,
-        });
+/// What `target` is expected to cost by an estimator; `None` where nothing is known of the error yet. Splats are not
+/// refined: for them it is the cost of another bake, with more rays.
+pub fn forecast(course: &[CostPoint], target: f64, estimator: Estimator) -> Option<Forecast> {
+    let met = |point: &&CostPoint| {
+        (!point.is_coarse || estimator == Estimator::Splat) && point.relative_rmse <= target
+    };
+    let of_point = |point: &CostPoint, times: [f64; 2], factor: f64| Forecast {
+        target,
+        rays: (point.rays.max(1) as f64 * times[0]) as u64,
+        cpu_s: point.cpu_s * times[1],
+        wall_s: point.wall_s * times[1],
+        // Maps stay as large as they are; what is kept of rays grows with them.
+        bytes: (point.bytes as f64 * times[0].sqrt()) as u64,
+        factor,
+    };
+    if let Some(point) = course.iter().find(met) {
+        return Some(of_point(point, [1.0, 1.0], 1.0));
     }
     let last = course.last()?;
-    let before = course
-        .iter()
-        .rev()
-        .find(|point| point.relative_rmse > 1.2 * last.relative_rmse);
-    let exponent = |of: fn(&CostPoint) -> f64| {
-        let measured = before
-            .map(|before| (of(last) / of(before)).ln() / (before.relative_rmse / last.relative_rmse).ln());
-        let measured = measured.filter(|exponent| exponent.is_finite());
-        let measured = measured.unwrap_or(USUAL_EXPONENT).clamp(EXPONENTS.0, EXPONENTS.1);
-        0.5 * (measured + USUAL_EXPONENT)
+    let (growths, is_coarse) = match estimator {
+        Estimator::Wavefront => ([RAYS, SECONDS], last.is_coarse),
+        Estimator::Splat => ([SPLATS, SPLATS], false),
     };
-    // What is still to come before a bake may end halves the error once or twice, whatever the target.
-    let gain = if last.is_coarse {
-        2.0 * (last.relative_rmse / target).max(1.0)
-    } else {
-        last.relative_rmse / target
-    };
-    let grown = |of: fn(&CostPoint) -> f64| of(last) * gain.powf(exponent(of));
-    let rays = grown(|point| point.rays.max(1) as f64);
-    Some(Forecast {
-        target,
-        rays: rays as u64,
-        cpu_s: grown(|point| point.cpu_s),
-        // Maps stay as large as they are; what is kept of rays grows with them.
-        bytes: (last.bytes as f64 * (rays / last.rays.max(1) as f64).sqrt()) as u64,
-        factor: (DOUBT * gain.ln()).exp().max(WHOLE_ROUND),
-    })
+    let beginning = if is_coarse { BEGINNING_GAIN } else { 1.0 };
+    let gain = (last.relative_rmse / beginning / target).max(1.0);
+    let costs: [fn(&CostPoint) -> f64; 2] = [|point| point.rays as f64, |point| point.cpu_s];
+    let times = [0, 1].map(|which| {
+        let begun = if is_coarse { growths[which].beginning } else { 1.0 };
+        let slope = Slope::of(course, costs[which], growths[which].usual_exponent);
+        begun * gain.powf(slope.exponent)
+    });
+    let doubt = Slope::of(course, costs[1], growths[1].usual_exponent).doubt;
+    let factor = (doubt * gain.ln()).exp().max(1.0);
+    Some(of_point(last, times, factor.max(WHOLE_ROUND)))
+}
+
+/// How a cost grew over a course.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Slope {
+    /// d ln(cost) / d ln(1/error).
+    exponent: f64,
+    /// Its expected error.
+    doubt: f64,
+}
+
+impl Slope {
+    /// The line of least squares through the levels since refinement began, drawn to the usual exponent by as much as it
+    /// rests on little.
+    fn of(course: &[CostPoint], cost: fn(&CostPoint) -> f64, usual: f64) -> Self {
+        let is_measured = |point: &&CostPoint| !point.is_coarse && cost(point) > 0.0;
+        let logarithms = |point: &CostPoint| (-point.relative_rmse.ln(), cost(point).ln());
+        let points: Vec<(f64, f64)> = course.iter().filter(is_measured).map(logarithms).collect();
+        let count = points.len().max(1) as f64;
+        let sums = points
+            .iter()
+            .fold((0.0, 0.0), |sum, p| (sum.0 + p.0, sum.1 + p.1));
+        let mean = (sums.0 / count, sums.1 / count);
+        let (squares, products) = points.iter().fold((0.0, 0.0), |sum, p| {
+            let (x, y) = (p.0 - mean.0, p.1 - mean.1);
+            (sum.0 + x * x, sum.1 + x * y)
+        });
+        let exponent = (products + WEIGHT_OF_USUAL * usual) / (squares + WEIGHT_OF_USUAL);
+        Self {
+            exponent: exponent.clamp(EXPONENTS.0, EXPONENTS.1),
+            doubt: DOUBT * (WEIGHT_OF_USUAL / (squares + WEIGHT_OF_USUAL)).sqrt(),
+        }
+    }
+}
+
+/// The last level of a course before its target came near: the first at or below `error`, else the last above it, but
+/// for the last of all. `None` of a course of one level.
+pub fn stood_at(course: &[CostPoint], error: f64) -> Option<usize> {
+    let before_end = course.len().checked_sub(2)?;
+    let first = course.iter().position(|point| point.relative_rmse <= error);
+    Some(first.unwrap_or(before_end).min(before_end))
+}
+
+impl Forecast {
+    /// "to 1 %: about 3.2 s (1.6 to 6.4 s), 21,000 rays": wall-clock seconds of the light pass.
+    pub fn in_words(&self) -> String {
+        let percent = (self.target * 1e6).round() / 1e4;
+        let rays = rounded_count(self.rays as f64);
+        if self.factor <= 1.0 {
+            return format!("to {percent} %: {} s, {rays} rays", two_digits(self.wall_s));
+        }
+        let (least, most) = (self.wall_s / self.factor, self.wall_s * self.factor);
+        format!(
+            "to {percent} %: about {} s ({} to {} s), {rays} rays",
+            two_digits(self.wall_s),
+            two_digits(least),
+            two_digits(most)
+        )
+    }
+}
+
+/// Two significant digits.
+fn two_digits(value: f64) -> String {
+    if value <= 0.0 || !value.is_finite() {
+        return format!("{value}");
+    }
+    let unit = 10_f64.powi(value.log10().floor() as i32 - 1);
+    let rounded = (value / unit).round() * unit;
+    let decimals = (1.0 - (rounded * 1.000_001).log10().floor()).max(0.0);
+    format!("{rounded:.*}", decimals as usize)
+}
+
+/// "950", "21 k", "1.1 M".
+fn rounded_count(count: f64) -> String {
+    match count {
+        ..1e3 => two_digits(count),
+        1e3..1e6 => format!("{} k", two_digits(count / 1e3)),
+        1e6..1e9 => format!("{} M", two_digits(count / 1e6)),
+        _ => format!("{} G", two_digits(count / 1e9)),
+    }
 }
 
 #[cfg(test)]
@@ -110,35 +218,38 @@ mod tests {
         CostPoint {
             rays,
             cpu_s,
+            wall_s: 0.5 * cpu_s,
             bytes: 1000,
             relative_rmse,
             is_coarse: false,
         }
     }
 
+    fn to(course: &[CostPoint], target: f64) -> Forecast {
+        forecast(course, target, Estimator::Wavefront).expect("known")
+    }
+
     #[test]
-    fn a_power_law_goes_on() {
-        let course = [
-            point(1_000, 0.1, 0.2),
-            point(4_000, 0.3, 0.05),
-            point(16_000, 0.9, 0.0125),
-        ];
-        let next = forecast(&course, 0.0125 / 4.0).expect("known");
-        // Measured exponents 1 and ln 3/ln 4, both drawn towards 0.6.
+    fn a_power_law_that_was_seen_long_enough_goes_on() {
+        // Rays with 1/error², seconds with 1/error, over a thousandfold.
+        let law = |error: f64| point((1e3 / (error * error)) as u64, 0.1 / error, error);
+        let course: Vec<_> = (0..10).map(|level| law(0.5_f64.powi(level))).collect();
+        let target = 0.5_f64.powi(11);
+        let (next, truth) = (to(&course, target), law(target));
         assert!(
-            (next.rays as f64 / (16_000.0 * 4_f64.powf(0.8)) - 1.0).abs() < 1e-3,
+            (next.rays as f64 / truth.rays as f64).ln().abs() < 0.06,
             "{next:?}"
         );
-        assert!(next.cpu_s > 2.1 && next.cpu_s < 2.8, "{next:?}");
-        assert!((2.0..2.5).contains(&next.factor), "{next:?}");
+        assert!((next.cpu_s / truth.cpu_s).ln().abs() < 0.03, "{next:?}");
+        assert!((next.wall_s - 0.5 * next.cpu_s).abs() < 1e-9, "{next:?}");
     }
 
     #[test]
     fn what_was_met_is_no_guess() {
         let course = [point(1_000, 0.1, 0.2), point(4_000, 0.3, 0.05)];
-        let met = forecast(&course, 0.1).expect("known");
+        let met = to(&course, 0.1);
         assert_eq!((met.rays, met.factor), (4_000, 1.0));
-        assert_eq!(forecast(&[], 0.1), None);
+        assert_eq!(forecast(&[], 0.1, Estimator::Wavefront), None);
     }
 
     #[test]
@@ -147,7 +258,7 @@ mod tests {
             is_coarse: true,
             ..point(1_000, 0.1, 0.01)
         };
-        let next = forecast(&[coarse], 0.05).expect("known");
+        let next = to(&[coarse], 0.05);
         assert!(next.rays > 1_200 && next.factor > 1.2, "{next:?}");
     }
 
@@ -157,11 +268,49 @@ mod tests {
             vec![point(1_000, 0.1, 0.2)],
             vec![point(900, 0.1, 0.2), point(1_000, 0.1, 0.2)],
         ] {
-            let next = forecast(&course, 0.02).expect("known");
-            assert!(
-                (next.cpu_s / (0.1 * 10_f64.powf(0.6)) - 1.0).abs() < 1e-9,
-                "{next:?}"
-            );
+            let next = to(&course, 0.02);
+            let usual = 0.1 * 10_f64.powf(SECONDS.usual_exponent);
+            assert!((next.cpu_s / usual - 1.0).abs() < 1e-9, "{next:?}");
         }
+    }
+
+    #[test]
+    fn the_farther_the_less_sure_and_the_more_was_seen_the_surer() {
+        let one = [point(1_000, 0.1, 0.5)];
+        let factor = |course: &[CostPoint], target| to(course, target).factor;
+        assert!(factor(&one, 0.001) > factor(&one, 0.01));
+        let many: Vec<_> = (0..8)
+            .map(|level| point(1_000 << level, 0.1, 0.5_f64.powi(level + 1)))
+            .collect();
+        let target = many[7].relative_rmse / 500.0;
+        assert!(factor(&many, target) < factor(&one, 0.001));
+    }
+
+    #[test]
+    fn forecasts_are_told_in_one_line() {
+        let told = Forecast {
+            target: 0.01,
+            rays: 1_123_456,
+            cpu_s: 6.0,
+            wall_s: 3.21,
+            bytes: 0,
+            factor: 2.0,
+        };
+        assert_eq!(told.in_words(), "to 1 %: about 3.2 s (1.6 to 6.4 s), 1.1 M rays");
+        let met = Forecast {
+            factor: 1.0,
+            rays: 950,
+            wall_s: 0.0996,
+            ..told
+        };
+        assert_eq!(met.in_words(), "to 1 %: 0.10 s, 950 rays");
+    }
+
+    #[test]
+    fn a_bake_stood_where_it_first_was_as_good() {
+        let course = [0.2, 0.06, 0.02, 0.01].map(|error| point(1, 1.0, error));
+        assert_eq!(stood_at(&course, 0.05), Some(2));
+        assert_eq!(stood_at(&course, 0.001), Some(2));
+        assert_eq!(stood_at(&course[..1], 0.05), None);
     }
 }

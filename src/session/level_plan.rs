@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use glam::DVec2;
 
-use super::caustic::{CausticLayer, Course, ESTIMATED_LEVELS};
+use super::caustic::{CausticLayer, Climb, Course, ESTIMATED_LEVELS};
 use super::light_level::{LevelKey, LightStates, TraceKey};
 use super::map_size::Sizes;
 use super::splat_level::LEVEL_STRIDES;
@@ -89,23 +89,19 @@ impl CausticLayer<'_> {
     }
 
     /// All that a level depends on.
-    pub(super) fn key(
-        &self,
-        light: &AimedLight,
-        step: usize,
-        (rounds, goal): (&[Round], Option<f64>),
-        sizes: &Sizes,
-    ) -> LevelKey {
+    pub(super) fn key(&self, light: &AimedLight, step: usize, climb: &Climb, sizes: &Sizes) -> LevelKey {
         let lattices = self.lattices(light);
         let size = lattices[step.min(lattices.len() - 1)];
         // Coarse lattices are deposited as coarsely, so that their difference shows both kinds of error.
         let before_last = (lattices.len() - 1).saturating_sub(step);
         LevelKey {
-            trace: self.trace_key(light, size, before_last as i32, rounds),
+            trace: TraceKey {
+                is_dim: !climb.is_underrated && self.is_dim(light),
+                ..self.trace_key(light, size, before_last as i32, &climb.rounds)
+            },
             resolved: None,
-            is_dim: self.is_dim(light),
             sizes: sizes.clone(),
-            coarseness: coarseness(self.settings.max_error, goal)
+            coarseness: coarseness(self.settings.max_error, climb.goal)
                 * (before_last as f64).exp2().min(MOST_COARSE),
             kernels: self.kernels(),
             stride: match self.settings.estimator {
@@ -145,6 +141,7 @@ impl CausticLayer<'_> {
             },
             rounds: rounds.to_vec(),
             spectrum: self.spectra.key(light.light).cloned(),
+            is_dim: false,
         }
     }
 

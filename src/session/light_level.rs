@@ -37,6 +37,8 @@ pub(super) struct TraceKey {
     pub(super) rounds: Vec<Round>,
     /// What chose its wavelengths, where it is traced by wavelength.
     pub(super) spectrum: Option<SpectralKey>,
+    /// Whether the light is taken to show hardly beside the others.
+    pub(super) is_dim: bool,
 }
 
 /// All that a light's maps depend on beside the scene.
@@ -54,8 +56,6 @@ pub(super) struct LevelKey {
     pub(super) stride: usize,
     /// Of a soft light: its wavefronts.
     pub(super) resolved: Option<Resolved>,
-    /// Whether the light hardly shows beside the others.
-    pub(super) is_dim: bool,
 }
 
 /// The two dimensions of a soft light's error, as far as they are known.

@@ -216,7 +216,7 @@ impl CausticLayer<'_> {
             ..self.key(
                 light,
                 step.min(self.lattices(light).len() - 1),
-                (&[], None),
+                &Climb::default(),
                 sizes,
             )
         }

@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use super::forecast::{Forecast, forecast};
-use super::{BakeEstimate, BakeResult, BakeSession, StopReason};
+use super::{BakeEstimate, BakeResult, BakeSession, StopReason, Timings};
 use crate::error::Result;
 use crate::plan::Effect;
 use crate::progress::Control;
@@ -64,7 +64,7 @@ impl BakeSession {
             preset,
             forecast: match settings.estimator {
                 _ if !is_on => Some(nothing(preset)),
-                Estimator::Wavefront => forecast(&pilot.course, preset.max_error()),
+                Estimator::Wavefront => forecast(&pilot.course, preset.max_error(), settings.estimator),
                 Estimator::Splat => splat_forecast(&pilot, preset),
             },
         };
@@ -80,10 +80,11 @@ impl BakeSession {
 
 /// A bake that went on where another ended, with what that one took.
 fn added(first: BakeResult, mut second: BakeResult) -> BakeResult {
-    let cpu_s = |result: &BakeResult| result.cpu_s.plan + result.cpu_s.trace + result.cpu_s.deposit;
+    let sum_s = |times: &Timings| times.plan + times.trace + times.deposit;
     for point in &mut second.course {
         point.rays += first.counts.rays;
-        point.cpu_s += cpu_s(&first);
+        point.cpu_s += sum_s(&first.cpu_s);
+        point.wall_s += sum_s(&first.timings_s);
     }
     second.counts.rays += first.counts.rays;
     second.item_buffers = first.item_buffers;
@@ -120,6 +121,7 @@ fn nothing(preset: Preset) -> Forecast {
         target: preset.max_error(),
         rays: 0,
         cpu_s: 0.0,
+        wall_s: 0.0,
         bytes: 0,
         factor: 1.0,
     }
@@ -134,6 +136,7 @@ fn splat_forecast(pilot: &BakeResult, preset: Preset) -> Option<Forecast> {
         target: last.relative_rmse / gain.sqrt(),
         rays: (last.rays as f64 * gain) as u64,
         cpu_s: last.cpu_s * gain,
+        wall_s: last.wall_s * gain,
         bytes: last.bytes,
         factor: SPLAT_FACTOR,
     })

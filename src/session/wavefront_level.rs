@@ -58,7 +58,7 @@ impl CausticLayer<'_> {
         };
         for (band, part) in self.spectra.parts(light.light) {
             let size = self.spectra.part_size(light.light, key.trace.size);
-            let bodies = self.small_bodies(light, size);
+            let bodies = self.small_bodies(light, size, self.closeness(light, &key.trace));
             let depositor = WavefrontDepositor {
                 receivers: &receivers,
                 chart_for: &chart_for,
@@ -119,7 +119,7 @@ impl CausticLayer<'_> {
         course: &Course,
     ) -> PassReport {
         let size = self.spectra.part_size(light.light, key.trace.size);
-        let bodies = self.small_bodies(light, size);
+        let bodies = self.small_bodies(light, size, self.closeness(light, &key.trace));
         let listener = Listener {
             progress: &(),
             control: course.control,
@@ -200,8 +200,8 @@ impl CausticLayer<'_> {
         }
     }
 
-    fn closeness(&self, light: &AimedLight) -> Closeness {
-        if self.is_soft(light) || self.is_dim(light) {
+    fn closeness(&self, light: &AimedLight, trace: &TraceKey) -> Closeness {
+        if self.is_soft(light) || trace.is_dim {
             Closeness::SOFT
         } else {
             Closeness::SHARP
@@ -209,9 +209,13 @@ impl CausticLayer<'_> {
     }
 
     /// Bodies that are small beside the cells of a lattice.
-    fn small_bodies(&self, light: &AimedLight, (columns, rows): (usize, usize)) -> SmallBodies {
+    fn small_bodies(
+        &self,
+        light: &AimedLight,
+        (columns, rows): (usize, usize),
+        closeness: Closeness,
+    ) -> SmallBodies {
         let cell = DVec2::new(1.0 / columns as f64, 1.0 / rows as f64);
-        let closeness = self.closeness(light);
         SmallBodies::find(self.tracer, &light.launch, light.visible(), cell, closeness)
     }
 
@@ -227,6 +231,7 @@ impl CausticLayer<'_> {
     ) -> WavefrontLattice<'a> {
         let size = self.spectra.part_size(light.light, trace.size);
         let mut lattice = self.wavefront_lattice(light, part, size, bodies, unit, control);
+        lattice.tracer = lattice.tracer.with_closeness(self.closeness(light, trace));
         lattice.tracer.bumps = BumpCells::for_lattice(lattice.cell_count(), trace.coarser);
         lattice
     }
@@ -248,7 +253,7 @@ impl CausticLayer<'_> {
             [1.0 / size.0 as f64, 1.0 / size.1 as f64],
             control,
         );
-        let mut tracer = tracer.with_closeness(self.closeness(light));
+        let mut tracer = tracer;
         tracer.bumps = BumpCells::UNDIVIDED;
         WavefrontLattice {
             tracer: tracer.at_node(part, 0),

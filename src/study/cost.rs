@@ -24,7 +24,13 @@ impl std::fmt::Display for Cost {
 }
 
 /// `123`, `1.23`, `0.00123`, `1.23e6`.
-fn three_digits(value: f64) -> String {
+pub(super) fn three_digits(value: f64) -> String {
+    if value == 0.0 {
+        return "0".into();
+    }
+    if value < 0.0 {
+        return format!("-{}", three_digits(-value));
+    }
     if !(1e-3..1e5).contains(&value) {
         return format!("{value:.2e}");
     }

@@ -1,5 +1,5 @@
 //! Accuracy against cost: references by brute force, agreement of maps, how errors fall with rays and seconds, what
-//! each effect costs and is worth, how long frames take, and hard cases with their laws.
+//! each effect costs and is worth, how long frames take, hard cases with their laws, and the paper's table and figures.
 
 pub mod agreement;
 pub mod brute_force;
@@ -8,6 +8,9 @@ pub mod cost;
 pub mod effects;
 #[cfg(feature = "gpu")]
 pub mod frame_times;
+pub mod page;
+pub mod pages;
+
 pub mod plot;
 pub mod references;
 mod repeats;

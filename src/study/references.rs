@@ -109,6 +109,14 @@ impl Reference {
         })
     }
 
+    /// Irradiance of its surface [W/m²]; `None` where it is of several.
+    pub fn grid(&self) -> Option<&Grid> {
+        match &self.truth {
+            Truth::Surface { grid, .. } => Some(grid),
+            Truth::Maps(_) => None,
+        }
+    }
+
     /// The maps of a finer bake.
     pub fn of_bake(maps: Vec<IlluminationMap>, kind: String) -> Self {
         Self {
@@ -122,22 +130,29 @@ impl Reference {
     /// # Errors
     /// Sizes that are no whole multiples of one another; a reference without light.
     pub fn measure(&self, maps: &[IlluminationMap]) -> Result<Agreement> {
-        let pairs = match &self.truth {
-            Truth::Maps(references) => pair_maps(maps, references),
-            Truth::Surface { object, grid } => pair_with_grid(maps, *object, grid),
-        };
-        let pairs = pairs.ok_or_else(|| {
-            Error::failure(
-                &self.kind,
-                "its size and that of the maps are no whole multiples of one another",
-                "choose another --map-resolution",
-            )
-        })?;
-        Agreement::of(&pairs).ok_or_else(|| {
+        Agreement::of(&self.pairs(maps)?).ok_or_else(|| {
             Error::failure(
                 &self.kind,
                 "the reference is dark, so that nothing can be measured against it",
                 "name a reference with light in it",
+            )
+        })
+    }
+
+    /// Texels of maps of the scene, each beside its own.
+    ///
+    /// # Errors
+    /// Sizes that are no whole multiples of one another.
+    pub fn pairs(&self, maps: &[IlluminationMap]) -> Result<Vec<TexelPair>> {
+        let pairs = match &self.truth {
+            Truth::Maps(references) => pair_maps(maps, references),
+            Truth::Surface { object, grid } => pair_with_grid(maps, *object, grid),
+        };
+        pairs.ok_or_else(|| {
+            Error::failure(
+                &self.kind,
+                "its size and that of the maps are no whole multiples of one another",
+                "choose another --map-resolution",
             )
         })
     }

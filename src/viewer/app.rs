@@ -1,6 +1,7 @@
 //! The window's life: events in, frames out, and rest while nothing changes.
 
 mod drawing;
+mod files;
 mod hands;
 mod saving;
 
@@ -17,14 +18,18 @@ use winit::keyboard::ModifiersState;
 use winit::window::WindowId;
 
 use super::event_log::Event;
+use super::files::dialog::{Choice, Dialog};
 use super::frame_times::{FrameTimes, sum_ms};
+use super::gizmo::Gizmo;
 use super::graphics::{Graphics, RETRY_AFTER, Shown};
 use super::interface::Painting;
+use super::latency::Latencies;
+use super::lens::Lens;
 use super::model::Model;
 use super::overlay;
 use super::pace::Pace;
 use super::panel::{Facts, Wishes};
-use super::{ViewerOptions, error_view};
+use super::{ViewerOptions, error_view, probe_lines, sketching, split};
 use crate::error::{Error, Result};
 use crate::progress::Control;
 use crate::session::EffectReport;
@@ -73,6 +78,10 @@ pub struct App {
     /// Where the mouse was when it took the gaze [pixels].
     looking_from: Option<PhysicalPosition<f64>>,
     pointer: PhysicalPosition<f64>,
+    /// Handles in the picture.
+    gizmo: Gizmo,
+    /// Where the left button went down on the picture, until it is a drag [pixels].
+    clicks_at: Option<PhysicalPosition<f64>>,
     /// Until when the camera has moved.
     moved_until: Instant,
     /// When the next frame is due though nothing happens.
@@ -81,6 +90,9 @@ pub struct App {
     /// The exposure that was measured last [stops], and how many layers the maps had then.
     measured: Option<(f64, usize)>,
     must_set_maps: bool,
+    must_set_beside: bool,
+    /// Where the picture's two parts meet, as a share of its width.
+    divider: f32,
     /// Whether direct light is traced, and not in the maps on the device.
     traces_lights: bool,
     pressed: Wishes,
@@ -100,10 +112,13 @@ pub struct App {
     frame_times: FrameTimes,
     /// Frames that may still come only to tell what the last picture took.
     reports_due: u32,
+    /// From events to frames.
+    latencies: Latencies,
     /// Told over the picture until the next key press.
     notice: Option<String>,
     /// Held now: Ctrl, Shift and the like.
     modifiers: ModifiersState,
+    dialog: Dialog,
     failure: Option<Error>,
 }
 
@@ -118,8 +133,11 @@ impl App {
             // Fails only when the window is gone, and then nobody waits for it.
             let _ = of_baker.send_event(News::Baker);
         };
+        let model = Model::new(options, wake.clone())?;
         Ok(Self {
-            model: Model::new(options, wake)?,
+            must_measure_exposure: options.exposure_stops.is_none() && !model.keeps_exposure(),
+            notice: files::dark_notice(&model),
+            model,
             graphics: None,
             proxy,
             stop: options.stop.clone(),
@@ -127,11 +145,14 @@ impl App {
             picture_rect: egui::Rect::NOTHING,
             looking_from: None,
             pointer: PhysicalPosition::default(),
+            gizmo: Gizmo::default(),
+            clicks_at: None,
             moved_until: Instant::now(),
             wake_at: None,
-            must_measure_exposure: options.exposure_stops.is_none(),
             measured: None,
             must_set_maps: true,
+            must_set_beside: false,
+            divider: 0.5,
             traces_lights: false,
             pressed: Wishes::default(),
             losses: Vec::new(),
@@ -144,8 +165,9 @@ impl App {
             chains: None,
             frame_times: FrameTimes::default(),
             reports_due: 0,
-            notice: None,
+            latencies: Latencies::default(),
             modifiers: ModifiersState::empty(),
+            dialog: Dialog::new(Arc::new(wake.clone())),
             failure: None,
         })
     }
@@ -176,12 +198,14 @@ impl App {
                 self.graphics = Some(graphics);
                 self.traces_lights = false;
                 self.must_set_maps = true;
+                self.must_set_beside = true;
             }
             Err(error) => self.fail(event_loop, error),
         }
     }
 
     fn close(&mut self, event_loop: &ActiveEventLoop) {
+        self.model.log.write(&Event::Latency(&self.latencies));
         self.model.log.write(&Event::Closing);
         event_loop.exit();
     }
@@ -245,23 +269,28 @@ impl App {
     /// One frame.
     fn redraw(&mut self, event_loop: &ActiveEventLoop) {
         self.fly();
-        let quantity = self.model.quantity();
+        let (quantity, style) = (self.model.quantity(), self.model.map_style());
+        self.poll_files();
         self.must_set_maps |= self.model.poll();
         self.report_chains();
         let layer = self.model.panel.display.layer;
         let mut wishes = std::mem::take(&mut self.pressed);
+        wishes.edit = self.model.placed();
         let Some(mut painting) = self.run_interface(&mut wishes) else {
             return;
         };
         self.model.act(&wishes, Instant::now());
+        self.must_set_beside |= wishes.compare.is_some() || self.model.map_style() != style;
         self.must_set_maps |= layer != self.model.panel.display.layer;
         if quantity != self.model.quantity() {
             self.must_set_maps = true;
             self.model.log.write(&Event::Shows(self.model.quantity().name()));
+            // The legend comes with the next frame.
+            self.request_redraw();
         }
         self.must_measure_exposure |= wishes.measure_exposure;
         if let Err(error) = self.draw_picture() {
-            self.notice = Some(error.to_string());
+            self.tell_fault(&error);
         }
         self.report_making();
         let Some(graphics) = &mut self.graphics else {
@@ -272,7 +301,13 @@ impl App {
         if shown != Shown::Broken
             && let Some(error) = graphics.gpu().take_error()
         {
-            self.notice = Some(error.to_string());
+            self.tell_fault(&error);
+        }
+        if wishes.browse {
+            self.ask_for_file(Choice::Open);
+        }
+        if wishes.save_scene {
+            self.ask_for_file(Choice::SaveScene);
         }
         if wishes.save_picture {
             self.save_picture();
@@ -280,14 +315,28 @@ impl App {
         self.schedule(event_loop, shown, painting.repaint_after);
     }
 
+    /// Tells over the picture what the graphics device could not do.
+    fn tell_fault(&mut self, error: &Error) {
+        let sentence = error.to_string();
+        self.model.log.write(&Event::Fault(&sentence));
+        self.notice = Some(sentence);
+    }
+
     /// Shows panel and picture to egui.
     fn run_interface(&mut self, wishes: &mut Wishes) -> Option<Painting> {
+        let lost_device = self
+            .losses
+            .last()
+            .is_some_and(|loss| loss.elapsed() < LOSSES_WITHIN);
         let Self {
             model,
             graphics,
             picture_rect,
+            divider,
+            gizmo,
             chains,
             frame_times,
+            latencies,
             notice,
             ..
         } = self;
@@ -298,39 +347,82 @@ impl App {
             graphics.gpu().adapter_name(),
         );
         let (window, picture) = (Arc::clone(graphics.window()), graphics.picture_id());
+        let beside = graphics.beside_id();
         let tells_times = graphics.tells_times();
         let (travel, speed_m_per_s) = (model.navigator.travel(), model.navigator.speed_m_per_s());
         let edits = model.edits();
         let (scene, loaded) = (Arc::clone(edits.scene()), Arc::clone(edits.loaded()));
-        let undoable = edits.undoable();
+        let history = edits.history();
+        let (undo, redo) = (
+            history.next_undo().map(str::to_owned),
+            history.next_redo().map(str::to_owned),
+        );
         let (has_errors, quantity) = (error_view::is_available(model.maps()), model.quantity());
+        let survey = *model.survey();
+        let probed = model.probed().cloned();
+        let sketch = model.sketch().cloned();
+        let (is_playing, film_told) = (model.is_playing(), model.film_told().map(str::to_owned));
+        let reference = model.reference().cloned();
         let Model {
             panel,
+            navigator,
             last,
+            given,
+            exporter,
             worth,
             refusal,
+            files,
             log,
             ..
         } = model;
         let facts = Facts {
             scene: &scene,
             loaded: &loaded,
-            undoable,
+            undo: undo.as_deref(),
+            redo: redo.as_deref(),
             refusal: refusal.as_deref(),
             state: &state,
             last: last.as_deref(),
+            maps: last.as_ref().map_or(given, |last| &last.result.maps),
+            export: exporter.state(),
             worth: worth.as_ref(),
             layers: &layers,
+            survey: &survey,
+            reference: reference.as_ref(),
+            probed: probed.as_ref(),
+            sketch: sketch.as_deref(),
+            is_playing,
+            film_told: film_told.as_deref(),
             has_errors,
             chains: chains.as_ref(),
             frame_times: tells_times.then_some(&*frame_times),
+            latencies,
             travel,
             speed_m_per_s,
+            lost_device,
+            files: files.facts(),
             adapter: &adapter,
         };
         let painting = graphics.interface().run(&window, |ui| {
             *wishes = std::mem::take(wishes).and(panel.show(ui, &facts));
-            *picture_rect = overlay::show(ui, picture, &facts, quantity, notice.as_deref());
+            let scale = panel.display.scale;
+            *picture_rect = overlay::show(ui, picture, &facts, (quantity, &scale), notice.as_deref());
+            if let Some((beside, reference)) = beside.zip(reference.as_ref()) {
+                split::show(ui, *picture_rect, divider, (beside, reference));
+            }
+            let camera = navigator.camera_for(f64::from(picture_rect.aspect_ratio()));
+            let lens = Lens {
+                camera: &camera,
+                picture: *picture_rect,
+            };
+            if let Some(sketch) = &sketch {
+                sketching::draw(ui.painter(), &lens, sketch, panel.sketched);
+            }
+            if let Some(probed) = &probed {
+                probe_lines::draw(ui.painter(), &lens, probed);
+            }
+            let pulled = gizmo.show(ui, &lens, panel.held(), (&scene, &loaded));
+            wishes.edit = pulled.or(wishes.edit.take());
         });
         if let Some(controls) = &painting.moved_controls {
             log.write(&Event::Controls(controls));
@@ -348,7 +440,7 @@ impl App {
             }
             Shown::Hidden => Duration::MAX,
             Shown::Later => RETRY_AFTER,
-            Shown::Yes if self.model.navigator.is_moving() => Duration::ZERO,
+            Shown::Yes if self.model.is_moving() => Duration::ZERO,
             Shown::Yes if self.is_refining => self.pace.pause(now),
             Shown::Yes if self.model.state().is_working() => repaint_after.min(BAKING_FRAME),
             Shown::Yes => repaint_after,
@@ -359,7 +451,10 @@ impl App {
         } else {
             wait
         };
-        self.frames += u64::from(shown == Shown::Yes);
+        if shown == Shown::Yes {
+            self.frames += 1;
+            self.latencies.show(now);
+        }
         if wait.is_zero() {
             self.wake_at = None;
             self.request_redraw();
@@ -369,7 +464,9 @@ impl App {
             .into_iter()
             .flatten()
             .min();
+        // A frame that could not be shown yet is no rest.
         let is_working = self.model.state().is_working() || self.is_refining || is_report_due;
+        let is_working = is_working || shown == Shown::Later || self.model.is_moving();
         if self.rested_at != self.pictures && !is_working {
             self.rested_at = self.pictures;
             let (pictures, frames) = (self.pictures, self.frames);
@@ -392,6 +489,7 @@ impl ApplicationHandler<News> for App {
     }
 
     fn new_events(&mut self, event_loop: &ActiveEventLoop, _: StartCause) {
+        self.latencies.begin_turn(Instant::now());
         if self.stop.as_ref().is_some_and(|stop| stop.is_cancelled()) {
             self.close(event_loop);
         } else if self.wake_at.is_some_and(|due| Instant::now() >= due) {
@@ -417,12 +515,17 @@ impl ApplicationHandler<News> for App {
         if window.id() != id {
             return;
         }
-        if is_by_hand(&event) {
+        let is_by_hand = is_by_hand(&event);
+        if is_by_hand {
             self.pace.touch(Instant::now());
         }
         // Egui counts each frame as one that needs another; the schedule knows better.
         if graphics.interface().on_event(&window, &event) && event != WindowEvent::RedrawRequested {
             window.request_redraw();
+            if is_by_hand {
+                let is_baking = self.model.state().is_baking();
+                self.latencies.meet(Instant::now(), is_baking);
+            }
         }
         match event {
             WindowEvent::CloseRequested | WindowEvent::Destroyed => self.close(event_loop),
@@ -436,7 +539,13 @@ impl ApplicationHandler<News> for App {
                 self.stop_looking();
                 self.model.navigator.stop();
             }
-            WindowEvent::CursorMoved { position, .. } => self.pointer = position,
+            WindowEvent::DroppedFile(path) => self.drop_file(&path),
+            WindowEvent::HoveredFile(path) => {
+                let name = path.file_name().unwrap_or_default().to_string_lossy();
+                self.notice = Some(format!("Let go to open {name}."));
+            }
+            WindowEvent::HoveredFileCancelled => self.notice = None,
+            WindowEvent::CursorMoved { position, .. } => self.on_pointer(position),
             WindowEvent::MouseInput { button, state, .. } => self.on_mouse_button(button, state),
             WindowEvent::MouseWheel { delta, .. } => self.on_wheel(delta),
             WindowEvent::ModifiersChanged(modifiers) => self.modifiers = modifiers.state(),
@@ -450,6 +559,8 @@ impl ApplicationHandler<News> for App {
             && self.looking_from.is_some()
         {
             self.model.navigator.look(DVec2::new(x, y));
+            self.latencies
+                .meet(Instant::now(), self.model.state().is_baking());
             self.request_redraw();
         }
     }
@@ -458,6 +569,7 @@ impl ApplicationHandler<News> for App {
         let look = self.stop.as_ref().map(|_| Instant::now() + LOOK_FOR_STOP);
         let until = [self.wake_at, look].into_iter().flatten().min();
         event_loop.set_control_flow(until.map_or(ControlFlow::Wait, ControlFlow::WaitUntil));
+        self.latencies.end_turn(Instant::now());
     }
 }
 

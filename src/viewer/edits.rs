@@ -1,22 +1,35 @@
-//! The scene that the user edits, with what takes the edits back.
+//! The scene that the user edits, with the history of everything that can be taken back.
 
 use std::sync::Arc;
 
+use super::filming::Film;
+use super::history::{Change, History, Step};
+use super::panel::Display;
 use crate::error::Result;
-use crate::scene::{Edit, EditTarget, Scene};
+use crate::scene::{Edit, Scene};
+use crate::settings::BakeSettings;
 
-/// Edits that can be taken back: the inverse of one edit is small, but a moved mesh is kept whole.
-const MOST_UNDONE: usize = 1000;
-
-/// A scene with its history.
+/// A scene with its history, and that of the settings it is baked and shown with.
 #[derive(Clone, Debug)]
 pub struct EditedScene {
     loaded: Arc<Scene>,
     scene: Arc<Scene>,
-    /// What takes back each edit, the newest last.
-    inverses: Vec<(EditTarget, Edit)>,
-    /// What the user drags at: all of a drag is one edit to take back.
-    dragged: Option<EditTarget>,
+    history: History,
+}
+
+/// What the panel is to be set to once a step was taken back or done again.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Restored {
+    /// Nothing: the scene was changed.
+    Scene,
+    /// These settings.
+    Settings(Box<BakeSettings>),
+    /// This path of the camera.
+    Film(Box<Film>),
+    /// Whether changes are baked by themselves.
+    Automatic(bool),
+    /// What differs between both, to what it is in the second.
+    Display(Display, Display),
 }
 
 impl EditedScene {
@@ -25,8 +38,7 @@ impl EditedScene {
         Self {
             loaded: Arc::clone(&scene),
             scene,
-            inverses: Vec::new(),
-            dragged: None,
+            history: History::default(),
         }
     }
 
@@ -40,9 +52,9 @@ impl EditedScene {
         &self.loaded
     }
 
-    /// Edits that can be taken back.
-    pub fn undoable(&self) -> usize {
-        self.inverses.len()
+    /// What can be taken back and done again.
+    pub fn history(&self) -> &History {
+        &self.history
     }
 
     /// Edits the scene. Edits of one target while the mouse is down are taken back together.
@@ -50,35 +62,94 @@ impl EditedScene {
     /// # Errors
     /// As [`Edit::apply`]: the scene stays.
     pub fn edit(&mut self, edit: &Edit) -> Result<()> {
-        let target = edit.target();
         let (scene, inverse) = edit.apply(&self.scene)?;
         self.scene = Arc::new(scene);
-        if self.dragged.as_ref() != Some(&target) {
-            self.inverses.push((target.clone(), inverse));
-            if self.inverses.len() > MOST_UNDONE {
-                self.inverses.remove(0);
-            }
-        }
-        self.dragged = Some(target);
+        self.history.record(Step::of_edit(edit, inverse, &self.scene));
         Ok(())
+    }
+
+    /// Notes that settings were changed in the panel.
+    pub fn note_settings(&mut self, before: &BakeSettings, after: &BakeSettings) {
+        if let Some(step) = Step::of_settings(before, after) {
+            self.history.record(step);
+        }
+    }
+
+    /// Notes that the maps are shown otherwise.
+    pub fn note_display(&mut self, before: Display, after: Display) {
+        if let Some(step) = Step::of_display(before, after) {
+            self.history.record(step);
+        }
+    }
+
+    /// Notes that the camera's path is another one.
+    pub fn note_film(&mut self, before: &Film, after: &Film) {
+        self.history.record(Step::of_film(before, after));
+    }
+
+    /// Notes that changes are baked by themselves from now on, or no longer.
+    pub fn note_automatic(&mut self, after: bool) {
+        self.history.record(Step::of_automatic(after));
     }
 
     /// The mouse is up: the next edit is one of its own.
     pub fn release(&mut self) {
-        self.dragged = None;
+        self.history.release();
     }
 
-    /// Takes the last edit back; tells whether there was one.
+    /// Takes the last step back; `None` where there was none. With its name and what is left to be restored.
     ///
     /// # Errors
     /// As [`Edit::apply`].
-    pub fn undo(&mut self) -> Result<bool> {
-        self.dragged = None;
-        let Some((_, inverse)) = self.inverses.pop() else {
-            return Ok(false);
+    pub fn undo(&mut self) -> Result<Option<(String, Restored)>> {
+        let Some(step) = self.history.take_done() else {
+            return Ok(None);
         };
-        let (scene, _) = inverse.apply(&self.scene)?;
-        self.scene = Arc::new(scene);
-        Ok(true)
+        let (step, restored) = self.turn(step, true)?;
+        let text = step.text.clone();
+        self.history.put_undone(step);
+        Ok(Some((text, restored)))
+    }
+
+    /// Does again what was taken back last; `None` where there was nothing. As [`undo`](Self::undo).
+    ///
+    /// # Errors
+    /// As [`Edit::apply`].
+    pub fn redo(&mut self) -> Result<Option<(String, Restored)>> {
+        let Some(step) = self.history.take_undone() else {
+            return Ok(None);
+        };
+        let (step, restored) = self.turn(step, false)?;
+        let text = step.text.clone();
+        self.history.put_done(step);
+        Ok(Some((text, restored)))
+    }
+
+    /// Goes a step back or forth; gives the step for the other way.
+    fn turn(&mut self, step: Step, is_back: bool) -> Result<(Step, Restored)> {
+        let (change, restored) = match step.change {
+            Change::Scene { target, inverse } => {
+                let (scene, inverse) = inverse.apply(&self.scene)?;
+                self.scene = Arc::new(scene);
+                (Change::Scene { target, inverse }, Restored::Scene)
+            }
+            Change::Settings { before, after } => {
+                let to = if is_back { before.clone() } else { after.clone() };
+                (Change::Settings { before, after }, Restored::Settings(to))
+            }
+            Change::Film { before, after } => {
+                let to = if is_back { before.clone() } else { after.clone() };
+                (Change::Film { before, after }, Restored::Film(to))
+            }
+            Change::Automatic { after } => {
+                (Change::Automatic { after }, Restored::Automatic(after != is_back))
+            }
+            Change::Display { before, after } => {
+                let (from, to) = if is_back { (after, before) } else { (before, after) };
+                (Change::Display { before, after }, Restored::Display(from, to))
+            }
+        };
+        let text = step.text;
+        Ok((Step { text, change }, restored))
     }
 }

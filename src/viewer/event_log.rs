@@ -7,10 +7,15 @@ use std::time::Instant;
 
 use serde_json::{Value, json};
 
+use super::beside::Reference;
 use super::controls::Control;
+use super::exporting::ExportState;
+use super::latency::Latencies;
+use super::probe::Probed;
 use super::worker::{BakedLevel, Worth};
 use crate::error::{Error, Result};
 use crate::eye_pass::renderer::Uploaded;
+use crate::light_pass::sketch::Sketch;
 use crate::scene::Edit;
 use crate::settings::BakeSettings;
 
@@ -24,6 +29,26 @@ pub enum Event<'a> {
         /// What draws it.
         adapter: &'a str,
     },
+    /// A scene is being read.
+    Opening(&'a str),
+    /// Another scene is in the window.
+    Opened {
+        /// Its name.
+        scene: &'a str,
+        /// What was asked for.
+        source: &'a str,
+        /// Whether it is the same one, read again.
+        again: bool,
+    },
+    /// A scene could not be read: the one before stays.
+    NotOpened {
+        /// What was asked for.
+        source: &'a str,
+        /// Why.
+        sentence: &'a str,
+    },
+    /// What was kept of a scene is taken over.
+    FoundAgain(&'a str),
     /// A bake was asked for.
     Baking {
         /// With what.
@@ -49,10 +74,18 @@ pub enum Event<'a> {
     Controls(&'a [Control]),
     /// The scene was edited.
     Edited(&'a Edit),
-    /// The last edit was taken back.
-    Undone,
+    /// The last change was taken back: its name.
+    Undone(&'a str),
+    /// A change that was taken back was done again: its name.
+    Redone(&'a str),
     /// What an effect is worth to the maps that are shown was found, or what failed.
     Compared(&'a Worth),
+    /// The maps that are shown were held against others.
+    Against(&'a Reference),
+    /// How light runs was found.
+    Sketched(&'a Sketch),
+    /// What lights a point was found.
+    Probe(&'a Probed),
     /// The picture shows the light, how far it may be off, or what an effect is worth.
     Shows(&'a str),
     /// The camera gets about in another way.
@@ -74,6 +107,14 @@ pub enum Event<'a> {
     Saved(&'a [PathBuf]),
     /// The picture could not be written.
     NotSaved(&'a str),
+    /// Maps were written to a file or folder, or could not be.
+    Exported(&'a ExportState),
+    /// Something was picked in the picture: its name.
+    Picked(&'a str),
+    /// The camera's path has other keys: how many.
+    Recorded(usize),
+    /// The camera's path began to be played, or ended.
+    Played(bool),
     /// The exposure was measured [stops].
     Exposure(f64),
     /// Pictures since the start; written when the window comes to rest.
@@ -87,6 +128,10 @@ pub enum Event<'a> {
         /// What the last timed picture took on the graphics device [ms]; `None` where it cannot tell.
         device_ms: Option<f64>,
     },
+    /// How long events have waited for the frames that showed them: written when the window closes.
+    Latency(&'a Latencies),
+    /// The graphics device refused something.
+    Fault(&'a str),
     /// The graphics device was lost.
     DeviceLost(&'a str),
     /// A new device took its place.
@@ -101,6 +146,14 @@ impl Event<'_> {
             Self::Started { scene, adapter } => {
                 json!({"event": "started", "scene": scene, "adapter": adapter})
             }
+            Self::Opening(source) => json!({"event": "opening", "source": source}),
+            Self::Opened { scene, source, again } => {
+                json!({"event": "opened", "scene": scene, "source": source, "again": again})
+            }
+            Self::NotOpened { source, sentence } => {
+                json!({"event": "not_opened", "source": source, "sentence": sentence})
+            }
+            Self::FoundAgain(source) => json!({"event": "found_again", "source": source}),
             Self::Baking { settings } => json!({"event": "baking", "settings": settings}),
             Self::Level { level, shown } => {
                 let mut line = baked("level", level);
@@ -121,9 +174,22 @@ impl Event<'_> {
                 let control = |c: &Control| json!({"role": c.role, "name": c.name, "rect_pixels": c.rect});
                 json!({"event": "controls", "controls": controls.iter().map(control).collect::<Vec<_>>()})
             }
+            Self::Sketched(sketch) => json!({
+                "event": "sketched",
+                "rays": sketch.rays,
+                "landings": sketch.landings.len(),
+                "patches": sketch.patches.len(),
+            }),
             Self::Edited(edit) => json!({"event": "edit", "target": format!("{:?}", edit.target())}),
-            Self::Undone => json!({"event": "undo"}),
+            Self::Undone(what) => json!({"event": "undone", "what": what}),
+            Self::Redone(what) => json!({"event": "redone", "what": what}),
             Self::Compared(worth) => compared(worth),
+            Self::Against(reference) => json!({
+                "event": "against",
+                "name": reference.name,
+                "relative_rmse": reference.relative_rmse.as_ref().ok(),
+            }),
+            Self::Probe(probed) => probed.to_json(),
             Self::Shows(what) => json!({"event": "shows", "what": what}),
             Self::Travel(way) => json!({"event": "travel", "way": way}),
             Self::Bookmark { number, kept } => {
@@ -134,6 +200,14 @@ impl Event<'_> {
             Self::SettingsChanged(settings) => json!({"event": "settings", "settings": settings}),
             Self::Saved(files) => json!({"event": "saved", "files": files}),
             Self::NotSaved(sentence) => json!({"event": "not_saved", "sentence": sentence}),
+            Self::Exported(ExportState::Failed(sentence)) => {
+                json!({"event": "not_exported", "sentence": sentence})
+            }
+            Self::Exported(ExportState::Done(path)) => json!({"event": "exported", "path": path}),
+            Self::Exported(_) => json!({"event": "exporting"}),
+            Self::Picked(name) => json!({"event": "picked", "name": name}),
+            Self::Recorded(keys) => json!({"event": "recorded", "keys": keys}),
+            Self::Played(plays) => json!({"event": if *plays { "plays" } else { "played" }}),
             Self::Exposure(stops) => json!({"event": "exposure", "stops": stops}),
             Self::AtRest {
                 pictures,
@@ -147,6 +221,12 @@ impl Event<'_> {
                 "position_m": position,
                 "device_ms": device_ms,
             }),
+            Self::Latency(latencies) => json!({
+                "event": "latency",
+                "while_baking": latencies.while_baking(),
+                "otherwise": latencies.otherwise(),
+            }),
+            Self::Fault(sentence) => json!({"event": "fault", "sentence": sentence}),
             Self::DeviceLost(reason) => json!({"event": "device_lost", "reason": reason}),
             Self::DeviceRecovered => json!({"event": "device_recovered"}),
             Self::Closing => json!({"event": "closing"}),

@@ -8,6 +8,7 @@ use winit::event_loop::{ActiveEventLoop, EventLoopProxy};
 use winit::window::{Window, WindowAttributes};
 
 use super::app::News;
+use super::beside::{Beside, Making};
 use super::interface::{Interface, Painting};
 use super::picture::Picture;
 use super::surface::{Acquired, Screen};
@@ -43,8 +44,14 @@ pub struct Graphics {
     interface: Interface,
     picture: Picture,
     renderer: Renderer,
+    /// The picture's other part, where there is one.
+    beside: Option<Beside>,
+    /// Whether that is still to be made as the picture is.
+    must_make_alike: bool,
     /// As the renderer shows it.
     scene: Arc<Scene>,
+    /// As the renderer has it.
+    map_style: MapStyle,
     /// As the renderer has it.
     chains: EffectSwitch,
     /// As the renderer has it.
@@ -93,8 +100,11 @@ impl Graphics {
             interface,
             picture,
             renderer,
+            beside: None,
+            must_make_alike: false,
             scene: Arc::clone(scene),
             chains: EffectSwitch::default(),
+            map_style: MapStyle::default(),
             dispersion: EffectSwitch::default(),
             white_balance: IDENTITY,
             screen,
@@ -120,6 +130,43 @@ impl Graphics {
     /// The picture's name in egui.
     pub fn picture_id(&self) -> egui::TextureId {
         self.picture.id()
+    }
+
+    /// The name in egui of the picture's other part.
+    pub fn beside_id(&self) -> Option<egui::TextureId> {
+        self.beside.as_ref().map(Beside::picture_id)
+    }
+
+    fn making(&self) -> Making {
+        Making {
+            chains: self.chains,
+            dispersion: self.dispersion,
+            white_balance: self.white_balance,
+        }
+    }
+
+    /// Shows other maps, of a scene, beside the picture from the next one on; nothing without.
+    ///
+    /// # Errors
+    /// The device cannot hold them.
+    pub fn set_beside(&mut self, shown: Option<(&Arc<Scene>, &[IlluminationMap], MapStyle)>) -> Result<()> {
+        let making = self.making();
+        let egui = self.interface.renderer();
+        let before = self.beside.take();
+        let Some((scene, maps, style)) = shown else {
+            if let Some(beside) = before {
+                beside.release(egui);
+            }
+            return Ok(());
+        };
+        let mut beside = match before {
+            Some(beside) => beside,
+            None => Beside::new(&self.gpu, egui, scene, SAMPLES)?,
+        };
+        beside.set_maps(&self.gpu, scene, maps, style, &making)?;
+        self.beside = Some(beside);
+        self.picture.invalidate();
+        Ok(())
     }
 
     /// The window's size changed.
@@ -149,9 +196,18 @@ impl Graphics {
     /// # Errors
     /// The device cannot hold them: what was shown stays.
     pub fn set_maps(&mut self, maps: &[IlluminationMap], style: MapStyle) -> Result<Uploaded> {
+        self.set_map_style(style);
         self.picture.invalidate();
-        self.renderer.set_map_style(style);
         self.renderer.set_maps(&self.gpu, &self.scene, maps)
+    }
+
+    /// Shows the maps that there are by something else from the next picture on.
+    pub fn set_map_style(&mut self, style: MapStyle) {
+        if self.map_style != style {
+            self.map_style = style;
+            self.picture.invalidate();
+            self.renderer.set_map_style(style);
+        }
     }
 
     /// Whether direct light is traced from the next picture on; the maps are then to be set without it.
@@ -170,7 +226,9 @@ impl Graphics {
         }
         self.chains = switch;
         self.picture.invalidate();
-        self.renderer.set_chains(&self.gpu, switch)
+        self.renderer.set_chains(&self.gpu, switch)?;
+        self.must_make_alike = true;
+        Ok(())
     }
 
     /// Switches what glass that parts wavelengths does to the picture, from the next one on.
@@ -179,6 +237,7 @@ impl Graphics {
             self.dispersion = switch;
             self.picture.invalidate();
             self.renderer.set_dispersion(switch);
+            self.must_make_alike = true;
         }
     }
 
@@ -188,6 +247,7 @@ impl Graphics {
             self.white_balance = *matrix;
             self.picture.invalidate();
             self.renderer.set_white_balance(&self.gpu, matrix);
+            self.must_make_alike = true;
         }
     }
 
@@ -250,7 +310,7 @@ impl Graphics {
 
     /// Whether the picture shows a view.
     pub fn shows(&self, view: &View) -> bool {
-        self.picture.shows(view)
+        self.picture.shows(view) && self.beside.as_ref().is_none_or(|beside| beside.shows(view))
     }
 
     /// Draws a view in another quality than it is shown in, or makes the picture that is shown better by another sample.
@@ -266,7 +326,10 @@ impl Graphics {
         let target = self.picture.target();
         self.renderer.refine(&self.gpu, &mut encoder, target, view)?;
         self.gpu.queue.submit([encoder.finish()]);
-        Ok(())
+        match &mut self.beside {
+            Some(beside) => beside.refine(&self.gpu, self.interface.renderer(), view, quality),
+            None => Ok(()),
+        }
     }
 
     /// Draws the scene where the view changed since the last time; tells whether it drew.
@@ -274,13 +337,23 @@ impl Graphics {
     /// # Errors
     /// The device cannot hold a picture of that size.
     pub fn draw_picture(&mut self, view: &View, quality: EyeQuality) -> Result<bool> {
+        let making = self.making();
+        if let Some(beside) = &mut self.beside
+            && std::mem::take(&mut self.must_make_alike)
+        {
+            beside.set_making(&self.gpu, &making)?;
+        }
         let Self {
             interface,
             picture,
             renderer,
             gpu,
+            beside,
             ..
         } = self;
+        if let Some(beside) = beside {
+            beside.draw(gpu, interface.renderer(), view, quality)?;
+        }
         picture.update(&gpu.device, interface.renderer(), view, |target| {
             let mut encoder = gpu
                 .device

@@ -20,6 +20,10 @@ pub enum Shortcut {
     NextTravel,
     /// M
     Look,
+    /// P
+    Probe,
+    /// K
+    RecordKey,
     /// 1 to 9, from 0 on
     Bookmark(usize),
     /// F12
@@ -58,6 +62,8 @@ pub fn shortcut(key: &Key) -> Option<Shortcut> {
             "h" | "?" => Some(Shortcut::Help),
             "v" => Some(Shortcut::NextTravel),
             "m" => Some(Shortcut::Look),
+            "p" => Some(Shortcut::Probe),
+            "k" => Some(Shortcut::RecordKey),
             digit => bookmark(digit).map(Shortcut::Bookmark),
         },
         _ => None,
@@ -70,7 +76,14 @@ pub fn bookmark(digit: &str) -> Option<usize> {
     (1..=BOOKMARKS).contains(&number).then(|| number - 1)
 }
 
-/// Whether a key, with Ctrl held, takes the last edit back.
-pub fn is_undo(key: &Key) -> bool {
-    matches!(key, Key::Character(letter) if letter.eq_ignore_ascii_case("z"))
+/// What a key does with Ctrl held: true takes the last change back, false does it again.
+pub fn undoes(key: &Key, shift: bool) -> Option<bool> {
+    let Key::Character(letter) = key else {
+        return None;
+    };
+    match letter.to_lowercase().as_str() {
+        "z" => Some(!shift),
+        "y" => Some(false),
+        _ => None,
+    }
 }

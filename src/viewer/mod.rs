@@ -1,28 +1,47 @@
 //! The window: fly through a scene, change a setting, see it baked anew.
 
 mod app;
+pub mod beside;
+pub mod brightest;
 pub mod controls;
 pub mod debounce;
 pub mod difference_view;
 pub mod edits;
 pub mod error_view;
 pub mod event_log;
+pub mod exporting;
 mod eye_report;
+pub mod files;
+pub mod filming;
+pub mod flat_map;
 pub mod frame_times;
+pub mod gizmo;
 mod graphics;
+pub mod history;
 mod input;
 mod interface;
+pub mod latency;
+pub mod lens;
 mod meter;
 pub mod model;
 pub mod navigation;
+pub mod new_light;
 mod overlay;
 pub mod pace;
 pub mod panel;
 mod picture;
+pub mod placement;
+pub mod probe;
+mod probe_lines;
 pub mod screenshot;
+pub mod sketching;
 pub mod solid;
+mod split;
 mod surface;
+pub mod time_left;
+pub mod views;
 pub mod walking;
+pub mod wavelength_view;
 pub mod worker;
 
 use std::path::PathBuf;
@@ -31,6 +50,7 @@ use std::sync::Arc;
 use winit::event_loop::EventLoop;
 
 use self::app::{App, News};
+use self::files::FilesOptions;
 use crate::error::{Error, Result};
 use crate::illumination::IlluminationMap;
 use crate::progress::Control;
@@ -56,6 +76,8 @@ pub struct ViewerOptions {
     pub stop: Option<Arc<Control>>,
     /// One JSON line per change of state is written here: for support and for tests.
     pub event_log: Option<PathBuf>,
+    /// How scenes are opened in the window.
+    pub files: FilesOptions,
 }
 
 /// Location of the error that [`run`] returns where there is no display.

@@ -1,25 +1,51 @@
 //! Everything that the window shows and does, without the window.
 
+mod filming;
+mod keeping;
+mod opening;
+mod picking;
+mod seeking;
+
 use std::borrow::Cow;
 use std::sync::Arc;
 use std::time::Instant;
 
+use super::beside::Reference;
 use super::debounce::Debounce;
-use super::edits::EditedScene;
+use super::edits::{EditedScene, Restored};
 use super::event_log::{Event, EventLog};
+use super::exporting::{Export, Exporter};
+use super::files::keeper::Keeper;
+use super::files::{Files, working_folder};
+use super::filming::Player;
 use super::navigation::{Navigator, Travel};
-use super::panel::{LayerShown, Panel, Quantity, Wishes};
+use super::panel::{CompareWish, LayerShown, Panel, Quantity, Wishes};
+use super::probe::{Probed, Prober};
+use super::sketching::Sketcher;
 use super::solid::{Solid, Surroundings};
+use super::views::MapSurvey;
 use super::worker::{BakeRequest, BakeState, BakedLevel, Worker, Worth};
-use super::{ViewerOptions, difference_view, error_view};
+use super::{ViewerOptions, difference_view, error_view, wavelength_view};
 use crate::effect::Effect;
 use crate::error::Result;
+use crate::eye_pass::renderer::MapStyle;
+use crate::geometry::Ray;
 use crate::illumination::IlluminationMap;
 use crate::illumination::difference::Difference;
+use crate::light_pass::explain::Limits;
+use crate::light_pass::sketch::{Sketch, SketchLimits};
 use crate::scene::Scene;
 use crate::session::BakeSession;
 use crate::settings::LayerKind;
 use crate::transport::Tracer;
+
+/// Rays that a probe may take for each place of a light.
+const MOST_PROBE_RAYS: u64 = 3_000_000;
+
+/// Cells of the lattice of rays that is drawn, for each light.
+const SKETCHED_CELLS: usize = 3000;
+/// Least share of a ray that is drawn [1].
+const SKETCHED_SHARE: f64 = 0.05;
 
 /// The state behind the window.
 #[derive(Debug)]
@@ -33,6 +59,8 @@ pub struct Model {
     /// What happened.
     pub log: EventLog,
     worker: Worker,
+    /// Writes maps to files.
+    pub exporter: Exporter,
     surroundings: Surroundings,
     state: BakeState,
     /// The maps that the picture shows.
@@ -40,15 +68,42 @@ pub struct Model {
     /// What an effect is worth to these maps, where that was asked for.
     pub worth: Option<Worth>,
     /// Maps that were baked before the start; until the first bake.
-    given: Vec<IlluminationMap>,
+    pub given: Vec<IlluminationMap>,
     debounce: Debounce,
     /// As they were at the last look.
     seen: BakeRequest,
     was_automatic: bool,
     /// The last request with its number; before the first one what the given maps are taken to be baked with.
     asked: Option<(u64, BakeRequest)>,
+    /// The first request for the scene in the window; maps of those before are of another.
+    first_request: u64,
     /// Why the last edit was refused.
     pub refusal: Option<String>,
+    /// What the maps that were shown last hold.
+    survey: MapSurvey,
+    prober: Prober,
+    sketcher: Sketcher,
+    reference: Option<Reference>,
+    /// What is to be picked once surfaces are known.
+    picking: Option<Ray>,
+    /// The light in the mouse's hand.
+    placing: picking::Placing,
+    /// What waits for the surfaces of the scene.
+    sought: seeking::Sought,
+    /// The camera's path, while it is played.
+    player: Option<Player>,
+    /// What became of the last file of a path.
+    film_told: Option<String>,
+    /// The scene that was asked about.
+    probed_scene: Option<Arc<Scene>>,
+    /// Whether the exposure is that of an earlier time.
+    exposure_is_kept: bool,
+    /// What was kept of it and not taken over.
+    left_alone: keeping::LeftAlone,
+    /// The scene in the window by its full path.
+    full_source: String,
+    /// What is read from files, and from which.
+    pub files: Files,
 }
 
 impl Model {
@@ -67,7 +122,18 @@ impl Model {
             panel: Panel::new(options.settings.clone()),
             log: EventLog::open(options.event_log.as_deref())?,
             worker,
-            surroundings: Surroundings::new(wake),
+            exporter: Exporter::new(Arc::clone(&wake)),
+            surroundings: Surroundings::new(Arc::clone(&wake)),
+            prober: Prober::new(Arc::clone(&wake)),
+            sketcher: Sketcher::new(Arc::clone(&wake)),
+            reference: None,
+            picking: None,
+            placing: picking::Placing::default(),
+            sought: seeking::Sought::default(),
+            player: None,
+            film_told: None,
+            probed_scene: None,
+            files: Files::new(&options.files, wake),
             state: BakeState::Idle,
             last: None,
             worth: None,
@@ -76,10 +142,16 @@ impl Model {
             seen: wanted.clone(),
             was_automatic: true,
             asked: options.maps.is_some().then_some((0, wanted)),
+            first_request: 1,
+            exposure_is_kept: false,
+            left_alone: keeping::LeftAlone::default(),
+            full_source: String::new(),
             refusal: None,
+            survey: MapSurvey::default(),
             edits: EditedScene::new(scene),
         };
         model.panel.display.exposure_stops = options.exposure_stops.unwrap_or(0.0);
+        model.begin(options);
         if options.maps.is_none() {
             model.rebake();
         }
@@ -101,7 +173,7 @@ impl Model {
 
     /// Moves the camera by some time [s].
     pub fn advance(&mut self, seconds: f64) {
-        if !self.navigator.is_moving() {
+        if self.play_on(seconds) || !self.navigator.is_moving() {
             return;
         }
         if self.navigator.travel() == Travel::Walk {
@@ -131,7 +203,9 @@ impl Model {
 
     /// When something is to be done though nothing happens.
     pub fn due(&self) -> Option<Instant> {
-        self.debounce.due()
+        let keeper = self.files.keeper.as_ref();
+        let dues = [self.debounce.due(), keeper.and_then(Keeper::due)];
+        dues.into_iter().flatten().min()
     }
 
     /// Maps with every layer that was baked; empty before the first bake.
@@ -157,7 +231,8 @@ impl Model {
         match self.panel.display.quantity {
             Quantity::Error if error_view::is_available(self.maps()) => Quantity::Error,
             Quantity::Difference if self.difference().is_some() => Quantity::Difference,
-            _ => Quantity::Light,
+            Quantity::Error | Quantity::Difference => Quantity::Light,
+            other => other,
         }
     }
 
@@ -200,28 +275,43 @@ impl Model {
 
     /// The maps as the panel asks them to be shown: some layers, the errors, or what an effect is worth.
     pub fn shown_maps(&self) -> Cow<'_, [IlluminationMap]> {
+        self.as_shown(self.maps())
+    }
+
+    /// Some maps of the scene as the panel asks them to be shown.
+    fn as_shown<'a>(&self, maps: &'a [IlluminationMap]) -> Cow<'a, [IlluminationMap]> {
+        self.with_quantity(maps, self.quantity())
+    }
+
+    /// Some maps of the scene, of the layer that the panel asks for, with a quantity in them.
+    fn with_quantity<'a>(
+        &self,
+        maps: &'a [IlluminationMap],
+        quantity: Quantity,
+    ) -> Cow<'a, [IlluminationMap]> {
         // Until the next maps come, an edit may have made a receiver clear, or a mirror.
         let receives = |map: &&IlluminationMap| {
             let scene = self.scene();
             let object = scene.objects.get(map.chart.object());
             object.is_none_or(|object| scene.materials[object.material].surface.is_receiver())
         };
-        let in_colours = match self.quantity() {
-            Quantity::Light => None,
-            Quantity::Error => Some(error_view::maps(self.maps())),
+        let in_colours = match quantity {
+            Quantity::Wavelength => Some(wavelength_view::maps(&self.with_quantity(maps, Quantity::Light))),
+            Quantity::Error => Some(error_view::maps(maps)),
             Quantity::Difference => self.difference().map(difference_view::maps),
+            _ => None,
         };
         if let Some(maps) = in_colours {
             return Cow::Owned(maps.into_iter().filter(|map| receives(&map)).collect());
         }
         let LayerShown::Only(kind) = self.panel.display.layer else {
-            return if self.maps().iter().all(|map| receives(&map)) {
-                Cow::Borrowed(self.maps())
+            return if maps.iter().all(|map| receives(&map)) {
+                Cow::Borrowed(maps)
             } else {
-                Cow::Owned(self.maps().iter().filter(receives).cloned().collect())
+                Cow::Owned(maps.iter().filter(receives).cloned().collect())
             };
         };
-        let with_kind = self.maps().iter().filter(receives).filter_map(|map| {
+        let with_kind = maps.iter().filter(receives).filter_map(|map| {
             let layer = map.layer(kind)?.clone();
             let chart = Arc::clone(&map.chart);
             Some(IlluminationMap {
@@ -234,12 +324,146 @@ impl Model {
         Cow::Owned(with_kind.collect())
     }
 
+    /// The maps' light, whatever the picture shows in its place.
+    fn lit_maps(&self) -> Cow<'_, [IlluminationMap]> {
+        self.with_quantity(self.maps(), Quantity::Light)
+    }
+
+    /// What the present maps are held against.
+    pub fn reference(&self) -> Option<&Reference> {
+        self.reference.as_ref()
+    }
+
+    /// The reference's maps as they are to be shown.
+    pub fn reference_to_show(&self) -> Option<(&Arc<Scene>, Vec<IlluminationMap>)> {
+        let reference = self.reference.as_ref()?;
+        Some((&reference.scene, self.as_shown(&reference.maps).into_owned()))
+    }
+
+    /// Begins or ends a comparison.
+    fn compare_with(&mut self, wish: &CompareWish) {
+        let scene = self.edits.scene();
+        let reference = match wish {
+            CompareWish::Keep => Reference::kept(scene, self.maps()).map(Some),
+            CompareWish::Load(folder) => Reference::of_folder(folder, scene).map(Some),
+            CompareWish::End => Ok(None),
+        };
+        match reference {
+            Ok(reference) => {
+                self.reference = reference;
+                self.refusal = None;
+                self.compare_again();
+            }
+            Err(error) => self.refusal = Some(error.to_string()),
+        }
+    }
+
+    /// Holds the maps that are shown now against the reference.
+    fn compare_again(&mut self) {
+        let present = self.last.as_ref().map_or(&self.given, |last| &last.result.maps);
+        if let Some(reference) = &mut self.reference {
+            reference.compare(present);
+            self.log.write(&Event::Against(reference));
+        }
+    }
+
+    /// Maps as they are to be shown next, looked at as a whole, with what their values stand for.
+    pub fn maps_to_show(&mut self, without_direct: bool) -> (Vec<IlluminationMap>, MapStyle) {
+        let maps = if without_direct {
+            self.maps_without_direct()
+        } else {
+            self.shown_maps().into_owned()
+        };
+        self.survey = MapSurvey::of(&maps);
+        (maps, self.map_style())
+    }
+
+    /// What the values of the maps that are shown stand for.
+    pub fn map_style(&self) -> MapStyle {
+        let quantity = self.quantity();
+        let choice = &self.panel.display.scale;
+        quantity.map_style(self.survey.scale(quantity, choice))
+    }
+
+    /// What the maps that were shown last hold.
+    pub fn survey(&self) -> &MapSurvey {
+        &self.survey
+    }
+
+    /// Asks what lights the surface along a ray; forgets what was asked without one.
+    pub fn probe(&mut self, gaze: Option<Ray>) {
+        self.prober.ask(gaze);
+    }
+
+    /// What is known of the point that was asked about.
+    pub fn probed(&self) -> Option<&Probed> {
+        self.prober.shown()
+    }
+
+    /// How light runs, where that is drawn.
+    pub fn sketch(&self) -> Option<&Arc<Sketch>> {
+        self.sketcher.shown()
+    }
+
+    /// Follows the light through the scene as it is now, while that is drawn.
+    fn poll_sketch(&mut self) {
+        if !self.panel.sketched.is_any() {
+            return self.sketcher.forget();
+        }
+        let Some(tracer) = self.surroundings.of(self.edits.scene()) else {
+            return;
+        };
+        let settings = &self.panel.settings;
+        let limits = SketchLimits {
+            max_depth: settings.max_depth,
+            branch_threshold: settings.path_threshold().max(SKETCHED_SHARE),
+            cells: SKETCHED_CELLS,
+        };
+        if self.sketcher.follow(&tracer, limits)
+            && let Some(sketch) = self.sketcher.shown()
+        {
+            self.log.write(&Event::Sketched(sketch));
+        }
+    }
+
+    /// Gets on with what was asked about: as soon as the surfaces of the scene are known, and again when it or its maps
+    /// are others.
+    fn poll_probe(&mut self, has_maps: bool) {
+        let is_other = |scene: &Arc<Scene>| !Arc::ptr_eq(scene, self.edits.scene());
+        let is_settled = has_maps && self.last.as_ref().is_some_and(|last| last.is_final);
+        if is_settled || self.probed_scene.as_ref().is_some_and(is_other) {
+            self.prober.ask_again();
+        }
+        if self.prober.is_due()
+            && let Some(tracer) = self.surroundings.of(self.edits.scene())
+        {
+            let settings = &self.panel.settings;
+            let limits = Limits {
+                max_depth: settings.max_depth,
+                branch_threshold: settings.path_threshold(),
+                most_rays: MOST_PROBE_RAYS,
+            };
+            let maps = self.last.as_ref().map_or(&self.given, |last| &last.result.maps);
+            self.prober.look(&tracer, maps, limits);
+            self.probed_scene = Some(Arc::clone(self.edits.scene()));
+        }
+        if self.prober.poll()
+            && let Some(probed) = self.prober.shown()
+        {
+            self.log.write(&Event::Probe(probed));
+        }
+    }
+
     /// Looks what the baking thread did; tells whether there are new maps to be shown.
     pub fn poll(&mut self) -> bool {
+        if self.exporter.poll() {
+            self.log.write(&Event::Exported(self.exporter.state()));
+        }
         // The state first: maps that come in between are taken by the next call, which the thread wakes.
         let state = self.worker.state();
         let mut has_maps = false;
-        if let Some(level) = self.worker.take_level() {
+        let level = self.worker.take_level();
+        if let Some(level) = level.filter(|level| level.serial >= self.first_request) {
             has_maps = self.improves_on_what_is_shown(&level);
             self.log.write(&if level.is_final {
                 Event::Done(&level)
@@ -269,6 +493,13 @@ impl Model {
             }
         }
         self.state = state;
+        self.poll_probe(has_maps);
+        self.poll_sketch();
+        self.poll_pick();
+        self.poll_sought();
+        if has_maps {
+            self.compare_again();
+        }
         has_maps
     }
 
@@ -319,6 +550,15 @@ impl Model {
     /// shown yet, the change waits for that, or until it has come to rest.
     pub fn act(&mut self, wishes: &Wishes, now: Instant) {
         self.edit(wishes);
+        if wishes.new_light.is_some() || wishes.brightest {
+            self.sought.light = wishes.new_light.or(self.sought.light);
+            self.sought.brightest |= wishes.brightest;
+            self.poll_sought();
+        }
+        if let Some(source) = &wishes.open {
+            self.open(source);
+        }
+        self.watch();
         let wanted = self.wanted();
         if wanted.settings != self.seen.settings {
             self.log.write(&Event::SettingsChanged(&wanted.settings));
@@ -334,6 +574,12 @@ impl Model {
         if wishes.cancel {
             self.cancel();
         }
+        if let Some(wish) = &wishes.film {
+            self.film(wish);
+        }
+        if let Some(export) = &wishes.export {
+            self.export(export);
+        }
         let is_ripe = self.debounce.due().is_some() && self.has_answered();
         let is_due = self.debounce.is_due(now) || is_ripe;
         if wishes.rebake || (is_due && self.is_changed()) {
@@ -341,6 +587,17 @@ impl Model {
         } else if let Some(effect) = wishes.worth {
             self.compare(effect);
         }
+        self.keep(now);
+    }
+
+    /// Has maps written that were baked here, into the working folder.
+    fn export(&mut self, export: &Export) {
+        let Some(last) = &self.last else {
+            return;
+        };
+        let last = Arc::clone(last);
+        self.exporter.start(export.clone(), last, working_folder());
+        self.log.write(&Event::Exported(self.exporter.state()));
     }
 
     /// Finds what an effect is worth to the maps that are shown, once these are done.
@@ -366,27 +623,64 @@ impl Model {
         !self.state.is_baking() || self.asked.as_ref().is_none_or(|(serial, _)| is_shown(*serial))
     }
 
-    /// Edits the scene, or takes an edit back.
+    /// Edits the scene, notes what the panel changed, or takes a change back.
     fn edit(&mut self, wishes: &Wishes) {
+        if let Some(wish) = &wishes.compare {
+            self.compare_with(wish);
+        }
+        if wishes.clear_probe {
+            self.probe(None);
+        }
+        if let Some((settings, display)) = wishes.changed.as_deref() {
+            self.edits.note_settings(settings, &self.panel.settings);
+            self.edits.note_display(*display, self.panel.display);
+        }
+        if let Some(film) = &wishes.changed_film {
+            self.edits.note_film(film, &self.panel.film);
+        }
+        if wishes.changed_automatic {
+            self.edits.note_automatic(self.panel.automatic);
+        }
         // A slow frame may bring both: the end of a drag, and the wish to take it back.
         let mut outcome = Ok(());
         if let Some(edit) = &wishes.edit {
             self.log.write(&Event::Edited(edit));
             outcome = self.edits.edit(edit);
         }
-        if wishes.undo && outcome.is_ok() {
-            outcome = self.edits.undo().map(|undone| {
-                if undone {
-                    self.log.write(&Event::Undone);
-                }
-            });
+        if outcome.is_ok() && (wishes.undo || wishes.redo) {
+            outcome = self.turn_back(wishes.undo);
         }
-        if wishes.edit.is_some() || wishes.undo {
+        if wishes.edit.is_some() || wishes.undo || wishes.redo {
             self.refusal = outcome.err().map(|error| error.to_string());
         }
         if !wishes.is_dragging {
             self.edits.release();
         }
+    }
+
+    /// Takes the last change back, or does again what was taken back.
+    fn turn_back(&mut self, is_back: bool) -> Result<()> {
+        let turned = if is_back {
+            self.edits.undo()?
+        } else {
+            self.edits.redo()?
+        };
+        let Some((text, restored)) = turned else {
+            return Ok(());
+        };
+        match restored {
+            Restored::Scene => {}
+            Restored::Settings(settings) => self.panel.settings = *settings,
+            Restored::Display(from, to) => self.panel.display.restore(&from, &to),
+            Restored::Film(film) => self.panel.film = *film,
+            Restored::Automatic(automatic) => self.panel.automatic = automatic,
+        }
+        self.log.write(&if is_back {
+            Event::Undone(&text)
+        } else {
+            Event::Redone(&text)
+        });
+        Ok(())
     }
 
     /// Bakes with the panel's settings, unless one of them is out of its range: the panel tells so.

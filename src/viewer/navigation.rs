@@ -3,7 +3,9 @@
 use std::f64::consts::FRAC_PI_2;
 
 use glam::{DVec2, DVec3};
+use serde::{Deserialize, Serialize};
 
+use super::files::kept::KeptViews;
 use super::solid::Solid;
 use super::walking::{self, Walker};
 use crate::scene::{Camera, Scene};
@@ -34,11 +36,14 @@ const CREEP_FACTOR: f64 = 0.25;
 const WALKING_RANGE: (f64, f64) = (0.1, 20.0);
 /// Nearest that an orbit comes, in scene radii.
 const NEAREST_ORBIT: f64 = 1e-3;
+/// Nearest that is shown, of the distance to what is framed.
+const NEAR_OF_FRAMED: f64 = 0.01;
 /// Views that can be kept.
 pub const BOOKMARKS: usize = 9;
 
 /// How the camera gets about.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Travel {
     /// Anywhere, through walls.
     #[default]
@@ -188,6 +193,11 @@ impl Navigator {
         }
     }
 
+    /// Half the diagonal of the scene's box [m, > 0].
+    pub fn radius_m(&self) -> f64 {
+        self.radius_m
+    }
+
     /// The camera for a picture of that aspect (width/height). Beside the panel a picture is narrower than most cameras
     /// are composed for: the view is widened then, so that nothing falls off its sides.
     pub fn camera_for(&self, aspect: f64) -> Camera {
@@ -254,6 +264,34 @@ impl Navigator {
         true
     }
 
+    /// What is kept for the next time.
+    pub fn views(&self) -> KeptViews {
+        KeptViews {
+            camera: Some(self.camera()),
+            travel: self.travel,
+            bookmarks: self.bookmarks.clone(),
+        }
+    }
+
+    /// Takes over what was kept: bookmarks, and the camera where that is wanted.
+    pub fn restore(&mut self, kept: &KeptViews, with_camera: bool) {
+        self.bookmarks.clone_from(&kept.bookmarks);
+        if !with_camera {
+            return;
+        }
+        if let Some(camera) = kept.camera.as_ref().filter(|camera| camera.is_sound()) {
+            self.stand_at(camera);
+        }
+        self.set_travel(kept.travel, None);
+    }
+
+    /// The same place, gaze and way to get about in a scene that was read again.
+    pub fn stay_in(&mut self, scene: &Scene) {
+        let mut there = Self::new(scene, None);
+        there.restore(&self.views(), true);
+        *self = there;
+    }
+
     /// Whether the next [`advance`](Self::advance) would move the camera.
     pub fn is_moving(&self) -> bool {
         self.keys.direction() != DVec3::ZERO
@@ -276,8 +314,15 @@ impl Navigator {
         if self.travel != Travel::Walk || seconds <= 0.0 {
             return self.advance(seconds);
         }
-        let path = self.drift(seconds);
-        let asked_m_per_s = path / seconds;
+        // Whoever has come past a corner walks on where he wants to, within one long frame too.
+        let looks = (seconds / walking::LOOK_S).ceil();
+        for _ in 0..looks as u64 {
+            self.look_and_step(seconds / looks, solid);
+        }
+    }
+
+    fn look_and_step(&mut self, seconds: f64, solid: &dyn Solid) {
+        let asked_m_per_s = self.drift(seconds) / seconds;
         let (eye, left_m_per_s) = self.walker.step(self.position, asked_m_per_s, seconds, solid);
         self.position = eye;
         if left_m_per_s != asked_m_per_s {
@@ -355,17 +400,38 @@ impl Navigator {
 
     /// Steps back or forth along the gaze until the scene fills a picture of that aspect (width/height).
     pub fn frame(&mut self, aspect: f64) {
+        self.frame_ball(self.centre, self.radius_m, aspect);
+    }
+
+    /// The same for a ball around a point of the scene [m, radius > 0].
+    pub fn frame_ball(&mut self, centre: DVec3, radius_m: f64, aspect: f64) {
         let half_height = 0.5 * self.vertical_fov_for(aspect);
         let half_width = (half_height.tan() * aspect).atan();
-        let distance_m = self.radius_m / half_height.min(half_width).sin();
+        let distance_m = radius_m / half_height.min(half_width).sin();
         let (_, _, forward) = self.level_axes();
         self.velocity_m_per_s = DVec3::ZERO;
-        self.position = self.centre - forward * distance_m;
+        self.position = centre - forward * distance_m;
         self.orbit_m = distance_m;
+        // Small things are not cut away.
+        self.near_m = self.near_m.min(NEAR_OF_FRAMED * distance_m);
         self.walker.look_again();
     }
 
-    fn stand_at(&mut self, camera: &Camera) {
+    /// Stands there and looks at a point [m], its horizon level.
+    pub fn look_at(&mut self, eye: DVec3, point: DVec3) {
+        let mut camera = self.camera();
+        let forward = (point - eye).normalize_or(camera.forward);
+        let (level_right, _, _) = self.level_axes();
+        let right = forward.cross(DVec3::Y).try_normalize().unwrap_or(level_right);
+        (camera.position, camera.forward) = (eye, forward);
+        camera.up = right.cross(forward);
+        self.stand_at(&camera);
+        self.orbit_m = eye.distance(point);
+        self.near_m = self.near_m.min(NEAR_OF_FRAMED * self.orbit_m);
+    }
+
+    /// Stands where a camera does and looks where it looks.
+    pub fn stand_at(&mut self, camera: &Camera) {
         let forward = camera.forward;
         let across = DVec2::new(forward.x, forward.z);
         self.velocity_m_per_s = DVec3::ZERO;

@@ -2,11 +2,15 @@
 
 use egui::{Align2, Color32, FontId, Rect, Ui, pos2, vec2};
 
-use super::error_view;
+use super::panel::control::short;
 use super::panel::{Facts, Quantity};
+use super::views::ScaleChoice;
 use super::worker::BakeState;
+use super::{error_view, wavelength_view};
 use crate::effect::Effect;
 use crate::illumination::difference_colours;
+use crate::illumination::false_colours::{ColourScale, viridis};
+use crate::optics::{LinearSrgb, Nanometres};
 
 const TEXT: Color32 = Color32::from_gray(230);
 const SIZE: f32 = 16.0;
@@ -16,7 +20,7 @@ pub fn show(
     ui: &mut Ui,
     picture: egui::TextureId,
     facts: &Facts<'_>,
-    quantity: Quantity,
+    (quantity, choice): (Quantity, &ScaleChoice),
     notice: Option<&str>,
 ) -> Rect {
     let rect = ui.available_rect_before_wrap();
@@ -37,9 +41,49 @@ pub fn show(
     match (quantity, facts.worth) {
         (Quantity::Error, _) => error_legend(ui, rect),
         (Quantity::Difference, Some(worth)) => difference_legend(ui, rect, worth.effect),
+        (Quantity::Irradiance, _) => {
+            let title = format!("Irradiance of the light shown [{}]", choice.unit.symbol());
+            let scale = facts.survey.scale(quantity, choice);
+            scale_legend(ui, rect, &title, &scale, choice.unit.per_w_m2());
+        }
+        (Quantity::TexelDensity, _) => {
+            let scale = facts.survey.scale(quantity, choice);
+            scale_legend(ui, rect, "Texels per metre", &scale, 1.0);
+        }
+        (Quantity::Wavelength, _) => wavelength_legend(ui, rect),
         _ => {}
     }
     rect
+}
+
+fn wavelength_legend(ui: &Ui, picture: Rect) {
+    let (low, high) = wavelength_view::RANGE_NM;
+    let at = |share: f64| Nanometres(low + (high - low) * share);
+    let marks = (0..=6).map(|mark| f64::from(mark) / 6.0);
+    let marks: Vec<_> = marks
+        .map(|share| (share, format!("{:.0}", at(share).0)))
+        .collect();
+    let colour = |share: f64| {
+        let linear = wavelength_view::colour(at(share)).to_array();
+        linear.map(|channel| (255.0 * LinearSrgb::encode_channel(channel)).round() as u8)
+    };
+    legend(
+        ui,
+        picture,
+        "Dominant wavelength of the light shown [nm]; grey: white",
+        &colour,
+        &marks,
+    );
+}
+
+/// Five values of a scale, times a factor.
+fn scale_legend(ui: &Ui, picture: Rect, title: &str, scale: &ColourScale, factor: f64) {
+    let marks = (0..=4).map(|mark| f64::from(mark) / 4.0);
+    let marks: Vec<_> = marks
+        .map(|place| (place, short(factor * scale.at(place))))
+        .collect();
+    let colour = |place: f64| viridis(place).map(|value| (255.0 * value).round() as u8);
+    legend(ui, picture, title, &colour, &marks);
 }
 
 fn error_legend(ui: &Ui, picture: Rect) {

@@ -19,7 +19,7 @@ const FASTEST_FALL_M_PER_S: f64 = 50.0;
 /// Time after which feet have closed 1 − 1/e of a step's height [s].
 const CLIMBING_S: f64 = 0.08;
 /// Longest time between two looks around [s].
-const LOOK_S: f64 = 1.0 / 120.0;
+pub(super) const LOOK_S: f64 = 1.0 / 120.0;
 /// Ground farther down than this is none [m]: nobody falls out of the world.
 const DEEPEST_M: f64 = 1e4;
 /// Feet this near to the ground stand on it [m].
@@ -45,29 +45,26 @@ impl Walker {
         self.stands = false;
     }
 
-    /// The eyes after some time [s, ≥ 0] at a velocity along the ground [m/s], and what walls left of that.
+    /// The eyes after the time from one look around to the next [s, > 0] at a velocity along the ground [m/s], and what
+    /// walls left of that.
     pub fn step(
         &mut self,
         mut eye: DVec3,
-        velocity_m_per_s: DVec3,
+        mut velocity_m_per_s: DVec3,
         seconds: f64,
         solid: &dyn Solid,
     ) -> (DVec3, DVec3) {
-        let looks = (seconds / LOOK_S).ceil().max(1.0);
-        let each_s = seconds / looks;
-        let mut velocity = velocity_m_per_s;
-        for _ in 0..looks as u32 {
-            if velocity != DVec3::ZERO {
-                let wanted = velocity * each_s;
-                let allowed = beside_walls(eye, wanted, solid);
-                if allowed != wanted && each_s > 0.0 {
-                    velocity = allowed / each_s;
-                }
-                eye += allowed;
+        if velocity_m_per_s != DVec3::ZERO {
+            let wanted = velocity_m_per_s * seconds;
+            let Allowed { along, away } = beside_walls(eye, wanted, solid);
+            if along != wanted {
+                // Being pushed off a wall gives no speed: in a short step it would be any.
+                velocity_m_per_s = along / seconds;
             }
-            eye.y += self.settle(eye, each_s, solid);
+            eye += along + away;
         }
-        (eye, velocity)
+        eye.y += self.settle(eye, seconds, solid);
+        (eye, velocity_m_per_s)
     }
 
     /// How far the eyes rise or fall.
@@ -91,13 +88,33 @@ impl Walker {
     }
 }
 
+/// What walls leave of a step along the ground [m].
+#[derive(Clone, Copy)]
+struct Allowed {
+    /// Of what was wanted.
+    along: DVec3,
+    /// How far they push away whoever is too near.
+    away: DVec3,
+}
+
+impl Allowed {
+    const NOTHING: Self = Self {
+        along: DVec3::ZERO,
+        away: DVec3::ZERO,
+    };
+}
+
 /// The part of a step along the ground that walls leave.
-fn beside_walls(eye: DVec3, wanted: DVec3, solid: &dyn Solid) -> DVec3 {
-    let mut step = wanted;
+fn beside_walls(eye: DVec3, wanted: DVec3, solid: &dyn Solid) -> Allowed {
+    let mut allowed = Allowed {
+        along: wanted,
+        away: DVec3::ZERO,
+    };
     // A corner takes two walls.
     for _ in 0..3 {
+        let step = allowed.along + allowed.away;
         let Some(forward) = step.try_normalize() else {
-            return DVec3::ZERO;
+            return Allowed::NOTHING;
         };
         let right = DVec3::new(-forward.z, 0.0, forward.x);
         let reach_m = BODY_M + step.length();
@@ -133,11 +150,12 @@ fn beside_walls(eye: DVec3, wanted: DVec3, solid: &dyn Solid) -> DVec3 {
             }
         }
         let Some((missing_m, wall)) = worst else {
-            return step;
+            return allowed;
         };
         let inward_m = (-step.dot(wall)).max(0.0);
-        step += wall * missing_m.min(inward_m + PUSH_M);
+        allowed.along += wall * missing_m.min(inward_m);
+        allowed.away += wall * (missing_m - inward_m).clamp(0.0, PUSH_M);
     }
     // In a narrow corner: nowhere.
-    DVec3::ZERO
+    Allowed::NOTHING
 }

@@ -101,6 +101,46 @@ fn estimates_of_the_reference_scenes_are_within_a_factor_of_two() {
     );
 }
 
+/// Texels say how far off each of them is expected to be: of those that are not dark 95 in 100 are within 7 times that, 99
+/// in 100 within 18 times. It is no bound: where light folds, levels miss the same.
+#[test]
+fn single_texels_are_off_by_what_they_say() {
+    let side = 64;
+    let mut faults = Vec::new();
+    for (name, converged_per_sr) in CONVERGED.into_iter().take(4) {
+        let truth = bake(builtin_scene(name), &at(converged_per_sr, side));
+        // The ball's dimmest texels are off by more than they say as long as all are off by 4 % of the mean.
+        let densities: &[f64] = if name == "ball" { &[2e4] } else { &[5e3, 2e4] };
+        for &density_per_sr in densities {
+            let result = bake(builtin_scene(name), &at(density_per_sr, side));
+            let mut off: Vec<f64> = Vec::new();
+            for wanted in &truth.maps {
+                let found = result
+                    .maps
+                    .iter()
+                    .find(|found| found.chart.receiver == wanted.chart.receiver);
+                let Some(found) = found else { continue };
+                let count = (wanted.width() * wanted.height()) as f64;
+                let mean = luminance(wanted).sum::<f64>() / count;
+                let said = found.error.iter().flatten().map(|error| f64::from(*error));
+                for ((value, error), wanted) in luminance(found).zip(said).zip(luminance(wanted)) {
+                    if wanted > 0.01 * mean {
+                        off.push((value - wanted).abs() / error.max(1e-6 * mean));
+                    }
+                }
+            }
+            off.sort_by(f64::total_cmp);
+            let [half, most, nearly_all] =
+                [0.5, 0.95, 0.99].map(|share| off[(share * (off.len() - 1) as f64) as usize]);
+            println!("{name:10} {density_per_sr:6}: 50 % {half:.2}, 95 % {most:.2}, 99 % {nearly_all:.2}");
+            if !(most <= 7.0 && nearly_all <= 18.0) {
+                faults.push(format!("{name} at {density_per_sr}: {most}, {nearly_all}"));
+            }
+        }
+    }
+    assert!(faults.is_empty(), "{faults:#?}");
+}
+
 /// One of many scenes: a floor, something specular over it, a lamp.
 fn random_scene(seed: u64) -> Scene {
     let mut random = Pcg64Mcg::seed_from_u64(0x5eed ^ seed << 8);
@@ -239,5 +279,45 @@ fn most_texels_lie_within_their_error() {
         );
         // Blur adds to the noise that this is about.
         assert!((0.55..=0.8).contains(&share), "{name}: {share}");
+    }
+}
+
+/// The error of a sum is that of its parts together, and direct light, which is no estimate, has none.
+#[test]
+fn errors_of_lights_add_up_and_direct_light_has_none() {
+    let scene = builtin_scene("ring");
+    let mut twice = scene.clone();
+    twice.lights.push(twice.lights[0].clone());
+    let settings = at(2_000.0, 32);
+    let with_direct = BakeSettings {
+        layers: vec![LayerKind::Caustic, LayerKind::Direct],
+        ..settings.clone()
+    };
+    let one = bake(scene.clone(), &settings);
+    let errors = |result: &BakeResult| -> Vec<f32> {
+        let map = result.maps.first().expect("a map");
+        map.error.clone().expect("an estimate")
+    };
+    let single = errors(&one);
+    assert!(single.iter().any(|error| *error > 0.0));
+    for (own, both) in single.iter().zip(errors(&bake(twice, &settings))) {
+        let expected = own * std::f32::consts::SQRT_2;
+        assert!((both - expected).abs() <= 1e-5 * expected, "{both} for {own}");
+    }
+    let lit = bake(scene, &with_direct);
+    assert_eq!(errors(&lit), single);
+    let estimate = |result: &BakeResult| result.estimated_relative_rmse.expect("an estimate");
+    assert!((estimate(&lit) / estimate(&one) - 1.0).abs() < 1e-6);
+}
+
+/// Two weak beams beside a lamp that is far stronger: one of them a ball draws together on a texel or two, where it is
+/// brighter than everything else. The floor is lit by all three, the wall by less.
+#[test]
+fn a_weak_light_in_focus_is_not_left_coarse() {
+    for target in [0.2, 0.1] {
+        let result = bake(builtin_scene("spectrum"), &towards(target));
+        assert_eq!(result.stop_reason, StopReason::MaxError, "{target}");
+        let estimate = result.estimated_relative_rmse.expect("an estimate");
+        assert!(estimate <= target, "{estimate} where {target} is said to be met");
     }
 }

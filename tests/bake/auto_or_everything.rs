@@ -1,141 +1,15 @@
 //! What the plan leaves out changes no map: random scenes with walls, boxes, mirrors, glass and lamps, baked as the plan
 //! says and with every effect forced on.
 
-use glam::{DQuat, DVec3};
 use nephroid::effect::{Effect, EffectSwitch, EffectSwitches};
 use nephroid::optics::LinearSrgb;
-use nephroid::scene::builtin::{parts, shapes};
-use nephroid::scene::{Light, LightKind, Material, Scene, Volume};
 use nephroid::session::BakeResult;
 use nephroid::settings::{BakeSettings, Estimator, LayerKind};
-use nephroid::units::{Flux, Irradiance, RadiantIntensity};
-use rand_pcg::Pcg64Mcg;
-use rand_pcg::rand_core::{Rng, SeedableRng};
+use nephroid::study::stability::random;
 
 use super::tools::{at, bake, settings};
 
 const SCENES: u64 = 200;
-
-struct Dice(Pcg64Mcg);
-
-impl Dice {
-    fn unit(&mut self) -> f64 {
-        (self.0.next_u64() >> 11) as f64 * (-53_f64).exp2()
-    }
-
-    fn between(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * self.unit()
-    }
-
-    fn below(&mut self, count: u32) -> u32 {
-        self.between(0.0, f64::from(count)) as u32
-    }
-
-    fn place(&mut self, height: [f64; 2]) -> DVec3 {
-        DVec3::new(
-            self.between(-0.8, 0.8),
-            self.between(height[0], height[1]),
-            self.between(-0.8, 0.8),
-        )
-    }
-
-    fn turn(&mut self) -> DQuat {
-        DQuat::from_rotation_y(self.between(0.0, 6.3)) * DQuat::from_rotation_x(self.between(0.0, 3.2))
-    }
-}
-
-fn glass(dice: &mut Dice) -> Material {
-    let mut glass = parts::dielectric("glass", dice.between(1.2, 1.9));
-    if dice.below(3) == 0 {
-        glass.volume = Some(Volume {
-            attenuation_distance_m: dice.between(0.05, 1.0),
-            attenuation_colour: LinearSrgb::new(0.9, 0.5, 0.3),
-        });
-    }
-    glass
-}
-
-fn add_caster(scene: &mut Scene, dice: &mut Dice, index: u32) {
-    let (centre, size) = (dice.place([0.2, 1.0]), dice.between(0.15, 0.3));
-    let turn = dice.turn();
-    let panel = shapes::rectangle(centre, turn * DVec3::X * size, turn * DVec3::Z * size);
-    let (mesh, material) = match dice.below(5) {
-        0 => (shapes::sphere(centre, size, 2), glass(dice)),
-        1 => (shapes::sphere(centre, size, 2), parts::mirror()),
-        2 => (panel, parts::mirror()),
-        3 => {
-            let pane = Material {
-                surface: nephroid::scene::SurfaceKind::ThinWall,
-                volume: None,
-                ..parts::dielectric("pane", 1.5)
-            };
-            (panel, pane)
-        }
-        _ => (shapes::cuboid(centre - size, centre + size), glass(dice)),
-    };
-    parts::add(scene, &format!("caster{index}"), mesh, material);
-    // Sealed, now and then.
-    if dice.below(4) == 0 {
-        let half = size * dice.between(1.8, 2.5);
-        let safe = shapes::cuboid(centre - half, centre + half);
-        parts::add(
-            scene,
-            &format!("safe{index}"),
-            safe,
-            parts::matte("safe", LinearSrgb::grey(0.5)),
-        );
-    }
-}
-
-fn add_wall(scene: &mut Scene, dice: &mut Dice, index: u32) {
-    let centre = dice.place([0.1, 1.2]);
-    let turn = dice.turn();
-    let (width, height) = (dice.between(0.1, 0.8), dice.between(0.1, 0.8));
-    let mesh = shapes::rectangle(centre, turn * DVec3::X * width, turn * DVec3::Z * height);
-    let matte = parts::matte("wall", LinearSrgb::grey(0.5));
-    parts::add(scene, &format!("wall{index}"), mesh, matte);
-}
-
-fn lamp(dice: &mut Dice, index: u32) -> Light {
-    let (name, place) = (format!("lamp{index}"), dice.place([0.8, 2.2]));
-    match dice.below(4) {
-        0 => parts::sun(
-            &name,
-            DVec3::new(dice.between(-1.0, 1.0), -1.0, dice.between(-1.0, 1.0)),
-            Irradiance(2.0),
-        ),
-        1 => Light {
-            name,
-            colour: LinearSrgb::WHITE,
-            spectrum: None,
-            kind: LightKind::Spot {
-                position: place,
-                direction: (dice.place([0.0, 0.6]) - place).normalize(),
-                intensity: RadiantIntensity(2.0),
-                inner_cone_rad: 0.2,
-                outer_cone_rad: dice.between(0.3, 1.0),
-            },
-            size: nephroid::scene::LightSize::None,
-        },
-        _ => parts::point_light(&name, place, Flux(10.0)),
-    }
-}
-
-fn random_scene(seed: u64) -> Scene {
-    let mut dice = Dice(Pcg64Mcg::seed_from_u64(0xeffec7 ^ seed << 20));
-    let mut scene = parts::reference_scene(1.0);
-    for index in 0..1 + dice.below(3) {
-        add_caster(&mut scene, &mut dice, index);
-    }
-    for index in 0..dice.below(4) {
-        add_wall(&mut scene, &mut dice, index);
-    }
-    for index in 0..1 + dice.below(3) {
-        let lamp = lamp(&mut dice, index);
-        scene.lights.push(lamp);
-    }
-    scene
-}
 
 /// Σ|E₁ − E₂|·A [W] over all maps; a map that one of them lacks counts as black.
 fn difference_w(a: &BakeResult, b: &BakeResult, objects: usize) -> f64 {
@@ -172,7 +46,7 @@ struct Outcome {
 }
 
 fn compare(seed: u64, estimator: Estimator) -> Outcome {
-    let scene = random_scene(seed);
+    let scene = random::scene(seed);
     let settings = BakeSettings {
         // Glass boxes have branches without end.
         max_depth: 4,

@@ -44,10 +44,10 @@ fn real_files_bake_and_at_least_four_get_caustic_light() {
         ..LoadOptions::default()
     };
     let settings = BakeSettings {
-        density_per_sr: 1e4,
+        density_per_sr: 3e3,
         map_resolution: MapResolution::Fixed {
-            width: 128,
-            height: 128,
+            width: 64,
+            height: 64,
         },
         layers: vec![LayerKind::Caustic],
         ..BakeSettings::splat()

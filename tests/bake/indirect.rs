@@ -4,12 +4,12 @@ use std::f64::consts::PI;
 use std::sync::Arc;
 
 use glam::DVec3;
-use nephroid::illumination::{IlluminationMap, Receiver};
+use nephroid::illumination::{Chart, IlluminationMap, Receiver};
 use nephroid::light_pass::indirect::{LEAST_PASSES, Network};
 use nephroid::optics::LinearSrgb;
 use nephroid::plan::Effect;
 use nephroid::progress::Control;
-use nephroid::scene::{Light, LightKind, Material, Mesh, Scene, SurfaceKind};
+use nephroid::scene::{Light, LightKind, Material, Mesh, Scene, SurfaceKind, Volume};
 use nephroid::session::{BakeResult, BakeSession};
 use nephroid::settings::{BakeSettings, LayerKind, MapResolution};
 use nephroid::transport::Tracer;
@@ -160,6 +160,22 @@ fn walls_take_all_that_comes_through_glass() {
     assert!(gathered > 1.1, "rays go through the glass");
 }
 
+/// What comes from other surfaces where each element gets E = 1 W/m² from elsewhere; maps by object and side [texels],
+/// so many rays an element and pass.
+fn under_even_light(scene: &Arc<Scene>, maps: &[(usize, usize)], rays: u32) -> Vec<LinearSrgb> {
+    let tracer = Tracer::new(Arc::clone(scene));
+    let charts: Vec<Arc<Chart>> = maps
+        .iter()
+        .map(|&(object, side)| Arc::new(crate::scenes::chart(&tracer, object, side, side)))
+        .collect();
+    let mut network = Network::new(scene, &charts);
+    let progress: (&dyn nephroid::progress::Progress, &Control) = (&(), &Control::default());
+    let count = network.element_count();
+    let passes = vec![LEAST_PASSES; count];
+    assert!(network.trace(&tracer, &passes, (rays, 0), progress));
+    network.solve(&vec![LinearSrgb::WHITE; count], &passes).irradiance
+}
+
 /// In light that is the same everywhere, what stands in it (glass, a mirror, polish) changes nothing.
 #[test]
 fn rays_weigh_all_the_same_through_anything_clear() {
@@ -173,16 +189,8 @@ fn rays_weigh_all_the_same_through_anything_clear() {
     ] {
         let ball = (sphere(at, 0.3, 48, 24), smooth(kind));
         let scene = Arc::new(scene(vec![(mesh.clone(), one_sided(albedo)), ball], vec![]));
-        let tracer = Tracer::new(Arc::clone(&scene));
-        let chart = Arc::new(crate::scenes::chart(&tracer, 0, 16, 16));
-        let mut network = Network::new(&scene, &[chart]);
-        let progress: (&dyn nephroid::progress::Progress, &Control) = (&(), &Control::default());
-        let passes = vec![LEAST_PASSES; network.element_count()];
-        assert!(network.trace(&tracer, &passes, (16, 0), progress));
-        let sources = vec![LinearSrgb::WHITE; network.element_count()];
-        let solution = network.solve(&sources, &passes);
         let expected = albedo / (1.0 - albedo);
-        for e in &solution.irradiance {
+        for e in under_even_light(&scene, &[(0, 16)], 16) {
             assert!(
                 (e.g / expected - 1.0).abs() < 1e-3,
                 "{kind:?}: {} for {expected}",
@@ -190,6 +198,61 @@ fn rays_weigh_all_the_same_through_anything_clear() {
             );
         }
     }
+}
+
+/// In a sphere full of coloured water light goes 2R cos θ from wall to wall, so that T̄ = ∫ 2c e^(−2Rσc) dc of it arrives:
+/// where all walls get E = 1 from elsewhere, ρT̄/(1 − ρT̄) comes from other walls.
+#[test]
+fn water_takes_its_share_of_light_between_walls() {
+    let (albedo, radius_m) = (0.6, 0.8);
+    let colour = LinearSrgb::new(0.3, 0.6, 0.95);
+    let mut water = smooth(SurfaceKind::Dielectric);
+    water.volume = Some(Volume {
+        attenuation_distance_m: 1.0,
+        attenuation_colour: colour,
+    });
+    let mut wall = sphere(DVec3::ZERO, radius_m, 96, 48);
+    wall.triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
+    wall.normals.iter_mut().for_each(|normal| *normal = -*normal);
+    let around = cuboid(-DVec3::ONE, DVec3::ONE);
+    let scene = Arc::new(scene(vec![(wall, one_sided(albedo)), (around, water)], vec![]));
+    let irradiance = under_even_light(&scene, &[(0, 24)], 16);
+    let count = irradiance.len() as f64;
+    let share = |colour: f64| {
+        let x = -2.0 * radius_m * colour.ln();
+        2.0 * (1.0 - (1.0 + x) * (-x).exp()) / (x * x)
+    };
+    let of = |channel: usize| irradiance.iter().map(move |e| e.to_array()[channel]).sum::<f64>() / count;
+    for (channel, colour) in colour.to_array().into_iter().enumerate() {
+        let arriving = albedo * share(colour);
+        let expected = arriving / (1.0 - arriving);
+        let found = of(channel);
+        println!("{found} for {expected}");
+        assert!((found / expected - 1.0).abs() < 0.005, "{found} for {expected}");
+    }
+}
+
+/// Within glass radiance is n² times what it is outside: a black plate in the middle of a ball gets n²(1 − R₀) times what
+/// it would get without, as what the ball's surface sends back comes to the plate again.
+#[test]
+fn radiance_within_glass_is_larger_by_the_square_of_its_index() {
+    let (albedo, ior) = (0.7, 1.5);
+    let walls = room(DVec3::ZERO, DVec3::new(1.0, 1.5, 2.0));
+    let (middle, half) = (DVec3::new(0.5, 0.6, 1.0), 0.01);
+    let ball = (sphere(middle, 0.3, 192, 96), smooth(SurfaceKind::Dielectric));
+    let corner = middle - DVec3::new(half, 0.0, half);
+    let plate = quad(corner, DVec3::Z * 2.0 * half, DVec3::X * 2.0 * half);
+    let scene = Arc::new(scene(
+        vec![(walls, one_sided(albedo)), ball, (plate, diffuse(0.0))],
+        vec![],
+    ));
+    let irradiance = under_even_light(&scene, &[(0, 16), (2, 8)], 64);
+    let on_plate = &irradiance[irradiance.len() - 64..];
+    let mean = on_plate.iter().map(|e| e.g).sum::<f64>() / on_plate.len() as f64;
+    let reflected = ((ior - 1.0_f64) / (ior + 1.0)).powi(2);
+    let expected = ior * ior * (1.0 - reflected) * albedo / (1.0 - albedo);
+    println!("{mean} for {expected}");
+    assert!((mean / expected - 1.0).abs() < 0.02, "{mean} for {expected}");
 }
 
 /// E at a point from a polygon of radiance 1/π, so of exitance 1, that faces it wholly above its horizon (Lambert 1760).

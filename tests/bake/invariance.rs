@@ -1,11 +1,16 @@
 //! What must not change a map: threads, other things in the scene, the order of objects.
 
+use std::sync::Arc;
+
 use nephroid::optics::LinearSrgb;
+use nephroid::progress::Control;
+use nephroid::scene::builtin::{parts, shapes};
 use nephroid::scene::{Light, LightKind};
-use nephroid::settings::{BakeSettings, MapResolution, RayPlacement};
+use nephroid::session::BakeSession;
+use nephroid::settings::{BakeSettings, LayerKind, MapResolution, RayPlacement};
 use nephroid::units::RadiantIntensity;
 
-use crate::tools::{bake, bits, builtin_scene, caustic, map_of, settings};
+use crate::tools::{at, bake, bits, builtin_scene, caustic, map_of, settings};
 
 #[test]
 fn any_number_of_threads_gives_the_same_bits() {
@@ -111,4 +116,55 @@ fn power_of_two_changes_of_power_are_exact() {
         caustic(map_of(&b, &bright, "floor")),
     );
     assert!(a.iter().zip(&b).all(|(a, b)| a * 1024.0 == *b));
+}
+
+/// Whatever is chosen by chance is chosen by the seed: where rays start, the places of lamps, the ways between surfaces.
+#[test]
+fn another_seed_chooses_anew_and_the_same_one_alike() {
+    let scene = builtin_scene("ring");
+    let mut soft = scene.clone();
+    soft.lights[0].size = nephroid::scene::LightSize::Radius { radius_m: 0.1 };
+    let mut walled = scene.clone();
+    let wall = shapes::rectangle(
+        glam::DVec3::new(-0.4, 0.4, 0.0),
+        glam::DVec3::Y * 0.4,
+        glam::DVec3::Z * 0.4,
+    );
+    parts::add(
+        &mut walled,
+        "wall",
+        wall,
+        parts::matte("wall", LinearSrgb::grey(0.5)),
+    );
+    let jittered = BakeSettings {
+        rays: RayPlacement::Jittered,
+        ..settings(2e3, 16)
+    };
+    let of_few_places = BakeSettings {
+        wavefronts: Some(2),
+        ..at(500.0, 16)
+    };
+    let indirect = BakeSettings {
+        layers: vec![LayerKind::Indirect],
+        max_error: Some(0.3),
+        ..at(500.0, 16)
+    };
+    for (what, scene, settings) in [
+        ("rays", &scene, jittered),
+        ("lamps", &soft, of_few_places),
+        ("ways", &walled, indirect),
+    ] {
+        let mut session = BakeSession::new(Arc::new(scene.clone())).expect("a session");
+        let mut with = |seed: u64| {
+            let settings = BakeSettings {
+                seed,
+                ..settings.clone()
+            };
+            let result = session.bake(&settings, &(), &Control::default()).expect("a bake");
+            bits(map_of(&result, scene, "floor"))
+        };
+        let [first, other, again] = [1, 2, 1].map(&mut with);
+        assert!(first != other, "{what}: another seed gives the same map");
+        assert!(first == again, "{what}: the same seed gives another map");
+    }
 }

@@ -89,11 +89,11 @@ fn water_in_a_glass_is_as_brute_force_has_it() {
     let settings_here = BakeSettings {
         max_error: Some(target),
         density_per_sr: BakeSettings::starting_density_per_sr(target),
-        ..at(1.0, 64)
+        ..at(1.0, 48)
     };
     let result = bake(scene.clone(), &settings_here);
     assert_eq!(energy_fault(&result), None);
-    let reference = brute(&scene, &settings(1.0, 64), 400_000);
+    let reference = brute(&scene, &settings(1.0, 48), 230_000);
     let map = map_of(&reference, &scene, "floor");
     let noise = map.estimated_relative_rmse.expect("a noise");
     let ours = caustic_luminance(map_of(&result, &scene, "floor"));

@@ -91,10 +91,10 @@ fn large_lamps_are_as_brute_force_has_them_and_know_their_error() {
         diameter_rad: 0.53_f64.to_radians(),
     };
     for (what, scene) in [("square lamp", &ring), ("sun of 0.53°", &sun)] {
-        let result = bake(scene.clone(), &towards(0.02, 64));
+        let result = bake(scene.clone(), &towards(0.02, 48));
         assert_eq!(energy_fault(&result), None, "{what}");
         let estimated = result.estimated_relative_rmse.expect("an estimate");
-        let off = off_brute_force(&result, scene, 2_500_000, 0.06);
+        let off = off_brute_force(&result, scene, 1_400_000, 0.06);
         println!(
             "{what}: off by {off:.4}, estimated {estimated:.4}, {} rays",
             result.counts.rays
@@ -131,9 +131,9 @@ fn frosted_plate(roughness: f64) -> Scene {
 }
 
 fn check_rough(what: &str, scene: &Scene, target: f64) {
-    let result = bake(scene.clone(), &towards(target, 64));
+    let result = bake(scene.clone(), &towards(target, 48));
     assert_eq!(energy_fault(&result), None, "{what}");
-    let off = off_brute_force(&result, scene, 3_000_000, 0.06);
+    let off = off_brute_force(&result, scene, 1_700_000, 0.06);
     println!(
         "{what}: off by {off:.4}, estimated {:?}, {} rays, {:.1} CPU s",
         result.estimated_relative_rmse, result.counts.rays, result.cpu_s.total

@@ -15,7 +15,7 @@ use crate::tools::{at, bake, energy_fault};
 const COUNT: usize = 1000;
 
 /// Of them, every so many-th is baked alone: a tenth of a second each.
-const EVERY: usize = 8;
+const EVERY: usize = 16;
 
 /// 1 W/sr.
 const POWER: Flux = Flux(4.0 * std::f64::consts::PI);
@@ -128,7 +128,7 @@ fn tiny_mirrors_deposit_what_falls_on_them_one_by_one() {
         .collect();
     assert!(wrong.is_empty(), "{wrong:?}");
     // And as they are in a bake of sixteen times the rays.
-    for mirror in mirrors.iter().step_by(100) {
+    for mirror in mirrors.iter().step_by(250) {
         let (usual, fine) = (
             deposited_w(&[*mirror], 25_000.0),
             deposited_w(&[*mirror], 400_000.0),

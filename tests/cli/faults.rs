@@ -127,6 +127,62 @@ fn little_address_space_is_told_and_ends_no_run() {
     assert!(run.code == 0 && !run.stderr.contains("ulimit"), "{}", run.stderr);
 }
 
+/// Under a limit that the program starts with and a large map does not fit in.
+#[cfg(target_os = "linux")]
+#[test]
+fn memory_that_is_refused_is_told_in_one_sentence() {
+    let sandbox = Sandbox::new();
+    sandbox.succeed(&format!("bake builtin:mirror -o out {QUICK}"));
+    let line = "bake builtin:mirror -o out --density 1e3 --map-resolution 8192 --threads 1";
+    let run = run_under("ulimit -v 1000000", &sandbox, line);
+    let errors: Vec<&str> = run
+        .stderr
+        .lines()
+        .filter(|line| line.starts_with("error: "))
+        .collect();
+    let is_told = matches!(errors[..], [sentence] if sentence.contains("the system refused") && sentence.contains("--map-resolution"));
+    assert!(
+        run.code == 1 && is_told && !run.stderr.contains("panicked"),
+        "{run:?}"
+    );
+    assert_eq!(torn(&sandbox.path("out")), None);
+    assert_eq!(
+        sandbox.manifest("out")["maps"][0]["width"],
+        64,
+        "what was there is there"
+    );
+}
+
+/// No warning and no time to end: what is on the disk is whole all the same.
+#[cfg(unix)]
+#[test]
+fn killed_while_it_writes_it_leaves_nothing_torn() {
+    let sandbox = Sandbox::new();
+    sandbox.succeed(&format!("bake builtin:slab -o out {QUICK}"));
+    let line = "bake builtin:slab -o out --density 1e3 --map-resolution 1024 --quiet";
+    let arguments: Vec<&str> = line.split_whitespace().collect();
+    let mut killed = 0;
+    for moment in 0..6 {
+        let before = sandbox.files("out/maps");
+        let mut child = sandbox
+            .command(&arguments)
+            .stdout(Stdio::null())
+            .spawn()
+            .expect("the program starts");
+        // From its first new file on.
+        while child.try_wait().expect("it runs").is_none() && sandbox.files("out/maps") == before {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        std::thread::sleep(Duration::from_millis(4 * moment));
+        child.kill().expect("it is ours");
+        killed += usize::from(!child.wait().expect("it ends").success());
+        assert_eq!(torn(&sandbox.path("out")), None, "at moment {moment}");
+    }
+    assert!(killed >= 3, "{killed} times in time");
+    sandbox.succeed(&format!("bake builtin:slab -o out {QUICK}"));
+    assert_eq!(torn(&sandbox.path("out")), None);
+}
+
 #[test]
 fn nothing_is_read_or_written_below_a_file() {
     let sandbox = Sandbox::new();
@@ -214,4 +270,35 @@ fn the_second_signal_ends_at_once_and_tears_nothing() {
     assert_eq!(child.wait().expect("it ends").code(), Some(130));
     assert!(start.elapsed() < Duration::from_secs(10), "{:?}", start.elapsed());
     assert_eq!(torn(&sandbox.path("out")), None);
+}
+
+#[test]
+fn an_export_that_does_not_fit_leaves_the_one_before() {
+    let sandbox = Sandbox::new();
+    sandbox.succeed(&format!("bake builtin:mirror -o out {QUICK}"));
+    sandbox.succeed("export out -o lit.glb");
+    let whole = std::fs::read(sandbox.path("lit.glb")).expect("it is there");
+    let before = sandbox.files(".");
+    // Blocks of 512 bytes.
+    let run = run_under("ulimit -f 4", &sandbox, "export out -o lit.glb --units E");
+    run.failed_in_one_sentence(1, &["lit.glb"]);
+    assert_eq!(std::fs::read(sandbox.path("lit.glb")).ok(), Some(whole));
+    assert_eq!(sandbox.files("."), before, "nothing lies beside it");
+}
+
+#[test]
+fn textures_that_do_not_fit_leave_those_before() {
+    let sandbox = Sandbox::new();
+    sandbox.succeed(&format!("bake builtin:mirror -o out {QUICK}"));
+    let run = run_under("ulimit -f 4", &sandbox, "export out --format hdr -o t");
+    run.failed_in_one_sentence(1, &["t/0000_floor.hdr", "larger than files may be"]);
+    assert_eq!(sandbox.files("."), ["out"], "a failed export leaves nothing");
+    sandbox.succeed("export out --format exr -o t");
+    let before = sandbox.files("t");
+    let bytes = |name: &str| std::fs::read(sandbox.path("t").join(name)).expect("it is there");
+    let (index, texture) = (bytes("index.json"), bytes("0000_floor.exr"));
+    let run = run_under("ulimit -f 4", &sandbox, "export out --format exr --bits 32 -o t");
+    run.failed_in_one_sentence(1, &["t/0000_floor.exr"]);
+    assert_eq!(sandbox.files("t"), before, "nothing lies beside them");
+    assert_eq!((bytes("index.json"), bytes("0000_floor.exr")), (index, texture));
 }

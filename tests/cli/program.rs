@@ -13,6 +13,7 @@ pub struct Sandbox {
 }
 
 /// How a run ended.
+#[derive(Debug)]
 pub struct Run {
     pub code: i32,
     pub stdout: String,

@@ -194,6 +194,55 @@ fn frames_are_kept_as_the_pictures_that_render_makes() {
 }
 
 #[test]
+fn a_turntable_goes_around_the_scene_in_equal_steps() {
+    let sandbox = Sandbox::new();
+    let turn = |frames: usize, folder: &str| {
+        format!("render builtin:mirror --turntable {frames} -o {folder} {QUICK} --exposure 1 --json")
+    };
+    let Some(four) = run(&sandbox, "turntable", &turn(4, "four")) else {
+        return;
+    };
+    assert_eq!(
+        (&four.json()["frames"], &four.json()["path"]),
+        (&4.into(), &"turntable".into())
+    );
+    sandbox.succeed(&turn(2, "two"));
+    assert_eq!(sandbox.files("four").len(), 4);
+    assert_eq!(sandbox.files("two").len(), 2);
+    let codes = |file: &str| {
+        image::open(sandbox.path(file))
+            .expect("a PNG")
+            .to_rgb8()
+            .into_raw()
+    };
+    // Half a turn is the third of four and the second of two, but for the sine of π.
+    let [half, other] = ["four/frame-00003.png", "two/frame-00002.png"].map(codes);
+    let off = half
+        .iter()
+        .zip(&other)
+        .filter(|(a, b)| a.abs_diff(**b) > 2)
+        .count();
+    assert!(off * 100 < half.len(), "{off} of {} codes", half.len());
+    let differs = |a: &str, b: &str| {
+        let (a, b) = (codes(a), codes(b));
+        a.iter().zip(&b).filter(|(a, b)| a.abs_diff(**b) > 10).count() * 20 > a.len()
+    };
+    assert!(differs("four/frame-00001.png", "four/frame-00002.png"));
+    assert!(differs("four/frame-00001.png", "four/frame-00003.png"));
+    for (options, words) in [
+        ("--turntable 0 -o none", &["--turntable", "1 to 10000"][..]),
+        ("--turntable 3", &["--turntable", "-o DIR"]),
+        ("--turntable 3 --path walk.json -o none", &["--path"]),
+        ("--turntable 3 -o none --camera nobody", &["--camera"]),
+    ] {
+        let code = if options.contains("nobody") { 1 } else { 2 };
+        sandbox
+            .run(&format!("render builtin:mirror {QUICK} {options}"))
+            .failed_in_one_sentence(code, words);
+    }
+}
+
+#[test]
 fn what_does_not_go_with_a_path_is_refused() {
     let sandbox = Sandbox::new();
     sandbox.write("walk.json", showroom(2));

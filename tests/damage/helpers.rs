@@ -13,6 +13,7 @@ use crate::tools::builtin_scene;
 
 #[test]
 fn every_broken_promise_of_a_scene_is_noticed() {
+    let _alone = crate::watch::alone();
     let sound = builtin_scene("showroom");
     assert_eq!(scene_fault(&sound), None);
     type Break = fn(&mut Scene);
@@ -58,6 +59,7 @@ fn every_broken_promise_of_a_scene_is_noticed() {
 
 #[test]
 fn evidence_is_image_reference_and_difference() {
+    let _alone = crate::watch::alone();
     let (image, reference) = (vec![[3.0, 2.0, 1.0]; 6], vec![[1.0, 2.0, 3.0]; 6]);
     let told = keep_images("helpers", &image, &reference, 3);
     let folder = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("evidence");
@@ -81,6 +83,7 @@ fn evidence_is_image_reference_and_difference() {
 
 #[test]
 fn closeness_is_relative_and_absolute_at_zero() {
+    let _alone = crate::watch::alone();
     assert_close(1.0005, 1.0, 1e-3, "within");
     assert_close(1e-4, 0.0, 1e-3, "within");
     for (actual, expected) in [
@@ -100,6 +103,7 @@ fn closeness_is_relative_and_absolute_at_zero() {
 
 #[test]
 fn a_reference_that_is_not_there_is_no_reference() {
+    let _alone = crate::watch::alone();
     assert_eq!(reference_map("S1").len(), 256 * 256);
     assert!(std::panic::catch_unwind(|| reference_map("S99")).is_err());
 }

@@ -30,6 +30,7 @@ fn picture(format: image::ImageFormat) -> Vec<u8> {
 
 #[test]
 fn environments() {
+    let _alone = crate::watch::alone();
     let tally = Tally::default();
     let folder = tempfile::tempdir().expect("temporary folder");
     let path = folder.path().join("sky");
@@ -55,6 +56,7 @@ fn environments() {
 
 #[test]
 fn skies_that_only_claim_to_be_large() {
+    let _alone = crate::watch::alone();
     let tally = Tally::default();
     let folder = tempfile::tempdir().expect("temporary folder");
     let path = folder.path().join("sky");
@@ -75,6 +77,7 @@ fn skies_that_only_claim_to_be_large() {
 
 #[test]
 fn textures() {
+    let _alone = crate::watch::alone();
     let tally = Tally::default();
     let options = LoadOptions {
         memory_limit_bytes: LIMIT_BYTES,

@@ -68,6 +68,7 @@ fn map_fault(map: &IlluminationMap, scene: &Scene) -> Option<String> {
 
 #[test]
 fn folders_of_maps() {
+    let _alone = crate::watch::alone();
     let tally = Tally::default();
     for name in ["mirror", "showroom"] {
         let folder = Folder::of(name);
@@ -112,6 +113,7 @@ fn folders_of_maps() {
 
 #[test]
 fn single_maps() {
+    let _alone = crate::watch::alone();
     let folder = Folder::of("mirror");
     let exr = folder
         .files
@@ -154,6 +156,7 @@ fn single_maps() {
 /// A header of some hundred bytes that claims gigabytes.
 #[test]
 fn stated_sizes_take_no_memory() {
+    let _alone = crate::watch::alone();
     let channel = |name: String| nephroid::export::float_image::Channel {
         name,
         values: vec![1.0; 64],

@@ -34,6 +34,7 @@ fn disturb(path: &Path, whole: &[u8], stop: &AtomicBool) {
 
 #[test]
 fn scenes_that_change_while_they_are_read() {
+    let _alone = crate::watch::alone();
     let folder = tempfile::tempdir().expect("temporary folder");
     let mut scene = Glb::tetrahedron().with_light("lamp", json!({ "type": "point" }));
     let data = scene.binary.clone();

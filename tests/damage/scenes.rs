@@ -155,6 +155,7 @@ fn scenes_of(folder: &Path) -> Vec<Original> {
 
 #[test]
 fn files_of_the_validator() {
+    let _alone = crate::watch::alone();
     let Some(folder) = shared_or_skip("validator") else {
         return;
     };
@@ -167,6 +168,7 @@ type Claim = Box<dyn Fn(&mut Glb)>;
 /// Counts that a file only states are worth nothing: a kilobyte must not take a gigabyte.
 #[test]
 fn stated_counts_take_no_memory() {
+    let _alone = crate::watch::alone();
     let tally = Tally::default();
     for count in [1_u64 << 20, 1 << 31, u64::from(u32::MAX), 1 << 53] {
         let claims: [(&str, Claim); 5] = [

@@ -14,6 +14,7 @@ const MOST_BYTES: usize = 16 << 20;
 
 #[test]
 fn camera_paths() {
+    let _alone = crate::watch::alone();
     let key = |x: f64| json!({ "position_m": [x, 1.0, 3.0], "target_m": [0.0, 0.5, -x] });
     let path = json!({ "frames": 30, "vertical_fov_deg": 50, "keys": [key(0.0), key(1.5), key(-2.0)] });
     let text = path.to_string();
@@ -43,6 +44,7 @@ fn camera_paths() {
 
 #[test]
 fn tables_of_spectra() {
+    let _alone = crate::watch::alone();
     let mut table = String::from("# a lamp\nnm, W/nm\n");
     for row in 0..40 {
         let _ = writeln!(table, "{}, {:.3}", 380 + 10 * row, f64::from(row % 7) * 0.25);

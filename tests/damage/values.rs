@@ -111,6 +111,7 @@ fn run(sandbox: &Sandbox, arguments: &[&str]) -> Run {
 
 #[test]
 fn values_are_taken_or_refused_in_one_sentence() {
+    let _alone = crate::watch::alone();
     let sandbox = Sandbox::new();
     let (mut taken, mut refused) = (0, 0);
     for number in 0..60 * effort() {
@@ -130,6 +131,7 @@ fn values_are_taken_or_refused_in_one_sentence() {
 
 #[test]
 fn a_panic_or_two_sentences_do_not_pass() {
+    let _alone = crate::watch::alone();
     let run = |code, stdout: &str, stderr: &str| Run {
         code,
         stdout: stdout.into(),

@@ -2,7 +2,7 @@
 
 use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use cpu_time::ProcessTime;
@@ -14,8 +14,11 @@ use crate::support::evidence::keep_bytes;
 /// CPU time, far more than any input here needs: a test for endless loops, not for speed.
 const PATIENCE: Duration = Duration::from_secs(20);
 
-/// One after the other: memory is counted over the whole process.
-static ALONE: Mutex<()> = Mutex::new(());
+/// Held by a test from its first line to its last: memory is counted over the whole process.
+pub fn alone() -> MutexGuard<'static, ()> {
+    static ALONE: Mutex<()> = Mutex::new(());
+    ALONE.lock().unwrap_or_else(PoisonError::into_inner)
+}
 
 /// How many inputs were tried, and how they ended.
 #[derive(Debug, Default)]
@@ -61,7 +64,6 @@ pub fn watched<T>(
     most_bytes: usize,
     work: impl FnOnce() -> Result<T>,
 ) -> std::result::Result<Result<T>, String> {
-    let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
     MEMORY.reset_peak_usage();
     let before = MEMORY.current_usage();
     let start = ProcessTime::now();
@@ -94,6 +96,7 @@ fn sentence_fault(error: &Error) -> Option<String> {
 
 #[test]
 fn what_goes_wrong_is_noticed() {
+    let _alone = alone();
     let refused = |what: &str| Err::<(), Error>(Error::failure("a.glb", what, "export it again"));
     assert!(watched(1 << 20, || Ok(())).is_ok());
     assert!(watched(1 << 20, || refused("is broken")).is_ok());

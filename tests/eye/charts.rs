@@ -1,7 +1,10 @@
 //! Which coordinates a map follows, and that they give every point its own place.
 
 use glam::{DMat3, DVec2, DVec3};
+use nephroid::illumination::gutter::fill_gutter;
+use nephroid::illumination::lookup::bilinear;
 use nephroid::illumination::parametrisation::DEFAULT_NOMINAL_SIDE;
+use nephroid::illumination::parametrisation::coverage::{for_each_texel_in_row, rows};
 use nephroid::illumination::{Parametrisation, UvSet, parametrise};
 use nephroid::scene::Mesh;
 
@@ -315,4 +318,67 @@ fn no_area_no_map_and_the_same_every_time() {
     assert!(parametrise(0, &Mesh::default(), 64).is_none());
     let mesh = torus();
     assert_eq!(of(&mesh).corner_uvs, of(&mesh).corner_uvs);
+}
+
+/// At a seam either side reads what the surface has there, gutters included: a field that is even in space is even
+/// across.
+#[test]
+fn gutters_go_on_beyond_seams_as_the_surface_does() {
+    let mesh = without_uv(sphere(DVec3::ZERO, 1.0, 48, 24));
+    let chart = of(&mesh).chart(512, 512);
+    let field = |point: DVec3| 3.0 + point.dot(DVec3::new(1.0, 0.7, -0.5));
+    let place = |triangle: usize, weights: DVec3| {
+        let [a, b, c] = mesh.corners(triangle);
+        a * weights.x + b * weights.y + c * weights.z
+    };
+    // The mean over the part of a triangle in a texel is the value at the middle of that part.
+    let size = DVec2::new(chart.width as f64, chart.height as f64);
+    let mut sums = vec![(0.0, 0.0); chart.width * chart.height];
+    for (triangle, uvs) in chart.corner_uvs.iter().enumerate() {
+        let corners = uvs.map(|uv| uv * size);
+        for row in rows(corners, chart.height) {
+            for_each_texel_in_row(corners, row, chart.width, |column, part| {
+                let at = part.centroid() / size;
+                let sum = &mut sums[row * chart.width + column];
+                sum.0 += part.area() * field(place(triangle, barycentric(*uvs, at)));
+                sum.1 += part.area();
+            });
+        }
+    }
+    let mut values: Vec<[f32; 3]> = sums
+        .iter()
+        .map(|&(sum, area)| [if area > 0.0 { (sum / area) as f32 } else { 0.0 }; 3])
+        .collect();
+    fill_gutter(&chart, &mut values);
+    let texel_m = (4.0 * std::f64::consts::PI / chart.texel_areas_m2.len() as f64).sqrt();
+    let (mut worst, mut squares, mut looks) = (0.0_f64, 0.0, 0.0);
+    let with_area = |triangle: &usize| mesh.face_normal(*triangle) != DVec3::ZERO;
+    for triangle in (0..mesh.triangles.len()).filter(with_area) {
+        let uvs = chart.corner_uvs[triangle];
+        for corner in 0..3 {
+            // Along all edges, those at seams among them.
+            for t in [0.2, 0.5, 0.8] {
+                let mut weights = DVec3::ZERO;
+                weights[corner] = 1.0 - t;
+                weights[(corner + 1) % 3] = t;
+                let uv = uvs[0] * weights.x + uvs[1] * weights.y + uvs[2] * weights.z;
+                let read = bilinear(&values, chart.width, chart.height, uv).g;
+                let off = (read - field(place(triangle, weights))).abs() / texel_m;
+
+                worst = worst.max(off);
+                squares += off * off;
+                looks += 1.0;
+            }
+        }
+    }
+    let rms = (squares / looks).sqrt();
+    assert!(!chart.beyond.is_empty(), "it has seams");
+    assert!(worst < 1.0 && rms < 0.1, "{worst} at most, {rms} rms");
+}
+
+/// Weights of a triangle's corners at a place of the map.
+fn barycentric([a, b, c]: [DVec2; 3], at: DVec2) -> DVec3 {
+    let all = (b - a).perp_dot(c - a);
+    let (v, w) = ((at - a).perp_dot(c - a) / all, (b - a).perp_dot(at - a) / all);
+    DVec3::new(1.0 - v - w, v, w)
 }

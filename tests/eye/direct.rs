@@ -8,7 +8,7 @@ use nephroid::light_pass::direct::bake_direct;
 use nephroid::optics::LinearSrgb;
 use nephroid::optics::fresnel::dielectric_reflectance;
 use nephroid::progress::Control;
-use nephroid::scene::{LightKind, Material, Mesh, SurfaceKind};
+use nephroid::scene::{LightKind, Material, Mesh, SurfaceKind, Volume};
 use nephroid::units::RadiantIntensity;
 
 use crate::meshes::{cuboid, floor, joined, moved, quad};
@@ -244,6 +244,36 @@ fn sides_of_a_sheet() {
     }
 }
 
+/// Smooth shading: the cosine is that to the interpolated normal.
+#[test]
+fn light_falls_by_the_interpolated_normal() {
+    let lean = DVec3::new(0.6, 0.8, 0.0);
+    let mut mesh = floor(1.0, 0.0);
+    mesh.normals.fill(lean);
+    let direction = DVec3::new(-0.3, -1.0, 0.2).normalize();
+    let tracer = tracer(vec![(mesh, diffuse(0.5))], vec![sun(direction, 700.0)]);
+    let chart = chart(&tracer, 0, 8, 8);
+    let expected = 700.0 * -direction.dot(lean);
+    for e in direct(&tracer, &chart).irradiance {
+        assert!(
+            (f64::from(e[1]) / expected - 1.0).abs() < 1e-6,
+            "{} for {expected}",
+            e[1]
+        );
+    }
+}
+
+/// Vertex normals may lean so far that a lamp below the surface is before them: it lights the other side all the same.
+#[test]
+fn a_leaning_normal_lets_no_light_through_its_surface() {
+    let mut mesh = floor(1.0, 0.0);
+    mesh.normals.fill(DVec3::new(0.9, 0.3, 0.0).normalize());
+    let lamp = DVec3::new(4.0, -0.5, 0.3);
+    let tracer = tracer(vec![(mesh, diffuse(0.5))], vec![point_light(lamp, 1.0)]);
+    let above = chart(&tracer, 0, 8, 8);
+    assert_eq!(flux_w(&above, &direct(&tracer, &above)), 0.0);
+}
+
 #[test]
 fn polish_takes_its_share() {
     let tracer = tracer(
@@ -254,6 +284,43 @@ fn polish_takes_its_share() {
     let expected = 0.8 * (1.0 - dielectric_reflectance(0.8, 1.5));
     for e in direct(&tracer, &chart).irradiance {
         assert!((f64::from(e[0]) - expected).abs() < 1e-7);
+    }
+}
+
+/// A lamp under water: its light crosses no surface, the water takes its share on the way, and a polish reflects less
+/// than in air.
+#[test]
+fn water_around_a_lamp_takes_its_share_and_weakens_polish() {
+    let water = Material {
+        volume: Some(Volume {
+            attenuation_distance_m: 2.0,
+            attenuation_colour: LinearSrgb::new(0.2, 0.5, 0.9),
+        }),
+        ..surface(SurfaceKind::Dielectric, 1.33)
+    };
+    let height_m = 1.0;
+    let lamp = DVec3::Y * height_m;
+    let body = cuboid(DVec3::new(-3.0, -0.5, -3.0), DVec3::new(3.0, 2.0, 3.0));
+    let polished = surface(SurfaceKind::Mixed, 1.5);
+    let tracer = tracer(
+        vec![(floor(1.0, 0.0), polished), (body, water)],
+        vec![point_light(lamp, 2.0)],
+    );
+    let n = 64;
+    let chart = chart(&tracer, 0, n, n);
+    for (texel, e) in direct(&tracer, &chart).irradiance.iter().enumerate() {
+        let along = |index: usize| (index as f64 + 0.5) * 2.0 / n as f64 - 1.0;
+        let distance_m = DVec3::new(along(texel % n), height_m, along(texel / n)).length();
+        let cosine = height_m / distance_m;
+        let taken = 1.0 - dielectric_reflectance(cosine, 1.5 / 1.33);
+        let open = 2.0 * cosine / (distance_m * distance_m) * taken;
+        for (found, colour) in e.iter().zip([0.2_f64, 0.5, 0.9]) {
+            let expected = open * colour.powf(distance_m / 2.0);
+            assert!(
+                (f64::from(*found) / expected - 1.0).abs() < 1e-3,
+                "texel {texel}: {found} for {expected}"
+            );
+        }
     }
 }
 

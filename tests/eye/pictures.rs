@@ -6,6 +6,7 @@ use std::sync::Arc;
 use glam::{DMat3, DVec2, DVec3};
 use nephroid::eye_pass::reference::{ChainLimits, ReferenceSettings, first_hits, render};
 use nephroid::eye_pass::{Picture, ToneMap, View};
+use nephroid::geometry::Ray;
 use nephroid::illumination::{IlluminationMap, Layer};
 use nephroid::optics::LinearSrgb;
 use nephroid::optics::fresnel::{dielectric_reflectance, thin_wall_reflectance};
@@ -237,6 +238,51 @@ fn coloured_glass_keeps_a_share_per_length() {
     }
 }
 
+/// A sheet whose back is not drawn may lie anywhere on the way: what it lies in absorbs as without it.
+#[test]
+fn backs_that_are_not_drawn_shorten_no_way_through_coloured_water() {
+    let colour = LinearSrgb::new(0.9, 0.5, 0.2);
+    let water = Material {
+        volume: Some(Volume {
+            attenuation_distance_m: 0.7,
+            attenuation_colour: colour,
+        }),
+        ..surface(SurfaceKind::Dielectric, WATER)
+    };
+    let sheet = Material {
+        double_sided: false,
+        ..diffuse(0.5)
+    };
+    // It faces down, away from the eye.
+    let below = quad(DVec3::new(-5.0, 0.6, -5.0), DVec3::Z * 10.0, DVec3::X * 10.0);
+    let tracer = tracer(
+        vec![
+            (floor(100.0, 0.0), diffuse(ALBEDO)),
+            (
+                cuboid(DVec3::new(-90.0, -0.5, -90.0), DVec3::new(90.0, 1.0, 90.0)),
+                water,
+            ),
+            (below, sheet),
+        ],
+        vec![],
+    );
+    let maps = [uniform_map(&tracer, 0, E)];
+    let view = view(DVec3::new(0.0, 3.0, 0.0), DVec3::new(0.4, 0.0, 0.2), 20.0, 3, 3);
+    for (pixel, radiance) in picture(&tracer, &maps, &view).radiance.iter().enumerate() {
+        let cos_i = -direction(&view, pixel).y;
+        let cos_t = (1.0 - (1.0 - cos_i * cos_i) / (WATER * WATER)).sqrt();
+        let r = dielectric_reflectance(cos_i, WATER);
+        for (channel, share) in radiance.iter().zip(colour.to_array()) {
+            let left = share.powf(1.0 / cos_t / 0.7);
+            let expected = (1.0 - r) * left * FLOOR / (WATER * WATER) + r * SKY;
+            assert!(
+                (f64::from(*channel) / expected - 1.0).abs() < 1e-6,
+                "pixel {pixel}: {channel} for {expected}"
+            );
+        }
+    }
+}
+
 #[test]
 fn a_thin_wall_reflects_by_all_its_orders_and_tints() {
     let tint = LinearSrgb::new(1.0, 0.5, 0.25);
@@ -409,6 +455,62 @@ fn textures_tint_and_emission_adds() {
         for (channel, expected) in picture(&tracer, &maps, &view).radiance[0].iter().zip(expected) {
             assert!((f64::from(*channel) - expected).abs() < 1e-6, "at {x}, {z}");
         }
+    }
+}
+
+/// A strip of texels, red by their number.
+fn strip(wrap: Wrap) -> Texture {
+    Texture {
+        name: "strip".into(),
+        width: 3,
+        height: 1,
+        rgba: (0..3).map(|column| [column, 0, 0, 255]).collect(),
+        wrap: [wrap; 2],
+    }
+}
+
+#[test]
+fn images_go_on_beyond_their_borders_as_they_say() {
+    for (wrap, expected) in [
+        (Wrap::Repeat, [2, 0, 1, 2, 0, 1, 2, 0, 1, 2, 0, 1]),
+        (Wrap::MirroredRepeat, [2, 2, 1, 0, 0, 1, 2, 2, 1, 0, 0, 1]),
+        (Wrap::ClampToEdge, [0, 0, 0, 0, 0, 1, 2, 2, 2, 2, 2, 2]),
+    ] {
+        let strip = strip(wrap);
+        let found: Vec<u8> = (-4..8)
+            .map(|column| strip.code(f64::from(column), 0.0)[0])
+            .collect();
+        assert_eq!(found, expected, "{wrap:?}");
+    }
+}
+
+#[test]
+fn textures_follow_the_coordinates_that_they_name() {
+    let mut mesh = floor(1.0, 0.0);
+    let middles = |column: f64| Some(vec![DVec2::new((column + 0.5) / 3.0, 0.5); 4]);
+    (mesh.uv0, mesh.uv1) = (middles(1.0), middles(2.0));
+    for uv_set in [0, 1] {
+        let material = Material {
+            base_colour_texture: Some(TextureRef {
+                texture: 0,
+                uv_set,
+                uv_transform: DMat3::IDENTITY,
+            }),
+            ..diffuse(1.0)
+        };
+        let mut scene = scene(vec![(mesh.clone(), material)], vec![]);
+        scene.textures.push(Arc::new(strip(Wrap::Repeat)));
+        let tracer = Tracer::new(Arc::new(scene));
+        let ray = Ray {
+            origin: DVec3::new(0.1, 1.0, 0.2),
+            direction: DVec3::NEG_Y,
+        };
+        let hit = tracer.closest_hit(&ray).expect("the floor");
+        let expected = LinearSrgb::decode_channel(uv_set as u8 + 1);
+        assert!(
+            (tracer.base_colour(&hit).r - expected).abs() < 1e-12,
+            "set {uv_set}"
+        );
     }
 }
 

@@ -12,7 +12,7 @@ use nephroid::scene::{Environment, Light, LightKind, LightSize, Material, Mesh, 
 use nephroid::transport::Tracer;
 use nephroid::units::Radiance;
 
-use crate::meshes::{cuboid, floor, quad, sphere};
+use crate::meshes::{cuboid, floor, grid, quad, sphere};
 use crate::scenes::{chart, diffuse, direct, flux_w, light, point_light, scene, sun, tracer};
 
 /// A panel at a height over the floor's middle that shines down.
@@ -305,6 +305,45 @@ fn surfaces_glow_on_the_sides_that_they_have() {
         assert!(
             own.irradiance.iter().all(|e| *e == [0.0; 3]),
             "a flat lamp does not light itself"
+        );
+    }
+}
+
+/// Of many triangles, so that it is looked for by samples alone: its dark side sends nothing all the same.
+#[test]
+fn a_large_sheet_glows_on_its_front_alone() {
+    // It faces up.
+    let sheet = grid(6, 6, |s, t| DVec3::new(t - 0.5, 0.7, s - 0.5));
+    let ceiling = quad(DVec3::new(-1.0, 1.4, -1.0), DVec3::Z * 2.0, DVec3::X * 2.0);
+    let parts = vec![
+        (floor(1.0, 0.0), diffuse(0.5)),
+        (sheet, sided(false)),
+        (ceiling, diffuse(0.5)),
+    ];
+    let tracer = tracer(parts, vec![glowing(1, 2.0)]);
+    assert!(tracer.scene().objects[1].mesh.face_normal(0).y > 0.0);
+    for (object, is_lit) in [(0, false), (2, true)] {
+        let chart = chart(&tracer, object, 8, 8);
+        let e_w = flux_w(&chart, &direct(&tracer, &chart));
+        assert_eq!(e_w > 0.0, is_lit, "object {object} gets {e_w} W");
+    }
+}
+
+/// Across its beam a sun gives its normal irradiance, however wide its disc is.
+#[test]
+fn a_wide_sun_gives_its_normal_irradiance() {
+    for degrees in [1.0_f64, 30.0, 90.0] {
+        let diameter_rad = degrees.to_radians();
+        let wide = Light {
+            size: LightSize::Angle { diameter_rad },
+            ..sun(DVec3::NEG_Y, 2.0)
+        };
+        let tracer = tracer(vec![(floor(1.0, 0.0), diffuse(0.5))], vec![wide]);
+        let layer = direct(&tracer, &chart(&tracer, 0, 16, 16));
+        let (largest, mean) = errors(&layer.irradiance, |_| 2.0);
+        assert!(
+            largest < 0.02 && mean < 2e-3,
+            "{degrees}°: {largest} at most, {mean} in the mean"
         );
     }
 }

@@ -8,7 +8,7 @@ use nephroid::eye_pass::{Picture, ToneMap, View};
 use nephroid::gpu::Gpu;
 use nephroid::optics::LinearSrgb;
 use nephroid::scene::builtin::{parts, shapes};
-use nephroid::scene::{Camera, Light, LightKind, PanelShape, Scene};
+use nephroid::scene::{Camera, Light, LightKind, PanelShape, Scene, Volume};
 use nephroid::session::BakeSession;
 use nephroid::settings::{BakeSettings, LayerKind, MapResolution};
 use nephroid::units::{Irradiance, Radiance, RadiantIntensity};
@@ -159,6 +159,33 @@ fn shadow_rays_show_what_the_baked_layer_shows() {
         assert!(unlike(&expected, &after) > 0.1);
         assert!(unlike(&by_layer(&gpu, &moved), &after) < 0.02);
     }
+    assert_eq!(gpu.take_error(), None);
+}
+
+/// Under water, which takes its share on the way.
+#[test]
+fn shadow_rays_of_a_lamp_under_water_are_weakened_as_the_baked_layer_is() {
+    let Some(gpu) = gpu() else { return };
+    let [point, ..] = lamps();
+    let mut scene = floor_scene(diffuse(LinearSrgb::grey(0.8)));
+    let mut water = parts::dielectric("water", 1.33);
+    water.volume = Some(Volume {
+        attenuation_distance_m: 0.5,
+        attenuation_colour: LinearSrgb::new(0.3, 0.7, 0.9),
+    });
+    let body = shapes::cuboid(DVec3::new(-1.0, -0.5, -1.0), DVec3::new(2.0, 1.2, 2.5));
+    parts::add(&mut scene, "water", body, water);
+    scene.lights = vec![point];
+    let mut renderer = renderer(&gpu, &scene);
+    let (found, expected) = (traced(&gpu, &mut renderer), by_layer(&gpu, &scene));
+    assert!(unlike(&expected, &found) < 0.02, "{}", unlike(&expected, &found));
+    // The comparison sees what the water takes.
+    let water = scene
+        .materials
+        .iter_mut()
+        .find(|material| material.name == "water");
+    water.expect("it is there").volume = None;
+    assert!(unlike(&expected, &by_layer(&gpu, &scene)) > 0.1);
     assert_eq!(gpu.take_error(), None);
 }
 

@@ -4,7 +4,8 @@ use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
 
 use glam::DVec3;
 use nephroid::optics::LinearSrgb;
-use nephroid::scene::{LightKind, LoadOptions, Material, Scene, SurfaceKind};
+use nephroid::scene::texture::Wrap;
+use nephroid::scene::{AlphaMask, LightKind, LoadOptions, Material, Scene, SurfaceKind, Texture};
 use serde_json::{Value, json};
 
 use crate::glb::{Glb, assert_warned};
@@ -513,4 +514,31 @@ fn a_lacquer_is_polish_over_what_is_matte_and_adds_to_metal() {
     }
     let (bare, _) = lacquered(0.0, 1.0, json!({}));
     assert_eq!(bare.surface, SurfaceKind::Diffuse);
+}
+
+/// glTF 2.0, 3.9.4: a surface is there where alpha is greater than or equal to the cutoff.
+#[test]
+fn a_mask_keeps_what_reaches_its_cutoff() {
+    for (cutoff, factor, there) in [
+        (0.5, 0.5, true),
+        (0.5, 0.4375, false),
+        (0.5, 1.0, true),
+        (0.0, 0.0, true),
+    ] {
+        let mask = AlphaMask { cutoff, factor };
+        assert_eq!(mask.is_there(None), there, "{mask:?}");
+    }
+    let half = Texture {
+        name: "half".into(),
+        width: 1,
+        height: 1,
+        rgba: vec![[255, 255, 255, 51]],
+        wrap: [Wrap::Repeat; 2],
+    };
+    let with = |cutoff: f64, factor: f64| {
+        AlphaMask { cutoff, factor }.is_there(Some((&half, glam::DVec2::splat(0.5))))
+    };
+    // Alpha is 0.2 of the factor.
+    assert!(with(0.19, 1.0) && !with(0.21, 1.0));
+    assert!(with(0.09, 0.5) && !with(0.11, 0.5));
 }

@@ -2,11 +2,12 @@
 
 use std::fs;
 use std::io::{BufRead, BufReader, Read};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
 use image::RgbImage;
+use nephroid::viewer::panel::WIDTH;
 use serde_json::Value;
 use x11rb::connection::Connection as _;
 use x11rb::protocol::xproto::{AtomEnum, ClientMessageEvent, ConnectionExt as _, EventMask};
@@ -17,6 +18,13 @@ use super::support::skip::skip;
 const PATIENCE: Duration = Duration::from_secs(120);
 /// Size of the screen and of the window [pixels].
 pub const SIZE: (u32, u32) = (1280, 720);
+
+/// Height of what the panel says between the button that bakes and its sections, at most: with what was refused and where
+/// files were written [pixels].
+const BELOW_BAKE: f64 = 160.0;
+
+/// What the names of the buttons there begin with.
+const ABOVE: [&str; 5] = ["Re-bake", "Cancel", "automatic", "Undo", "Redo"];
 
 /// The folder that the program is started in, within the test's own.
 const WORKING: &str = "working";
@@ -68,6 +76,11 @@ impl Screen {
         Some(Self { server, display })
     }
 
+    /// The title of a window on it.
+    pub fn title_of(&self, viewer: &Viewer<'_>) -> String {
+        self.xdotool(&["getwindowname", &viewer.window])
+    }
+
     fn xdotool(&self, arguments: &[&str]) -> String {
         let output = Command::new("xdotool")
             .args(arguments)
@@ -97,7 +110,13 @@ pub struct Viewer<'a> {
 impl<'a> Viewer<'a> {
     /// Starts `nephroid view` with these arguments and waits for its window.
     pub fn open(screen: &'a Screen, arguments: &[&str]) -> Self {
+        Self::open_with(screen, arguments, None)
+    }
+
+    /// The same, with what was kept in a folder by another window; otherwise nothing was kept.
+    pub fn open_with(screen: &'a Screen, arguments: &[&str], config: Option<&Path>) -> Self {
         let folder = tempfile::tempdir().expect("a folder");
+        let config = config.map_or_else(|| folder.path().join("config"), Path::to_path_buf);
         let stderr = fs::File::create(folder.path().join("stderr")).expect("a file");
         fs::create_dir(folder.path().join(WORKING)).expect("a folder");
         let program = Command::new(env!("CARGO_BIN_EXE_nephroid"))
@@ -108,6 +127,7 @@ impl<'a> Viewer<'a> {
             .current_dir(folder.path().join(WORKING))
             .env("DISPLAY", &screen.display)
             .env("WINIT_X11_SCALE_FACTOR", "1")
+            .env("NEPHROID_CONFIG_DIR", config)
             .env_remove("WAYLAND_DISPLAY")
             .stdout(Stdio::null())
             .stderr(stderr)
@@ -199,6 +219,25 @@ impl<'a> Viewer<'a> {
         }
     }
 
+    /// The next maps that are shown, of a first level or, where that came too soon after it to be shown by itself, of the
+    /// whole bake. They may be waited for again.
+    pub fn wait_for_maps(&mut self) -> Value {
+        let start = Instant::now();
+        let is_shown = |event: &Value| event["event"] == "done" || event["shown"] == true;
+        loop {
+            let events = self.events();
+            if let Some(maps) = events[self.read..].iter().find(|event| is_shown(event)) {
+                return maps.clone();
+            }
+            assert!(
+                start.elapsed() < PATIENCE,
+                "no maps after {events:#?}\n{}",
+                self.stderr()
+            );
+            std::thread::sleep(Duration::from_millis(20));
+        }
+    }
+
     /// Left, top, right and bottom of the first control of the panel that fits, by its role and name [pixels]; waits until
     /// it is there and rests.
     pub fn control(&self, what: &str, fits: impl Fn(&str, &str) -> bool) -> [f64; 4] {
@@ -224,12 +263,20 @@ impl<'a> Viewer<'a> {
 
     /// The middle of a control of the panel [pixels], scrolled into the window where it is not.
     pub fn centre(&self, role: &str, name: &str) -> (i32, i32) {
+        let mut last_top = None;
         for _ in 0..20 {
             let [left, top, right, bottom] = self.control(name, |r, n| r == role && n == name);
-            if bottom < f64::from(SIZE.1) && top > 0.0 {
+            let [.., bake] = self.control("Re-bake", |_, name| name == "Re-bake");
+            // What stands above the sections, or over the picture, does not scroll.
+            let is_fixed = ABOVE.iter().any(|above| name.starts_with(above)) || left >= f64::from(WIDTH);
+            let highest = if is_fixed { 0.0 } else { bake + BELOW_BAKE };
+            // What stands at the very top cannot be scrolled any lower.
+            let is_at_top = last_top == Some(top) && top > 0.0;
+            if bottom < f64::from(SIZE.1) && (top > highest || is_at_top) {
                 return ((0.5 * (left + right)) as i32, (0.5 * (top + bottom)) as i32);
             }
-            let wheel = if top > 0.0 { 5 } else { 4 };
+            last_top = Some(top);
+            let wheel = if top > highest { 5 } else { 4 };
             // The panel glides, picture by picture, and pictures may take half a second.
             self.hands(&format!("mousemove 20 300 click {wheel} sleep 3"));
         }
@@ -248,6 +295,21 @@ impl<'a> Viewer<'a> {
         self.hands(&format!(
             "mousemove {x} {y} sleep 0.3 mousedown 1 sleep 0.3 mouseup 1 sleep 0.3 mousemove 900 300"
         ));
+    }
+
+    /// Types over what a field of the panel holds, and confirms.
+    pub fn type_into(&self, role: &str, name: &str, text: &str) {
+        let (x, y) = self.centre(role, name);
+        self.hands(&format!(
+            "mousemove {x} {y} sleep 0.3 click 1 sleep 0.3 key ctrl+a sleep 0.2"
+        ));
+        self.xdotool(&["type", "--delay", "20", text]);
+        self.hands("sleep 0.3 key Return mousemove 900 300");
+    }
+
+    /// The display that its window is on.
+    pub fn display(&self) -> &str {
+        &self.screen.display
     }
 
     /// Forgets the events so far.
@@ -291,8 +353,19 @@ impl<'a> Viewer<'a> {
         text
     }
 
+    /// Whether the program has not ended.
+    pub fn runs(&mut self) -> bool {
+        self.program.try_wait().expect("it can be asked").is_none()
+    }
+
     /// Asks the window to close as a window manager does, and waits for the program's end.
-    pub fn close(mut self) -> (ExitStatus, String) {
+    pub fn close(self) -> (ExitStatus, String) {
+        let (status, stderr, _) = self.close_and_read();
+        (status, stderr)
+    }
+
+    /// The same, with all events.
+    pub fn close_and_read(mut self) -> (ExitStatus, String, Vec<Value>) {
         let (server, _) = x11rb::connect(Some(&self.screen.display)).expect("the server answers");
         let atom = |name: &str| {
             let asked = server.intern_atom(false, name.as_bytes()).expect("it is sent");
@@ -308,7 +381,7 @@ impl<'a> Viewer<'a> {
         self.wait_for("closing", |_| true);
         let status = self.wait_for_end();
         let stderr = self.stderr();
-        (status, stderr)
+        (status, stderr, self.events())
     }
 
     /// Sends a signal by name and waits for the program's end.

@@ -4,13 +4,20 @@ use std::sync::Arc;
 
 use egui::accesskit::{Node, NodeId, Role};
 use egui::{Event, PointerButton, Pos2, RawInput, Rect, pos2, vec2};
+use nephroid::illumination::IlluminationMap;
 use nephroid::plan::EffectPlan;
 use nephroid::scene::Scene;
 use nephroid::session::{BakeCounts, BakeResult, EffectReport, StopReason, Timings};
 use nephroid::settings::{BakeSettings, LayerKind};
+use nephroid::viewer::beside::Reference;
+use nephroid::viewer::exporting::ExportState;
+use nephroid::viewer::files::FileFacts;
 use nephroid::viewer::frame_times::FrameTimes;
+use nephroid::viewer::latency::Latencies;
 use nephroid::viewer::navigation::Travel;
 use nephroid::viewer::panel::{Facts, Panel, WIDTH, Wishes};
+use nephroid::viewer::probe::Probed;
+use nephroid::viewer::views::MapSurvey;
 use nephroid::viewer::worker::{BakeRequest, BakeState, BakedLevel, Worth};
 
 pub struct Headless {
@@ -18,15 +25,25 @@ pub struct Headless {
     pub panel: Panel,
     pub scene: Arc<Scene>,
     pub loaded: Arc<Scene>,
-    pub undoable: usize,
+    pub undo: Option<String>,
+    pub redo: Option<String>,
     pub refusal: Option<String>,
     pub state: BakeState,
     pub last: Option<BakedLevel>,
+    pub maps: Vec<IlluminationMap>,
+    pub export: ExportState,
     pub layers: Vec<LayerKind>,
+    pub survey: MapSurvey,
+    pub probed: Option<Probed>,
+    pub reference: Option<Reference>,
     pub has_errors: bool,
     pub worth: Option<Worth>,
     pub chains: Option<EffectReport>,
     pub frame_times: Option<FrameTimes>,
+    pub latencies: Latencies,
+    pub loading: Option<String>,
+    pub lost_device: bool,
+    pub file_refusal: Option<String>,
     /// What was pressed since the start.
     pub wishes: Wishes,
     size: egui::Vec2,
@@ -87,16 +104,26 @@ impl Headless {
             panel: Panel::new(settings),
             loaded: Arc::clone(&scene),
             scene,
-            undoable: 0,
+            undo: None,
+            redo: None,
             refusal: None,
             state: BakeState::Idle,
             last: None,
+            maps: Vec::new(),
+            export: ExportState::Idle,
             layers: vec![LayerKind::Caustic, LayerKind::Direct],
+            survey: MapSurvey::default(),
+            probed: None,
+            reference: None,
             has_errors: false,
             worth: None,
             chains: None,
             frame_times: None,
+            latencies: Latencies::default(),
             wishes: Wishes::default(),
+            loading: None,
+            lost_device: false,
+            file_refusal: None,
             size: vec2(size.0, size.1),
             time_s: 0.0,
             nodes: Vec::new(),
@@ -120,15 +147,25 @@ impl Headless {
             panel,
             scene,
             loaded,
-            undoable,
+            undo,
+            redo,
             refusal,
             state,
             last,
+            maps,
+            export,
             layers,
+            survey,
+            probed,
+            reference,
             has_errors,
             worth,
             chains,
             frame_times,
+            latencies,
+            loading,
+            lost_device,
+            file_refusal,
             wishes,
             ..
         } = self;
@@ -137,15 +174,31 @@ impl Headless {
             state,
             last: last.as_ref(),
             loaded,
-            undoable: *undoable,
+            undo: undo.as_deref(),
+            redo: redo.as_deref(),
             refusal: refusal.as_deref(),
+            maps,
+            export,
             layers,
+            survey,
+            probed: probed.as_ref(),
+            sketch: None,
+            reference: reference.as_ref(),
+            is_playing: false,
+            film_told: None,
             has_errors: *has_errors,
             worth: worth.as_ref(),
             chains: chains.as_ref(),
             frame_times: frame_times.as_ref(),
+            latencies,
             travel: Travel::Fly,
             speed_m_per_s: 1.0,
+            lost_device: *lost_device,
+            files: FileFacts {
+                loading: loading.as_deref(),
+                refusal: file_refusal.as_deref(),
+                ..FileFacts::default()
+            },
             adapter: "no adapter",
         };
         let mut output = context.run_ui(input, |ui| {

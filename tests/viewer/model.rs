@@ -10,6 +10,7 @@ use nephroid::settings::{BakeSettings, LayerKind, MapResolution, Sigma};
 use nephroid::units::RadiantIntensity;
 use nephroid::viewer::ViewerOptions;
 use nephroid::viewer::debounce::QUIET;
+use nephroid::viewer::files::FilesOptions;
 use nephroid::viewer::model::Model;
 use nephroid::viewer::panel::{LayerShown, Wishes};
 use nephroid::viewer::worker::BakeState;
@@ -34,6 +35,7 @@ fn options(log: &tempfile::NamedTempFile, density_per_sr: f64) -> ViewerOptions 
         exposure_stops: None,
         stop: Some(Arc::new(Control::default())),
         event_log: Some(log.path().to_owned()),
+        files: FilesOptions::default(),
     }
 }
 
@@ -229,7 +231,11 @@ fn an_edited_scene_is_baked_and_an_edit_taken_back_too() {
         model.panel.display.layer = LayerShown::All;
     }
     model.act(&Wishes::default(), Instant::now());
-    assert_eq!(model.edits().undoable(), 1, "a drag is taken back as one");
+    assert_eq!(
+        model.edits().history().undoable(),
+        1,
+        "a drag is taken back as one"
+    );
     wait_until_baked(&mut model);
     assert!(
         (flux(&model) / before - 4.0).abs() < 1e-5,
@@ -281,7 +287,7 @@ fn an_edited_scene_is_baked_and_an_edit_taken_back_too() {
     assert!(!model.state().is_baking());
     let log = logged(&log);
     assert!(
-        log.contains(&"edit".into()) && log.contains(&"undo".into()),
+        log.contains(&"edit".into()) && log.contains(&"undone".into()),
         "{log:?}"
     );
 }

@@ -237,23 +237,34 @@ fn framing_shows_the_whole_box_and_fills_the_picture() {
         navigator.advance(3.0);
         navigator.look(DVec2::new(500.0, 200.0));
         navigator.frame(aspect);
-        let camera = navigator.camera_for(aspect);
-        let tan = (0.5 * camera.vertical_fov_rad).tan();
-        let mut largest: f64 = 0.0;
-        for corner in 0..8 {
-            let sign = |bit: u32| if corner >> bit & 1 == 0 { -1.0 } else { 1.0 };
-            let d = centre + DVec3::new(sign(0), sign(1), sign(2)) - camera.position;
-            let depth = d.dot(camera.forward);
-            let x = d.dot(camera.right()) / depth / (tan * aspect);
-            let y = d.dot(camera.up) / depth / tan;
-            assert!(
-                depth > camera.near_m && x.abs() <= 1.0 && y.abs() <= 1.0,
-                "{x} {y}"
-            );
-            largest = largest.max(x.abs()).max(y.abs());
+        check_framed(&navigator, aspect, (centre, 1.0));
+        // A part of it that is far smaller.
+        let part = centre + DVec3::new(0.9, -0.3, 0.5);
+        for half in [0.3, 1e-4] {
+            navigator.frame_ball(part, half * 3.0_f64.sqrt(), aspect);
+            check_framed(&navigator, aspect, (part, half));
         }
-        assert!(largest > 0.4, "the box is lost in the picture: {largest}");
     }
+}
+
+/// Whether a cube of that half width fills the picture and is all in it.
+fn check_framed(navigator: &Navigator, aspect: f64, (centre, half): (DVec3, f64)) {
+    let camera = navigator.camera_for(aspect);
+    let tan = (0.5 * camera.vertical_fov_rad).tan();
+    let mut largest: f64 = 0.0;
+    for corner in 0..8 {
+        let sign = |bit: u32| if corner >> bit & 1 == 0 { -half } else { half };
+        let d = centre + DVec3::new(sign(0), sign(1), sign(2)) - camera.position;
+        let depth = d.dot(camera.forward);
+        let x = d.dot(camera.right()) / depth / (tan * aspect);
+        let y = d.dot(camera.up) / depth / tan;
+        assert!(
+            depth > camera.near_m && x.abs() <= 1.0 && y.abs() <= 1.0,
+            "{x} {y}"
+        );
+        largest = largest.max(x.abs()).max(y.abs());
+    }
+    assert!(largest > 0.4, "the box is lost in the picture: {largest}");
 }
 
 #[test]

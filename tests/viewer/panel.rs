@@ -31,7 +31,7 @@ fn settings() -> BakeSettings {
 const TALL: (f32, f32) = (1280.0, 1400.0);
 
 /// A floor, a ball of glass, a lamp, a sun and a spot.
-fn scene() -> Scene {
+pub fn scene() -> Scene {
     let mut scene = parts::reference_scene(0.6);
     let ball = shapes::sphere(DVec3::new(0.0, 0.8, 0.0), 0.5, 1);
     parts::add(&mut scene, "ball", ball, parts::dielectric("glass", 1.5));
@@ -54,6 +54,13 @@ fn scene() -> Scene {
     scene
 }
 
+/// The panel with section Scene open.
+fn with_scene(scene: Scene) -> Headless {
+    let mut panel = Headless::with_scene(scene, settings(), TALL);
+    open(&mut panel, "Scene");
+    panel
+}
+
 /// Types a number into the first field whose text begins like this.
 fn type_into(panel: &mut Headless, shown: &str, text: &str) {
     let begins = |text: Option<&str>| text.is_some_and(|text| text.starts_with(shown));
@@ -72,7 +79,7 @@ fn type_into(panel: &mut Headless, shown: &str, text: &str) {
 
 #[test]
 fn power_is_dragged_on_a_logarithmic_scale_with_its_unit() {
-    let mut panel = Headless::with_scene(scene(), settings(), SIZE);
+    let mut panel = with_scene(scene());
     drag(&mut panel, "Intensity [W/sr]", 0.5, 0.75);
     let Some(Edit::LightIntensity { light: 0, intensity }) = panel.wishes.edit else {
         panic!("{:?}", panel.wishes.edit)
@@ -100,7 +107,7 @@ fn power_is_dragged_on_a_logarithmic_scale_with_its_unit() {
 fn waves_are_raised_by_their_slope_and_shown_only_where_they_are() {
     let scene = builtin::build("pool-bump").expect("the pool");
     let waves = scene.materials[1].waves.clone().expect("it has waves");
-    let mut panel = Headless::with_scene(scene, settings(), TALL);
+    let mut panel = with_scene(scene);
     assert!(!panel.says("Waves' slope"), "the floor is chosen first");
     choose(&mut panel, "Object", "water");
     assert!(panel.wishes.edit.is_none(), "{:?}", panel.wishes.edit);
@@ -134,12 +141,12 @@ fn waves_are_raised_by_their_slope_and_shown_only_where_they_are() {
 
 #[test]
 fn looking_at_the_scene_edits_nothing() {
-    let mut panel = Headless::with_scene(scene(), settings(), SIZE);
+    let mut panel = with_scene(scene());
     for light in ["sun", "spot", "lamp"] {
         choose(&mut panel, "Light", light);
         for object in ["ball", "floor"] {
             choose(&mut panel, "Object", object);
-            for y in (0..720).step_by(8) {
+            for y in (0..1400).step_by(8) {
                 panel.move_to(pos2(250.0, y as f32));
             }
         }
@@ -149,7 +156,7 @@ fn looking_at_the_scene_edits_nothing() {
 
 #[test]
 fn places_and_directions_are_typed_in_numbers() {
-    let mut panel = Headless::with_scene(scene(), settings(), SIZE);
+    let mut panel = with_scene(scene());
     type_into(&mut panel, "y: 3", "2.5");
     assert_eq!(
         panel.wishes.edit,
@@ -177,7 +184,7 @@ fn places_and_directions_are_typed_in_numbers() {
 
 #[test]
 fn sizes_of_lamps_are_typed_and_0_is_none() {
-    let mut panel = Headless::with_scene(scene(), settings(), SIZE);
+    let mut panel = with_scene(scene());
     let sized = |panel: &mut Headless, label: &str, text: &str| {
         let field = Headless::rect_of(panel.labelled(Role::SpinButton, label)).center();
         panel.click(field);
@@ -236,7 +243,7 @@ fn lamps_with_a_surface_have_a_brightness_and_a_panel_a_place() {
             ..scene.lights[0].clone()
         });
     }
-    let mut panel = Headless::with_scene(scene, settings(), SIZE);
+    let mut panel = with_scene(scene);
     choose(&mut panel, "Light", "panel");
     assert!(!panel.says("Radius [m]") && !panel.says("Diameter [°]"));
     type_into(&mut panel, "y: 4", "3");
@@ -261,7 +268,7 @@ fn lamps_with_a_surface_have_a_brightness_and_a_panel_a_place() {
 
 #[test]
 fn a_material_shows_what_it_has_and_an_object_moves_from_its_place_in_the_file() {
-    let mut panel = Headless::with_scene(scene(), settings(), SIZE);
+    let mut panel = with_scene(scene());
     assert!(panel.labelled(Role::Slider, "Refractive index").is_disabled());
     let centre = slider(&panel, "Refractive index").center();
     panel.hover(centre);
@@ -305,14 +312,23 @@ fn a_material_shows_what_it_has_and_an_object_moves_from_its_place_in_the_file()
 }
 
 #[test]
-fn undo_is_offered_where_there_is_something_to_take_back() {
+fn undo_and_redo_are_offered_where_there_is_something_to_turn_back() {
     let mut panel = Headless::with_scene(scene(), settings(), SIZE);
-    assert!(panel.named(Role::Button, "Undo (Ctrl+Z)").is_disabled());
-    panel.undoable = 1;
+    for name in ["Undo (Ctrl+Z)", "Redo (Ctrl+Y)"] {
+        assert!(panel.named(Role::Button, name).is_disabled(), "{name}");
+    }
+    panel.undo = Some("power of `lamp`".into());
     panel.refusal = Some("light `lamp`: no; yes".into());
     panel.settle();
+    let centre = Headless::rect_of(panel.named(Role::Button, "Undo (Ctrl+Z)")).center();
+    panel.hover(centre);
+    assert!(panel.says("Takes back: power of `lamp`"), "{:#?}", panel.texts());
     click(&mut panel, Role::Button, "Undo (Ctrl+Z)");
-    assert!(panel.wishes.undo && panel.says("light `lamp`: no; yes"));
+    assert!(panel.wishes.undo && !panel.wishes.redo && panel.says("light `lamp`: no; yes"));
+    panel.redo = Some("sigma".into());
+    panel.settle();
+    click(&mut panel, Role::Button, "Redo (Ctrl+Y)");
+    assert!(panel.wishes.redo);
 }
 
 #[test]
@@ -324,20 +340,20 @@ fn a_bake_ends_by_density_error_or_time() {
         },
         SIZE,
     );
-    choose(&mut panel, "Bake until", "max error 3 %");
+    choose(&mut panel, "Bake until", "max error");
     assert_eq!(panel.panel.settings.max_error, Some(0.03));
     assert_eq!(panel.panel.settings.max_time_s, None);
     let starting = BakeSettings::starting_density_per_sr(0.03);
     assert_eq!(panel.panel.settings.density_per_sr, starting);
-    type_into(&mut panel, "3.0", "0.5");
+    type_into(&mut panel, "3.0 %", "0.5");
     assert_eq!(panel.panel.settings.max_error, Some(0.005));
-    choose(&mut panel, "Bake until", "max time 10 s");
+    choose(&mut panel, "Bake until", "max time");
     assert_eq!(
         panel.panel.settings.max_error,
         Some(LEAST_MAX_ERROR),
         "as far as the time goes"
     );
-    type_into(&mut panel, "10.0", "0.25");
+    type_into(&mut panel, "10 s", "0.25");
     assert_eq!(panel.panel.settings.max_time_s, Some(0.25));
     choose(&mut panel, "Bake until", "ray density");
     assert_eq!(panel.panel.settings.density_per_sr, 25_000.0);
@@ -345,7 +361,7 @@ fn a_bake_ends_by_density_error_or_time() {
         (panel.panel.settings.max_error, panel.panel.settings.max_time_s),
         (None, None)
     );
-    choose(&mut panel, "Bake until", "max error 1 %");
+    choose(&mut panel, "Bake until", "max error");
     choose(&mut panel, "Estimator", "splat");
     assert_eq!(panel.panel.settings.max_error, None, "splats do not refine");
     assert_eq!(panel.panel.settings.density_per_sr, 100_000.0);
@@ -375,14 +391,15 @@ fn levels_tell_their_error_and_time() {
 #[test]
 fn the_error_is_shown_only_where_there_is_one() {
     let mut panel = panel();
-    let centre = Headless::rect_of(panel.named(Role::RadioButton, "error")).center();
-    panel.click(centre);
+    choose(&mut panel, "View", "error");
     assert_eq!(panel.panel.display.quantity, Quantity::Light);
-    panel.hover(centre);
+    let list = Headless::rect_of(panel.labelled(Role::ComboBox, "View")).center();
+    panel.click(list);
+    panel.hover(Headless::rect_of(panel.named(Role::Button, "error")).center());
     assert!(panel.says("come without an estimate of their error"));
     panel.has_errors = true;
     panel.settle();
-    panel.click(centre);
+    click(&mut panel, Role::Button, "error");
     assert_eq!(panel.panel.display.quantity, Quantity::Error);
 }
 
@@ -685,8 +702,9 @@ fn everything_of_use_is_in_the_window_at_1280_by_720() {
 
 #[test]
 fn every_control_says_what_it_does_to_accuracy_and_cost() {
-    let mut panel = Headless::with_scene(scene(), settings(), TALL);
+    let mut panel = with_scene(scene());
     open(&mut panel, "Rays and kernels");
+    open(&mut panel, "Limits");
     for label in [
         "Light",
         "Intensity [W/sr]",
@@ -714,14 +732,18 @@ fn every_control_says_what_it_does_to_accuracy_and_cost() {
         "White balance",
         "Tone map",
         "Light shown",
-        "Map shown",
+        "View",
+        "Preset",
+        "Max depth",
+        "Weakest branch",
+        "Wavefronts",
     ]) {
         let centre = Headless::rect_of(panel.named(Role::Label, label)).center();
         panel.hover(centre);
         let told = panel.texts().into_iter().find(|text| text.contains("Accuracy:"));
         let told = told.unwrap_or_else(|| panic!("{label}: nothing on hover in {:#?}", panel.texts()));
         assert!(
-            told.contains("Range:") && told.contains("Cost:"),
+            told.contains("Range:") && told.contains("Default:") && told.contains("Cost:"),
             "{label}: {told}"
         );
         panel.hover(pos2(900.0, 400.0));

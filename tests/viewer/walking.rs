@@ -127,6 +127,48 @@ fn a_wall_stops_the_walk_at_every_frame_rate_and_lets_it_slide() {
 }
 
 #[test]
+fn past_a_corner_it_goes_straight_on_at_every_frame_rate() {
+    // The front of a cupboard is slid along to its corner; the end of the room is behind it.
+    let cupboard = [DVec3::new(-2.0, 0.0, -1.4), DVec3::new(0.1, 2.0, -1.0)];
+    let end = [DVec3::new(-10.0, 0.0, -9.0), DVec3::new(10.0, 3.0, -8.0)];
+    let room = Boxes(vec![floor(), cupboard, end]);
+    let mut places = Vec::new();
+    for frames in [2, 14, 168, 1400] {
+        let mut navigator = walker(DVec3::new(0.0, EYE_M, 1.0), DVec3::new(0.2, 0.0, -1.0), &room);
+        navigator.keys = HeldKeys { run: true, ..FORWARD };
+        pass(&mut navigator, &room, 1.4, frames);
+        let past = eye(&navigator);
+        assert!((-8.0..-1.4).contains(&past.z), "{frames} frames: {past}");
+        places.push(past);
+    }
+    for place in &places {
+        assert!(place.distance(places[3]) < 0.1, "{places:?}");
+    }
+}
+
+#[test]
+fn being_pushed_off_a_wall_gives_no_speed_however_short_the_frame() {
+    let wall = [DVec3::new(-10.0, 0.0, -3.2), DVec3::new(10.0, 3.0, -3.0)];
+    let room = Boxes(vec![floor(), wall]);
+    for frame_s in [1e-7, 1e-5, 1e-3, 0.1] {
+        // Nearer than anyone gets on foot: who came flying.
+        let mut navigator = walker(DVec3::new(0.0, EYE_M, -2.9), DVec3::new(1.0, 0.0, -1.0), &room);
+        navigator.keys = FORWARD;
+        for _ in 0..40 {
+            navigator.advance_among(frame_s, &room);
+        }
+        navigator.keys = HeldKeys::default();
+        pass(&mut navigator, &room, 1.0, 60);
+        let end = eye(&navigator);
+        assert!((-3.0..-2.7).contains(&end.z), "frames of {frame_s} s: {end}");
+        assert!(
+            end.x < 40.0 * frame_s * SPEED_M_PER_S + 0.2,
+            "frames of {frame_s} s: {end}"
+        );
+    }
+}
+
+#[test]
 fn steps_are_climbed_and_tables_are_not() {
     let step = [DVec3::new(-10.0, 0.0, -10.0), DVec3::new(10.0, 0.3, -2.0)];
     let table = [DVec3::new(-10.0, 0.0, -10.0), DVec3::new(10.0, 0.9, -5.0)];

@@ -12,6 +12,7 @@ use nephroid::progress::{Control, Stage};
 use nephroid::scene::builtin;
 use nephroid::settings::{BakeSettings, MapResolution};
 use nephroid::viewer::ViewerOptions;
+use nephroid::viewer::files::FilesOptions;
 use nephroid::viewer::model::Model;
 use nephroid::viewer::panel::{Quantity, Wishes};
 use nephroid::viewer::worker::{BakeRequest, BakeState, BakedLevel, Worth};
@@ -160,6 +161,7 @@ fn a_worth_is_shown_until_other_maps_come_and_the_maps_stay() {
         exposure_stops: None,
         stop: Some(Arc::new(Control::default())),
         event_log: None,
+        files: FilesOptions::default(),
     };
     let mut model = Model::new(&options, || ()).expect("threads are to be had");
     let worth = Wishes {
@@ -237,6 +239,12 @@ fn click(panel: &mut Headless, role: Role, name: &str) {
     panel.click(centre);
 }
 
+fn choose_view(panel: &mut Headless, name: &str) {
+    let centre = Headless::rect_of(panel.labelled(Role::ComboBox, "View")).center();
+    panel.click(centre);
+    click(panel, Role::Button, name);
+}
+
 fn worth_of_refraction(panel: &Headless, difference: Result<Difference, String>) -> Worth {
     Worth {
         effect: Effect::Refraction,
@@ -301,7 +309,7 @@ fn the_panel_offers_the_worth_of_what_is_on_and_tells_it_in_watts() {
         panel.settle();
         assert!(panel.says(told), "{told} is not in {:#?}", panel.texts());
     }
-    click(&mut panel, Role::RadioButton, "difference");
+    choose_view(&mut panel, "difference");
     assert_eq!(panel.panel.display.quantity, Quantity::Difference);
     panel.worth = Some(worth_of_refraction(
         &panel,
@@ -314,6 +322,6 @@ fn the_panel_offers_the_worth_of_what_is_on_and_tells_it_in_watts() {
 #[test]
 fn a_difference_is_shown_only_where_there_is_one() {
     let mut panel = panel();
-    click(&mut panel, Role::RadioButton, "difference");
+    choose_view(&mut panel, "difference");
     assert_eq!(panel.panel.display.quantity, Quantity::Light);
 }

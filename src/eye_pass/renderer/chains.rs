@@ -7,6 +7,7 @@ use glam::DVec3;
 
 use super::bindings::bind_group;
 use super::geometry::Geometry;
+use super::objects::absorption_per_m;
 use super::storage::Storage;
 use super::uniforms::{ChainStart, LightRecord, Node, SeenWavelengths, Triangle, rgb};
 use crate::error::{Error, Result};
@@ -147,15 +148,23 @@ impl ChainScene {
             .lights
             .iter()
             .filter_map(|light| Emitter::middle(light, scene));
-        let records: Vec<LightRecord> = middles.map(|middle| self.record(&middle)).collect();
+        let records: Vec<LightRecord> = middles.map(|middle| self.record(&middle, scene)).collect();
         self.light_count = records.len() as u32;
         self.lights.write(gpu, &records);
     }
 
-    fn record(&self, emitter: &Emitter) -> LightRecord {
+    fn record(&self, emitter: &Emitter, scene: &Scene) -> LightRecord {
         let single = |direction: DVec3| direction.as_vec3().to_array();
+        let within = match emitter.kind.position() {
+            Some(place) => media_at(&self.tracer, place),
+            None => MediumStack::default(),
+        };
         let record = LightRecord {
             strength: rgb(emitter.strength),
+            absorption_per_m: within
+                .top()
+                .map_or([0.0; 3], |body| absorption_per_m(scene.material_of(body))),
+            ior: within.ior(scene) as f32,
             ..Default::default()
         };
         match emitter.kind {

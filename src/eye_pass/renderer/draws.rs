@@ -43,10 +43,12 @@ impl Manner {
     pub(super) fn key(self, look: &Look) -> Option<PipelineKey> {
         let writes = match self.style {
             MapStyle::AsItIs => Writes::MapValue,
+            MapStyle::Inspected { what, .. } => Writes::Inspected(what),
             MapStyle::Lit if self.is_specular(look) => Writes::Composed,
             MapStyle::Lit => Writes::Own,
         };
-        let is_left_out = !look.surface.is_opaque() && writes != Writes::Composed;
+        let is_shape = matches!(writes, Writes::Inspected(what) if what.is_of_shape());
+        let is_left_out = !look.surface.is_opaque() && writes != Writes::Composed && !is_shape;
         (!is_left_out).then(|| self.of(look, writes))
     }
 
@@ -78,6 +80,7 @@ impl Manner {
             },
             has_sky: self.has_sky,
             parts_wavelengths: self.parts_wavelengths,
+            is_logarithmic: self.style.is_logarithmic(),
         };
         PipelineKey::new(writes, look.surface, faces, how)
     }

@@ -312,10 +312,14 @@ fn single(uv: DVec2) -> [f32; 2] {
 }
 
 fn corner(mesh: &Mesh, image: Option<&TextureRef>, vertex: usize) -> Corner {
-    let uv = image.and_then(|image| {
-        let set = if image.uv_set == 0 { &mesh.uv0 } else { &mesh.uv1 };
-        set.as_ref().map(|uvs| image.transform(uvs[vertex]))
-    });
+    // Without an image they are looked at, but nothing is looked up by them.
+    let uv = match image {
+        Some(image) => {
+            let set = if image.uv_set == 0 { &mesh.uv0 } else { &mesh.uv1 };
+            set.as_ref().map(|uvs| image.transform(uvs[vertex]))
+        }
+        None => mesh.uv0.as_ref().map(|uvs| uvs[vertex]),
+    };
     Corner {
         position: mesh.positions[vertex].as_vec3().to_array(),
         normal: mesh.normals[vertex].as_vec3().to_array(),

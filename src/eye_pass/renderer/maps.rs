@@ -15,7 +15,7 @@ use crate::gpu::Gpu;
 use crate::illumination::{Chart, IlluminationMap};
 use crate::scene::texture::Wrap;
 
-/// A texel: linear red, green and blue, and nothing.
+/// A texel: linear red, green and blue, and 1 in place of all three where they are no numbers.
 pub(super) type Texel = [f16; 4];
 
 /// Texels that one thread works on at a time.
@@ -119,6 +119,7 @@ fn peak(irradiance: &[[f32; 3]]) -> f32 {
         block
             .iter()
             .flatten()
+            .filter(|value| value.is_finite())
             .fold(0.0, |peak: f32, value| peak.max(*value))
     };
     irradiance
@@ -154,7 +155,12 @@ pub(super) fn half_floats(irradiance: &[[f32; 3]], scale: f32) -> Vec<Texel> {
     blocks.for_each(|(texels, irradiance)| {
         let scaled: Vec<[f32; 4]> = irradiance
             .iter()
-            .map(|[r, g, b]| [*r / scale, *g / scale, *b / scale, 0.0])
+            .map(|rgb| match rgb {
+                [r, g, b] if rgb.iter().all(|value| value.is_finite()) => {
+                    [r / scale, g / scale, b / scale, 0.0]
+                }
+                _ => [0.0, 0.0, 0.0, 1.0],
+            })
             .collect();
         texels
             .as_flattened_mut()

@@ -19,6 +19,7 @@ mod cover;
 mod draws;
 mod geometry;
 mod images;
+mod inspection;
 mod maps;
 mod minify;
 mod objects;
@@ -39,6 +40,7 @@ mod tone_mapping;
 mod uniforms;
 
 pub use counts::{EyeCounts, GpuMs};
+pub use inspection::{Inspected, MapStyle};
 pub use offscreen::{render_counted, render_offscreen, render_sampled};
 pub use paging::Uploaded;
 pub use probe::{ProbedHit, probe};
@@ -71,16 +73,6 @@ use crate::scene::Scene;
 const MAP_BUDGET_BYTES: u64 = 1 << 30;
 /// Storage buffers that every fragment reads.
 const LEAST_BUFFERS: u32 = 2;
-
-/// What the values of maps stand for.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum MapStyle {
-    /// Irradiance [W/m²]: surfaces send it by their albedo, mirrors reflect it, glass lets it through.
-    #[default]
-    Lit,
-    /// Colours in linear light: shown as they are, and clear bodies left out. Surfaces without a map are black.
-    AsItIs,
-}
 
 /// A scene on the device, drawn as often as asked.
 #[derive(Debug)]

@@ -240,7 +240,7 @@ fn lobe_rad(material: &Material) -> f64 {
 }
 
 /// What a body absorbs [1/m]: −ln(colour)/distance, per channel.
-fn absorption_per_m(material: &Material) -> [f32; 3] {
+pub(super) fn absorption_per_m(material: &Material) -> [f32; 3] {
     match material.volume {
         Some(volume) if volume.attenuation_distance_m.is_finite() && volume.attenuation_distance_m > 0.0 => {
             rgb(volume

@@ -5,7 +5,7 @@ use half::f16;
 use super::accumulation::Mean;
 use super::draws::visible_objects;
 use super::quality::Sample;
-use super::{EyeCounts, EyeQuality, Renderer};
+use super::{EyeCounts, EyeQuality, MapStyle, Renderer};
 use crate::effect::{Effect, EffectSwitches};
 use crate::error::Result;
 use crate::eye_pass::{Picture, View};
@@ -119,6 +119,9 @@ impl Renderer {
 
     /// By which radiance fits half floats.
     fn scale(&self, view: &View) -> f64 {
+        if matches!(self.map_style, MapStyle::Inspected { .. }) {
+            return 1.0;
+        }
         let peak = self.objects.peak_radiance.max(self.peak_behind(view));
         // A power of two changes no digit.
         if peak > 0.0 {

@@ -277,7 +277,11 @@ impl Renderer {
                 let offset = sample.offset[axis] - sample.traced_offset(quality)[axis];
                 (offset * traced_per_pixel[axis]) as f32
             }),
-            padding: [0.0; 2],
+            colour_scale: self.map_style.colour_scale().map(|number| number as f32),
+            fault: (radiance_scale / view.exposure_stops.exp2()) as f32,
+            padding0: 0.0,
+            padding1: 0.0,
+            padding2: 0.0,
         }
     }
 

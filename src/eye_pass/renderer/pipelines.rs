@@ -4,8 +4,11 @@ use std::collections::HashMap;
 
 use super::bindings::{bind_group_layout, pipeline_layout, storage, texture, uniform};
 use super::geometry::{CORNER_LAYOUT, MAP_UV_LAYOUT};
+use super::inspection::Inspected;
 use super::objects::surface_code;
-use super::shaders::{COMPOSED, PARTED, PARTED_UNDER_SKY, SURFACE, TRACED, TRACED_UNDER_SKY, UNDER_LIGHTS};
+use super::shaders::{
+    COMPOSED, INSPECTED, PARTED, PARTED_UNDER_SKY, SURFACE, TRACED, TRACED_UNDER_SKY, UNDER_LIGHTS,
+};
 use super::sky;
 use crate::gpu::Gpu;
 use crate::gpu::shader::Program;
@@ -25,6 +28,8 @@ pub(super) enum Writes {
     OwnUnderLights,
     /// The map's value.
     MapValue,
+    /// Something else about the surface.
+    Inspected(Inspected),
     /// Depth only, before chains are traced for what is nearest.
     Depth,
     /// Chains that begin at a specular surface.
@@ -34,14 +39,20 @@ pub(super) enum Writes {
 }
 
 impl Writes {
-    pub(super) const ALL: [Self; 6] = [
-        Self::Own,
-        Self::OwnUnderLights,
-        Self::MapValue,
-        Self::Depth,
-        Self::Traced,
-        Self::Composed,
-    ];
+    /// Every one.
+    pub(super) fn all() -> impl Iterator<Item = Self> {
+        let others = [
+            Self::Own,
+            Self::OwnUnderLights,
+            Self::MapValue,
+            Self::Depth,
+            Self::Traced,
+            Self::Composed,
+        ];
+        others
+            .into_iter()
+            .chain(Inspected::ALL.into_iter().map(Self::Inspected))
+    }
 
     /// Its fragment stage, if it has one.
     pub(super) fn entry_point(self) -> Option<&'static str> {
@@ -49,6 +60,7 @@ impl Writes {
             Self::Own => Some("own"),
             Self::OwnUnderLights => Some("own_under_lights"),
             Self::MapValue => Some("map_value"),
+            Self::Inspected(_) => Some("inspected"),
             Self::Depth => None,
             Self::Traced => Some("traced"),
             Self::Composed => Some("composed"),
@@ -103,6 +115,8 @@ pub(super) struct DrawnHow {
     pub(super) has_sky: bool,
     /// Whether chains go on by wavelength where glass parts light.
     pub(super) parts_wavelengths: bool,
+    /// Whether the scale of false colours is logarithmic.
+    pub(super) is_logarithmic: bool,
 }
 
 impl PipelineKey {
@@ -117,7 +131,7 @@ impl PipelineKey {
         let looks_up = match writes {
             Writes::Own | Writes::OwnUnderLights => surface != SurfaceKind::Mirror,
             Writes::Traced => true,
-            Writes::MapValue | Writes::Depth | Writes::Composed => false,
+            Writes::MapValue | Writes::Inspected(_) | Writes::Depth | Writes::Composed => false,
         };
         Self {
             writes,
@@ -135,6 +149,7 @@ impl PipelineKey {
                     && (writes == Writes::Traced || (shows_itself && surface == SurfaceKind::Mixed)),
                 has_sky: how.has_sky && writes == Writes::Traced,
                 parts_wavelengths: how.parts_wavelengths && writes == Writes::Traced,
+                is_logarithmic: how.is_logarithmic && matches!(writes, Writes::Inspected(_)),
             },
         }
     }
@@ -144,6 +159,7 @@ impl PipelineKey {
         match self.writes {
             Writes::Own | Writes::MapValue | Writes::Depth => SURFACE,
             Writes::OwnUnderLights => UNDER_LIGHTS,
+            Writes::Inspected(_) => INSPECTED,
             Writes::Traced => match (self.how.parts_wavelengths, self.how.has_sky) {
                 (false, false) => TRACED,
                 (false, true) => TRACED_UNDER_SKY,
@@ -161,6 +177,10 @@ impl PipelineKey {
                 ("SURFACE", f64::from(surface_code(self.surface))),
                 ("HAS_TEXTURE", flag(self.how.has_texture)),
                 ("HAS_BUMPS", flag(self.how.has_bumps)),
+            ],
+            Writes::Inspected(what) => vec![
+                ("INSPECTED", f64::from(what.code())),
+                ("IS_LOGARITHMIC", flag(self.how.is_logarithmic)),
             ],
             Writes::Traced => vec![
                 ("HAS_TINTED_GLASS", flag(self.how.has_texture)),
@@ -267,7 +287,7 @@ impl SurfacePipelines {
 
     fn layout(&self, gpu: &Gpu, key: PipelineKey) -> wgpu::PipelineLayout {
         let second = match key.writes {
-            Writes::Own | Writes::MapValue | Writes::Depth => None,
+            Writes::Own | Writes::MapValue | Writes::Inspected(_) | Writes::Depth => None,
             Writes::OwnUnderLights | Writes::Traced => self.traced_layout.as_ref(),
             Writes::Composed => Some(&self.composed_layout),
         };

@@ -29,6 +29,19 @@ pub(super) const SURFACE: Program = Program {
     ],
 };
 
+/// Surfaces by something else than their light.
+pub(super) const INSPECTED: Program = Program {
+    name: "inspected",
+    sources: &[
+        shader_source!("shared/false_colours"),
+        shader_source!("eye_pass/frame"),
+        shader_source!("eye_pass/objects"),
+        shader_source!("eye_pass/images"),
+        shader_source!("eye_pass/place"),
+        shader_source!("eye_pass/inspected"),
+    ],
+};
+
 /// Chains of specular surfaces.
 pub(super) const TRACED: Program = Program {
     name: "traced",
@@ -203,6 +216,7 @@ pub fn programs() -> Vec<Program> {
     vec![
         SURFACE,
         UNDER_LIGHTS,
+        INSPECTED,
         TRACED,
         TRACED_UNDER_SKY,
         PARTED,
@@ -267,7 +281,7 @@ pub fn specialisations() -> Vec<Specialisation> {
         constants: Vec::new(),
     };
     let mut all = vec![alone(ACCUMULATED, "accumulated"), alone(SKY, "sky_drawn")];
-    for writes in Writes::ALL {
+    for writes in Writes::all() {
         for kind in KINDS {
             for flags in 0..32 {
                 let manner = DrawnHow {
@@ -277,6 +291,7 @@ pub fn specialisations() -> Vec<Specialisation> {
                     has_bumps: flags & 8 > 0,
                     has_sky: flags & 4 > 0,
                     parts_wavelengths: flags & 16 > 0,
+                    is_logarithmic: flags & 1 > 0,
                 };
                 let key = PipelineKey::new(writes, kind, Faces::Both, manner);
                 all.extend(key.writes.entry_point().map(|entry_point| Specialisation {

@@ -37,7 +37,13 @@ shader_struct! {
         traced_per_pixel: [f32; 2],
         /// By which the traced picture is looked up off its place, right and down [pixels of it].
         traced_offset: [f32; 2],
-        padding: [f32; 2],
+        /// Where the scale of false colours begins, and what its steps are multiplied by.
+        colour_scale: [f32; 2],
+        /// What is written in place of what is no number.
+        fault: f32,
+        padding0: f32,
+        padding1: f32,
+        padding2: f32,
     }
 }
 
@@ -129,6 +135,10 @@ shader_struct! {
         axis: [f32; 3],
         /// Cosine of the half-angle at which it ends.
         cos_outer: f32,
+        /// Of what is around it [1/m].
+        absorption_per_m: [f32; 3],
+        /// Refractive index of that [1].
+        ior: f32,
     }
 }
 

@@ -179,7 +179,6 @@ impl<'a> PathTracer<'a> {
         if E::ABSORPTION && segment.media.absorbs(self.tracer.scene()) {
             flux_w = flux_w * segment.media.transmittance(self.tracer.scene(), hit.distance_m);
             self.counts.attenuated += 1;
-            self.book(Account::Absorbed, segment.flux_w - flux_w);
         }
         let path_m = segment.path_m + hit.distance_m;
         let micro = self.limits.microfacets.map(|facets| facets.at(segment.depth));
@@ -195,14 +194,20 @@ impl<'a> PathTracer<'a> {
         }
         let deposit_w = flux_w * interaction.deposit;
         if segment.depth == 0 {
-            // What a polished surface takes on the first hit is direct light.
-            self.book(Account::NotEmitted, deposit_w);
-            self.book(Account::Emitted, flux_w - deposit_w);
+            // What a surface takes on the first hit is direct light, and so is what a body around the lamp takes of that.
+            let is_specular = self.tracer.scene().material_of(hit.object).surface.is_specular();
+            let direct_w = if is_specular { deposit_w } else { segment.flux_w };
+            self.book(Account::NotEmitted, direct_w);
+            self.book(Account::Emitted, segment.flux_w - direct_w);
+            if !is_specular {
+                return;
+            }
         } else if let (Some(event), true) = (segment.event, deposit_w.max_channel() > 0.0) {
             let arriving_w = self.channels.apply(deposit_w);
             arrive(arrival(&hit, &segment, event, arriving_w, path_m));
         }
-        self.book(Account::Absorbed, flux_w * interaction.absorbed);
+        let on_the_way_w = segment.flux_w - flux_w;
+        self.book(Account::Absorbed, on_the_way_w + flux_w * interaction.absorbed);
         self.book(Account::SwitchedOff, flux_w * interaction.switched_off);
         for branch in [interaction.reflection, interaction.transmission]
             .into_iter()

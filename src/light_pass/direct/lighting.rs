@@ -3,6 +3,7 @@
 use glam::DVec3;
 
 use super::facet::SurfacePoint;
+use super::surroundings::Surroundings;
 use crate::optics::LinearSrgb;
 use crate::optics::fresnel::dielectric_reflectance;
 use crate::scene::emitter::{Emitter, EmitterKind};
@@ -58,25 +59,32 @@ pub struct Arriving {
     pub distance_m: f64,
     /// E for a strength of 1, before polish reflects its share.
     pub open: f64,
-    /// And after that.
-    pub strength: f64,
+    /// And after that, and after what lies on the way.
+    pub strength: LinearSrgb,
 }
 
 impl Arriving {
     /// What a beam gives a point; `None` where it is nothing, or comes to the wrong side. A mixed surface takes what its
-    /// polish does not reflect.
-    pub fn from_beam(beam: &Beam, point: &SurfacePoint, material: &Material) -> Option<Self> {
+    /// polish does not reflect; the light comes all the way through what is around its source.
+    pub fn from_beam(
+        beam: &Beam,
+        point: &SurfacePoint,
+        material: &Material,
+        within: &Surroundings,
+    ) -> Option<Self> {
         if beam.to_light.dot(point.geometric_normal) < 0.0 {
             return None;
         }
         let cosine = beam.to_light.dot(point.shading_normal);
         let taken = match material.surface {
-            SurfaceKind::Mixed => 1.0 - material.polish * dielectric_reflectance(cosine, material.ior),
+            SurfaceKind::Mixed => {
+                1.0 - material.polish * dielectric_reflectance(cosine, material.ior / within.ior)
+            }
             _ => 1.0,
         };
         let open = beam.across_beam * cosine;
-        let strength = open * taken;
-        (strength > 0.0).then(|| Self {
+        let strength = within.transmittance(beam.distance_m) * (open * taken);
+        (strength.max_channel() > 0.0).then(|| Self {
             irradiance: beam.strength * strength,
             to_light: beam.to_light,
             distance_m: beam.distance_m,

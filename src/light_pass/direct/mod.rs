@@ -1,13 +1,15 @@
 //! Light straight from the lamps (LD), as irradiance of every texel.
 //!
 //! E = I cos θ/r² for points and spots, E⊥ cos θ for suns, θ by the interpolated normal, stopped by every surface,
-//! clear glass included: what comes through that is caustic light (LS+D). Each side of a surface has a
+//! clear glass included: what comes through that is caustic light (LS+D). A body around a lamp takes its share on the
+//! way. Each side of a surface has a
 //! map of its own. Lights with extent are means over their places.
 
 pub(super) mod facet;
 mod lighting;
 mod polygon;
 mod source;
+mod surroundings;
 mod texel;
 
 use glam::DVec2;
@@ -23,7 +25,7 @@ use crate::scene::{Light, Material};
 use crate::transport::Tracer;
 use facet::Facet;
 use lighting::{Arriving, Beam};
-use source::Source;
+use source::{Emission, Source};
 use texel::{Lit, Part, Row, Sample, Texel, TexelSum};
 
 /// Samples across and down a texel where light is all there or all away.
@@ -62,7 +64,7 @@ pub fn bake_direct(
     let sources: Vec<Option<Source>> = lights
         .iter()
         .enumerate()
-        .map(|(index, light)| Source::new(light, tracer.scene(), index))
+        .map(|(index, light)| Source::new(light, tracer, index))
         .collect();
     charts
         .iter()
@@ -255,10 +257,11 @@ impl<'a> Baker<'a> {
             shadow_rays: 0,
         };
         for (light, source) in self.sources.iter().enumerate() {
-            match source {
-                Some(Source::Single(emitter)) => {
+            let Some(source) = source else { continue };
+            match &source.emission {
+                Emission::Single(emitter) => {
                     let arriving = Beam::new(emitter, point.position)
-                        .and_then(|beam| Arriving::from_beam(&beam, &point, self.material));
+                        .and_then(|beam| Arriving::from_beam(&beam, &point, self.material, &source.within));
                     let Some(arriving) = arriving else { continue };
                     sample.shadow_rays += 1;
                     let ray = point.spawn(arriving.to_light);
@@ -267,14 +270,13 @@ impl<'a> Baker<'a> {
                         sample.mask ^= 1u64.rotate_left(light as u32 % 64);
                     }
                 }
-                Some(Source::Soft(soft)) => {
+                Emission::Soft(soft) => {
                     let run = soft.run(hash, index, places);
-                    let gathered = soft.gather(self.tracer, &point, self.material, run);
+                    let gathered = soft.gather(self.tracer, &point, self.material, &source.within, run);
                     sample.shadow_rays += gathered.shadow_rays;
                     sample.irradiance += gathered.irradiance;
                     sample.soft += gathered.irradiance.luminance();
                 }
-                None => {}
             }
         }
         sample

@@ -13,6 +13,7 @@ use glam::{DVec2, DVec3};
 use super::facet::SurfacePoint;
 use super::lighting::{Arriving, Beam};
 use super::polygon::Polygon;
+use super::surroundings::Surroundings;
 use crate::geometry::sampling::even_point;
 use crate::optics::LinearSrgb;
 use crate::scene::emitter::{Emitter, Places};
@@ -37,7 +38,15 @@ const BEFORE_LAMP: f64 = 1e-9;
 const SEED: u64 = 0x6c69_6768_7473;
 
 /// A light ready to be looked for.
-pub enum Source {
+pub struct Source {
+    /// Where its light comes from.
+    pub emission: Emission,
+    /// What the light goes through.
+    pub within: Surroundings,
+}
+
+/// Where light comes from.
+pub enum Emission {
     /// From one point or direction.
     Single(Emitter),
     /// From many.
@@ -86,15 +95,23 @@ pub struct Gathered {
 
 impl Source {
     /// A light of a scene, the `index`th that is looked for; `None` where it sends nothing.
-    pub fn new(light: &Light, scene: &Scene, index: usize) -> Option<Self> {
-        if !light.has_extent() {
-            return Emitter::middle(light, scene).map(Self::Single);
-        }
-        Some(Self::Soft(Soft {
-            places: ManyPlaces::new(light, scene, index)?,
-            shape: shape(light, scene),
-            light: index as u64,
-        }))
+    pub fn new(light: &Light, tracer: &Tracer, index: usize) -> Option<Self> {
+        let scene = tracer.scene();
+        let middle = Emitter::middle(light, scene);
+        let within = middle
+            .as_ref()
+            .and_then(|middle| middle.kind.position())
+            .map_or(Surroundings::VACUUM, |place| Surroundings::at(tracer, place));
+        let emission = if light.has_extent() {
+            Emission::Soft(Soft {
+                places: ManyPlaces::new(light, scene, index)?,
+                shape: shape(light, scene),
+                light: index as u64,
+            })
+        } else {
+            Emission::Single(middle?)
+        };
+        Some(Self { emission, within })
     }
 }
 
@@ -210,6 +227,7 @@ impl Soft {
         tracer: &Tracer,
         point: &SurfacePoint,
         material: &Material,
+        within: &Surroundings,
         run: Range<usize>,
     ) -> Gathered {
         let count = run.len() as f64;
@@ -217,7 +235,7 @@ impl Soft {
         for index in run.clone() {
             let arriving = self
                 .beam(index, &run, point, material)
-                .and_then(|beam| Arriving::from_beam(&beam, point, material));
+                .and_then(|beam| Arriving::from_beam(&beam, point, material, within));
             let Some(arriving) = arriving else { continue };
             sum.shadow_rays += 1;
             sum.open += arriving.open;
@@ -329,9 +347,10 @@ impl Cosines {
 #[derive(Default)]
 struct Sum {
     irradiance: LinearSrgb,
-    /// Σ of what would come without shadows, polish left aside, and of what is taken, for strength 1.
+    /// Σ of what would come without shadows, polish and what lies on the way left aside, and of what is taken, for
+    /// strength 1.
     open: f64,
-    taken: f64,
+    taken: LinearSrgb,
     shadow_rays: u64,
 }
 

@@ -117,11 +117,14 @@ fn chosen(interaction: &Interaction, surface: SurfaceKind, at: f64) -> Option<(B
     .filter(|(_, share)| share.max_channel() > 0.0)
 }
 
-/// Share of the light from a direction that a surface takes: what its polish does not reflect.
-pub fn taken(tracer: &Tracer, object: usize, cosine: f64) -> f64 {
+/// Share of the light from a direction, out of a medium, that a surface takes: what its polish does not reflect.
+pub fn taken(tracer: &Tracer, object: usize, cosine: f64, media: &MediumStack) -> f64 {
     let material = tracer.scene().material_of(object);
     match material.surface {
-        SurfaceKind::Mixed => 1.0 - material.polish * dielectric_reflectance(cosine, material.ior),
+        SurfaceKind::Mixed => {
+            let eta = material.ior / media.ior(tracer.scene());
+            1.0 - material.polish * dielectric_reflectance(cosine, eta)
+        }
         _ => 1.0,
     }
 }

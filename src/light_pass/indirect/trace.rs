@@ -207,7 +207,7 @@ impl Pass<'_> {
         let point = grid.point(mesh, element, even_point(index, 0, seed))?;
         let direction = cosine_direction(&point, even_point(index, 1, seed));
         let own = grid.chart.object();
-        let share = taken(self.tracer(), own, direction.dot(point.shading_normal));
+        let share = taken(self.tracer(), own, direction.dot(point.shading_normal), &media);
         let first = part.links.len();
         let (links, counts) = (&mut part.links, &mut part.counts);
         let found = self.follower.follow(

@@ -285,11 +285,16 @@ impl<'a> StrandTracer<'a> {
         let is_dispersive = self.tracer.scene().material_of(hit.object).is_dispersive();
         let group = self.tracer.smoothing_group(hit.object, hit.triangle);
         let at_surface = from.signature.at(hit.object, group);
+        // Patches book what is taken between surfaces; there are none before the first.
+        let taken_before = match from.strand {
+            Some(_) => LinearSrgb::BLACK,
+            None => from.flux_w - incident,
+        };
         let mut node = SurfaceNode {
             signature: at_surface,
             first: from.strand.is_none(),
-            incident,
-            absorbed: incident * interaction.absorbed,
+            incident: incident + taken_before,
+            absorbed: incident * interaction.absorbed + taken_before,
             depth: LinearSrgb::BLACK,
             threshold: LinearSrgb::BLACK,
             non_finite: LinearSrgb::BLACK,

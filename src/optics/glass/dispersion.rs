@@ -2,6 +2,8 @@
 
 use std::ops::RangeInclusive;
 
+use serde::{Deserialize, Serialize};
+
 use super::GlassError;
 use crate::optics::Nanometres;
 use crate::optics::wavelength::{C_LINE, D_LINE, F_LINE, VISIBLE};
@@ -12,7 +14,7 @@ const HERZBERGER_UM: f64 = 0.168;
 const MOST_INDEX: f64 = 10.0;
 
 /// Refractive index n against vacuum or air [1] by wavelength λ [µm], as one of the formulas that people publish.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Dispersion {
     /// The same at every wavelength.
     Constant(f64),

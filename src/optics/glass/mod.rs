@@ -8,6 +8,8 @@ mod text;
 
 use std::ops::RangeInclusive;
 
+use serde::{Deserialize, Serialize};
+
 use super::Nanometres;
 use crate::error::Warning;
 
@@ -15,7 +17,7 @@ pub use dispersion::Dispersion;
 pub use error::GlassError;
 
 /// A transparent material.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Glass {
     /// Its name in the catalogue, or what it was asked for by.
     pub name: String,

@@ -7,6 +7,7 @@
 
 pub mod csv;
 pub mod error;
+pub mod hue;
 pub mod illuminants;
 pub mod luminous;
 pub mod matching;
@@ -17,6 +18,7 @@ pub mod upsample;
 pub mod xyz;
 
 pub use error::SpectrumError;
+pub use hue::{Hue, dominant};
 pub use illuminants::illuminant;
 pub use luminous::{Band, WavelengthSampler};
 pub use matching::xyz_bar;

@@ -3,6 +3,8 @@
 use std::ops::RangeInclusive;
 use std::sync::Arc;
 
+use serde::{Deserialize, Serialize};
+
 use super::quadrature::{integrate, knots_within};
 use super::{SpectrumError, Xyz, xyz_bar};
 use crate::optics::Nanometres;
@@ -13,11 +15,41 @@ use crate::units::LUMENS_PER_WATT;
 ///
 /// As light its values are W/nm (or that per m², per sr), unless they are said to be relative; as a factor they have
 /// no unit.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "Rows", into = "Rows")]
 pub struct Spectrum {
     name: Option<Arc<str>>,
     wavelengths_nm: Vec<f64>,
     values: Vec<f64>,
+}
+
+/// A spectrum as it is written down.
+#[derive(Serialize, Deserialize)]
+struct Rows {
+    name: Option<String>,
+    rows: Vec<(Nanometres, f64)>,
+}
+
+impl TryFrom<Rows> for Spectrum {
+    type Error = SpectrumError;
+
+    fn try_from(rows: Rows) -> Result<Self, SpectrumError> {
+        let spectrum = Self::new(rows.rows)?;
+        Ok(match rows.name {
+            Some(name) => spectrum.named(&name),
+            None => spectrum,
+        })
+    }
+}
+
+impl From<Spectrum> for Rows {
+    fn from(spectrum: Spectrum) -> Self {
+        let wavelengths = spectrum.wavelengths_nm.into_iter().map(Nanometres);
+        Self {
+            name: spectrum.name.map(|name| name.to_string()),
+            rows: wavelengths.zip(spectrum.values).collect(),
+        }
+    }
 }
 
 impl Spectrum {

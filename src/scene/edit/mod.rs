@@ -1,6 +1,7 @@
 //! Edits of a scene as data: each gives the edited scene and the edit that takes it back, bit for bit.
 
 mod light;
+mod light_list;
 mod material;
 mod ranges;
 mod shape;
@@ -8,15 +9,17 @@ mod shape;
 use std::sync::Arc;
 
 use glam::{DQuat, DVec3};
+use serde::{Deserialize, Serialize};
 
-use super::{LightSize, Mesh, Scene, Waves};
+pub use self::light_list::{LightOrigin, why_light_stays};
+use super::{Light, LightSize, Mesh, Scene, Waves};
 use crate::error::{Error, Result};
 use crate::optics::spectrum::Spectrum;
 use crate::optics::{Glass, LinearSrgb, Metal};
 use crate::units::{Irradiance, RadiantIntensity};
 
 /// One change of a scene. Indices are those of [`Scene::lights`], [`Scene::materials`] and [`Scene::objects`].
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Edit {
     /// Strength of a point or spot light.
     LightIntensity {
@@ -76,6 +79,21 @@ pub enum Edit {
         /// Scaled to one luminous-equivalent watt; `None` for none.
         spectrum: Option<Arc<Spectrum>>,
     },
+    /// One light more.
+    LightAdded {
+        /// Its index; `None` for behind all others.
+        light: Option<usize>,
+        /// What it is.
+        added: Arc<Light>,
+        /// Where it comes from. Not written down: for another time it is new.
+        #[serde(skip)]
+        origin: LightOrigin,
+    },
+    /// One light less: not of the glow of an object, nor of the environment.
+    LightRemoved {
+        /// Which light.
+        light: usize,
+    },
     /// Refractive index of a material; a glass keeps its Abbe number.
     MaterialIor {
         /// Which material.
@@ -94,6 +112,7 @@ pub enum Edit {
         /// Each channel in [0, 1].
         base_colour: LinearSrgb,
         /// `None` for no metal of a table.
+        #[serde(serialize_with = "Metal::write_name", deserialize_with = "Metal::read_name")]
         metal: Option<&'static Metal>,
     },
     /// Base colour of a material: the tint of glass, the albedo of what is matte; it takes the place of a metal's table.
@@ -126,7 +145,8 @@ pub enum Edit {
         /// [m].
         translation: DVec3,
     },
-    /// Another shape for an object: what takes a movement back.
+    /// Another shape for an object: what takes a movement back. Not written down.
+    #[serde(skip)]
     ObjectMesh {
         /// Which object.
         object: usize,
@@ -150,6 +170,8 @@ pub enum EditTarget {
     LightDirection(usize),
     /// Colour of a light.
     LightColour(usize),
+    /// Which lights there are.
+    LightList,
     /// Refractive index of a material.
     MaterialIor(usize),
     /// Base colour of a material.
@@ -191,6 +213,23 @@ impl Edit {
         Self::ObjectMesh { object, mesh }
     }
 
+    /// An object's mesh turned about a point of the scene, and then moved [m], from its place in `mesh`. The rotation is
+    /// a unit quaternion.
+    pub fn object_turned(
+        object: usize,
+        mesh: &Arc<Mesh>,
+        (rotation, pivot): (DQuat, DVec3),
+        offset: DVec3,
+    ) -> Self {
+        let place = |point: &DVec3| rotation * (*point - pivot) + pivot + offset;
+        let mesh = Arc::new(Mesh {
+            positions: mesh.positions.iter().map(place).collect(),
+            normals: mesh.normals.iter().map(|normal| rotation * *normal).collect(),
+            ..Mesh::clone(mesh)
+        });
+        Self::ObjectMesh { object, mesh }
+    }
+
     /// What it sets.
     pub fn target(&self) -> EditTarget {
         match self {
@@ -203,6 +242,7 @@ impl Edit {
             Self::LightColour { light, .. } | Self::LightSpectrum { light, .. } => {
                 EditTarget::LightColour(*light)
             }
+            Self::LightAdded { .. } | Self::LightRemoved { .. } => EditTarget::LightList,
             Self::MaterialIor { material, .. } => EditTarget::MaterialIor(*material),
             Self::MaterialTint { material, .. } => EditTarget::MaterialTint(*material),
             Self::MaterialSubstance { material, .. } => EditTarget::MaterialSubstance(*material),
@@ -228,6 +268,8 @@ impl Edit {
                 let found = existing(&mut scene.lights, *light, "light")?;
                 light::apply(self, *light, found)
             }
+            Self::LightAdded { light, added, origin } => light_list::add(scene, *light, added, origin),
+            Self::LightRemoved { light } => light_list::remove(scene, *light),
             Self::MaterialIor { material, .. }
             | Self::MaterialSubstance { material, .. }
             | Self::MaterialTint { material, .. }

@@ -10,7 +10,7 @@ use gltf::json::Value;
 use serde::Deserialize;
 
 use super::document::Document;
-use super::light::{left_out, light_name};
+use super::light::{Origin, left_out, light_name};
 use super::nodes::Placed;
 use super::report::Report;
 use super::spectrum;
@@ -19,7 +19,7 @@ use crate::optics::LinearSrgb;
 use crate::scene::{Light, LightKind, LightSize, PanelShape};
 use crate::units::{LUMENS_PER_WATT, Radiance};
 
-const NAME: &str = "EXT_lights_area";
+pub(super) const NAME: &str = "EXT_lights_area";
 
 /// A lamp as the file states it, unchecked.
 #[derive(Deserialize)]
@@ -67,7 +67,7 @@ impl Default for Rect {
 /// # Errors
 /// As [`spectrum::apply`].
 pub fn add_all(
-    lights: &mut Vec<Light>,
+    lights: &mut Vec<(Light, Origin)>,
     document: &Document,
     placed: &[Placed],
     folder: &Path,
@@ -99,7 +99,8 @@ pub fn add_all(
                 };
                 let stated = spectrum::stated(document, placed.node, &document.area_light_spectra, index);
                 spectrum::apply(&mut light, stated, folder, &owner, report)?;
-                lights.push(light);
+                let (node, list) = (placed.node, NAME);
+                lights.push((light, Origin { node, list, index }));
             }
             Err(why) => left_out(report, &owner, &why),
         }

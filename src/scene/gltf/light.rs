@@ -28,7 +28,7 @@ pub fn read_all(
     placed: &[Placed],
     folder: &Path,
     report: &mut Report,
-) -> Result<Vec<Light>> {
+) -> Result<Vec<(Light, Origin)>> {
     let root = &document.root;
     let extension = root
         .extensions
@@ -66,10 +66,25 @@ pub fn read_all(
         };
         let stated = spectrum::stated(document, placed.node, &document.light_spectra, index);
         spectrum::apply(&mut light, stated, folder, &owner, report)?;
-        lights.push(light);
+        let (node, list) = (placed.node, NAME);
+        lights.push((light, Origin { node, list, index }));
     }
     Ok(lights)
 }
+
+/// Where in a file a light stands.
+#[derive(Clone, Copy, Debug)]
+pub struct Origin {
+    /// glTF index of its node.
+    pub node: usize,
+    /// The extension that lists it.
+    pub list: &'static str,
+    /// Its place in that list.
+    pub index: usize,
+}
+
+/// The extension of lights without a surface.
+pub(super) const NAME: &str = "KHR_lights_punctual";
 
 /// The node's name; `lightN` where the file gives none.
 pub(super) fn light_name(placed: &Placed, index: usize) -> String {

@@ -13,6 +13,7 @@ mod document;
 mod extensions;
 mod extras;
 mod faults;
+mod glb;
 mod glow;
 pub(super) mod guard;
 mod images;
@@ -21,9 +22,11 @@ mod material;
 mod names;
 mod nodes;
 mod numbers;
+mod opened;
 mod primitive;
 mod rebase;
 mod report;
+mod save;
 mod shading;
 mod sizes;
 mod spectrum;
@@ -33,14 +36,21 @@ mod triangles;
 mod uri;
 mod viewpoint;
 mod waves;
+mod write;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
+
+use gltf::json::Value;
 
 use super::{LoadOptions, Scene};
 use crate::error::{Error, Result};
 use crate::files;
+pub use glb::Glb;
+pub use opened::Opened;
+pub(super) use opened::open;
 use report::{Budget, Report};
+pub(super) use save::save;
 
 /// Reads a `.glb` or `.gltf` file with the buffers and images beside it.
 ///
@@ -63,6 +73,31 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene> {
         .into_owned();
     scene.source = path.display().to_string();
     Ok(scene)
+}
+
+/// The file and those that its text may refer to: every text in it that names a file beside it.
+pub(super) fn files_of(path: &Path, most_bytes: u64) -> Vec<PathBuf> {
+    let mut found = vec![path.to_path_buf()];
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let Ok(bytes) = files::read_file(path, most_bytes) else {
+        return found;
+    };
+    let container = container::split(&bytes, &mut Report::default());
+    let value = container
+        .ok()
+        .and_then(|container| serde_json::from_slice(container.json).ok());
+    let mut waiting: Vec<Value> = value.into_iter().collect();
+    while let Some(value) = waiting.pop() {
+        match value {
+            Value::Array(items) => waiting.extend(items),
+            Value::Object(fields) => waiting.extend(fields.into_iter().map(|(_, value)| value)),
+            Value::String(text) => found.extend(uri::file(&text, folder).filter(|file| file.is_file())),
+            _ => {}
+        }
+    }
+    found.sort();
+    found.dedup();
+    found
 }
 
 fn crashed() -> Error {
@@ -103,8 +138,9 @@ fn read_scene(bytes: &[u8], path: &Path, options: &LoadOptions) -> Result<Scene>
     )?;
     scene.materials = materials.into_all();
     scene.textures = images.into_textures().into_iter().map(Arc::new).collect();
-    scene.lights = light::read_all(&document, &placed, folder, &mut report)?;
-    area_light::add_all(&mut scene.lights, &document, &placed, folder, &mut report)?;
+    let mut lights = light::read_all(&document, &placed, folder, &mut report)?;
+    area_light::add_all(&mut lights, &document, &placed, folder, &mut report)?;
+    scene.lights = lights.into_iter().map(|(light, _)| light).collect();
     glow::add_lights(&mut scene);
     scene.cameras = viewpoint::read_all(&document.root, &placed, &mut report);
     substance::warn_of_ranges(&scene, &mut report);

@@ -7,6 +7,7 @@ use gltf::json::Value;
 use super::extras::{of_file, text};
 use super::report::Report;
 use crate::error::{Error, Result};
+use crate::optics::glass::Dispersion;
 use crate::optics::wavelength::VISIBLE;
 use crate::optics::{Glass, Metal, Nanometres};
 use crate::scene::Scene;
@@ -48,6 +49,28 @@ pub fn read(glass: Option<&Value>, metal: Option<&Value>, owner: &str) -> Result
         }
     };
     Ok(Some(substance))
+}
+
+/// How a file states a glass beside its index at 587.56 nm.
+#[derive(Debug)]
+pub enum Stated<'a> {
+    /// In the extras, under [`GLASS_KEY`].
+    Name(&'a str),
+    /// By the extension [`NAME`]: 20/V_d.
+    Dispersion(f64),
+    /// Not at all: it has one index.
+    Nothing,
+}
+
+/// How to state a glass; `None` where a file cannot.
+pub fn stated(glass: &Glass) -> Option<Stated<'_>> {
+    let is_named = Glass::parse(&glass.name).is_ok_and(|found| found.dispersion == glass.dispersion);
+    match glass.dispersion {
+        _ if is_named => Some(Stated::Name(&glass.name)),
+        Dispersion::Abbe { v_d, .. } => Some(Stated::Dispersion(20.0 / v_d)),
+        Dispersion::Constant(_) => Some(Stated::Nothing),
+        _ => None,
+    }
 }
 
 /// The glass of an index at 587.56 nm and of what the extension states; `None` for no dispersion.

@@ -30,6 +30,16 @@ fn read_data(data: &str, owner: &str) -> Result<Vec<u8>> {
     percent_decode(payload).ok_or_else(|| refused("its data URI is not valid"))
 }
 
+/// The file that a URI names, where it may be read.
+pub fn file(uri: &str, folder: &Path) -> Option<PathBuf> {
+    // Data, and texts that no system takes for a name.
+    const MOST_BYTES: usize = 1024;
+    if uri.len() > MOST_BYTES {
+        return None;
+    }
+    path_within(folder, uri, "").ok()
+}
+
 /// A relative path below the folder. A file from elsewhere must not make us open what it likes.
 fn path_within(folder: &Path, uri: &str, owner: &str) -> Result<PathBuf> {
     let refused = |what: &str| {

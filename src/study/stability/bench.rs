@@ -1,6 +1,8 @@
 //! Bakes with the books open, and notes what laws come to.
 
+use std::num::NonZero;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use crate::error::{Error, Result};
 use crate::illumination::IlluminationMap;
@@ -78,6 +80,43 @@ impl<'a> Bench<'a> {
     /// # Errors
     /// A bake that fails; stopped before the end.
     pub fn bake(&mut self, scene: &Scene, settings: &BakeSettings) -> Result<BakeResult> {
+        let result = self.bake_unnoted(scene, settings)?;
+        self.note(&result);
+        Ok(result)
+    }
+
+    /// Bakes many small scenes side by side: as many at a time as the study has threads. Results are in the order of
+    /// the jobs.
+    ///
+    /// # Errors
+    /// As [`Self::bake`], the first of them.
+    pub fn bake_each(&mut self, jobs: &[(Scene, BakeSettings)]) -> Result<Vec<BakeResult>> {
+        let next = AtomicUsize::new(0);
+        let work = || -> Vec<(usize, Result<BakeResult>)> {
+            let indices = std::iter::from_fn(|| Some(next.fetch_add(1, Ordering::Relaxed)));
+            let jobs = indices.map_while(|index| Some((index, jobs.get(index)?)));
+            jobs.map(|(index, (scene, settings))| (index, self.bake_unnoted(scene, settings)))
+                .collect()
+        };
+        let cores = std::thread::available_parallelism().map_or(1, NonZero::get);
+        let threads = if self.threads == 0 { cores } else { self.threads };
+        let mut done: Vec<(usize, Result<BakeResult>)> = std::thread::scope(|scope| {
+            let workers: Vec<_> = (0..threads).map(|_| scope.spawn(work)).collect();
+            let results = workers.into_iter().flat_map(|worker| {
+                worker
+                    .join()
+                    .unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+            });
+            results.collect()
+        });
+        done.sort_by_key(|(index, _)| *index);
+        let results: Result<Vec<BakeResult>> = done.into_iter().map(|(_, result)| result).collect();
+        let results = results?;
+        results.iter().for_each(|result| self.note(result));
+        Ok(results)
+    }
+
+    fn bake_unnoted(&self, scene: &Scene, settings: &BakeSettings) -> Result<BakeResult> {
         let mut session = BakeSession::new(Arc::new(scene.clone()))?;
         let settings = BakeSettings {
             threads: if settings.threads == 0 {
@@ -91,9 +130,12 @@ impl<'a> Bench<'a> {
         if result.partial {
             return Err(Error::cancelled("study stability"));
         }
-        self.bakes += 1;
-        self.books_open = self.books_open.max(books_open(&result));
         Ok(result)
+    }
+
+    fn note(&mut self, result: &BakeResult) {
+        self.bakes += 1;
+        self.books_open = self.books_open.max(books_open(result));
     }
 
     /// Bakes, and leaves it to the case to look at values and ledgers.

@@ -4,16 +4,15 @@ use std::sync::Arc;
 
 use glam::{DMat3, DVec3};
 
-use super::laws::{apart, deposited_w, estimates, maps_apart, off, same_bits};
+use super::laws::{apart, deposited_w, estimates, map_sum, maps_apart, off, same_bits};
 use super::scenes::{at, glass_ball, transformed, upright_mirror};
 use super::{Bench, Case, Effort, Group};
 use crate::error::Result;
-use crate::illumination::{IlluminationMap, Layer};
+use crate::illumination::IlluminationMap;
 use crate::optics::LinearSrgb;
 use crate::scene::builtin::{self, parts, shapes};
 use crate::scene::{Light, LightKind, LightSize, PanelShape, Scene, Volume};
-use crate::session::BakeResult;
-use crate::settings::{BakeSettings, LayerKind};
+use crate::settings::BakeSettings;
 use crate::units::Radiance;
 
 /// Cases of symmetry and proportion.
@@ -43,9 +42,9 @@ fn linearity(bench: &mut Bench) -> Result<()> {
         other.lights[0].colour = LinearSrgb::new(0.3, 1.0, 0.6);
         let mut both = scene.clone();
         both.lights.extend(other.lights.clone());
-        let (a, b) = (bench.bake(&scene, &SETTINGS())?, bench.bake(&other, &SETTINGS())?);
+        let alone = [bench.bake(&scene, &SETTINGS())?, bench.bake(&other, &SETTINGS())?];
         let together = bench.bake(&both, &SETTINGS())?;
-        let sums: Vec<IlluminationMap> = together.maps.iter().map(|map| sum_of(map, &a, &b)).collect();
+        let sums: Vec<IlluminationMap> = together.maps.iter().map(|map| map_sum(map, &alone)).collect();
         bench.law(
             "two lights give the sum of their maps",
             maps_apart(&together.maps, &sums, 1.0),
@@ -53,28 +52,6 @@ fn linearity(bench: &mut Bench) -> Result<()> {
         );
     }
     Ok(())
-}
-
-/// The maps of one surface in two bakes, added up.
-fn sum_of(like: &IlluminationMap, a: &BakeResult, b: &BakeResult) -> IlluminationMap {
-    let mut sum = like.clone();
-    sum.layers = vec![Layer {
-        kind: LayerKind::Caustic,
-        irradiance: vec![[0.0; 3]; like.chart.texel_count()],
-    }];
-    let parts = a
-        .maps
-        .iter()
-        .chain(&b.maps)
-        .filter(|map| map.chart.receiver == like.chart.receiver);
-    for layer in parts.filter_map(|map| map.layer(LayerKind::Caustic)) {
-        for (total, part) in sum.layers[0].irradiance.iter_mut().zip(&layer.irradiance) {
-            for channel in 0..3 {
-                total[channel] += part[channel];
-            }
-        }
-    }
-    sum
 }
 
 /// Turned and moved, a scene has the same maps, within what both say of their errors.

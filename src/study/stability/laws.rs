@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use crate::illumination::IlluminationMap;
+use crate::illumination::{IlluminationMap, Layer};
 use crate::optics::LinearSrgb;
 use crate::scene::Scene;
 use crate::session::BakeResult;
@@ -55,6 +55,26 @@ pub fn maps_apart(maps: &[IlluminationMap], references: &[IlluminationMap], fact
 pub fn estimates(a: &BakeResult, b: &BakeResult) -> f64 {
     let estimate = |result: &BakeResult| result.estimated_relative_rmse.unwrap_or(0.0);
     estimate(a) + estimate(b)
+}
+
+/// The caustic maps of one surface in several bakes, added up; a bake without one adds nothing.
+pub fn map_sum(like: &IlluminationMap, bakes: &[BakeResult]) -> IlluminationMap {
+    let mut irradiance = vec![[0.0_f32; 3]; like.chart.texel_count()];
+    let maps = bakes.iter().flat_map(|bake| &bake.maps);
+    let parts = maps.filter(|map| map.chart.receiver == like.chart.receiver);
+    for layer in parts.filter_map(|map| map.layer(LayerKind::Caustic)) {
+        for (total, part) in irradiance.iter_mut().zip(&layer.irradiance) {
+            for channel in 0..3 {
+                total[channel] += part[channel];
+            }
+        }
+    }
+    let mut sum = like.clone();
+    sum.layers = vec![Layer {
+        kind: LayerKind::Caustic,
+        irradiance,
+    }];
+    sum
 }
 
 /// Whether two bakes gave the same maps, bit for bit.

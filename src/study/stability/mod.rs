@@ -12,6 +12,7 @@ mod lights;
 mod maps;
 mod mirrors;
 mod numbers;
+pub mod random;
 mod scenes;
 pub mod table;
 
@@ -152,6 +153,7 @@ pub fn cases() -> Vec<Case> {
         numbers::CASES,
         maps::CASES,
         invariance::CASES,
+        random::CASES,
     ];
     let mut cases = all.concat();
     cases.sort_by_key(|case| Group::ALL.iter().position(|group| *group == case.group));

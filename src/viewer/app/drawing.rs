@@ -5,17 +5,37 @@ use std::time::Instant;
 use super::{App, MOST_REPORTS};
 use crate::effect::{Effect, EffectSwitch};
 use crate::error::Result;
-use crate::eye_pass::renderer::{MapStyle, Uploaded};
+use crate::eye_pass::renderer::Uploaded;
 use crate::eye_pass::{ToneMap, View, WhiteBalance};
 use crate::optics::LinearSrgb;
 use crate::optics::spectrum::xyz::Matrix3;
+use crate::scene::load::was_dark;
 use crate::viewer::event_log::Event;
 use crate::viewer::eye_report;
 use crate::viewer::frame_times::Made;
+use crate::viewer::model::Model;
 use crate::viewer::panel::{Display, Quantity};
 
-/// Radiance behind the scene [W/(m² sr)]: dark.
-const BACKGROUND: LinearSrgb = LinearSrgb::BLACK;
+/// What is seen behind scenes that came without light, before tone mapping [1]: their glass and metal would be as black as
+/// what they show. It lights nothing.
+const BACKDROP: f64 = 0.03;
+
+/// Radiance behind the scene [W/(m² sr)]: the same in the picture at every exposure.
+fn backdrop(model: &Model, exposure_stops: f64) -> LinearSrgb {
+    if model.quantity() == Quantity::Light && was_dark(model.edits().loaded()) {
+        LinearSrgb::WHITE * (BACKDROP * (-exposure_stops).exp2())
+    } else {
+        LinearSrgb::BLACK
+    }
+}
+
+/// The view with light alone in it.
+pub(super) fn without_backdrop(view: View) -> View {
+    View {
+        background: LinearSrgb::BLACK,
+        ..view
+    }
+}
 
 impl App {
     /// Draws what changed of the picture: maps, exposure, view.
@@ -40,28 +60,32 @@ impl App {
         let mut uploaded = graphics.set_scene(self.model.scene())?;
         let mut is_new = uploaded != Uploaded::default();
         if std::mem::take(&mut self.must_set_maps) || is_new {
-            let style = match self.model.quantity() {
-                Quantity::Light => MapStyle::Lit,
-                Quantity::Error | Quantity::Difference => MapStyle::AsItIs,
-            };
-            uploaded += if traces_lights {
-                graphics.set_maps(&self.model.maps_without_direct(), style)?
-            } else {
-                graphics.set_maps(&self.model.shown_maps(), style)?
-            };
+            let (maps, style) = self.model.maps_to_show(traces_lights);
+            uploaded += graphics.set_maps(&maps, style)?;
             is_new = true;
+        } else {
+            graphics.set_map_style(self.model.map_style());
         }
         if is_new {
             let seconds = start.elapsed().as_secs_f64();
             self.model.log.write(&Event::Uploaded { uploaded, seconds });
+        }
+        let (has_beside, has_reference) = (graphics.beside_id().is_some(), self.model.reference().is_some());
+        let must_set = std::mem::take(&mut self.must_set_beside) || has_beside != has_reference;
+        if must_set || (is_new && has_reference) {
+            let style = self.model.map_style();
+            let shown = self.model.reference_to_show();
+            let shown = shown.as_ref().map(|(scene, maps)| (*scene, &maps[..], style));
+            graphics.set_beside(shown)?;
         }
         graphics.set_chains(chains)?;
         graphics.set_dispersion(dispersion);
         graphics.set_white_balance(&white_balance);
         if wants_exposure {
             self.must_measure_exposure = false;
-            view.exposure_stops = graphics.measure_exposure(&view)?;
+            view.exposure_stops = graphics.measure_exposure(&without_backdrop(view.clone()))?;
             self.model.panel.display.exposure_stops = view.exposure_stops;
+            view.background = backdrop(&self.model, view.exposure_stops);
             self.measured = Some((view.exposure_stops, self.model.layers().len()));
             self.model.log.write(&Event::Exposure(view.exposure_stops));
         }
@@ -110,7 +134,7 @@ impl App {
     /// that suits them does not suit the scene.
     pub(super) fn wants_exposure(&self) -> bool {
         let (model, now_stops) = (&self.model, self.model.panel.display.exposure_stops);
-        let is_first = model.last.as_ref().is_some_and(|last| last.serial == 1);
+        let is_first = model.last.as_ref().is_some_and(|last| model.is_first(last));
         let is_outdated = self.measured.is_some_and(|(measured_stops, layers)| {
             measured_stops == now_stops && layers < model.layers().len()
         });
@@ -130,7 +154,7 @@ impl App {
         let display = match self.model.quantity() {
             Quantity::Light => self.model.panel.display,
             // Colours of a legend are shown as they are.
-            Quantity::Error | Quantity::Difference => Display {
+            _ => Display {
                 exposure_stops: 0.0,
                 tone_map: ToneMap::None,
                 ..self.model.panel.display
@@ -142,7 +166,7 @@ impl App {
             height: height as u32,
             exposure_stops: display.exposure_stops,
             tone_map: display.tone_map,
-            background: BACKGROUND,
+            background: backdrop(&self.model, display.exposure_stops),
         })
     }
 
@@ -186,7 +210,7 @@ impl App {
     pub(super) fn white_balance(&self) -> Matrix3 {
         let chosen = match self.model.quantity() {
             Quantity::Light => self.model.panel.display.white_balance,
-            Quantity::Error | Quantity::Difference => WhiteBalance::None,
+            _ => WhiteBalance::None,
         };
         chosen.matrix(self.model.scene())
     }

@@ -6,9 +6,17 @@ use winit::keyboard::{Key, NamedKey, PhysicalKey};
 use winit::window::CursorGrabMode;
 
 use super::{App, PIXELS_PER_NOTCH};
+use crate::geometry::Ray;
+use crate::scene::Camera;
 use crate::viewer::event_log::Event;
+use crate::viewer::gizmo::{self, Held};
 use crate::viewer::input::{self, Shortcut};
+use crate::viewer::lens::Lens;
 use crate::viewer::navigation::Travel;
+use crate::viewer::panel::FilmWish;
+
+/// A press that moves farther than this before it is let go is no click [pixels].
+const CLICK_PIXELS: f64 = 4.0;
 
 /// What a way to get about means, when it was chosen.
 fn travel_notice(travel: Travel) -> String {
@@ -34,8 +42,10 @@ impl App {
         self.fly();
         if self.modifiers.control_key() || self.modifiers.super_key() {
             // Nothing flies or bakes by a chord.
-            self.pressed.undo |= event.state.is_pressed() && input::is_undo(&event.logical_key);
             if event.state.is_pressed() {
+                let undoes = input::undoes(&event.logical_key, self.modifiers.shift_key());
+                self.pressed.undo |= undoes == Some(true);
+                self.pressed.redo |= undoes == Some(false);
                 if let Key::Character(digit) = &event.logical_key
                     && let Some(number) = input::bookmark(digit)
                 {
@@ -59,10 +69,7 @@ impl App {
             self.notice = None;
             match input::shortcut(&event.logical_key) {
                 Some(Shortcut::NextCamera) => drop(self.model.navigator.next_camera().map(str::to_owned)),
-                Some(Shortcut::Frame) => {
-                    let aspect = self.picture_rect.aspect_ratio();
-                    self.model.navigator.frame(f64::from(aspect));
-                }
+                Some(Shortcut::Frame) => self.model.frame(f64::from(self.picture_rect.aspect_ratio())),
                 Some(Shortcut::NextTravel) => {
                     let next = self.model.navigator.travel().next();
                     self.model.travel(next);
@@ -70,6 +77,12 @@ impl App {
                 }
                 Some(Shortcut::Look) if self.looking_from.is_some() => self.stop_looking(),
                 Some(Shortcut::Look) => self.start_looking(),
+                Some(Shortcut::Probe) => self.model.panel.probes = !self.model.panel.probes,
+                Some(Shortcut::RecordKey) => {
+                    self.pressed.film = Some(FilmWish::Record(None));
+                    let number = self.model.panel.film.keys.len() + 1;
+                    self.notice = Some(format!("Key {number} of the camera's path is set here."));
+                }
                 Some(Shortcut::Bookmark(number)) => {
                     if self.model.navigator.go_to_bookmark(number) {
                         self.model.log.write(&Event::Bookmark { number, kept: false });
@@ -82,6 +95,7 @@ impl App {
                 Some(Shortcut::SavePicture) => self.pressed.save_picture = true,
                 Some(Shortcut::Help) => self.model.panel.help_open = !self.model.panel.help_open,
                 Some(Shortcut::LetGo) if self.looking_from.is_some() => self.stop_looking(),
+                Some(Shortcut::LetGo) if self.model.panel.held().is_some() => self.model.panel.hold(None),
                 Some(Shortcut::LetGo) => self.pressed.cancel = true,
                 None => {}
             }
@@ -96,6 +110,85 @@ impl App {
                 ElementState::Released => self.stop_looking(),
             }
         }
+        if button == MouseButton::Left {
+            match state {
+                ElementState::Pressed => self.on_left_press(),
+                ElementState::Released => self.on_left_release(),
+            }
+        }
+    }
+
+    fn on_left_press(&mut self) {
+        // What egui has under the pointer, handles included, is not for what is behind it.
+        if !self.is_over_picture() || self.gizmo.is_hot() {
+            return;
+        }
+        if self.model.panel.probes {
+            self.model.probe(self.gaze());
+        } else if let Some(gaze) = self.gaze().filter(|_| self.model.panel.placed_light().is_some()) {
+            self.model.begin_placing(gaze);
+        } else {
+            self.clicks_at = Some(self.pointer);
+        }
+    }
+
+    fn on_left_release(&mut self) {
+        self.model.end_placing();
+        if self.clicks_at.take().is_none() {
+            return;
+        }
+        let Some(place) = self.pointer_points() else {
+            return;
+        };
+        let camera = self.camera();
+        let lens = Lens {
+            camera: &camera,
+            picture: self.picture_rect,
+        };
+        // Lights are marked only beside handles.
+        let marks = self.model.panel.held().is_some();
+        let light = gizmo::light_at(&lens, self.model.scene(), place).filter(|_| marks);
+        match light {
+            Some(light) => self.model.hold(Held::Light(light)),
+            None => self.model.pick(lens.gaze(place)),
+        }
+        self.request_redraw();
+    }
+
+    pub(super) fn on_pointer(&mut self, position: PhysicalPosition<f64>) {
+        self.pointer = position;
+        let is_drag =
+            |from: PhysicalPosition<f64>| (from.x - position.x).hypot(from.y - position.y) > CLICK_PIXELS;
+        if self.clicks_at.is_some_and(is_drag) {
+            self.clicks_at = None;
+        }
+        if let Some(gaze) = self.gaze() {
+            self.model.go_on_placing(gaze);
+        }
+    }
+
+    /// As the picture shows the scene.
+    fn camera(&self) -> Camera {
+        let aspect = f64::from(self.picture_rect.aspect_ratio());
+        self.model.navigator.camera_for(aspect)
+    }
+
+    fn pointer_points(&self) -> Option<egui::Pos2> {
+        let scale = self.graphics.as_ref()?.window().scale_factor();
+        Some(egui::pos2(
+            (self.pointer.x / scale) as f32,
+            (self.pointer.y / scale) as f32,
+        ))
+    }
+
+    /// The ray from the eye through the pointer.
+    fn gaze(&self) -> Option<Ray> {
+        let camera = self.camera();
+        let lens = Lens {
+            camera: &camera,
+            picture: self.picture_rect,
+        };
+        self.pointer_points().map(|place| lens.gaze(place))
     }
 
     pub(super) fn on_wheel(&mut self, delta: MouseScrollDelta) {

@@ -3,8 +3,10 @@
 use std::path::PathBuf;
 
 use super::App;
+use super::drawing::without_backdrop;
 use crate::error::{Error, Result};
 use crate::viewer::event_log::Event;
+use crate::viewer::files::working_folder;
 use crate::viewer::panel::Quantity;
 use crate::viewer::screenshot;
 
@@ -36,9 +38,9 @@ impl App {
                 "make the window larger",
             ));
         };
+        let view = without_backdrop(view);
         let picture = graphics.radiance(&view)?;
-        // Said in full where the system knows it: the window does not show where it was started.
-        let folder = std::env::current_dir().unwrap_or_else(|_| PathBuf::from("."));
+        let folder = working_folder();
         // False colours are no radiance.
         let has_radiance = self.model.quantity() == Quantity::Light;
         let scene = &self.model.scene().name;

@@ -1,6 +1,7 @@
-//! Section *Bake*: start, stop, progress, and what the last bake came to.
+//! Start, stop, progress, and what the last bake came to.
 
 use std::sync::Arc;
+use std::time::Instant;
 
 use egui::{Color32, Grid, ProgressBar, RichText, Ui};
 
@@ -9,6 +10,7 @@ use super::{Facts, Panel, Wishes};
 use crate::illumination::IlluminationMap;
 use crate::light_pass::ledger::EnergyLedger;
 use crate::session::{BYTES_PER_TEXEL, StopReason};
+use crate::viewer::time_left::{in_words, time_left_s};
 use crate::viewer::worker::{BakeRequest, BakeState, BakedLevel};
 
 /// Text of what went wrong.
@@ -16,14 +18,14 @@ pub const FAILED: Color32 = Color32::from_rgb(255, 120, 110);
 /// Text of what needs attention.
 pub const ATTENTION: Color32 = Color32::from_rgb(250, 190, 90);
 
-/// Shows the section.
+/// Shows the controls and the state.
 pub fn show(ui: &mut Ui, panel: &mut Panel, facts: &Facts<'_>, wishes: &mut Wishes) {
     let refused = panel.settings.validate().err();
     ui.horizontal(|ui| {
         let rebake = ui
             .add_enabled(refused.is_none(), egui::Button::new("Re-bake"))
             .on_hover_text(
-                "Bakes with the settings above (R). The shown maps stay until the new ones are complete.",
+                "Bakes with the settings below (R). The shown maps stay until the new ones are complete.",
             )
             .on_disabled_hover_text("A setting is out of its range.");
         wishes.rebake |= rebake.clicked();
@@ -57,14 +59,25 @@ fn state_line(ui: &mut Ui, panel: &Panel, facts: &Facts<'_>) {
             fraction,
             since,
         } => {
-            let text = format!(
+            let mut text = format!(
                 "{} {:.0} %, {:.1} s",
                 stage.name(),
                 fraction * 100.0,
                 since.elapsed().as_secs_f64()
             );
+            let left_s = time_left_s(facts.state, &wanted, facts.last, Instant::now());
+            if let Some(left_s) = left_s {
+                text = format!("{text}, {}", in_words(left_s));
+            }
             ui.add(ProgressBar::new(*fraction as f32).text(text).desired_height(18.0))
-                .on_hover_text("Share of this stage that is done, and time since the bake was asked for.");
+                .on_hover_text(
+                    "Share of this stage that is done, time since the bake was asked for, and time until it is done as its \
+                     course so far tells.",
+                );
+            if left_s.is_some_and(|left_s| left_s > LONG_S) {
+                ui.weak("Long: coarser maps, a larger error or a max time end it sooner.")
+                    .on_hover_text(SOONER);
+            }
         }
         BakeState::Comparing {
             effect,
@@ -84,8 +97,21 @@ fn state_line(ui: &mut Ui, panel: &Panel, facts: &Facts<'_>) {
             ui.colored_label(ATTENTION, "Settings changed since the last bake.");
         }
         BakeState::Idle => drop(ui.label("Showing maps that were baked before.")),
+        BakeState::Done if has_converged(facts.last) => {
+            drop(ui.label("Converged: the maps belong to these settings."))
+        }
         BakeState::Done => drop(ui.label("Done: the maps belong to these settings.")),
     }
+}
+
+/// What takes longer is told how it ends sooner [s].
+const LONG_S: f64 = 600.0;
+const SOONER: &str =
+    "Section Accuracy: map size, max error, or bake until a max time. Cancel keeps the maps that are shown.";
+
+/// Whether a bake ended because its maps are as exact as they were to be.
+fn has_converged(last: Option<&BakedLevel>) -> bool {
+    last.is_some_and(|last| last.result.stop_reason == StopReason::MaxError)
 }
 
 fn last_bake(ui: &mut Ui, last: &BakedLevel) {
@@ -120,7 +146,7 @@ fn last_bake(ui: &mut Ui, last: &BakedLevel) {
     .on_hover_text(hover);
 }
 
-/// Shows section *Energy*: where the light of the last bake went.
+/// Shows where the light of the last bake went.
 pub fn energy(ui: &mut Ui, last: Option<&BakedLevel>) {
     let ledgers = last.map_or(&[][..], |last| &last.result.ledgers);
     let total: EnergyLedger = ledgers.iter().map(|light| &light.energy_w).sum();

@@ -1,17 +1,21 @@
 //! Section *Display*: how the picture shows the maps. Nothing here changes a bake.
 
-use egui::{Response, Slider, SliderClamping, Ui};
+use egui::{ComboBox, DragValue, Response, Slider, SliderClamping, Ui};
 
-use super::control::{About, choice, chosen, row, rows};
-use super::{Display, Facts, LayerShown, Quantity, Wishes};
+use super::control::{
+    About, CONTROL_WIDTH, arrow_steps, choice, chosen, counted, row, rows, setting, short, stepped,
+};
+use super::{Display, Facts, LayerShown, Quantity, Wishes, bake};
 use crate::eye_pass::{ToneMap, WhiteBalance};
 use crate::optics::spectrum::temperature::CAMERA_KELVIN;
 use crate::settings::LayerKind;
+use crate::viewer::views::{IrradianceUnit, ScaleChoice};
 
 const EXPOSURE: About = About {
     label: "Exposure [stops]",
     what: "Radiance is multiplied by 2 to this power before tone mapping.",
-    range: "−20 to 20; chosen from the first picture",
+    range: "−20 to 20",
+    default: "measured from the first picture; Auto measures again",
     accuracy: "none: only the picture changes",
     cost: "none",
 };
@@ -20,7 +24,8 @@ const AUTO_EXPOSURE: &str = "Measures the present picture and sets the exposure 
 const TONE_MAP: About = About {
     label: "Tone map",
     what: "How radiance beyond what the display shows is brought into its range.",
-    range: "neutral, AgX, ACES, none; default neutral",
+    range: "neutral, AgX, ACES, none",
+    default: "neutral",
     accuracy: "none: only the picture changes",
     cost: "none",
 };
@@ -28,26 +33,47 @@ const WHITE_BALANCE: About = About {
     label: "White balance",
     what: "Which light is shown as white, by chromatic adaptation (Bradford): the display's own (D65), what the lamps \
            send to the middle of the scene, or light of a colour temperature, as on a camera.",
-    range: "none, from the lamps, 1000 to 25,000 K; default none",
+    range: "none, from the lamps, 1000 to 25,000 K",
+    default: "none",
     accuracy: "none: only the picture changes",
     cost: "none",
 };
 const LAYER: About = About {
     label: "Light shown",
     what: "Which baked light the picture shows.",
-    range: "all, caustic, direct; default all",
+    range: "all, caustic, direct",
+    default: "all",
     accuracy: "none: only the picture changes",
     cost: "none",
 };
 
 const QUANTITY: About = About {
-    label: "Map shown",
-    what: "The light; how far each texel may be off, its estimated error; or what an effect adds and takes away. The \
-           last two in false colours, relative to the map's mean irradiance.",
-    range: "light, error, difference; default light",
+    label: "View",
+    what: "What surfaces are shown by: their light, or something about it or about them in its place. Texels that hold \
+           no finite number are magenta in every view.",
+    range: "light, irradiance, error, difference, texels, texel density, normals, texture uv, map uv",
+    default: "light",
     accuracy: "none: only the picture changes",
     cost: "none: the error is estimated in every bake, and the difference was found when an effect's worth was asked \
            for",
+};
+const SCALE: About = About {
+    label: "Scale",
+    what: "How irradiance becomes a colour: the unit of its legend (lux is W/m² times 683), and whether equal ratios or \
+           equal differences are equal steps.",
+    range: "W/m² or lx, logarithmic or linear",
+    default: "logarithmic in W/m²",
+    accuracy: "none: only the picture changes",
+    cost: "none",
+};
+const RANGE: About = About {
+    label: "From, to",
+    what: "Irradiance at the dark and at the bright end of the colours.",
+    range: "automatic: up to the brightest texel, rounded up, from a ten-thousandth of it (logarithmic) or from 0; typed: any \
+            above 0",
+    default: "automatic",
+    accuracy: "none: only the picture changes",
+    cost: "none",
 };
 const NO_DIFFERENCE: &str = "Ask under Effects what an effect is worth.";
 const NO_ERRORS: &str = "These maps come without an estimate of their error.";
@@ -71,6 +97,12 @@ const TONE_MAPS: [(ToneMap, &str, &str); 4] = [
     (ToneMap::None, "none", "cut at the display's white"),
 ];
 
+/// Ends of what can be typed as an end of the scale [W/m²].
+const LEAST_W_M2: f64 = 1e-9;
+const MOST_W_M2: f64 = 1e9;
+/// Of the upper end over the lower one.
+const LEAST_RATIO: f64 = 1.01;
+
 /// What the slider of the white balance begins at: D65.
 const DAYLIGHT_KELVIN: f64 = 6504.0;
 
@@ -80,6 +112,8 @@ pub fn show(ui: &mut Ui, display: &mut Display, facts: &Facts<'_>, wishes: &mut 
     rows(ui, "display", |ui| {
         row(ui, &EXPOSURE, None, |ui| {
             ui.horizontal(|ui| {
+                // A button stands beside it.
+                ui.spacing_mut().slider_width = 74.0;
                 let slider = exposure(ui, &mut display.exposure_stops);
                 let auto = ui.button("Auto").on_hover_text(AUTO_EXPOSURE);
                 wishes.measure_exposure |= auto.clicked();
@@ -87,19 +121,34 @@ pub fn show(ui: &mut Ui, display: &mut Display, facts: &Facts<'_>, wishes: &mut 
             })
             .inner
         });
-        row(ui, &WHITE_BALANCE, None, |ui| {
-            white_balance(ui, &mut display.white_balance)
-        });
-        row(ui, &TONE_MAP, None, |ui| {
-            let selected = chosen(&display.tone_map, &TONE_MAPS);
-            choice(ui, "tone map", &mut display.tone_map, selected, &TONE_MAPS)
+        let default = Display::default();
+        let white = (&mut display.white_balance, &default.white_balance);
+        setting(ui, &WHITE_BALANCE, None, white, white_balance);
+        let tone_map = (&mut display.tone_map, &default.tone_map);
+        setting(ui, &TONE_MAP, None, tone_map, |ui, tone_map| {
+            let selected = chosen(tone_map, &TONE_MAPS);
+            choice(ui, "tone map", tone_map, selected, &TONE_MAPS)
         });
         let nothing = baked.is_empty().then_some("There are no maps yet.");
-        row(ui, &LAYER, nothing, |ui| layer(ui, &mut display.layer, baked));
-        row(ui, &QUANTITY, nothing, |ui| {
-            quantity(ui, &mut display.quantity, facts)
+        let shown = (&mut display.layer, &default.layer);
+        setting(ui, &LAYER, nothing, shown, |ui, shown| layer(ui, shown, baked));
+        let shown = (&mut display.quantity, &default.quantity);
+        setting(ui, &QUANTITY, nothing, shown, |ui, shown| {
+            quantity(ui, shown, facts)
         });
+        if display.quantity == Quantity::Irradiance {
+            let chosen = (&mut display.scale, &default.scale);
+            setting(ui, &SCALE, None, chosen, scale);
+            row(ui, &RANGE, None, |ui| range(ui, &mut display.scale, facts));
+        }
     });
+    if facts.survey.faults > 0 {
+        let told = counted(facts.survey.faults, "texel");
+        ui.colored_label(
+            bake::ATTENTION,
+            format!("{told} without a finite value, shown in magenta."),
+        );
+    }
 }
 
 fn exposure(ui: &mut Ui, stops: &mut f64) -> Response {
@@ -138,26 +187,126 @@ fn white_balance(ui: &mut Ui, white: &mut WhiteBalance) -> Response {
                 .clamping(SliderClamping::Edits)
                 .fixed_decimals(0)
                 .suffix(" K");
-            ui.add(slider).on_hover_text(WHITE_BALANCE.what);
+            ui.add(slider)
+                .accessible_name("White balance [K]")
+                .on_hover_text(WHITE_BALANCE.what);
         }
         response
     })
     .inner
 }
 
+/// Of their list: all in sight [points].
+const VIEWS_HEIGHT: f32 = 320.0;
+const VIEWS: [(Quantity, &str); 10] = [
+    (Quantity::Light, "The lit scene."),
+    (
+        Quantity::Irradiance,
+        "Irradiance of the light shown, in false colours with a legend.",
+    ),
+    (
+        Quantity::Error,
+        "How far each texel may be off: its estimated error in false colours, relative to the map's mean irradiance.",
+    ),
+    (
+        Quantity::Difference,
+        "What an effect adds and takes away, in false colours, relative to the map's mean irradiance.",
+    ),
+    (Quantity::Texels, "The maps' texels as a checkerboard."),
+    (
+        Quantity::TexelDensity,
+        "Texels per metre, in false colours with a legend.",
+    ),
+    (
+        Quantity::Normals,
+        "Normals of the meshes: red, green, blue for x, y, z.",
+    ),
+    (
+        Quantity::Uv,
+        "Where the base colour's image is looked up, else the first set of coordinates: red for u, green for v.",
+    ),
+    (
+        Quantity::MapUv,
+        "Where the illumination map is looked up: red for u, green for v.",
+    ),
+    (
+        Quantity::Wavelength,
+        "The dominant wavelength [nm] of the light shown, against the white of D65: the single wavelength that, mixed with \
+         white, looks like it. White light is grey; purple, which no single wavelength looks like, is dim purple; texels \
+         below a thousandth of the brightest are black.",
+    ),
+];
+
 fn quantity(ui: &mut Ui, shown: &mut Quantity, facts: &Facts<'_>) -> Response {
     let has_difference = facts.worth.is_some_and(|worth| worth.difference.is_ok());
+    let why_not = |kind: Quantity| match kind {
+        Quantity::Error if !facts.has_errors => Some(NO_ERRORS),
+        Quantity::Difference if !has_difference => Some(NO_DIFFERENCE),
+        _ => None,
+    };
+    let list = ComboBox::from_id_salt("view")
+        .width(CONTROL_WIDTH)
+        .height(VIEWS_HEIGHT)
+        .selected_text(shown.name())
+        .show_ui(ui, |ui| {
+            for (kind, hover) in VIEWS {
+                let why_not = why_not(kind);
+                ui.add_enabled_ui(why_not.is_none(), |ui| {
+                    ui.selectable_value(shown, kind, kind.name())
+                        .on_hover_text(hover)
+                        .on_disabled_hover_text(why_not.unwrap_or_default());
+                });
+            }
+        });
+    if list.inner.is_none() {
+        let offered = VIEWS.map(|(kind, _)| kind).into_iter();
+        let offered: Vec<Quantity> = offered.filter(|kind| why_not(*kind).is_none()).collect();
+        let steps = arrow_steps(ui, &list.response);
+        let index = offered.iter().position(|kind| kind == shown).unwrap_or(0);
+        if steps != 0 {
+            *shown = offered[stepped(index, steps, offered.len())];
+        }
+    }
+    list.response
+}
+
+fn scale(ui: &mut Ui, choice: &mut ScaleChoice) -> Response {
     ui.horizontal(|ui| {
-        ui.radio_value(shown, Quantity::Light, "light");
-        for (kind, label, is_there, why_not) in [
-            (Quantity::Error, "error", facts.has_errors, NO_ERRORS),
-            (Quantity::Difference, "difference", has_difference, NO_DIFFERENCE),
-        ] {
-            ui.add_enabled_ui(is_there, |ui| {
-                ui.radio_value(shown, kind, label)
-                    .on_hover_text(QUANTITY.what)
-                    .on_disabled_hover_text(why_not);
-            });
+        ui.spacing_mut().item_spacing.x = 5.0;
+        for unit in [IrradianceUnit::WattsPerM2, IrradianceUnit::Lux] {
+            ui.radio_value(&mut choice.unit, unit, unit.symbol())
+                .on_hover_text(SCALE.what);
+        }
+        ui.checkbox(&mut choice.is_logarithmic, "logarithmic")
+            .on_hover_text(SCALE.what);
+    })
+    .response
+}
+
+fn range(ui: &mut Ui, choice: &mut ScaleChoice, facts: &Facts<'_>) -> Response {
+    ui.horizontal(|ui| {
+        ui.spacing_mut().item_spacing.x = 5.0;
+        ui.checkbox(&mut choice.is_automatic, "auto")
+            .on_hover_text(RANGE.range);
+        let factor = choice.unit.per_w_m2();
+        if choice.is_automatic {
+            let scale = facts.survey.scale(Quantity::Irradiance, choice);
+            let [low, high] = [scale.low, scale.high].map(|end| short(end * factor));
+            ui.label(format!("{low} to {high} {}", choice.unit.symbol()));
+        } else {
+            let [low, high] = choice.typed_w_m2;
+            let mut field = |name: &str, value: f64, range: std::ops::RangeInclusive<f64>| {
+                let mut shown = value * factor;
+                let speed = 0.02 * shown;
+                let drag = DragValue::new(&mut shown)
+                    .speed(speed)
+                    .range((range.start() * factor)..=(range.end() * factor))
+                    .custom_formatter(|value, _| short(value));
+                ui.add(drag).accessible_name(name).on_hover_text(RANGE.what);
+                shown / factor
+            };
+            choice.typed_w_m2[0] = field("Scale: from", low, LEAST_W_M2..=high / LEAST_RATIO);
+            choice.typed_w_m2[1] = field("Scale: to", high, low * LEAST_RATIO..=MOST_W_M2);
         }
     })
     .response
@@ -166,8 +315,9 @@ fn quantity(ui: &mut Ui, shown: &mut Quantity, facts: &Facts<'_>) -> Response {
 fn layer(ui: &mut Ui, shown: &mut LayerShown, baked: &[LayerKind]) -> Response {
     ui.horizontal(|ui| {
         // Four words in a narrow row.
-        ui.spacing_mut().item_spacing.x = 3.0;
-        ui.spacing_mut().icon_spacing = 2.0;
+        let spacing = ui.spacing_mut();
+        (spacing.item_spacing.x, spacing.icon_spacing) = (2.0, 1.0);
+        (spacing.icon_width, spacing.icon_width_inner) = (11.0, 6.0);
         ui.radio_value(shown, LayerShown::All, "all")
             .on_hover_text("The sum of what was baked.");
         for kind in LayerKind::ALL {

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use egui::{Button, Frame, RichText, Role, Ui, WidgetInfo, vec2};
 
-use super::control::{bytes, counted, grouped};
+use super::control::{bytes, counted, grouped, reset_to};
 use super::{Facts, Wishes, worth};
 use crate::effect::{Effect, EffectSwitch, EffectSwitches};
 use crate::plan::{self, EffectLine};
@@ -12,6 +12,8 @@ use crate::session::EffectCounts;
 
 /// Width of the three switches of an effect [points].
 const SWITCHES_WIDTH: f32 = 128.0;
+/// Of the button that sets it back, with what is before it.
+const RESET_WIDTH: f32 = 24.0;
 /// Size of a switch [points].
 const SWITCH: egui::Vec2 = vec2(40.0, 18.0);
 
@@ -99,8 +101,11 @@ fn entry(ui: &mut Ui, effect: Effect, switch: &mut EffectSwitch, facts: &Facts<'
         if has_worth {
             is_asked = worth::button(ui, effect, facts);
         }
-        ui.add_space((ui.available_width() - SWITCHES_WIDTH).max(0.0));
+        ui.add_space((ui.available_width() - SWITCHES_WIDTH - RESET_WIDTH).max(0.0));
         segments(ui, &name, switch);
+        if *switch != EffectSwitch::Auto && reset_to(ui, &name, "auto") {
+            *switch = EffectSwitch::Auto;
+        }
     });
     detail(ui, &name, |ui| {
         let reason = match &known.line {

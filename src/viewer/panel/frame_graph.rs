@@ -5,6 +5,7 @@ use egui::{Align2, Color32, FontId, Rect, RichText, Role, Sense, Ui, WidgetInfo,
 use super::effects::COUNTER;
 use crate::eye_pass::renderer::GpuMs;
 use crate::viewer::frame_times::{FrameTimes, Made, PICTURES, sum_ms};
+use crate::viewer::latency::{Latencies, Percentiles};
 
 /// Height of the graph [points].
 const HEIGHT: f32 = 64.0;
@@ -73,6 +74,34 @@ pub fn show(ui: &mut Ui, times: Option<&FrameTimes>) {
                 .on_hover_text(what);
         }
     });
+}
+
+const WAITS: &str = "From a key, click or movement of the mouse until the frame that shows it was handed to the \
+                     system; of the last 10,000. Events that came while the window was busy count from the earliest \
+                     moment at which they can have come.";
+
+/// Shows how long events waited for their frames.
+pub fn waits(ui: &mut Ui, latencies: &Latencies) {
+    for (when, waits) in [
+        ("Baking", latencies.while_baking()),
+        ("Otherwise", latencies.otherwise()),
+    ] {
+        if let Some(waits) = waits {
+            ui.label(RichText::new(told_waits(when, &waits)).size(COUNTER))
+                .on_hover_text(WAITS);
+        }
+    }
+}
+
+fn told_waits(when: &str, waits: &Percentiles) -> String {
+    let Percentiles {
+        count,
+        p50_ms,
+        p95_ms,
+        p99_ms,
+        ..
+    } = waits;
+    format!("{when}: event to frame {p50_ms:.0} ms, 95 % {p95_ms:.0}, 99 % {p99_ms:.0} (of {count})")
 }
 
 /// What is said beside the time where the traced picture is not as fine as the picture.

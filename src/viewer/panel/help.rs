@@ -23,11 +23,15 @@ pub fn show(ui: &mut Ui, travel: Travel, speed_m_per_s: f64) {
         ("Wheel", wheel.as_str()),
         ("1 … 9", "views kept with Ctrl+1 … Ctrl+9"),
         ("C", "next camera of the file"),
-        ("F", "frame the whole scene"),
+        ("F", "frame what has handles, or the whole scene"),
         ("R", "re-bake"),
-        ("Ctrl+Z", "take the last change of the scene back"),
+        ("Ctrl+Z", "take the last change back"),
+        ("Ctrl+Y", "do it again; Ctrl+Shift+Z too"),
+        ("P", "probe: click on a surface to see what lights it"),
+        ("K", "add a key to the camera's path"),
         ("F12", "save the picture as .png and .exr"),
-        ("Esc", "let go of the mouse, cancel the bake"),
+        ("Click", "on an object: handles to move and turn it"),
+        ("Esc", "let go of mouse and handles, cancel the bake"),
         ("H  ?", "open or close this list"),
     ];
     Grid::new("keys")

@@ -1,12 +1,11 @@
 //! Section *Light pass*: how the next bake is made.
 
-mod target;
-
 use egui::{Response, Slider, SliderClamping, Ui};
 
-use super::control::{About, choice, chosen, grouped, row, rows};
+use super::accuracy::target;
+use super::control::{About, choice, chosen, grouped, rows, setting};
 use crate::settings::{
-    BakeSettings, Estimator, Footprint, ItemBufferKind, Kernel, LayerKind, MapResolution, RayPlacement, Sigma,
+    BakeSettings, Estimator, Footprint, ItemBufferKind, Kernel, LayerKind, RayPlacement, Sigma,
 };
 
 /// Density at the slider's zero [rays/sr]. Each step is [`NESTING`] times the one before: the lattice's sides double,
@@ -21,7 +20,8 @@ const ESTIMATOR: About = About {
     label: "Estimator",
     what: "How light rays become irradiance. Wavefront: smooth patches between neighbouring rays, spread exactly over \
            the texels they cover. Splat: every ray spreads its flux over its footprint by a kernel (Collins).",
-    range: "wavefront, splat; default wavefront",
+    range: "wavefront, splat",
+    default: "wavefront",
     accuracy: "wavefront needs some hundred times fewer rays for the same error",
     cost: "grows with the number of rays; a wavefront ray costs a few times more than a splat",
 };
@@ -29,7 +29,8 @@ const LAYERS: About = About {
     label: "Layers",
     what: "Which light is baked. Caustic: light that met glass, mirrors or water. Direct: straight from the lights. \
            Indirect: what diffuse surfaces send each other of both, any number of times.",
-    range: "at least one; default here caustic and direct",
+    range: "at least one",
+    default: "caustic and direct",
     accuracy: "a layer that is not baked is missing from the picture; indirect stops at the max error, 3 % without one",
     cost: "direct takes one shadow ray per texel and light; indirect 64 to 4,096 rays per texel of a coarser grid, and \
            the other two layers though they be hidden; they are kept while only lamps are dimmed",
@@ -37,69 +38,60 @@ const LAYERS: About = About {
 const DENSITY: About = About {
     label: "Ray density [rays/sr]",
     what: "Light rays per steradian around each lamp; for a sun the same density over the casters.",
-    range: "391 to 102,400,000 in steps of ×4; default 25,000 (splat: 100,000)",
+    range: "391 to 102,400,000 in steps of ×4; logarithmic",
+    default: "25,000 (splat: 100,000); with a max error 40 over it, from 1,600 to 40,000",
     accuracy: "finer caustics and less noise with more rays; with a max error only where refinement starts, with a max \
                time the finest that is tried",
     cost: "time grows in proportion to it; a step keeps the rays of the one before",
-};
-const TARGET: About = About {
-    label: "Bake until",
-    what: "What ends a bake: the ray density below exactly, an estimated error (relative RMSE over all maps) that is \
-           small enough, or time that is up.",
-    range: "density; max error 0.01 to 100 %, default 3 %; max time 0.001 to 10,000 s",
-    accuracy: "a max error is kept by the estimate, not by a reference; after a max time the finest complete maps are \
-               shown",
-    cost: "halving the error takes about four times the rays",
 };
 const SIGMA: About = About {
     label: "Sigma [radii²]",
     what: "Splat: spread of the gaussian kernel in squared footprint radii, weight exp(−r²/2σ). Wavefront: smoothing of \
            the finished map in squared texel radii.",
-    range: "splat 0.01 to 100, default 1; wavefront 0 to 100, default 0; logarithmic",
+    range: "wavefront 0 to 100, splat 0.01 to 100; logarithmic",
+    default: "wavefront 0, splat 1",
     accuracy: "small shows single rays (splat) or is exact (wavefront), large blurs the caustic",
     cost: "splat: time per ray grows in proportion to it; wavefront: little",
 };
 const ADAPTIVE: About = About {
     label: "Adaptive sigma",
     what: "Scales sigma by how each footprint compares with the map's mean footprint.",
-    range: "on or off; default off",
+    range: "on or off",
+    default: "off",
     accuracy: "sharper where light converges, smoother where it spreads",
     cost: "about that of a constant sigma",
 };
 const KERNEL: About = About {
     label: "Kernel",
     what: "Shape of a splat. All have the same area at the same footprint.",
-    range: "gaussian, cone, disc, box; default gaussian",
+    range: "gaussian, cone, disc, box",
+    default: "gaussian",
     accuracy: "gaussian is smoothest; disc and box show their edges",
     cost: "gaussian touches the most texels",
 };
 const FOOTPRINT: About = About {
     label: "Footprint",
     what: "What sets the size and shape of a splat.",
-    range: "ellipse, disc, distance, fixed; default ellipse",
+    range: "ellipse, disc, distance, fixed",
+    default: "ellipse",
     accuracy: "ellipse follows the wavefront best, fixed least",
     cost: "nearly the same for all",
 };
 const RAYS: About = About {
     label: "Rays",
     what: "Where in its cell of the lattice a ray starts.",
-    range: "lattice, jittered; default lattice",
+    range: "lattice, jittered",
+    default: "lattice",
     accuracy: "a lattice converges faster, jittered rays turn regular patterns into noise",
     cost: "the same",
 };
 const ITEM_BUFFER: About = About {
     label: "Item buffer",
     what: "How the directions around a lamp are divided when looking for glass and mirrors.",
-    range: "equal, cube; default equal",
+    range: "equal, cube",
+    default: "equal",
     accuracy: "equal cells give each ray the same flux; the cube's differ by a factor of up to 5.2",
     cost: "nearly the same",
-};
-const MAP_RESOLUTION: About = About {
-    label: "Map size [texels]",
-    what: "Texels across and down of every map; automatic maps of flat surfaces are finer where light is finer.",
-    range: "auto, 64 to 4096; default auto",
-    accuracy: "details finer than a texel are averaged",
-    cost: "memory and the direct layer's time grow with its square",
 };
 
 const ESTIMATORS: [(Estimator, &str, &str); 2] = [
@@ -159,54 +151,79 @@ const NO_CAUSTIC: &str = "The caustic layer is off: nothing here applies to the 
 const NO_SPLATS: &str = "Only the splat estimator has it.";
 const NOT_GAUSSIAN: &str = "Sigma is the spread of the gaussian kernel; the chosen kernel has none.";
 
+/// What the settings are set back to: what the program begins with for an estimator.
+pub fn defaults(estimator: Estimator) -> BakeSettings {
+    let settings = match estimator {
+        Estimator::Wavefront => BakeSettings::default(),
+        Estimator::Splat => BakeSettings::splat(),
+    };
+    BakeSettings {
+        layers: vec![LayerKind::Caustic, LayerKind::Direct],
+        ..settings
+    }
+}
+
+/// The density that a bake begins from unless another is set [rays/sr].
+fn default_density_per_sr(settings: &BakeSettings) -> f64 {
+    settings.max_error.map_or_else(
+        || settings.estimator.preview_density_per_sr(),
+        BakeSettings::starting_density_per_sr,
+    )
+}
+
 /// Shows the section; `settings` holds what the user chose.
 pub fn show(ui: &mut Ui, settings: &mut BakeSettings) {
     let no_caustic = no_caustic(settings);
     let is_wavefront = settings.estimator == Estimator::Wavefront;
     let no_sigma = no_sigma(settings);
+    let default = defaults(settings.estimator);
     rows(ui, "light pass", |ui| {
         let before = settings.estimator;
-        row(ui, &ESTIMATOR, no_caustic, |ui| {
-            listed(ui, "estimator", &mut settings.estimator, &ESTIMATORS)
+        let estimator = (&mut settings.estimator, &Estimator::Wavefront);
+        setting(ui, &ESTIMATOR, no_caustic, estimator, |ui, estimator| {
+            listed(ui, "estimator", estimator, &ESTIMATORS)
         });
         if settings.estimator != before {
             change_estimator(settings, before);
         }
-        row(ui, &LAYERS, None, |ui| layers(ui, &mut settings.layers));
-        row(ui, &TARGET, no_caustic, |ui| target::show(ui, settings));
-        row(ui, &DENSITY, no_caustic, |ui| {
-            density(ui, &mut settings.density_per_sr)
-        });
-        row(ui, &SIGMA, no_sigma, |ui| {
-            sigma(ui, &mut settings.sigma, is_wavefront)
-        });
-        row(ui, &MAP_RESOLUTION, None, |ui| {
-            map_resolution(ui, &mut settings.map_resolution)
-        });
+        setting(ui, &LAYERS, None, (&mut settings.layers, &default.layers), layers);
+        let default_density_per_sr = default_density_per_sr(settings);
+        let density_per_sr = (&mut settings.density_per_sr, &default_density_per_sr);
+        setting(ui, &DENSITY, no_caustic, density_per_sr, density);
+        setting(
+            ui,
+            &SIGMA,
+            no_sigma,
+            (&mut settings.sigma, &default.sigma),
+            |ui, value| sigma(ui, value, is_wavefront),
+        );
     });
 }
 
-/// Shows the section of what is seldom changed.
+/// Shows what is seldom changed.
 pub fn show_details(ui: &mut Ui, settings: &mut BakeSettings) {
     let no_caustic = no_caustic(settings);
     let is_wavefront = settings.estimator == Estimator::Wavefront;
     let no_splats = no_caustic.or(is_wavefront.then_some(NO_SPLATS));
     let no_sigma = no_sigma(settings);
+    let default = defaults(settings.estimator);
     rows(ui, "rays and kernels", |ui| {
-        row(ui, &ADAPTIVE, no_splats.or(no_sigma), |ui| {
-            adaptive(ui, &mut settings.sigma)
+        adaptive(ui, &mut settings.sigma, no_splats.or(no_sigma));
+        let value = (&mut settings.kernel, &default.kernel);
+        setting(ui, &KERNEL, no_splats, value, |ui, kernel| {
+            listed(ui, "kernel", kernel, &KERNELS)
         });
-        row(ui, &KERNEL, no_splats, |ui| {
-            listed(ui, "kernel", &mut settings.kernel, &KERNELS)
+        let value = (&mut settings.footprint, &default.footprint);
+        setting(ui, &FOOTPRINT, no_splats, value, |ui, footprint| {
+            listed(ui, "footprint", footprint, &FOOTPRINTS)
         });
-        row(ui, &FOOTPRINT, no_splats, |ui| {
-            listed(ui, "footprint", &mut settings.footprint, &FOOTPRINTS)
+        let value = (&mut settings.rays, &default.rays);
+        setting(ui, &RAYS, no_splats, value, |ui, rays| {
+            listed(ui, "rays", rays, &PLACEMENTS)
         });
-        row(ui, &RAYS, no_splats, |ui| {
-            listed(ui, "rays", &mut settings.rays, &PLACEMENTS)
-        });
-        row(ui, &ITEM_BUFFER, no_caustic, |ui| {
-            listed(ui, "item buffer", &mut settings.item_buffer, &ITEM_BUFFERS)
+        let value = (&mut settings.item_buffer, &default.item_buffer);
+        setting(ui, &ITEM_BUFFER, no_caustic, value, |ui, item_buffer| {
+            listed(ui, "item buffer", item_buffer, &ITEM_BUFFERS)
         });
     });
 }
@@ -218,7 +235,8 @@ fn change_estimator(settings: &mut BakeSettings, before: Estimator) {
     target::after_change_of_estimator(settings);
 }
 
-fn no_caustic(settings: &BakeSettings) -> Option<&'static str> {
+/// Why nothing that shapes the caustic layer can be set, where that is so.
+pub fn no_caustic(settings: &BakeSettings) -> Option<&'static str> {
     (!settings.layers.contains(&LayerKind::Caustic)).then_some(NO_CAUSTIC)
 }
 
@@ -239,6 +257,8 @@ fn listed<T: PartialEq + Copy>(
 
 fn layers(ui: &mut Ui, layers: &mut Vec<LayerKind>) -> Response {
     ui.horizontal(|ui| {
+        // Three words in a narrow row.
+        ui.spacing_mut().item_spacing.x = 5.0;
         for kind in LayerKind::ALL {
             let mut on = layers.contains(&kind);
             let is_last = on && layers.len() == 1;
@@ -267,6 +287,8 @@ fn density(ui: &mut Ui, density_per_sr: &mut f64) -> Response {
         }
         step_of(*density_per_sr)
     };
+    // Beside it stand up to nine digits.
+    ui.spacing_mut().slider_width = 86.0;
     ui.add(
         Slider::from_get_set(DENSITY_STEPS, get_set)
             .clamping(SliderClamping::Edits)
@@ -297,48 +319,18 @@ fn sigma(ui: &mut Ui, sigma: &mut Sigma, from_zero: bool) -> Response {
             false,
             Slider::new(&mut 1.0, SIGMA_RANGE)
                 .logarithmic(true)
-                .text("adaptive"),
+                .custom_formatter(|_, _| "adaptive".into()),
         ),
     }
 }
 
-fn adaptive(ui: &mut Ui, sigma: &mut Sigma) -> Response {
+fn adaptive(ui: &mut Ui, sigma: &mut Sigma, unavailable: Option<&str>) {
     let mut on = *sigma == Sigma::Adaptive;
-    let response = ui.checkbox(&mut on, "per footprint");
-    if response.changed() {
+    let was_on = on;
+    setting(ui, &ADAPTIVE, unavailable, (&mut on, &false), |ui, on| {
+        ui.checkbox(on, "per footprint")
+    });
+    if on != was_on {
         *sigma = if on { Sigma::Adaptive } else { Sigma::Constant(1.0) };
     }
-    response
-}
-
-fn map_resolution(ui: &mut Ui, resolution: &mut MapResolution) -> Response {
-    let square = |side| MapResolution::Fixed {
-        width: side,
-        height: side,
-    };
-    let selected = match *resolution {
-        MapResolution::Auto => "auto".into(),
-        MapResolution::Fixed { width, height } if width == height => width.to_string(),
-        MapResolution::Fixed { width, height } => format!("{width} × {height}"),
-    };
-    choice(
-        ui,
-        "map size",
-        resolution,
-        &selected,
-        &[
-            (
-                MapResolution::Auto,
-                "auto",
-                "starts coarse and doubles while footprints are finer than texels",
-            ),
-            (square(64), "64", "64 × 64"),
-            (square(128), "128", "128 × 128"),
-            (square(256), "256", "256 × 256"),
-            (square(512), "512", "512 × 512"),
-            (square(1024), "1024", "1024 × 1024"),
-            (square(2048), "2048", "2048 × 2048"),
-            (square(4096), "4096", "4096 × 4096: 200 MB per map and layer"),
-        ],
-    )
 }

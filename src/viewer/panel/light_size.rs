@@ -3,7 +3,7 @@
 use egui::{DragValue, Response, Ui};
 
 use super::Wishes;
-use super::control::{About, row};
+use super::control::{About, setting};
 use crate::scene::{Edit, Light, LightKind, LightSize};
 
 const RADIUS: About = About {
@@ -11,6 +11,7 @@ const RADIUS: About = About {
     what: "Of a point light, that makes it a ball, or of a spot, that makes it a disc across its axis; 0 makes it a \
            point. Its power stays.",
     range: "0 up",
+    default: "as in the file",
     accuracy: "soft caustics are means over many places of the lamp and need more rays for the same error",
     cost: "this light is traced anew",
 };
@@ -18,6 +19,7 @@ const ANGLE: About = About {
     label: "Diameter [°]",
     what: "Angle across the disc of a sun; 0 makes its light parallel. The real sun has 0.53°. Its irradiance stays.",
     range: "0 to 180",
+    default: "as in the file",
     accuracy: RADIUS.accuracy,
     cost: RADIUS.cost,
 };
@@ -27,40 +29,56 @@ const RADIUS_SPEED: f64 = 0.01;
 /// Drag of one point [°].
 const ANGLE_SPEED_DEG: f64 = 0.01;
 
-/// Shows the size of a light that can have one; what is changed goes to `wishes`.
-pub fn show(ui: &mut Ui, index: usize, light: &Light, wishes: &mut Wishes) {
-    let size = match light.kind {
-        LightKind::Point { .. } | LightKind::Spot { .. } => {
-            let mut radius_m = match light.size {
-                LightSize::Radius { radius_m } => radius_m,
-                _ => 0.0,
-            };
-            let speed = if radius_m > 0.0 {
-                RADIUS_SPEED * radius_m
-            } else {
-                RADIUS_SPEED
-            };
-            let response = row(ui, &RADIUS, None, |ui| number(ui, &mut radius_m, f64::MAX, speed));
-            (response, LightSize::Radius { radius_m }, radius_m)
-        }
-        LightKind::Sun { .. } => {
-            let mut angle_deg = match light.size {
-                LightSize::Angle { diameter_rad } => diameter_rad.to_degrees(),
-                _ => 0.0,
-            };
-            let response = row(ui, &ANGLE, None, |ui| {
-                number(ui, &mut angle_deg, 180.0, ANGLE_SPEED_DEG)
-            });
-            let diameter_rad = angle_deg.to_radians();
-            (response, LightSize::Angle { diameter_rad }, angle_deg)
-        }
-        LightKind::Panel { .. } | LightKind::Surface { .. } | LightKind::Environment { .. } => return,
-    };
-    let (response, size, number) = size;
-    if response.changed() {
-        let size = if number > 0.0 { size } else { LightSize::None };
+/// Shows the size of a light that can have one, with that of the file; what is changed goes to `wishes`.
+pub fn show(ui: &mut Ui, index: usize, (light, of_file): (&Light, &Light), wishes: &mut Wishes) {
+    let mut size = light.size;
+    let value = (&mut size, &of_file.size);
+    match light.kind {
+        LightKind::Point { .. } | LightKind::Spot { .. } => setting(ui, &RADIUS, None, value, radius),
+        LightKind::Sun { .. } => setting(ui, &ANGLE, None, value, diameter),
+        LightKind::Panel { .. } | LightKind::Surface { .. } | LightKind::Environment { .. } => {}
+    }
+    if size != light.size {
         wishes.edit = Some(Edit::LightSize { light: index, size });
     }
+}
+
+fn radius(ui: &mut Ui, size: &mut LightSize) -> Response {
+    let mut radius_m = match *size {
+        LightSize::Radius { radius_m } => radius_m,
+        _ => 0.0,
+    };
+    let speed = if radius_m > 0.0 {
+        RADIUS_SPEED * radius_m
+    } else {
+        RADIUS_SPEED
+    };
+    let response = number(ui, &mut radius_m, f64::MAX, speed);
+    if response.changed() {
+        *size = if radius_m > 0.0 {
+            LightSize::Radius { radius_m }
+        } else {
+            LightSize::None
+        };
+    }
+    response
+}
+
+fn diameter(ui: &mut Ui, size: &mut LightSize) -> Response {
+    let mut angle_deg = match *size {
+        LightSize::Angle { diameter_rad } => diameter_rad.to_degrees(),
+        _ => 0.0,
+    };
+    let response = number(ui, &mut angle_deg, 180.0, ANGLE_SPEED_DEG);
+    if response.changed() {
+        let diameter_rad = angle_deg.to_radians();
+        *size = if angle_deg > 0.0 {
+            LightSize::Angle { diameter_rad }
+        } else {
+            LightSize::None
+        };
+    }
+    response
 }
 
 fn number(ui: &mut Ui, value: &mut f64, most: f64, speed: f64) -> Response {

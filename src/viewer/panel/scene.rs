@@ -1,13 +1,16 @@
 //! Section *Scene*: lights, materials and places, changed while they are looked at.
 
-use egui::{Button, ComboBox, DragValue, Response, Slider, SliderClamping, Ui};
+use egui::{ComboBox, DragValue, Response, RichText, Slider, SliderClamping, Ui};
 use glam::DVec3;
 
-use super::control::{About, CONTROL_WIDTH, row, rows, significant};
-use super::{Facts, Wishes, bake, light_size, waves};
+use super::control::{About, CONTROL_WIDTH, arrow_steps, counted, row, rows, setting, significant, stepped};
+use super::{Facts, Wishes, bake, glass, light_colour, light_size, waves};
 use crate::optics::LinearSrgb;
-use crate::scene::{Edit, LightKind, Scene, SurfaceKind};
+use crate::scene::{Edit, LightKind, Scene, SurfaceKind, why_light_stays};
 use crate::units::{Irradiance, RadiantIntensity};
+use crate::viewer::gizmo::Held;
+use crate::viewer::new_light::NewLight;
+use crate::viewer::placement::Placement;
 
 /// The slider's ends, as factors of the strength in the file.
 const POWER_FACTORS: (f64, f64) = (1e-2, 1e2);
@@ -18,10 +21,22 @@ const SAME_DIRECTION: f64 = 1e-9;
 /// Least distance that one point of a drag moves, as a share of the scene's extent.
 const DRAG_SHARE: f64 = 1e-3;
 
+const ADD: About = About {
+    label: "Add light",
+    what: "It comes before what the camera looks at, as bright as suits the exposure, with handles to move it. It can be \
+           undone and removed, and goes into a saved scene.",
+    range: "lamp, spot, sun or panel",
+    default: "none is added",
+    accuracy: "more light needs more rays for the same error",
+    cost: "the scene is baked anew",
+};
+/// What the list of lights leaves for the button beside it [points].
+const REMOVE_WIDTH: f32 = 66.0;
 const LIGHT: About = About {
     label: "Light",
     what: "Which light the rows below change.",
     range: "the scene's lights",
+    default: "the first",
     accuracy: "none",
     cost: "none",
 };
@@ -29,6 +44,7 @@ const INTENSITY: About = About {
     label: "Intensity [W/sr]",
     what: "Radiant intensity of a point light, of a spot on its axis: glTF's candela divided by 683.",
     range: "a hundredth to a hundred times that of the file; logarithmic; any value above 0 can be typed",
+    default: "as in the file",
     accuracy: "none: light is as exact as before",
     cost: "little: no ray is traced again, the deposits are scaled",
 };
@@ -36,6 +52,7 @@ const IRRADIANCE: About = About {
     label: "Irradiance [W/m²]",
     what: "Of the sun, measured across its beam: glTF's lux divided by 683.",
     range: INTENSITY.range,
+    default: "as in the file",
     accuracy: INTENSITY.accuracy,
     cost: INTENSITY.cost,
 };
@@ -43,6 +60,7 @@ const BRIGHTNESS: About = About {
     label: "Brightness",
     what: "Radiance of a lamp with a surface [W/(m² sr)], or how many times as bright as its image an environment is.",
     range: "a hundredth to a hundred times the file's value; others can be typed",
+    default: "as in the file",
     accuracy: "none: light scales with it",
     cost: "none: baked light is scaled",
 };
@@ -50,6 +68,7 @@ const POSITION: About = About {
     label: "Position [m]",
     what: "Place of the light in scene coordinates: x, y (up), z.",
     range: "any; drag sideways, or click and type",
+    default: "as in the file",
     accuracy: "none: light is as exact as before",
     cost: "this light is traced anew",
 };
@@ -58,13 +77,46 @@ const DIRECTION: About = About {
     what: "The way the light travels: azimuth, clockwise from −z as seen from above, and elevation; −90 is straight \
            down.",
     range: "azimuth −180 to 180, elevation −89.99 to 89.99",
+    default: "as in the file",
     accuracy: "none: light is as exact as before",
     cost: "this light is traced anew",
 };
+const LIGHT_HANDLES: About = About {
+    label: "By mouse",
+    what: "Handles in the picture that move the light along x, y and z; or a click or drag on a surface that puts it before \
+           that, as far off as it is now.",
+    range: "lights with a place",
+    default: "off",
+    accuracy: "none: light is as exact as before",
+    cost: "this light is traced anew while it moves",
+};
+const OBJECT_HANDLES: About = About {
+    label: "Handles",
+    what: "In the picture, to move the object with all parts of its node along x, y and z and to turn it about the \
+           vertical. A click on an object in the picture brings them up, Esc takes them away.",
+    range: "on or off",
+    default: "off",
+    accuracy: "none: light is as exact as before",
+    cost: "light that meets the old or the new place is traced anew while it moves",
+};
+const AIM: &str = "A click or drag in the picture turns the light: a spot to the surface there; a sun goes where it is seen there \
+                   in the sky, or would be seen if the surface there were a mirror.";
+const NO_HAND: &str = "Not for this light.";
+const NO_PLACE: &str = "This light has neither a place nor a direction that could be changed.";
+const TURN: About = About {
+    label: "Turn [°]",
+    what: "About the vertical through the middle of the object's node, counter-clockwise as seen from above.",
+    range: "any; drag sideways, or click and type",
+    default: "0: as in the file",
+    accuracy: "none: light is as exact as before",
+    cost: "light that meets the old or the new place is traced anew",
+};
+const NO_TURN: &str = "Its shape is another one than the file gives it.";
 const OBJECT: About = About {
     label: "Object",
     what: "Which object the rows below change; its material may be that of others too.",
     range: "the scene's objects",
+    default: "the first",
     accuracy: "none",
     cost: "none",
 };
@@ -72,6 +124,7 @@ const IOR: About = About {
     label: "Refractive index",
     what: "Of glass, water and polish at 588 nm: bends light and sets how much is reflected.",
     range: "1 to 3; larger values can be typed",
+    default: "as in the file",
     accuracy: "sharper caustics need more rays for the same error",
     cost: "light that meets this material is traced anew",
 };
@@ -80,6 +133,7 @@ const ROUGHNESS: About = About {
     what: "How wide the lobe is in which mirrors, glass and polish send light on (GGX). Metal and glass above 0.6, and \
            polish above 0.3, are matte.",
     range: "0 to 1",
+    default: "as in the file",
     accuracy: "wide lobes need more wavefronts for the same error",
     cost: "light that meets this material is traced anew where the class changes",
 };
@@ -87,6 +141,7 @@ const TINT: About = About {
     label: "Base colour",
     what: "Tint of glass per crossing, reflectance of a mirror, albedo of what is matte; linear sRGB.",
     range: "0 to 1 per channel",
+    default: "as in the file",
     accuracy: "none",
     cost: "specular: light that meets it is weighted anew; matte: only the picture changes",
 };
@@ -94,6 +149,7 @@ const OFFSET: About = About {
     label: "Offset [m]",
     what: "How far the object, with all parts of its node, stands from its place in the file: x, y (up), z.",
     range: "any; drag sideways, or click and type; 0 is the file's place exactly",
+    default: "0: as in the file",
     accuracy: "none: light is as exact as before",
     cost: "light that meets the old or the new place is traced anew",
 };
@@ -103,151 +159,302 @@ const OFFSET: About = About {
 pub struct Selection {
     light: usize,
     object: usize,
+    hand: Hand,
+    /// Whether the next frame opens the section: something was picked in the picture.
+    pub must_open: bool,
+}
+
+/// What clicks in the picture do to a light.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Placed {
+    /// Put it before the surface.
+    At(usize),
+    /// Turn it to the surface; a sun goes where it is seen, or would be in a mirror there.
+    Towards(usize),
+}
+
+/// What the mouse does in the picture.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Hand {
+    #[default]
+    Nothing,
+    /// Pulls the light by handles.
+    Light,
+    /// Puts the light before surfaces.
+    Place,
+    /// Turns the light to what is pointed at.
+    Aim,
+    /// Pulls the object by handles.
+    Object,
+}
+
+impl Selection {
+    /// What has handles in the picture.
+    pub fn held(&self) -> Option<Held> {
+        match self.hand {
+            Hand::Nothing => None,
+            Hand::Light | Hand::Place | Hand::Aim => Some(Held::Light(self.light)),
+            Hand::Object => Some(Held::Object(self.object)),
+        }
+    }
+
+    /// The light that clicks in the picture put elsewhere, or turn.
+    pub fn placed(&self) -> Option<Placed> {
+        match self.hand {
+            Hand::Place => Some(Placed::At(self.light)),
+            Hand::Aim => Some(Placed::Towards(self.light)),
+            Hand::Nothing | Hand::Light | Hand::Object => None,
+        }
+    }
+
+    /// Something was picked in the picture, or let go.
+    pub fn hold(&mut self, held: Option<Held>) {
+        self.hand = match held {
+            None => Hand::Nothing,
+            Some(Held::Light(light)) => {
+                self.light = light;
+                Hand::Light
+            }
+            Some(Held::Object(object)) => {
+                self.object = object;
+                Hand::Object
+            }
+        };
+        self.must_open = held.is_some();
+    }
 }
 
 /// Shows the section; what is changed goes to `wishes`.
 pub fn show(ui: &mut Ui, selection: &mut Selection, facts: &Facts<'_>, wishes: &mut Wishes) {
     let scene = facts.scene;
+    let inventory = format!(
+        "{}, {}, {}",
+        counted(scene.objects.len(), "object"),
+        counted(scene.triangle_count(), "triangle"),
+        counted(scene.lights.len(), "light")
+    );
+    ui.label(RichText::new(inventory).weak())
+        .on_hover_text(format!("{}, drawn by {}.", scene.source, facts.adapter));
     rows(ui, "scene", |ui| {
+        if scene.lights.is_empty() {
+            ui.label("");
+            ui.colored_label(bake::ATTENTION, "No light: add one.");
+            ui.end_row();
+        }
+        add_light(ui, wishes);
         if !scene.lights.is_empty() {
             let names = scene.lights.iter().map(|light| light.name.as_str());
             row(ui, &LIGHT, None, |ui| {
-                one_of(ui, "light", &mut selection.light, names)
+                ui.horizontal(|ui| {
+                    let list = one_of(
+                        ui,
+                        ("light", CONTROL_WIDTH - REMOVE_WIDTH),
+                        &mut selection.light,
+                        names,
+                    );
+                    remove_light(ui, selection, scene, wishes);
+                    list
+                })
+                .inner
             });
             light(ui, selection.light, facts, wishes);
+            light_hand(ui, selection, facts);
         }
         if !scene.objects.is_empty() {
             let names = scene.objects.iter().map(|object| object.name.as_str());
             row(ui, &OBJECT, None, |ui| {
-                one_of(ui, "object", &mut selection.object, names)
+                one_of(ui, ("object", CONTROL_WIDTH), &mut selection.object, names)
             });
-            material(ui, selection.object, scene, wishes);
-            row(ui, &OFFSET, None, |ui| {
-                offset(ui, selection.object, facts, wishes)
+            material(ui, selection.object, facts, wishes);
+            place_of_object(ui, selection.object, facts, wishes);
+            row(ui, &OBJECT_HANDLES, None, |ui| {
+                ui.horizontal(|ui| {
+                    hand(
+                        ui,
+                        &mut selection.hand,
+                        Hand::Object,
+                        ("Move object", "Move object"),
+                        OBJECT_HANDLES.what,
+                    );
+                })
+                .response
             });
         }
     });
-    undo(ui, facts, wishes);
 }
 
-fn undo(ui: &mut Ui, facts: &Facts<'_>, wishes: &mut Wishes) {
-    let undo = ui
-        .add_enabled(facts.undoable > 0, Button::new("Undo (Ctrl+Z)"))
-        .on_hover_text("Takes the last change of the scene back, exactly.")
-        .on_disabled_hover_text("The scene is as it was loaded.");
-    wishes.undo |= undo.clicked();
-    if let Some(refusal) = facts.refusal {
-        ui.colored_label(bake::FAILED, refusal);
+/// Buttons for lights that are to be added.
+fn add_light(ui: &mut Ui, wishes: &mut Wishes) {
+    row(ui, &ADD, None, |ui| {
+        ui.horizontal(|ui| {
+            ui.spacing_mut().item_spacing.x = 3.0;
+            for light in NewLight::ALL {
+                let button = ui
+                    .button(light.name())
+                    .accessible_name(format!("Add {}", light.name()))
+                    .on_hover_text(format!("{} {}", what_of(light), ADD.what));
+                if button.clicked() {
+                    wishes.new_light = Some(light);
+                }
+            }
+        })
+        .response
+    });
+}
+
+fn what_of(light: NewLight) -> &'static str {
+    match light {
+        NewLight::Lamp => "A point that shines the same in every direction.",
+        NewLight::Spot => "A cone of light, at what is looked at.",
+        NewLight::Sun => "Parallel light from infinitely far.",
+        NewLight::Panel => "A flat square lamp, turned to what is looked at.",
+    }
+}
+
+fn remove_light(ui: &mut Ui, selection: &mut Selection, scene: &Scene, wishes: &mut Wishes) {
+    let light = &scene.lights[selection.light];
+    let why_not = why_light_stays(&light.kind);
+    let remove = ui.add_enabled(why_not.is_none(), egui::Button::new("Remove"));
+    let remove = remove
+        .accessible_name("Remove light")
+        .on_hover_text("Takes the light out of the scene; undo brings it back.")
+        .on_disabled_hover_text(format!("`{}` {}.", light.name, why_not.unwrap_or_default()));
+    if remove.clicked() {
+        wishes.edit = Some(Edit::LightRemoved {
+            light: selection.light,
+        });
+        selection.hold(None);
     }
 }
 
 /// A list of names, of which one is chosen by its index.
 fn one_of<'a>(
     ui: &mut Ui,
-    name: &str,
+    (name, width): (&str, f32),
     chosen: &mut usize,
     names: impl ExactSizeIterator<Item = &'a str>,
 ) -> Response {
     let names: Vec<&str> = names.collect();
     *chosen = (*chosen).min(names.len().saturating_sub(1));
-    ComboBox::from_id_salt(name)
-        .width(CONTROL_WIDTH)
+    let list = ComboBox::from_id_salt(name)
+        .width(width)
         .selected_text(names[*chosen])
         .truncate()
         .show_ui(ui, |ui| {
             for (index, name) in names.iter().enumerate() {
                 ui.push_id(index, |ui| ui.selectable_value(chosen, index, *name));
             }
-        })
-        .response
+        });
+    if list.inner.is_none() {
+        *chosen = stepped(*chosen, arrow_steps(ui, &list.response), names.len());
+    }
+    list.response
 }
 
 fn light(ui: &mut Ui, light: usize, facts: &Facts<'_>, wishes: &mut Wishes) {
-    let kind = facts.scene.lights[light].kind;
-    let power_about = match kind {
+    let shown = &facts.scene.lights[light];
+    let of_file = facts.scene.light_at_first(light, facts.loaded);
+    let kind = shown.kind;
+    power(ui, light, (&kind, &of_file.kind), wishes);
+    light_size::show(ui, light, (shown, of_file), wishes);
+    if matches!(
+        kind,
+        LightKind::Point { .. } | LightKind::Spot { .. } | LightKind::Sun { .. }
+    ) {
+        light_colour::show(ui, light, (shown, of_file), wishes);
+    }
+    if let (Some(position), Some(default)) = (kind.position(), of_file.kind.position()) {
+        let mut moved = position;
+        setting(ui, &POSITION, None, (&mut moved, &default), |ui, moved| {
+            place(ui, POSITION.label, moved, facts.scene)
+        });
+        if moved != position {
+            let position = moved;
+            wishes.edit = Some(Edit::LightPosition { light, position });
+        }
+    }
+    if let (Some(present), Some(default)) = (direction(&kind), direction(&of_file.kind)) {
+        let mut turned = present;
+        setting(ui, &DIRECTION, None, (&mut turned, &default), angles);
+        if turned != present {
+            let direction = turned;
+            wishes.edit = Some(Edit::LightDirection { light, direction });
+        }
+    }
+}
+
+fn direction(kind: &LightKind) -> Option<DVec3> {
+    match *kind {
+        LightKind::Spot { direction, .. } | LightKind::Sun { direction, .. } => Some(direction),
+        _ => None,
+    }
+}
+
+fn power(ui: &mut Ui, light: usize, (kind, of_file): (&LightKind, &LightKind), wishes: &mut Wishes) {
+    let about = match kind {
         LightKind::Sun { .. } => &IRRADIANCE,
         LightKind::Point { .. } | LightKind::Spot { .. } => &INTENSITY,
         LightKind::Panel { .. } | LightKind::Surface { .. } | LightKind::Environment { .. } => &BRIGHTNESS,
     };
-    row(ui, power_about, None, |ui| power(ui, light, facts, wishes));
-    light_size::show(ui, light, &facts.scene.lights[light], wishes);
-    if let Some(position) = kind.position() {
-        row(ui, &POSITION, None, |ui| {
-            let mut moved = position;
-            let response = place(ui, &mut moved, facts.scene);
-            if moved != position {
-                wishes.edit = Some(Edit::LightPosition {
-                    light,
-                    position: moved,
-                });
-            }
-            response
-        });
-    }
-    if let LightKind::Spot { direction, .. } | LightKind::Sun { direction, .. } = kind {
-        row(ui, &DIRECTION, None, |ui| {
-            let (response, turned) = angles(ui, direction);
-            if let Some(direction) = turned {
-                wishes.edit = Some(Edit::LightDirection { light, direction });
-            }
-            response
-        });
+    let (present, default) = (kind.strength(), of_file.strength());
+    let mut value = present;
+    setting(ui, about, None, (&mut value, &default), |ui, value| {
+        ui.add(
+            Slider::new(value, default * POWER_FACTORS.0..=default * POWER_FACTORS.1)
+                .logarithmic(true)
+                .clamping(SliderClamping::Never)
+                .custom_formatter(|value, _| significant(value)),
+        )
+    });
+    if value != present {
+        wishes.edit = Some(strength(kind, light, value));
     }
 }
 
-fn power(ui: &mut Ui, light: usize, facts: &Facts<'_>, wishes: &mut Wishes) -> Response {
-    let kind = &facts.scene.lights[light].kind;
-    let of_file = facts.loaded.lights[light].kind.strength();
-    let mut value = kind.strength();
-    let response = ui.add(
-        Slider::new(&mut value, of_file * POWER_FACTORS.0..=of_file * POWER_FACTORS.1)
-            .logarithmic(true)
-            .clamping(SliderClamping::Never)
-            .custom_formatter(|value, _| significant(value)),
-    );
-    if response.changed() {
-        wishes.edit = Some(match kind {
-            LightKind::Sun { .. } => Edit::LightNormalIrradiance {
+fn strength(kind: &LightKind, light: usize, value: f64) -> Edit {
+    match kind {
+        LightKind::Sun { .. } => Edit::LightNormalIrradiance {
+            light,
+            normal_irradiance: Irradiance(value),
+        },
+        LightKind::Point { .. } | LightKind::Spot { .. } => Edit::LightIntensity {
+            light,
+            intensity: RadiantIntensity(value),
+        },
+        LightKind::Panel { .. } | LightKind::Surface { .. } | LightKind::Environment { .. } => {
+            Edit::LightBrightness {
                 light,
-                normal_irradiance: Irradiance(value),
-            },
-            LightKind::Point { .. } | LightKind::Spot { .. } => Edit::LightIntensity {
-                light,
-                intensity: RadiantIntensity(value),
-            },
-            LightKind::Panel { .. } | LightKind::Surface { .. } | LightKind::Environment { .. } => {
-                Edit::LightBrightness {
-                    light,
-                    brightness: value,
-                }
+                brightness: value,
             }
-        });
+        }
     }
-    response
 }
 
 /// Three lengths [m].
-fn place(ui: &mut Ui, place: &mut DVec3, scene: &Scene) -> Response {
+fn place(ui: &mut Ui, name: &str, place: &mut DVec3, scene: &Scene) -> Response {
     let (low, high) = scene.bounds().unwrap_or((DVec3::ZERO, DVec3::ONE));
     let speed = DRAG_SHARE * (high - low).length().max(1e-6);
     ui.horizontal(|ui| {
-        ui.spacing_mut().item_spacing.x = 4.0;
-        ui.spacing_mut().interact_size.x = 62.0;
-        let axes = [
-            ("x: ", &mut place.x),
-            ("y: ", &mut place.y),
-            ("z: ", &mut place.z),
-        ];
+        // Three numbers in a narrow row.
+        let spacing = ui.spacing_mut();
+        (spacing.item_spacing.x, spacing.button_padding.x) = (3.0, 2.0);
+        spacing.interact_size.x = 58.0;
+        let axes = [("x", &mut place.x), ("y", &mut place.y), ("z", &mut place.z)];
         axes.into_iter()
-            .map(|(prefix, value)| ui.add(DragValue::new(value).speed(speed).max_decimals(3).prefix(prefix)))
+            .map(|(axis, value)| {
+                let decimals = if value.abs() < 10.0 { 3 } else { 2 };
+                let drag = DragValue::new(value).speed(speed).max_decimals(decimals);
+                ui.add(drag.prefix(format!("{axis}: ")))
+                    .accessible_name(format!("{name}: {axis}"))
+            })
             .reduce(|all, one| all.union(one))
     })
     .inner
     .expect("there are three axes")
 }
 
-/// Azimuth and elevation; a new direction where one of them was changed.
-fn angles(ui: &mut Ui, direction: DVec3) -> (Response, Option<DVec3>) {
+/// Azimuth and elevation of a direction.
+fn angles(ui: &mut Ui, direction: &mut DVec3) -> Response {
     let mut azimuth_deg = direction.x.atan2(-direction.z).to_degrees();
     let mut elevation_deg = direction.y.clamp(-1.0, 1.0).asin().to_degrees();
     let before = (azimuth_deg, elevation_deg);
@@ -256,90 +463,129 @@ fn angles(ui: &mut Ui, direction: DVec3) -> (Response, Option<DVec3>) {
             let angle = |value, range| DragValue::new(value).speed(0.5).range(range).max_decimals(1);
             let azimuth = ui.add(angle(&mut azimuth_deg, -360.0..=360.0).prefix("azimuth: "));
             let elevation = ui.add(angle(&mut elevation_deg, -90.0..=90.0).prefix("elev.: "));
-            azimuth.union(elevation)
+            azimuth.union(elevation.accessible_name("Direction [°]: elevation"))
         })
         .inner;
-    let turned = ((azimuth_deg, elevation_deg) != before).then(|| {
+    if (azimuth_deg, elevation_deg) != before {
         let azimuth = azimuth_deg.to_radians();
         let (sine, cosine) = elevation_deg
             .clamp(-STEEPEST_DEG, STEEPEST_DEG)
             .to_radians()
             .sin_cos();
-        DVec3::new(azimuth.sin() * cosine, sine, -azimuth.cos() * cosine)
-    });
-    // Rounding to angles and back is no turn.
-    let turned = turned.filter(|turned| turned.distance(direction) > SAME_DIRECTION);
-    (response, turned)
-}
-
-fn material(ui: &mut Ui, object: usize, scene: &Scene, wishes: &mut Wishes) {
-    let index = scene.objects[object].material;
-    let material = &scene.materials[index];
-    let no_ior = matches!(material.surface, SurfaceKind::Diffuse | SurfaceKind::Mirror)
-        .then_some("Only glass, water and polish have one; this surface is matte or a mirror.");
-    row(ui, &IOR, no_ior, |ui| {
-        let mut ior = material.ior;
-        let slider = Slider::new(&mut ior, 1.0..=3.0).clamping(SliderClamping::Never);
-        let response = ui.add(slider.fixed_decimals(3));
-        if response.changed() {
-            wishes.edit = Some(Edit::MaterialIor { material: index, ior });
+        let turned = DVec3::new(azimuth.sin() * cosine, sine, -azimuth.cos() * cosine);
+        // Rounding to angles and back is no turn.
+        if turned.distance(*direction) > SAME_DIRECTION {
+            *direction = turned;
         }
-        response
-    });
-    row(ui, &ROUGHNESS, None, |ui| {
-        let mut roughness = material.roughness;
-        let slider = Slider::new(&mut roughness, 0.0..=1.0).clamping(SliderClamping::Never);
-        let response = ui.add(slider.fixed_decimals(2));
-        if response.changed() {
-            wishes.edit = Some(Edit::MaterialRoughness {
-                material: index,
-                roughness,
-            });
-        }
-        response
-    });
-    if let Some(waves) = material.bending_waves() {
-        waves::show(ui, index, waves, wishes);
-    }
-    row(ui, &TINT, None, |ui| {
-        let mut colour = material.base_colour.to_array().map(|channel| channel as f32);
-        let response = ui.color_edit_button_rgb(&mut colour);
-        if response.changed() {
-            wishes.edit = Some(Edit::MaterialTint {
-                material: index,
-                base_colour: LinearSrgb::from(colour.map(|channel| f64::from(channel.clamp(0.0, 1.0)))),
-            });
-        }
-        response
-    });
-}
-
-fn offset(ui: &mut Ui, object: usize, facts: &Facts<'_>, wishes: &mut Wishes) -> Response {
-    let first = |scene: &Scene| scene.objects[object].mesh.positions.first().copied();
-    let present = first(facts.scene).unwrap_or_default() - first(facts.loaded).unwrap_or_default();
-    // What rounding leaves of the difference is not shown as a digit.
-    let mut wanted = (present * 1e9).round() / 1e9;
-    let before = wanted;
-    let response = place(ui, &mut wanted, facts.scene);
-    if wanted != before {
-        wishes.edit = Some(moved_node(object, facts.loaded, wanted));
     }
     response
 }
 
-/// All parts of an object's node at an offset [m] from their places in the file.
-fn moved_node(object: usize, loaded: &Scene, offset: DVec3) -> Edit {
-    let node = loaded.objects[object].node;
-    let parts = loaded
-        .objects
-        .iter()
-        .enumerate()
-        .filter(|(_, part)| part.node == node);
-    let edits: Vec<Edit> = parts
-        .map(|(index, part)| Edit::object_at(index, &part.mesh, offset))
-        .collect();
-    match <[Edit; 1]>::try_from(edits) {
-        Ok([alone]) => alone,
-        Err(several) => Edit::Several(several),
+fn material(ui: &mut Ui, object: usize, facts: &Facts<'_>, wishes: &mut Wishes) {
+    let material = facts.scene.objects[object].material;
+    let (shown, of_file) = (
+        &facts.scene.materials[material],
+        &facts.loaded.materials[material],
+    );
+    let no_ior = matches!(shown.surface, SurfaceKind::Diffuse | SurfaceKind::Mirror)
+        .then_some("Only glass, water and polish have one; this surface is matte or a mirror.");
+    let mut ior = shown.ior;
+    setting(ui, &IOR, no_ior, (&mut ior, &of_file.ior), |ui, ior| {
+        let slider = Slider::new(ior, 1.0..=3.0).clamping(SliderClamping::Never);
+        ui.add(slider.fixed_decimals(3))
+    });
+    if ior != shown.ior {
+        wishes.edit = Some(Edit::MaterialIor { material, ior });
+    }
+    glass::show(ui, material, (shown, of_file), no_ior, wishes);
+    let mut roughness = shown.roughness;
+    let value = (&mut roughness, &of_file.roughness);
+    setting(ui, &ROUGHNESS, None, value, |ui, roughness| {
+        let slider = Slider::new(roughness, 0.0..=1.0).clamping(SliderClamping::Never);
+        ui.add(slider.fixed_decimals(2))
+    });
+    if roughness != shown.roughness {
+        wishes.edit = Some(Edit::MaterialRoughness { material, roughness });
+    }
+    if let Some(waves) = shown.bending_waves() {
+        waves::show(ui, material, (waves, of_file.bending_waves()), wishes);
+    }
+    let mut base_colour = shown.base_colour;
+    let value = (&mut base_colour, &of_file.base_colour);
+    setting(ui, &TINT, None, value, |ui, base_colour| {
+        let mut colour = base_colour.to_array().map(|channel| channel as f32);
+        let response = ui.color_edit_button_rgb(&mut colour);
+        if response.changed() {
+            *base_colour = LinearSrgb::from(colour.map(|channel| f64::from(channel.clamp(0.0, 1.0))));
+        }
+        response
+    });
+    if base_colour != shown.base_colour {
+        wishes.edit = Some(Edit::MaterialTint {
+            material,
+            base_colour,
+        });
+    }
+}
+
+/// A switch for what the mouse does in the picture.
+fn hand(ui: &mut Ui, present: &mut Hand, own: Hand, (text, name): (&str, &str), what: &str) {
+    let mut is_on = *present == own;
+    let switch = ui.toggle_value(&mut is_on, text).accessible_name(name);
+    let switch = switch
+        .on_hover_text(what)
+        .on_disabled_hover_text(format!("{what} {NO_HAND}"));
+    if switch.changed() {
+        *present = if is_on { own } else { Hand::Nothing };
+    }
+}
+
+fn light_hand(ui: &mut Ui, selection: &mut Selection, facts: &Facts<'_>) {
+    let kind = &facts.scene.lights[selection.light].kind;
+    let (has_place, has_direction) = (kind.position().is_some(), direction(kind).is_some());
+    let why_not = (!has_place && !has_direction).then_some(NO_PLACE);
+    row(ui, &LIGHT_HANDLES, why_not, |ui| {
+        ui.horizontal(|ui| {
+            let what = LIGHT_HANDLES.what;
+            ui.spacing_mut().item_spacing.x = 3.0;
+            ui.add_enabled_ui(has_place, |ui| {
+                hand(ui, &mut selection.hand, Hand::Light, ("Move", "Move light"), what);
+                hand(
+                    ui,
+                    &mut selection.hand,
+                    Hand::Place,
+                    ("Place", "Place light"),
+                    what,
+                );
+            });
+            ui.add_enabled_ui(has_direction, |ui| {
+                hand(ui, &mut selection.hand, Hand::Aim, ("Aim", "Aim light"), AIM);
+            });
+        })
+        .response
+    });
+}
+
+/// Offset and turn of an object's node.
+fn place_of_object(ui: &mut Ui, object: usize, facts: &Facts<'_>, wishes: &mut Wishes) {
+    let found = Placement::of(object, facts.loaded, facts.scene);
+    let why_not = found.is_none().then_some(NO_TURN);
+    let present = found.unwrap_or_default();
+    let mut wanted = present;
+    let offset_m = (&mut wanted.offset_m, &DVec3::ZERO);
+    setting(ui, &OFFSET, why_not, offset_m, |ui, offset_m| {
+        place(ui, OFFSET.label, offset_m, facts.scene)
+    });
+    // To the digits that are shown: a look at the number changes nothing.
+    let present_deg = (present.yaw_rad.to_degrees() * 1e2).round() / 1e2;
+    let mut turn_deg = present_deg;
+    setting(ui, &TURN, why_not, (&mut turn_deg, &0.0), |ui, turn_deg| {
+        ui.add(DragValue::new(turn_deg).speed(0.5).max_decimals(2))
+    });
+    if turn_deg != present_deg {
+        wanted.yaw_rad = turn_deg.to_radians();
+    }
+    if wanted != present {
+        wishes.edit = Some(wanted.edit(object, facts.loaded));
     }
 }

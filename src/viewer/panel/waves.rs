@@ -5,7 +5,7 @@ use glam::DVec3;
 
 use super::Wishes;
 use super::bake::FAILED;
-use super::control::{About, row};
+use super::control::{About, setting};
 use crate::scene::waves::STEEPEST_SLOPE;
 use crate::scene::{Edit, Wave, Waves};
 
@@ -13,6 +13,7 @@ const SLOPE: About = About {
     label: "Waves' slope",
     what: "Steepest slope A·2π/λ of all waves together; sets their heights, each in proportion.",
     range: "0 to 1; flatter waves focus farther away",
+    default: "as in the file",
     accuracy: "sharper caustics need more rays for the same error",
     cost: "light that meets this material is traced anew",
 };
@@ -21,19 +22,24 @@ const WAVE: About = About {
     what: "One wave of the normals: height A between rest and crest [m], length λ [m], and the direction it runs to, as \
            an azimuth clockwise from −z as seen from above [°].",
     range: "A from 0, λ above 0; slopes of at most 1 altogether",
+    default: "as in the file",
     accuracy: "cells become as short as a quarter of the shortest wave",
     cost: "light that meets this material is traced anew; short waves need more rays",
 };
 
 /// Least height that a drag starts from [m].
 const LEAST_HEIGHT_M: f64 = 1e-6;
+/// Slopes nearer than this are the same.
+const SAME_SLOPE: f64 = 1e-9;
 
-/// Shows the waves of a material; what is changed goes to `wishes`.
-pub fn show(ui: &mut Ui, material: usize, waves: &Waves, wishes: &mut Wishes) {
+/// Shows the waves of a material, with those of the file; what is changed goes to `wishes`.
+pub fn show(ui: &mut Ui, material: usize, (waves, of_file): (&Waves, Option<&Waves>), wishes: &mut Wishes) {
     let mut list = waves.list().to_vec();
-    row(ui, &SLOPE, None, |ui| slope(ui, &mut list));
-    for wave in &mut list {
-        row(ui, &WAVE, None, |ui| one(ui, wave));
+    let in_file = of_file.map_or(&[][..], Waves::list);
+    slope(ui, &mut list, in_file);
+    for (index, wave) in list.iter_mut().enumerate() {
+        let default = *in_file.get(index).unwrap_or(wave);
+        setting(ui, &WAVE, None, (wave, &default), one);
     }
     if list == waves.list() {
         return;
@@ -53,22 +59,28 @@ pub fn show(ui: &mut Ui, material: usize, waves: &Waves, wishes: &mut Wishes) {
 }
 
 /// The slope of all; their heights follow it.
-fn slope(ui: &mut Ui, list: &mut [Wave]) -> Response {
-    let present: f64 = list.iter().map(Wave::slope).sum();
+fn slope(ui: &mut Ui, list: &mut [Wave], in_file: &[Wave]) {
+    let of = |list: &[Wave]| list.iter().map(Wave::slope).sum::<f64>();
+    let (present, in_file) = (of(list), of(in_file));
+    // What rounding leaves is no difference.
+    let is_as_in_file = (present - in_file).abs() < SAME_SLOPE;
+    let default = if is_as_in_file { present } else { in_file };
     let mut wanted = present;
-    let slider = Slider::new(&mut wanted, 0.0..=STEEPEST_SLOPE).clamping(SliderClamping::Never);
-    let response = ui.add(slider.fixed_decimals(3));
-    if response.changed() {
-        for wave in list.iter_mut() {
-            // Flat waves rise too, all alike.
-            wave.amplitude_m = wave.amplitude_m.max(LEAST_HEIGHT_M);
-        }
-        let present: f64 = list.iter().map(Wave::slope).sum();
-        for wave in list.iter_mut() {
-            wave.amplitude_m *= wanted / present;
-        }
+    setting(ui, &SLOPE, None, (&mut wanted, &default), |ui, wanted| {
+        let slider = Slider::new(wanted, 0.0..=STEEPEST_SLOPE).clamping(SliderClamping::Never);
+        ui.add(slider.fixed_decimals(3))
+    });
+    if wanted == present {
+        return;
     }
-    response
+    for wave in list.iter_mut() {
+        // Flat waves rise too, all alike.
+        wave.amplitude_m = wave.amplitude_m.max(LEAST_HEIGHT_M);
+    }
+    let present = of(list);
+    for wave in list.iter_mut() {
+        wave.amplitude_m *= wanted / present;
+    }
 }
 
 fn one(ui: &mut Ui, wave: &mut Wave) -> Response {
@@ -83,15 +95,22 @@ fn one(ui: &mut Ui, wave: &mut Wave) -> Response {
             number(ui, &mut wave.amplitude_m, 5, |shown| {
                 shown.speed(height_speed).range(0.0..=f64::MAX).prefix("A: ")
             })
-            .union(number(ui, &mut wave.wavelength_m, 4, |shown| {
-                shown
-                    .speed(length_speed)
-                    .range(f64::MIN_POSITIVE..=f64::MAX)
-                    .prefix("λ: ")
-            }))
-            .union(number(ui, &mut azimuth_deg, 1, |shown| {
-                shown.speed(0.5).range(-360.0..=360.0).prefix("az.: ")
-            }))
+            .accessible_name("Wave: height [m]")
+            .union(
+                number(ui, &mut wave.wavelength_m, 4, |shown| {
+                    shown
+                        .speed(length_speed)
+                        .range(f64::MIN_POSITIVE..=f64::MAX)
+                        .prefix("λ: ")
+                })
+                .accessible_name("Wave: length [m]"),
+            )
+            .union(
+                number(ui, &mut azimuth_deg, 1, |shown| {
+                    shown.speed(0.5).range(-360.0..=360.0).prefix("az.: ")
+                })
+                .accessible_name("Wave: azimuth [°]"),
+            )
         })
         .inner;
     if azimuth_deg != before {

@@ -1,0 +1,77 @@
+// Surfaces by something else than their light: display colours in linear light.
+
+// What is shown, one of INSPECTED_*.
+override INSPECTED: u32;
+// Whether the scale of false colours is logarithmic.
+override IS_LOGARITHMIC: bool;
+
+const INSPECTED_IRRADIANCE: u32 = 0u;
+const INSPECTED_TEXELS: u32 = 1u;
+const INSPECTED_DENSITY: u32 = 2u;
+const INSPECTED_NORMALS: u32 = 3u;
+const INSPECTED_UV: u32 = 4u;
+const INSPECTED_MAP_UV: u32 = 5u;
+
+// Of surfaces without a map, where maps are shown.
+const NO_MAP: vec3f = vec3f(0.01);
+// Luminance of linear sRGB.
+const LUMINANCE: vec3f = vec3f(0.2126, 0.7152, 0.0722);
+
+// Colour of a quantity; frame.colour_scale is where the scale begins and by what its steps are multiplied.
+fn false_colour(quantity: f32) -> vec3f {
+    var value = quantity;
+    if IS_LOGARITHMIC {
+        value = log2(max(quantity, 1e-30));
+    }
+    return linear_from_srgb(viridis((value - frame.colour_scale.x) * frame.colour_scale.y));
+}
+
+// Texels of the unit square, across and down, at a place: those of the tile that is there.
+fn texels_at(record: u32, uv: vec2f) -> vec2f {
+    var level = image_table[record];
+    while level + 1u < image_table[record + 1u] && locate(record, level, uv).is_coarser {
+        level++;
+    }
+    return level_extent(record, level);
+}
+
+@fragment
+fn inspected(fragment: Fragment, @builtin(front_facing) is_front: bool) -> @location(0) vec4f {
+    // How the map's coordinates and the place change by a pixel.
+    let across = dpdx(fragment.map_uv);
+    let down = dpdy(fragment.map_uv);
+    let pixel_m2 = length(cross(dpdx(fragment.from_camera), dpdy(fragment.from_camera)));
+    let record = map_of(objects[fragment.object], is_front);
+    if INSPECTED == INSPECTED_NORMALS {
+        return vec4f(linear_from_srgb(0.5 * normalize(fragment.normal) + 0.5), 1.0);
+    }
+    if INSPECTED == INSPECTED_UV {
+        return vec4f(linear_from_srgb(vec3f(fract(fragment.uv), 0.0)), 1.0);
+    }
+    if record == NO_IMAGE {
+        return vec4f(NO_MAP, 1.0);
+    }
+    let lit = irradiance(record, fragment.map_uv, level_of(record, across, down));
+    if lit.a > 0.0 {
+        return vec4f(fault_colour(), 1.0);
+    }
+    if INSPECTED == INSPECTED_IRRADIANCE {
+        return vec4f(false_colour(dot(lit.rgb, LUMINANCE)), 1.0);
+    }
+    if INSPECTED == INSPECTED_MAP_UV {
+        return vec4f(linear_from_srgb(vec3f(fragment.map_uv, 0.0)), 1.0);
+    }
+    let texels = texels_at(record, fragment.map_uv);
+    let step_across = across * texels;
+    let step_down = down * texels;
+    if INSPECTED == INSPECTED_DENSITY {
+        let pixel_texels = abs(step_across.x * step_down.y - step_across.y * step_down.x);
+        return vec4f(false_colour(sqrt(pixel_texels / max(pixel_m2, 1e-30))), 1.0);
+    }
+    // A checkerboard, grey where its squares are smaller than pixels.
+    let cell = floor(fragment.map_uv * texels);
+    let is_odd = fract(0.5 * (cell.x + cell.y)) > 0.25;
+    let widest = max(max(abs(step_across.x), abs(step_across.y)), max(abs(step_down.x), abs(step_down.y)));
+    let contrast = 1.0 - smoothstep(0.4, 0.8, widest);
+    return vec4f(vec3f(0.3 + select(-0.22, 0.22, is_odd) * contrast), 1.0);
+}

@@ -1,0 +1,252 @@
+//! The coordinates that a surface looks its map up by.
+
+use std::collections::HashMap;
+
+use glam::{DAffine3, DVec2, DVec3};
+use serde_json::{Value, json};
+
+use crate::error::Warning;
+use crate::illumination::{Chart, UvSet};
+use crate::scene::{Glb, Mesh, Scene};
+
+/// Which set of texture coordinates a primitive's map follows.
+#[derive(Clone, Copy, Debug)]
+pub struct Coordinates {
+    /// n of TEXCOORD_n.
+    pub tex_coord: usize,
+}
+
+/// Gives the primitive of a chart's surface the coordinates of its map, where they are not its own. Vertices are doubled
+/// where charts part. `None` where the node's transform cannot be undone.
+pub fn write(
+    glb: &mut Glb,
+    scene: &Scene,
+    chart: &Chart,
+    world_from_node: &DAffine3,
+    warnings: &mut Vec<Warning>,
+) -> Option<Coordinates> {
+    let own = |tex_coord| Some(Coordinates { tex_coord });
+    match chart.uv_set {
+        UvSet::TexCoord0 => return own(0),
+        UvSet::TexCoord1 => return own(1),
+        UvSet::Generated => {}
+    }
+    let object = &scene.objects[chart.object()];
+    let place = (object.node, object.primitive);
+    let determinant = world_from_node.matrix3.determinant();
+    let node_from_world = world_from_node.inverse();
+    if determinant == 0.0 || !node_from_world.is_finite() {
+        return None;
+    }
+    let parted = Parted::new(&object.mesh, chart, determinant < 0.0);
+    let normal_from_world = world_from_node.matrix3.transpose();
+    let position = |vertex: usize| {
+        let world = object.mesh.positions[vertex] + scene.origin_world;
+        node_from_world.transform_point3(world).as_vec3().to_array()
+    };
+    let normal = |vertex: usize| {
+        let normal = (normal_from_world * object.mesh.normals[vertex]).normalize_or(DVec3::Y);
+        normal.as_vec3().to_array()
+    };
+    let of_vertices = |value: &dyn Fn(usize) -> [f32; 3]| -> Vec<[f32; 3]> {
+        parted.vertices.iter().map(|&(vertex, _)| value(vertex)).collect()
+    };
+    let was = glb.primitive(place).clone();
+    let mut attributes = json!({
+        "POSITION": glb.push_vectors(&of_vertices(&position)),
+        "NORMAL": glb.push_vectors(&of_vertices(&normal)),
+    });
+    let uvs: Vec<[f32; 2]> = parted
+        .vertices
+        .iter()
+        .map(|(_, uv)| uv.as_vec2().to_array())
+        .collect();
+    let generated = glb.push_vectors(&uvs);
+    let tex_coord = add_sets(glb, &object.mesh, &parted, &was, generated, &mut attributes);
+    keep_others(
+        glb,
+        &object.name,
+        &object.mesh,
+        &parted,
+        &was,
+        &mut attributes,
+        warnings,
+    );
+    let indices = glb.push_indices(parted.corners.iter().copied());
+    let primitive = glb.primitive(place);
+    primitive["attributes"] = attributes;
+    primitive["indices"] = json!(indices);
+    if let Some(fields) = primitive.as_object_mut() {
+        fields.remove("mode");
+        fields.remove("targets");
+        if let Some(extensions) = fields.get_mut("extensions").and_then(Value::as_object_mut) {
+            // Its data is written out now.
+            extensions.remove("KHR_draco_mesh_compression");
+        }
+    }
+    Some(Coordinates { tex_coord })
+}
+
+/// A mesh whose vertices have one map coordinate each.
+struct Parted {
+    /// Which vertex of the mesh each one is, and its coordinate.
+    vertices: Vec<(usize, DVec2)>,
+    /// Three per triangle.
+    corners: Vec<u32>,
+}
+
+impl Parted {
+    fn new(mesh: &Mesh, chart: &Chart, is_mirrored: bool) -> Self {
+        let mut known: HashMap<(u32, [u64; 2]), u32> = HashMap::new();
+        let mut parted = Self {
+            vertices: Vec::new(),
+            corners: Vec::new(),
+        };
+        for (triangle, uvs) in mesh.triangles.iter().zip(&chart.corner_uvs) {
+            // A node that mirrors turns triangles around; the file has them as they were before.
+            let order = if is_mirrored { [0, 2, 1] } else { [0, 1, 2] };
+            for corner in order {
+                let (vertex, uv) = (triangle[corner], uvs[corner]);
+                let next = parted.vertices.len() as u32;
+                let key = (vertex, uv.to_array().map(f64::to_bits));
+                let index = *known.entry(key).or_insert(next);
+                if index == next {
+                    parted.vertices.push((vertex as usize, uv));
+                }
+                parted.corners.push(index);
+            }
+        }
+        parted
+    }
+}
+
+/// Adds the mesh's own sets as far as its material uses them, and the generated one, as TEXCOORD_1 where that is free.
+/// Sets have to be numbered without a gap; a mesh without any has the generated one as its first too.
+fn add_sets(
+    glb: &mut Glb,
+    mesh: &Mesh,
+    parted: &Parted,
+    was: &Value,
+    generated: usize,
+    attributes: &mut Value,
+) -> usize {
+    let material = was["material"].as_u64().map_or(Value::Null, |material| {
+        glb.json["materials"][material as usize].clone()
+    });
+    let uses_second = mesh.uv1.is_some() && highest_set(&material) >= 1;
+    let mut push = |uvs: &[DVec2]| {
+        let uvs: Vec<[f32; 2]> = parted
+            .vertices
+            .iter()
+            .map(|&(vertex, _)| uvs[vertex].as_vec2().to_array())
+            .collect();
+        json!(glb.push_vectors(&uvs))
+    };
+    attributes["TEXCOORD_0"] = mesh.uv0.as_deref().map_or(json!(generated), &mut push);
+    let mut tex_coord = 1;
+    if let Some(uvs) = mesh.uv1.as_deref().filter(|_| uses_second) {
+        attributes["TEXCOORD_1"] = push(uvs);
+        tex_coord = 2;
+    }
+    attributes[format!("TEXCOORD_{tex_coord}")] = json!(generated);
+    tex_coord
+}
+
+/// The highest set of texture coordinates that anything in a material names.
+fn highest_set(material: &Value) -> u64 {
+    match material {
+        Value::Object(fields) => {
+            let own = fields.get("texCoord").and_then(Value::as_u64).unwrap_or(0);
+            fields.values().map(highest_set).fold(own, u64::max)
+        }
+        Value::Array(items) => items.iter().map(highest_set).max().unwrap_or(0),
+        _ => 0,
+    }
+}
+
+/// Takes over what else the vertices have: tangents, colours. Those of a mesh that was repaired on loading are lost.
+fn keep_others(
+    glb: &mut Glb,
+    name: &str,
+    mesh: &Mesh,
+    parted: &Parted,
+    was: &Value,
+    attributes: &mut Value,
+    warnings: &mut Vec<Warning>,
+) {
+    for (semantic, accessor) in was["attributes"].as_object().into_iter().flatten() {
+        let is_known =
+            ["POSITION", "NORMAL"].contains(&semantic.as_str()) || semantic.starts_with("TEXCOORD_");
+        if is_known {
+            continue;
+        }
+        let accessor = accessor.as_u64().unwrap_or(u64::MAX) as usize;
+        match gathered(glb, accessor, mesh.positions.len(), parted) {
+            Some(index) => attributes[semantic] = json!(index),
+            None => warnings.push(Warning::new(
+                format!("surface `{name}`"),
+                format!("lost its {semantic} where its map's coordinates were added"),
+                "give it light-map coordinates (TEXCOORD_1) of its own",
+            )),
+        }
+    }
+    if was.get("targets").is_some() {
+        warnings.push(Warning::new(
+            format!("surface `{name}`"),
+            "lost its morph targets: its map is that of one shape",
+            "bake the shape that is shown",
+        ));
+    }
+}
+
+/// The elements of an accessor in the order of the new vertices, as another accessor; `None` where they cannot be told.
+fn gathered(glb: &mut Glb, accessor: usize, vertices: usize, parted: &Parted) -> Option<usize> {
+    let stated = glb.json["accessors"].get(accessor)?.clone();
+    if stated.get("sparse").is_some() || stated["count"].as_u64()? != vertices as u64 {
+        return None;
+    }
+    let view = glb.json["bufferViews"]
+        .get(stated["bufferView"].as_u64()? as usize)?
+        .clone();
+    let element = element_bytes(&stated)?;
+    if view["buffer"].as_u64()? != 0 || view.get("extensions").is_some() {
+        return None;
+    }
+    let number = |value: &Value| value.as_u64().unwrap_or(0) as usize;
+    let stride = number(&view["byteStride"]).max(element);
+    let start = number(&view["byteOffset"]).checked_add(number(&stated["byteOffset"]))?;
+    let mut bytes = Vec::new();
+    for &(vertex, _) in &parted.vertices {
+        let from = start.checked_add(vertex.checked_mul(stride)?)?;
+        bytes.extend(glb.binary().get(from..from.checked_add(element)?)?);
+        // Elements of vertices begin at multiples of four bytes.
+        bytes.resize(bytes.len().next_multiple_of(4), 0);
+    }
+    let view = glb.push_view(&bytes);
+    if element % 4 != 0 {
+        glb.json["bufferViews"][view]["byteStride"] = json!(element.next_multiple_of(4));
+    }
+    let mut copy = stated;
+    copy["bufferView"] = json!(view);
+    copy["count"] = json!(parted.vertices.len());
+    let fields = copy.as_object_mut()?;
+    fields.remove("byteOffset");
+    Some(glb.push("accessors", copy))
+}
+
+fn element_bytes(accessor: &Value) -> Option<usize> {
+    let components = match accessor["type"].as_str()? {
+        "SCALAR" => 1,
+        "VEC2" => 2,
+        "VEC3" => 3,
+        "VEC4" => 4,
+        _ => return None,
+    };
+    let each = match accessor["componentType"].as_u64()? {
+        5120 | 5121 => 1,
+        5122 | 5123 => 2,
+        5125 | 5126 => 4,
+        _ => return None,
+    };
+    Some(components * each)
+}

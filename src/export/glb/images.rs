@@ -1,0 +1,260 @@
+//! Maps as sRGB-encoded images.
+
+use std::io::Cursor;
+
+use glam::DVec2;
+
+use super::{Bits, Carrier, GlbOptions};
+use crate::error::{Error, Result};
+use crate::export::{Quantity, white::white};
+use crate::illumination::{Chart, IlluminationMap};
+use crate::optics::LinearSrgb;
+use crate::scene::{Scene, TextureRef};
+use crate::settings::LayerKind;
+use crate::units::LUMENS_PER_WATT;
+
+/// Texels around a triangle that take its colours.
+const MARGIN_TEXELS: f64 = 2.0;
+
+/// An image of a map.
+pub struct LightImage {
+    /// The file's bytes.
+    pub png: Vec<u8>,
+    /// What its white stands for, > 0.
+    pub white: f64,
+    /// Texels with a channel above white.
+    pub cut_texels: usize,
+    /// Share of all light that was above white.
+    pub cut_share: f64,
+    /// Texels with a channel below 0.
+    pub negative_texels: usize,
+}
+
+/// What an image of a map holds, texel by texel of a dense map, in the unit of the export.
+pub fn light_of(
+    map: &IlluminationMap,
+    layers: &[LayerKind],
+    scene: &Scene,
+    options: GlbOptions,
+) -> Vec<LinearSrgb> {
+    let mut light = vec![LinearSrgb::BLACK; map.chart.texel_count()];
+    for layer in map.layers.iter().filter(|layer| layers.contains(&layer.kind)) {
+        for (sum, part) in light.iter_mut().zip(&layer.irradiance) {
+            *sum += LinearSrgb::from(part.map(f64::from));
+        }
+    }
+    let factor = match options.carrier {
+        Carrier::LightMap => options.quantity.factor(),
+        Carrier::Emissive => match options.quantity {
+            Quantity::Irradiance | Quantity::IrradianceByPi => std::f64::consts::FRAC_1_PI,
+            Quantity::Illuminance | Quantity::IlluminanceByPi => {
+                LUMENS_PER_WATT * std::f64::consts::FRAC_1_PI
+            }
+        },
+        Carrier::Unlit => options.exposure_stops.exp2() * std::f64::consts::FRAC_1_PI,
+    };
+    if options.carrier == Carrier::LightMap {
+        return light.into_iter().map(|light| light * factor).collect();
+    }
+    let albedo = albedo(scene, &map.chart);
+    let sent = light.into_iter().zip(albedo);
+    sent.map(|(light, albedo)| light * albedo * factor).collect()
+}
+
+/// Albedo of the surface under each texel and those beside it.
+fn albedo(scene: &Scene, chart: &Chart) -> Vec<LinearSrgb> {
+    let object = &scene.objects[chart.object()];
+    let material = scene.material_of(chart.object());
+    let plain = vec![material.base_colour; chart.texel_count()];
+    let Some(reference) = &material.base_colour_texture else {
+        return plain;
+    };
+    let sets = [&object.mesh.uv0, &object.mesh.uv1];
+    let Some(uvs) = sets.get(reference.uv_set).and_then(|set| set.as_deref()) else {
+        return plain;
+    };
+    let texture = &scene.textures[reference.texture];
+    let look = |reference: &TextureRef, uv: DVec2| texture.sample(reference.transform(uv));
+    // How far outside its nearest triangle each texel's centre lies [texels], with what that one has there.
+    let mut nearest: Vec<(f64, DVec2)> = vec![(f64::INFINITY, DVec2::ZERO); chart.texel_count()];
+    for (corners, triangle) in chart.corner_uvs.iter().zip(&object.mesh.triangles) {
+        let of_image = triangle.map(|vertex| uvs[vertex as usize]);
+        spread(chart, *corners, of_image, &mut nearest);
+    }
+    let of_texel = |(outside, uv): &(f64, DVec2)| match outside.is_finite() {
+        true => material.base_colour * look(reference, *uv),
+        false => material.base_colour,
+    };
+    nearest.iter().map(of_texel).collect()
+}
+
+/// Gives the texels in and around a triangle its coordinates, where none is nearer.
+fn spread(chart: &Chart, corners: [DVec2; 3], values: [DVec2; 3], nearest: &mut [(f64, DVec2)]) {
+    let size = DVec2::new(chart.width as f64, chart.height as f64);
+    let [a, b, c] = corners.map(|corner| corner * size);
+    let doubled = (b - a).perp_dot(c - a);
+    if doubled == 0.0 {
+        return;
+    }
+    let low = (a.min(b).min(c) - MARGIN_TEXELS).max(DVec2::ZERO);
+    let high = (a.max(b).max(c) + MARGIN_TEXELS).min(size);
+    for row in low.y as usize..high.y.ceil() as usize {
+        for column in low.x as usize..high.x.ceil() as usize {
+            let centre = DVec2::new(column as f64 + 0.5, row as f64 + 0.5);
+            let shares = [
+                (c - b).perp_dot(centre - b) / doubled,
+                (a - c).perp_dot(centre - c) / doubled,
+                (b - a).perp_dot(centre - a) / doubled,
+            ];
+            // Each share falls to 0 at a side, over the height above it.
+            let heights = [(b, c), (c, a), (a, b)].map(|(from, to)| doubled.abs() / from.distance(to));
+            let depths = shares
+                .into_iter()
+                .zip(heights)
+                .map(|(share, height)| -share * height);
+            let outside = depths.fold(0.0, f64::max);
+            let known = &mut nearest[row * chart.width + column];
+            if outside < known.0 && outside <= MARGIN_TEXELS {
+                let [x, y, z] = shares;
+                *known = (outside, values[0] * x + values[1] * y + values[2] * z);
+            }
+        }
+    }
+}
+
+/// Encodes what [`light_of`] gave for a map of a size [texels].
+///
+/// # Errors
+/// Sizes that the format cannot hold; `name` is named.
+pub fn encode(
+    light: &[LinearSrgb],
+    (width, height): (usize, usize),
+    options: GlbOptions,
+    name: &str,
+) -> Result<LightImage> {
+    let white = match options.carrier {
+        Carrier::Unlit => 1.0,
+        Carrier::LightMap | Carrier::Emissive => {
+            let values = light.iter().flat_map(|light| light.to_array());
+            white(values, options.cut).unwrap_or(1.0)
+        }
+    };
+    let channels = || light.iter().flat_map(|light| light.to_array());
+    let all: f64 = channels().map(|value| value.max(0.0)).sum();
+    let above: f64 = channels().map(|value| (value - white).max(0.0)).sum();
+    let count = |fits: &dyn Fn(f64) -> bool| {
+        let has = |light: &&LinearSrgb| light.to_array().into_iter().any(fits);
+        light.iter().filter(has).count()
+    };
+    let relative: Vec<[f64; 3]> = light
+        .iter()
+        .map(|light| light.to_array().map(|value| (value / white).clamp(0.0, 1.0)))
+        .collect();
+    let bytes = match options.bits {
+        Bits::Eight => png::<u8>(diffused(&relative, width), (width, height), name)?,
+        Bits::Sixteen => {
+            let code =
+                |value: &f64| (LinearSrgb::encode_channel(*value) * f64::from(u16::MAX)).round() as u16;
+            let codes = relative.as_flattened().iter().map(code).collect();
+            png::<u16>(codes, (width, height), name)?
+        }
+    };
+    Ok(LightImage {
+        png: bytes,
+        white,
+        cut_texels: count(&|value| value > white),
+        cut_share: if all > 0.0 { above / all } else { 0.0 },
+        negative_texels: count(&|value| value < 0.0),
+    })
+}
+
+fn png<T>(codes: Vec<T>, (width, height): (usize, usize), name: &str) -> Result<Vec<u8>>
+where
+    image::Rgb<T>: image::PixelWithColorType<Subpixel = T>,
+    T: image::Primitive,
+    [T]: image::EncodableLayout,
+{
+    let unusable = |why: String| {
+        let what = format!("its map cannot be written ({why})");
+        Error::failure(format!("surface `{name}`"), what, "bake smaller maps")
+    };
+    let image = image::ImageBuffer::<image::Rgb<T>, _>::from_raw(width as u32, height as u32, codes);
+    let image = image.ok_or_else(|| unusable(format!("{width}x{height} is not its size")))?;
+    let mut bytes = Cursor::new(Vec::new());
+    let written = image.write_to(&mut bytes, image::ImageFormat::Png);
+    written.map_err(|error| unusable(error.to_string()))?;
+    Ok(bytes.into_inner())
+}
+
+/// Codes of eight bits for values in [0, 1], row by row. What a code is off is made up for by those beside and below
+/// (Floyd and Steinberg 1976), in linear light, so that means over a few texels are right however dark they are.
+fn diffused(values: &[[f64; 3]], width: usize) -> Vec<u8> {
+    let mut codes = Vec::with_capacity(3 * values.len());
+    // One more at each side takes what goes over the border.
+    let mut below = vec![[0.0; 3]; width + 2];
+    for row in values.chunks(width) {
+        let here = std::mem::replace(&mut below, vec![[0.0; 3]; width + 2]);
+        let mut ahead = [0.0; 3];
+        for (column, value) in row.iter().enumerate() {
+            for channel in 0..3 {
+                let wanted = value[channel] + here[column + 1][channel] + ahead[channel];
+                let code = (LinearSrgb::encode_channel(wanted) * 255.0).round() as u8;
+                let off = wanted - LinearSrgb::decode_channel(code);
+                ahead[channel] = off * 7.0 / 16.0;
+                below[column][channel] += off * 3.0 / 16.0;
+                below[column + 1][channel] += off * 5.0 / 16.0;
+                below[column + 2][channel] += off / 16.0;
+                codes.push(code);
+            }
+        }
+    }
+    codes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn eight_bits_hold_the_mean_of_what_is_far_below_their_steps() {
+        let (width, height) = (64, 64);
+        for level in [2e-5, 1e-4, 1e-3, 0.02, 0.3, 1.0] {
+            let values = vec![[level, 0.5 * level, 0.0]; width * height];
+            let codes = diffused(&values, width);
+            for (channel, wanted) in [(0, level), (1, 0.5 * level), (2, 0.0)] {
+                let of_channel = codes.iter().skip(channel).step_by(3);
+                let mean = of_channel
+                    .map(|code| LinearSrgb::decode_channel(*code))
+                    .sum::<f64>()
+                    / 4096.0;
+                // Half a step at a border is lost: 1/64 of the rows and columns.
+                assert!(
+                    (mean - wanted).abs() < 0.02 * wanted + 2e-6,
+                    "{level}: {mean} of {wanted}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn colours_of_a_triangle_reach_its_texels_and_those_beside_it() {
+        let mut nearest = vec![(f64::INFINITY, DVec2::ZERO); 64];
+        let chart = Chart {
+            receiver: crate::illumination::Receiver::front(0),
+            uv_set: crate::illumination::UvSet::Generated,
+            corner_uvs: Vec::new(),
+            width: 8,
+            height: 8,
+            texel_areas_m2: vec![1.0],
+            layout: None,
+            beyond: Vec::new(),
+            joints: Vec::new(),
+        };
+        let corners = [DVec2::ZERO, DVec2::new(0.5, 0.0), DVec2::new(0.0, 0.5)];
+        spread(&chart, corners, corners.map(|corner| corner * 2.0), &mut nearest);
+        assert_eq!(nearest[0].0, 0.0);
+        assert!((nearest[0].1 - DVec2::splat(0.125)).length() < 1e-12);
+        assert!(nearest[4].0 > 0.0 && nearest[4].0 < 1.0, "{:?}", nearest[4]);
+        assert!(nearest[63].0.is_infinite());
+    }
+}

@@ -1,0 +1,275 @@
+//! A scene with its illumination maps as one `.glb`: light-map coordinates as TEXCOORD_1 (generated ones included) and
+//! the maps as images, for programs that know light maps (MOZ_lightmap), for those that know none (emissive), and for
+//! those that shall not light at all (unlit).
+
+mod geometry;
+mod images;
+mod lights;
+mod materials;
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
+
+use self::geometry::Coordinates;
+use super::Quantity;
+use crate::error::{Error, Result, Warning};
+use crate::illumination::{IlluminationMap, Side};
+use crate::scene::{Glb, Opened, Scene};
+use crate::settings::LayerKind;
+
+/// How materials carry the light.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Carrier {
+    /// MOZ_lightmap: the irradiance, which the program multiplies by the albedo.
+    LightMap,
+    /// The light that the surface sends on, as its emission.
+    Emissive,
+    /// The picture of that light, as the colour of a KHR_materials_unlit material.
+    Unlit,
+}
+
+/// What becomes of the scene's own lights. A file that had both them and their light in its maps would be lit twice.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum SceneLights {
+    /// They stay; maps hold what they cannot give, the caustic layer alone.
+    Keep,
+    /// They go; maps hold every layer that was baked.
+    Remove,
+}
+
+/// How many bits a channel of an image has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Bits {
+    /// What browsers read: with errors diffused, so that means over some texels are right.
+    #[serde(rename = "8")]
+    Eight,
+    /// Steps of 1/65535, for programs that read all of them.
+    #[serde(rename = "16")]
+    Sixteen,
+}
+
+/// How a scene is written.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct GlbOptions {
+    /// How materials carry the light.
+    pub carrier: Carrier,
+    /// What the maps' numbers mean. An emission is never E or lux: it is the same by π.
+    pub quantity: Quantity,
+    /// What becomes of the lights.
+    pub lights: SceneLights,
+    /// How many bits a channel has.
+    pub bits: Bits,
+    /// Share of a map's light that its brightest texels may lose so that dim ones have finer steps, [0, 1).
+    pub cut: f64,
+    /// Of unlit pictures: what is multiplied by 2 to this power before it is shown [stops].
+    pub exposure_stops: f64,
+}
+
+/// One surface of an exported file.
+#[derive(Clone, Debug, Serialize)]
+pub struct ExportedMap {
+    /// The node's name.
+    pub surface: String,
+    /// glTF index of the node in the file.
+    pub node: usize,
+    /// Index of the primitive within the node's mesh.
+    pub primitive: usize,
+    /// Which coordinates the map follows.
+    pub tex_coord: usize,
+    /// The value of the image's white, in the export's unit.
+    pub intensity: f64,
+    /// Texels of which some channel was above that.
+    pub cut_texels: usize,
+    /// Share of the map's light that was above that.
+    pub cut_share: f64,
+    /// Texels with a channel below 0 (colours outside of sRGB), which became 0.
+    pub negative_texels: usize,
+}
+
+/// What was written, beside the file's bytes.
+#[derive(Clone, Debug, Serialize)]
+pub struct GlbReport {
+    /// How.
+    pub options: GlbOptions,
+    /// Unit of the maps' values.
+    pub unit: &'static str,
+    /// The layers in the maps.
+    pub layers: Vec<LayerKind>,
+    /// One per surface.
+    pub maps: Vec<ExportedMap>,
+    /// What the file cannot hold.
+    pub warnings: Vec<Warning>,
+}
+
+/// The bytes of a `.glb` of a scene with its maps, and a report.
+///
+/// # Errors
+/// Maps that lack the layer which the lights leave to them; a scene whose file cannot be taken up; more than 4 GiB.
+pub fn encode(
+    scene: &Scene,
+    opened: Opened,
+    maps: &[IlluminationMap],
+    options: GlbOptions,
+) -> Result<(Vec<u8>, GlbReport)> {
+    let layers = layers_of(scene, maps, options)?;
+    let Opened {
+        mut glb,
+        world_from_node,
+        warnings,
+    } = opened;
+    let mut report = GlbReport {
+        options,
+        unit: options.quantity.unit(),
+        layers: layers.clone(),
+        maps: Vec::new(),
+        warnings,
+    };
+    glb.push_own_meshes(&nodes_with_maps(scene, maps));
+    for map in front_maps(maps, scene, &mut report.warnings) {
+        let object = &scene.objects[map.chart.object()];
+        let dense = map.dense();
+        let world_from_node = world_from_node.get(&object.node);
+        let Some(coordinates) = world_from_node.and_then(|transform| {
+            geometry::write(&mut glb, scene, &dense.chart, transform, &mut report.warnings)
+        }) else {
+            report.warnings.push(Warning::new(
+                format!("surface `{}`", object.name),
+                "stands at a node that is scaled to nothing; its map was left out",
+                "give the node a size",
+            ));
+            continue;
+        };
+        let exported = add_map(&mut glb, scene, &dense, &layers, coordinates, options)?;
+        report.maps.push(exported);
+    }
+    if options.lights == SceneLights::Remove {
+        lights::remove(&mut glb.json);
+    }
+    glb.json["asset"]["extras"]["nephroid"] = json!({
+        "unit": report.unit,
+        "layers": report.layers,
+        "carrier": options.carrier,
+        "lights": options.lights,
+    });
+    Ok((glb.into_bytes()?, report))
+}
+
+/// The layers that are written, in their order.
+fn layers_of(scene: &Scene, maps: &[IlluminationMap], options: GlbOptions) -> Result<Vec<LayerKind>> {
+    let mut kinds: Vec<LayerKind> = maps
+        .iter()
+        .flat_map(|map| map.layers.iter().map(|layer| layer.kind))
+        .collect();
+    kinds.sort_unstable();
+    kinds.dedup();
+    if options.lights == SceneLights::Keep {
+        kinds.retain(|kind| *kind == LayerKind::Caustic);
+    }
+    if kinds.is_empty() {
+        return Err(Error::failure(
+            &scene.source,
+            "has no maps with light that its own lights do not give",
+            "bake its caustic layer, or let its lights be removed (--lights remove)",
+        ));
+    }
+    Ok(kinds)
+}
+
+/// The maps that materials can carry: those of the side that is drawn.
+fn front_maps<'a>(
+    maps: &'a [IlluminationMap],
+    scene: &Scene,
+    warnings: &mut Vec<Warning>,
+) -> Vec<&'a IlluminationMap> {
+    let (front, back): (Vec<_>, Vec<_>) = maps
+        .iter()
+        .partition(|map| map.chart.receiver.side() == Side::Front);
+    for map in back {
+        warnings.push(Warning::new(
+            format!("surface `{}`", scene.objects[map.chart.object()].name),
+            "has light on its back too, which a glTF material cannot carry; it was left out",
+            "give the surface a thickness",
+        ));
+    }
+    front
+}
+
+fn nodes_with_maps(scene: &Scene, maps: &[IlluminationMap]) -> Vec<usize> {
+    let mut nodes: Vec<usize> = maps
+        .iter()
+        .map(|map| scene.objects[map.chart.object()].node)
+        .collect();
+    nodes.sort_unstable();
+    nodes.dedup();
+    nodes
+}
+
+fn add_map(
+    glb: &mut Glb,
+    scene: &Scene,
+    map: &IlluminationMap,
+    layers: &[LayerKind],
+    coordinates: Coordinates,
+    options: GlbOptions,
+) -> Result<ExportedMap> {
+    let object = &scene.objects[map.chart.object()];
+    let light = images::light_of(map, layers, scene, options);
+    let image = images::encode(&light, (map.width(), map.height()), options, &object.name)?;
+    let image_index = glb.push_png(&format!("{} light", object.name), &image.png);
+    let sampler = glb.push(
+        "samplers",
+        json!({ "magFilter": 9729, "minFilter": 9729, "wrapS": 33071, "wrapT": 33071 }),
+    );
+    let texture = glb.push("textures", json!({ "source": image_index, "sampler": sampler }));
+    let carried = materials::Carried {
+        texture: json!({ "index": texture, "texCoord": coordinates.tex_coord }),
+        intensity: image.white,
+        options,
+    };
+    let path = (object.node, object.primitive);
+    materials::give(glb, path, &carried);
+    Ok(ExportedMap {
+        surface: object.name.clone(),
+        node: object.node,
+        primitive: object.primitive,
+        tex_coord: coordinates.tex_coord,
+        intensity: image.white,
+        cut_texels: image.cut_texels,
+        cut_share: image.cut_share,
+        negative_texels: image.negative_texels,
+    })
+}
+
+impl Glb {
+    /// Gives each of these nodes a mesh of its own where others share it: their light differs.
+    fn push_own_meshes(&mut self, nodes: &[usize]) {
+        let mut users: BTreeMap<u64, usize> = BTreeMap::new();
+        for node in self.json["nodes"].as_array().into_iter().flatten() {
+            if let Some(mesh) = node["mesh"].as_u64() {
+                *users.entry(mesh).or_default() += 1;
+            }
+        }
+        for &node in nodes {
+            let Some(mesh) = self.json["nodes"][node]["mesh"].as_u64() else {
+                continue;
+            };
+            let count = users.entry(mesh).or_default();
+            if *count > 1 {
+                *count -= 1;
+                let copy = self.json["meshes"][mesh as usize].clone();
+                let copy = self.push("meshes", copy);
+                self.json["nodes"][node]["mesh"] = json!(copy);
+            }
+        }
+    }
+
+    /// A primitive of a node's mesh.
+    fn primitive(&mut self, (node, primitive): (usize, usize)) -> &mut Value {
+        let mesh = self.json["nodes"][node]["mesh"].as_u64().unwrap_or(0);
+        &mut self.json["meshes"][mesh as usize]["primitives"][primitive]
+    }
+}

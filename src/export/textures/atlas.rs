@@ -1,0 +1,205 @@
+//! Where many maps go in few textures.
+
+use super::index::Rectangle;
+use crate::error::{Error, Result};
+
+/// How an atlas is laid out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct AtlasOptions {
+    /// Longest side of a texture [texels], > 0.
+    pub most_side: usize,
+    /// Texels around each map that go on with those at its border.
+    pub gutter: usize,
+    /// Rectangles begin at multiples of this [texels].
+    pub grid: usize,
+}
+
+/// One texture of an atlas.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Page {
+    /// Texels across.
+    pub width: usize,
+    /// Texels down.
+    pub height: usize,
+    /// Which maps are in it, and where their texels are, without the gutter.
+    pub places: Vec<(usize, Rectangle)>,
+}
+
+/// Places maps of some sizes, each with its gutter, in as few textures as were found, with sides of powers of two.
+///
+/// # Errors
+/// A map that is larger than a texture may be; `name` gives what it is called.
+pub fn pack(
+    sizes: &[(usize, usize)],
+    options: AtlasOptions,
+    name: impl Fn(usize) -> String,
+) -> Result<Vec<Page>> {
+    let cell = |side: usize| (side + 2 * options.gutter).next_multiple_of(options.grid);
+    for (map, &(width, height)) in sizes.iter().enumerate() {
+        if cell(width.max(height)) > options.most_side {
+            return Err(Error::failure(
+                name(map),
+                format!(
+                    "its {width}x{height} texels with a gutter of {} are more than an atlas of {} holds",
+                    options.gutter, options.most_side
+                ),
+                "allow a larger one (--atlas N)",
+            ));
+        }
+    }
+    // Tall ones first; those of one size in their order.
+    let mut left: Vec<usize> = (0..sizes.len()).collect();
+    left.sort_by_key(|&map| std::cmp::Reverse((sizes[map].1, sizes[map].0)));
+    let mut pages = Vec::new();
+    while !left.is_empty() {
+        let fill = |(width, height): (usize, usize)| {
+            let mut skyline = Skyline::new(width, height);
+            let place = |&map: &usize| {
+                let (width, height) = sizes[map];
+                let (x, y) = skyline.place(cell(width), cell(height))?;
+                let (x, y) = (x + options.gutter, y + options.gutter);
+                Some((map, Rectangle { x, y, width, height }))
+            };
+            let places: Vec<(usize, Rectangle)> = left.iter().filter_map(place).collect();
+            Page {
+                width,
+                height,
+                places,
+            }
+        };
+        let holds_all = |page: &Page| page.places.len() == left.len();
+        let page = shapes(options.most_side)
+            .into_iter()
+            .map(fill)
+            .find(holds_all)
+            .unwrap_or_else(|| fill((options.most_side, options.most_side)));
+        left.retain(|map| page.places.iter().all(|(placed, _)| placed != map));
+        pages.push(page);
+    }
+    Ok(pages)
+}
+
+/// Squares and halves of squares with sides of powers of two, the smallest first.
+fn shapes(most_side: usize) -> Vec<(usize, usize)> {
+    let sides = (0..usize::BITS).map(|power| 1 << power);
+    let sides = sides.take_while(|side| *side <= most_side);
+    sides
+        .flat_map(|side: usize| [(side, side.div_ceil(2)), (side, side)])
+        .collect()
+}
+
+/// What is free above what was placed: steps from left to right.
+struct Skyline {
+    height: usize,
+    steps: Vec<Step>,
+}
+
+#[derive(Clone, Copy)]
+struct Step {
+    x: usize,
+    y: usize,
+    width: usize,
+}
+
+impl Skyline {
+    fn new(width: usize, height: usize) -> Self {
+        let floor = Step { x: 0, y: 0, width };
+        Self {
+            height,
+            steps: vec![floor],
+        }
+    }
+
+    /// Takes the lowest room of a size, and of those the leftmost.
+    fn place(&mut self, width: usize, height: usize) -> Option<(usize, usize)> {
+        let rooms = (0..self.steps.len()).filter_map(|first| Some((self.level(first, width)?, first)));
+        let (y, first) = rooms.filter(|(y, _)| y + height <= self.height).min()?;
+        let x = self.steps[first].x;
+        let end = x + width;
+        let mut after: Vec<Step> = Vec::new();
+        for step in self.steps.drain(first..) {
+            let begin = step.x.max(end);
+            if begin < step.x + step.width {
+                after.push(Step {
+                    x: begin,
+                    y: step.y,
+                    width: step.x + step.width - begin,
+                });
+            }
+        }
+        let top = y + height;
+        self.steps.push(Step { x, y: top, width });
+        self.steps.extend(after);
+        Some((x, y))
+    }
+
+    /// How low a width comes that begins at a step.
+    fn level(&self, first: usize, width: usize) -> Option<usize> {
+        let (mut room, mut level) = (0, 0);
+        for step in &self.steps[first..] {
+            room += step.width;
+            level = level.max(step.y);
+            if room >= width {
+                return Some(level);
+            }
+        }
+        None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const OPTIONS: AtlasOptions = AtlasOptions {
+        most_side: 256,
+        gutter: 2,
+        grid: 4,
+    };
+
+    #[test]
+    fn no_map_lies_on_another_and_all_lie_somewhere() {
+        let sizes: Vec<(usize, usize)> = (0..60)
+            .map(|map| (1 + map * 37 % 90, 1 + map * 53 % 70))
+            .collect();
+        let pages = pack(&sizes, OPTIONS, |_| String::new()).expect("they fit");
+        let mut found = vec![0; sizes.len()];
+        for page in &pages {
+            let mut owners = vec![None; page.width * page.height];
+            for (map, place) in &page.places {
+                assert_eq!((place.width, place.height), sizes[*map]);
+                found[*map] += 1;
+                for row in place.y - 2..place.y + place.height + 2 {
+                    for column in place.x - 2..place.x + place.width + 2 {
+                        let owner = &mut owners[row * page.width + column];
+                        assert_eq!(owner.replace(map), None, "with its gutter");
+                    }
+                }
+            }
+        }
+        assert_eq!(found, vec![1; sizes.len()]);
+        let taken: usize = sizes
+            .iter()
+            .map(|(width, height)| (width + 4) * (height + 4))
+            .sum();
+        let whole: usize = pages.iter().map(|page| page.width * page.height).sum();
+        assert!(taken as f64 > 0.6 * whole as f64, "{taken} of {whole} texels");
+    }
+
+    #[test]
+    fn a_texture_is_no_larger_than_it_has_to_be() {
+        let shape = |sizes: &[(usize, usize)]| {
+            let pages = pack(sizes, OPTIONS, |_| String::new()).expect("they fit");
+            pages
+                .iter()
+                .map(|page| (page.width, page.height))
+                .collect::<Vec<_>>()
+        };
+        assert_eq!(shape(&[]), []);
+        assert_eq!(shape(&[(28, 28)]), [(32, 32)]);
+        assert_eq!(shape(&[(28, 28), (28, 28)]), [(64, 32)]);
+        assert_eq!(shape(&[(250, 252), (250, 252)]), [(256, 256), (256, 256)]);
+        let refused = pack(&[(253, 1)], OPTIONS, |_| "floor".into()).expect_err("too large");
+        assert_eq!(refused.location, "floor");
+    }
+}

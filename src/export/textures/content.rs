@@ -1,0 +1,171 @@
+//! Which light of a map is in its textures.
+
+use crate::error::{Error, Result, Warning};
+use crate::export::map_reader::{StoredLight, StoredMap};
+use crate::files;
+use crate::settings::LayerKind;
+
+use super::index::PlacedMap;
+
+/// Share of a layer's light that rounding may leave out of the parts of lights.
+const ROUNDING: f64 = 1e-4;
+
+/// Which light textures hold.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Content {
+    /// All layers that were baked, summed.
+    Sum,
+    /// One layer.
+    Layer(LayerKind),
+    /// Each layer in a texture of its own.
+    EachLayer,
+    /// Each light in a texture of its own, its parts of all layers summed.
+    EachLight,
+}
+
+/// The light of one texture.
+#[derive(Clone, Debug)]
+pub struct Part {
+    /// Layers whose sum it is.
+    pub layers: Vec<LayerKind>,
+    /// Of one light alone.
+    pub light: Option<String>,
+    /// Part of the file's name; empty for the sum.
+    pub key: String,
+    /// E per texel [W/m²].
+    pub irradiance: Vec<[f32; 3]>,
+}
+
+impl Part {
+    /// What it is of, with no light and no layer yet.
+    pub fn without_light(&self) -> Self {
+        Self {
+            layers: Vec::new(),
+            light: self.light.clone(),
+            key: self.key.clone(),
+            irradiance: Vec::new(),
+        }
+    }
+
+    /// What the file's name ends in.
+    pub fn suffix(&self) -> String {
+        match self.key.as_str() {
+            "" => String::new(),
+            key => format!("_{key}"),
+        }
+    }
+
+    /// In words, for the file.
+    pub fn what(&self, maps: &[PlacedMap]) -> String {
+        let layers: Vec<&str> = self.layers.iter().map(|layer| layer.name()).collect();
+        let surfaces: Vec<&str> = maps.iter().map(|map| map.surface.as_str()).collect();
+        let light = self.light.as_ref().map(|light| format!(" of light {light}"));
+        format!(
+            "{}{} on {}",
+            layers.join(" + "),
+            light.unwrap_or_default(),
+            surfaces.join(", ")
+        )
+    }
+}
+
+impl Content {
+    /// The textures of a map, with a warning of light that is in none of them.
+    ///
+    /// # Errors
+    /// A map that lacks the layer, or the parts of lights, that are asked for.
+    pub fn parts(self, stored: &StoredMap) -> Result<(Vec<Part>, Option<Warning>)> {
+        let map = &stored.map;
+        let kinds: Vec<LayerKind> = map.layers.iter().map(|layer| layer.kind).collect();
+        let layer = |kind: LayerKind| {
+            let layer = map.layer(kind).ok_or_else(|| {
+                let what = format!("the {} layer was not baked", kind.name());
+                lacking(stored, what, "name a layer that was, or bake it (--layers)")
+            })?;
+            Ok(Part {
+                layers: vec![kind],
+                light: None,
+                key: kind.name().into(),
+                irradiance: layer.irradiance.clone(),
+            })
+        };
+        match self {
+            Self::Sum => {
+                let sum = Part {
+                    layers: kinds,
+                    light: None,
+                    key: String::new(),
+                    irradiance: map.total(),
+                };
+                Ok((vec![sum], None))
+            }
+            Self::Layer(kind) => Ok((vec![layer(kind)?], None)),
+            Self::EachLayer => Ok((kinds.into_iter().map(layer).collect::<Result<_>>()?, None)),
+            Self::EachLight => {
+                let parts = parts_of_lights(stored);
+                if parts.is_empty() && has_light(&map.total()) {
+                    return Err(lacking(
+                        stored,
+                        "holds no light apart from others",
+                        "bake it with --per-light",
+                    ));
+                }
+                let warning = rest(stored, &parts);
+                Ok((parts, warning))
+            }
+        }
+    }
+}
+
+fn lacking(stored: &StoredMap, what: impl Into<String>, remedy: &str) -> Error {
+    Error::failure(format!("the map of {}", stored.entry.surface), what, remedy)
+}
+
+/// One for each light, in the order of the file.
+fn parts_of_lights(stored: &StoredMap) -> Vec<Part> {
+    let mut parts: Vec<Part> = Vec::new();
+    for StoredLight { channels, irradiance } in &stored.lights {
+        // Lights of one name are told apart by their channels.
+        let own = channels.channels.split_once('.').map_or("", |(_, own)| own);
+        let key = files::slug(own, "light");
+        let known = parts.iter().position(|part| part.key == key);
+        let Some(known) = known else {
+            parts.push(Part {
+                layers: vec![channels.layer],
+                light: Some(channels.light.clone()),
+                key,
+                irradiance: irradiance.clone(),
+            });
+            continue;
+        };
+        let part = &mut parts[known];
+        part.layers.push(channels.layer);
+        let sums = part.irradiance.as_flattened_mut().iter_mut();
+        for (sum, value) in sums.zip(irradiance.as_flattened()) {
+            *sum += value;
+        }
+    }
+    parts
+}
+
+/// Says where light is in no light's texture.
+fn rest(stored: &StoredMap, parts: &[Part]) -> Option<Warning> {
+    let sum = |values: &[[f32; 3]]| {
+        let values = values.as_flattened().iter();
+        values.map(|value| f64::from(*value)).sum::<f64>()
+    };
+    let whole = sum(&stored.map.total());
+    let of_lights: f64 = parts.iter().map(|part| sum(&part.irradiance)).sum();
+    let left = 1.0 - of_lights / whole;
+    (whole > 0.0 && left.abs() > ROUNDING).then(|| {
+        Warning::new(
+            format!("the map of {}", stored.entry.surface),
+            format!("{:.2} % of its light is in the texture of no light", 100.0 * left),
+            "write a layer or the sum beside them",
+        )
+    })
+}
+
+fn has_light(values: &[[f32; 3]]) -> bool {
+    values.as_flattened().iter().any(|value| *value != 0.0)
+}

@@ -1,0 +1,170 @@
+//! `index.json`: what each texture of an export is.
+
+use serde::{Deserialize, Serialize};
+
+use super::{Encoding, Loss, TextureOptions};
+use crate::error::{Error, Result};
+use crate::export::manifest::{MapEntry, SceneSummary};
+use crate::export::map_reader::MapReader;
+use crate::illumination::{Side, UvSet};
+use crate::settings::LayerKind;
+
+/// Version of the format.
+pub const SCHEMA: u32 = 1;
+
+/// Name of the file in its folder.
+pub const FILE_NAME: &str = "index.json";
+
+/// What marks an index of ours.
+pub const KIND: &str = "nephroid textures";
+
+/// Everything in `index.json`.
+#[derive(Clone, Debug, Serialize)]
+pub struct TextureIndex {
+    /// [`KIND`].
+    pub kind: &'static str,
+    /// [`SCHEMA`].
+    pub schema: u32,
+    /// Version of the program that wrote it.
+    pub program_version: &'static str,
+    /// Kind of the files.
+    pub encoding: Encoding,
+    /// `E`, `E/pi`, `lux` or `lux/pi`.
+    pub quantity: super::Quantity,
+    /// Its unit; a value of a file is the quantity in that unit times 2^`exposure_stops`.
+    pub unit: &'static str,
+    /// What values were multiplied by: 2 to this power.
+    pub exposure_stops: f64,
+    /// Of all values.
+    pub primaries: &'static str,
+    /// Which edge of the images comes first.
+    pub row_0: &'static str,
+    /// The scene that was baked.
+    pub scene: SceneSummary,
+    /// One per file.
+    pub textures: Vec<TextureEntry>,
+}
+
+/// One file.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TextureEntry {
+    /// Its name, beside the index.
+    pub file: String,
+    /// Texels across.
+    pub width: usize,
+    /// Texels down.
+    pub height: usize,
+    /// Sizes of the image in the file, each half of the one before; 1 is the image alone.
+    pub levels: usize,
+    /// Layers whose sum it holds.
+    pub layers: Vec<LayerKind>,
+    /// The light whose part of them it is; `None`: of all lights.
+    pub light: Option<String>,
+    /// What the file does not hold.
+    pub lost: Loss,
+    /// The maps in it.
+    pub maps: Vec<PlacedMap>,
+}
+
+/// Where a map lies in a texture.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PlacedMap {
+    /// The node's name in the scene's file.
+    pub surface: String,
+    /// glTF index of the node.
+    pub node: usize,
+    /// Index of the primitive within the node's mesh.
+    pub primitive: usize,
+    /// Which side's light it holds.
+    pub side: Side,
+    /// Which texture coordinates it follows, before [`Rectangle`] places them.
+    pub uv_set: UvSet,
+    /// The generated ones, beside the index.
+    pub uv_file: Option<String>,
+    /// Where its texels are.
+    pub rectangle: Rectangle,
+}
+
+/// A part of a texture. Coordinates (u, v) of a map are (x + u·width, y + v·height) [texels] there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Rectangle {
+    /// Texels from the left.
+    pub x: usize,
+    /// Texels from row 0.
+    pub y: usize,
+    /// Texels across.
+    pub width: usize,
+    /// Texels down.
+    pub height: usize,
+}
+
+impl Rectangle {
+    /// All of a texture of a size.
+    pub fn whole((width, height): (usize, usize)) -> Self {
+        Self {
+            x: 0,
+            y: 0,
+            width,
+            height,
+        }
+    }
+}
+
+impl PlacedMap {
+    /// The map of a folder's entry, whose generated coordinates are in a file here.
+    pub(super) fn new(entry: &MapEntry, uv_file: Option<String>, rectangle: Rectangle) -> Self {
+        Self {
+            surface: entry.surface.clone(),
+            node: entry.node,
+            primitive: entry.primitive,
+            side: entry.side,
+            uv_set: entry.uv_set,
+            uv_file,
+            rectangle,
+        }
+    }
+}
+
+impl TextureIndex {
+    /// Of textures that were made of a folder of maps.
+    pub(super) fn new(
+        reader: &MapReader<'_>,
+        options: TextureOptions,
+        exposure_stops: f64,
+        textures: Vec<TextureEntry>,
+    ) -> Self {
+        Self {
+            kind: KIND,
+            schema: SCHEMA,
+            program_version: env!("CARGO_PKG_VERSION"),
+            encoding: options.encoding,
+            quantity: options.quantity,
+            unit: options.quantity.unit(),
+            exposure_stops,
+            primaries: "BT.709 (linear sRGB)",
+            row_0: "v = 0",
+            scene: reader.scene_summary().clone(),
+            textures,
+        }
+    }
+
+    /// The file.
+    pub(super) fn to_json(&self) -> Result<Vec<u8>> {
+        serde_json::to_vec_pretty(self).map_err(|error| {
+            Error::failure(
+                FILE_NAME,
+                format!("the index is not valid JSON ({error})"),
+                "report this",
+            )
+        })
+    }
+
+    /// Names of all files that it speaks of.
+    pub fn files(&self) -> impl Iterator<Item = &str> {
+        self.textures.iter().flat_map(|texture| {
+            let maps = texture.maps.iter();
+            let uvs = maps.filter_map(|map| map.uv_file.as_deref());
+            std::iter::once(texture.file.as_str()).chain(uvs)
+        })
+    }
+}

@@ -1,0 +1,271 @@
+//! Maps as textures of other programs: one file each or many maps in one, and an index that says what each file is.
+
+pub mod atlas;
+mod content;
+mod encoding;
+mod folder;
+pub mod index;
+mod ktx2;
+mod loss;
+mod png16;
+mod radiance;
+mod texels;
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+pub use self::content::Content;
+use self::content::Part;
+use self::encoding::Notes;
+pub use self::encoding::{Encoding, Transfer};
+pub use self::folder::TextureFolder;
+use self::index::{PlacedMap, Rectangle, TextureEntry, TextureIndex};
+pub use self::ktx2::Packing;
+pub use self::loss::Loss;
+use self::texels::Texels;
+use super::Quantity;
+use super::manifest::MapEntry;
+use super::map_reader::{MapReader, StoredMap};
+use super::white;
+use crate::error::{Error, Result, Warning};
+use crate::progress::Control;
+
+/// What stored values are multiplied by.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Exposure {
+    /// 2 to this power [stops], 0 for light as it is.
+    Stops(f64),
+    /// The same whole number of stops for all textures, so that none loses more than this share of its light, [0, 1), to
+    /// white = 1.
+    Cut(f64),
+}
+
+/// How textures are written.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TextureOptions {
+    /// Kind of file.
+    pub encoding: Encoding,
+    /// What the numbers mean.
+    pub quantity: Quantity,
+    /// Which light is in them.
+    pub content: Content,
+    /// How bright.
+    pub exposure: Exposure,
+    /// Many maps in one texture, whose sides are at most so many texels long; `None`: one file for each.
+    pub atlas_side: Option<usize>,
+}
+
+/// What was written.
+#[derive(Clone, Debug, Serialize)]
+pub struct TextureReport {
+    /// As in the folder.
+    #[serde(flatten)]
+    pub index: TextureIndex,
+    /// Of the files, with the index [bytes].
+    pub bytes: u64,
+    /// What the textures cannot hold.
+    #[serde(skip)]
+    pub warnings: Vec<Warning>,
+}
+
+/// Writes all maps of a folder as textures: whole, or nothing at all.
+///
+/// # Errors
+/// Maps that cannot be read or lack the light that was asked for; light that the format cannot hold; a place that cannot
+/// be written; [`Error::cancelled`].
+pub fn write(
+    reader: &MapReader<'_>,
+    options: TextureOptions,
+    mut folder: TextureFolder,
+    control: &Control,
+) -> Result<TextureReport> {
+    let mut writer = Writer {
+        options,
+        exposure_stops: 0.0,
+        control,
+        bytes: 0,
+        warnings: reader.warnings(),
+        folder: &mut folder,
+    };
+    writer.exposure_stops = writer.choose_exposure(reader)?;
+    let textures = match options.atlas_side {
+        Some(side) => writer.write_atlas(reader, side)?,
+        None => writer.write_each(reader)?,
+    };
+    let index = TextureIndex::new(reader, options, writer.exposure_stops, textures);
+    let json = index.to_json()?;
+    writer.put(index::FILE_NAME.into(), &json)?;
+    let (bytes, warnings) = (writer.bytes, writer.warnings);
+    folder.commit(&index)?;
+    Ok(TextureReport {
+        index,
+        bytes,
+        warnings,
+    })
+}
+
+/// What the files of one export have in common.
+struct Writer<'a> {
+    options: TextureOptions,
+    exposure_stops: f64,
+    control: &'a Control,
+    bytes: u64,
+    warnings: Vec<Warning>,
+    folder: &'a mut TextureFolder,
+}
+
+impl Writer<'_> {
+    fn choose_exposure(&self, reader: &MapReader<'_>) -> Result<f64> {
+        let cut = match self.options.exposure {
+            Exposure::Stops(stops) => return Ok(stops),
+            Exposure::Cut(cut) => cut,
+        };
+        let mut white: f64 = 0.0;
+        for entry in reader.entries() {
+            let stored = reader.read(entry)?;
+            for part in self.options.content.parts(&stored)?.0 {
+                self.check()?;
+                let texels = Texels::new(
+                    &stored.map.chart,
+                    &part.irradiance,
+                    self.options.quantity.factor(),
+                );
+                let values = texels.values().as_flattened().iter().copied().map(f64::from);
+                white = white.max(white::white(values, cut).unwrap_or(0.0));
+            }
+        }
+        Ok(if white > 0.0 { -white.log2().ceil() } else { 0.0 })
+    }
+
+    /// One file for each map.
+    fn write_each(&mut self, reader: &MapReader<'_>) -> Result<Vec<TextureEntry>> {
+        let mut textures = Vec::new();
+        for entry in reader.entries() {
+            let stored = reader.read(entry)?;
+            let uv_file = self.put_coordinates(reader, entry)?;
+            for part in self.parts(&stored)? {
+                let texels = self.texels(&stored, &part);
+                let map = PlacedMap::new(entry, uv_file.clone(), Rectangle::whole(texels.size()));
+                let name = format!("{}{}", stem(entry), part.suffix());
+                textures.push(self.write_texels(&name, &texels, &part, vec![map])?);
+            }
+        }
+        Ok(textures)
+    }
+
+    /// As few files as hold all maps.
+    fn write_atlas(&mut self, reader: &MapReader<'_>, most_side: usize) -> Result<Vec<TextureEntry>> {
+        let entries = reader.entries();
+        let sizes: Vec<(usize, usize)> = entries.iter().map(|entry| (entry.width, entry.height)).collect();
+        let options = self.options.encoding.atlas_options(most_side);
+        let name = |map: usize| format!("the map of {}", entries[map].surface);
+        let mut textures = Vec::new();
+        for (number, page) in atlas::pack(&sizes, options, name)?.into_iter().enumerate() {
+            // By what they hold.
+            let mut sheets: BTreeMap<String, Sheet> = BTreeMap::new();
+            for &(map, place) in &page.places {
+                let entry = &entries[map];
+                let stored = reader.read(entry)?;
+                let uv_file = self.put_coordinates(reader, entry)?;
+                for part in self.parts(&stored)? {
+                    self.check()?;
+                    let texels = self.texels(&stored, &part);
+                    let sheet = sheets.entry(part.key.clone()).or_insert_with(|| Sheet {
+                        texels: Texels::black((page.width, page.height)),
+                        part: part.without_light(),
+                        maps: Vec::new(),
+                    });
+                    sheet.texels.place(&texels, place, options.gutter);
+                    sheet.part.layers.extend(&part.layers);
+                    sheet.maps.push(PlacedMap::new(entry, uv_file.clone(), place));
+                }
+            }
+            for mut sheet in sheets.into_values() {
+                sheet.part.layers.sort_unstable();
+                sheet.part.layers.dedup();
+                let name = format!("atlas{number}{}", sheet.part.suffix());
+                textures.push(self.write_texels(&name, &sheet.texels, &sheet.part, sheet.maps)?);
+            }
+        }
+        Ok(textures)
+    }
+
+    /// Copies the coordinates that were made for a map; `None` where it follows the scene's own.
+    fn put_coordinates(&mut self, reader: &MapReader<'_>, entry: &MapEntry) -> Result<Option<String>> {
+        let bytes = reader.read_coordinates(entry)?;
+        bytes
+            .map(|bytes| self.put(format!("{}.uv", stem(entry)), &bytes))
+            .transpose()
+    }
+
+    fn parts(&mut self, stored: &StoredMap) -> Result<Vec<Part>> {
+        let (parts, warning) = self.options.content.parts(stored)?;
+        self.warnings.extend(warning);
+        Ok(parts)
+    }
+
+    /// The values of a part of a map as they are written.
+    fn texels(&self, stored: &StoredMap, part: &Part) -> Texels {
+        let factor = self.options.quantity.factor() * self.exposure_stops.exp2();
+        Texels::new(&stored.map.chart, &part.irradiance, factor)
+    }
+
+    /// One texture of maps that lie in it.
+    fn write_texels(
+        &mut self,
+        name: &str,
+        texels: &Texels,
+        part: &Part,
+        maps: Vec<PlacedMap>,
+    ) -> Result<TextureEntry> {
+        self.check()?;
+        let file = format!("{name}.{}", self.options.encoding.extension());
+        let location = self.folder.path().join(&file).display().to_string();
+        let notes = Notes {
+            quantity: self.options.quantity,
+            exposure_stops: self.exposure_stops,
+            what: part.what(&maps),
+            location: &location,
+        };
+        let encoded = self.options.encoding.encode(texels, &notes)?;
+        let lost = Loss::measure(texels.values(), &encoded.stored, self.options.encoding.most());
+        self.put(file.clone(), &encoded.bytes)?;
+        Ok(TextureEntry {
+            file,
+            width: texels.size().0,
+            height: texels.size().1,
+            levels: encoded.levels,
+            layers: part.layers.clone(),
+            light: part.light.clone(),
+            lost,
+            maps,
+        })
+    }
+
+    fn put(&mut self, name: String, bytes: &[u8]) -> Result<String> {
+        self.folder.write(&name, bytes)?;
+        self.bytes += bytes.len() as u64;
+        Ok(name)
+    }
+
+    fn check(&self) -> Result<()> {
+        if self.control.is_cancelled() {
+            return Err(Error::cancelled(self.folder.path().display().to_string()));
+        }
+        Ok(())
+    }
+}
+
+/// A texture of an atlas that is being filled.
+struct Sheet {
+    texels: Texels,
+    part: Part,
+    maps: Vec<PlacedMap>,
+}
+
+/// The name of a map's files without what they hold.
+fn stem(entry: &MapEntry) -> &str {
+    let file = entry.file.rsplit('/').next().unwrap_or_default();
+    file.strip_suffix(".exr").unwrap_or(file)
+}

@@ -1,0 +1,71 @@
+//! Quantities in false colours: viridis, which grows evenly in brightness to every eye, that of the colour-blind
+//! included (Smith and van der Walt, "A Better Default Colormap for Matplotlib", SciPy 2015).
+
+/// Coefficients of t⁰ … t⁶ for red, green and blue: a fit to the table of viridis by Matt Zucker, see
+/// `assets/SOURCES.md`.
+const FIT: [[f64; 3]; 7] = [
+    [0.2777273272234177, 0.005407344544966578, 0.3340998053353061],
+    [0.1050930431085774, 1.404613529898575, 1.384590162594685],
+    [-0.3308618287255563, 0.214847559468213, 0.09509516302823659],
+    [-4.634230498983486, -5.799100973351585, -19.33244095627987],
+    [6.228269936347081, 14.17993336680509, 56.69055260068105],
+    [4.776384997670288, -13.74514537774601, -65.35303263337234],
+    [-5.435455855934631, 4.645852612178535, 26.3124352495832],
+];
+
+/// Display colour (sRGB in [0, 1]) of a place in [0, 1] of the scale; places beyond are the ends. Twin of
+/// `shaders/shared/false_colours.wgsl`.
+pub fn viridis(place: f64) -> [f64; 3] {
+    let t = place.clamp(0.0, 1.0);
+    std::array::from_fn(|channel| {
+        let fit = FIT.iter().rev();
+        fit.fold(0.0, |sum, row| sum * t + row[channel]).clamp(0.0, 1.0)
+    })
+}
+
+/// Which quantities the two ends of the colours stand for.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ColourScale {
+    /// Darkest; > 0 where it is logarithmic.
+    pub low: f64,
+    /// Brightest, > low.
+    pub high: f64,
+    /// Whether equal ratios are equal steps, and not equal differences.
+    pub is_logarithmic: bool,
+}
+
+impl ColourScale {
+    /// Where a quantity lies: 0 at the dark end, 1 at the bright one, and beyond.
+    pub fn place(&self, quantity: f64) -> f64 {
+        let [begin, factor] = self.for_shaders();
+        (self.steps(quantity) - begin) * factor
+    }
+
+    /// The quantity at a place of the scale.
+    pub fn at(&self, place: f64) -> f64 {
+        if self.is_logarithmic {
+            self.low * (self.high / self.low).powf(place)
+        } else {
+            self.low + (self.high - self.low) * place
+        }
+    }
+
+    /// Display colour (sRGB in [0, 1]) of a quantity.
+    pub fn colour(&self, quantity: f64) -> [f64; 3] {
+        viridis(self.place(quantity))
+    }
+
+    /// Where it begins, and what steps from there are multiplied by, in binary orders where it is logarithmic.
+    pub fn for_shaders(&self) -> [f64; 2] {
+        let (low, high) = (self.steps(self.low), self.steps(self.high));
+        [low, (high - low).recip()]
+    }
+
+    fn steps(&self, quantity: f64) -> f64 {
+        if self.is_logarithmic {
+            quantity.max(f64::MIN_POSITIVE).log2()
+        } else {
+            quantity
+        }
+    }
+}

@@ -1,0 +1,38 @@
+//! What a lamp stands in: light straight from it crosses no surface, and so stays within that.
+
+use glam::DVec3;
+
+use crate::optics::LinearSrgb;
+use crate::scene::{Scene, Volume};
+use crate::transport::{Tracer, media_at};
+
+/// The medium around a lamp.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Surroundings {
+    /// Refractive index [1].
+    pub ior: f64,
+    volume: Option<Volume>,
+}
+
+impl Surroundings {
+    /// Where nothing is.
+    pub const VACUUM: Self = Self {
+        ior: 1.0,
+        volume: None,
+    };
+
+    /// At a point.
+    pub fn at(tracer: &Tracer, point: DVec3) -> Self {
+        let (scene, media): (&Scene, _) = (tracer.scene(), media_at(tracer, point));
+        Self {
+            ior: media.ior(scene),
+            volume: media.top().and_then(|object| scene.material_of(object).volume),
+        }
+    }
+
+    /// Share of the light that is left after a distance [m].
+    pub fn transmittance(&self, distance_m: f64) -> LinearSrgb {
+        self.volume
+            .map_or(LinearSrgb::WHITE, |volume| volume.transmittance(distance_m))
+    }
+}

@@ -1,0 +1,319 @@
+//! Which light paths light a texel, and how much each of them brings: found from the scene alone, without what was
+//! baked.
+//!
+//! The part of a light's domain that lights the texel is found by halving the domain's cells; its flux is what comes to
+//! the texel. Cells that hang together and go the same way are one path, shown by the ray among them that meets the
+//! point that was asked about, found by Newton's method on where it starts.
+
+mod clip;
+mod search;
+mod target;
+mod walk;
+
+pub use target::Target;
+
+use std::collections::HashMap;
+
+use glam::{DMat2, DVec2, DVec3};
+
+use self::search::{Piece, Searcher};
+use self::walk::{Walker, Way};
+use crate::geometry::sampling::even_point;
+use crate::light_pass::caustic::path::PathSignature;
+use crate::light_pass::caustic::setup::{Aim, AimedLight, Aiming};
+use crate::light_pass::direct::bake_direct;
+use crate::optics::LinearSrgb;
+use crate::progress::Control;
+use crate::scene::LightKind;
+use crate::scene::emitter::Emitter;
+use crate::settings::ItemBufferKind;
+use crate::transport::{Event, Tracer};
+
+/// Places that lights with a size are looked at from.
+const PLACES: u32 = 16;
+const PLACES_SEED: u64 = 0;
+/// Light that does not matter, as a share of the irradiance that there is.
+const NEGLIGIBLE: f64 = 1e-5;
+/// A path is to meet the point that was asked about this nearly [m], and is looked for in so many steps.
+const MEETS_M: f64 = 1e-9;
+const MOST_STEPS: u32 = 40;
+
+/// A specular surface on the way.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PathVertex {
+    /// Index into `Scene::objects`.
+    pub object: usize,
+    /// Index into the object's triangles.
+    pub triangle: usize,
+    /// Where [m].
+    pub point: DVec3,
+    /// Unit, the way the light comes.
+    pub incident: DVec3,
+    /// Unit, the way it goes on.
+    pub outgoing: DVec3,
+    /// Unit, of the surface, on the side that the light comes from.
+    pub normal: DVec3,
+    /// n of the side that it leaves over n of the side that it enters; 1 where it is sent back or goes straight on.
+    pub ior_ratio: f64,
+    /// What sent it on.
+    pub event: Event,
+}
+
+/// A way that light takes to a texel.
+#[derive(Clone, Debug)]
+pub struct LightPath {
+    /// Index into `Scene::lights`.
+    pub light: usize,
+    /// Where it begins [m]; of a sun, before the scene.
+    pub start: DVec3,
+    /// What it meets; nothing where the light is seen from the texel.
+    pub vertices: Vec<PathVertex>,
+    /// Where it ends on the receiver [m].
+    pub end: DVec3,
+    /// What it brings, mean over the texel [W/m²].
+    pub irradiance: LinearSrgb,
+}
+
+/// What lights a texel, light from other matte surfaces left out.
+#[derive(Clone, Debug, Default)]
+pub struct Explanation {
+    /// Brightest first.
+    pub paths: Vec<LightPath>,
+    /// Rays that it took.
+    pub rays: u64,
+    /// False where it was stopped, or would have taken too long.
+    pub is_complete: bool,
+}
+
+impl Explanation {
+    /// What the paths over specular surfaces bring [W/m²].
+    pub fn caustic(&self) -> LinearSrgb {
+        self.sum(|path| !path.vertices.is_empty())
+    }
+
+    /// What comes straight from the lights [W/m²].
+    pub fn direct(&self) -> LinearSrgb {
+        self.sum(|path| path.vertices.is_empty())
+    }
+
+    fn sum(&self, is_wanted: impl Fn(&LightPath) -> bool) -> LinearSrgb {
+        let wanted = self.paths.iter().filter(|path| is_wanted(path));
+        wanted.fold(LinearSrgb::BLACK, |sum, path| sum + path.irradiance)
+    }
+}
+
+/// How far light is followed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Limits {
+    /// Most specular surfaces on a path.
+    pub max_depth: u32,
+    /// Least share of the ray's flux (luminance) that a branch must carry to be followed.
+    pub branch_threshold: f64,
+    /// Most rays for each place of a light.
+    pub most_rays: u64,
+}
+
+/// Finds what lights a texel. `scale_w_m2`: about how bright it is, or the least that matters [W/m²], > 0: light far
+/// below that is looked for less closely. Glass bends all light as at 587.56 nm, and rough surfaces are smooth.
+pub fn explain(
+    tracer: &Tracer,
+    target: &Target,
+    limits: Limits,
+    scale_w_m2: f64,
+    control: &Control,
+) -> Explanation {
+    let aim = Aim::take(tracer, ItemBufferKind::Equal, Aiming::Reachable, true);
+    let negligible_w = NEGLIGIBLE * scale_w_m2 * target.area_m2;
+    let mut found = Explanation {
+        is_complete: true,
+        ..Explanation::default()
+    };
+    for aimed in &aim.lights {
+        explain_light(tracer, aimed, target, (limits, negligible_w), control, &mut found);
+    }
+    explain_direct(tracer, target, control, &mut found);
+    let brightness = |path: &LightPath| path.irradiance.luminance();
+    found
+        .paths
+        .sort_by(|a, b| brightness(b).total_cmp(&brightness(a)));
+    found.is_complete &= !control.is_cancelled();
+    found
+}
+
+fn explain_light(
+    tracer: &Tracer,
+    aimed: &AimedLight,
+    target: &Target,
+    (limits, negligible_w): (Limits, f64),
+    control: &Control,
+    found: &mut Explanation,
+) {
+    let scene = tracer.scene();
+    let light = &scene.lights[aimed.light];
+    let unit = light.of_unit_strength();
+    let places = if light.has_extent() { PLACES } else { 1 };
+    let strength = light.strength() * (1.0 / f64::from(places));
+    let mut by_way: HashMap<PathSignature, LightPath> = HashMap::new();
+    for place in 0..places {
+        let emitter = light
+            .has_extent()
+            .then(|| Emitter::sample(&unit, scene, even_point(place, 0, PLACES_SEED)));
+        let wavefront = match emitter {
+            Some(None) => None,
+            Some(Some(emitter)) => aimed.another(
+                tracer,
+                (ItemBufferKind::Equal, Aiming::Reachable),
+                Some(emitter),
+                None,
+            ),
+            None => Some(aimed.clone()),
+        };
+        let Some(wavefront) = wavefront else { continue };
+        let searcher = Searcher {
+            walker: Walker {
+                tracer,
+                launch: &wavefront.launch,
+                target,
+                limits,
+            },
+            item_buffer: wavefront.visible(),
+            negligible_w: negligible_w / strength.luminance().max(f64::MIN_POSITIVE),
+            most_rays: limits.most_rays,
+            control,
+        };
+        let search = searcher.search();
+        found.rays += search.rays;
+        found.is_complete &= search.is_complete;
+        for pieces in hanging_together(search.pieces) {
+            let way = pieces[0].way;
+            let Some(mut path) = path_of(&searcher.walker, aimed.light, &pieces) else {
+                continue;
+            };
+            path.irradiance = path.irradiance * strength;
+            if places == 1 {
+                found.paths.push(path);
+            } else if let Some(same) = by_way.get_mut(&way) {
+                // Shown from the first place of the light that takes it.
+                same.irradiance += path.irradiance;
+            } else {
+                by_way.insert(way, path);
+            }
+        }
+    }
+    found.paths.extend(by_way.into_values());
+}
+
+/// Pieces that share a corner and go the same way.
+fn hanging_together(pieces: Vec<Piece>) -> Vec<Vec<Piece>> {
+    let mut groups: Vec<usize> = (0..pieces.len()).collect();
+    fn root(groups: &mut [usize], mut at: usize) -> usize {
+        while groups[at] != at {
+            groups[at] = groups[groups[at]];
+            at = groups[at];
+        }
+        at
+    }
+    let mut owner: HashMap<(usize, PathSignature, [u64; 2]), usize> = HashMap::new();
+    for (index, piece) in pieces.iter().enumerate() {
+        for corner in piece.corners {
+            let other = *owner.entry((piece.face, piece.way, corner)).or_insert(index);
+            let (a, b) = (root(&mut groups, index), root(&mut groups, other));
+            groups[a.max(b)] = a.min(b);
+        }
+    }
+    let mut together: Vec<Vec<Piece>> = Vec::new();
+    let mut number: HashMap<usize, usize> = HashMap::new();
+    for (index, piece) in pieces.into_iter().enumerate() {
+        let group = root(&mut groups, index);
+        let at = *number.entry(group).or_insert_with(|| {
+            together.push(Vec::new());
+            together.len() - 1
+        });
+        together[at].push(piece);
+    }
+    together
+}
+
+/// The path of some pieces, for a light of strength 1.
+fn path_of(walker: &Walker<'_>, light: usize, pieces: &[Piece]) -> Option<LightPath> {
+    let flux_w = pieces
+        .iter()
+        .fold(LinearSrgb::BLACK, |sum, piece| sum + piece.flux_w);
+    let goal = walker.target.place;
+    let distance = |piece: &&Piece| piece.place.distance_squared(goal);
+    let nearest = pieces.iter().min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
+    let way = meeting(walker, nearest)?;
+    Some(LightPath {
+        light,
+        start: way.start,
+        vertices: way.vertices,
+        end: way.end,
+        irradiance: flux_w * (1.0 / walker.target.area_m2),
+    })
+}
+
+/// The ray of a piece that meets the point; the nearest one where none does, as beyond a bright line.
+fn meeting(walker: &Walker<'_>, piece: &Piece) -> Option<Way> {
+    let goal = walker.target.place;
+    let texel_m = walker.target.area_m2.sqrt();
+    let way = |square: DVec2| walker.way(piece.face, square, piece.way);
+    let side = piece.side();
+    let mut square = piece.ray;
+    let mut best = way(square)?;
+    let mut step = 1e-4 * side;
+    for _ in 0..MOST_STEPS {
+        let miss = goal - best.place;
+        if miss.length() * texel_m < MEETS_M {
+            break;
+        }
+        let beside = |offset: DVec2| Some((way(square + offset)?.place - best.place) / step);
+        let (Some(across), Some(down)) = (beside(DVec2::new(step, 0.0)), beside(DVec2::new(0.0, step)))
+        else {
+            break;
+        };
+        let slope = DMat2::from_cols(across, down);
+        if slope.determinant() == 0.0 {
+            break;
+        }
+        let mut move_by = slope.inverse() * miss;
+        // Never far beyond the piece, and only to what is nearer.
+        move_by = move_by.clamp_length_max(2.0 * side);
+        let better = (0..8).find_map(|halvings| {
+            let to = square + move_by * (-f64::from(halvings)).exp2();
+            let found = way(to)?;
+            (found.place.distance(goal) < best.place.distance(goal)).then_some((to, found))
+        });
+        let Some((to, found)) = better else { break };
+        step = (0.1 * to.distance(square)).clamp(1e-7 * side, 1e-4 * side);
+        (square, best) = (to, found);
+    }
+    Some(best)
+}
+
+/// Light straight from each light, as the direct layer has it.
+fn explain_direct(tracer: &Tracer, target: &Target, control: &Control, found: &mut Explanation) {
+    let chart = target.chart_of_texel();
+    let (low, high) = tracer.scene().bounds().unwrap_or_default();
+    for (index, light) in tracer.scene().lights.iter().enumerate() {
+        let baked = bake_direct(tracer, std::slice::from_ref(light), &[&chart], &(), control);
+        let irradiance = LinearSrgb::from(baked[0].irradiance[0].map(f64::from));
+        if irradiance.max_channel() <= 0.0 {
+            continue;
+        }
+        let start = light.kind.position().or_else(|| {
+            let LightKind::Sun { direction, .. } = light.kind else {
+                return None;
+            };
+            Some(target.point - direction * (high - low).length())
+        });
+        found.rays += baked[0].shadow_rays;
+        found.paths.push(LightPath {
+            light: index,
+            // The sky comes from everywhere.
+            start: start.unwrap_or(target.point),
+            vertices: Vec::new(),
+            end: target.point,
+            irradiance,
+        });
+    }
+}

@@ -1,0 +1,184 @@
+//! Where light lands, sketched: a thin lattice of light rays is followed over specular surfaces to matte ones, and four
+//! neighbours that went the same way span a patch of the wavefront. Shows how light runs, and measures nothing.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use glam::{DVec2, DVec3};
+use rayon::prelude::*;
+
+use crate::illumination::Receiver;
+use crate::illumination::accumulator::FluxUnit;
+use crate::light_pass::caustic::path::{PathLimits, PathSignature, PathTracer};
+use crate::light_pass::caustic::setup::{Aim, AimedLight, Aiming};
+use crate::light_pass::item_buffer::CELLS_PER_SIDE;
+use crate::progress::Control;
+use crate::settings::ItemBufferKind;
+use crate::transport::{EffectSet, Everything, Tracer};
+
+/// Rays start this far within the domain: its border may be the very border of a surface.
+const MARGIN: f64 = 1e-9;
+/// The domain's side is divided by no more than this power of two.
+const FINEST: u32 = 14;
+
+/// How far light is followed, and how closely.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SketchLimits {
+    /// Most specular surfaces on a path.
+    pub max_depth: u32,
+    /// Least share of the ray's flux (luminance) that a branch must carry to be followed.
+    pub branch_threshold: f64,
+    /// Most cells of the lattice for each light, > 0.
+    pub cells: usize,
+}
+
+/// A ray that landed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Landing {
+    /// Index into `Scene::lights`.
+    pub light: usize,
+    /// On a matte surface [m].
+    pub point: DVec3,
+}
+
+/// Where a piece of a wavefront landed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SketchedPatch {
+    /// Index into `Scene::lights`.
+    pub light: usize,
+    /// In their order around it, on one matte surface [m].
+    pub corners: [DVec3; 4],
+}
+
+/// Where light landed.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Sketch {
+    /// Of every ray, once for each way on which it came to a matte surface.
+    pub landings: Vec<Landing>,
+    /// Between neighbouring rays that met the same objects in the same way.
+    pub patches: Vec<SketchedPatch>,
+    /// Light rays.
+    pub rays: u64,
+}
+
+/// A corner of a cell: face, column and row.
+type Corner = (usize, u32, u32);
+
+/// How a ray came to a point.
+#[derive(Clone, Copy, Debug)]
+struct Arrived {
+    way: (PathSignature, Receiver),
+    point: DVec3,
+}
+
+/// Follows thin wavefronts of all lights; lamps with a size shine from their middles, glass bends all light as at
+/// 587.56 nm, and rough surfaces are smooth. Ends early where it is cancelled.
+pub fn sketch(tracer: &Tracer, limits: SketchLimits, control: &Control) -> Sketch {
+    let aim = Aim::take(tracer, ItemBufferKind::Equal, Aiming::Reachable, false);
+    let mut all = Sketch::default();
+    for aimed in &aim.lights {
+        if control.is_cancelled() {
+            break;
+        }
+        of_light(tracer, aimed, limits, &mut all);
+    }
+    all
+}
+
+fn of_light(tracer: &Tracer, aimed: &AimedLight, limits: SketchLimits, all: &mut Sketch) {
+    let (side, cells) = cells(aimed, limits.cells);
+    let corners: BTreeSet<Corner> = cells.iter().flat_map(|cell| corners_of(*cell)).collect();
+    let corners: Vec<Corner> = corners.into_iter().collect();
+    let arrived: Vec<Vec<Arrived>> = corners
+        .par_iter()
+        .map(|corner| follow(tracer, aimed, limits, *corner, side))
+        .collect();
+    let light = aimed.light;
+    let points = arrived.iter().flatten();
+    all.landings.extend(points.map(|arrived| Landing {
+        light,
+        point: arrived.point,
+    }));
+    all.rays += corners.len() as u64;
+    let known: BTreeMap<Corner, Vec<Arrived>> = corners.into_iter().zip(arrived).collect();
+    for cell in cells {
+        let at = corners_of(cell).map(|corner| &known[&corner][..]);
+        all.patches
+            .extend(patches(at).map(|corners| SketchedPatch { light, corners }));
+    }
+}
+
+/// Cells that are worth a ray, as many as there may be or a quarter of that, and how many lie side by side.
+fn cells(aimed: &AimedLight, most: usize) -> (u32, BTreeSet<Corner>) {
+    let marked = |face: usize| {
+        let all = (0..CELLS_PER_SIDE).flat_map(|row| (0..CELLS_PER_SIDE).map(move |column| (column, row)));
+        let buffer = aimed.visible();
+        all.filter(move |(column, row)| buffer.is_marked(face, *column, *row))
+            .map(move |(column, row)| (face, column as u32, row as u32))
+    };
+    let mut cells: BTreeSet<Corner> = (0..aimed.launch.face_count()).flat_map(marked).collect();
+    let mut level = CELLS_PER_SIDE.trailing_zeros();
+    while cells.len() > most && level > 0 {
+        cells = cells
+            .iter()
+            .map(|(face, column, row)| (*face, column / 2, row / 2))
+            .collect();
+        level -= 1;
+    }
+    while !cells.is_empty() && 4 * cells.len() <= most && level < FINEST {
+        cells = cells.iter().flat_map(|cell| quarters(*cell)).collect();
+        level += 1;
+    }
+    (1 << level, cells)
+}
+
+fn quarters((face, column, row): Corner) -> [Corner; 4] {
+    [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(x, y)| (face, 2 * column + x, 2 * row + y))
+}
+
+/// In their order around the cell.
+fn corners_of((face, column, row): Corner) -> [Corner; 4] {
+    [(0, 0), (1, 0), (1, 1), (0, 1)].map(|(x, y)| (face, column + x, row + y))
+}
+
+/// All landings of the ray of a corner.
+fn follow(
+    tracer: &Tracer,
+    aimed: &AimedLight,
+    limits: SketchLimits,
+    (face, column, row): Corner,
+    side: u32,
+) -> Vec<Arrived> {
+    let place = DVec2::new(f64::from(column), f64::from(row)) / f64::from(side);
+    let square = place.clamp(DVec2::splat(MARGIN), DVec2::splat(1.0 - MARGIN));
+    let ray = aimed.launch.ray(face, square);
+    let flux_w = aimed.launch.flux_density_w(square, ray.direction);
+    let mut found = Vec::new();
+    if !(flux_w.is_finite() && flux_w.max_channel() > 0.0) {
+        return found;
+    }
+    let limits = PathLimits {
+        max_depth: limits.max_depth,
+        branch_threshold: limits.branch_threshold,
+        effects: EffectSet::EVERYTHING,
+        microfacets: None,
+    };
+    let unit = FluxUnit::for_power(flux_w.max_channel());
+    let mut paths = PathTracer::new(tracer, limits, unit);
+    paths.trace::<Everything>(ray, flux_w, aimed.launch.media(), |arrival| {
+        found.push(Arrived {
+            way: (arrival.signature, arrival.receiver),
+            point: arrival.point,
+        });
+    });
+    found
+}
+
+/// What four rays span that went the same way.
+fn patches<'a>(at: [&'a [Arrived]; 4]) -> impl Iterator<Item = [DVec3; 4]> + 'a {
+    let [first, others @ ..] = at;
+    first.iter().filter_map(move |arrived| {
+        let same = |others: &[Arrived]| Some(others.iter().find(|other| other.way == arrived.way)?.point);
+        let [b, c, d] = others.map(same);
+        Some([arrived.point, b?, c?, d?])
+    })
+}

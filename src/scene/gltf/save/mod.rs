@@ -1,0 +1,279 @@
+//! An edited scene as a `.glb`: the file that it was loaded from, with nothing changed but what was edited. What the
+//! program does not know survives byte for byte.
+
+mod container;
+mod json_text;
+mod lights;
+mod materials;
+mod new_lights;
+mod placing;
+
+use std::mem::discriminant;
+use std::path::Path;
+
+use glam::{DAffine3, DVec3};
+use gltf::json::Value;
+use serde_json::json;
+
+pub use self::container::Parts;
+use self::json_text::JsonText;
+use self::lights::Edited;
+use self::placing::Placing;
+use super::document::{self, Document};
+use super::light::Origin;
+use super::nodes::Placed;
+use super::report::Report;
+use super::{area_light, light, nodes};
+use crate::error::{Error, Result};
+use crate::files;
+use crate::scene::changes::Motion;
+use crate::scene::{Light, LightKind, LoadOptions, Scene};
+
+/// Corners of a scene that is read back may differ by this share of its extent, and other numbers of themselves: lights and
+/// materials are 32-bit numbers in a file [1].
+const SAME: f64 = 1e-6;
+
+/// Writes `edited`, which `loaded` from `original` was edited to, as a `.glb`.
+///
+/// # Errors
+/// A file that changed since it was loaded; an edit that no file can hold; a place that cannot be written.
+pub fn save(
+    original: &Path,
+    target: &Path,
+    loaded: &Scene,
+    edited: &Scene,
+    options: &LoadOptions,
+) -> Result<()> {
+    let bytes = files::read_file(original, options.memory_limit_bytes)?;
+    let folder = original.parent().unwrap_or(Path::new(""));
+    let mut report = Report::default();
+    let split = super::container::split(&bytes, &mut report)?;
+    let document = document::parse(split.json, &mut report)?;
+    let placed = nodes::place(&document, &mut report)?;
+    let mut lights = light::read_all(&document, &placed, folder, &mut report)?;
+    area_light::add_all(&mut lights, &document, &placed, folder, &mut report)?;
+    let origins: Vec<Origin> = lights.into_iter().map(|(_, origin)| origin).collect();
+
+    let mut parts = Parts::of(&bytes, split.json, folder, options.memory_limit_bytes)?;
+    let mut patch = Patch {
+        loaded,
+        edited,
+        document: &document,
+        placing: Placing::new(&placed),
+        text: &mut parts.text,
+    };
+    patch.check_original(&placed, &origins, original)?;
+    patch.lights(&origins)?;
+    patch.materials()?;
+    patch.objects()?;
+    patch.placing.write(&document, patch.text);
+    let bytes = parts.into_glb()?;
+    check(&bytes, original, edited, options)?;
+    files::write_atomically(target, |writer| writer.write_all(&bytes))
+}
+
+/// What is written while it is written.
+struct Patch<'a> {
+    loaded: &'a Scene,
+    edited: &'a Scene,
+    document: &'a Document,
+    placing: Placing<'a>,
+    text: &'a mut JsonText,
+}
+
+impl Patch<'_> {
+    /// Another program may have written the file since.
+    fn check_original(&self, placed: &[Placed], origins: &[Origin], path: &Path) -> Result<()> {
+        let has_nodes = self.loaded.objects.iter().all(|object| {
+            let mut placed = placed.iter();
+            placed.any(|placed| placed.node == object.node && placed.name == object.name)
+        });
+        let has_materials = self.loaded.materials.len() >= self.document.root.materials.len();
+        if has_nodes && has_materials && self.loaded.lights.len() >= origins.len() {
+            return Ok(());
+        }
+        Err(Error::failure(
+            path.display().to_string(),
+            "is not the file any more that the scene was loaded from",
+            "open it again and repeat the edits",
+        ))
+    }
+
+    fn lights(&mut self, origins: &[Origin]) -> Result<()> {
+        let materials = self.document.root.materials.len();
+        let shift = self.edited.origin_world;
+        for (index, is) in self.edited.lights.iter().enumerate() {
+            let place = self.edited.light_when_loaded(index);
+            let (was, origin) = match place {
+                Some(place) => (Some(&self.loaded.lights[place]), origins.get(place)),
+                None => (None, None),
+            };
+            let is_foreign = origin.is_none() && new_lights::can_be_written(&is.kind);
+            match (was, origin) {
+                _ if is_foreign && is_to_be_written(index, self.loaded, self.edited) => {
+                    new_lights::write(is, shift, self.document, self.text)?;
+                }
+                (Some(was), _) if was == is => {}
+                (Some(was), Some(origin)) => {
+                    let of_file = (self.document, shift);
+                    Edited { was, is }.write(origin, of_file, &mut self.placing, self.text)?;
+                }
+                (was, _) => {
+                    let was = was.unwrap_or(is);
+                    Edited { was, is }.write_glow(self.edited, materials, self.text)?;
+                }
+            }
+        }
+        for place in &self.edited.light_list.removed {
+            if let Some(origin) = origins.get(*place) {
+                let path = format!("/nodes/{}/extensions/{}", origin.node, origin.list);
+                self.text.remove(&path);
+            }
+        }
+        Ok(())
+    }
+
+    fn materials(&mut self) -> Result<()> {
+        let in_file = self.document.root.materials.len();
+        let shift = self.edited.origin_world;
+        let pairs = self.loaded.materials.iter().zip(&self.edited.materials);
+        for (index, (was, is)) in pairs.enumerate() {
+            if index < in_file {
+                materials::write(index, was, is, shift, self.text)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn objects(&mut self) -> Result<()> {
+        let pairs = self.loaded.objects.iter().zip(&self.edited.objects);
+        for (was, is) in pairs {
+            let motion = Motion::between(&was.mesh, &is.mesh).ok_or_else(|| {
+                Error::failure(
+                    format!("object `{}`", is.name),
+                    "has another shape than its file gives it, which cannot be saved",
+                    "take that edit back and save again",
+                )
+            })?;
+            let Some(stands) = self.placing.of(is.node) else {
+                continue;
+            };
+            let centre = Motion::centre(&was.mesh) + self.edited.origin_world;
+            // Parts of one node that rest and parts that move are told apart too.
+            let is_moved = motion.is_some();
+            let moved = motion.map_or(stands, |motion| about(&motion, centre) * stands);
+            let is_of_moved = || {
+                let mut parts = self.loaded.objects.iter().zip(&self.edited.objects);
+                parts.any(|(a, b)| b.node == is.node && !std::sync::Arc::ptr_eq(&a.mesh, &b.mesh))
+            };
+            if is_moved || is_of_moved() {
+                self.placing.put(is.node, moved, &is.name)?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Whether a light that is not the file's becomes so: it was added, or edited, or others make the file one with light, so
+/// that it would not be given a sun any more.
+fn is_to_be_written(light: usize, loaded: &Scene, edited: &Scene) -> bool {
+    let was = edited.light_when_loaded(light).map(|place| &loaded.lights[place]);
+    was != Some(&edited.lights[light]) || !edited.light_list.added.is_empty()
+}
+
+/// A motion about a point, in the world's coordinates [m].
+fn about(motion: &Motion, centre: DVec3) -> DAffine3 {
+    let turn = DAffine3::from_quat(motion.rotation);
+    DAffine3::from_translation(centre + motion.translation) * turn * DAffine3::from_translation(-centre)
+}
+
+/// Names an extension among those that the file uses.
+fn use_extension(text: &mut JsonText, name: &str) {
+    const USED: &str = "/extensionsUsed";
+    let used: Vec<Value> = text
+        .get(USED)
+        .and_then(|list| serde_json::from_str(list).ok())
+        .unwrap_or_default();
+    if used.is_empty() {
+        text.set(USED, &json!([name]));
+    } else if !used.contains(&Value::from(name)) {
+        text.set(&format!("{USED}/{}", used.len()), &json!(name));
+    }
+}
+
+/// Reads what is to be written as anybody would, and refuses it where that is not the edited scene.
+fn check(bytes: &[u8], original: &Path, edited: &Scene, options: &LoadOptions) -> Result<()> {
+    let read = super::read_scene(bytes, original, options)?;
+    let differs = |what: String| {
+        Error::failure(
+            what,
+            "cannot be saved as it is: the file has something that stands against it",
+            "take its last edit back and save again",
+        )
+    };
+    let extent_m = edited.bounds().map_or(1.0, |(low, high)| (high - low).length());
+    let shift = read.origin_world - edited.origin_world;
+    let is_at = |a: DVec3, b: DVec3| (a + shift).distance(b) <= SAME * extent_m;
+    for (read, is) in read.objects.iter().zip(&edited.objects) {
+        let mut corners = read.mesh.positions.iter().zip(&is.mesh.positions);
+        if !corners.all(|(read, is)| is_at(*read, *is)) {
+            return Err(differs(format!("object `{}`", is.name)));
+        }
+    }
+    for (read, is) in read.materials.iter().zip(&edited.materials) {
+        let colours = read
+            .base_colour
+            .to_array()
+            .into_iter()
+            .zip(is.base_colour.to_array());
+        let numbers = [(read.ior, is.ior), (read.roughness, is.roughness)];
+        let is_same = colours.chain(numbers).all(|(read, is)| is_near(read, is))
+            && read.surface == is.surface
+            && read.metal == is.metal
+            && read.waves.is_some() == is.waves.is_some();
+        if !is_same {
+            return Err(differs(format!("material `{}`", is.name)));
+        }
+    }
+    check_lights(&read, edited, &is_at).map_err(differs)
+}
+
+/// Whether two numbers are the same but for what 32 bits make of them.
+fn is_near(a: f64, b: f64) -> bool {
+    (a - b).abs() <= SAME * a.abs().max(b.abs()).max(1e-9)
+}
+
+/// Every light that is to be in the file is there, in whatever order, and no other; or what is wrong.
+fn check_lights(
+    read: &Scene,
+    edited: &Scene,
+    is_at: &impl Fn(DVec3, DVec3) -> bool,
+) -> std::result::Result<(), String> {
+    let mut left: Vec<&Light> = read.lights.iter().collect();
+    let is_same = |read: &Light, is: &Light| {
+        let colours = read.colour.to_array().into_iter().zip(is.colour.to_array());
+        let strengths = [(read.kind.strength(), is.kind.strength())];
+        let places = read.kind.position().into_iter().zip(is.kind.position());
+        discriminant(&read.kind) == discriminant(&is.kind)
+            && colours.chain(strengths).all(|(read, is)| is_near(read, is))
+            && places.into_iter().all(|(read, is)| is_at(read, is))
+    };
+    for is in &edited.lights {
+        if let Some(found) = left.iter().position(|read| is_same(read, is)) {
+            left.remove(found);
+        } else if !is_of_program(is, read) {
+            return Err(format!("light `{}`", is.name));
+        }
+    }
+    match left.first() {
+        Some(light) => Err(format!("light `{}`", light.name)),
+        None => Ok(()),
+    }
+}
+
+/// Whether a light is what the program gives a scene, and no part of its file: the environment, or the sun of a scene
+/// without light.
+fn is_of_program(light: &Light, read: &Scene) -> bool {
+    let is_sun_of_dark = matches!(light.kind, LightKind::Sun { .. }) && read.lights.is_empty();
+    is_sun_of_dark || matches!(light.kind, LightKind::Environment { .. })
+}

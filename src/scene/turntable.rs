@@ -1,0 +1,69 @@
+//! A camera that goes once around what it looks at, as if that stood on a turntable.
+
+use std::f64::consts::TAU;
+
+use glam::{DQuat, DVec3};
+
+use super::{Camera, Scene};
+
+/// Cameras around the middle of the box that holds a scene; as [`turntable`].
+pub fn around(scene: &Scene, camera: &Camera, frames: usize) -> Vec<Camera> {
+    let pivot = scene
+        .bounds()
+        .map_or(DVec3::ZERO, |(low, high)| 0.5 * (low + high));
+    turntable(camera, pivot, frames)
+}
+
+/// A camera for each of some frames: the first is `camera`, each of the others is that turned about the vertical axis
+/// through `pivot`, clockwise as seen from above, by one more of the equal steps of a whole turn. The step after the
+/// last would be the first again.
+///
+/// Position and gaze turn together: what is composed stays so, and a camera beside the axis looks past it as before.
+pub fn turntable(camera: &Camera, pivot: DVec3, frames: usize) -> Vec<Camera> {
+    let turned = |frame: usize| {
+        let turn = DQuat::from_rotation_y(-TAU * frame as f64 / frames as f64);
+        Camera {
+            name: format!("frame {}", frame + 1),
+            position: pivot + turn * (camera.position - pivot),
+            forward: turn * camera.forward,
+            up: turn * camera.up,
+            ..camera.clone()
+        }
+    };
+    (0..frames).map(turned).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_camera_sees_the_axis_as_the_first_does() {
+        let pivot = DVec3::new(1.0, 2.0, -3.0);
+        let first = Camera::look_at("first", DVec3::new(4.0, 3.0, -3.5), pivot, 0.8);
+        let cameras = turntable(&first, pivot, 8);
+        assert_eq!(cameras.len(), 8);
+        let seen = |camera: &Camera, point: DVec3| {
+            let offset = point - camera.position;
+            DVec3::new(
+                offset.dot(camera.right()),
+                offset.dot(camera.up),
+                offset.dot(camera.forward),
+            )
+        };
+        for camera in &cameras {
+            for height in [-1.0, 0.0, 2.0] {
+                let point = pivot + height * DVec3::Y;
+                assert!(seen(camera, point).distance(seen(&first, point)) < 1e-12);
+            }
+        }
+        assert!(cameras[0].position.distance(first.position) < 1e-12);
+        // Half a turn on, it is at the other side.
+        let across = (cameras[4].position + first.position) / 2.0;
+        assert!((across - pivot).with_y(0.0).length() < 1e-12);
+        // Clockwise from above: from +x, which is at its right, to +z, which is towards the viewer.
+        let quarter = cameras[2].position - pivot;
+        let start = first.position - pivot;
+        assert!(start.cross(quarter).y < 0.0);
+    }
+}

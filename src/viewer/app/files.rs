@@ -1,0 +1,99 @@
+//! Scenes that are chosen, dropped, read or saved while the window is open.
+
+use std::path::{Path, PathBuf};
+
+use super::App;
+use crate::scene::load::was_dark;
+use crate::viewer::event_log::Event;
+use crate::viewer::files::dialog::{Choice, Chosen};
+use crate::viewer::files::loader::Purpose;
+use crate::viewer::files::saver::free_name;
+use crate::viewer::model::Model;
+use crate::viewer::screenshot;
+
+/// What who opens a file without light is told first.
+pub(super) fn dark_notice(model: &Model) -> Option<String> {
+    was_dark(model.edits().loaded()).then(|| {
+        "The scene has no light: a sun of 4 W/m² was added. Section Scene adds lamps, and removes or turns it.".to_owned()
+    })
+}
+
+impl App {
+    /// Shows what was chosen, read or written since the last frame.
+    pub(super) fn poll_files(&mut self) {
+        match self.dialog.take() {
+            Some(Chosen::File(Choice::Open, path)) => self.model.open(&path.display().to_string()),
+            Some(Chosen::File(Choice::SaveScene, path)) => self.save_scene_as(path),
+            Some(Chosen::NoDialog(Choice::Open, sentence)) => {
+                self.model.files.refusal = Some(sentence.to_owned());
+            }
+            // Beside the original it is found again, and the notice says where.
+            Some(Chosen::NoDialog(Choice::SaveScene, _)) => {
+                if let Some(path) = free_name(&self.original()) {
+                    self.save_scene_as(path);
+                }
+            }
+            Some(Chosen::Nothing) | None => {}
+        }
+        if let Some(purpose) = self.model.poll_files() {
+            self.begin_scene(purpose);
+        }
+        match self.model.files.saver.take() {
+            Some(Ok(path)) => {
+                let files = [path];
+                self.model.log.write(&Event::Saved(&files));
+                self.notice = Some(screenshot::told(&files));
+            }
+            Some(Err(error)) => self.tell_unsaved(&error.to_string()),
+            None => {}
+        }
+    }
+
+    /// Asks for a file in the system's own dialog.
+    pub(super) fn ask_for_file(&mut self, choice: Choice) {
+        let original = self.original();
+        if let Some(graphics) = &self.graphics {
+            self.dialog.ask(choice, graphics.window(), &original);
+        }
+    }
+
+    /// A file was dropped on the window.
+    pub(super) fn drop_file(&mut self, path: &Path) {
+        self.notice = None;
+        self.model.open(&path.display().to_string());
+        self.request_redraw();
+    }
+
+    /// The file that the scene in the window was read from.
+    fn original(&self) -> PathBuf {
+        PathBuf::from(&self.model.edits().loaded().source)
+    }
+
+    fn save_scene_as(&mut self, mut path: PathBuf) {
+        if path.extension().is_none() {
+            path.set_extension("glb");
+        }
+        if let Err(error) = self.model.save_scene(path) {
+            self.tell_unsaved(&error.to_string());
+        }
+    }
+
+    fn tell_unsaved(&mut self, sentence: &str) {
+        self.model.log.write(&Event::NotSaved(sentence));
+        self.notice = Some(sentence.to_owned());
+    }
+
+    /// The window shows another scene than before, or the same read again.
+    fn begin_scene(&mut self, purpose: Purpose) {
+        self.must_set_maps = true;
+        if purpose == Purpose::Open {
+            self.notice = dark_notice(&self.model);
+            self.must_measure_exposure = !self.model.keeps_exposure();
+            self.measured = None;
+        }
+        if let Some(graphics) = &self.graphics {
+            let name = &self.model.scene().name;
+            graphics.window().set_title(&format!("Nephroid – {name}"));
+        }
+    }
+}

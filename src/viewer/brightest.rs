@@ -1,0 +1,82 @@
+//! The brightest texel of the maps, and where it lies in the scene.
+
+use glam::{DVec2, DVec3};
+
+use crate::illumination::{Chart, IlluminationMap};
+use crate::optics::LinearSrgb;
+use crate::scene::Scene;
+
+/// A place of a surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Spot {
+    /// Where [m].
+    pub point: DVec3,
+    /// Unit, away from the side that is lit.
+    pub normal: DVec3,
+    /// Luminance of all layers [W/m²].
+    pub irradiance_w_m2: f64,
+}
+
+/// The middle of the texel with the most light of all; `None` where no light fell.
+pub fn find(scene: &Scene, maps: &[IlluminationMap]) -> Option<Spot> {
+    let brightest = maps.iter().filter_map(|map| {
+        let total = map.total();
+        let lit = (0..total.len()).filter(|texel| map.chart.texel_area_m2(*texel) > 0.0);
+        let values = lit.map(|texel| (texel, LinearSrgb::from(total[texel].map(f64::from)).luminance()));
+        let (texel, value) = values
+            .filter(|(_, value)| value.is_finite())
+            .max_by(|a, b| a.1.total_cmp(&b.1))?;
+        Some((map, texel, value))
+    });
+    let (map, texel, irradiance_w_m2) = brightest.max_by(|a, b| a.2.total_cmp(&b.2))?;
+    let (point, normal) = place(scene, &map.chart, texel)?;
+    (irradiance_w_m2 > 0.0).then_some(Spot {
+        point,
+        normal,
+        irradiance_w_m2,
+    })
+}
+
+/// The point of the surface at a texel's middle, or the nearest to it where the surface does not reach that.
+fn place(scene: &Scene, chart: &Chart, texel: usize) -> Option<(DVec3, DVec3)> {
+    let uv = middle(chart, texel)?;
+    let mesh = &scene.objects.get(chart.object())?.mesh;
+    let within = |(triangle, corners): (usize, &[DVec2; 3])| {
+        let shares = barycentric(corners, uv)?;
+        let least = shares.into_iter().fold(f64::INFINITY, f64::min);
+        Some((triangle, shares, least))
+    };
+    let triangles = chart.corner_uvs.iter().enumerate().filter_map(within);
+    let (triangle, shares, _) = triangles.max_by(|a, b| a.2.total_cmp(&b.2))?;
+    let shares = shares.map(|share| share.max(0.0));
+    let sum: f64 = shares.iter().sum();
+    let [a, b, c] = mesh.corners(triangle);
+    let point = (a * shares[0] + b * shares[1] + c * shares[2]) / sum;
+    let normal = (b - a).cross(c - a).try_normalize()?;
+    Some((point, normal * chart.receiver.side().sign()))
+}
+
+/// The middle of a texel in map coordinates.
+fn middle(chart: &Chart, texel: usize) -> Option<DVec2> {
+    let all = (0..chart.height).flat_map(|row| (0..chart.width).map(move |column| (column, row)));
+    let mut of_texel = all.filter(|(column, row)| chart.texel_at(*column, *row) == texel);
+    let (column, row) = of_texel.next()?;
+    let level = chart
+        .layout
+        .as_ref()
+        .map_or(0, |layout| layout.level_at(column, row));
+    let half = 0.5 * f64::from(1_u32 << level);
+    let size = DVec2::new(chart.width as f64, chart.height as f64);
+    Some((DVec2::new(column as f64, row as f64) + half) / size)
+}
+
+/// Shares of a triangle's corners in a point; `None` where it has no area.
+fn barycentric([a, b, c]: &[DVec2; 3], point: DVec2) -> Option<[f64; 3]> {
+    let (ab, ac, ap) = (*b - *a, *c - *a, point - *a);
+    let area = ab.perp_dot(ac);
+    if area == 0.0 {
+        return None;
+    }
+    let (of_b, of_c) = (ap.perp_dot(ac) / area, ab.perp_dot(ap) / area);
+    Some([1.0 - of_b - of_c, of_b, of_c])
+}

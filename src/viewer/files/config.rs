@@ -1,0 +1,144 @@
+//! The user's configuration folder: one file for each scene, and a list of the last ones.
+
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+use super::kept::Kept;
+use super::recent::Recent;
+use crate::error::{Error, Result};
+use crate::files::cache::ContentHash;
+use crate::files::{read_file, slug, write_atomically};
+
+/// Most that is read of one file [bytes]: far more than anything here takes.
+const MOST_BYTES: u64 = 16 << 20;
+/// Names that are tried for a file that is set aside.
+const NUMBERS: std::ops::RangeInclusive<u32> = 1..=99;
+
+/// A folder of the user's settings.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ConfigFolder {
+    path: PathBuf,
+}
+
+/// What was read, and a sentence where a broken file was set aside for it.
+pub type ReadBack<T> = (Option<T>, Option<String>);
+
+impl ConfigFolder {
+    /// This folder; it is made when something is written.
+    pub fn new(path: PathBuf) -> Self {
+        Self { path }
+    }
+
+    /// The user's: `$NEPHROID_CONFIG_DIR`, or else `nephroid` in `$XDG_CONFIG_HOME`, in `%APPDATA%` or in `~/.config`; `None`
+    /// where the system names none of them.
+    pub fn of_user() -> Option<Self> {
+        let variable = |name: &str| {
+            let value = std::env::var_os(name).filter(|value| !value.is_empty())?;
+            Some(PathBuf::from(value))
+        };
+        let path = variable("NEPHROID_CONFIG_DIR")
+            .or_else(|| Some(variable("XDG_CONFIG_HOME")?.join("nephroid")))
+            .or_else(|| Some(variable("APPDATA")?.join("nephroid")))
+            .or_else(|| Some(variable("HOME")?.join(".config/nephroid")))?;
+        Some(Self::new(path))
+    }
+
+    /// Where a scene's file is.
+    pub fn scene_file(&self, source: &str) -> PathBuf {
+        let full = full_source(source);
+        let mut hash = ContentHash::default();
+        full.bytes().for_each(|byte| hash.take(u64::from(byte)));
+        let stem = Path::new(&full).file_stem().unwrap_or_default().to_string_lossy();
+        let stem = stem.strip_prefix("builtin:").unwrap_or(&stem);
+        let name = format!("{}-{:016x}.json", slug(stem, "scene"), hash.value());
+        self.path.join("scenes").join(name)
+    }
+
+    /// What was kept of a scene.
+    pub fn read_scene(&self, source: &str) -> ReadBack<Kept> {
+        read(&self.scene_file(source))
+    }
+
+    /// Keeps a scene.
+    ///
+    /// # Errors
+    /// A place that cannot be written.
+    pub fn write_scene(&self, kept: &Kept) -> Result<PathBuf> {
+        let path = self.scene_file(&kept.source);
+        write(&path, kept)?;
+        Ok(path)
+    }
+
+    fn recent_file(&self) -> PathBuf {
+        self.path.join("recent.json")
+    }
+
+    /// Files that were opened before.
+    pub fn read_recent(&self) -> ReadBack<Recent> {
+        let (paths, warning) = read::<Vec<PathBuf>>(&self.recent_file());
+        (paths.map(Recent::of), warning)
+    }
+
+    /// Keeps the list.
+    ///
+    /// # Errors
+    /// A place that cannot be written.
+    pub fn write_recent(&self, recent: &Recent) -> Result<()> {
+        write(&self.recent_file(), &recent.paths())
+    }
+}
+
+/// A scene by its full path, so that it is the same one from whatever folder it is opened.
+pub fn full_source(source: &str) -> String {
+    if source.starts_with("builtin:") {
+        return source.to_owned();
+    }
+    let full = Path::new(source).canonicalize();
+    full.map_or_else(|_| source.to_owned(), |path| path.display().to_string())
+}
+
+/// What a file holds; nothing where there is none. One that cannot be understood gets another name, and is kept.
+fn read<T: DeserializeOwned>(path: &Path) -> ReadBack<T> {
+    if !path.exists() {
+        return (None, None);
+    }
+    let read = read_file(path, MOST_BYTES).map_err(|error| error.to_string());
+    let parsed = read.and_then(|bytes| serde_json::from_slice(&bytes).map_err(|error| error.to_string()));
+    match parsed {
+        Ok(value) => (Some(value), None),
+        Err(why) => (None, Some(set_aside(path, &why))),
+    }
+}
+
+/// Gives a broken file another name, and says so.
+fn set_aside(path: &Path, why: &str) -> String {
+    let named = |number: u32| path.with_extension(format!("broken-{number}.json"));
+    let free = NUMBERS.map(named).find(|name| !name.exists());
+    let moved = free.filter(|name| std::fs::rename(path, name).is_ok());
+    match moved {
+        Some(name) => format!(
+            "{} cannot be understood ({why}): it was renamed to {}, and the scene starts afresh.",
+            path.display(),
+            name.display()
+        ),
+        None => format!(
+            "{} cannot be understood ({why}) nor renamed: the scene starts afresh.",
+            path.display()
+        ),
+    }
+}
+
+fn write<T: Serialize>(path: &Path, value: &T) -> Result<()> {
+    let location = path.display().to_string();
+    let unwritable = |what: String| Error::failure(&location, what, "check the folder's permissions");
+    let mut text = serde_json::to_vec_pretty(value)
+        .map_err(|error| unwritable(format!("cannot be put into words ({error})")))?;
+    text.push(b'\n');
+    if let Some(folder) = path.parent() {
+        std::fs::create_dir_all(folder)
+            .map_err(|error| unwritable(format!("its folder cannot be made ({error})")))?;
+    }
+    write_atomically(path, |writer| writer.write_all(&text))
+}

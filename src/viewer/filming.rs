@@ -1,0 +1,224 @@
+//! A way for the camera through the scene: recorded key by key, played, kept in a file, and filmed.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
+
+use crate::effect::{Effect, EffectSwitches};
+use crate::error::{Error, Result};
+use crate::export::frame_folder::FrameFolder;
+use crate::eye_pass::View;
+use crate::files;
+use crate::gpu::Gpu;
+use crate::illumination::IlluminationMap;
+use crate::optics::spectrum::xyz::Matrix3;
+use crate::progress::{Control, Progress};
+use crate::scene::camera_path::{Key, PathPlan};
+use crate::scene::{Camera, CameraPath, Scene};
+use crate::study::frame_times::{self, Walk};
+
+/// Frames that a path is played with [1/s].
+pub const FRAMES_PER_S: f64 = 30.0;
+/// Numbers that are tried before the working folder counts as full.
+const NUMBERS: std::ops::RangeInclusive<u32> = 1..=9999;
+/// A camera leans no less than this [degrees].
+const LEVEL_DEG: f64 = 1e-6;
+/// What errors name.
+const LOCATION: &str = "camera path";
+
+/// A path that is being recorded, with how it is filmed.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Film {
+    /// From where to where, in the coordinates of the scene's file; equally long in time between any two.
+    pub keys: Vec<Key>,
+    /// Of the whole path, or of one turn.
+    pub frames: usize,
+    /// Of the camera that set the last key [degrees].
+    pub vertical_fov_deg: f64,
+    /// Pixels of each frame.
+    pub size: (u32, u32),
+}
+
+impl Default for Film {
+    fn default() -> Self {
+        Self {
+            keys: Vec::new(),
+            frames: 120,
+            vertical_fov_deg: 45.0,
+            size: (1280, 720),
+        }
+    }
+}
+
+/// How far a camera leans to its right from where a level one stands [degrees]; what rounding leaves is no lean.
+fn lean_deg(level: &Key, camera: &Camera) -> f64 {
+    let upright = level.camera(String::new(), DVec3::ZERO, camera.vertical_fov_rad);
+    let lean_deg = camera
+        .up
+        .dot(upright.right())
+        .atan2(camera.up.dot(upright.up))
+        .to_degrees();
+    if lean_deg.abs() < LEVEL_DEG { 0.0 } else { lean_deg }
+}
+
+impl Film {
+    /// Notes where a camera is: at the end, or in the place of a key. What it looks at lies `reach_m` before it.
+    pub fn record(&mut self, key: Option<usize>, camera: &Camera, origin_world: DVec3, reach_m: f64) {
+        let position_m = camera.position + origin_world;
+        let new = Key {
+            position_m,
+            target_m: position_m + camera.forward * reach_m,
+            roll_deg: 0.0,
+        };
+        let new = Key {
+            roll_deg: lean_deg(&new, camera),
+            ..new
+        };
+        match key.map(|index| self.keys.get_mut(index)) {
+            Some(Some(key)) => *key = new,
+            Some(None) => return,
+            None => self.keys.push(new),
+        }
+        self.vertical_fov_deg = camera.vertical_fov_rad.to_degrees();
+    }
+
+    /// The camera of a key, in scene coordinates.
+    pub fn camera_at(&self, key: usize, origin_world: DVec3) -> Option<Camera> {
+        let found = self.keys.get(key)?;
+        let vertical_fov_rad = self.vertical_fov_deg.to_radians();
+        Some(found.camera(format!("key {}", key + 1), origin_world, vertical_fov_rad))
+    }
+
+    /// What of it differs from another, in words.
+    pub fn change_to(&self, other: &Self) -> &'static str {
+        if self.keys == other.keys {
+            "frames of the camera's path"
+        } else {
+            "keys of the camera's path"
+        }
+    }
+
+    /// Takes over a file's path; pictures keep their size.
+    pub fn take(&mut self, plan: PathPlan) {
+        self.frames = plan.frames;
+        self.vertical_fov_deg = plan.vertical_fov_deg;
+        self.keys = plan.keys;
+    }
+
+    fn plan(&self) -> PathPlan {
+        PathPlan {
+            frames: self.frames,
+            vertical_fov_deg: self.vertical_fov_deg,
+            keys: self.keys.clone(),
+        }
+    }
+
+    /// The way through all keys.
+    ///
+    /// # Errors
+    /// As [`PathPlan::path`].
+    pub fn path(&self) -> Result<CameraPath> {
+        self.plan().path(LOCATION)
+    }
+
+    /// Writes the path to a file of its own in a folder; tells which.
+    ///
+    /// # Errors
+    /// As [`path`](Self::path); the file cannot be written; the folder is full of them.
+    pub fn save(&self, folder: &Path, scene: &str) -> Result<PathBuf> {
+        self.path()?;
+        let path = free_name(folder, scene, "path", ".json")?;
+        self.plan().write(&path)?;
+        Ok(path)
+    }
+}
+
+/// What goes on while a path is played.
+#[derive(Clone, Debug)]
+pub struct Player {
+    cameras: Vec<Camera>,
+    seconds: f64,
+}
+
+impl Player {
+    /// At the first camera; `None` where there is none.
+    pub fn new(cameras: Vec<Camera>) -> Option<Self> {
+        (!cameras.is_empty()).then_some(Self {
+            cameras,
+            seconds: 0.0,
+        })
+    }
+
+    /// Lets time pass [s, ≥ 0]; the camera to show next, and whether it is the last.
+    pub fn advance(&mut self, seconds: f64) -> (&Camera, bool) {
+        self.seconds += seconds;
+        let last = self.cameras.len() - 1;
+        let frame = ((self.seconds * FRAMES_PER_S) as usize).min(last);
+        (&self.cameras[frame], frame == last)
+    }
+}
+
+/// All that frames are made of.
+#[derive(Debug)]
+pub struct Shooting {
+    /// What is filmed.
+    pub scene: Arc<Scene>,
+    /// Its light.
+    pub maps: Vec<IlluminationMap>,
+    /// One for each frame.
+    pub cameras: Vec<Camera>,
+    /// Size, exposure and tone map of every frame.
+    pub view: View,
+    /// Whether mirrors and glass show what is seen in them, and glass parts wavelengths.
+    pub effects: EffectSwitches,
+    /// What radiance is multiplied by before tone mapping.
+    pub white_balance: Matrix3,
+    /// What the frames' folder is called by: `path` or `turntable`.
+    pub name: &'static str,
+}
+
+impl Shooting {
+    /// Draws every frame on a device of its own and writes it to a new folder in `folder`; tells which.
+    ///
+    /// # Errors
+    /// No graphics adapter; a frame that it cannot hold; a file that cannot be written; stopped before the end.
+    pub fn shoot(&self, folder: &Path, progress: &dyn Progress, control: &Control) -> Result<PathBuf> {
+        let gpu = Gpu::headless()?;
+        let path = free_name(folder, &self.scene.name, self.name, "")?;
+        let frames = FrameFolder::open(&path)?;
+        let walk = Walk {
+            scene: &self.scene,
+            maps: &self.maps,
+            view: self.view.clone(),
+            cameras: &self.cameras,
+            effects: &self.effects,
+            white_balance: self.white_balance,
+        };
+        let size = (self.view.width, self.view.height);
+        let mut write = |frame: usize, rgba: Vec<u8>| frames.write(frame, size, rgba);
+        frame_times::measure(
+            &gpu,
+            &walk,
+            &[self.effects.get(Effect::Chains)],
+            Some(&mut write),
+            progress,
+            control,
+        )?;
+        Ok(path)
+    }
+}
+
+fn free_name(folder: &Path, scene: &str, kind: &str, ending: &str) -> Result<PathBuf> {
+    let stem = format!("nephroid-{}-{kind}", files::slug(scene, "scene"));
+    let mut names = NUMBERS.map(|number| folder.join(format!("{stem}-{number:04}{ending}")));
+    names.find(|name| !name.exists()).ok_or_else(|| {
+        Error::failure(
+            folder.display().to_string(),
+            format!("it holds {} of these already", NUMBERS.end()),
+            "move some of them elsewhere",
+        )
+    })
+}

@@ -1,0 +1,138 @@
+//! A map as a flat picture: its thumbnail, what a window shows of it, and what lies under the pointer.
+
+use std::f64::consts::PI;
+
+use crate::eye_pass::tone_mapping::{auto_exposure_stops, display_rgba8};
+use crate::eye_pass::{Picture, ToneMap};
+use crate::illumination::IlluminationMap;
+use crate::optics::LinearSrgb;
+use crate::settings::LayerKind;
+
+/// Longest side of a thumbnail [pixels].
+pub const THUMBNAIL: usize = 64;
+/// Most texels across that a pixel is the mean of; more are skipped.
+const MOST_SAMPLES: f64 = 4.0;
+
+/// What of a map a picture shows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Part {
+    /// Column at the picture's left edge [finest texels]; may lie outside.
+    pub left: f64,
+    /// Row at its upper edge [finest texels]; may lie outside.
+    pub top: f64,
+    /// Texels across a pixel, > 0.
+    pub texels_per_pixel: f64,
+}
+
+/// Pixels as the display shows them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Shown {
+    /// Pixels across and down.
+    pub size: [usize; 2],
+    /// sRGB and opacity, row by row; nothing beside the map.
+    pub rgba: Vec<u8>,
+}
+
+/// A map's values at a place.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Reading {
+    /// Column and row [finest texels].
+    pub texel: [usize; 2],
+    /// Luminance of the irradiance of each layer [W/m²].
+    pub layers_w_per_m2: Vec<(LayerKind, f64)>,
+    /// Of their sum, where it was estimated [W/m²].
+    pub error_w_per_m2: Option<f64>,
+}
+
+/// The whole map, at most [`THUMBNAIL`] pixels long and wide, in an exposure that suits it alone.
+pub fn thumbnail(map: &IlluminationMap) -> Shown {
+    let longest = map.width().max(map.height()) as f64;
+    let texels_per_pixel = longest / THUMBNAIL as f64;
+    let pixels = |texels: usize| ((texels as f64 / texels_per_pixel).round() as usize).max(1);
+    let size = [pixels(map.width()), pixels(map.height())];
+    let part = Part {
+        left: 0.0,
+        top: 0.0,
+        texels_per_pixel,
+    };
+    show(map, part, size, exposure_stops(map))
+}
+
+/// Exposure that suits a map alone [stops].
+pub fn exposure_stops(map: &IlluminationMap) -> f64 {
+    let side = 64;
+    let step = |length: usize, index: usize| (2 * index + 1) * length / (2 * side);
+    let places =
+        (0..side * side).map(|index| (step(map.width(), index % side), step(map.height(), index / side)));
+    auto_exposure_stops(&Picture {
+        width: side as u32,
+        height: side as u32,
+        radiance: places.map(|(column, row)| radiance(map, column, row)).collect(),
+    })
+}
+
+/// A part of a map in a picture of so many pixels, exposed by so many stops: as white paper under that light.
+pub fn show(map: &IlluminationMap, part: Part, size: [usize; 2], exposure_stops: f64) -> Shown {
+    let places = (0..size[0] * size[1]).map(|index| [index % size[0], index / size[0]]);
+    let means: Vec<Option<[f32; 3]>> = places.map(|place| mean(map, part, place)).collect();
+    let picture = Picture {
+        width: size[0] as u32,
+        height: size[1] as u32,
+        radiance: means.iter().map(|mean| mean.unwrap_or_default()).collect(),
+    };
+    let mut rgba = display_rgba8(&picture, exposure_stops, ToneMap::Neutral);
+    for (pixel, mean) in rgba.chunks_exact_mut(4).zip(&means) {
+        if mean.is_none() {
+            pixel.fill(0);
+        }
+    }
+    Shown { size, rgba }
+}
+
+/// Values at a place [finest texels]; `None` beside the map.
+pub fn read(map: &IlluminationMap, x: f64, y: f64) -> Option<Reading> {
+    let (column, row) = inside(map, x, y)?;
+    let texel = map.chart.texel_at(column, row);
+    let luminance = |e: [f32; 3]| LinearSrgb::from(e.map(f64::from)).luminance();
+    let layers = map.layers.iter();
+    Some(Reading {
+        texel: [column, row],
+        layers_w_per_m2: layers
+            .map(|layer| (layer.kind, luminance(layer.irradiance[texel])))
+            .collect(),
+        error_w_per_m2: map.error.as_ref().map(|error| f64::from(error[texel])),
+    })
+}
+
+fn inside(map: &IlluminationMap, x: f64, y: f64) -> Option<(usize, usize)> {
+    let is_inside = x >= 0.0 && y >= 0.0 && x < map.width() as f64 && y < map.height() as f64;
+    is_inside.then_some((x as usize, y as usize))
+}
+
+/// Mean radiance of a pixel; `None` where its middle lies beside the map.
+fn mean(map: &IlluminationMap, part: Part, [x, y]: [usize; 2]) -> Option<[f32; 3]> {
+    let at = |origin: f64, pixel: usize, share: f64| origin + (pixel as f64 + share) * part.texels_per_pixel;
+    inside(map, at(part.left, x, 0.5), at(part.top, y, 0.5))?;
+    let samples = part.texels_per_pixel.ceil().clamp(1.0, MOST_SAMPLES) as usize;
+    let share = |index: usize| (index as f64 + 0.5) / samples as f64;
+    let mut sum = [0.0; 3];
+    let mut count = 0.0_f32;
+    for (i, j) in (0..samples * samples).map(|index| (index % samples, index / samples)) {
+        if let Some((column, row)) = inside(map, at(part.left, x, share(i)), at(part.top, y, share(j))) {
+            let radiance = radiance(map, column, row);
+            sum = [0, 1, 2].map(|channel| sum[channel] + radiance[channel]);
+            count += 1.0;
+        }
+    }
+    Some(sum.map(|channel| channel / count.max(1.0)))
+}
+
+/// What white paper sends on of all layers [W/(m² sr)].
+fn radiance(map: &IlluminationMap, column: usize, row: usize) -> [f32; 3] {
+    let texel = map.chart.texel_at(column, row);
+    let of_layers = map.layers.iter().map(|layer| layer.irradiance[texel]);
+    let sum = of_layers.fold([0.0; 3], |sum: [f32; 3], e| {
+        [sum[0] + e[0], sum[1] + e[1], sum[2] + e[2]]
+    });
+    sum.map(|channel| channel / PI as f32)
+}

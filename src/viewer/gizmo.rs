@@ -1,0 +1,295 @@
+//! Handles at what is held, over the picture: three that move it along an axis, and one that turns it about the vertical.
+
+use egui::{Color32, Pos2, Rect, Sense, Stroke, Ui, WidgetInfo, vec2};
+use glam::DVec3;
+
+use super::lens::Lens;
+use super::placement::Placement;
+use crate::geometry::Ray;
+use crate::scene::{Edit, Scene};
+
+/// Length of the axes [points].
+const LENGTH: f64 = 90.0;
+/// Radius of the circle of the turn, of the axes' length.
+const RING: f64 = 0.7;
+/// Half the side of what takes the mouse [points].
+const REACH: f32 = 11.0;
+const TIP: f32 = 6.0;
+/// Corners of the circle.
+const CORNERS: usize = 48;
+/// Gazes nearer to an axis, or to the plane of the turn, than this sine say nothing of it.
+const FLATTEST: f64 = 0.02;
+const LAMP: Color32 = Color32::from_rgb(255, 214, 110);
+
+/// What the mouse moves.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Held {
+    /// A light with a place, by its index.
+    Light(usize),
+    /// An object with all parts of its node, by its index.
+    Object(usize),
+}
+
+/// What is pulled.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Handle {
+    /// Along x.
+    X,
+    /// Up.
+    Y,
+    /// Along z.
+    Z,
+    /// About the vertical.
+    Turn,
+}
+
+impl Handle {
+    /// Its name to assistive technology.
+    fn name(self) -> &'static str {
+        match self {
+            Self::X => "Move x",
+            Self::Y => "Move y",
+            Self::Z => "Move z",
+            Self::Turn => "Turn",
+        }
+    }
+
+    fn colour(self) -> Color32 {
+        match self {
+            Self::X => Color32::from_rgb(235, 90, 80),
+            Self::Y => Color32::from_rgb(120, 210, 90),
+            Self::Z => Color32::from_rgb(90, 150, 250),
+            Self::Turn => Color32::from_rgb(230, 200, 90),
+        }
+    }
+
+    /// Unit, of those that move.
+    fn axis(self) -> Option<DVec3> {
+        match self {
+            Self::X => Some(DVec3::X),
+            Self::Y => Some(DVec3::Y),
+            Self::Z => Some(DVec3::Z),
+            Self::Turn => None,
+        }
+    }
+
+    /// What a gaze points at: how far along the axis from `origin` [m], or at which angle about the vertical from z
+    /// towards x [rad]. `None` where it runs along the axis, or in the plane of the turn.
+    pub fn reach(self, origin: DVec3, gaze: &Ray) -> Option<f64> {
+        let Some(axis) = self.axis() else {
+            let down = gaze.direction.y;
+            let along_m = (origin.y - gaze.origin.y) / down;
+            let met = gaze.origin + gaze.direction * along_m - origin;
+            return (down.abs() > FLATTEST && along_m > 0.0).then(|| met.x.atan2(met.z));
+        };
+        // The point of the axis that is nearest to the gaze.
+        let from = gaze.origin - origin;
+        let slant = axis.dot(gaze.direction);
+        let sine_squared = 1.0 - slant * slant;
+        let nearest = (axis.dot(from) - slant * gaze.direction.dot(from)) / sine_squared;
+        (sine_squared > FLATTEST * FLATTEST).then_some(nearest)
+    }
+}
+
+/// Where what is held was when it was taken.
+#[derive(Clone, Copy, Debug)]
+enum Pose {
+    Light(usize, DVec3),
+    Object(usize, Placement),
+}
+
+impl Pose {
+    fn of(held: Held, scene: &Scene, loaded: &Scene) -> Option<Self> {
+        match held {
+            Held::Light(light) => Some(Self::Light(light, scene.lights.get(light)?.kind.position()?)),
+            Held::Object(object) => Some(Self::Object(object, Placement::of(object, loaded, scene)?)),
+        }
+    }
+
+    fn middle_m(&self, loaded: &Scene) -> DVec3 {
+        match self {
+            Self::Light(_, position) => *position,
+            Self::Object(object, placement) => placement.middle_m(*object, loaded),
+        }
+    }
+
+    fn handles(&self) -> &'static [Handle] {
+        match self {
+            Self::Light(..) => &[Handle::X, Handle::Y, Handle::Z],
+            Self::Object(..) => &[Handle::X, Handle::Y, Handle::Z, Handle::Turn],
+        }
+    }
+
+    /// The edit that pulls it so far [m, rad].
+    fn pulled(&self, handle: Handle, by: f64, loaded: &Scene) -> Edit {
+        let step = handle.axis().map_or(DVec3::ZERO, |axis| axis * by);
+        match *self {
+            Self::Light(light, position) => Edit::LightPosition {
+                light,
+                position: position + step,
+            },
+            Self::Object(object, placement) => {
+                let turn = if handle == Handle::Turn { by } else { 0.0 };
+                let there = Placement {
+                    yaw_rad: placement.yaw_rad + turn,
+                    offset_m: placement.offset_m + step,
+                };
+                there.edit(object, loaded)
+            }
+        }
+    }
+}
+
+/// A handle in the hand.
+#[derive(Clone, Copy, Debug)]
+struct Grip {
+    handle: Handle,
+    from: Pose,
+    /// What the first gaze pointed at.
+    begun: f64,
+}
+
+/// The handles, and the hand at them.
+#[derive(Clone, Debug, Default)]
+pub struct Gizmo {
+    grip: Option<Grip>,
+    is_hot: bool,
+}
+
+impl Gizmo {
+    /// Whether the mouse is at a handle: clicks are not for what is behind it.
+    pub fn is_hot(&self) -> bool {
+        self.is_hot
+    }
+
+    /// Shows the handles of what is held over the picture; the edit that a pull asks for.
+    pub fn show(
+        &mut self,
+        ui: &Ui,
+        lens: &Lens<'_>,
+        held: Option<Held>,
+        (scene, loaded): (&Scene, &Scene),
+    ) -> Option<Edit> {
+        self.is_hot = false;
+        let pose = held.and_then(|held| Pose::of(held, scene, loaded));
+        let Some(pose) = pose.filter(|pose| lens.is_before(pose.middle_m(loaded))) else {
+            self.grip = None;
+            return None;
+        };
+        lamps(ui, lens, scene);
+        let origin = pose.middle_m(loaded);
+        let length_m = LENGTH * lens.m_per_point(origin);
+        let mut edit = None;
+        for handle in pose.handles() {
+            let tip = tip(*handle, &pose, origin, length_m);
+            if !lens.is_before(tip) {
+                continue;
+            }
+            edit = self
+                .pull(ui, lens, (*handle, &pose), lens.place(tip), loaded)
+                .or(edit);
+            draw(ui, lens, *handle, (origin, tip), length_m);
+        }
+        edit
+    }
+
+    /// Lets a handle be dragged.
+    fn pull(
+        &mut self,
+        ui: &Ui,
+        lens: &Lens<'_>,
+        (handle, pose): (Handle, &Pose),
+        at: Pos2,
+        loaded: &Scene,
+    ) -> Option<Edit> {
+        let rect = Rect::from_center_size(at, vec2(2.0 * REACH, 2.0 * REACH));
+        if !lens.picture.contains_rect(rect) && self.grip.is_none() {
+            return None;
+        }
+        let response = ui.interact(rect, ui.scope_id().with(handle.name()), Sense::drag());
+        response.widget_info(|| WidgetInfo::slider(true, 0.0, handle.name()));
+        self.is_hot |= response.hovered() || response.dragged();
+        let pointer = response.interact_pointer_pos()?;
+        if response.drag_started() {
+            let pressed = ui.input(|input| input.pointer.press_origin());
+            let gaze = lens.gaze(pressed.unwrap_or(pointer));
+            let begun = handle.reach(pose.middle_m(loaded), &gaze)?;
+            self.grip = Some(Grip {
+                handle,
+                from: *pose,
+                begun,
+            });
+        }
+        let grip = self.grip.filter(|grip| grip.handle == handle)?;
+        if response.drag_stopped() {
+            self.grip = None;
+        }
+        if response.drag_delta() == egui::Vec2::ZERO {
+            return None;
+        }
+        let reached = handle.reach(grip.from.middle_m(loaded), &lens.gaze(pointer))?;
+        Some(grip.from.pulled(handle, reached - grip.begun, loaded))
+    }
+}
+
+/// Where a handle is in the scene.
+fn tip(handle: Handle, pose: &Pose, origin: DVec3, length_m: f64) -> DVec3 {
+    match (handle.axis(), pose) {
+        (Some(axis), _) => origin + axis * length_m,
+        (None, Pose::Object(_, placement)) => {
+            // Between two axes, where it hides none.
+            origin + on_ring(placement.yaw_rad + std::f64::consts::FRAC_PI_4, length_m)
+        }
+        (None, Pose::Light(..)) => origin,
+    }
+}
+
+fn on_ring(angle_rad: f64, length_m: f64) -> DVec3 {
+    DVec3::new(angle_rad.sin(), 0.0, angle_rad.cos()) * (RING * length_m)
+}
+
+fn draw(ui: &Ui, lens: &Lens<'_>, handle: Handle, (origin, tip): (DVec3, DVec3), length_m: f64) {
+    let painter = ui.painter().with_clip_rect(lens.picture);
+    let stroke = Stroke::new(2.5, handle.colour());
+    let line = |from: DVec3, to: DVec3| {
+        if let Some(ends) = lens.line(from, to) {
+            painter.line_segment(ends, stroke);
+        }
+    };
+    if handle == Handle::Turn {
+        let corner = |index: usize| {
+            let angle = std::f64::consts::TAU * index as f64 / CORNERS as f64;
+            origin + on_ring(angle, length_m)
+        };
+        for index in 0..CORNERS {
+            line(corner(index), corner(index + 1));
+        }
+    } else {
+        line(origin, tip);
+    }
+    painter.circle_filled(lens.place(tip), TIP, handle.colour());
+}
+
+/// Marks every light that has a place, so that it can be clicked.
+fn lamps(ui: &Ui, lens: &Lens<'_>, scene: &Scene) {
+    let painter = ui.painter().with_clip_rect(lens.picture);
+    for light in &scene.lights {
+        if let Some(position) = light.kind.position().filter(|position| lens.is_before(*position)) {
+            let at = lens.place(position);
+            painter.circle_stroke(at, 7.0, Stroke::new(1.5, LAMP));
+            painter.circle_filled(at, 2.0, LAMP);
+        }
+    }
+}
+
+/// The light that is seen at a place of the picture, if one is.
+pub fn light_at(lens: &Lens<'_>, scene: &Scene, place: Pos2) -> Option<usize> {
+    let seen = scene.lights.iter().enumerate().filter_map(|(index, light)| {
+        let position = light.kind.position()?;
+        let distance = lens
+            .is_before(position)
+            .then(|| lens.place(position).distance(place))?;
+        (distance < REACH).then_some((index, distance))
+    });
+    seen.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(index, _)| index)
+}

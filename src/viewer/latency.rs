@@ -1,0 +1,108 @@
+//! How long after a key or the mouse was used the window shows what came of it.
+//!
+//! A window that is busy meets events late, and nobody tells it when they came. Each is taken to have come at the
+//! earliest moment that it can have: what is said here is never too short, but for the way through the system.
+
+use std::collections::VecDeque;
+use std::time::{Duration, Instant};
+
+use serde::Serialize;
+
+/// Waits that are remembered of each kind: the last ones.
+const MOST: usize = 10_000;
+/// Whoever asks the system for events and gets none at once has met all that came before.
+const WAITED: Duration = Duration::from_millis(1);
+
+/// Waits of one kind, from the shortest to the longest: the least that so many of them do not exceed.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Percentiles {
+    /// How many there are; at least 1.
+    pub count: usize,
+    /// Of half of them [ms].
+    pub p50_ms: f64,
+    /// Of 95 % [ms].
+    pub p95_ms: f64,
+    /// Of 99 % [ms].
+    pub p99_ms: f64,
+    /// The longest [ms].
+    pub max_ms: f64,
+}
+
+impl Percentiles {
+    /// Of some waits; `None` where there are none.
+    pub fn of(waits: impl IntoIterator<Item = Duration>) -> Option<Self> {
+        let mut sorted: Vec<_> = waits.into_iter().collect();
+        sorted.sort_unstable();
+        let last = sorted.len().checked_sub(1)?;
+        // Rounded up: 95 % of 20 are 19.
+        let at = |percent: usize| 1e3 * sorted[(percent * sorted.len()).div_ceil(100) - 1].as_secs_f64();
+        Some(Self {
+            count: sorted.len(),
+            p50_ms: at(50),
+            p95_ms: at(95),
+            p99_ms: at(99),
+            max_ms: 1e3 * sorted[last].as_secs_f64(),
+        })
+    }
+}
+
+/// Waits between events and frames, those during a bake and the others apart.
+#[derive(Clone, Debug, Default)]
+pub struct Latencies {
+    while_baking: VecDeque<Duration>,
+    otherwise: VecDeque<Duration>,
+    /// Events that no frame has shown yet: when they can have come, and whether a bake ran.
+    pending: Vec<(Instant, bool)>,
+    /// When the present turn of events and frames began.
+    turn: Option<Instant>,
+    /// When the turn before it ended.
+    ended: Option<Instant>,
+    /// The earliest moment at which events of the present turn can have come.
+    earliest: Option<Instant>,
+}
+
+impl Latencies {
+    /// A turn begins: the system has been asked for events.
+    pub fn begin_turn(&mut self, now: Instant) {
+        let has_waited = self.ended.is_some_and(|ended| now.duration_since(ended) > WAITED);
+        // Otherwise they may have come while the turn before was at work.
+        let earliest = if has_waited { None } else { self.turn };
+        self.earliest = earliest.or(Some(now));
+        self.turn = Some(now);
+    }
+
+    /// The turn ends: the system is asked next.
+    pub fn end_turn(&mut self, now: Instant) {
+        self.ended = Some(now);
+    }
+
+    /// An event is met that the next frame is to show.
+    pub fn meet(&mut self, now: Instant, is_baking: bool) {
+        self.pending.push((self.earliest.unwrap_or(now), is_baking));
+    }
+
+    /// A frame was handed to the system that shows all that was met.
+    pub fn show(&mut self, now: Instant) {
+        for (came, is_baking) in self.pending.drain(..) {
+            let waits = if is_baking {
+                &mut self.while_baking
+            } else {
+                &mut self.otherwise
+            };
+            if waits.len() == MOST {
+                waits.pop_front();
+            }
+            waits.push_back(now.duration_since(came));
+        }
+    }
+
+    /// Of events during a bake.
+    pub fn while_baking(&self) -> Option<Percentiles> {
+        Percentiles::of(self.while_baking.iter().copied())
+    }
+
+    /// Of all others.
+    pub fn otherwise(&self) -> Option<Percentiles> {
+        Percentiles::of(self.otherwise.iter().copied())
+    }
+}

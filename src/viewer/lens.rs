@@ -1,0 +1,69 @@
+//! From points of the scene to points of the picture, and back to gazes.
+
+use egui::{Pos2, Rect, vec2};
+use glam::DVec3;
+
+use crate::geometry::Ray;
+use crate::scene::Camera;
+
+/// A camera with the picture that it makes.
+#[derive(Clone, Copy, Debug)]
+pub struct Lens<'a> {
+    /// Whose vertical angle of view is that of the picture's height.
+    pub camera: &'a Camera,
+    /// Where the picture lies [points].
+    pub picture: Rect,
+}
+
+impl Lens<'_> {
+    /// Distance along the camera's axis [m].
+    pub fn depth_m(&self, point: DVec3) -> f64 {
+        (point - self.camera.position).dot(self.camera.forward)
+    }
+
+    /// Whether a point is before the camera, and so has a place in its plane.
+    pub fn is_before(&self, point: DVec3) -> bool {
+        self.depth_m(point) > self.camera.near_m
+    }
+
+    /// Where a point before the camera is seen; it may be beside the picture.
+    pub fn place(&self, point: DVec3) -> Pos2 {
+        let offset = point - self.camera.position;
+        let scale = 1.0 / self.m_per_point(point);
+        let (x, y) = (offset.dot(self.camera.right()), offset.dot(self.camera.up));
+        self.picture.center() + vec2((scale * x) as f32, (-scale * y) as f32)
+    }
+
+    /// What one point of the picture spans where a point of the scene is [m].
+    pub fn m_per_point(&self, point: DVec3) -> f64 {
+        let half_height_m = (0.5 * self.camera.vertical_fov_rad).tan() * self.depth_m(point);
+        half_height_m / (0.5 * f64::from(self.picture.height()))
+    }
+
+    /// The part of a line that is before the camera.
+    pub fn line(&self, from: DVec3, to: DVec3) -> Option<[Pos2; 2]> {
+        let near = self.camera.near_m;
+        let depths = [from, to].map(|point| self.depth_m(point) - near);
+        let cut = || from + (to - from) * (depths[0] / (depths[0] - depths[1]));
+        match depths.map(|depth| depth >= 0.0) {
+            [true, true] => Some([from, to]),
+            [true, false] => Some([from, cut()]),
+            [false, true] => Some([cut(), to]),
+            [false, false] => None,
+        }
+        .map(|ends| ends.map(|end| self.place(end)))
+    }
+
+    /// The ray from the eye through a place of the picture.
+    pub fn gaze(&self, place: Pos2) -> Ray {
+        let picture = self.picture;
+        let share = |at: f32, from: f32, length: f32| 2.0 * f64::from((at - from) / length) - 1.0;
+        let across = share(place.x, picture.left(), picture.width());
+        let down = share(place.y, picture.top(), picture.height());
+        let aspect = f64::from(picture.aspect_ratio());
+        Ray {
+            origin: self.camera.position,
+            direction: self.camera.direction(across, -down, aspect),
+        }
+    }
+}

@@ -1,0 +1,137 @@
+//! The camera's path: recorded, played, kept and filmed.
+
+use super::Model;
+use crate::error::Result;
+use crate::eye_pass::View;
+use crate::optics::LinearSrgb;
+use crate::scene::{PathPlan, turntable};
+use crate::viewer::event_log::Event;
+use crate::viewer::files::working_folder;
+use crate::viewer::filming::{Player, Shooting};
+use crate::viewer::panel::FilmWish;
+
+impl Model {
+    /// Whether the camera moves by itself or by keys.
+    pub fn is_moving(&self) -> bool {
+        self.player.is_some() || self.navigator.is_moving()
+    }
+
+    /// Whether the camera's path is being played.
+    pub fn is_playing(&self) -> bool {
+        self.player.is_some()
+    }
+
+    /// What became of the last file of a path.
+    pub fn film_told(&self) -> Option<&str> {
+        self.film_told.as_deref()
+    }
+
+    /// Moves the camera along its path by some time [s]; tells whether it is played.
+    pub(super) fn play_on(&mut self, seconds: f64) -> bool {
+        if self.navigator.is_moving() {
+            // Whoever presses a key takes over.
+            self.end_play();
+        }
+        let Some(player) = &mut self.player else {
+            return false;
+        };
+        let (camera, is_last) = player.advance(seconds);
+        self.navigator.stand_at(camera);
+        if is_last {
+            self.end_play();
+        }
+        true
+    }
+
+    fn end_play(&mut self) {
+        if self.player.take().is_some() {
+            self.log.write(&Event::Played(false));
+        }
+    }
+
+    /// Does what was asked for in section *Camera path*.
+    pub(super) fn film(&mut self, wish: &FilmWish) {
+        let before = self.panel.film.clone();
+        let outcome = self.filmed(wish);
+        if before != self.panel.film {
+            self.edits.note_film(&before, &self.panel.film);
+            self.edits.release();
+        }
+        match outcome {
+            Ok(None) => {}
+            Ok(Some(told)) => self.film_told = Some(told),
+            Err(error) => self.film_told = Some(error.to_string()),
+        }
+    }
+
+    /// A sentence where there is something to be told.
+    fn filmed(&mut self, wish: &FilmWish) -> Result<Option<String>> {
+        let origin_world = self.scene().origin_world;
+        match wish {
+            FilmWish::Record(key) => {
+                let (camera, reach_m) = (self.navigator.camera(), self.navigator.radius_m());
+                self.panel.film.record(*key, &camera, origin_world, reach_m);
+                self.log.write(&Event::Recorded(self.panel.film.keys.len()));
+            }
+            FilmWish::GoTo(index) => {
+                if let Some(camera) = self.panel.film.camera_at(*index, origin_world) {
+                    self.navigator.stand_at(&camera);
+                }
+            }
+            FilmWish::Play(true) => {
+                let cameras = self.panel.film.path()?.cameras(origin_world);
+                self.player = Player::new(cameras);
+                self.log.write(&Event::Played(true));
+            }
+            FilmWish::Play(false) => self.end_play(),
+            FilmWish::Save => {
+                let path = self.panel.film.save(&working_folder(), &self.scene().name)?;
+                let told = format!("Written: {}", path.display());
+                self.log.write(&Event::Saved(&[path]));
+                return Ok(Some(told));
+            }
+            FilmWish::Load(path) => {
+                let plan = PathPlan::read(path)?;
+                plan.path(&path.display().to_string())?;
+                self.panel.film.take(plan);
+                self.log.write(&Event::Recorded(self.panel.film.keys.len()));
+            }
+            FilmWish::Shoot { turns } => self.shoot(*turns)?,
+            FilmWish::Stop => self.exporter.stop(),
+        }
+        Ok(None)
+    }
+
+    /// Has frames drawn and written by the exporting thread.
+    fn shoot(&mut self, turns: bool) -> Result<()> {
+        let scene = self.scene().clone();
+        let display = self.panel.display;
+        let film = &self.panel.film;
+        let (width, height) = film.size;
+        let camera = self.navigator.camera_for(f64::from(width) / f64::from(height));
+        let (cameras, name) = if turns {
+            (turntable::around(&scene, &camera, film.frames), "turntable")
+        } else {
+            (film.path()?.cameras(scene.origin_world), "frames")
+        };
+        let shooting = Shooting {
+            maps: self.lit_maps().into_owned(),
+            cameras,
+            view: View {
+                camera,
+                width,
+                height,
+                exposure_stops: display.exposure_stops,
+                tone_map: display.tone_map,
+                background: LinearSrgb::BLACK,
+            },
+            effects: self.panel.settings.effects.clone(),
+            white_balance: display.white_balance.matrix(&scene),
+            scene,
+            name,
+        };
+        self.exporter.film(shooting, working_folder());
+        self.log.write(&Event::Exported(self.exporter.state()));
+        Ok(())
+    }
+}

@@ -1,0 +1,151 @@
+//! What is kept of the scene in the window, and found again.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use serde_json::Value;
+
+use super::Model;
+use crate::scene::changes::Change;
+use crate::settings::BakeSettings;
+use crate::viewer::event_log::Event;
+use crate::viewer::files::config::full_source;
+use crate::viewer::files::keeper::Snapshot;
+use crate::viewer::files::kept::Kept;
+
+/// What of a kept scene is taken over.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Restored {
+    /// Settings of the bake.
+    pub settings: bool,
+    /// The camera; bookmarks always are.
+    pub camera: bool,
+    /// The exposure.
+    pub exposure: bool,
+    /// Edits.
+    pub edits: bool,
+}
+
+/// What was kept and not taken over, to be kept on until it is changed: a look at other maps takes no edits away.
+#[derive(Debug, Default)]
+pub(super) struct LeftAlone {
+    changes: Vec<Change>,
+    /// What stood against them, and the settings.
+    settings: Option<(BakeSettings, Value)>,
+}
+
+impl Restored {
+    /// Everything.
+    pub(super) const ALL: Self = Self {
+        settings: true,
+        camera: true,
+        exposure: true,
+        edits: true,
+    };
+}
+
+impl Model {
+    /// What there is to be kept.
+    fn snapshot(&self) -> Snapshot {
+        Snapshot {
+            kept: Kept {
+                source: self.full_source.clone(),
+                views: self.navigator.views(),
+                settings: self.settings_to_keep(),
+                display: self.panel.display,
+                film: self.panel.film.clone(),
+                automatic: Some(self.panel.automatic),
+                watch: self.panel.watches(),
+                changes: self.left_alone.changes.clone(),
+            },
+            loaded: Arc::clone(self.edits.loaded()),
+            edited: Arc::clone(self.edits.scene()),
+        }
+    }
+
+    /// Those of the panel, or what was kept before where the command line stood against it and nobody changed it since.
+    fn settings_to_keep(&self) -> Value {
+        match &self.left_alone.settings {
+            Some((given, kept)) if *given == self.panel.settings => kept.clone(),
+            _ => serde_json::to_value(&self.panel.settings).unwrap_or_default(),
+        }
+    }
+
+    /// Keeps what changed.
+    pub(super) fn keep(&mut self, now: Instant) {
+        if self.files.keeper.is_some() {
+            let snapshot = self.snapshot();
+            if let Some(keeper) = &mut self.files.keeper {
+                keeper.look(snapshot, now);
+            }
+        }
+    }
+
+    /// Makes the scene in the window what it was last time, as far as that is wanted; tells whether there was such a time.
+    pub(super) fn find_again(&mut self, what: Option<Restored>) -> bool {
+        self.full_source = full_source(&self.edits.loaded().source);
+        let (kept, warning) = match what {
+            Some(_) => self.files.read_back(&self.full_source),
+            None => (None, None),
+        };
+        if let Some(sentence) = &warning {
+            log::warn!("{sentence}");
+            self.files.warning = warning;
+        }
+        self.left_alone = LeftAlone::default();
+        if let (Some(kept), Some(what)) = (&kept, what) {
+            self.restore(kept, what);
+            if !what.edits {
+                self.left_alone.changes.clone_from(&kept.changes);
+            }
+            if !what.settings {
+                self.left_alone.settings = Some((self.panel.settings.clone(), kept.settings.clone()));
+            }
+            self.log.write(&Event::FoundAgain(&self.full_source));
+        }
+        let snapshot = self.snapshot();
+        if let Some(keeper) = &mut self.files.keeper {
+            keeper.begin(snapshot);
+        }
+        kept.is_some()
+    }
+
+    fn restore(&mut self, kept: &Kept, what: Restored) {
+        if what.settings {
+            self.panel.settings = kept.settings_or(&self.panel.settings);
+            self.panel.automatic = kept.automatic.unwrap_or(true);
+            self.was_automatic = self.panel.automatic;
+        }
+        self.navigator.restore(&kept.views, what.camera);
+        self.panel.watch(kept.watch || self.panel.watches());
+        let exposure_stops = self.panel.display.exposure_stops;
+        self.panel.display = kept.display;
+        self.panel.film = kept.film.clone();
+        if !what.exposure {
+            self.panel.display.exposure_stops = exposure_stops;
+        }
+        if what.edits {
+            self.edit_again(&kept.changes);
+        }
+    }
+
+    /// Does edits of an earlier time again, each to be taken back by itself; says which of them the file has no place for.
+    pub(super) fn edit_again(&mut self, changes: &[Change]) {
+        let mut lost = Vec::new();
+        let loaded = Arc::clone(self.edits.loaded());
+        for change in changes.iter().filter(|change| !change.is_done_in(&loaded)) {
+            let edit = change.for_scene(&loaded);
+            let is_done = edit.is_some_and(|edit| self.edits.edit(&edit).is_ok());
+            self.edits.release();
+            if !is_done && !lost.contains(&change.of) {
+                lost.push(change.of.clone());
+            }
+        }
+        if !lost.is_empty() {
+            let names = lost.join("`, `");
+            self.files.warning = Some(format!(
+                "What was edited of `{names}` is left out, since the file is another one now."
+            ));
+        }
+    }
+}

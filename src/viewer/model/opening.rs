@@ -1,0 +1,192 @@
+//! Another scene in the same window, or the same one read again.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use super::Model;
+use super::keeping::Restored;
+use super::picking::Placing;
+use super::seeking::Sought;
+use crate::error::Result;
+use crate::scene::changes::Changes;
+use crate::scene::{Scene, load};
+use crate::viewer::ViewerOptions;
+use crate::viewer::edits::EditedScene;
+use crate::viewer::event_log::Event;
+use crate::viewer::files;
+use crate::viewer::files::loader::{Loaded, Purpose};
+use crate::viewer::files::watch::Stamps;
+use crate::viewer::filming::Film;
+use crate::viewer::navigation::Navigator;
+use crate::viewer::worker::BakedLevel;
+
+impl Model {
+    /// Takes over what was kept of the first scene; what the command line says goes first.
+    pub(super) fn begin(&mut self, options: &ViewerOptions) {
+        if options.files.watch {
+            self.panel.watch(true);
+        }
+        let what = Restored {
+            settings: options.maps.is_none() && !options.files.settings_given,
+            camera: options.camera.is_none(),
+            exposure: options.exposure_stops.is_none(),
+            edits: options.maps.is_none(),
+        };
+        let source = self.edits.loaded().source.clone();
+        self.files.opened(&source);
+        self.exposure_is_kept = self.find_again((!options.files.fresh).then_some(what));
+        self.seen = self.wanted();
+    }
+
+    /// Reads a scene, which takes the place of the present one when it is there: a path as it was typed, or
+    /// `builtin:NAME`. Whatever was being read is given up.
+    pub fn open(&mut self, source: &str) {
+        let source = files::typed(source);
+        if !source.is_empty() {
+            self.read(&source, Purpose::Open);
+        }
+    }
+
+    /// Writes the edited scene to a `.glb` file, on a thread: [`Saver::take`] tells what came of it.
+    ///
+    /// # Errors
+    /// As [`Saver::start`].
+    ///
+    /// [`Saver::take`]: crate::viewer::files::saver::Saver::take
+    /// [`Saver::start`]: crate::viewer::files::saver::Saver::start
+    pub fn save_scene(&mut self, target: PathBuf) -> Result<()> {
+        let (loaded, edited) = (Arc::clone(self.edits.loaded()), Arc::clone(self.edits.scene()));
+        let options = self.files.load.clone();
+        self.files.saver.start(target, loaded, edited, options)
+    }
+
+    /// Whether these maps are of the first bake of the scene in the window.
+    pub fn is_first(&self, level: &BakedLevel) -> bool {
+        level.serial == self.first_request
+    }
+
+    /// Whether the exposure is that of an earlier time, and none to be measured.
+    pub fn keeps_exposure(&self) -> bool {
+        self.exposure_is_kept
+    }
+
+    fn read(&mut self, source: &str, purpose: Purpose) {
+        self.files.refusal = None;
+        self.log.write(&Event::Opening(source));
+        let options = self.files.load.clone();
+        if let Err(error) = self.files.loader.start(source, purpose, &options) {
+            self.refuse(source, &error.to_string());
+        }
+    }
+
+    fn refuse(&mut self, source: &str, sentence: &str) {
+        self.log.write(&Event::NotOpened { source, sentence });
+        self.files.refusal = Some(sentence.to_owned());
+    }
+
+    /// Shows the scene that was being read once it is there; tells whether another scene is shown. One that cannot be
+    /// read leaves everything as it was.
+    pub fn poll_files(&mut self) -> Option<Purpose> {
+        if self.files.watch.as_ref().is_some_and(|watch| watch.take_change()) {
+            let source = self.edits.loaded().source.clone();
+            self.read(&source, Purpose::Reload);
+        }
+        let Loaded {
+            source,
+            purpose,
+            outcome,
+        } = self.files.loader.take()?;
+        let scene = match outcome {
+            Ok(scene) => scene,
+            Err(error) => {
+                self.refuse(&source, &error.to_string());
+                return None;
+            }
+        };
+        self.log.write(&Event::Opened {
+            scene: &scene.name,
+            source: &source,
+            again: purpose == Purpose::Reload,
+        });
+        match purpose {
+            Purpose::Open => self.show(scene),
+            Purpose::Reload => self.show_again(scene),
+        }
+        Some(purpose)
+    }
+
+    /// Puts a scene in the place of the present one: of its maps, edits and views nothing is left.
+    fn show(&mut self, scene: Scene) {
+        let scene = Arc::new(scene);
+        if let Some(keeper) = &mut self.files.keeper {
+            keeper.settle();
+        }
+        self.files.opened(&scene.source);
+        self.files.watch = None;
+        self.navigator = Navigator::new(&scene, None);
+        self.panel.forget_selection();
+        self.panel.film = Film::default();
+        self.player = None;
+        self.picking = None;
+        self.placing = Placing::default();
+        self.sought = Sought::default();
+        self.panel.watch(false);
+        self.edits = EditedScene::new(scene);
+        self.exposure_is_kept = self.find_again(Some(Restored::ALL));
+        self.forget_maps();
+        self.bake_first();
+    }
+
+    /// Puts a scene that was read again in its own place: camera, settings and edits stay.
+    fn show_again(&mut self, mut scene: Scene) {
+        let loaded = Arc::clone(self.edits.loaded());
+        let changes = Changes::between(&loaded, self.edits.scene());
+        let is_same_shape = load::share(&loaded, &mut scene);
+        self.edits = EditedScene::new(Arc::new(scene));
+        self.files.warning = None;
+        self.edit_again(&changes.changes);
+        self.navigator.stay_in(self.edits.scene());
+        if !is_same_shape {
+            self.forget_maps();
+        }
+        self.bake_first();
+    }
+
+    /// Nothing that was baked is shown any more.
+    fn forget_maps(&mut self) {
+        self.last = None;
+        self.given.clear();
+        self.reference = None;
+        self.probe(None);
+    }
+
+    /// Bakes a scene of which there are no maps that would do.
+    fn bake_first(&mut self) {
+        self.refusal = None;
+        self.worth = None;
+        self.debounce.clear();
+        self.seen = self.wanted();
+        self.asked = None;
+        self.rebake();
+        // Where a setting is out of its range nothing was asked for, and nothing of before is to come.
+        self.first_request = match &self.asked {
+            Some((serial, _)) => *serial,
+            None => {
+                self.worker.cancel();
+                u64::MAX
+            }
+        };
+    }
+
+    /// Watches the scene's files, or no longer, as the panel says.
+    pub(super) fn watch(&mut self) {
+        let source = &self.edits.loaded().source;
+        let wanted = self.panel.watches() && !source.starts_with("builtin:");
+        if !wanted {
+            self.files.watch = None;
+        } else if self.files.watch.is_none() {
+            let stamps = Stamps::of(load::files_of(source, &self.files.load));
+            self.files.start_watch(stamps);
+        }
+    }
+}

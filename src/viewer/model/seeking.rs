@@ -1,0 +1,117 @@
+//! What waits for the surfaces of the scene: lights that are to be added, and a look at the brightest spot.
+
+use std::sync::Arc;
+
+use glam::DVec3;
+
+use super::Model;
+use crate::geometry::Ray;
+use crate::scene::{Edit, LightOrigin};
+use crate::transport::Tracer;
+use crate::viewer::brightest::{self, Spot};
+use crate::viewer::event_log::Event;
+use crate::viewer::gizmo::Held;
+use crate::viewer::new_light::{Aim, NewLight};
+use crate::viewer::probe;
+
+/// From how far the brightest spot is looked at, in scene radii.
+const DISTANCE: f64 = 0.6;
+/// A spot is seen where a gaze ends as near to it as this, in scene radii.
+const SEEN: f64 = 1e-3;
+/// A gaze flatter than this sine shows little of a surface.
+const FLATTEST: f64 = 0.25;
+/// Leaves the surface by this much, in scene radii.
+const OFF: f64 = 1e-6;
+/// How often the way to a hidden spot is halved.
+const HALVINGS: i32 = 6;
+
+/// What is to be done once surfaces are known.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Sought {
+    pub light: Option<NewLight>,
+    pub brightest: bool,
+}
+
+impl Model {
+    /// Does what waited, as soon as the surfaces of the scene are known.
+    pub(super) fn poll_sought(&mut self) {
+        if self.sought.light.is_none() && !self.sought.brightest {
+            return;
+        }
+        let Some(surfaces) = self.surfaces() else { return };
+        let sought = std::mem::take(&mut self.sought);
+        if let Some(light) = sought.light {
+            self.add_light(light, &surfaces);
+        }
+        if sought.brightest {
+            self.show_brightest(&surfaces);
+        }
+    }
+
+    /// Adds a light before what the camera looks at, and gives it handles.
+    fn add_light(&mut self, light: NewLight, surfaces: &Arc<Tracer>) {
+        let (camera, radius_m) = (self.navigator.camera(), self.navigator.radius_m());
+        let gaze = Ray {
+            origin: camera.position,
+            direction: camera.forward,
+        };
+        let scene = Arc::clone(self.edits.scene());
+        let (low, high) = scene.bounds().unwrap_or((DVec3::ZERO, DVec3::ZERO));
+        let aim = Aim::of(surfaces, &gaze, 0.5 * (low + high));
+        let stops = self.panel.display.exposure_stops;
+        let added = light.make((surfaces, radius_m), &aim, stops, &scene);
+        let edit = Edit::LightAdded {
+            light: None,
+            added: Arc::new(added),
+            origin: LightOrigin::New,
+        };
+        self.log.write(&Event::Edited(&edit));
+        let outcome = self.edits.edit(&edit);
+        self.edits.release();
+        if outcome.is_ok() {
+            self.hold(Held::Light(scene.lights.len()));
+        }
+        self.refusal = outcome.err().map(|error| error.to_string());
+    }
+
+    /// Probes the texel with the most of the light that is shown, and goes where it is seen.
+    fn show_brightest(&mut self, surfaces: &Arc<Tracer>) {
+        let Some(spot) = brightest::find(self.edits.scene(), &self.lit_maps()) else {
+            self.refusal = Some("There is no light in the maps, and so no brightest spot.".into());
+            return;
+        };
+        let radius_m = self.navigator.radius_m();
+        let eye = self.view_of(&spot, surfaces);
+        self.navigator.look_at(eye, spot.point);
+        self.probe(Some(Ray {
+            origin: spot.point + spot.normal * (OFF * radius_m),
+            direction: -spot.normal,
+        }));
+    }
+
+    /// From where a spot is seen: the way the camera looks now if it can be, else as near as it must be.
+    fn view_of(&self, spot: &Spot, surfaces: &Tracer) -> DVec3 {
+        let radius_m = self.navigator.radius_m();
+        let back = -self.navigator.camera().forward;
+        let level = DVec3::new(back.x, 0.0, back.z).normalize_or(DVec3::X);
+        let ways = [back, spot.normal + level, spot.normal - level, spot.normal].map(DVec3::normalize);
+        let is_seen = |eye: DVec3| {
+            let gaze = Ray {
+                origin: eye,
+                direction: (spot.point - eye).normalize(),
+            };
+            let seen = surfaces.closest_hit(&gaze);
+            let through = probe::seen(surfaces, &gaze).map(|seen| seen.hit);
+            [seen, through]
+                .into_iter()
+                .flatten()
+                .any(|hit| hit.point.distance(spot.point) < SEEN * radius_m)
+        };
+        let eye =
+            |way: DVec3, halvings: i32| spot.point + way * (DISTANCE * radius_m * 0.5_f64.powi(halvings));
+        let views = (0..=HALVINGS).flat_map(|halvings| ways.map(|way| (way, eye(way, halvings))));
+        let mut views = views.filter(|(way, _)| way.dot(spot.normal) > FLATTEST);
+        let found = views.find(|(_, eye)| is_seen(*eye));
+        found.map_or_else(|| eye(spot.normal, HALVINGS), |(_, eye)| eye)
+    }
+}

@@ -1,0 +1,175 @@
+//! Lights that are added in the window: where there is room before what is looked at, and as bright as suits the picture.
+
+use glam::DVec3;
+
+use crate::geometry::Ray;
+use crate::optics::LinearSrgb;
+use crate::scene::{Light, LightKind, LightSize, PanelShape, Scene};
+use crate::transport::Tracer;
+use crate::units::{Irradiance, Radiance, RadiantIntensity};
+
+/// Irradiance of what is looked at, at exposure 0 [W/m²]: a grey surface is neither dark nor overexposed then.
+const SUITABLE_W_M2: f64 = 4.0;
+/// Farthest from what it lights, in scene radii.
+const FARTHEST: f64 = 0.45;
+/// A place nearer than this, in scene radii, is taken only where there is no other.
+const NEAR: f64 = 0.2;
+/// How much of the way to what stands above it goes [1].
+const OF_ROOM: f64 = 0.7;
+/// Leaves the surface by this much, in scene radii.
+const OFF: f64 = 1e-6;
+/// Half-angles of a spot [rad].
+const CONE_RAD: (f64, f64) = (0.35, 0.5);
+/// Side of a panel, as a share of its distance [1].
+const SIDE: f64 = 0.25;
+/// How far a sun leans from the way that is looked [1].
+const LEANING: f64 = 0.4;
+
+/// What can be added.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum NewLight {
+    /// The same in every direction.
+    Lamp,
+    /// A cone.
+    Spot,
+    /// Parallel light.
+    Sun,
+    /// A flat lamp.
+    Panel,
+}
+
+/// What is looked at.
+#[derive(Clone, Copy, Debug)]
+pub struct Aim {
+    /// Where [m].
+    pub point: DVec3,
+    /// Unit, towards the eye.
+    pub normal: DVec3,
+    /// Unit, from the point to the eye.
+    pub to_eye: DVec3,
+}
+
+impl Aim {
+    /// What a gaze meets; the point `otherwise` where it meets nothing.
+    pub fn of(surfaces: &Tracer, gaze: &Ray, otherwise: DVec3) -> Self {
+        let to_eye = -gaze.direction;
+        match surfaces.closest_place(gaze) {
+            Some(place) => {
+                let normal = surfaces.surface_at(&place).geometric_normal;
+                Self {
+                    point: gaze.at(place.distance_m),
+                    normal: normal * normal.dot(to_eye).signum(),
+                    to_eye,
+                }
+            }
+            None => Self {
+                point: otherwise,
+                normal: to_eye,
+                to_eye,
+            },
+        }
+    }
+}
+
+impl NewLight {
+    /// All, in the order of the panel.
+    pub const ALL: [Self; 4] = [Self::Lamp, Self::Spot, Self::Sun, Self::Panel];
+
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Lamp => "lamp",
+            Self::Spot => "spot",
+            Self::Sun => "sun",
+            Self::Panel => "panel",
+        }
+    }
+
+    /// The light, white, with a name of its own, to light what is looked at in a scene of that radius [m] that is shown
+    /// with that exposure.
+    pub fn make(
+        self,
+        (surfaces, radius_m): (&Tracer, f64),
+        aim: &Aim,
+        exposure_stops: f64,
+        scene: &Scene,
+    ) -> Light {
+        let irradiance_w_m2 = SUITABLE_W_M2 * (-exposure_stops).exp2();
+        let position = place(surfaces, aim, radius_m);
+        let way = aim.point - position;
+        let distance_m = way.length();
+        let direction = way / distance_m;
+        let intensity = RadiantIntensity(irradiance_w_m2 * distance_m * distance_m);
+        let kind = match self {
+            Self::Lamp => LightKind::Point { position, intensity },
+            Self::Spot => LightKind::Spot {
+                position,
+                direction,
+                intensity,
+                inner_cone_rad: CONE_RAD.0,
+                outer_cone_rad: CONE_RAD.1,
+            },
+            Self::Sun => LightKind::Sun {
+                direction: -above(aim, LEANING),
+                normal_irradiance: Irradiance(irradiance_w_m2),
+            },
+            Self::Panel => {
+                let half_m = 0.5 * SIDE * distance_m;
+                let across = direction.any_orthonormal_vector();
+                LightKind::Panel {
+                    centre: position,
+                    across: across * half_m,
+                    down: direction.cross(across) * half_m,
+                    shape: PanelShape::Rectangle,
+                    radiance: Radiance(irradiance_w_m2 / (SIDE * SIDE)),
+                }
+            }
+        };
+        Light {
+            name: own_name(self.name(), scene),
+            colour: LinearSrgb::WHITE,
+            spectrum: None,
+            kind,
+            size: LightSize::None,
+        }
+    }
+}
+
+/// Up, leaning towards the eye [1, of the height]; unit.
+fn above(aim: &Aim, leaning: f64) -> DVec3 {
+    let level = DVec3::new(aim.to_eye.x, 0.0, aim.to_eye.z).normalize_or(DVec3::X);
+    (DVec3::Y + level * leaning).normalize()
+}
+
+/// Where a light has room: above what is looked at, or else before it, or else towards the eye [m].
+fn place(surfaces: &Tracer, aim: &Aim, radius_m: f64) -> DVec3 {
+    let from = aim.point + aim.normal * (OFF * radius_m);
+    let room = |direction: DVec3| {
+        let ray = Ray {
+            origin: from,
+            direction,
+        };
+        let free_m = surfaces
+            .closest_place(&ray)
+            .map_or(f64::INFINITY, |place| place.distance_m);
+        (OF_ROOM * free_m).min(FARTHEST * radius_m)
+    };
+    let ways = [above(aim, LEANING), DVec3::Y, aim.normal, aim.to_eye];
+    // Behind the surface is no room.
+    let open = ways.into_iter().filter(|way| way.dot(aim.normal) > 0.0);
+    let open: Vec<(DVec3, f64)> = open.map(|way| (way, room(way))).collect();
+    let roomy = open.iter().find(|(_, room_m)| *room_m > NEAR * radius_m);
+    let widest = open.iter().max_by(|a, b| a.1.total_cmp(&b.1));
+    let (way, room_m) = roomy.or(widest).copied().unwrap_or((aim.normal, NEAR * radius_m));
+    from + way * room_m
+}
+
+/// The name, with a number where another light has it.
+fn own_name(name: &str, scene: &Scene) -> String {
+    let is_free = |name: &String| scene.lights.iter().all(|light| light.name != *name);
+    let numbered = (2..).map(|number| format!("{name} {number}"));
+    std::iter::once(name.to_owned())
+        .chain(numbered)
+        .find(is_free)
+        .unwrap_or_else(|| name.to_owned())
+}

@@ -1,0 +1,233 @@
+//! What ends a bake: a density, an error or a time.
+
+use egui::{ComboBox, Response, Slider, SliderClamping, Ui};
+
+use crate::settings::{BakeSettings, Estimator, LEAST_MAX_ERROR, Preset};
+use crate::viewer::panel::control::{About, CONTROL_WIDTH, arrow_steps, setting, stepped};
+
+const TARGET: About = About {
+    label: "Bake until",
+    what: "What ends a bake: exactly the lattice of the ray density, an estimated error (relative RMSE over all maps) \
+           that is small enough, or time that is up.",
+    range: "ray density, max error, max time",
+    default: "max error; ray density for splats, which do not refine",
+    accuracy: "a max error is kept by the estimate, not by a reference; after a max time the finest complete maps are \
+               shown",
+    cost: "halving the error takes about four times the rays",
+};
+const ERROR: About = About {
+    label: "Max error [%]",
+    what: "Relative RMSE over all maps, as it is estimated, that is small enough.",
+    range: "0.01 to 100; logarithmic",
+    default: "3",
+    accuracy: "kept by the estimate, not by a reference",
+    cost: "halving it takes about four times the rays",
+};
+const TIME: About = About {
+    label: "Max time [s]",
+    what: "Wall-clock time after which the light pass ends.",
+    range: "0.001 to 10,000; logarithmic",
+    default: "10",
+    accuracy: "the finest maps that were complete are shown; their error is estimated",
+    cost: "so much time, unless the maps cannot become better",
+};
+
+/// The first time that is offered [s].
+const FIRST_TIME_S: f64 = 10.0;
+/// Ends of the sliders.
+const PERCENTS: std::ops::RangeInclusive<f64> = 0.01..=100.0;
+const TIMES_S: std::ops::RangeInclusive<f64> = 1e-3..=1e4;
+const NO_ERRORS: &str = "Only the wavefront estimator refines until an error is reached.";
+
+/// Which of the targets is chosen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Target {
+    Density,
+    Error(f64),
+    Time(f64),
+}
+
+impl Target {
+    /// An error that is no target stands beside a time: as far as that goes.
+    fn of(settings: &BakeSettings) -> Self {
+        match (settings.max_error, settings.max_time_s) {
+            (Some(error), Some(time_s)) if error <= LEAST_MAX_ERROR => Self::Time(time_s),
+            (Some(error), _) => Self::Error(error),
+            (None, Some(time_s)) => Self::Time(time_s),
+            (None, None) => Self::Density,
+        }
+    }
+
+    /// Refinement begins from a density of its own; without it the density is all that counts.
+    fn set(self, settings: &mut BakeSettings) {
+        let was_refined = settings.max_error.is_some();
+        (settings.max_error, settings.max_time_s) = match self {
+            Self::Density => (None, None),
+            Self::Error(error) => (Some(error), None),
+            Self::Time(time_s) if settings.estimator == Estimator::Wavefront => {
+                (Some(LEAST_MAX_ERROR), Some(time_s))
+            }
+            Self::Time(time_s) => (None, Some(time_s)),
+        };
+        match settings.max_error {
+            Some(error) => settings.density_per_sr = BakeSettings::starting_density_per_sr(error),
+            None if was_refined => settings.density_per_sr = settings.estimator.preview_density_per_sr(),
+            None => {}
+        }
+    }
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Density => "ray density",
+            Self::Error(_) => "max error",
+            Self::Time(_) => "max time",
+        }
+    }
+
+    /// What a bake by an estimator ends with unless something else is set.
+    fn default_of(estimator: Estimator) -> Self {
+        match estimator {
+            Estimator::Wavefront => Self::Error(Preset::default().max_error()),
+            Estimator::Splat => Self::Density,
+        }
+    }
+}
+
+/// A point on the curve of error against time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Picked {
+    /// Relative RMSE [1].
+    Error(f64),
+    /// Wall-clock time [s].
+    Seconds(f64),
+}
+
+/// What the settings aim at; `None` where that is a density.
+pub fn picked(settings: &BakeSettings) -> Option<Picked> {
+    match Target::of(settings) {
+        Target::Error(error) => Some(Picked::Error(error)),
+        Target::Time(seconds) => Some(Picked::Seconds(seconds)),
+        Target::Density => None,
+    }
+}
+
+/// Aims at a point of the curve: by time where a time is the target, else by error, two digits of it. Splats refine to no error.
+pub fn pick(settings: &mut BakeSettings, seconds: f64, error: f64) {
+    let rounded = |value: f64| {
+        let unit = 10_f64.powf(value.log10().floor() - 1.0);
+        (value / unit).round() * unit
+    };
+    match (Target::of(settings), settings.estimator) {
+        (Target::Time(_), _) => {
+            Target::Time(rounded(seconds).clamp(*TIMES_S.start(), *TIMES_S.end())).set(settings);
+        }
+        (_, Estimator::Wavefront) => {
+            Target::Error(rounded(error).clamp(PERCENTS.start() / 100.0, PERCENTS.end() / 100.0))
+                .set(settings);
+        }
+        (_, Estimator::Splat) => {}
+    }
+}
+
+/// In per cent, without what rounding leaves.
+fn percent(share: f64) -> f64 {
+    (share * 1e6).round() / 1e4
+}
+
+/// Keeps what ends a bake where another estimator can: splats do not refine.
+pub fn after_change_of_estimator(settings: &mut BakeSettings) {
+    match (Target::of(settings), settings.estimator) {
+        (Target::Error(_), Estimator::Splat) => Target::Density,
+        (target, _) => target,
+    }
+    .set(settings);
+}
+
+/// Rows with the list of targets and the value of the chosen one. Settings that ask for both an error and a time keep both
+/// until one of them is touched here.
+pub fn show(ui: &mut Ui, settings: &mut BakeSettings, unavailable: Option<&str>) {
+    let before = Target::of(settings);
+    let mut target = before;
+    let default = Target::default_of(settings.estimator);
+    // Another error is no other target: its own row sets it back.
+    let mut kind = match (target, default) {
+        (Target::Error(_), Target::Error(_)) => default,
+        _ => target,
+    };
+    let shown = kind;
+    setting(ui, &TARGET, unavailable, (&mut kind, &default), |ui, kind| {
+        list(ui, kind, settings.estimator)
+    });
+    if kind != shown {
+        target = kind;
+    }
+    match &mut target {
+        Target::Density => {}
+        Target::Error(error) => {
+            let default = Preset::default().max_error();
+            setting(ui, &ERROR, unavailable, (error, &default), percent_slider);
+        }
+        Target::Time(time_s) => setting(ui, &TIME, unavailable, (time_s, &FIRST_TIME_S), |ui, time_s| {
+            let slider = Slider::new(time_s, TIMES_S).logarithmic(true).suffix(" s");
+            ui.add(slider.clamping(SliderClamping::Edits).max_decimals(3))
+        }),
+    }
+    if target != before {
+        target.set(settings);
+    }
+}
+
+fn list(ui: &mut Ui, target: &mut Target, estimator: Estimator) -> Response {
+    let targets = [
+        (
+            Target::Density,
+            "Exactly the lattice of that density, without refinement.",
+        ),
+        (
+            Target::Error(Preset::default().max_error()),
+            "Until the estimated relative RMSE over all maps is below it.",
+        ),
+        (Target::Time(FIRST_TIME_S), "Until the time is up."),
+    ];
+    let can = |target: Target| estimator == Estimator::Wavefront || !matches!(target, Target::Error(_));
+    let list = ComboBox::from_id_salt("target")
+        .width(CONTROL_WIDTH)
+        .selected_text(target.name())
+        .show_ui(ui, |ui| {
+            for (candidate, hover) in targets {
+                ui.add_enabled_ui(can(candidate), |ui| {
+                    let is_chosen = candidate.name() == target.name();
+                    let entry = ui.selectable_label(is_chosen, candidate.name());
+                    let entry = entry.on_hover_text(hover).on_disabled_hover_text(NO_ERRORS);
+                    if entry.clicked() && !is_chosen {
+                        *target = candidate;
+                    }
+                });
+            }
+        });
+    if list.inner.is_none() {
+        let possible: Vec<_> = targets
+            .iter()
+            .map(|(target, _)| *target)
+            .filter(|t| can(*t))
+            .collect();
+        let index = possible
+            .iter()
+            .position(|candidate| candidate.name() == target.name());
+        let steps = arrow_steps(ui, &list.response);
+        if let Some(index) = index.filter(|_| steps != 0) {
+            *target = possible[stepped(index, steps, possible.len())];
+        }
+    }
+    list.response
+}
+
+fn percent_slider(ui: &mut Ui, error: &mut f64) -> Response {
+    let mut shown = percent(*error);
+    let slider = Slider::new(&mut shown, PERCENTS).logarithmic(true).suffix(" %");
+    let response = ui.add(slider.clamping(SliderClamping::Edits).max_decimals(2));
+    if response.changed() {
+        *error = shown / 100.0;
+    }
+    response
+}

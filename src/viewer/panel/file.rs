@@ -1,0 +1,102 @@
+//! Row *File*: which scene is in the window.
+
+use std::path::Path;
+
+use egui::{Checkbox, Key, TextEdit, Ui, vec2};
+
+use super::control::{About, CONTROL_WIDTH, row, rows};
+use super::{Facts, Wishes, bake};
+use crate::scene::builtin;
+
+const FILE: About = About {
+    label: "File",
+    what: "The scene in the window: a .glb or .gltf file, or builtin:NAME. Enter opens what is typed; files can also be \
+           dropped on the window.",
+    range: "any path",
+    default: "what the program was started with",
+    accuracy: "none",
+    cost: "the scene is read and baked anew; until it is there, the present one stays",
+};
+
+const WATCH: &str = "Reads the scene again whenever its file, or a buffer or an image that the file refers to, is written. \
+                     Camera, settings and edits stay, as far as the new file has a place for them. Default: off.";
+
+/// What is typed into the row.
+#[derive(Clone, Debug, Default)]
+pub struct FileRow {
+    text: String,
+    /// What was in the window when it was typed.
+    of: String,
+    /// Whether the scene is read again when its files change.
+    pub watches: bool,
+}
+
+/// Says what is being read, and what could not be.
+pub fn show_state(ui: &mut Ui, facts: &Facts<'_>) {
+    if let Some(source) = facts.files.loading {
+        let name = Path::new(source).file_name().map(|name| name.to_string_lossy());
+        ui.label(format!("loading {} …", name.as_deref().unwrap_or(source)))
+            .on_hover_text(source);
+    }
+    if let Some(warning) = facts.files.warning {
+        ui.colored_label(bake::ATTENTION, warning);
+    }
+    if let Some(refusal) = facts.files.refusal {
+        ui.colored_label(bake::FAILED, refusal);
+    }
+}
+
+/// Shows the row; what is to be opened goes to `wishes`.
+pub fn show(ui: &mut Ui, file: &mut FileRow, facts: &Facts<'_>, wishes: &mut Wishes) {
+    if file.of != facts.scene.source {
+        file.of.clone_from(&facts.scene.source);
+        file.text.clone_from(&facts.scene.source);
+    }
+    rows(ui, "file", |ui| {
+        row(ui, &FILE, None, |ui| {
+            let size = vec2(CONTROL_WIDTH, ui.spacing().interact_size.y);
+            let field = ui.add_sized(size, TextEdit::singleline(&mut file.text));
+            if field.lost_focus() && ui.input(|input| input.key_pressed(Key::Enter)) {
+                wishes.open = Some(file.text.clone());
+            }
+            field
+        });
+    });
+    ui.horizontal(|ui| {
+        buttons(ui, facts, wishes);
+        let is_file = !facts.scene.source.starts_with("builtin:");
+        ui.add_enabled(is_file, Checkbox::new(&mut file.watches, "watch"))
+            .on_hover_text(WATCH)
+            .on_disabled_hover_text("A built-in scene has no file that could change.");
+    });
+}
+
+fn buttons(ui: &mut Ui, facts: &Facts<'_>, wishes: &mut Wishes) {
+    let open = ui.button("Open…");
+    wishes.browse |= open
+        .on_hover_text("Chooses a .glb or .gltf file in the system's own dialog.")
+        .clicked();
+    ui.add_enabled_ui(!facts.files.recent.is_empty(), |ui| {
+        ui.menu_button("Recent", |ui| {
+            for path in facts.files.recent {
+                let name = path.file_name().unwrap_or_default().to_string_lossy();
+                let full = path.display().to_string();
+                if ui.button(name).on_hover_text(&full).clicked() {
+                    wishes.open = Some(full);
+                }
+            }
+        })
+        .response
+        .on_hover_text("Files that were opened before, the newest first.")
+        .on_disabled_hover_text("No file was opened yet.");
+    });
+    ui.menu_button("Built-in", |ui| {
+        for name in builtin::NAMES {
+            if ui.button(name).clicked() {
+                wishes.open = Some(format!("builtin:{name}"));
+            }
+        }
+    })
+    .response
+    .on_hover_text("Scenes that come with the program.");
+}

@@ -1,0 +1,160 @@
+//! Section *Camera path*: keys, playing, and frames as files.
+
+use egui::{Button, DragValue, Response, RichText, TextEdit, Ui};
+
+use super::control::{About, counted, rows, setting};
+use super::{Facts, FilmWish, Wishes, export};
+use crate::scene::camera_path::MAX_FRAMES;
+use crate::viewer::filming::{FRAMES_PER_S, Film};
+
+const RECORD: &str = "Adds the present place and gaze as the path's last key (K).";
+const PLAY: &str = "Moves the camera along the path, 30 frames a second where pictures come as quickly; a movement key ends \
+                    it.";
+const SAVE: &str = "Writes the path to nephroid-SCENE-path-NNNN.json in the working folder, which `nephroid render --path` \
+                    reads.";
+const LOAD: &str = "Takes keys, frames and angle of view from a file such as Save path writes.";
+const FILM: &str = "Draws every frame of the path as light, with the present exposure, white balance and tone map, and \
+                    writes them as frame-NNNNN.png to a new folder in the working folder. Takes place beside the window, on \
+                    a device of its own.";
+const TURNTABLE: &str = "The same for one turn of the present camera around the middle of the scene.";
+const STOP: &str = "Ends the film after the present frame; those that are written stay.";
+const TOO_FEW: &str = "A path has at least two keys.";
+const FIELD: &str = "Path file";
+
+const FRAMES: About = About {
+    label: "Frames",
+    what: "Pictures from the first key to the last, or of one turn; keys are equally far apart in time.",
+    range: "1 to 10,000",
+    default: "120: four seconds at 30 frames a second",
+    accuracy: "none: maps stay as they are",
+    cost: "each frame is drawn and written once",
+};
+const SIZE: About = About {
+    label: "Frame size",
+    what: "Width and height of each frame [pixels].",
+    range: "16 to 8192 each, as far as the graphics device goes",
+    default: "1280 × 720",
+    accuracy: "none: maps stay as they are",
+    cost: "time, memory and disk space grow with the number of pixels",
+};
+/// Sides of a frame that can be set [pixels].
+const SIDES: std::ops::RangeInclusive<u32> = 16..=8192;
+
+/// Shows the section; `file` is what is typed as the path's file.
+pub fn show(ui: &mut Ui, film: &mut Film, file: &mut String, facts: &Facts<'_>, wishes: &mut Wishes) {
+    let too_few = (film.keys.len() < 2).then_some(TOO_FEW);
+    let mut wish = |asked: FilmWish| wishes.film = Some(asked);
+    ui.horizontal(|ui| {
+        if ui.button("Add key").on_hover_text(RECORD).clicked() {
+            wish(FilmWish::Record(None));
+        }
+        if facts.is_playing {
+            if ui.button("Stop playing").on_hover_text(PLAY).clicked() {
+                wish(FilmWish::Play(false));
+            }
+        } else if button(ui, "Play", PLAY, too_few) {
+            wish(FilmWish::Play(true));
+        }
+        ui.label(RichText::new(length(film)).weak());
+    });
+    if let Some(asked) = keys(ui, film) {
+        wish(asked);
+    }
+    let default = Film::default();
+    rows(ui, "film", |ui| {
+        setting(
+            ui,
+            &FRAMES,
+            None,
+            (&mut film.frames, &default.frames),
+            |ui, frames| ui.add(DragValue::new(frames).range(1..=MAX_FRAMES)),
+        );
+        setting(ui, &SIZE, None, (&mut film.size, &default.size), size);
+    });
+    ui.horizontal(|ui| {
+        if button(ui, "Save path", SAVE, too_few) {
+            wish(FilmWish::Save);
+        }
+        let field = TextEdit::singleline(file)
+            .hint_text("path.json")
+            .desired_width(150.0);
+        ui.add(field).accessible_name(FIELD).on_hover_text(LOAD);
+        let none = file.trim().is_empty().then_some("Type a file first.");
+        if button(ui, "Load path", LOAD, none) {
+            wish(FilmWish::Load(file.trim().into()));
+        }
+    });
+    let no_light = facts.layers.is_empty().then_some("There are no maps yet.");
+    let busy = facts.export.is_running().then_some("Something is being written.");
+    ui.horizontal(|ui| {
+        if button(ui, "Export frames", FILM, too_few.or(no_light).or(busy)) {
+            wish(FilmWish::Shoot { turns: false });
+        }
+        if button(ui, "Export turntable", TURNTABLE, no_light.or(busy)) {
+            wish(FilmWish::Shoot { turns: true });
+        }
+        let idle = (!facts.export.is_running()).then_some("Nothing is filmed now.");
+        if button(ui, "Stop", STOP, idle) {
+            wish(FilmWish::Stop);
+        }
+    });
+    if let Some(told) = facts.film_told {
+        ui.label(RichText::new(told).small());
+    }
+    export::outcome(ui, facts);
+}
+
+/// A button that says what it does, or why it cannot; tells whether it was pressed.
+fn button(ui: &mut Ui, name: &str, what: &str, why_not: Option<&str>) -> bool {
+    ui.add_enabled(why_not.is_none(), Button::new(name))
+        .on_hover_text(what)
+        .on_disabled_hover_text(why_not.unwrap_or_default())
+        .clicked()
+}
+
+fn length(film: &Film) -> String {
+    let keys = counted(film.keys.len(), "key");
+    let seconds = film.frames as f64 / FRAMES_PER_S;
+    format!("{keys}, {seconds:.1} s")
+}
+
+/// A row for each key.
+fn keys(ui: &mut Ui, film: &mut Film) -> Option<FilmWish> {
+    let mut wish = None;
+    let mut gone = None;
+    for (index, key) in film.keys.iter().enumerate() {
+        ui.horizontal(|ui| {
+            let number = index + 1;
+            let [x, y, z] = key.position_m.to_array();
+            for (name, what) in [
+                ("go", "Goes to this key."),
+                ("set", "Puts the present place and gaze in this key's place."),
+                ("delete", "Takes this key out of the path."),
+            ] {
+                let button = ui.small_button(name).on_hover_text(what);
+                if button.accessible_name(format!("Key {number}: {name}")).clicked() {
+                    match name {
+                        "go" => wish = Some(FilmWish::GoTo(index)),
+                        "set" => wish = Some(FilmWish::Record(Some(index))),
+                        _ => gone = Some(index),
+                    }
+                }
+            }
+            ui.label(RichText::new(format!("{number}: {x:.2}, {y:.2}, {z:.2} m")).weak());
+        });
+    }
+    if let Some(index) = gone {
+        film.keys.remove(index);
+    }
+    wish
+}
+
+fn size(ui: &mut Ui, (width, height): &mut (u32, u32)) -> Response {
+    ui.horizontal(|ui| {
+        let across = ui.add(DragValue::new(width).range(SIDES));
+        ui.label("×");
+        let up = ui.add(DragValue::new(height).range(SIDES));
+        across.union(up.accessible_name("Frame size: height"))
+    })
+    .inner
+}

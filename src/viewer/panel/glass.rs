@@ -1,0 +1,112 @@
+//! Rows of the section *Scene* for what a clear material is made of: glass by name, and how it parts wavelengths.
+
+use std::sync::Arc;
+
+use egui::{Response, Slider, SliderClamping, Ui};
+
+use super::Wishes;
+use super::control::{About, pick, setting};
+use crate::optics::Glass;
+use crate::optics::glass::{Dispersion, catalogue};
+use crate::scene::{Edit, Material};
+
+const GLASS: About = About {
+    label: "Glass",
+    what: "What the body is made of, by name: its index at every wavelength. The refractive index above becomes that at \
+           588 nm.",
+    range: "one index at all wavelengths, or the catalogue's glasses, liquids, crystals and plastics",
+    default: "as in the file",
+    accuracy: "formulas of their makers, good to about 1e-5",
+    cost: "light that meets this material is traced anew; parted by wavelength, where effects allow it",
+};
+const DISPERSION: About = About {
+    label: "Dispersion [20/V]",
+    what: "How much more blue light is bent than red: 20 over the Abbe number, as in glTF's KHR_materials_dispersion. 0 is \
+           none, crown glass has 0.3, flint 0.6.",
+    range: "0 to 1; larger values can be typed",
+    default: "as in the file",
+    accuracy: "colours need several wavelengths: more rays for the same error",
+    cost: GLASS.cost,
+};
+const ONE_INDEX: &str = "one index";
+/// Said where only figures make it up.
+const BY_NUMBERS: &str = "by numbers";
+
+/// Shows the rows of a clear material with that of the file; what is changed goes to `wishes`.
+pub fn show(
+    ui: &mut Ui,
+    material: usize,
+    (shown, of_file): (&Material, &Material),
+    why_not: Option<&str>,
+    wishes: &mut Wishes,
+) {
+    let mut glass = shown.glass.clone();
+    let value = (&mut glass, &of_file.glass);
+    setting(ui, &GLASS, why_not, value, by_name);
+    let mut dispersion = dispersion_of(shown);
+    let (before, default) = (dispersion, dispersion_of(of_file));
+    let value = (&mut dispersion, &default);
+    setting(ui, &DISPERSION, why_not, value, |ui, dispersion| {
+        let slider = Slider::new(dispersion, 0.0..=1.0).clamping(SliderClamping::Never);
+        ui.add(slider.fixed_decimals(3))
+    });
+    if dispersion != before {
+        // Back to the file's number is back to its glass.
+        glass = if dispersion == default && shown.ior == of_file.ior {
+            of_file.glass.clone()
+        } else {
+            let is_dispersive = dispersion > 0.0;
+            is_dispersive.then(|| Arc::new(Glass::with_abbe_number(shown.ior, 20.0 / dispersion)))
+        };
+    }
+    if glass != shown.glass {
+        let ior = match &glass {
+            Some(glass) => glass.dispersion.n_d(),
+            None => shown.ior,
+        };
+        wishes.edit = Some(Edit::MaterialSubstance {
+            material,
+            ior,
+            glass,
+            base_colour: shown.base_colour,
+            metal: shown.metal,
+        });
+    }
+}
+
+/// 20 over the Abbe number; 0 for none.
+fn dispersion_of(material: &Material) -> f64 {
+    let glass = material.glass.as_ref();
+    let parting = glass.filter(|glass| glass.dispersion.is_dispersive());
+    let abbe_number = parting.map(|glass| match glass.dispersion {
+        // As it was typed: the formula comes near it.
+        Dispersion::Abbe { v_d, .. } => v_d,
+        other => other.abbe_number(),
+    });
+    // To the digits that are shown: a look at the number changes nothing.
+    abbe_number.map_or(0.0, |v_d| (20.0 / v_d * 1e3).round() / 1e3)
+}
+
+fn by_name(ui: &mut Ui, glass: &mut Option<Arc<Glass>>) -> Response {
+    let all: Vec<&Glass> = catalogue::all().collect();
+    let known = |glass: &Glass| all.iter().position(|known| known.name == glass.name);
+    // The list begins with none of them.
+    let (shown, at) = match glass.as_deref() {
+        None => (ONE_INDEX, Some(0)),
+        Some(glass) => match known(glass) {
+            Some(index) => (all[index].name.as_str(), Some(index + 1)),
+            None => (BY_NUMBERS, None),
+        },
+    };
+    let mut names = vec![(ONE_INDEX, None)];
+    names.extend(all.iter().map(|glass| {
+        let (n_d, abbe) = (glass.dispersion.n_d(), glass.dispersion.abbe_number());
+        let hover = format!("n = {n_d:.4}, Abbe number {abbe:.1}");
+        (glass.name.as_str(), Some(hover))
+    }));
+    let (response, picked) = pick(ui, "glass", (shown, at), names.into_iter());
+    if let Some(index) = picked {
+        *glass = index.checked_sub(1).map(|index| Arc::new(all[index].clone()));
+    }
+    response
+}

@@ -1,0 +1,115 @@
+//! Rows of the section *Scene* for the colour and the spectrum of a light.
+
+use std::sync::Arc;
+
+use egui::{Response, Ui};
+
+use super::Wishes;
+use super::control::{About, pick, setting};
+use crate::optics::LinearSrgb;
+use crate::optics::spectrum::{Spectrum, illuminants};
+use crate::scene::{Edit, Light};
+
+const COLOUR: About = About {
+    label: "Colour",
+    what: "Colour of a light, which takes the place of a spectrum; multiplies its strength per channel, linear sRGB.",
+    range: "0 to 1 per channel, not all 0",
+    default: "as in the file, spectrum included",
+    accuracy: "none: light scales with it",
+    cost: "none: baked light is scaled; in place of a spectrum, light that meets dispersive glass is traced anew",
+};
+const SPECTRUM: About = About {
+    label: "Spectrum",
+    what: "Light by wavelength, by the lamp's name: as bright as before, in its own colour.",
+    range: "a colour alone; CIE's illuminants (A incandescent, D daylight, FL fluorescent, LED), black bodies by kelvin, \
+            lines by nanometre",
+    default: "as in the file",
+    accuracy: "tables of CIE, every nanometre",
+    cost: "light of this lamp is weighted anew; what meets dispersive glass is traced anew",
+};
+const COLOUR_ALONE: &str = "a colour alone";
+/// Of those that are called by a number.
+const BY_NUMBER: [&str; 7] = [
+    "blackbody:2700",
+    "blackbody:3200",
+    "blackbody:4000",
+    "blackbody:5600",
+    "line:450",
+    "line:532",
+    "line:633",
+];
+
+/// Shows the rows of a light with that of the file; what is changed goes to `wishes`.
+pub fn show(ui: &mut Ui, index: usize, (light, of_file): (&Light, &Light), wishes: &mut Wishes) {
+    let mut colour = light.colour;
+    setting(ui, &COLOUR, None, (&mut colour, &of_file.colour), button);
+    let mut spectrum = light.spectrum.clone();
+    let value = (&mut spectrum, &of_file.spectrum);
+    setting(ui, &SPECTRUM, None, value, by_name);
+    let as_in_file = || Edit::LightSpectrum {
+        light: index,
+        colour: of_file.colour,
+        spectrum: of_file.spectrum.clone(),
+    };
+    if spectrum != light.spectrum {
+        wishes.edit = Some(match &spectrum {
+            _ if spectrum == of_file.spectrum => as_in_file(),
+            Some(spectrum) => Edit::LightSpectrum {
+                light: index,
+                colour: spectrum.xyz().to_linear_srgb(),
+                spectrum: Some(Arc::clone(spectrum)),
+            },
+            None => Edit::LightColour {
+                light: index,
+                colour: within_reach(light.colour),
+            },
+        });
+    } else if colour != light.colour {
+        wishes.edit = Some(if colour == of_file.colour {
+            as_in_file()
+        } else {
+            Edit::LightColour { light: index, colour }
+        });
+    }
+}
+
+/// The nearest colour without a negative channel.
+fn within_reach(colour: LinearSrgb) -> LinearSrgb {
+    LinearSrgb::from(colour.to_array().map(|channel| channel.max(0.0)))
+}
+
+fn button(ui: &mut Ui, colour: &mut LinearSrgb) -> Response {
+    // What is outside of what the button shows is changed only with it.
+    let mut rgb = colour.to_array().map(|channel| channel.clamp(0.0, 1.0) as f32);
+    let response = ui.color_edit_button_rgb(&mut rgb);
+    if response.changed() && rgb.iter().any(|channel| *channel > 0.0) {
+        *colour = LinearSrgb::from(rgb.map(f64::from));
+    }
+    response
+}
+
+fn by_name(ui: &mut Ui, spectrum: &mut Option<Arc<Spectrum>>) -> Response {
+    let names: Vec<&str> = std::iter::once(COLOUR_ALONE)
+        .chain(illuminants::names())
+        .chain(BY_NUMBER)
+        .collect();
+    let shown = match spectrum.as_ref() {
+        None => COLOUR_ALONE,
+        Some(spectrum) => spectrum.name().unwrap_or("of the file"),
+    };
+    let at = names.iter().position(|name| *name == shown);
+    let (response, picked) = pick(
+        ui,
+        "spectrum",
+        (shown, at),
+        names.iter().map(|name| (*name, None)),
+    );
+    if let Some(index) = picked {
+        // Every name of the list is one of a lamp.
+        *spectrum = match index {
+            0 => None,
+            _ => illuminants::illuminant(names[index]).ok().map(Arc::new),
+        };
+    }
+    response
+}

@@ -1,0 +1,197 @@
+//! Section *Maps*: every receiver's map, to be looked at and written to files.
+
+mod large;
+
+use std::collections::HashMap;
+
+use egui::{Button, ColorImage, Image, RichText, ScrollArea, TextureHandle, TextureOptions, Ui, vec2};
+
+use super::bake::two_digits;
+use super::control::{bytes, counted};
+use super::effects::COUNTER;
+use super::{Facts, Panel, Wishes, export};
+use crate::illumination::{IlluminationMap, Side};
+use crate::session::BYTES_PER_TEXEL;
+use crate::viewer::exporting::Export;
+use crate::viewer::flat_map::{self, Shown};
+
+/// Side of a thumbnail [points].
+const THUMBNAIL: f32 = 40.0;
+/// Height of the list at most: six maps [points].
+const MOST_HEIGHT: f32 = 6.0 * (THUMBNAIL + 4.0);
+/// Thumbnails that are made in one frame: a millisecond each.
+const MOST_AT_ONCE: usize = 4;
+
+const LOOK: &str = "Shows the map large, with the irradiance under the pointer.";
+const ONE: &str = "Writes this map to an .exr file of its own in the working folder: each layer, their sum and the error \
+                   [W/m²].";
+
+/// Which maps thumbnails were made of: number of the bake, and its level.
+type Made = Option<(u64, u32)>;
+
+/// What the section keeps between frames.
+#[derive(Clone, Default)]
+pub struct Browser {
+    thumbnails: HashMap<usize, TextureHandle>,
+    made_of: Made,
+    large: Option<large::Large>,
+}
+
+impl std::fmt::Debug for Browser {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let made = self.thumbnails.len();
+        f.debug_struct("Browser")
+            .field("thumbnails", &made)
+            .finish_non_exhaustive()
+    }
+}
+
+/// Shows the section.
+pub fn show(ui: &mut Ui, panel: &mut Panel, facts: &Facts<'_>, wishes: &mut Wishes) {
+    let Panel {
+        maps: browser,
+        maps_folder,
+        ..
+    } = panel;
+    browser.keep_up(facts);
+    if facts.maps.is_empty() {
+        ui.label(RichText::new("There are no maps yet.").weak());
+        return;
+    }
+    ui.horizontal(|ui| {
+        let texels: usize = facts.maps.iter().map(|map| map.chart.texel_count()).sum();
+        let memory = bytes(texels as u64 * BYTES_PER_TEXEL);
+        ui.label(format!("{} in {memory}", counted(facts.maps.len(), "map")));
+        export::all(ui, "Export all", maps_folder, facts, wishes);
+    });
+    let mut still_to_make = MOST_AT_ONCE;
+    // What stands below is not to be far away.
+    let list = ScrollArea::vertical()
+        .id_salt("maps")
+        .max_height(MOST_HEIGHT)
+        .auto_shrink([false, true]);
+    list.show(ui, |ui| {
+        for (index, map) in facts.maps.iter().enumerate() {
+            ui.push_id(index, |ui| {
+                entry(ui, browser, (index, map), facts, wishes, &mut still_to_make)
+            });
+        }
+    });
+    if still_to_make == 0 {
+        ui.request_repaint();
+    }
+}
+
+/// Shows the map that was chosen, in a window over the picture.
+pub fn show_large(ui: &Ui, browser: &mut Browser, facts: &Facts<'_>) {
+    browser.keep_up(facts);
+    let Some(large) = &mut browser.large else {
+        return;
+    };
+    let map = facts.maps.get(large.map());
+    if !map.is_some_and(|map| large.show(ui, map, &name(map, facts))) {
+        browser.large = None;
+    }
+}
+
+impl Browser {
+    /// Forgets pictures of other maps than those that are shown.
+    fn keep_up(&mut self, facts: &Facts<'_>) {
+        let made_of = facts.last.map(|last| (last.serial, last.level));
+        if made_of != self.made_of {
+            self.made_of = made_of;
+            self.thumbnails.clear();
+            if let Some(large) = &mut self.large {
+                large.forget_picture();
+            }
+        }
+    }
+}
+
+fn entry(
+    ui: &mut Ui,
+    browser: &mut Browser,
+    (index, map): (usize, &IlluminationMap),
+    facts: &Facts<'_>,
+    wishes: &mut Wishes,
+    still_to_make: &mut usize,
+) {
+    let name = name(map, facts);
+    ui.horizontal(|ui| {
+        let texture = thumbnail(ui, browser, (index, map), still_to_make);
+        let size = vec2(THUMBNAIL, THUMBNAIL);
+        let button = match texture {
+            Some(texture) => Button::image(Image::new(&texture).fit_to_exact_size(size)),
+            None => Button::new("").min_size(size),
+        };
+        let look = ui.add(button.frame(false).min_size(size));
+        let look = look.accessible_name(format!("Map of {name}")).on_hover_text(LOOK);
+        if look.clicked() {
+            browser.large = Some(large::Large::new(index));
+        }
+        ui.vertical(|ui| {
+            ui.set_width(ui.available_width());
+            ui.horizontal(|ui| {
+                let reason = export::unavailable(facts);
+                let one = ui.add_enabled(reason.is_none(), Button::new("Export").small());
+                let one = one.accessible_name(format!("Export map of {name}"));
+                let one = one
+                    .on_hover_text(ONE)
+                    .on_disabled_hover_text(reason.unwrap_or_default());
+                if one.clicked() {
+                    wishes.export = Some(Export::Map(index));
+                }
+                ui.add(egui::Label::new(RichText::new(&name).strong()).truncate());
+            });
+            ui.label(RichText::new(figures(map)).size(COUNTER));
+        });
+    });
+}
+
+/// "512 × 512 texels, 14.7 MB, error 2.1 %".
+fn figures(map: &IlluminationMap) -> String {
+    let memory = bytes(map.chart.texel_count() as u64 * BYTES_PER_TEXEL);
+    let error = map.estimated_relative_rmse.map_or(String::new(), |error| {
+        format!(", error {} %", two_digits(100.0 * error))
+    });
+    format!("{} × {} texels, {memory}{error}", map.width(), map.height())
+}
+
+/// The object's name, and which of its sides where that is the back.
+fn name(map: &IlluminationMap, facts: &Facts<'_>) -> String {
+    let object = facts.scene.objects.get(map.chart.object());
+    let name = object.map_or("surface", |object| object.name.as_str());
+    match map.chart.receiver.side() {
+        Side::Front => name.to_owned(),
+        Side::Back => format!("{name}, back"),
+    }
+}
+
+/// The thumbnail of a map that is in view, once it is its turn.
+fn thumbnail(
+    ui: &Ui,
+    browser: &mut Browser,
+    (index, map): (usize, &IlluminationMap),
+    still_to_make: &mut usize,
+) -> Option<TextureHandle> {
+    let place = egui::Rect::from_min_size(ui.cursor().min, vec2(THUMBNAIL, THUMBNAIL));
+    let is_there = browser.thumbnails.contains_key(&index);
+    if !is_there && *still_to_make > 0 && ui.is_rect_visible(place) {
+        *still_to_make -= 1;
+        let texture = texture(ui, "thumbnail", &flat_map::thumbnail(map), None);
+        browser.thumbnails.insert(index, texture);
+    }
+    browser.thumbnails.get(&index).cloned()
+}
+
+/// Takes pixels to the device, in place of those of an older texture.
+fn texture(ui: &Ui, name: &str, shown: &Shown, old: Option<TextureHandle>) -> TextureHandle {
+    let image = ColorImage::from_rgba_unmultiplied(shown.size, &shown.rgba);
+    match old {
+        Some(mut texture) => {
+            texture.set(image, TextureOptions::NEAREST);
+            texture
+        }
+        None => ui.ctx().load_texture(name, image, TextureOptions::NEAREST),
+    }
+}

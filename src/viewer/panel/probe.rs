@@ -1,0 +1,173 @@
+//! Section *Probe*: why it is bright where the user points.
+
+use egui::{Grid, Ui};
+
+use super::control::{counted, grouped, significant};
+use super::{Facts, Wishes};
+use crate::light_pass::explain::LightPath;
+use crate::transport::Event;
+use crate::units::LUMENS_PER_WATT;
+use crate::viewer::probe::{Probed, ProbedTexel};
+use crate::viewer::sketching::Sketched;
+
+const TURN_ON: &str = "Click on a surface to see what lights it (P): irradiance and its error, and the light paths that \
+                       come there, drawn through every glass surface. Looks through glass and over mirrors to what is \
+                       seen in them. Changes nothing in a bake; paths take a second or so on a thread of their own.";
+const CLEAR: &str = "Forgets the point and takes its lines away.";
+const BRIGHTEST: &str = "Finds the texel with the most of the light that is shown, goes where it is seen, and tells what \
+                         lights it. Changes nothing in a bake.";
+const HITS: &str = "Draws a dot wherever one of some thousand light rays lands that went over glass, mirrors or water: the \
+                    caustic's light before it is spread. The rays are evenly thin over each light, and not those of the \
+                    bake. Lamps shine from their middles, rough surfaces as if smooth. Changes nothing in a bake.";
+const PATCHES: &str = "Outlines what lies between four neighbouring light rays that met the same objects: small patches are \
+                       bright, folded ones are where the wavefront overlaps. Far thinner than the bake's patches; changes \
+                       nothing in a bake.";
+/// Paths that are listed: the strongest.
+const MOST_LISTED: usize = 8;
+
+/// Shows the section.
+pub fn show(
+    ui: &mut Ui,
+    (is_on, sketched): (&mut bool, &mut Sketched),
+    facts: &Facts<'_>,
+    wishes: &mut Wishes,
+) {
+    ui.horizontal(|ui| {
+        ui.toggle_value(is_on, "Probe").on_hover_text(TURN_ON);
+        let clear = ui.add_enabled(facts.probed.is_some(), egui::Button::new("Clear probe"));
+        let clear = clear
+            .on_hover_text(CLEAR)
+            .on_disabled_hover_text("Nothing is probed yet.");
+        wishes.clear_probe |= clear.clicked();
+        let brightest = ui.add_enabled(!facts.maps.is_empty(), egui::Button::new("Brightest spot"));
+        let brightest = brightest
+            .on_hover_text(BRIGHTEST)
+            .on_disabled_hover_text("No light is baked yet.");
+        wishes.brightest |= brightest.clicked();
+    });
+    sketch(ui, sketched, facts);
+    let Some(probed) = facts.probed else {
+        if *is_on {
+            ui.weak("Click on a surface.");
+        }
+        return;
+    };
+    let [x, y, z] = probed.point.to_array();
+    ui.label(format!("{} at {x:.4}, {y:.4}, {z:.4} m", probed.surface));
+    match &probed.texel {
+        Some(texel) => figures(ui, texel),
+        None => drop(ui.label("No light is baked onto it.")),
+    }
+    match &probed.explanation {
+        Some(_) => paths(ui, probed, facts),
+        None if probed.texel.is_some() => drop(ui.weak("Looking for its light paths …")),
+        None => {}
+    }
+}
+
+/// What is drawn of the way that all light takes.
+fn sketch(ui: &mut Ui, sketched: &mut Sketched, facts: &Facts<'_>) {
+    ui.horizontal(|ui| {
+        ui.label("Draw");
+        ui.checkbox(&mut sketched.hits, "hits").on_hover_text(HITS);
+        ui.checkbox(&mut sketched.patches, "patches")
+            .on_hover_text(PATCHES);
+        if let Some(sketch) = facts.sketch.filter(|_| sketched.is_any()) {
+            let told = format!(
+                "{} rays, {} patches",
+                grouped(sketch.rays),
+                grouped(sketch.patches.len() as u64)
+            );
+            ui.weak(told);
+        }
+    });
+}
+
+fn figures(ui: &mut Ui, texel: &ProbedTexel) {
+    Grid::new("probed")
+        .num_columns(2)
+        .spacing([12.0, 2.0])
+        .show(ui, |ui| {
+            let mut line = |name: &str, text: String| {
+                ui.label(name);
+                ui.label(text);
+                ui.end_row();
+            };
+            let total = texel.total_w_m2();
+            let error = texel
+                .error_w_m2
+                .map_or_else(String::new, |error| format!(" ± {}", significant(error)));
+            line("irradiance", format!("{}{error} W/m²", significant(total)));
+            for (kind, luminance) in &texel.layers {
+                line(kind.name(), format!("{} W/m²", significant(*luminance)));
+            }
+            line(
+                "illuminance",
+                format!("{} lx", significant(LUMENS_PER_WATT * total)),
+            );
+            let [column, row] = texel.corner;
+            let [width, height] = texel.map;
+            let side_mm = 1e3 * texel.area_m2.sqrt();
+            line(
+                "texel",
+                format!(
+                    "{column}, {row} of {width} × {height}, {} mm",
+                    significant(side_mm)
+                ),
+            );
+        });
+}
+
+fn paths(ui: &mut Ui, probed: &Probed, facts: &Facts<'_>) {
+    let Some(told) = &probed.explanation else { return };
+    if told.paths.is_empty() {
+        ui.label("No light path leads here.");
+    }
+    for path in told.paths.iter().take(MOST_LISTED) {
+        ui.label(format!("{}  {}", percent(probed.share(path)), chain(path, facts)));
+    }
+    if told.paths.len() > MOST_LISTED {
+        let rest: f64 = told.paths[MOST_LISTED..]
+            .iter()
+            .map(|path| probed.share(path))
+            .sum();
+        let more = counted(told.paths.len() - MOST_LISTED, "path");
+        ui.label(format!("{}  {more} more", percent(rest)));
+    }
+    if !told.is_complete {
+        ui.weak("Not all of it could be followed.");
+    }
+}
+
+/// A share; one too small to be told is not none.
+fn percent(share: f64) -> String {
+    let percent = 100.0 * share;
+    if percent > 0.0 && percent < 0.05 {
+        return "<0.1 %".into();
+    }
+    format!("{percent:.1} %")
+}
+
+/// A path in words: lamp, through ball, through ball.
+fn chain(path: &LightPath, facts: &Facts<'_>) -> String {
+    let scene = facts.scene;
+    let light = scene.lights.get(path.light).map_or("light", |light| &light.name);
+    let mut text = light.to_owned();
+    for vertex in &path.vertices {
+        let verb = match vertex.event {
+            Event::Refraction | Event::ThinTransmission => "through",
+            Event::Reflection => "off",
+            Event::TotalInternalReflection => "totally off",
+        };
+        let object = scene
+            .objects
+            .get(vertex.object)
+            .map_or("surface", |object| &object.name);
+        text += &format!(", {verb} {object}");
+    }
+    if path.vertices.is_empty() {
+        text + ", straight"
+    } else {
+        text
+    }
+}

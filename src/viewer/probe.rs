@@ -1,0 +1,332 @@
+//! What a point of a surface is lit by: read off the maps at once, and explained on a thread of its own.
+
+use std::fmt;
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, TryRecvError, channel};
+use std::thread;
+
+use glam::DVec3;
+use serde_json::{Value, json};
+
+use crate::geometry::Ray;
+use crate::illumination::{self, IlluminationMap, Side};
+use crate::light_pass::explain::{Explanation, LightPath, Limits, Target, explain};
+use crate::optics::LinearSrgb;
+use crate::progress::Control;
+use crate::settings::LayerKind;
+use crate::transport::{MediumStack, SurfaceHit, Tracer, media_at};
+use crate::units::LUMENS_PER_WATT;
+
+/// Mirrors and glass that the eye looks through to what it points at.
+const MOST_SEEN_THROUGH: usize = 32;
+/// Of the mean of its map: texels that are darker are explained no more closely.
+const LEAST_SHARE: f64 = 1e-3;
+
+/// What is known of a point.
+#[derive(Clone, Debug)]
+pub struct Probed {
+    /// Name of the object.
+    pub surface: String,
+    /// Where [m].
+    pub point: DVec3,
+    /// Which side of it.
+    pub side: Side,
+    /// Its texel; `None` where the surface has no map.
+    pub texel: Option<ProbedTexel>,
+    /// What lights it; `None` until that is found.
+    pub explanation: Option<Explanation>,
+}
+
+/// What a map holds of a point.
+#[derive(Clone, Debug)]
+pub struct ProbedTexel {
+    /// Column and row, in texels of the map's finest size.
+    pub corner: [usize; 2],
+    /// Of these it is so many wide.
+    pub size: usize,
+    /// Texels of the map across and down.
+    pub map: [usize; 2],
+    /// Area of the surface under it [m²].
+    pub area_m2: f64,
+    /// Luminance of each layer [W/m²].
+    pub layers: Vec<(LayerKind, f64)>,
+    /// Estimated error of their sum [W/m²], where it was estimated.
+    pub error_w_m2: Option<f64>,
+}
+
+impl ProbedTexel {
+    /// Luminance of all layers [W/m²].
+    pub fn total_w_m2(&self) -> f64 {
+        self.layers.iter().map(|(_, luminance)| luminance).sum()
+    }
+
+    fn layer(&self, wanted: LayerKind) -> f64 {
+        let found = self.layers.iter().find(|(kind, _)| *kind == wanted);
+        found.map_or(0.0, |(_, luminance)| *luminance)
+    }
+}
+
+impl Probed {
+    /// Share of a path in all light of the texel: that of all paths, and what other surfaces send as the map has it.
+    pub fn share(&self, path: &LightPath) -> f64 {
+        let indirect = self
+            .texel
+            .as_ref()
+            .map_or(0.0, |texel| texel.layer(LayerKind::Indirect));
+        let paths = self
+            .explanation
+            .as_ref()
+            .map_or(LinearSrgb::BLACK, |told| told.caustic() + told.direct());
+        let all = paths.luminance() + indirect;
+        if all > 0.0 {
+            path.irradiance.luminance() / all
+        } else {
+            0.0
+        }
+    }
+
+    /// For the event log.
+    pub fn to_json(&self) -> Value {
+        let texel = self.texel.as_ref().map(|texel| {
+            let layers = texel.layers.iter();
+            let layers: serde_json::Map<_, _> = layers
+                .map(|(kind, luminance)| (kind.name().to_owned(), json!(luminance)))
+                .collect();
+            json!({
+                "column": texel.corner[0],
+                "row": texel.corner[1],
+                "size": texel.size,
+                "map": texel.map,
+                "area_m2": texel.area_m2,
+                "irradiance_w_m2": layers,
+                "error_w_m2": texel.error_w_m2,
+                "illuminance_lx": LUMENS_PER_WATT * texel.total_w_m2(),
+            })
+        });
+        let path = |path: &LightPath| {
+            let places = path.vertices.iter().map(|vertex| vertex.point.to_array());
+            json!({
+                "light": path.light,
+                "start_m": path.start.to_array(),
+                "vertices_m": places.collect::<Vec<_>>(),
+                "end_m": path.end.to_array(),
+                "irradiance_w_m2": path.irradiance.luminance(),
+                "share": self.share(path),
+            })
+        };
+        let paths = self
+            .explanation
+            .as_ref()
+            .map(|told| told.paths.iter().map(path).collect::<Vec<_>>());
+        json!({
+            "event": "probe",
+            "surface": self.surface,
+            "position_m": self.point.to_array(),
+            "texel": texel,
+            "paths": paths,
+            "rays": self.explanation.as_ref().map(|told| told.rays),
+            "complete": self.explanation.as_ref().map(|told| told.is_complete),
+        })
+    }
+}
+
+/// What is looked at, and from where.
+#[derive(Clone, Copy, Debug)]
+pub struct Seen {
+    /// Of a matte surface.
+    pub hit: SurfaceHit,
+    /// Unit, the way the gaze came.
+    pub direction: DVec3,
+}
+
+/// The matte surface that a gaze ends at: through glass and over mirrors, always the stronger way on.
+pub fn seen(tracer: &Tracer, gaze: &Ray) -> Option<Seen> {
+    let mut ray = *gaze;
+    let mut media: MediumStack = media_at(tracer, gaze.origin);
+    for _ in 0..MOST_SEEN_THROUGH {
+        let hit = tracer.closest_hit(&ray)?;
+        let interaction = tracer.interact(&hit, ray.direction, &media);
+        if interaction.deposit.max_channel() > 0.0 {
+            return Some(Seen {
+                hit,
+                direction: ray.direction,
+            });
+        }
+        let ways = [interaction.reflection, interaction.transmission];
+        let strongest = ways
+            .into_iter()
+            .flatten()
+            .max_by(|a, b| a.share.luminance().total_cmp(&b.share.luminance()))?;
+        (ray, media) = (strongest.ray, strongest.media);
+    }
+    None
+}
+
+/// Reads the maps at what is seen.
+pub fn read(tracer: &Tracer, maps: &[IlluminationMap], seen: &Seen) -> (Probed, Option<Target>) {
+    let found = maps.iter().find_map(|map| {
+        let target = Target::new(tracer, &map.chart, &seen.hit, seen.direction)?;
+        Some((map, target))
+    });
+    let texel = found.as_ref().map(|(map, target)| ProbedTexel {
+        corner: target.corner,
+        size: target.size,
+        map: [map.width(), map.height()],
+        area_m2: target.area_m2,
+        layers: layers_at(map, target.texel),
+        error_w_m2: map.error.as_ref().map(|error| f64::from(error[target.texel])),
+    });
+    let probed = Probed {
+        surface: tracer.scene().objects[seen.hit.object].name.clone(),
+        point: seen.hit.point,
+        side: Side::met(seen.direction, seen.hit.geometric_normal),
+        texel,
+        explanation: None,
+    };
+    (probed, found.map(|(_, target)| target))
+}
+
+fn layers_at(map: &IlluminationMap, texel: usize) -> Vec<(LayerKind, f64)> {
+    let luminance =
+        |layer: &illumination::Layer| LinearSrgb::from(layer.irradiance[texel].map(f64::from)).luminance();
+    map.layers
+        .iter()
+        .map(|layer| (layer.kind, luminance(layer)))
+        .collect()
+}
+
+/// About how bright a texel is: what its paths are to be looked for by [W/m²].
+fn scale_w_m2(maps: &[IlluminationMap], target: &Target, texel: &ProbedTexel) -> f64 {
+    let map = maps.iter().find(|map| map.chart.receiver == target.receiver);
+    let mean = map.map_or(0.0, |map| {
+        let flux_w: f64 = map
+            .layers
+            .iter()
+            .map(|layer| map.flux_w(layer.kind).luminance())
+            .sum();
+        flux_w / map.chart.area_m2()
+    });
+    let scale = texel.total_w_m2().max(LEAST_SHARE * mean);
+    if scale > 0.0 { scale } else { LEAST_SHARE }
+}
+
+/// A search that goes on.
+struct Coming {
+    explanation: Receiver<Explanation>,
+    control: Arc<Control>,
+}
+
+impl Drop for Coming {
+    fn drop(&mut self) {
+        self.control.cancel();
+    }
+}
+
+/// The point that is asked about, and what is known of it.
+pub struct Prober {
+    wake: Arc<dyn Fn() + Send + Sync>,
+    gaze: Option<Ray>,
+    /// Whether the gaze is still to be followed.
+    is_due: bool,
+    shown: Option<Probed>,
+    coming: Option<Coming>,
+}
+
+impl fmt::Debug for Prober {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "Prober {{ shown: {:?} }}", self.shown)
+    }
+}
+
+impl Prober {
+    /// Asks nothing yet; `wake` is called from another thread when there is something.
+    pub fn new(wake: Arc<dyn Fn() + Send + Sync>) -> Self {
+        Self {
+            wake,
+            gaze: None,
+            is_due: false,
+            shown: None,
+            coming: None,
+        }
+    }
+
+    /// Asks about what is seen along a ray; about nothing without one.
+    pub fn ask(&mut self, gaze: Option<Ray>) {
+        self.gaze = gaze;
+        self.is_due = gaze.is_some();
+        self.coming = None;
+        self.shown = None;
+    }
+
+    /// Asks again: the scene or its maps are others.
+    pub fn ask_again(&mut self) {
+        self.is_due = self.gaze.is_some();
+    }
+
+    /// Whether there is something to be found that needs the scene's surfaces.
+    pub fn is_due(&self) -> bool {
+        self.is_due
+    }
+
+    /// What is known.
+    pub fn shown(&self) -> Option<&Probed> {
+        self.shown.as_ref()
+    }
+
+    /// Follows the gaze that is due.
+    pub fn look(&mut self, tracer: &Arc<Tracer>, maps: &[IlluminationMap], limits: Limits) {
+        let Some(gaze) = self.gaze.filter(|_| self.is_due) else {
+            return;
+        };
+        self.is_due = false;
+        self.coming = None;
+        self.shown = None;
+        let Some(seen) = seen(tracer, &gaze) else { return };
+        let (probed, target) = read(tracer, maps, &seen);
+        if let (Some(target), Some(texel)) = (target, &probed.texel) {
+            let scale = scale_w_m2(maps, &target, texel);
+            self.coming = self.start(Arc::clone(tracer), target, limits, scale);
+        }
+        self.shown = Some(probed);
+    }
+
+    fn start(&self, tracer: Arc<Tracer>, target: Target, limits: Limits, scale: f64) -> Option<Coming> {
+        let (give, explanation) = channel();
+        let control = Arc::new(Control::default());
+        let (of_search, wake) = (Arc::clone(&control), Arc::clone(&self.wake));
+        let search = move || {
+            let told = explain(&tracer, &target, limits, scale, &of_search);
+            // Nobody waits any more where something else was asked.
+            let _ = give.send(told);
+            wake();
+        };
+        let started = thread::Builder::new().name("probe".into()).spawn(search);
+        started.is_ok().then_some(Coming { explanation, control })
+    }
+
+    /// Whether the paths are being looked for.
+    pub fn is_looking(&self) -> bool {
+        self.coming.is_some()
+    }
+
+    /// Looks whether the paths were found since the last time.
+    pub fn poll(&mut self) -> bool {
+        let Some(coming) = &self.coming else {
+            return false;
+        };
+        match coming.explanation.try_recv() {
+            Ok(told) => {
+                self.coming = None;
+                if let Some(shown) = &mut self.shown {
+                    shown.explanation = Some(told);
+                }
+                true
+            }
+            Err(TryRecvError::Empty) => false,
+            Err(TryRecvError::Disconnected) => {
+                self.coming = None;
+                false
+            }
+        }
+    }
+}

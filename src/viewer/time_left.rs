@@ -1,0 +1,60 @@
+//! How long a bake is going to take, from what is known of it so far.
+
+use std::time::{Duration, Instant};
+
+use super::worker::{BakeRequest, BakeState, BakedLevel};
+use crate::session::forecast::forecast;
+
+/// Less of a stage than this tells nothing of its pace [1].
+const LEAST_FRACTION: f64 = 0.1;
+
+/// Time until a bake is done [s, ≥ 0], rounded by nobody; `None` where nothing is known yet or no bake is running. `wanted` is
+/// what is baked, `last` the newest maps.
+///
+/// Where the bake refines towards an error, its course so far tells what that will cost; else the pace of the present stage
+/// tells when that ends. It never takes longer than it may.
+pub fn time_left_s(
+    state: &BakeState,
+    wanted: &BakeRequest,
+    last: Option<&BakedLevel>,
+    now: Instant,
+) -> Option<f64> {
+    let BakeState::Baking { fraction, since, .. } = *state else {
+        return None;
+    };
+    let elapsed_s = now.saturating_duration_since(since).as_secs_f64();
+    let own = last.filter(|last| !last.is_final && last.request.is_same(wanted));
+    let by_course = own.and_then(|level| {
+        let target = wanted.settings.max_error?;
+        let course = &level.result.course;
+        let spent_cpu_s = course.last()?.cpu_s;
+        let more_cpu_s = forecast(course, target, wanted.settings.estimator)?.cpu_s - spent_cpu_s;
+        // Threads work as they did up to that level.
+        let seconds_per_cpu_s = level.seconds / spent_cpu_s;
+        let left_s = more_cpu_s * seconds_per_cpu_s - (elapsed_s - level.seconds);
+        left_s.is_finite().then_some(left_s.max(0.0))
+    });
+    let by_pace = || {
+        let is_known = fraction >= LEAST_FRACTION && wanted.settings.max_error.is_none();
+        is_known.then(|| elapsed_s * (1.0 - fraction) / fraction)
+    };
+    let at_most_s = wanted
+        .settings
+        .max_time_s
+        .map(|limit_s| (limit_s - elapsed_s).max(0.0));
+    match (by_course.or_else(by_pace), at_most_s) {
+        (Some(left_s), Some(at_most_s)) => Some(left_s.min(at_most_s)),
+        (left_s, at_most_s) => left_s.or(at_most_s),
+    }
+}
+
+/// A time for people: no more exact than a forecast can be.
+pub fn in_words(seconds: f64) -> String {
+    let seconds = Duration::try_from_secs_f64(seconds).map_or(u64::MAX, |time| time.as_secs());
+    match seconds {
+        0 => "about a second left".into(),
+        1..=99 => format!("about {} s left", seconds + 1),
+        100..=5999 => format!("about {} min left", seconds.div_ceil(60)),
+        _ => format!("about {} h left", seconds.div_ceil(3600)),
+    }
+}

@@ -1,0 +1,208 @@
+//! What the picture can show in place of light, and on which scale.
+
+use serde::{Deserialize, Serialize};
+
+use crate::eye_pass::renderer::{Inspected, MapStyle};
+use crate::illumination::IlluminationMap;
+use crate::illumination::false_colours::ColourScale;
+use crate::optics::LinearSrgb;
+use crate::units::LUMENS_PER_WATT;
+
+/// Least of most on a logarithmic scale that follows the maps.
+const DECADES: f64 = 1e-4;
+
+/// What of the maps the picture shows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Quantity {
+    /// The lit scene.
+    #[default]
+    Light,
+    /// Irradiance, in false colours.
+    Irradiance,
+    /// How far the light may be off, in false colours.
+    Error,
+    /// What an effect adds to the light or takes from it, in false colours.
+    Difference,
+    /// Texels of the maps, as a checkerboard.
+    Texels,
+    /// Texels of the maps per metre, in false colours.
+    TexelDensity,
+    /// Normals of the meshes.
+    Normals,
+    /// Coordinates of the base colour's image, or of the first set.
+    Uv,
+    /// Coordinates in the illumination maps.
+    MapUv,
+    /// Which single wavelength the light looks like, in the colours of the spectrum.
+    Wavelength,
+}
+
+impl Quantity {
+    /// Its name in the event log and in the panel's list.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Light => "light",
+            Self::Irradiance => "irradiance",
+            Self::Error => "error",
+            Self::Difference => "difference",
+            Self::Texels => "texels",
+            Self::TexelDensity => "texel density",
+            Self::Normals => "normals",
+            Self::Uv => "texture uv",
+            Self::MapUv => "map uv",
+            Self::Wavelength => "wavelength",
+        }
+    }
+
+    /// By what surfaces are shown on the device, where that is not their light or colours.
+    fn inspected(self) -> Option<Inspected> {
+        match self {
+            Self::Light | Self::Error | Self::Difference | Self::Wavelength => None,
+            Self::Irradiance => Some(Inspected::Irradiance),
+            Self::Texels => Some(Inspected::Texels),
+            Self::TexelDensity => Some(Inspected::TexelDensity),
+            Self::Normals => Some(Inspected::Normals),
+            Self::Uv => Some(Inspected::Uv),
+            Self::MapUv => Some(Inspected::MapUv),
+        }
+    }
+
+    /// What the values of maps that are to show it stand for.
+    pub fn map_style(self, scale: ColourScale) -> MapStyle {
+        match (self, self.inspected()) {
+            (Self::Light, _) => MapStyle::Lit,
+            (_, Some(what)) => MapStyle::Inspected { what, scale },
+            (_, None) => MapStyle::AsItIs,
+        }
+    }
+}
+
+/// In which unit irradiance is told.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum IrradianceUnit {
+    /// W/m², luminous-equivalent.
+    #[default]
+    WattsPerM2,
+    /// lx = 683 of these.
+    Lux,
+}
+
+impl IrradianceUnit {
+    /// Its symbol.
+    pub fn symbol(self) -> &'static str {
+        match self {
+            Self::WattsPerM2 => "W/m²",
+            Self::Lux => "lx",
+        }
+    }
+
+    /// How many of it one W/m² is.
+    pub fn per_w_m2(self) -> f64 {
+        match self {
+            Self::WattsPerM2 => 1.0,
+            Self::Lux => LUMENS_PER_WATT,
+        }
+    }
+}
+
+/// How irradiance is shown in false colours.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct ScaleChoice {
+    /// What the legend says.
+    pub unit: IrradianceUnit,
+    /// Whether equal ratios are equal steps.
+    pub is_logarithmic: bool,
+    /// Whether the scale follows the maps.
+    pub is_automatic: bool,
+    /// Ends of a scale that does not [W/m²]: 0 < low < high.
+    pub typed_w_m2: [f64; 2],
+}
+
+impl Default for ScaleChoice {
+    fn default() -> Self {
+        Self {
+            unit: IrradianceUnit::default(),
+            is_logarithmic: true,
+            is_automatic: true,
+            typed_w_m2: [0.01, 10.0],
+        }
+    }
+}
+
+/// What is known of the maps that are shown, as a whole.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct MapSurvey {
+    /// Largest luminance of a texel [W/m²]; 0 where there is no light.
+    pub peak_w_m2: f64,
+    /// Texels per metre of the coarsest and the finest map, mean over each; `None` without maps.
+    pub texels_per_m: Option<[f64; 2]>,
+    /// Texels that hold something that is no finite number.
+    pub faults: usize,
+}
+
+impl MapSurvey {
+    /// Looks at all texels of some maps.
+    pub fn of(maps: &[IlluminationMap]) -> Self {
+        let mut survey = Self::default();
+        for map in maps {
+            for rgb in map.total() {
+                if rgb.iter().all(|value| value.is_finite()) {
+                    let luminance = LinearSrgb::from(rgb.map(f64::from)).luminance();
+                    survey.peak_w_m2 = survey.peak_w_m2.max(luminance);
+                } else {
+                    survey.faults += 1;
+                }
+            }
+            let chart = &map.chart;
+            let covered = (0..chart.texel_count()).filter(|texel| chart.texel_area_m2(*texel) > 0.0);
+            let density = (covered.count() as f64 / chart.area_m2()).sqrt();
+            if density.is_finite() {
+                let [least, most] = survey.texels_per_m.unwrap_or([density; 2]);
+                survey.texels_per_m = Some([least.min(density), most.max(density)]);
+            }
+        }
+        survey
+    }
+
+    /// The scale that a quantity is shown on, in its own unit.
+    pub fn scale(&self, quantity: Quantity, choice: &ScaleChoice) -> ColourScale {
+        match quantity {
+            Quantity::Irradiance => self.irradiance_scale(choice),
+            // An octave beyond either end: texels of one map differ too.
+            _ => {
+                let [least, most] = self.texels_per_m.unwrap_or([1.0; 2]);
+                ColourScale {
+                    low: 0.5 * least,
+                    high: 2.0 * most,
+                    is_logarithmic: true,
+                }
+            }
+        }
+    }
+
+    fn irradiance_scale(&self, choice: &ScaleChoice) -> ColourScale {
+        let peak = if self.peak_w_m2 > 0.0 { self.peak_w_m2 } else { 1.0 };
+        let [low, high] = match (choice.is_automatic, choice.is_logarithmic) {
+            (true, true) => [DECADES * rounded_up(peak), rounded_up(peak)],
+            (true, false) => [0.0, rounded_up(peak)],
+            (false, _) => choice.typed_w_m2,
+        };
+        ColourScale {
+            low,
+            high,
+            is_logarithmic: choice.is_logarithmic,
+        }
+    }
+}
+
+/// The next of 1, 2 and 5 times a power of ten.
+fn rounded_up(value: f64) -> f64 {
+    let decade = 10.0_f64.powf(value.log10().floor());
+    let steps = [1.0, 2.0, 5.0, 10.0];
+    // What rounding adds is no reason for the next step.
+    let step = steps
+        .into_iter()
+        .find(|step| step * decade >= value * (1.0 - 1e-9));
+    step.unwrap_or(10.0) * decade
+}

@@ -1,0 +1,152 @@
+"""What other programs make of our files: Khronos' validator, three.js in a browser, Blender.
+
+Usage: interop.py NEPHROID MODULES BROWSER SCENES... (SCENES: other files to export and validate)
+Each figure is a mean over blocks of pixels of the floor, against the radiance that our own maps say.
+"""
+
+import json
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy
+import OpenEXR
+
+import textures
+from three_pixels import pixels as three_pixels
+
+HERE = Path(__file__).parent
+LUMENS_PER_WATT = 683.0
+SIDE = 256
+# Largest difference of a block of 16 x 16 pixels [1], of blocks with light.
+BOUND = 0.02
+BLOCK = 16
+# Floors of the built-in scenes: half width [m] is read from the map's texel area.
+SCENES = ["ring", "ball", "pool"]
+
+faults = []
+
+
+def run(*command, cwd=None):
+    """Runs a program; its output, or the end of everything."""
+    done = subprocess.run([str(part) for part in command], capture_output=True, text=True, cwd=cwd)
+    if done.returncode != 0:
+        sys.exit(f"{' '.join(str(part) for part in command)}:\n{done.stdout}{done.stderr}")
+    return done.stdout
+
+
+def baked(folder, surface):
+    """E of a surface's map [W/m²], array [height, width, 3], row 0 at v = 0; and the side of a texel [m]."""
+    manifest = json.loads((folder / "manifest.json").read_text())
+    entry = next(entry for entry in manifest["maps"] if entry["surface"] == surface)
+    image = OpenEXR.File(str(folder / entry["file"]), separate_channels=True)
+    channels = image.parts[0].channels
+    return numpy.stack([channels[name].pixels for name in "RGB"], axis=-1), entry["texel_area_m2"] ** 0.5
+
+
+def blocks(picture):
+    """Means over blocks of luminance."""
+    luminance = picture @ numpy.array([0.2126, 0.7152, 0.0722])
+    side = luminance.shape[0] // BLOCK
+    return luminance.reshape(side, BLOCK, side, BLOCK).mean(axis=(1, 3))
+
+
+def compare(what, found, wanted):
+    """Prints how far two pictures are apart, and keeps it where that is too far."""
+    found, wanted = blocks(found), blocks(wanted)
+    has_light = wanted > 0.05 * wanted.mean()
+    worst = float(numpy.abs(found / numpy.maximum(wanted, 1e-30) - 1.0)[has_light].max())
+    ratio = float(found.sum() / wanted.sum())
+    print(f"{what}: worst block off by {100 * worst:.2f} %, whole floor {ratio:.4f} of ours")
+    if worst > BOUND or abs(ratio - 1.0) > BOUND:
+        faults.append(what)
+
+
+def floor_of(name, folder, nephroid, layers):
+    """Bakes a built-in scene; its folder, E of its floor and the floor's area seen from above."""
+    run(nephroid, "bake", f"builtin:{name}", "-o", folder, "--layers", layers, "--map-resolution", SIDE,
+        "--density", "1e5", "--quiet", "--force")
+    light, texel_m = baked(folder, "floor")
+    half = 0.5 * SIDE * texel_m
+    return light, (-half, -half, half, half)
+
+
+def check_three(name, nephroid, modules, browser, folder):
+    """Light maps in lux beside lights in candela: the caustic layer, and direct light baked against lit live."""
+    albedo = 0.5
+    light, area = floor_of(name, folder / name, nephroid, "caustic")
+    file = folder / f"{name}.glb"
+    run(nephroid, "export", folder / name, "-o", file, "--units", "lux", "--lights", "remove", "--cut", "0")
+    found, revision = three_pixels(browser, modules, file, ["floor"], area, SIDE)
+    wanted = light * LUMENS_PER_WATT * albedo / numpy.pi
+    compare(f"three.js r{revision}, {name}, caustic map", found, wanted)
+    numpy.save(folder / f"{name}_three.npy", found)
+
+    direct, area = floor_of(name, folder / f"{name}_direct", nephroid, "caustic,direct")
+    kept_file = folder / f"{name}_live.glb"
+    run(nephroid, "export", folder / name, "-o", kept_file, "--units", "lux", "--lights", "keep")
+    kept, _ = three_pixels(browser, modules, kept_file, ["floor"], area, SIDE)
+    whole = folder / f"{name}_whole.glb"
+    run(nephroid, "export", folder / f"{name}_direct", "-o", whole, "--units", "lux")
+    all_baked, _ = three_pixels(browser, modules, whole, ["floor"], area, SIDE)
+    # Where no caster hides the lamp, a floor lit live and by its caustic shows what one lit by its maps alone does.
+    alone = baked(folder / f"{name}_direct", "floor")[0] - light
+    lit = blocks(alone)
+    if not (lit > 0).any():
+        print(f"three.js r{revision}, {name}: no light reaches the floor straight from the lamp")
+        return [file, kept_file, whole]
+    is_lit = lit > 0.5 * numpy.median(lit[lit > 0])
+    live, maps = blocks(kept)[is_lit], blocks(all_baked)[is_lit]
+    off = float(numpy.abs(live / maps - 1.0).max())
+    print(f"three.js r{revision}, {name}, live light beside maps: median {numpy.median(live / maps):.4f}, worst {100 * off:.2f} %")
+    if abs(numpy.median(live / maps) - 1.0) > BOUND:
+        faults.append(f"{name}: lit live and by maps")
+    return [file, kept_file, whole]
+
+
+def check_blender(name, nephroid, folder):
+    """Emission in W/(m² sr)."""
+    albedo = 0.5
+    light, area = baked(folder / name, "floor")[0], None
+    half = 0.5 * SIDE * baked(folder / name, "floor")[1]
+    area = ",".join(str(value) for value in (-half, -half, half, half))
+    file = folder / f"{name}_emissive.glb"
+    run(nephroid, "export", folder / name, "-o", file, "--as", "emissive", "--units", "E", "--lights", "remove",
+        "--cut", "0")
+    out = folder / f"{name}_blender.npy"
+    told = run(sys.executable, HERE / "blender_pixels.py", file, out, "floor", area, SIDE)
+    version = next(line for line in told.splitlines() if line.startswith("blender "))
+    compare(f"{version}, {name}, emission", numpy.load(out), light * albedo / numpy.pi)
+    return [file]
+
+
+def main():
+    nephroid, modules, browser, *others = sys.argv[1:]
+    modules = Path(modules).resolve()
+    nephroid = Path(nephroid).resolve()
+    with tempfile.TemporaryDirectory() as folder:
+        folder = Path(folder)
+        files = []
+        for name in SCENES:
+            files += check_three(name, nephroid, modules, browser, folder)
+            files += check_blender(name, nephroid, folder)
+            textures.check(nephroid, modules, folder / name, folder / f"{name}_textures", run, faults)
+        for number, scene in enumerate(others):
+            maps = folder / f"other{number}"
+            run(nephroid, "bake", scene, "-o", maps, "--default-light", "--density", "2000", "--map-resolution", "64",
+                "--quiet", "--layers", "caustic,direct")
+            for carrier in ["lightmap", "emissive", "unlit"]:
+                file = folder / f"other{number}_{carrier}.glb"
+                run(nephroid, "export", maps, "-o", file, "--as", carrier)
+                files.append(file)
+        told = subprocess.run(["node", str(HERE / "validate.mjs"), *map(str, files)], cwd=modules.parent,
+                              capture_output=True, text=True)
+        print(told.stdout, told.stderr)
+        if told.returncode != 0:
+            faults.append("the validator's errors")
+    if faults:
+        sys.exit("interop: " + "; ".join(faults))
+
+
+main()
