@@ -460,17 +460,15 @@ fn measured_ratio(middle: &Images, coarse: &Images, fine: &BTreeMap<Receiver, (V
     }
 }
 
-/// Share of the light that no map shows though it should: what was given up is taken to go where the rest of it went, to
-/// maps, into surfaces and out of the scene.
+/// Share of the light that no map shows though it should: what ended by depth or threshold is taken to go where the rest
+/// of it went, to maps, into surfaces and out of the scene; what could not be resolved, to maps.
 pub fn given_up_share(ledger: &EnergyLedger) -> f64 {
     let truncated = &ledger.truncated;
-    let lost = truncated.depth
-        + truncated.threshold
-        + truncated.non_finite
-        + truncated.unresolved
-        + truncated.quadrature.abs();
+    let arrived = ledger.deposited + ledger.absorbed + ledger.escaped;
+    let ended = truncated.depth + truncated.threshold;
+    let lost = truncated.non_finite + truncated.unresolved + truncated.quadrature.abs();
     if ledger.deposited > 0.0 {
-        lost / (ledger.deposited + ledger.absorbed + ledger.escaped)
+        ended / arrived + lost / ledger.deposited
     } else {
         0.0
     }

@@ -144,6 +144,31 @@ impl Launch {
         }
     }
 
+    /// The ray through a point of the scene, and how far along it the point lies [m]. A point where the light itself is has
+    /// none that means anything.
+    pub fn ray_through(&self, point: DVec3) -> (Ray, f64) {
+        match self.domain {
+            Domain::Sphere { position, .. } => {
+                let path = point - position;
+                let ray = Ray {
+                    origin: position,
+                    direction: path.normalize_or(DVec3::Z),
+                };
+                (ray, path.length())
+            }
+            Domain::Plane {
+                corner, direction, ..
+            } => {
+                let path_m = (point - corner).dot(direction);
+                let ray = Ray {
+                    origin: point - direction * path_m,
+                    direction,
+                };
+                (ray, path_m)
+            }
+        }
+    }
+
     /// Flux [W per channel] through the cell between two corners of the unit square, for the strength that the light
     /// has in the direction of the cell's ray.
     pub fn cell_flux_w(&self, low: DVec2, high: DVec2, direction: DVec3) -> LinearSrgb {

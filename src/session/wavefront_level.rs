@@ -56,9 +56,9 @@ impl CausticLayer<'_> {
         } else {
             (state.take_traced(&key), self.room())
         };
+        let size = self.spectra.part_size(light.light, key.trace.size);
+        let bodies = self.small_bodies(light, size, self.closeness(light, &key.trace));
         for (band, part) in self.spectra.parts(light.light) {
-            let size = self.spectra.part_size(light.light, key.trace.size);
-            let bodies = self.small_bodies(light, size, self.closeness(light, &key.trace));
             let depositor = WavefrontDepositor {
                 receivers: &receivers,
                 chart_for: &chart_for,

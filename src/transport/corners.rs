@@ -1,6 +1,7 @@
-//! Sharp corners of a mesh: where its border, or the creases between its sides, turn. A silhouette bends there at once.
+//! Sharp edges of a mesh, its border and the creases between its sides, and sharp corners, where these turn: a silhouette
+//! lies along the ones and bends at once at the others.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 
 use glam::DVec3;
 
@@ -21,39 +22,87 @@ const MOST_TRIANGLES: usize = 1 << 14;
 /// More corners than these are facets: the lattice has to resolve them by itself.
 const MOST_CORNERS: usize = 64;
 
+/// The same for edges.
+const MOST_EDGES: usize = 1 << 12;
+
+/// A mesh whose vertices at one place are one.
+struct Joined {
+    /// Places [m].
+    points: Vec<DVec3>,
+    /// Normals of the sides around each point, those that are alike once.
+    sides: Vec<Vec<DVec3>>,
+    /// By their points, the lower index first.
+    edges: BTreeMap<(usize, usize), JoinedEdge>,
+}
+
+/// An edge between triangles.
+#[derive(Default)]
+struct JoinedEdge {
+    /// Triangles at it.
+    count: usize,
+    /// Normal of the first of them.
+    normal: DVec3,
+    /// Whether another one faces elsewhere.
+    is_crease: bool,
+}
+
+impl Joined {
+    /// `None` for larger meshes.
+    fn new(mesh: &Mesh) -> Option<Self> {
+        if mesh.triangles.len() > MOST_TRIANGLES {
+            return None;
+        }
+        let bits = |v: DVec3| (v + DVec3::ZERO).to_array().map(f64::to_bits);
+        let mut places: HashMap<[u64; 3], usize> = HashMap::new();
+        let mut points: Vec<DVec3> = Vec::new();
+        let point_of: Vec<usize> = mesh
+            .positions
+            .iter()
+            .map(|position| {
+                *places.entry(bits(*position)).or_insert_with(|| {
+                    points.push(*position);
+                    points.len() - 1
+                })
+            })
+            .collect();
+        let mut sides: Vec<Vec<DVec3>> = vec![Vec::new(); points.len()];
+        let mut edges: BTreeMap<(usize, usize), JoinedEdge> = BTreeMap::new();
+        for (triangle, vertices) in mesh.triangles.iter().enumerate() {
+            let normal = mesh.face_normal(triangle);
+            let corners = vertices.map(|vertex| point_of[vertex as usize]);
+            for (i, &corner) in corners.iter().enumerate() {
+                if sides[corner].iter().all(|side| side.dot(normal) < SAME_SIDE) {
+                    sides[corner].push(normal);
+                }
+                let next = corners[(i + 1) % 3];
+                let edge = edges.entry((corner.min(next), corner.max(next))).or_default();
+                if edge.count == 0 {
+                    edge.normal = normal;
+                }
+                edge.count += 1;
+                edge.is_crease |= edge.normal.dot(normal) < SAME_SIDE;
+            }
+        }
+        Some(Self {
+            points,
+            sides,
+            edges,
+        })
+    }
+}
+
 /// Sharp corners [m]; none where there are very many, or in a very fine mesh.
 pub fn sharp_corners(mesh: &Mesh) -> Vec<DVec3> {
-    if mesh.triangles.len() > MOST_TRIANGLES {
+    let Some(Joined {
+        points,
+        sides,
+        edges,
+    }) = Joined::new(mesh)
+    else {
         return Vec::new();
-    }
-    let bits = |v: DVec3| (v + DVec3::ZERO).to_array().map(f64::to_bits);
-    let mut places: HashMap<[u64; 3], usize> = HashMap::new();
-    let mut points: Vec<DVec3> = Vec::new();
-    let corner_of: Vec<usize> = mesh
-        .positions
-        .iter()
-        .map(|position| {
-            *places.entry(bits(*position)).or_insert_with(|| {
-                points.push(*position);
-                points.len() - 1
-            })
-        })
-        .collect();
-    let mut sides: Vec<Vec<DVec3>> = vec![Vec::new(); points.len()];
-    let mut edges: HashMap<(usize, usize), usize> = HashMap::new();
-    for (triangle, vertices) in mesh.triangles.iter().enumerate() {
-        let normal = mesh.face_normal(triangle);
-        let corners = vertices.map(|vertex| corner_of[vertex as usize]);
-        for (i, &corner) in corners.iter().enumerate() {
-            if sides[corner].iter().all(|side| side.dot(normal) < SAME_SIDE) {
-                sides[corner].push(normal);
-            }
-            let next = corners[(i + 1) % 3];
-            *edges.entry((corner.min(next), corner.max(next))).or_default() += 1;
-        }
-    }
+    };
     let mut border: Vec<Vec<usize>> = vec![Vec::new(); points.len()];
-    for (&(a, b), _) in edges.iter().filter(|(_, count)| **count == 1) {
+    for (&(a, b), _) in edges.iter().filter(|(_, edge)| edge.count == 1) {
         border[a].push(b);
         border[b].push(a);
     }
@@ -73,4 +122,18 @@ pub fn sharp_corners(mesh: &Mesh) -> Vec<DVec3> {
     } else {
         corners
     }
+}
+
+/// Both ends [m] of each sharp edge; none where there are very many, or in a very fine mesh.
+pub fn sharp_edges(mesh: &Mesh) -> Vec<[DVec3; 2]> {
+    let Some(joined) = Joined::new(mesh) else {
+        return Vec::new();
+    };
+    let is_sharp = |edge: &JoinedEdge| edge.count == 1 || edge.is_crease;
+    let sharp = joined.edges.iter().filter(|(_, edge)| is_sharp(edge));
+    let edges: Vec<[DVec3; 2]> = sharp
+        .map(|(&(a, b), _)| [joined.points[a], joined.points[b]])
+        .filter(|[a, b]| a != b)
+        .collect();
+    if edges.len() > MOST_EDGES { Vec::new() } else { edges }
 }

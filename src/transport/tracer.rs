@@ -6,7 +6,7 @@ use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::bend;
-use super::corners::sharp_corners;
+use super::corners::{sharp_corners, sharp_edges};
 use super::curvature::NormalField;
 use super::normal_texture::{TextureBump, texel_m};
 use super::smoothing::smoothing_groups;
@@ -38,6 +38,8 @@ struct Hierarchy {
     triangles: Vec<(u32, u32)>,
     /// How the triangles of each object hang together, found when it is asked for.
     adjacencies: Vec<OnceLock<Adjacency>>,
+    /// Sharp edges of each object, found when they are asked for.
+    edges: Vec<OnceLock<Vec<[DVec3; 2]>>>,
 }
 
 /// What is known of the shape of a specular object.
@@ -67,6 +69,7 @@ impl Hierarchy {
             bvh: TriangleBvh::build(&corners),
             triangles,
             adjacencies: scene.objects.iter().map(|_| OnceLock::new()).collect(),
+            edges: scene.objects.iter().map(|_| OnceLock::new()).collect(),
         }
     }
 }
@@ -249,6 +252,11 @@ impl Tracer {
     /// Sharp corners of an object [m]; none where it is not specular.
     pub fn sharp_corners(&self, object: usize) -> &[DVec3] {
         self.specular[object].as_ref().map_or(&[], |shape| &shape.corners)
+    }
+
+    /// Sharp edges of an object, both ends of each [m]; none where there are very many.
+    pub fn sharp_edges(&self, object: usize) -> &[[DVec3; 2]] {
+        self.hierarchy.edges[object].get_or_init(|| sharp_edges(&self.scene.objects[object].mesh))
     }
 
     /// Smoothing group of a triangle within its object; 0 where the object is not specular.

@@ -1,11 +1,12 @@
-//! Bodies that are smaller than the cells of a lattice, and sharp corners of larger ones: the cells' own corners alone
-//! would miss them.
+//! Bodies and openings that are smaller than the cells of a lattice, and sharp corners of larger bodies: the cells' own
+//! corners alone would miss them.
 
 use std::collections::HashMap;
 
 use glam::{DVec2, DVec3};
 
 use super::closeness::Closeness;
+use super::openings::{Opening, narrow_openings};
 use crate::geometry::Ray;
 use crate::geometry::enclosure::Bounds;
 use crate::light_pass::item_buffer::{self, CELLS_PER_SIDE, ItemBuffer};
@@ -27,19 +28,52 @@ const LEAST_ACROSS_CASTERS: f64 = 12.0;
 /// Small casters from which on each is looked at less closely.
 const MANY_CASTERS: usize = 8;
 
-/// The sphere around an object.
+/// Cells across an opening: of square ones that small, corners lie in it.
+const CELLS_ACROSS_OPENINGS: f64 = 4.0;
+
+/// The sphere around an object, or what lies around a part of a slit.
 #[derive(Clone, Copy, Debug)]
 struct Body {
-    centre: DVec3,
+    /// Ends of the line that it lies around [m]; the same for a sphere.
+    ends: [DVec3; 2],
+    /// About that line [m].
     radius_m: f64,
     /// Cells across it once they are fine enough.
     cells_across: f64,
 }
 
+impl Body {
+    fn of(opening: &Opening) -> Self {
+        Self {
+            ends: opening.ends,
+            radius_m: opening.width_m,
+            cells_across: 2.0 * CELLS_ACROSS_OPENINGS,
+        }
+    }
+
+    fn bounds(&self) -> Bounds {
+        let [a, b] = self.ends;
+        (a.min(b) - self.radius_m, a.max(b) + self.radius_m)
+    }
+
+    /// The point of its line that is nearest to a ray, or to the line that the ray lies on [m].
+    fn nearest(&self, ray: &Ray) -> DVec3 {
+        let [a, b] = self.ends;
+        let along = |v: DVec3| v - ray.direction * ray.direction.dot(v);
+        let (line, start) = (along(b - a), along(a - ray.origin));
+        let share = -start.dot(line) / line.length_squared();
+        if share.is_finite() {
+            a.lerp(b, share.clamp(0.0, 1.0))
+        } else {
+            a
+        }
+    }
+}
+
 /// Where something is to be looked for, by cells of the item buffer: face, column, row.
 type Bins<T> = HashMap<(u32, u32, u32), Vec<T>>;
 
-/// Small bodies as one light sees them.
+/// Small bodies and openings as one light sees them.
 #[derive(Clone, Debug, Default)]
 pub struct SmallBodies {
     bodies: Bins<Body>,
@@ -77,7 +111,7 @@ impl SmallBodies {
         let origin = launch.ray(0, middle).origin;
         let is_small = |body: &Body| {
             let width_m = launch
-                .cell_area_at_m2(middle, middle + cell, origin.distance(body.centre))
+                .cell_area_at_m2(middle, middle + cell, origin.distance(body.ends[0]))
                 .sqrt();
             body.radius_m > 0.0 && 2.0 * body.radius_m < SMALL_CELLS * width_m
         };
@@ -88,7 +122,7 @@ impl SmallBodies {
             .filter_map(|(index, object)| {
                 let (low, high) = object.mesh.bounds()?;
                 let body = Body {
-                    centre: low * 0.5 + high * 0.5,
+                    ends: [low * 0.5 + high * 0.5; 2],
                     radius_m: 0.5 * (high - low).length(),
                     cells_across: if scene.material_of(index).surface.is_specular() {
                         closeness.cells_across_casters
@@ -113,6 +147,10 @@ impl SmallBodies {
                 body.cells_across = (body.cells_across / crowd).max(least);
             }
             book(launch, *bounds, *body, &mut bodies);
+        }
+        for opening in narrow_openings(tracer, launch, visible, cell) {
+            let body = Body::of(&opening);
+            book(launch, body.bounds(), body, &mut bodies);
         }
         Self {
             bodies,
@@ -175,7 +213,8 @@ impl SmallBodies {
             if let Some(reach_m) = beam.reach_at_m(body, f64::INFINITY) {
                 // The whole cell, or the body and what is divided to get there.
                 let across = body.cells_across * (reach_m / body.radius_m).min(1.0);
-                cells += across.powi(2);
+                let length_m = body.ends[0].distance(body.ends[1]).min(2.0 * reach_m);
+                cells += across.powi(2) * (1.0 + 0.5 * length_m / body.radius_m);
             }
         });
         cells
@@ -212,14 +251,15 @@ impl Beam {
 
     /// Half the width of the beam at a body that it may hold [m]; `None` where it does not.
     fn reach_at_m(&self, body: &Body, hidden_beyond_m: f64) -> Option<f64> {
-        let along_m = self.along_m(body.centre);
+        let nearest = body.nearest(&self.middle);
+        let along_m = self.along_m(nearest);
         if along_m <= -body.radius_m || along_m - body.radius_m > hidden_beyond_m {
             return None;
         }
         let along_m = along_m.max(0.0);
         let centre = self.middle.at(along_m);
         let reach_m = self.reach_m(along_m);
-        (centre.distance(body.centre) <= body.radius_m + 1.5 * reach_m).then_some(reach_m)
+        (centre.distance(nearest) <= body.radius_m + 1.5 * reach_m).then_some(reach_m)
     }
 }
 

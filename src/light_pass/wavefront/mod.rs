@@ -14,6 +14,7 @@ mod facets;
 pub mod kept_rays;
 pub mod lattice;
 mod mesh;
+mod openings;
 pub mod overreach;
 pub mod pass;
 pub mod patch;

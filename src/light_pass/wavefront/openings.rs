@@ -1,0 +1,157 @@
+//! Slits and pinholes that are narrower than the cells of a lattice: rays beside the sharp edges of what stands before
+//! casters find them. The cells' corners alone would meet only what is around them.
+
+use glam::{DVec2, DVec3};
+use rayon::prelude::*;
+
+use crate::geometry::Ray;
+use crate::light_pass::item_buffer::ItemBuffer;
+use crate::light_pass::launch::Launch;
+use crate::transport::Tracer;
+
+/// An opening counts as narrow while it is less than this many cells wide: wider ones hold corners of cells.
+const NARROW_CELLS: f64 = 2.0;
+
+/// Narrower openings are not found [cells].
+const NARROWEST_CELLS: f64 = 1e-4;
+
+/// Bisections of an opening's width, after it was bracketed to a factor of two.
+const WIDTH_BITS: u32 = 4;
+
+/// Samples along an edge lie half a cell apart, but an edge has these at least.
+const LEAST_SAMPLES: usize = 3;
+
+/// Samples of one light's edges at most: beyond, they lie farther apart.
+const MOST_SAMPLES: f64 = 65_536.0;
+
+/// A part of a narrow opening, beside a part of an edge.
+#[derive(Clone, Copy, Debug)]
+pub struct Opening {
+    /// Ends of its middle line [m].
+    pub ends: [DVec3; 2],
+    /// Across, as the light sees it [m].
+    pub width_m: f64,
+}
+
+/// One light's look at a scene with a lattice of cells of some size.
+struct Search<'a> {
+    tracer: &'a Tracer,
+    launch: &'a Launch,
+    visible: &'a ItemBuffer,
+    /// In the unit square.
+    cell: DVec2,
+}
+
+/// The openings through which a light sees casters, and that are narrow beside cells of the given size in the unit square.
+pub fn narrow_openings(
+    tracer: &Tracer,
+    launch: &Launch,
+    visible: &ItemBuffer,
+    cell: DVec2,
+) -> Vec<Opening> {
+    let search = Search {
+        tracer,
+        launch,
+        visible,
+        cell,
+    };
+    let edges = search.edges();
+    let wanted: f64 = edges.iter().map(|edge| search.samples_wanted(edge)).sum();
+    let thinning = (wanted / MOST_SAMPLES).max(1.0);
+    let beside = |edge: &[DVec3; 2]| search.beside(edge, thinning);
+    edges.par_iter().map(beside).collect::<Vec<_>>().concat()
+}
+
+impl Search<'_> {
+    /// Sharp edges of what blocks light, in directions that casters are in.
+    fn edges(&self) -> Vec<[DVec3; 2]> {
+        let scene = self.tracer.scene();
+        let blocks = |&object: &usize| {
+            let bounds = scene.objects[object].mesh.bounds();
+            !scene.material_of(object).surface.is_specular()
+                && bounds.is_some_and(|bounds| self.visible.is_marked_towards(self.launch, bounds))
+        };
+        let objects = (0..scene.objects.len()).filter(blocks);
+        let is_before = |[a, b]: &&[DVec3; 2]| {
+            self.visible
+                .is_marked_towards(self.launch, (a.min(*b), a.max(*b)))
+        };
+        objects
+            .flat_map(|object| self.tracer.sharp_edges(object).iter().filter(is_before))
+            .copied()
+            .collect()
+    }
+
+    /// Width of a cell at a point [m].
+    fn cell_m(&self, point: DVec3) -> f64 {
+        let middle = DVec2::splat(0.5);
+        let path_m = self.launch.ray_through(point).1;
+        let area_m2 = self.launch.cell_area_at_m2(middle, middle + self.cell, path_m);
+        area_m2.sqrt()
+    }
+
+    /// Two a cell, along an edge as it appears from the light.
+    fn samples_wanted(&self, edge: &[DVec3; 2]) -> f64 {
+        let middle = edge[0] * 0.5 + edge[1] * 0.5;
+        let cells = edge[0].distance(edge[1]) / self.cell_m(middle);
+        if cells.is_finite() { 2.0 * cells } else { 0.0 }
+    }
+
+    fn beside(&self, edge: &[DVec3; 2], thinning: f64) -> Vec<Opening> {
+        let samples = ((self.samples_wanted(edge) / thinning).ceil() as usize).max(LEAST_SAMPLES);
+        let place = |share: f64| edge[0].lerp(edge[1], share);
+        let along = (edge[1] - edge[0]).normalize_or_zero();
+        let of_sample = |sample: usize| {
+            let [from, middle, to] = [0.0, 0.5, 1.0].map(|part| (sample as f64 + part) / samples as f64);
+            let (ray, path_m) = self.launch.ray_through(place(middle));
+            let across = ray.direction.cross(along).try_normalize()?;
+            let of_side = |across: DVec3| {
+                let width_m = self.width_m(ray.at(path_m), across)?;
+                let aside = across * (0.5 * width_m);
+                Some(Opening {
+                    ends: [place(from) + aside, place(to) + aside],
+                    width_m,
+                })
+            };
+            of_side(across).or_else(|| of_side(-across))
+        };
+        (0..samples).filter_map(of_sample).collect()
+    }
+
+    /// How far light goes past beside a point of an edge, in a direction across it [m]; `None` where it does not, or where
+    /// the way is wide.
+    fn width_m(&self, edge: DVec3, across: DVec3) -> Option<f64> {
+        let cell_m = self.cell_m(edge);
+        let is_open = |aside_m: f64| self.sees_caster(edge + across * aside_m);
+        let mut open_m = NARROWEST_CELLS * cell_m;
+        if !is_open(open_m) {
+            return None;
+        }
+        let mut closed_m = 2.0 * open_m;
+        while is_open(closed_m) {
+            (open_m, closed_m) = (closed_m, 2.0 * closed_m);
+            if open_m > NARROW_CELLS * cell_m {
+                return None;
+            }
+        }
+        for _ in 0..WIDTH_BITS {
+            let middle_m = 0.5 * (open_m + closed_m);
+            if is_open(middle_m) {
+                open_m = middle_m;
+            } else {
+                closed_m = middle_m;
+            }
+        }
+        Some(closed_m)
+    }
+
+    /// Whether the light's ray through a point meets a caster behind it before anything else.
+    fn sees_caster(&self, point: DVec3) -> bool {
+        let (ray, path_m): (Ray, f64) = self.launch.ray_through(point);
+        let scene = self.tracer.scene();
+        self.tracer.closest_place(&ray).is_some_and(|place| {
+            let material = scene.material_of(place.object as usize);
+            place.distance_m > path_m && material.surface.is_specular()
+        })
+    }
+}
