@@ -52,6 +52,8 @@ mod map_files;
 mod meshes;
 #[path = "bake/nested.rs"]
 mod nested;
+#[path = "bake/openings.rs"]
+mod openings;
 #[path = "bake/probe.rs"]
 mod probe;
 #[path = "bake/reference.rs"]

@@ -83,22 +83,13 @@ impl Joined {
                 edge.is_crease |= edge.normal.dot(normal) < SAME_SIDE;
             }
         }
-        Some(Self {
-            points,
-            sides,
-            edges,
-        })
+        Some(Self { points, sides, edges })
     }
 }
 
 /// Sharp corners [m]; none where there are very many, or in a very fine mesh.
 pub fn sharp_corners(mesh: &Mesh) -> Vec<DVec3> {
-    let Some(Joined {
-        points,
-        sides,
-        edges,
-    }) = Joined::new(mesh)
-    else {
+    let Some(Joined { points, sides, edges }) = Joined::new(mesh) else {
         return Vec::new();
     };
     let mut border: Vec<Vec<usize>> = vec![Vec::new(); points.len()];
@@ -135,5 +126,9 @@ pub fn sharp_edges(mesh: &Mesh) -> Vec<[DVec3; 2]> {
         .map(|(&(a, b), _)| [joined.points[a], joined.points[b]])
         .filter(|[a, b]| a != b)
         .collect();
-    if edges.len() > MOST_EDGES { Vec::new() } else { edges }
+    if edges.len() > MOST_EDGES {
+        Vec::new()
+    } else {
+        edges
+    }
 }

@@ -28,8 +28,11 @@ const LEAST_ACROSS_CASTERS: f64 = 12.0;
 /// Small casters from which on each is looked at less closely.
 const MANY_CASTERS: usize = 8;
 
-/// Cells across an opening: of square ones that small, corners lie in it.
-const CELLS_ACROSS_OPENINGS: f64 = 4.0;
+/// Least and most cells across an opening: of the least, corners lie in it; of the most, its own corners are resolved.
+const CELLS_ACROSS_OPENINGS: (f64, f64) = (4.0, 32.0);
+
+/// Cells in all openings, where they may have between the least and the most across.
+const CELLS_IN_OPENINGS: f64 = 16_384.0;
 
 /// The sphere around an object, or what lies around a part of a slit.
 #[derive(Clone, Copy, Debug)]
@@ -43,11 +46,12 @@ struct Body {
 }
 
 impl Body {
-    fn of(opening: &Opening) -> Self {
+    /// With so many cells across the opening.
+    fn of(opening: &Opening, across: f64) -> Self {
         Self {
             ends: opening.ends,
             radius_m: opening.width_m,
-            cells_across: 2.0 * CELLS_ACROSS_OPENINGS,
+            cells_across: 2.0 * across,
         }
     }
 
@@ -148,8 +152,12 @@ impl SmallBodies {
             }
             book(launch, *bounds, *body, &mut bodies);
         }
-        for opening in narrow_openings(tracer, launch, visible, cell) {
-            let body = Body::of(&opening);
+        let openings = narrow_openings(tracer, launch, visible, cell);
+        let squares: f64 = openings.iter().map(Opening::squares).sum();
+        let (least, most) = CELLS_ACROSS_OPENINGS;
+        let across = (CELLS_IN_OPENINGS / squares).sqrt().clamp(least, most);
+        for opening in &openings {
+            let body = Body::of(opening, across);
             book(launch, body.bounds(), body, &mut bodies);
         }
         Self {

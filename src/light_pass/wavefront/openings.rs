@@ -33,6 +33,13 @@ pub struct Opening {
     pub width_m: f64,
 }
 
+impl Opening {
+    /// As how many squares it is long, and the half ones around its ends.
+    pub fn squares(&self) -> f64 {
+        1.0 + self.ends[0].distance(self.ends[1]) / self.width_m
+    }
+}
+
 /// One light's look at a scene with a lattice of cells of some size.
 struct Search<'a> {
     tracer: &'a Tracer,
@@ -43,12 +50,7 @@ struct Search<'a> {
 }
 
 /// The openings through which a light sees casters, and that are narrow beside cells of the given size in the unit square.
-pub fn narrow_openings(
-    tracer: &Tracer,
-    launch: &Launch,
-    visible: &ItemBuffer,
-    cell: DVec2,
-) -> Vec<Opening> {
+pub fn narrow_openings(tracer: &Tracer, launch: &Launch, visible: &ItemBuffer, cell: DVec2) -> Vec<Opening> {
     let search = Search {
         tracer,
         launch,
