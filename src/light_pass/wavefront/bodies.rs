@@ -28,12 +28,6 @@ const LEAST_ACROSS_CASTERS: f64 = 12.0;
 /// Small casters from which on each is looked at less closely.
 const MANY_CASTERS: usize = 8;
 
-/// Least and most cells across an opening: of the least, corners lie in it; of the most, its own corners are resolved.
-const CELLS_ACROSS_OPENINGS: (f64, f64) = (4.0, 32.0);
-
-/// Cells in all openings, where they may have between the least and the most across.
-const CELLS_IN_OPENINGS: f64 = 16_384.0;
-
 /// The sphere around an object, or what lies around a part of a slit.
 #[derive(Clone, Copy, Debug)]
 struct Body {
@@ -152,10 +146,7 @@ impl SmallBodies {
             }
             book(launch, *bounds, *body, &mut bodies);
         }
-        let openings = narrow_openings(tracer, launch, visible, cell);
-        let squares: f64 = openings.iter().map(Opening::squares).sum();
-        let (least, most) = CELLS_ACROSS_OPENINGS;
-        let across = (CELLS_IN_OPENINGS / squares).sqrt().clamp(least, most);
+        let (openings, across) = narrow_openings(tracer, launch, visible, cell);
         for opening in &openings {
             let body = Body::of(opening, across);
             book(launch, body.bounds(), body, &mut bodies);

@@ -22,7 +22,17 @@ const WIDTH_BITS: u32 = 4;
 const LEAST_SAMPLES: usize = 3;
 
 /// Samples of one light's edges at most: beyond, they lie farther apart.
-const MOST_SAMPLES: f64 = 65_536.0;
+const MOST_SAMPLES: f64 = 8_192.0;
+
+/// Least and most cells across an opening: of the least, corners lie in it; of the most, its own corners are resolved.
+const CELLS_ACROSS: (f64, f64) = (4.0, 32.0);
+
+/// Cells that openings aim at, and what they may have with the least across, where no other light reaches casters; else
+/// as large a share of these as of the light.
+const CELLS: (f64, f64) = (8_192.0, 16_384.0);
+
+/// Rays per side of a face that ask how much light reaches casters.
+const PROBES_PER_SIDE: usize = 64;
 
 /// A part of a narrow opening, beside a part of an edge.
 #[derive(Clone, Copy, Debug)]
@@ -31,11 +41,13 @@ pub struct Opening {
     pub ends: [DVec3; 2],
     /// Across, as the light sees it [m].
     pub width_m: f64,
+    /// What of the launch domain goes through it, at most [sr, or m² of a sun].
+    measure: f64,
 }
 
 impl Opening {
     /// As how many squares it is long, and the half ones around its ends.
-    pub fn squares(&self) -> f64 {
+    fn squares(&self) -> f64 {
         1.0 + self.ends[0].distance(self.ends[1]) / self.width_m
     }
 }
@@ -49,8 +61,14 @@ struct Search<'a> {
     cell: DVec2,
 }
 
-/// The openings through which a light sees casters, and that are narrow beside cells of the given size in the unit square.
-pub fn narrow_openings(tracer: &Tracer, launch: &Launch, visible: &ItemBuffer, cell: DVec2) -> Vec<Opening> {
+/// The openings through which a light sees casters, that are narrow beside cells of the given size in the unit square and
+/// let through a share of its light that is worth their cells; and how many cells lie across each.
+pub fn narrow_openings(
+    tracer: &Tracer,
+    launch: &Launch,
+    visible: &ItemBuffer,
+    cell: DVec2,
+) -> (Vec<Opening>, f64) {
     let search = Search {
         tracer,
         launch,
@@ -61,7 +79,27 @@ pub fn narrow_openings(tracer: &Tracer, launch: &Launch, visible: &ItemBuffer, c
     let wanted: f64 = edges.iter().map(|edge| search.samples_wanted(edge)).sum();
     let thinning = (wanted / MOST_SAMPLES).max(1.0);
     let beside = |edge: &[DVec3; 2]| search.beside(edge, thinning);
-    edges.par_iter().map(beside).collect::<Vec<_>>().concat()
+    let openings = edges.par_iter().map(beside).collect::<Vec<_>>().concat();
+    if openings.is_empty() {
+        return (openings, CELLS_ACROSS.1);
+    }
+    let through: f64 = openings.iter().map(|opening| opening.measure).sum();
+    widest(openings, through / (through + search.seen_measure()))
+}
+
+/// The widest openings that there are cells for, and how many cells lie across each; `share` of all light goes through them.
+fn widest(mut openings: Vec<Opening>, share: f64) -> (Vec<Opening>, f64) {
+    openings.sort_by(|a, b| b.width_m.total_cmp(&a.width_m));
+    let mut squares = 0.0;
+    let fits = |opening: &&Opening| {
+        squares += opening.squares();
+        squares * CELLS_ACROSS.0 * CELLS_ACROSS.0 <= CELLS.1 * share
+    };
+    let count = openings.iter().take_while(fits).count();
+    openings.truncate(count);
+    let squares: f64 = openings.iter().map(Opening::squares).sum();
+    let across = (CELLS.0 * share / squares).sqrt();
+    (openings, across.clamp(CELLS_ACROSS.0, CELLS_ACROSS.1))
 }
 
 impl Search<'_> {
@@ -92,6 +130,39 @@ impl Search<'_> {
         area_m2.sqrt()
     }
 
+    /// Of the launch domain, per area across the light at a distance [1/m² of sr or m²].
+    fn measure_per_m2(&self, path_m: f64) -> f64 {
+        let middle = DVec2::splat(0.5);
+        let to = middle + self.cell;
+        self.launch.cell_measure(middle, to) / self.launch.cell_area_at_m2(middle, to, path_m)
+    }
+
+    /// Of the launch domain, what reaches casters, by a grid of rays [sr, or m² of a sun].
+    fn seen_measure(&self) -> f64 {
+        let size = (PROBES_PER_SIDE, PROBES_PER_SIDE);
+        let cell = DVec2::splat(1.0 / PROBES_PER_SIDE as f64);
+        let of_row = |(face, row): (usize, usize)| -> f64 {
+            let spans = self.visible.lattice_spans(face, row, size);
+            let columns = spans.into_iter().flat_map(|(begin, end)| begin..end);
+            let of_cell = |column: usize| {
+                let low = DVec2::new(column as f64, row as f64) * cell;
+                let ray = self.launch.ray(face, low + 0.5 * cell);
+                let is_seen = self.meets_caster(&ray, 0.0);
+                is_seen.then(|| self.launch.cell_measure(low, low + cell))
+            };
+            columns.filter_map(of_cell).sum()
+        };
+        let rows =
+            (0..self.launch.face_count()).flat_map(|face| (0..PROBES_PER_SIDE).map(move |row| (face, row)));
+        let rows: Vec<(usize, usize)> = rows.collect();
+        // Row by row, so that the sum does not depend on the number of threads.
+        rows.into_par_iter()
+            .map(of_row)
+            .collect::<Vec<f64>>()
+            .iter()
+            .sum()
+    }
+
     /// Two a cell, along an edge as it appears from the light.
     fn samples_wanted(&self, edge: &[DVec3; 2]) -> f64 {
         let middle = edge[0] * 0.5 + edge[1] * 0.5;
@@ -113,6 +184,7 @@ impl Search<'_> {
                 Some(Opening {
                     ends: [place(from) + aside, place(to) + aside],
                     width_m,
+                    measure: width_m * place(from).distance(place(to)) * self.measure_per_m2(path_m),
                 })
             };
             of_side(across).or_else(|| of_side(-across))
@@ -149,11 +221,16 @@ impl Search<'_> {
 
     /// Whether the light's ray through a point meets a caster behind it before anything else.
     fn sees_caster(&self, point: DVec3) -> bool {
-        let (ray, path_m): (Ray, f64) = self.launch.ray_through(point);
+        let (ray, path_m) = self.launch.ray_through(point);
+        self.meets_caster(&ray, path_m)
+    }
+
+    /// Whether the first thing that a ray meets is a caster, and farther away than that.
+    fn meets_caster(&self, ray: &Ray, beyond_m: f64) -> bool {
         let scene = self.tracer.scene();
-        self.tracer.closest_place(&ray).is_some_and(|place| {
+        self.tracer.closest_place(ray).is_some_and(|place| {
             let material = scene.material_of(place.object as usize);
-            place.distance_m > path_m && material.surface.is_specular()
+            place.distance_m > beyond_m && material.surface.is_specular()
         })
     }
 }
