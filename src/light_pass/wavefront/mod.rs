@@ -17,6 +17,7 @@ mod mesh;
 pub mod overreach;
 pub mod pass;
 pub mod patch;
+pub mod ray_log;
 pub mod receivers;
 pub mod refine;
 mod regions;
