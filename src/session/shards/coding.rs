@@ -33,6 +33,9 @@ impl Writer {
     }
 }
 
+/// No time is longer [s].
+const MOST_SECONDS: f64 = 1e12;
+
 /// Reads what a [`Writer`] wrote; takes no memory by what it reads.
 #[derive(Debug)]
 pub(super) struct Reader<R>(pub(super) R);
@@ -82,10 +85,10 @@ impl<R: Read> Reader<R> {
         Ok(u64::from_le_bytes(self.bytes()?))
     }
 
-    /// A number that is finite and not negative.
+    /// A time [s].
     pub(super) fn real(&mut self) -> io::Result<f64> {
         let value = f64::from_bits(self.word()?);
-        if value.is_finite() && value >= 0.0 {
+        if (0.0..=MOST_SECONDS).contains(&value) {
             Ok(value)
         } else {
             Err(damaged("a time is none"))

@@ -19,6 +19,9 @@ const MOST_OF_A_TEXEL: i64 = 1 << 61;
 /// No account counts more, over all wavefronts and shards.
 const MOST_OF_AN_ACCOUNT: i128 = 1 << 100;
 
+/// Nothing is counted more often than this.
+const MOST_OF_A_COUNT: u64 = 1 << 56;
+
 /// Effort of the compression: more is much slower and hardly smaller.
 const COMPRESSION: i32 = 1;
 
@@ -137,10 +140,13 @@ fn write_report(writer: &mut Writer, report: &PassReport) {
 fn read_report(reader: &mut Reader<impl Read>, report: &mut PassReport) -> io::Result<()> {
     for count in counts_of(report) {
         *count = checked(count.checked_add(reader.whole()?))?;
+        if *count > MOST_OF_A_COUNT {
+            return Err(damaged("a count is too large"));
+        }
     }
     for count in report.ledger.counts_mut() {
         *count = checked(count.checked_add(reader.signed()?))?;
-        if count.abs() > MOST_OF_AN_ACCOUNT {
+        if count.unsigned_abs() > MOST_OF_AN_ACCOUNT.unsigned_abs() {
             return Err(damaged("an account is too large"));
         }
     }
