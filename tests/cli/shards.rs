@@ -232,7 +232,7 @@ fn what_cannot_be_cut_is_refused_before_any_work() {
     }
     sandbox
         .run("bake builtin:mirror -o out --density 1000 --map-resolution 2048 --memory 1M --shard 1/2")
-        .failed_in_one_sentence(2, &["--memory", "--map-resolution"]);
+        .failed_in_one_sentence(1, &["--memory", "--map-resolution"]);
     assert!(sandbox.files(".").is_empty());
 }
 
