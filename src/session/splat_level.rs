@@ -36,14 +36,6 @@ struct Worker<'a> {
     source: Source<'a>,
 }
 
-/// What is left of arrivals when they are deposited.
-enum Arrived {
-    /// They themselves, where they are kept.
-    Kept(Option<KeptLight>),
-    /// What they would take if they were [bytes].
-    Bytes(u64),
-}
-
 impl CausticLayer<'_> {
     /// Traces and deposits a light, or deposits again what arrived for other kernels and maps; `None` where it was
     /// stopped.
@@ -157,12 +149,10 @@ impl CausticLayer<'_> {
                     worker.source
                 },
             };
-            let (of_part, arrived) = self.deposit_splats(lattice, worker, key, &mut halves, course);
+            let (of_part, arrived, bytes) = self.deposit_splats(lattice, worker, key, &mut halves, course);
             sums.report.merge(of_part);
-            match arrived {
-                Arrived::Kept(light) => kept = light,
-                Arrived::Bytes(bytes) => sums.kept_bytes += bytes,
-            }
+            sums.kept_bytes += bytes;
+            kept = arrived;
             if sums.report.cancelled {
                 break;
             }
@@ -170,6 +160,7 @@ impl CausticLayer<'_> {
         (sums, kept)
     }
 
+    /// One part. Of a share, nothing that arrives is kept, but it is told what that would take [bytes].
     fn deposit_splats(
         &self,
         lattice: Lattice,
@@ -177,7 +168,7 @@ impl CausticLayer<'_> {
         key: &LevelKey,
         halves: &mut Halves,
         course: &Course,
-    ) -> (PassReport, Arrived) {
+    ) -> (PassReport, Option<KeptLight>, u64) {
         let depositor = Depositor {
             lattice,
             settings: self.settings,
@@ -197,11 +188,11 @@ impl CausticLayer<'_> {
         match worker.share {
             Some(share) => {
                 let (report, bytes) = pass::run_share(&depositor, share, halves, &chart_for, &listener);
-                (report, Arrived::Bytes(bytes))
+                (report, None, bytes)
             }
             None => {
                 let (report, kept) = pass::run(&depositor, worker.source, halves, &chart_for, &listener);
-                (report, Arrived::Kept(kept))
+                (report, kept, 0)
             }
         }
     }
