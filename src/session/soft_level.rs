@@ -282,7 +282,9 @@ impl CausticLayer<'_> {
                 coarse
             }
         };
-        share_time(&mut report, watch.elapsed());
+        if !course.labour.is_merge() {
+            share_time(&mut report, watch.elapsed());
+        }
         course.outcome.count(&report, course.clock);
         if self.has_places(light) {
             course.outcome.meter.places.rays += report.rays;
