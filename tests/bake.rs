@@ -61,6 +61,8 @@ mod reference;
 #[path = "eye/scenes.rs"]
 #[allow(dead_code)]
 mod scenes;
+#[path = "bake/shards.rs"]
+mod shards;
 #[path = "bake/smoothing.rs"]
 mod smoothing;
 #[path = "bake/soft.rs"]

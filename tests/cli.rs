@@ -34,6 +34,8 @@ mod render;
 mod render_path;
 #[path = "cli/scenes.rs"]
 mod scenes;
+#[path = "cli/shards.rs"]
+mod shards;
 #[cfg(unix)]
 #[path = "cli/signals.rs"]
 mod signals;

@@ -26,6 +26,8 @@ mod program;
 mod races;
 #[path = "damage/scenes.rs"]
 mod scenes;
+#[path = "damage/shards.rs"]
+mod shards;
 #[path = "support/mod.rs"]
 mod support;
 #[path = "damage/tables.rs"]

@@ -6,6 +6,7 @@ use clap::error::ErrorKind as ClapErrorKind;
 use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand, ValueEnum};
 use nephroid::error::{Error, Result};
 use nephroid::eye_pass::{ToneMap, WhiteBalance};
+use nephroid::light_pass::share::Share;
 use nephroid::settings::{Estimator, MapResolution};
 
 use super::bake_options::BakeOptions;
@@ -50,6 +51,8 @@ pub enum Command {
     Compare(CompareArguments),
     /// Write baked maps for other programs
     Export(ExportArguments),
+    /// Add up the shards of a bake
+    Merge(MergeArguments),
     /// Study what accuracy costs
     Study(StudyArguments),
 }
@@ -161,10 +164,34 @@ pub struct BakeArguments {
     /// Write into the folder even if it holds other files
     #[arg(long)]
     pub force: bool,
+    /// Bake part I of N alone, as sums that `merge` adds up; with --density and a fixed --map-resolution
+    #[arg(long, value_name = "I/N", value_parser = values::share_of_bake, allow_hyphen_values = true)]
+    pub shard: Option<Share>,
     #[command(flatten)]
     pub scene_options: SceneOptions,
     #[command(flatten)]
     pub bake: BakeOptions,
+    #[command(flatten)]
+    pub run: RunOptions,
+}
+
+#[derive(Debug, Args)]
+pub struct MergeArguments {
+    /// Folders that `bake --shard` wrote, of all shards of a bake
+    #[arg(required = true, value_name = "DIR")]
+    pub shards: Vec<PathBuf>,
+    /// Folder for the maps and manifest.json
+    #[arg(short, long, value_name = "DIR")]
+    pub output: PathBuf,
+    /// Write into the folder even if it holds other files
+    #[arg(long)]
+    pub force: bool,
+    /// Where the scene is now [default: where the first shard found it]
+    #[arg(long, value_name = "SCENE")]
+    pub scene: Option<String>,
+    /// Where the image around the scene is now [default: where the first shard found it]
+    #[arg(long, value_name = "FILE")]
+    pub environment: Option<PathBuf>,
     #[command(flatten)]
     pub run: RunOptions,
 }
@@ -610,6 +637,7 @@ impl Arguments {
             Some(Command::Inspect(inspect)) => &inspect.run,
             Some(Command::Compare(compare)) => &compare.run,
             Some(Command::Export(export)) => &export.run,
+            Some(Command::Merge(merge)) => &merge.run,
             Some(Command::Study(study)) => study.study.as_ref().map_or(&study.run, Study::run),
         }
     }

@@ -45,7 +45,7 @@ impl Clock {
     }
 
     /// Wall-clock and CPU seconds since the start.
-    fn seconds(&self) -> (f64, f64) {
+    pub fn seconds(&self) -> (f64, f64) {
         (self.wall_s(), self.cpu.elapsed().as_secs_f64())
     }
 }
@@ -53,7 +53,7 @@ impl Clock {
 /// A scene, with the wall-clock and CPU seconds that loading it took.
 pub struct LoadedScene {
     pub scene: Arc<Scene>,
-    load_s: (f64, f64),
+    pub load_s: (f64, f64),
 }
 
 /// Loads a scene and prints its warnings.
@@ -106,7 +106,8 @@ pub fn run(job: &BakeJob, terminal: &Terminal, interrupt: &Interrupt) -> Result<
     terminal.print_result(&text, &manifest)
 }
 
-fn summary(manifest: &Manifest, result: &BakeResult, folder: &str) -> String {
+/// What people want to know of a folder of maps.
+pub fn summary(manifest: &Manifest, result: &BakeResult, folder: &str) -> String {
     let mut text = String::new();
     let mut line = |name: &str, value: String| {
         let _ = writeln!(text, "{name:<9} {value}");

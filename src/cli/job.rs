@@ -16,9 +16,11 @@ use super::bake_options::BakeOptions;
 use super::compare::{self, LayerChoice};
 use super::export::{self, ExportJob};
 use super::interrupt::Interrupt;
+use super::merge::{self, MergeJob};
 #[cfg(feature = "gpu")]
 use super::render_path;
 use super::scene_input::{MissingLight, SceneInput};
+use super::shard::{self, ShardJob};
 use super::study_jobs::{
     ConvergenceJob, EffectsJob, PageJob, ReferenceJob, SpectrumJob, StabilityJob, study_job,
 };
@@ -47,6 +49,8 @@ pub enum Job {
     RenderPath(PathJob),
     Inspect(InspectJob),
     Compare(CompareJob),
+    Shard(ShardJob),
+    Merge(MergeJob),
     Export(ExportJob),
     ListStudies,
     Convergence(ConvergenceJob),
@@ -195,6 +199,7 @@ impl Job {
             Some(Command::Render(render)) => render_job(render),
             Some(Command::Inspect(inspect)) => inspect_job(inspect),
             Some(Command::Compare(compare)) => compare_job(compare),
+            Some(Command::Merge(merge)) => Ok(Job::Merge(MergeJob::new(merge)?)),
             Some(Command::Export(export)) => Ok(Job::Export(ExportJob::new(export)?)),
             Some(Command::Study(study)) => study_job(study),
         }
@@ -213,6 +218,8 @@ impl Job {
             Self::RenderPath(job) => render_path::run(&job, terminal, interrupt),
             Self::Inspect(job) => inspect::run(&job, terminal, interrupt),
             Self::Compare(job) => compare::run(&job, terminal),
+            Self::Shard(job) => shard::run(&job, terminal, interrupt),
+            Self::Merge(job) => merge::run(&job, terminal, interrupt),
             Self::Export(job) => export::run(&job, terminal, interrupt),
             Self::ListStudies => study::list(terminal),
             Self::Convergence(job) => study::convergence(&job, terminal, interrupt),
@@ -259,14 +266,20 @@ fn view_job(arguments: ViewArguments) -> Result<Job> {
 }
 
 fn bake_job(arguments: BakeArguments) -> Result<Job> {
-    Ok(Job::Bake(BakeJob {
-        scene: scene_input(arguments.scene, &arguments.scene_options, MissingLight::Fail),
-        settings: arguments
-            .bake
-            .settings(&[LayerKind::Caustic], threads(&arguments.run)?)?,
-        output: arguments.output,
-        force: arguments.force,
-    }))
+    let scene = scene_input(arguments.scene, &arguments.scene_options, MissingLight::Fail);
+    let settings = arguments
+        .bake
+        .settings(&[LayerKind::Caustic], threads(&arguments.run)?)?;
+    let (output, force) = (arguments.output, arguments.force);
+    Ok(match arguments.shard {
+        Some(share) => Job::Shard(ShardJob::new(scene, settings, share, (output, force))?),
+        None => Job::Bake(BakeJob {
+            scene,
+            settings,
+            output,
+            force,
+        }),
+    })
 }
 
 fn render_job(arguments: RenderArguments) -> Result<Job> {

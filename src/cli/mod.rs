@@ -11,12 +11,14 @@ mod export_textures;
 mod inspect;
 mod interrupt;
 mod job;
+mod merge;
 mod picture;
 mod progress_bar;
 mod render;
 #[cfg(feature = "gpu")]
 mod render_path;
 mod scene_input;
+mod shard;
 mod spectral_report;
 mod study;
 mod study_effects;

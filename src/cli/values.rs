@@ -2,6 +2,7 @@
 
 use nephroid::effect::{Effect, EffectSwitch};
 use nephroid::eye_pass::WhiteBalance;
+use nephroid::light_pass::share::Share;
 use nephroid::scene::camera_path::MAX_FRAMES;
 use nephroid::settings::{MAX_MAP_SIDE, MapResolution, Sigma, Wavelengths};
 
@@ -53,6 +54,18 @@ pub fn share(text: &str) -> Result<f64, String> {
         None => text.parse(),
     };
     number.map_err(|_| "give a share such as 2% or 0.02".to_string())
+}
+
+/// Most parts of a bake.
+const MOST_SHARDS: u32 = 100_000;
+
+/// `I/N`: one part of several.
+pub fn share_of_bake(text: &str) -> Result<Share, String> {
+    let numbers = text.split_once('/').and_then(|(number, count)| {
+        let count = count.parse().ok().filter(|count| *count <= MOST_SHARDS)?;
+        Share::new(number.parse().ok()?, count)
+    });
+    numbers.ok_or_else(|| format!("give one of several, such as 3/8, of up to {MOST_SHARDS}"))
 }
 
 /// `10s`, `500ms`, `2min`, or seconds without a unit.

@@ -12,6 +12,7 @@ pub mod pfm;
 pub mod picture;
 pub mod png;
 mod quantity;
+pub mod shards;
 pub mod textures;
 pub mod uv_file;
 mod white;

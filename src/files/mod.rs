@@ -2,12 +2,14 @@
 
 pub mod cache;
 mod folder;
+mod part;
 mod read;
 mod slug;
 mod staged;
 mod write;
 
 pub use folder::{OutputFolder, check_output_file, remove_file};
+pub use part::{file_bytes, read_part};
 pub use read::read_file;
 pub use slug::slug;
 pub use staged::StagedFolder;

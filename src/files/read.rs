@@ -40,7 +40,8 @@ pub fn read_file(path: &Path, max_bytes: u64) -> Result<Vec<u8>> {
     Ok(bytes)
 }
 
-fn unreadable(path: &Path, error: &io::Error) -> Error {
+/// Why a file cannot be read, in the user's terms.
+pub(super) fn unreadable(path: &Path, error: &io::Error) -> Error {
     let (what, remedy) = match error.kind() {
         io::ErrorKind::NotFound => ("there is no such file".into(), "check the path"),
         io::ErrorKind::NotADirectory => (

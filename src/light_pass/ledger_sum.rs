@@ -40,6 +40,16 @@ pub struct LedgerSum {
 }
 
 impl LedgerSum {
+    /// The counts of all accounts, in the order of [`Account`].
+    pub fn counts(&self) -> impl Iterator<Item = i128> + '_ {
+        self.counts.iter().flatten().copied()
+    }
+
+    /// The same, to be added to.
+    pub fn counts_mut(&mut self) -> impl Iterator<Item = &mut i128> {
+        self.counts.iter_mut().flatten()
+    }
+
     /// Books a count.
     pub fn book(&mut self, account: Account, count: FluxCount) {
         for (sum, channel) in self.counts[account as usize].iter_mut().zip(count) {

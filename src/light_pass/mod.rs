@@ -10,6 +10,7 @@ pub mod launch;
 pub mod ledger;
 pub mod ledger_sum;
 pub mod receiver_maps;
+pub mod share;
 pub mod sketch;
 pub mod spectral_node;
 pub mod wavefront;

@@ -52,6 +52,11 @@ impl ReceiverMaps {
         }
     }
 
+    /// All receivers that it has places for, in order.
+    pub fn receivers(&self) -> impl Iterator<Item = Receiver> + use<> {
+        Receiver::all(self.slots.len() / 2)
+    }
+
     /// Allocates the map of a receiver unless that was tried before.
     pub fn touch(&mut self, receiver: Receiver, chart_for: &ChartFor) {
         let slot = &mut self.slots[receiver.index()];
@@ -188,6 +193,16 @@ impl ReceiverMap {
     pub fn level_for(&self, spread_texels: f64) -> usize {
         let fits = |level: &usize| spread_texels / f64::from(1_u32 << level) >= LEAST_SPREAD_TEXELS;
         (1..self.levels.len()).take_while(fits).last().unwrap_or(0)
+    }
+
+    /// The flux so far, level by level.
+    pub fn levels(&self) -> &[FluxAccumulator] {
+        &self.levels
+    }
+
+    /// The same, to be added to.
+    pub fn levels_mut(&mut self) -> &mut [FluxAccumulator] {
+        &mut self.levels
     }
 
     /// All that was added to it.

@@ -9,6 +9,7 @@ pub mod camera_path;
 pub mod changes;
 pub mod closed;
 pub mod contact;
+mod content_hash;
 pub mod edit;
 pub mod emitter;
 pub mod environment;

@@ -10,15 +10,17 @@ use super::forecast::{CostPoint, Forecast, forecast};
 use super::goals::Goal;
 use super::light_level::{KeptError, LevelKey, LightLevel, LightState, LightStates};
 use super::map_size::Sizes;
+use super::shards::{Labour, Pass, PassSums};
 use super::sizes::MapSizes;
 use super::soft_level::SOFT_BEGINNING;
 use super::spectra::Spectra;
-use crate::error::{Result, Warning};
+use crate::error::{Error, Result, Warning};
 use crate::illumination::accumulator::FluxUnit;
 use crate::light_pass::accuracy::{self, Before, Images, LightError};
 use crate::light_pass::caustic::pass::{PassReport, Stopwatch};
 use crate::light_pass::caustic::setup::{Aim, AimedLight, Aiming};
 use crate::light_pass::caustic::statistics::FootprintStatistics;
+use crate::light_pass::share::Share;
 use crate::light_pass::wavefront::refine::Round;
 use crate::optics::LinearSrgb;
 use crate::plan::{Effect, EffectPlan};
@@ -112,8 +114,32 @@ pub(super) struct Course<'a> {
     pub(super) control: &'a Control,
     pub(super) clock: &'a mut Clock,
     pub(super) outcome: &'a mut CausticOutcome,
+    /// Who traces and deposits.
+    pub(super) labour: &'a mut Labour,
     /// Mean footprints, where they are wanted.
     pub(super) statistics: Option<FootprintStatistics>,
+}
+
+impl Course<'_> {
+    /// A pass over the lattice of a light: `run` does it, or a share of it, adding to the sums that it is given, which are
+    /// nothing yet; or shards did.
+    ///
+    /// # Errors
+    /// Shards that did not.
+    pub(super) fn pass(
+        &mut self,
+        pass: &Pass,
+        nothing: PassSums,
+        run: impl FnOnce(&Self, Option<Share>, PassSums) -> PassSums,
+    ) -> Result<PassSums> {
+        if let Labour::Merge(merging) = self.labour {
+            return merging.pass(pass, nothing);
+        }
+        let share = self.labour.share();
+        let sums = run(self, share, nothing);
+        self.labour.note(&sums)?;
+        Ok(sums)
+    }
 }
 
 impl CausticLayer<'_> {
@@ -131,9 +157,20 @@ impl CausticLayer<'_> {
     pub(super) fn bake(
         &self,
         states: &mut LightStates,
-        clock: &mut Clock,
+        (clock, labour): (&mut Clock, &mut Labour),
         show: &mut ShowLevels,
     ) -> Result<CausticOutcome> {
+        if labour.is_cut() && !self.fits_anyway() {
+            return Err(Error::failure(
+                "--memory",
+                format!(
+                    "shards need maps of a fixed size, and those asked for may take more than {} MiB and would be \
+                     made coarser where the light falls",
+                    self.settings.map_memory_bytes() >> 20
+                ),
+                "allow more --memory or ask for a smaller --map-resolution",
+            ));
+        }
         let mut outcome = CausticOutcome::default();
         let lights: Vec<&AimedLight> = self.lit().collect();
         let whole = self.control.without_deadline();
@@ -141,6 +178,7 @@ impl CausticLayer<'_> {
             control: &whole,
             clock,
             outcome: &mut outcome,
+            labour,
             statistics: None,
         };
         for light in &lights {
@@ -273,7 +311,7 @@ impl CausticLayer<'_> {
         let key = self.key(light, step, climb, sizes);
         let made = match state.take(&key) {
             Some(level) => Some(level),
-            None => self.make(light, key, unit, state, course),
+            None => self.make(light, key, unit, state, course)?,
         };
         let Some(mut level) = made else {
             return Ok(());
@@ -294,7 +332,7 @@ impl CausticLayer<'_> {
         let predecessors = step.min(ESTIMATED_LEVELS - 1);
         let is_known = |error: &KeptError| error.predecessors == predecessors;
         if !level.error.as_ref().is_some_and(is_known) && !course.control.is_cancelled() {
-            let estimate = self.error_of(light, &level, state, climb, course);
+            let estimate = self.error_of(light, &level, state, climb, course)?;
             level.error = estimate.map(|estimate| KeptError {
                 predecessors,
                 estimate,
@@ -338,14 +376,14 @@ impl CausticLayer<'_> {
         unit: FluxUnit,
         state: &mut LightState,
         course: &mut Course,
-    ) -> Option<LightLevel> {
+    ) -> Result<Option<LightLevel>> {
         match self.settings.estimator {
             Estimator::Wavefront => self.make_wavefront(light, key, unit, state, course),
             Estimator::Splat => self.make_splats(light, key, unit, state, course),
         }
     }
 
-    /// The error of a level, from the levels before it.
+    /// The error of a level, from the levels before it; `None` where nothing is known yet, and of a shard's part.
     fn error_of(
         &self,
         light: &AimedLight,
@@ -353,9 +391,11 @@ impl CausticLayer<'_> {
         state: &mut LightState,
         climb: &Climb,
         course: &mut Course,
-    ) -> Option<LightError> {
+    ) -> Result<Option<LightError>> {
+        let is_shard = course.labour.is_shard();
         let ledger = level.ledger.report("", level.unit, LinearSrgb::WHITE).energy_w;
-        match self.settings.estimator {
+        Ok(match self.settings.estimator {
+            Estimator::Wavefront if is_shard => None,
             Estimator::Wavefront => {
                 let watch = Stopwatch::start();
                 let levels = climb.levels.iter().rev().take(ESTIMATED_LEVELS - 1);
@@ -374,10 +414,15 @@ impl CausticLayer<'_> {
             }
             Estimator::Splat => {
                 let thinner = self.thinned_images(light, level, state, course)?;
-                let fine = accuracy::images(&level.maps, level.unit);
-                accuracy::estimate_splats(&fine, &thinner, level.noise.as_ref()?, &ledger)
+                match (thinner, &level.noise) {
+                    (Some(thinner), Some(noise)) if !is_shard => {
+                        let fine = accuracy::images(&level.maps, level.unit);
+                        accuracy::estimate_splats(&fine, &thinner, noise, &ledger)
+                    }
+                    _ => None,
+                }
             }
-        }
+        })
     }
 
     /// Decides on another round of refinement towards a relative RMSE; false where there is nothing more to do.

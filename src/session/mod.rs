@@ -18,6 +18,7 @@ mod map_size;
 mod part_maps;
 pub mod result;
 mod scene_change;
+pub mod shards;
 mod sizes;
 mod soft_level;
 mod spectra;
@@ -33,6 +34,7 @@ pub use forecast::{CostPoint, Forecast, ForecastReport};
 pub use result::{
     BakeCounts, BakeResult, EffectCounts, EffectReport, ItemBufferReport, LightLayer, StopReason, Timings,
 };
+pub use shards::{ShardSource, ShardSums};
 pub use sizes::BYTES_PER_TEXEL;
 pub use spectra::SpectralBand;
 pub use survey::{PresetForecast, Survey};
@@ -46,7 +48,7 @@ use crate::progress::{Control, Progress, Stage};
 use crate::scene::Scene;
 use crate::settings::{BakeSettings, ItemBufferKind};
 use crate::transport::Tracer;
-use caustic::{CausticLayer, CausticOutcome, Stopped};
+use caustic::{CausticLayer, CausticOutcome, ShowLevels, Stopped};
 use clock::Clock;
 use direct_cache::DirectCache;
 use direct_work::DirectWork;
@@ -55,6 +57,7 @@ use indirect_cache::IndirectCache;
 use indirect_work::{Gathering, IndirectWork};
 use light_level::LightStates;
 use scene_change::SceneChange;
+use shards::Labour;
 use sizes::MapSizes;
 use spectra::Spectra;
 
@@ -250,11 +253,9 @@ impl BakeSession {
         level: Option<&mut (dyn FnMut(BakeResult) + Send)>,
     ) -> Result<BakeResult> {
         settings.validate()?;
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(settings.threads)
-            .build()
-            .map_err(|error| Error::failure("--threads", error.to_string(), "ask for fewer threads"))?;
-        pool.install(|| self.bake_here(settings, progress, control, level))
+        on_threads(settings, || {
+            self.bake_here(settings, progress, control, level, &mut Labour::Alone)
+        })
     }
 
     fn aim(&mut self, settings: &BakeSettings) -> Arc<Aim> {
@@ -273,15 +274,14 @@ impl BakeSession {
         }
     }
 
-    fn bake_here(
+    /// What every bake begins with.
+    fn ground<'a>(
         &mut self,
-        settings: &BakeSettings,
-        progress: &dyn Progress,
-        control: &Control,
-        mut level: Option<&mut (dyn FnMut(BakeResult) + Send)>,
-    ) -> Result<BakeResult> {
-        let whole = Stopwatch::start();
-        let mut clock = Clock::default();
+        settings: &'a BakeSettings,
+        progress: &'a dyn Progress,
+        control: &'a Control,
+        clock: &mut Clock,
+    ) -> Ground<'a> {
         progress.advance(Stage::Build, 0, 1);
         let tracer = clock.time(|clock| &mut clock.build, || self.tracer());
         let began = Instant::now();
@@ -289,61 +289,75 @@ impl BakeSession {
         let known = self.aim.as_ref().map(|(_, aim)| Arc::clone(aim));
         let aim = clock.time(|clock| &mut clock.plan, || self.aim(settings));
         let is_new = known.is_none_or(|known| !Arc::ptr_eq(&known, &aim));
-        let plan = plan::decide(&self.scene, settings, &aim.sights);
+        Ground {
+            plan: plan::decide(&self.scene, settings, &aim.sights),
+            item_buffer_tests: if is_new { aim.tests() } else { 0 },
+            tracer,
+            aim,
+            settings,
+            progress,
+            control,
+            began,
+        }
+    }
+
+    fn bake_here(
+        &mut self,
+        settings: &BakeSettings,
+        progress: &dyn Progress,
+        control: &Control,
+        mut level: Option<&mut (dyn FnMut(BakeResult) + Send)>,
+        labour: &mut Labour,
+    ) -> Result<BakeResult> {
+        let whole = Stopwatch::start();
+        let mut clock = Clock::default();
+        let ground = self.ground(settings, progress, control, &mut clock);
+        let Ground {
+            tracer,
+            aim,
+            plan,
+            began,
+            item_buffer_tests,
+            ..
+        } = &ground;
+        let (item_buffer_tests, began) = (*item_buffer_tests, *began);
         let finish = Finish {
             scene: &self.scene,
             sizes: &self.sizes,
             settings,
-            plan: &plan,
+            plan,
         };
         let (lights, direct, indirect) = (&mut self.lights, &mut self.direct, &mut self.indirect);
-        let item_buffer_tests = if is_new { aim.tests() } else { 0 };
-        let mut outcome = CausticOutcome::default();
         let mut lamps = DirectWork::default();
-        if plan.is_on(Effect::LightPass) {
-            let smooth = (!plan.is_on(Effect::Bumps)).then(|| tracer.without_bumps());
-            let seen = smooth.as_ref().unwrap_or(&tracer);
-            let spectra = Spectra::new(seen, &aim, &plan, settings)?;
-            let layer = CausticLayer {
-                tracer: seen,
-                spectra: &spectra,
-                aim: &aim,
-                settings,
-                sizes: &self.sizes,
-                plan: &plan,
-                progress,
-                control,
-                began,
+        let mut is_first = true;
+        let show: &mut ShowLevels = &mut |levels, so_far, clock| {
+            let Some(level) = &mut level else {
+                return Ok(());
             };
-            let mut is_first = true;
-            outcome = layer.bake(lights, &mut clock, &mut |levels, so_far, clock| {
-                let Some(level) = &mut level else {
-                    return Ok(());
-                };
-                let (charts, scarce) = finish.charts(levels);
-                let direct_charts = finish.direct_charts(&charts);
-                // The first picture is to come soon: direct light follows with the second.
-                let waits =
-                    std::mem::take(&mut is_first) && !direct.knows(finish.scene.lights.len(), &direct_charts);
-                if !waits && plan.is_on(Effect::Direct) {
-                    lamps.shine(&tracer, &direct_charts, direct, (progress, control));
-                }
-                let mut so_far = lamps.added_to(so_far);
-                so_far.counts.item_buffer_tests = item_buffer_tests;
-                so_far.warnings.extend(scarce);
-                let (mut maps, mut parts) = finish.maps(levels, &charts, direct);
-                if plan.is_on(Effect::Indirect) && !waits {
-                    let mut known = IndirectWork::default();
-                    known.remember(indirect, &maps);
-                    known.add_to(indirect, &mut maps, &mut parts);
-                }
-                let mut result = finish.result((maps, parts), levels, &so_far);
-                clock.total = whole.elapsed();
-                account(&mut result, &finish, &aim, &so_far, &lamps.clock(clock));
-                level(result);
-                Ok(())
-            })?;
-        }
+            let (charts, scarce) = finish.charts(levels);
+            let direct_charts = finish.direct_charts(&charts);
+            // The first picture is to come soon: direct light follows with the second.
+            let waits =
+                std::mem::take(&mut is_first) && !direct.knows(finish.scene.lights.len(), &direct_charts);
+            if !waits && plan.is_on(Effect::Direct) {
+                lamps.shine(tracer, &direct_charts, direct, (progress, control));
+            }
+            let mut so_far = lamps.added_to(so_far);
+            so_far.counts.item_buffer_tests = item_buffer_tests;
+            so_far.warnings.extend(scarce);
+            let (mut maps, mut parts) = finish.maps(levels, &charts, direct);
+            if plan.is_on(Effect::Indirect) && !waits {
+                let mut known = IndirectWork::default();
+                known.remember(indirect, &maps);
+                known.add_to(indirect, &mut maps, &mut parts);
+            }
+            let mut result = finish.result((maps, parts), levels, &so_far);
+            clock.total = whole.elapsed();
+            account(&mut result, &finish, aim, &so_far, &lamps.clock(clock));
+            level(result);
+            Ok(())
+        };
+        let mut outcome = ground.bake(&self.sizes, lights, &mut clock, labour, show)?;
         let finished: Vec<Shown> = outcome
             .finished
             .iter()
@@ -353,7 +367,7 @@ impl BakeSession {
         outcome.warnings.extend(scarce);
         if plan.is_on(Effect::Direct) {
             let direct_charts = finish.direct_charts(&charts);
-            let complete = lamps.shine(&tracer, &direct_charts, direct, (progress, control));
+            let complete = lamps.shine(tracer, &direct_charts, direct, (progress, control));
             if !complete {
                 outcome.stopped = Some(Stopped::Cancelled);
             }
@@ -373,7 +387,7 @@ impl BakeSession {
                 None => control.without_deadline(),
             };
             let gathering = Gathering {
-                tracer: &tracer,
+                tracer,
                 sizes: &self.sizes,
                 settings,
                 progress,
@@ -390,7 +404,7 @@ impl BakeSession {
                 let mut result = finish.result((maps, parts), &finished, &outcome);
                 let mut clock = so_far.clock(&clock);
                 clock.total = whole.elapsed();
-                account(&mut result, &finish, &aim, &outcome, &clock);
+                account(&mut result, &finish, aim, &outcome, &clock);
                 level(result);
             });
             if !complete {
@@ -402,8 +416,61 @@ impl BakeSession {
         }
         let mut result = finish.result((maps, parts), &finished, &outcome);
         clock.total = whole.elapsed();
-        account(&mut result, &finish, &aim, &outcome, &clock);
+        account(&mut result, &finish, aim, &outcome, &clock);
         Ok(result)
+    }
+}
+
+/// Runs work on as many threads as settings say.
+fn on_threads<T: Send>(settings: &BakeSettings, work: impl FnOnce() -> Result<T> + Send) -> Result<T> {
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(settings.threads)
+        .build()
+        .map_err(|error| Error::failure("--threads", error.to_string(), "ask for fewer threads"))?;
+    pool.install(work)
+}
+
+/// What every bake begins with: the scene made ready, and what there is to do.
+struct Ground<'a> {
+    tracer: Arc<Tracer>,
+    aim: Arc<Aim>,
+    plan: EffectPlan,
+    /// Tests that looking around took, where it was done now.
+    item_buffer_tests: u64,
+    settings: &'a BakeSettings,
+    progress: &'a dyn Progress,
+    control: &'a Control,
+    /// When the light pass began.
+    began: Instant,
+}
+
+impl Ground<'_> {
+    /// The caustic layer, where there is one.
+    fn bake(
+        &self,
+        sizes: &MapSizes,
+        lights: &mut LightStates,
+        clock: &mut Clock,
+        labour: &mut Labour,
+        show: &mut ShowLevels,
+    ) -> Result<CausticOutcome> {
+        if !self.plan.is_on(Effect::LightPass) {
+            return Ok(CausticOutcome::default());
+        }
+        let smooth = (!self.plan.is_on(Effect::Bumps)).then(|| self.tracer.without_bumps());
+        let seen = smooth.as_ref().unwrap_or(&self.tracer);
+        let layer = CausticLayer {
+            tracer: seen,
+            spectra: &Spectra::new(seen, &self.aim, &self.plan, self.settings)?,
+            aim: &self.aim,
+            settings: self.settings,
+            sizes,
+            plan: &self.plan,
+            progress: self.progress,
+            control: self.control,
+            began: self.began,
+        };
+        layer.bake(lights, (clock, labour), show)
     }
 }
 

@@ -18,6 +18,16 @@ impl PartMaps {
         &mut self.0[band.filter(|_| !only).unwrap_or(0)]
     }
 
+    /// All sets.
+    pub(super) fn sets(&self) -> &[ReceiverMaps] {
+        &self.0
+    }
+
+    /// The same, to be added to.
+    pub(super) fn sets_mut(&mut self) -> &mut [ReceiverMaps] {
+        &mut self.0
+    }
+
     /// Adds other light.
     pub(super) fn add(&mut self, other: Self) {
         for (sum, part) in self.0.iter_mut().zip(other.0) {

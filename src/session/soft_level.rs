@@ -11,6 +11,7 @@ use super::level_plan;
 use super::light_level::{KeptError, LevelKey, LightLevel, LightState, SoftParts};
 use super::map_size::{MapSize, Sizes};
 use super::part_maps::PartMaps;
+use super::shards::{Kept, Pass, PassSums};
 use super::wavefront_level::take_strays;
 use crate::error::{Error, Result};
 use crate::geometry::sampling::even_point;
@@ -21,6 +22,7 @@ use crate::light_pass::caustic::pass::{PassReport, Seconds, Stopwatch};
 use crate::light_pass::caustic::setup::AimedLight;
 use crate::light_pass::emitter::Emitter;
 use crate::light_pass::receiver_maps::{ChartFor, ReceiverMaps};
+use crate::light_pass::share::Share;
 use crate::light_pass::wavefront::receivers::Receivers;
 use crate::optics::LinearSrgb;
 use crate::plan::Effect;
@@ -197,7 +199,9 @@ impl CausticLayer<'_> {
         let Some(mut level) = made else {
             return Ok(());
         };
-        self.estimate_soft(&mut level, climb.levels.last(), course);
+        if !course.labour.is_shard() {
+            self.estimate_soft(&mut level, climb.levels.last(), course);
+        }
         climb.levels.push(level);
         Ok(())
     }
@@ -263,20 +267,24 @@ impl CausticLayer<'_> {
         let same = before.filter(|before| before.key.trace == key.trace && before.key.sizes == key.sizes);
         let first = same.and(before_at).map_or(0, |before| before.wavefronts);
         let watch = Stopwatch::start();
-        let (mut report, mut maps, mut bands) = self.run_wavefronts(light, &key, unit, first..count, course);
+        let (mut report, mut maps, mut bands) =
+            self.run_wavefronts(light, &key, unit, first..count, course)?;
         // What was fine before a finer lattice is what to compare with now.
         let is_refined = before_at == Some(resolved.coarser());
         let mut coarse = match before.filter(|_| is_refined) {
             Some(before) => before.maps.clone(),
             None => {
-                let (other, coarse, _) = self.run_wavefronts(light, &coarse_key, unit, first..count, course);
+                let (other, coarse, _) =
+                    self.run_wavefronts(light, &coarse_key, unit, first..count, course)?;
                 let ledger = report.ledger;
                 report.merge(other);
                 report.ledger = ledger;
                 coarse
             }
         };
-        share_time(&mut report, watch.elapsed());
+        if !course.labour.is_merge() {
+            share_time(&mut report, watch.elapsed());
+        }
         course.outcome.count(&report, course.clock);
         if self.has_places(light) {
             course.outcome.meter.places.rays += report.rays;
@@ -320,8 +328,39 @@ impl CausticLayer<'_> {
         key: &LevelKey,
         unit: FluxUnit,
         wavefronts: std::ops::Range<u32>,
+        course: &mut Course,
+    ) -> Result<(PassReport, ReceiverMaps, Vec<ReceiverMaps>)> {
+        let chart_for = |receiver: Receiver| self.chart(receiver, &key.sizes);
+        let pass = Pass {
+            light: light.light,
+            kept: Kept::Nothing,
+            chart_for: &chart_for,
+            memory_bytes: self.settings.memory_bytes,
+        };
+        let nothing = PassSums::new(vec![self.part_maps()]);
+        let mut sums = course.pass(&pass, nothing, |course, share, sums| {
+            // A wavefront is one piece, and shares no ray with others.
+            let of_share = |index: &u32| share.is_none_or(|share: Share| share.has(u64::from(*index)));
+            let own: Vec<u32> = wavefronts.filter(of_share).collect();
+            self.run_own_wavefronts(light, key, (unit, &chart_for), &own, sums, course)
+        })?;
+        let mut report = sums.report;
+        let (mut maps, bands) = sums.maps.swap_remove(0).into_sum();
+        self.spectra
+            .to_linear_srgb(light.light, &mut maps, &mut report.ledger);
+        Ok((report, maps, bands))
+    }
+
+    /// Adds some wavefronts.
+    fn run_own_wavefronts(
+        &self,
+        light: &AimedLight,
+        key: &LevelKey,
+        (unit, chart_for): (FluxUnit, &ChartFor),
+        wavefronts: &[u32],
+        mut sums: PassSums,
         course: &Course,
-    ) -> (PassReport, ReceiverMaps, Vec<ReceiverMaps>) {
+    ) -> PassSums {
         let count = wavefronts.len();
         let sets = self.spectra.kept_bands().max(1) as u64;
         let texels: u64 = sets * key.sizes.values().map(MapSize::texels).sum::<u64>();
@@ -332,21 +371,23 @@ impl CausticLayer<'_> {
             .min((room as usize).max(1))
             .max(1);
         let done = std::sync::atomic::AtomicU64::new(0);
-        let chart_for = |receiver: Receiver| self.chart(receiver, &key.sizes);
-        let receivers = Receivers::new(self.tracer, &chart_for);
-        let lit = (&receivers, &chart_for as &ChartFor);
+        let receivers = Receivers::new(self.tracer, chart_for);
+        let lit = (&receivers, chart_for);
         let parts: Vec<(PassReport, PartMaps)> = (0..tasks)
             .into_par_iter()
             .map(|task| {
                 let mut report = PassReport::default();
                 let mut maps = self.part_maps();
-                for index in wavefronts.clone().skip(task).step_by(tasks) {
+                for &index in wavefronts.iter().skip(task).step_by(tasks) {
                     if course.control.is_cancelled() {
                         report.cancelled = true;
                         break;
                     }
                     if let Some(wavefront) = self.wavefront(light, index) {
-                        report.merge(self.run_wavefront(&wavefront, key, unit, lit, &mut maps, course));
+                        let (of_wavefront, added) =
+                            self.run_wavefront(&wavefront, key, unit, lit, maps, course);
+                        report.merge(of_wavefront);
+                        maps = added;
                     }
                     let done = done.fetch_add(1, std::sync::atomic::Ordering::Relaxed) + 1;
                     self.progress.advance(Stage::Caustic, done, count as u64);
@@ -354,15 +395,11 @@ impl CausticLayer<'_> {
                 (report, maps)
             })
             .collect();
-        let (mut report, mut sum) = (PassReport::default(), self.part_maps());
         for (part, maps) in parts {
-            report.merge(part);
-            sum.add(maps);
+            sums.report.merge(part);
+            sums.maps[0].add(maps);
         }
-        let (mut maps, bands) = sum.into_sum();
-        self.spectra
-            .to_linear_srgb(light.light, &mut maps, &mut report.ledger);
-        (report, maps, bands)
+        sums
     }
 
     /// Compares a level with the one before it.
@@ -418,11 +455,14 @@ impl CausticLayer<'_> {
         key: &LevelKey,
         unit: FluxUnit,
         lit: (&Receivers, &ChartFor),
-        maps: &mut PartMaps,
+        mut maps: PartMaps,
         course: &Course,
-    ) -> PassReport {
+    ) -> (PassReport, PartMaps) {
         match self.settings.estimator {
-            Estimator::Wavefront => self.run_patches(wavefront, key, unit, lit, maps, course),
+            Estimator::Wavefront => {
+                let report = self.run_patches(wavefront, key, unit, lit, &mut maps, course);
+                (report, maps)
+            }
             Estimator::Splat => self.run_splats(wavefront, key, unit, maps, course),
         }
     }

@@ -3,6 +3,8 @@
 use super::caustic::{CausticLayer, Course};
 use super::light_level::{LevelKey, LightLevel, LightState, SoftParts, TraceKey};
 use super::part_maps::PartMaps;
+use super::shards::{Kept, Pass, PassSums};
+use crate::error::Result;
 use crate::illumination::Receiver;
 use crate::illumination::accumulator::FluxUnit;
 use crate::light_pass::accuracy::{self, Images};
@@ -13,7 +15,8 @@ use crate::light_pass::caustic::pass::{self, Listener, PassReport, Source};
 use crate::light_pass::caustic::setup::AimedLight;
 use crate::light_pass::caustic::statistics::FootprintStatistics;
 use crate::light_pass::ledger_sum::LedgerSum;
-use crate::light_pass::receiver_maps::ReceiverMaps;
+use crate::light_pass::receiver_maps::{ChartFor, ReceiverMaps};
+use crate::light_pass::share::Share;
 use crate::settings::{BakeSettings, Footprint, Sigma};
 
 /// Strides of the lattice for mean footprints, at most.
@@ -25,6 +28,14 @@ const LEAST_COARSE_SIDE: usize = 64;
 /// Stride of the lattice that the blur of splats is estimated from.
 const ERROR_STRIDE: usize = 2;
 
+/// Who makes splats, of what.
+#[derive(Clone, Copy, Debug)]
+struct Worker<'a> {
+    /// Its share of the lattice, of rays that are not kept; `None` for all of it.
+    share: Option<Share>,
+    source: Source<'a>,
+}
+
 impl CausticLayer<'_> {
     /// Traces and deposits a light, or deposits again what arrived for other kernels and maps; `None` where it was
     /// stopped.
@@ -35,31 +46,41 @@ impl CausticLayer<'_> {
         unit: FluxUnit,
         state: &mut LightState,
         course: &mut Course,
-    ) -> Option<LightLevel> {
-        let (mut maps, mut second) = (self.part_maps(), self.part_maps());
+    ) -> Result<Option<LightLevel>> {
         let lattice = Lattice {
             strides: (key.stride, key.stride),
             ..self.lattice(light, unit)
         };
-        let source = match source_of(state, &key.trace) {
-            Source::Rays { .. } if key.stride == 1 => Source::Rays {
-                keep_bytes: self.settings.kept_light_bytes(),
-            },
-            source => source,
+        let (source, kept) = match source_of(state, &key.trace) {
+            Source::Rays { .. } if key.stride == 1 && !self.spectra.has(light.light) => {
+                let keep_bytes = self.settings.kept_light_bytes();
+                (Source::Rays { keep_bytes }, Kept::Arrivals(keep_bytes))
+            }
+            source => (source, Kept::Nothing),
         };
-        let halves = (&mut maps, Some(&mut second));
-        let (mut report, arrived) = self.deposit_parts(light, lattice, source, &key, halves, course);
+        let chart_for = |receiver: Receiver| self.chart(receiver, &key.sizes);
+        let pass = self.pass_of(light, kept, &chart_for);
+        let nothing = PassSums::new(vec![self.part_maps(), self.part_maps()]);
+        let mut arrived = None;
+        let mut sums = course.pass(&pass, nothing, |course, share, sums| {
+            let worker = Worker { share, source };
+            let (sums, kept) = self.deposit_parts(light, lattice, worker, &key, sums, course);
+            arrived = kept;
+            sums
+        })?;
         if let Some(arrived) = arrived {
             state.arrivals = Some((key.trace.clone(), arrived));
         }
-        let (mut maps, mut bands) = maps.into_sum();
-        let (mut second, more) = second.into_sum();
+        let mut report = sums.report;
+        let (mut second, more) = sums.maps.swap_remove(1).into_sum();
+        let (mut maps, mut bands) = sums.maps.swap_remove(0).into_sum();
         let mut none = LedgerSum::default();
         self.spectra
             .to_linear_srgb(light.light, &mut maps, &mut report.ledger);
         self.spectra.to_linear_srgb(light.light, &mut second, &mut none);
         course.outcome.count(&report, course.clock);
-        let noise = (!report.cancelled).then(|| {
+        let is_known = !report.cancelled && !course.labour.is_shard();
+        let noise = is_known.then(|| {
             course.clock.time(
                 |clock| &mut clock.deposit,
                 || {
@@ -72,7 +93,7 @@ impl CausticLayer<'_> {
         for (band, more) in bands.iter_mut().zip(more) {
             band.add(more);
         }
-        (!report.cancelled).then_some(LightLevel {
+        Ok((!report.cancelled).then_some(LightLevel {
             key,
             noise,
             maps,
@@ -85,7 +106,16 @@ impl CausticLayer<'_> {
             traced: None,
             has_own_colour: self.spectra.has(light.light),
             parts: SoftParts::default(),
-        })
+        }))
+    }
+
+    fn pass_of<'a>(&self, light: &AimedLight, kept: Kept, chart_for: &'a ChartFor<'a>) -> Pass<'a> {
+        Pass {
+            light: light.light,
+            kept,
+            chart_for,
+            memory_bytes: self.settings.memory_bytes,
+        }
     }
 
     /// Every part of a light's spectrum, one after the other. What arrived is given back of light without one.
@@ -93,16 +123,17 @@ impl CausticLayer<'_> {
         &self,
         light: &AimedLight,
         lattice: Lattice,
-        source: Source,
+        worker: Worker,
         key: &LevelKey,
-        (first, mut second): (&mut PartMaps, Option<&mut PartMaps>),
+        mut sums: PassSums,
         course: &Course,
-    ) -> (PassReport, Option<KeptLight>) {
-        let (mut report, mut kept) = (PassReport::default(), None);
-        for (band, part) in self.spectra.parts(light.light) {
+    ) -> (PassSums, Option<KeptLight>) {
+        let mut kept = None;
+        let (first, second) = sums.maps.split_at_mut(1);
+        for (number, (band, part)) in self.spectra.parts(light.light).into_iter().enumerate() {
             let mut halves = Halves {
-                first: first.of(band),
-                second: second.as_deref_mut().map(|second| second.of(band)),
+                first: first[0].of(band),
+                second: second.first_mut().map(|second| second.of(band)),
             };
             let lattice = Lattice {
                 band: part.node(0),
@@ -110,29 +141,34 @@ impl CausticLayer<'_> {
                 centre: self.spectra.ray_place(light.light, band),
                 ..lattice
             };
-            let source = if band.is_some() {
-                Source::Rays { keep_bytes: 0 }
-            } else {
-                source
+            let worker = Worker {
+                share: worker.share.map(|share| share.shifted(number as u64)),
+                source: if band.is_some() {
+                    Source::Rays { keep_bytes: 0 }
+                } else {
+                    worker.source
+                },
             };
-            let (of_part, arrived) = self.deposit_splats(lattice, source, key, &mut halves, course);
-            report.merge(of_part);
+            let (of_part, arrived, bytes) = self.deposit_splats(lattice, worker, key, &mut halves, course);
+            sums.report.merge(of_part);
+            sums.kept_bytes += bytes;
             kept = arrived;
-            if report.cancelled {
+            if sums.report.cancelled {
                 break;
             }
         }
-        (report, kept)
+        (sums, kept)
     }
 
+    /// One part. Of a share, nothing that arrives is kept, but it is told what that would take [bytes].
     fn deposit_splats(
         &self,
         lattice: Lattice,
-        source: Source,
+        worker: Worker,
         key: &LevelKey,
         halves: &mut Halves,
         course: &Course,
-    ) -> (PassReport, Option<KeptLight>) {
+    ) -> (PassReport, Option<KeptLight>, u64) {
         let depositor = Depositor {
             lattice,
             settings: self.settings,
@@ -143,10 +179,22 @@ impl CausticLayer<'_> {
             progress: self.progress,
             control: course.control,
             done: course.outcome.counts.rays,
-            total: lattice.ray_count(),
+            total: match worker.share {
+                Some(share) => share.of(lattice.ray_count()),
+                None => lattice.ray_count(),
+            },
         };
         let chart_for = |receiver: Receiver| self.chart(receiver, &key.sizes);
-        pass::run(&depositor, source, halves, &chart_for, &listener)
+        match worker.share {
+            Some(share) => {
+                let (report, bytes) = pass::run_share(&depositor, share, halves, &chart_for, &listener);
+                (report, None, bytes)
+            }
+            None => {
+                let (report, kept) = pass::run(&depositor, worker.source, halves, &chart_for, &listener);
+                (report, kept, 0)
+            }
+        }
     }
 
     /// Traces and deposits one wavefront of a soft light onto maps.
@@ -155,16 +203,20 @@ impl CausticLayer<'_> {
         light: &AimedLight,
         key: &LevelKey,
         unit: FluxUnit,
-        maps: &mut PartMaps,
+        maps: PartMaps,
         course: &Course,
-    ) -> PassReport {
+    ) -> (PassReport, PartMaps) {
         let lattice = Lattice {
             size: key.trace.size,
             ..self.lattice(light, unit)
         };
-        let source = Source::Rays { keep_bytes: 0 };
-        self.deposit_parts(light, lattice, source, key, (maps, None), course)
-            .0
+        let worker = Worker {
+            share: None,
+            source: Source::Rays { keep_bytes: 0 },
+        };
+        let (mut sums, _) =
+            self.deposit_parts(light, lattice, worker, key, PassSums::new(vec![maps]), course);
+        (sums.report, sums.maps.swap_remove(0))
     }
 
     /// Maps of every second ray across and down, each for four.
@@ -174,23 +226,29 @@ impl CausticLayer<'_> {
         level: &LightLevel,
         state: &LightState,
         course: &mut Course,
-    ) -> Option<Images> {
+    ) -> Result<Option<Images>> {
         if level.key.stride > 1 {
-            return None;
+            return Ok(None);
         }
         let lattice = Lattice {
             strides: (ERROR_STRIDE, ERROR_STRIDE),
             ..self.lattice(light, level.unit)
         };
-        let mut maps = self.part_maps();
         let source = source_of(state, &level.key.trace);
-        let (mut report, _) =
-            self.deposit_parts(light, lattice, source, &level.key, (&mut maps, None), course);
-        let (mut maps, _) = maps.into_sum();
+        let chart_for = |receiver: Receiver| self.chart(receiver, &level.key.sizes);
+        let pass = self.pass_of(light, Kept::FromArrivals, &chart_for);
+        let nothing = PassSums::new(vec![self.part_maps()]);
+        let mut sums = course.pass(&pass, nothing, |course, share, sums| {
+            let worker = Worker { share, source };
+            self.deposit_parts(light, lattice, worker, &level.key, sums, course)
+                .0
+        })?;
+        let mut report = sums.report;
+        let (mut maps, _) = sums.maps.swap_remove(0).into_sum();
         self.spectra
             .to_linear_srgb(light.light, &mut maps, &mut report.ledger);
         course.outcome.count(&report, course.clock);
-        Some(accuracy::images(&maps, level.unit))
+        Ok(Some(accuracy::images(&maps, level.unit)))
     }
 
     /// Maps without light, by band where those are kept.

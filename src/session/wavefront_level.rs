@@ -5,6 +5,8 @@ use glam::DVec2;
 use super::caustic::{CausticLayer, Course};
 use super::light_level::{LevelKey, LightLevel, LightState, SoftParts, TraceKey};
 use super::part_maps::PartMaps;
+use super::shards::{Kept, Pass, PassSums};
+use crate::error::Result;
 use crate::illumination::Receiver;
 use crate::illumination::accumulator::FluxUnit;
 use crate::light_pass::caustic::pass::{Listener, PassReport};
@@ -34,15 +36,13 @@ impl CausticLayer<'_> {
         unit: FluxUnit,
         state: &mut LightState,
         course: &mut Course,
-    ) -> Option<LightLevel> {
+    ) -> Result<Option<LightLevel>> {
         let chart_for = |receiver: Receiver| self.chart(receiver, &key.sizes);
         let receivers = Receivers::new(self.tracer, &chart_for);
         let refinement = Refinement {
             receivers: &receivers,
             rounds: &key.trace.rounds,
         };
-        let mut maps = self.part_maps();
-        let mut report = PassReport::default();
         let mut traced = None;
         // Bands are too many to be kept.
         let (mut taken, room) = if self.spectra.has_bands(light) {
@@ -56,43 +56,57 @@ impl CausticLayer<'_> {
         } else {
             (state.take_traced(&key), self.room())
         };
-        let size = self.spectra.part_size(light.light, key.trace.size);
-        let bodies = self.small_bodies(light, size, self.closeness(light, &key.trace));
-        for (band, part) in self.spectra.parts(light.light) {
-            let depositor = WavefrontDepositor {
-                receivers: &receivers,
-                chart_for: &chart_for,
-                lattice: WavefrontLattice {
-                    refinement: Some(&refinement),
-                    ..self.bumpy_lattice(light, part, &key.trace, &bodies, unit, course.control)
-                },
-                reference_w: reference_w(light),
-                coarseness: key.coarseness,
-            };
-            let listener = Listener {
-                progress: self.progress,
-                control: course.control,
-                done: course.outcome.counts.rays + report.rays,
-                total: depositor.lattice.cell_count(),
-            };
-            let maps = maps.of(band);
-            let (of_part, kept) = match taken.take() {
-                Some(taken) => (depositor.deposit_again(&taken, maps, &listener), Some(taken)),
-                None => depositor.run(&mut state.rays, Some(maps), &listener, room),
-            };
-            report.merge(of_part);
-            traced = kept;
-            if report.cancelled {
-                break;
+        let pass = Pass {
+            light: light.light,
+            kept: Kept::Rays(room.rays_bytes),
+            chart_for: &chart_for,
+            memory_bytes: self.settings.memory_bytes,
+        };
+        let nothing = PassSums::new(vec![self.part_maps()]);
+        let mut sums = course.pass(&pass, nothing, |course, share, mut sums| {
+            let maps = &mut sums.maps[0];
+            let size = self.spectra.part_size(light.light, key.trace.size);
+            let bodies = self.small_bodies(light, size, self.closeness(light, &key.trace));
+            for (band, part) in self.spectra.parts(light.light) {
+                let depositor = WavefrontDepositor {
+                    receivers: &receivers,
+                    chart_for: &chart_for,
+                    lattice: WavefrontLattice {
+                        refinement: Some(&refinement),
+                        ..self.bumpy_lattice(light, part, &key.trace, &bodies, unit, course.control)
+                    },
+                    reference_w: reference_w(light),
+                    coarseness: key.coarseness,
+                };
+                let cells = depositor.lattice.cell_count();
+                let listener = Listener {
+                    progress: self.progress,
+                    control: course.control,
+                    done: course.outcome.counts.rays + sums.report.rays,
+                    total: share.map_or(cells, |share| share.of(cells)),
+                };
+                let maps = maps.of(band);
+                let (of_part, kept) = match (share, taken.take()) {
+                    (Some(share), _) => (depositor.run_share(share, &mut sums.rays, maps, &listener), None),
+                    (None, Some(taken)) => (depositor.deposit_again(&taken, maps, &listener), Some(taken)),
+                    (None, None) => depositor.run(&mut state.rays, Some(maps), &listener, room),
+                };
+                sums.report.merge(of_part);
+                traced = kept;
+                if sums.report.cancelled {
+                    break;
+                }
             }
-        }
-        let (mut maps, bands) = maps.into_sum();
+            sums
+        })?;
+        let mut report = sums.report;
+        let (mut maps, bands) = sums.maps.swap_remove(0).into_sum();
         let traced = traced.filter(|_| !self.spectra.has_bands(light));
         self.spectra
             .to_linear_srgb(light.light, &mut maps, &mut report.ledger);
         take_strays(&mut maps, &mut report.ledger);
         course.outcome.count(&report, course.clock);
-        (!report.cancelled).then_some(LightLevel {
+        Ok((!report.cancelled).then_some(LightLevel {
             key,
             maps,
             bands: self.spectra.level_bands(light.light, bands),
@@ -105,7 +119,7 @@ impl CausticLayer<'_> {
             traced,
             has_own_colour: self.spectra.has(light.light),
             parts: SoftParts::default(),
-        })
+        }))
     }
 
     /// Traces and deposits one wavefront of a soft light onto maps.

@@ -153,9 +153,10 @@ pub struct PathCounts {
 impl PathCounts {
     /// Counts a searched segment that an event began.
     pub fn count_segment(&mut self, event: Event) {
-        match event {
-            Event::Refraction | Event::ThinTransmission => self.transmitted += 1,
-            Event::Reflection | Event::TotalInternalReflection => self.reflected += 1,
+        if event.is_transmission() {
+            self.transmitted += 1;
+        } else {
+            self.reflected += 1;
         }
     }
 }

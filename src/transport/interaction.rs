@@ -23,6 +23,16 @@ pub enum Event {
     ThinTransmission,
 }
 
+impl Event {
+    /// Whether light goes through the surface.
+    pub fn is_transmission(self) -> bool {
+        match self {
+            Self::Refraction | Self::ThinTransmission => true,
+            Self::Reflection | Self::TotalInternalReflection => false,
+        }
+    }
+}
+
 /// One way on from a surface.
 #[derive(Clone, Copy, Debug)]
 pub struct Branch {

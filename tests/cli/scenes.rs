@@ -56,6 +56,34 @@ pub fn lamps_with_extent() -> String {
     scene.to_string()
 }
 
+/// A mirror on the ground under a matte ceiling, with three lamps between them: white, green, and one of 5 cm.
+pub fn mirror_under_lamps() -> String {
+    let mut scene = triangle();
+    scene["materials"] = json!([
+        {"name": "mirror", "pbrMetallicRoughness": {"metallicFactor": 1.0, "roughnessFactor": 0.0}},
+        {"name": "plaster", "pbrMetallicRoughness": {"metallicFactor": 0.0}},
+    ]);
+    let mut ceiling = scene["meshes"][0].clone();
+    ceiling["primitives"][0]["material"] = json!(1);
+    scene["meshes"][0]["primitives"][0]["material"] = json!(0);
+    scene["meshes"] = json!([scene["meshes"][0], ceiling]);
+    scene["extensionsUsed"] = json!(["KHR_lights_punctual"]);
+    scene["extensions"] = json!({"KHR_lights_punctual": {"lights": [
+        {"type": "point", "intensity": 683.0},
+        {"type": "point", "intensity": 300.0, "color": [0.2, 1.0, 0.1]},
+        {"type": "point", "intensity": 500.0, "extras": {"radius_m": 0.05}},
+    ]}});
+    scene["nodes"] = json!([
+        {"mesh": 0, "name": "ground"},
+        {"mesh": 1, "name": "ceiling", "translation": [-1.0, 1.5, -1.0], "scale": [4.0, 4.0, 4.0]},
+        {"translation": [0.2, 0.7, 0.2], "extensions": {"KHR_lights_punctual": {"light": 0}}},
+        {"translation": [0.6, 0.6, 0.1], "extensions": {"KHR_lights_punctual": {"light": 1}}},
+        {"translation": [0.3, 0.8, 0.4], "extensions": {"KHR_lights_punctual": {"light": 2}}},
+    ]);
+    scene["scenes"] = json!([{"nodes": [0, 1, 2, 3, 4]}]);
+    scene.to_string()
+}
+
 /// Two triangles, one of N-SF11 and one of gold, under a lamp with the spectrum of illuminant A and one without.
 pub fn glasses() -> String {
     let mut scene = triangle();

@@ -2,7 +2,9 @@
 
 use crate::program::Sandbox;
 
-const COMMANDS: [&str; 7] = ["view", "bake", "render", "inspect", "compare", "export", "study"];
+const COMMANDS: [&str; 8] = [
+    "view", "bake", "render", "inspect", "compare", "export", "merge", "study",
+];
 
 #[test]
 fn help_goes_to_stdout_and_names_what_there_is() {
@@ -14,7 +16,6 @@ fn help_goes_to_stdout_and_names_what_there_is() {
         let own = sandbox.succeed(&format!("{command} --help"));
         assert!(own.stdout.contains("--json"), "{}", own.stdout);
     }
-    assert!(!help.stdout.contains("  merge"), "there is no such command yet");
     let version = sandbox.succeed("--version");
     assert_eq!(
         version.stdout,
@@ -65,9 +66,11 @@ fn bad_usage_is_one_sentence_and_exit_2() {
             "bake builtin:ring -o out --estimator splat --kernel box --sigma 2",
             "--sigma",
         ),
-        // Options whose feature is not there are no options.
         ("bake builtin:ring -o out --wavelengths 0", "--wavelengths"),
-        ("bake builtin:ring -o out --shard 1/2", "--shard"),
+        ("bake builtin:ring -o out --shard 2", "--shard"),
+        ("bake builtin:ring -o out --shard 1/2", "--density"),
+        ("merge -o out", "required"),
+        ("merge shard", "--output"),
         ("render builtin:ring -o picture", ".png"),
         ("render builtin:ring -o picture.gif", ".png"),
         ("render builtin:ring -o a.png --size 0x5", "--size"),

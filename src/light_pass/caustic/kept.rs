@@ -20,6 +20,21 @@ pub struct KeptLight {
     bytes: u64,
 }
 
+/// Memory that rows would take if they were kept [bytes].
+pub fn bytes_if_kept(rows: &[TracedRow]) -> u64 {
+    let of_row = |row: &TracedRow| {
+        let arrivals = row.arrivals.len();
+        let is_coloured = !row.arrivals.iter().all(is_grey);
+        KeptRow::bytes_of(arrivals, if is_coloured { arrivals } else { 0 })
+    };
+    rows.iter().map(of_row).sum()
+}
+
+fn is_grey(arrival: &Arrival) -> bool {
+    let [r, g, b] = arrival.flux_w.to_array().map(f64::to_bits);
+    r == g && g == b
+}
+
 /// Arrivals of one row, in their order.
 #[derive(Debug)]
 struct KeptRow {
@@ -103,10 +118,6 @@ impl KeptRow {
             triangle: arrival.triangle,
             event: arrival.event,
         };
-        let is_grey = |arrival: &Arrival| {
-            let [r, g, b] = arrival.flux_w.to_array().map(f64::to_bits);
-            r == g && g == b
-        };
         let colours = if row.arrivals.iter().all(is_grey) {
             Box::default()
         } else {
@@ -143,6 +154,10 @@ impl KeptRow {
     }
 
     fn bytes(&self) -> u64 {
-        (size_of::<Self>() + size_of_val(&*self.arrivals) + size_of_val(&*self.colours)) as u64
+        Self::bytes_of(self.arrivals.len(), self.colours.len())
+    }
+
+    fn bytes_of(arrivals: usize, colours: usize) -> u64 {
+        (size_of::<Self>() + arrivals * size_of::<Kept>() + colours * size_of::<[f64; 2]>()) as u64
     }
 }

@@ -7,12 +7,13 @@ use rayon::prelude::*;
 use std::time::Instant;
 
 use super::deposit::{DepositReport, Depositor, Halves, RowContext};
-use super::kept::KeptLight;
+use super::kept::{self, KeptLight};
 use super::lattice::{Lattice, TracedRow};
 use super::statistics::FootprintStatistics;
 use crate::illumination::Receiver;
 use crate::light_pass::ledger_sum::LedgerSum;
 use crate::light_pass::receiver_maps::ChartFor;
+use crate::light_pass::share::Share;
 use crate::light_pass::wavefront::overreach::Overreach;
 use crate::progress::{Control, Progress, Stage};
 use crate::transport::PathCounts;
@@ -190,6 +191,62 @@ pub fn run(
     (report, recorder.light)
 }
 
+/// Traces and deposits the bands of a share. Gives what its rows would take if they were kept [bytes].
+///
+/// A band borrows its neighbours' rows: they are traced for it alone, and booked by nobody else than their own band.
+pub fn run_share(
+    depositor: &Depositor,
+    share: Share,
+    halves: &mut Halves,
+    chart_for: &ChartFor,
+    listener: &Listener,
+) -> (PassReport, u64) {
+    let mut report = PassReport::default();
+    let (mut number, mut kept_bytes) = (0, 0);
+    let lattice = &depositor.lattice;
+    let (_, rows) = lattice.traced_size();
+    for face in 0..lattice.launch.face_count() {
+        let mut first_row = 0;
+        while first_row < rows {
+            let end = band_end(lattice, face, first_row);
+            let band = first_row..end;
+            (first_row, number) = (end, number + 1);
+            if !share.has(number - 1) {
+                continue;
+            }
+            if listener.control.is_cancelled() {
+                report.cancelled = true;
+                return (report, kept_bytes);
+            }
+            let watch = Stopwatch::start();
+            let lent_before = usize::from(band.start > 0);
+            let with_lent = band.start - lent_before..(end + 1).min(rows);
+            let traced: Vec<TracedRow> = with_lent
+                .into_par_iter()
+                .map(|row| lattice.trace_row(face, row))
+                .collect();
+            report.trace_s.add(watch.elapsed());
+            let own = lent_before..lent_before + band.len();
+            report.count(&traced[own.clone()]);
+            kept_bytes += kept::bytes_if_kept(&traced[own.clone()]);
+            let watch = Stopwatch::start();
+            let context = |position: usize| RowContext {
+                row: &traced[position],
+                index: band.start + position - lent_before,
+                before: position.checked_sub(1).map(|before| &traced[before]),
+                after: traced.get(position + 1),
+            };
+            let contexts: Vec<RowContext> = own.map(context).collect();
+            deposit_rows(depositor, &contexts, halves, chart_for, &mut report);
+            report.deposit_s.add(watch.elapsed());
+            listener
+                .progress
+                .advance(Stage::Caustic, listener.done + report.rays, listener.total);
+        }
+    }
+    (report, kept_bytes)
+}
+
 /// Keeps what arrives, until it is too much.
 struct Recorder {
     light: Option<KeptLight>,
@@ -258,6 +315,19 @@ fn deposit_band(
             after: rows.get(position + 1),
         })
         .collect();
+    deposit_rows(depositor, &contexts, halves, chart_for, report);
+    let keep = rows.len().saturating_sub(2);
+    rows.split_off(keep)
+}
+
+/// Deposits rows on maps that are made where they are missing.
+fn deposit_rows(
+    depositor: &Depositor,
+    contexts: &[RowContext],
+    halves: &mut Halves,
+    chart_for: &ChartFor,
+    report: &mut PassReport,
+) {
     let receivers: BTreeSet<Receiver> = contexts
         .iter()
         .flat_map(|context| context.row.arrivals.chunk_by(|a, b| a.receiver == b.receiver))
@@ -266,9 +336,7 @@ fn deposit_band(
     for receiver in receivers {
         halves.touch(receiver, chart_for);
     }
-    report.add(&depositor.deposit(&contexts, halves));
-    let keep = rows.len().saturating_sub(2);
-    rows.split_off(keep)
+    report.add(&depositor.deposit(contexts, halves));
 }
 
 impl PassReport {

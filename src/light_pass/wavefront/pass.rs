@@ -6,12 +6,14 @@ use super::cell::Patch;
 use super::coverage::{FluxTriangle, deposit_triangles};
 use super::kept_rays::KeptRays;
 use super::lattice::{TracedBand, WavefrontLattice};
+use super::ray_log::RayLog;
 use super::receivers::Receivers;
 use super::spread::{SpreadOutput, Spreader};
 use crate::illumination::Receiver;
 use crate::light_pass::caustic::pass::{Listener, PassReport, Stopwatch};
 use crate::light_pass::ledger_sum::Account;
 use crate::light_pass::receiver_maps::{ChartFor, ReceiverMaps};
+use crate::light_pass::share::Share;
 use crate::progress::{Control, Stage};
 use crate::transport::{ForEffects, PathEffects};
 
@@ -109,6 +111,41 @@ impl WavefrontDepositor<'_> {
             }
         }
         (report, kept)
+    }
+
+    /// Traces and deposits the bands of a share, knowing no ray of any other band, and writes down what it searched.
+    pub fn run_share(
+        &self,
+        share: Share,
+        log: &mut RayLog,
+        maps: &mut ReceiverMaps,
+        listener: &Listener,
+    ) -> PassReport {
+        let mut report = PassReport::default();
+        let mut lattice = self.lattice;
+        lattice.tracer.tells_all = true;
+        for face in 0..lattice.tracer.launch.face_count() {
+            for band in lattice.bands(face) {
+                let number = log.next_band();
+                if !share.has(number) {
+                    continue;
+                }
+                let watch = Stopwatch::start();
+                let band = lattice.trace(face, band);
+                report.trace_s.add(watch.elapsed());
+                report.count_traced(&band);
+                log.take(number, &band.fresh);
+                self.deposit(&band, Some(&mut *maps), listener.control, &mut report);
+                if listener.control.is_cancelled() {
+                    report.cancelled = true;
+                    return report;
+                }
+                listener
+                    .progress
+                    .advance(Stage::Caustic, listener.done + report.rays, listener.total);
+            }
+        }
+        report
     }
 
     /// Deposits kept bands: no light ray is traced.

@@ -139,7 +139,7 @@ pub struct LightSample {
     pub segments: u32,
     /// What effects took part.
     pub counts: PathCounts,
-    /// What it met, where not all of that was known.
+    /// What it met, where not all of that was known or all is asked for.
     pub fresh: Option<Box<FreshRay>>,
 }
 

@@ -4,7 +4,7 @@ use glam::{DVec2, DVec3};
 
 use super::bumps::BumpCells;
 use super::closeness::Closeness;
-use super::kept_rays::{FreshRay, KeptHit, KeptRays, Known, RayKey};
+use super::kept_rays::{FreshRay, Help, KeptHit, KeptRays, Known, RayKey};
 use super::spectrum::LightPart;
 use super::strand::{Landing, LightSample, Strand, SurfaceNode};
 use crate::geometry::Ray;
@@ -41,6 +41,8 @@ pub struct StrandTracer<'a> {
     pub wavelength: Option<u32>,
     /// What was traced before.
     pub kept: Option<&'a KeptRays>,
+    /// Whether samples say what they met even where nothing had to be searched.
+    pub tells_all: bool,
     /// How closely borders are looked for.
     pub closeness: Closeness,
     /// Asks to stop: then rays end at once, and what they give is to be thrown away.
@@ -50,7 +52,7 @@ pub struct StrandTracer<'a> {
 }
 
 /// Follows the ray that starts at a point of the unit square of a face.
-type Follow = for<'t, 'a, 'h> fn(&'t StrandTracer<'a>, usize, DVec2, &'h [KeptHit]) -> LightSample;
+type Follow = for<'t, 'a, 'h> fn(&'t StrandTracer<'a>, usize, DVec2, Option<&'h FreshRay>) -> LightSample;
 
 /// Chooses the code for a set of effects.
 struct FollowFor;
@@ -88,6 +90,8 @@ struct Search<'a> {
     /// What the same light ray met at another wavelength.
     common: &'a [KeptHit],
     hits: Vec<KeptHit>,
+    /// Segments that a transmission began.
+    transmitted: u32,
     /// Closest-hit queries.
     searches: u32,
     /// The same by what began the segment.
@@ -111,6 +115,7 @@ impl<'a> StrandTracer<'a> {
             bumps: BumpCells::EXACT,
             wavelength: None,
             kept: None,
+            tells_all: false,
             closeness: Closeness::SHARP,
             control,
             follow: limits.effects.specialise(FollowFor),
@@ -138,17 +143,16 @@ impl<'a> StrandTracer<'a> {
 
     /// Traces the ray that starts at a point of the unit square of a face.
     pub fn trace(&self, face: usize, square: DVec2) -> LightSample {
-        (self.follow)(self, face, square, &[])
+        (self.follow)(self, face, square, None)
     }
 
     /// The same where it was traced at another wavelength: the stretch before the first dispersive surface is not
     /// searched again.
     pub fn trace_again(&self, face: usize, other: &LightSample) -> LightSample {
-        let hits = other.fresh.as_ref().map_or(&[][..], |fresh| &fresh.hits);
-        (self.follow)(self, face, other.square, hits)
+        (self.follow)(self, face, other.square, other.fresh.as_deref())
     }
 
-    fn follow<E: PathEffects>(&self, face: usize, square: DVec2, common: &[KeptHit]) -> LightSample {
+    fn follow<E: PathEffects>(&self, face: usize, square: DVec2, other: Option<&FreshRay>) -> LightSample {
         let mut sample = LightSample {
             square,
             ..LightSample::default()
@@ -161,8 +165,9 @@ impl<'a> StrandTracer<'a> {
         let key = RayKey::new(face, self.wavelength.unwrap_or(0), square);
         let mut search = Search {
             known: self.kept.and_then(|kept| kept.get(&key)),
-            common,
+            common: other.map_or(&[], |other| &other.hits),
             hits: Vec::new(),
+            transmitted: 0,
             searches: 0,
             counts: PathCounts::default(),
         };
@@ -182,7 +187,7 @@ impl<'a> StrandTracer<'a> {
             depth: 0,
             strand: None,
             is_known: search.known.is_some(),
-            is_common: !common.is_empty(),
+            is_common: other.is_some(),
         }];
         while let Some(next) = waiting.pop() {
             self.step::<E>(next, floor_w, &mut search, &mut sample, &mut waiting);
@@ -190,9 +195,16 @@ impl<'a> StrandTracer<'a> {
         sample.counts.of_a_wavelength += u64::from(self.wavelength.is_some());
         sample.segments = search.searches;
         sample.counts += search.counts;
-        if search.searches > 0 {
+        if search.searches > 0 || self.tells_all {
             sample.fresh = Some(Box::new(FreshRay {
                 key,
+                transmitted: search.transmitted,
+                help: other.map(|other| Help {
+                    node: other.key.parts().1,
+                    searched: search.searches,
+                    transmitted: search.counts.transmitted as u32,
+                    reflected: search.counts.reflected as u32,
+                }),
                 hits: search.hits.into_boxed_slice(),
             }));
         }
@@ -423,6 +435,7 @@ impl Search<'_> {
         };
         let is_known = kept == Some(place)
             && known.is_some_and(|known| place.is_none_or(|place| known.leaves_alike(place.object)));
+        self.transmitted += u32::from(from.event.is_some_and(Event::is_transmission));
         self.hits.push(KeptHit {
             signature: from.signature,
             place,

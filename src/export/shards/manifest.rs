@@ -1,0 +1,178 @@
+//! `shard.json`.
+
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use crate::error::{Error, Result};
+use crate::files;
+use crate::files::cache::ContentHash;
+use crate::light_pass::share::Share;
+use crate::scene::Scene;
+use crate::session::{ShardSums, Timings};
+use crate::settings::BakeSettings;
+
+/// Version of the format of both files.
+pub(super) const SCHEMA: u32 = 1;
+
+/// Name of the file in its folder.
+pub(super) const FILE_NAME: &str = "shard.json";
+
+/// Largest one that is read [bytes].
+const MOST_BYTES: u64 = 1 << 20;
+
+/// What the user named as the scene, and how it was read.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SceneOrigin {
+    /// A path as given or `builtin:NAME`.
+    pub source: String,
+    /// Whether a sun was to be added to a scene without light.
+    pub default_light: bool,
+    /// Whether transmissive materials without a volume were taken for solid glass.
+    pub solid_glass: bool,
+    /// Image around the scene.
+    pub environment: Option<PathBuf>,
+}
+
+/// Which shard it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ShardNumber {
+    /// From 1 on.
+    pub number: u32,
+    /// How many there are.
+    pub count: u32,
+}
+
+/// Everything in `shard.json`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ShardManifest {
+    /// Version of the format.
+    pub shard_schema: u32,
+    /// Version of the program that wrote it.
+    pub program_version: String,
+    /// Which shard it is.
+    pub shard: ShardNumber,
+    /// Of the whole bake.
+    pub settings: BakeSettings,
+    /// What was baked.
+    pub scene: SceneOrigin,
+    /// Of all that light meets there.
+    pub scene_hash: String,
+    /// Wall-clock seconds.
+    pub timings_s: Timings,
+    /// Seconds of the process's CPU clock.
+    pub cpu_s: Timings,
+}
+
+impl ShardManifest {
+    /// Of the shard of a bake.
+    pub fn new(
+        scene: &Scene,
+        origin: SceneOrigin,
+        settings: &BakeSettings,
+        share: Share,
+        sums: &ShardSums,
+    ) -> Self {
+        Self {
+            shard_schema: SCHEMA,
+            program_version: env!("CARGO_PKG_VERSION").into(),
+            shard: ShardNumber {
+                number: share.number(),
+                count: share.count(),
+            },
+            settings: settings.clone(),
+            scene: origin,
+            scene_hash: hash_of(scene),
+            timings_s: sums.timings_s,
+            cpu_s: sums.cpu_s,
+        }
+    }
+
+    /// Reads that of a folder.
+    ///
+    /// # Errors
+    /// No such file, one of another kind or version.
+    pub(super) fn read(folder: &Path) -> Result<Self> {
+        let path = folder.join(FILE_NAME);
+        if folder.is_dir() && !path.exists() {
+            return Err(Error::failure(
+                folder.display().to_string(),
+                "the folder holds no shard",
+                "name folders that `nephroid bake --shard` wrote",
+            ));
+        }
+        let bytes = files::read_file(&path, MOST_BYTES)?;
+        let refused =
+            |what: String| Error::failure(path.display().to_string(), what, "bake this shard again");
+        let document: serde_json::Value =
+            serde_json::from_slice(&bytes).map_err(|error| refused(format!("is damaged ({error})")))?;
+        match document.get("shard_schema").and_then(serde_json::Value::as_u64) {
+            Some(schema) if schema == u64::from(SCHEMA) => {}
+            Some(schema) => {
+                return Err(refused(format!(
+                    "is of format {schema}, and this program reads format {SCHEMA}"
+                )));
+            }
+            None => return Err(refused("is no shard's manifest".into())),
+        }
+        serde_json::from_value(document).map_err(|error| refused(format!("is damaged ({error})")))
+    }
+
+    /// Which shard lies in a folder; `None` where none does.
+    pub(super) fn known_in(folder: &Path) -> Option<ShardNumber> {
+        Some(Self::read(folder).ok()?.shard)
+    }
+
+    /// One number for all that the shards of a bake have in common.
+    pub(super) fn fingerprint(&self) -> u64 {
+        let mut hash = ContentHash::default();
+        let settings = common_settings(&self.settings);
+        let text = format!(
+            "{}\n{}\n{}\n{settings}",
+            self.program_version, self.shard.count, self.scene_hash
+        );
+        text.bytes().for_each(|byte| hash.take(u64::from(byte)));
+        hash.value()
+    }
+
+    /// What tells this shard's bake from that of another one; `None` where they are of the same.
+    pub(super) fn difference(&self, other: &Self) -> Option<String> {
+        let differs = |what: &str, own: &str, others: &str| Some(format!("{what} {own} and not {others}"));
+        if self.program_version != other.program_version {
+            return differs(
+                "it was baked by version",
+                &self.program_version,
+                &other.program_version,
+            );
+        }
+        if self.shard.count != other.shard.count {
+            let [own, others] = [self, other].map(|shard| shard.shard.count.to_string());
+            return differs("it is a part of", &format!("{own} shards"), &others);
+        }
+        if self.scene_hash != other.scene_hash {
+            return Some("it is of another scene".into());
+        }
+        let [own, others] = [self, other].map(|shard| common_settings(&shard.settings));
+        let fields = own.as_object()?;
+        fields.iter().find_map(|(name, own)| {
+            let others = &others[name];
+            let name = name.replace('_', " ");
+            (own != others).then(|| format!("its {name} is {own} and not {others}"))
+        })
+    }
+}
+
+/// The hash of a scene, as text.
+pub(super) fn hash_of(scene: &Scene) -> String {
+    format!("{:016x}", scene.content_hash())
+}
+
+/// Settings without what each shard may have of its own.
+fn common_settings(settings: &BakeSettings) -> serde_json::Value {
+    let common = BakeSettings {
+        threads: 0,
+        ..settings.clone()
+    };
+    // Settings are numbers, names and lists: all of them are JSON.
+    serde_json::to_value(common).unwrap_or_default()
+}

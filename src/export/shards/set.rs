@@ -1,0 +1,177 @@
+//! All shards of a bake, read back. Nothing in them is trusted: they may be torn, of different bakes, or not all.
+
+use std::path::{Path, PathBuf};
+
+use super::manifest::{ShardManifest, hash_of};
+use super::sums_file::{self, SumsIndex};
+use crate::error::{Error, Result};
+use crate::scene::Scene;
+use crate::session::{ShardSource, Timings};
+
+/// Shards that are named one by one where they are missing.
+const MOST_NAMED: usize = 8;
+
+/// The folders of all shards of one bake.
+#[derive(Debug)]
+pub struct ShardSet {
+    shards: Vec<Shard>,
+}
+
+#[derive(Debug)]
+struct Shard {
+    folder: PathBuf,
+    manifest: ShardManifest,
+    sums: SumsIndex,
+}
+
+impl Shard {
+    fn open(folder: &Path) -> Result<Self> {
+        let manifest = ShardManifest::read(folder)?;
+        let sums = SumsIndex::read(&folder.join(sums_file::FILE_NAME), &manifest)?;
+        Ok(Self {
+            folder: folder.to_path_buf(),
+            manifest,
+            sums,
+        })
+    }
+
+    fn name(&self) -> String {
+        self.folder.display().to_string()
+    }
+}
+
+impl ShardSet {
+    /// Reads what the shards in some folders are, and that they are all shards of one bake.
+    ///
+    /// # Errors
+    /// A folder without a shard, a torn one; shards of different bakes or program versions, one twice, one missing.
+    pub fn open(folders: &[PathBuf]) -> Result<Self> {
+        let mut shards = Vec::new();
+        for folder in folders {
+            shards.push(Shard::open(folder)?);
+        }
+        let set = Self { shards };
+        let first = set.first()?;
+        if first.manifest.program_version != env!("CARGO_PKG_VERSION") {
+            return Err(Error::failure(
+                first.name(),
+                format!(
+                    "it was baked by version {} and this program is version {}",
+                    first.manifest.program_version,
+                    env!("CARGO_PKG_VERSION")
+                ),
+                "merge with the version that baked",
+            ));
+        }
+        for shard in &set.shards {
+            if let Some(difference) = shard.manifest.difference(&first.manifest) {
+                return Err(Error::failure(
+                    shard.name(),
+                    format!("{difference} as that of {}", first.name()),
+                    "name the shards of one bake",
+                ));
+            }
+        }
+        set.refuse_gaps()?;
+        Ok(set)
+    }
+
+    fn first(&self) -> Result<&Shard> {
+        self.shards.first().ok_or_else(|| {
+            Error::usage(
+                "merge",
+                "no shard is named",
+                "name the folders of all shards of a bake",
+            )
+        })
+    }
+
+    fn refuse_gaps(&self) -> Result<()> {
+        let first = self.first()?;
+        let mut by_number: Vec<&Shard> = self.shards.iter().collect();
+        by_number.sort_by_key(|shard| shard.manifest.shard.number);
+        let number = |shard: &Shard| shard.manifest.shard.number;
+        if let Some([one, other]) = by_number.array_windows().find(|[a, b]| number(a) == number(b)) {
+            return Err(Error::failure(
+                other.name(),
+                format!("it is shard {}, and so is {}", number(other), one.name()),
+                "name each shard once",
+            ));
+        }
+        let count = first.manifest.shard.count;
+        let mut present = by_number.iter().map(|shard| number(shard)).peekable();
+        let is_missing = |wanted: &u32| present.next_if_eq(wanted).is_none();
+        // One more than is named tells that there are more.
+        let missing: Vec<u32> = (1..=count).filter(is_missing).take(MOST_NAMED + 1).collect();
+        if missing.is_empty() && by_number.len() == count as usize {
+            return Ok(());
+        }
+        let named: Vec<String> = missing.iter().take(MOST_NAMED).map(u32::to_string).collect();
+        let more = if missing.len() > MOST_NAMED {
+            " and more"
+        } else {
+            ""
+        };
+        Err(Error::failure(
+            first.name(),
+            format!(
+                "of the {count} shards of its bake these are missing: {}{more}",
+                named.join(", ")
+            ),
+            "bake them and name their folders too",
+        ))
+    }
+
+    /// What the shards have in common: that of the first one.
+    ///
+    /// # Errors
+    /// None: a set has at least one shard.
+    pub fn manifest(&self) -> Result<&ShardManifest> {
+        Ok(&self.first()?.manifest)
+    }
+
+    /// Refuses a scene that the shards are not of.
+    ///
+    /// # Errors
+    /// Another scene.
+    pub fn check_scene(&self, scene: &Scene) -> Result<()> {
+        let first = self.first()?;
+        if first.manifest.scene_hash == hash_of(scene) {
+            return Ok(());
+        }
+        Err(Error::failure(
+            &scene.source,
+            format!("it is not the scene that {} is a shard of", first.name()),
+            "name that one with --scene, or bake all shards of this one",
+        ))
+    }
+
+    /// Wall-clock seconds of the slowest shard, and CPU seconds of all.
+    pub fn seconds(&self) -> (f64, f64) {
+        let total = |pick: fn(&ShardManifest) -> &Timings| {
+            let shards = self.shards.iter();
+            shards.map(move |shard| pick(&shard.manifest).total)
+        };
+        let wall_s = total(|manifest| &manifest.timings_s).fold(0.0, f64::max);
+        (wall_s, total(|manifest| &manifest.cpu_s).sum())
+    }
+}
+
+impl ShardSource for ShardSet {
+    fn shard_count(&self) -> usize {
+        self.shards.len()
+    }
+
+    fn pass_count(&self, shard: usize) -> usize {
+        self.shards[shard].sums.pass_count()
+    }
+
+    fn pass(&self, shard: usize, pass: usize) -> Result<Vec<u8>> {
+        let Shard { folder, sums, .. } = &self.shards[shard];
+        sums.pass(&folder.join(sums_file::FILE_NAME), pass)
+    }
+
+    fn name(&self, shard: usize) -> String {
+        self.shards[shard].name()
+    }
+}

@@ -1,0 +1,73 @@
+//! A part of a light pass: of the numbered pieces that it is made of, every so many-th one. Which pieces those are
+//! depends on their numbers alone, so that shares that are worked on apart add up to the whole.
+
+/// One share of several.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Share {
+    /// Below `count`.
+    index: u32,
+    count: u32,
+    /// Added to all numbers, so that passes of few pieces do not all begin with the same share.
+    shift: u64,
+}
+
+impl Share {
+    /// Share `number` of `count`, from 1 on; `None` where there is no such share.
+    pub fn new(number: u32, count: u32) -> Option<Self> {
+        (1..=count).contains(&number).then(|| Self {
+            index: number - 1,
+            count,
+            shift: 0,
+        })
+    }
+
+    /// From 1 on.
+    pub fn number(self) -> u32 {
+        self.index + 1
+    }
+
+    /// How many shares there are.
+    pub fn count(self) -> u32 {
+        self.count
+    }
+
+    /// The same share of a pass whose pieces are dealt out from another share on.
+    #[must_use]
+    pub fn shifted(self, by: u64) -> Self {
+        Self {
+            shift: self.shift.wrapping_add(by),
+            ..self
+        }
+    }
+
+    /// Whether a piece belongs to it.
+    pub fn has(self, piece: u64) -> bool {
+        piece.wrapping_add(self.shift) % u64::from(self.count) == u64::from(self.index)
+    }
+
+    /// About how many of so many pieces it has.
+    pub fn of(self, pieces: u64) -> u64 {
+        pieces.div_ceil(u64::from(self.count))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_piece_belongs_to_one_share() {
+        for count in 1..9 {
+            for shift in [0, 1, 7] {
+                for piece in 0..40 {
+                    let shares = (1..=count).filter_map(|number| Share::new(number, count));
+                    let owners = shares.filter(|share| share.shifted(shift).has(piece)).count();
+                    assert_eq!(owners, 1, "piece {piece} of {count} shares");
+                }
+            }
+        }
+        assert_eq!(Share::new(0, 3), None);
+        assert_eq!(Share::new(4, 3), None);
+        assert_eq!(Share::new(1, 0), None);
+    }
+}

@@ -1,0 +1,156 @@
+//! A bake cut into shards: each traces and deposits its share of every pass and gives raw sums; whoever has the sums of
+//! all shards goes through the same passes without a ray and comes to the maps of the whole bake, bit for bit.
+//!
+//! What goes on from the sums (smoothing, gutters, errors, maps) and what is no light pass (direct and indirect light) is
+//! done there, once. All decisions on the way have to be the same in every shard: what depends on what the light did is
+//! refused.
+
+mod coding;
+mod labour;
+mod pass_sums;
+
+use crate::error::{Error, Result};
+use crate::light_pass::caustic::pass::Stopwatch;
+use crate::light_pass::share::Share;
+use crate::plan;
+use crate::progress::{Control, Progress};
+use crate::session::clock::Clock;
+use crate::session::light_level::LightStates;
+use crate::session::{BakeResult, BakeSession, Timings};
+use crate::settings::{BakeSettings, MapResolution};
+pub(super) use labour::{Kept, Labour, Pass};
+pub(super) use pass_sums::PassSums;
+
+/// What a shard gives.
+#[derive(Clone, Debug)]
+pub struct ShardSums {
+    /// Of every pass, compressed.
+    pub passes: Vec<Vec<u8>>,
+    /// Wall-clock seconds.
+    pub timings_s: Timings,
+    /// CPU seconds over all threads of the process.
+    pub cpu_s: Timings,
+}
+
+/// Has the sums of all shards of a bake.
+pub trait ShardSource: Send + Sync {
+    /// How many shards there are.
+    fn shard_count(&self) -> usize;
+
+    /// How many passes a shard has sums of.
+    fn pass_count(&self, shard: usize) -> usize;
+
+    /// Sums of one pass of a shard, as [`ShardSums::passes`] has them.
+    ///
+    /// # Errors
+    /// What cannot be read.
+    fn pass(&self, shard: usize, pass: usize) -> Result<Vec<u8>>;
+
+    /// What the user knows a shard by: its folder.
+    fn name(&self, shard: usize) -> String;
+}
+
+/// Refuses settings whose bake cannot be cut: those under which the light itself decides how far it is traced.
+///
+/// # Errors
+/// A usage error that names the option and what to give instead.
+pub fn check(settings: &BakeSettings) -> Result<()> {
+    settings.validate()?;
+    if let Some(target) = settings.max_error {
+        return Err(Error::usage(
+            "--max-error",
+            format!(
+                "shards need a fixed density, and an error of {:.3} % is a target that only the whole bake can see",
+                100.0 * target
+            ),
+            "give --density RAYS_PER_SR instead of --max-error, --max-time and --preset",
+        ));
+    }
+    if settings.max_time_s.is_some() {
+        return Err(Error::usage(
+            "--max-time",
+            "shards need a fixed density, and a time ends each of them somewhere else",
+            "give --density RAYS_PER_SR alone",
+        ));
+    }
+    if settings.map_resolution == MapResolution::Auto {
+        return Err(Error::usage(
+            "--map-resolution",
+            "shards need maps of a fixed size, and auto chooses it by where the light falls",
+            "give --map-resolution N or WxH",
+        ));
+    }
+    if !plan::wants_caustics(settings) {
+        return Err(Error::usage(
+            "--layers",
+            "a shard is a part of the caustic layer, which is not to be baked here",
+            "add caustic to --layers or bake without shards",
+        ));
+    }
+    Ok(())
+}
+
+impl BakeSession {
+    /// Bakes one share of the caustic layer, as sums that [`Self::merge`] puts together.
+    ///
+    /// # Errors
+    /// Settings outside their ranges or that [`check`] refuses; maps that may not fit into memory; a bake that was
+    /// cancelled.
+    pub fn bake_shard(
+        &mut self,
+        settings: &BakeSettings,
+        share: Share,
+        progress: &dyn Progress,
+        control: &Control,
+    ) -> Result<ShardSums> {
+        check(settings)?;
+        super::on_threads(settings, || {
+            let (whole, mut clock) = (Stopwatch::start(), Clock::default());
+            let ground = self.ground(settings, progress, control, &mut clock);
+            let mut labour = Labour::shard(share);
+            let mut states = LightStates::default();
+            ground.bake(
+                &self.sizes,
+                &mut states,
+                &mut clock,
+                &mut labour,
+                &mut |_, _, _| Ok(()),
+            )?;
+            if control.is_cancelled() {
+                return Err(Error::cancelled(&self.scene.source));
+            }
+            clock.total = whole.elapsed();
+            let (timings_s, cpu_s) = clock.timings();
+            Ok(ShardSums {
+                passes: labour.into_passes(),
+                timings_s,
+                cpu_s,
+            })
+        })
+    }
+
+    /// The bake that shards are the parts of.
+    ///
+    /// # Errors
+    /// As [`Self::bake_shard`]; sums that cannot be read, or are not those of this bake.
+    pub fn merge(
+        &mut self,
+        settings: &BakeSettings,
+        shards: Box<dyn ShardSource>,
+        progress: &dyn Progress,
+        control: &Control,
+    ) -> Result<BakeResult> {
+        check(settings)?;
+        // What was kept of other bakes is not what the shards began from.
+        self.lights = LightStates::default();
+        let mut labour = Labour::merge(shards);
+        let result = super::on_threads(settings, || {
+            self.bake_here(settings, progress, control, None, &mut labour)
+        })?;
+        if control.is_cancelled() {
+            return Err(Error::cancelled(&self.scene.source));
+        }
+        labour.finish()?;
+        Ok(result)
+    }
+}
