@@ -21,7 +21,29 @@ struct StoredMaps {
     schema: u32,
     scene: SceneSummary,
     partial: bool,
+    #[serde(default)]
+    energy_w: StoredEnergy,
     maps: Vec<MapEntry>,
+}
+
+/// What the bake's light comes to.
+#[derive(Clone, Copy, Debug, Default, Deserialize)]
+struct StoredEnergy {
+    #[serde(default)]
+    emitted: f64,
+}
+
+impl StoredEnergy {
+    /// Watts by which rounding may take a texel's light below 0. Sums count in steps of 2⁻⁶⁰ of the power at least, and
+    /// colours outside of sRGB are rounded channel by channel: this is room for a million roundings.
+    fn rounding_w(self) -> f64 {
+        let power_w = if self.emitted.is_finite() {
+            self.emitted.max(0.0)
+        } else {
+            0.0
+        };
+        power_w * 2.0_f64.powi(-40)
+    }
 }
 
 /// A map as its folder has it.
@@ -105,7 +127,7 @@ impl<'a> MapReader<'a> {
     /// # Errors
     /// Files that are missing, damaged or do not fit the manifest.
     pub fn read(&self, entry: &MapEntry) -> Result<StoredMap> {
-        let (map, image) = read_map(self.folder, entry, self.scene, &self.location)?;
+        let (map, image) = self.read_map(entry)?;
         let mut lights = Vec::new();
         for channels in &entry.lights {
             let irradiance = image.rgb(&channels.channels).ok_or_else(|| {
@@ -118,10 +140,13 @@ impl<'a> MapReader<'a> {
                     "bake the scene again",
                 )
             })?;
+            let location = self.folder.join(&entry.file).display().to_string();
+            let rounding_w = self.stored.energy_w.rounding_w();
             check_light(
-                &irradiance,
+                (&map.chart, &irradiance),
+                rounding_w,
                 &channels.channels,
-                &self.folder.join(&entry.file).display().to_string(),
+                &location,
             )?;
             lights.push(StoredLight {
                 channels: channels.clone(),
@@ -151,6 +176,42 @@ impl<'a> MapReader<'a> {
         let path = inside(self.folder, file, &self.location)?;
         files::read_file(&path, uv_file::size_bytes(triangles)).map(Some)
     }
+
+    /// A map, and all that is in its file.
+    fn read_map(&self, entry: &MapEntry) -> Result<(IlluminationMap, FloatImage)> {
+        let object = object_of(self.scene, entry, &self.location)?;
+        let path = inside(self.folder, &entry.file, &self.location)?;
+        let location = path.display().to_string();
+        let image = FloatImage::read(&path)?;
+        if (image.width, image.height) != (entry.width, entry.height) {
+            return Err(Error::failure(
+                location,
+                format!(
+                    "its size {}x{} is not the manifest's {}x{}",
+                    image.width, image.height, entry.width, entry.height
+                ),
+                "bake the scene again",
+            ));
+        }
+        let layers = read_layers(&image, entry, &location)?;
+        let chart = read_chart(self.folder, entry, object, &self.location)?;
+        let rounding_w = self.stored.energy_w.rounding_w();
+        for layer in &layers {
+            check_light(
+                (&chart, &layer.irradiance),
+                rounding_w,
+                layer.kind.name(),
+                &location,
+            )?;
+        }
+        let map = IlluminationMap {
+            chart: Arc::new(chart),
+            layers,
+            error: image.channel("error.Y").map(<[f32]>::to_vec),
+            estimated_relative_rmse: entry.estimated_relative_rmse,
+        };
+        Ok((map, image))
+    }
 }
 
 /// Maps of a scene from a folder, with warnings about their state.
@@ -161,7 +222,7 @@ pub fn read(folder: &Path, scene: &Scene) -> Result<(Vec<IlluminationMap>, Vec<W
     let reader = MapReader::open(folder, scene)?;
     let mut maps: Vec<IlluminationMap> = Vec::new();
     for entry in reader.entries() {
-        let (map, _) = read_map(folder, entry, scene, &reader.location)?;
+        let (map, _) = reader.read_map(entry)?;
         if maps
             .iter()
             .any(|other| other.chart.receiver == map.chart.receiver)
@@ -223,38 +284,6 @@ fn object_of<'a>(scene: &'a Scene, entry: &MapEntry, manifest: &str) -> Result<(
         })
 }
 
-/// A map, and all that is in its file.
-fn read_map(
-    folder: &Path,
-    entry: &MapEntry,
-    scene: &Scene,
-    manifest: &str,
-) -> Result<(IlluminationMap, FloatImage)> {
-    let object = object_of(scene, entry, manifest)?;
-    let path = inside(folder, &entry.file, manifest)?;
-    let location = path.display().to_string();
-    let image = FloatImage::read(&path)?;
-    if (image.width, image.height) != (entry.width, entry.height) {
-        return Err(Error::failure(
-            location,
-            format!(
-                "its size {}x{} is not the manifest's {}x{}",
-                image.width, image.height, entry.width, entry.height
-            ),
-            "bake the scene again",
-        ));
-    }
-    let layers = read_layers(&image, entry, &location)?;
-    let chart = read_chart(folder, entry, object, manifest)?;
-    let map = IlluminationMap {
-        chart: Arc::new(chart),
-        layers,
-        error: image.channel("error.Y").map(<[f32]>::to_vec),
-        estimated_relative_rmse: entry.estimated_relative_rmse,
-    };
-    Ok((map, image))
-}
-
 fn read_layers(image: &FloatImage, entry: &MapEntry, location: &str) -> Result<Vec<Layer>> {
     let mut kinds = entry.layers.clone();
     kinds.sort_unstable();
@@ -268,14 +297,20 @@ fn read_layers(image: &FloatImage, entry: &MapEntry, location: &str) -> Result<V
                 "bake the scene again",
             )
         })?;
-        check_light(&irradiance, kind.name(), location)?;
         layers.push(Layer { kind, irradiance });
     }
     Ok(layers)
 }
 
-fn check_light(irradiance: &[[f32; 3]], what: &str, location: &str) -> Result<()> {
-    if irradiance.iter().all(is_light) {
+/// Refuses texels that hold no light.
+fn check_light(
+    (chart, irradiance): (&Chart, &[[f32; 3]]),
+    rounding_w: f64,
+    what: &str,
+    location: &str,
+) -> Result<()> {
+    let mut texels = irradiance.iter().enumerate();
+    if texels.all(|(texel, light)| is_light(light, rounding_w / chart.texel_area_m2(texel))) {
         return Ok(());
     }
     Err(Error::failure(
@@ -285,15 +320,17 @@ fn check_light(irradiance: &[[f32; 3]], what: &str, location: &str) -> Result<()
     ))
 }
 
-/// Whether a texel holds finite light of no negative luminance, but for rounding. A channel below 0 is a colour outside
-/// of sRGB, as dispersion makes it.
-fn is_light(texel: &[f32; 3]) -> bool {
+/// Whether a texel holds finite light of no negative luminance, but for rounding: of its numbers, and of the counts that
+/// they come from [W/m²]. A channel below 0 is a colour outside of sRGB, as dispersion makes it.
+fn is_light(texel: &[f32; 3], rounding: f64) -> bool {
     let channels = texel.map(f64::from);
     let largest = channels
         .iter()
         .fold(0.0_f64, |largest, value| largest.max(value.abs()));
     let luminance = LinearSrgb::from(channels).luminance();
-    largest.is_finite() && luminance >= -f64::from(f32::EPSILON) * largest
+    let lost = f64::from(f32::EPSILON) * largest + rounding;
+    // A texel without an area of its own has its neighbours' light, and no bound.
+    largest.is_finite() && (lost.is_nan() || luminance >= -lost)
 }
 
 fn read_chart(

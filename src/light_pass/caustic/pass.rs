@@ -369,6 +369,7 @@ impl PassReport {
     fn add(&mut self, deposit: &DepositReport) {
         self.ledger.merge(&deposit.ledger);
         self.splats += deposit.splats;
+        self.deposits += deposit.deposits;
         self.statistics.merge(&deposit.statistics);
     }
 }
