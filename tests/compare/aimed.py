@@ -25,6 +25,7 @@ import steps
 DEPTH = 16
 STEP_M = 1e-4
 LARGEST_PASS = 1 << 22
+FIRST_THOUSANDS = 500
 
 
 def axes_across(direction):
@@ -117,7 +118,7 @@ def main():
         return (total * watts / cells**2 / (scene.side_m / side) ** 2).reshape(side, side)
 
     trace(1, 4095)  # compiles kernels, before the clock runs
-    steps.take(folder, float(budget_s), 64, trace, pooled=False, rays_per_sample=1000)
+    steps.take(folder, float(budget_s), FIRST_THOUSANDS, trace, pooled=False, rays_per_sample=1000)
 
 
 main()

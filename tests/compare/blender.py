@@ -1,6 +1,9 @@
 """Blender's Cycles bakes the floor: the light on it from the casters, path traced or by manifold next-event estimation.
 
 Usage: blender.py SCENE.glb FOLDER BUDGET_S SIDE paths|mnee
+
+Cycles carries radiance into water without the factor n² by which it grows there. A floor under water is multiplied by it
+here, by hand.
 """
 
 import math
@@ -8,13 +11,11 @@ import sys
 
 import bpy
 import numpy
+from mathutils import Vector
 
 import scene as scenes
 import steps
 
-# Paths have to find the lamp, so that it cannot be a point: this radius blurs less than a texel of any floor here.
-LAMP_RADIUS_M = 2e-3
-SUN_ANGLE = 2e-3
 BOUNCES = 18
 DIRECT_SAMPLES = 64
 
@@ -44,7 +45,6 @@ def add_mesh(name, positions, triangles, normals=None):
 def add_material(item, kind, **inputs):
     """A material of one shader node."""
     material = bpy.data.materials.new(item.name)
-    material.use_nodes = True
     tree = material.node_tree
     tree.nodes.clear()
     shader, output = tree.nodes.new(kind), tree.nodes.new("ShaderNodeOutputMaterial")
@@ -86,20 +86,20 @@ def add_casters(scene):
         item.cycles.is_caustics_caster = True
 
 
-def add_lamp(scene, by_paths):
-    """The lamp, of the same watts."""
+def add_lamp(scene, width_m):
+    """The lamp, of the same watts. A sun is as wide as this looks from the casters, `distance_m` above the floor."""
     lamp = scene.lamp
+    distance_m = max(caster.positions[:, 1].mean() for caster in scene.casters) - scene.height_m
     data = bpy.data.lights.new("lamp", "SUN" if lamp.is_sun else "POINT")
     if lamp.is_sun:
         data.energy = lamp.amount
-        data.angle = SUN_ANGLE if by_paths else 0.0
+        data.angle = width_m / distance_m
     else:
         data.energy = 4.0 * math.pi * lamp.amount
-        data.shadow_soft_size = LAMP_RADIUS_M if by_paths else 0.0
+        data.shadow_soft_size = 0.5 * width_m
     item = bpy.data.objects.new("lamp", data)
     item.location = blender(lamp.position)
     # A sun shines along its −z.
-    from mathutils import Vector
     item.rotation_mode = "QUATERNION"
     item.rotation_quaternion = Vector(-blender(lamp.direction)).to_track_quat("Z", "Y")
     bpy.context.scene.collection.objects.link(item)
@@ -130,10 +130,13 @@ def main():
     cycles = settings()
     floor, image = add_floor(scene, side)
     add_casters(scene)
-    lamp = add_lamp(scene, by_paths)
+    # Paths have to find the lamp, so that it cannot be a point: as wide as a texel, it blurs as little as the map does.
+    lamp = add_lamp(scene, scene.side_m / side if by_paths else 0.0)
     floor.cycles.is_caustics_receiver = True
     bpy.context.view_layer.objects.active = floor
     floor.select_set(True)
+
+    growth = scenes.ior_above_floor(scene) ** 2
 
     def bake(samples, seed, passes):
         """Irradiance of these passes [W/m²]: the light of a white floor without its colour is E/π."""
@@ -141,15 +144,16 @@ def main():
         bpy.ops.object.bake(type="DIFFUSE", pass_filter=passes)
         pixels = numpy.empty(side * side * 4, dtype=numpy.float32)
         image.pixels.foreach_get(pixels)
-        return math.pi * pixels.reshape(side, side, 4)[..., :3].mean(axis=-1, dtype=numpy.float64)
+        return growth * math.pi * pixels.reshape(side, side, 4)[..., :3].mean(axis=-1, dtype=numpy.float64)
 
     direct = bake(DIRECT_SAMPLES, 1, {"DIRECT"})
     lamp.cycles.is_caustics_light = not by_paths
 
     def trace(samples, seed):
+        """Without what comes straight from the lamp. (MNEE gives nothing where one of the two passes is left out.)"""
         if by_paths:
             return bake(samples, seed, {"INDIRECT"})
-        return bake(samples, seed, {"DIRECT"}) - direct
+        return bake(samples, seed, {"DIRECT", "INDIRECT"}) - direct
 
     start_s = steps.cpu_s()
     trace(1, 4095)

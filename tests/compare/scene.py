@@ -63,6 +63,20 @@ def read(path):
     return Scene(float(low[0]), float(low[2]), float(high[0] - low[0]), float(low[1]), casters, lamp)
 
 
+def ior_above_floor(scene):
+    """The refractive index of what lies on the floor: of a dielectric whose surface is crossed an odd number of times straight
+    up from a place near the floor's middle (not in it, where vertices may be), or 1 of air."""
+    place = numpy.array([scene.x0, scene.z0]) + scene.side_m * numpy.array([0.4872931, 0.5107653])
+    for caster in scene.casters:
+        corners = caster.positions[caster.triangles][:, :, [0, 2]] - place
+        after = numpy.roll(corners, -1, axis=1)
+        turns = corners[..., 0] * after[..., 1] - corners[..., 1] * after[..., 0]
+        crossings = int(((turns > 0).all(axis=1) | (turns < 0).all(axis=1)).sum())
+        if caster.ior and crossings % 2:
+            return caster.ior
+    return 1.0
+
+
 def chunks(data):
     """The JSON and the binary chunk of a .glb."""
     length = int.from_bytes(data[12:16], "little")

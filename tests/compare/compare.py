@@ -1,0 +1,117 @@
+"""Nephroid beside other programs: error of the floor's caustic against CPU seconds, on the same meshes and maps.
+
+Writes DIR/compare.csv (every step), DIR/compare.md (the page) and DIR/SCENE_PROGRAM.png (the last maps beside the reference).
+"""
+
+import argparse
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+import figures
+import nephroid
+import page
+import pictures
+
+HERE = Path(__file__).parent
+REFERENCES = HERE.parent.parent / "assets" / "reference"
+SCENES = {"ring": "S1", "ball": "S2", "pool": "S3"}
+SIDE = 256
+
+
+@dataclass
+class Program:
+    """A row of the table: how it is started, and whether its maps are averages of independent samples."""
+
+    key: str
+    name: str
+    script: str
+    last: list[str]
+    is_pooled: bool = False
+    needs_llvm: bool = False
+
+
+PROGRAMS = [
+    Program("wavefront", "Nephroid, wavefront", "", ["wavefront"]),
+    Program("splat", "Nephroid, splat", "", ["splat"]),
+    Program("aimed", "aimed, stratified rays on Mitsuba's intersector", "aimed.py", [], needs_llvm=True),
+    Program("ptracer_llvm", "Mitsuba `ptracer`, llvm", "ptracer.py", ["llvm_ad_rgb"], True, True),
+    Program("ptracer_scalar", "Mitsuba `ptracer`, scalar", "ptracer.py", ["scalar_rgb"], True),
+    Program("cycles_paths", "Cycles bake, path traced", "blender.py", ["paths"], True),
+    Program("cycles_mnee", "Cycles bake, MNEE", "blender.py", ["mnee"], True),
+]
+
+
+def arguments():
+    """The command line."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--nephroid", type=Path, required=True)
+    parser.add_argument("--output", type=Path, required=True, metavar="DIR")
+    parser.add_argument("--budget", type=float, default=60.0, metavar="SECONDS", help="CPU seconds, per program and scene")
+    parser.add_argument("--scenes", type=Path, metavar="DIR", help="S1.glb, S2.glb, S3.glb in place of the built-in scenes")
+    parser.add_argument("--only", help="names of programs, with commas", default=",".join(each.key for each in PROGRAMS))
+    return parser.parse_args()
+
+
+def measure(program, given, scene, folder):
+    """Lets a program spend its budget; raises RuntimeError with the last it said where it fails."""
+    if not program.script:
+        nephroid.take(given.nephroid, scene, folder, given.budget, SIDE, *program.last)
+        return
+    command = [sys.executable, HERE / program.script, scene, folder, given.budget, SIDE, *program.last]
+    done = subprocess.run([str(part) for part in command], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    if done.returncode != 0:
+        raise RuntimeError(" ".join(done.stdout.split()[-40:]))
+
+
+def scene_file(given, name, folder):
+    """The meshes that every program reads."""
+    if given.scenes:
+        return given.scenes / f"{SCENES[name]}.glb"
+    return nephroid.export_scene(given.nephroid, name, folder)
+
+
+def reason_against(program):
+    """Why a program cannot be measured here, or nothing."""
+    if program.needs_llvm and not os.environ.get("DRJIT_LIBLLVM_PATH"):
+        return "libLLVM 16 or newer was not found"
+    return ""
+
+
+def main():
+    given = arguments()
+    given.output.mkdir(parents=True, exist_ok=True)
+    wanted = given.only.split(",")
+    courses, left_out = {}, {}
+    with tempfile.TemporaryDirectory() as folder:
+        folder = Path(folder)
+        for name, reference_name in SCENES.items():
+            scene = scene_file(given, name, folder)
+            reference = figures.read_pfm(REFERENCES / f"{reference_name}.pfm")
+            for program in (each for each in PROGRAMS if each.key in wanted):
+                steps = folder / name / program.key
+                steps.mkdir(parents=True)
+                try:
+                    if reason := reason_against(program):
+                        raise RuntimeError(reason)
+                    measure(program, given, scene, steps)
+                except RuntimeError as error:
+                    left_out[program.name] = str(error)
+                    print(f"compare: {program.name} on {name} is left out: {error}", file=sys.stderr, flush=True)
+                    continue
+                found = figures.course(steps, reference, program.is_pooled)
+                courses[name, program.key] = found
+                pictures.write(given.output / f"{name}_{program.key}.png", found.last, reference)
+                print(page.line(name, program, found), flush=True)
+                shutil.rmtree(steps)
+    names = {each.key: each.name for each in PROGRAMS}
+    (given.output / "compare.csv").write_text(page.csv(courses, names))
+    (given.output / "compare.md").write_text(page.markdown(courses, names, left_out, given))
+    print((given.output / "compare.md").read_text())
+
+
+main()
