@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import figures
+import machine
 import nephroid
 import page
 import pictures
@@ -25,7 +26,8 @@ SIDE = 256
 
 @dataclass
 class Program:
-    """A row of the table: how it is started, and whether its maps are averages of independent samples."""
+    """A row of the table: its script (none is Nephroid itself) and the last of its arguments. Maps of random samples may be
+    pooled where none of them is stratified."""
 
     key: str
     name: str
@@ -38,7 +40,7 @@ class Program:
 PROGRAMS = [
     Program("wavefront", "Nephroid, wavefront", "", ["wavefront"]),
     Program("splat", "Nephroid, splat", "", ["splat"]),
-    Program("aimed", "aimed, stratified rays on Mitsuba's intersector", "aimed.py", [], needs_llvm=True),
+    Program("aimed", "aimed rays on Mitsuba's intersector", "aimed.py", [], needs_llvm=True),
     Program("ptracer_llvm", "Mitsuba `ptracer`, llvm", "ptracer.py", ["llvm_ad_rgb"], True, True),
     Program("ptracer_scalar", "Mitsuba `ptracer`, scalar", "ptracer.py", ["scalar_rgb"], True),
     Program("cycles_paths", "Cycles bake, path traced", "blender.py", ["paths"], True),
@@ -103,14 +105,14 @@ def main():
                     left_out[program.name] = str(error)
                     print(f"compare: {program.name} on {name} is left out: {error}", file=sys.stderr, flush=True)
                     continue
-                found = figures.course(steps, reference, program.is_pooled)
+                found = figures.course(steps, reference, bool(program.script), program.is_pooled)
                 courses[name, program.key] = found
                 pictures.write(given.output / f"{name}_{program.key}.png", found.last, reference)
                 print(page.line(name, program, found), flush=True)
                 shutil.rmtree(steps)
     names = {each.key: each.name for each in PROGRAMS}
     (given.output / "compare.csv").write_text(page.csv(courses, names))
-    (given.output / "compare.md").write_text(page.markdown(courses, names, left_out, given))
+    (given.output / "compare.md").write_text(page.markdown(courses, names, left_out, machine.heading(given)))
     print((given.output / "compare.md").read_text())
 
 

@@ -12,7 +12,8 @@ CERTAIN = 3.0
 
 @dataclass
 class Cost:
-    """CPU seconds to a target; `sign` is "", "<" (the first step is better), "~" (extrapolated) or "never" (bias)."""
+    """CPU seconds to a target; `sign` is "", "<" (the first step is better), "~" (extrapolated), "never" (bias, or an error that
+    does not fall) or "?" (one step only, which tells no slope)."""
 
     sign: str
     cpu_s: float = math.nan
@@ -26,7 +27,7 @@ class Course:
     rays: list[float]
     error: list[float]
     steps: list[dict]
-    bias: float  # what surely remains however long it runs, as a relative RMSE; 0 where none was seen
+    bias: float  # what surely remains however long it runs, as a relative RMSE; 0 where none was seen or looked for
     flux: float  # watts on the floor, of the reference's, at the last step
     is_pooled: bool
     last: numpy.ndarray
@@ -36,6 +37,14 @@ class Course:
         if len(self.error) < 2:
             return math.nan
         return float(numpy.polyfit(numpy.log(self.cpu_s), numpy.log(self.error), 1)[0])
+
+    def noise(self):
+        """What of the last error is not bias."""
+        return math.sqrt(self.error[-1] ** 2 - self.bias**2)
+
+    def flux_doubt(self):
+        """Standard error of `flux`, of texels that are noisy each on its own."""
+        return self.noise() / math.sqrt(self.last.size)
 
     def cost(self, target):
         """What an error at or below `target` costs.
@@ -47,10 +56,12 @@ class Course:
             if error <= target:
                 return self.between(index, target)
         exponent = -0.5 if self.is_pooled else self.slope()
-        if target <= self.bias or not exponent < 0.0:
+        if math.isnan(exponent):
+            return Cost("?")
+        if target <= self.bias or exponent >= 0.0:
             return Cost("never")
-        noise, wanted = (math.sqrt(value**2 - self.bias**2) for value in (self.error[-1], target))
-        return Cost("~", self.cpu_s[-1] * (noise / wanted) ** (-1.0 / exponent))
+        wanted = math.sqrt(target**2 - self.bias**2)
+        return Cost("~", self.cpu_s[-1] * (self.noise() / wanted) ** (-1.0 / exponent))
 
     def between(self, index, target):
         """The seconds at `target`, on a straight line of logarithms to the first step that is as good."""
@@ -67,14 +78,22 @@ def relative_rmse(irradiance, reference):
 
 
 def common_error(first, second, reference):
-    """The error that two independent maps surely have in common, as a relative RMSE: noise of one is not that of the other."""
-    product = (first - reference) * (second - reference) / reference.mean() ** 2
-    least = product.mean() - CERTAIN * product.std() / math.sqrt(product.size)
-    return math.sqrt(max(least, 0.0))
+    """The error that two independent maps surely have in common, as a relative RMSE.
+
+    Noise of one is not that of the other, so that the mean product of their errors a and b is the square of the bias. Its
+    variance is the sum of ((a + b)/2 (a − b))² over the texels, by their number squared: what it is where noise is even.
+    """
+    a, b = ((each - reference) / reference.mean() for each in (first, second))
+    doubt = math.sqrt(((0.5 * (a + b) * (a - b)) ** 2).sum()) / a.size
+    return math.sqrt(max((a * b).mean() - CERTAIN * doubt, 0.0))
 
 
-def course(folder, reference, is_pooled):
-    """Reads the steps in a folder. Pooled ones are averaged, by samples, with all before them."""
+def course(folder, reference, is_random, is_pooled):
+    """Reads the steps in a folder. Pooled ones are averaged, by samples, with all before them.
+
+    Only random samples are independent from step to step, so that what two of them have in common is bias. Errors of lattices
+    are alike, and shrink all the same.
+    """
     steps = json.loads((folder / "steps.json").read_text())
     maps = [numpy.load(folder / f"step_{number:02}.npy") for number in range(len(steps))]
     seconds, rays = ([step[name] for step in steps] for name in ("cpu_s", "rays"))
@@ -85,7 +104,7 @@ def course(folder, reference, is_pooled):
         shown = list(sums / numpy.cumsum(weights)[:, None, None])
         seconds, rays = list(numpy.cumsum(seconds)), list(numpy.cumsum(rays))
     errors = [relative_rmse(each, reference) for each in shown]
-    bias = common_error(shown[-2], maps[-1], reference) if len(maps) > 1 else 0.0
+    bias = common_error(shown[-2], maps[-1], reference) if is_random and len(maps) > 1 else 0.0
     # What remains cannot be more than what there is.
     bias = min(bias, errors[-1])
     return Course(seconds, rays, errors, steps, bias, float(shown[-1].mean() / reference.mean()), is_pooled, shown[-1])

@@ -6,7 +6,7 @@ import subprocess
 import numpy
 import OpenEXR
 
-TARGETS = [0.1, 0.05, 0.02, 0.01, 0.005, 0.002, 0.001, 0.0005]
+TARGETS = [0.2, 0.1, 0.05, 0.02, 0.01, 0.005, 0.002, 0.001, 0.0005]
 # Rays per steradian; under a sun, of the casters seen from their farthest receiver.
 DENSITIES = [5e4 * 2**power for power in range(14)]
 LUMINANCE = numpy.array([0.2126, 0.7152, 0.0722])
@@ -45,6 +45,7 @@ def take(program, scene, folder, budget_s, side, estimator):
             break
         numpy.save(folder / f"step_{number:02}.npy", floor_of(maps, manifest))
         steps.append({"cpu_s": taken_s, "samples": value, "rays": manifest["counts"]["rays"],
+                      "before_s": manifest["cpu_s"]["load"] + manifest["cpu_s"]["build"],
                       "estimated": manifest["error"]["estimated_relative_rmse"]})
         (folder / "steps.json").write_text(json.dumps(steps))
         growth = taken_s / steps[-2]["cpu_s"] if len(steps) > 1 else growth

@@ -17,19 +17,19 @@ def cpu_s():
 
 
 def take(folder, budget_s, first, trace, *, pooled, build_s=0.0, rays_per_sample=1):
-    """Writes `step_NN.npy` (maps of irradiance [W/m²]) and `steps.json` (their CPU seconds and rays).
+    """Writes `step_NN.npy` (maps of irradiance [W/m²]) and `steps.json`: their CPU seconds and rays, and the seconds before.
 
     `trace(samples, seed)` makes a map, independent of all others; `build_s` is what each call takes before it samples.
     Pooled maps share the budget, since all of them are averaged; others have it each for itself.
     """
     folder = Path(folder)
-    steps, samples, spent_s = [], first, 0.0
+    steps, samples, spent_s, before_s = [], first, 0.0, cpu_s()
     while samples >= 1:
         start_s = cpu_s()
         irradiance = trace(samples, len(steps))
         taken_s = max(cpu_s() - start_s - build_s, 1e-3)
         numpy.save(folder / f"step_{len(steps):02}.npy", irradiance)
-        steps.append({"cpu_s": taken_s, "samples": samples, "rays": samples * rays_per_sample})
+        steps.append({"cpu_s": taken_s, "samples": samples, "rays": samples * rays_per_sample, "before_s": before_s})
         (folder / "steps.json").write_text(json.dumps(steps))
         spent_s = spent_s + taken_s if pooled else taken_s
         left_s = budget_s - spent_s if pooled else budget_s
