@@ -3,8 +3,9 @@
 Usage: aimed.py SCENE.glb FOLDER BUDGET_S SIDE
 
 Rays fill the casters' bounding cone around a lamp, or their bounding rectangle across a sun's light, one in each cell of a
-square grid. Mitsuba chooses between reflection and refraction. A ray that goes on starts a little further on its own
-line, not beside it as Mitsuba's `spawn_ray` would have it, which would move what is focused.
+square grid. Mitsuba chooses between reflection and refraction, by numbers that are even among neighbours. A ray that goes on
+starts a little further on its own line, not beside it as Mitsuba's `spawn_ray` would have it, which would move what is
+focused.
 """
 
 import math
@@ -26,6 +27,9 @@ DEPTH = 16
 STEP_M = 1e-4
 LARGEST_PASS = 1 << 22
 FIRST_THOUSANDS = 500
+# Steps along a grid's two axes whose sums are spread evenly over [0, 1): 0.7549 and 0.5698 (powers of the root of
+# x³ = x + 1), in units of 2⁻³², so that they wrap around exactly.
+EVEN_STEPS = (3242174889, 2447445414)
 
 
 def axes_across(direction):
@@ -66,8 +70,11 @@ def rectangle(lamp, points):
 
 
 @dr.syntax
-def land(loaded, floor, ray, random):
-    """Follows rays over specular surfaces: where they end, and whether on the floor after at least one of them."""
+def land(loaded, floor, ray, choice):
+    """Follows rays over specular surfaces: where they end, and whether on the floor after at least one of them.
+
+    One number in [0, 1) makes all choices of a ray: what is left of it after one serves for the next.
+    """
     context = mi.BSDFContext(mi.TransportMode.Importance)
     depth, going, landed = mi.UInt32(0), mi.Bool(True), mi.Bool(False)
     while going:
@@ -76,8 +83,9 @@ def land(loaded, floor, ray, random):
         landed = hit.is_valid() & on_floor & (depth > 0)
         going = hit.is_valid() & ~on_floor & (depth < DEPTH)
         ray.maxt = dr.select(landed, hit.t, ray.maxt)
-        pair = mi.Point2f(random.next_float32(), random.next_float32())
-        sample, _ = hit.bsdf().sample(context, hit, random.next_float32(), pair, going)
+        sample, _ = hit.bsdf().sample(context, hit, choice, mi.Point2f(0.5), going)
+        is_reflected = mi.has_flag(sample.sampled_type, mi.BSDFFlags.DeltaReflection)
+        choice = dr.select(going, dr.select(is_reflected, choice, choice - 1.0 + sample.pdf) / sample.pdf, choice)
         onwards = hit.to_world(sample.wo)
         ray = dr.select(going, mi.Ray3f(hit.p + STEP_M * onwards, onwards), ray)
         depth += 1
@@ -100,9 +108,11 @@ def main():
         random = mi.PCG32(count, initstate=seed)
         cell = dr.arange(mi.UInt32, count) + dr.opaque(mi.UInt32, start)
         width = dr.opaque(mi.UInt32, cells)
-        u = (cell // width + random.next_float32()) / mi.Float(width)
-        v = (cell % width + random.next_float32()) / mi.Float(width)
-        place, landed = land(loaded, floor, aim(u, v), random)
+        down, across = cell // width, cell % width
+        u = (down + random.next_float32()) / mi.Float(width)
+        v = (across + random.next_float32()) / mi.Float(width)
+        turn = down * EVEN_STEPS[0] + across * EVEN_STEPS[1] + dr.opaque(mi.UInt32, seed & 0xFFFFFFFF)
+        place, landed = land(loaded, floor, aim(u, v), mi.Float(turn >> 8) * 2.0**-24)
         column = mi.Int32((place.x - scene.x0) * (side / scene.side_m))
         row = mi.Int32((place.z - scene.z0) * (side / scene.side_m))
         inside = landed & (column >= 0) & (column < side) & (row >= 0) & (row < side)

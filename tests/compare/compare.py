@@ -1,6 +1,7 @@
 """Nephroid beside other programs: error of the floor's caustic against CPU seconds, on the same meshes and maps.
 
-Writes DIR/compare.csv (every step), DIR/compare.md (the page) and DIR/SCENE_PROGRAM.png (the last maps beside the reference).
+Writes DIR/compare.csv (every step), DIR/compare.md (the page), DIR/SCENE_PROGRAM.png (the last maps beside the reference) and
+DIR/steps (every map).
 """
 
 import argparse
@@ -56,11 +57,16 @@ def arguments():
     parser.add_argument("--budget", type=float, default=60.0, metavar="SECONDS", help="CPU seconds, per program and scene")
     parser.add_argument("--scenes", type=Path, metavar="DIR", help="S1.glb, S2.glb, S3.glb in place of the built-in scenes")
     parser.add_argument("--only", help="names of programs, with commas", default=",".join(each.key for each in PROGRAMS))
+    parser.add_argument("--page", action="store_true", help="measures nothing: the page of what a run left in DIR/steps")
     return parser.parse_args()
 
 
 def measure(program, given, scene, folder):
     """Lets a program spend its budget; raises RuntimeError with the last it said where it fails."""
+    if program.needs_llvm and not os.environ.get("DRJIT_LIBLLVM_PATH"):
+        raise RuntimeError("libLLVM 16 or newer was not found")
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
     if not program.script:
         nephroid.take(given.nephroid, scene, folder, given.budget, SIDE, *program.last)
         return
@@ -77,43 +83,38 @@ def scene_file(given, name, folder):
     return nephroid.export_scene(given.nephroid, name, folder)
 
 
-def reason_against(program):
-    """Why a program cannot be measured here, or nothing."""
-    if program.needs_llvm and not os.environ.get("DRJIT_LIBLLVM_PATH"):
-        return "libLLVM 16 or newer was not found"
-    return ""
+def measured(given, wanted):
+    """Every program on every scene: courses by (scene, program), and why some are left out, by program."""
+    courses, left_out = {}, {}
+    with tempfile.TemporaryDirectory() as folder:
+        for name, reference_name in SCENES.items():
+            scene = None if given.page else scene_file(given, name, Path(folder))
+            reference = figures.read_pfm(REFERENCES / f"{reference_name}.pfm")
+            for program in wanted:
+                steps = given.output / "steps" / name / program.key
+                try:
+                    if not given.page:
+                        measure(program, given, scene, steps)
+                    found = figures.course(steps, reference, bool(program.script), program.is_pooled)
+                except (RuntimeError, OSError) as error:
+                    left_out[program.name] = str(error)
+                    print(f"compare: {program.name} on {name} is LEFT OUT: {error}", file=sys.stderr, flush=True)
+                    continue
+                courses[name, program.key] = found
+                pictures.write(given.output / f"{name}_{program.key}.png", found.last, reference)
+                print(page.line(name, program, found), flush=True)
+    return courses, left_out
 
 
 def main():
     given = arguments()
     given.output.mkdir(parents=True, exist_ok=True)
-    wanted = given.only.split(",")
-    courses, left_out = {}, {}
-    with tempfile.TemporaryDirectory() as folder:
-        folder = Path(folder)
-        for name, reference_name in SCENES.items():
-            scene = scene_file(given, name, folder)
-            reference = figures.read_pfm(REFERENCES / f"{reference_name}.pfm")
-            for program in (each for each in PROGRAMS if each.key in wanted):
-                steps = folder / name / program.key
-                steps.mkdir(parents=True)
-                try:
-                    if reason := reason_against(program):
-                        raise RuntimeError(reason)
-                    measure(program, given, scene, steps)
-                except RuntimeError as error:
-                    left_out[program.name] = str(error)
-                    print(f"compare: {program.name} on {name} is left out: {error}", file=sys.stderr, flush=True)
-                    continue
-                found = figures.course(steps, reference, bool(program.script), program.is_pooled)
-                courses[name, program.key] = found
-                pictures.write(given.output / f"{name}_{program.key}.png", found.last, reference)
-                print(page.line(name, program, found), flush=True)
-                shutil.rmtree(steps)
     names = {each.key: each.name for each in PROGRAMS}
+    courses, left_out = measured(given, [each for each in PROGRAMS if each.key in given.only.split(",")])
     (given.output / "compare.csv").write_text(page.csv(courses, names))
-    (given.output / "compare.md").write_text(page.markdown(courses, names, left_out, machine.heading(given)))
-    print((given.output / "compare.md").read_text())
+    text = page.markdown(courses, names, left_out, machine.heading(given))
+    (given.output / "compare.md").write_text(text)
+    print(text)
 
 
 main()
