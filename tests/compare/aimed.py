@@ -1,11 +1,10 @@
 """What somebody who knows how writes on Mitsuba's intersector: rays aimed at what is specular, stratified, into texels.
 
-Usage: aimed.py SCENE.glb FOLDER BUDGET_S SIDE
+Usage: aimed.py SCENE.glb FOLDER BUDGET_S SIDE line|beside
 
 Rays fill the casters' bounding cone around a lamp, or their bounding rectangle across a sun's light, one in each cell of a
 square grid. Mitsuba chooses between reflection and refraction, by numbers that are even among neighbours. A ray that goes on
-starts a little further on its own line, not beside it as Mitsuba's `spawn_ray` would have it, which would move what is
-focused.
+starts a little further on its own line; or beside it, where Mitsuba's `spawn_ray` has it, as all of Mitsuba's integrators do.
 """
 
 import math
@@ -69,8 +68,13 @@ def rectangle(lamp, points):
     return lambda u, v: mi.Ray3f(corner + u * first + v * second, direction), lamp.amount * float(size.prod())
 
 
+def onwards(hit, direction, is_beside):
+    """A ray that goes on from a surface."""
+    return hit.spawn_ray(direction) if is_beside else mi.Ray3f(hit.p + STEP_M * direction, direction)
+
+
 @dr.syntax
-def land(loaded, floor, ray, choice):
+def land(loaded, floor, ray, choice, is_beside):
     """Follows rays over specular surfaces: where they end, and whether on the floor after at least one of them.
 
     One number in [0, 1) makes all choices of a ray: what is left of it after one serves for the next.
@@ -86,14 +90,13 @@ def land(loaded, floor, ray, choice):
         sample, _ = hit.bsdf().sample(context, hit, choice, mi.Point2f(0.5), going)
         is_reflected = mi.has_flag(sample.sampled_type, mi.BSDFFlags.DeltaReflection)
         choice = dr.select(going, dr.select(is_reflected, choice, choice - 1.0 + sample.pdf) / sample.pdf, choice)
-        onwards = hit.to_world(sample.wo)
-        ray = dr.select(going, mi.Ray3f(hit.p + STEP_M * onwards, onwards), ray)
+        ray = dr.select(going, onwards(hit, hit.to_world(sample.wo), is_beside), ray)
         depth += 1
     return ray(ray.maxt), landed
 
 
 def main():
-    file, folder, budget_s, side = sys.argv[1:]
+    file, folder, budget_s, side, origins = sys.argv[1:]
     side = int(side)
     scene = scenes.read(file)
     points = numpy.vstack([caster.positions for caster in scene.casters])
@@ -112,7 +115,7 @@ def main():
         u = (down + random.next_float32()) / mi.Float(width)
         v = (across + random.next_float32()) / mi.Float(width)
         turn = down * EVEN_STEPS[0] + across * EVEN_STEPS[1] + dr.opaque(mi.UInt32, seed & 0xFFFFFFFF)
-        place, landed = land(loaded, floor, aim(u, v), mi.Float(turn >> 8) * 2.0**-24)
+        place, landed = land(loaded, floor, aim(u, v), mi.Float(turn >> 8) * 2.0**-24, origins == "beside")
         column = mi.Int32((place.x - scene.x0) * (side / scene.side_m))
         row = mi.Int32((place.z - scene.z0) * (side / scene.side_m))
         inside = landed & (column >= 0) & (column < side) & (row >= 0) & (row < side)

@@ -135,7 +135,6 @@ def main():
     floor.cycles.is_caustics_receiver = True
     bpy.context.view_layer.objects.active = floor
     floor.select_set(True)
-
     growth = scenes.ior_above_floor(scene) ** 2
 
     def bake(samples, seed, passes):

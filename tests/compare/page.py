@@ -17,11 +17,11 @@ def percent(value):
 
 
 def number(value):
-    """Seconds or rays of three digits at most, large ones as powers of ten."""
+    """Seconds, rays or a ratio to two digits, large ones as powers of ten."""
     if value >= 1e6:
         mantissa, exponent = f"{value:.1e}".split("e")
         return f"{mantissa}e{int(exponent)}"
-    return f"{float(f'{value:.2g}'):,.0f}" if value >= 10 else f"{value:.2g}"
+    return f"{float(f'{value:.2g}'):,.0f}" if value >= 9.95 else f"{value:#.2g}"
 
 
 def cost(found):
@@ -31,7 +31,7 @@ def cost(found):
 
 def slope(course):
     """The exponent of error against time."""
-    return "" if math.isnan(course.slope()) else f"{course.slope():.2f}".replace("-0.00", "0").replace("-", "−")
+    return "" if math.isnan(course.slope()) else f"{round(course.slope(), 2) + 0.0:.2f}".replace("-", "−")
 
 
 def line(scene, program, course):
@@ -57,7 +57,8 @@ def markdown(courses, names, left_out, heading):
     scenes = list(dict.fromkeys(scene for scene, _ in courses))
     parts = [heading + ":", table(courses, names)]
     parts += [sentence for scene in scenes for sentence in verdicts(scene, of_scene(courses, scene), names)]
-    parts += [asked(courses)] if any(key == OURS for _, key in courses) else []
+    ours = {scene: course for (scene, key), course in courses.items() if key == OURS}
+    parts += [asked(ours), worse_than_asked(ours)] if ours else []
     parts += [stuck(courses, names), watts(courses, names), not_counted(courses, names)]
     parts += [f"{name} is left out: {reason}." for name, reason in left_out.items()]
     return "\n\n".join(part for part in parts if part) + "\n"
@@ -80,17 +81,25 @@ def table(courses, names):
     return "\n".join(rows)
 
 
-def asked(courses):
+def bakes(ours):
+    """Nephroid's bakes to the table's targets: (scene, step, true error)."""
+    for scene, course in ours.items():
+        yield from ((scene, step, error) for step, error in zip(course.steps, course.error) if step["samples"] in TARGETS)
+
+
+def asked(ours):
     """What Nephroid was asked for, what it thought it had, and what it had."""
     rows = ["| scene | `--max-error` | estimated | true | rays | CPU s |", "|---|---|---|---|---|---|"]
-    for (scene, key), course in courses.items():
-        if key != OURS:
-            continue
-        for step, error in zip(course.steps, course.error):
-            if step["samples"] in TARGETS:
-                rows.append(f"| `{scene}` | {percent(step['samples'])} | {percent(step['estimated'])} | {percent(error)} | "
-                            f"{step['rays']:,} | {number(step['cpu_s'])} |")
+    rows += [f"| `{scene}` | {percent(step['samples'])} | {percent(step['estimated'])} | {percent(error)} | "
+             f"{step['rays']:,} | {number(step['cpu_s'])} |" for scene, step, error in bakes(ours)]
     return "\n".join(rows)
+
+
+def worse_than_asked(ours):
+    """Where Nephroid promised too much."""
+    said = [f"{percent(step['samples'])} on `{scene}`" for scene, step, error in bakes(ours) if error > step["samples"]]
+    return f"The true error is above what was asked for in {len(said)} of {len(list(bakes(ours)))} bakes" + (
+        f": {listed(said)}." if said else ".")
 
 
 def listed(words):
