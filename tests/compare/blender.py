@@ -56,7 +56,7 @@ def add_material(item, kind, **inputs):
 
 
 def add_floor(scene, side):
-    """The floor and the image that is baked. It reflects all where a bake looks at it and nothing after: it sends no light on."""
+    """The floor and the image that is baked. It reflects all where a bake looks at it, and sends no light on."""
     x, z, size, y = scene.x0, scene.z0, scene.side_m, scene.height_m
     corners = numpy.array([[x, y, z + size], [x + size, y, z + size], [x + size, y, z], [x, y, z]])
     floor = add_mesh("floor", corners, numpy.array([[0, 1, 2], [0, 2, 3]]))

@@ -43,7 +43,7 @@ PROGRAMS = [
     Program("wavefront", "Nephroid, wavefront", "", ["wavefront"]),
     Program("splat", "Nephroid, splat", "", ["splat"]),
     Program("aimed", "aimed rays on Mitsuba's intersector", "aimed.py", ["line"], needs_llvm=True),
-    Program("aimed_beside", "the same, started by Mitsuba's `spawn_ray`", "aimed.py", ["beside"], needs_llvm=True),
+    Program("aimed_beside", "aimed rays, started by Mitsuba's `spawn_ray`", "aimed.py", ["beside"], needs_llvm=True),
     Program("ptracer_llvm", "Mitsuba `ptracer`, llvm", "ptracer.py", ["llvm_ad_rgb"], True, True, "aimed_beside"),
     Program("ptracer_scalar", "Mitsuba `ptracer`, scalar", "ptracer.py", ["scalar_rgb"], True, starts_as="aimed_beside"),
     Program("cycles_paths", "Cycles bake, path traced", "blender.py", ["paths"], True),

@@ -12,8 +12,8 @@ CERTAIN = 3.0
 
 @dataclass
 class Cost:
-    """CPU seconds to a target; `sign` is "", "<" (the first step is better), "~" (extrapolated), "never" (bias, or an error that
-    does not fall) or "?" (one step only, which tells no slope)."""
+    """CPU seconds to a target; `sign` is "", "<" (the first step is better), "~" (extrapolated), "never" (bias, or an error
+    that does not fall) or "?" (one step only, which tells no slope)."""
 
     sign: str
     cpu_s: float = math.nan

@@ -15,7 +15,8 @@ def heading(given):
         f"Mitsuba {metadata.version('mitsuba')} (Dr.Jit {metadata.version('drjit')}, {llvm()})",
         f"Blender {metadata.version('bpy')}",
     ]
-    return f"{', '.join(programs)}; {processor()}, {os.cpu_count()} cores; {given.budget:g} CPU seconds for each program and scene"
+    machine = f"{processor()}, {os.cpu_count()} cores"
+    return f"{', '.join(programs)}; {machine}; {given.budget:g} CPU seconds for each program and scene"
 
 
 def processor():

@@ -71,12 +71,14 @@ def of_scene(courses, scene):
 
 def table(courses, names):
     """The table: one row for each scene and program."""
-    rows = ["| scene | program | error | after CPU s | slope | CPU s to 5 % | to 2 % | to 1 % |", "|---|---|---|---|---|---|---|---|"]
+    rows = ["| scene | program | error | after CPU s | slope | CPU s to 5 % | to 2 % | to 1 % |"]
+    rows += ["|---|---|---|---|---|---|---|---|"]
     before = None
     for (scene, key), course in courses.items():
-        costs = " | ".join(cost(course.cost(target)) for target in TARGETS)
         shown = "" if scene == before else f"`{scene}`"
-        rows.append(f"| {shown} | {names[key]} | {percent(course.error[-1])} | {number(course.cpu_s[-1])} | {slope(course)} | {costs} |")
+        cells = [shown, names[key], percent(course.error[-1]), number(course.cpu_s[-1]), slope(course)]
+        cells += [cost(course.cost(target)) for target in TARGETS]
+        rows.append(f"| {' | '.join(cells)} |")
         before = scene
     return "\n".join(rows)
 
@@ -132,10 +134,11 @@ def against(mine, rivals):
         return "no other program comes{}", ""
     name, best = min(rivals.items(), key=lambda item: item[1].cpu_s)
     doubt = {"<": "more than ", "~": "about "}.get(mine.sign, "about " if best.sign == "~" else "")
+    times = number(best.cpu_s / mine.cpu_s)
     if best.sign == "<":
-        return f"{name} takes {{}} times the CPU time of the wavefront", f"at most {number(best.cpu_s / mine.cpu_s)}"
+        return f"{name} takes {{}} times the CPU time of the wavefront", f"at most {times}"
     if mine.cpu_s <= best.cpu_s:
-        return f"the best of the others, {name}, takes {{}} times the CPU time of the wavefront", doubt + number(best.cpu_s / mine.cpu_s)
+        return f"the best of the others, {name}, takes {{}} times the CPU time of the wavefront", doubt + times
     return f"**{name} is quicker**: {{}} of the CPU time of the wavefront", percent(best.cpu_s / mine.cpu_s)
 
 
@@ -165,7 +168,9 @@ def stuck(courses, names):
     """Who has a bias above the finest target."""
     said = [f"{names[key]} on `{scene}` ({percent(course.bias)} or more)"
             for (scene, key), course in courses.items() if course.bias > min(TARGETS)]
-    return f"Stuck, since independent runs have an error in common that no number of samples takes away: {listed(said)}." if said else ""
+    if not said:
+        return ""
+    return f"Stuck, since independent runs have an error in common that no number of samples takes away: {listed(said)}."
 
 
 def watts(courses, names):
