@@ -7,6 +7,11 @@ from figures import CERTAIN
 TARGETS = [0.05, 0.02, 0.01]
 OURS = "wavefront"
 NEPHROID = ["wavefront", "splat"]
+LEGEND = """*slope* is the exponent of error against CPU time, by least squares of logarithms through all steps. Seconds are
+interpolated between steps; `<` is the first step, which is better already; `~` goes on from the last one, with the square
+root of time where independent samples are averaged, else as measured; `never` is a bias. What two independent runs have in
+common, by three standard errors, counts as bias; `ptracer`, whose noise hides it, has that of aimed rays that start as its
+own do."""
 # Watts that are off by more than this are told.
 FLUX_BOUND = 0.02
 
@@ -55,7 +60,7 @@ def csv(courses, names):
 def markdown(courses, names, left_out, heading):
     """Tables and sentences."""
     scenes = list(dict.fromkeys(scene for scene, _ in courses))
-    parts = [heading + ":", table(courses, names)]
+    parts = [heading + ":", table(courses, names), LEGEND]
     parts += [sentence for scene in scenes for sentence in verdicts(scene, of_scene(courses, scene), names)]
     ours = {scene: course for (scene, key), course in courses.items() if key == OURS}
     parts += [asked(ours), worse_than_asked(ours)] if ours else []
@@ -170,7 +175,7 @@ def stuck(courses, names):
             for (scene, key), course in courses.items() if course.bias > min(TARGETS)]
     if not said:
         return ""
-    return f"Stuck, since independent runs have an error in common that no number of samples takes away: {listed(said)}."
+    return f"Stuck with a bias that no number of samples takes away: {listed(said)}."
 
 
 def watts(courses, names):
