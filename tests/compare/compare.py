@@ -114,9 +114,12 @@ def main():
     given = arguments()
     given.output.mkdir(parents=True, exist_ok=True)
     names = {each.key: each.name for each in PROGRAMS}
+    heading = given.output / "heading.txt"
+    if not given.page:
+        heading.write_text(machine.heading(given))
     courses, left_out = measured(given, [each for each in PROGRAMS if each.key in given.only.split(",")])
     (given.output / "compare.csv").write_text(page.csv(courses, names))
-    text = page.markdown(courses, names, left_out, machine.heading(given))
+    text = page.markdown(courses, names, left_out, heading.read_text())
     (given.output / "compare.md").write_text(text)
     print(text)
 
