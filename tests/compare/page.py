@@ -134,7 +134,7 @@ def against(mine, rivals):
     """One target, the wavefront and the best of the other programs: a sentence, and the figure that it has a place for."""
     rivals = {name: found for name, found in rivals.items() if not math.isnan(found.cpu_s)}
     if math.isnan(mine.cpu_s):
-        return "the wavefront does not come{}", ""
+        return "the wavefront does not come{}" if mine.sign == "never" else "it is not known when the wavefront comes{}", ""
     if not rivals:
         return "no other program comes{}", ""
     name, best = min(rivals.items(), key=lambda item: item[1].cpu_s)
