@@ -1,0 +1,119 @@
+"""What the steps of a program come to: error against CPU time, what is bias, what targets cost."""
+
+import json
+import math
+from dataclasses import dataclass
+
+import numpy
+
+# A bias is held for one where it is this many standard errors above nothing.
+CERTAIN = 3.0
+
+
+@dataclass
+class Cost:
+    """CPU seconds to a target; `sign` is "", "<" (the first step is better), "~" (extrapolated), "never" (bias, or an error
+    that does not fall) or "?" (one step only, which tells no slope)."""
+
+    sign: str
+    cpu_s: float = math.nan
+
+
+@dataclass
+class Course:
+    """Errors (relative RMSE) of one program on one scene, step by step."""
+
+    cpu_s: list[float]
+    rays: list[float]
+    error: list[float]
+    steps: list[dict]
+    bias: float  # what surely remains however long it runs, as a relative RMSE; 0 where none was seen or looked for
+    flux: float  # watts on the floor, of the reference's, at the last step
+    is_pooled: bool
+    last: numpy.ndarray
+
+    def slope(self):
+        """Exponent of error against CPU time, by least squares of logarithms; none of fewer than two steps."""
+        if len(self.error) < 2:
+            return math.nan
+        return float(numpy.polyfit(numpy.log(self.cpu_s), numpy.log(self.error), 1)[0])
+
+    def noise(self):
+        """What of the last error is not bias."""
+        return math.sqrt(self.error[-1] ** 2 - self.bias**2)
+
+    def flux_doubt(self):
+        """Standard error of `flux`, of texels that are noisy each on its own."""
+        return self.noise() / math.sqrt(self.last.size)
+
+    def cost(self, target):
+        """What an error at or below `target` costs.
+
+        Beyond what was measured, noise goes on to fall: with the square root of time where independent samples are
+        averaged, else as it did. Bias stays.
+        """
+        for index, error in enumerate(self.error):
+            if error <= target:
+                return self.between(index, target)
+        exponent = -0.5 if self.is_pooled else self.slope()
+        if math.isnan(exponent):
+            return Cost("?")
+        if target <= self.bias or exponent >= 0.0:
+            return Cost("never")
+        wanted = math.sqrt(target**2 - self.bias**2)
+        return Cost("~", self.cpu_s[-1] * (self.noise() / wanted) ** (-1.0 / exponent))
+
+    def between(self, index, target):
+        """The seconds at `target`, on a straight line of logarithms to the first step that is as good."""
+        if index == 0:
+            return Cost("<", self.cpu_s[0])
+        before, after = self.error[index - 1], self.error[index]
+        share = math.log(before / target) / math.log(before / after)
+        return Cost("", self.cpu_s[index - 1] * (self.cpu_s[index] / self.cpu_s[index - 1]) ** share)
+
+
+def relative_rmse(irradiance, reference):
+    """sqrt(mean((I − R)²)) / mean(R)."""
+    return float(numpy.sqrt(((irradiance - reference) ** 2).mean()) / reference.mean())
+
+
+def common_error(first, second, reference):
+    """The error that two independent maps surely have in common, as a relative RMSE.
+
+    Noise of one is not that of the other, so that the mean product of their errors a and b is the square of the bias. Its
+    variance is the sum of ((a + b)/2 (a − b))² over the texels, by their number squared: what it is where noise is even.
+    """
+    a, b = ((each - reference) / reference.mean() for each in (first, second))
+    doubt = math.sqrt(((0.5 * (a + b) * (a - b)) ** 2).sum()) / a.size
+    return math.sqrt(max((a * b).mean() - CERTAIN * doubt, 0.0))
+
+
+def course(folder, reference, is_random, is_pooled):
+    """Reads the steps in a folder. Pooled ones are averaged, by samples, with all before them.
+
+    Only random samples are independent from step to step, so that what two of them have in common is bias. Errors of lattices
+    are alike, and shrink all the same.
+    """
+    steps = json.loads((folder / "steps.json").read_text())
+    maps = [numpy.load(folder / f"step_{number:02}.npy") for number in range(len(steps))]
+    seconds, rays = ([step[name] for step in steps] for name in ("cpu_s", "rays"))
+    shown = maps
+    if is_pooled:
+        weights = numpy.array([step["samples"] for step in steps], dtype=float)
+        sums = numpy.cumsum(weights[:, None, None] * numpy.stack(maps), axis=0)
+        shown = list(sums / numpy.cumsum(weights)[:, None, None])
+        seconds, rays = list(numpy.cumsum(seconds)), list(numpy.cumsum(rays))
+    errors = [relative_rmse(each, reference) for each in shown]
+    bias = common_error(shown[-2], maps[-1], reference) if is_random and len(maps) > 1 else 0.0
+    # What remains cannot be more than what there is.
+    bias = min(bias, errors[-1])
+    return Course(seconds, rays, errors, steps, bias, float(shown[-1].mean() / reference.mean()), is_pooled, shown[-1])
+
+
+def read_pfm(path):
+    """A portable float map of one channel, little-endian; rows in the order in which they are stored."""
+    kind, size, scale, data = path.read_bytes().split(b"\n", 3)
+    if kind != b"Pf" or float(scale) >= 0.0:
+        raise ValueError(f"{path}: one channel, little-endian, is what is read here")
+    width, height = map(int, size.split())
+    return numpy.frombuffer(data, "<f4", width * height).reshape(height, width).astype(float)
