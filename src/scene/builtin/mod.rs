@@ -1,10 +1,8 @@
-//! Procedural scenes. All but `gallery`, `showroom`, `pool-bump`, `spectrum` and
-//! `bowl` have a reference solution and are meshes of
+//! Procedural scenes. All but `showroom`, `pool-bump`, `spectrum` and `bowl` have a reference solution and are meshes of
 //! the exact surfaces that it was computed on: in `assets/reference/`, or for `prism` by wavelength in closed form.
 
 mod ball;
 mod bowl;
-mod gallery;
 mod mirror;
 mod paraboloid;
 pub mod parts;
@@ -19,9 +17,8 @@ mod spectrum;
 use super::Scene;
 
 /// Names of all built-in scenes, the program's default first.
-pub const NAMES: [&str; 13] = [
+pub const NAMES: [&str; 12] = [
     "showroom",
-    "gallery",
     "ring",
     "ball",
     "pool",
@@ -38,7 +35,6 @@ pub const NAMES: [&str; 13] = [
 /// The scene of that name; `None` where there is none.
 pub fn build(name: &str) -> Option<Scene> {
     let mut scene = match name {
-        "gallery" => gallery::build(),
         "showroom" => showroom::build(),
         "ring" => ring::ring(),
         "ball" => ball::build(),
