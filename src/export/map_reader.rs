@@ -380,3 +380,31 @@ fn inside(folder: &Path, file: &str, manifest: &str) -> Result<std::path::PathBu
         "bake the scene again",
     ))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn light_may_be_below_black_by_rounding_alone() {
+        let rounding = StoredEnergy { emitted: 2.0 }.rounding_w() / 1e-4;
+        let count = (2.0_f64.powi(-60) * 4.0 / 1e-4) as f32;
+        for texel in [
+            [2.0 * count, -count, count],
+            [0.0, -5.0 * count, 35.0 * count],
+            [0.0; 3],
+        ] {
+            assert!(is_light(&texel, rounding), "{texel:?}");
+        }
+        for texel in [
+            [0.0, -1e-3, 0.0],
+            [-1.0; 3],
+            [f32::NAN, 0.0, 0.0],
+            [f32::INFINITY; 3],
+        ] {
+            assert!(!is_light(&texel, rounding), "{texel:?}");
+        }
+        let unknown = StoredEnergy { emitted: f64::NAN }.rounding_w();
+        assert!(unknown == 0.0 && !is_light(&[-count; 3], unknown));
+    }
+}

@@ -58,6 +58,10 @@ fn check(case: &EffectScene, settings: &BakeSettings, faults: &mut Vec<String>) 
         if is_called == (took.rays == 0) || (!is_called && !is_nothing(&took)) {
             faults.push(format!("{what}: {took:?}"));
         }
+        let deposits = [Effect::LightPass, Effect::Refraction, Effect::Reflection].contains(&effect);
+        if is_called && deposits && took.deposits == 0 {
+            faults.push(format!("{what}: no deposit, {took:?}"));
+        }
         if is_called {
             check_off(case, &settings, effect, (&whole, &what), faults);
         }

@@ -273,6 +273,7 @@ fn plots(names: &[&'static str], runs: &[Run]) -> Vec<Plot> {
                 name: (*name).into(),
                 points: points(runs, name, estimator, cost),
             })
+            .filter(|curve| !curve.points.is_empty())
             .collect(),
     };
     let (rays, cpu_s) = ("light rays", "CPU time of the light pass [s]");
@@ -317,7 +318,12 @@ fn findings(names: &[&'static str], runs: &[Run]) -> Vec<String> {
             off(*ratio)
         ));
     }
-    for name in names {
+    let is_judged = |name: &&&str| {
+        runs.iter()
+            .any(|run| run.scene == **name && run.agreement.is_some())
+    };
+    let (judged, others): (Vec<&&str>, Vec<&&str>) = names.iter().partition(is_judged);
+    for name in judged {
         let price = |estimator, cost: fn(&Run) -> f64| price(&points(runs, name, estimator, cost));
         findings.push(format!(
             "`{name}`: a true error of {} takes the wavefront {} rays and {} CPU s, splats {} and {} (~ extrapolated, < already \
@@ -327,6 +333,14 @@ fn findings(names: &[&'static str], runs: &[Run]) -> Vec<String> {
             price(Estimator::Wavefront, Run::cpu_s),
             price(Estimator::Splat, Run::rays),
             price(Estimator::Splat, Run::cpu_s),
+        ));
+    }
+    if !others.is_empty() {
+        let names: Vec<String> = others.iter().map(|name| format!("`{name}`")).collect();
+        findings.push(format!(
+            "{}: no bake is known to {} after {TRUTH_LIMIT_S} s, so that their true errors are not.",
+            names.join(", "),
+            percent(TRUSTED)
         ));
     }
     findings
