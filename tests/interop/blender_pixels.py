@@ -34,7 +34,9 @@ def main():
     scene.cycles.use_denoising = False
     scene.cycles.max_bounces = 0
     scene.render.resolution_x = scene.render.resolution_y = side
-    scene.render.filter_size = 0.01
+    # A pixel is the mean over itself, and nothing of its neighbours.
+    scene.cycles.pixel_filter_type = "BOX"
+    scene.cycles.filter_width = 1.0
     scene.render.image_settings.file_format = "OPEN_EXR"
     scene.render.image_settings.color_depth = "32"
     scene.render.filepath = out + ".exr"
