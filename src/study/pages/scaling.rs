@@ -24,13 +24,16 @@ const SIDES: [usize; 8] = [64, 128, 256, 512, 1024, 2048, 4096, 8192];
 
 const THREADS: [usize; 2] = [1, 2];
 
-/// Of all but the ladder of rays [1/sr].
+/// Of all but the ladders of rays and threads [1/sr].
 const DENSITY_PER_SR: f64 = 3e5;
+
+/// Of the ladder of threads [1/sr]: the work has to be long beside what a bake begins and ends with.
+const OF_THREADS_PER_SR: f64 = 1e7;
 
 /// Cost per ray from 4,000 to 4 million triangles grows at most so many times.
 const MOST_GROWTH: f64 = 3.0;
 
-/// Memory of the ladder of rays [bytes]: what was traced is not kept for later changes where it takes more than a quarter.
+/// Memory of the ladders of rays and threads [bytes]: what was traced is not kept for later changes where it takes more than a quarter.
 const MEMORY_BYTES: u64 = 16 << 20;
 
 /// Memory over all numbers of rays stays within this factor.
@@ -180,7 +183,8 @@ fn steps(bench: &Bench) -> Result<Vec<Step>> {
     for &threads in &THREADS {
         let settings = BakeSettings {
             threads,
-            ..bench.at(splat(usual), 256)
+            memory_bytes: MEMORY_BYTES,
+            ..bench.at(splat(if bench.quick { usual } else { OF_THREADS_PER_SR }), 256)
         };
         step("threads", threads as f64, &ring, &settings)?;
     }
@@ -237,7 +241,7 @@ fn findings(steps: &[Step]) -> Vec<String> {
     if let [one, two] = wall[..] {
         findings.push(format!(
             "Two threads take {} of the time of one on the wall; half would be all of it. That light rays go well in parallel {} with \
-             that, on a machine that does nothing else.",
+             it, on a machine that does nothing else.",
             percent(two / one),
             verdict(two < 0.7 * one)
         ));
