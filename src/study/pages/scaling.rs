@@ -115,8 +115,8 @@ pub(super) fn page(bench: &Bench) -> Result<Page> {
     Ok(Page {
         title: "How cost grows".into(),
         settings: format!(
-            "Splats, {DENSITY_PER_SR:e} rays/sr but where they are counted, maps of 256 × 256 texels but where those are. Rays, texels and \
-             threads on `builtin:ring`; triangles: a glass ball of 20·4^n triangles over a floor."
+            "Splats, {DENSITY_PER_SR:e} rays/sr but where they are counted, and {OF_THREADS_PER_SR:e} where threads are; maps of 256 × 256 \
+             texels but where those are. Rays, texels and threads on `builtin:ring`; triangles: a glass ball of 20·4^n triangles over a floor."
         ),
         table,
         plots: vec![
