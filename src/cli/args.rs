@@ -125,7 +125,7 @@ pub struct MapsOption {
 
 #[derive(Debug, Args)]
 pub struct ViewArguments {
-    /// .glb, .gltf or builtin:NAME [default: builtin:showroom]
+    /// .glb, .gltf or builtin:NAME [default: builtin:gallery]
     pub scene: Option<String>,
     /// Write one JSON line per change of state of the window
     #[cfg(feature = "viewer")]

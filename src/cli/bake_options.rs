@@ -151,6 +151,16 @@ impl BakeOptions {
         })
     }
 
+    /// Of the scene that nobody asked for: all its light, as a draft, where nothing else is asked.
+    pub fn for_a_first_look(mut self) -> Self {
+        if !self.names_quality() && self.estimator != Some(Estimator::Splat) {
+            self.preset = Some(Preset::Draft);
+        }
+        let all = vec![LayerKind::Caustic, LayerKind::Direct, LayerKind::Indirect];
+        self.layers.get_or_insert(all);
+        self
+    }
+
     /// Whether any of them is given.
     #[cfg(feature = "viewer")]
     pub fn names_any(&self) -> bool {

@@ -31,7 +31,7 @@ use super::{
 };
 
 /// Scene of `view` when none is named.
-const DEFAULT_SCENE: &str = "builtin:showroom";
+const DEFAULT_SCENE: &str = "builtin:gallery";
 
 /// Pixels of pictures and of the window when no size is given.
 const DEFAULT_SIZE: (u32, u32) = (1280, 720);
@@ -240,10 +240,14 @@ fn view_job(arguments: ViewArguments) -> Result<Job> {
             "use bake, render or inspect with --json",
         ));
     }
+    let bake = match &arguments.scene {
+        Some(_) => arguments.bake.clone(),
+        None => arguments.bake.clone().for_a_first_look(),
+    };
     let scene = arguments.scene.unwrap_or_else(|| DEFAULT_SCENE.to_string());
     Ok(Job::View(ViewJob {
         scene: scene_input(scene, &arguments.scene_options, MissingLight::Add),
-        maps: map_source(arguments.maps, &arguments.bake, &arguments.run)?,
+        maps: map_source(arguments.maps, &bake, &arguments.run)?,
         picture: PictureRequest {
             camera: arguments.picture.camera,
             size: arguments.picture.size.unwrap_or(DEFAULT_SIZE),

@@ -88,7 +88,11 @@ impl CausticLayer<'_> {
     /// As fine as its light asks for; in tiles where that takes less.
     fn automatic_wish(&self, receiver: Receiver, seen: &FootprintStatistics) -> Option<Wish> {
         let object = receiver.object();
-        let times = self.sizes.doublings(receiver, seen, LARGEST_TILED_SIDE)?;
+        let mut times = self.sizes.doublings(receiver, seen, LARGEST_TILED_SIDE)?;
+        if self.plan.is_on(Effect::Direct) {
+            // Not coarser than direct light on a map of its own.
+            times = times.max(self.sizes.doublings_for_direct(object, self.settings));
+        }
         for times in (0..=times).rev() {
             let size = self.sizes.doubled_size(object, times)?;
             let is_small = size.0.max(size.1) <= LARGEST_AUTOMATIC_SIDE;

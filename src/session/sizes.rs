@@ -193,6 +193,18 @@ impl MapSizes {
         (0..).find(|&times| !(coarse(times) && small(times)))
     }
 
+    /// How often the map of an object doubles until direct light on it is no coarser than on one that holds nothing else.
+    pub fn doublings_for_direct(&self, object: usize, settings: &BakeSettings) -> u32 {
+        let sizes = self
+            .direct_size(object, settings)
+            .zip(self.doubled_size(object, 0));
+        sizes.map_or(0, |((width, height), first)| {
+            (0..)
+                .find(|times| (first.0 << times) * (first.1 << times) >= width * height)
+                .unwrap_or(0)
+        })
+    }
+
     /// The size of an object's map after so many doublings.
     pub fn doubled_size(&self, object: usize, times: u32) -> Option<(usize, usize)> {
         let (width, height) = first_size(self.parametrisation(object)?.suggested_aspect);

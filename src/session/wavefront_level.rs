@@ -16,6 +16,7 @@ use crate::light_pass::ledger_sum::{Account, LedgerSum};
 use crate::light_pass::receiver_maps::{ChartFor, ReceiverMaps};
 use crate::light_pass::wavefront::bodies::SmallBodies;
 use crate::light_pass::wavefront::bumps::BumpCells;
+use crate::light_pass::wavefront::cell::DEEPEST_SPLIT;
 use crate::light_pass::wavefront::closeness::Closeness;
 use crate::light_pass::wavefront::kept_rays::KeptRays;
 use crate::light_pass::wavefront::lattice::WavefrontLattice;
@@ -26,6 +27,9 @@ use crate::light_pass::wavefront::spectrum::LightPart;
 use crate::light_pass::wavefront::trace::StrandTracer;
 use crate::progress::Control;
 use crate::settings::Estimator;
+
+/// Relative RMSE up to which automatic maps are as fine as for a preview.
+const USUAL_MAP_ERROR: f64 = 0.03;
 
 impl CausticLayer<'_> {
     /// Traces and deposits a level, or deposits again what was traced for other maps; `None` where it was stopped.
@@ -172,7 +176,11 @@ impl CausticLayer<'_> {
         let depositor = WavefrontDepositor {
             receivers: &receivers,
             chart_for,
-            lattice: self.wavefront_lattice(light, LightPart::White, size, &none, unit, course.control),
+            lattice: WavefrontLattice {
+                // Light that goes very many ways lies as wide as its cells: pieces of them say nothing of it.
+                deepest_split: 0,
+                ..self.wavefront_lattice(light, LightPart::White, size, &none, unit, course.control)
+            },
             reference_w: reference_w(light),
             coarseness: 1.0,
         };
@@ -197,12 +205,15 @@ impl CausticLayer<'_> {
         report.statistics.refined(cells(meant) / cells(size))
     }
 
-    /// The density that automatic maps are made for [rays/sr]: with a target, the lattice says nothing of it.
+    /// The density that automatic maps are made for [rays/sr]: with a target, the lattice says nothing of it, and texels
+    /// are as long as the error allows.
     fn map_density_per_sr(&self) -> f64 {
-        if self.settings.max_error.is_some() {
-            Estimator::Wavefront.preview_density_per_sr()
-        } else {
-            self.settings.density_per_sr
+        match self.settings.max_error {
+            Some(target) => {
+                let coarser = (target / USUAL_MAP_ERROR).max(1.0);
+                Estimator::Wavefront.preview_density_per_sr() / (coarser * coarser)
+            }
+            None => self.settings.density_per_sr,
         }
     }
 
@@ -276,6 +287,7 @@ impl CausticLayer<'_> {
             unit,
             refinement: None,
             bodies,
+            deepest_split: DEEPEST_SPLIT,
             light: part,
         }
     }

@@ -20,7 +20,7 @@ fn refusal(source: &str) -> String {
 
 #[test]
 fn sources_that_are_no_scene() {
-    assert!(refusal("builtin:cup").contains("no such built-in scene; choose one of showroom, ring"));
+    assert!(refusal("builtin:cup").contains("no such built-in scene; choose one of gallery, showroom"));
     assert!(refusal("nowhere.glb").contains("there is no such file"));
     let folder = tempfile::tempdir().expect("temporary folder");
     assert!(refusal(folder.path().to_str().expect("UTF-8")).contains("is a folder"));

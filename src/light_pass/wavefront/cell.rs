@@ -16,7 +16,7 @@ use crate::light_pass::ledger_sum::{Account, LedgerSum};
 use crate::optics::{ColourMatrix, LinearSrgb};
 
 /// How often a cell is split whose cuts are ambiguous; what is then left goes on as one small patch per ray.
-pub(super) const DEEPEST_SPLIT: u32 = 2;
+pub const DEEPEST_SPLIT: u32 = 2;
 
 /// Mismatch along an edge from which a check ray decides between the cubic and the bilinear patch.
 pub(super) const CHECK_MISMATCH: f64 = 0.08;
@@ -110,6 +110,8 @@ pub struct CellCutter<'a> {
     pub refinement: Option<&'a Refinement<'a>>,
     /// What corners alone would miss.
     pub bodies: &'a SmallBodies,
+    /// How often a cell is split whose cuts are ambiguous.
+    pub deepest_split: u32,
     /// The light, before its wavelengths part.
     pub light: LightPart<'a>,
     /// What patches carry.
@@ -189,7 +191,7 @@ impl CellCutter<'_> {
             None => {}
         }
         if cell.edges.iter().all(Option::is_none) {
-            return if depth.ambiguous < DEEPEST_SPLIT && self.is_doubtful(cell, work) {
+            return if depth.ambiguous < self.deepest_split && self.is_doubtful(cell, work) {
                 let ambiguous = depth.ambiguous + 1;
                 self.split(cell, Depth { ambiguous, ..depth }, work, out)
             } else {
@@ -198,7 +200,9 @@ impl CellCutter<'_> {
         }
         if self.is_ambiguous(cell, work) {
             // What was divided for one of many small bodies is fine already.
-            return if depth.ambiguous + depth.bodies.min(self.bodies.are_many()) < DEEPEST_SPLIT {
+            return if depth.ambiguous + depth.bodies.min(self.bodies.are_many())
+                < self.most_splits(cell, work)
+            {
                 let ambiguous = depth.ambiguous + 1;
                 self.split(cell, Depth { ambiguous, ..depth }, work, out)
             } else {

@@ -43,6 +43,9 @@ const MIXED_TEXELS: f64 = 16.0;
 /// corners.
 const DETAILS_PER_PATCH: f64 = 64.0;
 
+/// The same of the surroundings of a single ray, a quarter of a cell of light that goes very many ways.
+const DETAILS_AROUND_ONE: f64 = 4.0;
+
 impl<E: PathEffects> Spreader<'_, E> {
     /// Whether nine rays of a patch meet a plane within its map.
     pub(super) fn stays_on_map(&self, shape: &PatchShape, receiver: Receiver) -> bool {
@@ -79,7 +82,11 @@ impl<E: PathEffects> Spreader<'_, E> {
         let is_one = probes.iter().flatten().all(|vertex| vertex.place.is_same(&first));
         let Some(receiver) = first.receiver().filter(|_| is_one) else {
             if self.gathers {
-                self.note_part(&probes, flux_w, out);
+                self.note_part(&probes, (flux_w, details(rays)), out);
+            }
+            if rays.are_around_one() {
+                // What is not known better need not be cut better.
+                return (1, 1);
             }
             let lit = probes.iter().flatten().find_map(|vertex| vertex.place.receiver());
             let tolerance = lit.map_or(1.0, |receiver| {
@@ -90,7 +97,7 @@ impl<E: PathEffects> Spreader<'_, E> {
         let local = self.laid_flat(receiver, &probes);
         let place = |i: usize, j: usize| local[j][i];
         let texel = |i: usize, j: usize| local[j][i].truncate();
-        self.count_area(receiver, &texel, flux_w, out);
+        self.count_area(receiver, &texel, (flux_w, details(rays)), out);
         let detail = self.detail(receiver, &probes);
         let place = |i: usize, j: usize| place(i, j) * detail;
         let texel = |i: usize, j: usize| texel(i, j) * detail;
@@ -207,7 +214,7 @@ impl<E: PathEffects> Spreader<'_, E> {
         &self,
         receiver: Receiver,
         texel: &impl Fn(usize, usize) -> DVec2,
-        flux_w: LinearSrgb,
+        (flux_w, details): (LinearSrgb, f64),
         out: &mut SpreadOutput,
     ) {
         let Some(surface) = self.receivers.get(receiver) else {
@@ -215,13 +222,9 @@ impl<E: PathEffects> Spreader<'_, E> {
         };
         let (a, b, c, d) = (texel(0, 0), texel(2, 0), texel(2, 2), texel(0, 2));
         let texels = 0.5 * ((b - a).perp_dot(c - a).abs() + (c - a).perp_dot(d - a).abs());
-        let share = texels / (surface.chart.width * surface.chart.height) as f64;
-        out.statistics.add(
-            receiver,
-            flux_w.luminance(),
-            share * surface.area_m2 / DETAILS_PER_PATCH,
-            share / DETAILS_PER_PATCH,
-        );
+        let share = texels / (surface.chart.width * surface.chart.height) as f64 / details;
+        let area_m2 = share * surface.area_m2;
+        out.statistics.add(receiver, flux_w.luminance(), area_m2, share);
         if self.gathers {
             let all = (0..9).map(|index| texel(index % 3, index / 3));
             self.note(receiver, all, flux_w.luminance(), share, out);
@@ -229,7 +232,12 @@ impl<E: PathEffects> Spreader<'_, E> {
     }
 
     /// Notes where a patch lies of which only some rays meet one surface.
-    fn note_part(&self, probes: &[[VirtualVertex; 3]; 3], flux_w: LinearSrgb, out: &mut SpreadOutput) {
+    fn note_part(
+        &self,
+        probes: &[[VirtualVertex; 3]; 3],
+        (flux_w, details): (LinearSrgb, f64),
+        out: &mut SpreadOutput,
+    ) {
         let places = || probes.iter().flatten().map(|vertex| &vertex.place);
         let Some(receiver) = places().find_map(|place| place.receiver()) else {
             return;
@@ -241,7 +249,7 @@ impl<E: PathEffects> Spreader<'_, E> {
         let (low, high) = bounds(lit().map(|place| place.texel()));
         let extent = (high - low) / DVec2::new(surface.chart.width as f64, surface.chart.height as f64);
         let part = lit().count() as f64 / 9.0;
-        let share = extent.x * extent.y;
+        let share = extent.x * extent.y / details;
         self.note(
             receiver,
             lit().map(|place| place.texel()),
@@ -251,7 +259,7 @@ impl<E: PathEffects> Spreader<'_, E> {
         );
     }
 
-    /// Notes where light lies that covers a share of its map.
+    /// Notes where light lies of which a detail covers a share of its map.
     fn note(
         &self,
         receiver: Receiver,
@@ -269,7 +277,7 @@ impl<E: PathEffects> Spreader<'_, E> {
             receiver,
             bounds: (low / size, high / size),
             flux_w,
-            map_share: share / DETAILS_PER_PATCH,
+            map_share: share,
         });
     }
 
@@ -288,6 +296,15 @@ impl<E: PathEffects> Spreader<'_, E> {
             (place.x as usize, place.y as usize)
         };
         1.0 / f64::from(1_u32 << layout.finest_between(within(low), within(high)))
+    }
+}
+
+/// Details of a patch that a map is to resolve.
+fn details<E: PathEffects>(rays: &VirtualRays<E>) -> f64 {
+    if rays.are_around_one() {
+        DETAILS_AROUND_ONE
+    } else {
+        DETAILS_PER_PATCH
     }
 }
 

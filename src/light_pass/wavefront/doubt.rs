@@ -16,6 +16,9 @@ const BRIGHT_SHARE: f64 = 0.1;
 /// A patch that is off by more than this share of the cell's width in its middle is of no use.
 const DOUBTFUL_SHARE: f64 = 0.1;
 
+/// Bright light that leaves a cell in more ways than this is shattered: pieces of the cell would be so too.
+const MANY_WAYS: usize = 8;
+
 /// How far patches are off in the middle of a cell, and how wide the cell is there: distances between origins with those
 /// between directions over the way to where they land [m].
 #[derive(Clone, Copy, Debug)]
@@ -88,29 +91,26 @@ impl CellCutter<'_> {
         })
     }
 
+    /// How often a cell is split whose cuts are ambiguous: where light is shattered, rounds of refinement find better where
+    /// that is of use.
+    pub(super) fn most_splits(&self, cell: &Cell, work: &Workspace) -> u32 {
+        let samples = cell.corners.map(|corner| work.get(corner.sample));
+        let least_w = least_bright_w(samples);
+        let ways = all_bright(samples.iter().map(|sample| bright(sample, least_w)));
+        if ways.len() > MANY_WAYS {
+            0
+        } else {
+            self.deepest_split
+        }
+    }
+
     /// Whether cuts along the edges do not tell what lies between them.
     pub(super) fn is_ambiguous(&self, cell: &Cell, work: &Workspace) -> bool {
         let samples = cell.corners.map(|corner| work.get(corner.sample));
-        let brightest_w = samples
-            .iter()
-            .map(|sample| sample.brightest_w)
-            .fold(0.0, f64::max);
-        let least_w = brightest_w * BRIGHT_SHARE;
-        let bright = |sample: &LightSample| -> Vec<PathSignature> {
-            sample
-                .strands
-                .iter()
-                .filter(|strand| strand.flux_w.luminance() > least_w)
-                .map(|strand| strand.signature)
-                .collect()
-        };
-        let mut kinds: Vec<Vec<PathSignature>> = samples.iter().map(|sample| bright(sample)).collect();
-        let all: Vec<PathSignature> = {
-            let mut all: Vec<_> = kinds.iter().flatten().copied().collect();
-            all.sort_unstable();
-            all.dedup();
-            all
-        };
+        let least_w = least_bright_w(samples);
+        let mut kinds: Vec<Vec<PathSignature>> =
+            samples.iter().map(|sample| bright(sample, least_w)).collect();
+        let all = all_bright(kinds.iter().cloned());
         // A strand that is bright at one corner counts at all where it is.
         for (kind, sample) in kinds.iter_mut().zip(samples) {
             *kind = all
@@ -123,7 +123,7 @@ impl CellCutter<'_> {
         kinds.dedup();
         // Light that only the samples along the edges met lies between the corners.
         let is_between = |sample: SampleId| {
-            let inner = bright(work.get(sample));
+            let inner = bright(work.get(sample), least_w);
             inner
                 .iter()
                 .any(|signature| all.binary_search(signature).is_err())
@@ -145,6 +145,27 @@ impl CellCutter<'_> {
             diagonal || crossed_twice || torn
         })
     }
+}
+
+/// Flux from which on light at the corners of a cell is bright [W].
+fn least_bright_w(samples: [&LightSample; 4]) -> f64 {
+    let brightest_w = samples.iter().map(|sample| sample.brightest_w);
+    brightest_w.fold(0.0, f64::max) * BRIGHT_SHARE
+}
+
+/// The ways of a sample's bright light.
+fn bright(sample: &LightSample, least_w: f64) -> Vec<PathSignature> {
+    let strands = sample.strands.iter();
+    let bright = strands.filter(|strand| strand.flux_w.luminance() > least_w);
+    bright.map(|strand| strand.signature).collect()
+}
+
+/// Each way once, ascending.
+fn all_bright(ways: impl Iterator<Item = Vec<PathSignature>>) -> Vec<PathSignature> {
+    let mut all: Vec<PathSignature> = ways.flatten().collect();
+    all.sort_unstable();
+    all.dedup();
+    all
 }
 
 /// Largest mismatch along a cell's edges.

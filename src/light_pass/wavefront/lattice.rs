@@ -47,6 +47,8 @@ pub struct WavefrontLattice<'a> {
     pub refinement: Option<&'a Refinement<'a>>,
     /// What corners alone would miss.
     pub bodies: &'a SmallBodies,
+    /// How often a cell is split whose cuts are ambiguous.
+    pub deepest_split: u32,
     /// Of a light whose wavelengths go different ways; `tracer` is then that of its first node.
     pub light: LightPart<'a>,
 }
@@ -365,6 +367,7 @@ impl WavefrontLattice<'_> {
             unit: self.unit,
             refinement: self.refinement,
             bodies: self.bodies,
+            deepest_split: self.deepest_split,
             light: self.light,
             tone: match self.light {
                 LightPart::White => Tone::White,

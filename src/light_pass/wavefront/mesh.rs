@@ -18,6 +18,9 @@ use crate::transport::PathEffects;
 /// Bisections of a virtual edge between rays that go to different surfaces.
 const CUT_STEPS: u32 = 10;
 
+/// The same in the surroundings of a single ray, whose own borders are not known better.
+const CUT_STEPS_AROUND_ONE: u32 = 4;
+
 /// How often a triangle may be divided.
 #[derive(Clone, Copy)]
 struct Divisions {
@@ -29,6 +32,9 @@ struct Divisions {
 
 impl Divisions {
     const WHOLE: Self = Self { cuts: 4, bends: 4 };
+
+    /// Of the surroundings of a single ray.
+    const AROUND_ONE: Self = Self { cuts: 2, bends: 1 };
 
     fn after_cut(self) -> Self {
         Self {
@@ -133,6 +139,11 @@ impl<E: PathEffects> PatchMesh<'_, '_, E> {
     pub(super) fn rectangle(&mut self, (across, down): (usize, usize), flux: FluxCount) {
         let at = |i: usize, j: usize| DVec2::new(i as f64 / across as f64, j as f64 / down as f64);
         let mut share = Shares::new(flux, 2 * across * down, mean(self.colours.iter().copied()));
+        let budget = if self.rays.are_around_one() {
+            Divisions::AROUND_ONE
+        } else {
+            Divisions::WHOLE
+        };
         let mut row: Vec<Knot> = (0..=across).map(|i| self.knot(at(i, 0))).collect();
         for j in 0..down {
             let next: Vec<Knot> = (0..=across).map(|i| self.knot(at(i, j + 1))).collect();
@@ -141,7 +152,7 @@ impl<E: PathEffects> PatchMesh<'_, '_, E> {
                 let middle = self.colour((corners[0].at + corners[2].at) * 0.5);
                 for triangle in [[0, 1, 2], [0, 2, 3]] {
                     let flux = share.next(middle);
-                    self.settle(triangle.map(|corner| corners[corner]), flux, Divisions::WHOLE);
+                    self.settle(triangle.map(|corner| corners[corner]), flux, budget);
                 }
             }
             row = next;
@@ -283,7 +294,12 @@ impl<E: PathEffects> PatchMesh<'_, '_, E> {
     fn bracket(&mut self, from: Knot, to: Knot) -> (f64, Knot, Knot) {
         let (mut low, mut high) = (0.0, 1.0);
         let (mut near, mut far) = (from, to);
-        for _ in 0..CUT_STEPS {
+        let steps = if self.rays.are_around_one() {
+            CUT_STEPS_AROUND_ONE
+        } else {
+            CUT_STEPS
+        };
+        for _ in 0..steps {
             let middle = 0.5 * (low + high);
             let knot = self.knot(from.at.lerp(to.at, middle));
             if self.is_joined(&near, &knot) {

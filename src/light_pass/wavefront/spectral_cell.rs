@@ -4,8 +4,8 @@
 use super::band::{Corner, SampleId, Workspace};
 use super::bodies::SmallBodies;
 use super::cell::{
-    Cell, CellCutter, CellOutput, DEEPEST_SPLIT, Depth, EDGE_ENDS, Patch, Tone, light_regions, reach_of,
-    signatures, surface_regions,
+    Cell, CellCutter, CellOutput, Depth, EDGE_ENDS, Patch, Tone, light_regions, reach_of, signatures,
+    surface_regions,
 };
 use super::edge::{Edge, EdgeCutter, Reach, is_suspicious, same_ways};
 use super::regions::{Outline, triangles};
@@ -44,7 +44,7 @@ impl CellCutter<'_> {
                 self.is_ambiguous(cell, work)
             }
         };
-        if depth.ambiguous < DEEPEST_SPLIT && is_unclear(work) {
+        if depth.ambiguous < self.most_splits(cell, work) && is_unclear(work) {
             let ambiguous = depth.ambiguous + 1;
             return self.split(cell, Depth { ambiguous, ..depth }, work, out);
         }
@@ -285,6 +285,7 @@ impl CellCutter<'_> {
             unit: self.unit,
             refinement: None,
             bodies: &none,
+            deepest_split: self.deepest_split,
             light: LightPart::White,
             tone: Tone::Node(node as u8),
             channels: spectrum.nodes[node].channels,

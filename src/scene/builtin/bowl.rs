@@ -35,7 +35,7 @@ pub fn build() -> Scene {
         table,
         parts::matte("white", LinearSrgb::grey(0.8)),
     );
-    parts::add(&mut scene, "bowl", bowl(), parts::glass(GLASS));
+    parts::add(&mut scene, "bowl", bowl(CORNERS), parts::glass(GLASS));
     let lamp = parts::point_light("lamp", DVec3::new(0.5, 0.62, -0.4), Flux(20.0));
     scene.lights.push(parts::daylight(lamp));
     scene.cameras = vec![
@@ -55,45 +55,45 @@ pub fn build() -> Scene {
     scene
 }
 
-/// Closed: flat facets outside and below, a flat rim, a smooth inside.
-fn bowl() -> Mesh {
+/// Closed: flat facets outside and below, a flat rim, a smooth inside; its foot around the origin. `corners` around are cut.
+pub(super) fn bowl(corners: u32) -> Mesh {
     let mut mesh = Mesh::default();
-    add_foot(&mut mesh);
+    add_foot(&mut mesh, corners);
     for ring in 1..RINGS_M.len() {
-        add_band(&mut mesh, ring);
+        add_band(&mut mesh, ring, corners);
     }
-    add_rim(&mut mesh);
-    shapes::append(&mut mesh, &inside());
+    add_rim(&mut mesh, corners);
+    shapes::append(&mut mesh, &inside(corners));
     mesh
 }
 
 /// A corner of a ring; the first is also the last, bit for bit.
-fn corner(ring: usize, index: u32) -> DVec3 {
+fn corner(ring: usize, index: u32, corners: u32) -> DVec3 {
     let turned = if ring % 2 == 1 { 0.5 } else { 0.0 };
-    let angle = TAU * (f64::from(index % CORNERS) + turned) / f64::from(CORNERS);
+    let angle = TAU * (f64::from(index % corners) + turned) / f64::from(corners);
     let [radius_m, height_m] = RINGS_M[ring];
     let (sine, cosine) = angle.sin_cos();
     DVec3::new(radius_m * cosine, GAP_M + height_m, radius_m * sine)
 }
 
-fn add_foot(mesh: &mut Mesh) {
+fn add_foot(mesh: &mut Mesh, corners: u32) {
     let middle = DVec3::Y * GAP_M;
-    for index in 0..CORNERS {
+    for index in 0..corners {
         shapes::append(
             mesh,
-            &shapes::facet([middle, corner(0, index), corner(0, index + 1)]),
+            &shapes::facet([middle, corner(0, index, corners), corner(0, index + 1, corners)]),
         );
     }
 }
 
 /// The triangles between a ring and the one below.
-fn add_band(mesh: &mut Mesh, ring: usize) {
+fn add_band(mesh: &mut Mesh, ring: usize, corners: u32) {
     let below = ring - 1;
     // The corner above lies half a corner after the one below, or before it.
     let shift = below % 2;
-    for index in 0..CORNERS {
-        let [low, next_low] = [corner(below, index), corner(below, index + 1)];
-        let top = |step: u32| corner(ring, index + step + shift as u32);
+    for index in 0..corners {
+        let [low, next_low] = [corner(below, index, corners), corner(below, index + 1, corners)];
+        let top = |step: u32| corner(ring, index + step + shift as u32, corners);
         shapes::append(mesh, &shapes::facet([low, top(0), next_low]));
         // The rim is finer: the facet below it shares its corners.
         let is_rim = ring + 1 == RINGS_M.len();
@@ -115,14 +115,19 @@ fn between(from: DVec3, to: DVec3, step: u32, steps: u32) -> DVec3 {
 }
 
 /// The flat ring between the cut edge and the smooth inside.
-fn add_rim(mesh: &mut Mesh) {
+fn add_rim(mesh: &mut Mesh, corners: u32) {
     let last = RINGS_M.len() - 1;
     let outer = |step: u32| {
         let (index, piece) = (step / FINER, step % FINER);
-        between(corner(last, index), corner(last, index + 1), piece, FINER)
+        between(
+            corner(last, index, corners),
+            corner(last, index + 1, corners),
+            piece,
+            FINER,
+        )
     };
-    let inner = |step: u32| inside_at(f64::from(step) / f64::from(CORNERS * FINER), 0.0).0;
-    for step in 0..CORNERS * FINER {
+    let inner = |step: u32| inside_at(f64::from(step) / f64::from(corners * FINER), 0.0).0;
+    for step in 0..corners * FINER {
         let [a, b] = [outer(step), outer(step + 1)];
         let [c, d] = [inner(step + 1), inner(step)];
         shapes::append(mesh, &shapes::facet([a, c, b]));
@@ -131,8 +136,8 @@ fn add_rim(mesh: &mut Mesh) {
 }
 
 /// The lower half of an ellipsoid, hollow side up.
-fn inside() -> Mesh {
-    shapes::sheet(CORNERS * FINER, 20, inside_at)
+fn inside(corners: u32) -> Mesh {
+    shapes::sheet(corners * FINER, 20, inside_at)
 }
 
 /// Position and normal of the inside: `u` around, `v` from the rim to the bottom.

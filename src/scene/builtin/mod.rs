@@ -1,8 +1,10 @@
-//! Procedural scenes. All but `showroom`, `pool-bump`, `spectrum` and `bowl` have a reference solution and are meshes of
-//! the exact surfaces that it was computed on: in `assets/reference/`, or for `prism` by wavelength in closed form.
+//! Procedural scenes. All but `gallery`, `showroom`, `pool-bump`, `spectrum` and `bowl` have a reference solution and are
+//! meshes of the exact surfaces that it was computed on: in `assets/reference/`, or for `prism` by wavelength in closed
+//! form.
 
 mod ball;
 mod bowl;
+mod gallery;
 mod mirror;
 mod paraboloid;
 pub mod parts;
@@ -17,7 +19,8 @@ mod spectrum;
 use super::Scene;
 
 /// Names of all built-in scenes, the program's default first.
-pub const NAMES: [&str; 12] = [
+pub const NAMES: [&str; 13] = [
+    "gallery",
     "showroom",
     "ring",
     "ball",
@@ -35,6 +38,7 @@ pub const NAMES: [&str; 12] = [
 /// The scene of that name; `None` where there is none.
 pub fn build(name: &str) -> Option<Scene> {
     let mut scene = match name {
+        "gallery" => gallery::build(),
         "showroom" => showroom::build(),
         "ring" => ring::ring(),
         "ball" => ball::build(),

@@ -37,6 +37,17 @@ impl Prism {
         self.along_base * turn_rad.cos() - self.to_base * turn_rad.sin()
     }
 
+    /// Where such light leaves: the middle of its second face [m].
+    pub fn exit(&self) -> DVec3 {
+        self.entry() + self.along_base * (0.5 * self.side_m)
+    }
+
+    /// Direction in which it leaves.
+    pub fn outgoing(&self, n: f64) -> DVec3 {
+        let incoming = self.incoming(n);
+        incoming - self.to_base * (2.0 * incoming.dot(self.to_base))
+    }
+
     /// As a closed body of a length [m].
     pub fn mesh(&self, length_m: f64) -> crate::scene::Mesh {
         let edge = self.to_base.cross(self.along_base) * length_m;

@@ -127,6 +127,13 @@ pub fn sphere(centre: DVec3, radius: f64, levels: u32) -> Mesh {
     }
 }
 
+/// A mesh elsewhere [m].
+#[must_use]
+pub fn moved(mut mesh: Mesh, offset: DVec3) -> Mesh {
+    mesh.positions.iter_mut().for_each(|position| *position += offset);
+    mesh
+}
+
 /// Adds a mesh to another, without its texture coordinates.
 pub fn append(mesh: &mut Mesh, part: &Mesh) {
     let offset = mesh.positions.len() as u32;

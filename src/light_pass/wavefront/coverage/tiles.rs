@@ -77,7 +77,11 @@ pub fn deposit(triangles: &[FluxTriangle], layout: &TileLayout, texels: &mut [Fl
 }
 
 /// Bands that a triangle may reach.
-fn visits(index: usize, triangle: &FluxTriangle, layout: &TileLayout) -> impl Iterator<Item = Visit> {
+fn visits<'a>(
+    index: usize,
+    triangle: &FluxTriangle,
+    layout: &'a TileLayout,
+) -> impl Iterator<Item = Visit> + 'a {
     let (rows, columns) = rows_and_columns(&triangle.corners, layout.size());
     let tiles = |range: &Range<usize>| {
         if range.is_empty() {
@@ -86,22 +90,21 @@ fn visits(index: usize, triangle: &FluxTriangle, layout: &TileLayout) -> impl It
             range.start / SIDE..(range.end - 1) / SIDE + 1
         }
     };
-    let (tile_columns, (across, _)) = (tiles(&columns), layout.tile_counts());
-    let mut found = Vec::with_capacity(tiles(&rows).len() * tile_columns.len());
-    for row in tiles(&rows) {
+    let (tile_rows, tile_columns) = (tiles(&rows), tiles(&columns));
+    let (across, _) = layout.tile_counts();
+    tile_rows.flat_map(move |row| {
         let (top, bottom) = (row * SIDE, row * SIDE + SIDE - 1);
         let (first, last) = (rows.start.max(top) - top, (rows.end - 1).min(bottom) - top);
-        for column in tile_columns.clone() {
+        tile_columns.clone().flat_map(move |column| {
             let tile = row * across + column;
             let level = layout.level_at(column * SIDE, top);
             let bands = (first >> level) / BAND_ROWS..(last >> level) / BAND_ROWS + 1;
-            found.extend(bands.map(|band| Visit {
+            bands.map(move |band| Visit {
                 band: (tile * BANDS + band) as u32,
                 triangle: index as u32,
-            }));
-        }
-    }
-    found.into_iter()
+            })
+        })
+    })
 }
 
 /// Of each band: its tile, its rows among the tile's, and its texels.
