@@ -24,6 +24,17 @@ fn ledgers_close_on_every_built_in_scene() {
 }
 
 #[test]
+fn every_lamp_of_the_gallery_has_its_caster() {
+    let gallery = builtin_scene("gallery");
+    let result = bake(gallery.clone(), &settings(1e4, 16));
+    for light in &gallery.lights {
+        let ledger = result.ledgers.iter().find(|ledger| ledger.light == light.name);
+        let deposited_w = ledger.expect("a ledger for each light").energy_w.deposited;
+        assert!(deposited_w > 0.003, "{}: {deposited_w} W", light.name);
+    }
+}
+
+#[test]
 fn a_lost_texel_or_deposit_is_noticed() {
     let mut result = bake(builtin_scene("ring"), &settings(3e3, 64));
     assert_eq!(energy_fault(&result), None);

@@ -218,3 +218,36 @@ fn direct_light_comes_to_tiles() {
         "{flux_a} W, dense {flux_b} W"
     );
 }
+
+/// Texels of automatic maps for a target.
+fn texels_for(name: &str, target: f64, layers: Vec<LayerKind>) -> usize {
+    let settings = BakeSettings {
+        max_error: Some(target),
+        density_per_sr: BakeSettings::starting_density_per_sr(target),
+        map_resolution: MapResolution::Auto,
+        layers,
+        ..BakeSettings::default()
+    };
+    let result = bake(builtin_scene(name), &settings);
+    result.maps.iter().map(|map| map.chart.texel_count()).sum()
+}
+
+#[test]
+fn drafts_have_coarser_maps_than_previews() {
+    for name in ["ball", "pool"] {
+        let [draft, preview] = [0.1, 0.03].map(|target| texels_for(name, target, vec![LayerKind::Caustic]));
+        println!("{name}: {draft} texels for a draft, {preview} for a preview");
+        assert!(2 * draft < preview, "{name}: {draft} of {preview} texels");
+    }
+}
+
+#[test]
+fn maps_of_a_coarse_caustic_show_direct_light_as_finely_as_maps_without_one() {
+    let [both, direct] = [
+        vec![LayerKind::Caustic, LayerKind::Direct],
+        vec![LayerKind::Direct],
+    ]
+    .map(|layers| texels_for("mirror", 0.9, layers));
+    println!("{both} texels with the caustic, {direct} without");
+    assert!(both >= direct, "{both} texels with the caustic, {direct} without");
+}

@@ -497,3 +497,14 @@ fn bowl_is_closed_cut_glass_under_daylight() {
         is_in_view(&scene, DVec3::new(0.14, 0.1, 0.0)) && is_in_view(&scene, DVec3::new(-0.14, 0.1, 0.0))
     );
 }
+
+#[test]
+fn what_the_gallery_shows_of_glass_is_solid() {
+    let gallery = scene("gallery");
+    for solid in ["bowl", "ball", "prism"] {
+        let mesh = &object(&gallery, solid).mesh;
+        let volume_m3 = volume_m3(mesh);
+        assert!(volume_m3 > 1e-4, "{solid}: {volume_m3} m3");
+        assert_eq!(open_edges(mesh), 0, "{solid}");
+    }
+}

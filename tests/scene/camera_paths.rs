@@ -61,16 +61,21 @@ fn a_path_is_in_the_coordinates_of_the_scenes_file() {
 }
 
 #[test]
-fn the_walk_through_the_showroom_is_a_path() {
-    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/assets/paths/showroom.json");
-    let path = CameraPath::read(std::path::Path::new(file)).expect("it is a path");
-    let cameras = path.cameras(DVec3::ZERO);
-    assert_eq!(cameras.len(), 120);
-    // Gentle: less than 10 cm and 5 degrees a frame, and never through the floor.
-    for pair in cameras.windows(2) {
-        assert!(pair[0].position.distance(pair[1].position) < 0.1);
-        assert!(pair[0].forward.dot(pair[1].forward) > 5.0_f64.to_radians().cos());
-        assert!(pair[0].position.y > 0.4);
+fn the_walks_through_gallery_and_showroom_are_paths() {
+    for (name, frames) in [("gallery", 240), ("showroom", 120)] {
+        let file = format!("{}/assets/paths/{name}.json", env!("CARGO_MANIFEST_DIR"));
+        let path = CameraPath::read(std::path::Path::new(&file)).expect("it is a path");
+        let cameras = path.cameras(DVec3::ZERO);
+        assert_eq!(cameras.len(), frames, "{name}");
+        // Gentle: less than 10 cm and 5 degrees a frame, and never through the floor.
+        for pair in cameras.windows(2) {
+            assert!(pair[0].position.distance(pair[1].position) < 0.1, "{name}");
+            assert!(
+                pair[0].forward.dot(pair[1].forward) > 5.0_f64.to_radians().cos(),
+                "{name}"
+            );
+            assert!(pair[0].position.y > 0.4, "{name}");
+        }
     }
 }
 

@@ -44,7 +44,7 @@ pub fn add(scene: &mut Scene) {
         .push(parts::matte("white lacquer", LinearSrgb::grey(0.78)));
     let white = scene.materials.len() - 1;
     add_basin(scene, white);
-    add_ring(scene, white);
+    add_ring(scene);
     add_sideboard(scene, white);
     add_prism(scene, white);
 }
@@ -79,7 +79,7 @@ fn add_basin(scene: &mut Scene, material: usize) {
     let [half_x, half_z] = BASIN_HALF_M;
     let x = [BASIN.x - half_x, BASIN.x + half_x];
     let z = [BASIN.z - half_z, BASIN.z + half_z];
-    let bottom = parts::matte("tiles", LinearSrgb::new(0.6, 0.74, 0.76));
+    let bottom = parts::matte("tiles", LinearSrgb::new(0.26, 0.42, 0.46));
     parts::add(scene, "basin bottom", shapes::floor(x, z, BOTTOM_M), bottom);
     for (side, outward, half_inner, half_along) in [
         ("left", DVec3::NEG_X, half_x, half_z),
@@ -119,9 +119,12 @@ fn add_basin(scene: &mut Scene, material: usize) {
     parts::add(scene, "water", surface, parts::dielectric("water", 1.333));
 }
 
-fn add_ring(scene: &mut Scene, white: usize) {
+fn add_ring(scene: &mut Scene) {
     let (x, z) = ([RING.x - 0.62, RING.x + 0.62], [RING.z - 0.5, RING.z + 0.5]);
-    add_stand(scene, "table", x, z, [0.0, TABLE_M], white);
+    // Grey: the sun alone would leave no room for what the ring adds.
+    scene.materials.push(parts::matte("slate", LinearSrgb::grey(0.2)));
+    let slate = scene.materials.len() - 1;
+    add_stand(scene, "table", x, z, [0.0, TABLE_M], slate);
     let ring = cylinder(RING + DVec3::Y * GAP_M, 0.27, 0.11);
     parts::add(scene, "ring", ring, parts::mirror());
 }
