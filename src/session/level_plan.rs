@@ -133,6 +133,7 @@ impl CausticLayer<'_> {
         TraceKey {
             settings: paths,
             effects: EffectSet::of(self.plan),
+            splits: self.splits(),
             size,
             coarser: if settings.estimator == Estimator::Wavefront && self.has_bumps() {
                 coarser
@@ -229,7 +230,7 @@ impl CausticLayer<'_> {
         course: &mut Course,
     ) -> Result<Sizes> {
         if self.wants_statistics() {
-            let keys: BTreeMap<usize, TraceKey> = lights
+            let paths: BTreeMap<usize, TraceKey> = lights
                 .iter()
                 .map(|light| {
                     (
@@ -238,7 +239,8 @@ impl CausticLayer<'_> {
                     )
                 })
                 .collect();
-            if states.statistics.as_ref().is_none_or(|(known, _)| *known != keys) {
+            let key = (paths, self.map_density_per_sr());
+            if states.statistics.as_ref().is_none_or(|(known, _)| *known != key) {
                 let mut statistics = FootprintStatistics::default();
                 for light in lights {
                     let unit = self.unit(light)?;
@@ -250,7 +252,7 @@ impl CausticLayer<'_> {
                 }
                 // What a cancelled run saw is not all.
                 let complete = !course.control.is_cancelled();
-                states.statistics = complete.then_some((keys, statistics));
+                states.statistics = complete.then_some((key, statistics));
             }
         }
         let statistics = states.statistics.as_ref().map(|(_, statistics)| statistics);

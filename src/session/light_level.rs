@@ -13,6 +13,7 @@ use crate::light_pass::caustic::statistics::FootprintStatistics;
 use crate::light_pass::launch::Launch;
 use crate::light_pass::ledger_sum::LedgerSum;
 use crate::light_pass::receiver_maps::ReceiverMaps;
+use crate::light_pass::wavefront::cell::Splits;
 use crate::light_pass::wavefront::kept_rays::KeptRays;
 use crate::light_pass::wavefront::overreach::Overreach;
 use crate::light_pass::wavefront::pass::TracedLight;
@@ -33,6 +34,8 @@ pub(super) struct TraceKey {
     pub(super) size: (usize, usize),
     /// How many lattices this one comes before the usual finest, where surfaces have bumps: what cells may miss of them.
     pub(super) coarser: i32,
+    /// How often cells are split.
+    pub(super) splits: Splits,
     /// Where cells are divided further, round by round.
     pub(super) rounds: Vec<Round>,
     /// What chose its wavelengths, where it is traced by wavelength.
@@ -40,6 +43,9 @@ pub(super) struct TraceKey {
     /// Whether the light is taken to show hardly beside the others.
     pub(super) is_dim: bool,
 }
+
+/// All that mean footprints depend on: the paths of each light, and the density that maps are made for [rays/sr].
+pub(super) type StatisticsKey = (BTreeMap<usize, TraceKey>, f64);
 
 /// All that a light's maps depend on beside the scene.
 #[derive(Clone, Debug, PartialEq)]
@@ -113,7 +119,7 @@ pub(super) struct KeptError {
 pub(super) struct LightStates {
     by_light: BTreeMap<usize, LightState>,
     /// Mean footprints that set the sizes of maps, with what they depend on.
-    pub(super) statistics: Option<(BTreeMap<usize, TraceKey>, FootprintStatistics)>,
+    pub(super) statistics: Option<(StatisticsKey, FootprintStatistics)>,
 }
 
 impl LightStates {

@@ -16,7 +16,7 @@ use crate::light_pass::ledger_sum::{Account, LedgerSum};
 use crate::light_pass::receiver_maps::{ChartFor, ReceiverMaps};
 use crate::light_pass::wavefront::bodies::SmallBodies;
 use crate::light_pass::wavefront::bumps::BumpCells;
-use crate::light_pass::wavefront::cell::DEEPEST_SPLIT;
+use crate::light_pass::wavefront::cell::Splits;
 use crate::light_pass::wavefront::closeness::Closeness;
 use crate::light_pass::wavefront::kept_rays::KeptRays;
 use crate::light_pass::wavefront::lattice::WavefrontLattice;
@@ -178,7 +178,7 @@ impl CausticLayer<'_> {
             chart_for,
             lattice: WavefrontLattice {
                 // Light that goes very many ways lies as wide as its cells: pieces of them say nothing of it.
-                deepest_split: 0,
+                splits: Splits::NONE,
                 ..self.wavefront_lattice(light, LightPart::White, size, &none, unit, course.control)
             },
             reference_w: reference_w(light),
@@ -207,13 +207,22 @@ impl CausticLayer<'_> {
 
     /// The density that automatic maps are made for [rays/sr]: with a target, the lattice says nothing of it, and texels
     /// are as long as the error allows.
-    fn map_density_per_sr(&self) -> f64 {
+    pub(super) fn map_density_per_sr(&self) -> f64 {
         match self.settings.max_error {
             Some(target) => {
                 let coarser = (target / USUAL_MAP_ERROR).max(1.0);
                 Estimator::Wavefront.preview_density_per_sr() / (coarser * coarser)
             }
             None => self.settings.density_per_sr,
+        }
+    }
+
+    /// How often cells are split.
+    pub(super) fn splits(&self) -> Splits {
+        if self.settings.max_error.is_some() {
+            Splits::BEFORE_ROUNDS
+        } else {
+            Splits::FULL
         }
     }
 
@@ -287,7 +296,7 @@ impl CausticLayer<'_> {
             unit,
             refinement: None,
             bodies,
-            deepest_split: DEEPEST_SPLIT,
+            splits: self.splits(),
             light: part,
         }
     }

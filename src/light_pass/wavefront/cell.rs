@@ -15,8 +15,34 @@ use crate::light_pass::caustic::path::PathSignature;
 use crate::light_pass::ledger_sum::{Account, LedgerSum};
 use crate::optics::{ColourMatrix, LinearSrgb};
 
-/// How often a cell is split whose cuts are ambiguous; what is then left goes on as one small patch per ray.
-pub const DEEPEST_SPLIT: u32 = 2;
+/// How often cells are split whose cuts do not tell what lies in them; what is then left goes on as one small patch per ray.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Splits {
+    /// Where cuts are ambiguous.
+    pub ambiguous: u32,
+    /// Where light is shattered besides: it leaves the cell in very many ways.
+    pub shattered: u32,
+}
+
+impl Splits {
+    /// As far as it helps.
+    pub const FULL: Self = Self {
+        ambiguous: 2,
+        shattered: 2,
+    };
+
+    /// Where rounds of refinement come after: they find better where it is of use to go on with shattered light.
+    pub const BEFORE_ROUNDS: Self = Self {
+        ambiguous: 2,
+        shattered: 1,
+    };
+
+    /// Never.
+    pub const NONE: Self = Self {
+        ambiguous: 0,
+        shattered: 0,
+    };
+}
 
 /// Mismatch along an edge from which a check ray decides between the cubic and the bilinear patch.
 pub(super) const CHECK_MISMATCH: f64 = 0.08;
@@ -110,8 +136,8 @@ pub struct CellCutter<'a> {
     pub refinement: Option<&'a Refinement<'a>>,
     /// What corners alone would miss.
     pub bodies: &'a SmallBodies,
-    /// How often a cell is split whose cuts are ambiguous.
-    pub deepest_split: u32,
+    /// How often cells are split.
+    pub splits: Splits,
     /// The light, before its wavelengths part.
     pub light: LightPart<'a>,
     /// What patches carry.
@@ -191,7 +217,7 @@ impl CellCutter<'_> {
             None => {}
         }
         if cell.edges.iter().all(Option::is_none) {
-            return if depth.ambiguous < self.deepest_split && self.is_doubtful(cell, work) {
+            return if depth.ambiguous < self.splits.ambiguous && self.is_doubtful(cell, work) {
                 let ambiguous = depth.ambiguous + 1;
                 self.split(cell, Depth { ambiguous, ..depth }, work, out)
             } else {

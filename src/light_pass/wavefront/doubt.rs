@@ -19,9 +19,6 @@ const DOUBTFUL_SHARE: f64 = 0.1;
 /// Bright light that leaves a cell in more ways than this is shattered: pieces of the cell would be so too.
 const MANY_WAYS: usize = 8;
 
-/// How often a cell of shattered light is split at most.
-const SPLITS_OF_SHATTERED: u32 = 1;
-
 /// How far patches are off in the middle of a cell, and how wide the cell is there: distances between origins with those
 /// between directions over the way to where they land [m].
 #[derive(Clone, Copy, Debug)]
@@ -94,16 +91,15 @@ impl CellCutter<'_> {
         })
     }
 
-    /// How often a cell is split whose cuts are ambiguous: where light is shattered, rounds of refinement find better where
-    /// that is of use.
+    /// How often a cell is split whose cuts are ambiguous.
     pub(super) fn most_splits(&self, cell: &Cell, work: &Workspace) -> u32 {
         let samples = cell.corners.map(|corner| work.get(corner.sample));
         let least_w = least_bright_w(samples);
         let ways = all_bright(samples.iter().map(|sample| bright(sample, least_w)));
         if ways.len() > MANY_WAYS {
-            self.deepest_split.min(SPLITS_OF_SHATTERED)
+            self.splits.shattered
         } else {
-            self.deepest_split
+            self.splits.ambiguous
         }
     }
 

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::band::{Corner, SampleId, Samples, Workspace};
 use super::bodies::SmallBodies;
-use super::cell::{Cell, CellCutter, CellOutput, Patch, Tone};
+use super::cell::{Cell, CellCutter, CellOutput, Patch, Splits, Tone};
 use super::edge::{Edge, EdgeCutter, may_bulge};
 use super::kept_rays::{FreshRay, KeptRays};
 use super::refine::Refinement;
@@ -47,8 +47,8 @@ pub struct WavefrontLattice<'a> {
     pub refinement: Option<&'a Refinement<'a>>,
     /// What corners alone would miss.
     pub bodies: &'a SmallBodies,
-    /// How often a cell is split whose cuts are ambiguous.
-    pub deepest_split: u32,
+    /// How often cells are split.
+    pub splits: Splits,
     /// Of a light whose wavelengths go different ways; `tracer` is then that of its first node.
     pub light: LightPart<'a>,
 }
@@ -367,7 +367,7 @@ impl WavefrontLattice<'_> {
             unit: self.unit,
             refinement: self.refinement,
             bodies: self.bodies,
-            deepest_split: self.deepest_split,
+            splits: self.splits,
             light: self.light,
             tone: match self.light {
                 LightPart::White => Tone::White,

@@ -285,7 +285,7 @@ impl CellCutter<'_> {
             unit: self.unit,
             refinement: None,
             bodies: &none,
-            deepest_split: self.deepest_split,
+            splits: self.splits,
             light: LightPart::White,
             tone: Tone::Node(node as u8),
             channels: spectrum.nodes[node].channels,

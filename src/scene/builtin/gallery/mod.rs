@@ -11,7 +11,7 @@ use crate::optics::LinearSrgb;
 use crate::scene::{Camera, Light, Scene};
 use crate::units::{Flux, Irradiance};
 
-/// A room of 7.2 m × 5.6 m, 3 m high: a sun of 1.5 W/m² through the window in its right wall, a spot on each exhibit.
+/// A room of 7.2 m × 5.6 m, 3 m high: a sun of 0.8 W/m² through the window in its right wall, a spot on each exhibit.
 pub fn build() -> Scene {
     let mut scene = Scene::default();
     room::add(&mut scene);
@@ -29,7 +29,7 @@ const SUN: LinearSrgb = LinearSrgb::new(1.1, 0.99, 0.84);
 
 fn lights() -> Vec<Light> {
     let tinted = |light: Light, colour: LinearSrgb| Light { colour, ..light };
-    let sun = parts::sun("sun", room::SUN_DIRECTION, Irradiance(1.5));
+    let sun = parts::sun("sun", room::SUN_DIRECTION, Irradiance(0.8));
     let spots = [
         (
             "basin spot",
@@ -69,7 +69,7 @@ fn cameras() -> Vec<Camera> {
     vec![
         look("overview", [3.1, 1.8, 2.7], DVec3::new(-0.85, 0.62, -0.9), 0.85),
         look("basin", [-0.6, 1.5, 2.4], exhibits::BASIN + DVec3::Y * 0.2, 0.75),
-        look("ring", [1.2, 1.6, 1.1], exhibits::RING, 0.7),
+        look("ring", [3.15, 1.55, 0.7], exhibits::RING, 0.62),
         look("bowl", [-2.1, 1.5, -0.9], exhibits::BOWL, 0.6),
         look("ball", [-0.6, 1.25, -0.7], exhibits::BALL, 0.6),
         look(
