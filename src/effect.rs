@@ -3,13 +3,26 @@
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
+use strum::{EnumMessage, IntoStaticStr, VariantArray};
 
 /// One effect that can be simulated or left out.
 #[derive(
-    Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, clap::ValueEnum,
+    Clone,
+    Copy,
+    Debug,
+    PartialEq,
+    Eq,
+    Hash,
+    PartialOrd,
+    Ord,
+    Serialize,
+    Deserialize,
+    EnumMessage,
+    IntoStaticStr,
+    VariantArray,
 )]
 #[serde(rename_all = "snake_case")]
-#[value(rename_all = "snake_case")]
+#[strum(serialize_all = "snake_case")]
 pub enum Effect {
     /// Light pass of the caustic layer at all.
     LightPass,
@@ -39,37 +52,11 @@ pub enum Effect {
 
 impl Effect {
     /// All of them, as they are listed.
-    pub const ALL: [Self; 12] = [
-        Self::LightPass,
-        Self::Refraction,
-        Self::Dispersion,
-        Self::Reflection,
-        Self::Absorption,
-        Self::Textures,
-        Self::Roughness,
-        Self::Bumps,
-        Self::AreaLights,
-        Self::Direct,
-        Self::Indirect,
-        Self::Chains,
-    ];
+    pub const ALL: [Self; 12] = *Self::VARIANTS.as_array().expect("twelve effects");
 
     /// Its name on the command line and in files.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::LightPass => "light_pass",
-            Self::Refraction => "refraction",
-            Self::Dispersion => "dispersion",
-            Self::Reflection => "reflection",
-            Self::Absorption => "absorption",
-            Self::Textures => "textures",
-            Self::Roughness => "roughness",
-            Self::Bumps => "bumps",
-            Self::AreaLights => "area_lights",
-            Self::Direct => "direct",
-            Self::Indirect => "indirect",
-            Self::Chains => "chains",
-        }
+        self.into()
     }
 
     /// What it is, in one sentence for people.
@@ -100,8 +87,22 @@ impl Effect {
 }
 
 /// Switch of one effect.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, clap::ValueEnum)]
+#[derive(
+    Clone,
+    Copy,
+    Debug,
+    Default,
+    PartialEq,
+    Eq,
+    Hash,
+    Serialize,
+    Deserialize,
+    EnumMessage,
+    IntoStaticStr,
+    VariantArray,
+)]
 #[serde(rename_all = "lowercase")]
+#[strum(serialize_all = "lowercase")]
 pub enum EffectSwitch {
     /// On where the scene calls for it.
     #[default]

@@ -1,15 +1,29 @@
 //! Everything that a user can set about a bake.
 
 use serde::{Deserialize, Serialize};
+use strum::{EnumMessage, IntoStaticStr, VariantArray};
 
 use crate::effect::EffectSwitches;
 use crate::error::{Error, Result};
 
 /// Which light a layer holds. The order is that of the files' channels.
 #[derive(
-    Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, clap::ValueEnum,
+    Clone,
+    Copy,
+    Debug,
+    PartialEq,
+    Eq,
+    PartialOrd,
+    Ord,
+    Hash,
+    Serialize,
+    Deserialize,
+    EnumMessage,
+    IntoStaticStr,
+    VariantArray,
 )]
 #[serde(rename_all = "lowercase")]
+#[strum(serialize_all = "lowercase")]
 pub enum LayerKind {
     /// LS+D: light that met at least one specular surface.
     Caustic,
@@ -25,17 +39,16 @@ impl LayerKind {
 
     /// Its name in files and on the command line.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Caustic => "caustic",
-            Self::Direct => "direct",
-            Self::Indirect => "indirect",
-        }
+        self.into()
     }
 }
 
 /// How the light pass turns rays into irradiance.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, EnumMessage, IntoStaticStr, VariantArray,
+)]
 #[serde(rename_all = "lowercase")]
+#[strum(serialize_all = "lowercase")]
 pub enum Estimator {
     /// Patches of the wavefront between neighbouring rays, spread exactly over the texels they cover.
     Wavefront,
@@ -45,8 +58,11 @@ pub enum Estimator {
 
 /// Shape of a splat. All have the same area at the same footprint: disc r = 1, box side √π, cone base √3 (footprint
 /// radii), gaussian exp(−r²/2σ).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, EnumMessage, IntoStaticStr, VariantArray,
+)]
 #[serde(rename_all = "lowercase")]
+#[strum(serialize_all = "lowercase")]
 pub enum Kernel {
     /// exp(−r²/2σ), cut at 4√σ (eq. 4.4).
     Gaussian,
@@ -59,8 +75,11 @@ pub enum Kernel {
 }
 
 /// How a kernel is taken into texels.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, EnumMessage, IntoStaticStr, VariantArray,
+)]
 #[serde(rename_all = "lowercase")]
+#[strum(serialize_all = "lowercase")]
 pub enum KernelSampling {
     /// Its integral over each texel.
     Integrated,
@@ -69,8 +88,11 @@ pub enum KernelSampling {
 }
 
 /// What sets the size and shape of a splat.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, EnumMessage, IntoStaticStr, VariantArray,
+)]
 #[serde(rename_all = "lowercase")]
+#[strum(serialize_all = "lowercase")]
 pub enum Footprint {
     /// The ellipse that the neighbouring rays span.
     Ellipse,
@@ -83,8 +105,11 @@ pub enum Footprint {
 }
 
 /// Where in its lattice cell a light ray starts.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, EnumMessage, IntoStaticStr, VariantArray,
+)]
 #[serde(rename_all = "lowercase")]
+#[strum(serialize_all = "lowercase")]
 pub enum RayPlacement {
     /// At the centre.
     Lattice,
@@ -93,8 +118,11 @@ pub enum RayPlacement {
 }
 
 /// How the sphere of directions around a light is divided.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, EnumMessage, IntoStaticStr, VariantArray,
+)]
 #[serde(rename_all = "lowercase")]
+#[strum(serialize_all = "lowercase")]
 pub enum ItemBufferKind {
     /// Cells of equal solid angle.
     Equal,
@@ -143,8 +171,11 @@ pub enum Wavelengths {
 }
 
 /// How rays and wavelengths go together (section 4.1 of the paper).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, EnumMessage, IntoStaticStr, VariantArray,
+)]
 #[serde(rename_all = "lowercase")]
+#[strum(serialize_all = "lowercase")]
 pub enum SpectralSampling {
     /// Every ray is traced at every wavelength.
     Split,
@@ -153,8 +184,21 @@ pub enum SpectralSampling {
 }
 
 /// How carefully to bake, by name.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[derive(
+    Clone,
+    Copy,
+    Debug,
+    Default,
+    PartialEq,
+    Eq,
+    Serialize,
+    Deserialize,
+    EnumMessage,
+    IntoStaticStr,
+    VariantArray,
+)]
 #[serde(rename_all = "lowercase")]
+#[strum(serialize_all = "lowercase")]
 pub enum Preset {
     /// 10 % of relative RMSE (splat: 12,500 rays per steradian).
     Draft,
@@ -171,11 +215,7 @@ impl Preset {
 
     /// Its name on the command line.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Draft => "draft",
-            Self::Preview => "preview",
-            Self::Final => "final",
-        }
+        self.into()
     }
 
     /// Relative RMSE that it aims at [1].

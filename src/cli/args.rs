@@ -7,7 +7,6 @@ use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand, ValueEnum};
 use nephroid::error::{Error, Result};
 use nephroid::eye_pass::{ToneMap, WhiteBalance};
 use nephroid::light_pass::share::Share;
-use nephroid::settings::{Estimator, MapResolution};
 
 use super::bake_options::BakeOptions;
 use super::compare::LayerChoice;
@@ -16,7 +15,7 @@ use super::export::{
     UnitsChoice,
 };
 use super::job::Job;
-use super::study_values;
+use super::study::StudyArguments;
 use super::terminal::{self, Terminal};
 use super::values::{self, Exposure};
 
@@ -87,18 +86,8 @@ pub struct RunOptions {
     #[arg(long)]
     pub no_cache: bool,
     /// Log messages of this level and above to stderr
-    #[arg(long, value_enum, value_name = "LEVEL", default_value = "off")]
-    pub log: LogLevel,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum LogLevel {
-    Off,
-    Error,
-    Warn,
-    Info,
-    Debug,
-    Trace,
+    #[arg(long, value_name = "LEVEL", default_value = "off", value_parser = values::log_level())]
+    pub log: log::LevelFilter,
 }
 
 #[derive(Debug, Args)]
@@ -225,7 +214,7 @@ pub struct RenderArguments {
     #[command(flatten)]
     pub maps: MapsOption,
     /// How radiance becomes display colour [default: neutral]
-    #[arg(long, value_enum)]
+    #[arg(long, value_parser = values::one_of::<ToneMap>())]
     pub tone_map: Option<ToneMap>,
     /// Which light is shown as white: the display's, the lamps', or light of a temperature or chromaticity
     /// [default: none]
@@ -334,260 +323,6 @@ pub struct ExportArguments {
     pub run: RunOptions,
 }
 
-#[derive(Debug, Args)]
-#[command(args_conflicts_with_subcommands = true)]
-pub struct StudyArguments {
-    /// Name all studies
-    #[arg(long)]
-    pub list: bool,
-    #[command(subcommand)]
-    pub study: Option<Study>,
-    #[command(flatten)]
-    pub run: RunOptions,
-}
-
-/// Stands for every study whose result is a page.
-pub const ALL_PAGES: &str = "pages";
-
-#[derive(Debug, Subcommand)]
-pub enum Study {
-    /// Error against light rays and CPU time, for every estimator
-    Convergence(ConvergenceArguments),
-    /// Maps by brute force, one texel per ray, with their noise
-    Reference(ReferenceArguments),
-    /// What each effect costs and what it is worth, by bakes with and without it
-    Effects(EffectsArguments),
-    /// Split and stochastic rays, few wavelengths, many and all: how right and how dear
-    Spectrum(SpectrumArguments),
-    /// Hard cases, each with a law that must hold, how far off it is and its bound
-    Stability(StabilityArguments),
-    /// What accuracy costs, for every built-in scene, and how well that was predicted
-    Accuracy(PageArguments),
-    /// Table 1 of the paper: error, rays and times at its three densities
-    Table1(PageArguments),
-    /// Figure 6a: error against the number of light rays
-    Rays(PageArguments),
-    /// Figure 6b: error against sigma
-    Sigma(PageArguments),
-    /// Plate 6: maps of 30, 100 and 300 texels across
-    Resolution(PageArguments),
-    /// Figure 5, Plates 1 and 2: shapes and sizes of kernels
-    Kernels(PageArguments),
-    /// Figure 3: density of nearest hits against areas between neighbouring rays
-    Connectivity(PageArguments),
-    /// The cube's bias against cells of equal solid angle
-    ItemBuffer(PageArguments),
-    /// Plates 7 and 8: a pool from above and from below
-    Pool(PageArguments),
-    /// Plate 9: how the polygons of a complex object show in its caustic
-    Complex(PageArguments),
-    /// How cost grows with rays, triangles, texels and threads
-    Scaling(PageArguments),
-    /// All of the pages from `accuracy` to `scaling`, each in a folder of its name
-    Pages(PageArguments),
-}
-
-impl Study {
-    /// Of a study whose result is a page: its name on the command line, and its arguments.
-    pub fn as_page(&self) -> Option<(&'static str, &PageArguments)> {
-        Some(match self {
-            Self::Accuracy(page) => ("accuracy", page),
-            Self::Table1(page) => ("table1", page),
-            Self::Rays(page) => ("rays", page),
-            Self::Sigma(page) => ("sigma", page),
-            Self::Resolution(page) => ("resolution", page),
-            Self::Kernels(page) => ("kernels", page),
-            Self::Connectivity(page) => ("connectivity", page),
-            Self::ItemBuffer(page) => ("item-buffer", page),
-            Self::Pool(page) => ("pool", page),
-            Self::Complex(page) => ("complex", page),
-            Self::Scaling(page) => ("scaling", page),
-            Self::Pages(page) => (ALL_PAGES, page),
-            Self::Convergence(_)
-            | Self::Reference(_)
-            | Self::Effects(_)
-            | Self::Spectrum(_)
-            | Self::Stability(_) => return None,
-        })
-    }
-
-    fn run(&self) -> &RunOptions {
-        match self {
-            Self::Convergence(convergence) => &convergence.run,
-            Self::Reference(reference) => &reference.run,
-            Self::Effects(effects) => &effects.run,
-            Self::Spectrum(spectrum) => &spectrum.run,
-            Self::Stability(stability) => &stability.run,
-            Self::Accuracy(page)
-            | Self::Table1(page)
-            | Self::Rays(page)
-            | Self::Sigma(page)
-            | Self::Resolution(page)
-            | Self::Kernels(page)
-            | Self::Connectivity(page)
-            | Self::ItemBuffer(page)
-            | Self::Pool(page)
-            | Self::Complex(page)
-            | Self::Scaling(page)
-            | Self::Pages(page) => &page.run,
-        }
-    }
-}
-
-#[derive(Debug, Args)]
-pub struct PageArguments {
-    /// Folder for the page: NAME.md, NAME.csv, plots (.svg) and pictures (.png)
-    #[arg(short, long, value_name = "DIR")]
-    pub output: PathBuf,
-    /// Write into the folder even if it holds other files
-    #[arg(long)]
-    pub force: bool,
-    /// Small maps and few of everything, to see that it works
-    #[arg(long)]
-    pub quick: bool,
-    #[command(flatten)]
-    pub run: RunOptions,
-}
-
-#[derive(Debug, Args)]
-pub struct ConvergenceArguments {
-    /// .glb, .gltf or builtin:NAME [default: builtin:ring]
-    pub scene: Option<String>,
-    /// Folder for convergence.csv and convergence.svg
-    #[arg(short, long, value_name = "DIR")]
-    pub output: PathBuf,
-    /// Write into the folder even if it holds other files
-    #[arg(long)]
-    pub force: bool,
-    /// Estimators to measure [default: all]
-    #[arg(long, value_enum, value_delimiter = ',', value_name = "ESTIMATOR,...")]
-    pub estimators: Option<Vec<Estimator>>,
-    /// Ascending light rays per steradian [default: 1e2 to 1e6, two a decade]
-    #[arg(
-        long,
-        value_delimiter = ',',
-        value_name = "RAYS_PER_SR,...",
-        allow_negative_numbers = true
-    )]
-    pub densities: Option<Vec<f64>>,
-    /// Map to measure against, .exr or .pfm [default: the shipped one of a built-in scene, else a much denser bake]
-    #[arg(long, value_name = "FILE")]
-    pub reference: Option<PathBuf>,
-    /// Surface of the reference [default: floor, or the only one that takes light]
-    #[arg(long, value_name = "NAME", requires = "reference")]
-    pub surface: Option<String>,
-    /// Texels of every map: N by N, or W by H [default: 256]
-    #[arg(long, value_name = "N|WxH", value_parser = study_values::fixed_map_resolution, allow_hyphen_values = true)]
-    pub map_resolution: Option<MapResolution>,
-    /// Bakes of each kind, whose median CPU time counts [default: 5]
-    #[arg(long, value_name = "N", conflicts_with = "quick")]
-    pub repeat: Option<usize>,
-    /// One bake of each kind, densities up to 1e5
-    #[arg(long)]
-    pub quick: bool,
-    #[command(flatten)]
-    pub scene_options: SceneOptions,
-    #[command(flatten)]
-    pub run: RunOptions,
-}
-
-#[derive(Debug, Args)]
-pub struct ReferenceArguments {
-    /// .glb, .gltf or builtin:NAME
-    pub scene: String,
-    /// Folder for the maps, manifest.json and reference.json
-    #[arg(short, long, value_name = "DIR")]
-    pub output: PathBuf,
-    /// Write into the folder even if it holds other files
-    #[arg(long)]
-    pub force: bool,
-    /// Light rays, such as 1e8
-    #[arg(long, value_name = "N", value_parser = study_values::ray_count, allow_hyphen_values = true)]
-    pub rays: u64,
-    /// Texels of every map: N by N, or W by H [default: 256]
-    #[arg(long, value_name = "N|WxH", value_parser = study_values::fixed_map_resolution, allow_hyphen_values = true)]
-    pub map_resolution: Option<MapResolution>,
-    /// Seed of the rays [default: 0]
-    #[arg(long, value_name = "N")]
-    pub seed: Option<u64>,
-    #[command(flatten)]
-    pub scene_options: SceneOptions,
-    #[command(flatten)]
-    pub run: RunOptions,
-}
-
-#[derive(Debug, Args)]
-pub struct EffectsArguments {
-    /// .glb, .gltf or builtin:NAME
-    pub scene: String,
-    /// Folder for effects.csv and a picture per effect
-    #[arg(short, long, value_name = "DIR")]
-    pub output: PathBuf,
-    /// Write into the folder even if it holds other files
-    #[arg(long)]
-    pub force: bool,
-    /// Bakes as planned and with everything forced on, in turns, whose median CPU times count [default: 5]
-    #[arg(long, value_name = "N", allow_negative_numbers = true)]
-    pub repeat: Option<usize>,
-    #[command(flatten)]
-    pub scene_options: SceneOptions,
-    #[command(flatten)]
-    pub bake: BakeOptions,
-    #[command(flatten)]
-    pub run: RunOptions,
-}
-
-#[derive(Debug, Args)]
-pub struct SpectrumArguments {
-    /// .glb, .gltf or builtin:NAME; of a scene with thin beams, those alone shine [default: builtin:spectrum]
-    pub scene: Option<String>,
-    /// Folder for spectrum.csv and spectrum.png
-    #[arg(short, long, value_name = "DIR")]
-    pub output: PathBuf,
-    /// Write into the folder even if it holds other files
-    #[arg(long)]
-    pub force: bool,
-    /// Numbers of wavelengths [default: 1,4,7,13]
-    #[arg(
-        long,
-        value_delimiter = ',',
-        value_name = "N,...",
-        allow_negative_numbers = true
-    )]
-    pub wavelengths: Option<Vec<u32>>,
-    /// Light rays per steradian; beams are thin [default: 1e8]
-    #[arg(long, value_name = "RAYS_PER_SR", allow_negative_numbers = true)]
-    pub density: Option<f64>,
-    /// Texels of every map: N by N, or W by H [default: 1024]
-    #[arg(long, value_name = "N|WxH", value_parser = study_values::fixed_map_resolution, allow_hyphen_values = true)]
-    pub map_resolution: Option<MapResolution>,
-    /// Bakes of each kind, whose median CPU time counts [default: 5]
-    #[arg(long, value_name = "N", allow_negative_numbers = true)]
-    pub repeat: Option<usize>,
-    #[command(flatten)]
-    pub scene_options: SceneOptions,
-    #[command(flatten)]
-    pub run: RunOptions,
-}
-
-#[derive(Debug, Args)]
-pub struct StabilityArguments {
-    /// Folder for stability.csv and stability.md
-    #[arg(short, long, value_name = "DIR")]
-    pub output: PathBuf,
-    /// Write into the folder even if it holds other files
-    #[arg(long)]
-    pub force: bool,
-    /// Only the case of that name
-    #[arg(long, value_name = "NAME")]
-    pub case: Option<String>,
-    /// Also what takes long: millions of triangles, the largest maps, many more seeds
-    #[arg(long)]
-    pub long: bool,
-    #[command(flatten)]
-    pub run: RunOptions,
-}
-
 /// What the arguments ask for.
 pub enum Parsed {
     /// A job to run.
@@ -616,7 +351,7 @@ pub fn parse() -> Result<Parsed> {
     };
     let arguments = Arguments::from_arg_matches(&matches).map_err(|error| in_one_sentence(&error))?;
     let run = arguments.run_options();
-    start_log(run.log);
+    env_logger::Builder::new().filter_level(run.log).init();
     if !run.no_cache {
         nephroid::files::cache::enable();
     }
@@ -638,7 +373,7 @@ impl Arguments {
             Some(Command::Compare(compare)) => &compare.run,
             Some(Command::Export(export)) => &export.run,
             Some(Command::Merge(merge)) => &merge.run,
-            Some(Command::Study(study)) => study.study.as_ref().map_or(&study.run, Study::run),
+            Some(Command::Study(study)) => study.run_options(),
         }
     }
 }
@@ -658,18 +393,6 @@ fn in_one_sentence(error: &clap::Error) -> Error {
         what.trim_start_matches("error: "),
         "see nephroid --help",
     )
-}
-
-fn start_log(level: LogLevel) {
-    let filter = match level {
-        LogLevel::Off => log::LevelFilter::Off,
-        LogLevel::Error => log::LevelFilter::Error,
-        LogLevel::Warn => log::LevelFilter::Warn,
-        LogLevel::Info => log::LevelFilter::Info,
-        LogLevel::Debug => log::LevelFilter::Debug,
-        LogLevel::Trace => log::LevelFilter::Trace,
-    };
-    env_logger::Builder::new().filter_level(filter).init();
 }
 
 #[cfg(test)]

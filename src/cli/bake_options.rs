@@ -15,10 +15,10 @@ use super::values;
 #[command(next_help_heading = "Bake options")]
 pub struct BakeOptions {
     /// Target error by name [default: preview, unless density, error or time is given]
-    #[arg(long, value_enum)]
+    #[arg(long, value_parser = values::one_of::<Preset>())]
     preset: Option<Preset>,
     /// How light rays become irradiance [default: wavefront]
-    #[arg(long, value_enum)]
+    #[arg(long, value_parser = values::one_of::<Estimator>())]
     estimator: Option<Estimator>,
     /// Light rays per steradian, and no refinement; with --max-error, to begin with. For suns density/D² rays per m², D
     /// from the casters' centre to their farthest receiver
@@ -36,23 +36,23 @@ pub struct BakeOptions {
     #[arg(long, value_name = "N")]
     wavefronts: Option<u32>,
     /// Where in its lattice cell a light ray starts (splat) [default: lattice]
-    #[arg(long, value_enum, value_name = "PLACEMENT")]
+    #[arg(long, value_parser = values::one_of::<RayPlacement>(), value_name = "PLACEMENT")]
     rays: Option<RayPlacement>,
     /// Spread of the gaussian kernel in squared footprint radii, or `adaptive` (splat) [default: 1]; for the wavefront,
     /// smoothing of the map in squared texel radii [default: 0, none]
     #[arg(long, value_name = "S|adaptive", value_parser = values::sigma, allow_negative_numbers = true)]
     sigma: Option<Sigma>,
     /// Shape of a splat (splat) [default: gaussian]
-    #[arg(long, value_enum)]
+    #[arg(long, value_parser = values::one_of::<Kernel>())]
     kernel: Option<Kernel>,
     /// How a kernel is taken into texels (splat) [default: integrated]
-    #[arg(long, value_enum, value_name = "SAMPLING")]
+    #[arg(long, value_parser = values::one_of::<KernelSampling>(), value_name = "SAMPLING")]
     kernel_sampling: Option<KernelSampling>,
     /// What sets the size and shape of a splat (splat) [default: ellipse]
-    #[arg(long, value_enum)]
+    #[arg(long, value_parser = values::one_of::<Footprint>())]
     footprint: Option<Footprint>,
     /// How the sphere of directions around a light is divided [default: equal]
-    #[arg(long, value_enum, value_name = "DIVISION")]
+    #[arg(long, value_parser = values::one_of::<ItemBufferKind>(), value_name = "DIVISION")]
     item_buffer: Option<ItemBufferKind>,
     /// Texels of every map: as needed, N by N, or W by H [default: auto]
     #[arg(long, value_name = "auto|N|WxH", value_parser = values::map_resolution, allow_hyphen_values = true)]
@@ -65,7 +65,7 @@ pub struct BakeOptions {
     #[arg(long, value_name = "SHARE", allow_negative_numbers = true)]
     branch_threshold: Option<f64>,
     /// Layers to bake [default: caustic for bake, caustic,direct for pictures]
-    #[arg(long, value_enum, value_delimiter = ',', value_name = "LAYER,...")]
+    #[arg(long, value_parser = values::one_of::<LayerKind>(), value_delimiter = ',', value_name = "LAYER,...")]
     layers: Option<Vec<LayerKind>>,
     /// Adds each light's part of each layer to the files, so that lamps can be dimmed afterwards
     #[arg(long)]
@@ -76,7 +76,7 @@ pub struct BakeOptions {
     wavelengths: Option<Wavelengths>,
     /// Every ray at every wavelength, or each ray at one of them [default: split; stochastic for splats over the whole
     /// spectrum]
-    #[arg(long, value_enum, value_name = "SAMPLING")]
+    #[arg(long, value_parser = values::one_of::<SpectralSampling>(), value_name = "SAMPLING")]
     spectral_sampling: Option<SpectralSampling>,
     /// Adds the light of each wavelength to the files [W/(m² nm)], with --wavelengths N
     #[arg(long)]

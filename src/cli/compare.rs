@@ -10,7 +10,7 @@ use nephroid::files;
 use nephroid::illumination::compare::{Comparison, Grid, at_common_size, compare};
 use serde::Serialize;
 
-use super::job::CompareJob;
+use super::args::CompareArguments;
 use super::terminal::Terminal;
 
 /// Which channels of an EXR map are compared.
@@ -68,7 +68,7 @@ struct Difference {
 ///
 /// # Errors
 /// Files that cannot be read or compared; a relative RMSE above the limit.
-pub fn run(job: &CompareJob, terminal: &Terminal) -> Result<()> {
+pub fn run(job: &CompareArguments, terminal: &Terminal) -> Result<()> {
     if let Some(path) = &job.difference {
         files::check_output_file(path)?;
     }
@@ -116,14 +116,14 @@ pub fn run(job: &CompareJob, terminal: &Terminal) -> Result<()> {
     hold_to_limit(job, relative_rmse)
 }
 
-fn hold_to_limit(job: &CompareJob, relative_rmse: f64) -> Result<()> {
+fn hold_to_limit(job: &CompareArguments, relative_rmse: f64) -> Result<()> {
     match job.max_rmse {
-        Some(limit) if relative_rmse > limit => Err(Error::failure(
+        Some(limit) if relative_rmse > limit / 100.0 => Err(Error::failure(
             job.map.display().to_string(),
             format!(
                 "its relative RMSE of {:.4} % is above the limit of {} %",
                 100.0 * relative_rmse,
-                100.0 * limit
+                limit
             ),
             "bake at a higher density or raise --max-rmse",
         )),

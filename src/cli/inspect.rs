@@ -106,7 +106,7 @@ impl Report {
                 *line = plan::dispersion(line.clone(), scene, camera, &chains);
             }
         }
-        plan.effects.push(chains.clone());
+        plan.effects.push(chains);
         Self {
             scene: scene.source.clone(),
             name: scene.name.clone(),
@@ -126,7 +126,7 @@ impl Report {
             cameras: scene.cameras.iter().map(|camera| camera.name.clone()).collect(),
             plan,
             estimated_rays: survey.estimate.rays,
-            survey: SurveyReport::new(scene, survey, chains),
+            survey: SurveyReport::new(scene, survey),
             warnings: scene.warnings.clone(),
         }
     }
@@ -314,6 +314,13 @@ fn text(report: &Report) -> String {
         line(
             "rays from",
             format!("{}: {switch}, {}", light.light, light.reason),
+        );
+    }
+    for effect in &report.plan.effects {
+        let switch = if effect.on { "on" } else { "off" };
+        line(
+            "effect",
+            format!("{}: {switch}, {}", effect.effect.name(), effect.reason),
         );
     }
     for (name, value) in report.survey.lines() {

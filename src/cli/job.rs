@@ -6,29 +6,26 @@ use std::path::{Path, PathBuf};
 use nephroid::effect::{Effect, EffectSwitch};
 use nephroid::error::{Error, Result};
 use nephroid::eye_pass::{ToneMap, WhiteBalance};
+use nephroid::light_pass::share::Share;
 use nephroid::settings::{BakeSettings, LayerKind};
 
 use super::args::{
     Arguments, Backend, BakeArguments, Command, CompareArguments, InspectArguments, MapsOption,
-    PictureOptions, RenderArguments, RunOptions, SceneOptions, ViewArguments,
+    MergeArguments, PictureOptions, RenderArguments, RunOptions, SceneOptions, ViewArguments,
 };
 use super::bake_options::BakeOptions;
-use super::compare::{self, LayerChoice};
+use super::compare;
 use super::export::{self, ExportJob};
 use super::interrupt::Interrupt;
-use super::merge::{self, MergeJob};
+use super::merge;
 #[cfg(feature = "gpu")]
 use super::render_path;
 use super::scene_input::{MissingLight, SceneInput};
-use super::shard::{self, ShardJob};
-use super::study_jobs::{
-    ConvergenceJob, EffectsJob, PageJob, ReferenceJob, SpectrumJob, StabilityJob, study_job,
-};
+use super::shard;
+use super::study::{self, StudyArguments};
 use super::terminal::Terminal;
 use super::values::Exposure;
-use super::{
-    bake, inspect, render, study, study_effects, study_pages, study_spectrum, study_stability, view,
-};
+use super::{bake, inspect, render, view};
 
 /// Scene of `view` when none is named.
 const DEFAULT_SCENE: &str = "builtin:gallery";
@@ -48,17 +45,11 @@ pub enum Job {
     #[cfg(feature = "gpu")]
     RenderPath(PathJob),
     Inspect(InspectJob),
-    Compare(CompareJob),
-    Shard(ShardJob),
-    Merge(MergeJob),
+    Compare(CompareArguments),
+    Shard(BakeJob, Share),
+    Merge(MergeArguments, usize),
     Export(ExportJob),
-    ListStudies,
-    Convergence(ConvergenceJob),
-    Reference(ReferenceJob),
-    Effects(EffectsJob),
-    Spectrum(SpectrumJob),
-    Stability(StabilityJob),
-    Page(PageJob),
+    Study(StudyArguments),
 }
 
 /// `view`.
@@ -134,17 +125,6 @@ pub struct InspectJob {
     pub settings: BakeSettings,
 }
 
-/// `compare`.
-#[derive(Debug)]
-pub struct CompareJob {
-    pub map: PathBuf,
-    pub reference: PathBuf,
-    pub layer: Option<LayerChoice>,
-    pub difference: Option<PathBuf>,
-    /// Largest relative RMSE [1].
-    pub max_rmse: Option<f64>,
-}
-
 /// Where illumination comes from.
 #[derive(Debug)]
 pub enum MapSource {
@@ -199,9 +179,12 @@ impl Job {
             Some(Command::Render(render)) => render_job(render),
             Some(Command::Inspect(inspect)) => inspect_job(inspect),
             Some(Command::Compare(compare)) => compare_job(compare),
-            Some(Command::Merge(merge)) => Ok(Job::Merge(MergeJob::new(merge)?)),
+            Some(Command::Merge(merge)) => {
+                let threads = threads(&merge.run)?;
+                Ok(Job::Merge(merge, threads))
+            }
             Some(Command::Export(export)) => Ok(Job::Export(ExportJob::new(export)?)),
-            Some(Command::Study(study)) => study_job(study),
+            Some(Command::Study(study)) => Ok(Job::Study(study)),
         }
     }
 
@@ -218,16 +201,10 @@ impl Job {
             Self::RenderPath(job) => render_path::run(&job, terminal, interrupt),
             Self::Inspect(job) => inspect::run(&job, terminal, interrupt),
             Self::Compare(job) => compare::run(&job, terminal),
-            Self::Shard(job) => shard::run(&job, terminal, interrupt),
-            Self::Merge(job) => merge::run(&job, terminal, interrupt),
+            Self::Shard(job, share) => shard::run(&job, share, terminal, interrupt),
+            Self::Merge(merge, threads) => merge::run(&merge, threads, terminal, interrupt),
             Self::Export(job) => export::run(&job, terminal, interrupt),
-            Self::ListStudies => study::list(terminal),
-            Self::Convergence(job) => study::convergence(&job, terminal, interrupt),
-            Self::Reference(job) => study::reference(&job, terminal, interrupt),
-            Self::Effects(job) => study_effects::run(&job, terminal, interrupt),
-            Self::Spectrum(job) => study_spectrum::run(&job, terminal, interrupt),
-            Self::Stability(job) => study_stability::run(&job, terminal, interrupt),
-            Self::Page(job) => study_pages::run(&job, terminal, interrupt),
+            Self::Study(arguments) => study::run(&arguments, terminal, interrupt),
         }
     }
 }
@@ -248,14 +225,7 @@ fn view_job(arguments: ViewArguments) -> Result<Job> {
     Ok(Job::View(ViewJob {
         scene: scene_input(scene, &arguments.scene_options, MissingLight::Add),
         maps: map_source(arguments.maps, &bake, &arguments.run)?,
-        picture: PictureRequest {
-            camera: arguments.picture.camera,
-            size: arguments.picture.size.unwrap_or(DEFAULT_SIZE),
-            exposure: arguments.picture.exposure.unwrap_or_default(),
-            tone_map: ToneMap::default(),
-            white_balance: WhiteBalance::default(),
-            backend: None,
-        },
+        picture: picture_request(arguments.picture, (None, None, None)),
         #[cfg(feature = "viewer")]
         event_log: arguments.event_log,
         #[cfg(feature = "viewer")]
@@ -270,20 +240,18 @@ fn view_job(arguments: ViewArguments) -> Result<Job> {
 }
 
 fn bake_job(arguments: BakeArguments) -> Result<Job> {
-    let scene = scene_input(arguments.scene, &arguments.scene_options, MissingLight::Fail);
-    let settings = arguments
-        .bake
-        .settings(&[LayerKind::Caustic], threads(&arguments.run)?)?;
-    let (output, force) = (arguments.output, arguments.force);
-    Ok(match arguments.shard {
-        Some(share) => Job::Shard(ShardJob::new(scene, settings, share, (output, force))?),
-        None => Job::Bake(BakeJob {
-            scene,
-            settings,
-            output,
-            force,
-        }),
-    })
+    let threads = threads(&arguments.run)?;
+    let job = BakeJob {
+        scene: scene_input(arguments.scene, &arguments.scene_options, MissingLight::Fail),
+        settings: arguments.bake.settings(&[LayerKind::Caustic], threads)?,
+        output: arguments.output,
+        force: arguments.force,
+    };
+    let Some(share) = arguments.shard else {
+        return Ok(Job::Bake(job));
+    };
+    nephroid::session::shards::check(&job.settings)?;
+    Ok(Job::Shard(job, share))
 }
 
 fn render_job(arguments: RenderArguments) -> Result<Job> {
@@ -298,11 +266,7 @@ fn render_job(arguments: RenderArguments) -> Result<Job> {
         ));
     };
     let format = picture_format(&output)?;
-    let PictureOptions {
-        camera,
-        exposure,
-        size,
-    } = arguments.picture;
+    let eye = (arguments.tone_map, arguments.white_balance, arguments.backend);
     if format == PictureFormat::Exr {
         let radiance_only = |option: &str| {
             Err(Error::usage(
@@ -311,7 +275,7 @@ fn render_job(arguments: RenderArguments) -> Result<Job> {
                 "leave it out or write a .png",
             ))
         };
-        if exposure.is_some() {
+        if arguments.picture.exposure.is_some() {
             return radiance_only("--exposure");
         }
         if arguments.tone_map.is_some() {
@@ -324,14 +288,7 @@ fn render_job(arguments: RenderArguments) -> Result<Job> {
     Ok(Job::Render(RenderJob {
         scene: scene_input(arguments.scene, &arguments.scene_options, MissingLight::Add),
         maps: map_source(arguments.maps, &arguments.bake, &arguments.run)?,
-        picture: PictureRequest {
-            camera,
-            size: size.unwrap_or(DEFAULT_SIZE),
-            exposure: exposure.unwrap_or_default(),
-            tone_map: arguments.tone_map.unwrap_or_default(),
-            white_balance: arguments.white_balance.unwrap_or_default(),
-            backend: arguments.backend,
-        },
+        picture: picture_request(arguments.picture, eye),
         output,
         format,
     }))
@@ -373,14 +330,10 @@ fn path_job(arguments: RenderArguments) -> Result<Job> {
     Ok(Job::RenderPath(PathJob {
         scene: scene_input(arguments.scene, &arguments.scene_options, MissingLight::Add),
         maps,
-        picture: PictureRequest {
-            camera: arguments.picture.camera,
-            size: arguments.picture.size.unwrap_or(DEFAULT_SIZE),
-            exposure: arguments.picture.exposure.unwrap_or_default(),
-            tone_map: arguments.tone_map.unwrap_or_default(),
-            white_balance: arguments.white_balance.unwrap_or_default(),
-            backend: arguments.backend,
-        },
+        picture: picture_request(
+            arguments.picture,
+            (arguments.tone_map, arguments.white_balance, arguments.backend),
+        ),
         motion,
         stats,
         output,
@@ -428,13 +381,21 @@ fn compare_job(arguments: CompareArguments) -> Result<Job> {
             "name a file that ends in .png",
         ));
     }
-    Ok(Job::Compare(CompareJob {
-        map: arguments.map,
-        reference: arguments.reference,
-        layer: arguments.layer,
-        difference: arguments.difference,
-        max_rmse: arguments.max_rmse.map(|percent| percent / 100.0),
-    }))
+    Ok(Job::Compare(arguments))
+}
+
+fn picture_request(
+    options: PictureOptions,
+    (tone_map, white_balance, backend): (Option<ToneMap>, Option<WhiteBalance>, Option<Backend>),
+) -> PictureRequest {
+    PictureRequest {
+        camera: options.camera,
+        size: options.size.unwrap_or(DEFAULT_SIZE),
+        exposure: options.exposure.unwrap_or_default(),
+        tone_map: tone_map.unwrap_or_default(),
+        white_balance: white_balance.unwrap_or_default(),
+        backend,
+    }
 }
 
 pub(super) fn scene_input(source: String, options: &SceneOptions, otherwise: MissingLight) -> SceneInput {

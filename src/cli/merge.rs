@@ -1,7 +1,5 @@
 //! `merge`: the maps of a bake from the sums of its shards.
 
-use std::path::PathBuf;
-
 use nephroid::error::Result;
 use nephroid::export::map_folder::MapFolder;
 use nephroid::export::shards::ShardSet;
@@ -11,45 +9,15 @@ use nephroid::settings::BakeSettings;
 use super::args::MergeArguments;
 use super::bake::{self, Clock};
 use super::interrupt::Interrupt;
-use super::job;
 use super::progress_bar::StageBar;
 use super::scene_input::{MissingLight, SceneInput};
 use super::terminal::Terminal;
-
-/// A validated `merge`.
-#[derive(Debug)]
-pub struct MergeJob {
-    shards: Vec<PathBuf>,
-    output: PathBuf,
-    force: bool,
-    /// Where the scene is now.
-    scene: Option<String>,
-    environment: Option<PathBuf>,
-    threads: usize,
-}
-
-impl MergeJob {
-    /// Checks the arguments.
-    ///
-    /// # Errors
-    /// A number of threads out of range.
-    pub fn new(arguments: MergeArguments) -> Result<Self> {
-        Ok(Self {
-            threads: job::threads(&arguments.run)?,
-            shards: arguments.shards,
-            output: arguments.output,
-            force: arguments.force,
-            scene: arguments.scene,
-            environment: arguments.environment,
-        })
-    }
-}
 
 /// Reads, adds up and writes.
 ///
 /// # Errors
 /// Shards that are torn, missing or of different bakes; another scene; output that cannot be written.
-pub fn run(job: &MergeJob, terminal: &Terminal, interrupt: &Interrupt) -> Result<()> {
+pub fn run(job: &MergeArguments, threads: usize, terminal: &Terminal, interrupt: &Interrupt) -> Result<()> {
     let clock = Clock::start();
     let shards = ShardSet::open(&job.shards)?;
     let (shards_wall_s, shards_cpu_s) = shards.seconds();
@@ -68,7 +36,7 @@ pub fn run(job: &MergeJob, terminal: &Terminal, interrupt: &Interrupt) -> Result
     shards.check_scene(&loaded.scene)?;
     let folder = MapFolder::open(&job.output, job.force)?;
     let settings = BakeSettings {
-        threads: job.threads,
+        threads,
         ..manifest.settings
     };
     interrupt.check(&loaded.scene.source)?;

@@ -21,12 +21,6 @@ mod scene_input;
 mod shard;
 mod spectral_report;
 mod study;
-mod study_effects;
-mod study_jobs;
-mod study_pages;
-mod study_spectrum;
-mod study_stability;
-mod study_values;
 mod survey_report;
 mod terminal;
 mod values;
@@ -41,6 +35,13 @@ use terminal::Terminal;
 
 /// Parses, runs, and says how it went: 0 done, 1 failed, 2 bad usage, 128 + signal when a signal stopped it.
 pub fn run() -> ExitCode {
+    let usual = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |info| {
+        // Those of damaged files become errors.
+        if !nephroid::scene::is_guarded() {
+            usual(info);
+        }
+    }));
     let (terminal, job) = match args::parse() {
         Ok(args::Parsed::Run(terminal, job)) => (terminal, job),
         Ok(args::Parsed::Printed) => return ExitCode::SUCCESS,

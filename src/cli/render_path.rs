@@ -5,11 +5,11 @@ use std::fmt::Write as _;
 use nephroid::effect::{Effect, EffectSwitch};
 use nephroid::error::Result;
 use nephroid::export::frame_folder::FrameFolder;
+use nephroid::eye_pass::frame_times::{self, Keep, MannerTimes, Ratio, SAMPLES, Spread, Walk};
 use nephroid::eye_pass::{ToneMap, View};
 use nephroid::gpu::Gpu;
 use nephroid::optics::LinearSrgb;
 use nephroid::scene::{CameraPath, turntable};
-use nephroid::study::frame_times::{self, Keep, MannerTimes, Ratio, SAMPLES, Spread, Walk};
 use serde::Serialize;
 
 use super::bake::{self, Clock};

@@ -1,144 +1,549 @@
-//! `study`: which there are, what accuracy costs, and references by brute force.
+//! `study`: which there are, what they take, and one way to run them.
 
 use std::fmt::Write as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use clap::{ArgMatches, Args, FromArgMatches, Subcommand};
 use nephroid::error::{Error, Result};
 use nephroid::export::manifest::MapEntry;
 use nephroid::export::map_folder::MapFolder;
 use nephroid::files::{self, OutputFolder};
 use nephroid::scene::Scene;
-use nephroid::study::brute_force::{brute_force, relative_noise};
-use nephroid::study::convergence::{self, Axis, Measurement, Price};
-use nephroid::study::cost::{self, Cost};
-use nephroid::study::pages::STUDIES as PAGES;
-use nephroid::study::plot::convergence_svg;
+use nephroid::settings::{BakeSettings, Estimator, LayerKind, MapResolution, Wavelengths};
+use nephroid::study::brute_force::{brute_force, check_rays, relative_noise};
+use nephroid::study::one_scene::{self, CONVERGENCE, EFFECTS, SPECTRUM};
+use nephroid::study::paper;
 use nephroid::study::references::Reference;
+use nephroid::study::sweep::{Bench, Outcome, Sweep};
+use nephroid::study::table::Table;
 use nephroid::transport::Tracer;
 use serde::Serialize;
+use strum::VariantArray;
 
-use super::args::ALL_PAGES;
+use super::args::{RunOptions, SceneOptions};
+use super::bake_options::BakeOptions;
 use super::compare::read_luminance;
 use super::interrupt::Interrupt;
+use super::job::{scene_input, threads};
 use super::progress_bar::StageBar;
-use super::scene_input::SceneInput;
-use super::study_jobs::{ConvergenceJob, ReferenceJob};
+use super::scene_input::MissingLight;
+
 use super::terminal::Terminal;
+use super::values;
 
-/// Name and one line of each study that is no page.
-const STUDIES: [(&str, &str); 6] = [
-    (
-        "convergence",
-        "error against light rays and CPU time, for every estimator",
-    ),
-    (
-        "reference",
-        "maps by brute force, one texel per ray, with their noise",
-    ),
-    (
-        "effects",
-        "what each effect costs and what it is worth, by bakes with and without it",
-    ),
-    (
-        "spectrum",
-        "split and stochastic rays, few wavelengths, many and all: how right and how dear",
-    ),
-    (
-        "stability",
-        "hard cases, each with a law that must hold, how far off it is and its bound",
-    ),
-    (ALL_PAGES, "all that follow, each in a folder of its name"),
-];
+const REFERENCE: (&str, &str) = (
+    "reference",
+    "maps by brute force, one texel per ray, with their noise",
+);
+const ALL: (&str, &str) = ("pages", "all that follow, each in a folder of its name");
 
-const CSV: &str = "convergence.csv";
-const SVG: &str = "convergence.svg";
-const REFERENCE: &str = "reference.json";
+/// Texels across and down where none are asked for.
+const SIDE: usize = 256;
+const SPECTRUM_SIDE: usize = 1024;
 
-/// Names all studies.
+/// Bakes of each kind where no number is asked for, and the most.
+const REPEATS: usize = 5;
+const MAX_REPEATS: usize = 1000;
+
+/// Densities of `convergence` [1/sr]; `--quick` leaves out the last.
+const DENSITIES: [f64; 9] = [1e2, 3e2, 1e3, 3e3, 1e4, 3e4, 1e5, 3e5, 1e6];
+const QUICK_DENSITIES: usize = 7;
+
+/// Of thin beams [1/sr].
+const BEAM_DENSITY_PER_SR: f64 = 1e8;
+
+#[derive(Debug, Args)]
+#[command(args_conflicts_with_subcommands = true)]
+pub struct StudyArguments {
+    /// Name all studies
+    #[arg(long)]
+    list: bool,
+    #[command(subcommand)]
+    study: Option<Study>,
+    #[command(flatten)]
+    run: RunOptions,
+}
+
+#[derive(Debug, Subcommand)]
+enum Study {
+    #[command(about = CONVERGENCE.1)]
+    Convergence(ConvergenceArguments),
+    #[command(about = REFERENCE.1)]
+    Reference(ReferenceArguments),
+    #[command(about = EFFECTS.1)]
+    Effects(EffectsArguments),
+    #[command(about = SPECTRUM.1)]
+    Spectrum(SpectrumArguments),
+    #[command(flatten)]
+    Built(BuiltStudy),
+}
+
+/// What every study takes.
+#[derive(Debug, Args)]
+struct Common {
+    /// Folder for what it finds: NAME.md, NAME.csv, plots (.svg) and pictures (.png)
+    #[arg(short, long, value_name = "DIR")]
+    output: PathBuf,
+    /// Write into the folder even if it holds other files
+    #[arg(long)]
+    force: bool,
+    /// Small maps and few of everything, to see that it works
+    #[arg(long)]
+    quick: bool,
+    #[command(flatten)]
+    run: RunOptions,
+}
+
+/// Studies of built-in scenes, by name.
+#[derive(Debug)]
+struct BuiltStudy {
+    name: String,
+    common: Common,
+}
+
+#[derive(Debug, Args)]
+struct ConvergenceArguments {
+    /// .glb, .gltf or builtin:NAME
+    #[arg(default_value = "builtin:ring")]
+    scene: String,
+    /// Estimators to measure [default: all]
+    #[arg(long, value_parser = values::one_of::<Estimator>(), value_delimiter = ',', value_name = "ESTIMATOR,...")]
+    estimators: Option<Vec<Estimator>>,
+    /// Ascending light rays per steradian [default: 1e2 to 1e6, two a decade]
+    #[arg(
+        long,
+        value_delimiter = ',',
+        value_name = "RAYS_PER_SR,...",
+        allow_negative_numbers = true
+    )]
+    densities: Option<Vec<f64>>,
+    /// Map to measure against, .exr or .pfm [default: the shipped one of a built-in scene, else a much denser bake]
+    #[arg(long, value_name = "FILE")]
+    reference: Option<PathBuf>,
+    /// Surface of the reference [default: floor, or the only one that takes light]
+    #[arg(long, value_name = "NAME", requires = "reference")]
+    surface: Option<String>,
+    /// Texels of every map: N by N, or W by H [default: 256]
+    #[arg(long, value_name = "N|WxH", value_parser = fixed_map_resolution, allow_hyphen_values = true)]
+    map_resolution: Option<MapResolution>,
+    /// Bakes of each kind, whose median CPU time counts [default: 5; 1 with --quick]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    repeat: Option<usize>,
+    #[command(flatten)]
+    scene_options: SceneOptions,
+    #[command(flatten)]
+    common: Common,
+}
+
+#[derive(Debug, Args)]
+struct ReferenceArguments {
+    /// .glb, .gltf or builtin:NAME
+    scene: String,
+    /// Light rays, such as 1e8
+    #[arg(long, value_name = "N", value_parser = ray_count, allow_hyphen_values = true)]
+    rays: u64,
+    /// Texels of every map: N by N, or W by H [default: 256]
+    #[arg(long, value_name = "N|WxH", value_parser = fixed_map_resolution, allow_hyphen_values = true)]
+    map_resolution: Option<MapResolution>,
+    /// Seed of the rays
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    seed: u64,
+    #[command(flatten)]
+    scene_options: SceneOptions,
+    #[command(flatten)]
+    common: Common,
+}
+
+#[derive(Debug, Args)]
+struct EffectsArguments {
+    /// .glb, .gltf or builtin:NAME
+    scene: String,
+    /// Bakes of each kind, whose median CPU time counts [default: 5; 1 with --quick]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    repeat: Option<usize>,
+    #[command(flatten)]
+    scene_options: SceneOptions,
+    #[command(flatten)]
+    bake: BakeOptions,
+    #[command(flatten)]
+    common: Common,
+}
+
+#[derive(Debug, Args)]
+struct SpectrumArguments {
+    /// .glb, .gltf or builtin:NAME; of a scene with thin beams, those alone shine
+    #[arg(default_value = "builtin:spectrum")]
+    scene: String,
+    /// Numbers of wavelengths
+    #[arg(
+        long,
+        value_delimiter = ',',
+        value_name = "N,...",
+        default_value = "1,4,7,13",
+        allow_negative_numbers = true
+    )]
+    wavelengths: Vec<u32>,
+    /// Light rays per steradian; beams are thin [default: 1e8]
+    #[arg(long, value_name = "RAYS_PER_SR", allow_negative_numbers = true)]
+    density: Option<f64>,
+    /// Texels of every map: N by N, or W by H [default: 1024]
+    #[arg(long, value_name = "N|WxH", value_parser = fixed_map_resolution, allow_hyphen_values = true)]
+    map_resolution: Option<MapResolution>,
+    /// Bakes of each kind, whose median CPU time counts [default: 5; 1 with --quick]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    repeat: Option<usize>,
+    #[command(flatten)]
+    scene_options: SceneOptions,
+    #[command(flatten)]
+    common: Common,
+}
+
+/// `N` (square) or `WxH` [texels].
+fn fixed_map_resolution(text: &str) -> std::result::Result<MapResolution, String> {
+    match values::map_resolution(text) {
+        Ok(fixed @ MapResolution::Fixed { .. }) => Ok(fixed),
+        _ => Err("give N or WxH in texels, such as 512 or 512x256".to_string()),
+    }
+}
+
+/// A number of rays, `250000` or `2.5e5`.
+fn ray_count(text: &str) -> std::result::Result<u64, String> {
+    let rays = text.parse::<f64>().ok().filter(|rays| (1.0..1e18).contains(rays));
+    rays.map(|rays| rays as u64)
+        .ok_or_else(|| "give a number of rays, such as 1e8".to_string())
+}
+
+impl Subcommand for BuiltStudy {
+    fn augment_subcommands(command: clap::Command) -> clap::Command {
+        let names = paper::STUDIES.iter().map(|study| (study.name, study.what));
+        names.chain([ALL]).fold(command, |command, (name, what)| {
+            command.subcommand(Common::augment_args(clap::Command::new(name).about(what)))
+        })
+    }
+
+    fn augment_subcommands_for_update(command: clap::Command) -> clap::Command {
+        Self::augment_subcommands(command)
+    }
+
+    fn has_subcommand(name: &str) -> bool {
+        name == ALL.0 || paper::STUDIES.iter().any(|study| study.name == name)
+    }
+}
+
+impl FromArgMatches for BuiltStudy {
+    fn from_arg_matches(matches: &ArgMatches) -> std::result::Result<Self, clap::Error> {
+        let missing = || clap::Error::new(clap::error::ErrorKind::MissingSubcommand);
+        let (name, matches) = matches.subcommand().ok_or_else(missing)?;
+        Ok(Self {
+            name: name.into(),
+            common: Common::from_arg_matches(matches)?,
+        })
+    }
+
+    fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> std::result::Result<(), clap::Error> {
+        *self = Self::from_arg_matches(matches)?;
+        Ok(())
+    }
+}
+
+impl StudyArguments {
+    pub fn run_options(&self) -> &RunOptions {
+        match &self.study {
+            None => &self.run,
+            Some(Study::Convergence(study)) => &study.common.run,
+            Some(Study::Reference(study)) => &study.common.run,
+            Some(Study::Effects(study)) => &study.common.run,
+            Some(Study::Spectrum(study)) => &study.common.run,
+            Some(Study::Built(study)) => &study.common.run,
+        }
+    }
+}
+
+/// Checks the arguments, measures, writes, and prints what was found.
 ///
 /// # Errors
-/// A stdout that cannot be written.
-pub fn list(terminal: &Terminal) -> Result<()> {
+/// No study is named; a value outside its range; input, output or a bake that failed; stopped before the end, which
+/// writes nothing of the study that it was at.
+pub fn run(arguments: &StudyArguments, terminal: &Terminal, interrupt: &Interrupt) -> Result<()> {
+    let desk = Desk { terminal, interrupt };
+    match &arguments.study {
+        None if arguments.list => list(terminal),
+        None => Err(Error::usage(
+            "study",
+            "no study is named",
+            "name one, or use --list to see which there are",
+        )),
+        Some(Study::Convergence(study)) => desk.convergence(study),
+        Some(Study::Reference(study)) => desk.reference(study),
+        Some(Study::Effects(study)) => desk.effects(study),
+        Some(Study::Spectrum(study)) => desk.spectrum(study),
+        Some(Study::Built(study)) if study.name == ALL.0 => desk.all(&study.common),
+        Some(Study::Built(study)) => desk.built(study),
+    }
+}
+
+fn list(terminal: &Terminal) -> Result<()> {
     #[derive(Serialize)]
     struct Line {
         name: &'static str,
         what: &'static str,
     }
-    let pages = PAGES.iter().map(|study| (study.name, study.what));
-    let studies: Vec<(&'static str, &'static str)> = STUDIES.into_iter().chain(pages).collect();
-    let lines: Vec<Line> = studies.iter().map(|&(name, what)| Line { name, what }).collect();
-    let text: Vec<String> = studies
+    let own = [CONVERGENCE, REFERENCE, EFFECTS, SPECTRUM, ALL].into_iter();
+    let built = paper::STUDIES.iter().map(|study| (study.name, study.what));
+    let lines: Vec<Line> = own.chain(built).map(|(name, what)| Line { name, what }).collect();
+    let text: Vec<String> = lines
         .iter()
-        .map(|(name, what)| format!("{name:<12} {what}"))
+        .map(|line| format!("{:<12} {}", line.name, line.what))
         .collect();
     terminal.print_result(&text.join("\n"), &lines)
 }
 
-/// Measures, writes the table and the plot, and says what errors cost.
-///
-/// # Errors
-/// Input, output or a bake that failed; stopped before the end, which writes nothing.
-pub fn convergence(job: &ConvergenceJob, terminal: &Terminal, interrupt: &Interrupt) -> Result<()> {
-    let scene = load(&job.scene, terminal)?;
-    let folder = open_folder(&job.output, job.force, CSV)?;
-    let bar = StageBar::new(terminal);
-    let reference = match &job.reference {
-        Some(path) => file_reference(path, job.surface.as_deref(), &scene)?,
-        None => match Reference::analytic(&scene)? {
-            Some(reference) => reference,
-            None => convergence::self_reference(&scene, &job.ladder, &bar, interrupt.control())?,
-        },
-    };
-    let measurements = convergence::measure(&scene, &job.ladder, &reference, &bar, interrupt.control())?;
-    drop(bar);
-    let title = format!("{} against {}", scene.source, reference.kind);
-    let svg = convergence_svg(&measurements, &title)?;
-    let csv = csv_of(CSV, &measurements)?;
-    write(&folder, CSV, &csv)?;
-    write(&folder, SVG, svg.as_bytes())?;
-    let report = Report::new(&job.output, &reference, measurements);
-    terminal.print_result(&report.text(), &report)
+/// Where studies are told of and stopped.
+#[derive(Clone, Copy)]
+struct Desk<'a> {
+    terminal: &'a Terminal,
+    interrupt: &'a Interrupt,
 }
 
-/// Traces, writes the maps, and says how noisy they are.
-///
-/// # Errors
-/// Input, output or a run that failed; stopped before the end, which writes nothing.
-pub fn reference(job: &ReferenceJob, terminal: &Terminal, interrupt: &Interrupt) -> Result<()> {
-    let scene = load(&job.scene, terminal)?;
-    let folder = MapFolder::open(&job.output, job.force)?;
-    interrupt.check(&scene.source)?;
-    let tracer = Tracer::new(scene.clone());
-    let bar = StageBar::new(terminal);
-    let result = brute_force(&tracer, &job.settings, job.rays, &bar, interrupt.control())?;
-    drop(bar);
-    let document = ReferenceReport {
-        method: "brute force: random rays, one per cell of two lattices; each arrival's flux into its texel",
-        rays: result.counts.rays,
-        noise: relative_noise(&result.maps),
-        cpu_s: result.cpu_s.total,
-        maps: folder.write(&scene, &job.settings, &result)?.maps,
-    };
-    let path = job.output.join(REFERENCE);
-    let json = serde_json::to_vec_pretty(&document).map_err(|error| no_json(&path, &error))?;
-    files::write_atomically(&path, |writer| writer.write_all(&json))?;
-    terminal.print_result(&document.text(&job.output), &document)
+/// The result of a study, as `--json` prints it.
+#[derive(Serialize)]
+struct Report {
+    study: &'static str,
+    folder: String,
+    files: Vec<String>,
+    table: Table,
+    costs: Table,
 }
 
-/// Loads a scene and prints its warnings.
-///
-/// # Errors
-/// A scene that cannot be read, or has no light where one is needed.
-pub fn load(input: &SceneInput, terminal: &Terminal) -> Result<Arc<Scene>> {
-    let scene = Arc::new(input.load()?);
-    terminal.print_warnings(&scene.warnings);
-    Ok(scene)
+impl Desk<'_> {
+    fn convergence(self, study: &ConvergenceArguments) -> Result<()> {
+        let settings = BakeSettings {
+            map_resolution: study.map_resolution.unwrap_or(square(SIDE)),
+            threads: threads(&study.common.run)?,
+            ..BakeSettings::default()
+        };
+        let few = if study.common.quick {
+            QUICK_DENSITIES
+        } else {
+            DENSITIES.len()
+        };
+        let densities = study.densities.as_deref().unwrap_or(&DENSITIES[..few]);
+        check_ladder(densities, &settings)?;
+        let mut estimators = study
+            .estimators
+            .clone()
+            .unwrap_or_else(|| Estimator::VARIANTS.to_vec());
+        estimators.dedup();
+        let repeats = repeats(study.repeat, &study.common)?;
+        let scene = self.load(&study.scene, &study.scene_options)?;
+        let make = || {
+            let reference = match &study.reference {
+                None => Reference::analytic(&scene)?,
+                Some(path) => {
+                    let (grid, _) = read_luminance(path, None)?;
+                    let kind = format!("file {}", path.display());
+                    Some(Reference::of_surface(
+                        &scene,
+                        study.surface.as_deref(),
+                        grid,
+                        kind,
+                    )?)
+                }
+            };
+            let sweep = one_scene::convergence(&scene, &settings, &estimators, densities, reference);
+            Ok(Sweep { repeats, ..sweep })
+        };
+        self.tell(&self.study(CONVERGENCE.0, &study.common, &study.common.output, |_| make())?)
+    }
+
+    fn effects(self, study: &EffectsArguments) -> Result<()> {
+        let settings = study
+            .bake
+            .settings(&[LayerKind::Caustic], threads(&study.common.run)?)?;
+        if settings.max_time_s.is_some() {
+            return Err(Error::usage(
+                "--max-time",
+                "bakes that a clock ends do not differ by their effects alone",
+                "leave it out, or use --max-error or --density",
+            ));
+        }
+        let repeats = repeats(study.repeat, &study.common)?;
+        let scene = self.load(&study.scene, &study.scene_options)?;
+        let make = |_: &Bench| {
+            let sweep = one_scene::effects(&scene, &settings)?;
+            Ok(Sweep { repeats, ..sweep })
+        };
+        self.tell(&self.study(EFFECTS.0, &study.common, &study.common.output, make)?)
+    }
+
+    fn spectrum(self, study: &SpectrumArguments) -> Result<()> {
+        let settings = BakeSettings {
+            map_resolution: study.map_resolution.unwrap_or(square(SPECTRUM_SIDE)),
+            density_per_sr: study.density.unwrap_or(BEAM_DENSITY_PER_SR),
+            threads: threads(&study.common.run)?,
+            ..BakeSettings::default()
+        };
+        for &count in &study.wavelengths {
+            let way = BakeSettings {
+                wavelengths: Wavelengths::Fixed(count),
+                ..settings.clone()
+            };
+            way.validate()?;
+        }
+        let repeats = repeats(study.repeat, &study.common)?;
+        let scene = self.load(&study.scene, &study.scene_options)?;
+        let make = |_: &Bench| {
+            let sweep = one_scene::spectrum(&scene, &settings, &study.wavelengths)?;
+            Ok(Sweep { repeats, ..sweep })
+        };
+        self.tell(&self.study(SPECTRUM.0, &study.common, &study.common.output, make)?)
+    }
+
+    fn built(self, study: &BuiltStudy) -> Result<()> {
+        let found = paper::STUDIES.iter().find(|known| known.name == study.name);
+        let found = found.ok_or_else(|| Error::usage("study", "there is no such study", "use --list"))?;
+        let make = |bench: &Bench| found.sweep(bench);
+        self.tell(&self.study(found.name, &study.common, &study.common.output, make)?)
+    }
+
+    /// Each is told as soon as it is done, but for JSON, which is one document.
+    fn all(self, common: &Common) -> Result<()> {
+        let mut reports = Vec::new();
+        for study in &paper::STUDIES {
+            let folder = common.output.join(study.name);
+            let told = self.study(study.name, common, &folder, |bench| study.sweep(bench))?;
+            if !self.terminal.json {
+                self.tell(&told)?;
+            }
+            reports.push(told.1);
+        }
+        match self.terminal.json {
+            true => self.terminal.print_result("", &reports),
+            false => Ok(()),
+        }
+    }
+
+    /// Runs it and writes its files.
+    fn study(
+        self,
+        name: &'static str,
+        common: &Common,
+        output: &Path,
+        make: impl FnOnce(&Bench) -> Result<Sweep>,
+    ) -> Result<(String, Report)> {
+        let folder = open_folder(output, common.force, &format!("{name}.csv"))?;
+        let bar = StageBar::new(self.terminal);
+        let bench = Bench {
+            quick: common.quick,
+            threads: threads(&common.run)?,
+            progress: &bar,
+            control: self.interrupt.control(),
+        };
+        let outcome: Outcome = make(&bench)?.run(&bench)?;
+        drop(bar);
+        let mut report = Report {
+            study: name,
+            folder: output.display().to_string(),
+            files: Vec::new(),
+            table: outcome.table.clone(),
+            costs: outcome.costs.clone(),
+        };
+        for (file, bytes) in outcome.files()? {
+            write(&folder, &file, &bytes)?;
+            report.files.push(file);
+        }
+        let files = report.files.join(", ");
+        Ok((
+            format!("folder {}: {files}\n\n{}", report.folder, outcome.tables()),
+            report,
+        ))
+    }
+
+    fn tell(self, (text, report): &(String, Report)) -> Result<()> {
+        self.terminal.print_result(text, report)
+    }
+
+    /// Traces, writes the maps, and says how noisy they are.
+    fn reference(self, study: &ReferenceArguments) -> Result<()> {
+        let settings = BakeSettings {
+            map_resolution: study.map_resolution.unwrap_or(square(SIDE)),
+            seed: study.seed,
+            threads: threads(&study.common.run)?,
+            ..BakeSettings::default()
+        };
+        settings.validate()?;
+        check_rays(study.rays)?;
+        let scene = self.load(&study.scene, &study.scene_options)?;
+        let output = &study.common.output;
+        let folder = MapFolder::open(output, study.common.force)?;
+        self.interrupt.check(&scene.source)?;
+        let tracer = Tracer::new(scene.clone());
+        let bar = StageBar::new(self.terminal);
+        let result = brute_force(&tracer, &settings, study.rays, &bar, self.interrupt.control())?;
+        drop(bar);
+        let report = ReferenceReport {
+            method: "brute force: random rays, one per cell of two lattices; each arrival's flux into its texel",
+            rays: result.counts.rays,
+            noise: relative_noise(&result.maps),
+            cpu_s: result.cpu_s.total,
+            maps: folder.write(&scene, &settings, &result)?.maps,
+        };
+        let path = output.join("reference.json");
+        let json = serde_json::to_vec_pretty(&report).map_err(|error| {
+            let what = format!("it is not valid JSON ({error})");
+            Error::failure(path.display().to_string(), what, "report this")
+        })?;
+        files::write_atomically(&path, |writer| writer.write_all(&json))?;
+        self.terminal.print_result(&report.text(output), &report)
+    }
+
+    /// Loads a scene and prints its warnings.
+    fn load(self, source: &str, options: &SceneOptions) -> Result<Arc<Scene>> {
+        let scene = scene_input(source.into(), options, MissingLight::Fail).load()?;
+        self.terminal.print_warnings(&scene.warnings);
+        Ok(Arc::new(scene))
+    }
 }
 
-fn file_reference(path: &Path, surface: Option<&str>, scene: &Scene) -> Result<Reference> {
-    let (grid, _) = read_luminance(path, None)?;
-    Reference::of_surface(scene, surface, grid, format!("file {}", path.display()))
+const fn square(side: usize) -> MapResolution {
+    MapResolution::Fixed {
+        width: side,
+        height: side,
+    }
+}
+
+fn repeats(asked: Option<usize>, common: &Common) -> Result<usize> {
+    match asked {
+        None => Ok(if common.quick { 1 } else { REPEATS }),
+        Some(repeats) if (1..=MAX_REPEATS).contains(&repeats) => Ok(repeats),
+        Some(repeats) => Err(Error::usage(
+            "--repeat",
+            format!("{repeats} is outside 1 to {MAX_REPEATS}"),
+            "give a number in that range",
+        )),
+    }
+}
+
+fn check_ladder(densities: &[f64], settings: &BakeSettings) -> Result<()> {
+    if densities.is_empty() || !densities.is_sorted_by(|a, b| a < b) {
+        return Err(Error::usage(
+            "--densities",
+            "they have to be in ascending order, each once",
+            "give numbers such as 1e3,1e4,1e5",
+        ));
+    }
+    for &density_per_sr in densities {
+        let rung = BakeSettings {
+            density_per_sr,
+            ..settings.clone()
+        };
+        rung.validate().map_err(|error| Error {
+            location: "--densities".into(),
+            ..error
+        })?;
+    }
+    Ok(())
 }
 
 /// A folder that is empty, holds the `table` of an earlier study, or is taken by force.
@@ -165,134 +570,6 @@ pub fn write(folder: &OutputFolder, name: &str, bytes: &[u8]) -> Result<()> {
     files::write_atomically(&folder.path().join(name), |writer| writer.write_all(bytes))
 }
 
-/// A table with a header; `name` is named in errors.
-///
-/// # Errors
-/// Rows that no table can hold.
-pub fn csv_of(name: &str, rows: impl IntoIterator<Item = impl Serialize>) -> Result<Vec<u8>> {
-    let unwritten = |reason: String| {
-        Error::failure(
-            name,
-            format!("the table cannot be written ({reason})"),
-            "report this",
-        )
-    };
-    let mut writer = csv::Writer::from_writer(Vec::new());
-    for row in rows {
-        writer
-            .serialize(row)
-            .map_err(|error| unwritten(error.to_string()))?;
-    }
-    writer.into_inner().map_err(|error| unwritten(error.to_string()))
-}
-
-fn no_json(path: &Path, error: &serde_json::Error) -> Error {
-    Error::failure(
-        path.display().to_string(),
-        format!("it is not valid JSON ({error})"),
-        "report this",
-    )
-}
-
-/// The result of `study convergence`, as `--json` prints it.
-#[derive(Serialize)]
-struct Report {
-    folder: String,
-    reference: String,
-    measurements: Vec<Measurement>,
-    costs: Vec<CostLine>,
-    /// d ln(error) / d ln(rays) over the whole ladder, by estimator.
-    slopes: Vec<(String, Option<f64>)>,
-}
-
-/// One line of the table.
-#[derive(Serialize)]
-struct CostLine {
-    estimator: String,
-    relative_rmse: f64,
-    rays: Option<String>,
-    cpu_s: Option<String>,
-}
-
-impl Report {
-    fn new(folder: &Path, reference: &Reference, measurements: Vec<Measurement>) -> Self {
-        let costs = convergence::prices(&measurements).into_iter().map(CostLine::from);
-        let costs = costs.collect();
-        let slopes = convergence::estimators(&measurements)
-            .into_iter()
-            .map(|estimator| {
-                let curve = convergence::curve(&measurements, estimator, Axis::Rays);
-                (estimator.to_string(), cost::slope(&curve))
-            })
-            .collect();
-        Self {
-            folder: folder.display().to_string(),
-            reference: reference.kind.clone(),
-            measurements,
-            costs,
-            slopes,
-        }
-    }
-
-    fn text(&self) -> String {
-        let mut text = format!(
-            "folder {}: {CSV}, {SVG}\nreference {}\n\n",
-            self.folder, self.reference
-        );
-        let _ = writeln!(
-            text,
-            "{:<10} {:>9} {:>10} {:>10} {:>9} {:>9} {:>8}",
-            "estimator", "density", "rays", "CPU s", "RMSE", "ARD", "flux"
-        );
-        for row in &self.measurements {
-            let _ = writeln!(
-                text,
-                "{:<10} {:>9.2e} {:>10} {:>10.4} {:>7.3} % {:>7.3} % {:>8.5}",
-                row.estimator,
-                row.density,
-                row.rays,
-                row.cpu_light_pass_s,
-                100.0 * row.relative_rmse,
-                100.0 * row.ard,
-                row.flux_ratio
-            );
-        }
-        let _ = writeln!(
-            text,
-            "\n{:<10} {:>6} {:>10} {:>10}",
-            "estimator", "RMSE", "rays", "CPU s"
-        );
-        let never = |cost: &Option<String>| cost.clone().unwrap_or_else(|| "never".into());
-        for line in &self.costs {
-            let _ = writeln!(
-                text,
-                "{:<10} {:>4} % {:>10} {:>10}",
-                line.estimator,
-                100.0 * line.relative_rmse,
-                never(&line.rays),
-                never(&line.cpu_s)
-            );
-        }
-        for (estimator, slope) in &self.slopes {
-            let slope = slope.map_or("undefined".into(), |slope| format!("{slope:.2}"));
-            let _ = writeln!(text, "{estimator}: error ~ rays^{slope}");
-        }
-        text + "~ extrapolated, < already at the first density"
-    }
-}
-
-impl From<Price> for CostLine {
-    fn from(price: Price) -> Self {
-        let text = |cost: Option<Cost>| cost.map(|cost| cost.to_string());
-        Self {
-            estimator: price.estimator,
-            relative_rmse: price.target,
-            rays: text(price.rays),
-            cpu_s: text(price.cpu_s),
-        }
-    }
-}
-
 /// `reference.json`.
 #[derive(Serialize)]
 struct ReferenceReport {
@@ -308,18 +585,33 @@ impl ReferenceReport {
     fn text(&self, folder: &Path) -> String {
         let mut text = format!("folder {}\n", folder.display());
         for map in &self.maps {
-            let noise = map.estimated_relative_rmse.unwrap_or(0.0);
-            let _ = writeln!(
-                text,
-                "map {} of {}, noise {:.3} %",
-                map.file,
-                map.surface,
-                100.0 * noise
-            );
+            let noise = 100.0 * map.estimated_relative_rmse.unwrap_or(0.0);
+            let _ = writeln!(text, "map {} of {}, noise {noise:.3} %", map.file, map.surface);
         }
         let noise = self.noise.map_or("nothing arrived".into(), |noise| {
             format!("noise {:.3} % of the mean over all maps", 100.0 * noise)
         });
         text + &format!("{} rays, {:.2} s of CPU, {noise}", self.rays, self.cpu_s)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rays_may_be_written_as_powers_of_ten() {
+        assert_eq!(ray_count("1e8"), Ok(100_000_000));
+        assert_eq!(ray_count("2500"), Ok(2500));
+        for text in ["", "0", "-5", "nan", "1e30", "many"] {
+            assert!(ray_count(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn maps_of_studies_have_a_size() {
+        assert!(fixed_map_resolution("auto").is_err());
+        let fixed = MapResolution::Fixed { width: 8, height: 4 };
+        assert_eq!(fixed_map_resolution("8x4"), Ok(fixed));
     }
 }

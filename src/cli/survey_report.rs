@@ -2,9 +2,8 @@
 
 use nephroid::illumination::parametrisation::refused_sets;
 use nephroid::illumination::{Side, UvSet};
-use nephroid::plan::EffectLine;
 use nephroid::scene::Scene;
-use nephroid::session::{CostPoint, EffectReport, Forecast, ItemBufferReport, Survey};
+use nephroid::session::{BakeCounts, CostPoint, Forecast, ItemBufferReport, Survey};
 use nephroid::settings::Preset;
 use serde::Serialize;
 
@@ -43,14 +42,14 @@ struct PresetReport {
 struct PilotReport {
     /// Of the whole survey, on the wall.
     seconds: f64,
+    counts: BakeCounts,
     course: Vec<CostPoint>,
-    effects: Vec<EffectReport>,
     item_buffers: Vec<ItemBufferReport>,
 }
 
 impl SurveyReport {
-    /// Of a survey of a scene; `chains` is the line of the eye pass.
-    pub fn new(scene: &Scene, survey: &Survey, chains: EffectLine) -> Self {
+    /// Of a survey of a scene.
+    pub fn new(scene: &Scene, survey: &Survey) -> Self {
         let maps = survey.pilot.maps.iter().map(|map| MapReport {
             surface: scene.objects[map.chart.object()].name.clone(),
             side: map.chart.receiver.side(),
@@ -62,11 +61,6 @@ impl SurveyReport {
             width: map.width(),
             height: map.height(),
             bytes: map.chart.texel_count() as u64 * nephroid::session::BYTES_PER_TEXEL,
-        });
-        let mut effects = survey.pilot.effects.clone();
-        effects.push(EffectReport {
-            line: chains,
-            counts: Default::default(),
         });
         Self {
             maps: maps.collect(),
@@ -80,8 +74,8 @@ impl SurveyReport {
                 .collect(),
             pilot: PilotReport {
                 seconds: survey.seconds,
+                counts: survey.pilot.counts,
                 course: survey.pilot.course.clone(),
-                effects,
                 item_buffers: survey.pilot.item_buffers.clone(),
             },
         }
@@ -89,10 +83,12 @@ impl SurveyReport {
 
     /// Name and value of each line of the text.
     pub fn lines(&self) -> Vec<(&'static str, String)> {
-        let mut lines = Vec::new();
-        for report in &self.pilot.effects {
-            lines.push(("effect", effect_line(report)));
-        }
+        let counts = &self.pilot.counts;
+        let taken = format!(
+            "{} light rays, {} shadow rays, {} gather rays",
+            counts.rays, counts.shadow_rays, counts.gather_rays
+        );
+        let mut lines = vec![("pilot", taken)];
         for map in &self.maps {
             lines.push(("map", map_line(map)));
         }
@@ -118,23 +114,6 @@ fn map_line(map: &MapReport) -> String {
     let mut text = format!("{}, {side}: {size}, {set}", map.surface);
     if !map.refused_uv_sets.is_empty() {
         text += &format!(" ({})", map.refused_uv_sets.join("; "));
-    }
-    text
-}
-
-/// "refraction: on, `ball` is lit by `lamp` (24560 rays, 6838 deposits, 1.4 MB)".
-fn effect_line(report: &EffectReport) -> String {
-    let line = &report.line;
-    let switch = if line.on { "on" } else { "off" };
-    let mut text = format!("{}: {switch}, {}", line.effect.name(), line.reason);
-    let counts = &report.counts;
-    if counts.rays > 0 {
-        text += &format!(
-            " (pilot: {} rays, {} deposits, {})",
-            counts.rays,
-            counts.deposits,
-            bytes(counts.bytes)
-        );
     }
     text
 }

@@ -1,10 +1,12 @@
 //! Values of options: how they are written.
 
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use nephroid::effect::{Effect, EffectSwitch};
 use nephroid::eye_pass::WhiteBalance;
 use nephroid::light_pass::share::Share;
 use nephroid::scene::camera_path::MAX_FRAMES;
 use nephroid::settings::{MAX_MAP_SIDE, MapResolution, Sigma, Wavelengths};
+use strum::{EnumMessage, VariantArray};
 
 /// A number of frames.
 pub fn frames(text: &str) -> Result<usize, String> {
@@ -134,17 +136,34 @@ pub fn effect_switch(text: &str) -> Result<(Effect, EffectSwitch), String> {
             names()
         ));
     };
-    let effect = Effect::ALL
-        .into_iter()
-        .find(|effect| effect.name() == name)
-        .ok_or_else(|| format!("there is no effect {name}; there are {}", names()))?;
-    let switch = match switch {
-        "auto" => EffectSwitch::Auto,
-        "on" => EffectSwitch::On,
-        "off" => EffectSwitch::Off,
-        other => return Err(format!("{other} is no switch; use auto, on or off")),
-    };
+    let effect = named(name).ok_or_else(|| format!("there is no effect {name}; there are {}", names()))?;
+    let switch = named(switch).ok_or_else(|| format!("{switch} is no switch; use auto, on or off"))?;
     Ok((effect, switch))
+}
+
+/// The variant of that name.
+fn named<T: VariantArray + Copy + Into<&'static str>>(name: &str) -> Option<T> {
+    T::VARIANTS
+        .iter()
+        .copied()
+        .find(|variant| (*variant).into() == name)
+}
+
+/// `off`, `error` and so on.
+pub fn log_level() -> impl TypedValueParser<Value = log::LevelFilter> {
+    let names = ["off", "error", "warn", "info", "debug", "trace"];
+    PossibleValuesParser::new(names).try_map(|name| name.parse::<log::LevelFilter>())
+}
+
+/// Reads one of the names of an enumeration; its documentation becomes the help of each.
+pub fn one_of<T>() -> impl TypedValueParser<Value = T>
+where
+    T: VariantArray + EnumMessage + Into<&'static str> + Copy + Send + Sync,
+{
+    let possible = T::VARIANTS
+        .iter()
+        .map(|variant| PossibleValue::new((*variant).into()).help(variant.get_documentation()));
+    PossibleValuesParser::new(possible).try_map(|name| named(&name).ok_or("an unknown name"))
 }
 
 /// `auto` (none) or a number of stops, −64 to 64.

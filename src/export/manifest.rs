@@ -6,10 +6,11 @@ use crate::error::Warning;
 use crate::files::cache::ContentHash;
 use crate::illumination::{IlluminationMap, Side, UvSet};
 use crate::light_pass::ledger::{EnergyLedger, LightLedger, Truncated};
+use crate::plan::EffectLine;
 use crate::scene::Scene;
 use crate::session::{
-    BYTES_PER_TEXEL, BakeCounts, BakeResult, CostPoint, EffectReport, ForecastReport, ItemBufferReport,
-    SpectralBand, StopReason, Timings,
+    BYTES_PER_TEXEL, BakeCounts, BakeResult, CostPoint, ForecastReport, ItemBufferReport, SpectralBand,
+    StopReason, Timings,
 };
 use crate::settings::{BakeSettings, LayerKind};
 
@@ -42,8 +43,8 @@ pub struct Manifest {
     pub cpu_s: Timings,
     /// What it took.
     pub counts: BakeCounts,
-    /// What each effect took, and why it was on or off.
-    pub effects: Vec<EffectReport>,
+    /// Why each effect was on or off, and how the user switched it.
+    pub effects: Vec<EffectLine>,
     /// What looking around from each light took.
     pub item_buffers: Vec<ItemBufferReport>,
     /// What the target was expected to cost, and what it cost.
@@ -217,7 +218,7 @@ impl Manifest {
             timings_s: result.timings_s,
             cpu_s: result.cpu_s,
             counts: result.counts,
-            effects: result.effects.clone(),
+            effects: result.plan.effects.clone(),
             item_buffers: result.item_buffers.clone(),
             forecast: result.forecast,
             course: result.course.clone(),

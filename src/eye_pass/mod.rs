@@ -1,5 +1,7 @@
 //! From the diffuse surfaces through specular ones into the eye (DS*E).
 
+#[cfg(feature = "gpu")]
+pub mod frame_times;
 pub mod reference;
 #[cfg(feature = "gpu")]
 pub mod renderer;

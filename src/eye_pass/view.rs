@@ -1,13 +1,28 @@
 //! What is asked of an eye pass and what it gives, the same for GPU and CPU.
 
 use serde::{Deserialize, Serialize};
+use strum::{EnumMessage, IntoStaticStr, VariantArray};
 
 use crate::optics::LinearSrgb;
 use crate::scene::Camera;
 
 /// How radiance becomes display colour.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, clap::ValueEnum)]
+#[derive(
+    Clone,
+    Copy,
+    Debug,
+    Default,
+    PartialEq,
+    Eq,
+    Hash,
+    Serialize,
+    Deserialize,
+    EnumMessage,
+    IntoStaticStr,
+    VariantArray,
+)]
 #[serde(rename_all = "lowercase")]
+#[strum(serialize_all = "lowercase")]
 pub enum ToneMap {
     /// Cut at 1.
     None,
@@ -15,7 +30,6 @@ pub enum ToneMap {
     #[default]
     Neutral,
     /// AgX: soft shoulder, saturated lights turn white.
-    #[value(name = "agx")]
     AgX,
     /// ACES, in the fit of Stephen Hill: more contrast, darker middle tones.
     Aces,

@@ -94,26 +94,4 @@ impl FaceMapping {
             }
         }
     }
-
-    /// Smallest rectangle of the face around the cell between two corners of the unit square, as low and high corner.
-    /// Curves of equal v bend away from the middle, so that y is farthest at the largest |x| and nearest at the
-    /// smallest.
-    pub fn cell_bounds(self, low: DVec2, high: DVec2) -> (DVec2, DVec2) {
-        let corners = [
-            self.plane_from_square(low),
-            self.plane_from_square(DVec2::new(high.x, low.y)),
-            self.plane_from_square(DVec2::new(low.x, high.y)),
-            self.plane_from_square(high),
-        ];
-        let mut bounds = (corners[0], corners[0]);
-        let middle = if low.x < 0.5 && high.x > 0.5 {
-            [low.y, high.y].map(|v| self.plane_from_square(DVec2::new(0.5, v)))
-        } else {
-            [corners[0]; 2]
-        };
-        for corner in corners.iter().chain(&middle) {
-            bounds = (bounds.0.min(*corner), bounds.1.max(*corner));
-        }
-        bounds
-    }
 }

@@ -38,7 +38,7 @@ pub fn is_no_adapter(error: &Error) -> bool {
 }
 
 impl Gpu {
-    /// A device without a window. Vulkan comes first, OpenGL (through EGL) where there is none.
+    /// A device without a window. Vulkan comes first, the others of this build where there is none.
     ///
     /// # Errors
     /// No adapter, or one that refuses to give a device.
@@ -167,6 +167,11 @@ fn instance_of(backends: wgpu::Backends) -> wgpu::Instance {
     wgpu::Instance::new(descriptor)
 }
 
+#[cfg(feature = "gles")]
+const BACKENDS: &str = "Vulkan, Metal, Direct3D or OpenGL";
+#[cfg(not(feature = "gles"))]
+const BACKENDS: &str = "Vulkan, Metal or Direct3D";
+
 fn request_adapter(
     instance: &wgpu::Instance,
     compatible_surface: Option<&wgpu::Surface<'_>>,
@@ -179,8 +184,9 @@ fn request_adapter(
     pollster::block_on(instance.request_adapter(&options)).map_err(|_| {
         Error::failure(
             GRAPHICS,
-            "no Vulkan or OpenGL adapter was found",
-            "install a driver (Debian and Ubuntu: apt-get install mesa-vulkan-drivers libvulkan1), or use --backend cpu",
+            format!("no graphics adapter was found by {BACKENDS}"),
+            "install a driver (Debian and Ubuntu: apt-get install mesa-vulkan-drivers libvulkan1), build with --features gles \
+             where there is OpenGL alone, or use --backend cpu",
         )
     })
 }

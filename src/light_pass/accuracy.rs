@@ -359,49 +359,39 @@ pub fn estimate_splats(
     noise: &Noise,
     ledger: &EnergyLedger,
 ) -> Option<LightError> {
-    let mut error = LightError {
-        ratio: PRIOR_RATIO,
-        ..LightError::default()
-    };
     let blur = 1.0 / ((PRIOR_RATIO - 1.0) * (PRIOR_RATIO - 1.0));
     let share = 0.5 * (blur + 1.0 / (1.0 + PRIOR_RATIO * PRIOR_RATIO));
-    let (mut squares_sum, mut flux_w, mut area_m2) = (0.0, 0.0, 0.0);
-    for (&receiver, image) in fine {
+    by_squares(fine, ledger, |receiver, image| {
         let differences = image.windowed(&image.squared_difference(thinner.get(&receiver)));
-        let noise = noise.get(&receiver)?;
-        let squares: Vec<f64> = differences
-            .iter()
-            .zip(noise)
-            .map(|(difference, noise)| noise + (difference - NOISE_OF_DIFFERENCE * noise).max(0.0) * share)
-            .collect();
-        let tiles = image.tile_sums(&squares);
-        squares_sum += tiles.iter().sum::<f64>();
-        let (map_w, map_m2) = image.sums();
-        (flux_w, area_m2) = (flux_w + map_w, area_m2 + map_m2);
-        let map = MapError {
-            size: (image.width, image.height),
-            texels: squares.iter().map(|square| square.sqrt()).collect(),
-            tiles,
+        let pairs = differences.iter().zip(noise.get(&receiver)?);
+        let square = |(difference, noise): (&f64, &f64)| {
+            noise + (difference - NOISE_OF_DIFFERENCE * noise).max(0.0) * share
         };
-        error.maps.insert(receiver, map);
-    }
-    let mean = flux_w / area_m2;
-    error.relative_rmse = (squares_sum / area_m2 / (mean * mean))
-        .sqrt()
-        .hypot(given_up_share(ledger));
-    (flux_w > 0.0).then_some(error)
+        Some(pairs.map(square).collect())
+    })
 }
 
 /// The error of `fine`, of whose squared difference from `other` it has a share of its own. `None` where no light arrived.
 pub fn by_difference(fine: &Images, other: &Images, share: f64, ledger: &EnergyLedger) -> Option<LightError> {
+    by_squares(fine, ledger, |receiver, image| {
+        let squares = image.windowed(&image.squared_difference(other.get(&receiver)));
+        Some(squares.iter().map(|square| square * share).collect())
+    })
+}
+
+/// The error whose square around each texel is given map by map.
+fn by_squares(
+    fine: &Images,
+    ledger: &EnergyLedger,
+    squares: impl Fn(Receiver, &Image) -> Option<Vec<f64>>,
+) -> Option<LightError> {
     let mut error = LightError {
         ratio: PRIOR_RATIO,
         ..LightError::default()
     };
     let (mut squares_sum, mut flux_w, mut area_m2) = (0.0, 0.0, 0.0);
     for (&receiver, image) in fine {
-        let squares = image.windowed(&image.squared_difference(other.get(&receiver)));
-        let squares: Vec<f64> = squares.iter().map(|square| square * share).collect();
+        let squares = squares(receiver, image)?;
         let tiles = image.tile_sums(&squares);
         squares_sum += tiles.iter().sum::<f64>();
         let (map_w, map_m2) = image.sums();

@@ -155,11 +155,6 @@ impl ItemBuffer {
         })
     }
 
-    /// Memory that it holds [bytes].
-    pub fn bytes(&self) -> u64 {
-        (self.faces.len() * CELLS_PER_SIDE * CELLS_PER_SIDE / 8) as u64
-    }
-
     /// Number of marked cells.
     pub fn marked_cells(&self) -> u64 {
         self.faces.iter().map(CellBits::count).sum()

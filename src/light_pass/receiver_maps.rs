@@ -1,10 +1,8 @@
 //! Maps while flux is added to them: allocated when a surface first receives some.
 
-use glam::DVec2;
 use rayon::prelude::*;
 use std::sync::Arc;
 
-use super::caustic::footprint::TexelFromWorld;
 use super::caustic::path::Arrival;
 use super::caustic::splat::Coverage;
 use crate::illumination::accumulator::FluxAccumulator;
@@ -12,7 +10,6 @@ use crate::illumination::islands::Islands;
 use crate::illumination::smoothing::smooth;
 use crate::illumination::{Chart, Receiver};
 use crate::optics::LinearSrgb;
-use crate::scene::Scene;
 
 /// One surface's map with its flux.
 #[derive(Clone, Debug)]
@@ -120,8 +117,8 @@ impl ReceiverMaps {
     }
 
     /// Takes out maps that are a millionth as bright as all together: what strayed there between the traced rays. Returns
-    /// the flux on them.
-    pub fn take_strays(&mut self) -> [i128; 3] {
+    /// whose they are and the flux on them.
+    pub fn take_strays(&mut self) -> (Vec<Receiver>, [i128; 3]) {
         let fluxes: Vec<(Receiver, [i128; 3], f64)> = self
             .iter()
             .map(|(receiver, map)| (receiver, map.flux_counts(), map.chart.area_m2()))
@@ -136,15 +133,16 @@ impl ReceiverMaps {
                 )
             });
         let least = STRAY_SHARE * brightness(&all.0, all.1);
-        let mut taken = [0; 3];
+        let (mut receivers, mut taken) = (Vec::new(), [0; 3]);
         for (receiver, counts, _) in fluxes
             .iter()
             .filter(|(_, counts, m2)| brightness(counts, *m2) < least)
         {
             self.slots[receiver.index()] = Slot::Untouched;
+            receivers.push(*receiver);
             taken = std::array::from_fn(|channel| taken[channel] + counts[channel]);
         }
-        taken
+        (receivers, taken)
     }
 
     /// All maps with their receivers, in order.
@@ -236,17 +234,6 @@ impl ReceiverMap {
             sum = finer;
         }
         sum
-    }
-
-    /// Texel coordinates of an arrival, and the local map from metres to texels; `None` on a triangle without area.
-    pub fn locate(&self, scene: &Scene, arrival: &Arrival) -> Option<(DVec2, TexelFromWorld)> {
-        let triangle = arrival.triangle as usize;
-        let [b, c] = arrival.barycentric.to_array();
-        let uv = self.chart.uv(triangle, [1.0 - b - c, b, c]);
-        let size = DVec2::new(self.chart.width as f64, self.chart.height as f64);
-        let corners = scene.objects[arrival.receiver.object()].mesh.corners(triangle);
-        let rows = self.chart.texel_from_world(triangle, corners)?;
-        Some(((uv * size).clamp(DVec2::ZERO, size), rows))
     }
 }
 

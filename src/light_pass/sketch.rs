@@ -13,7 +13,7 @@ use crate::light_pass::caustic::setup::{Aim, AimedLight, Aiming};
 use crate::light_pass::item_buffer::CELLS_PER_SIDE;
 use crate::progress::Control;
 use crate::settings::ItemBufferKind;
-use crate::transport::{EffectSet, Everything, Tracer};
+use crate::transport::{EffectSet, Tracer};
 
 /// Rays start this far within the domain: its border may be the very border of a surface.
 const MARGIN: f64 = 1e-9;
@@ -164,7 +164,7 @@ fn follow(
     };
     let unit = FluxUnit::for_power(flux_w.max_channel());
     let mut paths = PathTracer::new(tracer, limits, unit);
-    paths.trace::<Everything>(ray, flux_w, aimed.launch.media(), |arrival| {
+    paths.trace(ray, flux_w, aimed.launch.media(), |arrival| {
         found.push(Arrived {
             way: (arrival.signature, arrival.receiver),
             point: arrival.point,

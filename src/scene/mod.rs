@@ -34,6 +34,7 @@ pub use camera::Camera;
 pub use camera_path::{CameraPath, PathPlan};
 pub use edit::{Edit, EditTarget, LightOrigin, why_light_stays};
 pub use environment::Environment;
+pub use gltf::guard::is_guarded;
 pub use gltf::{Glb, Opened};
 pub use light::{Light, LightKind, LightList, LightSize, PanelShape};
 pub use load::{LoadOptions, load, open_document};

@@ -4,22 +4,23 @@ use std::time::{Duration, Instant};
 
 use super::BakeCounts;
 use super::clock::Clock;
-use super::effects::EffectMeter;
 use super::finish::Shown;
 use super::forecast::{CostPoint, Forecast, forecast};
 use super::goals::Goal;
 use super::light_level::{KeptError, LevelKey, LightLevel, LightState, LightStates};
 use super::map_size::Sizes;
-use super::shards::{Labour, Pass, PassSums};
+use super::shards::{Labour, PassSums};
 use super::sizes::MapSizes;
 use super::soft_level::SOFT_BEGINNING;
 use super::spectra::Spectra;
 use crate::error::{Error, Result, Warning};
 use crate::illumination::accumulator::FluxUnit;
+use crate::illumination::{Receiver, Side};
 use crate::light_pass::accuracy::{self, Before, Images, LightError};
 use crate::light_pass::caustic::pass::{PassReport, Stopwatch};
 use crate::light_pass::caustic::setup::{Aim, AimedLight, Aiming};
 use crate::light_pass::caustic::statistics::FootprintStatistics;
+use crate::light_pass::receiver_maps::ChartFor;
 use crate::light_pass::share::Share;
 use crate::light_pass::wavefront::refine::Round;
 use crate::optics::LinearSrgb;
@@ -61,8 +62,6 @@ pub(super) struct CausticLayer<'a> {
 pub(super) struct CausticOutcome {
     /// Of this layer, this time.
     pub(super) counts: BakeCounts,
-    /// The same by effect.
-    pub(super) meter: EffectMeter,
     /// Where it stood after each level whose error is known.
     pub(super) course: Vec<CostPoint>,
     /// What the target was expected to cost when its error was first known.
@@ -128,12 +127,12 @@ impl Course<'_> {
     /// Shards that did not.
     pub(super) fn pass(
         &mut self,
-        pass: &Pass,
+        chart_for: &ChartFor,
         nothing: PassSums,
         run: impl FnOnce(&Self, Option<Share>, PassSums) -> PassSums,
     ) -> Result<PassSums> {
         if let Labour::Merge(merging) = self.labour {
-            return merging.pass(pass, nothing);
+            return merging.pass(chart_for, nothing);
         }
         let share = self.labour.share();
         let sums = run(self, share, nothing);
@@ -225,8 +224,10 @@ impl CausticLayer<'_> {
         }
         outcome.stopped = self.stopped(&lights, &climbs, &limited);
         for (light, climb) in lights.iter().zip(climbs) {
-            if !climb.levels.is_empty() {
+            if let Some(level) = climb.levels.last() {
                 outcome.finished.push(light.light);
+                let strays = level.strays.iter().map(|&receiver| self.stray(light, receiver));
+                outcome.warnings.extend(strays);
             }
             let state = states.of_mut(light.light);
             state.keep(climb.levels, self.settings.memory_bytes);
@@ -272,6 +273,24 @@ impl CausticLayer<'_> {
             self.progress.expect(&expected.in_words());
             course.outcome.forecast.get_or_insert((point, expected));
         }
+    }
+
+    /// Says that a map was given up.
+    fn stray(&self, light: &AimedLight, receiver: Receiver) -> Warning {
+        let scene = self.tracer.scene();
+        Warning::new(
+            &scene.objects[receiver.object()].name,
+            format!(
+                "light of `{}` on its {} side is less than a millionth as bright as on the other maps, and is left out",
+                scene.lights[light.light].name,
+                if receiver.side() == Side::Front {
+                    "front"
+                } else {
+                    "back"
+                }
+            ),
+            "bake with more --density if it should be there",
+        )
     }
 
     /// Why there is no finer level.
@@ -456,8 +475,6 @@ impl CausticOutcome {
         self.counts.splats += report.splats;
         self.counts.cells += report.cells;
         self.counts.receiver_queries += report.receiver_queries;
-        self.meter.paths += report.paths;
-        self.meter.deposits += report.deposits;
         clock.trace.add(report.trace_s);
         clock.deposit.add(report.deposit_s);
     }

@@ -31,14 +31,6 @@ impl DirectCache {
         self.layers.clear();
     }
 
-    /// Memory that it holds [bytes].
-    pub(super) fn bytes(&self) -> u64 {
-        self.layers
-            .values()
-            .map(|layer| size_of_val(&layer[..]) as u64)
-            .sum()
-    }
-
     /// A light is not what it was.
     pub(super) fn forget(&mut self, light: usize) {
         self.layers.retain(|key, _| key.0 != light);

@@ -35,7 +35,6 @@ impl DirectWork {
     pub(super) fn added_to(&self, outcome: &CausticOutcome) -> CausticOutcome {
         let mut both = outcome.clone();
         both.counts.shadow_rays += self.shadow_rays;
-        both.meter.direct_s.add(self.seconds);
         both
     }
 

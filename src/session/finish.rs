@@ -97,7 +97,6 @@ impl Finish<'_> {
             maps,
             light_layers,
             plan: self.plan.clone(),
-            effects: Vec::new(),
             item_buffers: Vec::new(),
             ledgers,
             counts: outcome.counts,

@@ -34,11 +34,6 @@ impl IndirectCache {
         *self = Self::default();
     }
 
-    /// Memory that it holds [bytes].
-    pub(super) fn bytes(&self) -> u64 {
-        self.network().map_or(0, Network::bytes)
-    }
-
     /// The elements with what was traced, if anything was.
     pub(super) fn network(&self) -> Option<&Network> {
         self.network.as_ref().map(|(_, network)| network)

@@ -3,7 +3,7 @@
 use super::caustic::CausticOutcome;
 use super::clock::Clock;
 use super::indirect_cache::{IndirectCache, link_bytes};
-use super::result::{EffectCounts, LightLayer};
+use super::result::LightLayer;
 use super::sizes::MapSizes;
 use crate::error::Warning;
 use crate::illumination::{IlluminationMap, Layer, Receiver};
@@ -32,7 +32,6 @@ pub(super) struct IndirectWork {
     solution: Option<Solution>,
     /// Passes of each element.
     passes: Vec<u8>,
-    links: u64,
     /// Error that was aimed at.
     target: f64,
     /// Whether memory did not allow more rays.
@@ -119,7 +118,6 @@ impl IndirectWork {
         let after = network.counts();
         self.counts.rays += after.rays - before.rays;
         self.counts.segments += after.segments - before.segments;
-        self.links = network.link_count();
         self.loss = (after.truncated + after.lost as f64) / (after.rays as f64).max(1.0);
         if is_traced {
             self.solution = Some(network.solve(&sources(network, maps), passes));
@@ -213,19 +211,11 @@ impl IndirectWork {
     }
 
     /// The bake with this.
-    pub(super) fn added_to(&self, outcome: &CausticOutcome, cache: &IndirectCache) -> CausticOutcome {
+    pub(super) fn added_to(&self, outcome: &CausticOutcome) -> CausticOutcome {
         let mut both = outcome.clone();
         both.counts.gather_rays += self.counts.rays;
         both.counts.gather_segments += self.counts.segments;
         both.counts.bounces = self.solution.as_ref().map_or(0, |solution| solution.bounces);
-        both.meter.indirect = EffectCounts {
-            rays: self.counts.segments,
-            deposits: self.links,
-            bytes: cache.bytes(),
-            cpu_ms: Some(1e3 * self.seconds.cpu),
-            ..EffectCounts::default()
-        };
-        both.meter.indirect_s = self.seconds;
         both.warnings.extend(self.warnings());
         both
     }

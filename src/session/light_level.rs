@@ -6,6 +6,7 @@ use super::band_layers::LevelBand;
 use super::map_size::Sizes;
 use super::soft_level::Resolved;
 use super::spectra::SpectralKey;
+use crate::illumination::Receiver;
 use crate::illumination::accumulator::{FluxCount, FluxUnit};
 use crate::light_pass::accuracy::{LightError, Noise};
 use crate::light_pass::caustic::kept::KeptLight;
@@ -92,6 +93,8 @@ pub(super) struct LightLevel {
     pub(super) unit: FluxUnit,
     /// Of all paths.
     pub(super) ledger: LedgerSum,
+    /// Maps that were given up: next to no light was on them.
+    pub(super) strays: Vec<Receiver>,
     /// Patches that reach farther than their rays.
     pub(super) overreaches: Vec<Overreach>,
     /// Of splats: the squared difference of half sets, by receiver.

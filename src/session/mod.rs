@@ -5,7 +5,6 @@ mod caustic;
 mod clock;
 mod direct_cache;
 mod direct_work;
-mod effects;
 mod finish;
 pub mod forecast;
 mod goals;
@@ -29,11 +28,11 @@ mod wavefront_level;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use rayon::{ThreadPool, ThreadPoolBuilder};
+
 pub use band_layers::BandLayer;
 pub use forecast::{CostPoint, Forecast, ForecastReport};
-pub use result::{
-    BakeCounts, BakeResult, EffectCounts, EffectReport, ItemBufferReport, LightLayer, StopReason, Timings,
-};
+pub use result::{BakeCounts, BakeResult, ItemBufferReport, LightLayer, StopReason, Timings};
 pub use shards::{ShardSource, ShardSums};
 pub use sizes::BYTES_PER_TEXEL;
 pub use spectra::SpectralBand;
@@ -72,6 +71,7 @@ pub struct BakeSession {
     lights: LightStates,
     direct: DirectCache,
     indirect: IndirectCache,
+    threads: Threads,
 }
 
 /// What an [`Aim`] depends on beside the scene: how directions are divided, how thoroughly what cannot matter is left out,
@@ -120,6 +120,7 @@ impl BakeSession {
             lights: LightStates::default(),
             direct: DirectCache::default(),
             indirect: IndirectCache::default(),
+            threads: Threads::default(),
         })
     }
 
@@ -136,7 +137,13 @@ impl BakeSession {
     pub fn set_scene(&mut self, scene: Arc<Scene>) -> Result<()> {
         match SceneChange::between(&self.scene, &scene) {
             Some(change) => self.edit(scene, &change),
-            None => *self = Self::new(scene)?,
+            None => {
+                let threads = self.threads.clone();
+                *self = Self {
+                    threads,
+                    ..Self::new(scene)?
+                };
+            }
         }
         Ok(())
     }
@@ -253,9 +260,9 @@ impl BakeSession {
         level: Option<&mut (dyn FnMut(BakeResult) + Send)>,
     ) -> Result<BakeResult> {
         settings.validate()?;
-        on_threads(settings, || {
-            self.bake_here(settings, progress, control, level, &mut Labour::Alone)
-        })
+        self.threads
+            .of(settings)?
+            .install(|| self.bake_here(settings, progress, control, level, &mut Labour::Alone))
     }
 
     fn aim(&mut self, settings: &BakeSettings) -> Arc<Aim> {
@@ -353,7 +360,7 @@ impl BakeSession {
             }
             let mut result = finish.result((maps, parts), levels, &so_far);
             clock.total = whole.elapsed();
-            account(&mut result, &finish, aim, &so_far, &lamps.clock(clock));
+            account(&mut result, &finish, aim, &lamps.clock(clock));
             level(result);
             Ok(())
         };
@@ -374,8 +381,6 @@ impl BakeSession {
         }
         let mut outcome = lamps.added_to(&outcome);
         outcome.counts.item_buffer_tests = item_buffer_tests;
-        outcome.meter.direct_bytes = direct.bytes();
-        outcome.meter.caustic_bytes = lights.bytes();
         let mut clock = lamps.clock(&clock);
         let watch = Stopwatch::start();
         let (mut maps, mut parts) = finish.maps(&finished, &charts, direct);
@@ -400,34 +405,47 @@ impl BakeSession {
                 };
                 let (mut maps, mut parts) = (maps.clone(), parts.clone());
                 so_far.add_to(known, &mut maps, &mut parts);
-                let outcome = so_far.added_to(&outcome, known);
+                let outcome = so_far.added_to(&outcome);
                 let mut result = finish.result((maps, parts), &finished, &outcome);
                 let mut clock = so_far.clock(&clock);
                 clock.total = whole.elapsed();
-                account(&mut result, &finish, aim, &outcome, &clock);
+                account(&mut result, &finish, aim, &clock);
                 level(result);
             });
             if !complete {
                 outcome.stopped = Some(Stopped::Cancelled);
             }
             gathered.add_to(indirect, &mut maps, &mut parts);
-            outcome = gathered.added_to(&outcome, indirect);
+            outcome = gathered.added_to(&outcome);
             clock = gathered.clock(&clock);
         }
         let mut result = finish.result((maps, parts), &finished, &outcome);
         clock.total = whole.elapsed();
-        account(&mut result, &finish, aim, &outcome, &clock);
+        account(&mut result, &finish, aim, &clock);
         Ok(result)
     }
 }
 
-/// Runs work on as many threads as settings say.
-fn on_threads<T: Send>(settings: &BakeSettings, work: impl FnOnce() -> Result<T> + Send) -> Result<T> {
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(settings.threads)
-        .build()
-        .map_err(|error| Error::failure("--threads", error.to_string(), "ask for fewer threads"))?;
-    pool.install(work)
+/// The threads of the last bake, kept for the next one.
+#[derive(Clone, Debug, Default)]
+struct Threads(Option<(usize, Arc<ThreadPool>)>);
+
+impl Threads {
+    /// As many threads as settings say.
+    fn of(&mut self, settings: &BakeSettings) -> Result<Arc<ThreadPool>> {
+        match &self.0 {
+            Some((count, pool)) if *count == settings.threads => Ok(Arc::clone(pool)),
+            _ => {
+                let builder = ThreadPoolBuilder::new().num_threads(settings.threads);
+                let pool = builder.build().map_err(|error| {
+                    Error::failure("--threads", error.to_string(), "ask for fewer threads")
+                })?;
+                let pool = Arc::new(pool);
+                self.0 = Some((settings.threads, Arc::clone(&pool)));
+                Ok(pool)
+            }
+        }
+    }
 }
 
 /// What every bake begins with: the scene made ready, and what there is to do.
@@ -475,8 +493,21 @@ impl Ground<'_> {
 }
 
 /// Writes down what a bake took so far.
-fn account(result: &mut BakeResult, finish: &Finish, aim: &Aim, outcome: &CausticOutcome, clock: &Clock) {
+fn account(result: &mut BakeResult, finish: &Finish, aim: &Aim, clock: &Clock) {
     (result.timings_s, result.cpu_s) = clock.timings();
-    result.effects = effects::reports(finish.scene, finish.plan, aim, outcome, clock);
-    result.item_buffers = effects::item_buffers(finish.scene, aim);
+    result.item_buffers = item_buffers(finish.scene, aim);
+}
+
+/// What looking around took, light by light.
+fn item_buffers(scene: &Scene, aim: &Aim) -> Vec<ItemBufferReport> {
+    let lights = scene.lights.iter().zip(&aim.looks);
+    lights
+        .map(|(light, look)| ItemBufferReport {
+            light: light.name.clone(),
+            cells: look.cells,
+            hidden_cells: look.hidden_cells,
+            tests: look.tests,
+            cpu_ms: 1e3 * look.seconds.cpu,
+        })
+        .collect()
 }

@@ -7,7 +7,7 @@ use super::forecast::{CostPoint, ForecastReport};
 use crate::error::Warning;
 use crate::illumination::{IlluminationMap, Receiver};
 use crate::light_pass::ledger::LightLedger;
-use crate::plan::{EffectLine, EffectPlan};
+use crate::plan::EffectPlan;
 use crate::settings::LayerKind;
 
 /// Why a bake ended.
@@ -33,7 +33,7 @@ pub enum StopReason {
 pub struct BakeCounts {
     /// Light directions launched for light transport.
     pub rays: u64,
-    /// Rays traced to build item buffers.
+    /// Rays traced to build item buffers: none, the scene is projected onto their cells.
     pub item_buffer_rays: u64,
     /// Nodes, triangles and cells tested to build item buffers.
     pub item_buffer_tests: u64,
@@ -56,33 +56,6 @@ pub struct BakeCounts {
     pub splats: u64,
     /// Wavefront cells deposited.
     pub cells: u64,
-}
-
-/// What an effect took, counted where the work is done.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct EffectCounts {
-    /// Rays traced for it: light rays, segments after an event of its kind, shadow rays, rays of the eye.
-    pub rays: u64,
-    /// Patches and kernels that it brought to a map.
-    pub deposits: u64,
-    /// Memory that is held for it [bytes].
-    pub bytes: u64,
-    /// CPU time [ms]; where effects share loops, by their share of rays and deposits. `None` where it is a part of others.
-    pub cpu_ms: Option<f64>,
-    /// Render pipelines created for it; `None` where it is none of the eye pass.
-    pub pipelines: Option<u64>,
-    /// Time on the graphics device [ms]; `None` where it is none of the eye pass or the device cannot tell.
-    pub gpu_ms: Option<f64>,
-}
-
-/// One effect as it was planned, with what it took.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct EffectReport {
-    /// The plan's line.
-    #[serde(flatten)]
-    pub line: EffectLine,
-    /// What it took.
-    pub counts: EffectCounts,
 }
 
 /// What it took to look around from one light: tests, no rays.
@@ -142,8 +115,6 @@ pub struct BakeResult {
     pub band_layers: Vec<BandLayer>,
     /// Which effects were on, and why.
     pub plan: EffectPlan,
-    /// What each effect took, in the order of the plan.
-    pub effects: Vec<EffectReport>,
     /// What looking around from each light took.
     pub item_buffers: Vec<ItemBufferReport>,
     /// Energy of the caustic layer, one per light with its name.

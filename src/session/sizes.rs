@@ -1,6 +1,7 @@
 //! How large each surface's map is.
 
 use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use glam::DVec3;
@@ -35,16 +36,24 @@ pub struct MapSizes {
     /// Whether each object's mesh bounds a solid.
     closed: Vec<OnceLock<bool>>,
     /// Charts made so far, by object and size.
-    charts: Mutex<BTreeMap<ChartKey, Arc<Chart>>>,
+    charts: Mutex<BTreeMap<ChartKey, KeptChart>>,
     /// Those in tiles, the latest last.
     tiled: Mutex<Vec<Arc<Chart>>>,
+    /// Charts that were asked for.
+    asked: AtomicU64,
 }
 
 /// Receiver, texels across and down.
 type ChartKey = (Receiver, (usize, usize));
 
-/// Charts that are kept; beyond it, all are made anew.
-const MOST_CHARTS: usize = 256;
+/// A chart, and how many were asked for before it was last.
+type KeptChart = (Arc<Chart>, u64);
+
+/// Charts of each receiver that are kept, about.
+const CHARTS_PER_RECEIVER: usize = 4;
+
+/// Charts that are kept however few receivers there are.
+const LEAST_CHARTS: usize = 256;
 
 /// Charts in tiles that are kept.
 const MOST_TILED_CHARTS: usize = 16;
@@ -61,6 +70,7 @@ impl MapSizes {
             laid_out: Mutex::default(),
             charts: Mutex::default(),
             tiled: Mutex::default(),
+            asked: AtomicU64::new(0),
         }
     }
 
@@ -140,7 +150,9 @@ impl MapSizes {
         let key = (receiver, (width, height));
         // Whatever panicked under the lock, the charts in the map are whole.
         let charts = || self.charts.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(chart) = charts().get(&key) {
+        let now = self.asked.fetch_add(1, Ordering::Relaxed);
+        if let Some((chart, last)) = charts().get_mut(&key) {
+            *last = now;
             return Some(Arc::clone(chart));
         }
         let chart = self
@@ -148,10 +160,13 @@ impl MapSizes {
             .chart(width, height);
         let chart = Arc::new(chart.of_side(receiver.side()));
         let mut charts = charts();
-        if charts.len() >= MOST_CHARTS {
-            charts.clear();
+        if charts.len() >= LEAST_CHARTS.max(CHARTS_PER_RECEIVER * 2 * self.scene.objects.len()) {
+            let oldest = charts.iter().min_by_key(|(_, (_, last))| *last);
+            if let Some(oldest) = oldest.map(|(key, _)| *key) {
+                charts.remove(&oldest);
+            }
         }
-        charts.insert(key, Arc::clone(&chart));
+        charts.insert(key, (Arc::clone(&chart), now));
         Some(chart)
     }
 

@@ -11,7 +11,7 @@ use super::level_plan;
 use super::light_level::{KeptError, LevelKey, LightLevel, LightState, SoftParts};
 use super::map_size::{MapSize, Sizes};
 use super::part_maps::PartMaps;
-use super::shards::{Kept, Pass, PassSums};
+use super::shards::PassSums;
 use super::wavefront_level::take_strays;
 use crate::error::{Error, Result};
 use crate::geometry::sampling::even_point;
@@ -286,12 +286,8 @@ impl CausticLayer<'_> {
             share_time(&mut report, watch.elapsed());
         }
         course.outcome.count(&report, course.clock);
-        if self.has_places(light) {
-            course.outcome.meter.places.rays += report.rays;
-            course.outcome.meter.places.deposits += report.deposits.transmitted + report.deposits.reflected;
-        }
         let mut ledger = report.ledger;
-        take_strays(&mut maps, &mut ledger);
+        let strays = take_strays(&mut maps, &mut ledger);
         if let Some(same) = same {
             maps.add(same.maps.clone());
             for earlier in &same.bands {
@@ -303,21 +299,17 @@ impl CausticLayer<'_> {
             }
         }
         Ok((!report.cancelled).then(|| LightLevel {
-            unit: unit.shared(resolved.wavefronts),
-            key,
-            maps,
-            bands: self.spectra.level_bands(light.light, bands),
-            radiant: self.spectra.radiant(light.light),
-            ledger,
-            overreaches: Vec::new(),
-            noise: None,
-            error: None,
-            traced: None,
-            has_own_colour: self.spectra.has(light.light),
+            strays,
             parts: SoftParts {
                 coarse: Some(coarse),
                 ..SoftParts::default()
             },
+            ..self.level(
+                light,
+                (key, unit.shared(resolved.wavefronts)),
+                (maps, bands),
+                ledger,
+            )
         }))
     }
 
@@ -331,14 +323,8 @@ impl CausticLayer<'_> {
         course: &mut Course,
     ) -> Result<(PassReport, ReceiverMaps, Vec<ReceiverMaps>)> {
         let chart_for = |receiver: Receiver| self.chart(receiver, &key.sizes);
-        let pass = Pass {
-            light: light.light,
-            kept: Kept::Nothing,
-            chart_for: &chart_for,
-            memory_bytes: self.settings.memory_bytes,
-        };
         let nothing = PassSums::new(vec![self.part_maps()]);
-        let mut sums = course.pass(&pass, nothing, |course, share, sums| {
+        let mut sums = course.pass(&chart_for, nothing, |course, share, sums| {
             // A wavefront is one piece, and shares no ray with others.
             let of_share = |index: &u32| share.is_none_or(|share: Share| share.has(u64::from(*index)));
             let own: Vec<u32> = wavefronts.filter(of_share).collect();

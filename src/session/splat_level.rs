@@ -1,9 +1,9 @@
 //! One light by splats: the whole lattice at once, and thinner ones for its error.
 
 use super::caustic::{CausticLayer, Course};
-use super::light_level::{LevelKey, LightLevel, LightState, SoftParts, TraceKey};
+use super::light_level::{LevelKey, LightLevel, LightState, TraceKey};
 use super::part_maps::PartMaps;
-use super::shards::{Kept, Pass, PassSums};
+use super::shards::PassSums;
 use crate::error::Result;
 use crate::illumination::Receiver;
 use crate::illumination::accumulator::FluxUnit;
@@ -15,7 +15,7 @@ use crate::light_pass::caustic::pass::{self, Listener, PassReport, Source};
 use crate::light_pass::caustic::setup::AimedLight;
 use crate::light_pass::caustic::statistics::FootprintStatistics;
 use crate::light_pass::ledger_sum::LedgerSum;
-use crate::light_pass::receiver_maps::{ChartFor, ReceiverMaps};
+use crate::light_pass::receiver_maps::ReceiverMaps;
 use crate::light_pass::share::Share;
 use crate::settings::{BakeSettings, Footprint, Sigma};
 
@@ -51,18 +51,16 @@ impl CausticLayer<'_> {
             strides: (key.stride, key.stride),
             ..self.lattice(light, unit)
         };
-        let (source, kept) = match source_of(state, &key.trace) {
-            Source::Rays { .. } if key.stride == 1 && !self.spectra.has(light.light) => {
-                let keep_bytes = self.settings.kept_light_bytes();
-                (Source::Rays { keep_bytes }, Kept::Arrivals(keep_bytes))
-            }
-            source => (source, Kept::Nothing),
+        let source = match source_of(state, &key.trace) {
+            Source::Rays { .. } if key.stride == 1 && !self.spectra.has(light.light) => Source::Rays {
+                keep_bytes: self.settings.kept_light_bytes(),
+            },
+            source => source,
         };
         let chart_for = |receiver: Receiver| self.chart(receiver, &key.sizes);
-        let pass = self.pass_of(light, kept, &chart_for);
         let nothing = PassSums::new(vec![self.part_maps(), self.part_maps()]);
         let mut arrived = None;
-        let mut sums = course.pass(&pass, nothing, |course, share, sums| {
+        let mut sums = course.pass(&chart_for, nothing, |course, share, sums| {
             let worker = Worker { share, source };
             let (sums, kept) = self.deposit_parts(light, lattice, worker, &key, sums, course);
             arrived = kept;
@@ -93,29 +91,10 @@ impl CausticLayer<'_> {
         for (band, more) in bands.iter_mut().zip(more) {
             band.add(more);
         }
-        Ok((!report.cancelled).then_some(LightLevel {
-            key,
+        Ok((!report.cancelled).then(|| LightLevel {
             noise,
-            maps,
-            bands: self.spectra.level_bands(light.light, bands),
-            radiant: self.spectra.radiant(light.light),
-            unit,
-            ledger: report.ledger,
-            overreaches: Vec::new(),
-            error: None,
-            traced: None,
-            has_own_colour: self.spectra.has(light.light),
-            parts: SoftParts::default(),
+            ..self.level(light, (key, unit), (maps, bands), report.ledger)
         }))
-    }
-
-    fn pass_of<'a>(&self, light: &AimedLight, kept: Kept, chart_for: &'a ChartFor<'a>) -> Pass<'a> {
-        Pass {
-            light: light.light,
-            kept,
-            chart_for,
-            memory_bytes: self.settings.memory_bytes,
-        }
     }
 
     /// Every part of a light's spectrum, one after the other. What arrived is given back of light without one.
@@ -149,9 +128,8 @@ impl CausticLayer<'_> {
                     worker.source
                 },
             };
-            let (of_part, arrived, bytes) = self.deposit_splats(lattice, worker, key, &mut halves, course);
+            let (of_part, arrived) = self.deposit_splats(lattice, worker, key, &mut halves, course);
             sums.report.merge(of_part);
-            sums.kept_bytes += bytes;
             kept = arrived;
             if sums.report.cancelled {
                 break;
@@ -160,7 +138,7 @@ impl CausticLayer<'_> {
         (sums, kept)
     }
 
-    /// One part. Of a share, nothing that arrives is kept, but it is told what that would take [bytes].
+    /// One part. Of a share, nothing that arrives is kept.
     fn deposit_splats(
         &self,
         lattice: Lattice,
@@ -168,7 +146,7 @@ impl CausticLayer<'_> {
         key: &LevelKey,
         halves: &mut Halves,
         course: &Course,
-    ) -> (PassReport, Option<KeptLight>, u64) {
+    ) -> (PassReport, Option<KeptLight>) {
         let depositor = Depositor {
             lattice,
             settings: self.settings,
@@ -187,13 +165,10 @@ impl CausticLayer<'_> {
         let chart_for = |receiver: Receiver| self.chart(receiver, &key.sizes);
         match worker.share {
             Some(share) => {
-                let (report, bytes) = pass::run_share(&depositor, share, halves, &chart_for, &listener);
-                (report, None, bytes)
+                let report = pass::run_share(&depositor, share, halves, &chart_for, &listener);
+                (report, None)
             }
-            None => {
-                let (report, kept) = pass::run(&depositor, worker.source, halves, &chart_for, &listener);
-                (report, kept, 0)
-            }
+            None => pass::run(&depositor, worker.source, halves, &chart_for, &listener),
         }
     }
 
@@ -236,9 +211,8 @@ impl CausticLayer<'_> {
         };
         let source = source_of(state, &level.key.trace);
         let chart_for = |receiver: Receiver| self.chart(receiver, &level.key.sizes);
-        let pass = self.pass_of(light, Kept::FromArrivals, &chart_for);
         let nothing = PassSums::new(vec![self.part_maps()]);
-        let mut sums = course.pass(&pass, nothing, |course, share, sums| {
+        let mut sums = course.pass(&chart_for, nothing, |course, share, sums| {
             let worker = Worker { share, source };
             self.deposit_parts(light, lattice, worker, &level.key, sums, course)
                 .0

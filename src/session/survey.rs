@@ -36,7 +36,7 @@ pub struct PresetForecast {
 pub struct Survey {
     /// The plan, and bounds.
     pub estimate: BakeEstimate,
-    /// The pilot bake: which maps there are, and what effects took.
+    /// The pilot bake: which maps there are, and what it took.
     pub pilot: BakeResult,
     /// All presets.
     pub presets: Vec<PresetForecast>,
@@ -88,15 +88,6 @@ fn added(first: BakeResult, mut second: BakeResult) -> BakeResult {
     }
     second.counts.rays += first.counts.rays;
     second.item_buffers = first.item_buffers;
-    for (report, before) in second.effects.iter_mut().zip(&first.effects) {
-        report.counts.rays += before.counts.rays;
-        report.counts.deposits += before.counts.deposits;
-        report.counts.cpu_ms = report
-            .counts
-            .cpu_ms
-            .zip(before.counts.cpu_ms)
-            .map(|(after, before)| after + before);
-    }
     second
 }
 

@@ -5,7 +5,7 @@ use glam::DVec2;
 use super::caustic::{CausticLayer, Course};
 use super::light_level::{LevelKey, LightLevel, LightState, SoftParts, TraceKey};
 use super::part_maps::PartMaps;
-use super::shards::{Kept, Pass, PassSums};
+use super::shards::PassSums;
 use crate::error::Result;
 use crate::illumination::Receiver;
 use crate::illumination::accumulator::FluxUnit;
@@ -48,8 +48,8 @@ impl CausticLayer<'_> {
             rounds: &key.trace.rounds,
         };
         let mut traced = None;
-        // Bands are too many to be kept.
-        let (mut taken, room) = if self.spectra.has_bands(light) {
+        // Bands are too many to be kept, and those of a share are others in each pass.
+        let (mut taken, room) = if self.spectra.has_bands(light) || course.labour.is_cut() {
             (
                 None,
                 Room {
@@ -60,18 +60,13 @@ impl CausticLayer<'_> {
         } else {
             (state.take_traced(&key), self.room())
         };
-        let pass = Pass {
-            light: light.light,
-            kept: Kept::Rays(room.rays_bytes),
-            chart_for: &chart_for,
-            memory_bytes: self.settings.memory_bytes,
-        };
         let nothing = PassSums::new(vec![self.part_maps()]);
-        let mut sums = course.pass(&pass, nothing, |course, share, mut sums| {
+        let mut sums = course.pass(&chart_for, nothing, |course, share, mut sums| {
             let maps = &mut sums.maps[0];
             let size = self.spectra.part_size(light.light, key.trace.size);
             let bodies = self.small_bodies(light, size, self.closeness(light, &key.trace));
-            for (band, part) in self.spectra.parts(light.light) {
+            for (number, (band, part)) in self.spectra.parts(light.light).into_iter().enumerate() {
+                let share = share.map(|share| share.shifted(number as u64));
                 let depositor = WavefrontDepositor {
                     receivers: &receivers,
                     chart_for: &chart_for,
@@ -90,10 +85,9 @@ impl CausticLayer<'_> {
                     total: share.map_or(cells, |share| share.of(cells)),
                 };
                 let maps = maps.of(band);
-                let (of_part, kept) = match (share, taken.take()) {
-                    (Some(share), _) => (depositor.run_share(share, &mut sums.rays, maps, &listener), None),
-                    (None, Some(taken)) => (depositor.deposit_again(&taken, maps, &listener), Some(taken)),
-                    (None, None) => depositor.run(&mut state.rays, Some(maps), &listener, room),
+                let (of_part, kept) = match taken.take() {
+                    Some(taken) => (depositor.deposit_again(&taken, maps, &listener), Some(taken)),
+                    None => depositor.run(share, &mut state.rays, Some(maps), &listener, room),
                 };
                 sums.report.merge(of_part);
                 traced = kept;
@@ -105,25 +99,42 @@ impl CausticLayer<'_> {
         })?;
         let mut report = sums.report;
         let (mut maps, bands) = sums.maps.swap_remove(0).into_sum();
-        let traced = traced.filter(|_| !self.spectra.has_bands(light));
+        let traced = traced.filter(|_| room.bands_bytes > 0);
         self.spectra
             .to_linear_srgb(light.light, &mut maps, &mut report.ledger);
-        take_strays(&mut maps, &mut report.ledger);
+        let strays = take_strays(&mut maps, &mut report.ledger);
         course.outcome.count(&report, course.clock);
-        Ok((!report.cancelled).then_some(LightLevel {
+        Ok((!report.cancelled).then(|| LightLevel {
+            strays,
+            overreaches: report.overreaches,
+            traced,
+            ..self.level(light, (key, unit), (maps, bands), report.ledger)
+        }))
+    }
+
+    /// A level of some maps, without what only some levels have.
+    pub(super) fn level(
+        &self,
+        light: &AimedLight,
+        (key, unit): (LevelKey, FluxUnit),
+        (maps, bands): (ReceiverMaps, Vec<ReceiverMaps>),
+        ledger: LedgerSum,
+    ) -> LightLevel {
+        LightLevel {
             key,
             maps,
             bands: self.spectra.level_bands(light.light, bands),
             radiant: self.spectra.radiant(light.light),
             unit,
-            ledger: report.ledger,
-            overreaches: report.overreaches,
+            ledger,
+            strays: Vec::new(),
+            overreaches: Vec::new(),
             noise: None,
             error: None,
-            traced,
+            traced: None,
             has_own_colour: self.spectra.has(light.light),
             parts: SoftParts::default(),
-        }))
+        }
     }
 
     /// Traces and deposits one wavefront of a soft light onto maps.
@@ -155,7 +166,7 @@ impl CausticLayer<'_> {
             };
             let mut rays = KeptRays::default();
             let maps = Some(maps.of(band));
-            report.merge(depositor.run(&mut rays, maps, &listener, Room::default()).0);
+            report.merge(depositor.run(None, &mut rays, maps, &listener, Room::default()).0);
         }
         report
     }
@@ -194,7 +205,7 @@ impl CausticLayer<'_> {
             bands_bytes: 0,
             ..self.room()
         };
-        let (mut report, _) = depositor.run(&mut state.rays, None, &listener, room);
+        let (mut report, _) = depositor.run(None, &mut state.rays, None, &listener, room);
         // Its patches are in no map.
         (report.cells, report.splats) = (0, 0);
         course.outcome.count(&report, course.clock);
@@ -303,10 +314,11 @@ impl CausticLayer<'_> {
 }
 
 /// Light on maps that next to none of it reaches is none that was traced: it is given up, and booked.
-pub(super) fn take_strays(maps: &mut ReceiverMaps, ledger: &mut LedgerSum) {
-    let strays = maps.take_strays();
+pub(super) fn take_strays(maps: &mut ReceiverMaps, ledger: &mut LedgerSum) -> Vec<Receiver> {
+    let (receivers, strays) = maps.take_strays();
     ledger.book_sum(Account::Deposited, strays.map(|count| -count));
     ledger.book_sum(Account::Unresolved, strays);
+    receivers
 }
 
 /// Flux that a light of unit strength sends to marked cells [W].

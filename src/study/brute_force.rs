@@ -29,7 +29,7 @@ use crate::progress::{Control, Progress, Stage};
 use crate::scene::{Material, Scene};
 use crate::session::{BakeCounts, BakeResult, StopReason, Timings};
 use crate::settings::{BakeSettings, ItemBufferKind, LayerKind, MapResolution};
-use crate::transport::{EffectSet, Everything, Microfacets, Tracer};
+use crate::transport::{EffectSet, Microfacets, Tracer};
 
 /// Least and most rays of a run.
 pub const RAYS: std::ops::RangeInclusive<u64> = 1_000..=1_000_000_000_000;
@@ -323,7 +323,7 @@ impl Run<'_> {
                     paths.limits.microfacets = Some(facets);
                 }
                 tally.rays += 1;
-                paths.trace::<Everything>(ray, flux_w, light.launch.media(), |arrival| {
+                paths.trace(ray, flux_w, light.launch.media(), |arrival| {
                     let count = self.unit.count(arrival.flux_w);
                     deposited.book(self.deposit(half, &arrival, count), count);
                 });
@@ -467,7 +467,6 @@ fn empty_result(plan: EffectPlan, nothing_to_do: bool) -> BakeResult {
         light_layers: Vec::new(),
         band_layers: Vec::new(),
         plan,
-        effects: Vec::new(),
         item_buffers: Vec::new(),
         ledgers: Vec::new(),
         counts: BakeCounts::default(),

@@ -1,4 +1,6 @@
-//! What an error costs, read off a ladder of measurements.
+//! What an error costs, read off a curve of measurements.
+
+use super::table::three_digits;
 
 /// What reaching an error takes, in the unit of the measurements.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,53 +25,29 @@ impl std::fmt::Display for Cost {
     }
 }
 
-/// `123`, `1.23`, `0.00123`, `1.23e6`.
-pub(super) fn three_digits(value: f64) -> String {
-    if value == 0.0 {
-        return "0".into();
-    }
-    if value < 0.0 {
-        return format!("-{}", three_digits(-value));
-    }
-    if !(1e-3..1e5).contains(&value) {
-        return format!("{value:.2e}");
-    }
-    let digits_before = value.log10().floor() as i32 + 1;
-    let decimals = usize::try_from(3 - digits_before).unwrap_or(0);
-    format!("{value:.decimals$}")
-}
-
 /// Measurements from which an extrapolation takes its slope.
 const EXTRAPOLATION_POINTS: usize = 3;
 
 /// Cost from which on the error stays at or below `target`, by linear interpolation of logarithms. `points` are (cost,
-/// error), both above zero, from the coarsest measurement to the finest. `None` where the error does not fall, or
-/// nothing was measured.
+/// error), both above zero, cheapest first. `None` where the error does not fall, or nothing was measured.
 pub fn cost_of(points: &[(f64, f64)], target: f64) -> Option<Cost> {
     let Some(above) = points.iter().rposition(|(_, error)| *error > target) else {
         return points.first().map(|(cost, _)| Cost::AtMost(*cost));
     };
-    match points.get(above + 1) {
-        Some(&below) => Some(Cost::Interpolated(between(points[above], below, target))),
-        None => {
-            let tail = &points[points.len().saturating_sub(EXTRAPOLATION_POINTS)..];
-            let slope = slope(tail).filter(|slope| *slope < 0.0)?;
-            let (cost, error) = points[above];
-            Some(Cost::Extrapolated(cost * (target / error).powf(1.0 / slope)))
-        }
+    let (cost, error) = points[above];
+    if let Some(below) = points.get(above + 1) {
+        let share = (error / target).ln() / (error / below.1).ln();
+        return Some(Cost::Interpolated(cost * (below.0 / cost).powf(share)));
     }
-}
-
-fn between((cost_a, error_a): (f64, f64), (cost_b, error_b): (f64, f64), target: f64) -> f64 {
-    let share = (error_a / target).ln() / (error_a / error_b).ln();
-    cost_a * (cost_b / cost_a).powf(share)
+    let tail = &points[points.len().saturating_sub(EXTRAPOLATION_POINTS)..];
+    let slope = slope(tail).filter(|slope| *slope < 0.0)?;
+    Some(Cost::Extrapolated(cost * (target / error).powf(1.0 / slope)))
 }
 
 /// d ln(error) / d ln(cost) of the line of least squares; `None` with less than two different costs.
 pub fn slope(points: &[(f64, f64)]) -> Option<f64> {
     let logarithms: Vec<(f64, f64)> = points
         .iter()
-        .filter(|(cost, error)| *cost > 0.0 && *error > 0.0)
         .map(|(cost, error)| (cost.ln(), error.ln()))
         .collect();
     let count = logarithms.len() as f64;

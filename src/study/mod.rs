@@ -1,18 +1,13 @@
-//! Accuracy against cost: references by brute force, agreement of maps, how errors fall with rays and seconds, what
-//! each effect costs and is worth, how long frames take, hard cases with their laws, and the paper's table and figures.
+//! Accuracy against cost: references by brute force, agreement of maps, and studies, which are sweeps: bakes of several
+//! variants, a row for each.
 
 pub mod agreement;
 pub mod brute_force;
-pub mod convergence;
 pub mod cost;
-pub mod effects;
-#[cfg(feature = "gpu")]
-pub mod frame_times;
-pub mod page;
-pub mod pages;
-
+pub mod one_scene;
+pub mod paper;
+pub mod picture;
 pub mod plot;
 pub mod references;
-mod repeats;
-pub mod spectrum;
-pub mod stability;
+pub mod sweep;
+pub mod table;

@@ -3,7 +3,7 @@
 
 use glam::{DVec2, DVec3};
 
-use super::effects::{Everything, PathEffects};
+use super::effects::EffectSet;
 use super::microfacets::{self, Facet, Turn};
 use super::{MediumStack, SurfaceHit, Tracer};
 use crate::geometry::Ray;
@@ -21,16 +21,6 @@ pub enum Event {
     Refraction,
     /// Straight through a thin wall.
     ThinTransmission,
-}
-
-impl Event {
-    /// Whether light goes through the surface.
-    pub fn is_transmission(self) -> bool {
-        match self {
-            Self::Refraction | Self::ThinTransmission => true,
-            Self::Reflection | Self::TotalInternalReflection => false,
-        }
-    }
 }
 
 /// One way on from a surface.
@@ -212,14 +202,15 @@ impl Facing {
 impl Tracer {
     /// What becomes of light that arrives at `hit` along the unit direction `incident`, within `media`, with every effect.
     pub fn interact(&self, hit: &SurfaceHit, incident: DVec3, media: &MediumStack) -> Interaction {
-        self.interact_with::<Everything>(hit, incident, media, None)
+        self.interact_with(EffectSet::EVERYTHING, hit, incident, media, None)
     }
 
     /// The same with some effects. Light that would need a branch which is not among them is `switched_off`; where
     /// textures are not, the material's factor alone tints. `micro`: which micro-facet a rough surface shows, as a point
     /// of the unit square; rough surfaces are smooth without it, or without lobes among the effects.
-    pub fn interact_with<E: PathEffects>(
+    pub fn interact_with(
         &self,
+        effects: EffectSet,
         hit: &SurfaceHit,
         incident: DVec3,
         media: &MediumStack,
@@ -227,7 +218,7 @@ impl Tracer {
     ) -> Interaction {
         let material = self.scene().material_of(hit.object);
         let micro = micro
-            .filter(|_| E::LOBES && material.is_rough())
+            .filter(|_| effects.lobes && material.is_rough())
             .map(|point| Facet {
                 alpha: material.roughness * material.roughness,
                 point,
@@ -240,11 +231,11 @@ impl Tracer {
                 ..Interaction::NOTHING
             },
             SurfaceKind::Mirror => {
-                let share = self.metal_share::<E>(hit, material, cos_incident);
+                let share = self.metal_share(effects, hit, material, cos_incident);
                 let back = || reflection(hit, &facing, incident, media, share);
                 Interaction {
                     absorbed: LinearSrgb::WHITE - share,
-                    ..sent_back::<E>(share, back)
+                    ..sent_back(effects, share, back)
                 }
             }
             SurfaceKind::Mixed => {
@@ -254,17 +245,17 @@ impl Tracer {
                 let back = || reflection(hit, &facing, incident, media, share);
                 Interaction {
                     deposit: LinearSrgb::WHITE - share,
-                    ..sent_back::<E>(share, back)
+                    ..sent_back(effects, share, back)
                 }
             }
-            SurfaceKind::ThinWall => self.thin_wall::<E>(hit, &facing, incident, media, material),
-            SurfaceKind::Dielectric => self.dielectric::<E>(hit, &facing, incident, media, material),
+            SurfaceKind::ThinWall => self.thin_wall(effects, hit, &facing, incident, media, material),
+            SurfaceKind::Dielectric => self.dielectric(effects, hit, &facing, incident, media, material),
         }
     }
 
     /// Base colour at a hit, its texture included where textures are.
-    fn tint<E: PathEffects>(&self, hit: &SurfaceHit, material: &Material) -> LinearSrgb {
-        if E::TEXTURES {
+    fn tint(&self, effects: EffectSet, hit: &SurfaceHit, material: &Material) -> LinearSrgb {
+        if effects.textures {
             self.base_colour(hit)
         } else {
             material.base_colour
@@ -273,17 +264,18 @@ impl Tracer {
 
     /// What a metal sends back: by the table of its substance where that and the wavelength are known, else by
     /// Schlick's formula.
-    fn metal_share<E: PathEffects>(
+    fn metal_share(
         &self,
+        effects: EffectSet,
         hit: &SurfaceHit,
         material: &Material,
         cos_incident: f64,
     ) -> LinearSrgb {
         let (Some(metal), Some(wavelength)) = (material.metal, self.wavelength()) else {
-            return fresnel::metal_reflectance(cos_incident, self.tint::<E>(hit, material));
+            return fresnel::metal_reflectance(cos_incident, self.tint(effects, hit, material));
         };
         let clean = LinearSrgb::grey(metal.reflectance(cos_incident, wavelength));
-        if !E::TEXTURES {
+        if !effects.textures {
             return clean;
         }
         // Schlick's formula is linear in what the texture multiplies: the metal where it is white, else the rise alone.
@@ -292,8 +284,9 @@ impl Tracer {
         clean * kept + rise * (LinearSrgb::WHITE - kept)
     }
 
-    fn thin_wall<E: PathEffects>(
+    fn thin_wall(
         &self,
+        effects: EffectSet,
         hit: &SurfaceHit,
         facing: &Facing,
         incident: DVec3,
@@ -304,12 +297,12 @@ impl Tracer {
         let reflectance =
             fresnel::thin_wall_reflectance(cos_incident, material.ior / media.ior(self.scene()));
         let share = LinearSrgb::grey(reflectance);
-        let returned = sent_back::<E>(share, || reflection(hit, facing, incident, media, share));
-        let_through::<E>(returned, reflectance, || {
+        let returned = sent_back(effects, share, || reflection(hit, facing, incident, media, share));
+        let_through(effects, returned, reflectance, || {
             let turned = facing.passed(incident);
             Branch {
                 ray: hit.spawn(turned.direction),
-                share: self.tint::<E>(hit, material) * (1.0 - reflectance),
+                share: self.tint(effects, hit, material) * (1.0 - reflectance),
                 event: Event::ThinTransmission,
                 media: *media,
                 ior_ratio: 1.0,
@@ -319,8 +312,9 @@ impl Tracer {
         })
     }
 
-    fn dielectric<E: PathEffects>(
+    fn dielectric(
         &self,
+        effects: EffectSet,
         hit: &SurfaceHit,
         facing: &Facing,
         incident: DVec3,
@@ -343,7 +337,7 @@ impl Tracer {
         };
         let eta = ior_far / ior_near;
         let Some(turned) = facing.refracted(incident, eta) else {
-            return sent_back::<E>(LinearSrgb::WHITE, || {
+            return sent_back(effects, LinearSrgb::WHITE, || {
                 let mut total = reflection(hit, facing, incident, media, LinearSrgb::WHITE);
                 total.event = Event::TotalInternalReflection;
                 total
@@ -352,13 +346,13 @@ impl Tracer {
         let reflectance = fresnel::dielectric_reflectance(facing.cos_incident(incident), eta);
         let share = LinearSrgb::grey(reflectance);
         let returned = if reflectance > 0.0 {
-            sent_back::<E>(share, || reflection(hit, facing, incident, media, share))
+            sent_back(effects, share, || reflection(hit, facing, incident, media, share))
         } else {
             Interaction::NOTHING
         };
-        let_through::<E>(returned, reflectance, || Branch {
+        let_through(effects, returned, reflectance, || Branch {
             ray: hit.spawn(turned.direction),
-            share: self.tint::<E>(hit, material) * (1.0 - reflectance),
+            share: self.tint(effects, hit, material) * (1.0 - reflectance),
             event: Event::Refraction,
             media: beyond,
             ior_ratio: ior_near / ior_far,
@@ -369,13 +363,14 @@ impl Tracer {
 }
 
 /// What does not go back goes through, but for what the surface's tint takes.
-fn let_through<E: PathEffects>(
+fn let_through(
+    effects: EffectSet,
     returned: Interaction,
     reflectance: f64,
     branch: impl FnOnce() -> Branch,
 ) -> Interaction {
     let beneath = LinearSrgb::grey(1.0 - reflectance);
-    if !E::TRANSMISSION {
+    if !effects.transmission {
         return Interaction {
             switched_off: returned.switched_off + beneath,
             ..returned
@@ -390,8 +385,8 @@ fn let_through<E: PathEffects>(
 }
 
 /// A share of the light goes back.
-fn sent_back<E: PathEffects>(share: LinearSrgb, branch: impl FnOnce() -> Branch) -> Interaction {
-    if E::REFLECTION {
+fn sent_back(effects: EffectSet, share: LinearSrgb, branch: impl FnOnce() -> Branch) -> Interaction {
+    if effects.reflection {
         Interaction {
             reflection: Some(branch()),
             ..Interaction::NOTHING

@@ -14,7 +14,7 @@ mod surroundings;
 pub mod tracer;
 
 pub use differential::{RayDerivative, RayDifferential, SurfaceDetail, SurfaceScale};
-pub use effects::{EffectSet, Everything, ForEffects, PathCounts, PathEffects, Specialised};
+pub use effects::EffectSet;
 pub use interaction::{Branch, Event, Interaction, TurnedBy};
 pub use medium::MediumStack;
 pub use microfacets::Microfacets;

@@ -13,7 +13,7 @@ use super::smoothing::smoothing_groups;
 use crate::geometry::{Ray, TriangleBvh, ray};
 use crate::optics::spectrum::Spectrum;
 use crate::optics::{LinearSrgb, Nanometres};
-use crate::scene::{Adjacency, Mesh, Scene, SurfaceKind, TextureRef, Waves};
+use crate::scene::{Adjacency, Mesh, Scene, TextureRef, Waves};
 
 /// A scene with its hierarchy. What edits of the scene leave as it is, edited copies share.
 #[derive(Debug)]
@@ -227,7 +227,7 @@ impl Tracer {
     }
 
     /// Whether something bends the normals of an object.
-    pub fn is_bumpy(&self, object: usize) -> bool {
+    fn is_bumpy(&self, object: usize) -> bool {
         self.has_bumps && self.scene.material_of(object).has_bumps()
     }
 
@@ -399,16 +399,6 @@ impl Tracer {
             Some((&*self.scene.textures[reference.texture], uv))
         });
         mask.is_there(placed)
-    }
-
-    /// Whether light that goes on from an object is tinted by a texture.
-    pub fn is_textured(&self, object: usize) -> bool {
-        let material = self.scene.material_of(object);
-        material.base_colour_texture.is_some()
-            && matches!(
-                material.surface,
-                SurfaceKind::Mirror | SurfaceKind::Dielectric | SurfaceKind::ThinWall
-            )
     }
 
     /// Base colour of the surface at a hit, its texture included.

@@ -8,7 +8,6 @@ mod saving;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use egui_winit::accesskit_winit;
 use glam::DVec2;
 use winit::application::ApplicationHandler;
 use winit::dpi::PhysicalPosition;
@@ -17,7 +16,6 @@ use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoopProxy};
 use winit::keyboard::ModifiersState;
 use winit::window::WindowId;
 
-use super::event_log::Event;
 use super::files::dialog::{Choice, Dialog};
 use super::frame_times::{FrameTimes, sum_ms};
 use super::gizmo::Gizmo;
@@ -29,22 +27,23 @@ use super::model::Model;
 use super::overlay;
 use super::pace::Pace;
 use super::panel::{Facts, Wishes};
-use super::{ViewerOptions, error_view, probe_lines, sketching, split};
+use super::{ViewerOptions, accessibility, error_view, probe_lines, sketching, split};
 use crate::error::{Error, Result};
+use crate::plan::EffectLine;
 use crate::progress::Control;
-use crate::session::EffectReport;
+use serde_json::{Value, json};
 
 /// What other threads tell the window.
 #[derive(Debug)]
 pub enum News {
     /// The baking thread moved on.
     Baker,
-    /// Assistive technology asks for something.
-    Accessibility(accesskit_winit::Event),
+    /// A screen reader asks for something.
+    Accessibility(accessibility::Event),
 }
 
-impl From<accesskit_winit::Event> for News {
-    fn from(event: accesskit_winit::Event) -> Self {
+impl From<accessibility::Event> for News {
+    fn from(event: accessibility::Event) -> Self {
         Self::Accessibility(event)
     }
 }
@@ -108,7 +107,7 @@ pub struct App {
     /// Pictures at the last line of the log that told of rest.
     rested_at: u64,
     /// The eye's chains in the picture that is shown.
-    chains: Option<EffectReport>,
+    chains: Option<EffectLine>,
     frame_times: FrameTimes,
     /// Frames that may still come only to tell what the last picture took.
     reports_due: u32,
@@ -185,10 +184,9 @@ impl App {
                 }
                 let adapter = graphics.gpu().adapter_name();
                 let scene = Arc::clone(self.model.scene());
-                self.model.log.write(&Event::Started {
-                    scene: &scene.name,
-                    adapter: &adapter,
-                });
+                self.model
+                    .log
+                    .write("started", json!({"scene": scene.name, "adapter": adapter}));
                 graphics.window().request_redraw();
                 self.pace = if graphics.gpu().is_software() {
                     Pace::of_software()
@@ -205,8 +203,14 @@ impl App {
     }
 
     fn close(&mut self, event_loop: &ActiveEventLoop) {
-        self.model.log.write(&Event::Latency(&self.latencies));
-        self.model.log.write(&Event::Closing);
+        self.model.log.write(
+            "latency",
+            json!({
+                "while_baking": self.latencies.while_baking(),
+                "otherwise": self.latencies.otherwise(),
+            }),
+        );
+        self.model.log.write("closing", Value::Null);
         event_loop.exit();
     }
 
@@ -228,7 +232,9 @@ impl App {
                     "update the graphics driver, or use `render`",
                 )
             });
-        self.model.log.write(&Event::DeviceLost(&reason.to_string()));
+        self.model
+            .log
+            .write("device_lost", json!({"reason": reason.to_string()}));
         log::warn!("{reason}");
         if let Some(graphics) = self.graphics.take() {
             let window = graphics.window();
@@ -248,7 +254,7 @@ impl App {
         self.open(event_loop);
         if self.graphics.is_some() {
             self.notice = Some(format!("The graphics device was lost and came back: {reason}"));
-            self.model.log.write(&Event::DeviceRecovered);
+            self.model.log.write("device_recovered", Value::Null);
         }
     }
 
@@ -284,7 +290,8 @@ impl App {
         self.must_set_maps |= layer != self.model.panel.display.layer;
         if quantity != self.model.quantity() {
             self.must_set_maps = true;
-            self.model.log.write(&Event::Shows(self.model.quantity().name()));
+            let what = self.model.quantity().name();
+            self.model.log.write("shows", json!({"what": what}));
             // The legend comes with the next frame.
             self.request_redraw();
         }
@@ -318,7 +325,7 @@ impl App {
     /// Tells over the picture what the graphics device could not do.
     fn tell_fault(&mut self, error: &Error) {
         let sentence = error.to_string();
-        self.model.log.write(&Event::Fault(&sentence));
+        self.model.log.write("fault", json!({"sentence": sentence}));
         self.notice = Some(sentence);
     }
 
@@ -425,7 +432,10 @@ impl App {
             wishes.edit = pulled.or(wishes.edit.take());
         });
         if let Some(controls) = &painting.moved_controls {
-            log.write(&Event::Controls(controls));
+            let control =
+                |c: &super::controls::Control| json!({"role": c.role, "name": c.name, "rect_pixels": c.rect});
+            let controls: Vec<Value> = controls.iter().map(control).collect();
+            log.write("controls", json!({"controls": controls}));
         }
         Some(painting)
     }
@@ -471,12 +481,15 @@ impl App {
             self.rested_at = self.pictures;
             let (pictures, frames) = (self.pictures, self.frames);
             let position = self.model.navigator.camera().position.to_array();
-            self.model.log.write(&Event::AtRest {
-                pictures,
-                frames,
-                position,
-                device_ms: self.frame_times.newest().copied().map(sum_ms),
-            });
+            self.model.log.write(
+                "rest",
+                json!({
+                    "pictures": pictures,
+                    "frames": frames,
+                    "position_m": position,
+                    "device_ms": self.frame_times.newest().copied().map(sum_ms),
+                }),
+            );
         }
     }
 }
@@ -499,10 +512,8 @@ impl ApplicationHandler<News> for App {
     }
 
     fn user_event(&mut self, _: &ActiveEventLoop, news: News) {
-        if let (News::Accessibility(event), Some(graphics)) = (news, &mut self.graphics)
-            && event.window_id == graphics.window().id()
-        {
-            graphics.interface().on_accessibility(event.window_event);
+        if let (News::Accessibility(event), Some(graphics)) = (news, &mut self.graphics) {
+            graphics.interface().on_accessibility(event);
         }
         self.request_redraw();
     }

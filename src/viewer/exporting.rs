@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
 use std::thread::JoinHandle;
 
+use super::background::Wake;
 use super::filming::Shooting;
 use super::worker::BakedLevel;
 use crate::error::{Error, Result};
@@ -55,14 +56,14 @@ impl ExportState {
 /// Where the thread tells how it gets on.
 struct Told {
     states: Sender<ExportState>,
-    wake: Arc<dyn Fn() + Send + Sync>,
+    wake: Wake,
 }
 
 impl Told {
     fn tell(&self, state: ExportState) {
         // Nobody listens any more only where the window is gone.
         let _ = self.states.send(state);
-        (self.wake)();
+        (self.wake.0)();
     }
 }
 
@@ -73,19 +74,12 @@ impl Progress for Told {
 }
 
 /// The thread, while there is one. Dropping it stops what is filmed and waits until files are whole.
+#[derive(Debug)]
 pub struct Exporter {
     state: ExportState,
     running: Option<(JoinHandle<()>, Receiver<ExportState>)>,
     control: Arc<Control>,
-    wake: Arc<dyn Fn() + Send + Sync>,
-}
-
-impl std::fmt::Debug for Exporter {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Exporter")
-            .field("state", &self.state)
-            .finish_non_exhaustive()
-    }
+    wake: Wake,
 }
 
 impl Exporter {
@@ -95,7 +89,7 @@ impl Exporter {
             state: ExportState::Idle,
             running: None,
             control: Arc::default(),
-            wake,
+            wake: Wake(wake),
         }
     }
 
@@ -134,7 +128,7 @@ impl Exporter {
         let control = Arc::clone(&self.control);
         let told = Told {
             states: sender,
-            wake: Arc::clone(&self.wake),
+            wake: self.wake.clone(),
         };
         let work = move || {
             told.tell(match write(&told, &control) {

@@ -10,6 +10,7 @@ use crate::effect::{Effect, EffectSwitches};
 use crate::error::{Error, Result};
 use crate::export::frame_folder::FrameFolder;
 use crate::eye_pass::View;
+use crate::eye_pass::frame_times::{self, Walk};
 use crate::files;
 use crate::gpu::Gpu;
 use crate::illumination::IlluminationMap;
@@ -17,7 +18,6 @@ use crate::optics::spectrum::xyz::Matrix3;
 use crate::progress::{Control, Progress};
 use crate::scene::camera_path::{Key, PathPlan};
 use crate::scene::{Camera, CameraPath, Scene};
-use crate::study::frame_times::{self, Walk};
 
 /// Frames that a path is played with [1/s].
 pub const FRAMES_PER_S: f64 = 30.0;

@@ -2,11 +2,11 @@
 
 use std::time::Duration;
 
-use egui_winit::accesskit_winit;
 use winit::event::WindowEvent;
 use winit::event_loop::{ActiveEventLoop, EventLoopProxy};
 use winit::window::Window;
 
+use super::accessibility;
 use super::controls::{self, Control};
 
 /// egui's state for one window, and what paints it.
@@ -31,7 +31,7 @@ pub struct Painting {
 
 impl Interface {
     /// For a window that was never shown: assistive technology has to be told before.
-    pub fn new<T: From<accesskit_winit::Event> + Send>(
+    pub fn new<T: From<accessibility::Event> + Send>(
         event_loop: &ActiveEventLoop,
         window: &Window,
         proxy: EventLoopProxy<T>,
@@ -48,7 +48,7 @@ impl Interface {
             window.theme(),
             Some(device.limits().max_texture_dimension_2d as usize),
         );
-        state.init_accesskit(event_loop, window, proxy);
+        accessibility::connect(&mut state, event_loop, window, proxy);
         let renderer = egui_wgpu::Renderer::new(device, format, egui_wgpu::RendererOptions::default());
         Self {
             context,
@@ -79,18 +79,9 @@ impl Interface {
         self.state.on_window_event(window, event).repaint
     }
 
-    /// What assistive technology asks for.
-    pub fn on_accessibility(&mut self, event: accesskit_winit::WindowEvent) {
-        match event {
-            accesskit_winit::WindowEvent::InitialTreeRequested => self.context.enable_accesskit(),
-            accesskit_winit::WindowEvent::ActionRequested(request) => {
-                self.state.on_accesskit_action_request(request);
-            }
-            accesskit_winit::WindowEvent::AccessibilityDeactivated if self.controls.is_none() => {
-                self.context.disable_accesskit();
-            }
-            accesskit_winit::WindowEvent::AccessibilityDeactivated => {}
-        }
+    /// Answers a screen reader.
+    pub fn on_accessibility(&mut self, event: accessibility::Event) {
+        accessibility::answer(event, &mut self.state, &self.context, self.controls.is_some());
     }
 
     /// Runs one pass of the interface.

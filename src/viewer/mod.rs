@@ -1,6 +1,8 @@
 //! The window: fly through a scene, change a setting, see it baked anew.
 
+mod accessibility;
 mod app;
+mod background;
 pub mod beside;
 pub mod brightest;
 pub mod controls;
@@ -10,7 +12,6 @@ pub mod edits;
 pub mod error_view;
 pub mod event_log;
 pub mod exporting;
-mod eye_report;
 pub mod files;
 pub mod filming;
 pub mod flat_map;

@@ -13,7 +13,7 @@ use std::time::Instant;
 use super::beside::Reference;
 use super::debounce::Debounce;
 use super::edits::{EditedScene, Restored};
-use super::event_log::{Event, EventLog};
+use super::event_log::{self, EventLog};
 use super::exporting::{Export, Exporter};
 use super::files::keeper::Keeper;
 use super::files::{Files, working_folder};
@@ -38,6 +38,7 @@ use crate::scene::Scene;
 use crate::session::BakeSession;
 use crate::settings::LayerKind;
 use crate::transport::Tracer;
+use serde_json::{Value, json};
 
 /// Rays that a probe may take for each place of a light.
 const MOST_PROBE_RAYS: u64 = 3_000_000;
@@ -168,7 +169,7 @@ impl Model {
         let surfaces = self.surfaces();
         let solid = surfaces.as_deref().map(|tracer| tracer as &dyn Solid);
         self.navigator.set_travel(travel, solid);
-        self.log.write(&Event::Travel(travel.name()));
+        self.log.write("travel", json!({"way": travel.name()}));
     }
 
     /// Moves the camera by some time [s].
@@ -363,7 +364,9 @@ impl Model {
         let present = self.last.as_ref().map_or(&self.given, |last| &last.result.maps);
         if let Some(reference) = &mut self.reference {
             reference.compare(present);
-            self.log.write(&Event::Against(reference));
+            let relative_rmse = reference.relative_rmse.as_ref().ok();
+            let more = json!({"name": reference.name, "relative_rmse": relative_rmse});
+            self.log.write("against", more);
         }
     }
 
@@ -422,7 +425,9 @@ impl Model {
         if self.sketcher.follow(&tracer, limits)
             && let Some(sketch) = self.sketcher.shown()
         {
-            self.log.write(&Event::Sketched(sketch));
+            let (landings, patches) = (sketch.landings.len(), sketch.patches.len());
+            let more = json!({"rays": sketch.rays, "landings": landings, "patches": patches});
+            self.log.write("sketched", more);
         }
     }
 
@@ -450,14 +455,14 @@ impl Model {
         if self.prober.poll()
             && let Some(probed) = self.prober.shown()
         {
-            self.log.write(&Event::Probe(probed));
+            self.log.write("probe", probed.to_json());
         }
     }
 
     /// Looks what the baking thread did; tells whether there are new maps to be shown.
     pub fn poll(&mut self) -> bool {
         if self.exporter.poll() {
-            self.log.write(&Event::Exported(self.exporter.state()));
+            self.log.write_export(self.exporter.state());
         }
         // The state first: maps that come in between are taken by the next call, which the thread wakes.
         let state = self.worker.state();
@@ -465,14 +470,13 @@ impl Model {
         let level = self.worker.take_level();
         if let Some(level) = level.filter(|level| level.serial >= self.first_request) {
             has_maps = self.improves_on_what_is_shown(&level);
-            self.log.write(&if level.is_final {
-                Event::Done(&level)
+            let mut more = event_log::baked(&level);
+            if level.is_final {
+                self.log.write("done", more);
             } else {
-                Event::Level {
-                    level: &level,
-                    shown: has_maps,
-                }
-            });
+                more["shown"] = json!(has_maps);
+                self.log.write("level", more);
+            }
             if has_maps {
                 self.last = Some(Arc::new(level));
                 // It was found on other maps.
@@ -484,8 +488,8 @@ impl Model {
         }
         if std::mem::discriminant(&state) != std::mem::discriminant(&self.state) {
             match &state {
-                BakeState::Cancelled => self.log.write(&Event::Cancelled),
-                BakeState::Failed(sentence) => self.log.write(&Event::Failed(sentence)),
+                BakeState::Cancelled => self.log.write("cancelled", Value::Null),
+                BakeState::Failed(sentence) => self.log.write("failed", json!({"sentence": sentence})),
                 BakeState::Idle
                 | BakeState::Baking { .. }
                 | BakeState::Comparing { .. }
@@ -509,7 +513,7 @@ impl Model {
         if !self.last.as_ref().is_some_and(is_of_shown) {
             return false;
         }
-        self.log.write(&Event::Compared(&worth));
+        self.log.write("compared", event_log::compared(&worth));
         if worth.difference.is_ok() {
             self.panel.display.quantity = Quantity::Difference;
         }
@@ -561,7 +565,7 @@ impl Model {
         self.watch();
         let wanted = self.wanted();
         if wanted.settings != self.seen.settings {
-            self.log.write(&Event::SettingsChanged(&wanted.settings));
+            self.log.write("settings", json!({"settings": wanted.settings}));
         }
         if !wanted.is_same(&self.seen) || (self.panel.automatic && !self.was_automatic) {
             self.debounce.change(now);
@@ -597,7 +601,7 @@ impl Model {
         };
         let last = Arc::clone(last);
         self.exporter.start(export.clone(), last, working_folder());
-        self.log.write(&Event::Exported(self.exporter.state()));
+        self.log.write_export(self.exporter.state());
     }
 
     /// Finds what an effect is worth to the maps that are shown, once these are done.
@@ -644,7 +648,8 @@ impl Model {
         // A slow frame may bring both: the end of a drag, and the wish to take it back.
         let mut outcome = Ok(());
         if let Some(edit) = &wishes.edit {
-            self.log.write(&Event::Edited(edit));
+            self.log
+                .write("edit", json!({"target": format!("{:?}", edit.target())}));
             outcome = self.edits.edit(edit);
         }
         if outcome.is_ok() && (wishes.undo || wishes.redo) {
@@ -675,11 +680,8 @@ impl Model {
             Restored::Film(film) => self.panel.film = *film,
             Restored::Automatic(automatic) => self.panel.automatic = automatic,
         }
-        self.log.write(&if is_back {
-            Event::Undone(&text)
-        } else {
-            Event::Redone(&text)
-        });
+        let event = if is_back { "undone" } else { "redone" };
+        self.log.write(event, json!({"what": text}));
         Ok(())
     }
 
@@ -690,9 +692,7 @@ impl Model {
             return;
         }
         self.debounce.clear();
-        self.log.write(&Event::Baking {
-            settings: &wanted.settings,
-        });
+        self.log.write("baking", json!({"settings": wanted.settings}));
         self.asked = Some((self.worker.request(wanted.clone()), wanted));
         self.state = self.worker.state();
     }

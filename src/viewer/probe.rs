@@ -1,13 +1,11 @@
 //! What a point of a surface is lit by: read off the maps at once, and explained on a thread of its own.
 
-use std::fmt;
 use std::sync::Arc;
-use std::sync::mpsc::{Receiver, TryRecvError, channel};
-use std::thread;
 
 use glam::DVec3;
 use serde_json::{Value, json};
 
+use super::background::{Background, Wake};
 use crate::geometry::Ray;
 use crate::illumination::{self, IlluminationMap, Side};
 use crate::light_pass::explain::{Explanation, LightPath, Limits, Target, explain};
@@ -119,7 +117,6 @@ impl Probed {
             .as_ref()
             .map(|told| told.paths.iter().map(path).collect::<Vec<_>>());
         json!({
-            "event": "probe",
             "surface": self.surface,
             "position_m": self.point.to_array(),
             "texel": texel,
@@ -210,39 +207,22 @@ fn scale_w_m2(maps: &[IlluminationMap], target: &Target, texel: &ProbedTexel) ->
     if scale > 0.0 { scale } else { LEAST_SHARE }
 }
 
-/// A search that goes on.
-struct Coming {
-    explanation: Receiver<Explanation>,
-    control: Arc<Control>,
-}
-
-impl Drop for Coming {
-    fn drop(&mut self) {
-        self.control.cancel();
-    }
-}
-
 /// The point that is asked about, and what is known of it.
+#[derive(Debug)]
 pub struct Prober {
-    wake: Arc<dyn Fn() + Send + Sync>,
+    wake: Wake,
     gaze: Option<Ray>,
     /// Whether the gaze is still to be followed.
     is_due: bool,
     shown: Option<Probed>,
-    coming: Option<Coming>,
-}
-
-impl fmt::Debug for Prober {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "Prober {{ shown: {:?} }}", self.shown)
-    }
+    coming: Option<Background<Explanation>>,
 }
 
 impl Prober {
     /// Asks nothing yet; `wake` is called from another thread when there is something.
     pub fn new(wake: Arc<dyn Fn() + Send + Sync>) -> Self {
         Self {
-            wake,
+            wake: Wake(wake),
             gaze: None,
             is_due: false,
             shown: None,
@@ -285,48 +265,23 @@ impl Prober {
         let (probed, target) = read(tracer, maps, &seen);
         if let (Some(target), Some(texel)) = (target, &probed.texel) {
             let scale = scale_w_m2(maps, &target, texel);
-            self.coming = self.start(Arc::clone(tracer), target, limits, scale);
+            let tracer = Arc::clone(tracer);
+            let search = move |control: &Control| explain(&tracer, &target, limits, scale, control);
+            self.coming = Background::start("probe", &self.wake, search).ok();
         }
         self.shown = Some(probed);
     }
 
-    fn start(&self, tracer: Arc<Tracer>, target: Target, limits: Limits, scale: f64) -> Option<Coming> {
-        let (give, explanation) = channel();
-        let control = Arc::new(Control::default());
-        let (of_search, wake) = (Arc::clone(&control), Arc::clone(&self.wake));
-        let search = move || {
-            let told = explain(&tracer, &target, limits, scale, &of_search);
-            // Nobody waits any more where something else was asked.
-            let _ = give.send(told);
-            wake();
-        };
-        let started = thread::Builder::new().name("probe".into()).spawn(search);
-        started.is_ok().then_some(Coming { explanation, control })
-    }
-
-    /// Whether the paths are being looked for.
-    pub fn is_looking(&self) -> bool {
-        self.coming.is_some()
-    }
-
     /// Looks whether the paths were found since the last time.
     pub fn poll(&mut self) -> bool {
-        let Some(coming) = &self.coming else {
+        let Some(outcome) = self.coming.as_ref().and_then(Background::poll) else {
             return false;
         };
-        match coming.explanation.try_recv() {
-            Ok(told) => {
-                self.coming = None;
-                if let Some(shown) = &mut self.shown {
-                    shown.explanation = Some(told);
-                }
-                true
-            }
-            Err(TryRecvError::Empty) => false,
-            Err(TryRecvError::Disconnected) => {
-                self.coming = None;
-                false
-            }
+        self.coming = None;
+        let is_found = outcome.is_some();
+        if let Some(shown) = &mut self.shown {
+            shown.explanation = outcome.or_else(|| shown.explanation.take());
         }
+        is_found
     }
 }

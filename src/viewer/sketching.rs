@@ -1,12 +1,10 @@
 //! How light runs through the scene, over the picture: found on a thread of its own, and drawn.
 
-use std::fmt;
 use std::sync::Arc;
-use std::sync::mpsc::{Receiver, TryRecvError, channel};
-use std::thread;
 
 use egui::{Color32, Painter, Stroke};
 
+use super::background::{Background, Wake};
 use super::lens::Lens;
 use crate::light_pass::sketch::{Sketch, SketchLimits, sketch};
 use crate::progress::Control;
@@ -34,38 +32,19 @@ impl Sketched {
 }
 
 /// Finds it, and keeps what it found.
+#[derive(Debug)]
 pub struct Sketcher {
-    wake: Arc<dyn Fn() + Send + Sync>,
+    wake: Wake,
     /// Of these surfaces.
     shown: Option<(Arc<Tracer>, SketchLimits, Arc<Sketch>)>,
-    coming: Option<Coming>,
-}
-
-struct Coming {
-    of: Arc<Tracer>,
-    limits: SketchLimits,
-    sketch: Receiver<Sketch>,
-    control: Arc<Control>,
-}
-
-impl Drop for Coming {
-    fn drop(&mut self) {
-        self.control.cancel();
-    }
-}
-
-impl fmt::Debug for Sketcher {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (is_shown, is_coming) = (self.shown.is_some(), self.coming.is_some());
-        write!(f, "Sketcher {{ shown: {is_shown}, coming: {is_coming} }}")
-    }
+    coming: Option<(Arc<Tracer>, SketchLimits, Background<Sketch>)>,
 }
 
 impl Sketcher {
     /// Nothing yet; `wake` is called from another thread when there is something.
     pub fn new(wake: Arc<dyn Fn() + Send + Sync>) -> Self {
         Self {
-            wake,
+            wake: Wake(wake),
             shown: None,
             coming: None,
         }
@@ -85,15 +64,14 @@ impl Sketcher {
     /// that come after its own wait.
     pub fn follow(&mut self, tracer: &Arc<Tracer>, limits: SketchLimits) -> bool {
         let mut is_new = false;
-        if let Some(coming) = self.coming.take() {
-            match coming.sketch.try_recv() {
-                Ok(sketch) => {
-                    self.shown = Some((Arc::clone(&coming.of), coming.limits, Arc::new(sketch)));
-                    is_new = true;
-                }
-                Err(TryRecvError::Empty) => self.coming = Some(coming),
-                Err(TryRecvError::Disconnected) => {}
+        if let Some((of, with, coming)) = &self.coming
+            && let Some(outcome) = coming.poll()
+        {
+            is_new = outcome.is_some();
+            if let Some(sketch) = outcome {
+                self.shown = Some((Arc::clone(of), *with, Arc::new(sketch)));
             }
+            self.coming = None;
         }
         let is_of_these =
             |(of, with, _): &(Arc<Tracer>, SketchLimits, _)| Arc::ptr_eq(of, tracer) && *with == limits;
@@ -104,22 +82,10 @@ impl Sketcher {
     }
 
     fn start(&mut self, tracer: &Arc<Tracer>, limits: SketchLimits) {
-        let (give, found) = channel();
-        let control = Arc::new(Control::default());
-        let (of_search, wake) = (Arc::clone(&control), Arc::clone(&self.wake));
         let of = Arc::clone(tracer);
-        let search = move || {
-            // Nobody waits any more where it was switched off.
-            let _ = give.send(sketch(&of, limits, &of_search));
-            wake();
-        };
-        let started = thread::Builder::new().name("sketch".into()).spawn(search);
-        self.coming = started.is_ok().then(|| Coming {
-            of: Arc::clone(tracer),
-            limits,
-            sketch: found,
-            control,
-        });
+        let search = move |control: &Control| sketch(&of, limits, control);
+        let started = Background::start("sketch", &self.wake, search);
+        self.coming = started.ok().map(|coming| (Arc::clone(tracer), limits, coming));
     }
 }
 

@@ -1,13 +1,12 @@
 //! What a person bumps into and stands on: the surfaces of the scene, found on a thread of its own.
 
-use std::fmt;
 use std::sync::Arc;
-use std::sync::mpsc::{Receiver, TryRecvError, channel};
-use std::thread;
 
 use glam::DVec3;
 
+use super::background::{Background, Wake};
 use crate::geometry::Ray;
+use crate::progress::Control;
 use crate::scene::Scene;
 use crate::transport::Tracer;
 
@@ -30,24 +29,18 @@ impl Solid for Tracer {
 }
 
 /// The surfaces of the scene in the window, once somebody asks for them.
+#[derive(Debug)]
 pub struct Surroundings {
-    wake: Arc<dyn Fn() + Send + Sync>,
+    wake: Wake,
     found: Option<(Arc<Scene>, Arc<Tracer>)>,
-    coming: Option<(Arc<Scene>, Receiver<Arc<Tracer>>)>,
-}
-
-impl fmt::Debug for Surroundings {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (is_found, is_coming) = (self.found.is_some(), self.coming.is_some());
-        write!(f, "Surroundings {{ found: {is_found}, coming: {is_coming} }}")
-    }
+    coming: Option<(Arc<Scene>, Background<Tracer>)>,
 }
 
 impl Surroundings {
     /// Nothing yet; `wake` is called from another thread when there is something.
     pub fn new(wake: Arc<dyn Fn() + Send + Sync>) -> Self {
         Self {
-            wake,
+            wake: Wake(wake),
             found: None,
             coming: None,
         }
@@ -55,15 +48,13 @@ impl Surroundings {
 
     /// The surfaces of a scene; `None` until they are found, and where the system gives no thread to find them on.
     pub fn of(&mut self, scene: &Arc<Scene>) -> Option<Arc<Tracer>> {
-        if let Some((of, coming)) = &self.coming {
-            match coming.try_recv() {
-                Ok(tracer) => {
-                    self.found = Some((Arc::clone(of), tracer));
-                    self.coming = None;
-                }
-                Err(TryRecvError::Empty) => {}
-                Err(TryRecvError::Disconnected) => self.coming = None,
+        if let Some((of, coming)) = &self.coming
+            && let Some(outcome) = coming.poll()
+        {
+            if let Some(tracer) = outcome {
+                self.found = Some((Arc::clone(of), Arc::new(tracer)));
             }
+            self.coming = None;
         }
         if let Some((of, tracer)) = &self.found
             && Arc::ptr_eq(of, scene)
@@ -77,20 +68,14 @@ impl Surroundings {
     }
 
     fn start(&mut self, scene: &Arc<Scene>) {
-        let (give, take) = channel();
         let before = self.found.as_ref().map(|(_, tracer)| Arc::clone(tracer));
-        let (of, wake) = (Arc::clone(scene), Arc::clone(&self.wake));
-        let search = move || {
-            let tracer = match before {
-                Some(before) => before.edited(of),
-                None => Tracer::new(of),
-            };
-            // Nobody waits any more where the window was closed.
-            let _ = give.send(Arc::new(tracer));
-            wake();
+        let of = Arc::clone(scene);
+        let search = move |_: &Control| match before {
+            Some(before) => before.edited(of),
+            None => Tracer::new(of),
         };
-        let started = thread::Builder::new().name("surroundings".into()).spawn(search);
-        self.coming = started.is_ok().then(|| (Arc::clone(scene), take));
+        let started = Background::start("surroundings", &self.wake, search);
+        self.coming = started.ok().map(|coming| (Arc::clone(scene), coming));
     }
 }
 
@@ -107,7 +92,7 @@ mod tests {
             if let Some(tracer) = surroundings.of(scene) {
                 return tracer;
             }
-            thread::sleep(std::time::Duration::from_millis(1));
+            std::thread::sleep(std::time::Duration::from_millis(1));
         };
         let first = wait(&scene);
         assert!(Arc::ptr_eq(&first, &wait(&scene)));

@@ -6,6 +6,7 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::Instant;
 
+use super::background::Wake;
 use super::meter::{Meter, Reporter};
 use crate::effect::{Effect, EffectSwitch};
 use crate::error::Result;
@@ -184,7 +185,7 @@ impl Worker {
         make_baker: impl Fn(Arc<Scene>) -> Result<B> + Send + 'static,
         wake: impl Fn() + Send + Sync + 'static,
     ) -> Result<Self> {
-        let shared = Arc::new(Shared::new(Box::new(wake)));
+        let shared = Arc::new(Shared::new(Wake(Arc::new(wake))));
         let of_thread = Arc::clone(&shared);
         let thread = std::thread::Builder::new()
             .name("baker".into())
@@ -353,7 +354,7 @@ impl Slot {
 struct Shared {
     slot: Mutex<Slot>,
     news: Condvar,
-    wake: Box<dyn Fn() + Send + Sync>,
+    wake: Wake,
 }
 
 impl std::fmt::Debug for Shared {
@@ -363,7 +364,7 @@ impl std::fmt::Debug for Shared {
 }
 
 impl Shared {
-    fn new(wake: Box<dyn Fn() + Send + Sync>) -> Self {
+    fn new(wake: Wake) -> Self {
         let slot = Slot {
             serial: 0,
             request: None,
@@ -415,7 +416,7 @@ impl Shared {
         }
         slot.newest = Some(level);
         drop(slot);
-        (self.wake)();
+        (self.wake.0)();
     }
 
     /// Ends a comparison, and hands out what it found unless something else was asked for in between.
@@ -426,7 +427,7 @@ impl Shared {
             slot.worth = worth;
         }
         drop(slot);
-        (self.wake)();
+        (self.wake.0)();
     }
 
     fn settle(&self, serial: u64, state: BakeState) {
@@ -436,7 +437,7 @@ impl Shared {
         let outdated = state == BakeState::Done && serial != slot.serial;
         slot.settled = if outdated { BakeState::Cancelled } else { state };
         drop(slot);
-        (self.wake)();
+        (self.wake.0)();
     }
 }
 
@@ -444,10 +445,10 @@ impl Shared {
 fn serve<B: Baker>(shared: &Shared, make_baker: &impl Fn(Arc<Scene>) -> Result<B>) {
     let mut baker = None;
     while let Some((request, control, meter)) = shared.next() {
-        (shared.wake)();
+        (shared.wake.0)();
         let progress = Reporter {
             meter: &meter,
-            wake: &shared.wake,
+            wake: &*shared.wake.0,
             start: Instant::now(),
             next_wake_ms: AtomicU64::new(0),
         };

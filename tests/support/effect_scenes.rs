@@ -10,9 +10,6 @@ use nephroid::scene::texture::Wrap;
 use nephroid::scene::{Camera, LightSize, Material, Mesh, Scene, Texture, TextureRef, Volume, Wave, Waves};
 use nephroid::settings::LayerKind;
 use nephroid::units::Flux;
-use serde_json::{Value, json};
-
-use super::glb::Glb;
 
 /// A scene and the effects of its light pass.
 pub struct EffectScene {
@@ -20,110 +17,103 @@ pub struct EffectScene {
     pub scene: Scene,
     pub layers: Vec<LayerKind>,
     /// What the scene calls for; nothing else.
-    #[allow(dead_code, reason = "the tests of bakes ask for it")]
-    pub calls_for: &'static [Effect],
+    pub calls_for: Vec<Effect>,
     /// Whether something specular is in view of the scene's first camera, hidden or not.
-    #[allow(dead_code, reason = "the tests of the eye pass ask for it")]
     pub shows_specular: bool,
 }
 
-const MIRRORS: &[Effect] = &[Effect::LightPass, Effect::Reflection];
-const ROUGH_MIRRORS: &[Effect] = &[Effect::LightPass, Effect::Reflection, Effect::Roughness];
-const WAVY_MIRRORS: &[Effect] = &[Effect::LightPass, Effect::Reflection, Effect::Bumps];
-const LARGE_LAMPS: &[Effect] = &[Effect::LightPass, Effect::Reflection, Effect::AreaLights];
-const GLASS: &[Effect] = &[Effect::LightPass, Effect::Refraction, Effect::Reflection];
-const DISPERSIVE_GLASS: &[Effect] = &[
-    Effect::LightPass,
-    Effect::Refraction,
-    Effect::Reflection,
-    Effect::Dispersion,
-];
-const COLOURED_GLASS: &[Effect] = &[
-    Effect::LightPass,
-    Effect::Refraction,
-    Effect::Reflection,
-    Effect::Absorption,
-];
-const EVERYTHING: &[Effect] = &[
-    Effect::LightPass,
-    Effect::Refraction,
-    Effect::Reflection,
-    Effect::Absorption,
-    Effect::Textures,
-    Effect::Direct,
-];
-
 /// All of them.
 pub fn all() -> Vec<EffectScene> {
-    let caustic = || vec![LayerKind::Caustic];
-    let scene = |name, scene, calls_for, shows_specular| EffectScene {
-        name,
-        scene,
-        layers: caustic(),
-        calls_for,
-        shows_specular,
+    let mirrored = |material: Material| {
+        let mut scene = room();
+        add_mirror(&mut scene, material);
+        scene
     };
-    let mut dark = room();
-    add_mirror(&mut dark, parts::mirror());
+    let with_ball = |material: Material| {
+        let mut scene = room();
+        add_ball(&mut scene, material);
+        scene
+    };
+    let rough = |roughness: f64| Material {
+        roughness,
+        ..parts::mirror()
+    };
+    let mut matte = rough(0.9);
+    matte.surface = matte.classified();
+    let mut dark = mirrored(parts::mirror());
     dark.lights.clear();
-    let mut mirror = room();
-    add_mirror(&mut mirror, parts::mirror());
-    let mut glass = room();
-    add_ball(&mut glass, parts::dielectric("glass", 1.5));
-    let mut parting = room();
-    add_ball(&mut parting, parts::glass("N-SF11"));
-    let mut unlit = glass.clone();
+    let mut unlit = with_ball(parts::dielectric("glass", 1.5));
     add_box(&mut unlit, "safe", BALL, 0.35);
-    let mut coloured = room();
-    add_ball(&mut coloured, coloured_glass());
-    let mut rough = room();
-    add_mirror(&mut rough, rough_metal());
-    let mut glossy = room();
-    add_mirror(
-        &mut glossy,
-        Material {
-            roughness: 0.25,
-            ..parts::mirror()
-        },
-    );
-    let mut wavy = room();
-    add_mirror(&mut wavy, wavy_mirror());
-    let mut wide = mirror.clone();
+    let mut wide = mirrored(parts::mirror());
     wide.lights[0].size = LightSize::Radius { radius_m: 0.2 };
-    let mut turned_away = mirror.clone();
+    let mut turned_away = mirrored(parts::mirror());
     turned_away.cameras = vec![camera(DVec3::new(0.0, 1.0, 3.0), DVec3::new(0.0, 1.0, 9.0))];
-    let mut everything = room();
-    add_mirror(&mut everything, textured_mirror());
+    let mut everything = mirrored(textured_mirror());
     everything.textures = vec![Arc::new(stripes())];
     add_ball(&mut everything, coloured_glass());
+
+    let mirrors = [Effect::LightPass, Effect::Reflection];
+    let glass = [Effect::LightPass, Effect::Refraction, Effect::Reflection];
+    let of = |name, scene, base: &[Effect], more: &[Effect], shows_specular| EffectScene {
+        name,
+        scene,
+        layers: vec![LayerKind::Caustic],
+        calls_for: [base, more].concat(),
+        shows_specular,
+    };
+    let (absorption, textures, direct) = (Effect::Absorption, Effect::Textures, Effect::Direct);
     vec![
-        scene("no light", dark, &[], true),
-        scene("nothing specular", room(), &[], false),
-        scene("mirror", mirror, MIRRORS, true),
-        scene("glass", glass, GLASS, true),
-        scene("dispersive glass", parting, DISPERSIVE_GLASS, true),
-        scene("glass unlit", unlit, &[], true),
-        scene("absorption", coloured, COLOURED_GLASS, true),
-        scene(
-            "normal map",
-            from_file(json!({ "normalTexture": { "index": 0 } }), json!({})),
-            GLASS,
+        of("no light", dark, &[], &[], true),
+        of("nothing specular", room(), &[], &[], false),
+        of("mirror", mirrored(parts::mirror()), &mirrors, &[], true),
+        of(
+            "glass",
+            with_ball(parts::dielectric("glass", 1.5)),
+            &glass,
+            &[],
             true,
         ),
-        scene(
-            "alpha mask",
-            from_file(json!({}), json!({ "alphaMode": "MASK", "alphaCutoff": 0.5 })),
-            GLASS,
+        of(
+            "dispersive glass",
+            with_ball(parts::glass("N-SF11")),
+            &glass,
+            &[Effect::Dispersion],
             true,
         ),
-        scene("rough metal", rough, &[], false),
-        scene("rough mirror", glossy, ROUGH_MIRRORS, true),
-        scene("wavy mirror", wavy, WAVY_MIRRORS, true),
-        scene("lamp with a size", wide, LARGE_LAMPS, true),
-        scene("camera turned away", turned_away, MIRRORS, false),
+        of("glass unlit", unlit, &[], &[], true),
+        of(
+            "absorption",
+            with_ball(coloured_glass()),
+            &glass,
+            &[absorption],
+            true,
+        ),
+        of("rough metal", mirrored(matte), &[], &[], false),
+        of(
+            "rough mirror",
+            mirrored(rough(0.25)),
+            &mirrors,
+            &[Effect::Roughness],
+            true,
+        ),
+        of(
+            "wavy mirror",
+            mirrored(wavy_mirror()),
+            &mirrors,
+            &[Effect::Bumps],
+            true,
+        ),
+        of("lamp with a size", wide, &mirrors, &[Effect::AreaLights], true),
+        of("camera turned away", turned_away, &mirrors, &[], false),
         EffectScene {
             layers: vec![LayerKind::Caustic, LayerKind::Direct],
-            ..scene("everything", everything, EVERYTHING, true)
+            ..of(
+                "everything",
+                everything,
+                &glass,
+                &[absorption, textures, direct],
+                true,
+            )
         },
     ]
 }
@@ -172,15 +162,6 @@ fn coloured_glass() -> Material {
     }
 }
 
-fn rough_metal() -> Material {
-    let mut material = Material {
-        roughness: 0.9,
-        ..parts::mirror()
-    };
-    material.surface = material.classified();
-    material
-}
-
 fn wavy_mirror() -> Material {
     let wave = Wave {
         amplitude_m: 0.002,
@@ -215,42 +196,4 @@ fn stripes() -> Texture {
         rgba: rgba.collect(),
         wrap: [Wrap::Repeat; 2],
     }
-}
-
-/// A white pixel.
-const PIXEL: &str = "data:image/png;base64,iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mP8/5+hHgAHggJ/PchI7wAA\
-                     AABJRU5ErkJggg==";
-
-/// A glass tetrahedron over a floor, with more fields for their materials, by way of a file.
-fn from_file(of_glass: Value, of_floor: Value) -> Scene {
-    let with = |mut material: Value, more: Value| {
-        let fields = more.as_object().expect("an object").clone();
-        material.as_object_mut().expect("an object").extend(fields);
-        material
-    };
-    let glass = json!({
-        "pbrMetallicRoughness": { "metallicFactor": 0.0, "roughnessFactor": 0.0 },
-        "extensions": {
-            "KHR_materials_transmission": { "transmissionFactor": 1.0 },
-            "KHR_materials_volume": { "thicknessFactor": 1.0 },
-        },
-    });
-    let lamp = json!({ "type": "point", "intensity": 683.0 });
-    let mut file = Glb::tetrahedron().with_material(with(glass, of_glass));
-    file.push("images", json!({ "uri": PIXEL }));
-    file.push("textures", json!({ "source": 0 }));
-    let corners = [-4.0, -2.0, -4.0, -4.0, -2.0, 4.0, 4.0, -2.0, 4.0, 4.0, -2.0, -4.0];
-    let positions = file.push_floats(&corners, 3);
-    let indices = file.push_indices(&[0, 1, 2, 0, 2, 3]);
-    let white = json!({ "pbrMetallicRoughness": { "metallicFactor": 0.0, "roughnessFactor": 1.0 } });
-    let material = file.push("materials", with(white, of_floor));
-    let attributes = json!({ "POSITION": positions });
-    let mesh = file.push_mesh(json!({ "attributes": attributes, "indices": indices, "material": material }));
-    file.push_root(json!({ "name": "floor", "mesh": mesh }));
-    let mut file = file.with_light("lamp", lamp);
-    let node = file.json["nodes"].as_array().expect("a list").len() - 1;
-    file.json["nodes"][node]["translation"] = json!([0.3, 5.0, 0.2]);
-    let mut scene = file.scene();
-    scene.cameras = vec![camera(DVec3::new(0.0, 3.0, 9.0), DVec3::ZERO)];
-    scene
 }

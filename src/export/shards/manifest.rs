@@ -13,7 +13,7 @@ use crate::session::{ShardSums, Timings};
 use crate::settings::BakeSettings;
 
 /// Version of the format of both files.
-pub(super) const SCHEMA: u32 = 1;
+pub(super) const SCHEMA: u32 = 3;
 
 /// Name of the file in its folder.
 pub(super) const FILE_NAME: &str = "shard.json";

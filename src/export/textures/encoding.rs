@@ -165,7 +165,7 @@ impl Encoding {
                 levels: 1,
             }),
             Self::Png16 { transfer } => png16::encode(texels, transfer, notes),
-            Self::Radiance => Ok(radiance::encode(texels, notes)),
+            Self::Radiance => radiance::encode(texels, notes),
             Self::Ktx2 { packing, mips } => ktx2::encode(texels, packing, mips, notes),
         }
     }

@@ -1,22 +1,21 @@
 //! Radiance pictures (Ward, "Real pixels", Graphics Gems II, 1991): three mantissas of eight bits and one exponent.
 
+use image::Rgb;
+use image::codecs::hdr::HdrEncoder;
+
 use super::encoding::{Encoded, Notes};
 use super::texels::Texels;
+use crate::error::{Error, Result};
 
 /// The largest value: 255/256 · 2^127.
 pub const MOST: f32 = 255.0 / 256.0 * 1.701_411_8e38;
 
-/// Widths that rows may be run-length encoded at.
-const RUN_WIDTHS: std::ops::RangeInclusive<usize> = 8..=32767;
-/// Shortest run that is worth its two bytes.
-const LEAST_RUN: usize = 3;
-/// Most bytes of a run, and of what lies between two.
-const MOST_RUN: usize = 127;
-const MOST_DUMP: usize = 128;
-
 /// The file. Values below 0 become 0, and so do channels of less than 1/512 of their texel's largest; each is rounded to
 /// the nearest step. Multiplied by 2^stops, it says so by EXPOSURE, by which readers divide.
-pub fn encode(texels: &Texels, notes: &Notes<'_>) -> Encoded {
+///
+/// # Errors
+/// None that is known of: it is written in memory.
+pub fn encode(texels: &Texels, notes: &Notes<'_>) -> Result<Encoded> {
     let (width, height) = texels.size();
     let mut bytes = format!(
         "#?RADIANCE\nSOFTWARE=nephroid {}\nFORMAT=32-bit_rle_rgbe\n",
@@ -27,16 +26,21 @@ pub fn encode(texels: &Texels, notes: &Notes<'_>) -> Encoded {
         bytes.extend(format!("EXPOSURE={}\n", notes.exposure_stops.exp2()).bytes());
     }
     let comment: String = notes.comment().chars().filter(|c| !c.is_control()).collect();
-    bytes.extend(format!("# {comment}\n\n-Y {height} +X {width}\n").bytes());
-    let codes: Vec<[u8; 4]> = texels.values().iter().map(|texel| code(*texel)).collect();
-    for row in codes.chunks(width) {
-        write_row(row, &mut bytes);
-    }
-    Encoded {
+    bytes.extend(format!("# {comment}").bytes());
+    // The encoder cuts what it cannot hold, and keeps values that are rounded already.
+    let stored: Vec<[f32; 3]> = texels.values().iter().map(|texel| value(code(*texel))).collect();
+    let pixels: Vec<Rgb<f32>> = stored.iter().map(|texel| Rgb(*texel)).collect();
+    let mut file = Vec::new();
+    let written = HdrEncoder::new(&mut file).encode(&pixels, width, height);
+    written.map_err(|error| Error::failure(notes.location, error.to_string(), "report this"))?;
+    // Its own head ends with an empty line; this one says more.
+    let head = file.windows(2).position(|two| two == b"\n\n").unwrap_or_default();
+    bytes.extend(&file[head..]);
+    Ok(Encoded {
         bytes,
-        stored: codes.iter().map(|code| value(*code)).collect(),
+        stored,
         levels: 1,
-    }
+    })
 }
 
 /// Mantissas and exponent of a texel.
@@ -66,47 +70,6 @@ fn value([r, g, b, exponent]: [u8; 4]) -> [f32; 3] {
     }
     let scale = f64::from(i32::from(exponent) - 136).exp2();
     [r, g, b].map(|mantissa| (f64::from(mantissa) * scale) as f32)
-}
-
-/// A row: component by component in runs, where its width allows that.
-fn write_row(row: &[[u8; 4]], bytes: &mut Vec<u8>) {
-    if !RUN_WIDTHS.contains(&row.len()) {
-        bytes.extend(row.as_flattened());
-        return;
-    }
-    bytes.extend([2, 2]);
-    bytes.extend((row.len() as u16).to_be_bytes());
-    for component in 0..4 {
-        let values: Vec<u8> = row.iter().map(|texel| texel[component]).collect();
-        write_runs(&values, bytes);
-    }
-}
-
-/// Runs of at most 127 alike (128 + length, value), and what lies between them (length, values).
-fn write_runs(values: &[u8], bytes: &mut Vec<u8>) {
-    let run_at = |start: usize| {
-        let same = values[start..]
-            .iter()
-            .take_while(|value| **value == values[start]);
-        same.count().min(MOST_RUN)
-    };
-    let mut start = 0;
-    while start < values.len() {
-        let run = run_at(start);
-        if run >= LEAST_RUN {
-            bytes.extend([128 + run as u8, values[start]]);
-            start += run;
-            continue;
-        }
-        let mut end = start + run;
-        while end < values.len() && end - start < MOST_DUMP && run_at(end) < LEAST_RUN {
-            end += 1;
-        }
-        let end = end.min(start + MOST_DUMP);
-        bytes.push((end - start) as u8);
-        bytes.extend(&values[start..end]);
-        start = end;
-    }
 }
 
 #[cfg(test)]

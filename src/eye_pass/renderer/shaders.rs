@@ -12,203 +12,84 @@ use crate::gpu::layout::StructLayout;
 use crate::gpu::shader::{Program, shader_source};
 use crate::scene::SurfaceKind;
 
+/// A program of files, in their order.
+macro_rules! program {
+    ($name:literal: $($source:literal)+) => {
+        Program {
+            name: $name,
+            sources: &[$(shader_source!($source)),+],
+        }
+    };
+}
+
+/// A program that follows chains of specular surfaces, with its files of indices and of what is behind the scene.
+macro_rules! chains {
+    ($name:literal, $indices:literal, $background:literal) => {
+        program! { $name:
+            "shared/srgb" "shared/refraction" "shared/fresnel" "shared/traversal" "eye_pass/frame"
+            "eye_pass/objects" "eye_pass/images" "eye_pass/bumps" "eye_pass/place" "eye_pass/start"
+            "eye_pass/lights" "eye_pass/corners" $indices "eye_pass/medium" "eye_pass/interaction"
+            $background "eye_pass/chain" "eye_pass/traced"
+        }
+    };
+}
+
 /// Surfaces of the scene by themselves.
-pub(super) const SURFACE: Program = Program {
-    name: "surface",
-    sources: &[
-        shader_source!("shared/srgb"),
-        shader_source!("shared/refraction"),
-        shader_source!("shared/fresnel"),
-        shader_source!("eye_pass/frame"),
-        shader_source!("eye_pass/objects"),
-        shader_source!("eye_pass/images"),
-        shader_source!("eye_pass/bumps"),
-        shader_source!("eye_pass/place"),
-        shader_source!("eye_pass/surface"),
-        shader_source!("eye_pass/own"),
-    ],
+pub(super) const SURFACE: Program = program! { "surface":
+    "shared/srgb" "shared/refraction" "shared/fresnel" "eye_pass/frame" "eye_pass/objects" "eye_pass/images"
+    "eye_pass/bumps" "eye_pass/place" "eye_pass/surface" "eye_pass/own"
 };
 
 /// Surfaces by something else than their light.
-pub(super) const INSPECTED: Program = Program {
-    name: "inspected",
-    sources: &[
-        shader_source!("shared/false_colours"),
-        shader_source!("eye_pass/frame"),
-        shader_source!("eye_pass/objects"),
-        shader_source!("eye_pass/images"),
-        shader_source!("eye_pass/place"),
-        shader_source!("eye_pass/inspected"),
-    ],
+pub(super) const INSPECTED: Program = program! { "inspected":
+    "shared/false_colours" "eye_pass/frame" "eye_pass/objects" "eye_pass/images" "eye_pass/place"
+    "eye_pass/inspected"
 };
 
 /// Chains of specular surfaces.
-pub(super) const TRACED: Program = Program {
-    name: "traced",
-    sources: &[
-        shader_source!("shared/srgb"),
-        shader_source!("shared/refraction"),
-        shader_source!("shared/fresnel"),
-        shader_source!("shared/traversal"),
-        shader_source!("eye_pass/frame"),
-        shader_source!("eye_pass/objects"),
-        shader_source!("eye_pass/images"),
-        shader_source!("eye_pass/bumps"),
-        shader_source!("eye_pass/place"),
-        shader_source!("eye_pass/start"),
-        shader_source!("eye_pass/lights"),
-        shader_source!("eye_pass/corners"),
-        shader_source!("eye_pass/one_index"),
-        shader_source!("eye_pass/medium"),
-        shader_source!("eye_pass/interaction"),
-        shader_source!("eye_pass/plain_background"),
-        shader_source!("eye_pass/chain"),
-        shader_source!("eye_pass/traced"),
-    ],
-};
+pub(super) const TRACED: Program = chains!("traced", "eye_pass/one_index", "eye_pass/plain_background");
 
 /// The same in an environment.
-pub(super) const TRACED_UNDER_SKY: Program = Program {
-    name: "traced_under_sky",
-    sources: &[
-        shader_source!("shared/srgb"),
-        shader_source!("shared/refraction"),
-        shader_source!("shared/fresnel"),
-        shader_source!("shared/traversal"),
-        shader_source!("eye_pass/frame"),
-        shader_source!("eye_pass/objects"),
-        shader_source!("eye_pass/images"),
-        shader_source!("eye_pass/bumps"),
-        shader_source!("eye_pass/place"),
-        shader_source!("eye_pass/start"),
-        shader_source!("eye_pass/lights"),
-        shader_source!("eye_pass/corners"),
-        shader_source!("eye_pass/one_index"),
-        shader_source!("eye_pass/medium"),
-        shader_source!("eye_pass/interaction"),
-        shader_source!("eye_pass/sky"),
-        shader_source!("eye_pass/chain"),
-        shader_source!("eye_pass/traced"),
-    ],
-};
+pub(super) const TRACED_UNDER_SKY: Program =
+    chains!("traced_under_sky", "eye_pass/one_index", "eye_pass/sky");
 
 /// Chains of specular surfaces, by wavelength from where glass parts light.
-pub(super) const PARTED: Program = Program {
-    name: "parted",
-    sources: &[
-        shader_source!("shared/srgb"),
-        shader_source!("shared/refraction"),
-        shader_source!("shared/fresnel"),
-        shader_source!("shared/traversal"),
-        shader_source!("eye_pass/frame"),
-        shader_source!("eye_pass/objects"),
-        shader_source!("eye_pass/images"),
-        shader_source!("eye_pass/bumps"),
-        shader_source!("eye_pass/place"),
-        shader_source!("eye_pass/start"),
-        shader_source!("eye_pass/lights"),
-        shader_source!("eye_pass/corners"),
-        shader_source!("eye_pass/wavelengths"),
-        shader_source!("eye_pass/medium"),
-        shader_source!("eye_pass/interaction"),
-        shader_source!("eye_pass/plain_background"),
-        shader_source!("eye_pass/chain"),
-        shader_source!("eye_pass/traced"),
-    ],
-};
+pub(super) const PARTED: Program = chains!("parted", "eye_pass/wavelengths", "eye_pass/plain_background");
 
 /// The same in an environment.
-pub(super) const PARTED_UNDER_SKY: Program = Program {
-    name: "parted_under_sky",
-    sources: &[
-        shader_source!("shared/srgb"),
-        shader_source!("shared/refraction"),
-        shader_source!("shared/fresnel"),
-        shader_source!("shared/traversal"),
-        shader_source!("eye_pass/frame"),
-        shader_source!("eye_pass/objects"),
-        shader_source!("eye_pass/images"),
-        shader_source!("eye_pass/bumps"),
-        shader_source!("eye_pass/place"),
-        shader_source!("eye_pass/start"),
-        shader_source!("eye_pass/lights"),
-        shader_source!("eye_pass/corners"),
-        shader_source!("eye_pass/wavelengths"),
-        shader_source!("eye_pass/medium"),
-        shader_source!("eye_pass/interaction"),
-        shader_source!("eye_pass/sky"),
-        shader_source!("eye_pass/chain"),
-        shader_source!("eye_pass/traced"),
-    ],
-};
+pub(super) const PARTED_UNDER_SKY: Program =
+    chains!("parted_under_sky", "eye_pass/wavelengths", "eye_pass/sky");
 
 /// An environment behind all surfaces.
-pub(super) const SKY: Program = Program {
-    name: "sky",
-    sources: &[
-        shader_source!("eye_pass/frame"),
-        shader_source!("eye_pass/sky"),
-        shader_source!("eye_pass/sky_drawn"),
-    ],
+pub(super) const SKY: Program = program! { "sky":
+    "eye_pass/frame" "eye_pass/sky" "eye_pass/sky_drawn"
 };
 
 /// Surfaces of the scene by themselves, while lights are moved.
-pub(super) const UNDER_LIGHTS: Program = Program {
-    name: "under_lights",
-    sources: &[
-        shader_source!("shared/srgb"),
-        shader_source!("shared/refraction"),
-        shader_source!("shared/fresnel"),
-        shader_source!("shared/traversal"),
-        shader_source!("eye_pass/frame"),
-        shader_source!("eye_pass/objects"),
-        shader_source!("eye_pass/images"),
-        shader_source!("eye_pass/bumps"),
-        shader_source!("eye_pass/place"),
-        shader_source!("eye_pass/start"),
-        shader_source!("eye_pass/lights"),
-        shader_source!("eye_pass/surface"),
-        shader_source!("eye_pass/own_under_lights"),
-    ],
+pub(super) const UNDER_LIGHTS: Program = program! { "under_lights":
+    "shared/srgb" "shared/refraction" "shared/fresnel" "shared/traversal" "eye_pass/frame"
+    "eye_pass/objects" "eye_pass/images" "eye_pass/bumps" "eye_pass/place" "eye_pass/start"
+    "eye_pass/lights" "eye_pass/surface" "eye_pass/own_under_lights"
 };
 
 /// What was traced, in the picture.
-pub(super) const COMPOSED: Program = Program {
-    name: "composed",
-    sources: &[
-        shader_source!("eye_pass/frame"),
-        shader_source!("eye_pass/place"),
-        shader_source!("eye_pass/composed"),
-    ],
+pub(super) const COMPOSED: Program = program! { "composed":
+    "eye_pass/frame" "eye_pass/place" "eye_pass/composed"
 };
 
 /// Means of pictures.
-pub(super) const ACCUMULATED: Program = Program {
-    name: "accumulated",
-    sources: &[
-        shader_source!("shared/cover"),
-        shader_source!("eye_pass/accumulated"),
-    ],
+pub(super) const ACCUMULATED: Program = program! { "accumulated":
+    "shared/cover" "eye_pass/accumulated"
 };
 
 /// Rays, to hold the device's answers against the processor's.
-pub(super) const PROBE: Program = Program {
-    name: "probe",
-    sources: &[
-        shader_source!("shared/traversal"),
-        shader_source!("eye_pass/probe"),
-    ],
+pub(super) const PROBE: Program = program! { "probe":
+    "shared/traversal" "eye_pass/probe"
 };
 
 /// Radiance to display colour.
-pub(super) const TONE_MAPPING: Program = Program {
-    name: "tone_mapping",
-    sources: &[
-        shader_source!("shared/cover"),
-        shader_source!("shared/srgb"),
-        shader_source!("shared/tone_map"),
-        shader_source!("eye_pass/tone_mapping"),
-    ],
+pub(super) const TONE_MAPPING: Program = program! { "tone_mapping":
+    "shared/cover" "shared/srgb" "shared/tone_map" "eye_pass/tone_mapping"
 };
 
 /// Every shader module of the eye pass, for the tests.

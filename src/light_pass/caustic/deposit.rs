@@ -16,7 +16,6 @@ use crate::illumination::Receiver;
 use crate::light_pass::ledger_sum::{Account, LedgerSum};
 use crate::light_pass::receiver_maps::{ChartFor, ReceiverMaps};
 use crate::settings::{BakeSettings, Kernel, KernelSampling, Sigma};
-use crate::transport::PathCounts;
 
 /// How kernels are made from arrivals.
 #[derive(Clone, Copy, Debug)]
@@ -77,8 +76,6 @@ pub struct DepositReport {
     pub ledger: LedgerSum,
     /// Kernels deposited.
     pub splats: u64,
-    /// The same by what took part in them.
-    pub deposits: PathCounts,
     /// Sizes of their footprints.
     pub statistics: FootprintStatistics,
 }
@@ -97,7 +94,6 @@ impl Depositor<'_> {
             report.ledger.merge(&part.ledger);
             report.statistics.merge(&part.statistics);
             report.splats += part.splats.len() as u64;
-            report.deposits += part.deposits;
             // Neighbours mostly go to the same map.
             for run in part
                 .splats
@@ -144,8 +140,6 @@ impl Depositor<'_> {
                 .and_then(|surface| self.place(arrival, &neighbours, surface, &unbent_area_m2, &mut made));
             match placed {
                 Some(placed) => {
-                    made.deposits.count_segment(arrival.event);
-                    made.deposits.of_a_wavelength += u64::from(self.lattice.band.is_some());
                     made.splats.push(Placed {
                         is_second: (column + context.index) % 2 == 1,
                         ..placed
@@ -247,6 +241,5 @@ pub(super) struct Placed {
 struct RowSplats {
     splats: Vec<Placed>,
     ledger: LedgerSum,
-    deposits: PathCounts,
     statistics: FootprintStatistics,
 }

@@ -8,7 +8,6 @@ use super::path::{Arrival, PathSignature};
 use crate::illumination::Receiver;
 use crate::light_pass::ledger_sum::LedgerSum;
 use crate::optics::LinearSrgb;
-use crate::transport::Event;
 
 /// All that one light sent to diffuse surfaces, row by row of its lattice.
 #[derive(Debug, Default)]
@@ -18,16 +17,6 @@ pub struct KeptLight {
     /// Accounts of the paths; `Deposited` is not among them.
     ledger: LedgerSum,
     bytes: u64,
-}
-
-/// Memory that rows would take if they were kept [bytes].
-pub fn bytes_if_kept(rows: &[TracedRow]) -> u64 {
-    let of_row = |row: &TracedRow| {
-        let arrivals = row.arrivals.len();
-        let is_coloured = !row.arrivals.iter().all(is_grey);
-        KeptRow::bytes_of(arrivals, if is_coloured { arrivals } else { 0 })
-    };
-    rows.iter().map(of_row).sum()
 }
 
 fn is_grey(arrival: &Arrival) -> bool {
@@ -54,7 +43,6 @@ struct Kept {
     column: u32,
     receiver: Receiver,
     triangle: u32,
-    event: Event,
 }
 
 impl KeptLight {
@@ -116,7 +104,6 @@ impl KeptRow {
             column,
             receiver: arrival.receiver,
             triangle: arrival.triangle,
-            event: arrival.event,
         };
         let colours = if row.arrivals.iter().all(is_grey) {
             Box::default()
@@ -149,15 +136,10 @@ impl KeptRow {
             point: glam::DVec3::ZERO,
             flux_w: LinearSrgb::new(kept.flux_w, g, b),
             path_m: kept.path_m,
-            event: kept.event,
         }
     }
 
     fn bytes(&self) -> u64 {
-        Self::bytes_of(self.arrivals.len(), self.colours.len())
-    }
-
-    fn bytes_of(arrivals: usize, colours: usize) -> u64 {
-        (size_of::<Self>() + arrivals * size_of::<Kept>() + colours * size_of::<[f64; 2]>()) as u64
+        (size_of::<Self>() + size_of_val(&*self.arrivals) + size_of_val(&*self.colours)) as u64
     }
 }

@@ -13,7 +13,7 @@ use crate::light_pass::ledger_sum::LedgerSum;
 use crate::light_pass::spectral_node::SpectralNode;
 use crate::scene::Scene;
 use crate::settings::RayPlacement;
-use crate::transport::{ForEffects, PathCounts, PathEffects, Tracer};
+use crate::transport::Tracer;
 
 /// All that is needed to trace the lattice of one light.
 #[derive(Clone, Copy, Debug)]
@@ -56,8 +56,6 @@ pub struct TracedRow {
     pub rays: u64,
     /// Closest-hit queries.
     pub segments: u64,
-    /// The same by what began them.
-    pub paths: PathCounts,
 }
 
 impl TracedRow {
@@ -105,21 +103,6 @@ impl<'a> Points<'a> {
 /// First of the columns (rows) of the whole lattice that a traced one stands for, and the one after the last.
 fn group(index: usize, stride: usize, size: usize) -> (usize, usize) {
     (index * stride, ((index + 1) * stride).min(size))
-}
-
-/// A row to be traced.
-struct RowOf<'a> {
-    lattice: &'a Lattice<'a>,
-    face: usize,
-    row: usize,
-}
-
-impl ForEffects for RowOf<'_> {
-    type Output = TracedRow;
-
-    fn run<E: PathEffects>(self) -> TracedRow {
-        self.lattice.trace_row_with::<E>(self.face, self.row)
-    }
 }
 
 impl Lattice<'_> {
@@ -181,11 +164,6 @@ impl Lattice<'_> {
 
     /// Traces one row of one face.
     pub fn trace_row(&self, face: usize, row: usize) -> TracedRow {
-        let lattice = self;
-        self.limits.effects.specialise(RowOf { lattice, face, row })
-    }
-
-    fn trace_row_with<E: PathEffects>(&self, face: usize, row: usize) -> TracedRow {
         let mut traced = TracedRow::default();
         let fine_row = self.fine_row(row);
         if fine_row >= self.size.1 {
@@ -213,7 +191,7 @@ impl Lattice<'_> {
                     continue;
                 }
                 traced.rays += 1;
-                paths.trace::<E>(ray, flux_w, self.launch.media(), |mut arrival| {
+                paths.trace(ray, flux_w, self.launch.media(), |mut arrival| {
                     arrival.point = points.of(&arrival);
                     arrival.flux_w = arrival.flux_w * self.cells_of(column, row);
                     traced.columns.push(column as u32);
@@ -223,10 +201,6 @@ impl Lattice<'_> {
         }
         traced.ledger = paths.ledger;
         traced.segments = paths.segments;
-        traced.paths = paths.counts;
-        if self.band.is_some() {
-            traced.paths.of_a_wavelength = traced.rays;
-        }
         traced
     }
 

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use std::time::Instant;
 
 use super::deposit::{DepositReport, Depositor, Halves, RowContext};
-use super::kept::{self, KeptLight};
+use super::kept::KeptLight;
 use super::lattice::{Lattice, TracedRow};
 use super::statistics::FootprintStatistics;
 use crate::illumination::Receiver;
@@ -16,7 +16,6 @@ use crate::light_pass::receiver_maps::ChartFor;
 use crate::light_pass::share::Share;
 use crate::light_pass::wavefront::overreach::Overreach;
 use crate::progress::{Control, Progress, Stage};
-use crate::transport::PathCounts;
 
 /// Rays that a band aims at: enough for all cores, and few enough that what they bring stays in their caches.
 const RAYS_PER_BAND: usize = 1 << 14;
@@ -34,10 +33,6 @@ pub struct PassReport {
     pub rays: u64,
     /// Closest-hit queries.
     pub segments: u64,
-    /// Segments by what began them.
-    pub paths: PathCounts,
-    /// Patches and kernels that came to a map, by what took part in them.
-    pub deposits: PathCounts,
     /// Kernels deposited.
     pub splats: u64,
     /// Wavefront cells.
@@ -191,7 +186,7 @@ pub fn run(
     (report, recorder.light)
 }
 
-/// Traces and deposits the bands of a share. Gives what its rows would take if they were kept [bytes].
+/// Traces and deposits the bands of a share.
 ///
 /// A band borrows its neighbours' rows: they are traced for it alone, and booked by nobody else than their own band.
 pub fn run_share(
@@ -200,9 +195,9 @@ pub fn run_share(
     halves: &mut Halves,
     chart_for: &ChartFor,
     listener: &Listener,
-) -> (PassReport, u64) {
+) -> PassReport {
     let mut report = PassReport::default();
-    let (mut number, mut kept_bytes) = (0, 0);
+    let mut number = 0;
     let lattice = &depositor.lattice;
     let (_, rows) = lattice.traced_size();
     for face in 0..lattice.launch.face_count() {
@@ -216,7 +211,7 @@ pub fn run_share(
             }
             if listener.control.is_cancelled() {
                 report.cancelled = true;
-                return (report, kept_bytes);
+                return report;
             }
             let watch = Stopwatch::start();
             let lent_before = usize::from(band.start > 0);
@@ -228,7 +223,6 @@ pub fn run_share(
             report.trace_s.add(watch.elapsed());
             let own = lent_before..lent_before + band.len();
             report.count(&traced[own.clone()]);
-            kept_bytes += kept::bytes_if_kept(&traced[own.clone()]);
             let watch = Stopwatch::start();
             let context = |position: usize| RowContext {
                 row: &traced[position],
@@ -244,7 +238,7 @@ pub fn run_share(
                 .advance(Stage::Caustic, listener.done + report.rays, listener.total);
         }
     }
-    (report, kept_bytes)
+    report
 }
 
 /// Keeps what arrives, until it is too much.
@@ -345,8 +339,6 @@ impl PassReport {
         self.ledger.merge(&other.ledger);
         self.rays += other.rays;
         self.segments += other.segments;
-        self.paths += other.paths;
-        self.deposits += other.deposits;
         self.splats += other.splats;
         self.cells += other.cells;
         self.receiver_queries += other.receiver_queries;
@@ -362,14 +354,12 @@ impl PassReport {
             self.ledger.merge(&row.ledger);
             self.rays += row.rays;
             self.segments += row.segments;
-            self.paths += row.paths;
         }
     }
 
     fn add(&mut self, deposit: &DepositReport) {
         self.ledger.merge(&deposit.ledger);
         self.splats += deposit.splats;
-        self.deposits += deposit.deposits;
         self.statistics.merge(&deposit.statistics);
     }
 }

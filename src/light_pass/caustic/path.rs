@@ -7,9 +7,7 @@ use crate::geometry::Ray;
 use crate::illumination::accumulator::FluxUnit;
 use crate::illumination::{Receiver, Side};
 use crate::optics::{ColourMatrix, LinearSrgb};
-use crate::transport::{
-    Branch, EffectSet, Event, MediumStack, Microfacets, PathCounts, PathEffects, SurfaceHit, Tracer,
-};
+use crate::transport::{Branch, EffectSet, Event, MediumStack, Microfacets, SurfaceHit, Tracer};
 
 /// Sequence of (object, event) along a path, as a hash: equal for neighbouring rays that took the same way.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -60,8 +58,6 @@ pub struct Arrival {
     pub flux_w: LinearSrgb,
     /// From the light to here [m].
     pub path_m: f64,
-    /// The last event on the way.
-    pub event: Event,
 }
 
 /// Limits of a path.
@@ -84,8 +80,6 @@ struct Segment {
     flux_w: LinearSrgb,
     media: MediumStack,
     signature: PathSignature,
-    /// What began it; `None` for the light's own ray.
-    event: Option<Event>,
     depth: u32,
     path_m: f64,
 }
@@ -104,8 +98,6 @@ pub struct PathTracer<'a> {
     pub ledger: LedgerSum,
     /// Closest-hit queries so far.
     pub segments: u64,
-    /// What effects took part.
-    pub counts: PathCounts,
 }
 
 impl<'a> PathTracer<'a> {
@@ -119,7 +111,6 @@ impl<'a> PathTracer<'a> {
             waiting: Vec::new(),
             ledger: LedgerSum::default(),
             segments: 0,
-            counts: PathCounts::default(),
         }
     }
 
@@ -131,7 +122,7 @@ impl<'a> PathTracer<'a> {
 
     /// Follows a ray that carries `flux_w` from the light, which lies within `media`; arrivals on diffuse surfaces after
     /// at least one specular event are handed to `arrive`. `Deposited` is not booked here but by who places the flux.
-    pub fn trace<E: PathEffects>(
+    pub fn trace(
         &mut self,
         ray: Ray,
         flux_w: LinearSrgb,
@@ -147,13 +138,12 @@ impl<'a> PathTracer<'a> {
             flux_w,
             media: *media,
             signature: PathSignature::default(),
-            event: None,
             depth: 0,
             path_m: 0.0,
         };
         self.waiting.push(first);
         while let Some(segment) = self.waiting.pop() {
-            self.step::<E>(segment, floor_w, &mut arrive);
+            self.step(segment, floor_w, &mut arrive);
         }
     }
 
@@ -162,11 +152,8 @@ impl<'a> PathTracer<'a> {
             .book(account, self.unit.count(self.channels.apply(flux_w)));
     }
 
-    fn step<E: PathEffects>(&mut self, segment: Segment, floor_w: f64, arrive: &mut impl FnMut(Arrival)) {
+    fn step(&mut self, segment: Segment, floor_w: f64, arrive: &mut impl FnMut(Arrival)) {
         self.segments += 1;
-        if let Some(event) = segment.event {
-            self.counts.count_segment(event);
-        }
         let Some(hit) = self.tracer.closest_hit(&segment.ray) else {
             let account = if segment.depth == 0 {
                 Account::NotEmitted
@@ -176,22 +163,15 @@ impl<'a> PathTracer<'a> {
             return self.book(account, segment.flux_w);
         };
         let mut flux_w = segment.flux_w;
-        if E::ABSORPTION && segment.media.absorbs(self.tracer.scene()) {
+        let effects = self.limits.effects;
+        if effects.absorption && segment.media.absorbs(self.tracer.scene()) {
             flux_w = flux_w * segment.media.transmittance(self.tracer.scene(), hit.distance_m);
-            self.counts.attenuated += 1;
         }
         let path_m = segment.path_m + hit.distance_m;
         let micro = self.limits.microfacets.map(|facets| facets.at(segment.depth));
-        let interaction = self
-            .tracer
-            .interact_with::<E>(&hit, segment.ray.direction, &segment.media, micro);
-        self.counts.bent += u64::from(self.tracer.is_bumpy(hit.object));
-        if E::TEXTURES && self.tracer.is_textured(hit.object) {
-            self.counts.textured += 1;
-        }
-        if E::LOBES && micro.is_some() && self.tracer.scene().material_of(hit.object).is_rough() {
-            self.counts.scattered += 1;
-        }
+        let interaction =
+            self.tracer
+                .interact_with(effects, &hit, segment.ray.direction, &segment.media, micro);
         let deposit_w = flux_w * interaction.deposit;
         if segment.depth == 0 {
             // What a surface takes on the first hit is direct light, and so is what a body around the lamp takes of that.
@@ -202,9 +182,9 @@ impl<'a> PathTracer<'a> {
             if !is_specular {
                 return;
             }
-        } else if let (Some(event), true) = (segment.event, deposit_w.max_channel() > 0.0) {
+        } else if deposit_w.max_channel() > 0.0 {
             let arriving_w = self.channels.apply(deposit_w);
-            arrive(arrival(&hit, &segment, event, arriving_w, path_m));
+            arrive(arrival(&hit, &segment, arriving_w, path_m));
         }
         let on_the_way_w = segment.flux_w - flux_w;
         self.book(Account::Absorbed, on_the_way_w + flux_w * interaction.absorbed);
@@ -247,14 +227,13 @@ impl<'a> PathTracer<'a> {
             flux_w,
             media: branch.media,
             signature: from.signature.with(object, branch.event),
-            event: Some(branch.event),
             depth: from.depth + 1,
             path_m,
         });
     }
 }
 
-fn arrival(hit: &SurfaceHit, segment: &Segment, event: Event, flux_w: LinearSrgb, path_m: f64) -> Arrival {
+fn arrival(hit: &SurfaceHit, segment: &Segment, flux_w: LinearSrgb, path_m: f64) -> Arrival {
     Arrival {
         receiver: Receiver::new(hit.object, Side::met(segment.ray.direction, hit.geometric_normal)),
         triangle: hit.triangle as u32,
@@ -263,6 +242,5 @@ fn arrival(hit: &SurfaceHit, segment: &Segment, event: Event, flux_w: LinearSrgb
         point: hit.point,
         flux_w,
         path_m,
-        event,
     }
 }

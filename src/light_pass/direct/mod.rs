@@ -26,7 +26,7 @@ use crate::transport::Tracer;
 use facet::Facet;
 use lighting::{Arriving, Beam};
 use source::{Emission, Source};
-use texel::{Lit, Part, Row, Sample, Texel, TexelSum};
+use texel::{Lit, Part, Row, Sample, Texel, TexelSum, mark_of};
 
 /// Samples across and down a texel where light is all there or all away.
 const COARSE_SIDE: usize = 2;
@@ -267,7 +267,7 @@ impl<'a> Baker<'a> {
                     let ray = point.spawn(arriving.to_light);
                     if !self.tracer.is_blocked(&ray, arriving.distance_m) {
                         sample.irradiance += arriving.irradiance;
-                        sample.mask ^= 1u64.rotate_left(light as u32 % 64);
+                        sample.mask ^= mark_of(light);
                     }
                 }
                 Emission::Soft(soft) => {

@@ -25,6 +25,14 @@ impl Lit {
     }
 }
 
+/// A light's part of a mask: masks of different sets of lights differ however many lights there are (SplitMix64).
+pub fn mark_of(light: usize) -> u64 {
+    let mut bits = (light as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    bits = (bits ^ bits >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    bits = (bits ^ bits >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
+    bits ^ bits >> 31
+}
+
 /// Sums over the samples of one texel that lie on the surface.
 #[derive(Clone, Copy, Debug)]
 pub struct TexelSum {
@@ -131,4 +139,21 @@ pub struct Row {
     pub texels: Vec<(u32, Texel)>,
     pub shadow_rays: u64,
     pub cancelled: bool,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shadows_of_lights_64_apart_do_not_cancel() {
+        let both = mark_of(0) ^ mark_of(64);
+        for other in [0, mark_of(0), mark_of(64)] {
+            assert_eq!(Lit::EMPTY.and(both).and(other), Lit::MIXED);
+        }
+        assert_ne!(
+            Lit::EMPTY.and(mark_of(32)),
+            Lit::EMPTY.and(mark_of(0) ^ mark_of(1))
+        );
+    }
 }

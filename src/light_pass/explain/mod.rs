@@ -12,7 +12,7 @@ mod walk;
 
 pub use target::Target;
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 
 use glam::{DMat2, DVec2, DVec3};
 
@@ -153,7 +153,7 @@ fn explain_light(
     let unit = light.of_unit_strength();
     let places = if light.has_extent() { PLACES } else { 1 };
     let strength = light.strength() * (1.0 / f64::from(places));
-    let mut by_way: HashMap<PathSignature, LightPath> = HashMap::new();
+    let mut by_way: BTreeMap<PathSignature, LightPath> = BTreeMap::new();
     for place in 0..places {
         let emitter = light
             .has_extent()

@@ -114,16 +114,11 @@ impl Network {
         self.counts
     }
 
-    /// Links of all passes.
-    pub fn link_count(&self) -> u64 {
-        self.batches.iter().map(|links| links.len() as u64).sum()
-    }
-
     /// Memory [bytes].
-    pub fn bytes(&self) -> u64 {
+    fn bytes(&self) -> u64 {
         let rows = self.rows.iter().map(|rows| size_of_val(&rows[..]) as u64);
-        let links = self.link_count() * size_of::<Link>() as u64;
-        self.grids.iter().map(Grid::bytes).sum::<u64>() + rows.sum::<u64>() + links
+        let links = self.batches.iter().map(|links| size_of_val(&links[..]) as u64);
+        self.grids.iter().map(Grid::bytes).sum::<u64>() + rows.sum::<u64>() + links.sum::<u64>()
     }
 
     /// Memory once every element has so many passes, about [bytes].

@@ -7,7 +7,7 @@ use crate::illumination::Side;
 use crate::optics::LinearSrgb;
 use crate::optics::fresnel::dielectric_reflectance;
 use crate::scene::SurfaceKind;
-use crate::transport::{Branch, Everything, Interaction, MediumStack, SurfaceHit, Tracer};
+use crate::transport::{Branch, EffectSet, Interaction, MediumStack, SurfaceHit, Tracer};
 
 /// Rays that carry less than this share of what they could are given up, and counted.
 const LEAST_WEIGHT: f64 = 1e-4;
@@ -64,9 +64,9 @@ impl Follower<'_> {
             }
             weight = weight * media.transmittance(scene, hit.distance_m);
             let micro = material.is_rough().then(|| choice(2 * depth + 1));
-            let interaction = self
-                .tracer
-                .interact_with::<Everything>(&hit, ray.direction, &media, micro);
+            let interaction =
+                self.tracer
+                    .interact_with(EffectSet::EVERYTHING, &hit, ray.direction, &media, micro);
             if material.surface.is_receiver() {
                 if is_back && !material.double_sided {
                     // Nothing is drawn there, and nothing sends light.

@@ -604,6 +604,7 @@ impl CellCutter<'_> {
             (Account::Absorbed, self.unit.count(sum(|node| node.absorbed))),
             (Account::Depth, self.unit.count(sum(|node| node.depth))),
             (Account::Threshold, self.unit.count(sum(|node| node.threshold))),
+            (Account::Unresolved, self.unit.count(sum(|node| node.unresolved))),
             (Account::NonFinite, self.unit.count(sum(|node| node.non_finite))),
             (
                 Account::SwitchedOff,

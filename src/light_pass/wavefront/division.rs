@@ -8,7 +8,6 @@ use super::virtual_vertex::{VirtualRays, VirtualVertex};
 use crate::illumination::Receiver;
 use crate::light_pass::caustic::statistics::Spot;
 use crate::optics::LinearSrgb;
-use crate::transport::PathEffects;
 
 /// Deviation from straight that triangles may have [texels].
 const CHORD_TEXELS: f64 = 0.02;
@@ -46,7 +45,7 @@ const DETAILS_PER_PATCH: f64 = 64.0;
 /// The same of the surroundings of a single ray, a quarter of a cell of light that goes very many ways.
 const DETAILS_AROUND_ONE: f64 = 4.0;
 
-impl<E: PathEffects> Spreader<'_, E> {
+impl Spreader<'_> {
     /// Whether nine rays of a patch meet a plane within its map.
     pub(super) fn stays_on_map(&self, shape: &PatchShape, receiver: Receiver) -> bool {
         let Some(surface) = self.receivers.get(receiver) else {
@@ -68,7 +67,7 @@ impl<E: PathEffects> Spreader<'_, E> {
     pub(super) fn steps(
         &self,
         shape: &PatchShape,
-        rays: &mut VirtualRays<E>,
+        rays: &mut VirtualRays,
         is_plane: bool,
         flux_w: LinearSrgb,
         out: &mut SpreadOutput,
@@ -157,7 +156,7 @@ impl<E: PathEffects> Spreader<'_, E> {
     }
 
     /// One step, where a patch is the surroundings of a single ray that adds next to nothing: one of very many.
-    fn steps_around_one(&self, rays: &VirtualRays<E>, flux_w: LinearSrgb) -> Option<(usize, usize)> {
+    fn steps_around_one(&self, rays: &VirtualRays, flux_w: LinearSrgb) -> Option<(usize, usize)> {
         let tolerance = |receiver| self.tolerance(receiver, flux_w.luminance(), 1.0);
         let tolerance = rays.lit().map_or(COARSEST_TOLERANCE, tolerance);
         let is_dust = rays.are_around_one() && !self.gathers && tolerance >= DUST_TOLERANCE;
@@ -300,7 +299,7 @@ impl<E: PathEffects> Spreader<'_, E> {
 }
 
 /// Details of a patch that a map is to resolve.
-fn details<E: PathEffects>(rays: &VirtualRays<E>) -> f64 {
+fn details(rays: &VirtualRays) -> f64 {
     if rays.are_around_one() {
         DETAILS_AROUND_ONE
     } else {

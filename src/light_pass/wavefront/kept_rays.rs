@@ -22,7 +22,7 @@ pub struct RayKey {
 }
 
 /// Memory that a ray of so many segments takes while it is kept [bytes].
-pub(super) fn bytes_of(segments: usize) -> u64 {
+fn bytes_of(segments: usize) -> u64 {
     (segments * size_of::<KeptHit>() + size_of::<(RayKey, KeptRay)>()) as u64
 }
 
@@ -34,22 +34,6 @@ impl RayKey {
             node,
             square: square.to_array().map(f64::to_bits),
         }
-    }
-
-    /// The ray of the same start at another wavelength.
-    #[must_use]
-    pub fn at_node(self, node: u32) -> Self {
-        Self { node, ..self }
-    }
-
-    /// Face, number of the wavelength, and the bits of the place.
-    pub fn parts(&self) -> (u32, u32, [u64; 2]) {
-        (self.face, self.node, self.square)
-    }
-
-    /// Of its parts.
-    pub fn from_parts((face, node, square): (u32, u32, [u64; 2])) -> Self {
-        Self { face, node, square }
     }
 }
 
@@ -69,23 +53,6 @@ pub struct FreshRay {
     pub key: RayKey,
     /// In the order in which its branches were followed.
     pub hits: Box<[KeptHit]>,
-    /// Segments that a transmission began.
-    pub transmitted: u32,
-    /// What was left to be searched, where the same ray at another wavelength had met some of it.
-    pub help: Option<Help>,
-}
-
-/// What is left to be searched of a ray where it is the same at another wavelength.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Help {
-    /// The number of that wavelength.
-    pub node: u32,
-    /// Segments that were searched.
-    pub searched: u32,
-    /// Those of them that a transmission began.
-    pub transmitted: u32,
-    /// Those that a reflection began.
-    pub reflected: u32,
 }
 
 #[derive(Clone, Debug)]

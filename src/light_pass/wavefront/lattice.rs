@@ -15,7 +15,6 @@ use super::trace::StrandTracer;
 use crate::illumination::accumulator::FluxUnit;
 use crate::light_pass::item_buffer::ItemBuffer;
 use crate::light_pass::ledger_sum::{Account, LedgerSum};
-use crate::transport::PathCounts;
 
 /// Cells that a band aims at: enough for all cores, and no more memory than some ten megabytes.
 const CELLS_PER_BAND: f64 = 4096.0;
@@ -70,8 +69,6 @@ pub struct TracedBand {
     pub rays: u64,
     /// Closest-hit queries.
     pub segments: u64,
-    /// The same by what began them.
-    pub paths: PathCounts,
     /// Cells.
     pub cells: u64,
     /// Patches that stand for a single ray.
@@ -268,7 +265,6 @@ impl WavefrontLattice<'_> {
         for sample in samples.chunks.iter_mut().flatten() {
             traced.rays += u64::from(sample.segments > 0);
             traced.segments += u64::from(sample.segments);
-            traced.paths += sample.counts;
             traced.fresh.extend(sample.fresh.take().map(|fresh| *fresh));
         }
         traced.samples = samples;

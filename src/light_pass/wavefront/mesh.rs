@@ -13,7 +13,6 @@ use crate::illumination::Receiver;
 use crate::illumination::accumulator::FluxCount;
 use crate::light_pass::ledger_sum::Account;
 use crate::optics::LinearSrgb;
-use crate::transport::PathEffects;
 
 /// Bisections of a virtual edge between rays that go to different surfaces.
 const CUT_STEPS: u32 = 10;
@@ -100,10 +99,10 @@ const LEAST_BENT_TEXELS: f64 = 0.75;
 const TINY_TEXELS: f64 = 0.5;
 
 /// One patch while it is spread.
-pub(super) struct PatchMesh<'a, 'b, E> {
+pub(super) struct PatchMesh<'a, 'b> {
     pub(super) receivers: &'a Receivers<'a>,
     pub(super) shape: &'a PatchShape,
-    pub(super) rays: VirtualRays<'a, E>,
+    pub(super) rays: VirtualRays<'a>,
     /// Flux density at the patch's corners.
     pub(super) colours: &'a [LinearSrgb],
     pub(super) out: &'b mut SpreadOutput,
@@ -120,7 +119,7 @@ struct Knot {
     vertex: VirtualVertex,
 }
 
-impl<E: PathEffects> PatchMesh<'_, '_, E> {
+impl PatchMesh<'_, '_> {
     fn knot(&mut self, at: DVec2) -> Knot {
         Knot {
             at,
@@ -314,7 +313,7 @@ impl<E: PathEffects> PatchMesh<'_, '_, E> {
     /// All three rays go to the same receiver, or nowhere.
     fn place(&mut self, knots: &[Knot; 3], pieces: Option<&[Piece]>, flux: FluxCount) {
         let mut arrived = flux;
-        if E::ABSORPTION && self.absorbs {
+        if self.absorbs {
             let left = knots
                 .iter()
                 .fold(LinearSrgb::BLACK, |sum, knot| sum + knot.vertex.transmittance)

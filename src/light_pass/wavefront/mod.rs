@@ -18,7 +18,6 @@ mod openings;
 pub mod overreach;
 pub mod pass;
 pub mod patch;
-pub mod ray_log;
 pub mod receivers;
 pub mod refine;
 mod regions;

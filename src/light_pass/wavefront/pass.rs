@@ -6,7 +6,6 @@ use super::cell::Patch;
 use super::coverage::{FluxTriangle, deposit_triangles};
 use super::kept_rays::KeptRays;
 use super::lattice::{TracedBand, WavefrontLattice};
-use super::ray_log::RayLog;
 use super::receivers::Receivers;
 use super::spread::{SpreadOutput, Spreader};
 use crate::illumination::Receiver;
@@ -15,7 +14,6 @@ use crate::light_pass::ledger_sum::Account;
 use crate::light_pass::receiver_maps::{ChartFor, ReceiverMaps};
 use crate::light_pass::share::Share;
 use crate::progress::{Control, Stage};
-use crate::transport::{ForEffects, PathEffects};
 
 /// Patches that one task spreads.
 const PATCHES_PER_TASK: usize = 128;
@@ -71,10 +69,11 @@ pub struct WavefrontDepositor<'a> {
 }
 
 impl WavefrontDepositor<'_> {
-    /// Traces and deposits a whole lattice. Bands are given back where they take less than `room.bands_bytes`; what
-    /// rays met is added to `rays`. A cancelled run is to be thrown away, all but its rays.
+    /// Traces and deposits a lattice, or the bands of a share of it. Bands are given back where they take less than
+    /// `room.bands_bytes`; what rays met is added to `rays`. A cancelled run is to be thrown away, all but its rays.
     pub fn run(
         &self,
+        share: Option<Share>,
         rays: &mut KeptRays,
         maps: Option<&mut ReceiverMaps>,
         listener: &Listener,
@@ -82,10 +81,14 @@ impl WavefrontDepositor<'_> {
     ) -> (PassReport, Option<TracedLight>) {
         let mut report = PassReport::default();
         let mut kept = Some(TracedLight::default());
-        let mut kept_bytes = 0;
+        let (mut kept_bytes, mut number) = (0, 0);
         let mut maps = maps;
         for face in 0..self.lattice.tracer.launch.face_count() {
             for band in self.lattice.bands(face) {
+                number += 1;
+                if share.is_some_and(|share| !share.has(number)) {
+                    continue;
+                }
                 let watch = Stopwatch::start();
                 let mut band = self.lattice.knowing(rays).trace(face, band);
                 for fresh in band.fresh.drain(..) {
@@ -111,41 +114,6 @@ impl WavefrontDepositor<'_> {
             }
         }
         (report, kept)
-    }
-
-    /// Traces and deposits the bands of a share, knowing no ray of any other band, and writes down what it searched.
-    pub fn run_share(
-        &self,
-        share: Share,
-        log: &mut RayLog,
-        maps: &mut ReceiverMaps,
-        listener: &Listener,
-    ) -> PassReport {
-        let mut report = PassReport::default();
-        let mut lattice = self.lattice;
-        lattice.tracer.tells_all = true;
-        for face in 0..lattice.tracer.launch.face_count() {
-            for band in lattice.bands(face) {
-                let number = log.next_band();
-                if !share.has(number) {
-                    continue;
-                }
-                let watch = Stopwatch::start();
-                let band = lattice.trace(face, band);
-                report.trace_s.add(watch.elapsed());
-                report.count_traced(&band);
-                log.take(number, &band.fresh);
-                self.deposit(&band, Some(&mut *maps), listener.control, &mut report);
-                if listener.control.is_cancelled() {
-                    report.cancelled = true;
-                    return report;
-                }
-                listener
-                    .progress
-                    .advance(Stage::Caustic, listener.done + report.rays, listener.total);
-            }
-        }
-        report
     }
 
     /// Deposits kept bands: no light ray is traced.
@@ -188,17 +156,10 @@ impl WavefrontDepositor<'_> {
         while !rest.is_empty() {
             let (tasks, later) = rest.split_at(at_once.min(rest.len()));
             rest = later;
-            let parts = self.lattice.tracer.limits.effects.specialise(SpreadTasks {
-                depositor: self,
-                band,
-                tasks,
-                control,
-                gathers: maps.is_none(),
-            });
+            let parts = self.spread(band, tasks, control, maps.is_none());
             for part in &parts {
                 report.ledger.merge(&part.ledger);
                 report.receiver_queries += part.queries;
-                report.deposits += part.deposits;
                 report.statistics.merge(&part.statistics);
                 report.overreaches.extend_from_slice(&part.overreaches);
             }
@@ -218,46 +179,36 @@ impl WavefrontDepositor<'_> {
         }
         report.deposit_s.add(watch.elapsed());
     }
-}
 
-/// Patches that are spread at once, task by task.
-struct SpreadTasks<'a> {
-    depositor: &'a WavefrontDepositor<'a>,
-    band: &'a TracedBand,
-    tasks: &'a [&'a [Patch]],
-    control: &'a Control,
-    /// Whether the places of footprints are wanted.
-    gathers: bool,
-}
-
-impl ForEffects for SpreadTasks<'_> {
-    type Output = Vec<SpreadOutput>;
-
-    fn run<E: PathEffects>(self) -> Vec<SpreadOutput> {
-        let depositor = self.depositor;
+    /// Spreads patches, task by task; `gathers`: whether the places of footprints are wanted.
+    fn spread(
+        &self,
+        band: &TracedBand,
+        tasks: &[&[Patch]],
+        control: &Control,
+        gathers: bool,
+    ) -> Vec<SpreadOutput> {
         let spreader = Spreader {
-            receivers: depositor.receivers,
-            face: self.band.face,
-            samples: &self.band.samples,
-            unit: depositor.lattice.unit,
-            effects: E::default(),
-            reference_w: depositor.reference_w,
-            coarseness: depositor.coarseness,
-            gathers: self.gathers,
-            light: depositor.lattice.light,
+            receivers: self.receivers,
+            face: band.face,
+            samples: &band.samples,
+            unit: self.lattice.unit,
+            absorption: self.lattice.tracer.limits.effects.absorption,
+            reference_w: self.reference_w,
+            coarseness: self.coarseness,
+            gathers,
+            light: self.lattice.light,
         };
         let spread = |patches: &&[Patch]| {
             let mut output = SpreadOutput::default();
-            for patch in patches.iter().take_while(|_| !self.control.is_cancelled()) {
+            for patch in patches.iter().take_while(|_| !control.is_cancelled()) {
                 spreader.spread(patch, &mut output);
             }
             output
         };
-        self.tasks.par_iter().map(spread).collect()
+        tasks.par_iter().map(spread).collect()
     }
-}
 
-impl WavefrontDepositor<'_> {
     /// Adds triangles to a map.
     fn place(
         &self,
@@ -287,7 +238,6 @@ impl PassReport {
         self.ledger.merge(&band.ledger);
         self.rays += band.rays;
         self.segments += band.segments;
-        self.paths += band.paths;
         self.cells += band.cells;
         self.splats += band.splats;
     }

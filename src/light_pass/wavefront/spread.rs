@@ -19,7 +19,6 @@ use crate::illumination::accumulator::{FluxCount, FluxUnit};
 use crate::light_pass::caustic::statistics::FootprintStatistics;
 use crate::light_pass::ledger_sum::{Account, LedgerSum};
 use crate::optics::{ColourMatrix, LinearSrgb};
-use crate::transport::{PathCounts, PathEffects};
 
 /// Slices of the brightest light over a texel that its wavelengths part over, at least: beams may be thinner than texels.
 /// Dim light has fewer.
@@ -30,7 +29,7 @@ const FAR_TEXELS: f64 = 32.0;
 
 /// Spreads patches.
 #[derive(Clone, Copy, Debug)]
-pub struct Spreader<'a, E> {
+pub struct Spreader<'a> {
     /// Who is lit.
     pub receivers: &'a Receivers<'a>,
     /// Of the launch domain.
@@ -39,8 +38,8 @@ pub struct Spreader<'a, E> {
     pub samples: &'a Samples,
     /// Of the accounts.
     pub unit: FluxUnit,
-    /// What paths may need.
-    pub effects: E,
+    /// Whether bodies absorb light along the way.
+    pub absorption: bool,
     /// Flux that all lights send to specular surfaces [W, luminance]: over a map, about its mean irradiance.
     pub reference_w: f64,
     /// How much coarser (> 1) or finer triangles may be than is usual.
@@ -64,8 +63,6 @@ pub struct SpreadOutput {
     pub statistics: FootprintStatistics,
     /// Patches that reach farther than their rays.
     pub overreaches: Vec<Overreach>,
-    /// Patches that came to a map, by what took part in them.
-    pub deposits: PathCounts,
 }
 
 impl SpreadOutput {
@@ -133,7 +130,7 @@ enum Course {
     Mixed,
 }
 
-impl<E: PathEffects> Spreader<'_, E> {
+impl Spreader<'_> {
     /// Spreads one patch.
     pub fn spread(&self, patch: &Patch, out: &mut SpreadOutput) {
         let strands: [&Strand; 4] = patch
@@ -238,32 +235,12 @@ impl<E: PathEffects> Spreader<'_, E> {
             }
             Course::Mixed => self.over(patch, strands, (flux, flux_w, &colours), tint, None, out),
         }
-        self.count(strands[0], tint, &before, out);
         self.note_overreach(patch, strands, &before, out);
-    }
-
-    /// Counts a patch that came to a map, by what took part in it.
-    fn count(&self, strand: &Strand, tint: Tint, before: &[usize], out: &mut SpreadOutput) {
-        let lists = out.triangles.iter().enumerate();
-        let is_deposited = |(index, (_, list)): (usize, &(Receiver, Vec<FluxTriangle>))| {
-            list.len() > before.get(index).copied().unwrap_or(0)
-        };
-        if !lists.into_iter().any(is_deposited) {
-            return;
-        }
-        let tracer = self.receivers.tracer;
-        out.deposits.count_segment(strand.event);
-        out.deposits.of_a_wavelength += u64::from(tint.is_spectral);
-        out.deposits.attenuated += u64::from(self.absorbs(strand));
-        out.deposits.scattered +=
-            u64::from(E::LOBES && tracer.scene().material_of(strand.from as usize).is_rough());
-        out.deposits.bent += u64::from(tracer.is_bumpy(strand.from as usize));
-        out.deposits.textured += u64::from(E::TEXTURES && tracer.is_textured(strand.from as usize));
     }
 
     /// Whether the light of a strand is absorbed on its way from the surface it left.
     pub(super) fn absorbs(&self, strand: &Strand) -> bool {
-        E::ABSORPTION && strand.media.absorbs(self.receivers.tracer.scene())
+        self.absorption && strand.media.absorbs(self.receivers.tracer.scene())
     }
 
     /// Notes where the patch's triangles, those beyond the given counts, lie far from its traced rays.

@@ -7,15 +7,13 @@ use crate::geometry::Ray;
 use crate::illumination::Receiver;
 use crate::light_pass::caustic::path::PathSignature;
 use crate::optics::LinearSrgb;
-use crate::transport::{Event, MediumStack, PathCounts, RayDifferential};
+use crate::transport::{MediumStack, RayDifferential};
 
 /// An outgoing ray after a specular event. Flux is per unit area of the launch domain's unit square.
 #[derive(Clone, Copy, Debug)]
 pub struct Strand {
     /// The way up to and with the event; where the ray goes from here is no part of it.
     pub signature: PathSignature,
-    /// The event itself.
-    pub event: Event,
     /// Starts at the specular surface.
     pub ray: Ray,
     /// Derivatives of the ray by the coordinates of the unit square.
@@ -108,6 +106,8 @@ pub struct SurfaceNode {
     pub depth: LinearSrgb,
     /// Would have gone on below the branch threshold.
     pub threshold: LinearSrgb,
+    /// Would have made too many branches of one ray.
+    pub unresolved: LinearSrgb,
     /// Met a number that is not finite.
     pub non_finite: LinearSrgb,
     /// Would have needed an effect that is switched off.
@@ -137,9 +137,7 @@ pub struct LightSample {
     pub is_rough: bool,
     /// Closest-hit queries; 0 where all that it met was known.
     pub segments: u32,
-    /// What effects took part.
-    pub counts: PathCounts,
-    /// What it met, where not all of that was known or all is asked for.
+    /// What it met, where not all of that was known.
     pub fresh: Option<Box<FreshRay>>,
 }
 

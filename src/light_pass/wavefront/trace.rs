@@ -4,7 +4,7 @@ use glam::{DVec2, DVec3};
 
 use super::bumps::BumpCells;
 use super::closeness::Closeness;
-use super::kept_rays::{FreshRay, Help, KeptHit, KeptRays, Known, RayKey};
+use super::kept_rays::{FreshRay, KeptHit, KeptRays, Known, RayKey};
 use super::spectrum::LightPart;
 use super::strand::{Landing, LightSample, Strand, SurfaceNode};
 use crate::geometry::Ray;
@@ -14,8 +14,8 @@ use crate::light_pass::launch::Launch;
 use crate::optics::LinearSrgb;
 use crate::progress::Control;
 use crate::transport::{
-    Branch, Event, ForEffects, HitPlace, Interaction, MediumStack, PathCounts, PathEffects, RayDerivative,
-    RayDifferential, SurfaceDetail, SurfaceHit, SurfaceScale, Tracer,
+    Branch, Event, HitPlace, Interaction, MediumStack, RayDerivative, RayDifferential, SurfaceDetail,
+    SurfaceHit, SurfaceScale, Tracer,
 };
 
 /// Strands that one light ray may have waiting: a closed mirror box with glass in it doubles them without end.
@@ -41,28 +41,10 @@ pub struct StrandTracer<'a> {
     pub wavelength: Option<u32>,
     /// What was traced before.
     pub kept: Option<&'a KeptRays>,
-    /// Whether samples say what they met even where nothing had to be searched.
-    pub tells_all: bool,
     /// How closely borders are looked for.
     pub closeness: Closeness,
     /// Asks to stop: then rays end at once, and what they give is to be thrown away.
     pub control: &'a Control,
-    /// The code that follows rays, compiled for the effects of `limits`.
-    follow: Follow,
-}
-
-/// Follows the ray that starts at a point of the unit square of a face.
-type Follow = for<'t, 'a, 'h> fn(&'t StrandTracer<'a>, usize, DVec2, Option<&'h FreshRay>) -> LightSample;
-
-/// Chooses the code for a set of effects.
-struct FollowFor;
-
-impl ForEffects for FollowFor {
-    type Output = Follow;
-
-    fn run<E: PathEffects>(self) -> Follow {
-        |tracer, face, square, common| tracer.follow::<E>(face, square, common)
-    }
 }
 
 /// A ray that waits to be followed.
@@ -73,8 +55,6 @@ struct Waiting {
     flux_w: LinearSrgb,
     media: MediumStack,
     signature: PathSignature,
-    /// What began it; `None` for the light's own ray.
-    event: Option<Event>,
     depth: u32,
     /// Index of its strand; none for the light's own ray.
     strand: Option<usize>,
@@ -90,12 +70,8 @@ struct Search<'a> {
     /// What the same light ray met at another wavelength.
     common: &'a [KeptHit],
     hits: Vec<KeptHit>,
-    /// Segments that a transmission began.
-    transmitted: u32,
     /// Closest-hit queries.
     searches: u32,
-    /// The same by what began the segment.
-    counts: PathCounts,
 }
 
 impl<'a> StrandTracer<'a> {
@@ -115,10 +91,8 @@ impl<'a> StrandTracer<'a> {
             bumps: BumpCells::EXACT,
             wavelength: None,
             kept: None,
-            tells_all: false,
             closeness: Closeness::SHARP,
             control,
-            follow: limits.effects.specialise(FollowFor),
         }
     }
 
@@ -143,16 +117,16 @@ impl<'a> StrandTracer<'a> {
 
     /// Traces the ray that starts at a point of the unit square of a face.
     pub fn trace(&self, face: usize, square: DVec2) -> LightSample {
-        (self.follow)(self, face, square, None)
+        self.follow(face, square, None)
     }
 
     /// The same where it was traced at another wavelength: the stretch before the first dispersive surface is not
     /// searched again.
     pub fn trace_again(&self, face: usize, other: &LightSample) -> LightSample {
-        (self.follow)(self, face, other.square, other.fresh.as_deref())
+        self.follow(face, other.square, other.fresh.as_deref())
     }
 
-    fn follow<E: PathEffects>(&self, face: usize, square: DVec2, other: Option<&FreshRay>) -> LightSample {
+    fn follow(&self, face: usize, square: DVec2, other: Option<&FreshRay>) -> LightSample {
         let mut sample = LightSample {
             square,
             ..LightSample::default()
@@ -167,9 +141,7 @@ impl<'a> StrandTracer<'a> {
             known: self.kept.and_then(|kept| kept.get(&key)),
             common: other.map_or(&[], |other| &other.hits),
             hits: Vec::new(),
-            transmitted: 0,
             searches: 0,
-            counts: PathCounts::default(),
         };
         let (ray, differential) = self.launch.ray_with_differential(face, square);
         let flux_w = self.launch.flux_density_w(square, ray.direction);
@@ -183,28 +155,18 @@ impl<'a> StrandTracer<'a> {
             flux_w,
             media: *self.launch.media(),
             signature: PathSignature::default(),
-            event: None,
             depth: 0,
             strand: None,
             is_known: search.known.is_some(),
             is_common: other.is_some(),
         }];
         while let Some(next) = waiting.pop() {
-            self.step::<E>(next, floor_w, &mut search, &mut sample, &mut waiting);
+            self.step(next, floor_w, &mut search, &mut sample, &mut waiting);
         }
-        sample.counts.of_a_wavelength += u64::from(self.wavelength.is_some());
         sample.segments = search.searches;
-        sample.counts += search.counts;
-        if search.searches > 0 || self.tells_all {
+        if search.searches > 0 {
             sample.fresh = Some(Box::new(FreshRay {
                 key,
-                transmitted: search.transmitted,
-                help: other.map(|other| Help {
-                    node: other.key.parts().1,
-                    searched: search.searches,
-                    transmitted: search.counts.transmitted as u32,
-                    reflected: search.counts.reflected as u32,
-                }),
                 hits: search.hits.into_boxed_slice(),
             }));
         }
@@ -218,7 +180,7 @@ impl<'a> StrandTracer<'a> {
         sample
     }
 
-    fn step<E: PathEffects>(
+    fn step(
         &self,
         from: Waiting,
         floor_w: f64,
@@ -251,23 +213,16 @@ impl<'a> StrandTracer<'a> {
             }
             return;
         }
+        let effects = self.limits.effects;
         let mut incident = from.flux_w;
-        if E::ABSORPTION && from.media.absorbs(self.tracer.scene()) {
+        if effects.absorption && from.media.absorbs(self.tracer.scene()) {
             let transmittance = from.media.transmittance(self.tracer.scene(), hit.distance_m);
             incident = incident * transmittance;
-            sample.counts.attenuated += 1;
-        }
-        sample.counts.bent += u64::from(self.tracer.is_bumpy(hit.object));
-        if E::TEXTURES && self.tracer.is_textured(hit.object) {
-            sample.counts.textured += 1;
         }
         let micro = self.limits.microfacets.map(|facets| facets.at(from.depth));
-        if E::LOBES && micro.is_some() && material.is_rough() {
-            sample.counts.scattered += 1;
-        }
         let interaction = self
             .tracer
-            .interact_with::<E>(&hit, from.ray.direction, &from.media, micro);
+            .interact_with(effects, &hit, from.ray.direction, &from.media, micro);
         self.scatter(from, &hit, incident, &interaction, floor_w, sample, waiting);
     }
 
@@ -309,6 +264,7 @@ impl<'a> StrandTracer<'a> {
             absorbed: incident * interaction.absorbed + taken_before,
             depth: LinearSrgb::BLACK,
             threshold: LinearSrgb::BLACK,
+            unresolved: LinearSrgb::BLACK,
             non_finite: LinearSrgb::BLACK,
             switched_off: incident * interaction.switched_off,
             taken: incident * interaction.deposit,
@@ -327,8 +283,10 @@ impl<'a> StrandTracer<'a> {
                 node.non_finite += finite;
             } else if from.depth + 1 > self.limits.max_depth {
                 node.depth += flux_w;
-            } else if flux_w.luminance() < floor_w || sample.strands.len() >= MOST_BRANCHES {
+            } else if flux_w.luminance() < floor_w {
                 node.threshold += flux_w;
+            } else if sample.strands.len() >= MOST_BRANCHES {
+                node.unresolved += flux_w;
             } else {
                 let surface = if is_too_fine {
                     SurfaceDetail::Mesh
@@ -394,7 +352,6 @@ fn push(
         flux_w,
         media: branch.media,
         signature,
-        event: Some(branch.event),
         depth: from.depth + 1,
         strand: Some(sample.strands.len()),
         is_known: from.is_known,
@@ -402,7 +359,6 @@ fn push(
     });
     sample.strands.push(Strand {
         signature,
-        event: branch.event,
         ray: branch.ray,
         differential,
         flux_w,
@@ -427,15 +383,11 @@ impl Search<'_> {
             _ if let Some(hit) = common() => hit.place,
             _ => {
                 self.searches += 1;
-                if let Some(event) = from.event {
-                    self.counts.count_segment(event);
-                }
                 tracer.closest_place(&from.ray)
             }
         };
         let is_known = kept == Some(place)
             && known.is_some_and(|known| place.is_none_or(|place| known.leaves_alike(place.object)));
-        self.transmitted += u32::from(from.event.is_some_and(Event::is_transmission));
         self.hits.push(KeptHit {
             signature: from.signature,
             place,

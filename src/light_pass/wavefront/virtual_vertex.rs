@@ -1,7 +1,5 @@
 //! Rays between the traced ones, and where they land.
 
-use std::marker::PhantomData;
-
 use glam::{DVec2, DVec3};
 
 use super::facets::FacetPlace;
@@ -13,7 +11,6 @@ use crate::geometry::Ray;
 use crate::illumination::{Receiver, Side};
 use crate::optics::{ColourMatrix, LinearSrgb};
 use crate::scene::SurfaceKind;
-use crate::transport::PathEffects;
 use crate::transport::{MediumStack, SurfaceHit};
 
 /// Where a ray lands.
@@ -90,7 +87,7 @@ pub struct VirtualVertex {
 }
 
 /// Makes rays of one patch and lets them land.
-pub struct VirtualRays<'a, E> {
+pub struct VirtualRays<'a> {
     receivers: &'a Receivers<'a>,
     shape: &'a PatchShape,
     /// Whose extended plane all rays are for.
@@ -100,7 +97,6 @@ pub struct VirtualRays<'a, E> {
     media: MediumStack,
     /// Whether light is absorbed on the way.
     absorbs: bool,
-    effects: PhantomData<E>,
     /// Object and smoothing group that the rays leave.
     from: (u32, u32),
     /// Within this distance of its origin a ray may meet the surface it leaves, since its origin is interpolated [m].
@@ -113,10 +109,10 @@ pub struct VirtualRays<'a, E> {
     pub queries: u64,
 }
 
-impl<'a, E: PathEffects> VirtualRays<'a, E> {
+impl<'a> VirtualRays<'a> {
     /// For one patch between strands of one signature.
     pub fn new(
-        spreader: &Spreader<'a, E>,
+        spreader: &Spreader<'a>,
         shape: &'a PatchShape,
         strands: &[&Strand],
         plane: Option<Receiver>,
@@ -142,7 +138,6 @@ impl<'a, E: PathEffects> VirtualRays<'a, E> {
             factors,
             media: first.media,
             absorbs: spreader.absorbs(first),
-            effects: PhantomData,
             from: (first.from, first.from_group),
             skin_m: spread_m.min(0.5 * nearest_own_m),
             origins: strands.iter().map(|strand| strand.ray.origin).collect(),
@@ -194,7 +189,7 @@ impl<'a, E: PathEffects> VirtualRays<'a, E> {
     }
 
     fn transmittance(&self, distance_m: f64) -> LinearSrgb {
-        if E::ABSORPTION && self.absorbs {
+        if self.absorbs {
             let left = self
                 .media
                 .transmittance(self.receivers.tracer.scene(), distance_m);

@@ -138,26 +138,37 @@ impl Glb {
                 Some(buffer) => buffer["byteLength"] = length,
                 None => self.json["buffers"] = json!([{ "byteLength": length }]),
             }
-            chunks.push((*b"BIN\0", self.binary, 0));
+            chunks = chunk(*b"BIN\0", self.binary, 0);
         }
-        chunks.insert(0, (*b"JSON", self.json.to_string().into_bytes(), b' '));
-        let mut body = Vec::new();
-        for (kind, mut data, padding) in chunks {
-            data.resize(data.len().next_multiple_of(4), padding);
-            body.extend((data.len() as u32).to_le_bytes());
-            body.extend(kind);
-            body.extend(data);
-        }
-        let length = u32::try_from(body.len() + 12).map_err(|_| {
-            Error::failure(
-                "GLB",
-                "would be larger than 4 GiB",
-                "use smaller maps or a smaller scene",
-            )
-        })?;
-        let mut bytes = b"glTF\x02\0\0\0".to_vec();
-        bytes.extend(length.to_le_bytes());
-        bytes.extend(body);
-        Ok(bytes)
+        file_of(self.json.to_string(), &chunks)
     }
+}
+
+/// Data with a header, padded to four bytes.
+pub fn chunk(kind: [u8; 4], mut data: Vec<u8>, padding: u8) -> Vec<u8> {
+    data.resize(data.len().next_multiple_of(4), padding);
+    let mut bytes = (data.len() as u32).to_le_bytes().to_vec();
+    bytes.extend(kind);
+    bytes.extend(data);
+    bytes
+}
+
+/// A file of a document and the chunks after it.
+///
+/// # Errors
+/// More than the 4 GiB that such a file can hold.
+pub fn file_of(json: String, chunks: &[u8]) -> Result<Vec<u8>> {
+    let json = chunk(*b"JSON", json.into_bytes(), b' ');
+    let length = u32::try_from(json.len() + chunks.len() + 12).map_err(|_| {
+        Error::failure(
+            "GLB",
+            "would be larger than 4 GiB",
+            "use smaller maps or a smaller scene",
+        )
+    })?;
+    let mut bytes = b"glTF\x02\0\0\0".to_vec();
+    bytes.extend(length.to_le_bytes());
+    bytes.extend(json);
+    bytes.extend(chunks);
+    Ok(bytes)
 }

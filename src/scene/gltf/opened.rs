@@ -51,7 +51,7 @@ pub fn open(scene: &Scene, most_bytes: u64) -> Result<Opened> {
     let parts = Parts::of(&bytes, split.json, folder, most_bytes)?;
     let broken = |what: String| Error::failure(&scene.source, what, "export the file again");
     let json: Value =
-        serde_json::from_str(&parts.text.into_text()).map_err(|error| broken(error.to_string()))?;
+        serde_json::from_str(&parts.json.into_text()).map_err(|error| broken(error.to_string()))?;
     let has_elsewhere = json["buffers"][0].get("uri").is_some();
     if has_elsewhere {
         return Err(broken(

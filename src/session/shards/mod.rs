@@ -5,7 +5,6 @@
 //! done there, once. All decisions on the way have to be the same in every shard: what depends on what the light did is
 //! refused.
 
-mod coding;
 mod labour;
 mod pass_sums;
 
@@ -18,7 +17,7 @@ use crate::session::clock::Clock;
 use crate::session::light_level::LightStates;
 use crate::session::{BakeResult, BakeSession, Timings};
 use crate::settings::{BakeSettings, MapResolution};
-pub(super) use labour::{Kept, Labour, Pass};
+pub(super) use labour::Labour;
 pub(super) use pass_sums::PassSums;
 
 /// What a shard gives.
@@ -104,7 +103,7 @@ impl BakeSession {
         control: &Control,
     ) -> Result<ShardSums> {
         check(settings)?;
-        super::on_threads(settings, || {
+        self.threads.of(settings)?.install(|| {
             let (whole, mut clock) = (Stopwatch::start(), Clock::default());
             let ground = self.ground(settings, progress, control, &mut clock);
             let mut labour = Labour::shard(share);
@@ -144,9 +143,8 @@ impl BakeSession {
         // What was kept of other bakes is not what the shards began from.
         self.lights = LightStates::default();
         let mut labour = Labour::merge(shards);
-        let result = super::on_threads(settings, || {
-            self.bake_here(settings, progress, control, None, &mut labour)
-        })?;
+        let threads = self.threads.of(settings)?;
+        let result = threads.install(|| self.bake_here(settings, progress, control, None, &mut labour))?;
         if control.is_cancelled() {
             return Err(Error::cancelled(&self.scene.source));
         }

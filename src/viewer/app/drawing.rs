@@ -9,12 +9,12 @@ use crate::eye_pass::renderer::Uploaded;
 use crate::eye_pass::{ToneMap, View, WhiteBalance};
 use crate::optics::LinearSrgb;
 use crate::optics::spectrum::xyz::Matrix3;
+use crate::plan;
 use crate::scene::load::was_dark;
-use crate::viewer::event_log::Event;
-use crate::viewer::eye_report;
 use crate::viewer::frame_times::Made;
 use crate::viewer::model::Model;
 use crate::viewer::panel::{Display, Quantity};
+use serde_json::json;
 
 /// What is seen behind scenes that came without light, before tone mapping [1]: their glass and metal would be as black as
 /// what they show. It lights nothing.
@@ -68,7 +68,15 @@ impl App {
         }
         if is_new {
             let seconds = start.elapsed().as_secs_f64();
-            self.model.log.write(&Event::Uploaded { uploaded, seconds });
+            self.model.log.write(
+                "upload",
+                json!({
+                    "tiles": uploaded.tiles,
+                    "tile_bytes": uploaded.tile_bytes,
+                    "other_bytes": uploaded.other_bytes,
+                    "upload_s": seconds,
+                }),
+            );
         }
         let (has_beside, has_reference) = (graphics.beside_id().is_some(), self.model.reference().is_some());
         let must_set = std::mem::take(&mut self.must_set_beside) || has_beside != has_reference;
@@ -87,7 +95,9 @@ impl App {
             self.model.panel.display.exposure_stops = view.exposure_stops;
             view.background = backdrop(&self.model, view.exposure_stops);
             self.measured = Some((view.exposure_stops, self.model.layers().len()));
-            self.model.log.write(&Event::Exposure(view.exposure_stops));
+            self.model
+                .log
+                .write("exposure", json!({"stops": view.exposure_stops}));
         }
         // Drawing would take them in without a word.
         if let Some(ms) = graphics.take_times() {
@@ -181,8 +191,12 @@ impl App {
         if let Some(ms) = graphics.take_times() {
             self.frame_times.push(ms);
         }
-        let counts = graphics.counts();
-        self.chains = Some(eye_report::chains(self.model.scene(), &view, switch, &counts));
+        let aspect = f64::from(view.width) / f64::from(view.height);
+        self.chains = Some(plan::chains(
+            self.model.scene(),
+            Some((&view.camera, aspect)),
+            switch,
+        ));
         let is_complete = !graphics.awaits_times();
         self.reports_due = if is_complete {
             0

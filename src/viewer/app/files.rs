@@ -4,12 +4,12 @@ use std::path::{Path, PathBuf};
 
 use super::App;
 use crate::scene::load::was_dark;
-use crate::viewer::event_log::Event;
 use crate::viewer::files::dialog::{Choice, Chosen};
 use crate::viewer::files::loader::Purpose;
 use crate::viewer::files::saver::free_name;
 use crate::viewer::model::Model;
 use crate::viewer::screenshot;
+use serde_json::json;
 
 /// What who opens a file without light is told first.
 pub(super) fn dark_notice(model: &Model) -> Option<String> {
@@ -41,7 +41,7 @@ impl App {
         match self.model.files.saver.take() {
             Some(Ok(path)) => {
                 let files = [path];
-                self.model.log.write(&Event::Saved(&files));
+                self.model.log.write("saved", json!({"files": files}));
                 self.notice = Some(screenshot::told(&files));
             }
             Some(Err(error)) => self.tell_unsaved(&error.to_string()),
@@ -79,7 +79,7 @@ impl App {
     }
 
     fn tell_unsaved(&mut self, sentence: &str) {
-        self.model.log.write(&Event::NotSaved(sentence));
+        self.model.log.write("not_saved", json!({"sentence": sentence}));
         self.notice = Some(sentence.to_owned());
     }
 

@@ -8,12 +8,12 @@ use winit::window::CursorGrabMode;
 use super::{App, PIXELS_PER_NOTCH};
 use crate::geometry::Ray;
 use crate::scene::Camera;
-use crate::viewer::event_log::Event;
 use crate::viewer::gizmo::{self, Held};
 use crate::viewer::input::{self, Shortcut};
 use crate::viewer::lens::Lens;
 use crate::viewer::navigation::Travel;
 use crate::viewer::panel::FilmWish;
+use serde_json::json;
 
 /// A press that moves farther than this before it is let go is no click [pixels].
 const CLICK_PIXELS: f64 = 4.0;
@@ -50,7 +50,9 @@ impl App {
                     && let Some(number) = input::bookmark(digit)
                 {
                     self.model.navigator.set_bookmark(number);
-                    self.model.log.write(&Event::Bookmark { number, kept: true });
+                    self.model
+                        .log
+                        .write("bookmark", json!({"number": number + 1, "kept": true}));
                     self.notice = Some(format!("View kept as {}: press {0} to come back.", number + 1));
                 }
                 // What was held before goes on, more slowly.
@@ -85,7 +87,9 @@ impl App {
                 }
                 Some(Shortcut::Bookmark(number)) => {
                     if self.model.navigator.go_to_bookmark(number) {
-                        self.model.log.write(&Event::Bookmark { number, kept: false });
+                        self.model
+                            .log
+                            .write("bookmark", json!({"number": number + 1, "kept": false}));
                     } else {
                         let key = number + 1;
                         self.notice = Some(format!("No view is kept as {key}: Ctrl+{key} keeps this one."));

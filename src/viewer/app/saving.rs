@@ -5,10 +5,10 @@ use std::path::PathBuf;
 use super::App;
 use super::drawing::without_backdrop;
 use crate::error::{Error, Result};
-use crate::viewer::event_log::Event;
 use crate::viewer::files::working_folder;
 use crate::viewer::panel::Quantity;
 use crate::viewer::screenshot;
+use serde_json::json;
 
 impl App {
     /// Writes the picture to files in the working folder, and tells where over the picture.
@@ -16,12 +16,12 @@ impl App {
         let outcome = self.written_picture();
         let notice = match &outcome {
             Ok(files) => {
-                self.model.log.write(&Event::Saved(files));
+                self.model.log.write("saved", json!({"files": files}));
                 screenshot::told(files)
             }
             Err(error) => {
                 let sentence = error.to_string();
-                self.model.log.write(&Event::NotSaved(&sentence));
+                self.model.log.write("not_saved", json!({"sentence": sentence}));
                 sentence
             }
         };

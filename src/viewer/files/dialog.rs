@@ -1,14 +1,14 @@
 //! The system's own window to choose a file in, where there is one; it runs on a thread of its own.
 
-use std::fmt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::mpsc::{Receiver, TryRecvError, channel};
-use std::thread;
 use std::time::{Duration, Instant};
 
 use rfd::FileDialog;
 use winit::window::Window;
+
+use crate::progress::Control;
+use crate::viewer::background::{Background, Wake};
 
 /// Nobody sees a dialog and closes it in so short a time: there was none.
 const NO_DIALOG_WITHIN: Duration = Duration::from_millis(400);
@@ -38,27 +38,27 @@ pub enum Chosen {
 }
 
 /// A dialog, open or not.
+#[derive(Debug)]
 pub struct Dialog {
-    wake: Arc<dyn Fn() + Send + Sync>,
+    wake: Wake,
     open: Option<Open>,
 }
 
+#[derive(Debug)]
 struct Open {
     choice: Choice,
     since: Instant,
-    answer: Receiver<Option<PathBuf>>,
-}
-
-impl fmt::Debug for Dialog {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "Dialog {{ open: {} }}", self.open.is_some())
-    }
+    /// `None` where the system gives no thread.
+    answer: Option<Background<Option<PathBuf>>>,
 }
 
 impl Dialog {
     /// None is open; `wake` is called from another thread when a file was chosen.
     pub fn new(wake: Arc<dyn Fn() + Send + Sync>) -> Self {
-        Self { wake, open: None }
+        Self {
+            wake: Wake(wake),
+            open: None,
+        }
     }
 
     /// Asks for a file, unless a dialog is open already. It begins in the folder of the file that is in the window.
@@ -76,34 +76,25 @@ impl Dialog {
             let stem = present.file_stem().unwrap_or_default().to_string_lossy();
             dialog = dialog.set_file_name(format!("{stem}-edited.glb"));
         }
-        let (give, take) = channel();
-        let wake = Arc::clone(&self.wake);
-        let ask = move || {
-            let chosen = match choice {
-                Choice::Open => dialog.pick_file(),
-                Choice::SaveScene => dialog.save_file(),
-            };
-            // The window may be closed by then.
-            let _ = give.send(chosen);
-            wake();
+        let ask = move |_: &Control| match choice {
+            Choice::Open => dialog.pick_file(),
+            Choice::SaveScene => dialog.save_file(),
         };
-        // Without a thread the answer is missing at once, which says that there is no dialog.
-        let _ = thread::Builder::new().name("dialog".into()).spawn(ask);
         self.open = Some(Open {
             choice,
             since: Instant::now(),
-            answer: take,
+            answer: Background::start("dialog", &self.wake, ask).ok(),
         });
     }
 
     /// What was chosen, once.
     pub fn take(&mut self) -> Option<Chosen> {
         let open = self.open.as_ref()?;
-        let chosen = match open.answer.try_recv() {
-            Err(TryRecvError::Empty) => return None,
-            Ok(Some(path)) => Chosen::File(open.choice, path),
-            Ok(None) if open.since.elapsed() >= NO_DIALOG_WITHIN => Chosen::Nothing,
-            Ok(None) | Err(TryRecvError::Disconnected) => Chosen::NoDialog(open.choice, NONE),
+        let answer = open.answer.as_ref().map_or(Some(None), Background::poll)?;
+        let chosen = match answer {
+            Some(Some(path)) => Chosen::File(open.choice, path),
+            Some(None) if open.since.elapsed() >= NO_DIALOG_WITHIN => Chosen::Nothing,
+            Some(None) | None => Chosen::NoDialog(open.choice, NONE),
         };
         self.open = None;
         Some(chosen)

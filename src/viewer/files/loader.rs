@@ -1,12 +1,11 @@
 //! Reads a scene on a thread of its own, so that the window goes on.
 
-use std::fmt;
 use std::sync::Arc;
-use std::sync::mpsc::{Receiver, TryRecvError, channel};
-use std::thread;
 
 use crate::error::{Error, Result};
+use crate::progress::Control;
 use crate::scene::{self, LoadOptions, Scene};
+use crate::viewer::background::{Background, Wake, no_thread};
 
 /// Why a scene is read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -28,28 +27,27 @@ pub struct Loaded {
     pub outcome: Result<Scene>,
 }
 
+#[derive(Debug)]
 struct Coming {
     source: String,
     purpose: Purpose,
-    outcome: Receiver<Result<Scene>>,
+    outcome: Background<Result<Scene>>,
 }
 
 /// Reads one scene at a time: who asks for another gives up the one before.
+#[derive(Debug)]
 pub struct Loader {
-    wake: Arc<dyn Fn() + Send + Sync>,
+    wake: Wake,
     coming: Option<Coming>,
-}
-
-impl fmt::Debug for Loader {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "Loader {{ loading: {:?} }}", self.loading())
-    }
 }
 
 impl Loader {
     /// Nothing is asked for yet; `wake` is called from another thread when a scene is there.
     pub fn new(wake: Arc<dyn Fn() + Send + Sync>) -> Self {
-        Self { wake, coming: None }
+        Self {
+            wake: Wake(wake),
+            coming: None,
+        }
     }
 
     /// Reads a scene from now on.
@@ -57,27 +55,14 @@ impl Loader {
     /// # Errors
     /// The system gives no thread.
     pub fn start(&mut self, source: &str, purpose: Purpose, options: &LoadOptions) -> Result<()> {
-        let (give, take) = channel();
-        let (named, options, wake) = (source.to_owned(), options.clone(), Arc::clone(&self.wake));
-        let read = move || {
-            // Nobody waits any more where another scene was asked for.
-            let _ = give.send(scene::load(&named, &options));
-            wake();
-        };
-        thread::Builder::new()
-            .name("loader".into())
-            .spawn(read)
-            .map_err(|error| {
-                Error::failure(
-                    source,
-                    format!("the system gives no thread to read it on ({error})"),
-                    "close other programs and try again",
-                )
-            })?;
+        let (named, options) = (source.to_owned(), options.clone());
+        let read = move |_: &Control| scene::load(&named, &options);
+        let outcome = Background::start("loader", &self.wake, read)
+            .map_err(|error| no_thread(source, "read it", &error))?;
         self.coming = Some(Coming {
             source: source.to_owned(),
             purpose,
-            outcome: take,
+            outcome,
         });
         Ok(())
     }
@@ -90,15 +75,14 @@ impl Loader {
     /// The scene that was asked for last, once it is there.
     pub fn take(&mut self) -> Option<Loaded> {
         let coming = self.coming.as_ref()?;
-        let outcome = match coming.outcome.try_recv() {
-            Ok(outcome) => outcome,
-            Err(TryRecvError::Empty) => return None,
-            Err(TryRecvError::Disconnected) => Err(Error::failure(
+        let broken = || {
+            Err(Error::failure(
                 &coming.source,
                 "reading it broke off",
                 "check the file and try again",
-            )),
+            ))
         };
+        let outcome = coming.outcome.poll()?.unwrap_or_else(broken);
         let Coming { source, purpose, .. } = self.coming.take()?;
         Some(Loaded {
             source,

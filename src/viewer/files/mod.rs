@@ -9,7 +9,6 @@ pub mod recent;
 pub mod saver;
 pub mod watch;
 
-use std::fmt;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -21,6 +20,7 @@ use self::recent::Recent;
 use self::saver::Saver;
 use self::watch::{Stamps, Watch};
 use crate::scene::LoadOptions;
+use crate::viewer::background::Wake;
 
 /// How scenes are opened in the window.
 #[derive(Clone, Debug, Default)]
@@ -38,6 +38,7 @@ pub struct FilesOptions {
 }
 
 /// What the window knows of files.
+#[derive(Debug)]
 pub struct Files {
     /// How scenes are read.
     pub load: LoadOptions,
@@ -56,17 +57,7 @@ pub struct Files {
     /// Keeps what the user does.
     pub keeper: Option<Keeper>,
     config: Option<ConfigFolder>,
-    wake: Arc<dyn Fn() + Send + Sync>,
-}
-
-impl fmt::Debug for Files {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "Files {{ loader: {:?}, recent: {:?} }}",
-            self.loader, self.recent
-        )
-    }
+    wake: Wake,
 }
 
 impl Files {
@@ -84,7 +75,7 @@ impl Files {
             watch: None,
             keeper: options.config.clone().and_then(Keeper::start),
             config: options.config.clone(),
-            wake,
+            wake: Wake(wake),
         }
     }
 
@@ -104,7 +95,7 @@ impl Files {
 
     /// Watches files that were as `stamps` say.
     pub fn start_watch(&mut self, stamps: Stamps) {
-        match Watch::start(stamps, Arc::clone(&self.wake)) {
+        match Watch::start(stamps, Arc::clone(&self.wake.0)) {
             Ok(watch) => self.watch = Some(watch),
             Err(error) => self.refusal = Some(error.to_string()),
         }

@@ -1,33 +1,30 @@
 //! Writes the edited scene on a thread of its own.
 
-use std::fmt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::mpsc::{Receiver, TryRecvError, channel};
-use std::thread;
 
 use crate::error::{Error, Result};
+use crate::progress::Control;
 use crate::scene::{LoadOptions, Scene, load};
+use crate::viewer::background::{Background, Wake, no_thread};
 
 /// Names that are tried beside the original.
 const NUMBERS: std::ops::RangeInclusive<u32> = 1..=9999;
 
 /// Writes one scene at a time.
+#[derive(Debug)]
 pub struct Saver {
-    wake: Arc<dyn Fn() + Send + Sync>,
-    coming: Option<(PathBuf, Receiver<Result<()>>)>,
-}
-
-impl fmt::Debug for Saver {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "Saver {{ saving: {} }}", self.coming.is_some())
-    }
+    wake: Wake,
+    coming: Option<(PathBuf, Background<Result<()>>)>,
 }
 
 impl Saver {
     /// Nothing is written yet; `wake` is called from another thread when something was.
     pub fn new(wake: Arc<dyn Fn() + Send + Sync>) -> Self {
-        Self { wake, coming: None }
+        Self {
+            wake: Wake(wake),
+            coming: None,
+        }
     }
 
     /// Writes a scene as [`load::save`], unless one is being written.
@@ -44,39 +41,25 @@ impl Saver {
         if self.coming.is_some() {
             return Ok(());
         }
-        let (give, take) = channel();
-        let (path, wake) = (target.clone(), Arc::clone(&self.wake));
-        let write = move || {
-            // The window may be closed by then; the file is whole or not there.
-            let _ = give.send(load::save(&path, &loaded, &edited, &options));
-            wake();
-        };
-        thread::Builder::new()
-            .name("saver".into())
-            .spawn(write)
-            .map_err(|error| {
-                Error::failure(
-                    target.display().to_string(),
-                    format!("the system gives no thread to write it on ({error})"),
-                    "close other programs and try again",
-                )
-            })?;
-        self.coming = Some((target, take));
+        let path = target.clone();
+        let write = move |_: &Control| load::save(&path, &loaded, &edited, &options);
+        let outcome = Background::start("saver", &self.wake, write)
+            .map_err(|error| no_thread(&target.display().to_string(), "write it", &error))?;
+        self.coming = Some((target, outcome));
         Ok(())
     }
 
     /// What was written, or why not, once.
     pub fn take(&mut self) -> Option<Result<PathBuf>> {
         let (target, outcome) = self.coming.as_ref()?;
-        let outcome = match outcome.try_recv() {
-            Err(TryRecvError::Empty) => return None,
-            Ok(outcome) => outcome.map(|()| target.clone()),
-            Err(TryRecvError::Disconnected) => Err(Error::failure(
+        let broken = || {
+            Err(Error::failure(
                 target.display().to_string(),
                 "writing it broke off",
                 "try again, or choose another place",
-            )),
+            ))
         };
+        let outcome = outcome.poll()?.unwrap_or_else(broken).map(|()| target.clone());
         self.coming = None;
         Some(outcome)
     }

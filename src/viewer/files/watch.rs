@@ -6,7 +6,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, SystemTime};
 
-use crate::error::{Error, Result};
+use crate::error::Result;
+use crate::viewer::background::no_thread;
 
 /// Time between two looks. A change counts once it is the same at two of them: who writes has come to rest.
 pub const BETWEEN_LOOKS: Duration = Duration::from_millis(500);
@@ -57,13 +58,7 @@ impl Watch {
         let thread = thread::Builder::new()
             .name("watch".into())
             .spawn(move || look(&of_thread, stamps, &*wake))
-            .map_err(|error| {
-                Error::failure(
-                    "watch",
-                    format!("the system gives no thread to watch files on ({error})"),
-                    "close other programs and try again",
-                )
-            })?;
+            .map_err(|error| no_thread("watch", "watch files", &error))?;
         Ok(Self {
             shared,
             thread: Some(thread),

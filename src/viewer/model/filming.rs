@@ -5,10 +5,10 @@ use crate::error::Result;
 use crate::eye_pass::View;
 use crate::optics::LinearSrgb;
 use crate::scene::{PathPlan, turntable};
-use crate::viewer::event_log::Event;
 use crate::viewer::files::working_folder;
 use crate::viewer::filming::{Player, Shooting};
 use crate::viewer::panel::FilmWish;
+use serde_json::{Value, json};
 
 impl Model {
     /// Whether the camera moves by itself or by keys.
@@ -43,9 +43,14 @@ impl Model {
         true
     }
 
+    fn tell_keys(&mut self) {
+        let keys = self.panel.film.keys.len();
+        self.log.write("recorded", json!({"keys": keys}));
+    }
+
     fn end_play(&mut self) {
         if self.player.take().is_some() {
-            self.log.write(&Event::Played(false));
+            self.log.write("played", Value::Null);
         }
     }
 
@@ -71,7 +76,7 @@ impl Model {
             FilmWish::Record(key) => {
                 let (camera, reach_m) = (self.navigator.camera(), self.navigator.radius_m());
                 self.panel.film.record(*key, &camera, origin_world, reach_m);
-                self.log.write(&Event::Recorded(self.panel.film.keys.len()));
+                self.tell_keys();
             }
             FilmWish::GoTo(index) => {
                 if let Some(camera) = self.panel.film.camera_at(*index, origin_world) {
@@ -81,20 +86,20 @@ impl Model {
             FilmWish::Play(true) => {
                 let cameras = self.panel.film.path()?.cameras(origin_world);
                 self.player = Player::new(cameras);
-                self.log.write(&Event::Played(true));
+                self.log.write("plays", Value::Null);
             }
             FilmWish::Play(false) => self.end_play(),
             FilmWish::Save => {
                 let path = self.panel.film.save(&working_folder(), &self.scene().name)?;
                 let told = format!("Written: {}", path.display());
-                self.log.write(&Event::Saved(&[path]));
+                self.log.write("saved", json!({"files": [path]}));
                 return Ok(Some(told));
             }
             FilmWish::Load(path) => {
                 let plan = PathPlan::read(path)?;
                 plan.path(&path.display().to_string())?;
                 self.panel.film.take(plan);
-                self.log.write(&Event::Recorded(self.panel.film.keys.len()));
+                self.tell_keys();
             }
             FilmWish::Shoot { turns } => self.shoot(*turns)?,
             FilmWish::Stop => self.exporter.stop(),
@@ -131,7 +136,7 @@ impl Model {
             name,
         };
         self.exporter.film(shooting, working_folder());
-        self.log.write(&Event::Exported(self.exporter.state()));
+        self.log.write_export(self.exporter.state());
         Ok(())
     }
 }

@@ -8,10 +8,10 @@ use serde_json::Value;
 use super::Model;
 use crate::scene::changes::Change;
 use crate::settings::BakeSettings;
-use crate::viewer::event_log::Event;
 use crate::viewer::files::config::full_source;
 use crate::viewer::files::keeper::Snapshot;
 use crate::viewer::files::kept::Kept;
+use serde_json::json;
 
 /// What of a kept scene is taken over.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -101,7 +101,7 @@ impl Model {
             if !what.settings {
                 self.left_alone.settings = Some((self.panel.settings.clone(), kept.settings.clone()));
             }
-            self.log.write(&Event::FoundAgain(&self.full_source));
+            self.log.write("found_again", json!({"source": self.full_source}));
         }
         let snapshot = self.snapshot();
         if let Some(keeper) = &mut self.files.keeper {

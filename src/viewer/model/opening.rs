@@ -12,13 +12,13 @@ use crate::scene::changes::Changes;
 use crate::scene::{Scene, load};
 use crate::viewer::ViewerOptions;
 use crate::viewer::edits::EditedScene;
-use crate::viewer::event_log::Event;
 use crate::viewer::files;
 use crate::viewer::files::loader::{Loaded, Purpose};
 use crate::viewer::files::watch::Stamps;
 use crate::viewer::filming::Film;
 use crate::viewer::navigation::Navigator;
 use crate::viewer::worker::BakedLevel;
+use serde_json::json;
 
 impl Model {
     /// Takes over what was kept of the first scene; what the command line says goes first.
@@ -72,7 +72,7 @@ impl Model {
 
     fn read(&mut self, source: &str, purpose: Purpose) {
         self.files.refusal = None;
-        self.log.write(&Event::Opening(source));
+        self.log.write("opening", json!({"source": source}));
         let options = self.files.load.clone();
         if let Err(error) = self.files.loader.start(source, purpose, &options) {
             self.refuse(source, &error.to_string());
@@ -80,7 +80,8 @@ impl Model {
     }
 
     fn refuse(&mut self, source: &str, sentence: &str) {
-        self.log.write(&Event::NotOpened { source, sentence });
+        let more = json!({"source": source, "sentence": sentence});
+        self.log.write("not_opened", more);
         self.files.refusal = Some(sentence.to_owned());
     }
 
@@ -103,11 +104,10 @@ impl Model {
                 return None;
             }
         };
-        self.log.write(&Event::Opened {
-            scene: &scene.name,
-            source: &source,
-            again: purpose == Purpose::Reload,
-        });
+        self.log.write(
+            "opened",
+            json!({"scene": scene.name, "source": source, "again": purpose == Purpose::Reload}),
+        );
         match purpose {
             Purpose::Open => self.show(scene),
             Purpose::Reload => self.show_again(scene),

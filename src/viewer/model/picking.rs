@@ -8,9 +8,9 @@ use super::Model;
 use crate::geometry::Ray;
 use crate::scene::Edit;
 use crate::transport::Tracer;
-use crate::viewer::event_log::Event;
 use crate::viewer::gizmo::Held;
 use crate::viewer::panel::Placed;
+use serde_json::json;
 
 /// A light at a surface has no place before it: it is put there as far off as this, in scene radii.
 const OFF: f64 = 0.3;
@@ -102,7 +102,7 @@ impl Model {
             Held::Light(light) => &scene.lights[light].name,
             Held::Object(object) => &scene.objects[object].name,
         };
-        self.log.write(&Event::Picked(name));
+        self.log.write("picked", json!({"name": name}));
     }
 
     /// Steps back or forth until what has handles fills a picture of that aspect (width/height), or else the scene.

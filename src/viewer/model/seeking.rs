@@ -9,10 +9,10 @@ use crate::geometry::Ray;
 use crate::scene::{Edit, LightOrigin};
 use crate::transport::Tracer;
 use crate::viewer::brightest::{self, Spot};
-use crate::viewer::event_log::Event;
 use crate::viewer::gizmo::Held;
 use crate::viewer::new_light::{Aim, NewLight};
 use crate::viewer::probe;
+use serde_json::json;
 
 /// From how far the brightest spot is looked at, in scene radii.
 const DISTANCE: f64 = 0.6;
@@ -65,7 +65,8 @@ impl Model {
             added: Arc::new(added),
             origin: LightOrigin::New,
         };
-        self.log.write(&Event::Edited(&edit));
+        self.log
+            .write("edit", json!({"target": format!("{:?}", edit.target())}));
         let outcome = self.edits.edit(&edit);
         self.edits.release();
         if outcome.is_ok() {

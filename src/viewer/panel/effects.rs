@@ -1,14 +1,14 @@
-//! Section *Effects*: what can be simulated or left out, how it is switched, why it is on or off, and what it takes.
+//! Section *Effects*: what can be simulated or left out, how it is switched, why it is on or off, and what it is worth.
 
 use std::borrow::Cow;
 
 use egui::{Button, Frame, RichText, Role, Ui, WidgetInfo, vec2};
 
-use super::control::{bytes, counted, grouped, reset_to};
+use super::control::{grouped, reset_to};
 use super::{Facts, Wishes, worth};
 use crate::effect::{Effect, EffectSwitch, EffectSwitches};
 use crate::plan::{self, EffectLine};
-use crate::session::EffectCounts;
+use crate::session::BakeCounts;
 
 /// Width of the three switches of an effect [points].
 const SWITCHES_WIDTH: f32 = 128.0;
@@ -38,13 +38,6 @@ const SWITCHES: [(EffectSwitch, &str, &str); 3] = [
     ),
 ];
 
-/// What is known of an effect.
-#[derive(Clone, Debug, Default)]
-struct Known<'a> {
-    line: Option<Cow<'a, EffectLine>>,
-    counts: Option<&'a EffectCounts>,
-}
-
 /// Shows every effect, then every light.
 pub fn show(ui: &mut Ui, switches: &mut EffectSwitches, facts: &Facts<'_>, wishes: &mut Wishes) {
     for effect in Effect::ALL {
@@ -61,38 +54,25 @@ pub fn show(ui: &mut Ui, switches: &mut EffectSwitches, facts: &Facts<'_>, wishe
     }
 }
 
-/// The reports of the last level, the eye's chains from the picture; before there are reports, the plan. Dispersion is
-/// of both passes.
-fn known<'a>(effect: Effect, facts: &Facts<'a>) -> Known<'a> {
-    let result = facts.last.map(|last| &last.result);
-    let reports = result.into_iter().flat_map(|result| &result.effects);
-    let report = if effect == Effect::Chains {
-        facts.chains
-    } else {
-        reports.into_iter().find(|report| report.line.effect == effect)
-    };
-    let plan = result.map(|result| &result.plan);
-    let planned = plan.and_then(|plan| plan.effects.iter().find(|line| line.effect == effect));
-    let line = report.map(|report| &report.line).or(planned).map(Cow::Borrowed);
-    let in_both = |line: Cow<'a, EffectLine>| match facts.chains {
-        Some(chains) if effect == Effect::Dispersion => Cow::Owned(plan::dispersion(
-            line.into_owned(),
-            facts.scene,
-            None,
-            &chains.line,
-        )),
-        _ => line,
-    };
-    Known {
-        line: line.map(in_both),
-        counts: report.map(|report| &report.counts),
+/// The plan of the last level, the eye's chains as the picture has them. Dispersion is of both passes.
+fn known<'a>(effect: Effect, facts: &Facts<'a>) -> Option<Cow<'a, EffectLine>> {
+    let plan = facts.last.map(|last| &last.result.plan);
+    let planned = || plan?.effects.iter().find(|line| line.effect == effect);
+    let chains = facts.chains;
+    match effect {
+        Effect::Chains => chains.map(Cow::Borrowed),
+        Effect::Dispersion => planned().map(|line| match chains {
+            Some(chains) => Cow::Owned(plan::dispersion(line.clone(), facts.scene, None, chains)),
+            None => Cow::Borrowed(line),
+        }),
+        _ => planned().map(Cow::Borrowed),
     }
 }
 
 /// Shows one effect; tells whether it was asked what it is worth.
 fn entry(ui: &mut Ui, effect: Effect, switch: &mut EffectSwitch, facts: &Facts<'_>) -> bool {
     let known = known(effect, facts);
-    let is_on = known.line.as_ref().map(|line| line.on);
+    let is_on = known.as_ref().map(|line| line.on);
     let name = effect.name().replace('_', " ");
     let has_worth = is_on == Some(true) && effect != Effect::Chains;
     let mut is_asked = false;
@@ -108,14 +88,15 @@ fn entry(ui: &mut Ui, effect: Effect, switch: &mut EffectSwitch, facts: &Facts<'
         }
     });
     detail(ui, &name, |ui| {
-        let reason = match &known.line {
+        let reason = match &known {
             Some(line) => line.reason.as_str(),
             None if effect == Effect::Chains => "Known with the first picture.",
             None => "Known after the first bake.",
         };
         ui.label(RichText::new(reason).weak());
-        if let Some(counts) = known.counts {
-            counters(ui, counts);
+        if let Some(rays) = facts.last.and_then(|last| rays(effect, &last.result.counts)) {
+            ui.label(RichText::new(rays).size(COUNTER))
+                .on_hover_text("Traced by this bake up to the maps that are shown; what was kept from before is not counted.");
         }
         if has_worth {
             worth::line(ui, effect, facts);
@@ -164,71 +145,13 @@ fn segments(ui: &mut Ui, name: &str, switch: &mut EffectSwitch) {
     });
 }
 
-/// What the effect took up to the maps that are shown.
-fn counters(ui: &mut Ui, counts: &EffectCounts) {
-    let mut texts: Vec<(String, &str)> = Vec::new();
-    let mut add = |text: String, hover: &'static str| texts.push((text, hover));
-    if let Some(pipelines) = counts.pipelines {
-        add(
-            counted(pipelines as usize, "pipeline"),
-            "Render pipelines that exist for it on the graphics device.",
-        );
-        add(
-            bytes(counts.bytes),
-            "Memory on the graphics device for the triangles that chains are traced through.",
-        );
-        let gpu = counts
-            .gpu_ms
-            .map_or("GPU time unknown".into(), |ms| format!("{ms:.1} ms GPU"));
-        add(
-            gpu,
-            "Time on the graphics device for the last picture's specular surfaces, in milliseconds. Some devices \
-             cannot tell.",
-        );
-    } else {
-        for (text, hover) in light_counters(counts) {
-            add(text, hover);
-        }
-    }
-    ui.horizontal_wrapped(|ui| {
-        ui.spacing_mut().item_spacing.x = 10.0;
-        for (text, hover) in texts {
-            ui.label(RichText::new(text).size(COUNTER)).on_hover_text(hover);
-        }
-    });
-}
-
-/// Of an effect of the light: what it took none of is left out.
-fn light_counters(counts: &EffectCounts) -> Vec<(String, &'static str)> {
-    let cpu_ms = counts.cpu_ms.unwrap_or(0.0);
-    let counters = [
-        (
-            counts.rays > 0,
-            format!("{} rays", grouped(counts.rays)),
-            "Rays traced for it: light rays, segments after an event of its kind, shadow rays.",
-        ),
-        (
-            counts.deposits > 0,
-            format!("{} deposits", grouped(counts.deposits)),
-            "Patches and kernels that it brought to a map.",
-        ),
-        (
-            counts.bytes > 0,
-            bytes(counts.bytes),
-            "Memory that is held for it.",
-        ),
-        (
-            cpu_ms > 0.0,
-            format!("{cpu_ms:.1} ms CPU"),
-            "CPU time over all threads, in milliseconds; where effects share loops, by their share of rays and \
-             deposits. What is a part of other effects' time is not told.",
-        ),
-    ];
-    let taken = counters.into_iter().filter(|(is_taken, ..)| *is_taken);
-    let taken: Vec<_> = taken.map(|(_, text, hover)| (text, hover)).collect();
-    if taken.is_empty() {
-        let text = "takes no rays, no memory, no time".into();
-        return vec![(text, "Counted where the work would be done.")];
-    }
-    taken
+/// Rays that a bake counts for an effect by themselves; `None` where it traced none.
+fn rays(effect: Effect, counts: &BakeCounts) -> Option<String> {
+    let (rays, name) = match effect {
+        Effect::LightPass => (counts.rays, "light rays"),
+        Effect::Direct => (counts.shadow_rays, "shadow rays"),
+        Effect::Indirect => (counts.gather_rays, "gather rays"),
+        _ => return None,
+    };
+    (rays > 0).then(|| format!("{} {name}", grouped(rays)))
 }

@@ -50,8 +50,8 @@ use crate::error::Warning;
 use crate::eye_pass::{ToneMap, WhiteBalance};
 use crate::illumination::IlluminationMap;
 use crate::light_pass::sketch::Sketch;
+use crate::plan::EffectLine;
 use crate::scene::{Edit, Scene};
-use crate::session::EffectReport;
 use crate::settings::{BakeSettings, LayerKind};
 
 /// Width of the panel [points].
@@ -178,8 +178,8 @@ pub struct Facts<'a> {
     pub has_errors: bool,
     /// What an effect is worth to these maps, where that was asked for.
     pub worth: Option<&'a Worth>,
-    /// The eye's chains in the picture that is shown.
-    pub chains: Option<&'a EffectReport>,
+    /// Whether the picture that is shown has the eye's chains, and why.
+    pub chains: Option<&'a EffectLine>,
     /// How long the last pictures took; `None` where the device cannot tell.
     pub frame_times: Option<&'a FrameTimes>,
     /// From events to frames.

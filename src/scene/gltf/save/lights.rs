@@ -4,7 +4,7 @@ use glam::{DAffine3, DQuat, DVec3};
 use gltf::json::Value;
 use serde_json::json;
 
-use super::json_text::JsonText;
+use super::json_document::JsonDocument;
 use super::placing::Placing;
 use crate::error::{Error, Result};
 use crate::optics::LinearSrgb;
@@ -42,43 +42,43 @@ impl Edited<'_> {
         origin: &Origin,
         (document, shift): (&Document, DVec3),
         placing: &mut Placing<'_>,
-        text: &mut JsonText,
+        json: &mut JsonDocument,
     ) -> Result<()> {
         let (was, is) = (self.was, self.is);
         if was.kind.strength() != is.kind.strength() || was.colour != is.colour || was.spectrum != is.spectrum
         {
-            let light = own_light(document, origin, text);
+            let light = own_light(document, origin, json);
             if was.kind.strength() != is.kind.strength() {
                 let candela = is.kind.strength() * LUMENS_PER_WATT;
-                text.set(&format!("{light}/intensity"), &json!(candela));
+                json.set(&format!("{light}/intensity"), json!(candela));
             }
             if was.colour != is.colour || was.spectrum != is.spectrum {
-                self.write_colour(origin, &light, text)?;
+                self.write_colour(origin, &light, json)?;
             }
         }
         if was.size != is.size {
-            self.write_size(origin, text);
+            self.write_size(origin, json);
         }
         self.place(origin, shift, placing)
     }
 
-    fn write_colour(&self, origin: &Origin, light: &str, text: &mut JsonText) -> Result<()> {
+    fn write_colour(&self, origin: &Origin, light: &str, json: &mut JsonDocument) -> Result<()> {
         let of_node = format!("/nodes/{}/extras/{}", origin.node, spectrum::KEY);
         let of_light = format!("{light}/extras/{}", spectrum::KEY);
         let Some(spectrum) = &self.is.spectrum else {
-            text.remove(&of_node);
-            text.remove(&of_light);
-            text.set(&format!("{light}/color"), &json!(self.is.colour.to_array()));
+            json.remove(&of_node);
+            json.remove(&of_light);
+            json.set(&format!("{light}/color"), json!(self.is.colour.to_array()));
             return Ok(());
         };
         let name = spectrum.name().filter(|name| illuminant(name).is_ok());
         let name = name.ok_or_else(|| self.refused("has a spectrum without a name"))?;
-        text.set(&of_node, &json!(name));
-        text.set(&format!("{light}/color"), &json!(LinearSrgb::WHITE.to_array()));
+        json.set(&of_node, json!(name));
+        json.set(&format!("{light}/color"), json!(LinearSrgb::WHITE.to_array()));
         Ok(())
     }
 
-    fn write_size(&self, origin: &Origin, text: &mut JsonText) {
+    fn write_size(&self, origin: &Origin, json: &mut JsonDocument) {
         let extras = |name: &str| format!("/nodes/{}/extras/{name}", origin.node);
         let (name, size) = match (self.is.size, &self.is.kind) {
             (LightSize::Radius { radius_m }, _) => ("radius_m", radius_m),
@@ -86,7 +86,7 @@ impl Edited<'_> {
             (LightSize::None, LightKind::Sun { .. }) => ("angular_diameter_deg", 0.0),
             (LightSize::None, _) => ("radius_m", 0.0),
         };
-        text.set(&extras(name), &json!(size));
+        json.set(&extras(name), json!(size));
     }
 
     /// Turns and moves its node, as little as the light itself was.
@@ -119,7 +119,7 @@ impl Edited<'_> {
     ///
     /// # Errors
     /// Another colour, or a material that glows elsewhere too and did not change there.
-    pub fn write_glow(&self, edited: &Scene, in_file: usize, text: &mut JsonText) -> Result<()> {
+    pub fn write_glow(&self, edited: &Scene, in_file: usize, json: &mut JsonDocument) -> Result<()> {
         let (was, is) = (self.was, self.is);
         if was.colour != is.colour || was.spectrum != is.spectrum {
             return Err(self.refused("glows in another colour"));
@@ -133,35 +133,30 @@ impl Edited<'_> {
         }
         let path = format!("/materials/{material}/extensions/KHR_materials_emissive_strength");
         let path = format!("{path}/emissiveStrength");
-        let before = text.get(&path).and_then(|written| written.parse::<f64>().ok());
+        let before = json.get(&path).and_then(Value::as_f64);
         let times = is.kind.strength() / was.kind.strength();
-        text.set(&path, &json!(before.unwrap_or(1.0) * times));
-        super::use_extension(text, "KHR_materials_emissive_strength");
+        json.set(&path, json!(before.unwrap_or(1.0) * times));
+        json.use_extension("KHR_materials_emissive_strength");
         Ok(())
     }
 }
 
 /// The path of a light's entry in its list: one of its own where other nodes refer to the same.
-fn own_light(document: &Document, origin: &Origin, text: &mut JsonText) -> String {
+fn own_light(document: &Document, origin: &Origin, json: &mut JsonDocument) -> String {
     let list = origin.list;
     let lights = format!("/extensions/{list}/lights");
     let of_node = |node: usize| format!("/nodes/{node}/extensions/{list}/light");
     let refers = |node: &usize| {
-        let stated = text
-            .get(&of_node(*node))
-            .and_then(|written| written.parse::<usize>().ok());
-        stated == Some(origin.index)
+        let stated = json.get(&of_node(*node)).and_then(Value::as_u64);
+        stated == Some(origin.index as u64)
     };
     let sharing = (0..document.root.nodes.len()).filter(refers).count();
     let path = format!("{lights}/{}", origin.index);
     if sharing <= 1 {
         return path;
     }
-    let all: Option<Vec<Value>> = text.get(&lights).and_then(|list| serde_json::from_str(list).ok());
-    let next = all.map_or(0, |all| all.len());
-    let copy = text.get(&path).unwrap_or("{}").to_owned();
-    let own = format!("{lights}/{next}");
-    text.put(&own, copy);
-    text.set(&of_node(origin.node), &json!(next));
-    own
+    let copy = json.get(&path).cloned().unwrap_or_else(|| json!({}));
+    let next = json.append(&lights, copy);
+    json.set(&of_node(origin.node), json!(next));
+    format!("{lights}/{next}")
 }

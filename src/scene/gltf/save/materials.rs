@@ -3,7 +3,7 @@
 use glam::DVec3;
 use serde_json::json;
 
-use super::json_text::JsonText;
+use super::json_document::JsonDocument;
 use crate::error::{Error, Result};
 use crate::scene::gltf::substance::Stated;
 use crate::scene::gltf::{substance, waves};
@@ -13,49 +13,52 @@ use crate::scene::{Material, Wave};
 ///
 /// # Errors
 /// A glass that has neither a name nor an Abbe number.
-pub fn write(index: usize, was: &Material, is: &Material, shift: DVec3, text: &mut JsonText) -> Result<()> {
+pub fn write(
+    index: usize,
+    was: &Material,
+    is: &Material,
+    shift: DVec3,
+    json: &mut JsonDocument,
+) -> Result<()> {
     let path = |name: &str| format!("/materials/{index}/{name}");
     if was.roughness != is.roughness {
-        text.set(
-            &path("pbrMetallicRoughness/roughnessFactor"),
-            &json!(is.roughness),
-        );
+        json.set(&path("pbrMetallicRoughness/roughnessFactor"), json!(is.roughness));
     }
     if was.metal != is.metal {
         let metal = path(&format!("extras/{}", substance::METAL_KEY));
         match is.metal {
             Some(named) => {
-                text.set(&metal, &json!(named.name()));
+                json.set(&metal, json!(named.name()));
             }
-            None => text.remove(&metal),
+            None => json.remove(&metal),
         }
     }
     if was.base_colour != is.base_colour {
         let path = path("pbrMetallicRoughness/baseColorFactor");
-        let stated = text
+        let stated = json
             .get(&path)
-            .and_then(|written| serde_json::from_str(written).ok());
+            .and_then(|stated| serde_json::from_value(stated.clone()).ok());
         let [.., alpha]: [f64; 4] = stated.unwrap_or([1.0; 4]);
         let [red, green, blue] = is.base_colour.to_array();
-        text.set(&path, &json!([red, green, blue, alpha]));
+        json.set(&path, json!([red, green, blue, alpha]));
     }
     if was.ior != is.ior || was.glass.as_deref() != is.glass.as_deref() {
-        write_glass(index, is, text)?;
+        write_glass(index, is, json)?;
     }
     if was.waves != is.waves {
-        write_waves(&path(&format!("extras/{}", waves::KEY)), is, shift, text);
+        write_waves(&path(&format!("extras/{}", waves::KEY)), is, shift, json);
     }
     Ok(())
 }
 
-fn write_glass(index: usize, is: &Material, text: &mut JsonText) -> Result<()> {
+fn write_glass(index: usize, is: &Material, json: &mut JsonDocument) -> Result<()> {
     let path = |name: &str| format!("/materials/{index}/{name}");
     let extension = |name: &str| format!("/materials/{index}/extensions/{name}");
     let by_name = path(&format!("extras/{}", substance::GLASS_KEY));
     let dispersion = format!("{}/dispersion", extension(substance::NAME));
     let stated = match is.glass.as_deref().map(|glass| (glass, substance::stated(glass))) {
         Some((_, Some(Stated::Name(name)))) => {
-            text.set(&by_name, &json!(name));
+            json.set(&by_name, json!(name));
             return Ok(());
         }
         Some((_, Some(Stated::Dispersion(dispersion)))) => dispersion,
@@ -68,19 +71,19 @@ fn write_glass(index: usize, is: &Material, text: &mut JsonText) -> Result<()> {
             ));
         }
     };
-    text.remove(&by_name);
-    text.set(&format!("{}/ior", extension("KHR_materials_ior")), &json!(is.ior));
-    super::use_extension(text, "KHR_materials_ior");
-    if stated > 0.0 || text.get(&dispersion).is_some() {
-        text.set(&dispersion, &json!(stated));
-        super::use_extension(text, substance::NAME);
+    json.remove(&by_name);
+    json.set(&format!("{}/ior", extension("KHR_materials_ior")), json!(is.ior));
+    json.use_extension("KHR_materials_ior");
+    if stated > 0.0 || json.get(&dispersion).is_some() {
+        json.set(&dispersion, json!(stated));
+        json.use_extension(substance::NAME);
     }
     Ok(())
 }
 
-fn write_waves(path: &str, is: &Material, shift: DVec3, text: &mut JsonText) {
+fn write_waves(path: &str, is: &Material, shift: DVec3, json: &mut JsonDocument) {
     let Some(waves) = &is.waves else {
-        text.remove(path);
+        json.remove(path);
         return;
     };
     let in_world = Vec::<Wave>::from(waves.with_origin(-shift));
@@ -95,5 +98,5 @@ fn write_waves(path: &str, is: &Material, shift: DVec3, text: &mut JsonText) {
             })
         })
         .collect();
-    text.set(path, &json!(stated));
+    json.set(path, json!(stated));
 }

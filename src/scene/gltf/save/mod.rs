@@ -1,8 +1,8 @@
 //! An edited scene as a `.glb`: the file that it was loaded from, with nothing changed but what was edited. What the
-//! program does not know survives byte for byte.
+//! program does not know survives, in its order.
 
 mod container;
-mod json_text;
+mod json_document;
 mod lights;
 mod materials;
 mod new_lights;
@@ -12,11 +12,9 @@ use std::mem::discriminant;
 use std::path::Path;
 
 use glam::{DAffine3, DVec3};
-use gltf::json::Value;
-use serde_json::json;
 
 pub use self::container::Parts;
-use self::json_text::JsonText;
+use self::json_document::JsonDocument;
 use self::lights::Edited;
 use self::placing::Placing;
 use super::document::{self, Document};
@@ -60,13 +58,13 @@ pub fn save(
         edited,
         document: &document,
         placing: Placing::new(&placed),
-        text: &mut parts.text,
+        json: &mut parts.json,
     };
     patch.check_original(&placed, &origins, original)?;
     patch.lights(&origins)?;
     patch.materials()?;
     patch.objects()?;
-    patch.placing.write(&document, patch.text);
+    patch.placing.write(&document, patch.json);
     let bytes = parts.into_glb()?;
     check(&bytes, original, edited, options)?;
     files::write_atomically(target, |writer| writer.write_all(&bytes))
@@ -78,7 +76,7 @@ struct Patch<'a> {
     edited: &'a Scene,
     document: &'a Document,
     placing: Placing<'a>,
-    text: &'a mut JsonText,
+    json: &'a mut JsonDocument,
 }
 
 impl Patch<'_> {
@@ -111,23 +109,23 @@ impl Patch<'_> {
             let is_foreign = origin.is_none() && new_lights::can_be_written(&is.kind);
             match (was, origin) {
                 _ if is_foreign && is_to_be_written(index, self.loaded, self.edited) => {
-                    new_lights::write(is, shift, self.document, self.text)?;
+                    new_lights::write(is, shift, self.document, self.json)?;
                 }
                 (Some(was), _) if was == is => {}
                 (Some(was), Some(origin)) => {
                     let of_file = (self.document, shift);
-                    Edited { was, is }.write(origin, of_file, &mut self.placing, self.text)?;
+                    Edited { was, is }.write(origin, of_file, &mut self.placing, self.json)?;
                 }
                 (was, _) => {
                     let was = was.unwrap_or(is);
-                    Edited { was, is }.write_glow(self.edited, materials, self.text)?;
+                    Edited { was, is }.write_glow(self.edited, materials, self.json)?;
                 }
             }
         }
         for place in &self.edited.light_list.removed {
             if let Some(origin) = origins.get(*place) {
                 let path = format!("/nodes/{}/extensions/{}", origin.node, origin.list);
-                self.text.remove(&path);
+                self.json.remove(&path);
             }
         }
         Ok(())
@@ -139,7 +137,7 @@ impl Patch<'_> {
         let pairs = self.loaded.materials.iter().zip(&self.edited.materials);
         for (index, (was, is)) in pairs.enumerate() {
             if index < in_file {
-                materials::write(index, was, is, shift, self.text)?;
+                materials::write(index, was, is, shift, self.json)?;
             }
         }
         Ok(())
@@ -185,20 +183,6 @@ fn is_to_be_written(light: usize, loaded: &Scene, edited: &Scene) -> bool {
 fn about(motion: &Motion, centre: DVec3) -> DAffine3 {
     let turn = DAffine3::from_quat(motion.rotation);
     DAffine3::from_translation(centre + motion.translation) * turn * DAffine3::from_translation(-centre)
-}
-
-/// Names an extension among those that the file uses.
-fn use_extension(text: &mut JsonText, name: &str) {
-    const USED: &str = "/extensionsUsed";
-    let used: Vec<Value> = text
-        .get(USED)
-        .and_then(|list| serde_json::from_str(list).ok())
-        .unwrap_or_default();
-    if used.is_empty() {
-        text.set(USED, &json!([name]));
-    } else if !used.contains(&Value::from(name)) {
-        text.set(&format!("{USED}/{}", used.len()), &json!(name));
-    }
 }
 
 /// Reads what is to be written as anybody would, and refuses it where that is not the edited scene.

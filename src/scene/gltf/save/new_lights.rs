@@ -4,7 +4,7 @@ use glam::{DMat3, DQuat, DVec3};
 use gltf::json::Value;
 use serde_json::{Map, json};
 
-use super::json_text::JsonText;
+use super::json_document::JsonDocument;
 use crate::error::{Error, Result};
 use crate::optics::LinearSrgb;
 use crate::optics::spectrum::illuminant;
@@ -22,10 +22,10 @@ pub fn can_be_written(kind: &LightKind) -> bool {
 ///
 /// # Errors
 /// A spectrum without a name.
-pub fn write(light: &Light, shift: DVec3, document: &Document, text: &mut JsonText) -> Result<()> {
+pub fn write(light: &Light, shift: DVec3, document: &Document, json: &mut JsonDocument) -> Result<()> {
     let (list, entry) = entry(light);
-    let listed = append(text, &format!("/extensions/{list}/lights"), &entry);
-    super::use_extension(text, list);
+    let listed = json.append(&format!("/extensions/{list}/lights"), entry);
+    json.use_extension(list);
     let mut node = json!({
         "name": light.name,
         "rotation": turn(&light.kind).to_array(),
@@ -38,30 +38,13 @@ pub fn write(light: &Light, shift: DVec3, document: &Document, text: &mut JsonTe
     if !extras.is_empty() {
         node["extras"] = Value::Object(extras);
     }
-    let node = append(text, "/nodes", &node);
+    let node = json.append("/nodes", node);
     let scene = document.root.scene.map_or(0, |scene| scene.value());
     // Without scenes, nodes that are nobody's child are at the top.
-    if text.get(&format!("/scenes/{scene}")).is_some() {
-        append(text, &format!("/scenes/{scene}/nodes"), &json!(node));
+    if json.get(&format!("/scenes/{scene}")).is_some() {
+        json.append(&format!("/scenes/{scene}/nodes"), json!(node));
     }
     Ok(())
-}
-
-/// Adds an item to a list, which is made where it is missing; gives its index.
-fn append(text: &mut JsonText, list: &str, item: &Value) -> usize {
-    let present: Option<Vec<Value>> = text
-        .get(list)
-        .and_then(|written| serde_json::from_str(written).ok());
-    match present.map(|items| items.len()).filter(|count| *count > 0) {
-        Some(count) => {
-            text.set(&format!("{list}/{count}"), item);
-            count
-        }
-        None => {
-            text.set(list, &json!([item]));
-            0
-        }
-    }
 }
 
 /// The extension that lists such lights, and what it lists.

@@ -1,0 +1,350 @@
+//! How long the frames of a camera's path take on the graphics device: as the window draws them, with and without the
+//! eye's chains.
+
+use std::time::Instant;
+
+use serde::Serialize;
+
+use super::renderer::{GpuMs, Renderer};
+use super::{View, tone_mapping};
+use crate::effect::{Effect, EffectSwitch, EffectSwitches};
+use crate::error::{Error, Result};
+use crate::gpu::{Gpu, readback};
+use crate::illumination::IlluminationMap;
+use crate::optics::spectrum::xyz::Matrix3;
+use crate::progress::{Control, Progress, Stage};
+use crate::scene::{Camera, Scene};
+
+/// Samples per pixel, as in the window.
+pub const SAMPLES: u32 = 4;
+
+/// Format of the target: encoded values, as in the window.
+const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
+
+/// A frame is drawn once more where pipelines were made for it. They come in one go; whoever makes new ones for ever
+/// is not waited for.
+const MOST_REPEATS: usize = 8;
+
+/// What is drawn.
+#[derive(Debug)]
+pub struct Walk<'a> {
+    /// The scene.
+    pub scene: &'a Scene,
+    /// Its light.
+    pub maps: &'a [IlluminationMap],
+    /// Size, exposure, tone map and background of every frame; its camera counts for the exposure alone.
+    pub view: View,
+    /// One for each frame.
+    pub cameras: &'a [Camera],
+    /// Whether what is seen through glass is parted by wavelength.
+    pub effects: &'a EffectSwitches,
+    /// What radiance is multiplied by before tone mapping.
+    pub white_balance: Matrix3,
+}
+
+/// Three figures of many.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Spread {
+    /// The middle one; the lower middle of an even number.
+    pub median: f64,
+    /// The least that at least 95 % of them do not exceed.
+    pub p95: f64,
+    /// The largest.
+    pub max: f64,
+}
+
+impl Spread {
+    /// Of some values; zeros where there are none.
+    pub fn of(mut values: Vec<f64>) -> Self {
+        values.sort_by(f64::total_cmp);
+        // Rounded up: 95 % of 20 are 19.
+        let rank = (values.len() * 19).div_ceil(20);
+        Self {
+            p95: values.get(rank.saturating_sub(1)).copied().unwrap_or(0.0),
+            max: values.last().copied().unwrap_or(0.0),
+            // The lower middle of an even number.
+            median: values
+                .get(values.len().saturating_sub(1) / 2)
+                .copied()
+                .unwrap_or(0.0),
+        }
+    }
+}
+
+/// Time on the device by pass [ms].
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct DeviceMs {
+    /// Surfaces, as the picture shows them.
+    pub opaque: Spread,
+    /// Chains of mirrors, polish and clear bodies.
+    pub specular: Spread,
+    /// The last pass.
+    pub tone_mapping: Spread,
+    /// All three of a frame together.
+    pub sum: Spread,
+}
+
+/// A drawing that made pipelines or was the very first: it says what a first look costs, and counts nowhere else.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct WarmUp {
+    /// Which frame, from 1 on.
+    pub frame: usize,
+    /// From the call until the device was done [ms].
+    pub wall_ms: f64,
+    /// All passes; `None` where the device cannot tell.
+    pub device_ms: Option<f64>,
+    /// Pipelines that were made for it.
+    pub pipelines: u64,
+}
+
+/// All frames of a path, drawn in one manner.
+#[derive(Clone, Debug, Serialize)]
+pub struct MannerTimes {
+    /// How the eye's chains were switched.
+    pub chains: EffectSwitch,
+    /// Frames that were timed: each of the path once, warm-up apart.
+    pub frames: usize,
+    /// `None` where the device cannot tell.
+    pub device_ms: Option<DeviceMs>,
+    /// From the call until the device was done [ms].
+    pub wall_ms: Spread,
+    /// Objects that a frame drew.
+    pub drawn_objects: Spread,
+    /// Those of them that were drawn as specular.
+    pub drawn_specular: Spread,
+    /// Render pipelines at the end.
+    pub pipelines: u64,
+    /// Those of them for specular surfaces.
+    pub specular_pipelines: u64,
+    /// In the order of the frames.
+    pub warm_up: Vec<WarmUp>,
+}
+
+/// What one manner takes over what another takes, median over median.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Ratio {
+    /// Of the sum of all passes on the device; `None` where it cannot tell.
+    pub device: Option<f64>,
+    /// Of the time from the call until the device was done.
+    pub wall: Option<f64>,
+}
+
+impl MannerTimes {
+    /// What it takes over what `other` takes.
+    pub fn over(&self, other: &Self) -> Ratio {
+        let over = |a: f64, b: f64| (b > 0.0).then(|| a / b);
+        let device = self.device_ms.zip(other.device_ms);
+        Ratio {
+            device: device.and_then(|(a, b)| over(a.sum.median, b.sum.median)),
+            wall: over(self.wall_ms.median, other.wall_ms.median),
+        }
+    }
+}
+
+/// Called with the number of a frame, from 0 on, and its pixels: encoded, RGBA, row 0 at the top.
+pub type Keep<'a> = dyn FnMut(usize, Vec<u8>) -> Result<()> + 'a;
+
+/// Draws every frame once with each of `switches`, now one first, now another, so that what drifts meets all alike.
+/// `keep` gets the frames of the last switch.
+///
+/// # Errors
+/// No switch or camera; a picture that the device cannot hold; a device that was lost; stopped before the end; what
+/// `keep` returns.
+pub fn measure(
+    gpu: &Gpu,
+    walk: &Walk<'_>,
+    switches: &[EffectSwitch],
+    mut keep: Option<&mut Keep<'_>>,
+    progress: &dyn Progress,
+    control: &Control,
+) -> Result<Vec<MannerTimes>> {
+    gpu.check_texture_size("picture", walk.view.width, walk.view.height)?;
+    let target = target(gpu, &walk.view);
+    let manners = switches.iter().map(|switch| Manner::new(gpu, walk, *switch));
+    let mut manners = manners.collect::<Result<Vec<_>>>()?;
+    for (frame, camera) in walk.cameras.iter().enumerate() {
+        progress.advance(Stage::Picture, frame as u64, walk.cameras.len() as u64);
+        let view = View {
+            camera: camera.clone(),
+            ..walk.view.clone()
+        };
+        for turn in 0..manners.len() {
+            if control.is_cancelled() {
+                return Err(Error::cancelled("path"));
+            }
+            let which = (frame + turn) % manners.len();
+            manners[which].draw_settled(gpu, &target, &view, frame)?;
+            if let Some(keep) = keep.as_mut().filter(|_| which + 1 == switches.len()) {
+                keep(frame, readback::read_texture(gpu, &target)?)?;
+            }
+        }
+    }
+    Ok(manners.into_iter().map(Manner::times).collect())
+}
+
+/// Exposure that suits what the walk's view shows [stops].
+///
+/// # Errors
+/// A picture that the device cannot hold; a device that was lost.
+pub fn auto_exposure_stops(gpu: &Gpu, walk: &Walk<'_>) -> Result<f64> {
+    let mut renderer = Renderer::new(gpu, walk.scene, FORMAT, SAMPLES)?;
+    renderer.set_maps(gpu, walk.scene, walk.maps)?;
+    // An eighth of the pixels tells as much about the brightness as all of them.
+    let view = View {
+        width: walk.view.width.div_ceil(8),
+        height: walk.view.height.div_ceil(8),
+        ..walk.view.clone()
+    };
+    Ok(tone_mapping::auto_exposure_stops(&renderer.radiance(gpu, &view)?))
+}
+
+fn target(gpu: &Gpu, view: &View) -> wgpu::Texture {
+    gpu.device.create_texture(&wgpu::TextureDescriptor {
+        label: Some("frame"),
+        size: wgpu::Extent3d {
+            width: view.width,
+            height: view.height,
+            depth_or_array_layers: 1,
+        },
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format: FORMAT,
+        usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
+        view_formats: &[],
+    })
+}
+
+/// One drawing.
+#[derive(Clone, Copy, Debug)]
+struct Drawing {
+    wall_ms: f64,
+    device_ms: Option<GpuMs>,
+    objects: u64,
+    specular: u64,
+}
+
+fn sum(ms: GpuMs) -> f64 {
+    ms.opaque + ms.specular + ms.tone_mapping
+}
+
+/// A renderer of its own, since switching chains off gives up what they took.
+struct Manner {
+    chains: EffectSwitch,
+    renderer: Renderer,
+    drawings: Vec<Drawing>,
+    warm_up: Vec<WarmUp>,
+}
+
+impl Manner {
+    fn new(gpu: &Gpu, walk: &Walk<'_>, chains: EffectSwitch) -> Result<Self> {
+        let mut renderer = Renderer::new(gpu, walk.scene, FORMAT, SAMPLES)?;
+        renderer.set_maps(gpu, walk.scene, walk.maps)?;
+        renderer.set_chains(gpu, chains)?;
+        renderer.set_dispersion(walk.effects.get(Effect::Dispersion));
+        renderer.set_white_balance(gpu, &walk.white_balance);
+        gpu.wait()?;
+        Ok(Self {
+            chains,
+            renderer,
+            drawings: Vec::new(),
+            warm_up: Vec::new(),
+        })
+    }
+
+    /// Draws a frame until nothing had to be made for it.
+    fn draw_settled(&mut self, gpu: &Gpu, target: &wgpu::Texture, view: &View, frame: usize) -> Result<()> {
+        let mut is_first = self.drawings.is_empty();
+        for repeat in 0.. {
+            let before = self.renderer.counts().pipelines;
+            let drawing = self.draw(gpu, target, view)?;
+            let made = self.renderer.counts().pipelines.saturating_sub(before);
+            if (made == 0 && !is_first) || repeat == MOST_REPEATS {
+                self.drawings.push(drawing);
+                break;
+            }
+            is_first = false;
+            self.warm_up.push(WarmUp {
+                frame: frame + 1,
+                wall_ms: drawing.wall_ms,
+                device_ms: drawing.device_ms.map(sum),
+                pipelines: made,
+            });
+        }
+        Ok(())
+    }
+
+    fn draw(&mut self, gpu: &Gpu, target: &wgpu::Texture, view: &View) -> Result<Drawing> {
+        let start = Instant::now();
+        let target = target.create_view(&wgpu::TextureViewDescriptor::default());
+        let mut encoder = gpu
+            .device
+            .create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("frame") });
+        self.renderer.draw(gpu, &mut encoder, &target, view)?;
+        gpu.queue.submit([encoder.finish()]);
+        gpu.wait()?;
+        let wall_ms = 1e3 * start.elapsed().as_secs_f64();
+        // The device is done: what it tells now is of this frame.
+        let is_told = self.renderer.collect_times(gpu);
+        let counts = self.renderer.counts();
+        Ok(Drawing {
+            wall_ms,
+            device_ms: counts.gpu_ms.filter(|_| is_told),
+            objects: counts.drawn_objects,
+            specular: counts.drawn_specular,
+        })
+    }
+
+    fn times(self) -> MannerTimes {
+        let counts = self.renderer.counts();
+        let drawings = &self.drawings;
+        let spread = |value: &dyn Fn(&Drawing) -> f64| Spread::of(drawings.iter().map(value).collect());
+        MannerTimes {
+            chains: self.chains,
+            frames: drawings.len(),
+            device_ms: device_ms(drawings),
+            wall_ms: spread(&|drawing| drawing.wall_ms),
+            drawn_objects: spread(&|drawing| drawing.objects as f64),
+            drawn_specular: spread(&|drawing| drawing.specular as f64),
+            pipelines: counts.pipelines,
+            specular_pipelines: counts.specular_pipelines,
+            warm_up: self.warm_up,
+        }
+    }
+}
+
+/// Of frames that the device has all told of.
+fn device_ms(drawings: &[Drawing]) -> Option<DeviceMs> {
+    let told: Vec<GpuMs> = drawings
+        .iter()
+        .map(|drawing| drawing.device_ms)
+        .collect::<Option<_>>()?;
+    let spread = |value: fn(GpuMs) -> f64| Spread::of(told.iter().copied().map(value).collect());
+    Some(DeviceMs {
+        opaque: spread(|ms| ms.opaque),
+        specular: spread(|ms| ms.specular),
+        tone_mapping: spread(|ms| ms.tone_mapping),
+        sum: spread(sum),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn spreads_are_of_the_values() {
+        let values: Vec<f64> = (1..=100).rev().map(f64::from).collect();
+        let of = |values: &[f64]| Spread::of(values.to_vec());
+        let expected = Spread {
+            median: 50.0,
+            p95: 95.0,
+            max: 100.0,
+        };
+        assert_eq!(of(&values), expected);
+        // A hitch in one frame of three is the 95th percentile, in one of a hundred it is not.
+        assert_eq!(of(&[1.0, 9.0, 2.0]).p95, 9.0);
+        assert_eq!(of(&[1.0, 9.0, 2.0]).median, 2.0);
+        assert_eq!(of(&[]), Spread::default());
+    }
+}

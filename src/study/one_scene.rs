@@ -1,0 +1,299 @@
+//! Studies of a scene that the user names: convergence, effects, spectrum.
+
+use std::sync::Arc;
+
+use super::plot::Plot;
+use super::references::{Reference, Truth};
+use super::sweep::{
+    ARD, Against, CELLS, CPU_S, Column, FLUX_RATIO, Group, Measured, PEAK_RATIO, RAYS, REFERENCE,
+    RELATIVE_RMSE, SPLATS, Sweep, Variant, number, share,
+};
+use super::table::Cell;
+use crate::effect::{Effect, EffectSwitch};
+use crate::error::{Error, Result};
+use crate::illumination::IlluminationMap;
+use crate::optics::LinearSrgb;
+use crate::scene::{Light, LightKind, Scene};
+use crate::session::BakeSession;
+use crate::settings::{BakeSettings, Estimator, LayerKind, SpectralSampling, Wavelengths};
+
+/// Name and one line of each.
+pub const CONVERGENCE: (&str, &str) = (
+    "convergence",
+    "error against light rays and CPU time, for every estimator",
+);
+/// Name and one line.
+pub const EFFECTS: (&str, &str) = (
+    "effects",
+    "what each effect costs and what it is worth, by bakes without it",
+);
+/// Name and one line.
+pub const SPECTRUM: (&str, &str) = (
+    "spectrum",
+    "split and stochastic rays, few wavelengths, many and all: how right and how dear",
+);
+
+/// The finest bake is this many times as dense where it is the reference itself.
+const SELF_REFERENCE_FACTOR: f64 = 16.0;
+
+/// Every estimator at every density (ascending, at least one), against a reference or a much denser bake by the last
+/// estimator. Of the settings, estimator, density and sigma are those of the variant.
+pub fn convergence(
+    scene: &Arc<Scene>,
+    settings: &BakeSettings,
+    estimators: &[Estimator],
+    densities: &[f64],
+    reference: Option<Reference>,
+) -> Sweep {
+    let at = |estimator: Estimator, density_per_sr| BakeSettings {
+        estimator,
+        density_per_sr,
+        sigma: estimator.default_sigma(),
+        ..settings.clone()
+    };
+    let densest = densities.last().copied().unwrap_or(1.0) * SELF_REFERENCE_FACTOR;
+    let finest = at(estimators.last().copied().unwrap_or(settings.estimator), densest);
+    let variants = estimators.iter().flat_map(|&estimator| {
+        densities.iter().map(move |&density| {
+            let name: &str = estimator.into();
+            Variant::new(vec![name.into(), density.into()], scene, at(estimator, density))
+        })
+    });
+    Sweep {
+        name: CONVERGENCE.0,
+        what: CONVERGENCE.1,
+        note: format!("`{}`.", scene.source),
+        labels: &["estimator", "density_per_sr"],
+        columns: &[
+            RAYS,
+            SPLATS,
+            CELLS,
+            CPU_S,
+            RELATIVE_RMSE,
+            ARD,
+            PEAK_RATIO,
+            FLUX_RATIO,
+            REFERENCE,
+        ],
+        groups: vec![Group {
+            variants: variants.collect(),
+            against: match reference {
+                Some(reference) => Against::Known(reference),
+                None => Against::Bake(Arc::clone(scene), Box::new(finest)),
+            },
+        }],
+        plots: const {
+            &[
+                against("convergence-rays", "rays"),
+                against("convergence-cpu", "cpu_s"),
+            ]
+        },
+        ..Sweep::default()
+    }
+}
+
+const fn against(file: &'static str, x: &'static str) -> Plot {
+    Plot {
+        file,
+        x,
+        y: "relative_rmse",
+        by: &["estimator"],
+        only: None,
+    }
+}
+
+/// A bake as planned, and one without each effect that is on in the plan.
+///
+/// # Errors
+/// Settings outside their ranges.
+pub fn effects(scene: &Arc<Scene>, settings: &BakeSettings) -> Result<Sweep> {
+    let plan = BakeSession::new(Arc::clone(scene))?.plan(settings)?;
+    let planned = vec!["none".into(), "as planned".into()];
+    let mut variants = vec![Variant::new(planned, scene, settings.clone())];
+    for line in plan.effects.iter().filter(|line| line.on) {
+        let name = line.effect.name();
+        let without = BakeSettings {
+            effects: settings.effects.clone().with(line.effect, EffectSwitch::Off),
+            ..settings.clone()
+        };
+        variants.push(Variant {
+            difference: Some(format!("difference_{name}")),
+            ..Variant::new(vec![name.into(), line.reason.clone().into()], scene, without)
+        });
+    }
+    Ok(Sweep {
+        name: EFFECTS.0,
+        what: EFFECTS.1,
+        note: format!(
+            "`{}`, baked as planned and without each effect. `worth_w` is what the planned bake has more, `relative_rmse` is between \
+             both. Pictures are warm where the effect adds light and cool where it takes light away, 1 to 1000 % of the map's mean.",
+            scene.source
+        ),
+        labels: &["without", "reason"],
+        columns: EFFECT_COLUMNS,
+        groups: vec![Group {
+            against: Against::Bake(Arc::clone(scene), Box::new(settings.clone())),
+            variants,
+        }],
+        ..Sweep::default()
+    })
+}
+
+const EFFECT_COLUMNS: &[Column] = &[
+    Column {
+        name: "flux_w",
+        value: |m| number(m.difference().map(|found| found.without_w)),
+    },
+    Column {
+        name: "worth_w",
+        value: |m| number(m.difference().map(|found| found.difference_w())),
+    },
+    Column {
+        name: "relative_rmse",
+        value: |m| share(m.difference().and_then(|found| found.relative_rmse)),
+    },
+    RAYS,
+    CPU_S,
+];
+
+/// Wavelengths of the reference.
+const REFERENCE_WAVELENGTHS: u32 = 300;
+
+/// The reference's lattice is so many times as dense as the others.
+const REFERENCE_DENSITY_FACTOR: f64 = 2.0;
+
+/// A spot of less than this half-angle is a thin beam [rad].
+const THIN_RAD: f64 = 0.05;
+
+/// Every way to sample the spectrum, the paper's first (section 4.1, Plates 3 and 4). Of a scene with thin beams those alone
+/// shine.
+///
+/// # Errors
+/// A scene without dispersive light.
+pub fn spectrum(scene: &Scene, settings: &BakeSettings, wavelengths: &[u32]) -> Result<Sweep> {
+    let mut scene = scene.clone();
+    let is_thin = |light: &Light| matches!(light.kind, LightKind::Spot { outer_cone_rad, .. } if outer_cone_rad < THIN_RAD);
+    if scene.lights.iter().any(is_thin) {
+        scene.lights.retain(is_thin);
+    }
+    let scene = Arc::new(scene);
+    let with = |estimator: Estimator, wavelengths, spectral_sampling| BakeSettings {
+        estimator,
+        sigma: estimator.default_sigma(),
+        wavelengths,
+        spectral_sampling,
+        layers: vec![LayerKind::Caustic],
+        ..settings.clone()
+    };
+    let (split, stochastic) = (SpectralSampling::Split, SpectralSampling::Stochastic);
+    let mut variants = Vec::new();
+    let mut add = |sampling: &str, wavelengths: String, settings: BakeSettings| {
+        let name: &str = settings.estimator.into();
+        variants.push(Variant {
+            sheet: Some(SPECTRUM.0.into()),
+            ..Variant::new(
+                vec![name.into(), sampling.into(), wavelengths.into()],
+                &scene,
+                settings,
+            )
+        });
+    };
+    for (estimator, all) in [
+        (Estimator::Splat, "stochastic"),
+        (Estimator::Wavefront, "interpolated"),
+    ] {
+        for (name, sampling) in [("split", split), ("stochastic", stochastic)] {
+            for &count in wavelengths {
+                let settings = with(estimator, Wavelengths::Fixed(count), Some(sampling));
+                add(name, count.to_string(), settings);
+            }
+        }
+        add(
+            all,
+            "continuous".into(),
+            with(estimator, Wavelengths::Continuous, None),
+        );
+    }
+    let finest = BakeSettings {
+        density_per_sr: settings.density_per_sr * REFERENCE_DENSITY_FACTOR,
+        ..with(
+            Estimator::Wavefront,
+            Wavelengths::Fixed(REFERENCE_WAVELENGTHS),
+            Some(split),
+        )
+    };
+    if !BakeSession::new(Arc::clone(&scene))?
+        .plan(&finest)?
+        .is_on(Effect::Dispersion)
+    {
+        return Err(Error::failure(
+            &scene.source,
+            "no light comes to a diffuse surface by way of glass that parts it",
+            "name a scene with a lit prism, such as builtin:spectrum",
+        ));
+    }
+    Ok(Sweep {
+        name: SPECTRUM.0,
+        what: SPECTRUM.1,
+        note: format!(
+            "`{}` against the wavefront split into {REFERENCE_WAVELENGTHS} wavelengths at {REFERENCE_DENSITY_FACTOR} times the density. \
+             Errors are the root of the squared differences over that of the reference's squares.",
+            scene.source
+        ),
+        labels: &["estimator", "sampling", "wavelengths"],
+        columns: SPECTRUM_COLUMNS,
+        groups: vec![Group {
+            against: Against::Bake(scene, Box::new(finest)),
+            variants,
+        }],
+        sheet_columns: 1,
+        ..Sweep::default()
+    })
+}
+
+const SPECTRUM_COLUMNS: &[Column] = &[
+    RAYS,
+    SPLATS,
+    CPU_S,
+    Column {
+        name: "colour_error",
+        value: |m| norm_of_difference(m, LinearSrgb::to_array),
+    },
+    Column {
+        name: "luminance_error",
+        value: |m| norm_of_difference(m, |colour| [colour.luminance(), 0.0, 0.0]),
+    },
+    FLUX_RATIO,
+];
+
+/// ‖I − R‖ / ‖R‖ over all texels, by area.
+fn norm_of_difference(measured: &Measured, of: fn(LinearSrgb) -> [f64; 3]) -> Cell {
+    let Some(Truth::Maps(references)) = measured.reference.map(|reference| &reference.truth) else {
+        return Cell::Empty;
+    };
+    let square = |rgb: LinearSrgb| of(rgb).iter().map(|channel| channel * channel).sum::<f64>();
+    let counterpart = |map: &IlluminationMap, among: &[IlluminationMap]| {
+        let found = among
+            .iter()
+            .find(|other| other.chart.receiver == map.chart.receiver);
+        found.map(|map| map.dense().total())
+    };
+    let texel = |values: &Option<Vec<[f32; 3]>>, texel: usize| match values {
+        Some(values) => LinearSrgb::from(values[texel].map(f64::from)),
+        None => LinearSrgb::BLACK,
+    };
+    let maps = &measured.result.maps;
+    let is_alone = |map: &&IlluminationMap| counterpart(map, maps).is_none();
+    let (mut difference, mut whole) = (0.0, 0.0);
+    for map in maps.iter().chain(references.iter().filter(is_alone)) {
+        let (image, reference) = (counterpart(map, maps), counterpart(map, references));
+        let chart = map.dense().chart.clone();
+        for index in 0..chart.texel_count() {
+            let area_m2 = chart.texel_area_m2(index);
+            let truth = texel(&reference, index);
+            difference += area_m2 * square(texel(&image, index) - truth);
+            whole += area_m2 * square(truth);
+        }
+    }
+    Cell::Share((difference / whole).sqrt())
+}

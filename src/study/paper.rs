@@ -1,0 +1,845 @@
+//! The studies of built-in scenes: what accuracy costs, how cost grows, and the paper's table, figures and plates
+//! (Collins 1994, *Adaptive Splatting for Specular to Diffuse Light Transport*).
+
+use std::sync::Arc;
+
+use glam::{DVec2, DVec3};
+use rayon::prelude::*;
+
+use super::plot::Plot;
+use super::references::Reference;
+use super::sweep::{
+    ARD, Against, Bench, CPU_S, Column, EYE_PASS_CPU_S, FLUX_RATIO, Group, MEMORY_MB, Measured, RAYS,
+    REFERENCE, RELATIVE_RMSE, Sweep, Variant, WALL_S, number, share,
+};
+use super::table::Cell;
+use crate::error::{Error, Result};
+use crate::geometry::Ray;
+use crate::illumination::accumulator::FluxUnit;
+use crate::light_pass::caustic::path::{PathLimits, PathTracer};
+use crate::optics::LinearSrgb;
+use crate::scene::builtin::{self, parts, pool, shapes};
+use crate::scene::{Camera, LightKind, Mesh, Scene};
+use crate::session::forecast::{forecast, stood_at};
+use crate::session::{BakeResult, CostPoint, Forecast, StopReason};
+use crate::settings::{
+    BakeSettings, Estimator, Footprint, ItemBufferKind, Kernel, KernelSampling, RayPlacement, Sigma,
+};
+use crate::transport::{EffectSet, MediumStack, Tracer};
+use crate::units::Flux;
+
+/// A study of built-in scenes.
+#[derive(Clone, Copy, Debug)]
+pub struct Study {
+    /// On the command line.
+    pub name: &'static str,
+    /// What it finds out, in one line.
+    pub what: &'static str,
+    sweep: fn(&Bench) -> Result<Sweep>,
+}
+
+impl Study {
+    const fn new(name: &'static str, what: &'static str, sweep: fn(&Bench) -> Result<Sweep>) -> Self {
+        Self { name, what, sweep }
+    }
+
+    /// Its bakes.
+    ///
+    /// # Errors
+    /// Never for built-in scenes and references as they are shipped.
+    pub fn sweep(&self, bench: &Bench) -> Result<Sweep> {
+        Ok(Sweep {
+            name: self.name,
+            what: self.what,
+            ..(self.sweep)(bench)?
+        })
+    }
+}
+
+/// All of them, in the order of the paper, what it has not first.
+pub const STUDIES: [Study; 11] = [
+    Study::new(
+        "accuracy",
+        "error against CPU time and rays for every built-in scene, with what was predicted",
+        accuracy,
+    ),
+    Study::new(
+        "scaling",
+        "how cost grows with rays, triangles, texels and threads",
+        scaling,
+    ),
+    Study::new(
+        "table1",
+        "Table 1: error, rays and times at the paper's three densities, beside its own figures",
+        table1,
+    ),
+    Study::new("rays", "Figure 6a: error against the number of light rays", rays),
+    Study::new("sigma", "Figure 6b: error against sigma", sigma),
+    Study::new(
+        "resolution",
+        "Plate 6: maps of 30, 100 and 300 texels across",
+        resolution,
+    ),
+    Study::new(
+        "kernels",
+        "Figure 5, Plates 1 and 2: shapes and sizes of kernels",
+        kernels,
+    ),
+    Study::new(
+        "connectivity",
+        "Figure 3: density of nearest hits against areas between neighbouring rays",
+        connectivity,
+    ),
+    Study::new(
+        "item-buffer",
+        "section 3.1.2: cells of a cube against cells of equal solid angle",
+        item_buffer,
+    ),
+    Study::new(
+        "pool",
+        "Plates 7 and 8: a pool from above and from below, its waves as a mesh and as bumps",
+        pool_plates,
+    ),
+    Study::new(
+        "complex",
+        "Plate 9: how a mesh of some 4,000 polygons shows in its caustic",
+        complex,
+    ),
+];
+
+/// The paper's densest lattice but one [1/sr].
+const DENSITY_PER_SR: f64 = 79_577.5;
+
+type Way = (&'static str, fn(f64) -> BakeSettings);
+const AS_PAPER: Way = ("splat, as the paper", paper);
+const SPLAT: Way = ("splat", splat);
+const WAVEFRONT: Way = ("wavefront", wavefront);
+
+/// What "as the paper" means.
+const AS_PAPER_NOTE: &str = "As the paper: jittered rays, a cube around the light, discs of the wavefront's area, point samples \
+                             of a gaussian with σ = 1.";
+
+/// The paper's own choices.
+fn paper(density_per_sr: f64) -> BakeSettings {
+    BakeSettings {
+        footprint: Footprint::Disc,
+        rays: RayPlacement::Jittered,
+        item_buffer: ItemBufferKind::Cube,
+        kernel_sampling: KernelSampling::Point,
+        ..splat(density_per_sr)
+    }
+}
+
+fn splat(density_per_sr: f64) -> BakeSettings {
+    BakeSettings {
+        density_per_sr,
+        ..BakeSettings::splat()
+    }
+}
+
+/// Exactly one lattice.
+fn wavefront(density_per_sr: f64) -> BakeSettings {
+    BakeSettings {
+        density_per_sr,
+        ..BakeSettings::default()
+    }
+}
+
+/// A built-in scene with the name that it has on the command line.
+fn scene(name: &str) -> Result<Arc<Scene>> {
+    let scene = builtin::build(name).map(Arc::new);
+    scene.ok_or_else(|| Error::failure(name, "there is no built-in scene of that name", "report this"))
+}
+
+/// A built-in scene with its analytic map.
+fn scene_and_truth(name: &str) -> Result<(Arc<Scene>, Against)> {
+    let scene = scene(name)?;
+    match Reference::analytic(&scene)? {
+        Some(reference) => Ok((scene, Against::Known(reference))),
+        None => Err(Error::failure(name, "it has no analytic map", "report this")),
+    }
+}
+
+const fn error_against_rays(file: &'static str, by: &'static [&'static str]) -> Plot {
+    Plot {
+        file,
+        x: "rays",
+        y: "relative_rmse",
+        by,
+        only: None,
+    }
+}
+
+/// What a bake that got to its target was expected to take when its error was first at most five times that, and where it
+/// stood then.
+fn predicted(measured: &Measured) -> Option<(CostPoint, Forecast)> {
+    let (result, target) = (measured.result, measured.variant.settings.max_error?);
+    let made = stood_at(&result.course, 5.0 * target)?;
+    let expected = forecast(&result.course[..=made], target, Estimator::Wavefront)?;
+    (result.stop_reason == StopReason::MaxError).then_some((result.course[made], expected))
+}
+
+/// Predicted over actual.
+fn predicted_over_actual(measured: &Measured, of: fn(&Forecast) -> f64, cost: fn(&CostPoint) -> f64) -> Cell {
+    let actual = measured.result.course.last().map(cost);
+    number(
+        predicted(measured)
+            .zip(actual)
+            .map(|((_, expected), actual)| of(&expected) / actual),
+    )
+}
+
+const ACCURACY: &[Column] = &[
+    RAYS,
+    CPU_S,
+    WALL_S,
+    MEMORY_MB,
+    Column {
+        name: "estimated_rmse",
+        value: |m| share(m.result.estimated_relative_rmse),
+    },
+    RELATIVE_RMSE,
+    Column {
+        name: "stop",
+        value: |m| format!("{:?}", m.result.stop_reason).into(),
+    },
+    Column {
+        name: "predicted_at_rmse",
+        value: |m| share(predicted(m).map(|(made_at, _)| made_at.relative_rmse)),
+    },
+    Column {
+        name: "predicted_rays",
+        value: |m| number(predicted(m).map(|(_, expected)| expected.rays as f64)),
+    },
+    Column {
+        name: "predicted_cpu_s",
+        value: |m| number(predicted(m).map(|(_, expected)| expected.cpu_s)),
+    },
+    Column {
+        name: "rays_ratio",
+        value: |m| predicted_over_actual(m, |f| f.rays as f64, |p| p.rays as f64),
+    },
+    Column {
+        name: "cpu_ratio",
+        value: |m| predicted_over_actual(m, |f| f.cpu_s, |p| p.cpu_s),
+    },
+    REFERENCE,
+];
+
+fn accuracy(bench: &Bench) -> Result<Sweep> {
+    const TARGETS: [f64; 5] = [0.10, 0.05, 0.02, 0.01, 0.005];
+    const DENSITIES: [f64; 4] = [1e4, 1e5, 1e6, 4e6];
+    const PLOTS: &[Plot] = &[
+        by_scene("wavefront-cpu", "cpu_s", "wavefront"),
+        by_scene("wavefront-rays", "rays", "wavefront"),
+        by_scene("splat-cpu", "cpu_s", "splat"),
+        by_scene("splat-rays", "rays", "splat"),
+    ];
+    const fn by_scene(file: &'static str, x: &'static str, estimator: &'static str) -> Plot {
+        Plot {
+            x,
+            only: Some(("estimator", estimator)),
+            ..error_against_rays(file, &["scene"])
+        }
+    }
+    let towards = |target: f64, limit_s: f64| BakeSettings {
+        max_error: Some(target),
+        max_time_s: Some(limit_s),
+        ..bench.at(
+            wavefront(BakeSettings::starting_density_per_sr(target)),
+            bench.side(),
+        )
+    };
+    let names = if bench.quick {
+        &["mirror", "pool"][..]
+    } else {
+        &builtin::NAMES
+    };
+    let mut groups = Vec::new();
+    for &name in names {
+        let scene = scene(name)?;
+        let against = match Reference::analytic(&scene)? {
+            Some(reference) => Against::Known(reference),
+            None => Against::Bake(Arc::clone(&scene), Box::new(towards(0.002, 60.0))),
+        };
+        let variant = |way: Way, target, settings: BakeSettings| {
+            let labels = vec![
+                name.into(),
+                way.0.into(),
+                share(target),
+                settings.density_per_sr.into(),
+            ];
+            Variant::new(labels, &scene, settings)
+        };
+        let targets = bench.some(&TARGETS, 4).iter();
+        let targets = targets.map(|&target| variant(WAVEFRONT, Some(target), towards(target, 20.0)));
+        let densities = bench.some(&DENSITIES, 2).iter();
+        let splats = densities.map(|&density| {
+            let settings = BakeSettings {
+                max_time_s: Some(20.0),
+                ..bench.at(splat(density), bench.side())
+            };
+            variant(SPLAT, None, settings)
+        });
+        groups.push(Group {
+            against,
+            variants: targets.chain(splats).collect(),
+        });
+    }
+    Ok(Sweep {
+        note: "The wavefront refines towards each target; splats trace lattices of given densities. Bakes end after 20 s. Predictions \
+               are of when the error was first at most five times the target. A scene without a map that is known is measured against a bake \
+               to 0.2 % of 60 s, where that gets to 1 %."
+            .into(),
+        labels: &["scene", "estimator", "target", "density_per_sr"],
+        columns: ACCURACY,
+        groups,
+        plots: PLOTS,
+        ..Sweep::default()
+    })
+}
+
+const SCALING: &[Column] = &[
+    RAYS,
+    Column {
+        name: "segments_per_ray",
+        value: |m| per_ray(m, m.result.counts.segments as f64),
+    },
+    Column {
+        name: "plan_cpu_s",
+        value: |m| m.result.cpu_s.plan.into(),
+    },
+    Column {
+        name: "us_per_ray",
+        value: |m| per_ray(m, 1e6 * (m.result.cpu_s.trace + m.result.cpu_s.deposit)),
+    },
+    WALL_S,
+    MEMORY_MB,
+];
+
+fn per_ray(measured: &Measured, amount: f64) -> Cell {
+    (amount / measured.result.counts.rays.max(1) as f64).into()
+}
+
+fn scaling(bench: &Bench) -> Result<Sweep> {
+    const DENSITIES: [f64; 6] = [1e3, 1e4, 1e5, 1e6, 1e7, 1e8];
+    const LEVELS: [u32; 5] = [2, 4, 6, 8, 9];
+    const SIDES: [usize; 8] = [64, 128, 256, 512, 1024, 2048, 4096, 8192];
+    const PLOTS: &[Plot] = &[
+        ladder("scaling-rays", "us_per_ray", "rays"),
+        ladder("scaling-memory", "memory_mb", "rays"),
+        ladder("scaling-triangles", "us_per_ray", "triangles"),
+        ladder("scaling-texels", "wall_s", "texels"),
+    ];
+    const fn ladder(file: &'static str, y: &'static str, what: &'static str) -> Plot {
+        Plot {
+            file,
+            x: "value",
+            y,
+            by: &["what"],
+            only: Some(("what", what)),
+        }
+    }
+    let ring = scene("ring")?;
+    // So little that what was traced is not kept for later changes.
+    let thrifty = |settings: BakeSettings| BakeSettings {
+        memory_bytes: 16 << 20,
+        ..bench.at(settings, 256)
+    };
+    let usual = splat(if bench.quick { 1e4 } else { 3e5 });
+    let step = |what: &str, value: f64, scene: &Arc<Scene>, settings| {
+        Variant::new(vec![what.into(), value.into()], scene, settings)
+    };
+    let mut variants = Vec::new();
+    for &density in bench.some(&DENSITIES, 3) {
+        variants.push(step("rays", density, &ring, thrifty(splat(density))));
+    }
+    for &levels in bench.some(&LEVELS, 3) {
+        let mesh = shapes::sphere(DVec3::new(0.0, 0.8, 0.0), 0.5, levels);
+        let ball = over_a_floor(0.6, ("ball", mesh), DVec3::new(0.0, 3.0, 0.0));
+        let triangles = 20.0 * 4_f64.powi(levels as i32);
+        variants.push(step("triangles", triangles, &ball, bench.at(usual.clone(), 256)));
+    }
+    for &side in bench.some(&SIDES, 3) {
+        variants.push(step(
+            "texels",
+            (side * side) as f64,
+            &ring,
+            bench.at(usual.clone(), side),
+        ));
+    }
+    for threads in [1, 2] {
+        let settings = BakeSettings {
+            threads,
+            ..thrifty(splat(if bench.quick { 1e4 } else { 1e7 }))
+        };
+        variants.push(step("threads", threads as f64, &ring, settings));
+    }
+    Ok(Sweep {
+        note: "Splats on `ring`, maps of 256 × 256 texels but where those are counted; triangles: a glass ball over a floor.".into(),
+        labels: &["what", "value"],
+        columns: SCALING,
+        groups: vec![Group {
+            against: Against::Nothing,
+            variants,
+        }],
+        plots: PLOTS,
+        ..Sweep::default()
+    })
+}
+
+/// Something of glass over a floor of that half width, below a lamp.
+fn over_a_floor(half_m: f64, (name, mesh): (&str, Mesh), lamp: DVec3) -> Arc<Scene> {
+    let mut scene = parts::reference_scene(half_m);
+    scene.name = name.into();
+    parts::add(&mut scene, name, mesh, parts::dielectric("glass", 1.5));
+    scene.lights.push(parts::point_light("light", lamp, Flux(100.0)));
+    Arc::new(scene)
+}
+
+fn table1(bench: &Bench) -> Result<Sweep> {
+    /// Rays per steradian, light rays, light-pass seconds, eye-pass seconds (a 486 at 66 MHz).
+    const TABLE: [(f64, u64, f64, f64); 3] = [
+        (7_957.7, 3_467, 11.57, 148.33),
+        (79_577.5, 34_680, 53.27, 144.72),
+        (795_774.7, 346_813, 379.22, 135.96),
+    ];
+    let (scene, against) = scene_and_truth("ring")?;
+    let mut variants = Vec::new();
+    for &(density, rays, light_pass_s, eye_pass_s) in bench.some(&TABLE, 2) {
+        for (name, settings) in [AS_PAPER, WAVEFRONT] {
+            let paper = [Cell::from(rays), light_pass_s.into(), eye_pass_s.into()];
+            let labels = [density.into(), name.into()].into_iter().chain(paper).collect();
+            let file = format!("table1-{}", variants.len() + 1);
+            variants.push(Variant {
+                views: vec![(file, scene.cameras[0].clone())],
+                ..Variant::new(labels, &scene, bench.at(settings(density), bench.side()))
+            });
+        }
+    }
+    Ok(Sweep {
+        note: format!(
+            "`ring` in place of the paper's test scene, whose measures it does not give. {AS_PAPER_NOTE}"
+        ),
+        labels: &[
+            "density_per_sr",
+            "estimator",
+            "paper_rays",
+            "paper_light_pass_s",
+            "paper_eye_pass_s",
+        ],
+        columns: &[RAYS, RELATIVE_RMSE, ARD, CPU_S, EYE_PASS_CPU_S],
+        groups: vec![Group { against, variants }],
+        ..Sweep::default()
+    })
+}
+
+fn rays(bench: &Bench) -> Result<Sweep> {
+    const DENSITIES: [f64; 7] = [1e3, 3e3, 1e4, 3e4, 1e5, 3e5, 1e6];
+    let (scene, against) = scene_and_truth("ring")?;
+    let variants = [AS_PAPER, SPLAT, WAVEFRONT]
+        .into_iter()
+        .flat_map(|(name, settings)| {
+            let densities = bench.some(&DENSITIES, 4).iter();
+            let scene = &scene;
+            densities.map(move |&density| {
+                let settings = bench.at(settings(density), bench.side());
+                Variant::new(vec![name.into(), density.into()], scene, settings)
+            })
+        });
+    Ok(Sweep {
+        note: format!("`ring`. {AS_PAPER_NOTE}"),
+        labels: &["estimator", "density_per_sr"],
+        columns: &[RAYS, CPU_S, RELATIVE_RMSE, ARD],
+        groups: vec![Group {
+            variants: variants.collect(),
+            against,
+        }],
+        plots: const { &[error_against_rays("rays", &["estimator"])] },
+        ..Sweep::default()
+    })
+}
+
+fn sigma(bench: &Bench) -> Result<Sweep> {
+    const SIGMAS: [f64; 12] = [0.1, 0.3, 0.5, 1.0, 3.0, 0.2, 0.4, 0.7, 0.9, 1.4, 2.0, 5.0];
+    /// σ counts squared lengths: in squares of half the side of the square of the footprint's area instead of squares of the
+    /// radius of its disc, the same kernel has a σ so many times as large.
+    const PER_HALF_SIDE: f64 = 4.0 / std::f64::consts::PI;
+    let (scene, against) = scene_and_truth("ring")?;
+    let even = BakeSettings {
+        rays: RayPlacement::Lattice,
+        ..paper(DENSITY_PER_SR)
+    };
+    let mut variants = Vec::new();
+    for (name, kernel) in [
+        ("as the paper", paper(DENSITY_PER_SR)),
+        ("as the paper, without jitter", even),
+        ("ellipses, integrated", splat(DENSITY_PER_SR)),
+    ] {
+        for &sigma in bench.some(&SIGMAS, 5) {
+            let labels = vec![name.into(), sigma.into(), (sigma * PER_HALF_SIDE).into()];
+            let settings = BakeSettings {
+                sigma: Sigma::Constant(sigma),
+                ..bench.at(kernel.clone(), bench.side())
+            };
+            variants.push(Variant::new(labels, &scene, settings));
+        }
+    }
+    Ok(Sweep {
+        note: format!(
+            "`ring`, {DENSITY_PER_SR} rays/sr. {AS_PAPER_NOTE} The paper writes the kernel as exp(−r²/2σ) without the unit of r. Here \
+             r is 1 on the edge of the disc of the footprint's area; `sigma_half_sides` has r = 1 at half a side of the square of \
+             that area."
+        ),
+        labels: &["kernel", "sigma", "sigma_half_sides"],
+        columns: &[RELATIVE_RMSE, ARD],
+        groups: vec![Group { against, variants }],
+        plots: &[Plot {
+            file: "sigma",
+            x: "sigma",
+            y: "relative_rmse",
+            by: &["kernel"],
+            only: None,
+        }],
+        ..Sweep::default()
+    })
+}
+
+fn resolution(bench: &Bench) -> Result<Sweep> {
+    let scene = scene("ring")?;
+    let finer = wavefront(if bench.quick { 8e3 } else { 4.0 * DENSITY_PER_SR });
+    let groups = bench.some(&[30, 100, 300], 2).iter().map(|&side| {
+        let variants = [SPLAT, WAVEFRONT].map(|(name, settings)| Variant {
+            views: vec![(format!("plate6-{side}-{name}"), scene.cameras[0].clone())],
+            sheet: Some("plate6-maps".into()),
+            ..Variant::new(
+                vec![name.into(), (side as u64).into()],
+                &scene,
+                bench.at(settings(DENSITY_PER_SR), side),
+            )
+        });
+        Group {
+            against: Against::Bake(Arc::clone(&scene), Box::new(bench.at(finer.clone(), side))),
+            variants: variants.into(),
+        }
+    });
+    Ok(Sweep {
+        note: format!(
+            "`ring`, {DENSITY_PER_SR} rays/sr; each size against a wavefront of the same size with four times the rays, so that the \
+             error is what rays and kernels leave, not what texels average."
+        ),
+        labels: &["estimator", "side_texels"],
+        columns: &[RAYS, CPU_S, EYE_PASS_CPU_S, RELATIVE_RMSE, ARD],
+        groups: groups.collect(),
+        sheet_columns: 7,
+        ..Sweep::default()
+    })
+}
+
+const KERNELS: &[Column] = &[
+    RELATIVE_RMSE,
+    ARD,
+    Column {
+        name: "paper_rms",
+        value: |m| {
+            let square = |pair: &super::agreement::TexelPair| (pair.image - pair.reference).powi(2);
+            m.pairs.iter().map(square).sum::<f64>().sqrt().into()
+        },
+    },
+    Column {
+        name: "paper_ard",
+        value: |m| {
+            let lit = m.pairs.iter().filter(|pair| pair.reference > 0.0);
+            let sum: f64 = lit
+                .map(|pair| (pair.image - pair.reference).abs() / pair.reference)
+                .sum();
+            Cell::Share(sum / m.pairs.len() as f64)
+        },
+    },
+];
+
+fn kernels(bench: &Bench) -> Result<Sweep> {
+    const SHAPES: [(&str, Kernel, Sigma); 7] = [
+        ("box", Kernel::Box, Sigma::Constant(1.0)),
+        ("disc", Kernel::Disc, Sigma::Constant(1.0)),
+        ("cone", Kernel::Cone, Sigma::Constant(1.0)),
+        ("gaussian 0.5", Kernel::Gaussian, Sigma::Constant(0.5)),
+        ("gaussian 1", Kernel::Gaussian, Sigma::Constant(1.0)),
+        ("gaussian 2", Kernel::Gaussian, Sigma::Constant(2.0)),
+        ("gaussian adaptive", Kernel::Gaussian, Sigma::Adaptive),
+    ];
+    let (scene, against) = scene_and_truth("ring")?;
+    let mut variants = Vec::new();
+    for (placement, rays) in [
+        ("jittered", RayPlacement::Jittered),
+        ("even", RayPlacement::Lattice),
+    ] {
+        for (size, footprint) in [
+            ("neighbours", Footprint::Disc),
+            ("distance", Footprint::Distance),
+            ("fixed", Footprint::Fixed),
+        ] {
+            for (shape, kernel, sigma) in SHAPES {
+                let settings = BakeSettings {
+                    rays,
+                    footprint,
+                    kernel,
+                    sigma,
+                    ..bench.at(paper(DENSITY_PER_SR), bench.side())
+                };
+                variants.push(Variant {
+                    sheet: Some(format!("kernels-{placement}-{size}")),
+                    ..Variant::new(
+                        vec![placement.into(), shape.into(), size.into()],
+                        &scene,
+                        settings,
+                    )
+                });
+            }
+        }
+    }
+    Ok(Sweep {
+        note: format!(
+            "`ring`, {DENSITY_PER_SR} rays/sr, point-sampled kernels, the cube. `paper_rms` is the paper's (5.1) [W/m²], which sums \
+             without a mean, `paper_ard` its (5.2), which divides by every texel that is not black."
+        ),
+        labels: &["placement", "kernel", "size"],
+        columns: KERNELS,
+        groups: vec![Group { against, variants }],
+        sheet_columns: 8,
+        ..Sweep::default()
+    })
+}
+
+fn connectivity(bench: &Bench) -> Result<Sweep> {
+    let (scene, against) = scene_and_truth("ring")?;
+    let density = if bench.quick { 8e3 } else { DENSITY_PER_SR };
+    let variant = |name: &str, hits: Option<u64>, (_, settings): Way| Variant {
+        estimate: hits.map(|_| nearest_hits as fn(&Variant, BakeResult) -> BakeResult),
+        sheet: Some("connectivity".into()),
+        ..Variant::new(
+            vec![name.into(), hits.map_or(Cell::Empty, Cell::Count)],
+            &scene,
+            bench.at(settings(density), bench.side() / 2),
+        )
+    };
+    let nearest = [4, 16, 64].map(|hits| variant("nearest hits", Some(hits), SPLAT));
+    let areas = [AS_PAPER, WAVEFRONT].map(|way| variant(way.0, None, way));
+    Ok(Sweep {
+        note: format!(
+            "`ring`, {density} rays/sr. A density estimate sums the flux of the hits nearest to a texel's centre and divides by the \
+             disc that holds them. {AS_PAPER_NOTE}"
+        ),
+        labels: &["estimate", "hits"],
+        columns: &[RAYS, RELATIVE_RMSE, ARD],
+        groups: vec![Group {
+            against,
+            variants: nearest.into_iter().chain(areas).collect(),
+        }],
+        sheet_columns: 3,
+        ..Sweep::default()
+    })
+}
+
+/// In place of what was baked: E by the density of the nearest hits, on the floor of a built-in scene.
+fn nearest_hits(variant: &Variant, mut result: BakeResult) -> BakeResult {
+    /// Half the side of the floor [m].
+    const HALF_M: f64 = 1.0;
+    let count = variant.labels[1].value().unwrap_or(1.0) as usize;
+    let hits = hits(&variant.scene, variant.settings.density_per_sr);
+    result.counts.rays = hits.len() as u64;
+    for map in &mut result.maps {
+        let (width, height) = (map.width(), map.height());
+        let texel = |index: usize| {
+            let at = |index: usize, side: usize| HALF_M * ((2 * index + 1) as f64 / side as f64 - 1.0);
+            let centre = DVec2::new(at(index % width, width), at(index / width, height));
+            let near = hits
+                .iter()
+                .map(|(place, flux_w)| (place.distance_squared(centre), *flux_w));
+            let mut near: Vec<(f64, f64)> = near.collect();
+            let last = count.min(near.len()).saturating_sub(1);
+            near.select_nth_unstable_by(last, |a, b| a.0.total_cmp(&b.0));
+            let flux_w: f64 = near[..=last].iter().map(|hit| hit.1).sum();
+            [(flux_w / (std::f64::consts::PI * near[last].0)) as f32; 3]
+        };
+        for layer in &mut map.layers {
+            layer.irradiance = (0..width * height).into_par_iter().map(texel).collect();
+        }
+    }
+    result
+}
+
+/// Where on the floor [m] the light of the scene's lamps falls, and how much [W]: directions on a spiral, evenly dense.
+fn hits(scene: &Arc<Scene>, density_per_sr: f64) -> Vec<(DVec2, f64)> {
+    let tracer = Tracer::new(Arc::clone(scene));
+    let limits = PathLimits {
+        max_depth: 16,
+        branch_threshold: 1e-4,
+        effects: EffectSet::EVERYTHING,
+        microfacets: None,
+    };
+    let mut paths = PathTracer::new(&tracer, limits, FluxUnit::for_power(1e3));
+    let golden = 0.5 * (5_f64.sqrt() - 1.0);
+    let mut hits = Vec::new();
+    for light in &scene.lights {
+        let LightKind::Point { position, intensity } = light.kind else {
+            continue;
+        };
+        let sphere_sr = 4.0 * std::f64::consts::PI;
+        let count = (sphere_sr * density_per_sr).round();
+        let flux_w = LinearSrgb::grey(intensity.0 * light.colour.luminance() * sphere_sr / count);
+        for index in 0..count as u64 {
+            let height = 1.0 - (2.0 * index as f64 + 1.0) / count;
+            let turn = DVec2::from_angle(std::f64::consts::TAU * (index as f64 * golden).fract());
+            let across = turn * (1.0 - height * height).sqrt();
+            let ray = Ray {
+                origin: position,
+                direction: DVec3::new(across.x, height, across.y),
+            };
+            paths.trace(ray, flux_w, &MediumStack::default(), |arrival| {
+                let place = DVec2::new(arrival.point.x, arrival.point.z);
+                hits.push((place, arrival.flux_w.luminance()));
+            });
+        }
+    }
+    hits
+}
+
+fn item_buffer(bench: &Bench) -> Result<Sweep> {
+    let mut groups = Vec::new();
+    for &name in bench.some(&["ring", "ball"], 1) {
+        let (scene, against) = scene_and_truth(name)?;
+        let mut variants = Vec::new();
+        for (kind, item_buffer) in [("equal", ItemBufferKind::Equal), ("cube", ItemBufferKind::Cube)] {
+            for &density in bench.some(&[1e3, 1e4, 1e5, 1e6], 2) {
+                let settings = BakeSettings {
+                    item_buffer,
+                    rays: RayPlacement::Jittered,
+                    ..bench.at(splat(density), bench.side())
+                };
+                variants.push(Variant::new(
+                    vec![name.into(), kind.into(), density.into()],
+                    &scene,
+                    settings,
+                ));
+            }
+        }
+        groups.push(Group { against, variants });
+    }
+    Ok(Sweep {
+        note: "Splats of jittered rays. The cube's cells have equal areas on its faces, so that their solid angles differ by up to 5.2 \
+               times; each ray carries the flux of its own cell's solid angle."
+            .into(),
+        labels: &["scene", "item_buffer", "density_per_sr"],
+        columns: &[RAYS, FLUX_RATIO, RELATIVE_RMSE, ARD],
+        groups,
+        plots: const { &[error_against_rays("item-buffer", &["scene", "item_buffer"])] },
+        ..Sweep::default()
+    })
+}
+
+fn pool_plates(bench: &Bench) -> Result<Sweep> {
+    let (mesh, against) = scene_and_truth("pool")?;
+    let mut waters = vec![
+        ("mesh of 512 × 512 quads".to_string(), Arc::clone(&mesh)),
+        ("one polygon with bumps".to_string(), scene("pool-bump")?),
+    ];
+    for &quads in bench.some(&[16, 32, 64, 128], 1) {
+        let mut coarse = Scene::clone(&mesh);
+        coarse
+            .objects
+            .retain(|object| mesh.materials[object.material].surface.is_receiver());
+        let water = pool::water(DVec3::Y, [1.5; 2], [quads; 2], &pool::waves(pool::AMPLITUDE_M));
+        parts::add(&mut coarse, "water", water, parts::dielectric("water", 1.333));
+        waters.push((format!("mesh of {quads} × {quads} quads"), Arc::new(coarse)));
+    }
+    let mut variants: Vec<Variant> = Vec::new();
+    for (name, scene) in &waters {
+        let labels = vec![name.clone().into(), Cell::Count(scene.triangle_count() as u64)];
+        variants.push(Variant::new(
+            labels,
+            scene,
+            bench.at(wavefront(4e4), bench.side()),
+        ));
+    }
+    let from = |file: &str, position: DVec3| {
+        let target = DVec3::new(0.0, 0.1, 0.0);
+        (
+            file.to_string(),
+            Camera::look_at(file, position, target, 55_f64.to_radians()),
+        )
+    };
+    variants[0].views = vec![
+        from("plate7-above", DVec3::new(1.6, 2.6, 2.4)),
+        from("plate8-below", DVec3::new(0.9, 0.7, 0.9)),
+    ];
+    Ok(Sweep {
+        note: "`pool`, wavefront, 40,000 rays/sr, against smooth displaced water.".into(),
+        labels: &["water", "triangles"],
+        columns: &[RAYS, CPU_S, RELATIVE_RMSE, ARD],
+        groups: vec![Group { against, variants }],
+        ..Sweep::default()
+    })
+}
+
+fn complex(bench: &Bench) -> Result<Sweep> {
+    /// Quads around and along the knot's tube: the second has about as many triangles as the paper's object (3,958).
+    const MESHES: [(u32, u32); 3] = [(11, 45), (22, 90), (44, 180)];
+    let settings = bench.at(wavefront(if bench.quick { 500.0 } else { 3e3 }), bench.side());
+    let knot = |(around, along)| over_a_floor(1.0, ("knot", tube(around, along)), DVec3::new(0.4, 2.4, 0.3));
+    let mut variants = Vec::new();
+    for &mesh in bench.some(&MESHES, 2) {
+        let triangles = 2 * u64::from(mesh.0) * u64::from(mesh.1);
+        let scene = knot(mesh);
+        let views = match mesh == MESHES[1] {
+            true => vec![("plate9".to_string(), scene.cameras[0].clone())],
+            false => Vec::new(),
+        };
+        variants.push(Variant {
+            views,
+            sheet: Some("complex-maps".into()),
+            ..Variant::new(vec![triangles.into()], &scene, settings.clone())
+        });
+    }
+    let finest = knot(if bench.quick { MESHES[2] } else { (88, 360) });
+    Ok(Sweep {
+        note: "A trefoil knot of glass over a floor, wavefront, against the finest mesh: the error is that of the mesh.".into(),
+        labels: &["triangles"],
+        columns: &[RAYS, CPU_S, RELATIVE_RMSE, ARD],
+        groups: vec![Group {
+            against: Against::Bake(finest, Box::new(settings)),
+            variants,
+        }],
+        plots: &[Plot {
+            file: "complex",
+            x: "triangles",
+            y: "relative_rmse",
+            by: &[],
+            only: None,
+        }],
+        sheet_columns: 4,
+        ..Sweep::default()
+    })
+}
+
+/// The tube of a trefoil.
+fn tube(around: u32, along: u32) -> Mesh {
+    const CENTRE: DVec3 = DVec3::new(0.0, 0.55, 0.0);
+    // Radii [m] of the ring that it winds around, of its winding, of its tube.
+    let [ring_m, winding_m, tube_m] = [0.32, 0.13, 0.075];
+    let line = |t: f64| {
+        let angle = std::f64::consts::TAU * t;
+        let reach_m = ring_m + winding_m * (3.0 * angle).cos();
+        let around = DVec2::from_angle(2.0 * angle) * reach_m;
+        CENTRE + DVec3::new(around.x, winding_m * (3.0 * angle).sin(), around.y)
+    };
+    shapes::sheet(along, around, |u, v| {
+        let (u, v) = (u.fract(), v.fract());
+        let middle = line(u);
+        let ahead = (line(u + 1e-5) - line(u - 1e-5)).normalize();
+        let side = ahead.cross((middle - CENTRE).normalize()).normalize();
+        let (sine, cosine) = (std::f64::consts::TAU * v).sin_cos();
+        let normal = side.cross(ahead) * cosine + side * sine;
+        (middle + tube_m * normal, normal)
+    })
+}

@@ -1,0 +1,257 @@
+//! Errors without a reference, against errors against one: a bake of the same mesh with many times the rays.
+
+use glam::{DQuat, DVec3};
+use nephroid::scene::builtin::{parts, shapes};
+use nephroid::scene::{Mesh, Scene};
+use nephroid::session::forecast::{forecast, stood_at};
+use nephroid::session::{BakeResult, StopReason};
+use nephroid::settings::{BakeSettings, Estimator, RayPlacement};
+use nephroid::units::{Flux, Irradiance};
+use rand_pcg::Pcg64Mcg;
+use rand_pcg::rand_core::{Rng, SeedableRng};
+
+use crate::bake::common::{CAUSTIC_AND_DIRECT, caustic_like, same_map, torus, towards, turned, with_layers};
+use support::tools::{at, bake, builtin_scene, caustic, settings};
+
+/// Side of all maps [texels].
+const SIDE: usize = 128;
+
+/// Relative RMSE against a finer bake, over all maps by area; maps that only one of both has count as black in the
+/// other.
+fn true_error(result: &BakeResult, truth: &BakeResult) -> f64 {
+    let (mut squares, mut flux_w, mut area_m2) = (0.0, 0.0, 0.0);
+    for map in &truth.maps {
+        let values = caustic_like(result, map);
+        for (texel, (wanted, value)) in caustic(map).into_iter().zip(values).enumerate() {
+            let texel_m2 = map.chart.texel_area_m2(texel);
+            squares += (value - wanted) * (value - wanted) * texel_m2;
+            flux_w += wanted * texel_m2;
+            area_m2 += texel_m2;
+        }
+    }
+    (squares * area_m2).sqrt() / flux_w
+}
+
+/// The reference scenes with the density at which they have converged [rays/sr].
+const CONVERGED: [(&str, f64); 7] = [
+    ("ring", 2e5),
+    ("ball", 4e5),
+    ("pool", 2e5),
+    ("mirror", 4e5),
+    ("slab", 1e5),
+    ("paraboloid", 2e5),
+    ("nephroid", 4e5),
+];
+
+/// Rays expected and taken to an error, by counts: clocks tell nothing on a busy machine.
+fn check_forecast(name: &str, result: &BakeResult, target: f64) {
+    let course = &result.course;
+    let made = stood_at(course, 0.05).expect("more than one level");
+    let expected = forecast(&course[..=made], target, Estimator::Wavefront).expect("known");
+    let actual = course.last().expect("it has one").rays;
+    let ratio = expected.rays as f64 / actual as f64;
+    println!(
+        "{name:<11} at {:5.2} %, {:>6} rays: {:>6} expected, {actual:>6} taken, ratio {ratio:.2}",
+        100.0 * course[made].relative_rmse,
+        course[made].rays,
+        expected.rays
+    );
+    assert!(expected.factor > 1.0, "{name}: it is a guess");
+    assert!((0.5..2.0).contains(&ratio), "{name}: {ratio}");
+}
+
+/// Estimates are within a factor of two of the error, and the rays to an error of 1 % are known within a factor of two once
+/// it is 5 %.
+#[test]
+fn estimates_and_rays_to_one_per_cent() {
+    let (mut faults, mut too_careful) = (Vec::new(), 0);
+    for (index, (name, converged_per_sr)) in CONVERGED.into_iter().enumerate() {
+        let truth = bake(builtin_scene(name), &at(converged_per_sr, SIDE));
+        if index < 4 {
+            faults.extend(texel_fault(name, &truth));
+        }
+        for target in [0.05, 0.02, 0.01] {
+            let result = bake(builtin_scene(name), &towards(target, SIDE));
+            let estimate = result.estimated_relative_rmse.expect("an estimate");
+            let error = true_error(&result, &truth);
+            assert_eq!(result.stop_reason, StopReason::MaxError, "{name}, {target}");
+            assert!(estimate <= target, "{name}: {estimate} for {target}");
+            let ratio = error / estimate;
+            // No estimate may be less than half of the error. One is known to be more than twice as large: the square
+            // mirror's straight edges come right within its last level.
+            too_careful += usize::from(ratio < 0.5);
+            if !(0.4..=2.0).contains(&ratio) || (target == 0.02 && error > 0.03) {
+                faults.push(format!("{name}, {target}: true {error}, estimated {estimate}"));
+            }
+            if target == 0.01 {
+                check_forecast(name, &result, target);
+            }
+        }
+    }
+    assert!(faults.is_empty(), "{faults:#?}");
+    assert!(too_careful <= 1, "{too_careful} estimates are twice the error");
+}
+
+/// Means of 2×2 texels.
+fn halved(values: &[f64], side: usize) -> Vec<f64> {
+    let mut means = vec![0.0; values.len() / 4];
+    for (texel, value) in values.iter().enumerate() {
+        means[texel / side / 2 * (side / 2) + texel % side / 2] += 0.25 * value;
+    }
+    means
+}
+
+/// Texels say how far off each of them is expected to be: of those that are not dark 95 in 100 are within 7 times that, 99
+/// in 100 within 18 times. It is no bound: where light folds, levels miss the same.
+fn texel_fault(name: &str, truth: &BakeResult) -> Option<String> {
+    // The ball's dimmest texels are off by more than they say as long as all are off by 4 % of the mean.
+    let densities: &[f64] = if name == "ball" { &[2e4] } else { &[5e3, 2e4] };
+    densities.iter().find_map(|&density_per_sr| {
+        let result = bake(builtin_scene(name), &at(density_per_sr, SIDE / 2));
+        let mut off: Vec<f64> = Vec::new();
+        for map in &truth.maps {
+            let Some(found) = same_map(&result, map) else {
+                continue;
+            };
+            let (wanted, values) = (halved(&caustic(map), SIDE), caustic(found));
+            let mean = wanted.iter().sum::<f64>() / wanted.len() as f64;
+            let errors = found.error.as_ref().expect("an estimate");
+            for ((value, error), wanted) in values.into_iter().zip(errors).zip(wanted) {
+                if wanted > 0.01 * mean {
+                    off.push((value - wanted).abs() / f64::from(*error).max(1e-6 * mean));
+                }
+            }
+        }
+        off.sort_by(f64::total_cmp);
+        let [most, nearly_all] = [0.95, 0.99].map(|share| off[(share * (off.len() - 1) as f64) as usize]);
+        let is_fault = !(most <= 7.0 && nearly_all <= 18.0);
+        is_fault.then(|| format!("texels of {name} at {density_per_sr}: {most}, {nearly_all}"))
+    })
+}
+
+/// One of many scenes: a floor, something specular over it, a lamp.
+fn random_scene(seed: u64) -> Scene {
+    let mut random = Pcg64Mcg::seed_from_u64(0x5eed ^ seed << 8);
+    let mut unit = || (random.next_u64() >> 11) as f64 * (-53_f64).exp2();
+    let mut scene = parts::reference_scene(1.0);
+    let mut around = |low: f64, high: f64| low + (high - low) * unit();
+    let centre = DVec3::new(around(-0.4, 0.4), around(0.35, 0.8), around(-0.4, 0.4));
+    let size = around(0.12, 0.3);
+    let turn = DQuat::from_rotation_y(around(0.0, 6.0)) * DQuat::from_rotation_x(around(0.9, 1.6));
+    let kind = around(0.0, 6.0) as u32;
+    let mesh = match kind {
+        0 | 1 => shapes::sphere(centre, size, 4),
+        2 => shapes::rectangle(centre, turn * DVec3::X * size, turn * DVec3::Z * size),
+        3 => torus(centre, turn, size),
+        4 => bowl(centre, turn, size),
+        _ => {
+            let half = DVec3::new(size, 0.4 * size, 0.7 * size);
+            shapes::cuboid(centre - half, centre + half)
+        }
+    };
+    let material = match kind {
+        1 | 2 | 4 => parts::mirror(),
+        _ => parts::dielectric("glass", 1.3 + 0.5 * around(0.0, 1.0)),
+    };
+    parts::add(&mut scene, "caster", mesh, material);
+    let from = DVec3::new(around(-0.9, 0.9), around(1.6, 2.6), around(-0.9, 0.9));
+    scene.lights.push(if around(0.0, 1.0) < 0.7 {
+        parts::point_light("lamp", from, Flux(10.0))
+    } else {
+        parts::sun("sun", -from, Irradiance(1.0))
+    });
+    scene.name = format!("random {seed}, kind {kind}");
+    scene
+}
+
+/// A half of a hollow sphere, open upwards before it is turned.
+fn bowl(centre: DVec3, turn: DQuat, radius: f64) -> Mesh {
+    shapes::sheet(96, 32, |u, v| {
+        let (sine, cosine) = turned(u);
+        let (down, out) = f64::sin_cos((0.02 + 0.98 * v) * std::f64::consts::FRAC_PI_2);
+        let outward = DVec3::new(cosine * down, -out, sine * down);
+        (centre + turn * outward * radius, turn * -outward)
+    })
+}
+
+#[test]
+fn random_scenes_within_a_factor_of_two() {
+    let (mut ratios, mut faults) = (Vec::new(), Vec::new());
+    for seed in 0..50 {
+        let scene = random_scene(seed);
+        let result = bake(scene.clone(), &at(4e3, SIDE));
+        let Some(estimate) = result.estimated_relative_rmse else {
+            continue;
+        };
+        let error = true_error(&result, &bake(scene.clone(), &at(6.4e4, SIDE)));
+        ratios.push(error / estimate);
+        if !(0.5..=2.0).contains(&(error / estimate)) {
+            faults.push(format!("{}: true {error}, estimated {estimate}", scene.name));
+        }
+    }
+    ratios.sort_by(f64::total_cmp);
+    // Half of these errors are above 20 %: the light of a bowl, say, on a floor that most of it misses.
+    assert!(ratios.len() >= 45, "{} scenes are lit", ratios.len());
+    assert!(faults.len() <= 2, "{faults:#?}");
+    assert!(ratios[0] > 0.33 && ratios[ratios.len() - 1] < 3.0, "{ratios:?}");
+}
+
+/// A splat bake of randomly placed rays against the mean of many such: what is left is noise.
+#[test]
+fn most_texels_lie_within_their_error() {
+    for name in ["ring", "pool"] {
+        let bakes = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11].map(|seed| {
+            let jittered = BakeSettings {
+                rays: RayPlacement::Jittered,
+                seed,
+                ..settings(3e4, SIDE)
+            };
+            bake(builtin_scene(name), &jittered)
+        });
+        let maps = bakes.each_ref().map(|bake| caustic(&bake.maps[0]));
+        let mean = |texel: usize| maps.iter().map(|map| map[texel]).sum::<f64>() / maps.len() as f64;
+        let error = bakes[0].maps[0].error.as_ref().expect("an estimate");
+        let lit: Vec<usize> = (0..maps[0].len()).filter(|&texel| mean(texel) > 0.0).collect();
+        // The mean of twelve holds a twelfth of the one.
+        let scale = (1.0 - 1.0 / maps.len() as f64).sqrt();
+        let is_within =
+            |texel: usize| (maps[0][texel] - mean(texel)).abs() <= f64::from(error[texel]) * scale;
+        let within = lit.iter().filter(|&&texel| is_within(texel)).count();
+        let share = within as f64 / lit.len() as f64;
+        // Blur adds to the noise that this is about.
+        assert!((0.55..=0.8).contains(&share), "{name}: {share}");
+    }
+}
+
+/// The error of a sum is that of its parts together, and direct light, which is no estimate, has none.
+#[test]
+fn errors_of_lights_add_up() {
+    let scene = builtin_scene("ring");
+    let mut twice = scene.clone();
+    twice.lights.push(twice.lights[0].clone());
+    let settings = at(2_000.0, 32);
+    let one = bake(scene.clone(), &settings);
+    let errors = |result: &BakeResult| result.maps[0].error.clone().expect("an estimate");
+    let single = errors(&one);
+    assert!(single.iter().any(|error| *error > 0.0));
+    for (own, both) in single.iter().zip(errors(&bake(twice, &settings))) {
+        let expected = own * std::f32::consts::SQRT_2;
+        assert!((both - expected).abs() <= 1e-5 * expected, "{both} for {own}");
+    }
+    let lit = bake(scene, &with_layers(&CAUSTIC_AND_DIRECT, settings));
+    assert_eq!(errors(&lit), single);
+    let estimate = |result: &BakeResult| result.estimated_relative_rmse.expect("an estimate");
+    assert!((estimate(&lit) / estimate(&one) - 1.0).abs() < 1e-6);
+}
+
+/// Two weak beams beside a lamp that is far stronger: one of them a ball draws together on a texel or two, where it is
+/// brighter than everything else. The floor is lit by all three, the wall by less.
+#[test]
+fn a_weak_light_in_focus_is_not_coarse() {
+    for target in [0.2, 0.1] {
+        let result = bake(builtin_scene("spectrum"), &towards(target, 64));
+        assert_eq!(result.stop_reason, StopReason::MaxError, "{target}");
+        let estimate = result.estimated_relative_rmse.expect("an estimate");
+        assert!(estimate <= target, "{estimate} where {target} is said to be met");
+    }
+}

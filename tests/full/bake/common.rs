@@ -1,0 +1,163 @@
+//! Sessions, settings and comparisons that tests of bakes share.
+
+use std::sync::Arc;
+
+use glam::{DQuat, DVec3};
+use nephroid::illumination::IlluminationMap;
+use nephroid::illumination::compare::relative_rmse;
+use nephroid::progress::Control;
+use nephroid::scene::builtin::shapes;
+use nephroid::scene::{Edit, Mesh, Scene};
+use nephroid::session::{BakeResult, BakeSession};
+use nephroid::settings::{BakeSettings, LayerKind, MapResolution};
+use nephroid::study::brute_force::brute_force;
+use nephroid::transport::Tracer;
+
+use support::tools::{at, bits, caustic, map_of, settings};
+
+pub fn session(scene: &Scene) -> BakeSession {
+    BakeSession::new(Arc::new(scene.clone())).expect("a session")
+}
+
+pub fn run(session: &mut BakeSession, settings: &BakeSettings) -> BakeResult {
+    session.bake(settings, &(), &Control::default()).expect("a bake")
+}
+
+/// Applies an edit to a session's scene.
+pub fn edit(session: &mut BakeSession, edit: &Edit) {
+    let (scene, _) = edit.apply(session.scene()).expect("a sound edit");
+    session.set_scene(Arc::new(scene)).expect("a sound scene");
+}
+
+/// Settings of a bake that ends at an error, with maps of `side` texels each way.
+pub fn towards(target: f64, side: usize) -> BakeSettings {
+    BakeSettings {
+        max_error: Some(target),
+        ..at(BakeSettings::starting_density_per_sr(target), side)
+    }
+}
+
+pub fn sized(settings: BakeSettings, (width, height): (usize, usize)) -> BakeSettings {
+    let map_resolution = MapResolution::Fixed { width, height };
+    BakeSettings {
+        map_resolution,
+        ..settings
+    }
+}
+
+pub fn automatic(settings: BakeSettings) -> BakeSettings {
+    BakeSettings {
+        map_resolution: MapResolution::Auto,
+        ..settings
+    }
+}
+
+pub fn with_layers(layers: &[LayerKind], settings: BakeSettings) -> BakeSettings {
+    BakeSettings {
+        layers: layers.to_vec(),
+        ..settings
+    }
+}
+
+pub const CAUSTIC_AND_DIRECT: [LayerKind; 2] = [LayerKind::Caustic, LayerKind::Direct];
+
+/// Luminance of the floor's caustic [W/m²].
+pub fn floor(result: &BakeResult, scene: &Scene) -> Vec<f64> {
+    caustic(map_of(result, scene, "floor"))
+}
+
+/// The map of the same receiver.
+pub fn same_map<'a>(result: &'a BakeResult, map: &IlluminationMap) -> Option<&'a IlluminationMap> {
+    let mut maps = result.maps.iter();
+    maps.find(|found| found.chart.receiver == map.chart.receiver)
+}
+
+/// Luminance of the same receiver's caustic [W/m²]; black where the result has none.
+pub fn caustic_like(result: &BakeResult, map: &IlluminationMap) -> Vec<f64> {
+    let dark = || vec![0.0; map.chart.texel_count()];
+    same_map(result, map).map_or_else(dark, caustic)
+}
+
+/// Root mean square of the difference over the reference's mean, texels weighing alike.
+pub fn rmse(image: &[f64], reference: &[f64]) -> f64 {
+    relative_rmse(image, reference).expect("a reference with light")
+}
+
+pub fn all_bits(result: &BakeResult) -> Vec<u32> {
+    result.maps.iter().flat_map(bits).collect()
+}
+
+/// What differs between two results beside what they took; `None` where nothing does.
+pub fn difference(a: &BakeResult, b: &BakeResult) -> Option<String> {
+    if a.ledgers != b.ledgers {
+        return Some(format!("ledgers: {:?} and {:?}", a.ledgers, b.ledgers));
+    }
+    let receivers = |result: &BakeResult| -> Vec<_> {
+        let chart = |map: &IlluminationMap| (map.chart.receiver, map.width(), map.height(), map.layers.len());
+        result.maps.iter().map(chart).collect()
+    };
+    if receivers(a) != receivers(b) {
+        return Some(format!("maps of {:?} and {:?}", receivers(a), receivers(b)));
+    }
+    let estimates = [a, b].map(|result| result.estimated_relative_rmse);
+    if estimates[0].map(f64::to_bits) != estimates[1].map(f64::to_bits) {
+        return Some(format!("estimates: {estimates:?}"));
+    }
+    let error_bits = |map: &IlluminationMap| -> Option<Vec<u32>> {
+        let error = map.error.as_ref()?;
+        Some(error.iter().map(|e| e.to_bits()).collect())
+    };
+    a.maps.iter().zip(&b.maps).find_map(|(a, b)| {
+        let what = if bits(a) != bits(b) {
+            "map"
+        } else if a.chart.layout != b.chart.layout {
+            "tiles"
+        } else if error_bits(a) != error_bits(b) {
+            "error"
+        } else {
+            return None;
+        };
+        Some(format!("the {what} of {:?}", a.chart.receiver))
+    })
+}
+
+#[track_caller]
+pub fn assert_same(a: &BakeResult, b: &BakeResult, what: &str) {
+    assert_eq!(difference(a, b), None, "{what}");
+}
+
+pub fn with_threads<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> T {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+    pool.expect("threads").install(work)
+}
+
+/// Relative RMSE of the floor's caustic against brute force, without the latter's noise, which must not hide more than
+/// `most_noise`; and the watts of both.
+pub fn off_brute_force(result: &BakeResult, scene: &Scene, rays: u64, most_noise: f64) -> (f64, [f64; 2]) {
+    let side = map_of(result, scene, "floor").width();
+    let tracer = Tracer::new(Arc::new(scene.clone()));
+    let reference = brute_force(&tracer, &settings(1.0, side), rays, &(), &Control::default());
+    let reference = reference.expect("a reference");
+    let noise = map_of(&reference, scene, "floor").estimated_relative_rmse;
+    let noise = noise.expect("a noise");
+    assert!(noise < most_noise, "noise {noise}");
+    let off = rmse(&floor(result, scene), &floor(&reference, scene));
+    let deposited_w = [result, &reference].map(|result| result.ledgers[0].energy_w.deposited);
+    ((off * off - noise * noise).max(0.0).sqrt(), deposited_w)
+}
+
+/// A torus whose outer radius is 0.98 of a size [m], around the y axis before it is turned.
+pub fn torus(centre: DVec3, turn: DQuat, size: f64) -> Mesh {
+    shapes::sheet(96, 48, |u, v| {
+        let ((sine_u, cosine_u), (sine_v, cosine_v)) = (turned(u), turned(v));
+        let outward = DVec3::new(cosine_u, 0.0, sine_u);
+        let normal = outward * cosine_v + DVec3::Y * sine_v;
+        let place = centre + turn * (outward + normal * 0.4) * (0.7 * size);
+        (place, turn * normal)
+    })
+}
+
+/// Sine and cosine of so many turns.
+pub fn turned(turns: f64) -> (f64, f64) {
+    (std::f64::consts::TAU * turns.fract()).sin_cos()
+}

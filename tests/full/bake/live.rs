@@ -1,0 +1,470 @@
+//! A session that goes on: an edit or another setting costs what it touches and nothing more, and its maps are those of a
+//! fresh bake, bit for bit.
+
+use std::sync::Arc;
+
+use glam::{DQuat, DVec3};
+use nephroid::optics::LinearSrgb;
+use nephroid::progress::Control;
+use nephroid::scene::builtin::{parts, shapes};
+use nephroid::scene::edit::Edit;
+use nephroid::scene::{LightKind, LightSize, Scene};
+use nephroid::session::{BakeResult, BakeSession, StopReason};
+use nephroid::settings::{
+    BakeSettings, Footprint, ItemBufferKind, Kernel, KernelSampling, LayerKind, RayPlacement, Sigma,
+};
+use nephroid::units::{Flux, Radiance, RadiantIntensity};
+use rand_pcg::Pcg64Mcg;
+use rand_pcg::rand_core::{Rng, SeedableRng};
+
+use crate::bake::common::{
+    CAUSTIC_AND_DIRECT, all_bits, assert_same, automatic, difference, edit, run, session, sized, with_layers,
+};
+use support::tools::{at, bake, builtin_scene, energy_fault, settings};
+
+/// Fails unless a session now gives what a fresh bake of its scene gives.
+#[track_caller]
+fn assert_fresh(session: &mut BakeSession, settings: &BakeSettings, what: &str) -> (BakeResult, BakeResult) {
+    let now = run(session, settings);
+    let fresh = bake(Scene::clone(session.scene()), settings);
+    assert_same(&now, &fresh, what);
+    (now, fresh)
+}
+
+fn moved(object: usize, translation: DVec3) -> Edit {
+    Edit::ObjectMoved {
+        object,
+        rotation: DQuat::IDENTITY,
+        translation,
+    }
+}
+
+fn material_of(scene: &Scene, object: &str) -> usize {
+    let mut objects = scene.objects.iter();
+    objects
+        .find(|found| found.name == object)
+        .expect("it is there")
+        .material
+}
+
+type Change = fn(&mut BakeSettings);
+
+fn changed(base: &BakeSettings, change: Change) -> BakeSettings {
+    let mut settings = base.clone();
+    change(&mut settings);
+    settings
+}
+
+#[test]
+fn another_deposit_of_splats_takes_no_ray() {
+    let changes: [Change; 11] = [
+        |settings| *settings = sized(settings.clone(), (96, 40)),
+        |settings| *settings = automatic(settings.clone()),
+        |settings| settings.kernel = Kernel::Cone,
+        |settings| settings.kernel_sampling = KernelSampling::Point,
+        |settings| settings.sigma = Sigma::Constant(0.3),
+        |settings| settings.sigma = Sigma::Adaptive,
+        |settings| settings.footprint = Footprint::Fixed,
+        |settings| settings.footprint = Footprint::Distance,
+        |settings| settings.layers = CAUSTIC_AND_DIRECT.to_vec(),
+        |settings| settings.threads = 1,
+        |_| {},
+    ];
+    for (name, rays) in [
+        ("ring", RayPlacement::Lattice),
+        ("ball", RayPlacement::Jittered),
+        ("pool", RayPlacement::Lattice),
+    ] {
+        let mut scene = builtin_scene(name);
+        if name == "ring" {
+            scene.lights[0].colour = LinearSrgb::new(1.0, 0.7, 0.2);
+        }
+        let base = BakeSettings {
+            rays,
+            ..settings(1e4, 48)
+        };
+        let mut session = session(&scene);
+        assert!(run(&mut session, &base).counts.rays > 0);
+        for change in changes {
+            let other = changed(&base, change);
+            let what = format!("{name}, {other:?}");
+            let (kept, _) = assert_fresh(&mut session, &other, &what);
+            assert_eq!((kept.counts.rays, kept.counts.segments), (0, 0), "{what}");
+            assert_eq!(energy_fault(&kept), None, "{what}");
+        }
+    }
+}
+
+#[test]
+fn another_deposit_of_patches_takes_no_ray() {
+    let scene = builtin_scene("ring");
+    let mut session = session(&scene);
+    let first = run(&mut session, &at(5e3, 64));
+    assert!(first.counts.rays > 0);
+    let smoothed = BakeSettings {
+        sigma: Sigma::Constant(4.0),
+        ..at(5e3, 64)
+    };
+    for other in [at(5e3, 192), smoothed] {
+        let (again, fresh) = assert_fresh(&mut session, &other, "deposited again");
+        assert_eq!((again.counts.rays, again.counts.segments), (0, 0));
+        assert!(fresh.counts.rays > 0);
+        assert!(
+            all_bits(&again) != all_bits(&first),
+            "the setting changes nothing"
+        );
+    }
+    assert!(
+        run(&mut session, &at(6e3, 64)).counts.rays > 0,
+        "another density is traced"
+    );
+}
+
+#[test]
+fn what_changes_the_rays_traces_them_again() {
+    let base = settings(5e3, 32);
+    let changes: [Change; 6] = [
+        |settings| settings.density_per_sr = 6e3,
+        |settings| settings.rays = RayPlacement::Jittered,
+        |settings| settings.seed = 1,
+        |settings| settings.max_depth = 2,
+        |settings| settings.branch_threshold = Some(0.01),
+        |settings| settings.item_buffer = ItemBufferKind::Cube,
+    ];
+    let mut session = session(&builtin_scene("ball"));
+    for change in changes {
+        run(&mut session, &base);
+        let other = changed(&base, change);
+        let (result, _) = assert_fresh(&mut session, &other, &format!("{other:?}"));
+        assert!(result.counts.rays > 0, "{other:?}");
+    }
+}
+
+/// Some ten thousand arrivals of 56 bytes, and patches, against a quarter of the memory.
+#[test]
+fn light_beyond_its_memory_is_not_kept() {
+    let mut session = session(&builtin_scene("ring"));
+    // Another size than the bake before: its maps are of no use.
+    let mut side = 32;
+    let mut rays = |memory_bytes: u64| {
+        side += 2;
+        let settings = BakeSettings {
+            memory_bytes,
+            ..sized(settings(2e4, 32), (side, side))
+        };
+        run(&mut session, &settings).counts.rays
+    };
+    let (little, much) = (1 << 20, 256 << 20);
+    assert!(rays(little) > 0);
+    assert!(rays(little) > 0, "it was kept all the same");
+    assert!(rays(much) > 0);
+    assert_eq!(rays(much), 0);
+    // A smaller limit gives back what is kept.
+    assert!(rays(little) > 0);
+    assert!(rays(much) > 0);
+}
+
+#[test]
+fn a_cancelled_bake_leaves_nothing_behind() {
+    let settings = settings(2e4, 32);
+    let mut session = session(&builtin_scene("ring"));
+    let control = Control::default();
+    control.cancel();
+    assert!(session.bake(&settings, &(), &control).expect("a part").partial);
+    let (whole, _) = assert_fresh(&mut session, &settings, "after a cancelled one");
+    assert!(whole.counts.rays > 0);
+}
+
+#[test]
+fn dimming_and_smoothing_take_no_work() {
+    let scene = builtin_scene("ring");
+    let base = with_layers(&CAUSTIC_AND_DIRECT, at(5e3, 96));
+    let mut session = session(&scene);
+    let first = run(&mut session, &base).counts;
+    assert!(first.rays > 0 && first.cells > 0 && first.shadow_rays > 0);
+    let LightKind::Point { intensity, .. } = scene.lights[0].kind else {
+        panic!("the ring has a point light")
+    };
+    let dimmer = Edit::LightIntensity {
+        light: 0,
+        intensity: RadiantIntensity(0.37 * intensity.0),
+    };
+    let colour = LinearSrgb::new(1.0, 0.6, 0.2);
+    let warmer = Edit::LightColour { light: 0, colour };
+    for (sigma, change) in [(0.0, Some(dimmer)), (0.0, Some(warmer)), (2.5, None)] {
+        if let Some(change) = &change {
+            edit(&mut session, change);
+        }
+        let settings = BakeSettings {
+            sigma: Sigma::Constant(sigma),
+            ..base.clone()
+        };
+        let what = format!("sigma {sigma}, {change:?}");
+        let (again, _) = assert_fresh(&mut session, &settings, &what);
+        assert_eq!(again.counts, Default::default(), "{what}");
+        assert_eq!(energy_fault(&again).filter(|_| sigma == 0.0), None);
+    }
+}
+
+#[test]
+fn rays_of_the_next_level_are_not_retraced() {
+    for name in ["ring", "ball"] {
+        let mut session = session(&builtin_scene(name));
+        let coarse = run(&mut session, &at(8e3, 64));
+        let (fine, whole) = assert_fresh(&mut session, &at(3.2e4, 64), name);
+        // The finer bake goes through the coarser lattice anyway: together both took what the finer one takes alone.
+        assert_eq!(coarse.counts.rays + fine.counts.rays, whole.counts.rays, "{name}");
+        assert!(coarse.counts.rays * 5 > whole.counts.rays, "{name}: {coarse:?}");
+        // And back: nothing to trace.
+        assert_eq!(run(&mut session, &at(8e3, 64)).counts.rays, 0, "{name}");
+    }
+}
+
+#[test]
+fn a_deeper_path_traces_what_goes_deeper() {
+    let with = |max_depth| BakeSettings {
+        max_depth,
+        ..at(2e3, 64)
+    };
+    let mut session = session(&builtin_scene("ball"));
+    run(&mut session, &with(3));
+    let (deeper, whole) = assert_fresh(&mut session, &with(8), "deeper");
+    assert!(deeper.counts.segments < whole.counts.segments);
+    assert_eq!(run(&mut session, &with(3)).counts.rays, 0);
+}
+
+/// Two glass balls over a floor; a lamp above.
+fn two_casters() -> Scene {
+    let mut scene = parts::reference_scene(2.0);
+    for (name, x) in [("left", -0.8), ("right", 0.8)] {
+        let ball = shapes::sphere(DVec3::new(x, 0.5, 0.0), 0.3, 3);
+        parts::add(&mut scene, name, ball, parts::dielectric(name, 1.5));
+    }
+    scene
+        .lights
+        .push(parts::point_light("lamp", DVec3::new(0.0, 3.0, 0.0), Flux(12.0)));
+    scene.name = "two casters".into();
+    scene
+}
+
+/// Each edit of one of two balls or lamps, and the share of a fresh bake's rays that it takes.
+#[test]
+fn an_edit_traces_only_what_it_touches() {
+    let mut scene = two_casters();
+    scene
+        .lights
+        .push(parts::point_light("other", DVec3::new(0.5, 2.5, 0.6), Flux(25.0)));
+    let material = material_of(&scene, "left");
+    let settings = at(2e3, 64);
+    let mut session = session(&scene);
+    run(&mut session, &settings);
+    let tint = LinearSrgb::new(0.9, 0.8, 0.95);
+    let edits = [
+        // Half of the light goes to either ball.
+        (moved(2, DVec3::new(0.1, 0.05, 0.0)), 0.3..0.62),
+        (Edit::MaterialIor { material, ior: 1.7 }, 0.1..0.67),
+        // Only branches that another tint lifts over the threshold are new.
+        (
+            Edit::MaterialTint {
+                material,
+                base_colour: tint,
+            },
+            0.0..0.05,
+        ),
+        (
+            Edit::LightPosition {
+                light: 1,
+                position: DVec3::new(0.1, 2.6, 0.5),
+            },
+            0.3..0.7,
+        ),
+    ];
+    for (change, expected) in edits {
+        edit(&mut session, &change);
+        let (now, whole) = assert_fresh(&mut session, &settings, &format!("{change:?}"));
+        let share = now.counts.rays as f64 / whole.counts.rays as f64;
+        assert!(expected.contains(&share), "{change:?}: {share} of the rays");
+    }
+}
+
+/// The size of a lamp, and the place of an object that glows, are as good as another light.
+#[test]
+fn a_resized_lamp_and_a_moved_glow_are_seen() {
+    let mut scene = builtin_scene("ball");
+    let patch = shapes::floor([-0.1, 0.1], [-0.1, 0.1], 1.5);
+    let mut glow = parts::matte("glow", LinearSrgb::BLACK);
+    glow.emitted_radiance = LinearSrgb::WHITE;
+    parts::add(&mut scene, "glow", patch, glow);
+    let object = scene.objects.len() - 1;
+    let mut lamp = scene.lights[0].clone();
+    lamp.kind = LightKind::Surface {
+        object,
+        radiance: Radiance(1.0),
+    };
+    scene.lights.push(lamp);
+    let settings = with_layers(&[LayerKind::Direct], at(1e3, 32));
+    let mut session = session(&scene);
+    let mut before = run(&mut session, &settings);
+    let size = LightSize::Radius { radius_m: 0.3 };
+    for change in [Edit::LightSize { light: 0, size }, moved(object, DVec3::X * 0.3)] {
+        edit(&mut session, &change);
+        let (after, _) = assert_fresh(&mut session, &settings, &format!("{change:?}"));
+        assert!(
+            difference(&after, &before).is_some(),
+            "{change:?} changes nothing"
+        );
+        before = after;
+    }
+}
+
+/// Edits and settings in a random order, each bake cancelled at a random place.
+struct Storm {
+    random: Pcg64Mcg,
+    settings: BakeSettings,
+}
+
+impl Storm {
+    fn below(&mut self, count: usize) -> usize {
+        (self.random.next_u64() % count as u64) as usize
+    }
+
+    fn unit(&mut self) -> f64 {
+        (self.random.next_u64() >> 11) as f64 * (-53_f64).exp2()
+    }
+
+    /// The next change: of the settings, or an edit.
+    fn change(&mut self, scene: &Scene) -> Option<Edit> {
+        let spread = DVec3::new(self.unit(), self.unit(), self.unit()) * 0.2 - 0.1;
+        let light = self.below(scene.lights.len());
+        let object = 1 + self.below(2);
+        match self.below(8) {
+            0 => self.settings.sigma = Sigma::Constant(self.unit() * 3.0),
+            1 => self.settings.density_per_sr = [500.0, 2e3, 8e3][self.below(3)],
+            2 => {
+                let side = [48, 64, 96][self.below(3)];
+                self.settings = sized(self.settings.clone(), (side, side));
+            }
+            3 => self.settings.max_depth = 2 + self.below(5) as u32,
+            4 => {
+                let intensity = RadiantIntensity(0.1 + self.unit());
+                return Some(Edit::LightIntensity { light, intensity });
+            }
+            5 => {
+                let position = scene.lights[light].kind.position()? + spread;
+                return Some(Edit::LightPosition { light, position });
+            }
+            6 => {
+                let (material, ior) = (scene.objects[object].material, 1.2 + 0.6 * self.unit());
+                return Some(Edit::MaterialIor { material, ior });
+            }
+            _ => {
+                return Some(Edit::ObjectMoved {
+                    object,
+                    rotation: DQuat::from_rotation_y(self.unit()),
+                    translation: spread * 0.3,
+                });
+            }
+        }
+        None
+    }
+}
+
+#[test]
+fn edits_while_baking_leave_nothing_behind() {
+    let mut session = session(&two_casters());
+    let mut storm = Storm {
+        random: Pcg64Mcg::seed_from_u64(7),
+        settings: at(2e3, 64),
+    };
+    let (mut cancelled, mut complete) = (0, 0);
+    for round in 0..60 {
+        if let Some(change) = storm.change(&Scene::clone(session.scene())) {
+            edit(&mut session, &change);
+        }
+        let control = Control::default();
+        let budget_ms = storm.below(40) as u64;
+        let result = std::thread::scope(|scope| {
+            scope.spawn(|| {
+                std::thread::sleep(std::time::Duration::from_millis(budget_ms));
+                control.cancel();
+            });
+            session.bake(&storm.settings, &(), &control).expect("a bake")
+        });
+        if result.stop_reason == StopReason::Cancelled {
+            cancelled += 1;
+            continue;
+        }
+        complete += 1;
+        if complete % 5 == 0 {
+            let fresh = bake(Scene::clone(session.scene()), &storm.settings);
+            assert_same(&result, &fresh, &format!("round {round}"));
+        }
+    }
+    assert!(cancelled > 6, "{cancelled} bakes were cut short");
+    let (last, _) = assert_fresh(&mut session, &storm.settings, "the last");
+    let is_sharp = storm.settings.sigma == Sigma::Constant(0.0);
+    assert_eq!(energy_fault(&last).filter(|_| is_sharp), None);
+}
+
+#[test]
+fn hard_edits_and_back_lose_no_watt() {
+    let scene = two_casters();
+    let material = material_of(&scene, "left");
+    let lamp = |x, y, z| Edit::LightPosition {
+        light: 0,
+        position: DVec3::new(x, y, z),
+    };
+    let hard = [
+        ("a lamp within glass", lamp(-0.8, 0.5, 0.0)),
+        ("a lamp in the floor", lamp(0.3, 0.0, 0.2)),
+        ("a ball through the other", moved(1, DVec3::new(1.3, 0.1, 0.05))),
+        (
+            "a ball half under the floor",
+            moved(1, DVec3::new(0.0, -0.5, 0.0)),
+        ),
+        ("a ball beyond all light", moved(1, DVec3::new(0.0, 0.0, 1e6))),
+        ("the floor above the lamp", moved(0, DVec3::new(0.0, 5.0, 0.0))),
+        ("glass like air", Edit::MaterialIor { material, ior: 1.0 }),
+        ("glass of index 40", Edit::MaterialIor { material, ior: 40.0 }),
+        (
+            "black glass",
+            Edit::MaterialTint {
+                material,
+                base_colour: LinearSrgb::BLACK,
+            },
+        ),
+        (
+            "rough glass",
+            Edit::MaterialRoughness {
+                material,
+                roughness: 1.0,
+            },
+        ),
+    ];
+    let settings = at(1e3, 48);
+    let untouched = bake(scene.clone(), &settings);
+    for (what, change) in hard {
+        let mut session = session(&scene);
+        run(&mut session, &settings);
+        edit(&mut session, &change);
+        let (edited, _) = assert_fresh(&mut session, &settings, what);
+        assert_eq!(energy_fault(&edited), None, "{what}");
+        // And back, as if nothing had been.
+        session.set_scene(Arc::new(scene.clone())).expect("a sound scene");
+        assert_same(&run(&mut session, &settings), &untouched, what);
+    }
+}
+
+#[test]
+fn no_time_at_all_gives_a_whole_picture() {
+    let hurried = BakeSettings {
+        max_error: Some(1e-4),
+        max_time_s: Some(1e-3),
+        ..at(1.6e3, 64)
+    };
+    let result = bake(builtin_scene("ring"), &hurried);
+    assert_eq!(result.stop_reason, StopReason::MaxTime);
+    assert!(!result.partial);
+    assert_eq!(result.maps.len(), 1);
+    assert_eq!(energy_fault(&result), None);
+}

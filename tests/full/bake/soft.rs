@@ -1,0 +1,144 @@
+//! Soft caustics: lights with a size and rough surfaces, against brute force, against their limits, and against the law of
+//! energy.
+
+use glam::DVec3;
+use nephroid::optics::LinearSrgb;
+use nephroid::scene::builtin::{parts, shapes};
+use nephroid::scene::{LightKind, LightSize, PanelShape, Scene};
+use nephroid::settings::BakeSettings;
+use nephroid::units::Radiance;
+
+use crate::bake::common::{assert_same, floor, off_brute_force, rmse, towards};
+use support::tools::{at, bake, builtin_scene, energy_fault};
+
+/// The ring with a square lamp of a side [m] that shines downwards, with the same intensity on its axis whatever its side.
+fn ring_under_square_lamp(side_m: f64) -> Scene {
+    let mut scene = builtin_scene("ring");
+    scene.lights[0].kind = LightKind::Panel {
+        centre: scene.lights[0].kind.position().expect("a point light"),
+        across: DVec3::X * (0.5 * side_m),
+        down: DVec3::Z * (0.5 * side_m),
+        shape: PanelShape::Rectangle,
+        radiance: Radiance(8.0 / (side_m * side_m)),
+    };
+    scene
+}
+
+#[test]
+fn a_square_lamp_tends_to_a_point() {
+    let map_at = |side_m: f64| {
+        let scene = ring_under_square_lamp(side_m);
+        let result = bake(scene.clone(), &towards(0.02, 32));
+        assert_eq!(energy_fault(&result), None);
+        floor(&result, &scene)
+    };
+    let point = map_at(1e-6);
+    let off = [0.4, 0.2, 0.1].map(|side_m| rmse(&map_at(side_m), &point));
+    // The blur is as wide as the lamp: caustics of about a texel's width change by at least its 0.7th power.
+    assert!(off[0] > 0.15, "{off:?}");
+    assert!(off.windows(2).all(|pair| pair[1] < 0.65 * pair[0]), "{off:?}");
+}
+
+/// A scene whose specular materials have a roughness.
+fn roughened(name: &str, roughness: f64) -> Scene {
+    let mut scene = builtin_scene(name);
+    let specular = |material: &&mut nephroid::scene::Material| material.surface.is_specular();
+    for material in scene.materials.iter_mut().filter(specular) {
+        material.roughness = roughness;
+    }
+    scene
+}
+
+/// A plate of frosted glass over the floor. Wider lobes take thousands of wavefronts: minutes.
+fn frosted_plate() -> Scene {
+    let mut scene = builtin_scene("mirror");
+    scene.objects.truncate(1);
+    let mut glass = parts::dielectric("frosted glass", 1.5);
+    glass.roughness = 0.05;
+    let plate = shapes::cuboid(DVec3::new(-0.3, 0.5, -0.3), DVec3::new(0.3, 0.56, 0.3));
+    parts::add(&mut scene, "plate", plate, glass);
+    scene
+}
+
+/// What is off brute force may be twice the estimate, as everywhere; rough surfaces are within 3 %.
+#[test]
+fn soft_light_is_as_brute_force_has_it() {
+    let mut sun = builtin_scene("nephroid");
+    sun.lights[0].size = LightSize::Angle {
+        diameter_rad: 0.53_f64.to_radians(),
+    };
+    let cases = [
+        ("square lamp", ring_under_square_lamp(0.3), 0.02, false),
+        ("sun of 0.53°", sun, 0.02, false),
+        ("roughness 0.05", roughened("mirror", 0.05), 0.03, true),
+        ("roughness 0.2", roughened("mirror", 0.2), 0.03, true),
+        ("roughness 0.5", roughened("mirror", 0.5), 0.03, true),
+        ("frosted glass", frosted_plate(), 0.02, true),
+    ];
+    for (what, scene, target, is_rough) in cases {
+        let result = bake(scene.clone(), &towards(target, 48));
+        assert_eq!(energy_fault(&result), None, "{what}");
+        let estimated = result.estimated_relative_rmse.expect("an estimate");
+        let rays = if is_rough { 1_700_000 } else { 1_400_000 };
+        let (off, _) = off_brute_force(&result, &scene, rays, 0.06);
+        if is_rough {
+            assert!(off <= 0.03, "{what}: off by {off}");
+        } else {
+            assert!(estimated <= target, "{what}: {estimated}");
+            assert!(off <= 2.0 * estimated, "{what}: {off}, estimated {estimated}");
+        }
+    }
+}
+
+/// All that leaves it arrives somewhere: a closed white room.
+#[test]
+fn a_rough_white_mirror_loses_nothing() {
+    let mut scene = roughened("mirror", 0.6);
+    let walls = shapes::cuboid(DVec3::new(-1.0, -0.001, -1.0), DVec3::new(1.0, 2.0, 1.0));
+    let white = parts::matte("walls", LinearSrgb::WHITE);
+    parts::add(&mut scene, "walls", walls, white);
+    let settings = BakeSettings {
+        wavefronts: Some(16),
+        ..at(2_000.0, 16)
+    };
+    let result = bake(scene, &settings);
+    let energy = result.ledgers[0].energy_w;
+    assert_eq!(energy_fault(&result), None);
+    let given_up = energy.truncated.total();
+    let lost = energy.emitted - energy.deposited - given_up;
+    assert!(lost.abs() < 1e-9 * energy.emitted, "{energy:?}");
+    assert!(given_up.abs() < 1e-3 * energy.emitted, "{energy:?}");
+    assert_eq!(energy.absorbed, 0.0);
+}
+
+#[test]
+fn threads_change_no_bit_of_soft_maps() {
+    let mut scene = roughened("mirror", 0.2);
+    scene.lights[0].size = LightSize::Radius { radius_m: 0.1 };
+    let [one, three] = [1, 3].map(|threads| {
+        let settings = BakeSettings {
+            threads,
+            ..towards(0.1, 32)
+        };
+        bake(scene.clone(), &settings)
+    });
+    assert_same(&one, &three, "three threads");
+    assert_eq!(one.counts, three.counts);
+}
+
+#[test]
+fn as_many_wavefronts_as_asked_for() {
+    let with = |wavefronts| BakeSettings {
+        wavefronts: Some(wavefronts),
+        ..at(2_000.0, 16)
+    };
+    let rays = [16, 32].map(|wavefronts| {
+        let result = bake(roughened("mirror", 0.2), &with(wavefronts));
+        assert_eq!(energy_fault(&result), None);
+        result.counts.rays
+    });
+    let ratio = rays[1] as f64 / rays[0] as f64;
+    assert!((1.8..2.2).contains(&ratio), "{rays:?}");
+    let error = with(48).validate().expect_err("48 is no power of two");
+    assert!(error.to_string().contains("--wavefronts"), "{error}");
+}

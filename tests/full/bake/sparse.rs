@@ -1,0 +1,182 @@
+//! Maps in tiles: how much memory they save, what that costs, and that a bake never fails for want of memory.
+
+use glam::{DQuat, DVec3};
+use nephroid::illumination::IlluminationMap;
+use nephroid::scene::Scene;
+use nephroid::scene::builtin::parts;
+use nephroid::session::{BYTES_PER_TEXEL, BakeResult};
+use nephroid::settings::{BakeSettings, LayerKind};
+use nephroid::units::Flux;
+
+use crate::bake::common::{
+    CAUSTIC_AND_DIRECT, assert_same, automatic, rmse, sized, torus, towards, with_layers,
+};
+use support::tools::{at, bake, builtin_scene, caustic, energy_fault, map_of};
+
+fn auto(density_per_sr: f64) -> BakeSettings {
+    automatic(at(density_per_sr, 1))
+}
+
+/// A tilted torus of glass of 9,216 triangles over a floor that is large beside its caustic.
+fn torus_over_a_wide_floor() -> Scene {
+    let mut scene = parts::reference_scene(4.0);
+    let tilt = DQuat::from_rotation_x(0.5) * DQuat::from_rotation_z(0.3);
+    let torus = torus(DVec3::Y * 0.6, tilt, 0.5);
+    parts::add(&mut scene, "torus", torus, parts::dielectric("glass", 1.5));
+    let lamp = parts::point_light("lamp", DVec3::new(0.5, 2.0, 0.3), Flux(100.0));
+    scene.lights.push(lamp);
+    scene
+}
+
+/// Memory of all maps, and that of maps with all texels as fine [bytes].
+fn memory(result: &BakeResult) -> (u64, u64) {
+    let texels = |count: fn(&IlluminationMap) -> usize| result.maps.iter().map(count).sum::<usize>() as u64;
+    let (taken, dense) = (
+        texels(|map| map.chart.texel_count()),
+        texels(|map| map.width() * map.height()),
+    );
+    (taken * BYTES_PER_TEXEL, dense * BYTES_PER_TEXEL)
+}
+
+/// The floor's caustic, all of it as fine.
+fn dense_floor(scene: &Scene, result: &BakeResult) -> Vec<f64> {
+    caustic(&map_of(result, scene, "floor").dense())
+}
+
+fn floor_size(scene: &Scene, result: &BakeResult) -> (usize, usize) {
+    let map = map_of(result, scene, "floor");
+    (map.width(), map.height())
+}
+
+fn estimate(result: &BakeResult) -> f64 {
+    result.estimated_relative_rmse.expect("an estimate")
+}
+
+#[test]
+fn a_ball_takes_a_tenth_of_a_dense_map() {
+    let result = bake(builtin_scene("ball"), &auto(2.5e4));
+    let (taken, dense) = memory(&result);
+    assert!(taken * 10 <= dense, "{taken} of {dense} bytes");
+    assert_eq!(result.warnings, []);
+    assert_eq!(energy_fault(&result), None);
+}
+
+#[test]
+fn a_small_caustic_looks_the_same_in_tiles() {
+    let scene = torus_over_a_wide_floor();
+    assert!(scene.triangle_count() >= 4_000);
+    let sparse = bake(scene.clone(), &auto(2e3));
+    let (taken, dense_bytes) = memory(&sparse);
+    assert!(taken * 10 <= dense_bytes, "{taken} of {dense_bytes} bytes");
+    assert_eq!(energy_fault(&sparse), None);
+    let dense = bake(scene.clone(), &sized(auto(2e3), floor_size(&scene, &sparse)));
+    assert!(map_of(&dense, &scene, "floor").chart.layout.is_none());
+    let [in_tiles, whole] = [&sparse, &dense].map(|result| dense_floor(&scene, result));
+    let (off, error) = (rmse(&in_tiles, &whole), estimate(&dense));
+    assert!(off < 0.5 * error, "{off} beside {error}");
+    // Where light is finest nothing is lost at all.
+    let [peak, whole_peak] = [in_tiles, whole].map(|values| values.into_iter().fold(0.0, f64::max));
+    assert!((peak / whole_peak - 1.0).abs() < 1e-6);
+}
+
+#[test]
+fn a_tenth_of_the_memory_costs_what_it_says() {
+    let scene = builtin_scene("ball");
+    let ample = auto(6e3);
+    let wished = bake(scene.clone(), &ample);
+    assert_eq!(wished.warnings, []);
+    let size = floor_size(&scene, &wished);
+    let (taken, dense) = memory(&wished);
+    let truth = dense_floor(&scene, &bake(scene.clone(), &sized(auto(2.4e4), size)));
+    for (case, settings, memory_bytes) in [
+        ("automatic", ample.clone(), taken / 10),
+        ("fixed", sized(ample.clone(), size), dense / 10),
+        ("fixed, a hundredth", sized(ample.clone(), size), dense / 100),
+    ] {
+        let scarce = BakeSettings {
+            memory_bytes,
+            ..settings
+        };
+        let result = bake(scene.clone(), &scarce);
+        let (taken, _) = memory(&result);
+        let fits = memory_bytes / 4..=memory_bytes;
+        assert!(fits.contains(&taken), "{case}: {taken} of {memory_bytes} bytes");
+        let [warning] = &result.warnings[..] else {
+            panic!("{case}: {:?}", result.warnings)
+        };
+        assert_eq!(warning.location, "--memory");
+        assert!(warning.remedy.contains("--memory"), "{warning}");
+        assert!(warning.to_string().contains("MiB"), "{warning}");
+        assert_eq!(energy_fault(&result), None);
+        let off = rmse(&dense_floor(&scene, &result), &truth);
+        let ratio = off / estimate(&result);
+        assert!((0.5..2.0).contains(&ratio), "{case}: {ratio} of the estimate");
+    }
+}
+
+#[test]
+fn however_little_memory_there_are_maps() {
+    for (name, layers) in [
+        ("mirror", &[LayerKind::Caustic][..]),
+        ("showroom", &CAUSTIC_AND_DIRECT),
+    ] {
+        let settings = BakeSettings {
+            memory_bytes: 20_000,
+            ..with_layers(layers, at(1e3, 512))
+        };
+        let result = bake(builtin_scene(name), &settings);
+        assert!(!result.maps.is_empty(), "{name}");
+        assert_eq!(energy_fault(&result), None, "{name}");
+        let mut warnings = result.warnings.iter();
+        assert!(
+            warnings.any(|warning| warning.location == "--memory"),
+            "{name}: {:?}",
+            result.warnings
+        );
+    }
+}
+
+/// Neither threads change a bit of maps in tiles, nor tiles the direct light, but for what larger texels leave out.
+#[test]
+fn tiles_keep_bits_and_direct_light() {
+    let scene = torus_over_a_wide_floor();
+    let settings = with_layers(&CAUSTIC_AND_DIRECT, auto(500.0));
+    let [one, three] = [1, 3].map(|threads| {
+        let settings = BakeSettings {
+            threads,
+            ..settings.clone()
+        };
+        bake(scene.clone(), &settings)
+    });
+    assert_same(&one, &three, "three threads");
+    let dense = bake(scene.clone(), &sized(settings, floor_size(&scene, &one)));
+    let [a, b] = [&one, &dense].map(|result| map_of(result, &scene, "floor"));
+    assert!(a.chart.layout.is_some() && b.chart.layout.is_none());
+    let [in_tiles, whole] = [a, b].map(|map| map.flux_w(LayerKind::Direct).luminance());
+    assert!(
+        (in_tiles / whole - 1.0).abs() < 2e-3,
+        "{in_tiles} W, dense {whole} W"
+    );
+}
+
+/// Texels of automatic maps for a target.
+fn texels_for(name: &str, target: f64, layers: &[LayerKind]) -> usize {
+    let settings = automatic(with_layers(layers, towards(target, 1)));
+    let result = bake(builtin_scene(name), &settings);
+    result.maps.iter().map(|map| map.chart.texel_count()).sum()
+}
+
+#[test]
+fn drafts_have_coarser_maps_than_previews() {
+    for name in ["ball", "pool"] {
+        let [draft, preview] = [0.1, 0.03].map(|target| texels_for(name, target, &[LayerKind::Caustic]));
+        assert!(2 * draft < preview, "{name}: {draft} of {preview} texels");
+    }
+}
+
+#[test]
+fn a_coarse_caustic_keeps_direct_light_fine() {
+    let both = texels_for("mirror", 0.9, &CAUSTIC_AND_DIRECT);
+    let direct = texels_for("mirror", 0.9, &[LayerKind::Direct]);
+    assert!(both >= direct, "{both} texels with the caustic, {direct} without");
+}

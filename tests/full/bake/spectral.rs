@@ -1,0 +1,498 @@
+//! Light by wavelength: a prism's spectrum against exact rays, and laws that glass, metals and lamps keep.
+
+use std::sync::Arc;
+
+use glam::DVec3;
+use nephroid::geometry::Ray;
+use nephroid::illumination::Side;
+use nephroid::optics::fresnel::dielectric_reflectance;
+use nephroid::optics::glass::Glass;
+use nephroid::optics::spectrum::{Spectrum, Xyz, illuminant, xyz_bar};
+use nephroid::optics::wavelength::VISIBLE;
+use nephroid::optics::{LinearSrgb, Metal, Nanometres};
+use nephroid::scene::builtin::{parts, shapes};
+use nephroid::scene::{LoadOptions, Scene, load};
+use nephroid::session::BakeResult;
+use nephroid::settings::{BakeSettings, Estimator, LayerKind, Wavelengths};
+use nephroid::transport::{MediumStack, Tracer};
+use nephroid::units::{Flux, Irradiance};
+
+use crate::bake::common::sized;
+use support::tools::{bake, builtin_scene, energy_fault};
+
+fn settings(side: usize) -> BakeSettings {
+    sized(BakeSettings::default(), (side, side))
+}
+
+fn at_wavelengths(wavelengths: Wavelengths, settings: BakeSettings) -> BakeSettings {
+    BakeSettings {
+        wavelengths,
+        ..settings
+    }
+}
+
+fn sampled(count: u32, estimator: Estimator, side: usize) -> BakeSettings {
+    BakeSettings {
+        estimator,
+        sigma: estimator.default_sigma(),
+        wavelengths: Wavelengths::Fixed(count),
+        ..settings(side)
+    }
+}
+
+fn lamp(name: &str) -> Arc<Spectrum> {
+    Arc::new(illuminant(name).expect("a lamp"))
+}
+
+fn glass(text: &str) -> Arc<Glass> {
+    Arc::new(Glass::parse(text).expect("a glass"))
+}
+
+/// Caustic light on the upper side of the object of a name, row by row.
+fn caustic(result: &BakeResult, scene: &Scene, name: &str) -> Vec<[f32; 3]> {
+    let is_wanted = |map: &&nephroid::illumination::IlluminationMap| {
+        scene.objects[map.chart.object()].name == name && map.chart.receiver.side() == Side::Front
+    };
+    let map = result.maps.iter().find(is_wanted).expect("its map");
+    map.layer(LayerKind::Caustic)
+        .expect("caustic light")
+        .irradiance
+        .clone()
+}
+
+fn floor(scene: &Scene, settings: &BakeSettings) -> Vec<[f32; 3]> {
+    caustic(&bake(scene.clone(), settings), scene, "floor")
+}
+
+fn ball_of(text: &str) -> Scene {
+    let mut scene = builtin_scene("ball");
+    for material in &mut scene.materials {
+        if material.surface.is_specular() {
+            material.set_glass(glass(text));
+        }
+    }
+    scene
+}
+
+/// Root mean square difference of all channels over the mean.
+fn difference(a: &[[f32; 3]], b: &[[f32; 3]]) -> f64 {
+    let pairs = a.as_flattened().iter().zip(b.as_flattened());
+    let squares: f64 = pairs.map(|(a, b)| f64::from(a - b).powi(2)).sum();
+    let sum: f64 = a.as_flattened().iter().map(|a| f64::from(*a)).sum();
+    assert!(sum > 0.0, "a map with light");
+    (squares * 3.0 * a.len() as f64).sqrt() / sum
+}
+
+fn brightest(texels: &[[f32; 3]]) -> f32 {
+    texels.iter().map(|texel| texel[1]).fold(0.0, f32::max)
+}
+
+#[test]
+fn next_to_no_dispersion_is_none() {
+    let [without, with] = ["abbe:1.5,1e12", "abbe:1.5,2e7"].map(|text| floor(&ball_of(text), &settings(128)));
+    let off = difference(&without, &with);
+    assert!(off < 1e-4, "{off}");
+}
+
+#[test]
+fn dispersion_parts_colours_not_their_sum() {
+    let scene = ball_of("N-SF11");
+    let result = bake(scene.clone(), &settings(128));
+    let texels = caustic(&result, &scene, "floor");
+    let sum = texels.iter().fold(LinearSrgb::BLACK, |sum, texel| {
+        sum + LinearSrgb::from(texel.map(f64::from))
+    });
+    let spreads = texels.iter().map(|texel| (texel[0] - texel[2]).abs());
+    assert!(
+        spreads.fold(0.0, f32::max) > 0.02 * brightest(&texels),
+        "colours part"
+    );
+    for channel in sum.to_array() {
+        // Fresnel's factors differ by a per cent between red and blue.
+        assert!((channel / sum.luminance() - 1.0).abs() < 0.04, "{sum:?}");
+    }
+    assert_eq!(energy_fault(&result), None);
+    let energy = result.ledgers[0].energy_w;
+    assert!(
+        energy.truncated.total().abs() < 1e-3 * energy.emitted,
+        "{energy:?}"
+    );
+}
+
+/// A beam through a thick slab, tilted: wavelengths leave it side by side.
+#[test]
+fn a_beam_recombines_behind_a_slab() {
+    let mut scene = parts::reference_scene(1.0);
+    let pane = shapes::cuboid(DVec3::new(-0.6, 0.5, -0.6), DVec3::new(0.6, 0.7, 0.6));
+    parts::add(&mut scene, "slab", pane, parts::glass("635577"));
+    let direction = DVec3::new(0.5, -1.0, 0.0).normalize();
+    scene.lights.push(parts::sun("sun", direction, Irradiance(1.0)));
+    scene.lights[0].set_spectrum(lamp("A"));
+    let texels = floor(&scene, &settings(64));
+    let white = lamp("A").xyz().chromaticity().expect("light");
+    // The slab's light covers x from some -0.25 to 0.95 on the floor.
+    for column in 64 * 45 / 100..64 * 85 / 100 {
+        let texel = texels[32 * 64 + column];
+        let xyz = Xyz::from(LinearSrgb::from(texel.map(f64::from)));
+        let xy = xyz.chromaticity().expect("light");
+        for axis in 0..2 {
+            let off = (xy[axis] - white[axis]).abs();
+            assert!(off < 1e-3, "column {column}: {xy:?}, lamp {white:?}");
+        }
+    }
+}
+
+#[test]
+fn lumens_stay_lumens_whatever_the_spectrum() {
+    let plain = builtin_scene("ball");
+    let position = plain.lights[0].kind.position().expect("a point light");
+    // 1,000 lm, luminous-equivalent.
+    let with_lamp = |mut scene: Scene, spectrum: Option<&str>| {
+        scene.lights[0] = parts::point_light("lamp", position, Flux(1000.0 / 683.0));
+        if let Some(name) = spectrum {
+            scene.lights[0].set_spectrum(lamp(name));
+        }
+        let ledger = bake(scene, &settings(64)).ledgers[0].clone();
+        let energy = ledger.energy_w;
+        let out_w = energy.deposited + energy.absorbed + energy.escaped + energy.truncated.total();
+        assert!(
+            (out_w / energy.emitted - 1.0).abs() < 1e-4,
+            "{spectrum:?}: {energy:?}"
+        );
+        energy.emitted + ledger.not_emitted_w
+    };
+    let plain_w = with_lamp(plain, None);
+    for name in ["E", "A", "FL2", "LED-B1", "line:589.3"] {
+        let sent_w = with_lamp(ball_of("N-BK7"), Some(name));
+        assert!(
+            (sent_w / plain_w - 1.0).abs() < 1e-4,
+            "{name}: {sent_w} W, {plain_w} W of a white lamp"
+        );
+    }
+}
+
+/// A row of the prism's table: wavelength [nm], exit point and direction, height on the wall [m].
+fn prism_table(path: &std::path::Path) -> Vec<[f64; 6]> {
+    let text = std::fs::read_to_string(path).expect("a table");
+    let mut rows = text.lines().map(|line| line.split(',').collect::<Vec<&str>>());
+    let wanted = ["lambda_nm", "exit_x", "exit_y", "dir_x", "dir_y", "wall_y"];
+    let header = rows.next().expect("a header");
+    let columns = wanted.map(|name| {
+        header
+            .iter()
+            .position(|column| *column == name)
+            .expect("a column")
+    });
+    rows.map(|row| columns.map(|column| row[column].parse().expect("a number")))
+        .collect()
+}
+
+fn shared_prism() -> Option<(Scene, Vec<[f64; 6]>)> {
+    let path = support::shared_or_skip("oracle/S4.glb")?;
+    let scene = load(&path.to_string_lossy(), &LoadOptions::default()).expect("a scene");
+    Some((scene, prism_table(&path.with_file_name("S4_table.csv"))))
+}
+
+#[test]
+fn rays_leave_a_prism_where_snell_says() {
+    let Some((scene, table)) = shared_prism() else {
+        return;
+    };
+    let tracer = Tracer::new(Arc::new(scene));
+    let direction = DVec3::new(0.907_518_796_638_282_2, 0.420_011_468_591_280_8, 0.0).normalize();
+    let entry = DVec3::new(-0.015, 1.0 + 0.015 / 3.0_f64.sqrt(), 0.0);
+    let mut worst = [0.0_f64; 2];
+    for [nm, exit_x, exit_y, dir_x, dir_y, wall_y] in table {
+        let at = tracer.at_wavelength(Nanometres(nm));
+        let mut ray = Ray {
+            origin: entry - direction * 0.005 - tracer.scene().origin_world,
+            direction,
+        };
+        let mut media = MediumStack::default();
+        for _ in 0..2 {
+            let hit = at.closest_hit(&ray).expect("the prism");
+            let branch = at
+                .interact(&hit, ray.direction, &media)
+                .transmission
+                .expect("light goes through");
+            (ray, media) = (branch.ray, branch.media);
+        }
+        let exit = ray.origin + tracer.scene().origin_world;
+        let at_wall = exit.y + (1.5 - exit.x) * ray.direction.y / ray.direction.x;
+        worst[0] = worst[0].max((ray.direction - DVec3::new(dir_x, dir_y, 0.0)).length());
+        worst[1] = worst[1]
+            .max((at_wall - wall_y).abs())
+            .max((exit.x - exit_x).hypot(exit.y - exit_y));
+    }
+    assert!(worst[0] < 1e-5 && worst[1] < 1e-5, "{worst:?}");
+}
+
+#[test]
+fn each_wavelength_lands_in_its_texel() {
+    let Some((scene, table)) = shared_prism() else {
+        return;
+    };
+    let side = 512;
+    for [nm, .., wall_y] in table.into_iter().step_by(9) {
+        let mut scene = scene.clone();
+        scene.lights[0].set_spectrum(lamp(&format!("line:{nm}")));
+        // The slit is a millimetre wide: half of that between rays.
+        let fine = BakeSettings {
+            density_per_sr: 1.2e7,
+            ..settings(side)
+        };
+        let texels = caustic(&bake(scene.clone(), &fine), &scene, "wall");
+        let expected = (wall_y + 0.2) / 1.4 * side as f64;
+        let (mut sum, mut weighted) = (0.0, 0.0);
+        for (texel, irradiance) in texels.iter().enumerate() {
+            let row = (texel / side) as f64 + 0.5;
+            let luminance = LinearSrgb::from(irradiance.map(f64::from)).luminance();
+            if (row - expected).abs() < 4.0 {
+                (sum, weighted) = (sum + luminance, weighted + row * luminance);
+            }
+        }
+        let off = weighted / sum - expected;
+        assert!(off.abs() < 1.0, "{nm} nm: {off} texels off");
+    }
+}
+
+#[test]
+fn kept_bands_add_up_to_their_colour() {
+    let mut scene = ball_of("N-SF11");
+    scene.lights[0].set_spectrum(lamp("E"));
+    for estimator in [Estimator::Wavefront, Estimator::Splat] {
+        let kept = BakeSettings {
+            keep_spectrum: true,
+            ..sampled(7, estimator, 64)
+        };
+        let result = bake(scene.clone(), &kept);
+        let texels = caustic(&result, &scene, "floor");
+        let floor = result.maps[0].chart.receiver;
+        let layers = result.band_layers.iter();
+        let layers: Vec<_> = layers.filter(|layer| layer.receiver == floor).collect();
+        assert_eq!(layers.len(), 7);
+        // Equal energy: within a band E is the same at every wavelength, so that its XYZ is that times the integrals.
+        let weights = layers.iter().map(|layer| -> [f64; 3] {
+            let flat = Spectrum::from_fn(|_| 1.0).expect("light");
+            let range = Nanometres(layer.band.from_nm)..=Nanometres(layer.band.to_nm);
+            flat.xyz_within(range).into()
+        });
+        let weights: Vec<[f64; 3]> = weights.collect();
+        let most = 1e-4 * f64::from(brightest(&texels));
+        let mut parted = 0.0_f32;
+        for (texel, colour) in texels.iter().enumerate() {
+            let sum = layers
+                .iter()
+                .zip(&weights)
+                .fold([0.0; 3], |sum, (layer, weight)| {
+                    let irradiance = f64::from(layer.irradiance[texel]);
+                    std::array::from_fn(|axis| sum[axis] + irradiance * weight[axis])
+                });
+            let made = Xyz::from(sum).to_linear_srgb().to_array();
+            for (made, stored) in made.into_iter().zip(colour) {
+                assert!((made - f64::from(*stored)).abs() < most, "{made} beside {stored}");
+            }
+            parted = parted.max((layers[0].irradiance[texel] - layers[6].irradiance[texel]).abs());
+        }
+        assert!(parted > 0.05 * layers[3].irradiance.iter().copied().fold(0.0, f32::max));
+        // The ledger knows the same light in radiant watts.
+        let radiant_w = result.band_layers.iter().map(|layer| {
+            let mut maps = result.maps.iter();
+            let map = maps
+                .find(|map| map.chart.receiver == layer.receiver)
+                .expect("its map");
+            let texels = layer.irradiance.iter().enumerate();
+            let flux = texels.map(|(texel, e)| f64::from(*e) * map.chart.texel_area_m2(texel));
+            flux.sum::<f64>() * (layer.band.to_nm - layer.band.from_nm)
+        });
+        let radiant_w: f64 = radiant_w.sum();
+        let ledger = &result.ledgers[0];
+        let stated_w = ledger.deposited_radiant_w.expect("bands are kept");
+        assert!(
+            (radiant_w / stated_w - 1.0).abs() < 1e-4,
+            "{radiant_w} {stated_w}"
+        );
+        assert!(stated_w < ledger.emitted_radiant_w.expect("a spectrum"));
+    }
+}
+
+#[test]
+fn one_wavelength_parts_nothing() {
+    for estimator in [Estimator::Wavefront, Estimator::Splat] {
+        let texels = floor(&ball_of("N-SF11"), &sampled(1, estimator, 64));
+        let most = 1e-4 * brightest(&texels);
+        let mut channels = texels.iter();
+        assert!(channels.all(|[r, g, b]| (r - g).abs() < most && (b - g).abs() < most));
+    }
+}
+
+#[test]
+fn more_wavelengths_come_nearer_to_all() {
+    let scene = ball_of("N-SF11");
+    let whole = floor(&scene, &settings(64));
+    let error = |settings: &BakeSettings| difference(&whole, &floor(&scene, settings));
+    let errors = [1, 4, 16].map(|count| error(&sampled(count, Estimator::Wavefront, 64)));
+    assert!(errors[1] < errors[0] && errors[2] < 0.3 * errors[0], "{errors:?}");
+    // Splats over the whole spectrum see the same colours, as far as kernels are sharp.
+    let [all, one] = [Wavelengths::Continuous, Wavelengths::Fixed(1)].map(|wavelengths| {
+        error(&BakeSettings {
+            density_per_sr: 4e5,
+            ..at_wavelengths(wavelengths, sampled(1, Estimator::Splat, 64))
+        })
+    });
+    assert!(all < 0.5 * one, "{all} of all wavelengths, {one} of one");
+}
+
+/// Around the focus of a ball, light of all wavelengths at once against that of many traced one by one. The ball's
+/// silhouette cuts cells here, and their light reaches far: what is wrong at a border shows.
+#[test]
+fn all_wavelengths_are_as_many_alone() {
+    let scene = ball_of("N-BK7");
+    let side = 128;
+    let [all, many] = [Wavelengths::Continuous, Wavelengths::Fixed(10)].map(|wavelengths| {
+        let coarse = BakeSettings {
+            density_per_sr: 4e3,
+            ..settings(side)
+        };
+        floor(&scene, &at_wavelengths(wavelengths, coarse))
+    });
+    let middle = 0.5 * side as f64;
+    let is_around = |texel: usize| {
+        let place = |index: usize| (index as f64 + 0.5 - middle) / side as f64;
+        (0.05..0.2).contains(&place(texel % side).hypot(place(texel / side)))
+    };
+    let around: Vec<usize> = (0..side * side).filter(|texel| is_around(*texel)).collect();
+    let rms = |channel: usize| {
+        let off = |texel: &usize| f64::from(all[*texel][channel] / many[*texel][channel] - 1.0).powi(2);
+        (around.iter().map(off).sum::<f64>() / around.len() as f64).sqrt()
+    };
+    let rms = [0, 1, 2].map(rms);
+    // A ray traced again a bracket beside its border moves red by 45 % here; ten wavelengths are off by about 1 % themselves.
+    assert!(rms.iter().all(|rms| *rms < 0.03), "{rms:?}");
+}
+
+#[test]
+fn plain_glass_traces_no_wavelengths() {
+    let scene = ball_of("cauchy:1.5,0");
+    assert!(!scene.materials.iter().any(|material| material.is_dispersive()));
+    for estimator in [Estimator::Wavefront, Estimator::Splat] {
+        let [a, b] = [Wavelengths::Continuous, Wavelengths::Fixed(13)].map(|wavelengths| {
+            let settings = at_wavelengths(wavelengths, sampled(1, estimator, 64));
+            bake(scene.clone(), &settings)
+        });
+        assert_eq!(a.counts.rays, b.counts.rays);
+        assert_eq!(caustic(&a, &scene, "floor"), caustic(&b, &scene, "floor"));
+    }
+}
+
+#[test]
+fn a_prism_throws_a_spectrum_without_bands() {
+    let scene = builtin_scene("prism");
+    let wall = |wavelengths: Wavelengths| {
+        let fine = BakeSettings {
+            density_per_sr: 1e8,
+            ..settings(512)
+        };
+        caustic(
+            &bake(scene.clone(), &at_wavelengths(wavelengths, fine)),
+            &scene,
+            "wall",
+        )
+    };
+    let split = wall(Wavelengths::Fixed(128));
+    let norm = |values: &mut dyn Iterator<Item = f32>| -> f64 {
+        values.map(|value| f64::from(value).powi(2)).sum::<f64>().sqrt()
+    };
+    let whole = norm(&mut split.as_flattened().iter().copied());
+    let [continuous, three] = [Wavelengths::Continuous, Wavelengths::Fixed(3)].map(|way| {
+        let found = wall(way);
+        let pairs = found.as_flattened().iter().zip(split.as_flattened());
+        norm(&mut pairs.map(|(a, b)| a - b)) / whole
+    });
+    assert!(three > 1.0, "three lines are no spectrum");
+    assert!(continuous < 0.15, "{continuous}");
+}
+
+/// Of the beam to the plates' normal.
+const TILT_RAD: f64 = 0.1;
+const CEILING_HALF_M: f64 = 1.0;
+const GLASS: &str = "N-SF11";
+
+fn gold() -> &'static Metal {
+    Metal::by_name("gold").expect("a metal")
+}
+
+/// A narrow beam of one luminous-equivalent watt down onto a pane over a plate of gold, beneath a ceiling.
+fn gold_under_glass(spectrum: &Arc<Spectrum>) -> Scene {
+    let mut scene = Scene::default();
+    let mut plate = parts::mirror();
+    plate.set_metal(gold());
+    parts::add(
+        &mut scene,
+        "plate",
+        shapes::floor([-3.0, 3.0], [-3.0, 3.0], 0.0),
+        plate,
+    );
+    let pane = shapes::cuboid(DVec3::new(-3.0, 0.1, -3.0), DVec3::new(3.0, 0.2, 3.0));
+    parts::add(&mut scene, "pane", pane, parts::glass(GLASS));
+    let half = CEILING_HALF_M;
+    let ceiling = shapes::rectangle(DVec3::Y * 1.5, DVec3::X * half, DVec3::Z * half);
+    let grey = parts::matte("ceiling", LinearSrgb::grey(0.5));
+    parts::add(&mut scene, "ceiling", ceiling, grey);
+    let down = DVec3::new(TILT_RAD.sin(), -TILT_RAD.cos(), 0.0);
+    scene
+        .lights
+        .push(parts::beam("lamp", DVec3::Y, down, 0.02, Flux(1.0)));
+    scene.lights[0].set_spectrum(Arc::clone(spectrum));
+    scene
+}
+
+/// What comes to the ceiling of each luminous-equivalent watt that comes to the pane [W per channel].
+fn to_ceiling(spectrum: &Arc<Spectrum>, wavelengths: Wavelengths) -> LinearSrgb {
+    let side = 64;
+    let settings = BakeSettings {
+        branch_threshold: Some(1e-5),
+        ..at_wavelengths(wavelengths, settings(side))
+    };
+    let scene = gold_under_glass(spectrum);
+    let result = bake(scene, &settings);
+    let texel_m2 = (2.0 * CEILING_HALF_M / side as f64).powi(2);
+    let maps = result.maps.iter().filter(|map| map.chart.object() == 2);
+    let layers = maps.filter_map(|map| map.layer(LayerKind::Caustic));
+    let texels = layers.flat_map(|layer| &layer.irradiance);
+    let sum = texels.fold(LinearSrgb::BLACK, |sum, texel| {
+        sum + LinearSrgb::from(texel.map(f64::from)) * texel_m2
+    });
+    sum / result.ledgers[0].energy_w.emitted
+}
+
+/// Gold under a pane that parts light: all that a pane and a metal send back, whose many reflections form a geometric series each.
+fn sent_back(wavelength: Nanometres) -> f64 {
+    let glass = Glass::parse(GLASS).expect("a glass");
+    let interface = dielectric_reflectance(TILT_RAD.cos(), glass.dispersion.index(wavelength));
+    let (pane, through) = (
+        2.0 * interface / (1.0 + interface),
+        (1.0 - interface) / (1.0 + interface),
+    );
+    let metal = gold().reflectance(TILT_RAD.cos(), wavelength);
+    pane + through * through * metal / (1.0 - pane * metal)
+}
+
+#[test]
+fn gold_under_glass_reflects_by_wavelength() {
+    for name in ["D65", "LED-B1", "line:500"] {
+        let spectrum = lamp(name);
+        let xyz = spectrum.integral_times(VISIBLE, |wavelength| {
+            xyz_bar(wavelength).map(|channel| channel * sent_back(wavelength))
+        });
+        let expected = Xyz::from(xyz).to_linear_srgb();
+        for (wavelengths, tolerance) in [(Wavelengths::Continuous, 0.012), (Wavelengths::Fixed(24), 0.004)] {
+            let found = to_ceiling(&spectrum, wavelengths);
+            let error = (found - expected).map(f64::abs).max_channel();
+            assert!(
+                error < tolerance * expected.max_channel(),
+                "{name}: {found:?} for {expected:?}"
+            );
+        }
+    }
+}

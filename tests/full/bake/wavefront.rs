@@ -1,0 +1,229 @@
+//! The wavefront estimator against an independent solver, and by its counters.
+
+use glam::{DMat3, DVec3};
+use nephroid::scene::{LoadOptions, load};
+use nephroid::session::BakeResult;
+use nephroid::settings::BakeSettings;
+
+use crate::bake::common::{assert_same, floor, rmse, towards};
+use support::references::references;
+use support::tools::{at, bake, builtin_scene, energy_fault, map_of, settings, transformed};
+use support::{assert_close, project_file, reference_map, shared_or_skip};
+
+/// The others are in the quick tests.
+#[test]
+fn few_rays_agree_with_the_solver() {
+    let references = references();
+    let large = ["ball", "pool", "paraboloid"];
+    for reference in references
+        .iter()
+        .filter(|reference| large.contains(&reference.builtin))
+    {
+        let scene = builtin_scene(reference.builtin);
+        let result = bake(scene.clone(), &at(reference.by_wavefronts.0, 256));
+        reference.check_wavefronts(&result, &scene);
+        if reference.builtin == "ball" {
+            let texel_m = map_of(&result, &scene, "floor").chart.texel_area_m2(0).sqrt();
+            check_far_field(&floor(&result, &scene), texel_m);
+        }
+    }
+}
+
+/// As a lamp's irradiance falls with the square of the size, and a sun's does not.
+#[test]
+fn moved_and_scaled_scenes_agree() {
+    let rotation = DMat3::from_axis_angle(DVec3::new(0.3, -0.8, 0.52).normalize(), 1.234);
+    let size = 3.7;
+    let references = references();
+    for reference in references
+        .iter()
+        .filter(|reference| ["ring", "pool"].contains(&reference.builtin))
+    {
+        let offset = DVec3::new(5.0, -3.0, 11.0);
+        let scene = transformed(builtin_scene(reference.builtin), rotation, size, offset);
+        let (density, most) = reference.by_wavefronts;
+        reference.check(
+            &bake(scene.clone(), &at(density, 256)),
+            &scene,
+            size,
+            (most, 0.001),
+        );
+    }
+}
+
+#[test]
+fn the_solvers_files_agree_with_its_maps() {
+    for reference in references()
+        .iter()
+        .filter(|reference| reference.by_splats.is_some())
+    {
+        let Some(path) = shared_or_skip(&format!("oracle/{}.glb", reference.file)) else {
+            continue;
+        };
+        let path = path.to_str().expect("a readable path");
+        let scene = load(path, &LoadOptions::default()).expect("a valid file");
+        let (density, most) = reference.by_wavefronts;
+        reference.check(
+            &bake(scene.clone(), &at(density, 256)),
+            &scene,
+            1.0,
+            (most, 0.005),
+        );
+    }
+}
+
+/// Rings around the ball's axis that lie wholly on its map, against the solver's profile.
+fn check_far_field(image: &[f64], texel_m: f64) {
+    let profile = std::fs::read_to_string(project_file("assets/reference/S2_profile.csv"));
+    let profile = profile.expect("a readable profile");
+    let numbers = |line: &str| -> Vec<f64> {
+        let numbers = line.split(',').map(|x| x.parse().expect("a number"));
+        numbers.collect()
+    };
+    let rows: Vec<Vec<f64>> = profile.lines().skip(1).map(numbers).collect();
+    for ring in 0..12 {
+        let (inner, outer) = (0.05 * f64::from(ring), 0.05 * f64::from(ring + 1));
+        let (mut flux, mut area) = (0.0, 0.0);
+        const SUB: usize = 8;
+        for (texel, e) in image.iter().enumerate() {
+            for sub in 0..SUB * SUB {
+                let place = |index: usize, part: usize| {
+                    (index as f64 + (part as f64 + 0.5) / SUB as f64 - 128.0) * texel_m
+                };
+                let r = place(texel % 256, sub % SUB).hypot(place(texel / 256, sub / SUB));
+                if (inner..outer).contains(&r) {
+                    flux += e;
+                    area += 1.0;
+                }
+            }
+        }
+        let (mut expected, mut whole) = (0.0, 0.0);
+        for row in &rows {
+            let (low, high) = (row[0].max(inner), row[1].min(outer));
+            if high > low {
+                expected += row[2] * (high * high - low * low);
+                whole += high * high - low * low;
+            }
+        }
+        let what = format!("ring {inner:.2} to {outer:.2} m");
+        assert_close(flux / area, expected / whole, 0.05, &what);
+    }
+}
+
+/// Errors of the meshes themselves (of the solver's own files; a little is left for the deposit).
+#[test]
+fn more_rays_find_the_meshs_own_error() {
+    for (name, reference, density, mesh) in [
+        ("ring", "S1", 1e5, 0.0014),
+        ("pool", "S3", 1e5, 0.007),
+        ("paraboloid", "S7", 3e5, 0.0014),
+    ] {
+        let scene = builtin_scene(name);
+        let [coarse, fine] = [density / 10.0, density].map(|density| {
+            let result = bake(scene.clone(), &at(density, 256));
+            rmse(&floor(&result, &scene), &reference_map(reference))
+        });
+        assert!(
+            fine <= 1.3 * mesh || fine < 0.5 * coarse,
+            "{name}: {coarse} only falls to {fine}"
+        );
+    }
+}
+
+#[test]
+fn tighter_targets_err_less() {
+    for (name, reference) in [("ring", "S1"), ("ball", "S2")] {
+        let scene = builtin_scene(name);
+        let found = [0.05, 0.02, 0.01].map(|target| {
+            let settings = BakeSettings {
+                max_error: Some(target),
+                ..at(40.0 / target, 256)
+            };
+            let result = bake(scene.clone(), &settings);
+            assert_eq!(energy_fault(&result), None, "{name}");
+            let off = rmse(&floor(&result, &scene), &reference_map(reference));
+            (result.counts.rays, off)
+        });
+        for pair in found.windows(2) {
+            assert!(
+                pair[1].0 > pair[0].0 && pair[1].1 < pair[0].1,
+                "{name}: {found:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn any_threads_give_the_same_bits() {
+    for max_error in [None, Some(0.03)] {
+        let bakes = [1, 2, 4, 7].map(|threads| {
+            let settings = BakeSettings {
+                threads,
+                max_error,
+                ..at(3e3, 128)
+            };
+            bake(builtin_scene("ball"), &settings)
+        });
+        for many in &bakes[1..] {
+            assert_same(&bakes[0], many, "more threads");
+            assert_eq!(bakes[0].counts, many.counts);
+        }
+    }
+}
+
+#[test]
+fn what_refinement_leaves_open_shrinks() {
+    let [coarse, fine] = [1e3, 3e4].map(|density| {
+        let result = bake(builtin_scene("ball"), &at(density, 64));
+        let energy = result.ledgers[0].energy_w;
+        energy.truncated.quadrature.abs() / energy.emitted
+    });
+    assert!(
+        fine < 2e-3 && fine < coarse,
+        "{coarse} of the emitted flux, then {fine}"
+    );
+}
+
+/// Given up below the threshold, over what arrived.
+fn left_out(result: &BakeResult) -> f64 {
+    let energy = &result.ledgers[0].energy_w;
+    energy.truncated.threshold / energy.deposited
+}
+
+/// Branches too weak to matter are not traced: how weak follows the target, and their watts are booked.
+#[test]
+fn a_tighter_target_follows_weaker_branches() {
+    let targets = [0.1, 0.03, 0.01];
+    let shares = targets.map(|target| {
+        let result = bake(builtin_scene("ball"), &towards(target, 64));
+        assert_eq!(energy_fault(&result), None);
+        let share = left_out(&result);
+        assert!(share > 0.0, "something is always too weak");
+        assert!(share < 0.1 * target, "{share} at a target of {target}");
+        share
+    });
+    assert!(shares.windows(2).all(|pair| pair[1] < pair[0]), "{shares:?}");
+    // Rays of splats are always the same, their segments are not.
+    let splats = targets.map(|target| {
+        let settings = BakeSettings {
+            branch_threshold: Some(towards(target, 64).path_threshold()),
+            ..settings(4_000.0, 64)
+        };
+        let result = bake(builtin_scene("ball"), &settings);
+        (result.counts.rays, result.counts.segments, left_out(&result))
+    });
+    for pair in splats.windows(2) {
+        assert_eq!(pair[0].0, pair[1].0);
+        assert!(pair[0].1 < pair[1].1 && pair[0].2 > pair[1].2, "{splats:?}");
+    }
+}
+
+#[test]
+fn a_named_threshold_is_taken_as_it_is() {
+    let named = BakeSettings {
+        branch_threshold: Some(0.02),
+        ..towards(0.01, 64)
+    };
+    assert_eq!(named.path_threshold().to_bits(), 0.02_f64.to_bits());
+    assert!(towards(0.1, 64).path_threshold() > towards(0.01, 64).path_threshold());
+}

@@ -1,0 +1,274 @@
+//! What is seen in mirrors and through glass: as on the CPU, as FLIP sees it, and only where a view calls for it.
+
+use std::sync::Arc;
+
+use glam::{DVec2, DVec3};
+use nephroid::effect::EffectSwitch;
+use nephroid::eye_pass::reference::{ChainLimits, EyeRays, ReferenceSettings, first_hits};
+use nephroid::eye_pass::renderer::EyeQuality;
+use nephroid::eye_pass::tone_mapping::{auto_exposure_stops, display_rgba8};
+use nephroid::eye_pass::{Picture, ToneMap, View};
+use nephroid::optics::LinearSrgb;
+use nephroid::plan;
+use nephroid::scene::builtin::{parts, shapes};
+use nephroid::scene::{Camera, Material, Scene, SurfaceKind, Volume, Wave, Waves};
+use nephroid::settings::{BakeSettings, LayerKind};
+use nephroid::transport::Tracer;
+use nephroid::units::Flux;
+
+use crate::gpu::rig::{AS_CPU, Rig, or_skip};
+use support::bump_scenes::by_image;
+use support::effect_scenes::all;
+use support::flip::mean_flip;
+use support::scenes::{bits, seen, view_of};
+use support::tools::{bake, builtin_scene, settings};
+
+/// Largest mean FLIP between the device's picture and the CPU's of every chain.
+const LARGEST_FLIP: f64 = 0.02;
+/// Largest mean FLIP where both follow the same chains: what single precision and half floats leave. The rest is what
+/// the device approximates: after four surfaces it follows only the stronger way on.
+const LARGEST_SAME: f64 = 0.002;
+/// Largest mean FLIP of a walk's picture: maps as coarse as they are seen, and both ways on at two surfaces only, while
+/// most of a glass ball in a tank lies behind more of them.
+const LARGEST_WALKING: f64 = 0.03;
+/// Largest mean difference on diffuse surfaces, relative to the mean.
+const LARGEST_DIFFUSE: f64 = 1.0 / 255.0;
+const SIZE: [u32; 2] = [320, 213];
+
+fn both_layers() -> Vec<LayerKind> {
+    vec![LayerKind::Caustic, LayerKind::Direct]
+}
+
+fn limited(branching_depth: u32) -> ReferenceSettings {
+    ReferenceSettings {
+        limits: ChainLimits {
+            branching_depth,
+            ..Default::default()
+        },
+        ..Default::default()
+    }
+}
+
+/// The picture one pixel to the left.
+fn slipped(picture: &Picture) -> Picture {
+    let mut slipped = picture.clone();
+    slipped.radiance.rotate_left(1);
+    slipped
+}
+
+/// Mean difference of two pictures on some pixels, relative to the mean.
+fn relative(a: &Picture, b: &Picture, pixels: &[usize]) -> f64 {
+    let (mut off, mut sum) = (0.0, 0.0);
+    for pixel in pixels {
+        for (a, b) in a.radiance[*pixel].iter().zip(b.radiance[*pixel]) {
+            off += f64::from((a - b).abs());
+            sum += f64::from(b);
+        }
+    }
+    off / sum
+}
+
+fn compare(scene: Scene) {
+    if crate::gpu::rig::gpu().is_none() {
+        return;
+    }
+    let baking = BakeSettings {
+        layers: both_layers(),
+        ..settings(8000.0, 256)
+    };
+    let maps = bake(scene.clone(), &baking).maps;
+    let tracer = Tracer::new(Arc::new(scene.clone()));
+    let view = view_of(scene.cameras[0].clone(), SIZE);
+    let on_cpu = |depth: u32| seen(&tracer, &maps, &view, &limited(depth)).0;
+    let (all_chains, same_chains) = (on_cpu(u32::MAX), on_cpu(AS_CPU.branching_depth));
+    let mut rig = or_skip!(Rig::at(AS_CPU, &scene, &maps));
+    let device = rig.picture(&view);
+    assert_eq!(rig.renderer.chain_refusal(), None);
+    rig.set_chains(EffectSwitch::Off);
+    let bare = rig.picture(&view);
+    rig.set_chains(EffectSwitch::Auto);
+    rig.renderer.set_quality(EyeQuality::WALKING);
+    let walking = rig.picture(&view);
+
+    let stops = auto_exposure_stops(&all_chains);
+    let show = |picture: &Picture| display_rgba8(picture, stops, ToneMap::None);
+    let flip = |a: &Picture, b: &Picture| mean_flip(&show(a), &show(b), SIZE[0] as usize);
+    let (found, same) = (flip(&all_chains, &device), flip(&same_chains, &device));
+    assert!(found <= LARGEST_FLIP && same <= LARGEST_SAME, "{found} {same}");
+    let walked = flip(&all_chains, &walking);
+    assert!(walked <= LARGEST_WALKING, "{walked}");
+    // The comparison sees chains that are missing and a slip by one pixel.
+    for wrong in [&bare, &slipped(&device)] {
+        assert!(flip(&all_chains, wrong) > 4.0 * LARGEST_SAME);
+    }
+    // Where chains have no part, every digit of it.
+    let is_diffuse = |object: usize| scene.material_of(object).surface == SurfaceKind::Diffuse;
+    let hits = first_hits(&tracer, &view);
+    let seen_directly = |pixel: &usize| hits[*pixel].is_some_and(is_diffuse);
+    let diffuse: Vec<usize> = (0..hits.len()).filter(seen_directly).collect();
+    assert!(diffuse.len() > 2000 || !["ring", "mirror"].contains(&scene.name.as_str()));
+    if diffuse.len() > 2000 {
+        let off = relative(&device, &same_chains, &diffuse);
+        assert!(off < LARGEST_DIFFUSE, "{off}");
+        assert!(relative(&slipped(&device), &same_chains, &diffuse) > LARGEST_DIFFUSE);
+    }
+}
+
+#[test]
+fn ring_looks_as_on_the_cpu() {
+    compare(builtin_scene("ring"));
+}
+
+#[test]
+fn ball_looks_as_on_the_cpu() {
+    let mut scene = builtin_scene("ball");
+    // From so high up that the floor, and the caustic on it, are seen through the ball.
+    let (eye, target) = (DVec3::new(0.35, 2.2, 1.0), DVec3::new(0.0, 0.45, 0.0));
+    scene.cameras = vec![Camera::look_at("above", eye, target, 0.7)];
+    compare(scene);
+}
+
+#[test]
+fn pools_look_as_on_the_cpu() {
+    compare(builtin_scene("pool"));
+    compare(builtin_scene("pool-bump"));
+}
+
+#[test]
+fn mirror_and_slab_look_as_on_the_cpu() {
+    compare(builtin_scene("mirror"));
+    compare(builtin_scene("slab"));
+}
+
+/// A lamp, a red pillar and a mirror behind it.
+fn hall(mirror: Material, pillar: [DVec3; 2]) -> Scene {
+    let mut scene = parts::reference_scene(1.0);
+    let plane = shapes::rectangle(DVec3::new(0.0, 0.5, -0.7), DVec3::X * 0.9, DVec3::Y * 0.48);
+    parts::add(&mut scene, "mirror", plane, mirror);
+    let red = parts::matte("red", LinearSrgb::new(0.7, 0.2, 0.1));
+    parts::add(&mut scene, "pillar", shapes::cuboid(pillar[0], pillar[1]), red);
+    let lamp = DVec3::new(-0.3, 1.8, 0.7);
+    scene.lights.push(parts::point_light("light", lamp, Flux(100.0)));
+    scene
+}
+
+/// A glass ball in a tank of greenish water, before a mirror: chains of ten surfaces and more.
+#[test]
+fn nested_glass_looks_as_on_the_cpu() {
+    let pillar = [DVec3::new(0.6, 0.0, -0.1), DVec3::new(0.75, 0.7, 0.05)];
+    let mut scene = hall(parts::mirror(), pillar);
+    let mut water = parts::dielectric("water", 1.333);
+    water.volume = Some(Volume {
+        attenuation_distance_m: 1.0,
+        attenuation_colour: LinearSrgb::new(0.7, 0.95, 0.85),
+    });
+    let tank = shapes::cuboid(DVec3::new(-0.55, 0.05, -0.3), DVec3::new(0.45, 0.6, 0.35));
+    parts::add(&mut scene, "water", tank, water);
+    let ball = shapes::sphere(DVec3::new(-0.1, 0.32, 0.0), 0.2, 5);
+    parts::add(&mut scene, "ball", ball, parts::dielectric("glass", 1.5));
+    let (eye, target) = (DVec3::new(0.35, 0.95, 2.0), DVec3::new(0.0, 0.3, -0.1));
+    scene.cameras = vec![Camera::look_at("camera", eye, target, 0.75)];
+    compare(scene);
+}
+
+/// A wavy mirror and a matte pillar on a polished wavy floor.
+#[test]
+fn wavy_mirror_and_polish_look_as_on_the_cpu() {
+    let waves = |direction: DVec3| {
+        let wave = |wavelength_m, direction: DVec3| Wave {
+            amplitude_m: 0.03 * wavelength_m,
+            wavelength_m,
+            direction: direction.normalize(),
+            phase_rad: 0.4,
+        };
+        let across = direction.cross(DVec3::ONE);
+        Waves::new(vec![wave(0.3, direction), wave(0.23, across)]).ok()
+    };
+    let wavy = Material {
+        waves: waves(DVec3::new(1.0, 1.0, 0.0)),
+        ..parts::mirror()
+    };
+    let mut scene = hall(wavy, [DVec3::new(0.2, 0.0, -0.1), DVec3::new(0.4, 0.7, 0.1)]);
+    let floor = &mut scene.materials[0];
+    (floor.surface, floor.roughness, floor.polish) = (SurfaceKind::Mixed, 0.0, 0.6);
+    floor.waves = waves(DVec3::X);
+    compare(scene);
+}
+
+#[test]
+fn normal_images_bend_chains_as_on_the_cpu() {
+    let mut scene = by_image(false);
+    // Polish as well, seen by itself.
+    let normal_map = scene.materials[1].normal_map.clone();
+    let floor = &mut scene.materials[0];
+    (floor.surface, floor.roughness, floor.normal_map) = (SurfaceKind::Mixed, 0.0, normal_map);
+    let mesh = Arc::make_mut(&mut scene.objects[0].mesh);
+    let uv = |place: &DVec3| DVec2::new(place.x, place.z);
+    mesh.uv0 = Some(mesh.positions.iter().map(uv).collect());
+    compare(scene);
+}
+
+const SWITCHES: [EffectSwitch; 3] = [EffectSwitch::Auto, EffectSwitch::On, EffectSwitch::Off];
+
+#[test]
+fn chains_only_where_something_specular_is_in_view() {
+    let (mut hidden, mut dark) = (Vec::new(), Vec::new());
+    for case in all() {
+        let (name, scene) = (case.name, &case.scene);
+        let baking = BakeSettings {
+            layers: case.layers.clone(),
+            ..settings(3000.0, 32)
+        };
+        let maps = bake(scene.clone(), &baking).maps;
+        let tracer = Tracer::new(Arc::new(scene.clone()));
+        let view = View {
+            background: LinearSrgb::new(0.5, 0.6, 0.7),
+            ..view_of(scene.cameras[0].clone(), [96, 64])
+        };
+        // Nothing opaque hides it.
+        let is_specular = |object: usize| scene.material_of(object).surface.is_specular();
+        let mut hits = first_hits(&tracer, &view).into_iter().flatten();
+        let (in_view, is_visible) = (case.shows_specular, hits.any(is_specular));
+        assert!(in_view || !is_visible, "{name}");
+        for (switch, expected) in SWITCHES.into_iter().zip([in_view, true, false]) {
+            let line = plan::chains(scene, Some((&view.camera, 1.5)), switch);
+            assert_eq!(line.on, expected, "{name}: {line:?}");
+        }
+        // On is auto to the bit; off is another picture where a chain is seen.
+        let assert_right = |[auto, on, off]: [&Picture; 3]| {
+            assert!(bits(auto) == bits(on), "{name}");
+            assert_eq!(bits(auto) != bits(off), is_visible, "{name}");
+        };
+        let by_cpu = |switch| -> (Picture, EyeRays) {
+            let mut settings = limited(u32::MAX);
+            settings.limits.switch = switch;
+            seen(&tracer, &maps, &view, &settings)
+        };
+        let [(auto, took), (on, forced), (off, left)] = SWITCHES.map(by_cpu);
+        assert_right([&auto, &on, &off]);
+        assert_eq!((took.chain_rays > 0, took), (is_visible, forced), "{name}");
+        assert_eq!((left.chain_rays, took.camera_rays), (0, 96 * 64), "{name}");
+        let by_gpu = |switch| {
+            let mut rig = Rig::new(scene, &maps)?;
+            rig.set_chains(switch);
+            let picture = rig.picture(&view);
+            let made = rig.renderer.counts();
+            Some((
+                picture,
+                [made.specular_pipelines, made.chain_bytes, made.drawn_specular],
+            ))
+        };
+        let [Some((auto, took)), Some((on, _)), Some((off, left))] = SWITCHES.map(by_gpu) else {
+            return;
+        };
+        assert_right([&auto, &on, &off]);
+        assert!(
+            took.iter().all(|count| (*count > 0) == in_view),
+            "{name}: {took:?}"
+        );
+        assert_eq!(left, [0; 3], "{name}");
+        hidden.extend((in_view && !is_visible).then_some(name));
+        dark.extend((is_visible && maps.is_empty()).then_some(name));
+    }
+    assert_eq!((hidden, dark), (vec!["glass unlit"], vec!["no light"]));
+}

@@ -1,0 +1,142 @@
+//! What glass that parts wavelengths shows: the device against the CPU.
+
+use std::sync::Arc;
+
+use glam::DVec3;
+use nephroid::effect::EffectSwitch;
+use nephroid::eye_pass::reference::{ChainLimits, ReferenceSettings};
+use nephroid::eye_pass::tone_mapping::display_rgba8;
+use nephroid::eye_pass::{Picture, ToneMap, View};
+use nephroid::illumination::IlluminationMap;
+use nephroid::optics::LinearSrgb;
+use nephroid::scene::builtin::{parts, shapes};
+use nephroid::scene::{Material, Scene};
+use nephroid::transport::Tracer;
+
+use crate::gpu::rig::{AS_CPU, Rig, or_skip};
+use support::flip::mean_flip;
+use support::floors::{diffuse, floor_map, floor_scene};
+use support::scenes::{seen, view};
+
+/// Largest mean FLIP between the device's picture at rest and the CPU's of the same chains. Nearly all of it is that
+/// they look through other places of the pixels: without dispersion they differ as much.
+const LARGEST_FLIP: f64 = 0.02;
+/// Pictures of which the one at rest is the mean.
+const PICTURES: u32 = 64;
+
+/// A ball and a lying prism over a floor of bright lines, two of them coloured.
+fn exhibit(glass: &Material) -> (Scene, Vec<IlluminationMap>) {
+    let mut scene = floor_scene(diffuse(LinearSrgb::WHITE));
+    let ball = shapes::sphere(DVec3::new(0.3, 0.24, 0.55), 0.2, 5);
+    parts::add(&mut scene, "ball", ball, glass.clone());
+    let outline = [[0.62, 0.1, 0.2], [0.82, 0.1, 0.35], [0.66, 0.35, 0.3]];
+    let prism = shapes::prism(outline.map(DVec3::from), DVec3::new(0.1, 0.0, 0.4));
+    parts::add(&mut scene, "prism", prism, glass.clone());
+    // Wide lines with soft edges: what differs by the places of samples is little beside what glass parts.
+    let wave = |place: usize| 0.5 + 0.5 * (std::f64::consts::TAU * (place as f64 + 0.5) / 8.0).cos();
+    let line = |index: usize| {
+        let (across, along) = (wave(index % 32), wave(index / 32));
+        let lit = 3.0 * across.max(along).powi(2);
+        [1.0, along.max(0.3), across.max(0.2)].map(|share| (0.1 + lit * share) as f32)
+    };
+    let maps = vec![floor_map(0, 32, 32, (0..32 * 32).map(line).collect())];
+    (scene, maps)
+}
+
+fn ahead() -> View {
+    View {
+        background: LinearSrgb::grey(0.1),
+        ..view(
+            DVec3::new(0.5, 0.9, 1.7),
+            DVec3::new(0.46, 0.2, 0.5),
+            0.26,
+            [96, 64],
+        )
+    }
+}
+
+/// The picture at rest, after so many.
+fn at_rest(rig: &mut Rig, pictures: u32) -> Picture {
+    // From the first picture on.
+    rig.renderer.set_quality(AS_CPU);
+    for _ in 0..pictures {
+        rig.refined(&ahead());
+    }
+    assert_eq!(rig.renderer.counts().samples, pictures);
+    assert_eq!((rig.gpu.take_error(), rig.renderer.chain_refusal()), (None, None));
+    rig.renderer
+        .shown_radiance(rig.gpu, &ahead())
+        .expect("it is read back")
+}
+
+#[test]
+fn picture_at_rest_shows_all_wavelengths() {
+    let (scene, maps) = exhibit(&parts::glass("N-SF66"));
+    let mut rig = or_skip!(Rig::at(AS_CPU, &scene, &maps));
+    let tracer = Tracer::new(Arc::new(scene));
+    let [parted, unparted] = [16, 0].map(|wavelengths| {
+        let settings = ReferenceSettings {
+            samples_per_side: 4,
+            limits: ChainLimits {
+                branching_depth: AS_CPU.branching_depth,
+                ..ChainLimits::default()
+            },
+            wavelengths,
+        };
+        seen(&tracer, &maps, &ahead(), &settings).0
+    });
+    let found = at_rest(&mut rig, PICTURES);
+    rig.renderer.set_dispersion(EffectSwitch::Off);
+    let off = at_rest(&mut rig, PICTURES);
+    let show = |picture: &Picture| display_rgba8(picture, 0.0, ToneMap::None);
+    let flip = |a: &Picture, b: &Picture| mean_flip(&show(a), &show(b), 96);
+    let (same, both_off) = (flip(&parted, &found), flip(&unparted, &off));
+    assert!(
+        same <= LARGEST_FLIP && same < 1.25 * both_off,
+        "{same} {both_off}"
+    );
+    for missing in [&off, &unparted] {
+        assert!(flip(&parted, missing) > 2.5 * same, "{same}");
+    }
+}
+
+#[test]
+fn switched_off_glass_has_one_index() {
+    let glass = parts::glass("N-SF66");
+    let plain = Material {
+        glass: None,
+        ..glass.clone()
+    };
+    let picture = |(material, switch): (&Material, EffectSwitch)| {
+        let (scene, maps) = exhibit(material);
+        let mut rig = Rig::at(AS_CPU, &scene, &maps)?;
+        rig.renderer.set_dispersion(switch);
+        Some(rig.picture(&ahead()))
+    };
+    let (auto, on, off) = (EffectSwitch::Auto, EffectSwitch::On, EffectSwitch::Off);
+    let [one_index, forced, switched_off, parted] =
+        [(&plain, auto), (&plain, on), (&glass, off), (&glass, auto)].map(picture);
+    assert!(forced == one_index && switched_off == one_index);
+    assert!(one_index.is_none() || parted != one_index);
+}
+
+#[test]
+fn white_stays_white_in_every_picture() {
+    let mut scene = Scene::default();
+    let slab = shapes::cuboid(DVec3::new(-2.0, 0.1, -2.0), DVec3::new(3.0, 0.4, 3.0));
+    parts::add(&mut scene, "slab", slab, parts::glass("N-SF11"));
+    let mut rig = or_skip!(Rig::at(AS_CPU, &scene, &[]));
+    rig.renderer.set_dispersion(EffectSwitch::Off);
+    let by_one_index = at_rest(&mut rig, 1);
+    rig.renderer.set_dispersion(EffectSwitch::Auto);
+    for pictures in 1..6 {
+        let seen = at_rest(&mut rig, pictures);
+        let channels = seen.radiance.iter().flatten();
+        let pairs = channels.zip(by_one_index.radiance.iter().flatten());
+        let off: Vec<f32> = pairs.map(|(a, b)| (a / b - 1.0).abs()).collect();
+        let mean = off.iter().sum::<f32>() / off.len() as f32;
+        let largest = off.iter().copied().fold(0.0, f32::max);
+        // Half floats hold 5e-4; which way is the stronger after four surfaces may differ by wavelength.
+        assert!(mean < 1e-3 && largest < 0.02, "{pictures}: {mean}, {largest}");
+    }
+}

@@ -1,0 +1,136 @@
+//! Surfaces shown by something else than their light, on floors of which every pixel is known.
+
+use std::sync::Arc;
+
+use glam::DVec3;
+use nephroid::eye_pass::renderer::{Inspected, MapStyle};
+use nephroid::illumination::IlluminationMap;
+use nephroid::illumination::false_colours::ColourScale;
+use nephroid::optics::LinearSrgb;
+use nephroid::scene::Scene;
+
+use crate::gpu::display::ramp;
+use crate::gpu::rig::{Rig, or_skip};
+use support::floors::{diffuse, floor_map, floor_scene, from_above};
+use support::scenes::middles;
+
+/// Pixels and texels across.
+const SIDE: usize = 16;
+/// A step of 8-bit display values, and half of one for half floats.
+const CODE: f64 = 1.5 / 255.0;
+
+/// Display values of a view of the floor.
+fn shown(scene: &Scene, maps: &[IlluminationMap], style: MapStyle, side: usize) -> Option<Vec<[f64; 3]>> {
+    let mut rig = Rig::new(scene, maps)?;
+    rig.renderer.set_map_style(style);
+    let picture = rig.picture(&from_above(side as u32));
+    let display = |rgb: &[f32; 3]| rgb.map(|linear| LinearSrgb::encode_channel(f64::from(linear)));
+    Some(picture.radiance.iter().map(display).collect())
+}
+
+fn inspected(what: Inspected) -> MapStyle {
+    inspected_on(what, ColourScale::default())
+}
+
+fn inspected_on(what: Inspected, scale: ColourScale) -> MapStyle {
+    MapStyle::Inspected { what, scale }
+}
+
+fn scale(low: f64, high: f64, is_logarithmic: bool) -> ColourScale {
+    ColourScale {
+        low,
+        high,
+        is_logarithmic,
+    }
+}
+
+fn grey_floor() -> Scene {
+    floor_scene(diffuse(LinearSrgb::grey(0.3)))
+}
+
+fn even(width: usize, height: usize) -> Vec<IlluminationMap> {
+    vec![floor_map(0, width, height, vec![[1.0; 3]; width * height])]
+}
+
+fn is_near(found: [f64; 3], expected: [f64; 3]) -> bool {
+    found.iter().zip(expected).all(|(a, b)| (a - b).abs() <= CODE)
+}
+
+#[track_caller]
+fn assert_near(found: &[[f64; 3]], expected: impl Iterator<Item = [f64; 3]>) {
+    for (found, expected) in found.iter().zip(expected) {
+        assert!(is_near(*found, expected), "{found:?}, not {expected:?}");
+    }
+}
+
+#[test]
+fn irradiance_has_the_colour_of_the_scale() {
+    // From 2⁻⁸ to 2⁷ W/m², of changing hue.
+    let texels = ramp(SIDE as u32, -8.0, 1.0);
+    let maps = [floor_map(0, SIDE, SIDE, texels.clone())];
+    for is_logarithmic in [false, true] {
+        let scale = scale(0.01, 20.0, is_logarithmic);
+        let style = inspected_on(Inspected::Irradiance, scale);
+        let found = or_skip!(shown(&grey_floor(), &maps, style, SIDE));
+        let luminance = |rgb: &[f32; 3]| LinearSrgb::from(rgb.map(f64::from)).luminance();
+        assert_near(&found, texels.iter().map(|rgb| scale.colour(luminance(rgb))));
+        assert!(!is_near(found[0], found[SIDE - 1]), "there are colours");
+    }
+}
+
+#[test]
+fn normals_are_those_of_the_mesh() {
+    for normal in [DVec3::Y, DVec3::new(0.6, 0.8, 0.0), DVec3::new(-0.48, 0.6, -0.64)] {
+        let mut scene = grey_floor();
+        Arc::make_mut(&mut scene.objects[0].mesh).normals = vec![normal; 4];
+        // Surfaces have them with and without maps.
+        let found = or_skip!(shown(&scene, &[], inspected(Inspected::Normals), SIDE));
+        assert_near(&found, std::iter::repeat((0.5 * normal + 0.5).to_array()));
+    }
+}
+
+#[test]
+fn coordinates_run_as_the_floors_do() {
+    for what in [Inspected::Uv, Inspected::MapUv] {
+        let found = or_skip!(shown(&grey_floor(), &even(4, 4), inspected(what), SIDE));
+        assert_near(&found, middles(SIDE).map(|uv| [uv.x, uv.y, 0.0]));
+    }
+}
+
+#[test]
+fn texels_are_squares_counted_by_the_metre() {
+    // 8 by 4 texels on a square metre.
+    let scale = scale(1.0, 100.0, true);
+    let style = inspected_on(Inspected::TexelDensity, scale);
+    let found = or_skip!(shown(&grey_floor(), &even(8, 4), style, SIDE));
+    assert_near(&found, std::iter::repeat(scale.colour(32.0_f64.sqrt())));
+    let squares = shown(&grey_floor(), &even(8, 4), inspected(Inspected::Texels), 8 * SIDE);
+    let squares = squares.expect("there is a device");
+    // Each is seen by 16 by 32 pixels.
+    let of_texel = |column: usize, row: usize| squares[(row * 32 + 3) * 128 + column * 16 + 3][0];
+    for (column, row) in (0..7).flat_map(|column| (0..3).map(move |row| (column, row))) {
+        let here = of_texel(column, row);
+        assert!((here - of_texel(column + 1, row + 1)).abs() < CODE);
+        assert!((here - of_texel(column + 1, row)).abs() > 0.2);
+        assert!((here - of_texel(column, row + 1)).abs() > 0.2);
+    }
+}
+
+#[test]
+fn what_is_no_number_is_magenta() {
+    use Inspected::{Irradiance, MapUv, TexelDensity, Texels};
+    let of_maps = |what| inspected_on(what, scale(0.1, 10.0, true));
+    let styles = [Irradiance, Texels, TexelDensity, MapUv].map(of_maps);
+    for fault in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+        let mut texels = vec![[1.0; 3]; SIDE * SIDE];
+        let middle = SIDE / 2 * SIDE + SIDE / 2;
+        texels[middle][1] = fault;
+        let maps = [floor_map(0, SIDE, SIDE, texels)];
+        for style in styles.into_iter().chain([MapStyle::Lit, MapStyle::AsItIs]) {
+            let found = or_skip!(shown(&grey_floor(), &maps, style, SIDE));
+            let is_magenta = |pixel: &usize| is_near(found[*pixel], [1.0, 0.0, 1.0]);
+            let magenta: Vec<usize> = (0..found.len()).filter(is_magenta).collect();
+            assert_eq!(magenta, [middle], "{fault} in {style:?}");
+        }
+    }
+}

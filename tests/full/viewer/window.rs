@@ -1,0 +1,341 @@
+//! The real program in a real window, used as a person would: seen only by screenshots and its event log.
+
+use std::path::Path;
+use std::time::Duration;
+
+use image::RgbImage;
+use nephroid::export::FloatImage;
+use nephroid::eye_pass::tone_mapping::display_rgba8;
+use nephroid::eye_pass::{Picture, ToneMap};
+use nephroid::gpu::Gpu;
+use nephroid::scene::builtin;
+use nephroid::viewer::panel::WIDTH;
+use nephroid::viewer::walking::EYE_M;
+use serde_json::Value;
+
+use support::desktop::{ALIKE, SIZE, Screen, Viewer, difference, picture, position};
+
+/// The caustic alone, coarse enough to be baked in a second, by the estimator whose sigma changes the picture most.
+const RING: &str = "builtin:ring --estimator splat --density 10000 --map-resolution 128 --layers caustic";
+
+#[test]
+fn picture_is_saved_flown_and_resized() {
+    let Some(screen) = Screen::start() else {
+        return;
+    };
+    let mut viewer = Viewer::open(&screen, RING);
+    let stops = viewer.wait_for("exposure", |_| true)["stops"].as_f64();
+    let rest = viewer.wait_for("rest", |_| true);
+    // What the picture took has come back by then, from a device that can tell.
+    let gpu = Gpu::headless().expect("the window has an adapter too");
+    let tells = gpu.device.features().contains(wgpu::Features::TIMESTAMP_QUERY);
+    let device_ms = rest["device_ms"].as_f64();
+    assert!(
+        device_ms.is_some_and(|ms| ms > 0.0 && ms < 1e5) == tells,
+        "{rest}"
+    );
+    drop(gpu);
+    let seen = viewer.screenshot();
+    save(&mut viewer, &seen, stops.expect("a number"));
+    takes_no_time_at_rest(&viewer);
+    for size in ["1 1", "345 2", "3000 2000", "700 400", "1280 720"] {
+        viewer.hands(&format!("windowsize {} {size} sleep 0.3", viewer.place().1));
+    }
+    viewer.screenshot_that("shows the same again", |again| difference(&seen, again) < ALIKE);
+    fly(&mut viewer, &seen, &rest);
+    viewer.close();
+}
+
+/// A pair of files that the log tells of: the PNG's pixels and the EXR's radiance.
+fn saved(event: &Value) -> (RgbImage, Picture) {
+    let file = |index: usize| Path::new(event["files"][index].as_str().expect("a path")).to_owned();
+    let shown = image::open(file(0)).expect("a PNG").to_rgb8();
+    let image = FloatImage::read(&file(1)).expect("an EXR");
+    let radiance = Picture {
+        width: image.width as u32,
+        height: image.height as u32,
+        radiance: image.rgb("").expect("R, G, B"),
+    };
+    (shown, radiance)
+}
+
+/// The picture is saved by key and by button as it is seen, and as radiance.
+fn save(viewer: &mut Viewer<'_>, seen: &RgbImage, stops: f64) {
+    // The PNG is the screen beside the panel, and the EXR, shown by the CPU, is the PNG.
+    viewer.hands("key F12");
+    let event = viewer.wait_for("saved", |_| true);
+    let name = event["files"][0].to_string();
+    assert!(name.ends_with("nephroid-ring-0001.png\""), "{event}");
+    let (shown, radiance) = saved(&event);
+    assert_eq!(shown.dimensions(), (SIZE.0 - WIDTH as u32, SIZE.1));
+    let most = |a: &[u8], b: &[u8]| a.iter().zip(b).map(|(a, b)| a.abs_diff(*b)).max();
+    let on_screen: Vec<u8> = picture(seen).flat_map(|(.., rgb)| rgb).collect();
+    let off = most(&on_screen, shown.as_raw());
+    assert!(off <= Some(1), "{off:?} codes between the screen and the file");
+    let by_cpu = display_rgba8(&radiance, stops, ToneMap::Neutral);
+    let by_cpu: Vec<u8> = by_cpu.chunks(4).flat_map(|rgba| rgba[..3].to_vec()).collect();
+    let off = most(&by_cpu, shown.as_raw());
+    assert!(off <= Some(1), "{off:?} codes between the two files");
+    assert!(by_cpu.iter().any(|code| *code > 100), "it is not dark");
+
+    // Where it lies is told over the picture, and the next key takes that away.
+    viewer.screenshot_that("tells where", |shot| difference(seen, shot) > 0.001);
+    viewer.hands("key b");
+    viewer.screenshot_that("is clear again", |shot| difference(seen, shot) == 0.0);
+    viewer.click("Button", "Save picture");
+    let event = viewer.wait_for("saved", |_| true);
+    let name = event["files"][1].to_string();
+    assert!(
+        name.ends_with("nephroid-ring-0002.exr\""),
+        "the next number: {event}"
+    );
+    assert_eq!(saved(&event), (shown, radiance), "the same picture again");
+
+    // Where it cannot be written the window says so and goes on.
+    std::fs::remove_dir_all(viewer.working_folder()).expect("it was there");
+    viewer.hands("key F12");
+    let event = viewer.wait_for("not_saved", |_| true);
+    let sentence = event["sentence"].as_str().expect("a sentence");
+    assert!(
+        sentence.contains("nephroid-ring-0001") && !sentence.contains('\n'),
+        "{sentence}"
+    );
+    viewer.hands("key b");
+    viewer.screenshot_that("goes on", |shot| difference(seen, shot) == 0.0);
+}
+
+fn takes_no_time_at_rest(viewer: &Viewer<'_>) {
+    std::thread::sleep(Duration::from_millis(500));
+    let before = viewer.cpu_s();
+    std::thread::sleep(Duration::from_secs(2));
+    let spent = viewer.cpu_s() - before;
+    assert!(spent < 0.1, "{spent} s of processor time in 2 s at rest");
+}
+
+/// W flies towards what is seen; the right mouse button looks around.
+fn fly(viewer: &mut Viewer<'_>, seen: &RgbImage, rest: &Value) {
+    let path = viewer.fly("w", position(rest)) - position(rest);
+    let camera = &builtin::build("ring").expect("it is built in").cameras[0];
+    assert!(
+        path.normalize().dot(camera.forward) > 0.999,
+        "it flew along {path}"
+    );
+    let closer = viewer.screenshot_that("shows the flight", |shot| difference(seen, shot) > 0.05);
+    viewer.hands("mousemove 800 400 mousedown 3 sleep 0.2");
+    for _ in 0..4 {
+        viewer.hands("mousemove_relative 30 0 sleep 0.05");
+    }
+    viewer.hands("mouseup 3");
+    viewer.screenshot_that("looks elsewhere", |shot| difference(&closer, shot) > 0.05);
+}
+
+#[test]
+fn views_maps_worth_and_split_are_shown() {
+    let Some(screen) = Screen::start() else {
+        return;
+    };
+    let mut viewer = Viewer::open(&screen, RING);
+    viewer.wait_for_bake();
+    views(&mut viewer);
+    undo_sigma(&mut viewer);
+    viewer.toggle_sections(&["Light pass", "Accuracy", "Scene", "Compare"]);
+    split(&mut viewer);
+    viewer.toggle_sections(&["Scene", "Compare", "Effects"]);
+    worth(&mut viewer);
+    viewer.toggle_sections(&["Effects", "Maps"]);
+    maps(&mut viewer);
+    viewer.close();
+}
+
+/// Every view is another picture, and the light comes back.
+fn views(viewer: &mut Viewer<'_>) {
+    let light = viewer.screenshot();
+    let mut before = light.clone();
+    for view in [
+        "irradiance",
+        "texels",
+        "texel density",
+        "normals",
+        "texture uv",
+        "map uv",
+        "wavelength",
+    ] {
+        viewer.choose_view(view);
+        before = viewer.screenshot_that(view, |shot| difference(&before, shot) > 0.05);
+    }
+    viewer.choose_view("light");
+    viewer.screenshot_that("shows light again", |shot| difference(&light, shot) < ALIKE);
+}
+
+/// All of a drag is one step back, and one step on again.
+fn undo_sigma(viewer: &mut Viewer<'_>) {
+    let slider = viewer.on_slider("Sigma [radii²]", [0.5, 0.75]);
+    viewer.pull(&slider);
+    viewer.wait_for("settings", |_| true);
+    viewer.let_go();
+    let sigma = |event: &Value| event["settings"]["sigma"]["constant"].as_f64().unwrap_or(0.0);
+    let blurred = viewer.wait_for("done", |event| sigma(event) > 3.0);
+    viewer.hands("key ctrl+z");
+    viewer.wait_for("undone", |event| event["what"] == "sigma");
+    viewer.wait_for("done", |event| sigma(event) == 1.0);
+    viewer.hands("key ctrl+shift+z");
+    viewer.wait_for("redone", |event| event["what"] == "sigma");
+    viewer.wait_for("done", |event| sigma(event) == sigma(&blurred));
+    viewer.wait_for("rest", |_| true);
+}
+
+/// What the light pass is worth is found beside the maps, and shown in false colours.
+fn worth(viewer: &mut Viewer<'_>) {
+    let light = viewer.screenshot();
+    viewer.click("Button", "light pass: worth");
+    let compared = viewer.wait_for("compared", |_| true);
+    assert_eq!(compared["effect"], "light_pass");
+    assert!(compared["with_w"].as_f64() > Some(0.0), "{compared}");
+    viewer.wait_for("shows", |shows| shows["what"] == "difference");
+    viewer.screenshot_that("shows the difference", |shot| difference(&light, shot) > 0.1);
+}
+
+/// A map is looked at and exported, and all are.
+fn maps(viewer: &mut Viewer<'_>) {
+    let scene = builtin::build("ring").expect("it is built in");
+    let floor = &scene.objects[0].name;
+    let before = viewer.screenshot();
+    viewer.click("Button", &format!("Map of {floor}"));
+    viewer.screenshot_that("shows the map", |shot| difference(&before, shot) > 0.2);
+    viewer.click("Button", &format!("Export map of {floor}"));
+    let path = |event: Value| event["path"].as_str().map(ToOwned::to_owned).expect("a path");
+    let file = path(viewer.wait_for("exported", |_| true));
+    assert!(
+        file.ends_with(&format!("nephroid-ring-0000_{floor}-0001.exr")),
+        "{file}"
+    );
+    let map = FloatImage::read(Path::new(&file)).expect("an EXR");
+    assert_eq!((map.width, map.height), (128, 128));
+    let light = map.rgb("caustic").expect("the layer");
+    assert!(light.iter().any(|e| e[1] > 0.0));
+    viewer.click("Button", "Export all");
+    let folder = path(viewer.wait_for("exported", |_| true));
+    assert!(Path::new(&folder).join("manifest.json").exists(), "{folder}");
+}
+
+/// Mean display value of the picture's left and right half, below what is written over it and without the line between
+/// them, wherever it is.
+fn halves(shot: &RgbImage) -> [f64; 2] {
+    let left = WIDTH as u32;
+    let middle = (left + SIZE.0) / 2;
+    [(left + 60, middle - 10), (middle + 10, SIZE.0)].map(|(from, to)| {
+        let pixels = picture(shot).filter(|(x, y, _)| (from..to).contains(x) && *y >= 150);
+        let (sum, count) = pixels.fold((0.0, 0.0), |(sum, count), (.., rgb)| {
+            (sum + f64::from(rgb[1]), count + 1.0)
+        });
+        sum / count
+    })
+}
+
+/// What was kept stays in the picture's right part while the lamp gets brighter in the left one; the line between them
+/// is dragged.
+fn split(viewer: &mut Viewer<'_>) {
+    viewer.forget();
+    viewer.click("Button", "Keep as before");
+    let against = viewer.wait_for("against", |_| true);
+    assert_eq!(against["relative_rmse"].as_f64(), Some(0.0), "{against}");
+    let before = halves(&viewer.screenshot());
+    viewer.centre("Slider", "Intensity [W/sr]");
+    let slider = viewer.on_slider("Intensity [W/sr]", [0.5, 0.65]);
+    viewer.pull(&slider);
+    viewer.wait_for("edit", |_| true);
+    viewer.let_go();
+    // Brighter by one factor everywhere: the maps differ by no less than their mean does.
+    viewer.wait_for("against", |against| against["relative_rmse"].as_f64() > Some(1.0));
+    let brighter = |shot: &RgbImage| [0, 1].map(|half| halves(shot)[half] / before[half]);
+    viewer.screenshot_that("is brighter at the left alone", |shot| {
+        let [left, right] = brighter(shot);
+        left > 1.1 && (right - 1.0).abs() < 0.02
+    });
+    // The line goes to the left, and with it the right part.
+    let (x, y) = viewer.centre("Slider", "Divider");
+    viewer.pull(&[(x, y), (WIDTH as i32 + 40, y)]);
+    viewer.let_go();
+    viewer.screenshot_that("shows the kept maps nearly everywhere", |shot| {
+        brighter(shot).iter().all(|factor| (factor - 1.0).abs() < 0.02)
+    });
+    viewer.click("Button", "End comparison");
+    viewer.screenshot_that("shows the present maps everywhere", |shot| {
+        brighter(shot).iter().all(|factor| *factor > 1.1)
+    });
+}
+
+#[test]
+fn exposure_suits_a_room_that_is_walked() {
+    let Some(screen) = Screen::start() else {
+        return;
+    };
+    // Caustic and direct light: the first maps come without the second, unless the bake outruns the window.
+    let mut viewer = Viewer::open(&screen, "builtin:showroom --map-resolution 64 --max-error 50%");
+    let (_, rest) = viewer.wait_for_bake();
+    let measured = viewer.all("exposure");
+    let stops: Vec<f64> = measured
+        .iter()
+        .filter_map(|event| event["stops"].as_f64())
+        .collect();
+    match stops[..] {
+        [of_the_caustic, of_both] => assert!(of_both < of_the_caustic - 2.0, "{stops:?}"),
+        [of_both] => assert!(of_both.abs() < 2.0, "{of_both}"),
+        _ => panic!("measured again and again: {measured:?}"),
+    }
+    let shot = viewer.screenshot();
+    let share = |is_so: fn([u8; 3]) -> bool| {
+        picture(&shot).filter(|(.., rgb)| is_so(*rgb)).count() as f64 / picture(&shot).count() as f64
+    };
+    let (white, dark) = (share(|rgb| rgb == [255; 3]), share(|rgb| rgb[1] < 32));
+    assert!(white < 0.2 && dark < 0.5, "{white} of it white, {dark} dark");
+    walk(&mut viewer, &rest);
+    viewer.close();
+}
+
+/// Who walks falls to the ground, stops at walls and finds a kept view again.
+fn walk(viewer: &mut Viewer<'_>, rest: &Value) {
+    // Over the floor, lower than eyes are.
+    viewer.hands("mousemove 900 300 keydown w sleep 1 keyup w");
+    let start = viewer.wait_for_move(position(rest));
+    viewer.hands("key ctrl+1");
+    viewer.wait_for("bookmark", |event| event["number"] == 1 && event["kept"] == true);
+    viewer.hands("key v");
+    viewer.wait_for("travel", |event| event["way"] == "walk");
+    let standing = viewer.wait_for_move(start);
+    let (low, high) = builtin::build("showroom")
+        .and_then(|scene| scene.bounds())
+        .expect("a room");
+    assert!((standing.y - low.y - EYE_M).abs() < 0.01, "{standing} over {low}");
+    // Through the room and on, at a run: ten seconds would be fifty metres. Where pictures take longer than the half
+    // second that a step may last, it takes another run to come to the wall; each must lead somewhere.
+    let mut stopped = standing;
+    let is_at_wall = |place: glam::DVec3| (place.z - (low.z + 0.25)).abs() < 0.02;
+    for _ in 0..8 {
+        let before = stopped;
+        viewer.forget();
+        viewer.hands("keydown shift keydown w sleep 10 keyup w keyup shift");
+        stopped = viewer.wait_for_move(before);
+        let walked_m = before.distance(stopped);
+        assert!(walked_m > 0.3, "it walked {walked_m} m");
+        if is_at_wall(stopped) {
+            break;
+        }
+    }
+    // A quarter of a metre before the wall behind the exhibits, and along that on to wherever it led.
+    assert!(is_at_wall(stopped), "{stopped} in {low}, {high}");
+    assert!(
+        (low.x..=high.x).contains(&stopped.x),
+        "{stopped} in {low}, {high}"
+    );
+    // A wall that is pressed against does not let go on.
+    viewer.hands("keydown w sleep 2 keyup w sleep 0.5");
+    let shot = viewer.screenshot();
+    viewer.hands("key 1");
+    viewer.wait_for("bookmark", |event| event["number"] == 1 && event["kept"] == false);
+    let is_back = |rest: &Value| position(rest).distance(stopped) > 0.1;
+    let back = position(&viewer.wait_for("rest", is_back));
+    // On foot again: over the place that was kept, on the ground.
+    assert!((back - start).with_y(0.0).length() < 1e-6, "{back}, {start}");
+    viewer.screenshot_that("from elsewhere", |seen| difference(&shot, seen) > 0.05);
+}

@@ -1,0 +1,344 @@
+//! What must not change a map or its ledgers, or must change them just so.
+
+use std::sync::Arc;
+
+use glam::{DMat3, DVec3};
+use nephroid::illumination::IlluminationMap;
+use nephroid::optics::LinearSrgb;
+use nephroid::scene::builtin::{self, parts, shapes};
+use nephroid::scene::{LightKind, LightSize, PanelShape, Scene, Volume};
+use nephroid::settings::{
+    BakeSettings, Footprint, Kernel, KernelSampling, LayerKind, MapResolution, RayPlacement, Sigma,
+};
+use nephroid::units::{Flux, Radiance};
+
+use support::laws::law::*;
+use support::laws::scenes::*;
+use support::laws::{Baked, Table, books_open, is_long};
+use support::tools::{at, bake, builtin_scene, settings, transformed};
+
+pub fn fill(t: &mut Table) {
+    for (name, scene) in [
+        ("mirror", before(upright())),
+        ("glass-ball", glass_ball(3)),
+        ("slab", builtin_scene("slab")),
+        ("ring", builtin_scene("ring")),
+    ] {
+        symmetries(t, name, &scene);
+    }
+    uniform_scale(t);
+    let names: &[&str] = if is_long() {
+        &["ring", "ball", "pool", "slab", "nephroid"]
+    } else {
+        &["ring", "ball"]
+    };
+    for name in names {
+        t.case(format!("sixteen-times-the-rays-{name}"))
+            .bake(builtin_scene(name), 64e3, 32)
+            .bake(builtin_scene(name), 500.0, 32)
+            .bake(builtin_scene(name), 8e3, 32)
+            .law("error at 16 times the rays over that at 1", 0.5, |bakes| {
+                let error = |bake: &Baked| maps_apart(&bake.result.maps, &bakes[0].result.maps, 1.0);
+                error(&bakes[2]) / error(&bakes[1])
+            });
+    }
+    threads(t);
+    seeds(t);
+    ledgers(t);
+    both_estimators(t);
+}
+
+fn symmetries(t: &mut Table, name: &str, scene: &Scene) {
+    let turn = DMat3::from_axis_angle(DVec3::new(0.6, 0.0, 0.8), 0.7);
+    let mirror = DMat3::from_diagonal(DVec3::new(-1.0, 1.0, 1.0));
+    let moved = |rotation, offset| transformed(scene.clone(), rotation, 1.0, offset);
+    let mut other = scene.clone();
+    other.lights[0].kind = other.lights[0].kind.moved(DVec3::new(0.07, 0.11, -0.05));
+    other.lights[0].colour = LinearSrgb::new(0.3, 1.0, 0.6);
+    let both = scene.clone().lit(other.lights[0].clone());
+    t.case(format!("linearity-{name}"))
+        .bake(both, 1e3, 32)
+        .bake(scene.clone(), 1e3, 32)
+        .bake(other, 1e3, 32)
+        .law("two lights give the sum of their maps", 1e-6, |bakes| {
+            let together = &bakes[0].result.maps;
+            let sums: Vec<_> = together.iter().map(|map| map_sum(map, &bakes[1..])).collect();
+            maps_apart(together, &sums, 1.0)
+        });
+    t.case(format!("rigid-motion-{name}"))
+        .bake(scene.clone(), 1e3, 32)
+        .bake(moved(turn, DVec3::new(3.1, -7.3, 0.9)), 1e3, 32)
+        .watts_as_first("watts", 0.01)
+        .as_first_within_errors()
+        // Lamps start their rays in the same directions wherever they stand.
+        .bake(moved(DMat3::IDENTITY, DVec3::splat(64.0)), 1e3, 32)
+        .as_first("maps, moved by 64 m along the axes", 1e-5, 1.0);
+    // Maps seen in a mirror lie the same way in texture coordinates.
+    t.case(format!("mirror-symmetry-{name}"))
+        .bake(scene.clone(), 1e3, 32)
+        .bake(moved(mirror, DVec3::ZERO), 1e3, 32)
+        .watts_as_first("watts", 5e-3)
+        .as_first_within_errors();
+    let (mut reversed, mut triangles) = (scene.clone(), scene.clone());
+    reversed.objects.reverse();
+    for object in &mut triangles.objects {
+        Arc::make_mut(&mut object.mesh).triangles.reverse();
+    }
+    t.case(format!("order-of-objects-{name}"))
+        .bake(scene.clone(), 1e3, 32)
+        .bake(reversed, 1e3, 32)
+        .compare("objects in reverse: the same bits", 0.0, |reversed, plain| {
+            let maps: Vec<IlluminationMap> = reversed.result.maps.iter().rev().cloned().collect();
+            no(same_bits(&plain.result.maps, &maps))
+        })
+        .bake(triangles, 1e3, 32)
+        .watts_as_first("triangles in reverse: watts", 1e-3);
+}
+
+/// E of lamps is divided by the square of the size; of suns and panels it stays. Where light divides, a few of its
+/// borders are found elsewhere at another size.
+fn uniform_scale(t: &mut Table) {
+    let [mut tinted, mut sunny] = [0; 2].map(|_| glass_ball(3));
+    tinted.materials[1].volume = Some(Volume {
+        attenuation_distance_m: 0.3,
+        attenuation_colour: LinearSrgb::new(0.5, 0.8, 0.9),
+    });
+    sunny.lights.clear();
+    let panel = LightKind::Panel {
+        centre: DVec3::new(0.1, 0.5, 0.0),
+        across: DVec3::Z * 0.1,
+        down: DVec3::X * 0.1,
+        shape: PanelShape::Rectangle,
+        radiance: Radiance(1.0),
+    };
+    let ceiling = shapes::rectangle(DVec3::Y, DVec3::X * 0.5, DVec3::Z * 0.5);
+    let of_eight_places = BakeSettings {
+        wavefronts: Some(8),
+        ..at(1e3, 32)
+    };
+    for (name, scene, power) in [
+        ("mirror", before(upright()), -2),
+        ("tinted-ball", tinted, -2),
+        ("ball-under-a-sun", sunny.sun(DVec3::new(0.2, -1.0, 0.1)), 0),
+        (
+            "panel-below-a-mirror",
+            floor(0.5).mirror(ceiling).lit(light(panel)),
+            0,
+        ),
+    ] {
+        for scale in [0.25_f64, 8.0] {
+            t.case(format!("uniform-scale-{name}"))
+                .bake_with(scene.clone(), of_eight_places.clone())
+                .bake_with(
+                    transformed(scene.clone(), DMat3::IDENTITY, scale, DVec3::ZERO),
+                    of_eight_places.clone(),
+                )
+                .as_first(
+                    "E as 1/s² of lamps, as it is of suns and panels",
+                    1e-3,
+                    scale.powi(power),
+                );
+        }
+    }
+}
+
+fn threads(t: &mut Table) {
+    for (name, rays) in [("ring", RayPlacement::Lattice), ("ball", RayPlacement::Jittered)] {
+        let splats = BakeSettings {
+            rays,
+            map_resolution: MapResolution::Auto,
+            ..settings(2e4, 0)
+        };
+        for (settings, many) in [
+            (at(2e3, 32), &[64][..]),
+            (settings(2e3, 32), &[64]),
+            (splats, &[2, 4, 7]),
+        ] {
+            let same = t
+                .case(format!("threads-{name}"))
+                .bake_with(builtin_scene(name), settings.clone());
+            for threads in many.iter().copied() {
+                same.bake_with(
+                    builtin_scene(name),
+                    BakeSettings {
+                        threads,
+                        ..settings.clone()
+                    },
+                )
+                .bits_as_first("the same map, bit for bit")
+                .compare("the same ledgers and counts", 0.0, |many, one| {
+                    let [many, one] = [many, one].map(|bake| &bake.result);
+                    no(many.ledgers == one.ledgers && many.counts == one.counts)
+                });
+            }
+        }
+    }
+}
+
+/// Whatever is chosen by chance is chosen by the seed: where rays start, the places of lamps, the ways between surfaces.
+fn seeds(t: &mut Table) {
+    let mut soft = builtin_scene("ring");
+    soft.lights[0].size = LightSize::Radius { radius_m: 0.1 };
+    let wall = shapes::rectangle(DVec3::new(-0.4, 0.4, 0.0), DVec3::Y * 0.4, DVec3::Z * 0.4);
+    let jittered = BakeSettings {
+        rays: RayPlacement::Jittered,
+        ..settings(2e3, 16)
+    };
+    let of_few_places = BakeSettings {
+        wavefronts: Some(2),
+        ..at(500.0, 16)
+    };
+    let indirect = BakeSettings {
+        layers: vec![LayerKind::Indirect],
+        max_error: Some(0.3),
+        ..at(500.0, 16)
+    };
+    for (name, scene, settings) in [
+        ("rays", builtin_scene("ring"), jittered),
+        ("places-of-lamps", soft, of_few_places),
+        (
+            "indirect-paths",
+            builtin_scene("ring").diffuse("wall", wall),
+            indirect,
+        ),
+    ] {
+        let with = |seed: u64| BakeSettings {
+            seed,
+            ..settings.clone()
+        };
+        let case = t.case(format!("seed-of-{name}"));
+        if name == "indirect-paths" {
+            case.without_books();
+        }
+        case.bake_with(scene.clone(), with(1))
+            .bake_with(scene.clone(), with(2))
+            .compare("another seed gives another map", 0.0, |other, first| {
+                no(!same_bits(&other.result.maps, &first.result.maps))
+            })
+            .bake_with(scene, with(1))
+            .bits_as_first("the same seed gives the same map");
+    }
+    // Lamps below the floor, where the mirror is not.
+    let mut cellar = builtin_scene("mirror");
+    for lamp in 0..3 {
+        let place = DVec3::new(0.1 * f64::from(lamp), -1.0, 0.0);
+        cellar = cellar.lit(parts::beam("cellar", place, DVec3::NEG_Y, 0.5, Flux(50.0)));
+    }
+    t.case("lamps-that-see-nothing-specular")
+        .splat(builtin_scene("mirror"), 1e4, 64)
+        .splat(cellar, 1e4, 64)
+        .bits_as_first("map as without them, bit for bit");
+}
+
+fn ledgers(t: &mut Table) {
+    for name in builtin::NAMES {
+        // A slit of a millimetre lets one ray of hundreds through.
+        let density_per_sr = if name == "prism" { 2e6 } else { 3e3 };
+        t.case(format!("ledger-of-{name}"))
+            .splat(builtin_scene(name), density_per_sr, 64)
+            .must("something arrives", |bake| deposited_w(bake) > 0.0);
+    }
+    t.case("ledger-with-a-fault").check(
+        "a lost watt and a value that is no number are noticed",
+        faults_are_noticed,
+    );
+    // The same rays: not a bit of the accounts may depend on how they are drawn.
+    let base = || settings(3e3, 48);
+    let kernels = [Kernel::Gaussian, Kernel::Cone, Kernel::Disc, Kernel::Box];
+    let footprints = [
+        Footprint::Ellipse,
+        Footprint::Disc,
+        Footprint::Distance,
+        Footprint::Fixed,
+    ];
+    for kernel in kernels {
+        let drawn = t
+            .case("kernels-and-footprints")
+            .bake_with(builtin_scene("ring"), base());
+        for footprint in footprints {
+            for kernel_sampling in [KernelSampling::Integrated, KernelSampling::Point] {
+                for sigma in [Sigma::Constant(0.5), Sigma::Adaptive] {
+                    let settings = BakeSettings {
+                        kernel,
+                        footprint,
+                        kernel_sampling,
+                        sigma,
+                        ..base()
+                    };
+                    drawn.bake_with(builtin_scene("ring"), settings).compare(
+                        "the same accounts, to the bit",
+                        0.0,
+                        |bake, first| no(bake.result.ledgers[0].energy_w == first.result.ledgers[0].energy_w),
+                    );
+                }
+            }
+        }
+    }
+}
+
+fn faults_are_noticed() {
+    let sound = bake(builtin_scene("ring"), &at(500.0, 16));
+    assert!(books_open(&sound) <= 1e-6);
+    let mut lost = sound.clone();
+    lost.ledgers[0].energy_w.deposited *= 1.0 + 1e-5;
+    assert!(books_open(&lost) > 1e-6);
+    for bad in [f32::NAN, f32::INFINITY, -1e-3] {
+        let mut broken = sound.clone();
+        broken.maps[0].layers[0].irradiance[7][2] = bad;
+        assert!(books_open(&broken).is_infinite(), "{bad}");
+    }
+}
+
+/// Patches and kernels book in ways of their own: what one forgets, drops or books twice, the other tells.
+fn both_estimators(t: &mut Table) {
+    let (mut ball, mut ring) = (builtin_scene("ball"), builtin_scene("ring"));
+    for volume in ball
+        .materials
+        .iter_mut()
+        .filter_map(|material| material.volume.as_mut())
+    {
+        *volume = Volume {
+            attenuation_distance_m: 0.3,
+            attenuation_colour: LinearSrgb::new(0.3, 0.5, 0.7),
+        };
+    }
+    for metal in ring
+        .materials
+        .iter_mut()
+        .filter(|material| material.metallic > 0.0)
+    {
+        metal.base_colour = LinearSrgb::new(0.5, 0.6, 0.7);
+    }
+    // Within tinted glass, light is taken before its first hit.
+    let mut within = ball.clone();
+    let (low, high) = within.objects[1].mesh.bounds().expect("a ball");
+    let lamp = within.lights[0].kind.position().expect("a point light");
+    within.lights[0].kind = within.lights[0].kind.moved(0.5 * (low + high) - lamp);
+    for (name, scene, density_per_sr) in [
+        ("ball", ball, 2e4),
+        ("ring", ring, 2e4),
+        ("ball-around-its-lamp", within, 1e3),
+    ] {
+        t.case(format!("both-estimators-{name}"))
+            .bake(scene.clone(), density_per_sr, 64)
+            .ledger("a tenth is absorbed", 0.0, |energy| {
+                no(energy.absorbed > 0.1 * energy.emitted)
+            })
+            .share("left open between surfaces", 2e-3, |energy| {
+                energy.truncated.quadrature.abs()
+            })
+            .splat(scene, density_per_sr, 64)
+            .compare("accounts apart, of what is emitted", 0.01, accounts_apart);
+    }
+}
+
+fn accounts_apart(a: &Baked, b: &Baked) -> f64 {
+    let [a, b] = [a, b].map(|bake| bake.result.ledgers[0].energy_w);
+    let pairs = [
+        (a.emitted, b.emitted),
+        (a.deposited, b.deposited),
+        (a.absorbed, b.absorbed),
+        (a.escaped, b.escaped),
+    ];
+    pairs.into_iter().map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) / b.emitted
+}

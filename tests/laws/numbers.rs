@@ -1,0 +1,164 @@
+//! Sizes, counts, densities and maps at the ends of what numbers bear.
+
+use std::f64::consts::PI;
+
+use glam::{DMat3, DVec3};
+use nephroid::export::exr;
+use nephroid::export::float_image::{Channel, FloatImage};
+use nephroid::illumination::accumulator::{FluxAccumulator, FluxUnit};
+use nephroid::optics::LinearSrgb;
+use nephroid::scene::builtin::{parts, shapes};
+use nephroid::settings::{BakeSettings, LayerKind, MapResolution, Sigma};
+use nephroid::units::Flux;
+
+use crate::mirrors::paraboloid;
+use support::laws::law::*;
+use support::laws::scenes::*;
+use support::laws::{Baked, Table, is_long};
+use support::tools::{at, settings, transformed};
+
+pub fn fill(t: &mut Table) {
+    t.case("small-deposits-in-one-texel")
+        .fact("the sum is that of all deposits", 1e-9, small_deposits);
+    t.case("units-of-flux")
+        .check("they keep their precision at any power", units_of_flux);
+    t.case("coarse-map-on-a-finer-one")
+        .check("every count is kept, and even light stays even", spread_map);
+    let sized = |width, height| BakeSettings {
+        map_resolution: MapResolution::Fixed { width, height },
+        ..at(1e3, 1)
+    };
+    for (name, scene) in [("mirror", before(upright())), ("ball", glass_ball(3))] {
+        let scaled = t
+            .case(format!("{name}-scaled-1e-4-to-1e5"))
+            .bake(scene.clone(), 1e3, 32);
+        for scale in [1e-4, 1e-2, 1e2, 1e5] {
+            scaled
+                .bake(
+                    transformed(scene.clone(), DMat3::IDENTITY, scale, DVec3::ZERO),
+                    1e3,
+                    32,
+                )
+                .as_first("E goes as 1/s²", 1e-4, 1.0 / (scale * scale));
+        }
+        let resized = t
+            .case(format!("{name}-on-maps-of-1-to-4000"))
+            .bake(scene.clone(), 1e3, 32);
+        for (width, height) in [(1, 1), (1, 2), (3, 1), (1, 1000), (1000, 1), (4, 4000)] {
+            resized
+                .bake_with(scene.clone(), sized(width, height))
+                .watts_as_first("watts as of 32 × 32", 5e-3);
+        }
+    }
+    // A small mirror, sampled as densely as the whole sky never could be.
+    let half_m = 0.5 * 1e-3_f64.sqrt();
+    let mirror = shapes::rectangle(DVec3::Y, DVec3::X * half_m, DVec3::Z * half_m);
+    let seen_sr = solid_angle_sr(&mirror, DVec3::ZERO);
+    let density_per_sr = if is_long() { 1e9 } else { 3e7 };
+    t.case("a-billion-rays-per-steradian")
+        .splat(room(2.5).mirror(mirror).lamp(DVec3::ZERO), density_per_sr, 16)
+        .sent(seen_sr, 0.01)
+        .ledger("all of it arrives", 1e-6, |energy| {
+            off(energy.deposited, energy.emitted)
+        });
+    if is_long() {
+        // All light of a focus in the finest map that 256 MB hold, the rest of which is dark.
+        let little_memory = BakeSettings {
+            memory_bytes: 256 << 20,
+            ..sized(16384, 16384)
+        };
+        t.case("maps-of-16384-with-one-lit-tile")
+            .bake_with(paraboloid(), little_memory)
+            .watts(0.64, 1e-3);
+    }
+    // Spreads from a millionth of a footprint to ten thousand of them.
+    let of_sigma = |sigma, settings| BakeSettings {
+        sigma: Sigma::Constant(sigma),
+        ..settings
+    };
+    for sigma in [1e-6, 1.0, 1e4] {
+        for settings in [settings(2e3, 32), at(1e3, 32)] {
+            t.case("sigma-from-nothing-to-huge")
+                .bake_with(glass_ball(3), of_sigma(sigma, settings))
+                .arrives_of_sent(1.0);
+        }
+    }
+    t.case("hardly-any-sigma")
+        .bake(glass_ball(3), 1e3, 32)
+        .bake_with(glass_ball(3), of_sigma(1e-6, at(1e3, 32)))
+        .as_first("is hardly any blur", 0.02, 1.0);
+    let mut bright = before(upright());
+    bright.lights = vec![parts::point_light(
+        "lamp",
+        DVec3::new(-0.1, 1.0, 0.05),
+        Flux(4e9 * PI),
+    )];
+    t.case("peaks-beyond-half-precision").bake(bright, 1e3, 16).must(
+        "above 65504 W/m², written and read, bit for bit",
+        is_kept_by_files,
+    );
+}
+
+/// A hundred million deposits of a hundred-millionth.
+fn small_deposits() -> f64 {
+    let unit = FluxUnit::for_power(100.0);
+    let deposit = unit.count(LinearSrgb::grey(1e-6));
+    let mut accumulator = FluxAccumulator::new(1, 1);
+    for _ in 0..100_000_000_u32 {
+        for (sum, deposit) in accumulator.texels_mut()[0].iter_mut().zip(deposit) {
+            *sum += deposit;
+        }
+    }
+    off(unit.flux_w(accumulator.texels()[0]).g, 100.0)
+}
+
+fn units_of_flux() {
+    for power_w in [1e-30, 1e-9, 1.0, 683.0, 1e12, 1e30] {
+        let unit = FluxUnit::for_power(power_w);
+        let colour = LinearSrgb::new(power_w, 0.5 * power_w, 1e-9 * power_w);
+        let back = unit.flux_w(unit.count(colour));
+        assert!(
+            off(back.r, colour.r) < 1e-15 && off(back.b, colour.b) < 1e-8,
+            "{power_w} W"
+        );
+    }
+}
+
+fn spread_map() {
+    let mut coarse = FluxAccumulator::new(4, 4);
+    for (index, texel) in coarse.texels_mut().iter_mut().enumerate() {
+        *texel = [640_000, 1 << 58, 7 * index as i64 + 1];
+    }
+    let mut fine = FluxAccumulator::new(8, 8);
+    coarse.spread_into(&mut fine);
+    for channel in 0..3 {
+        let sum = |map: &FluxAccumulator| map.texels().iter().map(|t| i128::from(t[channel])).sum::<i128>();
+        assert_eq!(sum(&coarse), sum(&fine));
+    }
+    // An even field stays even, borders included.
+    assert!(
+        fine.texels().iter().all(|texel| texel[0] == 160_000),
+        "{:?}",
+        fine.texels()
+    );
+}
+
+fn is_kept_by_files(bake: &Baked) -> bool {
+    let map = floor_map(bake).expect("a lit floor");
+    let values: Vec<f32> = luminance(map, LayerKind::Caustic)
+        .iter()
+        .map(|e| *e as f32)
+        .collect();
+    let channel = Channel {
+        name: "Y".into(),
+        values: values.clone(),
+    };
+    let image = FloatImage {
+        width: map.width(),
+        height: map.height(),
+        channels: vec![channel],
+    };
+    let bytes = exr::encode(image, "", "case").expect("an image");
+    let back = exr::decode(&bytes, "case").expect("an image");
+    values.iter().any(|e| *e > 65_504.0) && back.channel("Y").is_some_and(|read| read == values)
+}

@@ -1,0 +1,225 @@
+//! Rays against triangles where rounding decides, the bodies around a point, and chains of known radiance.
+
+use std::sync::Arc;
+
+use glam::{DMat3, DVec3};
+use nephroid::eye_pass::reference::{ChainLimits, ReferenceSettings, render};
+use nephroid::geometry::{Ray, TriangleBvh};
+use nephroid::scene::Scene;
+use nephroid::scene::builtin::shapes;
+use nephroid::transport::{MediumStack, Tracer, media_at};
+
+use support::chain_laws;
+use support::laws::Table;
+use support::laws::scenes::Build;
+use support::tools::builtin_scene;
+
+pub fn fill(t: &mut Table) {
+    t.case("rays-at-edges-and-vertices")
+        .check("none slips through", no_ray_slips_through);
+    t.case("directions-with-signed-zeros")
+        .check("hit what lies there", signed_zeros);
+    t.case("hits-closer-than-an-epsilon")
+        .check("are found", close_hits);
+    t.case("light-in-a-mirror-ring")
+        .check("never leaves through the wall", within_a_ring);
+    t.case("ray-that-leaves-a-surface")
+        .check("does not meet it again", no_second_hit);
+    t.case("bodies-around-a-point")
+        .check("from the outermost inwards", nested_bodies);
+    t.case("body-inside-out")
+        .check("is around nothing below it", inside_out);
+    for (index, law) in chain_laws::all().iter().enumerate() {
+        let name = law.name.replace(' ', "-");
+        t.case(format!("chain-{name}"))
+            .check("right, finite, and at an end", move || keeps_to_law(index));
+    }
+}
+
+/// A picture by chains keeps to the law of its scene.
+fn keeps_to_law(index: usize) {
+    let law = chain_laws::all().swap_remove(index);
+    let tracer = Tracer::new(Arc::new(law.scene.clone()));
+    let limits = ChainLimits {
+        branch_threshold: 1e-10,
+        ..Default::default()
+    };
+    let settings = ReferenceSettings {
+        samples_per_side: 1,
+        limits,
+        ..Default::default()
+    };
+    let picture = render(&tracer, &[], &law.view, &settings, &(), &Default::default());
+    law.assert_kept(&picture.expect("nobody cancels"), 1e-6);
+}
+
+/// Triangles that close around their centre: the unit octahedron, divided and pushed onto a sphere.
+fn sphere(levels: u32) -> Vec<[DVec3; 3]> {
+    let sign = |signs: u32, bit: u32| if signs >> bit & 1 == 1 { 1.0 } else { -1.0 };
+    let octant = |signs| {
+        [
+            DVec3::X * sign(signs, 0),
+            DVec3::Y * sign(signs, 1),
+            DVec3::Z * sign(signs, 2),
+        ]
+    };
+    let mut triangles: Vec<[DVec3; 3]> = (0..8).map(octant).collect();
+    for _ in 0..levels {
+        let quarters = |[a, b, c]: [DVec3; 3]| {
+            let (ab, bc, ca) = ((a + b).normalize(), (b + c).normalize(), (c + a).normalize());
+            [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
+        };
+        triangles = triangles.into_iter().flat_map(quarters).collect();
+    }
+    triangles
+}
+
+fn towards(origin: DVec3, target: DVec3) -> Ray {
+    Ray {
+        origin,
+        direction: (target - origin).normalize(),
+    }
+}
+
+fn no_ray_slips_through() {
+    let rotation = DMat3::from_axis_angle(DVec3::new(0.6, 0.0, 0.8), 0.7);
+    let far = DVec3::new(3.1, -7.3, 0.9);
+    for (scale, offset) in [
+        (1.0, DVec3::ZERO),
+        (1.0, far),
+        (1e-4, far * 1e-4),
+        (1e5, far),
+        (1.0, far * 1e6),
+    ] {
+        let place = |p: DVec3| rotation * p * scale + offset;
+        let triangles: Vec<_> = sphere(5).into_iter().map(|corners| corners.map(place)).collect();
+        let bvh = TriangleBvh::build(&triangles);
+        let origin = place(DVec3::new(0.21, -0.13, 0.34));
+        for [a, b, c] in &triangles {
+            for target in [*a, *b, (*a + *b) * 0.5, *b * 0.7 + *c * 0.3] {
+                let ray = towards(origin, target);
+                assert!(
+                    bvh.closest_hit(&ray).is_some(),
+                    "scale {scale}: a ray to {target}"
+                );
+                assert!(
+                    bvh.is_blocked(&ray, 10.0 * scale),
+                    "scale {scale}: a shadow ray to {target}"
+                );
+            }
+        }
+        assert!(4 * triangles.len() > 30_000);
+    }
+}
+
+fn signed_zeros() {
+    let bvh = TriangleBvh::build(&sphere(4));
+    for (axis, (sign, zero)) in
+        (0..12).map(|i| (i % 3, [(1.0, 0.0), (1.0, -0.0), (-1.0, 0.0), (-1.0, -0.0)][i / 3]))
+    {
+        let mut direction = DVec3::splat(zero);
+        direction[axis] = sign;
+        let ray = Ray {
+            origin: DVec3::ZERO,
+            direction,
+        };
+        let hit = bvh.closest_hit(&ray).expect("a wall of the sphere");
+        assert!((hit.distance_m - 1.0).abs() < 0.01, "{direction}: {hit:?}");
+    }
+}
+
+fn close_hits() {
+    let square = |y: f64| {
+        let [a, b, c, d] =
+            [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(|(x, z)| DVec3::new(x, y, z));
+        [[a, b, c], [a, c, d]]
+    };
+    for gap in [1e-3, 1e-6, 1e-9, 1e-12] {
+        let bvh = TriangleBvh::build(&[square(0.0), square(gap)].concat());
+        let ray = Ray {
+            origin: DVec3::new(0.3, 0.5 * gap, 0.2),
+            direction: DVec3::Y,
+        };
+        let hit = bvh.closest_hit(&ray).expect("the upper square");
+        assert!(
+            (hit.distance_m - 0.5 * gap).abs() <= 1e-6 * gap,
+            "gap {gap}: {hit:?}"
+        );
+    }
+}
+
+fn within_a_ring() {
+    let tracer = Tracer::new(Arc::new(builtin_scene("ring")));
+    let mut reflected = 0;
+    for index in 0..100_000_u32 {
+        let angle = (f64::from(index) * 0.618_033_988_749_894_9).fract() * std::f64::consts::TAU;
+        let target = DVec3::new(angle.cos(), (f64::from(index) + 0.5) * 0.499e-5, angle.sin());
+        let mut ray = towards(DVec3::new(-0.7, 1.2, 0.0), target);
+        for _ in 0..64 {
+            let hit = tracer
+                .closest_hit(&ray)
+                .expect("everything ends on the ring or the floor");
+            let turned = tracer.interact(&hit, ray.direction, &MediumStack::default());
+            let Some(branch) = turned.reflection else { break };
+            ray = branch.ray;
+            reflected += 1;
+        }
+    }
+    assert!(reflected > 90_000);
+}
+
+fn no_second_hit() {
+    let scene = builtin_scene("ball");
+    let ball = scene
+        .objects
+        .iter()
+        .find(|object| object.name == "ball")
+        .expect("the ball");
+    let mesh = Arc::clone(&ball.mesh);
+    let tracer = Tracer::new(Arc::new(scene));
+    for triangle in (0..mesh.triangles.len()).step_by(97) {
+        let [a, b, c] = mesh.corners(triangle);
+        let normal = mesh.face_normal(triangle);
+        let target = a * 0.2 + b * 0.5 + c * 0.3;
+        let hit = tracer
+            .closest_hit(&towards(target + normal * 0.1, target))
+            .expect("the ball");
+        for tilt in [
+            DVec3::ZERO,
+            (b - a).normalize() * 30.0,
+            (c - a).normalize() * 3000.0,
+        ] {
+            if let Some(next) = tracer.closest_hit(&hit.spawn((normal + tilt).normalize())) {
+                assert!(next.distance_m > 1e-6, "met again after {} m", next.distance_m);
+            }
+        }
+    }
+}
+
+fn objects_around(scene: &Scene, point: DVec3) -> Vec<u32> {
+    media_at(&Tracer::new(Arc::new(scene.clone())), point)
+        .objects()
+        .to_vec()
+}
+
+fn nested_bodies() {
+    let ball = |radius_m| shapes::sphere(DVec3::ZERO, radius_m, 3);
+    let scene = Scene::default().glass(1.5, ball(0.5)).glass(1.5, ball(0.3));
+    let expected: [(f64, &[u32]); 5] = [(0.0, &[0, 1]), (-0.4, &[0]), (0.4, &[0]), (-1.0, &[]), (1.0, &[])];
+    for (y, objects) in expected {
+        assert_eq!(
+            objects_around(&scene, DVec3::new(0.01, y, 0.02)),
+            objects,
+            "at {y} m"
+        );
+    }
+}
+
+fn inside_out() {
+    let scene = Scene::default()
+        .glass(1.5, shapes::sphere(DVec3::ZERO, 0.5, 3))
+        .reshaped(0, |mesh| {
+            mesh.triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
+        });
+    assert!(objects_around(&scene, DVec3::new(0.01, -1.0, 0.02)).is_empty());
+}

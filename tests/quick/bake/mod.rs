@@ -1,0 +1,4 @@
+//! Bakes of reference scenes: against an independent solver, against the law of energy, against themselves.
+
+mod effects;
+mod reference;

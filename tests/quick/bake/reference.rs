@@ -1,0 +1,132 @@
+//! The built-in scenes against maps of an independent solver (`assets/reference`), and bits that nothing may change.
+
+use glam::DVec2;
+use nephroid::illumination::lookup::bilinear;
+use nephroid::scene::Scene;
+use nephroid::settings::{BakeSettings, LayerKind};
+use std::sync::Arc;
+
+use support::references::references;
+use support::tools::{at, bake, bits, builtin_scene, map_of, settings};
+
+/// The others are in the full tests.
+#[test]
+fn wavefronts_agree_with_the_solver() {
+    let small = ["ring", "mirror", "slab", "nephroid"];
+    let references = references();
+    for reference in references
+        .iter()
+        .filter(|reference| small.contains(&reference.builtin))
+    {
+        let scene = builtin_scene(reference.builtin);
+        let result = bake(scene.clone(), &at(reference.by_wavefronts.0, 256));
+        reference.check_wavefronts(&result, &scene);
+    }
+}
+
+#[test]
+fn splats_agree_with_the_solver() {
+    for reference in references() {
+        let Some((density, most)) = reference.by_splats else {
+            continue;
+        };
+        let scene = builtin_scene(reference.builtin);
+        let result = bake(scene.clone(), &settings(density, 256));
+        reference.check(&result, &scene, 1.0, (most, 0.005));
+    }
+}
+
+#[test]
+fn two_threads_change_no_bit() {
+    for base in [at(3e3, 64), settings(2e4, 64)] {
+        let [one, two] = [1, 2].map(|threads| {
+            let settings = BakeSettings {
+                threads,
+                layers: vec![LayerKind::Caustic, LayerKind::Direct],
+                ..base.clone()
+            };
+            bake(builtin_scene("ball"), &settings)
+        });
+        assert_eq!(one.ledgers, two.ledgers);
+        assert_eq!(one.counts, two.counts);
+        assert!(one.maps.iter().map(bits).eq(two.maps.iter().map(bits)));
+        let errors = [&one, &two].map(|result| result.maps[0].error.clone());
+        assert!(errors[0] == errors[1]);
+    }
+}
+
+/// The mirror's scene with its floor in the middle half of its map.
+fn with_room_around_the_floor() -> Scene {
+    let mut scene = builtin_scene("mirror");
+    let mut objects = scene.objects.iter_mut();
+    let floor = objects.find(|object| object.name == "floor").expect("a floor");
+    let mesh = Arc::make_mut(&mut floor.mesh);
+    for uv in mesh.uv0.as_mut().expect("coordinates") {
+        *uv = *uv * 0.5 + 0.25;
+    }
+    scene
+}
+
+/// Texels beside a surface hold the mean of their neighbours on it, so that look-ups at its border show no dark seam.
+#[test]
+fn gutters_are_filled() {
+    let side = 64_usize;
+    let scene = with_room_around_the_floor();
+    for base in [at(2e4, side), settings(2e4, side)] {
+        let settings = BakeSettings {
+            layers: LayerKind::ALL.to_vec(),
+            ..base
+        };
+        let result = bake(scene.clone(), &settings);
+        let map = map_of(&result, &scene, "floor");
+        let is_covered = |texel: usize| map.chart.texel_area_m2(texel) > 0.0;
+        assert_eq!(
+            (0..side * side).filter(|&texel| is_covered(texel)).count(),
+            side * side / 4
+        );
+        assert_eq!(map.layers.len(), 3);
+        for layer in &map.layers {
+            let values = &layer.irradiance;
+            let mut gutter = 0;
+            for texel in (0..side * side).filter(|&texel| !is_covered(texel)) {
+                let (column, row) = (texel % side, texel / side);
+                let around = (row.saturating_sub(1)..=(row + 1).min(side - 1)).flat_map(|row| {
+                    let columns = column.saturating_sub(1)..=(column + 1).min(side - 1);
+                    columns.map(move |column| row * side + column)
+                });
+                let known: Vec<f32> = { around }
+                    .filter(|&texel| is_covered(texel))
+                    .map(|texel| values[texel][1])
+                    .collect();
+                if known.is_empty() {
+                    continue;
+                }
+                gutter += 1;
+                let mean = known.iter().sum::<f32>() / known.len() as f32;
+                let off = (values[texel][1] - mean).abs();
+                assert!(off <= 1e-5 * mean, "{:?} at {column}, {row}", layer.kind);
+            }
+            assert_eq!(gutter, 4 * (side / 2) + 4);
+            if layer.kind == LayerKind::Direct {
+                check_border(values, side);
+            }
+        }
+    }
+}
+
+/// No dark seam: with nothing beside it, the floor's border would be half as bright as half a texel further in. Edges of
+/// shadows that meet the border take a third at most.
+fn check_border(values: &[[f32; 3]], side: usize) {
+    for step in 0..=200 {
+        let along = 0.25 + 0.5 * f64::from(step) / 200.0;
+        for (border, inside) in [(0.25, 0.25 + 0.5 / side as f64), (0.75, 0.75 - 0.5 / side as f64)] {
+            let look = |across: f64| {
+                [DVec2::new(across, along), DVec2::new(along, across)]
+                    .map(|uv| bilinear(values, side, side, uv).luminance())
+            };
+            for (at_border, further_in) in look(border).into_iter().zip(look(inside)) {
+                assert!(at_border >= 0.6 * further_in, "{at_border} beside {further_in}");
+            }
+        }
+    }
+}

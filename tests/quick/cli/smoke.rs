@@ -1,0 +1,230 @@
+//! Every command once, from its arguments to its files.
+
+use serde_json::{Value, json};
+
+use support::files;
+use support::program::{Run, Sandbox};
+
+use super::without_card;
+
+const QUICK: &str = "--density 1e3 --map-resolution 32";
+
+fn number(value: &Value) -> f64 {
+    value.as_f64().unwrap_or_else(|| panic!("{value} is no number"))
+}
+
+/// Whether an object has exactly these keys, in any order.
+#[track_caller]
+fn assert_keys(object: &Value, expected: &str) {
+    let mut keys: Vec<&str> = object
+        .as_object()
+        .expect("an object")
+        .keys()
+        .map(String::as_str)
+        .collect();
+    let mut expected: Vec<&str> = expected.split_whitespace().collect();
+    keys.sort_unstable();
+    expected.sort_unstable();
+    assert_eq!(keys, expected);
+}
+
+#[test]
+fn bake_prints_the_manifest_that_it_writes() {
+    let sandbox = Sandbox::new();
+    let bake = "bake builtin:mirror -o out --density 1e4 --map-resolution 64x32 --layers direct,caustic";
+    let run = sandbox.succeed(&format!("{bake} --json"));
+    let manifest = sandbox.manifest("out");
+    assert_eq!((run.json(), run.stderr.as_str()), (manifest.clone(), ""));
+    assert_keys(
+        &manifest,
+        "schema program_version settings scene partial stop_reason warnings timings_s cpu_s counts effects \
+         item_buffers forecast course energy_w ledgers error maps",
+    );
+    assert_eq!(manifest["schema"], 1);
+    assert_eq!(manifest["program_version"], env!("CARGO_PKG_VERSION"));
+    assert_eq!(
+        (&manifest["partial"], &manifest["stop_reason"]),
+        (&false.into(), &"density".into())
+    );
+    assert_eq!(manifest["scene"]["source"], "builtin:mirror");
+    assert_eq!(number(&manifest["settings"]["density_per_sr"]), 1e4);
+    let stages = ["load", "build", "plan", "trace", "deposit"];
+    for clock in ["timings_s", "cpu_s"] {
+        assert_keys(&manifest[clock], &format!("{} total", stages.join(" ")));
+        let parts: f64 = stages.iter().map(|stage| number(&manifest[clock][stage])).sum();
+        let total = number(&manifest[clock]["total"]);
+        assert!(parts <= total * 1.001 + 1e-3, "{clock}: {parts} of {total}");
+    }
+    let counts = &manifest["counts"];
+    assert_keys(
+        counts,
+        "rays item_buffer_rays item_buffer_tests segments shadow_rays gather_rays gather_segments bounces \
+         receiver_queries splats cells",
+    );
+    assert!(number(&counts["rays"]) > 0.0 && number(&counts["shadow_rays"]) > 0.0);
+    assert_keys(
+        &manifest["energy_w"],
+        "emitted deposited absorbed escaped truncated truncated_by_cause",
+    );
+    let map = &manifest["maps"][0];
+    assert_keys(
+        map,
+        "surface node primitive side file width height uv_set uv_file layers texel_area_m2 units \
+         estimated_relative_rmse memory_bytes dense_bytes",
+    );
+    let error = number(&manifest["error"]["estimated_relative_rmse"]);
+    assert!((1e-6..0.2).contains(&error), "an error of {error}");
+    let of_map = number(&map["estimated_relative_rmse"]);
+    assert!(of_map > 0.0 && of_map <= error * 1.000_001, "{of_map} of {error}");
+    assert_eq!(
+        (&map["width"], &map["height"], &map["units"]),
+        (&64.into(), &32.into(), &"W/m^2".into())
+    );
+    assert_eq!(map["layers"], json!(["caustic", "direct"]));
+    // Again for people, over the first one.
+    let text = sandbox.succeed(bake).stdout;
+    for word in [
+        "maps/",
+        "rays",
+        "splats",
+        "emitted",
+        "deposited",
+        "escaped",
+        "seconds",
+    ] {
+        assert!(text.contains(word), "no {word:?} in: {text}");
+    }
+}
+
+#[test]
+fn a_bake_tells_its_forecast() {
+    let sandbox = Sandbox::new();
+    let bake = "bake builtin:ring -o out --max-error 2% --map-resolution 64 --json";
+    let manifest = sandbox.succeed(bake).json();
+    let forecast = &manifest["forecast"];
+    let rays = |part: &str| number(&forecast[part]["rays"]);
+    assert!(rays("made_at") > 0.0 && rays("expected") >= rays("made_at"));
+    assert_eq!(rays("actual"), number(&manifest["counts"]["rays"]));
+    let ratio = rays("actual") / rays("expected");
+    assert!((0.2..5.0).contains(&ratio), "{forecast}");
+    assert!(manifest["course"].as_array().expect("points").len() >= 2);
+}
+
+#[test]
+fn merged_shards_are_the_bake_bit_by_bit() {
+    let sandbox = Sandbox::new();
+    sandbox.write("lamps.gltf", files::mirror_under_lamps());
+    let bake = "bake lamps.gltf --density 4000 --map-resolution 24 --wavefronts 4 --layers caustic,direct --per-light";
+    sandbox.succeed(&format!("{bake} -o whole"));
+    for number in [1, 2] {
+        let shard = sandbox.succeed(&format!("{bake} --shard {number}/2 -o part{number} --json"));
+        assert_eq!(shard.json()["shard"]["number"], number);
+        assert_eq!(sandbox.files(format!("part{number}")), ["shard.json", "sums.bin"]);
+    }
+    // The scene was moved meanwhile.
+    std::fs::rename(sandbox.path("lamps.gltf"), sandbox.path("moved.gltf")).expect("it can be moved");
+    let gone = sandbox.run("merge part2 part1 -o merged");
+    gone.failed_in_one_sentence(1, &["lamps.gltf", "there is no such file"]);
+    sandbox.succeed("merge part2 part1 -o merged --scene moved.gltf");
+    let [whole, merged] = ["whole", "merged"].map(|folder| sandbox.manifest(folder));
+    for name in ["ledgers", "energy_w", "error"] {
+        assert_eq!(whole[name], merged[name], "{name}");
+    }
+    let names = sandbox.files("whole/maps");
+    assert!(!names.is_empty());
+    assert_eq!(sandbox.files("merged/maps"), names);
+    for name in names {
+        let [whole, merged] = ["whole", "merged"].map(|folder| {
+            std::fs::read(sandbox.path(folder).join("maps").join(&name)).expect("it is listed")
+        });
+        assert!(whole == merged, "{name}");
+    }
+}
+
+#[test]
+fn export_writes_a_scene_or_textures() {
+    let sandbox = Sandbox::new();
+    sandbox.succeed(&format!(
+        "bake builtin:mirror -o out --layers caustic,direct {QUICK}"
+    ));
+    // Direct light was baked: the lamps go, unless they are to stay.
+    for (options, file, layers) in [
+        ("", "out/mirror.glb", json!(["caustic", "direct"])),
+        ("-o kept.glb --lights keep", "kept.glb", json!(["caustic"])),
+    ] {
+        let run = sandbox.succeed(&format!("export out {options} --json"));
+        let report = run.json();
+        assert_eq!((&report["file"], &report["layers"]), (&json!(file), &layers));
+        let bytes = std::fs::read(sandbox.path(file)).expect("it was written");
+        assert_eq!(report["bytes"], bytes.len());
+        // What lies below the floor is no part of what is drawn.
+        assert_eq!(run.stderr.matches("warning: ").count(), 1);
+        assert!(run.stderr.contains("light on its back too"), "{}", run.stderr);
+        assert!(bytes.starts_with(b"glTF"));
+    }
+    let unlit = sandbox
+        .succeed("export out -o unlit.glb --as unlit --exposure 1.5 --json")
+        .json();
+    assert_eq!(unlit["options"]["exposure_stops"], 1.5);
+    for (options, folder, file) in [
+        ("--format exr --bits 32", "out/exr", "0000_floor.exr"),
+        ("--format png --exposure 20", "out/png", "0000_floor.png"),
+        ("--format hdr --layer direct -o t", "t", "0000_floor_direct.hdr"),
+        ("--format ktx2 --mips --packing bc6h -o k", "k", "0000_floor.ktx2"),
+        ("--format exr --units lux --atlas -o a", "a", "atlas0.exr"),
+    ] {
+        let report = sandbox.succeed(&format!("export out {options} --json")).json();
+        assert_eq!(
+            (&report["folder"], &report["textures"][0]["file"]),
+            (&json!(folder), &json!(file))
+        );
+        let written = sandbox.files(folder);
+        assert!(
+            ["index.json", file]
+                .iter()
+                .all(|name| written.iter().any(|known| known == name))
+        );
+    }
+    let told = sandbox.succeed("export out --format png --exposure 20").stdout;
+    assert!(
+        told.contains("texels above white") && told.contains("2^20"),
+        "{told}"
+    );
+}
+
+#[test]
+fn view_without_display_writes_files() {
+    let sandbox = Sandbox::new();
+    let picture = |line: &str, display: &str| {
+        let mut command = without_card(&sandbox, &format!("{line} {QUICK} --size 64x48 --exposure 0"));
+        if !display.is_empty() {
+            command.env("DISPLAY", display);
+        }
+        let run = Run::from(command.output().expect("the program starts"));
+        assert_eq!(
+            (run.code, run.stdout.as_str()),
+            (0, "./nephroid-out/\n"),
+            "{}",
+            run.stderr
+        );
+        assert_eq!(run.stderr.matches("no display").count(), 1, "{}", run.stderr);
+        assert_eq!(
+            sandbox.files("nephroid-out"),
+            ["manifest.json", "maps", "picture.png"]
+        );
+        assert_eq!(sandbox.manifest("nephroid-out")["partial"], false);
+        let picture = image::open(sandbox.path("nephroid-out/picture.png")).expect("a PNG");
+        assert_eq!((picture.width(), picture.height()), (64, 48));
+        picture.to_rgb8()
+    };
+    let shown = picture("builtin:mirror", "");
+    assert_eq!(
+        picture("view builtin:mirror", ":987"),
+        shown,
+        "a display that is not there"
+    );
+    let black = |picture: &image::RgbImage| picture.pixels().filter(|pixel| pixel.0 == [0; 3]).count();
+    let without_chains = picture("builtin:mirror --effects chains=off", "");
+    assert!(shown.pixels().any(|pixel| pixel.0[1] > 64));
+    assert!(black(&without_chains) > black(&shown) + 20, "the mirror is black");
+}

@@ -1,0 +1,181 @@
+//! Files for other programs, read back by readers that are not ours.
+
+mod folders;
+mod glb;
+mod ktx2;
+mod maps;
+mod shards;
+mod textures;
+
+use std::path::{Path, PathBuf};
+
+use glam::DVec3;
+use nephroid::error::Error;
+use nephroid::export::map_folder::MapFolder;
+use nephroid::export::map_reader::MapReader;
+use nephroid::export::textures::{Content, Encoding, Exposure, TextureFolder, TextureOptions, TextureReport};
+use nephroid::export::{FloatImage, Quantity};
+use nephroid::progress::Control;
+use nephroid::scene::Scene;
+use nephroid::scene::builtin::shapes;
+use nephroid::session::BakeResult;
+use nephroid::settings::{BakeSettings, LayerKind};
+use serde_json::{Value, json};
+
+use support::glb::Glb;
+use support::program::read_json;
+use support::tools::{at, bake};
+
+/// A scene with the folder of its maps.
+struct Baked {
+    scene: Scene,
+    result: BakeResult,
+    around: tempfile::TempDir,
+}
+
+impl Baked {
+    fn new(scene: Scene, settings: &BakeSettings) -> Self {
+        let baked = Self {
+            result: bake(scene.clone(), settings),
+            around: tempfile::tempdir().expect("a temporary folder"),
+            scene,
+        };
+        let folder = MapFolder::open(&baked.path("out"), false).expect("it can be written");
+        folder
+            .write(&baked.scene, settings, &baked.result)
+            .expect("it can be written");
+        baked
+    }
+
+    /// Maps of 64 texels each way, of a light pass of milliseconds.
+    fn quick(scene: Scene, layers: &[LayerKind]) -> Self {
+        let settings = BakeSettings {
+            layers: layers.to_vec(),
+            ..at(1e3, 64)
+        };
+        Self::new(scene, &settings)
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.around.path().join(name)
+    }
+
+    fn manifest(&self) -> Value {
+        read_json(&self.path("out/manifest.json"))
+    }
+
+    /// A map as its file has it.
+    fn file(&self, map: usize) -> FloatImage {
+        let manifest = self.manifest();
+        let name = manifest["maps"][map]["file"].as_str().expect("a name");
+        FloatImage::read(&self.path("out").join(name)).expect("it can be read")
+    }
+
+    /// E of the first map [W/m²], of a layer or (without a name) of all.
+    fn light(&self, layer: &str) -> Vec<[f32; 3]> {
+        self.file(0).rgb(layer).expect("it has the layer")
+    }
+
+    /// Writes textures to a folder.
+    fn textures(&self, options: TextureOptions, folder: &str) -> Result<TextureReport, Error> {
+        let maps = self.path("out");
+        let reader = MapReader::open(&maps, &self.scene)?;
+        let folder = TextureFolder::open(&self.path(folder), false)?;
+        nephroid::export::textures::write(&reader, options, folder, &Control::default())
+    }
+}
+
+/// All light as it is [W/m²], a file for each map.
+fn as_it_is(encoding: Encoding) -> TextureOptions {
+    TextureOptions {
+        encoding,
+        quantity: Quantity::Irradiance,
+        content: Content::Sum,
+        exposure: Exposure::Stops(0.0),
+        atlas_side: None,
+    }
+}
+
+/// Luminous efficacy that watts are counted by [lm/W].
+const LUMENS_PER_WATT: f64 = 683.0;
+
+/// IEC 61966-2-1.
+fn linear_of_srgb(code: u16) -> f64 {
+    let share = f64::from(code) / 65535.0;
+    if share <= 0.040_45 {
+        share / 12.92
+    } else {
+        ((share + 0.055) / 1.055).powf(2.4)
+    }
+}
+
+/// Names of what is in a folder, sorted.
+fn names(folder: &Path) -> Vec<String> {
+    let entries = std::fs::read_dir(folder).expect("it is there");
+    let name = |entry: std::io::Result<std::fs::DirEntry>| entry.expect("listed").file_name();
+    let mut names: Vec<String> = entries
+        .map(|entry| name(entry).into_string().expect("text"))
+        .collect();
+    names.sort();
+    names
+}
+
+#[track_caller]
+fn assert_says(error: &Error, words: &[&str]) {
+    let sentence = error.to_string();
+    for word in words {
+        assert!(sentence.contains(word), "no {word:?} in: {sentence}");
+    }
+}
+
+/// Two boxes of one mesh, one of them mirrored, with colours at their vertices (position + 0.5), before a mirror.
+pub fn boxes() -> Glb {
+    let mut file = Glb::empty();
+    let cube = shapes::cuboid(DVec3::splat(-0.3), DVec3::splat(0.3));
+    let numbers =
+        |vectors: &[DVec3]| -> Vec<f32> { vectors.iter().flat_map(|v| v.as_vec3().to_array()).collect() };
+    let positions = numbers(&cube.positions);
+    let colours: Vec<f32> = positions.iter().map(|value| value + 0.5).collect();
+    let attributes = json!({
+        "POSITION": file.push_floats(&positions, 3),
+        "NORMAL": file.push_floats(&numbers(&cube.normals), 3),
+        "COLOR_0": file.push_floats(&colours, 3),
+    });
+    let indices = file.push_indices(cube.triangles.as_flattened());
+    let plaster = json!({ "name": "plaster", "pbrMetallicRoughness": { "metallicFactor": 0.0 } });
+    let plaster = file.push("materials", plaster);
+    let mesh = file.push_mesh(json!({ "attributes": attributes, "indices": indices, "material": plaster }));
+    file.push_root(json!({ "name": "box", "mesh": mesh, "translation": [0.0, 0.3, 0.0] }));
+    file.push_root(
+        json!({ "name": "mirrored box", "mesh": mesh, "translation": [1.0, 0.3, 0.1],
+        "scale": [-1.0, 1.5, 1.0], "rotation": [0.0, 0.38268343, 0.0, 0.92387953] }),
+    );
+    let silver = json!({ "name": "silver", "doubleSided": true,
+        "pbrMetallicRoughness": { "metallicFactor": 1.0, "roughnessFactor": 0.0 } });
+    let silver = file.push("materials", silver);
+    let corners = [-2.0, 0.0, -1.0, 3.0, 0.0, -1.0, 3.0, 2.0, -1.0, -2.0, 2.0, -1.0];
+    let attributes = json!({ "POSITION": file.push_floats(&corners, 3) });
+    let indices = file.push_indices(&[0, 1, 2, 0, 2, 3]);
+    let wall = file.push_mesh(json!({ "attributes": attributes, "indices": indices, "material": silver }));
+    file.push_root(json!({ "name": "wall", "mesh": wall }));
+    file.json["extensionsUsed"] = json!(["KHR_lights_punctual"]);
+    file.json["extras"] = json!({ "note": "kept" });
+    with_lamp(
+        file,
+        json!({ "type": "point", "intensity": 683.0 }),
+        [0.4, 2.0, 1.5],
+    )
+}
+
+/// The same with a second lamp of the first one's name.
+fn two_lamps() -> Glb {
+    let warm = json!({ "type": "point", "intensity": 300.0, "color": [1.0, 0.5, 0.2] });
+    with_lamp(boxes(), warm, [-0.6, 1.7, 1.9])
+}
+
+fn with_lamp(file: Glb, light: Value, translation: [f64; 3]) -> Glb {
+    let mut file = file.with_light("lamp", light);
+    let nodes = file.json["nodes"].as_array_mut().expect("a list");
+    nodes.last_mut().expect("the lamp's")["translation"] = json!(translation);
+    file
+}

@@ -1,0 +1,402 @@
+//! Maps as textures, read by the image crate, which knows nothing of ours.
+
+use std::f64::consts::FRAC_1_PI;
+use std::path::Path;
+
+use image::ImageDecoder as _;
+use nephroid::error::ErrorKind;
+use nephroid::export::Quantity;
+use nephroid::export::map_reader::{self, MapReader};
+use nephroid::export::textures::index::{Rectangle, TextureEntry};
+use nephroid::export::textures::{
+    self, Content, Encoding, Exposure, TextureFolder, TextureOptions, TextureReport, Transfer,
+};
+use nephroid::progress::Control;
+use nephroid::settings::{BakeSettings, LayerKind};
+
+use support::assert_close;
+use support::program::read_json;
+use support::tools::{at, builtin_scene};
+
+use super::{Baked, LUMENS_PER_WATT, as_it_is, assert_says, linear_of_srgb, names, two_lamps};
+
+const FLOAT: Encoding = Encoding::Float;
+
+fn ring() -> Baked {
+    Baked::quick(builtin_scene("ring"), &[LayerKind::Caustic])
+}
+
+/// Two maps with generated coordinates, of two layers and two lamps.
+fn boxes_by_light() -> Baked {
+    let settings = BakeSettings {
+        layers: vec![LayerKind::Caustic, LayerKind::Direct],
+        per_light: true,
+        ..at(1e3, 64)
+    };
+    Baked::new(two_lamps().scene(), &settings)
+}
+
+fn texels(file: &Path) -> Vec<[f32; 3]> {
+    let image = image::open(file).expect("it is an image").to_rgb32f();
+    image.pixels().map(|pixel| pixel.0).collect()
+}
+
+fn brightest(values: &[f32; 3]) -> f32 {
+    values.iter().fold(0.0, |a, b| a.max(*b))
+}
+
+#[test]
+fn an_index_says_what_its_files_are() {
+    let baked = ring();
+    let report = baked.textures(as_it_is(FLOAT), "t").expect("it fits");
+    assert_eq!(
+        texels(&baked.path("t/0000_floor.exr")),
+        baked.light(""),
+        "bit by bit"
+    );
+    let index = read_json(&baked.path("t/index.json"));
+    assert_eq!(index, serde_json::to_value(&report.index).expect("it is JSON"));
+    let manifest = baked.manifest();
+    assert_eq!(index["scene"], manifest["scene"]);
+    assert_eq!(
+        (index["unit"].as_str(), index["exposure_stops"].as_f64()),
+        (Some("W/m^2"), Some(0.0))
+    );
+    let [texture] = &report.index.textures[..] else {
+        panic!("one map, one file")
+    };
+    assert_eq!((texture.width, texture.height), (64, 64));
+    assert_eq!(texture.layers, [LayerKind::Caustic]);
+    assert_eq!(
+        (texture.light.as_deref(), texture.lost.relative_rmse),
+        (None, 0.0)
+    );
+    assert_eq!(texture.maps[0].rectangle, Rectangle::whole((64, 64)));
+    for name in ["surface", "node", "primitive", "side", "uv_set", "uv_file"] {
+        let told = &index["textures"][0]["maps"][0][name];
+        assert_eq!(*told, manifest["maps"][0][name], "{name}");
+    }
+}
+
+#[test]
+fn half_floats_hold_every_unit_and_exposure() {
+    let baked = ring();
+    let light = baked.light("");
+    for (quantity, factor, stops) in [
+        (Quantity::Irradiance, 1.0, -2.0),
+        (Quantity::IrradianceByPi, FRAC_1_PI, 1.5),
+        (Quantity::Illuminance, LUMENS_PER_WATT, -2.0),
+        (Quantity::IlluminanceByPi, LUMENS_PER_WATT * FRAC_1_PI, 1.5),
+    ] {
+        let options = TextureOptions {
+            quantity,
+            exposure: Exposure::Stops(stops),
+            ..as_it_is(Encoding::Half)
+        };
+        baked.textures(options, "t").expect("it fits");
+        let found = texels(&baked.path("t/0000_floor.exr"));
+        for (found, wanted) in found.as_flattened().iter().zip(light.as_flattened()) {
+            let (found, wanted) = (f64::from(*found), f64::from(*wanted) * factor * stops.exp2());
+            // Eleven bits, and steps of 2^-24 below 2^-14.
+            let bound = (wanted.abs() * f64::exp2(-11.0) * 1.0001).max(f64::exp2(-25.0));
+            assert!(
+                (found - wanted).abs() <= bound,
+                "{quantity:?} {stops}: {found} of {wanted}"
+            );
+        }
+    }
+}
+
+#[test]
+fn too_bright_light_is_refused_with_advice() {
+    let baked = ring();
+    let peak = baked.light("").iter().map(brightest).fold(0.0, f32::max);
+    let bright = |encoding, stops: f64| TextureOptions {
+        exposure: Exposure::Stops(stops),
+        ..as_it_is(encoding)
+    };
+    let stops = f64::from((65504.0 / peak).log2().ceil());
+    let error = baked
+        .textures(bright(Encoding::Half, stops), "t")
+        .expect_err("too bright");
+    assert_says(&error, &["0000_floor.exr", "65504", "--bits 32"]);
+    assert_eq!(names(&baked.path(".")), ["out"], "nothing is left");
+    let advised = error.remedy.rsplit(' ').next().expect("a number");
+    let advised = advised.parse().expect("a number");
+    baked
+        .textures(bright(Encoding::Half, advised), "t")
+        .expect("as it was advised");
+    baked
+        .textures(bright(FLOAT, stops), "t")
+        .expect("as it was advised");
+}
+
+#[test]
+fn a_png_says_its_exposure_and_what_is_lost() {
+    let baked = ring();
+    let light = baked.light("");
+    let png = |transfer, quantity, exposure| {
+        let options = TextureOptions {
+            quantity,
+            exposure,
+            ..as_it_is(Encoding::Png16 { transfer })
+        };
+        let report = baked.textures(options, "t").expect("it fits");
+        (report.index.exposure_stops, report.index.textures[0].lost)
+    };
+    for (transfer, marks) in [
+        (Transfer::Srgb, &b"sRGB"[..]),
+        (Transfer::Linear, b"gAMA\x00\x01\x86\xa0"),
+    ] {
+        let (stops, lost) = png(transfer, Quantity::Illuminance, Exposure::Cut(0.005));
+        let bytes = std::fs::read(baked.path("t/0000_floor.png")).expect("it is there");
+        let has = |mark: &[u8]| bytes.windows(mark.len()).any(|window| window == mark);
+        assert!(has(marks) && has(b"tEXtUnit\0lx"));
+        assert!(stops.fract() == 0.0 && has(format!("tEXtExposure\0{stops} stops").as_bytes()));
+        let image = image::load_from_memory(&bytes).expect("it is a PNG");
+        assert_eq!(image.color(), image::ColorType::Rgb16);
+        let (mut above, mut cut, mut all) = (0, 0.0, 0.0);
+        for (pixel, light) in image.to_rgb16().pixels().zip(&light) {
+            let wanted = light.map(|value| f64::from(value) * LUMENS_PER_WATT * stops.exp2());
+            above += usize::from(wanted.iter().any(|value| *value > 1.0));
+            for (code, wanted) in pixel.0.into_iter().zip(wanted) {
+                (cut, all) = (cut + (wanted - 1.0).max(0.0), all + wanted);
+                let found = match transfer {
+                    Transfer::Srgb => linear_of_srgb(code),
+                    Transfer::Linear => f64::from(code) / 65535.0,
+                };
+                assert!(
+                    (found - wanted.clamp(0.0, 1.0)).abs() <= 2e-5,
+                    "{found} of {wanted}"
+                );
+            }
+        }
+        assert_eq!(lost.above_texels, above);
+        assert_close(lost.above_share, cut / all, 1e-3, "share that is told");
+        assert!(cut / all <= 0.005, "{}", cut / all);
+    }
+    let lost = |exposure| png(Transfer::Srgb, Quantity::Irradiance, exposure).1;
+    assert_eq!(lost(Exposure::Cut(0.0)).above_texels, 0, "nothing may be cut");
+    assert!(
+        lost(Exposure::Stops(20.0)).above_share > 0.9,
+        "so it was asked for"
+    );
+}
+
+#[test]
+fn a_radiance_file_is_within_its_steps() {
+    let baked = ring();
+    let light = baked.light("");
+    for stops in [0.0, 3.0] {
+        let options = TextureOptions {
+            exposure: Exposure::Stops(stops),
+            ..as_it_is(Encoding::Radiance)
+        };
+        baked.textures(options, "t").expect("it fits");
+        let file = baked.path("t/0000_floor.hdr");
+        let bytes = std::fs::read(&file).expect("it is there");
+        let decoder = image::codecs::hdr::HdrDecoder::new(&bytes[..]).expect("it is a Radiance file");
+        assert_eq!(decoder.dimensions(), (64, 64));
+        let stated = decoder.metadata().exposure.unwrap_or(1.0);
+        assert_eq!(f64::from(stated), stops.exp2());
+        for (found, wanted) in texels(&file).iter().zip(&light) {
+            for (found, value) in found.iter().zip(wanted) {
+                let off = (found / stated - value).abs();
+                assert!(off <= brightest(wanted) / 255.0, "{found} of {value}");
+            }
+        }
+    }
+}
+
+/// Exports to a folder of that name, whose entries it returns.
+fn export(baked: &Baked, content: Content, atlas_side: Option<usize>, folder: &str) -> Vec<TextureEntry> {
+    let options = TextureOptions {
+        content,
+        atlas_side,
+        ..as_it_is(FLOAT)
+    };
+    let TextureReport { index, warnings, .. } = baked.textures(options, folder).expect("it fits");
+    assert_eq!(warnings, []);
+    index.textures
+}
+
+#[test]
+fn layers_and_lights_come_apart_and_add_up() {
+    let baked = boxes_by_light();
+    let read = |folder: &str, entry: &TextureEntry| texels(&baked.path(folder).join(&entry.file));
+    let whole = export(&baked, Content::Sum, None, "sum");
+    assert_eq!(whole.len(), 2);
+    for (content, folder) in [(Content::EachLayer, "layers"), (Content::EachLight, "lights")] {
+        let mut parts = export(&baked, content, None, folder);
+        for whole in &whole {
+            let sum = read("sum", whole);
+            assert!(sum.as_flattened().iter().any(|value| *value > 0.0));
+            let node = whole.maps[0].node;
+            let (own, others) = parts.into_iter().partition(|part| part.maps[0].node == node);
+            parts = others;
+            let own: Vec<TextureEntry> = own;
+            let [a, b] = &own[..] else {
+                panic!("{folder}: two parts of each map")
+            };
+            if content == Content::EachLight {
+                let names = [a, b].map(|entry| entry.light.as_deref());
+                assert_eq!(names, [Some("lamp"); 2], "of one name, told apart by their files");
+            }
+            let [a, b] = [a, b].map(|entry| read(folder, entry));
+            assert_ne!(a, b);
+            for ((a, b), sum) in a
+                .as_flattened()
+                .iter()
+                .zip(b.as_flattened())
+                .zip(sum.as_flattened())
+            {
+                let bound = 1e-5 * sum.abs() + 1e-9;
+                assert!((a + b - sum).abs() <= bound, "{folder}: {a} and {b} of {sum}");
+            }
+            // Generated coordinates come along.
+            let uv_file = whole.maps[0].uv_file.as_ref().expect("they were generated");
+            let copied = std::fs::read(baked.path(folder).join(uv_file)).expect("it is there");
+            assert_eq!(
+                copied,
+                std::fs::read(baked.path("out/maps").join(uv_file)).expect("it is there")
+            );
+        }
+        assert!(parts.is_empty());
+    }
+    let direct = Content::Layer(LayerKind::Direct);
+    for entry in export(&baked, direct, None, "one") {
+        assert_eq!(entry.layers, [LayerKind::Direct]);
+        assert_eq!(read("one", &entry), read("layers", &entry));
+    }
+    let refuse = |baked: &Baked, content, words: &[&str]| {
+        let options = TextureOptions {
+            content,
+            ..as_it_is(FLOAT)
+        };
+        assert_says(
+            &baked.textures(options, "none").expect_err("it is not there"),
+            words,
+        );
+    };
+    refuse(
+        &baked,
+        Content::Layer(LayerKind::Indirect),
+        &["indirect", "--layers"],
+    );
+    refuse(&ring(), Content::EachLight, &["--per-light"]);
+}
+
+#[test]
+fn nothing_black_lies_beside_a_surface() {
+    let baked = Baked::quick(two_lamps().scene(), &[LayerKind::Caustic]);
+    let entries = export(&baked, Content::Sum, None, "t");
+    let (maps, _) = map_reader::read(&baked.path("out"), &baked.scene).expect("we wrote it");
+    let mut outside = 0;
+    for (map, entry) in maps.iter().zip(&entries) {
+        let texture = texels(&baked.path("t").join(&entry.file));
+        let total = map.total();
+        let on_surface = |texel: &usize| map.chart.texel_area_m2(*texel) > 0.0;
+        let (covered, free): (Vec<usize>, Vec<usize>) = (0..total.len()).partition(on_surface);
+        outside += free.len();
+        for texel in &covered {
+            assert_eq!(texture[*texel], total[*texel], "light on the surface stays");
+        }
+        // What lies outside holds values between those that are there, and their mean is no darker by half.
+        let peak = total.iter().fold(0.0_f32, |a, b| a.max(b[1]));
+        assert!(
+            free.iter()
+                .all(|texel| (0.0..=peak).contains(&texture[*texel][1]))
+        );
+        let mean = |of: &[usize]| of.iter().map(|texel| texture[*texel][1]).sum::<f32>() / of.len() as f32;
+        let (inside, beside) = (mean(&covered), mean(&free));
+        assert!(beside > 0.5 * inside, "{beside} beside {inside}");
+    }
+    assert!(outside > 100, "{outside}: the charts leave room");
+}
+
+#[test]
+fn an_atlas_holds_maps_where_its_index_says() {
+    let baked = boxes_by_light();
+    for content in [Content::Sum, Content::EachLayer, Content::EachLight] {
+        let apart = export(&baked, content, None, "apart");
+        let together = export(&baked, content, Some(16_384), "together");
+        assert_eq!(2 * together.len(), apart.len(), "two maps in each");
+        for entry in &together {
+            let atlas = texels(&baked.path("together").join(&entry.file));
+            // What the name says of the content: `_caustic`, `_lamp-0`, nothing.
+            let content = entry.file.trim_start_matches("atlas0");
+            for placed in &entry.maps {
+                let is_it = |single: &&TextureEntry| {
+                    single.maps[0].node == placed.node
+                        && single.layers == entry.layers
+                        && (content.starts_with('.') || single.file.ends_with(content))
+                };
+                let single = apart.iter().find(is_it).expect("it is there");
+                let Rectangle { x, y, width, height } = placed.rectangle;
+                assert_eq!((single.width, single.height), (width, height));
+                assert_eq!(single.light, entry.light);
+                let own = texels(&baked.path("apart").join(&single.file));
+                for row in 0..height + 4 {
+                    for column in 0..width + 4 {
+                        // Two texels around it go on with those at its border.
+                        let inside = |at: usize, side: usize| at.saturating_sub(2).min(side - 1);
+                        let wanted = own[inside(row, height) * width + inside(column, width)];
+                        let found = atlas[(y + row - 2) * entry.width + x + column - 2];
+                        assert_eq!(found, wanted, "{}", entry.file);
+                    }
+                }
+                let uv_file = placed.uv_file.as_ref().expect("they were generated");
+                assert!(baked.path("together").join(uv_file).is_file());
+            }
+        }
+    }
+    // Smaller ones hold fewer; too small ones none.
+    assert_eq!(export(&baked, Content::Sum, Some(70), "small").len(), 2);
+    let options = TextureOptions {
+        atlas_side: Some(67),
+        ..as_it_is(FLOAT)
+    };
+    let error = baked.textures(options, "none").expect_err("there is no room");
+    assert_says(&error, &["the map of", "64x64", "--atlas"]);
+    assert!(!baked.path("none").exists());
+}
+
+#[test]
+fn a_cancelled_export_leaves_nothing() {
+    let baked = ring();
+    let maps = baked.path("out");
+    let reader = MapReader::open(&maps, &baked.scene).expect("we wrote it");
+    let folder = TextureFolder::open(&baked.path("t"), false).expect("it can be written");
+    let control = Control::default();
+    control.cancel();
+    let error = textures::write(&reader, as_it_is(FLOAT), folder, &control).expect_err("it was cancelled");
+    assert_eq!(error.kind, ErrorKind::Cancelled);
+    assert_eq!(names(&baked.path(".")), ["out"]);
+}
+
+#[test]
+fn an_export_replaces_its_own_files_alone() {
+    let baked = ring();
+    let float = as_it_is(FLOAT);
+    let each = TextureOptions {
+        content: Content::EachLayer,
+        ..float
+    };
+    let png = as_it_is(Encoding::Png16 {
+        transfer: Transfer::Srgb,
+    });
+    let t = baked.path("t");
+    baked.textures(each, "t").expect("it is empty");
+    assert_eq!(names(&t), ["0000_floor_caustic.exr", "index.json"]);
+    baked.textures(png, "t").expect("they are ours");
+    assert_eq!(
+        names(&t),
+        ["0000_floor.png", "index.json"],
+        "what was there more is gone"
+    );
+    // A folder has the name of a texture.
+    std::fs::create_dir(t.join("0000_floor.exr")).expect("it can be made");
+    let error = baked.textures(float, "t").expect_err("it is in the way");
+    assert_says(&error, &["0000_floor.exr", "folder"]);
+    assert_eq!(names(&t), ["0000_floor.exr", "0000_floor.png", "index.json"]);
+}

@@ -1,0 +1,108 @@
+//! One picture: the device against the CPU, and both against a closed form, every channel by itself.
+
+use std::sync::Arc;
+
+use glam::DVec3;
+use nephroid::eye_pass::Picture;
+use nephroid::eye_pass::tone_mapping::display_rgba8;
+use nephroid::illumination::IlluminationMap;
+use nephroid::optics::LinearSrgb;
+use nephroid::scene::builtin::{parts, shapes};
+use nephroid::scene::{Environment, LightKind, Material, Scene};
+use nephroid::transport::Tracer;
+
+use crate::gpu::rig::{AS_CPU, Rig, or_skip};
+use support::floors::{diffuse, floor_map, floor_scene, four_colours, lambert, texture_reference};
+use support::scenes::{light, seen, view};
+
+/// A textured floor with a lit corner of known radiance, a glowing wall, a mirror ball and a glass ball under a sky;
+/// whatever has a colour has three distinct channels.
+fn exhibit() -> (Scene, Vec<IlluminationMap>) {
+    let mut scene = floor_scene(Material {
+        base_colour_texture: Some(texture_reference()),
+        ..diffuse(LinearSrgb::new(0.8, 0.6, 0.3))
+    });
+    scene.textures.push(four_colours().into());
+    let mirror = Material {
+        base_colour: LinearSrgb::new(0.9, 0.7, 0.5),
+        ..parts::mirror()
+    };
+    let mut glass = parts::dielectric("glass", 1.5);
+    glass.base_colour = LinearSrgb::new(1.0, 0.8, 0.6);
+    let glowing = Material {
+        emitted_radiance: LinearSrgb::new(0.3, 0.9, 0.6),
+        ..diffuse(LinearSrgb::BLACK)
+    };
+    let ball = |x: f64| shapes::sphere(DVec3::new(x, 0.2, 0.35), 0.18, 4);
+    let wall = shapes::rectangle(DVec3::new(0.5, 0.3, -0.1), DVec3::X * 0.4, DVec3::Y * 0.2);
+    parts::add(&mut scene, "mirror", ball(0.25), mirror);
+    parts::add(&mut scene, "glass", ball(0.75), glass);
+    parts::add(&mut scene, "wall", wall, glowing);
+    let sky = vec![[0.1, 0.2, 0.4], [0.4, 0.2, 0.1], [0.3, 0.1, 0.2], [0.1, 0.3, 0.2]];
+    scene.environment = Some(Arc::new(Environment::new(2, 2, sky).expect("sound")));
+    scene.lights = vec![light(LightKind::Environment { scale: 1.5 })];
+    let texel = |index: usize| {
+        let at = index as f32 / 64.0;
+        [3.0 - at, 1.0 + at, 0.5 + 0.5 * at]
+    };
+    let mut texels: Vec<[f32; 3]> = (0..64).map(texel).collect();
+    for corner in [54, 55, 62, 63] {
+        texels[corner] = [3.0, 2.0, 1.0];
+    }
+    (scene, vec![floor_map(0, 8, 8, texels)])
+}
+
+/// Share of the channels that differ by more than 1 % of the brightest or themselves.
+fn unlike(a: &Picture, b: &Picture) -> f64 {
+    let channels = || a.radiance.iter().flatten().zip(b.radiance.iter().flatten());
+    let peak = channels().fold(0.0_f32, |peak, (a, _)| peak.max(*a));
+    let far = channels().filter(|(a, b)| (*a - *b).abs() > 0.01 * a.max(0.2 * peak));
+    far.count() as f64 / (3 * a.radiance.len()) as f64
+}
+
+#[test]
+fn device_shows_what_the_cpu_shows() {
+    let (scene, maps) = exhibit();
+    let (eye, target) = (DVec3::new(0.6, 0.8, 1.9), DVec3::new(0.5, 0.15, 0.45));
+    let view = view(eye, target, 0.75, [96, 64]);
+    let tracer = Tracer::new(Arc::new(scene.clone()));
+    let by_cpu = seen(&tracer, &maps, &view, &Default::default()).0;
+    // The lower right corner of the floor: white texel, evenly lit.
+    let camera = &view.camera;
+    let off = DVec3::new(0.9, 0.0, 0.9) - camera.position;
+    let half = (0.5 * camera.vertical_fov_rad).tan() * off.dot(camera.forward);
+    let column = 48.0 + 32.0 * off.dot(camera.right()) / half;
+    let row = 32.0 - 32.0 * off.dot(camera.up) / half;
+    let corner = row as usize * 96 + column as usize;
+    let expected = [lambert(0.8, 3.0), lambert(0.6, 2.0), lambert(0.3, 1.0)];
+    let assert_known = |picture: &Picture, tolerance: f64| {
+        for (found, expected) in picture.radiance[corner].into_iter().zip(expected) {
+            assert!(
+                (f64::from(found) / expected - 1.0).abs() < tolerance,
+                "{found}, {expected}"
+            );
+        }
+    };
+    assert_known(&by_cpu, 1e-6);
+    let mut rig = or_skip!(Rig::at(AS_CPU, &scene, &maps));
+    let by_gpu = rig.picture(&view);
+    assert_known(&by_gpu, 2e-3);
+    // Chains that end at a ball's outline may differ.
+    assert!(unlike(&by_cpu, &by_gpu) < 0.01, "{}", unlike(&by_cpu, &by_gpu));
+    let swapped = |[a, b, c]: [usize; 3]| {
+        let mut picture = by_gpu.clone();
+        for pixel in &mut picture.radiance {
+            *pixel = [pixel[a], pixel[b], pixel[c]];
+        }
+        unlike(&by_cpu, &picture)
+    };
+    for order in [[1, 0, 2], [2, 1, 0], [0, 2, 1]] {
+        assert!(swapped(order) > 0.1, "{order:?}");
+    }
+
+    // As a window shows it: bytes in the order of the format, rounded at another place.
+    let bytes = display_rgba8(&by_gpu, 0.0, view.tone_map);
+    let apart = |pair: (&u8, &u8)| pair.0.abs_diff(*pair.1);
+    let most = rig.drawn(&view).iter().zip(&bytes).map(apart).max();
+    assert!(most <= Some(1), "{most:?}");
+}

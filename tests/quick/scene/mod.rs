@@ -1,0 +1,13 @@
+//! Scenes: the built-in ones and those from files.
+
+mod builtins;
+mod camera_paths;
+mod collections;
+mod edits;
+mod files;
+mod lights;
+mod materials;
+mod meshes;
+mod oracle;
+mod refusals;
+mod spectral;

@@ -1,0 +1,146 @@
+//! The camera's path: recorded, played and written.
+
+use glam::DVec3;
+use nephroid::scene::{Camera, CameraPath};
+use nephroid::settings::BakeSettings;
+use nephroid::viewer::exporting::ExportState;
+use nephroid::viewer::filming::{Film, Player};
+use nephroid::viewer::panel::FilmWish;
+
+use super::fixtures::folder;
+use super::headless::Headless;
+
+fn camera(x: f64) -> Camera {
+    let target = DVec3::new(0.5 * x, 0.2, -4.0);
+    Camera::look_at("here", DVec3::new(x, 1.5, 3.0), target, 0.7)
+}
+
+/// From x = 0 to x = 2 [m].
+fn film() -> Film {
+    let mut film = Film::default();
+    for x in [0.0, 2.0] {
+        film.record(None, &camera(x), DVec3::ZERO, 5.0);
+    }
+    film
+}
+
+#[test]
+fn keys_are_the_camera_that_was_there() {
+    let origin = DVec3::new(1e6, 0.0, -2e6);
+    let mut film = Film::default();
+    // The third has no place to go to.
+    for (place, x, stands) in [(None, 1.0, 1.0), (Some(0), -1.0, -1.0), (Some(7), 9.0, -1.0)] {
+        film.record(place, &camera(x), origin, 3.0);
+        let there = film.camera_at(0, origin).expect("it is recorded");
+        assert!(
+            there.position.distance(camera(stands).position) < 1e-8,
+            "{there:?}"
+        );
+        assert!(there.forward.distance(camera(stands).forward) < 1e-8, "{there:?}");
+        assert!((there.vertical_fov_rad - 0.7).abs() < 1e-12, "{there:?}");
+        assert!(film.keys.len() == 1 && film.camera_at(1, origin).is_none());
+    }
+    assert_eq!(film.keys[0].roll_deg, 0.0, "who stands level writes no roll");
+}
+
+#[test]
+fn a_lean_takes_the_shorter_way() {
+    let leaning = |degrees: f64| {
+        let level = camera(1.0);
+        let (sine, cosine) = degrees.to_radians().sin_cos();
+        Camera {
+            up: level.up * cosine + level.right() * sine,
+            ..level
+        }
+    };
+    let mut film = Film {
+        frames: 3,
+        ..Film::default()
+    };
+    for (key, degrees) in [170.0, -150.0].into_iter().enumerate() {
+        film.record(None, &leaning(degrees), DVec3::ZERO, 3.0);
+        let there = film.camera_at(key, DVec3::ZERO).expect("it is recorded");
+        assert!(there.up.distance(leaning(degrees).up) < 1e-9, "{there:?}");
+    }
+    let folder = folder();
+    let path = film.save(folder.path(), "leaning").expect("it can be written");
+    let path = CameraPath::read(&path).expect("it can be read");
+    let cameras = path.cameras(DVec3::ZERO);
+    assert!(cameras[1].up.distance(leaning(-170.0).up) < 1e-9, "{cameras:?}");
+    assert!(cameras.iter().all(Camera::is_sound));
+}
+
+#[test]
+fn paths_are_written_as_render_reads_them() {
+    let folder = folder();
+    let film = Film { frames: 5, ..film() };
+    for number in 1..=2 {
+        let path = film.save(folder.path(), "my scene").expect("it can be written");
+        assert!(
+            path.ends_with(format!("nephroid-my-scene-path-000{number}.json")),
+            "{path:?}"
+        );
+        let cameras = CameraPath::read(&path)
+            .expect("it is a path")
+            .cameras(DVec3::ZERO);
+        assert_eq!(cameras.len(), 5);
+        for (frame, camera) in cameras.iter().enumerate() {
+            let expected = DVec3::new(0.5 * frame as f64, 1.5, 3.0);
+            assert!(camera.position.distance(expected) < 1e-12, "{camera:?}");
+        }
+    }
+    let mut one = film;
+    one.keys.truncate(1);
+    let error = one.save(folder.path(), "one").expect_err("it leads nowhere");
+    assert!(error.to_string().contains("keys"), "{error}");
+}
+
+#[test]
+fn paths_are_played_in_their_own_time() {
+    let film = Film { frames: 61, ..film() };
+    let cameras = film.path().expect("it is a path").cameras(DVec3::ZERO);
+    let mut player = Player::new(cameras).expect("there are frames");
+    let (camera, is_last) = player.advance(0.0);
+    assert!(camera.position.x == 0.0 && !is_last);
+    // In one step or in many.
+    for _ in 0..100 {
+        player.advance(0.01001);
+    }
+    let (camera, is_last) = player.advance(0.0);
+    assert!((camera.position.x - 1.0).abs() < 1e-9 && !is_last, "{camera:?}");
+    let (camera, is_last) = player.advance(50.0);
+    assert!(camera.position.x == 2.0 && is_last, "{camera:?}");
+    assert!(Player::new(Vec::new()).is_none());
+}
+
+#[test]
+fn buttons_record_play_and_film() {
+    let mut panel = Headless::new(BakeSettings::splat());
+    panel.open("Camera path");
+    let wish = |panel: &mut Headless, name: &str| {
+        panel.press(name);
+        panel.wishes.film.take()
+    };
+    assert_eq!(wish(&mut panel, "Play"), None, "there is nothing to be played");
+    assert_eq!(wish(&mut panel, "Add key"), Some(FilmWish::Record(None)));
+    panel.panel.film = film();
+    panel.settle();
+    panel.assert_says(&["2 keys, 4.0 s"]);
+    for (name, expected) in [
+        ("Play", FilmWish::Play(true)),
+        ("Key 1: go", FilmWish::GoTo(0)),
+        ("Key 2: set", FilmWish::Record(Some(1))),
+        ("Save path", FilmWish::Save),
+        ("Export frames", FilmWish::Shoot { turns: false }),
+        ("Export turntable", FilmWish::Shoot { turns: true }),
+    ] {
+        assert_eq!(wish(&mut panel, name), Some(expected), "{name}");
+    }
+    panel.tell(|told| told.export = &ExportState::Filming { done: 3, total: 120 });
+    panel.assert_says(&["3 of 120 frames"]);
+    assert_eq!(wish(&mut panel, "Stop"), Some(FilmWish::Stop));
+    assert_eq!(wish(&mut panel, "Export frames"), None, "one at a time");
+    panel.press("Key 1: delete");
+    assert_eq!(panel.panel.film.keys, film().keys[1..]);
+    assert_eq!(wish(&mut panel, "Save path"), None, "one key is no path");
+}

@@ -1,0 +1,480 @@
+//! The panel without a window, used by its accessible names.
+
+use std::collections::BTreeSet;
+use std::ops::{Deref, DerefMut};
+use std::sync::Arc;
+
+use egui::accesskit::Role;
+use egui::{Event, Key, Pos2, Rect, Vec2, vec2};
+use egui_kittest::kittest::NodeT as _;
+use egui_kittest::{Harness, Node};
+use nephroid::plan::EffectPlan;
+use nephroid::scene::{Edit, Scene};
+use nephroid::session::{BakeCounts, BakeResult, StopReason, Timings};
+use nephroid::settings::{BakeSettings, LayerKind};
+use nephroid::viewer::exporting::ExportState;
+use nephroid::viewer::files::FileFacts;
+use nephroid::viewer::latency::Latencies;
+use nephroid::viewer::navigation::Travel;
+use nephroid::viewer::panel::{Facts, Panel, WIDTH, Wishes, set_style};
+use nephroid::viewer::views::MapSurvey;
+use nephroid::viewer::worker::{BakeRequest, BakeState, BakedLevel};
+
+use super::fixtures;
+
+/// Left of the panel [points]: the harness leaves a margin.
+pub const LEFT: f32 = 8.0;
+/// A window as the program opens it [points], and pixels per point.
+pub const SCREEN: ((f32, f32), f32) = ((1280.0, 720.0), 1.0);
+
+/// What the panel is told, and what was pressed since the start.
+pub struct Desk {
+    pub panel: Panel,
+    pub told: Facts<'static>,
+    pub wishes: Wishes,
+}
+
+/// What a panel is told lives as long as the test.
+pub fn leak<T>(value: T) -> &'static T {
+    Box::leak(Box::new(value))
+}
+
+impl Desk {
+    fn new(scene: Scene, settings: BakeSettings) -> Self {
+        let scene = leak(Arc::new(scene));
+        let told = Facts {
+            scene,
+            loaded: scene,
+            undo: None,
+            redo: None,
+            refusal: None,
+            state: &BakeState::Idle,
+            last: None,
+            maps: &[],
+            export: &ExportState::Idle,
+            layers: &[LayerKind::Caustic, LayerKind::Direct],
+            survey: leak(MapSurvey::default()),
+            reference: None,
+            probed: None,
+            sketch: None,
+            is_playing: false,
+            film_told: None,
+            has_errors: false,
+            worth: None,
+            chains: None,
+            frame_times: None,
+            latencies: leak(Latencies::default()),
+            travel: Travel::Fly,
+            speed_m_per_s: 1.0,
+            lost_device: false,
+            files: FileFacts::default(),
+            adapter: "no adapter",
+        };
+        Self {
+            panel: Panel::new(settings),
+            told,
+            wishes: Wishes::default(),
+        }
+    }
+
+    fn show(&mut self, ui: &mut egui::Ui) {
+        let wishes = self.panel.show(ui, &self.told);
+        self.wishes = std::mem::take(&mut self.wishes).and(wishes);
+    }
+}
+
+/// What a bake that found nothing to do returns.
+pub fn nothing() -> BakeResult {
+    BakeResult {
+        light_layers: Vec::new(),
+        band_layers: Vec::new(),
+        maps: Vec::new(),
+        plan: EffectPlan::default(),
+        course: Vec::new(),
+        forecast: None,
+        item_buffers: Vec::new(),
+        ledgers: Vec::new(),
+        counts: BakeCounts::default(),
+        timings_s: Timings::default(),
+        cpu_s: Timings::default(),
+        estimated_relative_rmse: None,
+        stop_reason: StopReason::NothingToDo,
+        partial: false,
+        warnings: Vec::new(),
+    }
+}
+
+/// The last level of such a bake.
+pub fn finished(scene: &Arc<Scene>, settings: &BakeSettings) -> BakedLevel {
+    BakedLevel {
+        serial: 1,
+        request: BakeRequest {
+            scene: Arc::clone(scene),
+            settings: settings.clone(),
+        },
+        level: 1,
+        is_final: true,
+        result: nothing(),
+        seconds: 0.0,
+    }
+}
+
+/// What is done to a control, by its name.
+#[derive(Clone, Copy, Debug)]
+pub enum Gesture {
+    Press(&'static str),
+    Check(&'static str),
+    Radio(&'static str),
+    /// A list, and the entry to choose.
+    Choose(&'static str, &'static str),
+    /// A field, and the text to type over what is in it.
+    Type(&'static str, &'static str),
+    /// A slider, from one share of its length to another.
+    Drag(&'static str, f32, f32),
+}
+
+pub struct Headless(Harness<'static, Desk>);
+
+impl Deref for Headless {
+    type Target = Desk;
+
+    fn deref(&self) -> &Desk {
+        self.0.state()
+    }
+}
+
+impl DerefMut for Headless {
+    fn deref_mut(&mut self) -> &mut Desk {
+        self.0.state_mut()
+    }
+}
+
+impl Headless {
+    /// An empty scene, in a window in which everything has room.
+    pub fn new(settings: BakeSettings) -> Self {
+        let scene = Scene {
+            name: "test".into(),
+            ..Scene::default()
+        };
+        Self::with_scene(scene, settings, ((1280.0, 1800.0), 1.0))
+    }
+
+    pub fn with_scene(
+        scene: Scene,
+        settings: BakeSettings,
+        (size, pixels_per_point): ((f32, f32), f32),
+    ) -> Self {
+        let harness = Harness::builder()
+            .with_size(Vec2::from(size))
+            .with_pixels_per_point(pixels_per_point)
+            .with_context_setup(set_style)
+            .build_ui_state(|ui, desk: &mut Desk| desk.show(ui), Desk::new(scene, settings));
+        let mut headless = Self(harness);
+        headless.settle();
+        headless
+    }
+
+    /// Lets the layout come to rest.
+    pub fn settle(&mut self) {
+        self.0.run_steps(3);
+    }
+
+    pub fn settings(&self) -> &BakeSettings {
+        &self.panel.settings
+    }
+
+    /// The last edit that was asked for.
+    pub fn edit(&mut self) -> Option<Edit> {
+        self.wishes.edit.take()
+    }
+
+    /// Makes that edit of the scene, as the window does.
+    pub fn apply(&mut self) -> &'static Scene {
+        let edit = self.edit().expect("an edit was asked for");
+        let edited = edit.apply(self.told.scene).expect("the edit is possible").0;
+        self.tell(|told| told.scene = leak(Arc::new(edited)));
+        self.told.scene
+    }
+
+    /// Tells the panel something new.
+    pub fn tell(&mut self, set: impl FnOnce(&mut Facts<'static>)) {
+        set(&mut self.told);
+        self.settle();
+    }
+
+    /// A bake of the panel's settings has ended with this.
+    pub fn tell_level(&mut self, set: impl FnOnce(&mut BakedLevel)) {
+        let mut last = finished(self.told.scene, self.settings());
+        set(&mut last);
+        self.tell(|told| {
+            let last = leak(last);
+            (told.last, told.maps) = (Some(last), &last.result.maps);
+            told.state = &BakeState::Done;
+        });
+    }
+
+    pub fn nodes(&self) -> impl Iterator<Item = Node<'_>> {
+        self.0.root().children_recursive()
+    }
+
+    /// The first node of a role that `is_it` says yes to, given its name.
+    pub fn find(&self, role: Role, is_it: impl Fn(&str) -> bool) -> Option<Node<'_>> {
+        self.nodes().find(|node| {
+            let node = node.accesskit_node();
+            let has_name = |name: Option<String>| name.is_some_and(|name| is_it(&name));
+            node.role() == role && (has_name(node.label()) || has_name(node.value()))
+        })
+    }
+
+    pub fn named(&self, role: Role, name: &str) -> Node<'_> {
+        let found = self.find(role, |text| text == name);
+        found.unwrap_or_else(|| panic!("no {role:?} {name:?} in {:#?}", self.texts()))
+    }
+
+    pub fn is_disabled(&self, role: Role, name: &str) -> bool {
+        self.named(role, name).accesskit_node().is_disabled()
+    }
+
+    /// Every text, values of controls included.
+    pub fn texts(&self) -> BTreeSet<String> {
+        let nodes = self.nodes().map(|node| node.accesskit_node());
+        nodes.filter_map(|node| node.value().or(node.label())).collect()
+    }
+
+    pub fn says(&self, part: &str) -> bool {
+        self.texts().iter().any(|text| text.contains(part))
+    }
+
+    #[track_caller]
+    pub fn assert_says(&self, parts: &[&str]) {
+        for part in parts {
+            assert!(self.says(part), "{part:?} is not in {:#?}", self.texts());
+        }
+    }
+
+    /// Brings a control into the window; where it is then.
+    pub fn reach(&mut self, role: Role, name: &str) -> Rect {
+        self.named(role, name).scroll_to_me();
+        self.settle();
+        self.named(role, name).rect()
+    }
+
+    pub fn click(&mut self, role: Role, name: &str) {
+        let centre = self.reach(role, name).center();
+        self.click_at(centre);
+    }
+
+    pub fn click_at(&mut self, position: Pos2) {
+        self.0.hover_at(position);
+        self.0.drag_at(position);
+        self.0.drop_at(position);
+        self.settle();
+    }
+
+    pub fn open(&mut self, section: &str) {
+        self.click(Role::DisclosureTriangle, section);
+    }
+
+    /// A part whose title goes on.
+    pub fn open_part(&mut self, title: &str) {
+        let part = self.find(Role::DisclosureTriangle, |name| name.starts_with(title));
+        let centre = part.expect("there is such a part").rect().center();
+        self.click_at(centre);
+    }
+
+    pub fn press(&mut self, button: &str) {
+        self.click(Role::Button, button);
+    }
+
+    pub fn choose(&mut self, list: &str, entry: &str) {
+        self.click(Role::ComboBox, list);
+        let centre = self.named(Role::Button, entry).rect().center();
+        self.click_at(centre);
+    }
+
+    /// Types over what a field holds, and confirms.
+    pub fn type_into(&mut self, field: &str, text: &str) {
+        self.click(Role::SpinButton, field);
+        self.type_text(text);
+    }
+
+    pub fn type_text(&mut self, text: &str) {
+        self.0.event(Event::Text(text.into()));
+        self.strike(Key::Enter);
+    }
+
+    pub fn strike(&mut self, key: Key) {
+        self.0.key_press(key);
+        self.0.run_steps(2);
+    }
+
+    pub fn focus(&mut self, role: Role, name: &str) {
+        self.named(role, name).focus();
+        self.0.run_steps(2);
+    }
+
+    pub fn drag(&mut self, slider: &str, from: f32, to: f32) {
+        let rect = self.reach(Role::Slider, slider);
+        let at = |share: f32| rect.left_center() + vec2(4.0 + 100.0 * share, 0.0);
+        self.drag_at(at(from), at(to));
+    }
+
+    pub fn drag_at(&mut self, from: Pos2, to: Pos2) {
+        self.move_to(from);
+        self.0.drag_at(from);
+        self.0.run_steps(1);
+        self.move_to(from.lerp(to, 0.5));
+        self.move_to(to);
+        self.0.drop_at(to);
+        self.settle();
+    }
+
+    pub fn move_to(&mut self, position: Pos2) {
+        self.0.hover_at(position);
+        self.0.run_steps(1);
+    }
+
+    /// Rests the pointer there until a hover text shows.
+    pub fn hover(&mut self, role: Role, name: &str) {
+        let centre = self.reach(role, name).center();
+        self.move_to(centre);
+        self.settle();
+    }
+
+    pub fn make(&mut self, gesture: Gesture) {
+        match gesture {
+            Gesture::Press(name) => self.press(name),
+            Gesture::Check(name) => self.click(Role::CheckBox, name),
+            Gesture::Radio(name) => self.click(Role::RadioButton, name),
+            Gesture::Choose(list, entry) => self.choose(list, entry),
+            Gesture::Type(field, text) => self.type_into(field, text),
+            Gesture::Drag(slider, from, to) => self.drag(slider, from, to),
+        }
+    }
+
+    /// Role, name and place of every control.
+    pub fn controls(&self) -> Vec<(Role, String, Rect)> {
+        let control = |node: Node<'_>| {
+            let role = node.accesskit_node().role();
+            let name = node.accesskit_node().label().unwrap_or_default();
+            is_control(role).then(|| (role, name, node.rect()))
+        };
+        self.nodes().filter_map(control).collect()
+    }
+
+    /// Whether a rectangle is within the panel's width.
+    pub fn is_inside(rect: Rect) -> bool {
+        rect.left() >= LEFT && rect.right() <= LEFT + WIDTH + 0.5
+    }
+}
+
+fn is_control(role: Role) -> bool {
+    matches!(
+        role,
+        Role::Button
+            | Role::CheckBox
+            | Role::ColorWell
+            | Role::ComboBox
+            | Role::RadioButton
+            | Role::Slider
+            | Role::SpinButton
+            | Role::TextInput
+    )
+}
+
+/// Sections in their order, with what they hold in parts of their own.
+pub const SECTIONS: [(&str, &[&str]); 10] = [
+    ("Scene", &[]),
+    ("Light pass", &["Rays and kernels", "Energy"]),
+    ("Accuracy", &["Error against time", "Limits"]),
+    ("Effects", &[]),
+    ("Maps", &[]),
+    ("Display", &["Frame time"]),
+    ("Export", &[]),
+    ("Camera path", &[]),
+    ("Probe", &[]),
+    ("Compare", &[]),
+];
+
+/// Settings of the splat estimator: they grey no control.
+pub fn splats() -> BakeSettings {
+    BakeSettings {
+        layers: vec![LayerKind::Caustic, LayerKind::Direct],
+        ..BakeSettings::splat()
+    }
+}
+
+impl Headless {
+    /// After a bake of [`fixtures::scene`], with something to undo and to redo.
+    pub fn baked(settings: BakeSettings, screen: ((f32, f32), f32)) -> Self {
+        let mut panel = Self::with_scene(fixtures::scene(), settings, screen);
+        panel.tell_level(|last| last.result.maps = vec![fixtures::map()]);
+        panel.tell(|told| {
+            (told.undo, told.redo) = (Some("sigma"), Some("power of `lamp`"));
+            (told.layers, told.has_errors) = (&LayerKind::ALL, true);
+        });
+        panel
+    }
+
+    /// The same, with every section open.
+    pub fn opened(settings: BakeSettings, screen: ((f32, f32), f32)) -> Self {
+        let mut panel = Self::baked(settings, screen);
+        for (section, parts) in SECTIONS {
+            // The others are open from the start.
+            if !["Light pass", "Accuracy", "Display", "Export"].contains(&section) {
+                panel.open(section);
+            }
+            parts.iter().for_each(|part| panel.open(part));
+        }
+        panel
+    }
+
+    /// Every control has a name, and no two of a kind the same.
+    pub fn assert_names(&self) {
+        let mut seen = BTreeSet::new();
+        for (role, name, _) in self.controls() {
+            assert!(!name.trim().is_empty(), "a {role:?} without a name");
+            // A slider and its number share a name.
+            assert!(
+                seen.insert((format!("{role:?}"), name.clone())),
+                "two {role:?} {name:?}"
+            );
+        }
+        assert!(seen.len() > 80, "{}", seen.len());
+    }
+
+    /// Controls and labels lie within the panel, and no control on another.
+    pub fn assert_layout(&self) {
+        let found = self.controls();
+        for (role, name, rect) in &found {
+            // A field for text shows some of it.
+            let least = if *role == Role::TextInput { 60.0 } else { 5.0 };
+            assert!(
+                Self::is_inside(*rect) && rect.width() > least,
+                "{role:?} {name} at {rect}"
+            );
+        }
+        for label in self
+            .nodes()
+            .filter(|node| node.accesskit_node().role() == Role::Label)
+        {
+            assert!(
+                Self::is_inside(label.rect()),
+                "{:?} at {}",
+                label.value(),
+                label.rect()
+            );
+        }
+        // What stands above the sections covers what is scrolled under it.
+        let below: Vec<_> = found.iter().filter(|(.., rect)| rect.top() > 150.0).collect();
+        for (index, (_, a, first)) in below.iter().enumerate() {
+            for (_, b, second) in &below[index + 1..] {
+                let common = first.intersect(*second);
+                assert!(
+                    common.width() < 1.0 || common.height() < 1.0,
+                    "{a} at {first} and {b} at {second}"
+                );
+            }
+        }
+    }
+}

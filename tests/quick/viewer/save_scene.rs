@@ -1,0 +1,242 @@
+//! An edited scene as a file: the original, with nothing changed but what was edited.
+
+use std::fs;
+use std::sync::Arc;
+
+use glam::{DQuat, DVec3};
+use nephroid::optics::spectrum::illuminant;
+use nephroid::optics::wavelength::D_LINE;
+use nephroid::optics::{Glass, LinearSrgb, Nanometres};
+use nephroid::scene::load::save;
+use nephroid::scene::{Edit, LightKind, LightSize, LoadOptions, Scene, Wave, Waves, builtin};
+use serde_json::Value;
+
+use super::fixtures::{edited, folder, intensity, read};
+use super::scene_file;
+
+/// Everything that can be edited of the scene, without a look at what stands in its file.
+fn edits() -> Vec<Edit> {
+    let wave = Wave {
+        amplitude_m: 0.01,
+        wavelength_m: 0.25,
+        direction: DVec3::X,
+        phase_rad: 0.5,
+    };
+    let moved = |object, yaw_rad, translation| Edit::ObjectMoved {
+        object,
+        rotation: DQuat::from_rotation_y(yaw_rad),
+        translation,
+    };
+    vec![
+        intensity(0, 2.5),
+        Edit::LightPosition {
+            light: 0,
+            position: DVec3::new(0.25, 2.0, 0.5),
+        },
+        Edit::LightColour {
+            light: 0,
+            colour: LinearSrgb::from([1.0, 0.5, 0.25]),
+        },
+        Edit::LightSize {
+            light: 0,
+            size: LightSize::Radius { radius_m: 0.05 },
+        },
+        Edit::MaterialTint {
+            material: 0,
+            base_colour: LinearSrgb::from([0.1, 0.2, 0.3]),
+        },
+        Edit::MaterialRoughness {
+            material: 1,
+            roughness: 0.25,
+        },
+        Edit::MaterialWaves {
+            material: 1,
+            waves: Some(Waves::new(vec![wave]).expect("it is one")),
+        },
+        moved(1, 0.3, DVec3::new(0.1, 0.2, -0.3)),
+        moved(0, 0.0, DVec3::new(0.0, -0.125, 0.0)),
+    ]
+}
+
+/// A scene that is read back is the one that was saved: lights and materials to what 32-bit numbers hold.
+fn assert_same(read: &Scene, saved: &Scene) {
+    let is_near = |a: f64, b: f64| (a - b).abs() < 1e-6;
+    assert_eq!(read.objects.len(), saved.objects.len());
+    for (a, b) in read.objects.iter().zip(&saved.objects) {
+        assert_eq!(a.name, b.name);
+        for (a, b) in a.mesh.positions.iter().zip(&b.mesh.positions) {
+            assert!(a.distance(*b) < 1e-9, "{a} where {b} was saved");
+        }
+    }
+    for (a, b) in read.materials.iter().zip(&saved.materials) {
+        assert!(
+            is_near(a.roughness, b.roughness) && is_near(a.ior, b.ior),
+            "{a:?}"
+        );
+        let [tint, expected] = [a, b].map(|material| material.base_colour.to_array());
+        assert!(
+            tint.into_iter().zip(expected).all(|(a, b)| is_near(a, b)),
+            "{tint:?}"
+        );
+        assert_eq!((a.surface, &a.waves), (b.surface, &b.waves));
+    }
+    assert_eq!(read.lights.len(), saved.lights.len());
+    for (a, b) in read.lights.iter().zip(&saved.lights) {
+        assert!(is_near(a.kind.strength() / b.kind.strength(), 1.0), "{a:?} {b:?}");
+        assert_eq!((a.size, &a.spectrum), (b.size, &b.spectrum));
+        let places = a.kind.position().zip(b.kind.position());
+        assert!(places.is_none_or(|(a, b)| a.distance(b) < 1e-9));
+    }
+}
+
+/// Saves a scene to a folder of its own and reads it back, with the text of the file.
+fn saved(loaded: &Scene, scene: &Scene) -> (Scene, String) {
+    let folder = folder();
+    let target = folder.path().join("saved.glb");
+    save(&target, loaded, scene, &LoadOptions::default()).expect("it is saved");
+    assert_eq!(fs::read_dir(folder.path()).expect("it is there").count(), 1);
+    let read = read(&target);
+    assert_same(&read, scene);
+    (read, scene_file::text_of(&target))
+}
+
+/// What the program does not know, as it is written again.
+const UNKNOWN: [&str; 7] = [
+    r#""VENDOR_invented_thing":{"deep":[1.5,1.0,{"x":"café"}],"big":1.2345678901234568e+22}"#,
+    r#""generator":"Hand & Co""#,
+    r#""VENDOR_invented_thing":{"of":"lamp"}"#,
+    r#""extras":{"note":"kept"}"#,
+    r#""VENDOR":{"a":1.1}"#,
+    r#""name":"bulb""#,
+    r#""rotation":[0.0,0.3826834323650898,0.0,0.9238795325112867]"#,
+];
+
+#[test]
+fn edits_are_read_back_and_the_unknown_stays() {
+    let folder = folder();
+    for source in [
+        scene_file::glb(folder.path(), "a", "300"),
+        scene_file::gltf(folder.path(), "b", "300"),
+    ] {
+        let loaded = read(&source);
+        let (_, text) = saved(&loaded, &edited(&loaded, &edits()));
+        for unknown in UNKNOWN {
+            assert!(text.contains(unknown), "{unknown} in {text}");
+        }
+        let value: Value = serde_json::from_str(text.trim_end()).expect("it is JSON");
+        assert_eq!(value["nodes"][1]["name"], "frame");
+        assert_eq!(value["nodes"][1].as_object().map(|node| node.len()), Some(4));
+    }
+}
+
+#[test]
+fn without_an_edit_the_file_stays_the_same() {
+    let folder = folder();
+    let source = scene_file::glb(folder.path(), "a", "300");
+    let target = folder.path().join("b.glb");
+    let loaded = read(&source);
+    save(&target, &loaded, &loaded, &LoadOptions::default()).expect("it is saved");
+    let [a, b] = [&source, &target].map(|path| fs::read(path).expect("it is there"));
+    assert_eq!(a, b);
+}
+
+/// A `.gltf` whose text differs in this from that of [`scene_file::gltf`].
+fn changed(folder: &std::path::Path, changes: &[(&str, &str)]) -> Scene {
+    scene_file::gltf(folder, "a", "300");
+    let mut text = scene_file::json_text("300", Some("a.bin"));
+    for (from, to) in changes {
+        assert!(text.contains(from), "{from} in {text}");
+        text = text.replace(from, to);
+    }
+    let source = folder.join("changed.gltf");
+    fs::write(&source, text).expect("it is written");
+    read(&source)
+}
+
+#[test]
+fn glass_spectra_and_directions_are_saved() {
+    let folder = folder();
+    let spot = r#""type":"spot","spot":{"outerConeAngle":0.5}"#;
+    let loaded = changed(
+        folder.path(),
+        &[
+            (r#""type":"point""#, spot),
+            (r#""metallicFactor":1.0"#, r#""metallicFactor":0.0"#),
+        ],
+    );
+    let lamp = Arc::new(illuminant("A").expect("it is known"));
+    let direction = DVec3::new(0.2, -1.0, 0.1);
+    for glass in [
+        Glass::parse("N-BK7").expect("it is known"),
+        Glass::with_abbe_number(1.7, 30.0),
+    ] {
+        let edits = [
+            Edit::MaterialSubstance {
+                material: 1,
+                ior: glass.dispersion.index(D_LINE),
+                glass: Some(Arc::new(glass.clone())),
+                base_colour: loaded.materials[1].base_colour,
+                metal: None,
+            },
+            Edit::LightSpectrum {
+                light: 0,
+                colour: lamp.xyz().to_linear_srgb(),
+                spectrum: Some(Arc::clone(&lamp)),
+            },
+            Edit::LightDirection { light: 0, direction },
+        ];
+        let (read, _) = saved(&loaded, &edited(&loaded, &edits));
+        let found = read.materials[1].glass.as_ref().expect("it is of glass");
+        for nm in [450.0, 650.0].map(Nanometres) {
+            let off = found.dispersion.index(nm) - glass.dispersion.index(nm);
+            assert!(off.abs() < 1e-6, "{off} at {nm:?}");
+        }
+        let LightKind::Spot { direction: found, .. } = read.lights[0].kind else {
+            panic!("{:?}", read.lights[0])
+        };
+        assert!(found.distance(direction.normalize()) < 1e-9, "{found}");
+    }
+}
+
+#[test]
+fn a_shared_lamp_gets_an_entry_of_its_own() {
+    let folder = folder();
+    let twin = r#""of":"lamp"}}},{"name":"twin","translation":[0,2,0],"extensions":{"KHR_lights_punctual":{"light":0}}}"#;
+    let loaded = changed(
+        folder.path(),
+        &[
+            (r#""nodes":[0,1,3]}"#, r#""nodes":[0,1,3,4]}"#),
+            (r#""of":"lamp"}}}"#, twin),
+        ],
+    );
+    assert_eq!(loaded.lights.len(), 2);
+    saved(&loaded, &edited(&loaded, &[intensity(1, 9.0)]));
+}
+
+#[test]
+fn what_no_file_can_hold_is_refused() {
+    let folder = folder();
+    let source = scene_file::glb(folder.path(), "a", "300");
+    let loaded = read(&source);
+    let mut mesh = (*loaded.objects[1].mesh).clone();
+    mesh.positions.iter_mut().for_each(|corner| corner.y *= 0.5);
+    let mesh = Arc::new(mesh);
+    let squeezed = edited(&loaded, &[Edit::ObjectMesh { object: 1, mesh }]);
+    let ring = builtin::build("ring").expect("it is built in");
+    let target = folder.path().join("saved.glb");
+    let refusal = |loaded: &Scene, scene: &Scene| {
+        let refused = save(&target, loaded, scene, &LoadOptions::default()).expect_err("it is impossible");
+        assert!(!target.exists());
+        refused.to_string()
+    };
+    for (loaded, scene, named) in [
+        (&loaded, &squeezed, "object `mirror`"),
+        (&ring, &ring, "built in"),
+    ] {
+        let sentence = refusal(loaded, scene);
+        assert!(sentence.contains(named), "{sentence}");
+    }
+    // Another program took the mirror away in between.
+    fs::copy(scene_file::no_scene(folder.path()), &source).expect("it is written");
+    refusal(&loaded, &loaded);
+}

@@ -1,0 +1,286 @@
+//! Edits of the scene that the panel asks for.
+
+use std::f64::consts::{FRAC_PI_2, PI};
+use std::sync::Arc;
+
+use egui::accesskit::Role;
+use egui::pos2;
+use glam::DVec3;
+use nephroid::scene::{Edit, Light, LightKind, LightSize, PanelShape, Scene, Wave, Waves, builtin};
+use nephroid::units::Radiance;
+use nephroid::viewer::gizmo::Held;
+use nephroid::viewer::new_light::NewLight;
+use nephroid::viewer::panel::Placed;
+use nephroid::viewer::placement::Placement;
+
+use super::fixtures;
+use super::headless::Gesture::{Choose, Drag, Press, Type};
+use super::headless::{Headless, splats};
+
+fn panel_of(scene: Scene) -> Headless {
+    let mut panel = Headless::with_scene(scene, splats(), ((1280.0, 1800.0), 1.0));
+    panel.open("Scene");
+    panel
+}
+
+/// The fixture's lights, and two with a surface.
+fn scene() -> Scene {
+    let mut scene = fixtures::scene();
+    let panel = LightKind::Panel {
+        centre: DVec3::Y * 4.0,
+        across: DVec3::X,
+        down: DVec3::Z,
+        shape: PanelShape::Rectangle,
+        radiance: Radiance(3.0),
+    };
+    for (name, kind) in [("panel", panel), ("sky", LightKind::Environment { scale: 1.0 })] {
+        scene.lights.push(Light {
+            name: name.into(),
+            kind,
+            ..scene.lights[0].clone()
+        });
+    }
+    scene
+}
+
+fn panel() -> Headless {
+    panel_of(scene())
+}
+
+/// What a slider's edit is of, by kind and index, and the value.
+fn slid(edit: Edit) -> (&'static str, usize, f64) {
+    match edit {
+        Edit::LightIntensity { light, intensity } => ("intensity", light, intensity.0),
+        Edit::LightNormalIrradiance {
+            light,
+            normal_irradiance,
+        } => ("irradiance", light, normal_irradiance.0),
+        Edit::LightBrightness { light, brightness } => ("brightness", light, brightness),
+        Edit::MaterialIor { material, ior } => ("ior", material, ior),
+        Edit::MaterialRoughness { material, roughness } => ("roughness", material, roughness),
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn sliders_ask_for_their_edit() {
+    let mut panel = panel();
+    // On logarithmic scales a quarter of four decades is one decade.
+    let lamp = 100.0 / (4.0 * PI);
+    let power = Drag("Intensity [W/sr]", 0.5, 0.75);
+    let beam = Drag("Irradiance [W/m²]", 0.5, 0.25);
+    let (brighter, darker) = (Drag("Brightness", 0.5, 0.75), Drag("Brightness", 0.5, 0.25));
+    let bent = Drag("Refractive index", 0.25, 0.5);
+    for (list, name, gesture, kind, range) in [
+        ("Light", "lamp", power, ("intensity", 0), 5.0 * lamp..20.0 * lamp),
+        ("Light", "sun", beam, ("irradiance", 1), 0.1..0.4),
+        ("Light", "panel", brighter, ("brightness", 3), 15.0..60.0),
+        ("Light", "sky", darker, ("brightness", 4), 0.05..0.2),
+        ("Object", "ball", bent, ("ior", 1), 1.7..2.3),
+        (
+            "Object",
+            "ball",
+            Drag("Roughness", 0.0, 0.5),
+            ("roughness", 1),
+            0.3..0.7,
+        ),
+    ] {
+        panel.choose(list, name);
+        assert_eq!(panel.edit(), None, "choosing is no edit");
+        panel.make(gesture);
+        let (what, index, value) = slid(panel.edit().expect("an edit"));
+        assert_eq!((what, index), kind, "{gesture:?}");
+        assert!(range.contains(&value), "{gesture:?}: {value}");
+    }
+    assert!(!panel.wishes.undo);
+}
+
+#[test]
+fn numbers_ask_for_their_edit() {
+    let mut panel = panel();
+    let at = |light, position| Edit::LightPosition { light, position };
+    let ball = |light, radius_m| {
+        let size = LightSize::Radius { radius_m };
+        Edit::LightSize { light, size }
+    };
+    let disc = |degrees: f64| {
+        let diameter_rad = degrees.to_radians();
+        let size = LightSize::Angle { diameter_rad };
+        Edit::LightSize { light: 1, size }
+    };
+    for (light, gesture, expected) in [
+        ("lamp", Type("Position [m]: y", "2.5"), at(0, DVec3::Y * 2.5)),
+        (
+            "lamp",
+            Type("Position [m]: z", "2.5"),
+            at(0, DVec3::new(0.0, 3.0, 2.5)),
+        ),
+        ("panel", Type("Position [m]: y", "3"), at(3, DVec3::Y * 3.0)),
+        ("lamp", Type("Radius [m]", "0.25"), ball(0, 0.25)),
+        ("spot", Type("Radius [m]", "0.5"), ball(2, 0.5)),
+        ("sun", Type("Diameter [°]", "0.53"), disc(0.53)),
+        // No disc is wider.
+        ("sun", Type("Diameter [°]", "500"), disc(180.0)),
+        ("sun", Press("Remove light"), Edit::LightRemoved { light: 1 }),
+    ] {
+        panel.choose("Light", light);
+        panel.make(gesture);
+        assert_eq!(panel.edit(), Some(expected), "{light}: {gesture:?}");
+    }
+    panel.choose("Light", "sun");
+    panel.type_into("Diameter [°]", "0.5");
+    panel.apply();
+    panel.type_into("Diameter [°]", "0");
+    let size = LightSize::None;
+    assert_eq!(panel.edit(), Some(Edit::LightSize { light: 1, size }));
+    // From 45° above the horizon to straight down, with the azimuth kept.
+    panel.type_into("Direction [°]: elevation", "-90");
+    let Some(Edit::LightDirection { light: 1, direction }) = panel.edit() else {
+        panic!("no direction")
+    };
+    assert!(
+        direction.dot(DVec3::NEG_Y) > 0.999_999 && direction.z < 0.0,
+        "{direction}"
+    );
+    for light in NewLight::ALL {
+        panel.press(&format!("Add {}", light.name()));
+        assert_eq!(panel.wishes.new_light.take(), Some(light));
+    }
+}
+
+#[test]
+fn rows_are_those_of_the_light() {
+    let mut panel = panel();
+    let rows = ["Position [m]", "Direction [°]", "Radius [m]", "Diameter [°]"];
+    for (light, has) in [
+        ("lamp", [true, false, true, false]),
+        ("sun", [false, true, false, true]),
+        ("spot", [true, true, true, false]),
+        ("panel", [true, false, false, false]),
+        ("sky", [false, false, false, false]),
+    ] {
+        panel.choose("Light", light);
+        assert_eq!(rows.map(|row| panel.says(row)), has, "{light}");
+    }
+    assert!(panel.is_disabled(Role::Slider, "Refractive index"));
+    panel.hover(Role::Slider, "Refractive index");
+    panel.assert_says(&["Only glass, water and polish have one"]);
+}
+
+#[test]
+fn looking_edits_nothing() {
+    let mut panel = panel();
+    for (light, object) in [("sun", "ball"), ("spot", "floor"), ("lamp", "ball")] {
+        panel.choose("Light", light);
+        panel.choose("Object", object);
+        for y in (80..720).step_by(16) {
+            panel.move_to(pos2(250.0, y as f32));
+        }
+    }
+    assert_eq!(panel.edit(), None);
+}
+
+#[test]
+fn objects_move_from_their_place_in_the_file() {
+    let mut panel = panel();
+    panel.choose("Object", "ball");
+    let loaded = Arc::clone(panel.told.scene);
+    let low = |scene: &Scene| scene.objects[1].mesh.bounds().expect("a ball").0;
+    panel.type_into("Offset [m]: y", "0.25");
+    let moved = panel.apply();
+    assert!((low(moved) - low(&loaded)).distance(DVec3::Y * 0.25) < 1e-12);
+    panel.assert_says(&["y: 0.25"]);
+    panel.type_into("Offset [m]: y", "0");
+    let back = panel.apply();
+    let (back, loaded) = (&back.objects[1].mesh, &loaded.objects[1].mesh);
+    assert!(Arc::ptr_eq(back, loaded), "the file's place exactly");
+    panel.type_into("Turn [°]", "90");
+    let turned = panel.apply();
+    let found = Placement::of(1, panel.told.loaded, turned).expect("a turn");
+    assert!((found.yaw_rad - FRAC_PI_2).abs() < 1e-8, "{found:?}");
+}
+
+#[test]
+fn waves_keep_their_proportions() {
+    let scene = builtin::build("pool-bump").expect("it is built in");
+    let waves = scene.materials[1].waves.clone().expect("it has waves");
+    let mut panel = panel_of(scene);
+    assert!(!panel.says("Waves' slope"), "the floor is chosen first");
+    panel.choose("Object", "water");
+    assert_eq!(panel.edit(), None);
+    let asked = |panel: &mut Headless| match panel.edit() {
+        Some(Edit::MaterialWaves {
+            material: 1,
+            waves: Some(waves),
+        }) => waves,
+        other => panic!("{other:?}"),
+    };
+    panel.drag("Waves' slope", 0.48, 0.24);
+    let lower = asked(&mut panel);
+    let slope = |waves: &Waves| waves.list().iter().map(Wave::slope).sum::<f64>();
+    assert!((0.15..0.35).contains(&slope(&lower)), "{}", slope(&lower));
+    for (low, high) in lower.list().iter().zip(waves.list()) {
+        let part = low.amplitude_m / high.amplitude_m;
+        assert!((part - slope(&lower) / slope(&waves)).abs() < 1e-9);
+        assert_eq!(
+            (low.wavelength_m, low.direction),
+            (high.wavelength_m, high.direction)
+        );
+    }
+    panel.type_into("Wave: length [m]", "0.5");
+    assert_eq!(asked(&mut panel).list()[0].wavelength_m, 0.5);
+}
+
+#[test]
+fn glass_is_set_by_name_or_number() {
+    let mut panel = panel();
+    panel.choose("Object", "ball");
+    // SCHOTT's data sheet of N-BK7: n_d = 1.51680, V_d = 64.17; and 20 over 0.5 is 40.
+    for (gesture, name, number, abbe) in [
+        (Choose("Glass", "N-BK7"), "N-BK7", "0.312", 64.17),
+        (Type("Dispersion [20/V]", "0.5"), "by numbers", "0.500", 40.0),
+    ] {
+        panel.make(gesture);
+        let scene = panel.apply();
+        let material = &scene.materials[scene.objects[1].material];
+        assert!((material.ior - 1.5168).abs() < 1e-5, "{}", material.ior);
+        let glass = material.glass.as_ref().expect("it has one");
+        let found = glass.dispersion.abbe_number();
+        assert!((found - abbe).abs() < 5e-3, "{found} instead of {abbe}");
+        panel.assert_says(&[name, number]);
+    }
+    panel.press("Reset Glass");
+    let scene = panel.apply();
+    assert_eq!(scene.materials[scene.objects[1].material].glass, None);
+}
+
+#[test]
+fn spectra_are_set_by_name() {
+    let mut panel = panel();
+    panel.choose("Spectrum", "A");
+    let light = &panel.apply().lights[0];
+    let spectrum = light.spectrum.as_ref().expect("it has one");
+    assert_eq!(spectrum.name(), Some("A"));
+    // Incandescent light is reddish, and as bright as before.
+    let colour = light.colour;
+    assert!(colour.r > 1.0 && colour.b < 0.5, "{colour:?}");
+    assert!((colour.luminance() - 1.0).abs() < 1e-3, "{colour:?}");
+    panel.press("Reset Spectrum");
+    assert_eq!(panel.apply().lights[0], panel.told.loaded.lights[0]);
+}
+
+#[test]
+fn mouse_holds_one_thing_at_a_time() {
+    let mut panel = panel();
+    panel.choose("Object", "ball");
+    assert_eq!(panel.panel.held(), None);
+    for (button, held, placed) in [
+        ("Move object", Some(Held::Object(1)), None),
+        ("Place light", Some(Held::Light(0)), Some(Placed::At(0))),
+        ("Move light", Some(Held::Light(0)), None),
+        ("Move light", None, None),
+    ] {
+        panel.press(button);
+        assert_eq!((panel.panel.held(), panel.panel.placed_light()), (held, placed));
+    }
+}

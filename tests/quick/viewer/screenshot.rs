@@ -1,0 +1,98 @@
+//! The picture of the window as files.
+
+use std::fs;
+use std::path::Path;
+
+use nephroid::export::FloatImage;
+use nephroid::eye_pass::{Picture, ToneMap, View, tone_mapping};
+use nephroid::optics::LinearSrgb;
+use nephroid::optics::spectrum::xyz::IDENTITY;
+use nephroid::scene::Camera;
+use nephroid::viewer::screenshot;
+
+use super::fixtures::folder;
+
+fn picture() -> Picture {
+    let radiance = (0..6).map(|index| {
+        let level = 0.01 * 4.0_f32.powi(index);
+        [level, 0.5 * level, 0.0]
+    });
+    Picture {
+        width: 3,
+        height: 2,
+        radiance: radiance.collect(),
+    }
+}
+
+/// The names of the files, or why there are none.
+fn save(folder: &Path, scene: &str, has_radiance: bool) -> Result<Vec<String>, String> {
+    let view = View {
+        camera: Camera::framing("all", (-glam::DVec3::ONE, glam::DVec3::ONE), 1.5),
+        width: 3,
+        height: 2,
+        exposure_stops: -1.5,
+        tone_map: ToneMap::AgX,
+        background: LinearSrgb::BLACK,
+    };
+    let saved = screenshot::save(folder, scene, &picture(), &view, &IDENTITY, has_radiance);
+    let files = saved.map_err(|error| error.to_string())?;
+    let name = |file: &std::path::PathBuf| {
+        assert!(
+            file.parent() == Some(folder) && file.is_file(),
+            "{}",
+            file.display()
+        );
+        file.file_name().expect("a name").to_string_lossy().into_owned()
+    };
+    Ok(files.iter().map(name).collect())
+}
+
+#[test]
+fn files_hold_the_picture_and_its_radiance() {
+    let folder = folder();
+    let names = save(folder.path(), "ring", true).expect("it is saved");
+    assert_eq!(names, ["nephroid-ring-0001.png", "nephroid-ring-0001.exr"]);
+    let radiance = FloatImage::read(&folder.path().join(&names[1])).expect("a picture");
+    assert_eq!(radiance.rgb("").expect("R, G, B"), picture().radiance);
+    let shown = image::open(folder.path().join(&names[0]))
+        .expect("a PNG")
+        .to_rgba8();
+    assert_eq!(shown.dimensions(), (3, 2));
+    let expected = tone_mapping::display_rgba8(&picture(), -1.5, ToneMap::AgX);
+    assert_eq!(shown.into_raw(), expected);
+}
+
+#[test]
+fn names_are_new_and_form_no_path() {
+    let folder = folder();
+    let mine = folder.path().join("nephroid-ring-0001.exr");
+    fs::write(&mine, "mine").expect("it is written");
+    // A folder takes a number too.
+    fs::create_dir(folder.path().join("nephroid-ring-0005.png")).expect("it is made");
+    for (scene, has_radiance, last) in [
+        ("ring", true, "nephroid-ring-0002.exr"),
+        ("ring", false, "nephroid-ring-0003.png"),
+        ("ring", true, "nephroid-ring-0004.exr"),
+        ("ring", true, "nephroid-ring-0006.exr"),
+        ("ball", false, "nephroid-ball-0001.png"),
+        ("../../etc/passwd", false, "nephroid-etc-passwd-0001.png"),
+        ("床", false, "nephroid-scene-0001.png"),
+        ("A\0b", false, "nephroid-a-b-0001.png"),
+    ] {
+        let names = save(folder.path(), scene, has_radiance).expect("it is saved");
+        assert_eq!(names.len(), 1 + usize::from(has_radiance));
+        assert_eq!(names.last().map(String::as_str), Some(last));
+        assert!(
+            names[0].strip_suffix(".png") == last.get(..last.len() - 4),
+            "one number"
+        );
+    }
+    assert_eq!(fs::read(mine).expect("it is there"), b"mine");
+    let gone = folder.path().join("gone");
+    let sentence = save(&gone, "ring", true).expect_err("no folder");
+    assert!(
+        sentence.contains("gone") && sentence.contains("folder does not exist"),
+        "{sentence}"
+    );
+    assert!(!sentence.contains('\n') && !gone.exists());
+}

@@ -1,0 +1,243 @@
+//! What an effect is worth: a second bake that leaves the first one alone.
+
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::time::Instant;
+
+use egui::accesskit::Role;
+use nephroid::effect::{Effect, EffectSwitch};
+use nephroid::illumination::difference::Difference;
+use nephroid::progress::Stage;
+use nephroid::viewer::panel::{Quantity, Wishes};
+use nephroid::viewer::worker::{BakeState, BakedLevel, Worth};
+
+use super::effects::{line, panel};
+use super::fixtures::{self, act, bake, options, until, wait_for};
+use super::headless::{Headless, finished, leak};
+use super::worker::{AT_ONCE, Bench, ENDLESS, FAILING, PANICKING, STUBBORN, asked, bench};
+
+/// Maps that a script would bake at this density.
+fn level(density_per_sr: f64) -> Arc<BakedLevel> {
+    let request = asked(density_per_sr);
+    Arc::new(finished(&request.scene, &request.settings))
+}
+
+/// A bench whose session has baked once.
+fn baked() -> Bench {
+    let bench = bench();
+    assert!(bench.answer(AT_ONCE).is_some());
+    bench
+}
+
+/// Sessions that are there, and that were made.
+fn sessions(bench: &Bench) -> (usize, usize) {
+    (
+        bench.alive.load(Ordering::SeqCst),
+        bench.made.load(Ordering::SeqCst),
+    )
+}
+
+fn found(bench: &Bench) -> Worth {
+    let mut found = None;
+    wait_for("the comparison", || {
+        found = bench.worker.take_worth();
+        found.is_some()
+    });
+    found.expect("it was waited for")
+}
+
+fn begin(bench: &Bench, with: Arc<BakedLevel>) {
+    assert!(bench.worker.compare(Effect::Refraction, with));
+    wait_for("the comparison", || sessions(bench).0 == 2);
+}
+
+#[test]
+fn has_its_own_session() {
+    let bench = baked();
+    let with = level(STUBBORN);
+    begin(&bench, Arc::clone(&with));
+    let state = bench.worker.state();
+    assert!(state.is_working() && !state.is_baking());
+    assert!(
+        matches!(
+            state,
+            BakeState::Comparing {
+                effect: Effect::Refraction,
+                ..
+            }
+        ),
+        "{state:?}"
+    );
+    bench.open_gate();
+    assert_eq!(bench.settled(), BakeState::Done);
+    let worth = bench.worker.take_worth().expect("it was found");
+    assert!(worth.effect == Effect::Refraction && Arc::ptr_eq(&worth.with, &with));
+    assert!(worth.difference.is_ok());
+    assert!(bench.worker.take_worth().is_none(), "only once");
+    assert!(bench.worker.take_level().is_none(), "no maps are replaced");
+    assert_eq!(sessions(&bench), (1, 2));
+    // The session goes on with what it has.
+    assert!(bench.answer(AT_ONCE).is_some());
+    assert_eq!(sessions(&bench).1, 2);
+}
+
+#[test]
+fn gives_way_to_later_requests() {
+    let bench = baked();
+    let ends_for_nothing = || {
+        assert_eq!(bench.settled(), BakeState::Done);
+        assert!(bench.worker.take_worth().is_none() && sessions(&bench).0 == 1);
+    };
+    begin(&bench, level(ENDLESS));
+    assert!(bench.answer(AT_ONCE).is_some());
+    ends_for_nothing();
+
+    assert!(bench.worker.compare(Effect::Direct, level(ENDLESS)));
+    assert!(bench.worker.compare(Effect::Textures, level(AT_ONCE)));
+    assert_eq!(found(&bench).effect, Effect::Textures);
+
+    begin(&bench, level(ENDLESS));
+    bench.worker.cancel();
+    ends_for_nothing();
+}
+
+#[test]
+fn waits_for_no_bake() {
+    let bench = bench();
+    bench.ask(ENDLESS);
+    assert!(!bench.worker.compare(Effect::Direct, level(AT_ONCE)));
+    wait_for("the start", || sessions(&bench).0 == 1);
+    assert!(!bench.worker.compare(Effect::Direct, level(AT_ONCE)));
+    assert!(bench.worker.state().is_baking());
+}
+
+#[test]
+fn a_failure_spoils_nothing() {
+    let bench = baked();
+    for density in [FAILING, PANICKING] {
+        assert!(bench.worker.compare(Effect::Direct, level(density)));
+        let sentence = found(&bench).difference.err();
+        assert!(sentence.is_some_and(|sentence| !sentence.is_empty()));
+        assert_eq!(bench.worker.state(), BakeState::Done);
+    }
+    assert!(bench.answer(AT_ONCE).is_some());
+    // Its own session is still the first one.
+    assert_eq!(sessions(&bench), (1, 3));
+}
+
+#[test]
+fn shown_until_other_maps_come() {
+    let mut model = fixtures::model(&options("ring"));
+    let wish = || Wishes {
+        worth: Some(Effect::Reflection),
+        ..Wishes::default()
+    };
+    act(&mut model, wish());
+    assert!(
+        model.state().is_baking(),
+        "nothing is compared before there are maps"
+    );
+    bake(&mut model);
+    let before = Arc::clone(model.last.as_ref().expect("there are maps"));
+    assert_eq!(model.quantity(), Quantity::Light);
+
+    act(&mut model, wish());
+    until(&mut model, "the comparison", |model| model.worth.is_some());
+    bake(&mut model);
+    assert!(Arc::ptr_eq(&before, model.last.as_ref().expect("there are maps")));
+    assert_eq!(model.quantity(), Quantity::Difference, "it is shown by itself");
+    let worth = model.worth.as_ref().expect("it was asked for");
+    let found = worth.difference.as_ref().expect("it was found");
+    let map = &before.result.maps[0];
+    let layers = map.layers.iter();
+    let flux_w: f64 = layers.map(|layer| map.flux_w(layer.kind).luminance()).sum();
+    assert!((found.with_w / flux_w - 1.0).abs() < 1e-6, "{found:?}");
+    assert_eq!(model.shown_maps().len(), found.maps.len());
+    let switch = model.panel.settings.effects.get(Effect::Reflection);
+    assert_eq!(switch, EffectSwitch::Auto, "the settings are those of the maps");
+
+    for quantity in [Quantity::Light, Quantity::Difference] {
+        model.panel.display.quantity = quantity;
+        assert_eq!(model.quantity(), quantity);
+    }
+    model.panel.settings.density_per_sr *= 4.0;
+    act(&mut model, Wishes::default());
+    bake(&mut model);
+    assert!(model.worth.is_none(), "it belonged to other maps");
+    assert_eq!(model.quantity(), Quantity::Light);
+}
+
+fn offered(panel: &Headless) -> Vec<String> {
+    let names = panel.controls().into_iter().map(|(_, name, _)| name);
+    names.filter(|name| name.ends_with(": worth")).collect()
+}
+
+#[test]
+fn asked_for_and_told_in_watts() {
+    let mut panel = panel(vec![
+        line(Effect::Refraction, true, "for a reason"),
+        line(Effect::Absorption, false, "for a reason"),
+    ]);
+    panel.choose("View", "difference");
+    assert_eq!(panel.panel.display.quantity, Quantity::Light, "there is none");
+    assert_eq!(offered(&panel), ["refraction: worth"]);
+    panel.tell(|told| {
+        told.state = leak(BakeState::Baking {
+            stage: Stage::Caustic,
+            fraction: 0.5,
+            since: Instant::now(),
+        });
+    });
+    assert!(panel.is_disabled(Role::Button, "refraction: worth"));
+    panel.tell(|told| told.state = &BakeState::Done);
+    panel.press("refraction: worth");
+    assert_eq!(panel.wishes.worth, Some(Effect::Refraction));
+
+    panel.tell(|told| {
+        told.state = &BakeState::Comparing {
+            effect: Effect::Refraction,
+            stage: Stage::Caustic,
+            fraction: 0.25,
+        };
+    });
+    assert!(panel.says("25 %") && offered(&panel).is_empty());
+    assert!(!panel.is_disabled(Role::Button, "Cancel"));
+
+    panel.tell(|told| told.state = &BakeState::Done);
+    let found = |with_w, without_w, relative_rmse| {
+        Ok(Difference {
+            maps: Vec::new(),
+            with_w,
+            without_w,
+            relative_rmse,
+        })
+    };
+    for (difference, sentence) in [
+        (
+            found(16.1, 3.8, Some(0.84)),
+            "+12.30 W of 16.10 W deposited; maps differ by 84 % (relative RMSE)",
+        ),
+        (
+            found(1.0, 1.25, Some(0.0312)),
+            "−0.2500 W of 1.000 W deposited; maps differ by 3.1 % (relative RMSE)",
+        ),
+        (found(0.0, 1.0, None), "there is no light with it"),
+        (
+            Err("bake: it failed; try again".into()),
+            "bake: it failed; try again",
+        ),
+    ] {
+        let has_maps = difference.is_ok();
+        let worth = Worth {
+            effect: Effect::Refraction,
+            with: Arc::new(finished(panel.told.scene, panel.settings())),
+            difference,
+        };
+        panel.tell(|told| told.worth = Some(leak(worth)));
+        panel.assert_says(&[sentence]);
+        if has_maps {
+            panel.choose("View", "difference");
+            assert_eq!(panel.panel.display.quantity, Quantity::Difference);
+        }
+    }
+}

@@ -1,0 +1,489 @@
+//! A screen without a monitor, the program on it, and hands: Xvfb, xdotool and ImageMagick.
+
+use std::fs;
+use std::io::{BufRead, BufReader};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::time::{Duration, Instant};
+
+use glam::DVec3;
+use image::RgbImage;
+use nephroid::viewer::navigation::Navigator;
+use nephroid::viewer::panel::WIDTH;
+use serde_json::Value;
+use x11rb::connection::Connection as _;
+use x11rb::protocol::xproto::{AtomEnum, ClientMessageEvent, ConnectionExt as _, EventMask};
+
+use crate::evidence::keep_bytes;
+use crate::program::program;
+use crate::skip;
+use crate::tools::builtin_scene;
+
+/// Far longer than anything here takes; only a failing test waits for it.
+const PATIENCE: Duration = Duration::from_secs(300);
+
+/// Size of the screen and of the window [pixels].
+pub const SIZE: (u32, u32) = (1280, 720);
+
+/// Share of pixels by which two pictures of the same view at rest may differ visibly: each is the mean of as many samples
+/// as time allowed, which shows at the edges of what is seen in the mirror.
+pub const ALIKE: f64 = 0.005;
+
+/// Height of what the panel says between the button that bakes and its sections, at most [pixels].
+const BELOW_BAKE: f64 = 160.0;
+
+/// Beginnings of the names of what stands above the sections and does not scroll.
+const ABOVE: [&str; 5] = ["Re-bake", "Cancel", "automatic", "Undo", "Redo"];
+
+/// Asks until there is an answer.
+#[track_caller]
+fn poll<T>(what: &dyn Fn() -> String, mut ask: impl FnMut() -> Option<T>) -> T {
+    let start = Instant::now();
+    loop {
+        if let Some(answer) = ask() {
+            return answer;
+        }
+        assert!(start.elapsed() < PATIENCE, "{}", what());
+        std::thread::sleep(Duration::from_millis(50));
+    }
+}
+
+/// An X server of its own on a display number that was free.
+pub struct Screen {
+    server: Child,
+    display: String,
+}
+
+impl Screen {
+    /// `None`, after a counted skip, where a tool is missing.
+    pub fn start() -> Option<Self> {
+        for (tool, question) in [("Xvfb", "-help"), ("xdotool", "version"), ("import", "-version")] {
+            let mut command = Command::new(tool);
+            command.arg(question).stdout(Stdio::null()).stderr(Stdio::null());
+            if command.status().is_err() {
+                let test = std::thread::current().name().unwrap_or("?").to_owned();
+                skip(&test, &format!("{tool} is not installed"));
+                return None;
+            }
+        }
+        let mut server = Command::new("Xvfb")
+            .args(["-displayfd", "1", "-nolisten", "tcp", "-screen", "0"])
+            .arg(format!("{}x{}x24", SIZE.0, SIZE.1))
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()
+            .expect("Xvfb starts");
+        let mut number = String::new();
+        let output = server.stdout.as_mut().expect("it is piped");
+        BufReader::new(output)
+            .read_line(&mut number)
+            .expect("Xvfb tells its display");
+        let number: u32 = number.trim().parse().expect("a display number");
+        let display = format!(":{number}");
+        Some(Self { server, display })
+    }
+
+    fn xdotool(&self, arguments: &[&str]) -> String {
+        let mut command = Command::new("xdotool");
+        let output = command.args(arguments).env("DISPLAY", &self.display).output();
+        String::from_utf8(output.expect("xdotool runs").stdout).expect("xdotool writes text")
+    }
+}
+
+impl Drop for Screen {
+    fn drop(&mut self) {
+        let _ = self.server.kill();
+        let _ = self.server.wait();
+    }
+}
+
+/// The program with its window open.
+pub struct Viewer<'a> {
+    screen: &'a Screen,
+    program: Child,
+    window: String,
+    folder: tempfile::TempDir,
+    /// Events that the test has read.
+    read: usize,
+    /// Whether the left mouse button is down.
+    pulls: bool,
+}
+
+impl<'a> Viewer<'a> {
+    /// Starts `nephroid view` with arguments separated by spaces and waits for its window.
+    pub fn open(screen: &'a Screen, arguments: &str) -> Self {
+        Self::open_with(screen, arguments, None)
+    }
+
+    /// The same, with what another window kept in a folder; otherwise nothing was kept.
+    pub fn open_with(screen: &'a Screen, arguments: &str, config: Option<&Path>) -> Self {
+        let folder = tempfile::tempdir().expect("a folder");
+        let config = config.map_or_else(|| folder.path().join("config"), Path::to_path_buf);
+        let stderr = fs::File::create(folder.path().join("stderr")).expect("a file");
+        fs::create_dir(folder.path().join("working")).expect("a folder");
+        let program = Command::new(program())
+            .arg("view")
+            .args(arguments.split_whitespace())
+            .args(["--size", &format!("{}x{}", SIZE.0, SIZE.1), "--event-log"])
+            .arg(folder.path().join("events"))
+            .current_dir(folder.path().join("working"))
+            .env("DISPLAY", &screen.display)
+            .env("WINIT_X11_SCALE_FACTOR", "1")
+            .env("NEPHROID_CONFIG_DIR", config)
+            .env_remove("WAYLAND_DISPLAY")
+            .stdout(Stdio::null())
+            .stderr(stderr)
+            .spawn()
+            .expect("the program starts");
+        let window = String::new();
+        let mut viewer = Self {
+            screen,
+            program,
+            window,
+            folder,
+            read: 0,
+            pulls: false,
+        };
+        viewer.wait_for("started", |_| true);
+        viewer.window = screen
+            .xdotool(&["search", "--name", "Nephroid"])
+            .trim()
+            .to_owned();
+        assert!(
+            viewer.window.parse::<u32>().is_ok(),
+            "one window: {:?}",
+            viewer.window
+        );
+        viewer.hands(&format!("windowfocus --sync {}", viewer.window));
+        viewer
+    }
+
+    /// Hands that do several things in a row, in xdotool's words.
+    pub fn hands(&self, what: &str) {
+        self.screen.xdotool(&what.split_whitespace().collect::<Vec<_>>());
+    }
+
+    /// The display that its window is on, and the window's number.
+    pub fn place(&self) -> (&str, &str) {
+        (&self.screen.display, &self.window)
+    }
+
+    pub fn title(&self) -> String {
+        self.screen.xdotool(&["getwindowname", &self.window])
+    }
+
+    /// Where the program was started.
+    pub fn working_folder(&self) -> PathBuf {
+        self.folder.path().join("working")
+    }
+
+    pub fn stderr(&self) -> String {
+        fs::read_to_string(self.folder.path().join("stderr")).expect("it is text")
+    }
+
+    /// The whole lines of its log; the last one may be half-written.
+    fn log(&self) -> String {
+        let mut text = fs::read_to_string(self.folder.path().join("events")).unwrap_or_default();
+        text.truncate(text.rfind('\n').map_or(0, |end| end + 1));
+        text
+    }
+
+    /// All events of that name so far.
+    pub fn all(&self, name: &str) -> Vec<Value> {
+        let start = format!("{{\"event\":\"{name}\"");
+        let log = self.log();
+        log.lines()
+            .filter(|line| line.starts_with(&start))
+            .map(event)
+            .collect()
+    }
+
+    /// Forgets the events so far.
+    pub fn forget(&mut self) {
+        self.read = self.log().lines().count();
+    }
+
+    /// The number and text of the next event that fits.
+    fn next(&mut self, what: &str, fits: impl Fn(&Value) -> bool) -> (usize, Value) {
+        let (path, read) = (self.folder.path().join("events"), self.read);
+        let told = || format!("no {what}: {}", fs::read_to_string(&path).unwrap_or_default());
+        poll(&told, || {
+            let has_ended = !self.runs();
+            let log = self.log();
+            let mut events = log
+                .lines()
+                .enumerate()
+                .skip(read)
+                .map(|(index, line)| (index, event(line)));
+            let found = events.find(|(_, event)| fits(event));
+            let is_well = found.is_some() || !has_ended;
+            assert!(is_well, "it ended without {what}: {}", self.stderr());
+            found
+        })
+    }
+
+    /// The next event of that name that fits, after those that were waited for before.
+    pub fn wait_for(&mut self, name: &str, fits: impl Fn(&Value) -> bool) -> Value {
+        let (index, event) = self.next(name, |event| event["event"] == name && fits(event));
+        self.read = index + 1;
+        event
+    }
+
+    /// The end of the bake, and the rest that follows it.
+    pub fn wait_for_bake(&mut self) -> (Value, Value) {
+        (self.wait_for("done", |_| true), self.wait_for("rest", |_| true))
+    }
+
+    /// The next maps that are shown, of a first level or, where that came too soon after it to be shown by itself, of the
+    /// whole bake. They may be waited for again.
+    pub fn wait_for_maps(&mut self) -> Value {
+        let is_shown = |event: &Value| event["event"] == "done" || event["shown"] == true;
+        self.next("maps", is_shown).1
+    }
+
+    /// Holds a key for half a second, and tells where the camera rests then. A window that is late sees the key go down and up
+    /// in one frame, and does not move: then once more.
+    pub fn fly(&mut self, key: &str, from: DVec3) -> DVec3 {
+        let before = self.screenshot();
+        self.forget();
+        poll(&|| format!("{key} does not move the camera"), || {
+            self.hands(&format!("keydown {key} sleep 0.5 keyup {key}"));
+            let has_moved = (0..20).any(|_| difference(&before, &self.screenshot()) > 0.02);
+            has_moved.then_some(())
+        });
+        self.wait_for_move(from)
+    }
+
+    /// The next rest with the camera elsewhere than there.
+    pub fn wait_for_move(&mut self, from: DVec3) -> DVec3 {
+        position(&self.wait_for("rest", |rest| position(rest).distance(from) > 1e-6))
+    }
+
+    /// Left, top, right and bottom of the first control of the panel that fits, by its role and name [pixels]; waits until
+    /// it is there and rests.
+    pub fn control(&self, what: &str, fits: impl Fn(&str, &str) -> bool) -> [f64; 4] {
+        let mut last = None;
+        poll(&|| format!("no {what}"), || {
+            let controls = self.all("controls").pop()?;
+            let text = |control: &Value, key: &str| control[key].as_str().unwrap_or_default().to_owned();
+            let mut all = controls["controls"].as_array()?.iter();
+            let found = all.find(|control| fits(&text(control, "role"), &text(control, "name")))?;
+            let rect = [0, 1, 2, 3].map(|side| found["rect_pixels"][side].as_f64().expect("a number"));
+            if last == Some(rect) {
+                return last;
+            }
+            last = Some(rect);
+            std::thread::sleep(Duration::from_millis(200));
+            None
+        })
+    }
+
+    /// The middle of a control of the panel [pixels], scrolled into the window where it is not.
+    pub fn centre(&self, role: &str, name: &str) -> (i32, i32) {
+        let mut last_top = None;
+        for _ in 0..40 {
+            let [left, top, right, bottom] = self.control(name, |r, n| r == role && n == name);
+            let [.., bake] = self.control("Re-bake", |_, name| name == "Re-bake");
+            // What stands above the sections, or over the picture, does not scroll.
+            let is_fixed = ABOVE.iter().any(|above| name.starts_with(above)) || left >= f64::from(WIDTH);
+            let highest = if is_fixed { 0.0 } else { bake + BELOW_BAKE };
+            // What stands at the very top cannot be scrolled any lower.
+            let is_at_top = last_top == Some(top) && top > 0.0;
+            if bottom < f64::from(SIZE.1) && (top > highest || is_at_top) {
+                return ((0.5 * (left + right)) as i32, (0.5 * (top + bottom)) as i32);
+            }
+            last_top = Some(top);
+            let wheel = if top > highest { 5 } else { 4 };
+            // The panel glides, picture by picture, and pictures may take half a second.
+            self.hands(&format!("mousemove 20 300 click {wheel} sleep 1"));
+        }
+        panic!("{role} {name} cannot be scrolled to");
+    }
+
+    /// Places on a slider of the panel, by the share of the way along it [pixels].
+    pub fn on_slider<const N: usize>(&self, name: &str, shares: [f64; N]) -> [(i32, i32); N] {
+        let [left, top, _, bottom] = self.control(name, |r, n| r == "Slider" && n == name);
+        shares.map(|share| ((left + 4.0 + share * 104.0) as i32, (0.5 * (top + bottom)) as i32))
+    }
+
+    /// Clicks at a place [pixels], and stays there: a window that is late sees all of it in one frame. Where it sees the
+    /// button go up later than it went down, it may take that for a drag.
+    pub fn click_at(&self, (x, y): (i32, i32)) {
+        self.hands(&format!("mousemove {x} {y} sleep 0.3 click 1 sleep 0.3"));
+    }
+
+    /// Clicks a control of the panel as a person would.
+    pub fn click(&self, role: &str, name: &str) {
+        self.click_at(self.centre(role, name));
+    }
+
+    /// Opens sections of the panel, or closes them: what stands below moves.
+    pub fn toggle_sections(&self, names: &[&str]) {
+        for name in names {
+            let before = self.all("controls").len();
+            self.click("DisclosureTriangle", name);
+            poll(&|| format!("{name} does not open"), || {
+                (self.all("controls").len() > before).then_some(())
+            });
+        }
+    }
+
+    /// Chooses what the picture shows, and waits until the log tells so.
+    pub fn choose_view(&mut self, view: &str) {
+        self.click("ComboBox", "View");
+        self.click("Button", view);
+        self.wait_for("shows", |shows| shows["what"] == view);
+    }
+
+    /// Types over what a field of the panel holds, and confirms.
+    pub fn type_into(&self, role: &str, name: &str, text: &str) {
+        self.click_at(self.centre(role, name));
+        self.hands("key ctrl+a sleep 0.2");
+        self.screen.xdotool(&["type", "--delay", "20", text]);
+        self.hands("sleep 0.3 key Return");
+    }
+
+    /// Presses the mouse at the first place and pulls to the others [pixels]; it stays down. A window has to see the button
+    /// go down in a frame before the mouse moves, or go up before it leaves.
+    pub fn pull(&mut self, places: &[(i32, i32)]) {
+        self.forget();
+        self.pulls = true;
+        let mut deeds = String::new();
+        for (index, (x, y)) in places.iter().enumerate() {
+            let press = if index == 0 {
+                "sleep 1 mousedown 1 sleep 1"
+            } else {
+                ""
+            };
+            deeds += &format!("mousemove {x} {y} {press} sleep 0.3 ");
+        }
+        self.hands(&deeds);
+    }
+
+    /// Lets the mouse go.
+    pub fn let_go(&mut self) {
+        self.hands("sleep 0.3 mouseup 1 sleep 1");
+        self.pulls = false;
+    }
+
+    /// What is on the screen, without what is said of a control that the mouse is over.
+    pub fn screenshot(&self) -> RgbImage {
+        if !self.pulls {
+            self.hands("mousemove 900 300");
+        }
+        let path = self.folder.path().join("screen.png");
+        let taken = Command::new("import")
+            .args(["-window", "root", &format!("png24:{}", path.display())])
+            .env("DISPLAY", &self.screen.display)
+            .status();
+        assert!(taken.expect("import runs").success(), "import took no picture");
+        image::open(path).expect("it is a picture").to_rgb8()
+    }
+
+    /// The first screenshot that fits: what the log tells takes a moment to reach the screen.
+    #[track_caller]
+    pub fn screenshot_that(&self, what: &str, fits: impl Fn(&RgbImage) -> bool) -> RgbImage {
+        let keep = || {
+            let png = fs::read(self.folder.path().join("screen.png")).unwrap_or_default();
+            format!("no picture {what}; {}", keep_bytes("screen.png", &png))
+        };
+        poll(&keep, || Some(self.screenshot()).filter(&fits))
+    }
+
+    /// Processor time of all its threads so far [s].
+    pub fn cpu_s(&self) -> f64 {
+        let stat = fs::read_to_string(format!("/proc/{}/stat", self.program.id())).expect("it runs");
+        // Fields 14 and 15, counted after the name in parentheses, in ticks of 1/100 s.
+        let after_name = stat.rsplit(')').next().expect("a name");
+        let ticks = after_name.split_whitespace().skip(11).take(2);
+        ticks
+            .map(|ticks| ticks.parse::<f64>().expect("a number") / 100.0)
+            .sum()
+    }
+
+    /// Whether the program has not ended.
+    pub fn runs(&mut self) -> bool {
+        self.program.try_wait().expect("it can be asked").is_none()
+    }
+
+    /// Asks the window to close as a window manager does. The program ends with success and without a panic; its stderr
+    /// and all events.
+    #[track_caller]
+    pub fn close(mut self) -> (String, Vec<Value>) {
+        let (server, _) = x11rb::connect(Some(&self.screen.display)).expect("the server answers");
+        let atom = |name: &str| {
+            let asked = server.intern_atom(false, name.as_bytes()).expect("it is sent");
+            asked.reply().expect("it is answered").atom
+        };
+        let window = self.window.parse().expect("a number");
+        let data = [atom("WM_DELETE_WINDOW"), AtomEnum::NONE.into(), 0, 0, 0];
+        let message = ClientMessageEvent::new(32, window, atom("WM_PROTOCOLS"), data);
+        let sent = server.send_event(false, window, EventMask::NO_EVENT, message);
+        sent.expect("it is sent");
+        server.flush().expect("it is sent");
+        self.wait_for("closing", |_| true);
+        let status = self.wait_for_end();
+        let stderr = self.stderr();
+        assert_eq!(status.code(), Some(0), "{stderr}");
+        assert!(!stderr.contains("panicked"), "{stderr}");
+        (stderr, self.log().lines().map(event).collect())
+    }
+
+    /// Sends a signal by name and waits for the program's end.
+    pub fn signal(mut self, name: &str) -> ExitStatus {
+        let id = self.program.id().to_string();
+        let sent = Command::new("kill").args(["-s", name, &id]).status();
+        assert!(sent.expect("kill runs").success());
+        self.wait_for_end()
+    }
+
+    fn wait_for_end(&mut self) -> ExitStatus {
+        poll(&|| "it does not end".to_owned(), || {
+            self.program.try_wait().expect("it can be asked")
+        })
+    }
+}
+
+impl Drop for Viewer<'_> {
+    fn drop(&mut self) {
+        let _ = self.program.kill();
+        let _ = self.program.wait();
+    }
+}
+
+/// A line of the log.
+fn event(line: &str) -> Value {
+    serde_json::from_str(line).expect("a line is JSON")
+}
+
+/// A camera's place from the log [m].
+pub fn position(rest: &Value) -> DVec3 {
+    let coordinate = |axis: usize| rest["position_m"][axis].as_f64().expect("a number");
+    DVec3::new(coordinate(0), coordinate(1), coordinate(2))
+}
+
+/// Where a point of a built-in scene is seen at the start [pixels of the window].
+pub fn pixel_of(scene: &str, point: DVec3) -> (i32, i32) {
+    let (left, height) = (f64::from(WIDTH), f64::from(SIZE.1));
+    let width = f64::from(SIZE.0) - left;
+    let camera = Navigator::new(&builtin_scene(scene), None).camera_for(width / height);
+    let d = point - camera.position;
+    let scale = 0.5 * height / (0.5 * camera.vertical_fov_rad).tan() / d.dot(camera.forward);
+    let x = left + 0.5 * width + scale * d.dot(camera.right());
+    let y = 0.5 * height - scale * d.dot(camera.up);
+    (x as i32, y as i32)
+}
+
+/// The picture's pixels with their places, the panel left out.
+pub fn picture(shot: &RgbImage) -> impl Iterator<Item = (u32, u32, [u8; 3])> {
+    let pixels = shot.enumerate_pixels().map(|(x, y, pixel)| (x, y, pixel.0));
+    pixels.filter(|(x, ..)| *x >= WIDTH as u32)
+}
+
+/// Share of the picture's pixels that differ visibly.
+pub fn difference(a: &RgbImage, b: &RgbImage) -> f64 {
+    let differs = |p: [u8; 3], q: [u8; 3]| p.iter().zip(q).any(|(p, q)| p.abs_diff(q) > 8);
+    let pairs = picture(a).zip(picture(b));
+    let count = pairs.filter(|((.., p), (.., q))| differs(*p, *q)).count();
+    count as f64 / picture(a).count() as f64
+}

@@ -1,0 +1,119 @@
+//! Scenes small enough to know every pixel of.
+
+use std::f64::consts::PI;
+use std::sync::Arc;
+
+use glam::{DMat3, DVec2, DVec3};
+use nephroid::eye_pass::View;
+use nephroid::illumination::{Chart, IlluminationMap, Receiver, UvSet};
+use nephroid::optics::LinearSrgb;
+use nephroid::scene::texture::Wrap;
+use nephroid::scene::{Camera, Material, Mesh, Object, Scene, Texture, TextureRef};
+
+use crate::scenes::{map_of, view_of};
+
+/// Corners of the unit floor by (x, z), and at the same time by (u, v).
+const CORNERS: [DVec2; 4] = [
+    DVec2::new(0.0, 0.0),
+    DVec2::new(1.0, 0.0),
+    DVec2::new(1.0, 1.0),
+    DVec2::new(0.0, 1.0),
+];
+const TRIANGLES: [[u32; 3]; 2] = [[0, 2, 1], [0, 3, 2]];
+
+/// A floor over x, z in [0, 1] at the given height, facing up, with uv = (x, z).
+pub fn floor(name: &str, material: usize, height_m: f64) -> Object {
+    Object {
+        name: name.into(),
+        node: 0,
+        primitive: 0,
+        material,
+        mesh: Arc::new(Mesh {
+            positions: CORNERS
+                .map(|corner| DVec3::new(corner.x, height_m, corner.y))
+                .to_vec(),
+            normals: vec![DVec3::Y; 4],
+            uv0: Some(CORNERS.to_vec()),
+            uv1: None,
+            triangles: TRIANGLES.to_vec(),
+        }),
+    }
+}
+
+/// One floor of the given material.
+pub fn floor_scene(material: Material) -> Scene {
+    Scene {
+        name: "floor".into(),
+        objects: vec![floor("floor", 0, 0.0)],
+        materials: vec![material],
+        ..Default::default()
+    }
+}
+
+/// A map of a floor, with uv = (x, z).
+pub fn floor_map(object: usize, width: usize, height: usize, irradiance: Vec<[f32; 3]>) -> IlluminationMap {
+    let chart = Chart {
+        receiver: Receiver::front(object),
+        uv_set: UvSet::TexCoord0,
+        corner_uvs: TRIANGLES.map(|triangle| triangle.map(|corner| CORNERS[corner as usize])).to_vec(),
+        width,
+        height,
+        texel_areas_m2: vec![1.0 / (width * height) as f64],
+        layout: None,
+        beyond: Vec::new(),
+        joints: Vec::new(),
+    };
+    map_of(chart, irradiance)
+}
+
+/// The unit floor from straight above, filling a square picture exactly: pixel (i, j) sees x = (i + ½)/size and
+/// z = (j + ½)/size.
+pub fn from_above(size: u32) -> View {
+    let camera = Camera {
+        name: "above".into(),
+        position: DVec3::new(0.5, 1.0, 0.5),
+        forward: DVec3::NEG_Y,
+        up: DVec3::NEG_Z,
+        vertical_fov_rad: 2.0 * 0.5_f64.atan(),
+        near_m: 0.01,
+    };
+    view_of(camera, [size; 2])
+}
+
+/// Lambert of a given albedo.
+pub fn diffuse(albedo: LinearSrgb) -> Material {
+    Material {
+        base_colour: albedo,
+        ..Default::default()
+    }
+}
+
+/// Four texels of different colours, 2×2, u to the right and v down.
+pub fn four_colours() -> Texture {
+    Texture {
+        name: "four".into(),
+        width: 2,
+        height: 2,
+        rgba: vec![
+            [255, 0, 0, 255],
+            [0, 255, 0, 255],
+            [0, 0, 255, 255],
+            [255, 255, 255, 255],
+        ],
+        wrap: [Wrap::ClampToEdge; 2],
+    }
+}
+
+/// A reference to texture 0 by TEXCOORD_0.
+pub fn texture_reference() -> TextureRef {
+    TextureRef {
+        texture: 0,
+        uv_set: 0,
+        uv_transform: DMat3::IDENTITY,
+    }
+}
+
+/// Radiance of a diffuse surface.
+pub fn lambert(albedo: f64, irradiance_w_m2: f64) -> f64 {
+    albedo * irradiance_w_m2 / PI
+}

@@ -1,0 +1,200 @@
+//! Small glTF files made in memory.
+
+use std::path::Path;
+
+use nephroid::error::Result;
+use nephroid::scene::{LoadOptions, Scene, load};
+use serde_json::{Value, json};
+
+/// JSON and binary data of a file to be.
+#[derive(Clone)]
+pub struct Glb {
+    pub json: Value,
+    pub binary: Vec<u8>,
+}
+
+impl Glb {
+    /// A file without nodes.
+    pub fn empty() -> Self {
+        let json = json!({
+            "asset": { "version": "2.0" },
+            "scene": 0,
+            "scenes": [{ "nodes": [] }],
+            "nodes": [], "meshes": [], "accessors": [], "bufferViews": [], "materials": [],
+        });
+        Self {
+            json,
+            binary: Vec::new(),
+        }
+    }
+
+    /// Appends to a list of the JSON and returns the index.
+    pub fn push(&mut self, list: &str, item: Value) -> usize {
+        let fields = self.json.as_object_mut().expect("a file is an object");
+        let items = fields.entry(list).or_insert_with(|| json!([]));
+        let items = items.as_array_mut().expect("is a list");
+        items.push(item);
+        items.len() - 1
+    }
+
+    /// Adds a node and lists it in the scene.
+    pub fn push_root(&mut self, node: Value) -> usize {
+        let index = self.push("nodes", node);
+        let nodes = self.json["scenes"][0]["nodes"]
+            .as_array_mut()
+            .expect("the scene lists nodes");
+        nodes.push(json!(index));
+        index
+    }
+
+    /// Adds bytes as a buffer view of their own.
+    pub fn push_view(&mut self, bytes: &[u8]) -> usize {
+        let offset = self.binary.len();
+        self.binary.extend(bytes);
+        self.binary.resize(self.binary.len().next_multiple_of(4), 0);
+        self.push(
+            "bufferViews",
+            json!({ "buffer": 0, "byteOffset": offset, "byteLength": bytes.len() }),
+        )
+    }
+
+    /// Adds an accessor of floats with `width` numbers an element.
+    pub fn push_floats(&mut self, values: &[f32], width: usize) -> usize {
+        let bytes: Vec<u8> = values.iter().flat_map(|value| value.to_le_bytes()).collect();
+        let view = self.push_view(&bytes);
+        let kind = ["SCALAR", "VEC2", "VEC3"][width - 1];
+        self.push(
+            "accessors",
+            json!({ "bufferView": view, "componentType": 5126, "count": values.len() / width, "type": kind }),
+        )
+    }
+
+    /// Adds an accessor of 32-bit indices.
+    pub fn push_indices(&mut self, values: &[u32]) -> usize {
+        let bytes: Vec<u8> = values.iter().flat_map(|value| value.to_le_bytes()).collect();
+        let view = self.push_view(&bytes);
+        self.push(
+            "accessors",
+            json!({ "bufferView": view, "componentType": 5125, "count": values.len(), "type": "SCALAR" }),
+        )
+    }
+
+    /// Adds a mesh of one primitive.
+    pub fn push_mesh(&mut self, primitive: Value) -> usize {
+        self.push("meshes", json!({ "primitives": [primitive] }))
+    }
+
+    /// A file with one triangle (0 0 0), (1 0 0), (0 1 0) without normals on the node `tri`.
+    pub fn triangle() -> Self {
+        let mut file = Self::empty();
+        let positions = file.push_floats(&[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0], 3);
+        let mesh = file.push_mesh(json!({ "attributes": { "POSITION": positions } }));
+        file.push_root(json!({ "name": "tri", "mesh": mesh }));
+        file
+    }
+
+    /// A file with a closed tetrahedron with its vertices' directions as normals, on the node `solid`.
+    pub fn tetrahedron() -> Self {
+        let mut file = Self::empty();
+        let corners = [1.0, 1.0, 1.0, 1.0, -1.0, -1.0, -1.0, 1.0, -1.0, -1.0, -1.0, 1.0];
+        let positions = file.push_floats(&corners, 3);
+        let normals = file.push_floats(&corners.map(|x: f32| x / 3.0_f32.sqrt()), 3);
+        let indices = file.push_indices(&[0, 1, 2, 0, 3, 1, 0, 2, 3, 1, 3, 2]);
+        let attributes = json!({ "POSITION": positions, "NORMAL": normals });
+        let mesh = file.push_mesh(json!({ "attributes": attributes, "indices": indices }));
+        file.push_root(json!({ "name": "solid", "mesh": mesh }));
+        file
+    }
+
+    /// Gives the first mesh a material.
+    pub fn with_material(mut self, material: Value) -> Self {
+        let material = self.push("materials", material);
+        self.json["meshes"][0]["primitives"][0]["material"] = json!(material);
+        self
+    }
+
+    /// Adds a light on a node of the same name.
+    pub fn with_light(mut self, name: &str, light: Value) -> Self {
+        let lights = &mut self.json["extensions"]["KHR_lights_punctual"]["lights"];
+        if lights.is_null() {
+            *lights = json!([]);
+        }
+        let lights = lights.as_array_mut().expect("is a list");
+        lights.push(light);
+        let index = lights.len() - 1;
+        self.push_root(json!({ "name": name, "extensions": { "KHR_lights_punctual": { "light": index } } }));
+        self
+    }
+
+    /// The bytes of the `.glb` file.
+    pub fn bytes(&self) -> Vec<u8> {
+        let mut json = self.json.clone();
+        if !self.binary.is_empty() {
+            json["buffers"] = json!([{ "byteLength": self.binary.len() }]);
+        }
+        let mut text = json.to_string().into_bytes();
+        text.resize(text.len().next_multiple_of(4), b' ');
+        let mut body = Vec::new();
+        for (kind, chunk) in [(b"JSON", &text), (b"BIN\0", &self.binary)] {
+            body.extend((chunk.len() as u32).to_le_bytes());
+            body.extend(kind);
+            body.extend(chunk);
+        }
+        let mut bytes = b"glTF\x02\0\0\0".to_vec();
+        bytes.extend((body.len() as u32 + 12).to_le_bytes());
+        bytes.extend(body);
+        bytes
+    }
+
+    /// Loads it as a file.
+    pub fn load(&self) -> Result<Scene> {
+        self.load_with(&LoadOptions::default())
+    }
+
+    /// Loads it as a file, with options.
+    pub fn load_with(&self, options: &LoadOptions) -> Result<Scene> {
+        load_bytes(&self.bytes(), options)
+    }
+
+    /// Loads it; fails where that fails.
+    #[track_caller]
+    pub fn scene(&self) -> Scene {
+        self.load().unwrap_or_else(|error| panic!("{error}"))
+    }
+
+    /// Fails unless it is refused in a sentence with these words.
+    #[track_caller]
+    pub fn assert_refused(&self, words: &str) {
+        let refusal = self.refusal();
+        assert!(refusal.contains(words), "{refusal}");
+    }
+
+    /// The sentence with which it is refused.
+    #[track_caller]
+    pub fn refusal(&self) -> String {
+        self.load().expect_err("has to be refused").to_string()
+    }
+}
+
+/// Loads the bytes as a file of their own.
+pub fn load_bytes(bytes: &[u8], options: &LoadOptions) -> Result<Scene> {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let path = folder.path().join("test.glb");
+    std::fs::write(&path, bytes).expect("file can be written");
+    load_path(&path, options)
+}
+
+/// Loads a file.
+pub fn load_path(path: &Path, options: &LoadOptions) -> Result<Scene> {
+    load(path.to_str().expect("path is UTF-8"), options)
+}
+
+/// Fails unless one of the scene's warnings has all the parts.
+#[track_caller]
+pub fn assert_warned(scene: &Scene, parts: &[&str]) {
+    let all: Vec<String> = scene.warnings.iter().map(ToString::to_string).collect();
+    let found = all
+        .iter()
+        .any(|warning| parts.iter().all(|part| warning.contains(part)));
+    assert!(found, "no warning has {parts:?} among {all:#?}");
+}

@@ -1,0 +1,325 @@
+//! Hard cases as a table: scenes that are baked, and the laws that their bakes must keep.
+
+pub mod law;
+pub mod scenes;
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use nephroid::illumination::IlluminationMap;
+use nephroid::scene::Scene;
+use nephroid::session::BakeResult;
+use nephroid::settings::{BakeSettings, LayerKind};
+
+use crate::tools::{at, bake, settings};
+
+/// Most that ledgers and maps may leave open, of what was emitted or deposited.
+const BOOKS_BOUND: f64 = 1e-6;
+
+/// Whether the long variants of cases are asked for.
+pub fn is_long() -> bool {
+    std::env::var_os("NEPHROID_LONG").is_some_and(|value| value != "0")
+}
+
+/// A scene and what a bake made of it.
+pub struct Baked {
+    pub scene: Scene,
+    pub result: BakeResult,
+}
+
+/// How far a law is off, after all bakes before it.
+type Measure = Box<dyn Fn(&[Baked]) -> f64 + Send>;
+
+/// What is done with bakes before they are forgotten.
+type Look = Box<dyn Fn(&[Baked]) + Send>;
+
+enum Step {
+    Bake(Box<(Scene, BakeSettings)>),
+    Law(String, f64, Measure),
+    Forget(Look),
+}
+
+/// Hard cases.
+#[derive(Default)]
+pub struct Table {
+    cases: Vec<Case>,
+}
+
+impl Table {
+    /// One case more.
+    pub fn case(&mut self, name: impl Into<String>) -> &mut Case {
+        self.cases.push(Case {
+            name: name.into(),
+            steps: Vec::new(),
+            is_without_books: false,
+        });
+        self.cases.last_mut().expect("it was pushed")
+    }
+}
+
+/// Bakes and laws, in the order in which they are made and looked at. A law sees all bakes before it.
+pub struct Case {
+    name: String,
+    steps: Vec<Step>,
+    is_without_books: bool,
+}
+
+impl Case {
+    /// A bake by wavefronts at a density [rays/sr], with maps of so many texels each way.
+    pub fn bake(&mut self, scene: Scene, density_per_sr: f64, side: usize) -> &mut Self {
+        self.bake_with(scene, at(density_per_sr, side))
+    }
+
+    /// The same by splats.
+    pub fn splat(&mut self, scene: Scene, density_per_sr: f64, side: usize) -> &mut Self {
+        self.bake_with(scene, settings(density_per_sr, side))
+    }
+
+    /// A bake with settings of its own.
+    pub fn bake_with(&mut self, scene: Scene, settings: BakeSettings) -> &mut Self {
+        self.steps.push(Step::Bake(Box::new((scene, settings))));
+        self
+    }
+
+    /// A law, how far it may be off, and how far it is. The worst of several of one wording counts.
+    pub fn law(
+        &mut self,
+        says: impl Into<String>,
+        bound: f64,
+        of: impl Fn(&[Baked]) -> f64 + Send + 'static,
+    ) -> &mut Self {
+        self.steps.push(Step::Law(says.into(), bound, Box::new(of)));
+        self
+    }
+
+    /// Looks at all bakes so far and forgets them.
+    pub fn forget(&mut self, after: impl Fn(&[Baked]) + Send + 'static) -> &mut Self {
+        self.steps.push(Step::Forget(Box::new(after)));
+        self
+    }
+
+    /// Ledgers and maps are not compared: of light beyond what maps can hold, of other layers than caustics.
+    pub fn without_books(&mut self) -> &mut Self {
+        self.is_without_books = true;
+        self
+    }
+
+    fn rows(self) -> Vec<Row> {
+        let (mut bakes, mut rows) = (Vec::new(), Vec::new());
+        let (mut open, mut first) = (None, String::new());
+        let mut note = |law: String, measured: f64, bound: f64, scene: &str| {
+            rows.push(Row {
+                case: self.name.clone(),
+                scene: scene.into(),
+                law,
+                // What is no number is worse than anything.
+                measured: if measured.is_nan() { f64::INFINITY } else { measured },
+                bound,
+            });
+        };
+        for step in self.steps {
+            let is_done = catch_unwind(AssertUnwindSafe(|| match step {
+                Step::Bake(what) => {
+                    let (scene, mut settings) = *what;
+                    // Cases run side by side.
+                    settings.threads = settings.threads.max(1);
+                    let result = bake(scene.clone(), &settings);
+                    if open.is_none() {
+                        first = described(&scene);
+                    }
+                    open = Some(books_open(&result).max(open.unwrap_or(0.0)));
+                    bakes.push(Baked { scene, result });
+                }
+                Step::Law(says, bound, of) => note(says, of(&bakes), bound, &first),
+                Step::Forget(after) => {
+                    after(&bakes);
+                    bakes.clear();
+                }
+            }));
+            if is_done.is_err() {
+                note("runs to its end".into(), f64::INFINITY, 0.0, &first);
+            }
+        }
+        if let Some(open) = open.filter(|_| !self.is_without_books) {
+            note("ledgers and maps hold every watt".into(), open, BOOKS_BOUND, &first);
+        }
+        rows
+    }
+}
+
+/// A scene's name, or what is in it.
+fn described(scene: &Scene) -> String {
+    if !scene.name.is_empty() {
+        return scene.name.clone();
+    }
+    let objects = scene.objects.iter().map(|object| &object.name);
+    let mut counts: Vec<(&String, usize)> = Vec::new();
+    for name in objects.chain(scene.lights.iter().map(|light| &light.name)) {
+        match counts.iter_mut().find(|(known, _)| *known == name) {
+            Some((_, count)) => *count += 1,
+            None => counts.push((name, 1)),
+        }
+    }
+    let words = counts.into_iter().take(6).map(|(name, count)| match count {
+        1 => name.clone(),
+        _ => format!("{count} × {name}"),
+    });
+    words.collect::<Vec<_>>().join(", ")
+}
+
+/// What ledgers leave open at worst, of what was emitted, or maps of what was deposited; infinite where a value is not
+/// finite, or below zero though no light is traced by wavelength, which knows colours beyond sRGB.
+pub fn books_open(result: &BakeResult) -> f64 {
+    let is_spectral = result.ledgers.iter().any(|ledger| ledger.emitted_radiant_w.is_some());
+    let is_value = |e: f32| e.is_finite() && (e >= 0.0 || is_spectral);
+    let mut is_sound = result.maps.iter().flat_map(values).all(is_value);
+    let mut worst: f64 = 0.0;
+    let (mut deposited_w, mut emitted_w) = (0.0, 0.0);
+    for energy in result.ledgers.iter().map(|ledger| ledger.energy_w) {
+        let imbalance = energy.relative_imbalance();
+        is_sound &= imbalance.is_finite() && energy.truncated.non_finite == 0.0;
+        worst = worst.max(imbalance);
+        deposited_w += energy.deposited;
+        emitted_w += energy.emitted;
+    }
+    let has_layer = |map: &IlluminationMap| map.layer(LayerKind::Caustic).is_some();
+    if result.maps.iter().any(has_layer) || deposited_w > 0.0 {
+        let held = |map: &IlluminationMap| map.flux_w(LayerKind::Caustic).luminance();
+        let held_w: f64 = result.maps.iter().map(held).sum();
+        is_sound &= held_w.is_finite();
+        // Of a sliver of light, roundings are as large as the light itself.
+        let whole_w = deposited_w.max(1e-9 * emitted_w);
+        // Nor do maps hold what single precision does not.
+        let area_m2: f64 = result.maps.iter().map(|map| map.chart.area_m2()).sum();
+        let lost_w = (held_w - deposited_w).abs() - area_m2 * f64::from(f32::MIN_POSITIVE);
+        if whole_w > 0.0 {
+            worst = worst.max(lost_w.max(0.0) / whole_w);
+        }
+    }
+    if is_sound { worst } else { f64::INFINITY }
+}
+
+/// All values of a map, its errors included.
+pub fn values(map: &IlluminationMap) -> impl Iterator<Item = f32> {
+    let layers = map.layers.iter().flat_map(|layer| layer.irradiance.iter().flatten());
+    layers.chain(map.error.iter().flatten()).copied()
+}
+
+/// One law of one case.
+struct Row {
+    case: String,
+    scene: String,
+    law: String,
+    measured: f64,
+    bound: f64,
+}
+
+impl Row {
+    fn holds(&self) -> bool {
+        self.measured <= self.bound
+    }
+
+    fn line(&self) -> String {
+        let (measured, bound) = (number(self.measured), number(self.bound));
+        let verdict = if self.holds() { "holds" } else { "**fails**" };
+        let (case, scene, law) = (&self.case, &self.scene, &self.law);
+        format!("| {case} | {scene} | {law} | {measured} | {bound} | {verdict} |\n")
+    }
+}
+
+/// Rows of one case and one law are one: the worst.
+fn worst(mut rows: Vec<Row>, row: Row) -> Vec<Row> {
+    match rows.iter_mut().find(|known| known.case == row.case && known.law == row.law) {
+        Some(known) if known.measured < row.measured => *known = row,
+        Some(_) => {}
+        None => rows.push(row),
+    }
+    rows
+}
+
+/// Tables of the groups that are done, by name.
+static DONE: Mutex<Vec<(&str, String)>> = Mutex::new(Vec::new());
+
+/// Runs all cases of a group and writes the table of all groups so far; fails unless all laws hold.
+#[track_caller]
+pub fn hold(group: &'static str, fill: fn(&mut Table)) {
+    let mut table = Table::default();
+    fill(&mut table);
+    let rows = run(table);
+    publish(group, &rows);
+    check(&rows);
+}
+
+/// Runs the cases of those names; fails unless all laws hold, and there are such cases.
+#[track_caller]
+pub fn hold_some(fill: fn(&mut Table), names: &[&str]) {
+    let mut table = Table::default();
+    fill(&mut table);
+    table.cases.retain(|case| names.contains(&case.name.as_str()));
+    let has = |name: &&str| table.cases.iter().any(|case| case.name == **name);
+    assert!(names.iter().all(has), "a case of {names:?} is missing");
+    check(&run(table));
+}
+
+#[track_caller]
+fn check(rows: &[Row]) {
+    let faults: String = rows.iter().filter(|row| !row.holds()).map(Row::line).collect();
+    assert!(!rows.is_empty() && faults.is_empty(), "laws that do not hold:\n{faults}");
+}
+
+/// Runs cases side by side.
+fn run(table: Table) -> Vec<Row> {
+    let cases: Vec<Mutex<Option<Case>>> = table.cases.into_iter().map(Some).map(Mutex::new).collect();
+    let next = AtomicUsize::new(0);
+    let take = |index: usize| cases.get(index)?.lock().expect("no panic holds it").take();
+    let work = || {
+        let indices = std::iter::from_fn(|| Some(next.fetch_add(1, Ordering::Relaxed)));
+        let cases = indices.map_while(|index| Some((index, take(index)?)));
+        cases.map(|(index, case)| (index, case.rows())).collect::<Vec<_>>()
+    };
+    let mut found: Vec<(usize, Vec<Row>)> = std::thread::scope(|scope| {
+        let cores = std::thread::available_parallelism().map_or(1, usize::from);
+        let workers: Vec<_> = (0..cores).map(|_| scope.spawn(work)).collect();
+        let done = workers.into_iter().map(|worker| worker.join().expect("panics are caught"));
+        done.flatten().collect()
+    });
+    found.sort_by_key(|(index, _)| *index);
+    found.into_iter().flat_map(|(_, rows)| rows).fold(Vec::new(), worst)
+}
+
+/// Prints a group's table and writes those of all groups so far to `laws/laws.md` in the build folder.
+#[allow(clippy::print_stdout, reason = "the README quotes it")]
+fn publish(group: &'static str, rows: &[Row]) {
+    let mut table = format!("\n## {group}\n\n| case | scene | law | measured | bound | verdict |\n|---|---|---|---|---|---|\n");
+    table.extend(rows.iter().map(Row::line));
+    println!("{table}");
+    let mut done = DONE.lock().expect("no panic holds it");
+    done.push((group, table));
+    done.sort();
+    let mut text = String::from("# Hard cases\n");
+    text.extend(done.iter().map(|(_, table)| table.as_str()));
+    let folder = crate::build_folder().with_file_name("laws");
+    std::fs::create_dir_all(&folder).expect("the build folder can be written");
+    std::fs::write(folder.join("laws.md"), text).expect("the build folder can be written");
+}
+
+/// Two digits: as they are from a thousandth to a thousand, else with a power of ten.
+fn number(value: f64) -> String {
+    let magnitude = value.abs();
+    if value == 0.0 {
+        return "0".into();
+    }
+    if !value.is_finite() {
+        return "∞".into();
+    }
+    if !(1e-3..1e3).contains(&magnitude) {
+        return format!("{value:.1e}");
+    }
+    let digits = (1 - magnitude.log10().floor() as i32).max(0) as usize;
+    let text = format!("{value:.digits$}");
+    match text.contains('.') {
+        true => text.trim_end_matches('0').trim_end_matches('.').into(),
+        false => text,
+    }
+}

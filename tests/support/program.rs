@@ -1,0 +1,150 @@
+//! Runs the program in a folder of its own.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+
+use serde_json::Value;
+use tempfile::TempDir;
+
+/// An empty folder in which the program runs, and one for what it and its drivers keep; both removed at the end.
+pub struct Sandbox {
+    folder: TempDir,
+    cache: TempDir,
+}
+
+/// The program of this build.
+pub fn program() -> PathBuf {
+    crate::build_folder().join(format!("nephroid{}", std::env::consts::EXE_SUFFIX))
+}
+
+/// How a run ended.
+#[derive(Debug)]
+pub struct Run {
+    pub code: i32,
+    pub stdout: String,
+    pub stderr: String,
+}
+
+impl Sandbox {
+    pub fn new() -> Self {
+        let [folder, cache] = [(); 2].map(|()| tempfile::tempdir().expect("a temporary folder"));
+        Self { folder, cache }
+    }
+
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    pub fn write(&self, name: &str, contents: impl AsRef<[u8]>) -> PathBuf {
+        let path = self.path(name);
+        std::fs::write(&path, contents).expect("the sandbox can be written");
+        path
+    }
+
+    /// A one-channel PFM; the values are stored in their order.
+    pub fn write_pfm(&self, name: &str, width: usize, height: usize, value: impl Fn(usize, usize) -> f32) {
+        let mut bytes = format!("Pf\n{width} {height}\n-1.0\n").into_bytes();
+        for row in 0..height {
+            for column in 0..width {
+                bytes.extend(value(column, row).to_le_bytes());
+            }
+        }
+        self.write(name, bytes);
+    }
+
+    /// The program, ready to start here, without a display.
+    pub fn command(&self, arguments: &[&str]) -> Command {
+        let mut command = Command::new(program());
+        command
+            .args(arguments)
+            .current_dir(self.folder.path())
+            // Without it, libraries of the window system complain on stderr.
+            .env("XDG_RUNTIME_DIR", self.folder.path())
+            .env("XDG_CACHE_HOME", self.cache.path())
+            .stdin(Stdio::null());
+        for display in ["DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET"] {
+            command.env_remove(display);
+        }
+        command
+    }
+
+    /// Runs it, arguments separated by spaces.
+    pub fn run(&self, line: &str) -> Run {
+        let arguments: Vec<&str> = line.split_whitespace().collect();
+        Run::from(self.command(&arguments).output().expect("the program starts"))
+    }
+
+    /// Runs it and expects success.
+    #[track_caller]
+    pub fn succeed(&self, line: &str) -> Run {
+        let run = self.run(line);
+        assert_eq!(run.code, 0, "{line}: {}", run.stderr);
+        run
+    }
+
+    /// Where the program keeps what took long to make.
+    pub fn cache(&self) -> PathBuf {
+        self.cache.path().join("nephroid")
+    }
+
+    /// Names of the files in a folder, sorted; none where there is no such folder.
+    pub fn files(&self, folder: impl AsRef<Path>) -> Vec<String> {
+        let mut names: Vec<String> = std::fs::read_dir(self.folder.path().join(folder))
+            .into_iter()
+            .flatten()
+            .map(|entry| {
+                entry
+                    .expect("it can be listed")
+                    .file_name()
+                    .to_string_lossy()
+                    .into_owned()
+            })
+            .collect();
+        names.sort();
+        names
+    }
+
+    pub fn manifest(&self, folder: &str) -> Value {
+        read_json(&self.path(folder).join("manifest.json"))
+    }
+}
+
+impl From<Output> for Run {
+    fn from(output: Output) -> Self {
+        Self {
+            code: output.status.code().expect("it ended by itself"),
+            stdout: String::from_utf8(output.stdout).expect("text"),
+            stderr: String::from_utf8(output.stderr).expect("text"),
+        }
+    }
+}
+
+impl Run {
+    /// The one JSON document that stdout is.
+    #[track_caller]
+    pub fn json(&self) -> Value {
+        serde_json::from_str(&self.stdout).unwrap_or_else(|error| panic!("{error}: {}", self.stdout))
+    }
+
+    /// Expects that exit code, nothing on stdout, and one sentence on stderr with every one of these words.
+    #[track_caller]
+    pub fn failed_in_one_sentence(&self, code: i32, words: &[&str]) {
+        assert_eq!(self.code, code, "{}", self.stderr);
+        assert_eq!(self.stdout, "");
+        let lines: Vec<&str> = self.stderr.lines().collect();
+        let [sentence] = lines[..] else {
+            panic!("not one line: {}", self.stderr)
+        };
+        // `error: location: what; remedy`
+        assert!(sentence.starts_with("error: "), "{sentence}");
+        assert!(sentence.contains(": ") && sentence.contains("; "), "{sentence}");
+        for word in words {
+            assert!(sentence.contains(word), "no {word:?} in: {sentence}");
+        }
+    }
+}
+
+pub fn read_json(path: &Path) -> Value {
+    let bytes = std::fs::read(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+    serde_json::from_slice(&bytes).expect("JSON")
+}

@@ -1,0 +1,136 @@
+//! The built-in scenes with maps of an independent solver (`assets/reference`), and how near bakes come to them.
+
+use nephroid::illumination::compare::{average_relative_difference, relative_rmse};
+use nephroid::scene::Scene;
+use nephroid::session::BakeResult;
+
+use crate::tools::{caustic, energy_fault, map_of};
+use crate::{assert_close, reference_map};
+
+/// A density [1/sr] and the largest relative RMSE with it, on maps of 256×256.
+pub type Agreement = (f64, f64);
+
+pub struct Reference {
+    pub builtin: &'static str,
+    pub file: &'static str,
+    pub by_wavefronts: Agreement,
+    /// Largest mean relative difference of wavefronts.
+    pub mean_difference: f64,
+    pub by_splats: Option<Agreement>,
+    /// Watts on the floor.
+    pub floor_w: f64,
+    /// Watts that left the scene, where the solver says so.
+    pub escaped_w: Option<f64>,
+    /// Whether a sun shines, whose irradiance does not fall with the scene's size.
+    pub has_sun: bool,
+}
+
+const fn reference(
+    (builtin, file): (&'static str, &'static str),
+    by_wavefronts: Agreement,
+    by_splats: Option<Agreement>,
+    (floor_w, escaped_w): (f64, Option<f64>),
+) -> Reference {
+    Reference {
+        builtin,
+        file,
+        by_wavefronts,
+        mean_difference: 0.01,
+        by_splats,
+        floor_w,
+        escaped_w,
+        has_sun: false,
+    }
+}
+
+pub fn references() -> [Reference; 7] {
+    let ball = reference(
+        ("ball", "S2"),
+        (1.5e5, 0.02),
+        Some((1e5, 0.10)),
+        (1.090_823, Some(0.092_578 + 0.125_041)),
+    );
+    let pool = reference(("pool", "S3"), (1e4, 0.012), None, (3.770_999, None));
+    let nephroid = reference(
+        ("nephroid", "S8"),
+        (1.2e5, 0.01),
+        Some((3e5, 0.06)),
+        (0.966_650, Some(0.832_455)),
+    );
+    [
+        reference(
+            ("ring", "S1"),
+            (1e4, 0.01),
+            Some((1e5, 0.10)),
+            (6.992_461, Some(0.0)),
+        ),
+        Reference {
+            mean_difference: 0.05,
+            ..ball
+        },
+        Reference { has_sun: true, ..pool },
+        reference(
+            ("mirror", "S5"),
+            (1e5, 0.01),
+            Some((1e6, 0.03)),
+            (1.286_660, Some(0.016_970)),
+        ),
+        reference(
+            ("slab", "S6"),
+            (5e3, 0.01),
+            Some((2e5, 0.03)),
+            (6.490_964, None),
+        ),
+        reference(("paraboloid", "S7"), (3e4, 0.01), None, (0.502_656, None)),
+        Reference {
+            has_sun: true,
+            ..nephroid
+        },
+    ]
+}
+
+impl Reference {
+    /// Fails unless a bake of the scene, `size` times as large, has the solver's map within an error, and its watts within a
+    /// share.
+    pub fn check(&self, result: &BakeResult, scene: &Scene, size: f64, (most, share): (f64, f64)) {
+        let name = self.builtin;
+        let irradiance = if self.has_sun { 1.0 } else { 1.0 / (size * size) };
+        let image = caustic(map_of(result, scene, "floor"));
+        let image: Vec<f64> = image.iter().map(|e| e / irradiance).collect();
+        let expected = reference_map(self.file);
+        let off = relative_rmse(&image, &expected).expect("a reference with light");
+        assert!(off <= most, "{name}: relative RMSE {off}");
+        assert_eq!(energy_fault(result), None, "{name}");
+        let energy = &result.ledgers[0].energy_w;
+        let scale = irradiance * size * size;
+        let what = format!("{name}: watts on the floor");
+        assert_close(energy.deposited, self.floor_w * scale, share, &what);
+        if let Some(escaped_w) = self.escaped_w {
+            let off_w = (energy.escaped - escaped_w * scale).abs();
+            assert!(
+                off_w <= 0.005 * energy.emitted,
+                "{name}: escaped {} W",
+                energy.escaped
+            );
+        }
+    }
+
+    /// Fails unless few rays of wavefronts are enough, here and everywhere on the map.
+    pub fn check_wavefronts(&self, result: &BakeResult, scene: &Scene) {
+        let name = self.builtin;
+        self.check(result, scene, 1.0, (self.by_wavefronts.1, 0.001));
+        let image = caustic(map_of(result, scene, "floor"));
+        let mean = average_relative_difference(&image, &reference_map(self.file));
+        let mean = mean.expect("a reference with light");
+        assert!(
+            mean <= self.mean_difference,
+            "{name}: mean relative difference {mean}"
+        );
+        assert!(
+            result.counts.rays < 250_000,
+            "{name}: {} rays",
+            result.counts.rays
+        );
+        assert!(result.counts.receiver_queries > 0 && result.counts.cells > 0);
+    }
+}

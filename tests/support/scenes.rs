@@ -1,0 +1,160 @@
+//! Small scenes that the tests share.
+
+use std::sync::Arc;
+
+use glam::{DVec2, DVec3};
+use nephroid::eye_pass::reference::{EyeRays, ReferenceSettings, render_counted};
+use nephroid::eye_pass::{Picture, ToneMap, View};
+use nephroid::illumination::parametrisation::DEFAULT_NOMINAL_SIDE;
+use nephroid::illumination::{Chart, IlluminationMap, Layer, parametrise};
+use nephroid::light_pass::direct::{DirectLayer, bake_direct};
+use nephroid::optics::LinearSrgb;
+use nephroid::progress::Control;
+use nephroid::scene::{Camera, Light, LightKind, LightSize, Material, Mesh, Object, Scene, SurfaceKind};
+use nephroid::settings::LayerKind;
+use nephroid::transport::Tracer;
+use nephroid::units::{Irradiance, RadiantIntensity};
+
+/// A scene of meshes, each with its own material.
+pub fn scene(parts: Vec<(Mesh, Material)>, lights: Vec<Light>) -> Scene {
+    let mut scene = Scene {
+        name: "test".into(),
+        lights,
+        ..Scene::default()
+    };
+    for (index, (mesh, material)) in parts.into_iter().enumerate() {
+        scene.objects.push(Object {
+            name: format!("object {index}"),
+            node: index,
+            primitive: 0,
+            material: index,
+            mesh: mesh.into(),
+        });
+        scene.materials.push(material);
+    }
+    scene
+}
+
+pub fn tracer(parts: Vec<(Mesh, Material)>, lights: Vec<Light>) -> Tracer {
+    Tracer::new(Arc::new(scene(parts, lights)))
+}
+
+pub fn surface(surface: SurfaceKind, ior: f64) -> Material {
+    Material {
+        surface,
+        ior,
+        base_colour: LinearSrgb::WHITE,
+        ..Material::default()
+    }
+}
+
+/// Lambert of an albedo.
+pub fn diffuse(albedo: f64) -> Material {
+    Material {
+        base_colour: LinearSrgb::grey(albedo),
+        ..Material::default()
+    }
+}
+
+pub fn light(kind: LightKind) -> Light {
+    Light {
+        name: "light".into(),
+        colour: LinearSrgb::WHITE,
+        spectrum: None,
+        kind,
+        size: LightSize::None,
+    }
+}
+
+pub fn point_light(position: DVec3, intensity: f64) -> Light {
+    light(LightKind::Point {
+        position,
+        intensity: RadiantIntensity(intensity),
+    })
+}
+
+pub fn sun(direction: DVec3, normal_irradiance: f64) -> Light {
+    light(LightKind::Sun {
+        direction: direction.normalize(),
+        normal_irradiance: Irradiance(normal_irradiance),
+    })
+}
+
+/// The chart of an object of a tracer's scene.
+pub fn chart(tracer: &Tracer, object: usize, width: usize, height: usize) -> Chart {
+    parametrise(object, &tracer.scene().objects[object].mesh, DEFAULT_NOMINAL_SIDE)
+        .expect("the object has area")
+        .chart(width, height)
+}
+
+/// The direct layer of an object.
+pub fn direct(tracer: &Tracer, chart: &Chart) -> DirectLayer {
+    let layer = bake_direct(tracer, &tracer.scene().lights, &[chart], &(), &Control::default())
+        .pop()
+        .expect("one layer per chart");
+    assert!(layer.complete);
+    assert_eq!(layer.irradiance.len(), chart.width * chart.height);
+    layer
+}
+
+/// Flux on a whole surface [W], by the first channel.
+pub fn flux_w(chart: &Chart, layer: &DirectLayer) -> f64 {
+    layer
+        .irradiance
+        .iter()
+        .enumerate()
+        .map(|(texel, e)| f64::from(e[0]) * chart.texel_area_m2(texel))
+        .sum()
+}
+
+/// A map of one layer.
+pub fn map_of(chart: impl Into<Arc<Chart>>, irradiance: Vec<[f32; 3]>) -> IlluminationMap {
+    IlluminationMap {
+        chart: chart.into(),
+        layers: vec![Layer {
+            kind: LayerKind::Caustic,
+            irradiance,
+        }],
+        error: None,
+        estimated_relative_rmse: None,
+    }
+}
+
+/// A view before a black background, without a tone map.
+pub fn view(eye: DVec3, target: DVec3, fov_rad: f64, size: [u32; 2]) -> View {
+    view_of(Camera::look_at("eye", eye, target, fov_rad), size)
+}
+
+/// The view of a camera before a black background, without a tone map.
+pub fn view_of(camera: Camera, [width, height]: [u32; 2]) -> View {
+    View {
+        camera,
+        width,
+        height,
+        exposure_stops: 0.0,
+        tone_map: ToneMap::None,
+        background: LinearSrgb::BLACK,
+    }
+}
+
+/// The CPU's picture and the rays that it took.
+pub fn seen(
+    tracer: &Tracer,
+    maps: &[IlluminationMap],
+    view: &View,
+    settings: &ReferenceSettings,
+) -> (Picture, EyeRays) {
+    render_counted(tracer, maps, view, settings, &(), &Control::default()).expect("nobody cancels")
+}
+
+/// The bits of a picture: pictures are the same only where these are.
+pub fn bits(picture: &Picture) -> Vec<u32> {
+    let channels = picture.radiance.iter().flatten();
+    channels.map(|channel| channel.to_bits()).collect()
+}
+
+/// The middles of a square picture's pixels or of a square map's texels, in the unit square, row by row.
+pub fn middles(side: usize) -> impl Iterator<Item = DVec2> {
+    let at = move |index: usize| (index as f64 + 0.5) / side as f64;
+    (0..side * side).map(move |index| DVec2::new(at(index % side), at(index / side)))
+}

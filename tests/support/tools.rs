@@ -1,0 +1,149 @@
+//! Bakes with little ceremony, and checks that are themselves tested with wrong input.
+
+use std::sync::Arc;
+
+use glam::{DMat3, DVec3};
+use nephroid::illumination::IlluminationMap;
+use nephroid::progress::Control;
+use nephroid::scene::{Camera, LightKind, Scene, builtin};
+use nephroid::session::{BakeResult, BakeSession};
+use nephroid::settings::{BakeSettings, LayerKind, MapResolution};
+
+/// A built-in scene that must exist.
+pub fn builtin_scene(name: &str) -> Scene {
+    builtin::build(name).unwrap_or_else(|| panic!("there is no built-in scene {name}"))
+}
+
+/// Default settings at a density [1/sr] and a map side.
+pub fn settings(density_per_sr: f64, side: usize) -> BakeSettings {
+    BakeSettings {
+        density_per_sr,
+        map_resolution: MapResolution::Fixed {
+            width: side,
+            height: side,
+        },
+        ..BakeSettings::splat()
+    }
+}
+
+/// Wavefront settings at a density [rays/sr], with maps of `side` texels each way.
+pub fn at(density_per_sr: f64, side: usize) -> BakeSettings {
+    BakeSettings {
+        density_per_sr,
+        map_resolution: MapResolution::Fixed {
+            width: side,
+            height: side,
+        },
+        ..BakeSettings::default()
+    }
+}
+
+/// Bakes a scene to the end.
+pub fn bake(scene: Scene, settings: &BakeSettings) -> BakeResult {
+    let mut session = BakeSession::new(Arc::new(scene)).expect("a session");
+    session.bake(settings, &(), &Control::default()).expect("a bake")
+}
+
+/// The map of the object of that name.
+pub fn map_of<'a>(result: &'a BakeResult, scene: &Scene, name: &str) -> &'a IlluminationMap {
+    result
+        .maps
+        .iter()
+        .find(|map| scene.objects[map.chart.object()].name == name)
+        .unwrap_or_else(|| panic!("{name} received no light"))
+}
+
+/// Luminance of the caustic layer [W/m²].
+pub fn caustic(map: &IlluminationMap) -> Vec<f64> {
+    let layer = map.layer(LayerKind::Caustic).expect("a caustic layer");
+    layer
+        .irradiance
+        .iter()
+        .map(|&[r, g, b]| {
+            nephroid::optics::LinearSrgb::new(f64::from(r), f64::from(g), f64::from(b)).luminance()
+        })
+        .collect()
+}
+
+/// The first fault of a bake's energy, if there is one: a ledger that does not close to 1e-6, or maps that do not hold
+/// what the ledgers say was deposited (to 1e-6; maps are single precision).
+pub fn energy_fault(result: &BakeResult) -> Option<String> {
+    for ledger in &result.ledgers {
+        let imbalance = ledger.energy_w.relative_imbalance();
+        if imbalance.is_nan() || imbalance > 1e-6 {
+            return Some(format!(
+                "the ledger of {} is off by {imbalance:e}: {ledger:?}",
+                ledger.light
+            ));
+        }
+    }
+    let deposited: f64 = result
+        .ledgers
+        .iter()
+        .map(|ledger| ledger.energy_w.deposited)
+        .sum();
+    let held: f64 = result
+        .maps
+        .iter()
+        .map(|map| map.flux_w(LayerKind::Caustic).luminance())
+        .sum();
+    let off = (held - deposited).abs();
+    (off.is_nan() || off > 1e-6 * deposited)
+        .then(|| format!("the maps hold {held} W, the ledgers say {deposited} W"))
+}
+
+/// The scene turned or mirrored, scaled about the origin, then moved. Lights keep their strength, and skies their place.
+pub fn transformed(mut scene: Scene, rotation: DMat3, scale: f64, offset: DVec3) -> Scene {
+    let place = |p: DVec3| rotation * p * scale + offset;
+    let turned = |direction: DVec3| (rotation * direction).normalize();
+    let is_mirrored = rotation.determinant() < 0.0;
+    for object in &mut scene.objects {
+        let mesh = Arc::make_mut(&mut object.mesh);
+        mesh.positions.iter_mut().for_each(|p| *p = place(*p));
+        mesh.normals.iter_mut().for_each(|n| *n = turned(*n));
+        if is_mirrored {
+            // Outsides stay outside.
+            mesh.triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
+        }
+    }
+    for light in &mut scene.lights {
+        match &mut light.kind {
+            LightKind::Point { position, .. } => *position = place(*position),
+            LightKind::Spot {
+                position, direction, ..
+            } => (*position, *direction) = (place(*position), turned(*direction)),
+            LightKind::Sun { direction, .. } => *direction = turned(*direction),
+            LightKind::Panel {
+                centre, across, down, ..
+            } => {
+                let side = if is_mirrored { -scale } else { scale };
+                (*centre, *across, *down) = (place(*centre), rotation * *across * scale, rotation * *down * side);
+            }
+            LightKind::Surface { .. } | LightKind::Environment { .. } => {}
+        }
+    }
+    for material in &mut scene.materials {
+        if let Some(volume) = &mut material.volume {
+            volume.attenuation_distance_m *= scale;
+        }
+    }
+    for camera in &mut scene.cameras {
+        *camera = Camera {
+            position: place(camera.position),
+            forward: turned(camera.forward),
+            up: turned(camera.up),
+            ..camera.clone()
+        };
+    }
+    scene
+}
+
+/// The bits of all layers of a map: maps are the same only where these are.
+pub fn bits(map: &IlluminationMap) -> Vec<u32> {
+    map.layers
+        .iter()
+        .flat_map(|layer| &layer.irradiance)
+        .flatten()
+        .map(|e| e.to_bits())
+        .collect()
+}
