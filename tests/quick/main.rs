@@ -10,6 +10,7 @@ mod eye;
 mod gpu;
 mod laws;
 mod physics;
+mod prelude;
 mod scene;
 #[cfg(feature = "viewer")]
 mod viewer;

@@ -8,11 +8,10 @@ use nephroid::export::map_folder::MapFolder;
 use nephroid::export::shards::ShardFolder;
 use nephroid::export::textures::TextureFolder;
 use nephroid::light_pass::share::Share;
-use nephroid::settings::LayerKind;
 
-use support::tools::{at, bake, builtin_scene};
-
-use super::{Baked, assert_says, names, two_lamps};
+use super::{Baked, names, two_lamps};
+use crate::prelude::*;
+use support::tools::{at, bake};
 
 type Open = fn(&Path, bool) -> Result<()>;
 
@@ -30,7 +29,7 @@ const KINDS: [(&str, Open); 3] = [
 
 #[test]
 fn others_folders_are_taken_only_by_force() {
-    let around = tempfile::tempdir().expect("a temporary folder");
+    let around = folder();
     let photos = around.path().join("photos");
     std::fs::create_dir(&photos).expect("writable");
     std::fs::write(photos.join("cat.jpg"), "a cat").expect("writable");
@@ -38,13 +37,13 @@ fn others_folders_are_taken_only_by_force() {
     for foreign in ["manifest.json", "index.json", "shard.json"] {
         for (kind, open) in KINDS {
             let refused = open(&photos, false).expect_err("it is not ours");
-            assert_says(&refused, &["photos", &format!("not from {kind}"), "--force"]);
+            says(refused, &format!("photos | not from {kind} | --force"));
             open(&photos, true).expect("by force");
         }
         std::fs::write(photos.join(foreign), r#"{"name": "an app"}"#).expect("writable");
     }
     let refused = FrameFolder::open(&photos).expect_err("it is not ours");
-    assert_says(&refused, &["photos", "not frames"]);
+    says(refused, "photos | not frames");
     assert_eq!(
         names(&photos),
         ["cat.jpg", "index.json", "manifest.json", "shard.json"]
@@ -55,7 +54,7 @@ fn others_folders_are_taken_only_by_force() {
 
 #[test]
 fn folders_are_made_for_a_result_alone() {
-    let around = tempfile::tempdir().expect("a temporary folder");
+    let around = folder();
     let deep = around.path().join("x/y");
     for (kind, open) in KINDS {
         open(&deep, false).expect("writable");
@@ -65,7 +64,7 @@ fn folders_are_made_for_a_result_alone() {
     std::fs::write(&file, "kept").expect("writable");
     for (_, open) in KINDS {
         for place in [&file, &file.join("below")] {
-            assert_says(&open(place, true).expect_err("a file"), &["file"]);
+            says(open(place, true).expect_err("a file"), "file");
         }
     }
     assert_eq!(std::fs::read(&file).expect("there"), b"kept");
@@ -73,7 +72,7 @@ fn folders_are_made_for_a_result_alone() {
 
 #[test]
 fn maps_are_replaced_file_by_file() {
-    let baked = Baked::quick(builtin_scene("mirror"), &[LayerKind::Caustic]);
+    let baked = Baked::quick(built_in("mirror"), &[LayerKind::Caustic]);
     let out = baked.path("out");
     std::fs::write(out.join("notes.txt"), "keep me").expect("writable");
     std::fs::write(out.join("maps/other.exr"), "not ours").expect("writable");
@@ -87,10 +86,8 @@ fn maps_are_replaced_file_by_file() {
         .maps
         .iter()
         .flat_map(|map| [Some(&map.file), map.uv_file.as_ref()]);
-    let mut expected: Vec<String> = written
-        .filter_map(|file| file?.strip_prefix("maps/").map(str::to_string))
-        .chain(["other.exr".to_string()])
-        .collect();
+    let own = written.filter_map(|file| file?.strip_prefix("maps/").map(str::to_string));
+    let mut expected: Vec<String> = own.chain(["other.exr".to_string()]).collect();
     expected.sort();
     assert_eq!(names(&out.join("maps")), expected);
     assert_ne!(first, expected);

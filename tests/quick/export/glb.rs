@@ -1,19 +1,15 @@
 //! A scene with its maps as one `.glb`, taken apart by hand.
 
-use std::f64::consts::{FRAC_1_PI, PI};
+use std::f64::consts::FRAC_1_PI;
 
 use nephroid::error::Result;
 use nephroid::export::glb::{self, Bits, Carrier, GlbOptions, GlbReport, SceneLights};
 use nephroid::export::{Quantity, map_reader, uv_file};
-use nephroid::scene::{LoadOptions, Mesh, Scene, open_document};
-use nephroid::settings::LayerKind;
-use serde_json::{Value, json};
+use nephroid::scene::open_document;
 
-use support::assert_close;
+use super::{Baked, LUMENS_PER_WATT, boxes, linear_of_srgb};
+use crate::prelude::*;
 use support::glb::{load_bytes, load_path};
-use support::tools::builtin_scene;
-
-use super::{Baked, LUMENS_PER_WATT, assert_says, boxes, linear_of_srgb};
 
 const LAYERS: [LayerKind; 2] = [LayerKind::Caustic, LayerKind::Direct];
 
@@ -98,16 +94,14 @@ impl Exported {
     fn image(&self, texture: &Value) -> Vec<[f64; 3]> {
         let image = self.item("images", &self.item("textures", &texture["index"])["source"]);
         let png = image::load_from_memory(self.view(&image["bufferView"])).expect("it is a PNG");
-        png.to_rgb16()
-            .pixels()
-            .map(|pixel| pixel.0.map(linear_of_srgb))
-            .collect()
+        let pixels = png.to_rgb16();
+        pixels.pixels().map(|pixel| pixel.0.map(linear_of_srgb)).collect()
     }
 }
 
 #[test]
 fn light_maps_hold_light_in_the_unit_asked() {
-    let baked = Baked::quick(builtin_scene("ring"), &[LayerKind::Caustic]);
+    let baked = Baked::quick(built_in("ring"), &[LayerKind::Caustic]);
     let light = baked.light("caustic");
     for (quantity, factor, cut) in [
         (Quantity::Irradiance, 1.0, 0.005),
@@ -141,7 +135,7 @@ fn light_maps_hold_light_in_the_unit_asked() {
 
 #[test]
 fn a_scene_is_lit_by_its_lights_or_its_maps() {
-    let baked = Baked::quick(builtin_scene("ball"), &LAYERS);
+    let baked = Baked::quick(built_in("ball"), &LAYERS);
     let kept = GlbOptions {
         bits: Bits::Eight,
         cut: 0.005,
@@ -156,12 +150,9 @@ fn a_scene_is_lit_by_its_lights_or_its_maps() {
     assert!(exported.scene.lights.is_empty());
     assert_eq!(exported.json.get("extensions"), None, "no list of lights is left");
     let (texels, white) = exported.light_map(0);
-    let found: f64 = texels
-        .iter()
-        .map(|texel| texel[1] * white / LUMENS_PER_WATT)
-        .sum();
+    let watts = texels.iter().map(|texel| texel[1] * white / LUMENS_PER_WATT);
     let total = baked.light("").iter().map(|texel| f64::from(texel[1])).sum();
-    assert_close(found, total, 0.006, "all light, in eight bits");
+    assert_close(watts.sum(), total, 0.006, "all light, in eight bits");
 
     let (exported, report) = export(&baked, kept);
     assert_eq!(report.layers, [LayerKind::Caustic], "what the lights do not give");
@@ -169,15 +160,15 @@ fn a_scene_is_lit_by_its_lights_or_its_maps() {
     let mut materials = exported.scene.materials.iter();
     assert!(materials.any(|material| material.ior == 1.5 && material.volume.is_some()));
 
-    let baked = Baked::quick(builtin_scene("mirror"), &[LayerKind::Direct]);
+    let baked = Baked::quick(built_in("mirror"), &[LayerKind::Direct]);
     let error = encode(&baked, kept).expect_err("there is nothing that lamps do not give");
-    assert_says(&error, &["builtin:mirror", "--lights remove"]);
+    says(error, "builtin:mirror | --lights remove");
     export(&baked, removed);
 }
 
 #[test]
 fn emission_and_pictures_hold_light_sent_on() {
-    let baked = Baked::quick(builtin_scene("ring"), &[LayerKind::Caustic]);
+    let baked = Baked::quick(built_in("ring"), &[LayerKind::Caustic]);
     // The floor's albedo is a half.
     let sent = |e: &[f32; 3]| f64::from(e[1]) * 0.5 / PI;
     let sent: Vec<f64> = baked.light("").iter().map(sent).collect();
@@ -220,16 +211,13 @@ fn emission_and_pictures_hold_light_sent_on() {
 }
 
 fn mesh_at(scene: &Scene, node: usize) -> &Mesh {
-    let mut objects = scene.objects.iter();
-    &objects
-        .find(|object| object.node == node)
-        .expect("it is there")
-        .mesh
+    let found = scene.objects.iter().find(|object| object.node == node);
+    &found.expect("it is there").mesh
 }
 
 #[test]
 fn nodes_of_one_mesh_get_their_own_maps() {
-    let around = tempfile::tempdir().expect("a temporary folder");
+    let around = folder();
     let file = around.path().join("boxes.glb");
     std::fs::write(&file, boxes().bytes()).expect("it can be written");
     let scene = load_path(&file, &LoadOptions::default()).expect("it can be read");
@@ -261,7 +249,7 @@ fn nodes_of_one_mesh_get_their_own_maps() {
             let same = triangles.clone().find(lies_there).expect("the same triangle");
             let found = after.triangles[triangle].map(|vertex| second[vertex as usize]);
             for (wanted, found) in uvs[same].iter().zip(found) {
-                assert!(wanted.distance(found) < 1e-6, "{wanted}, {found}");
+                near(found, *wanted, 1e-6, triangle);
             }
             let outward = after.corner_normals(triangle)[0];
             assert!(after.face_normal(triangle).dot(outward) > 0.9, "normals look out");
@@ -271,7 +259,7 @@ fn nodes_of_one_mesh_get_their_own_maps() {
         let [colours, places] = ["COLOR_0", "POSITION"].map(|name| exported.floats(&attributes[name]));
         assert_eq!(colours.len(), places.len());
         for (colour, place) in colours.iter().zip(&places) {
-            assert!((place + 0.5 - colour).abs() < 3e-6, "{place} {colour}");
+            near(*colour, place + 0.5, 3e-6, "colour");
         }
     }
 }

@@ -9,20 +9,14 @@ mod textures;
 
 use std::path::{Path, PathBuf};
 
-use glam::DVec3;
 use nephroid::error::Error;
 use nephroid::export::map_folder::MapFolder;
 use nephroid::export::map_reader::MapReader;
 use nephroid::export::textures::{Content, Encoding, Exposure, TextureFolder, TextureOptions, TextureReport};
 use nephroid::export::{FloatImage, Quantity};
-use nephroid::progress::Control;
-use nephroid::scene::Scene;
-use nephroid::scene::builtin::shapes;
 use nephroid::session::BakeResult;
-use nephroid::settings::{BakeSettings, LayerKind};
-use serde_json::{Value, json};
 
-use support::glb::Glb;
+use crate::prelude::*;
 use support::program::read_json;
 use support::tools::{at, bake};
 
@@ -35,24 +29,22 @@ struct Baked {
 
 impl Baked {
     fn new(scene: Scene, settings: &BakeSettings) -> Self {
+        let (result, around) = (bake(scene.clone(), settings), folder());
         let baked = Self {
-            result: bake(scene.clone(), settings),
-            around: tempfile::tempdir().expect("a temporary folder"),
             scene,
+            result,
+            around,
         };
         let folder = MapFolder::open(&baked.path("out"), false).expect("it can be written");
-        folder
-            .write(&baked.scene, settings, &baked.result)
-            .expect("it can be written");
+        let written = folder.write(&baked.scene, settings, &baked.result);
+        written.expect("it can be written");
         baked
     }
 
     /// Maps of 64 texels each way, of a light pass of milliseconds.
     fn quick(scene: Scene, layers: &[LayerKind]) -> Self {
-        let settings = BakeSettings {
-            layers: layers.to_vec(),
-            ..at(1e3, 64)
-        };
+        let mut settings = at(1e3, 64);
+        settings.layers = layers.to_vec();
         Self::new(scene, &settings)
     }
 
@@ -120,14 +112,6 @@ fn names(folder: &Path) -> Vec<String> {
     names
 }
 
-#[track_caller]
-fn assert_says(error: &Error, words: &[&str]) {
-    let sentence = error.to_string();
-    for word in words {
-        assert!(sentence.contains(word), "no {word:?} in: {sentence}");
-    }
-}
-
 /// Two boxes of one mesh, one of them mirrored, with colours at their vertices (position + 0.5), before a mirror.
 pub fn boxes() -> Glb {
     let mut file = Glb::empty();
@@ -146,12 +130,16 @@ pub fn boxes() -> Glb {
     let plaster = file.push("materials", plaster);
     let mesh = file.push_mesh(json!({ "attributes": attributes, "indices": indices, "material": plaster }));
     file.push_root(json!({ "name": "box", "mesh": mesh, "translation": [0.0, 0.3, 0.0] }));
-    file.push_root(
-        json!({ "name": "mirrored box", "mesh": mesh, "translation": [1.0, 0.3, 0.1],
-        "scale": [-1.0, 1.5, 1.0], "rotation": [0.0, 0.38268343, 0.0, 0.92387953] }),
+    let mut mirrored = parsed(
+        r#"{"name": "mirrored box", "translation": [1.0, 0.3, 0.1], "scale": [-1.0, 1.5, 1.0],
+            "rotation": [0.0, 0.38268343, 0.0, 0.92387953]}"#,
     );
-    let silver = json!({ "name": "silver", "doubleSided": true,
-        "pbrMetallicRoughness": { "metallicFactor": 1.0, "roughnessFactor": 0.0 } });
+    mirrored["mesh"] = json!(mesh);
+    file.push_root(mirrored);
+    let silver = parsed(
+        r#"{"name": "silver", "doubleSided": true,
+            "pbrMetallicRoughness": {"metallicFactor": 1.0, "roughnessFactor": 0.0}}"#,
+    );
     let silver = file.push("materials", silver);
     let corners = [-2.0, 0.0, -1.0, 3.0, 0.0, -1.0, 3.0, 2.0, -1.0, -2.0, 2.0, -1.0];
     let attributes = json!({ "POSITION": file.push_floats(&corners, 3) });
@@ -160,11 +148,8 @@ pub fn boxes() -> Glb {
     file.push_root(json!({ "name": "wall", "mesh": wall }));
     file.json["extensionsUsed"] = json!(["KHR_lights_punctual"]);
     file.json["extras"] = json!({ "note": "kept" });
-    with_lamp(
-        file,
-        json!({ "type": "point", "intensity": 683.0 }),
-        [0.4, 2.0, 1.5],
-    )
+    let lamp = json!({ "type": "point", "intensity": 683.0 });
+    with_lamp(file, lamp, [0.4, 2.0, 1.5])
 }
 
 /// The same with a second lamp of the first one's name.

@@ -1,20 +1,10 @@
-//! Linear light, its luminance and its display encoding.
+//! Linear light, its luminance and display encoding, and what RGB factors are at a wavelength.
 
-use nephroid::optics::LinearSrgb;
-use proptest::prelude::*;
+use nephroid::optics::ColourBasis;
+use nephroid::optics::spectrum::xyz::colour_under_d65;
 
-#[test]
-fn luminance_weights_sum_to_one() {
-    assert!((LinearSrgb::WHITE.luminance() - 1.0).abs() < 1e-15);
-    let [r, g, b] = [
-        LinearSrgb::new(1.0, 0.0, 0.0),
-        LinearSrgb::new(0.0, 1.0, 0.0),
-        LinearSrgb::new(0.0, 0.0, 1.0),
-    ]
-    .map(LinearSrgb::luminance);
-    // The rounded weights of IEC 61966-2-1.
-    assert!((r - 0.2126).abs() < 5e-5 && (g - 0.7152).abs() < 5e-5 && (b - 0.0722).abs() < 5e-5);
-}
+use super::primaries;
+use crate::prelude::*;
 
 /// Every 8-bit code survives the way to linear light and back.
 #[test]
@@ -24,20 +14,29 @@ fn srgb_codes_round_trip() {
         let linear = LinearSrgb::decode_channel(code);
         assert!(linear > previous, "code {code} is not above its predecessor");
         previous = linear;
-        let encoded = LinearSrgb::encode_channel(linear) * 255.0;
-        assert!(
-            (encoded - f64::from(code)).abs() < 1e-3,
-            "code {code} came back as {encoded}"
+        near(
+            LinearSrgb::encode_channel(linear) * 255.0,
+            f64::from(code),
+            1e-3,
+            code,
         );
     }
-    assert_eq!(LinearSrgb::decode_channel(0), 0.0);
-    assert_eq!(LinearSrgb::decode_channel(255), 1.0);
-}
-
-/// Middle grey: linear 0.214 041 is code 127.5, the textbook value of ((0.5 + 0.055)/1.055)^2.4.
-#[test]
-fn middle_grey() {
-    assert!((LinearSrgb::encode_channel(0.214_041_140_482_232_55) - 0.5).abs() < 1e-15);
+    assert_eq!([0, 255].map(LinearSrgb::decode_channel), [0.0, 1.0]);
+    // Middle grey: the textbook value of ((0.5 + 0.055)/1.055)^2.4.
+    near(
+        LinearSrgb::encode_channel(0.214_041_140_482_232_55),
+        0.5,
+        1e-15,
+        "middle grey",
+    );
+    // The rounded weights of IEC 61966-2-1.
+    near(
+        primaries().map(LinearSrgb::luminance),
+        [0.2126, 0.7152, 0.0722],
+        5e-5,
+        "weights",
+    );
+    near(LinearSrgb::WHITE.luminance(), 1.0, 1e-15, "white");
 }
 
 proptest! {
@@ -55,7 +54,66 @@ proptest! {
     #[test]
     fn luminance_is_linear(c in prop::array::uniform3(0.0..10.0f64), d in prop::array::uniform3(0.0..10.0f64), k in 0.0..10.0f64) {
         let (c, d) = (LinearSrgb::from(c), LinearSrgb::from(d));
-        prop_assert!(((c + d * k).luminance() - (c.luminance() + k * d.luminance())).abs() < 1e-12);
-        prop_assert!((LinearSrgb::grey(k).luminance() - k).abs() < 1e-13);
+        near((c + d * k).luminance(), c.luminance() + k * d.luminance(), 1e-12, "sum");
+        near(LinearSrgb::grey(k).luminance(), k, 1e-13, "grey");
     }
+}
+
+/// A channel may be off by so much: what the table's digits leave, with room.
+const TOLERANCE: f64 = 1e-9;
+
+fn at(nm: f64) -> ColourBasis {
+    ColourBasis::at(Nanometres(nm))
+}
+
+/// The visible by tenths of a nanometre.
+fn tenths() -> impl Iterator<Item = f64> {
+    (3600..=8300).map(|tenth| f64::from(tenth) / 10.0)
+}
+
+#[test]
+fn basis_adds_up_to_one() {
+    // Beyond the visible, too.
+    for nm in tenths().chain([0.0, 300.0, 359.9, 830.1, 1000.0]) {
+        let row = at(nm).row();
+        assert!(row.iter().all(|part| (0.0..=1.0).contains(part)), "{nm}: {row:?}");
+        near(row.iter().sum(), 1.0, 1e-12, nm);
+        // Each primary's tone is its part.
+        assert_eq!(primaries().map(|primary| at(nm).tone(primary).r), row, "{nm}");
+    }
+    // Dominant wavelengths of the primaries (IEC 61966-2-1 with CIE 1931).
+    for (channel, nm) in [(0, 611.0), (1, 549.0), (2, 464.0)] {
+        assert!(at(nm).row()[channel] > 0.9, "{nm}: {:?}", at(nm).row());
+    }
+    // No jump: from nothing to all takes tens of nanometres.
+    let parts: Vec<[f64; 3]> = tenths().map(|nm| at(nm).row()).collect();
+    for pair in parts.windows(2) {
+        near(pair[0], pair[1], 0.1 / 30.0, "within 0.1 nm");
+    }
+}
+
+#[test]
+fn factors_come_back_under_d65() {
+    let check = |factor: LinearSrgb| {
+        let back = colour_under_d65(|wavelength| ColourBasis::at(wavelength).tone(factor).r);
+        near(back, factor, TOLERANCE, "round trip");
+    };
+    primaries().into_iter().for_each(check);
+    proptest!(support::law(512), |(factor in prop::array::uniform3(0.0..=1.0))| check(factor.into()));
+}
+
+#[test]
+fn tones_are_linear_means() {
+    let colour = || prop::array::uniform3(0.0..=1.0).prop_map(LinearSrgb::from);
+    proptest!(support::law(4096), |(nm in 360.0..830.0, a in colour(), b in colour(), share in 0.0..=1.0)| {
+        let basis = at(nm);
+        let apart = basis.tone(a) * share + basis.tone(b) * (1.0 - share);
+        near(basis.tone(a * share + b * (1.0 - share)), apart, 1e-14, nm);
+        // Between its channels; grey stays grey.
+        let LinearSrgb { r: toned, g: same, b: again } = basis.tone(a);
+        let [least, most] = [a.r.min(a.g).min(a.b), a.max_channel()];
+        prop_assert!((least - 1e-12..=most + 1e-12).contains(&toned));
+        prop_assert!(toned == same && same == again);
+        prop_assert_eq!(basis.tone(LinearSrgb::grey(a.r)), LinearSrgb::grey(a.r));
+    });
 }

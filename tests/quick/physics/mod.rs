@@ -1,19 +1,27 @@
 //! The laws of optics, of lights and of units, tested as laws.
 
 mod colour;
-mod colour_basis;
 mod differentials;
 mod false_colours;
 mod fresnel;
 mod glass;
-mod interfaces;
 mod lights;
 mod metal_paths;
 mod metals;
-mod microfacets;
-mod polish;
 mod refraction;
 mod spectrum;
+mod surfaces;
 mod tone_maps;
 mod upsampling;
 mod waves;
+
+use crate::prelude::*;
+
+/// Every whole nanometre of the visible.
+fn visible() -> impl Iterator<Item = Nanometres> {
+    (360..=830).map(|nm| Nanometres(f64::from(nm)))
+}
+
+fn primaries() -> [LinearSrgb; 3] {
+    [rgb(1.0, 0.0, 0.0), rgb(0.0, 1.0, 0.0), rgb(0.0, 0.0, 1.0)]
+}

@@ -3,48 +3,43 @@
 use nephroid::optics::spectrum::illuminants::d65;
 use nephroid::optics::spectrum::xyz::colour_under_d65;
 use nephroid::optics::spectrum::{Emission, SmoothSpectrum, Xyz};
-use nephroid::optics::{LinearSrgb, Nanometres};
-use proptest::prelude::*;
+
+use super::visible;
+use crate::prelude::*;
 
 /// A channel may be off by so much; the work's own demand is 1e-3.
 const TOLERANCE: f64 = 1e-8;
 
-fn round_trip(colour: LinearSrgb) -> (SmoothSpectrum, f64) {
-    let smooth = SmoothSpectrum::from_colour(colour).expect("a colour");
-    let back = colour_under_d65(|wavelength| smooth.at(wavelength));
-    (smooth, (back - colour).map(f64::abs).max_channel())
+fn smooth(colour: LinearSrgb) -> SmoothSpectrum {
+    SmoothSpectrum::from_colour(colour).expect("a colour")
 }
 
-fn visible() -> impl Iterator<Item = Nanometres> {
-    (360..=830).map(|nm| Nanometres(f64::from(nm)))
+/// The spectrum, which has that colour under D65.
+fn round_trip(colour: LinearSrgb, tolerance: f64) -> SmoothSpectrum {
+    let smooth = smooth(colour);
+    near(
+        colour_under_d65(|wavelength| smooth.at(wavelength)),
+        colour,
+        tolerance,
+        "round trip",
+    );
+    smooth
 }
 
 #[test]
 fn every_colour_comes_back_under_d65() {
     let step = |i: u32| f64::from(i) / 8.0;
     for i in 0..9 * 9 * 9 {
-        let colour = LinearSrgb::new(step(i / 81), step(i / 9 % 9), step(i % 9));
-        let (_, error) = round_trip(colour);
-        assert!(error < TOLERANCE, "{colour:?}: {error}");
+        round_trip(rgb(step(i / 81), step(i / 9 % 9), step(i % 9)), TOLERANCE);
     }
-}
-
-#[test]
-fn colours_near_the_limits_come_back_too() {
-    let near = prop_oneof![
+    let limit = prop_oneof![
         3 => (-8.0..0.0f64).prop_map(|x| 10f64.powf(x)),
         3 => (-8.0..0.0f64).prop_map(|x| 1.0 - 10f64.powf(x)),
         1 => Just(0.0),
         1 => Just(1.0),
     ];
-    let cases = proptest::test_runner::Config {
-        cases: 512,
-        ..support::law(4096)
-    };
-    proptest!(cases, |(r in near.clone(), g in near.clone(), b in near)| {
-        let colour = LinearSrgb::new(r, g, b);
-        let (smooth, error) = round_trip(colour);
-        prop_assert!(error < TOLERANCE, "{:?}: {}", colour, error);
+    proptest!(support::law(512), |(colour in prop::array::uniform3(limit))| {
+        let smooth = round_trip(colour.into(), TOLERANCE);
         for wavelength in visible() {
             prop_assert!((0.0..=1.0).contains(&smooth.at(wavelength)));
         }
@@ -54,15 +49,13 @@ fn colours_near_the_limits_come_back_too() {
 #[test]
 fn white_black_and_grey_are_flat() {
     for grey in [0.0, 1e-9, 0.2, 0.5, 0.999, 1.0] {
-        let smooth = SmoothSpectrum::from_colour(LinearSrgb::grey(grey)).expect("a colour");
+        let smooth = smooth(LinearSrgb::grey(grey));
         for wavelength in visible() {
-            let found = smooth.at(wavelength);
-            assert!((found - grey).abs() < 1e-15, "{grey} at {wavelength:?}: {found}");
+            near(smooth.at(wavelength), grey, 1e-15, wavelength);
         }
     }
-    let [black, white] = [LinearSrgb::BLACK, LinearSrgb::WHITE].map(SmoothSpectrum::from_colour);
-    assert_eq!(black.expect("a colour").at(Nanometres(555.0)), 0.0);
-    assert_eq!(white.expect("a colour").at(Nanometres(555.0)), 1.0);
+    let ends = [LinearSrgb::BLACK, LinearSrgb::WHITE].map(|end| smooth(end).at(Nanometres(555.0)));
+    assert_eq!(ends, [0.0, 1.0]);
 }
 
 #[test]
@@ -70,8 +63,8 @@ fn smooth_means_smooth() {
     // At most one rise and one fall, and no step: from a tenth to nine tenths takes tens of nanometres.
     let step = |i: u32| f64::from(i) / 4.0;
     for i in 0..5 * 5 * 5 {
-        let colour = LinearSrgb::new(step(i / 25), step(i / 5 % 5), step(i % 5));
-        let (smooth, _) = round_trip(colour);
+        let colour = rgb(step(i / 25), step(i / 5 % 5), step(i % 5));
+        let smooth = smooth(colour);
         let values: Vec<f64> = visible().map(|wavelength| smooth.at(wavelength)).collect();
         let steps: Vec<f64> = values.windows(2).map(|pair| pair[1] - pair[0]).collect();
         let turns = steps.windows(2).filter(|pair| pair[0] * pair[1] < 0.0).count();
@@ -83,67 +76,51 @@ fn smooth_means_smooth() {
 
 #[test]
 fn factors_above_one_are_scaled() {
-    let colour = LinearSrgb::new(3.0, 1.5, 0.3);
-    let (smooth, error) = round_trip(colour);
-    assert!(error < 3.0 * TOLERANCE, "{error}");
-    assert_eq!(smooth.scale, 3.0);
+    assert_eq!(round_trip(rgb(3.0, 1.5, 0.3), 3.0 * TOLERANCE).scale, 3.0);
     // Half as bright is the same shape, where both are dark enough for any shape.
-    let [full, half] = [0.4, 0.2].map(|most| {
-        let colour = LinearSrgb::new(most, 0.5 * most, 0.1 * most);
-        SmoothSpectrum::from_colour(colour).expect("a colour")
-    });
+    let [full, half] = [0.4, 0.2].map(|most| smooth(rgb(most, 0.5 * most, 0.1 * most)));
     for wavelength in visible() {
-        assert!((full.at(wavelength) - 2.0 * half.at(wavelength)).abs() < 1e-9);
+        near(full.at(wavelength), 2.0 * half.at(wavelength), 1e-9, wavelength);
     }
 }
 
 #[test]
 fn lamps_keep_their_xyz() {
+    let emission = |colour| Emission::from_colour(colour).expect("a colour").light;
     for colour in [
         LinearSrgb::WHITE,
         LinearSrgb::grey(1e6),
-        LinearSrgb::new(1.0, 0.0, 0.0),
-        LinearSrgb::new(0.0, 1e-6, 0.0),
-        LinearSrgb::new(0.0, 0.0, 40.0),
-        LinearSrgb::new(1.0, 0.7, 0.4),
-        LinearSrgb::new(0.2, 0.0, 1.0),
-        LinearSrgb::new(0.0, 1.0, 1.0),
+        rgb(1.0, 0.0, 0.0),
+        rgb(0.0, 1e-6, 0.0),
+        rgb(0.0, 0.0, 40.0),
+        rgb(1.0, 0.7, 0.4),
+        rgb(0.2, 0.0, 1.0),
+        rgb(0.0, 1.0, 1.0),
     ] {
-        let light = Emission::from_colour(colour).expect("a colour").light;
-        let wanted = Xyz::from(colour);
-        let most = wanted.x.max(wanted.y).max(wanted.z);
-        for (found, wanted) in <[f64; 3]>::from(light.xyz())
-            .into_iter()
-            .zip(<[f64; 3]>::from(wanted))
-        {
-            assert!(
-                (found - wanted).abs() < 1e-9 * most,
-                "{colour:?}: {found} for {wanted}"
-            );
-        }
+        let [found, wanted] = [emission(colour).xyz(), Xyz::from(colour)].map(<[f64; 3]>::from);
+        near(
+            found,
+            wanted,
+            1e-9 * LinearSrgb::from(wanted).max_channel(),
+            colour,
+        );
     }
-    let dark = Emission::from_colour(LinearSrgb::BLACK).expect("a colour");
-    assert_eq!(dark.light.xyz(), Xyz::default());
+    assert_eq!(emission(LinearSrgb::BLACK).xyz(), Xyz::default());
     // White light is D65, but for a smooth factor near to 1.
-    let white = Emission::from_colour(LinearSrgb::WHITE).expect("a colour");
+    let white = emission(LinearSrgb::WHITE);
     for nm in (400..=700).map(|nm| Nanometres(f64::from(nm))) {
-        assert!((white.light.at(nm) / d65().at(nm) - 1.0).abs() < 2e-3, "{nm:?}");
+        near(white.at(nm) / d65().at(nm), 1.0, 2e-3, nm);
     }
 }
 
 #[test]
 fn impossible_colours_are_refused() {
     for (wrong, fault) in [
-        (LinearSrgb::new(-1e-9, 0.5, 0.5), "negative"),
-        (LinearSrgb::new(0.5, f64::NAN, 0.5), "finite"),
-        (LinearSrgb::new(0.5, 0.5, f64::INFINITY), "finite"),
+        (rgb(-1e-9, 0.5, 0.5), "negative"),
+        (rgb(0.5, f64::NAN, 0.5), "finite"),
+        (rgb(0.5, 0.5, f64::INFINITY), "finite"),
     ] {
-        for error in [
-            SmoothSpectrum::from_colour(wrong).err(),
-            Emission::from_colour(wrong).err(),
-        ] {
-            let error = error.expect("refused").to_string();
-            assert!(error.contains(fault), "{error}");
-        }
+        says(SmoothSpectrum::from_colour(wrong).expect_err("impossible"), fault);
+        says(Emission::from_colour(wrong).err().expect("impossible"), fault);
     }
 }

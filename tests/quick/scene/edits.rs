@@ -1,69 +1,45 @@
 //! Edits and their inverses.
 
-use std::sync::Arc;
-
-use glam::{DQuat, DVec3};
 use nephroid::error::ErrorKind;
-use nephroid::optics::LinearSrgb;
-use nephroid::scene::builtin::{parts, shapes};
-use nephroid::scene::texture::Wrap;
-use nephroid::scene::{
-    Edit, EditTarget, Light, LightKind, LightSize, PanelShape, Scene, SurfaceKind, Texture, Wave, Waves,
-};
+use nephroid::scene::{EditTarget, PanelShape};
 use nephroid::units::{Flux, Irradiance, Radiance, RadiantIntensity};
+
+use crate::prelude::*;
+use support::floors::four_colours;
 
 /// A scene with a floor (object 0), a glass ball (object 1), an image, a lamp (light 0), a sun (1), a spot (2), a panel (3),
 /// the floor as a lamp (4) and an environment (5).
 fn scene() -> Scene {
     let mut scene = parts::reference_scene(0.6);
-    let ball = shapes::sphere(DVec3::new(0.0, 0.8, 0.0), 0.5, 2);
+    let ball = shapes::sphere(dvec3(0.0, 0.8, 0.0), 0.5, 2);
     parts::add(&mut scene, "ball", ball, parts::dielectric("glass", 1.5));
-    scene
-        .lights
-        .push(parts::point_light("light", DVec3::Y * 3.0, Flux(100.0)));
-    scene
-        .lights
-        .push(parts::sun("sun", DVec3::new(1.0, -3.0, 0.2), Irradiance(2.0)));
-    let mut spot = scene.lights[0].clone();
-    spot.name = "spot".into();
-    spot.kind = LightKind::Spot {
-        position: DVec3::new(0.1, 2.0, 0.3),
-        direction: DVec3::new(0.3, -0.9, 0.1).normalize(),
+    let lamp = parts::point_light("light", DVec3::Y * 3.0, Flux(100.0));
+    let sun = parts::sun("sun", dvec3(1.0, -3.0, 0.2), Irradiance(2.0));
+    let other = |name: &str, kind| Light {
+        name: name.into(),
+        kind,
+        ..support::scenes::point_light(DVec3::ZERO, 1.0)
+    };
+    let spot = LightKind::Spot {
+        position: dvec3(0.1, 2.0, 0.3),
+        direction: dvec3(0.3, -0.9, 0.1).normalize(),
         intensity: RadiantIntensity(3.0),
         inner_cone_rad: 0.1,
         outer_cone_rad: 0.4,
     };
-    scene.lights.push(spot);
-    let kinds = [
-        LightKind::Panel {
-            centre: DVec3::Y * 2.0,
-            across: DVec3::X,
-            down: DVec3::Z,
-            shape: PanelShape::Disc,
-            radiance: Radiance(3.0),
-        },
-        LightKind::Surface {
-            object: 0,
-            radiance: Radiance(1.0),
-        },
-        LightKind::Environment { scale: 1.0 },
-    ];
-    for kind in kinds {
-        scene.lights.push(Light {
-            name: "large".into(),
-            colour: LinearSrgb::WHITE,
-            spectrum: None,
-            kind,
-            size: LightSize::None,
-        });
-    }
-    scene.textures.push(Arc::new(Texture {
-        name: "white".into(),
-        width: 1,
-        height: 1,
-        rgba: vec![[255; 4]],
-        wrap: [Wrap::Repeat; 2],
-    }));
+    let panel = LightKind::Panel {
+        centre: DVec3::Y * 2.0,
+        across: DVec3::X,
+        down: DVec3::Z,
+        shape: PanelShape::Disc,
+        radiance: Radiance(3.0),
+    };
+    let radiance = Radiance(1.0);
+    let glow = other("large", LightKind::Surface { object: 0, radiance });
+    let sky = other("large", LightKind::Environment { scale: 1.0 });
+    let (spot, panel) = (other("spot", spot), other("large", panel));
+    scene.lights.extend([lamp, sun, spot, panel, glow, sky]);
+    scene.textures.push(Arc::new(four_colours()));
     scene
 }
 
@@ -113,7 +89,7 @@ fn direction(light: usize, direction: DVec3) -> Edit {
 }
 
 fn colour(r: f64) -> Edit {
-    let colour = LinearSrgb::new(r, 0.5 * r, 0.0);
+    let colour = rgb(r, 0.5 * r, 0.0);
     Edit::LightColour { light: 0, colour }
 }
 
@@ -122,7 +98,7 @@ fn ior(material: usize, ior: f64) -> Edit {
 }
 
 fn tint(material: usize, r: f64) -> Edit {
-    let base_colour = LinearSrgb::new(r, 0.2, 0.3);
+    let base_colour = rgb(r, 0.2, 0.3);
     Edit::MaterialTint {
         material,
         base_colour,
@@ -151,13 +127,13 @@ fn edits() -> Vec<Edit> {
         intensity(0, 0.3),
         intensity(2, 1e9),
         sun(1, 0.7),
-        position(0, DVec3::new(0.1, 2.7, -0.3)),
+        position(0, dvec3(0.1, 2.7, -0.3)),
         position(2, DVec3::ZERO),
-        direction(1, DVec3::new(0.0, -7.0, 1.0)),
+        direction(1, dvec3(0.0, -7.0, 1.0)),
         direction(2, DVec3::NEG_Y),
         colour(1.0),
         sphere(0, 0.1),
-        disc(1, std::f64::consts::PI),
+        disc(1, PI),
         sphere(2, 1.0 / 3.0),
         brightness(3, 0.7),
         position(3, DVec3::Y),
@@ -168,7 +144,7 @@ fn edits() -> Vec<Edit> {
         roughness(1, 0.9),
         roughness(0, 0.1),
         waves,
-        moved(1, DQuat::IDENTITY, DVec3::new(0.1, 0.0, 1.0 / 3.0)),
+        moved(1, DQuat::IDENTITY, dvec3(0.1, 0.0, 1.0 / 3.0)),
         moved(1, DQuat::from_rotation_x(0.3), DVec3::X),
         Edit::Several(vec![ior(1, 1.3), ior(1, 2.3), lifted]),
     ]
@@ -180,86 +156,75 @@ fn image(scene: &Scene) -> String {
 }
 
 #[test]
-fn edits_undo_bit_for_bit() {
-    let scene = scene();
-    for edit in edits() {
-        let (edited, inverse) = edit.apply(&scene).expect("it is in range");
-        assert_ne!(image(&edited), image(&scene), "{edit:?} changes something");
-        let (restored, again) = inverse.apply(&edited).expect("what was, is in range");
-        assert!(image(&restored) == image(&scene), "{inverse:?}");
-        let (repeated, _) = again.apply(&restored).expect("it is in range");
-        assert!(image(&repeated) == image(&edited), "{again:?}");
-    }
-}
-
-#[test]
-fn edits_share_what_they_leave() {
+fn edits_undo_bit_for_bit_and_share_what_they_leave() {
     let scene = scene();
     let before = image(&scene);
+    let mesh = |scene: &Scene, object: usize| Arc::clone(&scene.objects[object].mesh);
     for edit in edits() {
-        let moves = matches!(&edit, Edit::ObjectMoved { .. } | Edit::Several(_));
         let (edited, inverse) = edit.apply(&scene).expect("it is in range");
         assert!(image(&scene) == before);
+        assert_ne!(image(&edited), before, "{edit:?} changes something");
+        let (restored, again) = inverse.apply(&edited).expect("what was, is in range");
+        assert!(image(&restored) == before, "{inverse:?}");
+        let (repeated, _) = again.apply(&restored).expect("it is in range");
+        assert!(image(&repeated) == image(&edited), "{again:?}");
+
         assert!(Arc::ptr_eq(&edited.textures[0], &scene.textures[0]));
-        assert!(Arc::ptr_eq(&edited.objects[0].mesh, &scene.objects[0].mesh));
+        assert!(Arc::ptr_eq(&mesh(&edited, 0), &mesh(&scene, 0)));
+        let moves = matches!(&edit, Edit::ObjectMoved { .. } | Edit::Several(_));
         assert_eq!(
-            Arc::ptr_eq(&edited.objects[1].mesh, &scene.objects[1].mesh),
+            Arc::ptr_eq(&mesh(&edited, 1), &mesh(&scene, 1)),
             !moves,
             "{edit:?}"
         );
-        let (restored, _) = inverse.apply(&edited).expect("what was, is in range");
-        assert!(
-            Arc::ptr_eq(&restored.objects[1].mesh, &scene.objects[1].mesh),
-            "a movement that is taken back gives the old mesh itself"
-        );
+        // A movement that is taken back gives the old mesh itself.
+        assert!(Arc::ptr_eq(&mesh(&restored, 1), &mesh(&scene, 1)));
     }
 }
 
 #[test]
 fn roughness_changes_the_class() {
     let scene = scene();
-    let class = |scene: &Scene, material: usize, roughness: f64| {
-        let edit = Edit::MaterialRoughness { material, roughness };
-        let (edited, _) = edit.apply(scene).expect("it is in range");
-        edited.materials[material].surface
+    let pane = Material {
+        surface: SurfaceKind::ThinWall,
+        volume: None,
+        ..parts::dielectric("pane", 1.5)
     };
-    assert_eq!(class(&scene, 1, 0.3), SurfaceKind::Dielectric);
-    assert_eq!(class(&scene, 1, 0.6), SurfaceKind::Dielectric);
-    assert_eq!(class(&scene, 1, 0.61), SurfaceKind::Diffuse);
-    assert_eq!(class(&scene, 0, 0.3), SurfaceKind::Mixed);
-    let mut others = scene.clone();
-    others.materials[0] = parts::mirror();
-    assert_eq!(class(&others, 0, 0.2), SurfaceKind::Mirror);
-    assert_eq!(class(&others, 0, 0.5), SurfaceKind::Mirror);
-    assert_eq!(class(&others, 0, 0.7), SurfaceKind::Diffuse);
-    others.materials[0] = parts::dielectric("pane", 1.5);
-    others.materials[0].volume = None;
-    others.materials[0].surface = SurfaceKind::ThinWall;
-    assert_eq!(class(&others, 0, 0.2), SurfaceKind::ThinWall);
     // Unlit: smooth by its factors, matte because the file says so.
-    others.materials[0] = parts::mirror();
-    others.materials[0].surface = SurfaceKind::Diffuse;
-    assert_eq!(class(&others, 0, 0.1), SurfaceKind::Diffuse);
+    let unlit = Material {
+        surface: SurfaceKind::Diffuse,
+        ..parts::mirror()
+    };
+    let [floor, glass] = [0, 1].map(|material| scene.materials[material].clone());
+    for (material, to, expected) in [
+        (&glass, 0.3, SurfaceKind::Dielectric),
+        (&glass, 0.6, SurfaceKind::Dielectric),
+        (&glass, 0.61, SurfaceKind::Diffuse),
+        (&floor, 0.3, SurfaceKind::Mixed),
+        (&parts::mirror(), 0.2, SurfaceKind::Mirror),
+        (&parts::mirror(), 0.5, SurfaceKind::Mirror),
+        (&parts::mirror(), 0.7, SurfaceKind::Diffuse),
+        (&pane, 0.2, SurfaceKind::ThinWall),
+        (&unlit, 0.1, SurfaceKind::Diffuse),
+    ] {
+        let mut scene = scene.clone();
+        scene.materials[0] = material.clone();
+        let (edited, _) = roughness(0, to).apply(&scene).expect("it is in range");
+        assert_eq!(edited.materials[0].surface, expected, "{} at {to}", material.name);
+    }
 }
 
 #[test]
 fn objects_turn_about_their_middle() {
-    let scene = scene();
-    let edit = Edit::ObjectMoved {
-        object: 0,
-        // Of any length: made unit.
-        rotation: DQuat::from_rotation_z(std::f64::consts::FRAC_PI_2) * 3.0,
-        translation: DVec3::new(0.0, 0.25, 0.0),
-    };
-    let (edited, _) = edit.apply(&scene).expect("it is in range");
+    // Of any length: made unit.
+    let turn = DQuat::from_rotation_z(std::f64::consts::FRAC_PI_2) * 3.0;
+    let edit = moved(0, turn, dvec3(0.0, 0.25, 0.0));
+    let (edited, _) = edit.apply(&scene()).expect("it is in range");
     let (low, high) = edited.objects[0].mesh.bounds().expect("a floor");
-    let expected = (DVec3::new(0.0, -0.35, -0.6), DVec3::new(0.0, 0.85, 0.6));
-    assert!(
-        low.distance(expected.0) < 1e-12 && high.distance(expected.1) < 1e-12,
-        "{low} {high}"
-    );
+    near(low, dvec3(0.0, -0.35, -0.6), 1e-12, "low");
+    near(high, dvec3(0.0, 0.85, 0.6), 1e-12, "high");
     for normal in &edited.objects[0].mesh.normals {
-        assert!(normal.distance(DVec3::NEG_X) < 1e-12, "{normal}");
+        near(*normal, DVec3::NEG_X, 1e-12, "normal");
     }
 }
 
@@ -292,7 +257,8 @@ fn edits_out_of_range_are_refused() {
         light: 3,
         size: LightSize::None,
     };
-    let refused = [
+    let several = Edit::Several(vec![ior(1, 1.2), ior(1, 0.0)]);
+    for (edit, part) in [
         (intensity(6, 1.0), "light 6"),
         (intensity(3, 1.0), "light `large`"),
         (brightness(0, 1.0), "set its intensity"),
@@ -332,16 +298,11 @@ fn edits_out_of_range_are_refused() {
         (turned(0.0, 0.0), "rotation"),
         (turned(nan, 1.0), "rotation"),
         (broken, "object `floor`"),
-        (
-            Edit::Several(vec![ior(1, 1.2), ior(1, 0.0)]),
-            "refractive index of 0",
-        ),
+        (several, "refractive index of 0"),
         (ior(9, 1.5), "material 9"),
-    ];
-    for (edit, part) in refused {
+    ] {
         let error = edit.apply(&scene).expect_err("it is out of range");
         assert_eq!(error.kind, ErrorKind::Usage);
-        let sentence = error.to_string();
-        assert!(sentence.contains(part) && !sentence.contains('\n'), "{sentence}");
+        says(error, part);
     }
 }

@@ -1,14 +1,10 @@
 //! The references: whole, and of the scenes that are built in.
 
-use glam::DVec3;
-use nephroid::optics::Nanometres;
-use nephroid::scene::builtin::build;
-use nephroid::scene::{LightKind, LoadOptions, Mesh, Scene};
-
+use crate::prelude::*;
 use support::glb::load_path;
-use support::{assert_close, project_file, shared_or_skip};
+use support::{project_file, reference_map, shared_or_skip};
 
-/// The maps' headers and means are those that `assets/SOURCES.md` states.
+/// The maps' headers and means are those that `assets/SOURCES.md` states, to six decimals.
 #[test]
 fn references_are_whole() {
     for (file, mean) in [
@@ -20,23 +16,9 @@ fn references_are_whole() {
         ("S7", 0.502_656),
         ("S8", 0.241_662),
     ] {
-        let path = project_file(&format!("assets/reference/{file}.pfm"));
-        let bytes = std::fs::read(path).expect("reference can be read");
-        let texels = bytes
-            .strip_prefix(b"Pf\n256 256\n-1.0\n")
-            .expect("header of a 256 × 256 map");
-        let values = texels
-            .as_chunks::<4>()
-            .0
-            .iter()
-            .map(|bytes| f64::from(f32::from_le_bytes(*bytes)));
+        let values = reference_map(file);
         assert_eq!(values.len(), 256 * 256);
-        let found = values.sum::<f64>() / 65_536.0;
-        // Stated to six decimals.
-        assert!(
-            (found - mean).abs() < 5.1e-7,
-            "{file}: mean {found} instead of {mean}"
-        );
+        near(values.iter().sum::<f64>() / 65_536.0, mean, 5.1e-7, file);
     }
     project_file("assets/reference/S2_profile.csv");
 }
@@ -58,8 +40,8 @@ fn prism_is_that_of_its_file() {
         return;
     };
     let scene = load_path(&path, &LoadOptions::default()).unwrap_or_else(|error| panic!("{error}"));
-    let ours = build("prism").expect("is built in");
-    assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
+    let ours = built_in("prism");
+    warns_not(&scene);
     let sun = |scene: &Scene| match scene.lights[0].kind {
         LightKind::Sun {
             direction,
@@ -68,36 +50,26 @@ fn prism_is_that_of_its_file() {
         kind => panic!("{kind:?}"),
     };
     // The file states 32-bit numbers.
-    assert!(sun(&scene).0.distance(sun(&ours).0) < 1e-6);
+    near(sun(&scene).0, sun(&ours).0, 1e-6, "direction");
     assert_close(sun(&scene).1, sun(&ours).1, 1e-6, "irradiance");
     assert_eq!(scene.objects.len(), ours.objects.len());
     for (index, (theirs, own)) in scene.objects.iter().zip(&ours.objects).enumerate() {
         assert_eq!(corners(&theirs.mesh), corners(&own.mesh), "{}", own.name);
         assert_close(theirs.mesh.area_m2(), own.mesh.area_m2(), 1e-4, &own.name);
         let (theirs, own) = (scene.material_of(index), ours.material_of(index));
-        assert_eq!(
-            (theirs.surface, theirs.base_colour),
-            (own.surface, own.base_colour)
-        );
+        assert_eq!(theirs.surface, own.surface);
+        assert_eq!(theirs.base_colour, own.base_colour);
         for nm in [400.0, 486.13, 587.56, 656.27, 700.0] {
             let [a, b] = [theirs, own].map(|material| material.index_at(Nanometres(nm)));
             assert_close(a, b, 1e-12, "refractive index");
         }
     }
-    let uvs = |scene: &Scene| {
-        scene.objects[0]
-            .mesh
-            .uv0
-            .clone()
-            .expect("the wall has TEXCOORD_0")
-    };
-    assert_eq!(scene.objects[0].mesh.positions.len(), 4);
-    for (position, uv) in scene.objects[0].mesh.positions.iter().zip(uvs(&scene)) {
-        let own = &ours.objects[0].mesh;
-        let near = own
-            .positions
-            .iter()
-            .position(|own| own.distance(*position) < 1e-6);
-        assert_eq!(uvs(&ours)[near.expect("the same corner")], uv);
+    let [wall, own] = [&scene, &ours].map(|scene| &scene.objects[0].mesh);
+    let [uvs, own_uvs] = [wall, own].map(|mesh| mesh.uv0.as_ref().expect("it has TEXCOORD_0"));
+    assert_eq!(wall.positions.len(), 4);
+    for (position, uv) in wall.positions.iter().zip(uvs) {
+        let mut corners = own.positions.iter();
+        let same = corners.position(|own| own.distance(*position) < 1e-6);
+        assert_eq!(own_uvs[same.expect("the same corner")], *uv);
     }
 }

@@ -1,23 +1,19 @@
 //! Glass, metals and spectra of lamps, as files state them.
 
-use std::path::Path;
-use std::sync::Arc;
-
-use glam::DVec3;
 use nephroid::effect::{Effect, EffectSwitch, EffectSwitches};
+use nephroid::error::Result;
+use nephroid::optics::Metal;
 use nephroid::optics::glass::{Dispersion, catalogue};
 use nephroid::optics::spectrum::{Spectrum, illuminant};
 use nephroid::optics::wavelength::{C_LINE, D_LINE, F_LINE};
-use nephroid::optics::{LinearSrgb, Metal, Nanometres};
 use nephroid::plan::EffectLine;
-use nephroid::scene::builtin::{self, parts, shapes};
-use nephroid::scene::{Edit, Light, LightKind, LoadOptions, Material, Scene, SurfaceKind};
 use nephroid::session::BakeSession;
-use nephroid::settings::BakeSettings;
-use serde_json::{Value, json};
 
-use support::glb::{Glb, assert_warned, load_path};
-use support::{assert_close, shared_or_skip};
+use crate::prelude::*;
+use support::glb::load_path;
+use support::shared_or_skip;
+
+const SMOOTH: &str = r#"{"metallicFactor": 0, "roughnessFactor": 0}"#;
 
 /// A solid of clear glass, with more extensions and extras.
 fn solid(extensions: Value, extras: Value) -> Glb {
@@ -25,138 +21,123 @@ fn solid(extensions: Value, extras: Value) -> Glb {
         "KHR_materials_transmission": { "transmissionFactor": 1.0 },
         "KHR_materials_volume": { "thicknessFactor": 0.1 },
     });
-    for (name, extension) in extensions.as_object().expect("extensions are an object") {
+    for (name, extension) in extensions.as_object().into_iter().flatten() {
         all[name] = extension.clone();
     }
-    let factors = json!({ "metallicFactor": 0.0, "roughnessFactor": 0.0 });
     Glb::tetrahedron().with_material(json!({
-        "name": "glass", "pbrMetallicRoughness": factors, "extensions": all, "extras": extras,
+        "name": "glass", "pbrMetallicRoughness": parsed(SMOOTH), "extensions": all, "extras": extras,
     }))
+}
+
+fn dispersion(stated: impl Into<Value>) -> Value {
+    json!({ "KHR_materials_dispersion": { "dispersion": stated.into() } })
 }
 
 fn material(scene: &Scene) -> &Material {
     scene.material_of(0)
 }
 
+/// Abbe number of a material's indices.
+fn v_d(glass: &Material) -> f64 {
+    (glass.ior - 1.0) / (glass.index_at(F_LINE) - glass.index_at(C_LINE))
+}
+
 #[test]
 fn dispersion_is_20_by_the_abbe_number() {
-    let extensions = json!({
-        "KHR_materials_ior": { "ior": 1.635 },
-        "KHR_materials_dispersion": { "dispersion": 20.0 / 57.7 },
-    });
+    let mut extensions = dispersion(20.0 / 57.7);
+    extensions["KHR_materials_ior"] = json!({ "ior": 1.635 });
     let scene = solid(extensions, Value::Null).scene();
     let glass = material(&scene);
-    assert!(glass.is_dispersive() && scene.warnings.is_empty());
-    assert_eq!(glass.ior, 1.635);
+    assert!(glass.is_dispersive() && glass.ior == 1.635);
+    warns_not(&scene);
     assert_close(glass.index_at(D_LINE), 1.635, 1e-12, "index at the d line");
-    let spread = glass.index_at(F_LINE) - glass.index_at(C_LINE);
-    assert_close(0.635 / spread, 57.7, 1e-9, "Abbe number");
-}
-
-#[test]
-fn without_dispersion_the_index_is_the_same_everywhere() {
-    for stated in [json!({}), json!({ "dispersion": 0.0 })] {
-        let scene = solid(json!({ "KHR_materials_dispersion": stated }), Value::Null).scene();
+    assert_close(v_d(glass), 57.7, 1e-9, "Abbe number");
+    for stated in [json!({ "KHR_materials_dispersion": {} }), dispersion(0.0)] {
+        let scene = solid(stated, Value::Null).scene();
         assert!(!material(&scene).is_dispersive() && material(&scene).glass.is_none());
         assert_eq!(material(&scene).index_at(Nanometres(400.0)), 1.5);
-        assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
+        warns_not(&scene);
     }
-    // However little is some.
-    let little = json!({ "KHR_materials_dispersion": { "dispersion": 1e-6 } });
-    assert!(material(&solid(little, Value::Null).scene()).is_dispersive());
-}
-
-#[test]
-fn a_dispersion_that_cannot_be_is_named_and_left_out() {
+    let little = solid(dispersion(1e-6), Value::Null).scene();
+    assert!(material(&little).is_dispersive(), "however little is some");
     for stated in [json!(-0.1), json!("much"), json!([1.0])] {
-        let extension = json!({ "KHR_materials_dispersion": { "dispersion": stated } });
-        let scene = solid(extension, Value::Null).scene();
-        assert_warned(
+        let scene = solid(dispersion(stated), Value::Null).scene();
+        warns(
             &scene,
-            &[
-                "material `glass`",
-                "dispersion cannot be",
-                "read as 0",
-                "Abbe number",
-            ],
+            "material `glass` | dispersion cannot be | read as 0 | Abbe number",
         );
         assert!(!material(&scene).is_dispersive());
     }
 }
 
 #[test]
-fn dispersion_needs_a_solid_that_lets_light_through() {
-    let extension = json!({ "KHR_materials_dispersion": { "dispersion": 1.0 } });
-    let factors = json!({ "metallicFactor": 0.0, "roughnessFactor": 0.0 });
-    let polished = Glb::tetrahedron().with_material(
-        json!({ "name": "lacquer", "pbrMetallicRoughness": factors, "extensions": extension }),
-    );
-    let scene = polished.scene();
-    assert_eq!(material(&scene).surface, SurfaceKind::Mixed);
-    assert!(!material(&scene).is_dispersive());
-    assert_warned(&scene, &["material `lacquer`", "lets no light through"]);
-
-    let mut pane = extension;
+fn dispersion_needs_a_clear_solid() {
+    let of = |extensions: Value| {
+        let json =
+            json!({ "name": "lacquer", "pbrMetallicRoughness": parsed(SMOOTH), "extensions": extensions });
+        Glb::tetrahedron().with_material(json)
+    };
+    let polished = of(dispersion(1.0)).scene();
+    assert_eq!(material(&polished).surface, SurfaceKind::Mixed);
+    assert!(!material(&polished).is_dispersive());
+    warns(&polished, "material `lacquer` | lets no light through");
+    let mut pane = dispersion(1.0);
     pane["KHR_materials_transmission"] = json!({ "transmissionFactor": 1.0 });
-    let pane =
-        Glb::tetrahedron().with_material(json!({ "pbrMetallicRoughness": factors, "extensions": pane }));
+    let pane = of(pane);
     assert!(
         !material(&pane.scene()).is_dispersive(),
         "a pane does not refract"
     );
-    let options = LoadOptions {
-        solid_glass: true,
-        ..LoadOptions::default()
-    };
-    let filled = pane.load_with(&options).expect("a sound file");
-    assert!(material(&filled).is_dispersive(), "the same as a solid");
+    let filled = pane.load_with(&options(|options| options.solid_glass = true));
+    assert!(
+        material(&filled.expect("a sound file")).is_dispersive(),
+        "the same as a solid"
+    );
 }
 
 #[test]
-fn a_glass_in_extras_takes_the_place_of_index_and_dispersion() {
-    let extensions = || {
-        json!({
-            "KHR_materials_ior": { "ior": 2.0 },
-            "KHR_materials_dispersion": { "dispersion": 5.0 },
-        })
-    };
-    for (name, n_d, v_d) in [
+fn glass_in_extras_replaces_index_and_dispersion() {
+    let mut extensions = dispersion(5.0);
+    extensions["KHR_materials_ior"] = json!({ "ior": 2.0 });
+    for (name, n_d, abbe) in [
         // SCHOTT's data sheet of N-BK7; the number says it to three digits; Cauchy's constants by hand.
         ("N-BK7", 1.51680, 64.17),
         ("523588", 1.523, 58.8),
         ("abbe:1.6,40", 1.6, 40.0),
         ("cauchy:1.5,0.004", 1.5 + 0.004 / (0.58756 * 0.58756), f64::NAN),
     ] {
-        let scene = solid(extensions(), json!({ "glass": name })).scene();
+        let scene = solid(extensions.clone(), json!({ "glass": name })).scene();
         let glass = material(&scene);
         assert_close(glass.ior, n_d, 4e-6, name);
         assert_eq!(glass.ior, glass.index_at(D_LINE), "{name}");
-        assert!(glass.is_dispersive() && scene.warnings.is_empty(), "{name}");
-        if v_d.is_finite() {
-            let spread = glass.index_at(F_LINE) - glass.index_at(C_LINE);
-            assert_close((glass.ior - 1.0) / spread, v_d, 2e-4, name);
+        assert!(glass.is_dispersive(), "{name}");
+        warns_not(&scene);
+        if abbe.is_finite() {
+            assert_close(v_d(glass), abbe, 2e-4, name);
         }
+    }
+    for glass in catalogue::all() {
+        let scene = solid(json!({}), json!({ "glass": glass.name })).scene();
+        assert_close(material(&scene).ior, glass.dispersion.n_d(), 1e-15, &glass.name);
+        assert_eq!(material(&scene).base_colour, LinearSrgb::WHITE);
     }
 }
 
 #[test]
-fn a_glass_beyond_its_range_is_named_as_far_as_the_lamps_go() {
+fn glass_beyond_its_range_is_named_as_far_as_lamps_go() {
     let glass = || solid(json!({}), json!({ "glass": "N-SF11" }));
     let white = glass().with_light("lamp", json!({ "type": "point" })).scene();
-    assert_warned(&white, &["material `glass`", "N-SF11", "370", "360"]);
+    warns(&white, "material `glass` | N-SF11 | 370 | 360");
     let sodium = json!({ "type": "point", "extras": { "spectrum": "line:589" } });
-    let yellow = glass().with_light("lamp", sodium).scene();
-    assert!(yellow.warnings.is_empty(), "{:?}", yellow.warnings);
+    warns_not(&glass().with_light("lamp", sodium).scene());
 }
 
 #[test]
-fn a_metal_in_extras_is_a_mirror_of_its_colour() {
+fn metal_in_extras_is_a_mirror_of_its_colour() {
     let metal = |name: &str| {
         let factors = json!({ "metallicFactor": 0.0, "roughnessFactor": 0.1 });
-        let extras = json!({ "metal": name });
-        let file =
-            Glb::triangle().with_material(json!({ "pbrMetallicRoughness": factors, "extras": extras }));
-        file.scene()
+        let json = json!({ "pbrMetallicRoughness": factors, "extras": { "metal": name } });
+        Glb::triangle().with_material(json).scene()
     };
     for name in ["gold", "silver", "copper", "aluminium"] {
         let scene = metal(name);
@@ -170,37 +151,30 @@ fn a_metal_in_extras_is_a_mirror_of_its_colour() {
             assert_close(channel, of_table / dimmed, 1e-12, name);
         }
     }
-    assert_warned(
-        &metal("gold"),
-        &["Gold lies outside of sRGB", "multiplied by 0.9"],
-    );
-    assert!(metal("silver").warnings.is_empty());
+    warns(&metal("gold"), "Gold lies outside of sRGB | multiplied by 0.9");
+    warns_not(&metal("silver"));
     // glTF's roughness is 1 where a file is silent.
-    let scene = Glb::triangle()
-        .with_material(json!({ "extras": { "metal": "silver" } }))
-        .scene();
-    assert_warned(&scene, &["metal of roughness 1.00, treated as matte"]);
+    let silver = json!({ "extras": { "metal": "silver" } });
+    let scene = Glb::triangle().with_material(silver).scene();
+    warns(&scene, "metal of roughness 1.00, treated as matte");
 }
 
 #[test]
-fn what_is_no_glass_or_metal_is_refused_in_one_sentence() {
-    for (extras, parts) in [
-        (json!({ "glass": "N-BK8" }), ["N-BK8", "N-BK7"]),
-        (json!({ "glass": "52358" }), ["52358", "six digits"]),
-        (json!({ "glass": "cauchy:1.5" }), ["cauchy", "A, B"]),
-        (json!({ "glass": 1.5 }), ["`glass` is no text", "quotation marks"]),
-        (json!({ "metal": "tin" }), ["tin", "choose one"]),
-        (
-            json!({ "metal": null }),
-            ["`metal` is no text", "quotation marks"],
-        ),
-        (json!({ "metal": "gold", "glass": "BK7" }), ["both", "name one"]),
-    ] {
-        let refusal = solid(json!({}), extras).refusal();
-        assert!(refusal.contains("material `glass`: "), "{refusal}");
-        for part in parts {
-            assert!(refusal.contains(part), "`{part}` in {refusal}");
-        }
+fn unknown_glass_and_metal_are_refused() {
+    for (extras, parts) in rows(
+        r#"
+        {"glass": "N-BK8"} => N-BK8 | N-BK7
+        {"glass": "52358"} => 52358 | six digits
+        {"glass": "cauchy:1.5"} => cauchy | A, B
+        {"glass": 1.5} => `glass` is no text | quotation marks
+        {"metal": "tin"} => tin | choose one
+        {"metal": null} => `metal` is no text | quotation marks
+        {"metal": "gold", "glass": "BK7"} => both | name one
+        "#,
+    ) {
+        let refusal = solid(json!({}), parsed(extras)).refusal();
+        says(&refusal, "material `glass`: ");
+        says(&refusal, parts);
     }
 }
 
@@ -208,8 +182,7 @@ fn what_is_no_glass_or_metal_is_refused_in_one_sentence() {
 fn lamp(of_light: Value, of_node: Value) -> Glb {
     let light = json!({ "type": "point", "intensity": 100.0, "extras": of_light });
     let mut file = Glb::triangle().with_light("lamp", light);
-    let node = file.json["nodes"].as_array().expect("nodes").len() - 1;
-    file.json["nodes"][node]["extras"] = of_node;
+    file.json["nodes"][1]["extras"] = of_node;
     file
 }
 
@@ -218,18 +191,15 @@ fn spectrum_of(light: &Light) -> &Spectrum {
 }
 
 #[test]
-fn a_lamp_takes_the_spectrum_of_its_node_or_else_of_its_light() {
-    let a = || json!({ "spectrum": "A" });
-    let d65 = || json!({ "spectrum": "d65" });
+fn lamps_take_the_spectrum_of_node_or_light() {
+    let spectrum = |name: &str| json!({ "spectrum": name });
+    let a = || spectrum("A");
     for (file, name) in [
         (lamp(a(), Value::Null), "A"),
-        (lamp(Value::Null, d65()), "D65"),
-        (lamp(a(), d65()), "D65"),
-        (
-            lamp(json!({ "spectrum": "blackbody:2856" }), Value::Null),
-            "blackbody:2856",
-        ),
-        (lamp(json!({ "spectrum": "FL11" }), Value::Null), "FL11"),
+        (lamp(Value::Null, spectrum("d65")), "D65"),
+        (lamp(a(), spectrum("d65")), "D65"),
+        (lamp(spectrum("blackbody:2856"), Value::Null), "blackbody:2856"),
+        (lamp(spectrum("FL11"), Value::Null), "FL11"),
     ] {
         let scene = file.scene();
         let light = &scene.lights[0];
@@ -245,28 +215,25 @@ fn a_lamp_takes_the_spectrum_of_its_node_or_else_of_its_light() {
     // Incandescent light is redder than daylight, daylight white to the digits of its table.
     let colour = |extras| lamp(extras, Value::Null).scene().lights[0].colour;
     assert!(colour(a()).r > 1.5 && colour(a()).b < 0.5, "{:?}", colour(a()));
-    assert!(
-        colour(d65())
-            .to_array()
-            .iter()
-            .all(|channel| (channel - 1.0).abs() < 1e-3)
-    );
-}
+    near(colour(spectrum("d65")), LinearSrgb::WHITE, 1e-3, "daylight");
 
-#[test]
-fn flat_lamps_have_spectra_too() {
-    let mut file = Glb::triangle();
-    file.json["extensions"]["EXT_lights_area"]["lights"] = json!([
-        { "type": "rect", "size": 1.0, "intensity": 683.0, "extras": { "spectrum": "FL2" } },
-    ]);
-    file.push_root(json!({ "name": "tube", "extensions": { "EXT_lights_area": { "light": 0 } } }));
+    let mut file = lamp(spectrum("E"), Value::Null);
+    file.json["extensions"]["KHR_lights_punctual"]["lights"][0]["color"] = json!([1.0, 0.0, 0.0]);
     let scene = file.scene();
-    assert_eq!(spectrum_of(&scene.lights[0]), &illuminant("FL2").expect("a lamp"));
-    assert_close(scene.lights[0].strength().luminance(), 1.0, 1e-9, "radiance");
+    warns(&scene, "light `lamp` | colour was left out | spectrum");
+    assert_close(scene.lights[0].colour.luminance(), 1.0, 1e-9, "luminance");
+
+    let mut file = Glb::triangle();
+    let tube = r#"[{"type": "rect", "size": 1.0, "intensity": 683.0, "extras": {"spectrum": "FL2"}}]"#;
+    file.json["extensions"]["EXT_lights_area"]["lights"] = parsed(tube);
+    file.push_root(json!({ "name": "tube", "extensions": { "EXT_lights_area": { "light": 0 } } }));
+    let flat = &file.scene().lights[0];
+    assert_eq!(spectrum_of(flat), &illuminant("FL2").expect("a lamp"));
+    assert_close(flat.strength().luminance(), 1.0, 1e-9, "radiance");
 }
 
 /// A triangle that glows with 683 cd/m² per channel of its emissive factor, and a spectrum.
-fn glowing(spectrum: Value, factor: [f64; 3]) -> Glb {
+fn glowing(spectrum: &str, factor: [f64; 3]) -> Glb {
     Glb::triangle().with_material(json!({
         "name": "glow",
         "pbrMetallicRoughness": { "metallicFactor": 0.0 },
@@ -278,64 +245,43 @@ fn glowing(spectrum: Value, factor: [f64; 3]) -> Glb {
 
 #[test]
 fn what_glows_has_a_spectrum_too() {
-    let scene = glowing(json!("FL2"), [0.5; 3]).scene();
+    let scene = glowing("FL2", [0.5; 3]).scene();
     let light = &scene.lights[0];
     let named = illuminant("FL2").expect("a lamp");
     assert!(matches!(light.kind, LightKind::Surface { .. }));
     assert_eq!(spectrum_of(light), &named);
-    // As bright as stated, in the colour of the spectrum.
+    // As bright as stated, in the colour of the spectrum; what is seen is what lights.
     assert_close(light.strength().luminance(), 0.5, 1e-9, "radiance");
-    let off = light.colour - named.xyz().to_linear_srgb();
-    assert!(off.map(f64::abs).max_channel() < 1e-9, "{:?}", light.colour);
-    let seen = scene.emitted_radiance(0) - scene.material_of(0).emitted_radiance;
-    assert!(
-        seen.map(f64::abs).max_channel() < 1e-9,
-        "what is seen is what lights"
+    near(light.colour, named.xyz().to_linear_srgb(), 1e-9, "colour");
+    near(
+        scene.emitted_radiance(0),
+        scene.material_of(0).emitted_radiance,
+        1e-9,
+        "seen",
     );
-    assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
-}
+    warns_not(&scene);
 
-#[test]
-fn a_glow_says_what_its_spectrum_takes_the_place_of() {
-    let coloured = glowing(json!("E"), [0.5, 0.25, 0.1]).scene();
-    assert_warned(
-        &coloured,
-        &["material `glow`", "colour of its light was left out"],
-    );
-    let expected = LinearSrgb::new(0.5, 0.25, 0.1).luminance();
+    let coloured = glowing("E", [0.5, 0.25, 0.1]).scene();
+    warns(&coloured, "material `glow` | colour of its light was left out");
+    let expected = rgb(0.5, 0.25, 0.1).luminance();
     assert_close(
         coloured.lights[0].strength().luminance(),
         expected,
         1e-6,
         "radiance",
     );
-    let dark = glowing(json!("E"), [0.0; 3]).scene();
+    let dark = glowing("E", [0.0; 3]).scene();
     assert!(dark.lights.is_empty());
-    assert_warned(&dark, &["material `glow`", "sends no light"]);
-    let refusal = glowing(json!("D66"), [1.0; 3]).refusal();
-    assert!(
-        refusal.contains("material `glow`") && refusal.contains("D65"),
-        "{refusal}"
-    );
+    warns(&dark, "material `glow` | sends no light");
+    says(glowing("D66", [1.0; 3]).refusal(), "material `glow` | D65");
 }
 
-#[test]
-fn a_colour_beside_a_spectrum_is_left_out_by_name() {
-    let mut file = lamp(json!({ "spectrum": "E" }), Value::Null);
-    file.json["extensions"]["KHR_lights_punctual"]["lights"][0]["color"] = json!([1.0, 0.0, 0.0]);
-    let scene = file.scene();
-    assert_warned(&scene, &["light `lamp`", "colour was left out", "spectrum"]);
-    assert_close(scene.lights[0].colour.luminance(), 1.0, 1e-9, "luminance");
-}
-
-/// A file with a lamp of a stated spectrum, in a folder with others beside it.
-fn beside(stated: &str, files: &[(&str, &str)]) -> nephroid::error::Result<Scene> {
-    let folder = tempfile::tempdir().expect("temporary folder");
+/// A file with a lamp of a stated spectrum, in a folder with a table beside it.
+fn beside(stated: &str, table: &str, text: &str) -> Result<Scene> {
+    let folder = folder();
     let own = folder.path().join("scene");
     std::fs::create_dir(&own).expect("folder can be made");
-    for (name, text) in files {
-        std::fs::write(own.join(name), text).expect("file can be written");
-    }
+    std::fs::write(own.join(table), text).expect("file can be written");
     let path = own.join("lamp.glb");
     let file = lamp(json!({ "spectrum": stated }), Value::Null);
     std::fs::write(&path, file.bytes()).expect("file can be written");
@@ -343,54 +289,41 @@ fn beside(stated: &str, files: &[(&str, &str)]) -> nephroid::error::Result<Scene
 }
 
 #[test]
-fn a_lamp_may_be_measured_in_a_table_beside_the_scene() {
-    let table = "nm,W\n500,1\n600,3\n";
-    let scene = beside("my lamp.CSV", &[("my lamp.CSV", table)]).expect("a sound lamp");
+fn lamps_may_be_measured_in_a_table() {
+    let scene = beside("my lamp.CSV", "my lamp.CSV", "nm,W\n500,1\n600,3\n").expect("a sound lamp");
     let spectrum = spectrum_of(&scene.lights[0]);
     assert_eq!(spectrum.wavelengths_nm(), [500.0, 600.0]);
     assert_eq!(spectrum.name(), Some("my lamp.CSV"));
     let [first, last] = [500.0, 600.0].map(|nm| spectrum.at(Nanometres(nm)));
     assert_close(last / first, 3.0, 1e-12, "shape");
     assert_close(spectrum.luminous_flux_lm(), 683.0, 1e-12, "one watt");
-}
-
-#[test]
-fn what_is_no_spectrum_is_refused_in_one_sentence() {
     for (stated, table, parts) in [
-        ("D66", "", ["light `lamp`: ", "D65"]),
-        ("blackbody:hot", "", ["light `lamp`: ", "500 to 25000 K"]),
+        ("D66", "", "light `lamp`: | D65"),
+        ("blackbody:hot", "", "light `lamp`: | 500 to 25000 K"),
         (
             "lamp.csv",
             "nm,W\n500,1\n400,1\n",
-            ["`lamp.csv`: line 3", "sort the rows"],
+            "`lamp.csv`: line 3 | sort the rows",
         ),
-        ("lamp.csv", "nm,W\n900,1\n950,1\n", ["`lamp.csv`: ", "360 to 830"]),
-        ("../lamp.csv", "", ["light `lamp`: ", "scene's folder"]),
-        ("/etc/lamp.csv", "", ["light `lamp`: ", "scene's folder"]),
-        ("https://example.org/lamp.csv", "", ["light `lamp`: ", "scheme"]),
-        ("none.csv", "", ["none.csv", ""]),
+        ("lamp.csv", "nm,W\n900,1\n950,1\n", "`lamp.csv`: | 360 to 830"),
+        ("../lamp.csv", "", "light `lamp`: | scene's folder"),
+        ("/etc/lamp.csv", "", "light `lamp`: | scene's folder"),
+        ("https://example.org/lamp.csv", "", "light `lamp`: | scheme"),
+        ("none.csv", "", "none.csv"),
     ] {
-        let refusal = beside(stated, &[("lamp.csv", table)])
-            .expect_err("has to be refused")
-            .to_string();
-        for part in parts {
-            assert!(refusal.contains(part), "`{part}` in {refusal}");
-        }
+        says(beside(stated, "lamp.csv", table).expect_err("no spectrum"), parts);
     }
     let refusal = lamp(json!({ "spectrum": 6500 }), Value::Null).refusal();
-    assert!(
-        refusal.contains("light `lamp`: its `spectrum` is no text"),
-        "{refusal}"
-    );
+    says(refusal, "light `lamp`: its `spectrum` is no text");
 }
 
 #[test]
-fn the_collection_of_dispersive_balls_is_read() {
+fn collection_of_dispersive_balls_is_read() {
     let Some(path) = shared_or_skip("scenes/DispersionTest.glb") else {
         return;
     };
-    let scene = load_path(Path::new(&path), &LoadOptions::default()).expect("a sound file");
-    // Its materials are named by index and by column: 0, 0.5, 1, 2, 5.
+    let scene = load_path(&path, &LoadOptions::default()).expect("a sound file");
+    // Its materials are named by index and by column.
     let columns = [("D1", 0.0), ("D2", 0.5), ("D3", 1.0), ("D4", 2.0), ("D5", 5.0)];
     let mut read = 0;
     for material in &scene.materials {
@@ -408,93 +341,6 @@ fn the_collection_of_dispersive_balls_is_read() {
     assert_eq!(read, 25, "five indices by five dispersions");
 }
 
-#[test]
-fn every_glass_of_the_catalogue_can_be_in_a_file() {
-    for glass in catalogue::all() {
-        let scene = solid(json!({}), json!({ "glass": glass.name })).scene();
-        assert_close(material(&scene).ior, glass.dispersion.n_d(), 1e-15, &glass.name);
-        assert_eq!(material(&scene).base_colour, LinearSrgb::WHITE);
-    }
-}
-
-#[test]
-fn an_edited_index_keeps_the_abbe_number_and_is_taken_back_exactly() {
-    let scene = solid(json!({}), json!({ "glass": "F2" })).scene();
-    let (there, back) = undone(
-        &scene,
-        &Edit::MaterialIor {
-            material: 0,
-            ior: 1.9,
-        },
-    );
-    let v_d = |scene: &Scene| {
-        material(scene)
-            .glass
-            .as_ref()
-            .map(|glass| glass.dispersion.abbe_number())
-    };
-    assert_eq!(material(&there).ior, 1.9);
-    assert_close(
-        v_d(&there).expect("a glass"),
-        v_d(&scene).expect("a glass"),
-        1e-9,
-        "Abbe number",
-    );
-    assert_eq!(material(&back).glass, material(&scene).glass);
-    assert_eq!(material(&back).ior, material(&scene).ior);
-    // By way of 1, where nothing disperses, the number is still known.
-    let (without, _) = undone(
-        &there,
-        &Edit::MaterialIor {
-            material: 0,
-            ior: 1.0,
-        },
-    );
-    let (again, _) = undone(
-        &without,
-        &Edit::MaterialIor {
-            material: 0,
-            ior: 1.9,
-        },
-    );
-    assert!(!material(&without).is_dispersive() && v_d(&again).is_some_and(|v_d| (v_d - 36.4).abs() < 0.1));
-}
-
-#[test]
-fn an_edited_colour_takes_the_place_of_a_table_and_is_taken_back_exactly() {
-    let factors = json!({ "roughnessFactor": 0.0 });
-    let gold = json!({ "pbrMetallicRoughness": factors, "extras": { "metal": "gold" } });
-    let spectrum = json!({ "type": "point", "extras": { "spectrum": "FL11" } });
-    let scene = Glb::triangle()
-        .with_material(gold)
-        .with_light("lamp", spectrum)
-        .scene();
-    let base_colour = LinearSrgb::new(0.1, 0.2, 0.3);
-    let (there, back) = undone(
-        &scene,
-        &Edit::MaterialTint {
-            material: 0,
-            base_colour,
-        },
-    );
-    assert_eq!(
-        (material(&there).base_colour, material(&there).metal),
-        (base_colour, None)
-    );
-    assert_eq!(material(&back).metal, material(&scene).metal);
-    assert_eq!(material(&back).base_colour, material(&scene).base_colour);
-    let edit = Edit::LightColour {
-        light: 0,
-        colour: base_colour,
-    };
-    let (there, back) = undone(&scene, &edit);
-    assert_eq!(
-        (there.lights[0].colour, &there.lights[0].spectrum),
-        (base_colour, &None)
-    );
-    assert_eq!(back.lights, scene.lights);
-}
-
 /// The edited scene, and that with the edit taken back.
 fn undone(scene: &Scene, edit: &Edit) -> (Scene, Scene) {
     let (there, inverse) = edit.apply(scene).expect("it is in range");
@@ -502,73 +348,104 @@ fn undone(scene: &Scene, edit: &Edit) -> (Scene, Scene) {
     (there, back)
 }
 
-fn dispersion_of(scene: Scene, settings: &BakeSettings) -> EffectLine {
-    let mut session = BakeSession::new(Arc::new(scene)).expect("a session");
-    let plan = session.plan(settings).expect("a plan");
-    let line = plan
-        .effects
-        .into_iter()
-        .find(|line| line.effect == Effect::Dispersion);
-    line.expect("dispersion is planned")
-}
-
-fn built_in(name: &str) -> Scene {
-    builtin::build(name).expect("is built in")
-}
-
-fn switched(switch: EffectSwitch) -> BakeSettings {
-    BakeSettings {
-        effects: EffectSwitches::default().with(Effect::Dispersion, switch),
-        ..BakeSettings::default()
-    }
+#[test]
+fn edited_indices_keep_the_abbe_number() {
+    let scene = solid(json!({}), json!({ "glass": "F2" })).scene();
+    let ior = |scene: &Scene, ior| undone(scene, &Edit::MaterialIor { material: 0, ior });
+    let (there, back) = ior(&scene, 1.9);
+    let v_d = |scene: &Scene| {
+        let glass = material(scene).glass.as_ref().expect("a glass");
+        glass.dispersion.abbe_number()
+    };
+    assert_eq!(material(&there).ior, 1.9);
+    assert_close(v_d(&there), v_d(&scene), 1e-9, "Abbe number");
+    assert_eq!(material(&back).glass, material(&scene).glass);
+    assert_eq!(material(&back).ior, material(&scene).ior);
+    // By way of 1, where nothing disperses, the number is still known.
+    let (without, _) = ior(&there, 1.0);
+    let (again, _) = ior(&without, 1.9);
+    assert!(!material(&without).is_dispersive());
+    near(v_d(&again), 36.4, 0.1, "Abbe number");
 }
 
 #[test]
-fn dispersion_is_called_for_by_a_lit_solid_that_disperses() {
-    for (name, object, light) in [("prism", "prism", "light"), ("bowl", "bowl", "lamp")] {
-        let line = dispersion_of(built_in(name), &BakeSettings::default());
-        assert!(line.on, "{line:?}");
-        for part in [format!("`{object}`"), format!("`{light}`"), "Abbe number".into()] {
-            assert!(line.reason.contains(&part), "{line:?}");
-        }
-    }
-    for name in ["ball", "mirror", "pool"] {
-        let line = dispersion_of(built_in(name), &BakeSettings::default());
-        assert!(
-            !line.on && line.reason.contains("no lit solid bends"),
-            "{name}: {line:?}"
-        );
+fn edited_colours_take_the_place_of_tables() {
+    let gold = r#"{"pbrMetallicRoughness": {"roughnessFactor": 0.0}, "extras": {"metal": "gold"}}"#;
+    let lamp = json!({ "type": "point", "extras": { "spectrum": "FL11" } });
+    let scene = Glb::triangle()
+        .with_material(parsed(gold))
+        .with_light("lamp", lamp)
+        .scene();
+    let colour = rgb(0.1, 0.2, 0.3);
+    let tint = Edit::MaterialTint {
+        material: 0,
+        base_colour: colour,
+    };
+    let (there, back) = undone(&scene, &tint);
+    assert_eq!(
+        (material(&there).base_colour, material(&there).metal),
+        (colour, None)
+    );
+    assert_eq!(material(&back).metal, material(&scene).metal);
+    assert_eq!(material(&back).base_colour, material(&scene).base_colour);
+    let (there, back) = undone(&scene, &Edit::LightColour { light: 0, colour });
+    assert_eq!(
+        (there.lights[0].colour, &there.lights[0].spectrum),
+        (colour, &None)
+    );
+    assert_eq!(back.lights, scene.lights);
+}
+
+/// What the plan says of dispersion.
+fn planned(scene: Scene, switches: EffectSwitches) -> EffectLine {
+    let mut session = BakeSession::new(Arc::new(scene)).expect("a session");
+    let settings = BakeSettings {
+        effects: switches,
+        ..BakeSettings::default()
+    };
+    let mut lines = session.plan(&settings).expect("a plan").effects.into_iter();
+    lines
+        .find(|line| line.effect == Effect::Dispersion)
+        .expect("dispersion is planned")
+}
+
+#[test]
+fn dispersion_needs_a_lit_dispersive_solid() {
+    let automatic = |scene| planned(scene, EffectSwitches::default());
+    for (name, parts) in rows(
+        "prism => `prism` | `light` | Abbe number
+         bowl => `bowl` | `lamp` | Abbe number
+         ball => no lit solid bends
+         mirror => no lit solid bends
+         pool => no lit solid bends",
+    ) {
+        let line = automatic(built_in(name));
+        assert_eq!(line.on, ["prism", "bowl"].contains(&name), "{name}");
+        says(line.reason, parts);
     }
     // What no light reaches calls for nothing.
     let mut sealed = built_in("bowl");
-    let safe = shapes::cuboid(DVec3::new(-0.2, -0.1, -0.2), DVec3::new(0.2, 0.2, 0.2));
+    let safe = shapes::cuboid(dvec3(-0.2, -0.1, -0.2), dvec3(0.2, 0.2, 0.2));
     parts::add(
         &mut sealed,
         "safe",
         safe,
         parts::matte("steel", LinearSrgb::grey(0.5)),
     );
-    let line = dispersion_of(sealed, &BakeSettings::default());
-    assert!(!line.on, "{line:?}");
+    assert!(!automatic(sealed).on);
     // The same for a pane of the same glass: it does not bend light.
     let mut pane = built_in("prism");
     let material = pane.objects[1].material;
-    pane.materials[material].volume = None;
-    pane.materials[material].surface = SurfaceKind::ThinWall;
-    assert!(!dispersion_of(pane, &BakeSettings::default()).on);
-}
+    (pane.materials[material].volume, pane.materials[material].surface) = (None, SurfaceKind::ThinWall);
+    assert!(!automatic(pane).on);
 
-#[test]
-fn dispersion_is_switched_like_any_effect() {
-    let off = dispersion_of(built_in("prism"), &switched(EffectSwitch::Off));
+    let switched = |switch| EffectSwitches::default().with(Effect::Dispersion, switch);
+    let off = planned(built_in("prism"), switched(EffectSwitch::Off));
     assert_eq!((off.on, off.switch), (false, EffectSwitch::Off));
-    assert!(off.reason.contains("switched off by the user"));
-    let forced = dispersion_of(built_in("ball"), &switched(EffectSwitch::On));
-    assert!(
-        forced.on && forced.reason.contains("nothing calls for it"),
-        "{forced:?}"
-    );
-    let mut settings = switched(EffectSwitch::On);
-    settings.effects.set(Effect::LightPass, EffectSwitch::Off);
-    assert!(!dispersion_of(built_in("prism"), &settings).on);
+    says(off.reason, "switched off by the user");
+    let forced = planned(built_in("ball"), switched(EffectSwitch::On));
+    assert!(forced.on);
+    says(forced.reason, "nothing calls for it");
+    let without_light = switched(EffectSwitch::On).with(Effect::LightPass, EffectSwitch::Off);
+    assert!(!planned(built_in("prism"), without_light).on);
 }
