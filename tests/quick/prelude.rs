@@ -12,7 +12,7 @@ pub use nephroid::scene::builtin::{self, parts, shapes};
 pub use nephroid::scene::texture::Wrap;
 pub use nephroid::scene::{
     Camera, Edit, Light, LightKind, LightSize, LoadOptions, Material, Mesh, Scene, SurfaceKind, Texture,
-    TextureRef, Wave, Waves,
+    Wave, Waves,
 };
 pub use nephroid::settings::{BakeSettings, LayerKind, MapResolution};
 pub use nephroid::transport::{MediumStack, Tracer};

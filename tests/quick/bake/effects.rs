@@ -2,8 +2,8 @@
 
 use nephroid::effect::{Effect, EffectSwitch, EffectSwitches};
 use nephroid::session::BakeResult;
-use nephroid::settings::BakeSettings;
 
+use crate::prelude::*;
 use support::effect_scenes::{EffectScene, all};
 use support::tools::{at, bake, bits, energy_fault, settings};
 

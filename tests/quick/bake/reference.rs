@@ -1,11 +1,8 @@
 //! The built-in scenes against maps of an independent solver (`assets/reference`), and bits that nothing may change.
 
-use glam::DVec2;
 use nephroid::illumination::lookup::bilinear;
-use nephroid::scene::Scene;
-use nephroid::settings::{BakeSettings, LayerKind};
-use std::sync::Arc;
 
+use crate::prelude::*;
 use support::references::references;
 use support::tools::{at, bake, bits, builtin_scene, map_of, settings};
 
@@ -121,7 +118,7 @@ fn check_border(values: &[[f32; 3]], side: usize) {
         let along = 0.25 + 0.5 * f64::from(step) / 200.0;
         for (border, inside) in [(0.25, 0.25 + 0.5 / side as f64), (0.75, 0.75 - 0.5 / side as f64)] {
             let look = |across: f64| {
-                [DVec2::new(across, along), DVec2::new(along, across)]
+                [dvec2(across, along), dvec2(along, across)]
                     .map(|uv| bilinear(values, side, side, uv).luminance())
             };
             for (at_border, further_in) in look(border).into_iter().zip(look(inside)) {

@@ -1,19 +1,9 @@
 //! `compare`: maps against references whose measures are known.
 
-use serde_json::{Value, json};
-
+use crate::prelude::*;
 use support::program::Sandbox;
 
-#[track_caller]
-fn assert_measures(report: &Value, expected: &[(&str, f64)]) {
-    for (name, expected) in expected {
-        let found = report[name]
-            .as_f64()
-            .unwrap_or_else(|| panic!("{name} in {report}"));
-        assert!((found - expected).abs() < 1e-12, "{name}: {found}");
-    }
-}
-
+/// What the measures are worth is held beside them; here that they are told.
 #[test]
 fn measures_of_known_pairs() {
     let sandbox = Sandbox::new();
@@ -25,21 +15,20 @@ fn measures_of_known_pairs() {
         let mean = (1 + column / 2 + 2 * (row / 2)) as f32;
         mean + [0.25, -0.25][(column + row) % 2]
     });
-    let quarter_more = [
-        ("relative_rmse", 0.25),
-        ("average_relative_difference", 0.25),
-        ("flux_ratio", 1.25),
-        ("peak", 1.25),
-    ];
-    let same_size = [("relative_rmse", 0.0), ("width", 2.0), ("height", 3.0)];
+    let more =
+        r#"{"relative_rmse": 0.25, "average_relative_difference": 0.25, "flux_ratio": 1.25, "peak": 1.25}"#;
+    let same_size = r#"{"relative_rmse": 0, "width": 2, "height": 3}"#;
     for (pair, expected) in [
-        ("more.pfm ones.pfm", &quarter_more[..]),
-        ("ones.pfm ones.pfm --max-rmse 0", &[("relative_rmse", 0.0)]),
-        ("large.pfm small.pfm --max-rmse 0", &same_size),
-        ("small.pfm large.pfm --max-rmse 0", &same_size),
+        ("more.pfm ones.pfm", more),
+        ("ones.pfm ones.pfm --max-rmse 0", r#"{"relative_rmse": 0}"#),
+        ("large.pfm small.pfm --max-rmse 0", same_size),
+        ("small.pfm large.pfm --max-rmse 0", same_size),
     ] {
         let report = sandbox.succeed(&format!("compare {pair} --json")).json();
-        assert_measures(&report, expected);
+        for (name, expected) in parsed(expected).as_object().expect("measures") {
+            let [found, expected] = [&report[name], expected].map(|value| value.as_f64().expect(name));
+            near(found, expected, 1e-12, name);
+        }
     }
 }
 
@@ -97,27 +86,23 @@ fn what_cannot_be_compared_is_said() {
     sandbox.write_pfm("ones.pfm", 2, 2, |_, _| 1.0);
     sandbox.write_pfm("odd.pfm", 3, 3, |_, _| 1.0);
     sandbox.write_pfm("dark.pfm", 2, 2, |_, _| 0.0);
-    sandbox.write_pfm(
-        "nan.pfm",
-        2,
-        2,
-        |column, row| if column + row == 2 { f32::NAN } else { 1.0 },
-    );
+    let nan = |column, row| if column + row == 2 { f32::NAN } else { 1.0 };
+    sandbox.write_pfm("nan.pfm", 2, 2, nan);
     sandbox.write("short.pfm", "Pf\n2 2\n-1.0\nabc");
     sandbox.write("text.exr", "hello");
     sandbox.write("cut.exr", [0x76, 0x2f, 0x31, 0x01, 2, 0, 0, 0]);
-    for (files, words) in [
-        ("ones.pfm dark.pfm", &["dark.pfm", "the reference is dark"][..]),
-        ("ones.pfm odd.pfm", &["2x2", "3x3", "multiples"]),
-        ("nan.pfm ones.pfm", &["nan.pfm", "column 1, row 1"]),
-        ("short.pfm ones.pfm", &["short.pfm"]),
-        ("text.exr ones.pfm", &["text.exr", "neither"]),
-        ("cut.exr ones.pfm", &["cut.exr"]),
-        ("missing.exr ones.pfm", &["missing.exr"]),
-        ("ones.pfm missing.exr", &["missing.exr"]),
-        ("ones.pfm ones.pfm --difference no/d.png", &["no/d.png"]),
-    ] {
+    for (files, words) in rows(
+        "ones.pfm dark.pfm => dark.pfm | the reference is dark
+         ones.pfm odd.pfm => 2x2 | 3x3 | multiples
+         nan.pfm ones.pfm => nan.pfm | column 1, row 1
+         short.pfm ones.pfm => short.pfm
+         text.exr ones.pfm => text.exr | neither
+         cut.exr ones.pfm => cut.exr
+         missing.exr ones.pfm => missing.exr
+         ones.pfm missing.exr => missing.exr
+         ones.pfm ones.pfm --difference no/d.png => no/d.png",
+    ) {
         let run = sandbox.run(&format!("compare {files}"));
-        run.failed_in_one_sentence(1, words);
+        run.failed_in_one_sentence(1, &words.split(" | ").collect::<Vec<_>>());
     }
 }

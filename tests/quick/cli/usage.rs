@@ -1,18 +1,15 @@
 //! Help, options and what is refused before any work.
 
+use crate::prelude::*;
 use support::files;
 use support::program::Sandbox;
-
-const COMMANDS: [&str; 8] = [
-    "view", "bake", "render", "inspect", "compare", "export", "merge", "study",
-];
 
 #[test]
 fn help_names_what_there_is() {
     let sandbox = Sandbox::new();
     let help = sandbox.succeed("--help");
     assert_eq!(help.stderr, "");
-    for command in COMMANDS {
+    for command in "view bake render inspect compare export merge study".split(' ') {
         assert!(help.stdout.contains(command), "{command}");
         let own = sandbox.succeed(&format!("{command} --help"));
         assert!(own.stdout.contains("--json"), "{}", own.stdout);
@@ -26,9 +23,9 @@ fn help_names_what_there_is() {
 
 /// Runs each line in an empty folder and expects that exit code, one sentence with the words (separated by ` | `), and
 /// nothing written.
-fn assert_refused(code: i32, beginning: &str, rows: &[(&str, &str)]) {
+fn assert_refused(code: i32, beginning: &str, table: &str) {
     let sandbox = Sandbox::new();
-    for (options, words) in rows {
+    for (options, words) in rows(table) {
         let line = format!("{beginning} {options}");
         let run = sandbox.run(&line);
         assert_eq!(run.code, code, "{line}: {}", run.stderr);
@@ -39,153 +36,156 @@ fn assert_refused(code: i32, beginning: &str, rows: &[(&str, &str)]) {
 
 #[test]
 fn bad_bake_options_are_refused() {
-    let rows = [
-        ("--density -5", "--density"),
-        ("--density nan", "--density"),
-        ("--density many", "--density"),
-        ("--sigma -1", "--sigma"),
-        ("--sigma adaptive", "--sigma"),
-        ("--estimator splat --sigma 0", "--sigma"),
-        ("--estimator splat --kernel box --sigma 2", "--sigma"),
-        ("--footprint disc", "--footprint"),
-        ("--rays jittered", "--rays"),
-        ("--kernel round", "--kernel"),
-        ("--max-error 0", "--max-error"),
-        ("--max-error many", "--max-error"),
-        ("--estimator splat --max-error 2%", "--max-error"),
-        ("--map-resolution 0", "--map-resolution"),
-        ("--map-resolution -4", "--map-resolution"),
-        ("--map-resolution 64x0", "--map-resolution"),
-        ("--map-resolution 99999", "--map-resolution"),
-        ("--max-depth 0", "--max-depth"),
-        ("--branch-threshold 2", "--branch-threshold"),
-        ("--threads 0", "--threads"),
-        ("--memory 0", "--memory"),
-        ("--layers ambient", "--layers"),
-        ("--keep-spectrum", "no bands to keep"),
-        ("--wavelengths 0", "outside 1 to 1000"),
-        ("--wavelengths many", "a number, `rainbow` or `continuous`"),
-        ("--spectral-sampling split", "interpolated, not sampled"),
-        ("--effects refraction=sideways", "auto, on or off"),
-    ];
-    assert_refused(2, "bake builtin:prism -o out", &rows);
+    assert_refused(
+        2,
+        "bake builtin:prism -o out",
+        "--density -5 => --density
+         --density nan => --density
+         --density many => --density
+         --sigma -1 => --sigma
+         --sigma adaptive => --sigma
+         --estimator splat --sigma 0 => --sigma
+         --estimator splat --kernel box --sigma 2 => --sigma
+         --footprint disc => --footprint
+         --rays jittered => --rays
+         --kernel round => --kernel
+         --max-error 0 => --max-error
+         --max-error many => --max-error
+         --estimator splat --max-error 2% => --max-error
+         --map-resolution 0 => --map-resolution
+         --map-resolution -4 => --map-resolution
+         --map-resolution 64x0 => --map-resolution
+         --map-resolution 99999 => --map-resolution
+         --max-depth 0 => --max-depth
+         --branch-threshold 2 => --branch-threshold
+         --threads 0 => --threads
+         --memory 0 => --memory
+         --layers ambient => --layers
+         --keep-spectrum => no bands to keep
+         --wavelengths 0 => outside 1 to 1000
+         --wavelengths many => a number, `rainbow` or `continuous`
+         --spectral-sampling split => interpolated, not sampled
+         --effects refraction=sideways => auto, on or off",
+    );
 }
 
 #[test]
 fn shards_that_cannot_be_cut_are_refused() {
-    let rows = [
-        ("--map-resolution 16", "--max-error | --density"),
-        ("--map-resolution 16 --preset draft", "--max-error | --density"),
-        ("--map-resolution 16 --max-error 2%", "--max-error | --density"),
-        (
-            "--map-resolution 16 --density 1000 --max-time 5s",
-            "--max-time | --density",
-        ),
-        ("--density 1000", "--map-resolution | auto"),
-        ("--density 1000 --map-resolution auto", "--map-resolution | auto"),
-        (
-            "--density 1000 --map-resolution 16 --layers direct",
-            "--layers | caustic",
-        ),
-    ];
-    assert_refused(2, "bake builtin:mirror -o out --shard 1/2", &rows);
-    let numbers = ["0/2", "3/2", "2", "1/0", "-1/2", "1/1000000000", "a/b"];
-    let rows = numbers.map(|shard| (shard, "--shard"));
+    assert_refused(
+        2,
+        "bake builtin:mirror -o out --shard 1/2",
+        "--map-resolution 16 => --max-error | --density
+         --map-resolution 16 --preset draft => --max-error | --density
+         --map-resolution 16 --max-error 2% => --max-error | --density
+         --map-resolution 16 --density 1000 --max-time 5s => --max-time | --density
+         --density 1000 => --map-resolution | auto
+         --density 1000 --map-resolution auto => --map-resolution | auto
+         --density 1000 --map-resolution 16 --layers direct => --layers | caustic",
+    );
     let bake = "bake builtin:mirror -o out --density 1000 --map-resolution";
-    assert_refused(2, &format!("{bake} 16 --shard"), &rows);
-    let short = [("--memory 1M --shard 1/2", "--memory | --map-resolution")];
-    assert_refused(1, &format!("{bake} 2048"), &short);
+    assert_refused(
+        2,
+        &format!("{bake} 16 --shard"),
+        "0/2 => --shard
+         3/2 => --shard
+         2 => --shard
+         1/0 => --shard
+         -1/2 => --shard
+         1/1000000000 => --shard
+         a/b => --shard",
+    );
+    let short = "--memory 1M --shard 1/2 => --memory | --map-resolution";
+    assert_refused(1, &format!("{bake} 2048"), short);
 }
 
 #[test]
 fn bad_render_options_are_refused() {
-    let rows = [
-        ("", "--output"),
-        ("-o picture", ".png"),
-        ("-o picture.gif", ".png"),
-        ("-o a.png --size 0x5", "--size"),
-        ("-o a.png --maps out --density 10", "--maps"),
-        ("-o a.exr --exposure 2", "--exposure"),
-        ("-o a.exr --tone-map none", "--tone-map"),
-        ("-o a.exr --white-balance 3000", "--white-balance | radiance"),
-        ("-o a.png --white-balance warm", "--white-balance"),
-        ("-o a.png --white-balance 300", "--white-balance"),
-        ("-o a.png --white-balance 0.8,0.4", "--white-balance"),
-        ("-o a.png --white-balance 0.3", "--white-balance"),
-        ("-o a.png --stats", "--path"),
-    ];
-    assert_refused(2, "render builtin:ring", &rows);
-}
-
-#[cfg(feature = "gpu")]
-#[test]
-fn bad_camera_paths_are_refused() {
-    let rows = [
-        (
-            "--path walk.json --stats --backend cpu",
-            "--backend cpu | graphics card",
-        ),
-        ("--path walk.json", "--stats | -o DIR"),
-        ("--path walk.json --stats --camera 0", "--camera"),
-        ("--path walk.json --stats --effects chains=off", "chains=off"),
-        ("--turntable 0 -o none", "--turntable | 1 to 10000"),
-        ("--turntable 3", "--turntable | -o DIR"),
-        ("--turntable 3 --path walk.json -o none", "--path"),
-    ];
-    assert_refused(2, "render builtin:ring", &rows);
-    let missing = [("--path walk.json --stats", "walk.json | no such file")];
-    assert_refused(1, "render builtin:ring", &missing);
+    let render = "render builtin:ring";
+    assert_refused(
+        2,
+        render,
+        "=> --output
+         -o picture => .png
+         -o picture.gif => .png
+         -o a.png --size 0x5 => --size
+         -o a.png --maps out --density 10 => --maps
+         -o a.exr --exposure 2 => --exposure
+         -o a.exr --tone-map none => --tone-map
+         -o a.exr --white-balance 3000 => --white-balance | radiance
+         -o a.png --white-balance warm => --white-balance
+         -o a.png --white-balance 300 => --white-balance
+         -o a.png --white-balance 0.8,0.4 => --white-balance
+         -o a.png --white-balance 0.3 => --white-balance
+         -o a.png --stats => --path",
+    );
+    if !cfg!(feature = "gpu") {
+        return;
+    }
+    assert_refused(
+        2,
+        render,
+        "--path walk.json --stats --backend cpu => --backend cpu | graphics card
+         --path walk.json => --stats | -o DIR
+         --path walk.json --stats --camera 0 => --camera
+         --path walk.json --stats --effects chains=off => chains=off
+         --turntable 0 -o none => --turntable | 1 to 10000
+         --turntable 3 => --turntable | -o DIR
+         --turntable 3 --path walk.json -o none => --path",
+    );
+    assert_refused(1, render, "--path walk.json --stats => walk.json | no such file");
 }
 
 #[test]
 fn bad_export_options_are_refused() {
-    let rows = [
-        ("--cut 100%", "--cut | share"),
-        ("--cut nan", "--cut"),
-        ("--exposure 1", "--exposure | unlit"),
-        ("--as unlit --lights keep", "--lights keep"),
-        ("--as unlit --exposure nan", "--exposure"),
-        ("--layer sum", "--layer"),
-        ("--bits 32", "--bits"),
-        ("--force", "--force"),
-        ("--transfer srgb", "--transfer"),
-        ("--mips", "--mips"),
-        ("--atlas", "--atlas"),
-        ("--format bmp", "--format"),
-        ("--format exr --bits 8", "--bits"),
-        ("--format exr --cut 1%", "--cut"),
-        ("--format exr --as unlit", "--as"),
-        ("--format exr --lights keep", "--lights"),
-        ("--format exr --mips", "--mips"),
-        ("--format exr --packing bc6h", "--packing"),
-        ("--format png --bits 32", "--bits"),
-        ("--format png --cut 1% --exposure 1", "--cut"),
-        ("--format png --exposure 65", "--exposure"),
-        ("--format png --atlas 5", "--atlas"),
-        ("--format hdr --bits 16", "--bits"),
-        ("--format hdr --transfer linear", "--transfer"),
-        ("--format ktx2 --bits 16", "--bits"),
-        ("--format ktx2 --cut 1%", "--cut"),
-        ("--format ktx2 --atlas --mips", "--mips"),
-    ];
-    assert_refused(2, "export out -o none", &rows);
-    assert_refused(1, "export", &[("nowhere", "nowhere")]);
+    assert_refused(
+        2,
+        "export out -o none",
+        "--cut 100% => --cut | share
+         --cut nan => --cut
+         --exposure 1 => --exposure | unlit
+         --as unlit --lights keep => --lights keep
+         --as unlit --exposure nan => --exposure
+         --layer sum => --layer
+         --bits 32 => --bits
+         --force => --force
+         --transfer srgb => --transfer
+         --mips => --mips
+         --atlas => --atlas
+         --format bmp => --format
+         --format exr --bits 8 => --bits
+         --format exr --cut 1% => --cut
+         --format exr --as unlit => --as
+         --format exr --lights keep => --lights
+         --format exr --mips => --mips
+         --format exr --packing bc6h => --packing
+         --format png --bits 32 => --bits
+         --format png --cut 1% --exposure 1 => --cut
+         --format png --exposure 65 => --exposure
+         --format png --atlas 5 => --atlas
+         --format hdr --bits 16 => --bits
+         --format hdr --transfer linear => --transfer
+         --format ktx2 --bits 16 => --bits
+         --format ktx2 --cut 1% => --cut
+         --format ktx2 --atlas --mips => --mips",
+    );
+    assert_refused(1, "export", "nowhere => nowhere");
 }
 
 #[test]
 fn other_bad_usage_is_refused() {
-    let rows = [
-        ("bake", "required"),
-        ("bake builtin:ring", "--output"),
-        ("merge -o out", "required"),
-        ("merge shard", "--output"),
-        ("compare a.exr", "REFERENCE"),
-        ("compare a.exr b.exr --max-rmse -1", "--max-rmse"),
-        ("compare a.exr b.exr --difference c.exr", "--difference"),
-        ("view builtin:ring --json", "--json"),
-        ("inspect builtin:ring --log loudly", "--log"),
-    ];
-    assert_refused(2, "", &rows);
+    assert_refused(
+        2,
+        "",
+        "bake => required
+         bake builtin:ring => --output
+         merge -o out => required
+         merge shard => --output
+         compare a.exr => REFERENCE
+         compare a.exr b.exr --max-rmse -1 => --max-rmse
+         compare a.exr b.exr --difference c.exr => --difference
+         view builtin:ring --json => --json
+         inspect builtin:ring --log loudly => --log",
+    );
 }
 
 #[test]

@@ -2,14 +2,13 @@
 
 use std::f64::consts::TAU;
 
-use glam::{DMat3, DVec2, DVec3};
 use nephroid::illumination::gutter::fill_gutter;
 use nephroid::illumination::lookup::bilinear;
 use nephroid::illumination::parametrisation::DEFAULT_NOMINAL_SIDE;
 use nephroid::illumination::parametrisation::coverage::{for_each_texel_in_row, rows};
 use nephroid::illumination::{Parametrisation, UvSet, parametrise};
-use nephroid::scene::Mesh;
 
+use crate::prelude::*;
 use support::meshes::{cuboid, floor, grid, joined, moved, quad, sphere};
 
 fn of(mesh: &Mesh) -> Parametrisation {
@@ -51,7 +50,7 @@ fn deepest_overlap(map: &Parametrisation) -> usize {
     };
     let over = |i: i32| {
         let i = f64::from(i);
-        let p = DVec2::new((i + 0.5) / 2e4, (i * 0.618_033_988_749_895).fract());
+        let p = dvec2((i + 0.5) / 2e4, (i * 0.618_033_988_749_895).fract());
         let triangles = map.corner_uvs.iter();
         triangles.filter(|triangle| inside(**triangle, p)).count()
     };
@@ -68,7 +67,7 @@ fn covered(map: &Parametrisation) -> f64 {
 fn winding_ramp() -> Mesh {
     grid(240, 4, |s, t| {
         let (phi, r) = (s * 3.0 * TAU, 1.0 + t);
-        DVec3::new(r * phi.cos(), 0.6 * s, r * phi.sin())
+        dvec3(r * phi.cos(), 0.6 * s, r * phi.sin())
     })
 }
 
@@ -76,7 +75,7 @@ fn torus() -> Mesh {
     grid(96, 48, |s, t| {
         let (phi, theta) = (s * TAU, t * TAU);
         let r = 1.0 + 0.35 * theta.cos();
-        DVec3::new(r * phi.cos(), 0.35 * theta.sin(), r * phi.sin())
+        dvec3(r * phi.cos(), 0.35 * theta.sin(), r * phi.sin())
     })
 }
 
@@ -86,17 +85,15 @@ fn a_covering_first_set_is_taken() {
     let map = of(&mesh);
     assert_eq!((map.uv_set, map.object), (UvSet::TexCoord0, 3));
     // u runs with x, v with z.
-    assert_eq!(
-        [0, 1, 3].map(|vertex| uv_at(&mesh, &map, vertex)),
-        [DVec2::ZERO, DVec2::X, DVec2::Y]
-    );
+    let corners = [0, 1, 3].map(|vertex| uv_at(&mesh, &map, vertex));
+    assert_eq!(corners, [DVec2::ZERO, DVec2::X, DVec2::Y]);
     let chart = map.chart(8, 4);
     assert_eq!(chart.texel_areas_m2.len(), 1);
-    assert!((chart.texel_area_m2(31) - 4.0 / 32.0).abs() < 1e-15);
+    near(chart.texel_area_m2(31), 4.0 / 32.0, 1e-15, "area");
 
     // Neither a rotation nor an exporter's single precision spoils it.
-    let rotation = DMat3::from_axis_angle(DVec3::new(0.3, -0.5, 0.8).normalize(), 1.1);
-    let mut mesh = moved(floor(2.0, 0.0), rotation, DVec3::new(5.0, -3.0, 11.0));
+    let rotation = DMat3::from_axis_angle(dvec3(0.3, -0.5, 0.8).normalize(), 1.1);
+    let mut mesh = moved(floor(2.0, 0.0), rotation, dvec3(5.0, -3.0, 11.0));
     for position in &mut mesh.positions {
         *position = position.as_vec3().as_dvec3();
     }
@@ -116,7 +113,7 @@ fn sets_that_give_no_place_are_refused() {
     let two = || joined(floor(1.0, 0.0), other.clone());
     let beside = |overlap: f64| {
         let start = move |vertex: usize| if vertex < 4 { 0.0 } else { 0.5 - overlap };
-        let change = |vertex, uv: DVec2| DVec2::new(0.5 * uv.x + start(vertex), uv.y);
+        let change = |vertex, uv: DVec2| dvec2(0.5 * uv.x + start(vertex), uv.y);
         with_uv(two(), change)
     };
     for (what, mesh, is_taken) in [
@@ -126,7 +123,7 @@ fn sets_that_give_no_place_are_refused() {
         ("two quads on one place", two(), false),
         ("two quads side by side", beside(0.0), true),
         ("a strip of a fiftieth lies double", beside(0.02), false),
-        ("no number", corner(2, DVec2::new(f64::NAN, 1.0)), false),
+        ("no number", corner(2, dvec2(f64::NAN, 1.0)), false),
         ("a flat triangle", corner(3, DVec2::splat(0.5)), false),
     ] {
         let found = of(&mesh).uv_set;
@@ -154,9 +151,9 @@ fn generated_floors_and_walls_are_upright() {
         let map = of(&mesh);
         assert_eq!(map.uv_set, UvSet::Generated);
         for (vertex, uv) in (0..).zip([DVec2::ZERO, DVec2::X, DVec2::ONE, DVec2::Y]) {
-            assert!(uv_at(&mesh, &map, vertex).distance(uv) < 1e-12, "vertex {vertex}");
+            near(uv_at(&mesh, &map, vertex), uv, 1e-12, vertex);
         }
-        assert!((map.suggested_aspect - aspect).abs() < 1e-12);
+        near(map.suggested_aspect, aspect, 1e-12, "aspect");
     }
 }
 
@@ -164,29 +161,24 @@ fn generated_floors_and_walls_are_upright() {
 #[test]
 fn generated_maps_of_squares_are_full() {
     for step in 0..24 {
-        let axis = DVec3::new(0.2, 1.0, f64::from(step) - 12.0).normalize();
+        let axis = dvec3(0.2, 1.0, f64::from(step) - 12.0).normalize();
         let rotation = DMat3::from_axis_angle(axis, 0.37 * f64::from(step));
-        let map = of(&without_uv(moved(
-            floor(0.7, 0.0),
-            rotation,
-            DVec3::new(1.0, 2.0, 3.0),
-        )));
-        assert!((covered(&map) - 1.0).abs() < 1e-9, "{step} {}", covered(&map));
+        let square = moved(floor(0.7, 0.0), rotation, dvec3(1.0, 2.0, 3.0));
+        let map = of(&without_uv(square));
+        near(covered(&map), 1.0, 1e-9, step);
         assert_eq!(map.chart(32, 32).texel_areas_m2.len(), 1, "step {step}");
-        assert!(
-            map.corner_uvs.iter().all(|triangle| turn(triangle) < 0.0),
-            "step {step}: v runs down"
-        );
+        let mut turns = map.corner_uvs.iter().map(turn);
+        assert!(turns.all(|turn| turn < 0.0), "step {step}: v runs down");
     }
 }
 
 #[test]
 fn bent_surfaces_give_every_point_a_place() {
-    let back = quad(DVec3::new(-1.0, 0.0, 1.0), DVec3::X * 2.0, DVec3::NEG_Z * 2.0);
+    let back = quad(dvec3(-1.0, 0.0, 1.0), DVec3::X * 2.0, DVec3::NEG_Z * 2.0);
     for (name, mesh) in [
         ("ball", sphere(DVec3::ZERO, 1.0, 48, 24)),
         ("torus", torus()),
-        ("box", cuboid(DVec3::ZERO, DVec3::new(1.0, 2.0, 3.0))),
+        ("box", cuboid(DVec3::ZERO, dvec3(1.0, 2.0, 3.0))),
         ("winding ramp", winding_ramp()),
         ("sheet with two sides", without_uv(joined(floor(1.0, 0.0), back))),
     ] {
@@ -207,7 +199,7 @@ fn bent_surfaces_give_every_point_a_place() {
 #[test]
 fn texels_are_alike_all_over_a_surface() {
     for (name, mesh, least) in [
-        ("box", cuboid(DVec3::ZERO, DVec3::new(1.0, 2.0, 3.0)), 1.0 - 1e-5),
+        ("box", cuboid(DVec3::ZERO, dvec3(1.0, 2.0, 3.0)), 1.0 - 1e-5),
         ("ball", sphere(DVec3::ZERO, 1.0, 48, 24), 0.766),
     ] {
         let map = of(&mesh);
@@ -226,14 +218,12 @@ fn texels_are_alike_all_over_a_surface() {
 /// Faces of a box keep two texels apart at the nominal size.
 #[test]
 fn pieces_keep_their_gutter() {
-    let mesh = cuboid(DVec3::ZERO, DVec3::new(1.0, 2.0, 3.0));
+    let mesh = cuboid(DVec3::ZERO, dvec3(1.0, 2.0, 3.0));
     let map = parametrise(0, &mesh, 128).expect("the box has area");
     let bounds = |face: &[[DVec2; 3]]| {
         let corners = || face.iter().flatten().copied();
-        (
-            corners().fold(DVec2::INFINITY, DVec2::min),
-            corners().fold(DVec2::NEG_INFINITY, DVec2::max),
-        )
+        let low = corners().fold(DVec2::INFINITY, DVec2::min);
+        (low, corners().fold(DVec2::NEG_INFINITY, DVec2::max))
     };
     let boxes: Vec<(DVec2, DVec2)> = map.corner_uvs.chunks(2).map(bounds).collect();
     for (index, a) in boxes.iter().enumerate() {
@@ -266,7 +256,7 @@ fn gutters_continue_the_surface_at_seams() {
     let field = |triangle: usize, weights: DVec3| {
         let [a, b, c] = mesh.corners(triangle);
         let point = a * weights.x + b * weights.y + c * weights.z;
-        3.0 + point.dot(DVec3::new(1.0, 0.7, -0.5))
+        3.0 + point.dot(dvec3(1.0, 0.7, -0.5))
     };
     // The mean over the part of a triangle in a texel is the value at the middle of that part.
     let mut sums = vec![(0.0, 0.0); 512 * 512];
@@ -278,7 +268,7 @@ fn gutters_continue_the_surface_at_seams() {
                 let whole = turn(&[*a, *b, *c]);
                 let (v, w) = (turn(&[*a, at, *c]) / whole, turn(&[*a, *b, at]) / whole);
                 let sum = &mut sums[row * 512 + column];
-                sum.0 += part.area() * field(triangle, DVec3::new(1.0 - v - w, v, w));
+                sum.0 += part.area() * field(triangle, dvec3(1.0 - v - w, v, w));
                 sum.1 += part.area();
             });
         }

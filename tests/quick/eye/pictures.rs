@@ -1,20 +1,12 @@
 //! The CPU eye pass on scenes of known radiance.
 
-use std::f64::consts::PI;
-use std::sync::Arc;
-
-use glam::{DVec2, DVec3};
 use nephroid::eye_pass::reference::{ChainLimits, ReferenceSettings, first_hits, render};
 use nephroid::eye_pass::{Picture, View};
-use nephroid::geometry::Ray;
 use nephroid::illumination::IlluminationMap;
-use nephroid::optics::LinearSrgb;
 use nephroid::optics::fresnel::{dielectric_reflectance, thin_wall_reflectance};
-use nephroid::progress::Control;
-use nephroid::scene::texture::Wrap;
-use nephroid::scene::{Environment, LightKind, Material, Mesh, Scene, SurfaceKind, Texture, Volume};
-use nephroid::transport::Tracer;
+use nephroid::scene::{Environment, Volume};
 
+use crate::prelude::*;
 use support::chain_laws::direction;
 use support::floors::{diffuse, texture_reference};
 use support::meshes::{cuboid, floor, quad, sphere};
@@ -26,7 +18,7 @@ const ALBEDO: [f64; 3] = [0.6, 0.5, 0.3];
 /// Irradiance on them [W/m²].
 const E: [f32; 3] = [50.0, 40.0, 20.0];
 /// Radiance of the background [W/(m² sr)].
-const SKY: DVec3 = DVec3::new(3.0, 2.0, 1.0);
+const SKY: DVec3 = dvec3(3.0, 2.0, 1.0);
 
 /// What the floors send [W/(m² sr)].
 fn floor_sends() -> DVec3 {
@@ -92,8 +84,8 @@ impl Lit {
     /// Fails unless a floor's point, seen from above, sends this.
     #[track_caller]
     fn assert_point_sends(&self, [x, z]: [f64; 2], expected: DVec3) {
-        let point = DVec3::new(x, 0.0, z);
-        let above = point + DVec3::new(0.1, 1.0, 0.2);
+        let point = dvec3(x, 0.0, z);
+        let above = point + dvec3(0.1, 1.0, 0.2);
         self.assert_sends(&view(above, point, 0.02, [1, 1]), |_| expected);
     }
 }
@@ -128,16 +120,18 @@ fn coloured(
         attenuation_distance_m,
         attenuation_colour,
     };
-    let material = Material {
-        volume: Some(volume),
-        ..material
-    };
-    (material, volume)
+    (
+        Material {
+            volume: Some(volume),
+            ..material
+        },
+        volume,
+    )
 }
 
 /// A body that is much wider than what is seen of it.
 fn layer(low: f64, high: f64) -> Mesh {
-    cuboid(DVec3::new(-90.0, low, -90.0), DVec3::new(90.0, high, 90.0))
+    cuboid(dvec3(-90.0, low, -90.0), dvec3(90.0, high, 90.0))
 }
 
 /// Water as an open sheet and as a closed body.
@@ -168,6 +162,12 @@ fn lit_floor_sends_albedo_times_e_over_pi() {
     let lit = Lit::floor_and(vec![]);
     let view = looking([0.0, 2.0, 3.0], [0.0; 3], 40.0, [9, 7]);
     lit.assert_sends(&view, |_| floor_sends());
+    let control = Control::default();
+    control.cancel();
+    assert!(
+        render(&lit.0, &[], &view, &Default::default(), &(), &control).is_err(),
+        "cancelled"
+    );
     let unlit = Lit(lit.0, vec![]);
     unlit.assert_sends(&view, |_| DVec3::ZERO);
 }
@@ -205,7 +205,7 @@ fn from_within_water_there_is_snells_window() {
 
 #[test]
 fn slab_of_coloured_glass_keeps_its_shares() {
-    for colour in [LinearSrgb::WHITE, LinearSrgb::new(0.9, 0.5, 0.2)] {
+    for colour in [LinearSrgb::WHITE, rgb(0.9, 0.5, 0.2)] {
         let (material, volume) = coloured(glass(), 0.07, colour);
         let lit = Lit::floor_and(vec![(layer(1.0, 1.1), material)]);
         for target in [[0.0, 1e-3], [4.0, 2.0]] {
@@ -220,7 +220,7 @@ fn slab_of_coloured_glass_keeps_its_shares() {
 
 #[test]
 fn slab_under_water_counts_by_contrast() {
-    let slab_mesh = cuboid(DVec3::new(-80.0, 1.0, -80.0), DVec3::new(80.0, 1.1, 80.0));
+    let slab_mesh = cuboid(dvec3(-80.0, 1.0, -80.0), dvec3(80.0, 1.1, 80.0));
     let lit = Lit::floor_and(vec![(floor(90.0, 3.0), water()), (slab_mesh, glass())]);
     let down = looking([0.0, 2.0, 0.0], [0.0, 1.0, 0.0], 30.0, [5, 5]);
     lit.assert_sends(&down, |direction| {
@@ -235,13 +235,13 @@ fn slab_under_water_counts_by_contrast() {
 /// A sheet whose back is not drawn may lie anywhere on the way: what it lies in absorbs as without it.
 #[test]
 fn undrawn_backs_shorten_no_way_through_water() {
-    let (coloured, volume) = coloured(water(), 0.7, LinearSrgb::new(0.9, 0.5, 0.2));
+    let (coloured, volume) = coloured(water(), 0.7, rgb(0.9, 0.5, 0.2));
     let sheet = Material {
         double_sided: false,
         ..floor_material()
     };
     // It faces down, away from the eye.
-    let below = quad(DVec3::new(-5.0, 0.6, -5.0), DVec3::Z * 10.0, DVec3::X * 10.0);
+    let below = quad(dvec3(-5.0, 0.6, -5.0), DVec3::Z * 10.0, DVec3::X * 10.0);
     let lit = Lit::floor_and(vec![(layer(-0.5, 1.0), coloured), (below, sheet)]);
     lit.assert_sends_up([0.4, 0.2], |direction| {
         let r = dielectric_reflectance(-direction.y, WATER);
@@ -252,7 +252,7 @@ fn undrawn_backs_shorten_no_way_through_water() {
 
 #[test]
 fn thin_wall_reflects_all_orders_and_tints() {
-    let tint = DVec3::new(1.0, 0.5, 0.25);
+    let tint = dvec3(1.0, 0.5, 0.25);
     let pane = Material {
         base_colour: tint.to_array().into(),
         ..surface(SurfaceKind::ThinWall, 1.5)
@@ -280,19 +280,19 @@ fn polished_floor_sends_what_polish_lets_out() {
 /// A small shining square beside a mirror shows at the pixel where its virtual image lies.
 #[test]
 fn mirror_shows_the_virtual_image_in_place() {
-    let centre = DVec3::new(0.6, 0.3, 1.0);
-    let (sent, f0) = (DVec3::new(7.0, 5.0, 2.0), DVec3::new(0.9, 0.8, 0.5));
+    let centre = dvec3(0.6, 0.3, 1.0);
+    let (sent, f0) = (dvec3(7.0, 5.0, 2.0), dvec3(0.9, 0.8, 0.5));
     let shining = Material {
         emitted_radiance: sent.to_array().into(),
         ..diffuse(LinearSrgb::BLACK)
     };
-    let lamp = quad(centre - DVec3::new(0.1, 0.1, 0.0), DVec3::X * 0.2, DVec3::Y * 0.2);
+    let lamp = quad(centre - dvec3(0.1, 0.1, 0.0), DVec3::X * 0.2, DVec3::Y * 0.2);
     let metal = Material {
         base_colour: f0.to_array().into(),
         ..surface(SurfaceKind::Mirror, 1.5)
     };
     // The mirror is the plane z = −1; the image of a point lies at z → −2 − z.
-    let mirror = quad(DVec3::new(-3.0, -3.0, -1.0), DVec3::X * 6.0, DVec3::Y * 6.0);
+    let mirror = quad(dvec3(-3.0, -3.0, -1.0), DVec3::X * 6.0, DVec3::Y * 6.0);
     let lit = Lit(tracer(vec![(lamp, shining), (mirror, metal)], vec![]), vec![]);
     let view = looking([-0.4, 0.1, 2.5], [0.0, 0.0, -1.0], 50.0, [240, 160]);
     let (mut inside, mut outside) = (0, 0);
@@ -342,22 +342,21 @@ fn maps_are_read_bilinearly_by_their_chart() {
     let texels = |values: &[f32]| values.iter().map(|value| colour.map(|c| c * value)).collect();
     let sent = |value: f64| radiance_of(colour) * value / PI;
     let lit = Lit::with_map(white(), 2, texels(&[1.0, 3.0, 5.0, 11.0]));
-    for (place, expected) in [
-        ([-0.5, -0.5], 1.0),
-        ([0.5, -0.5], 3.0),
-        ([0.0, -0.5], 2.0),
-        ([0.0, 0.0], 5.0),
-        ([0.25, 0.5], 9.5),
-        ([-0.9, -0.9], 1.0),
-        ([0.5, 0.99], 11.0),
+    for (x, z, expected) in [
+        (-0.5, -0.5, 1.0),
+        (0.5, -0.5, 3.0),
+        (0.0, -0.5, 2.0),
+        (0.0, 0.0, 5.0),
+        (0.25, 0.5, 9.5),
+        (-0.9, -0.9, 1.0),
+        (0.5, 0.99, 11.0),
     ] {
-        lit.assert_point_sends(place, sent(expected));
+        lit.assert_point_sends([x, z], sent(expected));
     }
     // u runs against x.
     let mut turned = white();
     let mesh = Arc::make_mut(&mut turned.objects[0].mesh);
-    let coordinates = mesh.uv0.iter_mut().flatten();
-    coordinates.for_each(|uv| uv.x = 1.0 - uv.x);
+    mesh.uv0.iter_mut().flatten().for_each(|uv| uv.x = 1.0 - uv.x);
     let lit = Lit::with_map(turned, 2, texels(&[1.0, 2.0]));
     lit.assert_point_sends([-0.5, 0.0], sent(2.0));
     lit.assert_point_sends([0.5, 0.0], sent(1.0));
@@ -376,11 +375,8 @@ fn texture(width: u32, rgba: Vec<[u8; 4]>, wrap: Wrap) -> Texture {
 fn textured(mesh: Mesh, material: Material, uv_set: usize, texture: Texture) -> Scene {
     let mut image = texture_reference();
     image.uv_set = uv_set;
-    let material = Material {
-        base_colour_texture: Some(image),
-        ..material
-    };
     let mut scene = scene(vec![(mesh, material)], vec![]);
+    scene.materials[0].base_colour_texture = Some(image);
     scene.textures.push(Arc::new(texture));
     scene
 }
@@ -393,22 +389,19 @@ fn textures_tint_and_emission_adds() {
         [0, 0, 255, 255],
         [188, 188, 188, 255],
     ];
-    let emission = DVec3::new(0.25, 0.0, 0.0);
-    let material = Material {
-        emitted_radiance: emission.to_array().into(),
-        ..diffuse(LinearSrgb::grey(0.5))
-    };
+    let emission = dvec3(0.25, 0.0, 0.0);
+    let mut material = diffuse(LinearSrgb::grey(0.5));
+    material.emitted_radiance = emission.to_array().into();
     let four = texture(2, codes.to_vec(), Wrap::ClampToEdge);
     let lit = Lit::with_map(textured(floor(1.0, 0.0), material, 0, four), 1, vec![E]);
     let grey = DVec3::splat(LinearSrgb::decode_channel(188));
-    for (place, tint) in [
-        ([-0.5, -0.5], DVec3::X),
-        ([0.5, -0.5], DVec3::Y),
-        ([-0.5, 0.5], DVec3::Z),
-        ([0.5, 0.5], grey),
+    for (x, z, tint) in [
+        (-0.5, -0.5, DVec3::X),
+        (0.5, -0.5, DVec3::Y),
+        (-0.5, 0.5, DVec3::Z),
+        (0.5, 0.5, grey),
     ] {
-        let reflected = 0.5 * tint * radiance_of(E) / PI;
-        lit.assert_point_sends(place, emission + reflected);
+        lit.assert_point_sends([x, z], emission + 0.5 * tint * radiance_of(E) / PI);
     }
 }
 
@@ -428,24 +421,18 @@ fn images_go_on_beyond_their_borders() {
         let found = (-4..8).map(|column| strip.code(f64::from(column), 0.0)[0]);
         assert!(found.eq(expected), "{wrap:?}");
     }
-}
-
-#[test]
-fn textures_follow_the_set_they_name() {
+    // Textures follow the set that they name.
     let mut mesh = floor(1.0, 0.0);
-    let middles = |column: f64| Some(vec![DVec2::new((column + 0.5) / 3.0, 0.5); 4]);
+    let middles = |column: f64| Some(vec![dvec2((column + 0.5) / 3.0, 0.5); 4]);
     (mesh.uv0, mesh.uv1) = (middles(1.0), middles(2.0));
     for uv_set in [0, 1] {
         let white = diffuse(LinearSrgb::WHITE);
         let scene = textured(mesh.clone(), white, uv_set, strip(Wrap::Repeat));
         let tracer = Tracer::new(Arc::new(scene));
-        let hit = tracer.closest_hit(&Ray {
-            origin: DVec3::new(0.1, 1.0, 0.2),
-            direction: DVec3::NEG_Y,
-        });
-        let found = tracer.base_colour(&hit.expect("the floor")).r;
+        let (origin, direction) = (dvec3(0.1, 1.0, 0.2), DVec3::NEG_Y);
+        let hit = tracer.closest_hit(&Ray { origin, direction }).expect("the floor");
         let expected = LinearSrgb::decode_channel(uv_set as u8 + 1);
-        assert!((found - expected).abs() < 1e-12, "set {uv_set}");
+        near(tracer.base_colour(&hit).r, expected, 1e-12, uv_set);
     }
 }
 
@@ -454,7 +441,7 @@ fn textures_follow_the_set_they_name() {
 fn skies_lie_and_shine_as_their_light_says() {
     let pixels = [1.0, 2.0, 3.0, 4.0].map(|value| [value, 0.5 * value, 3.0]);
     let mut scene = scene(vec![], vec![light(LightKind::Environment { scale: 2.0 })]);
-    scene.lights[0].colour = LinearSrgb::new(1.0, 0.5, 0.25);
+    scene.lights[0].colour = rgb(1.0, 0.5, 0.25);
     scene.environment = Some(Arc::new(Environment::new(4, 1, pixels.to_vec()).expect("sound")));
     let lit = Lit(Tracer::new(Arc::new(scene)), vec![]);
     for (quarters, expected) in [
@@ -468,11 +455,11 @@ fn skies_lie_and_shine_as_their_light_says() {
         let azimuth = quarters * PI / 2.0;
         let ahead = [azimuth.sin(), 0.0, -azimuth.cos()];
         let view = looking([0.0; 3], ahead, 1e-6, [1, 1]);
-        lit.assert_sends(&view, |_| DVec3::new(2.0 * expected, 0.5 * expected, 1.5));
+        lit.assert_sends(&view, |_| dvec3(2.0 * expected, 0.5 * expected, 1.5));
     }
 }
 
-/// The back of a single-sided wall is not drawn: one looks into the room.
+/// One looks into the room.
 #[test]
 fn backs_of_single_sided_walls_are_not_drawn() {
     for double_sided in [true, false] {
@@ -480,18 +467,15 @@ fn backs_of_single_sided_walls_are_not_drawn() {
             double_sided,
             ..floor_material()
         };
-        let ceiling = quad(DVec3::new(-5.0, 1.0, -5.0), DVec3::Z * 10.0, DVec3::X * 10.0);
+        let ceiling = quad(dvec3(-5.0, 1.0, -5.0), DVec3::Z * 10.0, DVec3::X * 10.0);
         let lit = Lit::floor_and(vec![(ceiling, wall)]);
         let view = looking([0.0, 3.0, 0.0], [0.0, 0.0, 0.1], 30.0, [4, 3]);
         assert_eq!(first_hits(&lit.0, &view), [Some(usize::from(double_sided)); 12]);
         let seen = if double_sided { DVec3::ZERO } else { floor_sends() };
         lit.assert_sends(&view, |_| seen);
     }
-}
-
-#[test]
-fn first_hits_start_with_the_top_row() {
-    let square = |x: f64, y: f64| (quad(DVec3::new(x, y, -5.0), DVec3::X, DVec3::Y), floor_material());
+    // First hits start with the top row.
+    let square = |x: f64, y: f64| (quad(dvec3(x, y, -5.0), DVec3::X, DVec3::Y), floor_material());
     let tracer = tracer(vec![square(-1.0, 0.0), square(0.0, -1.0)], vec![]);
     let view = view(DVec3::ZERO, DVec3::NEG_Z, 2.0 * 0.2f64.atan(), [2, 2]);
     assert_eq!(first_hits(&tracer, &view), [Some(0), None, None, Some(1)]);
@@ -503,14 +487,14 @@ fn more_samples_soften_edges() {
     let lit = Lit::floor_and(vec![]);
     // The horizon of a floor that ends 100 m away runs through the middle row.
     let eye = DVec3::Y;
-    let view = view(eye, DVec3::new(0.0, 0.99, -1.0), 1f64.to_radians(), [1, 3]);
-    let at = |samples_per_side: u32| {
-        let picture = lit.picture(&view, samples_per_side);
-        let shares = picture
+    let view = view(eye, dvec3(0.0, 0.99, -1.0), 1f64.to_radians(), [1, 3]);
+    let share = |pixel: &[f32; 3]| f64::from(pixel[0]) / floor_sends().x;
+    let at = |side: u32| {
+        lit.picture(&view, side)
             .radiance
             .iter()
-            .map(|pixel| f64::from(pixel[0]) / floor_sends().x);
-        shares.collect::<Vec<f64>>()
+            .map(share)
+            .collect::<Vec<f64>>()
     };
     let fine = at(32);
     assert!(fine[0] == 0.0 && (fine[2] - 1.0).abs() < 1e-6);
@@ -547,13 +531,4 @@ fn clear_things_vanish_in_a_furnace() {
             assert!(relative.abs_diff_eq(DVec3::ONE, 1e-4), "{kind:?}: {relative}");
         }
     }
-}
-
-#[test]
-fn cancelled_picture_is_an_error() {
-    let lit = Lit::floor_and(vec![]);
-    let control = Control::default();
-    control.cancel();
-    let view = looking([0.0, 1.0, 0.0], [0.0; 3], 30.0, [4, 4]);
-    assert!(render(&lit.0, &[], &view, &Default::default(), &(), &control).is_err());
 }

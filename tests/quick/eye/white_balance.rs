@@ -1,13 +1,10 @@
 //! Which light is shown as white.
 
-use glam::DVec3;
 use nephroid::eye_pass::WhiteBalance;
-use nephroid::optics::LinearSrgb;
 use nephroid::optics::spectrum::Xyz;
 use nephroid::optics::spectrum::xyz::{IDENTITY, transformed};
-use nephroid::scene::{Light, Scene};
 
-use support::assert_close;
+use crate::prelude::*;
 use support::meshes::floor;
 use support::scenes::{diffuse, point_light, scene, sun};
 
@@ -28,7 +25,7 @@ fn assert_grey(colour: LinearSrgb, of: LinearSrgb) {
 
 #[test]
 fn light_of_lamps_becomes_white() {
-    let (warm, cold) = (LinearSrgb::new(1.0, 0.6, 0.3), LinearSrgb::new(0.5, 0.7, 1.0));
+    let (warm, cold) = (rgb(1.0, 0.6, 0.3), rgb(0.5, 0.7, 1.0));
     let lamp = |height_m: f64, colour| of_colour(point_light(DVec3::Y * height_m, 5.0), colour);
     let matrix = WhiteBalance::Lamps.matrix(&under(vec![lamp(3.0, warm)]));
     assert_grey(transformed(&matrix, warm), warm);
@@ -48,8 +45,8 @@ fn without_a_light_colours_stay() {
     }
     // Daylight is white already.
     let daylight = WhiteBalance::Kelvin(6504.0).matrix(&dark);
-    for (found, expected) in daylight.as_flattened().iter().zip(IDENTITY.as_flattened()) {
-        assert!((found - expected).abs() < 2e-3, "{found}");
+    for (found, expected) in daylight.into_iter().zip(IDENTITY) {
+        near(found, expected, 2e-3, "daylight");
     }
 }
 
@@ -80,7 +77,6 @@ fn whites_are_read_as_they_are_written() {
     for wrong in [
         "", "auto", "999", "25001", "NaN", "0.5,0.5", "0,0.3", "0.3,", "-1,1",
     ] {
-        let told = wrong.parse::<WhiteBalance>().expect_err(wrong);
-        assert!(told.contains("kelvin"), "{wrong}: {told}");
+        says(wrong.parse::<WhiteBalance>().expect_err(wrong), "kelvin");
     }
 }

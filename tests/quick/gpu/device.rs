@@ -1,18 +1,13 @@
 //! Faults of a device, and what it is too small for: refused in a sentence, and the rest is drawn.
 
-use std::sync::Arc;
-
-use glam::{DVec2, DVec3};
 use nephroid::effect::EffectSwitch;
 use nephroid::eye_pass::View;
 use nephroid::eye_pass::renderer::{Renderer, render_offscreen};
 use nephroid::gpu::Gpu;
 use nephroid::illumination::{IlluminationMap, parametrise};
-use nephroid::optics::LinearSrgb;
-use nephroid::scene::builtin::{parts, shapes};
-use nephroid::scene::{Material, Mesh, Scene, SurfaceKind};
 
 use crate::gpu::rig::{FORMAT, Rig, gpu, or_skip, own_gpu};
+use crate::prelude::*;
 use support::floors::{diffuse, floor_map, floor_scene, from_above};
 use support::meshes::grid;
 use support::scenes::{bits, map_of, view};
@@ -20,9 +15,9 @@ use support::scenes::{bits, map_of, view};
 /// A lit floor with a mirror and a glass ball on it.
 fn scene(levels: u32) -> (Scene, Vec<IlluminationMap>) {
     let mut scene = floor_scene(diffuse(LinearSrgb::WHITE));
-    let mirror = shapes::rectangle(DVec3::new(0.5, 0.3, 0.0), DVec3::X * 0.4, DVec3::Y * 0.2);
+    let mirror = shapes::rectangle(dvec3(0.5, 0.3, 0.0), DVec3::X * 0.4, DVec3::Y * 0.2);
     parts::add(&mut scene, "mirror", mirror, parts::mirror());
-    let ball = shapes::sphere(DVec3::new(0.5, 0.3, 0.5), 0.2, levels);
+    let ball = shapes::sphere(dvec3(0.5, 0.3, 0.5), 0.2, levels);
     parts::add(&mut scene, "ball", ball, parts::dielectric("glass", 1.5));
     let texels = (0..16).map(|texel| [0.1 + 0.2 * texel as f32; 3]).collect();
     (scene, vec![floor_map(0, 4, 4, texels)])
@@ -30,13 +25,8 @@ fn scene(levels: u32) -> (Scene, Vec<IlluminationMap>) {
 
 fn ahead() -> View {
     View {
-        background: LinearSrgb::new(0.1, 0.2, 0.3),
-        ..view(
-            DVec3::new(0.5, 0.8, 2.0),
-            DVec3::new(0.5, 0.2, 0.3),
-            0.7,
-            [48, 32],
-        )
+        background: rgb(0.1, 0.2, 0.3),
+        ..view(dvec3(0.5, 0.8, 2.0), dvec3(0.5, 0.2, 0.3), 0.7, [48, 32])
     }
 }
 
@@ -179,8 +169,8 @@ fn meshes_beyond_a_buffer_are_drawn_whole() {
     let limit = |limits: &mut wgpu::Limits| limits.max_buffer_size = 1 << 16;
     let small = or_skip!(own_gpu(limit));
     let sheet = |height: f64| {
-        let mut mesh: Mesh = grid(64, 64, |s, t| DVec3::new(t, height, s));
-        let uv = |place: &DVec3| DVec2::new(place.x, place.z);
+        let mut mesh: Mesh = grid(64, 64, |s, t| dvec3(t, height, s));
+        let uv = |place: &DVec3| dvec2(place.x, place.z);
         mesh.uv0 = Some(mesh.positions.iter().map(uv).collect());
         mesh
     };

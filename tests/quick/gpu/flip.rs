@@ -1,6 +1,6 @@
 //! The perceptual difference that pictures are compared by.
 
-use support::assert_close;
+use crate::prelude::*;
 use support::flip::mean_flip;
 
 /// Stripes, a disc and a gradient, changed by `change`.

@@ -1,17 +1,12 @@
 //! One picture: the device against the CPU, and both against a closed form, every channel by itself.
 
-use std::sync::Arc;
-
-use glam::DVec3;
 use nephroid::eye_pass::Picture;
 use nephroid::eye_pass::tone_mapping::display_rgba8;
 use nephroid::illumination::IlluminationMap;
-use nephroid::optics::LinearSrgb;
-use nephroid::scene::builtin::{parts, shapes};
-use nephroid::scene::{Environment, LightKind, Material, Scene};
-use nephroid::transport::Tracer;
+use nephroid::scene::Environment;
 
 use crate::gpu::rig::{AS_CPU, Rig, or_skip};
+use crate::prelude::*;
 use support::floors::{diffuse, floor_map, floor_scene, four_colours, lambert, texture_reference};
 use support::scenes::{light, seen, view};
 
@@ -20,21 +15,21 @@ use support::scenes::{light, seen, view};
 fn exhibit() -> (Scene, Vec<IlluminationMap>) {
     let mut scene = floor_scene(Material {
         base_colour_texture: Some(texture_reference()),
-        ..diffuse(LinearSrgb::new(0.8, 0.6, 0.3))
+        ..diffuse(rgb(0.8, 0.6, 0.3))
     });
     scene.textures.push(four_colours().into());
     let mirror = Material {
-        base_colour: LinearSrgb::new(0.9, 0.7, 0.5),
+        base_colour: rgb(0.9, 0.7, 0.5),
         ..parts::mirror()
     };
     let mut glass = parts::dielectric("glass", 1.5);
-    glass.base_colour = LinearSrgb::new(1.0, 0.8, 0.6);
+    glass.base_colour = rgb(1.0, 0.8, 0.6);
     let glowing = Material {
-        emitted_radiance: LinearSrgb::new(0.3, 0.9, 0.6),
+        emitted_radiance: rgb(0.3, 0.9, 0.6),
         ..diffuse(LinearSrgb::BLACK)
     };
-    let ball = |x: f64| shapes::sphere(DVec3::new(x, 0.2, 0.35), 0.18, 4);
-    let wall = shapes::rectangle(DVec3::new(0.5, 0.3, -0.1), DVec3::X * 0.4, DVec3::Y * 0.2);
+    let ball = |x: f64| shapes::sphere(dvec3(x, 0.2, 0.35), 0.18, 4);
+    let wall = shapes::rectangle(dvec3(0.5, 0.3, -0.1), DVec3::X * 0.4, DVec3::Y * 0.2);
     parts::add(&mut scene, "mirror", ball(0.25), mirror);
     parts::add(&mut scene, "glass", ball(0.75), glass);
     parts::add(&mut scene, "wall", wall, glowing);
@@ -63,13 +58,13 @@ fn unlike(a: &Picture, b: &Picture) -> f64 {
 #[test]
 fn device_shows_what_the_cpu_shows() {
     let (scene, maps) = exhibit();
-    let (eye, target) = (DVec3::new(0.6, 0.8, 1.9), DVec3::new(0.5, 0.15, 0.45));
+    let (eye, target) = (dvec3(0.6, 0.8, 1.9), dvec3(0.5, 0.15, 0.45));
     let view = view(eye, target, 0.75, [96, 64]);
     let tracer = Tracer::new(Arc::new(scene.clone()));
     let by_cpu = seen(&tracer, &maps, &view, &Default::default()).0;
     // The lower right corner of the floor: white texel, evenly lit.
     let camera = &view.camera;
-    let off = DVec3::new(0.9, 0.0, 0.9) - camera.position;
+    let off = dvec3(0.9, 0.0, 0.9) - camera.position;
     let half = (0.5 * camera.vertical_fov_rad).tan() * off.dot(camera.forward);
     let column = 48.0 + 32.0 * off.dot(camera.right()) / half;
     let row = 32.0 - 32.0 * off.dot(camera.up) / half;

@@ -1,20 +1,10 @@
 //! What is kept of scenes from one window to the next.
 
-use std::fs;
-use std::sync::Arc;
-use std::time::Instant;
-
-use glam::DVec2;
-use nephroid::scene::builtin;
-use nephroid::scene::changes::Changes;
-use nephroid::viewer::ViewerOptions;
 use nephroid::viewer::files::config::ConfigFolder;
 use nephroid::viewer::files::keeper::SOON;
-use nephroid::viewer::model::Model;
-use nephroid::viewer::navigation::Travel;
-use nephroid::viewer::panel::Wishes;
 
-use super::fixtures::{act, folder, intensity, model, options, undo, until, wait_for, wish};
+use super::fixtures::model;
+use super::*;
 
 /// A window on `ring` that keeps what is set in a folder of its own.
 struct Kept {
@@ -48,9 +38,9 @@ impl Kept {
 
 /// A camera elsewhere, two bookmarks, a setting, an exposure and an edit.
 fn use_it(model: &mut Model) {
-    model.navigator.look(DVec2::new(100.0, 30.0));
+    model.navigator.look(dvec2(100.0, 30.0));
     assert!(model.navigator.set_bookmark(0));
-    model.navigator.look(DVec2::new(40.0, 0.0));
+    model.navigator.look(dvec2(40.0, 0.0));
     assert!(model.navigator.set_bookmark(8));
     model.travel(Travel::Orbit);
     model.panel.settings.seed = 7;
@@ -76,7 +66,7 @@ fn what_was_set_is_found_again() {
 
     let mut second = kept.model();
     assert_eq!(second.panel.settings, settings);
-    assert!((second.panel.display.exposure_stops - 1.5).abs() < 1e-12);
+    near(second.panel.display.exposure_stops, 1.5, 1e-12, "exposure");
     assert!(second.keeps_exposure());
     assert_eq!(second.navigator.travel(), Travel::Orbit);
     assert_eq!(second.scene().lights, scene.lights);
@@ -89,7 +79,7 @@ fn what_was_set_is_found_again() {
     assert_eq!(second.scene().lights, second.edits().loaded().lights);
 
     // Another scene has nothing of it.
-    let slab = Arc::new(builtin::build("slab").expect("it is built in"));
+    let slab = Arc::new(built_in("slab"));
     assert!(!kept.other(|options| options.scene = slab).keeps_exposure());
 }
 
@@ -102,11 +92,11 @@ fn what_is_asked_for_comes_first() {
         options.files.settings_given = true;
     });
     assert_eq!(asked.panel.settings, kept.options.settings);
-    assert!((asked.panel.display.exposure_stops + 2.0).abs() < 1e-12);
+    near(asked.panel.display.exposure_stops, -2.0, 1e-12, "exposure");
     assert_eq!(undoable(&asked), 1, "edits were not asked away");
     // Who only looks around with other settings, or at other maps, takes none of what was kept away.
     let look = |model: &mut Model| {
-        model.navigator.look(DVec2::new(5.0, 5.0));
+        model.navigator.look(dvec2(5.0, 5.0));
         act(model, Wishes::default());
     };
     look(&mut asked);
@@ -127,7 +117,8 @@ fn what_is_asked_for_comes_first() {
     let fresh = kept.other(|options| options.files.fresh = true);
     assert_eq!(undoable(&fresh), 0);
     let (found, expected) = (camera(&fresh), camera(&untouched));
-    assert!(found.0.distance(expected.0) < 1e-9 && found.1.distance(expected.1) < 1e-9);
+    near(found.0, expected.0, 1e-9, "position");
+    near(found.1, expected.1, 1e-9, "forward");
     drop(fresh);
     assert_eq!(undoable(&kept.model()), 1, "nothing was changed, nothing is lost");
 }
@@ -149,7 +140,7 @@ fn changes_are_written_within_a_second() {
     }
     wait_for("the file", || file.exists());
     let text = fs::read_to_string(&file).expect("it is there");
-    let written: serde_json::Value = serde_json::from_str(&text).expect("it is whole");
+    let written: Value = serde_json::from_str(&text).expect("it is whole");
     assert_eq!(written["settings"]["seed"], 20);
     assert_eq!(written["source"], "builtin:ring");
 }
@@ -164,10 +155,7 @@ fn broken_files_are_set_aside() {
         fs::write(&file, text).expect("it is written");
         let mut model = kept.model();
         let warning = model.files.warning.clone().expect("it is told");
-        assert!(
-            warning.contains("renamed to") && warning.lines().count() == 1,
-            "{warning}"
-        );
+        says(warning, "renamed to");
         use_it(&mut model);
     }
     let files = fs::read_dir(scenes).expect("it is there");
@@ -182,7 +170,7 @@ fn settings_of_other_versions_are_taken() {
     let kept = Kept::new();
     use_it(&mut kept.model());
     let text = fs::read_to_string(kept.file()).expect("it is there");
-    let mut value: serde_json::Value = serde_json::from_str(&text).expect("it is whole");
+    let mut value: Value = serde_json::from_str(&text).expect("it is whole");
     let settings = &mut value["settings"];
     settings["max_depth"] = "many".into();
     settings["invented"] = 1.into();

@@ -1,13 +1,10 @@
 //! The plot of error against time, and the target on it.
 
-use egui::accesskit::Role;
-use egui::{Rect, pos2, vec2};
 use nephroid::session::CostPoint;
 use nephroid::session::forecast::forecast;
-use nephroid::settings::{BakeSettings, Estimator, LEAST_MAX_ERROR};
 use nephroid::viewer::panel::accuracy::course::{Curve, Frame};
 
-use super::headless::Headless;
+use super::*;
 
 fn towards(target: f64) -> BakeSettings {
     BakeSettings {
@@ -60,8 +57,8 @@ fn target_stands_where_the_forecast_has_it() {
         let place = frame.place(point.wall_s, point.relative_rmse);
         assert!(rect.contains(place), "{place}");
         let (seconds, error) = frame.at(place);
-        assert!((seconds / point.wall_s - 1.0).abs() < 1e-4, "{seconds}");
-        assert!((error / point.relative_rmse - 1.0).abs() < 1e-4, "{error}");
+        near(seconds / point.wall_s, 1.0, 1e-4, "time");
+        near(error / point.relative_rmse, 1.0, 1e-4, "error");
     }
     let at = frame.place(1.0, 0.1);
     assert!(at.y < frame.place(1.0, 0.01).y, "errors go up");
@@ -69,10 +66,7 @@ fn target_stands_where_the_forecast_has_it() {
 
     panel.assert_says(&["5.0 % after 0.90 s; to 1 %: about"]);
     let rect = plot(&panel);
-    assert!(
-        Headless::is_inside(rect) && rect.width() > 250.0 && rect.height() > 80.0,
-        "{rect}"
-    );
+    assert!(Headless::is_inside(rect) && rect.width() > 250.0 && rect.height() > 80.0);
     let mut unknown = last.clone();
     unknown.result.course.clear();
     assert_eq!(Curve::new(panel.settings(), &unknown), None);
@@ -82,10 +76,8 @@ fn target_stands_where_the_forecast_has_it() {
 fn drag_along_the_curve_sets_the_target() {
     let mut panel = panel(towards(0.05));
     let rect = plot(&panel);
-    panel.drag_at(
-        rect.center(),
-        rect.center_bottom() - vec2(0.0, 0.2 * rect.height()),
-    );
+    let lower = rect.center_bottom() - vec2(0.0, 0.2 * rect.height());
+    panel.drag_at(rect.center(), lower);
     let target = panel.settings().max_error.expect("still an error");
     assert!((0.0015..0.02).contains(&target), "{target}");
     let percent = (target * 1e6).round() / 1e4;

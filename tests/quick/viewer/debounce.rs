@@ -1,8 +1,8 @@
 //! Waiting for a change to come to rest.
 
-use std::time::{Duration, Instant};
+use nephroid::viewer::debounce::Debounce;
 
-use nephroid::viewer::debounce::{Debounce, QUIET};
+use super::*;
 
 #[test]
 fn many_changes_are_acted_upon_once_after_the_last() {

@@ -1,13 +1,8 @@
 //! The panel's section *Effects*.
 
-use egui::Key;
-use egui::accesskit::Role;
-use egui_kittest::kittest::NodeT as _;
-use nephroid::effect::{Effect, EffectSwitch};
 use nephroid::plan::{EffectLine, EffectPlan, LightLine};
-use nephroid::settings::BakeSettings;
 
-use super::headless::{Headless, leak};
+use super::*;
 
 pub fn line(effect: Effect, on: bool, reason: &str) -> EffectLine {
     EffectLine {
@@ -43,18 +38,9 @@ fn plan_and_rays_are_listed() {
         line(Effect::LightPass, true, "`glass` is lit by `sun`"),
         line(Effect::Absorption, false, "no solid absorbs"),
     ]);
-    panel.assert_says(&[
-        "light pass: on",
-        "`glass` is lit by `sun`",
-        "12,345 light rays",
-        "678 gather rays",
-        "absorption: off",
-        "no solid absorbs",
-        "light lamp: on",
-        "sees `ball`",
-        "Known after the first bake.",
-        "Known with the first picture.",
-    ]);
+    let told = "light pass: on|`glass` is lit by `sun`|12,345 light rays|678 gather rays|absorption: off|\
+                no solid absorbs|light lamp: on|sees `ball`|Known after the first bake.|Known with the first picture.";
+    panel.assert_says(&told.split('|').collect::<Vec<_>>());
     assert!(!panel.says("shadow rays"), "there were none");
     panel.hover(Role::Label, "light pass: on");
     panel.assert_says(&[Effect::LightPass.description()]);
@@ -64,35 +50,7 @@ fn plan_and_rays_are_listed() {
 }
 
 #[test]
-fn switched_by_pointer_and_keyboard() {
-    let mut panel = panel(Vec::new());
-    for effect in Effect::ALL {
-        let name = effect.name().replace('_', " ");
-        for (switch, label) in [
-            (EffectSwitch::On, "on"),
-            (EffectSwitch::Auto, "auto"),
-            (EffectSwitch::Off, "off"),
-        ] {
-            panel.click(Role::RadioButton, &format!("{name}: {label}"));
-            assert_eq!(panel.settings().effects.get(effect), switch, "{name}");
-        }
-    }
-    panel.focus(Role::RadioButton, "refraction: off");
-    let target = "reflection: on";
-    let is_there = |panel: &Headless| panel.named(Role::RadioButton, target).is_focused();
-    let steps = (0..200).take_while(|_| {
-        panel.strike(Key::Tab);
-        !is_there(&panel)
-    });
-    assert!(steps.count() < 200, "the keyboard gets there");
-    panel.strike(Key::Space);
-    let effects = &panel.settings().effects;
-    assert_eq!(effects.get(Effect::Reflection), EffectSwitch::On);
-    assert_eq!(effects.get(Effect::Refraction), EffectSwitch::Off);
-}
-
-#[test]
-fn chains_need_no_bake() {
+fn effects_are_switched() {
     let mut panel = panel(Vec::new());
     for (name, told) in [
         ("chains: off", "Done: the maps belong to these settings."),
@@ -101,6 +59,29 @@ fn chains_need_no_bake() {
         panel.click(Role::RadioButton, name);
         panel.assert_says(&[told]);
     }
+    let labels = [
+        (EffectSwitch::On, "on"),
+        (EffectSwitch::Auto, "auto"),
+        (EffectSwitch::Off, "off"),
+    ];
+    for effect in Effect::ALL {
+        let name = effect.name().replace('_', " ");
+        for (switch, label) in labels {
+            panel.click(Role::RadioButton, &format!("{name}: {label}"));
+            assert_eq!(panel.settings().effects.get(effect), switch, "{name}");
+        }
+    }
+    panel.focus(Role::RadioButton, "refraction: off");
+    let target = "reflection: on";
+    let steps = (0..200).take_while(|_| {
+        panel.strike(Key::Tab);
+        !panel.named(Role::RadioButton, target).is_focused()
+    });
+    assert!(steps.count() < 200, "the keyboard gets there");
+    panel.strike(Key::Space);
+    let effects = &panel.settings().effects;
+    assert_eq!(effects.get(Effect::Reflection), EffectSwitch::On);
+    assert_eq!(effects.get(Effect::Refraction), EffectSwitch::Off);
 }
 
 #[test]

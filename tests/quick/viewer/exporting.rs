@@ -1,15 +1,9 @@
 //! Maps written by a thread of their own.
 
-use std::path::Path;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use nephroid::viewer::exporting::{Exporter, folder_name};
 
-use nephroid::export::FloatImage;
-use nephroid::settings::BakeSettings;
-use nephroid::viewer::exporting::{Export, ExportState, Exporter, folder_name};
-
-use super::fixtures::{folder, map, scene, wait_for};
-use super::headless::finished;
+use super::fixtures::{map, scene};
+use super::*;
 
 /// What an export comes to; the thread has to say that it is done.
 fn export(what: Export, folder: &Path) -> ExportState {
@@ -39,9 +33,8 @@ fn check_map(path: &Path) {
 fn one_map_is_never_written_over_another() {
     let folder = folder();
     for number in 1..=2 {
-        let path = folder
-            .path()
-            .join(format!("nephroid-test-0000_floor-000{number}.exr"));
+        let name = format!("nephroid-test-0000_floor-000{number}.exr");
+        let path = folder.path().join(name);
         let state = export(Export::Map(0), folder.path());
         assert_eq!(state, ExportState::Done(path.clone()));
         check_map(&path);
@@ -59,14 +52,14 @@ fn all_maps_replace_those_before() {
         assert_eq!(state, ExportState::Done(maps.clone()));
     }
     check_map(&maps.join("maps/0000_floor.exr"));
-    let manifest = std::fs::read_to_string(maps.join("manifest.json")).expect("a manifest");
+    let manifest = fs::read_to_string(maps.join("manifest.json")).expect("a manifest");
     assert!(manifest.contains("maps/0000_floor.exr") && manifest.contains("maps/0000_floor.uv"));
 }
 
 #[test]
 fn failures_are_told_in_a_sentence() {
     let folder = folder();
-    std::fs::write(folder.path().join("mine.txt"), "mine").expect("a file");
+    fs::write(folder.path().join("mine.txt"), "mine").expect("a file");
     for what in [
         Export::All(".".into()),
         Export::All("mine.txt".into()),
@@ -77,6 +70,6 @@ fn failures_are_told_in_a_sentence() {
         };
         assert!(!sentence.contains('\n') && sentence.len() > 20, "{sentence}");
     }
-    let left = std::fs::read_dir(folder.path()).expect("it is there");
+    let left = fs::read_dir(folder.path()).expect("it is there");
     assert_eq!(left.count(), 1, "nothing else is left there");
 }

@@ -1,26 +1,16 @@
 //! Errors, differences and dominant wavelengths in false colours.
 
-use std::sync::Arc;
-
-use nephroid::illumination::IlluminationMap;
-use nephroid::illumination::difference::{Difference, SignedMap};
+use nephroid::illumination::difference::SignedMap;
 use nephroid::illumination::difference_colours;
 use nephroid::optics::spectrum::{Hue, Xyz, dominant, xyz_bar};
-use nephroid::optics::{LinearSrgb, Nanometres};
 use nephroid::viewer::{difference_view, error_view, wavelength_view};
 
-use super::fixtures::{caustic, chart};
+use super::*;
 
 /// A texel's display codes, to the rounding of one code.
 fn assert_shows(map: &IlluminationMap, texel: usize, codes: [u8; 3]) {
-    let found = map.total()[texel];
-    let expected = codes.map(|code| LinearSrgb::decode_channel(code) as f32);
-    for (found, expected) in found.into_iter().zip(expected) {
-        assert!(
-            (found - expected).abs() < 0.01,
-            "texel {texel}: {found} {expected}"
-        );
-    }
+    let found = map.total()[texel].map(f64::from);
+    near(found, codes.map(LinearSrgb::decode_channel), 0.01, texel);
 }
 
 #[test]
@@ -58,16 +48,18 @@ fn error_colours_are_logarithmic_to_their_ends() {
 fn differences_show_relative_to_the_mean() {
     let chart = chart(0, 3, 1, vec![1.0]);
     let shown = |mean_w_m2| {
-        let map = SignedMap {
-            chart: Arc::clone(&chart),
-            irradiance: vec![1.0, -0.1, 0.0],
+        let (chart, irradiance) = (Arc::clone(&chart), vec![1.0, -0.1, 0.0]);
+        let maps = vec![SignedMap {
+            chart,
+            irradiance,
             mean_w_m2,
-        };
+        }];
+        let (with_w, without_w, relative_rmse) = (6.0, 5.1, Some(0.3));
         difference_view::maps(&Difference {
-            maps: vec![map],
-            with_w: 6.0,
-            without_w: 5.1,
-            relative_rmse: Some(0.3),
+            maps,
+            with_w,
+            without_w,
+            relative_rmse,
         })
     };
     assert!(Arc::ptr_eq(&shown(2.0)[0].chart, &chart));
@@ -97,7 +89,7 @@ fn dominant_wavelengths_are_those_published() {
         let Some(Hue::Spectral(found)) = dominant(colour) else {
             panic!("{colour:?}")
         };
-        assert!((found.0 - nm).abs() < tolerance, "{found:?} instead of {nm} nm");
+        near(found.0, nm, tolerance, colour);
     }
     assert_eq!(dominant(LinearSrgb::from([1.0, 0.0, 1.0])), Some(Hue::Purple));
     assert_eq!(dominant(LinearSrgb::WHITE * 7.0), Some(Hue::White));
@@ -111,9 +103,7 @@ fn texels_show_their_wavelength() {
     let texels = vec![green, faint, [0.5; 3], [f32::NAN; 3]];
     let shown = wavelength_view::maps(&[caustic(chart(0, 4, 1, vec![1.0]), texels)])[0].total();
     let expected = wavelength_view::colour(Nanometres(530.0)).to_array();
-    for (found, expected) in shown[0].into_iter().zip(expected) {
-        assert!((f64::from(found) - expected).abs() < 1e-3, "{shown:?}");
-    }
+    near(shown[0].map(f64::from), expected, 1e-3, "530 nm");
     assert_eq!(shown[1], [0.0; 3], "dark texels are black");
     assert!(shown[2][0] > 0.0 && shown[2] == [shown[2][0]; 3], "{shown:?}");
     assert!(shown[3][0].is_nan());

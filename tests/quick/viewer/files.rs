@@ -1,18 +1,9 @@
 //! Opening scenes while the window is open.
 
-use std::fs;
-use std::sync::Arc;
-
-use egui::accesskit::Role;
-use nephroid::settings::BakeSettings;
-use nephroid::viewer::ViewerOptions;
 use nephroid::viewer::files::recent::{MOST, Recent};
 use nephroid::viewer::files::{FileFacts, typed};
-use nephroid::viewer::model::Model;
 
-use super::fixtures::{self, act, bake, events, folder, intensity, options, until, wish};
-use super::headless::Headless;
-use super::scene_file;
+use super::*;
 
 /// A baked scene with one edit, and the folder of its log.
 fn model() -> (Model, tempfile::TempDir) {
@@ -29,7 +20,7 @@ fn model() -> (Model, tempfile::TempDir) {
 fn opened(folder: &tempfile::TempDir) -> Vec<String> {
     let mut events = events(&folder.path().join("log"));
     events.retain(|event| event["event"] == "opened");
-    let scene = |event: &serde_json::Value| event["scene"].as_str().expect("a name").to_owned();
+    let scene = |event: &Value| event["scene"].as_str().expect("a name").to_owned();
     events.iter().map(scene).collect()
 }
 
@@ -66,10 +57,8 @@ fn another_scene_takes_the_place_of_the_first() {
 #[test]
 fn a_refused_file_leaves_all_as_it_was() {
     let (mut model, folder) = model();
-    let (scene, last) = (
-        Arc::clone(model.scene()),
-        model.last.clone().expect("it was baked"),
-    );
+    let scene = Arc::clone(model.scene());
+    let last = model.last.clone().expect("it was baked");
     let broken = scene_file::no_scene(folder.path()).display().to_string();
     for source in [&broken, "no such file.glb", "builtin:nothing"] {
         model.open(source);
@@ -132,10 +121,7 @@ fn paths_are_taken_as_pasted() {
 fn panel_opens_paths_and_builtin_scenes() {
     let mut panel = Headless::new(BakeSettings::splat());
     panel.open("Scene");
-    let field = panel
-        .find(Role::TextInput, |_| true)
-        .expect("a field for the path")
-        .rect();
+    let field = panel.find(Role::TextInput, |_| true).expect("a field").rect();
     assert!(field.width() > 150.0, "a path has room there: {field:?}");
     panel.click_at(field.center());
     panel.type_text("x.glb");
@@ -157,6 +143,6 @@ fn panel_opens_paths_and_builtin_scenes() {
     panel.assert_says(&[
         "loading y.glb …",
         "y.glb: is no scene",
-        "The graphics device was lost and came back",
+        "device was lost and came back",
     ]);
 }

@@ -1,18 +1,13 @@
 //! The camera's path: recorded, played and written.
 
-use glam::DVec3;
-use nephroid::scene::{Camera, CameraPath};
-use nephroid::settings::BakeSettings;
-use nephroid::viewer::exporting::ExportState;
+use nephroid::scene::CameraPath;
 use nephroid::viewer::filming::{Film, Player};
-use nephroid::viewer::panel::FilmWish;
 
-use super::fixtures::folder;
-use super::headless::Headless;
+use super::*;
 
 fn camera(x: f64) -> Camera {
-    let target = DVec3::new(0.5 * x, 0.2, -4.0);
-    Camera::look_at("here", DVec3::new(x, 1.5, 3.0), target, 0.7)
+    let target = dvec3(0.5 * x, 0.2, -4.0);
+    Camera::look_at("here", dvec3(x, 1.5, 3.0), target, 0.7)
 }
 
 /// From x = 0 to x = 2 [m].
@@ -26,18 +21,15 @@ fn film() -> Film {
 
 #[test]
 fn keys_are_the_camera_that_was_there() {
-    let origin = DVec3::new(1e6, 0.0, -2e6);
+    let origin = dvec3(1e6, 0.0, -2e6);
     let mut film = Film::default();
     // The third has no place to go to.
     for (place, x, stands) in [(None, 1.0, 1.0), (Some(0), -1.0, -1.0), (Some(7), 9.0, -1.0)] {
         film.record(place, &camera(x), origin, 3.0);
         let there = film.camera_at(0, origin).expect("it is recorded");
-        assert!(
-            there.position.distance(camera(stands).position) < 1e-8,
-            "{there:?}"
-        );
-        assert!(there.forward.distance(camera(stands).forward) < 1e-8, "{there:?}");
-        assert!((there.vertical_fov_rad - 0.7).abs() < 1e-12, "{there:?}");
+        near(there.position, camera(stands).position, 1e-8, "position");
+        near(there.forward, camera(stands).forward, 1e-8, "forward");
+        near(there.vertical_fov_rad, 0.7, 1e-12, "angle of view");
         assert!(film.keys.len() == 1 && film.camera_at(1, origin).is_none());
     }
     assert_eq!(film.keys[0].roll_deg, 0.0, "who stands level writes no roll");
@@ -60,13 +52,13 @@ fn a_lean_takes_the_shorter_way() {
     for (key, degrees) in [170.0, -150.0].into_iter().enumerate() {
         film.record(None, &leaning(degrees), DVec3::ZERO, 3.0);
         let there = film.camera_at(key, DVec3::ZERO).expect("it is recorded");
-        assert!(there.up.distance(leaning(degrees).up) < 1e-9, "{there:?}");
+        near(there.up, leaning(degrees).up, 1e-9, degrees);
     }
     let folder = folder();
     let path = film.save(folder.path(), "leaning").expect("it can be written");
     let path = CameraPath::read(&path).expect("it can be read");
     let cameras = path.cameras(DVec3::ZERO);
-    assert!(cameras[1].up.distance(leaning(-170.0).up) < 1e-9, "{cameras:?}");
+    near(cameras[1].up, leaning(-170.0).up, 1e-9, "half-way");
     assert!(cameras.iter().all(Camera::is_sound));
 }
 
@@ -76,23 +68,22 @@ fn paths_are_written_as_render_reads_them() {
     let film = Film { frames: 5, ..film() };
     for number in 1..=2 {
         let path = film.save(folder.path(), "my scene").expect("it can be written");
-        assert!(
-            path.ends_with(format!("nephroid-my-scene-path-000{number}.json")),
-            "{path:?}"
-        );
+        let name = format!("nephroid-my-scene-path-000{number}.json");
+        assert!(path.ends_with(name), "{path:?}");
         let cameras = CameraPath::read(&path)
             .expect("it is a path")
             .cameras(DVec3::ZERO);
         assert_eq!(cameras.len(), 5);
         for (frame, camera) in cameras.iter().enumerate() {
-            let expected = DVec3::new(0.5 * frame as f64, 1.5, 3.0);
-            assert!(camera.position.distance(expected) < 1e-12, "{camera:?}");
+            near(camera.position, dvec3(0.5 * frame as f64, 1.5, 3.0), 1e-12, frame);
         }
     }
     let mut one = film;
     one.keys.truncate(1);
-    let error = one.save(folder.path(), "one").expect_err("it leads nowhere");
-    assert!(error.to_string().contains("keys"), "{error}");
+    says(
+        one.save(folder.path(), "one").expect_err("it leads nowhere"),
+        "keys",
+    );
 }
 
 #[test]

@@ -1,9 +1,9 @@
 //! Maps as flat pictures.
 
-use nephroid::settings::LayerKind;
 use nephroid::viewer::flat_map::{Part, Shown, read, show, thumbnail};
 
 use super::fixtures::map;
+use super::*;
 
 /// Brightness [0, 255] and opacity of a pixel.
 fn pixel(shown: &Shown, x: usize, y: usize) -> (u8, u8) {
@@ -77,8 +77,5 @@ fn reading_tells_layers_and_error() {
         panic!("{reading:?}")
     };
     // Grey light is its own luminance.
-    assert!(
-        (caustic - 6.0).abs() < 1e-9 && (direct - 3.0).abs() < 1e-9,
-        "{reading:?}"
-    );
+    near([caustic, direct], [6.0, 3.0], 1e-9, "layers");
 }

@@ -1,13 +1,9 @@
 //! The graph of what pictures took on the graphics device.
 
-use egui::accesskit::Role;
-use egui::{Rect, pos2};
-use nephroid::eye_pass::renderer::GpuMs;
-use nephroid::settings::BakeSettings;
 use nephroid::viewer::frame_times::{FrameTimes, PICTURES};
 use nephroid::viewer::panel::frame_graph::{columns, scale_ms};
 
-use super::headless::{Headless, leak};
+use super::*;
 
 fn of<const N: usize>(pictures: [[f64; 3]; N]) -> FrameTimes {
     let mut times = FrameTimes::default();
@@ -45,17 +41,9 @@ fn oldest_pictures_are_forgotten() {
 
 #[test]
 fn scale_holds_the_longest_picture() {
-    for (longest, scale) in [
-        (0.0, 0.1),
-        (0.1, 0.1),
-        (0.11, 0.2),
-        (3.0, 5.0),
-        (16.7, 20.0),
-        (51.0, 100.0),
-        (1e9, 1e5),
-    ] {
-        let found = scale_ms(longest);
-        assert!((found / scale - 1.0).abs() < 1e-12, "{longest}: {found}");
+    let longest = [0.0, 0.1, 0.11, 3.0, 16.7, 51.0, 1e9];
+    for (longest, scale) in longest.into_iter().zip([0.1, 0.1, 0.2, 5.0, 20.0, 100.0, 1e5]) {
+        near(scale_ms(longest) / scale, 1.0, 1e-12, longest);
     }
 }
 
@@ -79,16 +67,13 @@ fn passes_are_stacked_newest_at_the_right() {
 fn newest_time_is_told_in_numbers() {
     let mut panel = panel(Some(of([[9.0, 9.0, 9.0], [1.25, 3.5, 0.25]])));
     let passes = ["opaque 1.25", "specular 3.50", "tone mapping 0.25"];
-    panel.assert_says(&["Frame time (5.00 ms)"]);
     panel.assert_says(&passes);
+    panel.assert_says(&["Frame time (5.00 ms)"]);
     let graph = "Device times of 2 pictures, at most 27.00 ms";
     panel.hover(Role::Image, graph);
     panel.assert_says(&["the newest at the right"]);
     let rect = panel.named(Role::Image, graph).rect();
-    assert!(
-        Headless::is_inside(rect) && rect.width() > 250.0 && rect.height() > 40.0,
-        "{rect}"
-    );
+    assert!(Headless::is_inside(rect) && rect.width() > 250.0 && rect.height() > 40.0);
     // The section stays open though its title is another.
     panel.tell(|told| told.frame_times = Some(leak(of([[0.5, 0.0, 0.25]]))));
     panel.assert_says(&["Frame time (0.75 ms)", "specular 0.00"]);

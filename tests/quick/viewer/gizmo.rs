@@ -1,24 +1,17 @@
 //! Handles in the picture: what a gaze points at, how far a pull moves, and where nodes stand afterwards.
 
-use std::sync::Arc;
-
-use egui::accesskit::Role;
-use egui::{Rect, pos2, vec2};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
-use glam::{DQuat, DVec3};
-use nephroid::geometry::Ray;
-use nephroid::scene::{Camera, Edit, Scene};
-use nephroid::viewer::gizmo::{Gizmo, Handle, Held, light_at};
+use nephroid::viewer::gizmo::{Gizmo, Handle, light_at};
 use nephroid::viewer::lens::Lens;
-use nephroid::viewer::placement::Placement;
 
-use super::fixtures::{edited, scene};
+use super::fixtures::scene;
+use super::*;
 
 const SIZE: (f32, f32) = (800.0, 600.0);
 
 fn camera() -> Camera {
-    Camera::look_at("eye", DVec3::new(2.0, 3.0, 6.0), DVec3::new(0.1, 0.8, -0.2), 0.9)
+    Camera::look_at("eye", dvec3(2.0, 3.0, 6.0), dvec3(0.1, 0.8, -0.2), 0.9)
 }
 
 fn lens(camera: &Camera) -> Lens<'_> {
@@ -32,16 +25,11 @@ fn lens(camera: &Camera) -> Lens<'_> {
 fn gazes_meet_what_is_seen() {
     let camera = camera();
     let lens = lens(&camera);
-    for point in [
-        DVec3::ZERO,
-        DVec3::new(-1.0, 0.3, 0.5),
-        DVec3::new(1.5, 2.0, -3.0),
-    ] {
+    for point in [DVec3::ZERO, dvec3(-1.0, 0.3, 0.5), dvec3(1.5, 2.0, -3.0)] {
         let gaze = lens.gaze(lens.place(point));
         let along = (point - gaze.origin).dot(gaze.direction);
-        let off = (gaze.origin + gaze.direction * along).distance(point);
         // Places are 32-bit numbers.
-        assert!(off < 1e-4, "{point}: {off}");
+        near(gaze.origin + gaze.direction * along, point, 1e-4, "met");
         assert!(lens.is_before(point) && !lens.is_before(gaze.origin - camera.forward));
     }
     let scene = scene();
@@ -58,7 +46,7 @@ fn handles_tell_distance_and_angle() {
         origin,
         direction: (to - origin).normalize(),
     };
-    let (eye, origin) = (camera().position, DVec3::new(0.2, 0.7, -0.4));
+    let (eye, origin) = (camera().position, dvec3(0.2, 0.7, -0.4));
     let turned = |angle| DQuat::from_rotation_y(angle) * DVec3::Z;
     let axes = [
         (Handle::X, DVec3::X),
@@ -68,16 +56,14 @@ fn handles_tell_distance_and_angle() {
     let along = axes.map(|(handle, axis)| [-1.5, 0.0, 0.25, 2.0].map(|m| (handle, axis * m, m)));
     let around = [-2.0, 0.0, 0.5, 3.0].map(|angle| (Handle::Turn, turned(angle), angle));
     for (handle, way, expected) in along.into_iter().flatten().chain(around) {
-        let found = handle
-            .reach(origin, &ray(eye, origin + way))
-            .expect("it is reached");
-        assert!((found - expected).abs() < 1e-9, "{handle:?} {expected}: {found}");
+        let found = handle.reach(origin, &ray(eye, origin + way));
+        near(found.expect("it is reached"), expected, 1e-9, handle);
     }
     // Along the axis, or level with the circle, a gaze tells nothing.
     for (handle, axis) in axes {
         assert_eq!(handle.reach(origin, &ray(origin - axis, origin)), None);
     }
-    let level = DVec3::new(5.0, origin.y, 0.0);
+    let level = dvec3(5.0, origin.y, 0.0);
     assert_eq!(Handle::Turn.reach(origin, &ray(level, level - DVec3::X)), None);
 }
 
@@ -86,31 +72,29 @@ fn nodes_move_and_come_back_bit_for_bit() {
     // Two parts of one node, of which none lies in the node's middle.
     let mut loaded = scene();
     let (ball, last) = (1, loaded.objects.len());
-    let Edit::ObjectMesh { mesh, .. } =
-        Edit::object_at(ball, &loaded.objects[ball].mesh, DVec3::new(2.0, 0.5, 0.0))
-    else {
+    let beside = Edit::object_at(ball, &loaded.objects[ball].mesh, dvec3(2.0, 0.5, 0.0));
+    let Edit::ObjectMesh { mesh, .. } = beside else {
         panic!("it is a mesh")
     };
     loaded.objects.push(loaded.objects[ball].clone());
     loaded.objects[last].mesh = mesh;
     let there = Placement {
         yaw_rad: 0.7,
-        offset_m: DVec3::new(0.25, -0.5, 1.0),
+        offset_m: dvec3(0.25, -0.5, 1.0),
     };
     let (moved, inverse) = there.edit(ball, &loaded).apply(&loaded).expect("it can be moved");
     // Balls of 0.5 m around 0.8 m, and 2 m and 0.5 m further: their box is from −0.5 to 2.5 and from 0.3 to 1.8.
     let pivot = there.middle_m(ball, &loaded) - there.offset_m;
-    assert!(pivot.distance(DVec3::new(1.0, 1.05, 0.0)) < 0.02);
+    assert!(pivot.distance(dvec3(1.0, 1.05, 0.0)) < 0.02);
     let turn = DQuat::from_rotation_y(there.yaw_rad);
     for part in [ball, last] {
         let [was, is] = [&loaded, &moved].map(|scene| &scene.objects[part].mesh.positions);
         for (was, is) in was.iter().zip(is) {
-            let expected = turn * (*was - pivot) + pivot + there.offset_m;
-            assert!(is.distance(expected) < 1e-12, "{is} instead of {expected}");
+            near(*is, turn * (*was - pivot) + pivot + there.offset_m, 1e-12, part);
         }
         let found = Placement::of(part, &loaded, &moved).expect("it is a turn and a way");
-        assert!((found.yaw_rad - there.yaw_rad).abs() < 1e-8, "{found:?}");
-        assert!(found.offset_m.distance(there.offset_m) < 1e-8, "{found:?}");
+        near(found.yaw_rad, there.yaw_rad, 1e-8, "turn");
+        near(found.offset_m, there.offset_m, 1e-8, "offset");
     }
     let [floor, same_floor] = [&loaded, &moved].map(|scene| &scene.objects[0].mesh);
     assert!(Arc::ptr_eq(floor, same_floor), "nothing else moves");
@@ -187,10 +171,8 @@ fn objects_turn_about_their_vertical() {
         Placement::of(1, &scenes[0], &scenes[scenes.len() - 1]).expect("a turn or a way")
     };
     let turned = placed("Turn", vec2(-50.0, 10.0));
-    assert!(
-        turned.yaw_rad.abs() > 0.1 && turned.offset_m == DVec3::ZERO,
-        "{turned:?}"
-    );
+    assert!(turned.yaw_rad.abs() > 0.1, "{turned:?}");
+    assert_eq!(turned.offset_m, DVec3::ZERO);
     let moved = placed("Move z", vec2(-20.0, 30.0));
     assert!(moved.offset_m.z > 0.05 && moved.yaw_rad == 0.0, "{moved:?}");
     assert_eq!(moved.offset_m.with_z(0.0), DVec3::ZERO);

@@ -1,28 +1,17 @@
 //! Lights that are added and removed in the window, and the brightest spot.
 
-use std::path::Path;
-use std::sync::Arc;
-
-use glam::{DVec2, DVec3};
-use nephroid::illumination::{Chart, IlluminationMap, Receiver};
-use nephroid::optics::LinearSrgb;
-use nephroid::scene::builtin::parts;
-use nephroid::scene::changes::{Change, Changes};
-use nephroid::scene::load::save;
-use nephroid::scene::{Edit, Light, LightKind, LightOrigin, LoadOptions, Mesh, Scene, load};
-use nephroid::transport::Tracer;
+use nephroid::illumination::{Chart, Receiver};
+use nephroid::scene::changes::Change;
+use nephroid::scene::{LightOrigin, load};
 use nephroid::units::Flux;
-use nephroid::viewer::ViewerOptions;
 use nephroid::viewer::brightest;
-use nephroid::viewer::edits::EditedScene;
-use nephroid::viewer::new_light::{Aim, NewLight};
-use nephroid::viewer::panel::Wishes;
+use nephroid::viewer::new_light::Aim;
 
-use super::fixtures::{self, act, added, bake, caustic, chart, edited, folder, options, until};
-use super::scene_file;
+use super::fixtures::added;
+use super::*;
 
 fn lamp(name: &str) -> Light {
-    parts::point_light(name, DVec3::new(0.3, 2.0, 0.1), Flux(30.0))
+    parts::point_light(name, dvec3(0.3, 2.0, 0.1), Flux(30.0))
 }
 
 /// The first is dimmed, the second taken out, two come, and of these the first goes again and the second moves.
@@ -38,7 +27,7 @@ fn edits() -> Vec<Edit> {
         Edit::LightRemoved { light: 2 },
         Edit::LightPosition {
             light: 2,
-            position: DVec3::new(-0.5, 1.5, 0.25),
+            position: dvec3(-0.5, 1.5, 0.25),
         },
     ]
 }
@@ -114,16 +103,12 @@ fn impossible_changes_of_lights_are_refused() {
         (added(dark), ""),
         (misplaced, ""),
     ] {
-        let refused = edit.apply(&scene).expect_err("it is impossible").to_string();
-        assert!(refused.contains(named), "{refused}");
+        says(edit.apply(&scene).expect_err("it is impossible"), named);
     }
 }
 
 fn read(path: &Path, default_light: bool) -> Scene {
-    let options = LoadOptions {
-        default_light,
-        ..LoadOptions::default()
-    };
+    let options = crate::prelude::options(|options| options.default_light = default_light);
     load(&path.display().to_string(), &options).expect("it is read")
 }
 
@@ -133,9 +118,9 @@ fn lights_come_into_files_and_go_from_them() {
     let loaded = read(&scene_file::glb(folder.path(), "a", "300"), false);
     let tracer = Tracer::new(Arc::new(loaded.clone()));
     let aim = Aim {
-        point: DVec3::new(0.2, 0.0, 0.4),
+        point: dvec3(0.2, 0.0, 0.4),
         normal: DVec3::Y,
-        to_eye: DVec3::new(0.6, 0.8, 0.0),
+        to_eye: dvec3(0.6, 0.8, 0.0),
     };
     let mut scene = loaded.clone();
     for kind in NewLight::ALL {
@@ -149,10 +134,9 @@ fn lights_come_into_files_and_go_from_them() {
     assert_eq!(again.lights.len(), 4);
     for (is, saved) in again.lights.iter().zip(&scene.lights) {
         assert_eq!(is.name, saved.name);
-        let strengths = is.kind.strength() / saved.kind.strength();
-        assert!((strengths - 1.0).abs() < 1e-6, "{is:?}");
+        near(is.kind.strength() / saved.kind.strength(), 1.0, 1e-6, &is.name);
         for (a, b) in vectors(&is.kind).into_iter().zip(vectors(&saved.kind)) {
-            assert!(a.distance(b) < 1e-6, "{is:?} for {saved:?}");
+            near(a, b, 1e-6, &is.name);
         }
     }
 }
@@ -168,7 +152,7 @@ fn vectors(kind: &LightKind) -> Vec<DVec3> {
             inner_cone_rad,
             outer_cone_rad,
             ..
-        } => vectors.extend([direction, DVec3::new(inner_cone_rad, outer_cone_rad, 0.0)]),
+        } => vectors.extend([direction, dvec3(inner_cone_rad, outer_cone_rad, 0.0)]),
         _ => {}
     }
     vectors
@@ -186,7 +170,7 @@ fn default_sun_is_written_when_it_must_be() {
     let target = folder.path().join("saved.glb");
     let turn = Edit::LightDirection {
         light: 0,
-        direction: DVec3::new(0.3, -0.9, 0.2),
+        direction: dvec3(0.3, -0.9, 0.2),
     };
     let comes = added(lamp("new"));
     for (edits, expected) in [
@@ -207,7 +191,7 @@ fn brightest_texel_is_found_where_it_lies() {
     let mut scene = Scene::default();
     let corners = [(-2.0, -1.0), (-2.0, 1.0), (2.0, 1.0), (2.0, -1.0)];
     let mesh = Mesh {
-        positions: corners.map(|(x, z)| DVec3::new(x, 0.0, z)).to_vec(),
+        positions: corners.map(|(x, z)| dvec3(x, 0.0, z)).to_vec(),
         normals: vec![DVec3::Y; 4],
         triangles: vec![[0, 1, 2], [0, 2, 3]],
         ..Mesh::default()
@@ -218,7 +202,7 @@ fn brightest_texel_is_found_where_it_lies() {
         mesh,
         parts::matte("grey", LinearSrgb::WHITE * 0.5),
     );
-    let uv = corners.map(|(x, z)| DVec2::new(0.25 * (x + 2.0), 0.5 * (z + 1.0)));
+    let uv = corners.map(|(x, z)| dvec2(0.25 * (x + 2.0), 0.5 * (z + 1.0)));
     let map = |receiver: Receiver, texel: usize, value: f32| {
         let mut irradiance = vec![[0.5; 3]; 32];
         irradiance[texel] = [value; 3];
@@ -236,11 +220,9 @@ fn brightest_texel_is_found_where_it_lies() {
         (&maps[..], 1.25, 0.25, DVec3::NEG_Y, 3.0),
     ] {
         let spot = brightest::find(&scene, maps).expect("there is light");
-        assert!(spot.point.distance(DVec3::new(x, 0.0, z)) < 1e-12, "{spot:?}");
-        assert!(
-            spot.normal == normal && (spot.irradiance_w_m2 - w_m2).abs() < 1e-6,
-            "{spot:?}"
-        );
+        near(spot.point, dvec3(x, 0.0, z), 1e-12, "spot");
+        assert_eq!(spot.normal, normal);
+        near(spot.irradiance_w_m2, w_m2, 1e-6, "irradiance");
     }
     assert_eq!(brightest::find(&scene, &[]), None);
 }
@@ -275,10 +257,7 @@ fn window_adds_a_light_and_tells_the_brightest() {
     let values = model.maps().iter().flat_map(IlluminationMap::total);
     let luminance = |value: [f32; 3]| LinearSrgb::from(value.map(f64::from)).luminance();
     let most = values.map(luminance).fold(0.0, f64::max);
-    assert!(
-        (texel.total_w_m2() / most - 1.0).abs() < 1e-5,
-        "{texel:?} of {most}"
-    );
+    near(texel.total_w_m2() / most, 1.0, 1e-5, texel);
     let camera = model.navigator.camera();
     let way = (probed.point - camera.position).normalize();
     assert!(

@@ -31,3 +31,40 @@ mod views;
 mod window;
 mod worker;
 mod worth;
+
+use std::fs;
+use std::path::Path;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::{Duration, Instant};
+
+use egui::accesskit::Role;
+use egui::{Key, Rect, pos2, vec2};
+use egui_kittest::kittest::NodeT as _;
+use nephroid::effect::{Effect, EffectSwitch};
+use nephroid::export::FloatImage;
+use nephroid::eye_pass::ToneMap;
+use nephroid::eye_pass::renderer::GpuMs;
+use nephroid::illumination::IlluminationMap;
+use nephroid::illumination::difference::Difference;
+use nephroid::progress::Stage;
+use nephroid::scene::changes::Changes;
+use nephroid::scene::load::save;
+use nephroid::session::StopReason;
+use nephroid::settings::{Estimator, LEAST_MAX_ERROR, Sigma};
+use nephroid::viewer::ViewerOptions;
+use nephroid::viewer::debounce::QUIET;
+use nephroid::viewer::edits::EditedScene;
+use nephroid::viewer::exporting::{Export, ExportState};
+use nephroid::viewer::gizmo::Held;
+use nephroid::viewer::model::Model;
+use nephroid::viewer::navigation::Travel;
+use nephroid::viewer::new_light::NewLight;
+use nephroid::viewer::panel::{Display, FilmWish, LayerShown, Quantity, Wishes};
+use nephroid::viewer::placement::Placement;
+use nephroid::viewer::worker::{BakeState, BakedLevel};
+
+use crate::prelude::*;
+use fixtures::{
+    act, bake, caustic, chart, edited, events, folder, intensity, options, undo, until, wait_for, wish,
+};
+use headless::{Headless, finished, leak, splats};

@@ -1,15 +1,16 @@
 //! How well pictures are made, by how long those before took.
 
-use std::time::{Duration, Instant};
-
-use nephroid::eye_pass::renderer::{EyeQuality, GpuMs};
+use nephroid::eye_pass::renderer::EyeQuality;
 use nephroid::viewer::pace::Pace;
 
+use super::*;
+
 fn ms(opaque: f64, specular: f64) -> GpuMs {
+    let tone_mapping = 0.5;
     GpuMs {
         opaque,
         specular,
-        tone_mapping: 0.5,
+        tone_mapping,
     }
 }
 

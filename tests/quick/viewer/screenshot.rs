@@ -1,16 +1,10 @@
 //! The picture of the window as files.
 
-use std::fs;
-use std::path::Path;
-
-use nephroid::export::FloatImage;
-use nephroid::eye_pass::{Picture, ToneMap, View, tone_mapping};
-use nephroid::optics::LinearSrgb;
+use nephroid::eye_pass::{Picture, View, tone_mapping};
 use nephroid::optics::spectrum::xyz::IDENTITY;
-use nephroid::scene::Camera;
 use nephroid::viewer::screenshot;
 
-use super::fixtures::folder;
+use super::*;
 
 fn picture() -> Picture {
     let radiance = (0..6).map(|index| {
@@ -27,7 +21,7 @@ fn picture() -> Picture {
 /// The names of the files, or why there are none.
 fn save(folder: &Path, scene: &str, has_radiance: bool) -> Result<Vec<String>, String> {
     let view = View {
-        camera: Camera::framing("all", (-glam::DVec3::ONE, glam::DVec3::ONE), 1.5),
+        camera: Camera::framing("all", (-DVec3::ONE, DVec3::ONE), 1.5),
         width: 3,
         height: 2,
         exposure_stops: -1.5,
@@ -82,17 +76,15 @@ fn names_are_new_and_form_no_path() {
         let names = save(folder.path(), scene, has_radiance).expect("it is saved");
         assert_eq!(names.len(), 1 + usize::from(has_radiance));
         assert_eq!(names.last().map(String::as_str), Some(last));
-        assert!(
-            names[0].strip_suffix(".png") == last.get(..last.len() - 4),
+        assert_eq!(
+            names[0].strip_suffix(".png"),
+            last.get(..last.len() - 4),
             "one number"
         );
     }
     assert_eq!(fs::read(mine).expect("it is there"), b"mine");
     let gone = folder.path().join("gone");
     let sentence = save(&gone, "ring", true).expect_err("no folder");
-    assert!(
-        sentence.contains("gone") && sentence.contains("folder does not exist"),
-        "{sentence}"
-    );
-    assert!(!sentence.contains('\n') && !gone.exists());
+    says(sentence, "gone | folder does not exist");
+    assert!(!gone.exists());
 }

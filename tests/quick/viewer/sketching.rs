@@ -1,16 +1,11 @@
 //! Where light lands, as it is drawn over the picture.
 
 use std::collections::HashSet;
-use std::sync::Arc;
 
-use glam::DVec3;
 use nephroid::light_pass::sketch::{Sketch, SketchLimits, sketch};
-use nephroid::progress::Control;
-use nephroid::scene::SurfaceKind;
-use nephroid::transport::Tracer;
 use nephroid::viewer::sketching::Sketcher;
 
-use super::fixtures::{options, wait_for};
+use super::*;
 
 const LIMITS: SketchLimits = SketchLimits {
     max_depth: 8,
@@ -62,17 +57,14 @@ fn finer_lattices_have_smaller_patches() {
     let times = fine.rays as f64 / coarse.rays as f64;
     assert!(times > 3.0 && times < 5.0, "{times}");
     let bits = |point: DVec3| point.to_array().map(f64::to_bits);
-    let landings: HashSet<_> = coarse
-        .landings
-        .iter()
-        .map(|landing| bits(landing.point))
-        .collect();
+    let landings = coarse.landings.iter().map(|landing| bits(landing.point));
+    let landings: HashSet<_> = landings.collect();
     for patch in &coarse.patches {
-        let are_landings = patch
-            .corners
-            .iter()
-            .all(|corner| landings.contains(&bits(*corner)));
-        assert!(are_landings, "{patch:?}");
+        let mut corners = patch.corners.iter();
+        assert!(
+            corners.all(|corner| landings.contains(&bits(*corner))),
+            "{patch:?}"
+        );
     }
     let middling = |sketch: &Sketch| {
         let sides = sketch.patches.iter();

@@ -1,19 +1,23 @@
 //! What the picture shows in place of light, on which scale, and what it is compared with.
 
-use egui::accesskit::Role;
-use nephroid::illumination::IlluminationMap;
-use nephroid::settings::BakeSettings;
 use nephroid::viewer::beside::Reference;
-use nephroid::viewer::panel::{CompareWish, Quantity};
+use nephroid::viewer::panel::CompareWish;
 use nephroid::viewer::views::{IrradianceUnit, MapSurvey, ScaleChoice};
 
-use super::fixtures::{caustic, chart};
 use super::headless::Gesture::{Check, Choose, Radio};
-use super::headless::{Headless, leak};
+use super::*;
 
 /// Two texels over 1 and 3 m².
 fn map(object: usize, irradiance: [[f32; 3]; 2]) -> IlluminationMap {
     caustic(chart(object, 2, 1, vec![1.0, 3.0]), irradiance.to_vec())
+}
+
+fn survey(peak_w_m2: f64, faults: usize) -> MapSurvey {
+    MapSurvey {
+        peak_w_m2,
+        faults,
+        ..MapSurvey::default()
+    }
 }
 
 fn panel() -> Headless {
@@ -28,22 +32,16 @@ fn survey_tells_peak_density_and_faults() {
         let survey = MapSurvey::of(&maps);
         assert_eq!(survey.faults, faults);
         // Faults are no light.
-        assert!((survey.peak_w_m2 - 4.0).abs() < 1e-6, "{survey:?}");
+        near(survey.peak_w_m2, 4.0, 1e-6, "peak");
         // Two texels on 4 m².
-        let [least, most] = survey.texels_per_m.expect("there is a map");
-        assert!(
-            (least - 0.5_f64.sqrt()).abs() < 1e-12 && least == most,
-            "{survey:?}"
-        );
+        let density = survey.texels_per_m.expect("there is a map");
+        near(density, [0.5_f64.sqrt(); 2], 1e-12, "density");
     }
 }
 
 #[test]
 fn scale_follows_the_maps_until_typed() {
-    let survey = MapSurvey {
-        peak_w_m2: 43.0,
-        ..MapSurvey::default()
-    };
+    let survey = survey(43.0, 0);
     let mut choice = ScaleChoice::default();
     let scale = survey.scale(Quantity::Irradiance, &choice);
     assert!(scale.is_logarithmic && scale.high == 50.0 && (scale.low - 0.005).abs() < 1e-12);
@@ -60,10 +58,7 @@ fn scale_follows_the_maps_until_typed() {
 #[test]
 fn irradiance_has_a_unit_and_counts_faults() {
     let mut panel = panel();
-    panel.told.survey = leak(MapSurvey {
-        peak_w_m2: 2.0,
-        ..MapSurvey::default()
-    });
+    panel.told.survey = leak(survey(2.0, 0));
     assert!(!panel.says("From, to"), "it belongs to the irradiance");
     panel.make(Choose("View", "irradiance"));
     assert_eq!(panel.panel.display.quantity, Quantity::Irradiance);
@@ -74,12 +69,7 @@ fn irradiance_has_a_unit_and_counts_faults() {
     panel.assert_says(&[" to 1366 lx"]);
     panel.make(Check("auto"));
     assert!(!panel.panel.display.scale.is_automatic && !panel.says("magenta."));
-    panel.tell(|told| {
-        told.survey = leak(MapSurvey {
-            faults: 3,
-            ..MapSurvey::default()
-        });
-    });
+    panel.tell(|told| told.survey = leak(survey(0.0, 3)));
     panel.assert_says(&["3 texels without a finite value"]);
 }
 
@@ -92,9 +82,13 @@ fn reference_tells_its_relative_rmse() {
     assert_eq!(reference.relative_rmse, Ok(0.0));
     // Off by 1 W/m² on a quarter of the area: √(1/4) over a mean of 2.
     reference.compare(&[map(0, [[3.0; 3], [2.0; 3]])]);
-    let rmse = reference.relative_rmse.clone().expect("it is lit");
-    assert!((rmse - 0.25).abs() < 1e-6, "{rmse}");
-    assert!(reference.told().contains(" 25 %"), "{}", reference.told());
+    near(
+        reference.relative_rmse.clone().expect("it is lit"),
+        0.25,
+        1e-6,
+        "RMSE",
+    );
+    says(reference.told(), " 25 %");
     assert!(Reference::kept(panel.told.scene, &[]).is_err());
 }
 

@@ -1,7 +1,8 @@
 //! The real program in a real window: light arrives, one edit bakes again, and it closes.
 
-use glam::DVec3;
 use image::RgbImage;
+
+use super::*;
 use support::desktop::{SIZE, Screen, Viewer, difference, pixel_of};
 
 /// Luminance of display values [0, 1], of a square of 5 pixels around a point of the floor.
@@ -31,15 +32,15 @@ fn light_arrives_and_sigma_bakes_again() {
     let baked = viewer.screenshot();
     assert_eq!(baked.dimensions(), SIZE);
     // A mirror of radius 1 m images the lamp's axis, 1.7 m before it, at 1/(2 − 1/1.7) = 0.708 m.
-    let cusp = brightness(&baked, DVec3::new(1.0 - 0.708, 0.0, 0.0));
-    let beside = brightness(&baked, DVec3::new(-0.4, 0.0, 0.0));
+    let cusp = brightness(&baked, dvec3(1.0 - 0.708, 0.0, 0.0));
+    let beside = brightness(&baked, dvec3(-0.4, 0.0, 0.0));
     assert!(cusp > 0.5 && cusp > 5.0 * beside, "cusp {cusp}, beside {beside}");
 
     let slider = viewer.on_slider("Sigma [radii²]", [0.5, 0.62, 0.75]);
     viewer.pull(&slider);
     viewer.wait_for("settings", |_| true);
     viewer.let_go();
-    let sigma = |event: &serde_json::Value| event["settings"]["sigma"]["constant"].as_f64().unwrap_or(0.0);
+    let sigma = |event: &Value| event["settings"]["sigma"]["constant"].as_f64().unwrap_or(0.0);
     let done = viewer.wait_for("done", |event| sigma(event) > 3.0);
     assert!((3.0..40.0).contains(&sigma(&done)), "{done}");
     viewer.screenshot_that("is blurred", |shot| difference(&baked, shot) > 0.005);

@@ -1,20 +1,10 @@
 //! What an effect is worth: a second bake that leaves the first one alone.
 
-use std::sync::Arc;
-use std::sync::atomic::Ordering;
-use std::time::Instant;
-
-use egui::accesskit::Role;
-use nephroid::effect::{Effect, EffectSwitch};
-use nephroid::illumination::difference::Difference;
-use nephroid::progress::Stage;
-use nephroid::viewer::panel::{Quantity, Wishes};
-use nephroid::viewer::worker::{BakeState, BakedLevel, Worth};
+use nephroid::viewer::worker::Worth;
 
 use super::effects::{line, panel};
-use super::fixtures::{self, act, bake, options, until, wait_for};
-use super::headless::{Headless, finished, leak};
 use super::worker::{AT_ONCE, Bench, ENDLESS, FAILING, PANICKING, STUBBORN, asked, bench};
+use super::*;
 
 /// Maps that a script would bake at this density.
 fn level(density_per_sr: f64) -> Arc<BakedLevel> {
@@ -31,10 +21,8 @@ fn baked() -> Bench {
 
 /// Sessions that are there, and that were made.
 fn sessions(bench: &Bench) -> (usize, usize) {
-    (
-        bench.alive.load(Ordering::SeqCst),
-        bench.made.load(Ordering::SeqCst),
-    )
+    let count = |of: &AtomicUsize| of.load(Ordering::SeqCst);
+    (count(&bench.alive), count(&bench.made))
 }
 
 fn found(bench: &Bench) -> Worth {
@@ -58,14 +46,9 @@ fn has_its_own_session() {
     begin(&bench, Arc::clone(&with));
     let state = bench.worker.state();
     assert!(state.is_working() && !state.is_baking());
+    let effect = Effect::Refraction;
     assert!(
-        matches!(
-            state,
-            BakeState::Comparing {
-                effect: Effect::Refraction,
-                ..
-            }
-        ),
+        matches!(state, BakeState::Comparing { effect: of, .. } if of == effect),
         "{state:?}"
     );
     bench.open_gate();
@@ -102,17 +85,14 @@ fn gives_way_to_later_requests() {
 }
 
 #[test]
-fn waits_for_no_bake() {
+fn failures_spoil_nothing_and_bakes_come_first() {
     let bench = bench();
     bench.ask(ENDLESS);
     assert!(!bench.worker.compare(Effect::Direct, level(AT_ONCE)));
     wait_for("the start", || sessions(&bench).0 == 1);
     assert!(!bench.worker.compare(Effect::Direct, level(AT_ONCE)));
     assert!(bench.worker.state().is_baking());
-}
 
-#[test]
-fn a_failure_spoils_nothing() {
     let bench = baked();
     for density in [FAILING, PANICKING] {
         assert!(bench.worker.compare(Effect::Direct, level(density)));
@@ -151,7 +131,7 @@ fn shown_until_other_maps_come() {
     let map = &before.result.maps[0];
     let layers = map.layers.iter();
     let flux_w: f64 = layers.map(|layer| map.flux_w(layer.kind).luminance()).sum();
-    assert!((found.with_w / flux_w - 1.0).abs() < 1e-6, "{found:?}");
+    near(found.with_w / flux_w, 1.0, 1e-6, "watts");
     assert_eq!(model.shown_maps().len(), found.maps.len());
     let switch = model.panel.settings.effects.get(Effect::Reflection);
     assert_eq!(switch, EffectSwitch::Auto, "the settings are those of the maps");
@@ -205,27 +185,22 @@ fn asked_for_and_told_in_watts() {
 
     panel.tell(|told| told.state = &BakeState::Done);
     let found = |with_w, without_w, relative_rmse| {
+        let maps = Vec::new();
         Ok(Difference {
-            maps: Vec::new(),
+            maps,
             with_w,
             without_w,
             relative_rmse,
         })
     };
+    let more = "+12.30 W of 16.10 W deposited; maps differ by 84 % (relative RMSE)";
+    let less = "−0.2500 W of 1.000 W deposited; maps differ by 3.1 % (relative RMSE)";
+    let failed = "bake: it failed; try again";
     for (difference, sentence) in [
-        (
-            found(16.1, 3.8, Some(0.84)),
-            "+12.30 W of 16.10 W deposited; maps differ by 84 % (relative RMSE)",
-        ),
-        (
-            found(1.0, 1.25, Some(0.0312)),
-            "−0.2500 W of 1.000 W deposited; maps differ by 3.1 % (relative RMSE)",
-        ),
+        (found(16.1, 3.8, Some(0.84)), more),
+        (found(1.0, 1.25, Some(0.0312)), less),
         (found(0.0, 1.0, None), "there is no light with it"),
-        (
-            Err("bake: it failed; try again".into()),
-            "bake: it failed; try again",
-        ),
+        (Err(failed.into()), failed),
     ] {
         let has_maps = difference.is_ok();
         let worth = Worth {
