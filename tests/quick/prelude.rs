@@ -32,9 +32,7 @@ pub fn built_in(name: &str) -> Scene {
 
 /// Options of loading, changed.
 pub fn options(change: impl FnOnce(&mut LoadOptions)) -> LoadOptions {
-    let mut options = LoadOptions::default();
-    change(&mut options);
-    options
+    with(LoadOptions::default(), change)
 }
 
 pub fn folder() -> tempfile::TempDir {
@@ -125,4 +123,10 @@ pub fn rows(table: &str) -> impl Iterator<Item = (&str, &str)> {
 #[track_caller]
 pub fn parsed(text: &str) -> Value {
     serde_json::from_str(text).unwrap_or_else(|error| panic!("{error}: {text}"))
+}
+
+/// A thing, changed.
+pub fn with<T>(mut it: T, change: impl FnOnce(&mut T)) -> T {
+    change(&mut it);
+    it
 }

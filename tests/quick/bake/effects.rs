@@ -81,17 +81,16 @@ fn only_what_is_called_for() {
         let has = |case: &EffectScene| case.calls_for.contains(&effect);
         assert!(scenes.iter().any(has) && !scenes.iter().all(has), "{effect:?}");
     }
+    let dark = scenes
+        .iter()
+        .find(|case| case.name == "no light")
+        .expect("it is listed");
+    let result = bake(dark.scene.clone(), &at(3_000.0, 48));
+    assert!(result.maps.is_empty());
+    assert_eq!(result.plan.effects[0].reason, "the scene has no light");
     for case in &scenes {
         for settings in [at(3_000.0, 48), settings(6_000.0, 48)] {
             check(case, &settings);
         }
     }
-}
-
-#[test]
-fn darkness_has_a_reason() {
-    let dark = all().into_iter().find(|case| case.name == "no light");
-    let result = bake(dark.expect("it is listed").scene, &at(3_000.0, 48));
-    assert!(result.maps.is_empty());
-    assert_eq!(result.plan.effects[0].reason, "the scene has no light");
 }

@@ -6,7 +6,6 @@ use crate::prelude::*;
 use support::references::references;
 use support::tools::{at, bake, bits, builtin_scene, map_of, settings};
 
-/// The others are in the full tests.
 #[test]
 fn wavefronts_agree_with_the_solver() {
     let small = ["ring", "mirror", "slab", "nephroid"];
@@ -34,9 +33,9 @@ fn splats_agree_with_the_solver() {
 }
 
 #[test]
-fn two_threads_change_no_bit() {
+fn threads_change_no_bit() {
     for base in [at(3e3, 64), settings(2e4, 64)] {
-        let [one, two] = [1, 2].map(|threads| {
+        let [one, two, three] = [1, 2, 3].map(|threads| {
             let settings = BakeSettings {
                 threads,
                 layers: vec![LayerKind::Caustic, LayerKind::Direct],
@@ -44,11 +43,12 @@ fn two_threads_change_no_bit() {
             };
             bake(builtin_scene("ball"), &settings)
         });
-        assert_eq!(one.ledgers, two.ledgers);
-        assert_eq!(one.counts, two.counts);
-        assert!(one.maps.iter().map(bits).eq(two.maps.iter().map(bits)));
-        let errors = [&one, &two].map(|result| result.maps[0].error.clone());
-        assert!(errors[0] == errors[1]);
+        for other in [two, three] {
+            assert_eq!(one.ledgers, other.ledgers);
+            assert_eq!(one.counts, other.counts);
+            assert!(one.maps.iter().map(bits).eq(other.maps.iter().map(bits)));
+            assert!(one.maps[0].error == other.maps[0].error);
+        }
     }
 }
 
@@ -70,17 +70,12 @@ fn gutters_are_filled() {
     let side = 64_usize;
     let scene = with_room_around_the_floor();
     for base in [at(2e4, side), settings(2e4, side)] {
-        let settings = BakeSettings {
-            layers: LayerKind::ALL.to_vec(),
-            ..base
-        };
+        let settings = with(base, |it| it.layers = LayerKind::ALL.to_vec());
         let result = bake(scene.clone(), &settings);
         let map = map_of(&result, &scene, "floor");
         let is_covered = |texel: usize| map.chart.texel_area_m2(texel) > 0.0;
-        assert_eq!(
-            (0..side * side).filter(|&texel| is_covered(texel)).count(),
-            side * side / 4
-        );
+        let covered = (0..side * side).filter(|&texel| is_covered(texel));
+        assert_eq!(covered.count(), side * side / 4);
         assert_eq!(map.layers.len(), 3);
         for layer in &map.layers {
             let values = &layer.irradiance;
@@ -91,10 +86,8 @@ fn gutters_are_filled() {
                     let columns = column.saturating_sub(1)..=(column + 1).min(side - 1);
                     columns.map(move |column| row * side + column)
                 });
-                let known: Vec<f32> = { around }
-                    .filter(|&texel| is_covered(texel))
-                    .map(|texel| values[texel][1])
-                    .collect();
+                let known = { around }.filter(|&texel| is_covered(texel));
+                let known: Vec<f32> = known.map(|texel| values[texel][1]).collect();
                 if known.is_empty() {
                     continue;
                 }

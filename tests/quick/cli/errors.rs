@@ -4,7 +4,6 @@ use crate::prelude::*;
 use support::files;
 use support::program::Sandbox;
 
-/// Runs a line and expects one sentence with the words.
 #[track_caller]
 fn refused(sandbox: &Sandbox, line: &str, words: &str) {
     let words: Vec<&str> = words.split(" | ").collect();

@@ -8,7 +8,6 @@ fn number(value: &Value) -> f64 {
     value.as_f64().unwrap_or_else(|| panic!("{value} is no number"))
 }
 
-/// What it prints for people, which has to hold all of the words.
 #[track_caller]
 fn assert_tells(sandbox: &Sandbox, line: &str, words: &str) {
     let text = sandbox.succeed(line).stdout;

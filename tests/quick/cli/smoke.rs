@@ -11,7 +11,6 @@ fn number(value: &Value) -> f64 {
     value.as_f64().unwrap_or_else(|| panic!("{value} is no number"))
 }
 
-/// Whether an object has exactly these keys, in any order.
 #[track_caller]
 fn assert_keys(object: &Value, expected: &str) {
     let keys = object.as_object().expect("an object").keys();
@@ -197,21 +196,16 @@ fn view_without_display_writes_files() {
             run.stderr
         );
         assert_eq!(run.stderr.matches("no display").count(), 1, "{}", run.stderr);
-        assert_eq!(
-            sandbox.files("nephroid-out").join(" "),
-            "manifest.json maps picture.png"
-        );
+        let files = sandbox.files("nephroid-out").join(" ");
+        assert_eq!(files, "manifest.json maps picture.png");
         assert_eq!(sandbox.manifest("nephroid-out")["partial"], false);
         let picture = image::open(sandbox.path("nephroid-out/picture.png")).expect("a PNG");
         assert_eq!((picture.width(), picture.height()), (64, 48));
         picture.to_rgb8()
     };
     let shown = picture("builtin:mirror", "");
-    assert_eq!(
-        picture("view builtin:mirror", ":987"),
-        shown,
-        "a display that is not there"
-    );
+    // A display that is not there.
+    assert_eq!(picture("view builtin:mirror", ":987"), shown);
     let black = |picture: &image::RgbImage| picture.pixels().filter(|pixel| pixel.0 == [0; 3]).count();
     let without_chains = picture("builtin:mirror --effects chains=off", "");
     assert!(shown.pixels().any(|pixel| pixel.0[1] > 64));

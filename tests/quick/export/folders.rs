@@ -15,7 +15,6 @@ use support::tools::{at, bake};
 
 type Open = fn(&Path, bool) -> Result<()>;
 
-/// Every kind of folder that results are written to.
 const KINDS: [(&str, Open); 3] = [
     ("a bake", |path, force| MapFolder::open(path, force).map(drop)),
     ("an export of textures", |path, force| {

@@ -35,7 +35,6 @@ fn export(baked: &Baked, options: GlbOptions) -> (Exported, GlbReport) {
     (Exported::new(bytes), report)
 }
 
-/// A `.glb` taken apart.
 struct Exported {
     json: Value,
     binary: Vec<u8>,
@@ -67,7 +66,6 @@ impl Exported {
         &self.binary[number("byteOffset")..number("byteOffset") + number("byteLength")]
     }
 
-    /// The numbers of an accessor of floats.
     fn floats(&self, accessor: &Value) -> Vec<f64> {
         let accessor = self.item("accessors", accessor);
         assert_eq!(accessor["componentType"], 5126);
@@ -109,11 +107,7 @@ fn light_maps_hold_light_in_the_unit_asked() {
         (Quantity::IrradianceByPi, FRAC_1_PI, 0.005),
         (Quantity::Irradiance, 1.0, 0.0),
     ] {
-        let options = GlbOptions {
-            quantity,
-            cut,
-            ..WHOLE
-        };
+        let options = with(WHOLE, |it| (it.quantity, it.cut) = (quantity, cut));
         let (exported, report) = export(&baked, options);
         let used = exported.json["extensionsUsed"].as_array().expect("a list");
         assert!(used.contains(&json!("MOZ_lightmap")));
@@ -136,15 +130,8 @@ fn light_maps_hold_light_in_the_unit_asked() {
 #[test]
 fn a_scene_is_lit_by_its_lights_or_its_maps() {
     let baked = Baked::quick(built_in("ball"), &LAYERS);
-    let kept = GlbOptions {
-        bits: Bits::Eight,
-        cut: 0.005,
-        ..WHOLE
-    };
-    let removed = GlbOptions {
-        lights: SceneLights::Remove,
-        ..kept
-    };
+    let kept = with(WHOLE, |it| (it.bits, it.cut) = (Bits::Eight, 0.005));
+    let removed = with(kept, |it| it.lights = SceneLights::Remove);
     let (exported, report) = export(&baked, removed);
     assert_eq!(report.layers, LAYERS);
     assert!(exported.scene.lights.is_empty());
@@ -172,10 +159,7 @@ fn emission_and_pictures_hold_light_sent_on() {
     // The floor's albedo is a half.
     let sent = |e: &[f32; 3]| f64::from(e[1]) * 0.5 / PI;
     let sent: Vec<f64> = baked.light("").iter().map(sent).collect();
-    let removed = GlbOptions {
-        lights: SceneLights::Remove,
-        ..WHOLE
-    };
+    let removed = with(WHOLE, |it| it.lights = SceneLights::Remove);
     for (quantity, factor) in [
         (Quantity::Irradiance, 1.0),
         (Quantity::Illuminance, LUMENS_PER_WATT),

@@ -8,10 +8,8 @@ use super::{Baked, LUMENS_PER_WATT, as_it_is};
 use crate::prelude::*;
 use support::tools::at;
 
-/// A size and its linear values.
 type Level = ((usize, usize), Vec<[f32; 3]>);
 
-/// A file taken apart.
 struct Texture {
     /// The largest first.
     levels: Vec<Level>,
@@ -98,7 +96,6 @@ fn packed(packing: Packing, mips: bool) -> TextureOptions {
     as_it_is(Encoding::Ktx2 { packing, mips })
 }
 
-/// The first texture of an export, and what the index says of it.
 fn export(baked: &Baked, options: TextureOptions) -> (Texture, TextureEntry) {
     let report = baked.textures(options, "t").expect("it fits");
     let entry = report.index.textures[0].clone();
@@ -179,10 +176,7 @@ fn sizes_go_down_to_one_texel() {
 fn light_beyond_a_packing_is_refused() {
     let baked = baked("ring", (32, 32));
     for (packing, most) in [(Packing::Rgb9e5, "65408"), (Packing::Bc6h, "65504")] {
-        let options = TextureOptions {
-            exposure: Exposure::Stops(30.0),
-            ..packed(packing, false)
-        };
+        let options = with(packed(packing, false), |it| it.exposure = Exposure::Stops(30.0));
         let error = baked.textures(options, "t").expect_err("too bright");
         says(error, &format!("0000_floor.ktx2 | {most} | --exposure"));
         assert!(!baked.path("t").exists(), "nothing is left");

@@ -54,10 +54,8 @@ fn map_files_are_what_other_readers_expect() {
     assert!(channels.iter().all(is_float));
     let mut names: Vec<String> = channels.iter().map(|channel| channel.name.to_string()).collect();
     names.sort_unstable();
-    assert_eq!(
-        names.join(" "),
-        "B G R caustic.B caustic.G caustic.R direct.B direct.G direct.R error.Y"
-    );
+    let expected = "B G R caustic.B caustic.G caustic.R direct.B direct.G direct.R error.Y";
+    assert_eq!(names.join(" "), expected);
 }
 
 #[test]

@@ -20,7 +20,6 @@ use crate::prelude::*;
 use support::program::read_json;
 use support::tools::{at, bake};
 
-/// A scene with the folder of its maps.
 struct Baked {
     scene: Scene,
     result: BakeResult,
@@ -56,7 +55,6 @@ impl Baked {
         read_json(&self.path("out/manifest.json"))
     }
 
-    /// A map as its file has it.
     fn file(&self, map: usize) -> FloatImage {
         let manifest = self.manifest();
         let name = manifest["maps"][map]["file"].as_str().expect("a name");
@@ -68,7 +66,6 @@ impl Baked {
         self.file(0).rgb(layer).expect("it has the layer")
     }
 
-    /// Writes textures to a folder.
     fn textures(&self, options: TextureOptions, folder: &str) -> Result<TextureReport, Error> {
         let maps = self.path("out");
         let reader = MapReader::open(&maps, &self.scene)?;
@@ -101,7 +98,6 @@ fn linear_of_srgb(code: u16) -> f64 {
     }
 }
 
-/// Names of what is in a folder, sorted.
 fn names(folder: &Path) -> Vec<String> {
     let entries = std::fs::read_dir(folder).expect("it is there");
     let name = |entry: std::io::Result<std::fs::DirEntry>| entry.expect("listed").file_name();

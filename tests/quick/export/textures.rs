@@ -46,11 +46,8 @@ fn brightest(values: &[f32; 3]) -> f32 {
 fn an_index_says_what_its_files_are() {
     let baked = ring();
     let report = baked.textures(as_it_is(FLOAT), "t").expect("it fits");
-    assert_eq!(
-        texels(&baked.path("t/0000_floor.exr")),
-        baked.light(""),
-        "bit by bit"
-    );
+    // Bit by bit.
+    assert_eq!(texels(&baked.path("t/0000_floor.exr")), baked.light(""));
     let index = read_json(&baked.path("t/index.json"));
     assert_eq!(index, serde_json::to_value(&report.index).expect("it is JSON"));
     let manifest = baked.manifest();
@@ -107,13 +104,7 @@ fn too_bright_light_is_refused_with_advice() {
     let peak = baked.light("").iter().map(brightest).fold(0.0, f32::max);
     let write = |encoding, stops: f64| {
         let exposure = Exposure::Stops(stops);
-        baked.textures(
-            TextureOptions {
-                exposure,
-                ..as_it_is(encoding)
-            },
-            "t",
-        )
+        baked.textures(with(as_it_is(encoding), |it| it.exposure = exposure), "t")
     };
     let stops = f64::from((65504.0 / peak).log2().ceil());
     let error = write(Encoding::Half, stops).expect_err("too bright");
@@ -168,10 +159,8 @@ fn a_png_says_its_exposure_and_what_is_lost() {
     }
     let lost = |exposure| png(Transfer::Srgb, Quantity::Irradiance, exposure).1;
     assert_eq!(lost(Exposure::Cut(0.0)).above_texels, 0, "nothing may be cut");
-    assert!(
-        lost(Exposure::Stops(20.0)).above_share > 0.9,
-        "so it was asked for"
-    );
+    // So it was asked for.
+    assert!(lost(Exposure::Stops(20.0)).above_share > 0.9);
 }
 
 #[test]
@@ -199,7 +188,6 @@ fn a_radiance_file_is_within_its_steps() {
     }
 }
 
-/// Exports to a folder of that name, whose entries it returns.
 fn export(baked: &Baked, content: Content, atlas_side: Option<usize>, folder: &str) -> Vec<TextureEntry> {
     let options = TextureOptions {
         content,
@@ -258,10 +246,7 @@ fn layers_and_lights_come_apart_and_add_up() {
         (&baked, indirect, "indirect | --layers"),
         (&ring(), Content::EachLight, "--per-light"),
     ] {
-        let options = TextureOptions {
-            content,
-            ..as_it_is(FLOAT)
-        };
+        let options = with(as_it_is(FLOAT), |it| it.content = content);
         says(
             baked.textures(options, "none").expect_err("it is not there"),
             words,
@@ -307,10 +292,7 @@ fn an_atlas_holds_maps_where_its_index_says() {
     }
     // Smaller ones hold fewer; too small ones none.
     assert_eq!(export(&baked, Content::Sum, Some(70), "small").len(), 2);
-    let options = TextureOptions {
-        atlas_side: Some(67),
-        ..as_it_is(FLOAT)
-    };
+    let options = with(as_it_is(FLOAT), |it| it.atlas_side = Some(67));
     let error = baked.textures(options, "none").expect_err("there is no room");
     says(error, "the map of | 64x64 | --atlas");
     assert!(!baked.path("none").exists());
@@ -320,10 +302,7 @@ fn an_atlas_holds_maps_where_its_index_says() {
 fn an_export_replaces_its_own_files_alone() {
     let baked = ring();
     let float = as_it_is(FLOAT);
-    let each = TextureOptions {
-        content: Content::EachLayer,
-        ..float
-    };
+    let each = with(float, |it| it.content = Content::EachLayer);
     let png = as_it_is(Encoding::Png16 {
         transfer: Transfer::Srgb,
     });
@@ -331,11 +310,8 @@ fn an_export_replaces_its_own_files_alone() {
     baked.textures(each, "t").expect("it is empty");
     assert_eq!(names(&t), ["0000_floor_caustic.exr", "index.json"]);
     baked.textures(png, "t").expect("they are ours");
-    assert_eq!(
-        names(&t),
-        ["0000_floor.png", "index.json"],
-        "what was there more is gone"
-    );
+    // What was there more is gone.
+    assert_eq!(names(&t), ["0000_floor.png", "index.json"]);
     // A folder has the name of a texture.
     std::fs::create_dir(t.join("0000_floor.exr")).expect("it can be made");
     let error = baked.textures(float, "t").expect_err("it is in the way");

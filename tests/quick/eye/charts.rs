@@ -27,7 +27,6 @@ fn with_uv(mut mesh: Mesh, change: impl Fn(usize, DVec2) -> DVec2) -> Mesh {
     mesh
 }
 
-/// Map coordinates of a vertex.
 fn uv_at(mesh: &Mesh, map: &Parametrisation, vertex: u32) -> DVec2 {
     let corners = mesh.triangles.as_flattened().iter();
     let mut corners = corners.zip(map.corner_uvs.as_flattened());
@@ -57,7 +56,6 @@ fn deepest_overlap(map: &Parametrisation) -> usize {
     (0..20_000).map(over).max().expect("there are points")
 }
 
-/// Share of the unit square that is covered.
 fn covered(map: &Parametrisation) -> f64 {
     let triangles = map.corner_uvs.iter();
     triangles.map(|triangle| 0.5 * turn(triangle).abs()).sum()
@@ -157,7 +155,6 @@ fn generated_floors_and_walls_are_upright() {
     }
 }
 
-/// Whatever way a square lies, the generated map is full, and not mirrored.
 #[test]
 fn generated_maps_of_squares_are_full() {
     for step in 0..24 {
@@ -215,7 +212,6 @@ fn texels_are_alike_all_over_a_surface() {
     }
 }
 
-/// Faces of a box keep two texels apart at the nominal size.
 #[test]
 fn pieces_keep_their_gutter() {
     let mesh = cuboid(DVec3::ZERO, dvec3(1.0, 2.0, 3.0));

@@ -15,12 +15,10 @@ fn under(lights: Vec<Light>) -> Tracer {
     tracer(vec![(floor(1.0, 0.0), diffuse(0.5))], lights)
 }
 
-/// Irradiance of the first object by a map of `side` texels each way.
 fn lit(tracer: &Tracer, side: usize) -> Vec<[f32; 3]> {
     direct(tracer, &chart(tracer, 0, side, side)).irradiance
 }
 
-/// Fails unless a channel of every texel is as expected.
 #[track_caller]
 fn assert_even(irradiance: &[[f32; 3]], channel: usize, expected: f64, tolerance: f64) {
     for e in irradiance {
@@ -239,10 +237,7 @@ fn water_around_a_lamp_takes_its_share() {
 
 #[test]
 fn lights_add_up_in_their_colours() {
-    let coloured = |colour, strength| Light {
-        colour,
-        ..sun(DVec3::NEG_Y, strength)
-    };
+    let coloured = |colour, strength| with(sun(DVec3::NEG_Y, strength), |it| it.colour = colour);
     let red = coloured(rgb(1.0, 0.25, 0.0), 2.0);
     let blue = coloured(rgb(0.0, 0.0, 1.0), 3.0);
     assert_eq!(lit(&under(vec![red, blue]), 2), [[2.0, 0.5, 3.0]; 4]);

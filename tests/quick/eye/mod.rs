@@ -7,7 +7,6 @@ mod pictures;
 mod texel_areas;
 mod white_balance;
 
-/// Runs on so many threads.
 fn on_threads<T: Send>(count: usize, work: impl FnOnce() -> T + Send) -> T {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(count).build();
     pool.expect("a pool of threads").install(work)

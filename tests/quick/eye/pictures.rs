@@ -20,7 +20,6 @@ const E: [f32; 3] = [50.0, 40.0, 20.0];
 /// Radiance of the background [W/(m² sr)].
 const SKY: DVec3 = dvec3(3.0, 2.0, 1.0);
 
-/// What the floors send [W/(m² sr)].
 fn floor_sends() -> DVec3 {
     DVec3::from(ALBEDO) * DVec3::from(E.map(f64::from)) / PI
 }
@@ -29,7 +28,6 @@ fn floor_material() -> Material {
     diffuse(ALBEDO.into())
 }
 
-/// A scene and its maps.
 struct Lit(Tracer, Vec<IlluminationMap>);
 
 impl Lit {
@@ -60,7 +58,6 @@ impl Lit {
         seen(&self.0, &self.1, view, &settings).0
     }
 
-    /// Fails unless every pixel has the radiance that is expected of its direction.
     #[track_caller]
     fn assert_sends(&self, view: &View, expected: impl Fn(DVec3) -> DVec3) {
         let picture = self.picture(view, 1);
@@ -94,7 +91,6 @@ fn radiance_of(pixel: [f32; 3]) -> DVec3 {
     DVec3::from(pixel.map(f64::from))
 }
 
-/// A view before the sky.
 fn looking(eye: [f64; 3], target: [f64; 3], fov_degrees: f64, size: [u32; 2]) -> View {
     View {
         background: LinearSrgb::from(SKY.to_array()),
@@ -110,7 +106,6 @@ fn water() -> Material {
     surface(SurfaceKind::Dielectric, WATER)
 }
 
-/// With a volume of a colour.
 fn coloured(
     material: Material,
     attenuation_distance_m: f64,
@@ -120,16 +115,9 @@ fn coloured(
         attenuation_distance_m,
         attenuation_colour,
     };
-    (
-        Material {
-            volume: Some(volume),
-            ..material
-        },
-        volume,
-    )
+    (with(material, |it| it.volume = Some(volume)), volume)
 }
 
-/// A body that is much wider than what is seen of it.
 fn layer(low: f64, high: f64) -> Mesh {
     cuboid(dvec3(-90.0, low, -90.0), dvec3(90.0, high, 90.0))
 }
@@ -236,10 +224,7 @@ fn slab_under_water_counts_by_contrast() {
 #[test]
 fn undrawn_backs_shorten_no_way_through_water() {
     let (coloured, volume) = coloured(water(), 0.7, rgb(0.9, 0.5, 0.2));
-    let sheet = Material {
-        double_sided: false,
-        ..floor_material()
-    };
+    let sheet = with(floor_material(), |it| it.double_sided = false);
     // It faces down, away from the eye.
     let below = quad(dvec3(-5.0, 0.6, -5.0), DVec3::Z * 10.0, DVec3::X * 10.0);
     let lit = Lit::floor_and(vec![(layer(-0.5, 1.0), coloured), (below, sheet)]);
@@ -459,14 +444,10 @@ fn skies_lie_and_shine_as_their_light_says() {
     }
 }
 
-/// One looks into the room.
 #[test]
 fn backs_of_single_sided_walls_are_not_drawn() {
     for double_sided in [true, false] {
-        let wall = Material {
-            double_sided,
-            ..floor_material()
-        };
+        let wall = with(floor_material(), |it| it.double_sided = double_sided);
         let ceiling = quad(dvec3(-5.0, 1.0, -5.0), DVec3::Z * 10.0, DVec3::X * 10.0);
         let lit = Lit::floor_and(vec![(ceiling, wall)]);
         let view = looking([0.0, 3.0, 0.0], [0.0, 0.0, 0.1], 30.0, [4, 3]);

@@ -19,7 +19,6 @@ fn l_shape() -> Mesh {
     mesh
 }
 
-/// The areas of a map's texels.
 fn areas(mesh: &Mesh, width: usize, height: usize) -> Vec<f64> {
     let map = parametrise(0, mesh, 256).expect("the mesh has area");
     assert_close(map.area_m2(), mesh.area_m2(), 1e-12, "the map's area");
@@ -58,7 +57,6 @@ fn texels_beside_the_surface_are_empty() {
     assert_eq!(areas[8], 0.0, "exactly none");
 }
 
-/// A set that squeezes one half of a floor: there a texel holds more surface.
 #[test]
 fn texels_follow_the_local_scale() {
     let first = quad(DVec3::ZERO, DVec3::X, DVec3::Z);

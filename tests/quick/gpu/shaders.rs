@@ -20,7 +20,6 @@ fn modules() -> BTreeMap<String, Module> {
     programs.iter().map(parse).collect()
 }
 
-/// Without any optional capability.
 fn validator() -> Validator {
     Validator::new(ValidationFlags::all(), Capabilities::empty())
 }
@@ -85,9 +84,8 @@ fn every_shader_file_is_part_of_a_program() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("shaders");
     let within = |folder: &Path| {
         let entries = std::fs::read_dir(folder).expect("shaders/ holds folders only");
-        entries
-            .map(|entry| entry.expect("readable").path())
-            .collect::<Vec<_>>()
+        let paths = entries.map(|entry| entry.expect("readable").path());
+        paths.collect::<Vec<_>>()
     };
     let files = within(&root).into_iter().flat_map(|folder| within(&folder));
     let name = |path: std::path::PathBuf| {
@@ -140,11 +138,11 @@ fn structs_lie_the_same_in_rust_and_shaders() {
     let ours: BTreeMap<_, _> = shared_structs()
         .iter()
         .map(|layout| {
-            let fields = layout.fields.iter();
-            let fields: Vec<_> = fields
-                .map(|field| (field.name.to_owned(), field.offset))
-                .collect();
-            (layout.name.to_owned(), (layout.size, fields))
+            let fields = layout
+                .fields
+                .iter()
+                .map(|field| (field.name.to_owned(), field.offset));
+            (layout.name.to_owned(), (layout.size, fields.collect()))
         })
         .collect();
     assert!(!ours.is_empty());

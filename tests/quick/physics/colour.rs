@@ -66,7 +66,6 @@ fn at(nm: f64) -> ColourBasis {
     ColourBasis::at(Nanometres(nm))
 }
 
-/// The visible by tenths of a nanometre.
 fn tenths() -> impl Iterator<Item = f64> {
     (3600..=8300).map(|tenth| f64::from(tenth) / 10.0)
 }

@@ -117,7 +117,6 @@ proptest! {
         near(r + t, 1.0, 1e-12, (r, t));
     }
 
-    /// Never a NaN, whatever comes in at the edges.
     #[test]
     fn always_a_share(cos_i in prop_oneof![Just(0.0), Just(1.0), Just(1.0 + 1e-15), -1e-15..1.0f64],
                       eta in prop_oneof![Just(1.0), Just(1.0 + f64::EPSILON), Just(1.0 - f64::EPSILON), 0.01..100.0f64]) {

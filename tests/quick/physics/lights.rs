@@ -64,7 +64,6 @@ fn units_multiply_lawfully() {
 proptest! {
     #![proptest_config(support::law(4096))]
 
-    /// The fall-off is a share and falls.
     #[test]
     fn falloff_falls(outer in 0.05..1.57f64, share in 0.0..1.0f64, a in 0.0..3.1f64, b in 0.0..3.1f64) {
         let light = spot(outer * share, outer);

@@ -9,10 +9,8 @@ use super::metals::metal;
 use crate::prelude::*;
 use support::floors::texture_reference;
 
-/// Wavelengths that a lamp's light is followed at.
 const WAVELENGTHS: u32 = 1024;
 
-/// A polished plate at y = 0.
 fn plate_of(material: Material) -> Scene {
     let mut scene = Scene::default();
     parts::add(

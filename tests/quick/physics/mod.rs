@@ -17,7 +17,6 @@ mod waves;
 
 use crate::prelude::*;
 
-/// Every whole nanometre of the visible.
 fn visible() -> impl Iterator<Item = Nanometres> {
     (360..=830).map(|nm| Nanometres(f64::from(nm)))
 }

@@ -14,7 +14,6 @@ fn unit() -> impl Strategy<Value = DVec3> {
     })
 }
 
-/// A ray and a normal on whose side it arrives.
 fn incidence() -> impl Strategy<Value = (DVec3, DVec3)> {
     (unit(), unit())
         .prop_map(|(incident, normal)| (incident, -normal * incident.dot(normal).signum()))
@@ -57,7 +56,6 @@ proptest! {
         near(refract(incident, normal, 1.0).expect("no interface"), incident, 1e-15, "equal indices");
     }
 
-    /// A ray sent back along its own path leaves where it came from.
     #[test]
     fn refraction_is_reversible((incident, normal) in incidence(), eta in 0.3..3.0f64) {
         if let Some(out) = refract(incident, normal, eta) {

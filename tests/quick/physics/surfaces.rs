@@ -152,10 +152,7 @@ fn micro_normals_have_no_side() {
 /// From below as well, beyond the critical angle of some facets or of all.
 #[test]
 fn clear_rough_glass_absorbs_nothing() {
-    let rough = Material {
-        roughness: 0.5,
-        ..parts::dielectric("glass", 1.5)
-    };
+    let rough = with(parts::dielectric("glass", 1.5), |it| it.roughness = 0.5);
     // Vertex normals that lean: sides are those of the triangle.
     let tracer = in_water(rough, dvec3(0.4, 1.0, 0.1).normalize());
     let mut total = 0;

@@ -134,7 +134,6 @@ fn aces_has_the_values_of_the_fit() {
 proptest! {
     #![proptest_config(support::law(4096))]
 
-    /// Whatever comes, what is shown can be shown.
     #[test]
     fn display_light_is_within_its_range(c in prop::array::uniform3(-1e3..1e6f64), stops in -30.0..30.0f64) {
         for tone_map in ToneMap::ALL {

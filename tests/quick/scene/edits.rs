@@ -191,10 +191,7 @@ fn roughness_changes_the_class() {
         ..parts::dielectric("pane", 1.5)
     };
     // Unlit: smooth by its factors, matte because the file says so.
-    let unlit = Material {
-        surface: SurfaceKind::Diffuse,
-        ..parts::mirror()
-    };
+    let unlit = with(parts::mirror(), |it| it.surface = SurfaceKind::Diffuse);
     let [floor, glass] = [0, 1].map(|material| scene.materials[material].clone());
     for (material, to, expected) in [
         (&glass, 0.3, SurfaceKind::Dielectric),
@@ -234,11 +231,8 @@ fn edits_of_a_control_share_a_target() {
     assert_eq!(intensity(0, 1.0).target(), EditTarget::LightPower(0));
     let mut targets: Vec<_> = edits().iter().map(Edit::target).collect();
     targets.dedup();
-    assert_eq!(
-        targets.len(),
-        edits().len() - 1,
-        "only the two movements share one"
-    );
+    // Only the two movements share one.
+    assert_eq!(targets.len(), edits().len() - 1);
 }
 
 #[test]

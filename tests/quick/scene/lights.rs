@@ -58,7 +58,6 @@ fn what_glows_is_a_light_after_those_of_the_file() {
     warns(&scene, "triangles without area were dropped");
 }
 
-/// A file with one flat lamp on the node `panel`.
 fn with_area_light(light: Value, mut node: Value) -> Glb {
     let mut file = Glb::triangle();
     file.json["extensionsUsed"] = json!(["EXT_lights_area"]);
@@ -217,7 +216,6 @@ fn under_file(path: PathBuf) -> Result<Scene> {
     load_path(&scene, &under)
 }
 
-/// An OpenEXR image.
 fn exr(width: usize, height: usize, pixel: impl Fn(usize, usize) -> (f32, f32, f32) + Sync) -> Vec<u8> {
     use exr::prelude::WritableImage;
     let mut bytes = std::io::Cursor::new(Vec::new());

@@ -145,7 +145,6 @@ fn png(pixels: &[[u8; 4]], width: u32) -> Vec<u8> {
     bytes.into_inner()
 }
 
-/// A textured triangle whose image holds these bytes.
 fn textured(image: &[u8], texture_info: Value) -> Glb {
     let mut file = Glb::triangle();
     let view = file.push_view(image);
@@ -308,7 +307,6 @@ fn cameras_look_along_minus_z() {
     warns(&scene, "is orthographic");
 }
 
-/// Polished, with waves.
 fn rippled(waves: Value) -> Value {
     json!({
         "pbrMetallicRoughness": factors(0.0, 0.0),
@@ -371,7 +369,6 @@ fn waves_stay_where_they_are_in_a_rebased_scene() {
     assert!(far.origin_world.x > 900.0);
 }
 
-/// A triangle with a normal texture.
 fn embossed(image: &[u8], normals: Value, factors: Value) -> Scene {
     let mut file = textured(image, json!({ "index": 0 }));
     let material = json!({ "name": "m", "pbrMetallicRoughness": factors, "normalTexture": normals });

@@ -18,7 +18,6 @@ pub fn volume_m3(mesh: &Mesh) -> f64 {
     six_volumes.sum::<f64>() / 6.0
 }
 
-/// Puts the file's top nodes below a parent.
 fn below(mut file: Glb, mut parent: Value) -> Glb {
     parent["children"] = file.json["scenes"][0]["nodes"].clone();
     let index = file.push("nodes", parent);
@@ -26,12 +25,10 @@ fn below(mut file: Glb, mut parent: Value) -> Glb {
     file
 }
 
-/// The attributes of the file's only primitive.
 fn attributes(file: &mut Glb) -> &mut Value {
     &mut file.json["meshes"][0]["primitives"][0]["attributes"]
 }
 
-/// A triangle of these corners.
 fn triangle(corners: &[f32; 9]) -> Glb {
     let mut file = Glb::triangle();
     let positions = file.push_floats(corners, 3);

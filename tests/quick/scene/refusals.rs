@@ -80,7 +80,6 @@ fn required_extensions_are_refused_or_left_out() {
     );
 }
 
-/// A file and what lies beside it.
 fn with_uri(uri: &str, beside: &[(&str, &[u8])]) -> Result<Scene> {
     let mut file = Glb::triangle();
     file.json["buffers"] = json!([{ "byteLength": 36, "uri": uri }]);

@@ -15,7 +15,6 @@ use support::shared_or_skip;
 
 const SMOOTH: &str = r#"{"metallicFactor": 0, "roughnessFactor": 0}"#;
 
-/// A solid of clear glass, with more extensions and extras.
 fn solid(extensions: Value, extras: Value) -> Glb {
     let mut all = json!({
         "KHR_materials_transmission": { "transmissionFactor": 1.0 },
@@ -37,7 +36,6 @@ fn material(scene: &Scene) -> &Material {
     scene.material_of(0)
 }
 
-/// Abbe number of a material's indices.
 fn v_d(glass: &Material) -> f64 {
     (glass.ior - 1.0) / (glass.index_at(F_LINE) - glass.index_at(C_LINE))
 }
@@ -84,15 +82,11 @@ fn dispersion_needs_a_clear_solid() {
     let mut pane = dispersion(1.0);
     pane["KHR_materials_transmission"] = json!({ "transmissionFactor": 1.0 });
     let pane = of(pane);
-    assert!(
-        !material(&pane.scene()).is_dispersive(),
-        "a pane does not refract"
-    );
+    // A pane does not refract.
+    assert!(!material(&pane.scene()).is_dispersive());
     let filled = pane.load_with(&options(|options| options.solid_glass = true));
-    assert!(
-        material(&filled.expect("a sound file")).is_dispersive(),
-        "the same as a solid"
-    );
+    // The same as a solid.
+    assert!(material(&filled.expect("a sound file")).is_dispersive());
 }
 
 #[test]
@@ -341,7 +335,6 @@ fn collection_of_dispersive_balls_is_read() {
     assert_eq!(read, 25, "five indices by five dispersions");
 }
 
-/// The edited scene, and that with the edit taken back.
 fn undone(scene: &Scene, edit: &Edit) -> (Scene, Scene) {
     let (there, inverse) = edit.apply(scene).expect("it is in range");
     let (back, _) = inverse.apply(&there).expect("what was, is in range");
@@ -396,13 +389,9 @@ fn edited_colours_take_the_place_of_tables() {
     assert_eq!(back.lights, scene.lights);
 }
 
-/// What the plan says of dispersion.
 fn planned(scene: Scene, switches: EffectSwitches) -> EffectLine {
     let mut session = BakeSession::new(Arc::new(scene)).expect("a session");
-    let settings = BakeSettings {
-        effects: switches,
-        ..BakeSettings::default()
-    };
+    let settings = with(BakeSettings::default(), |it| it.effects = switches);
     let mut lines = session.plan(&settings).expect("a plan").effects.into_iter();
     lines
         .find(|line| line.effect == Effect::Dispersion)

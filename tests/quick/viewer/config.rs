@@ -24,7 +24,6 @@ impl Kept {
         model(&self.options)
     }
 
-    /// Another window on the same folder.
     fn other(&self, change: impl FnOnce(&mut ViewerOptions)) -> Model {
         let mut options = self.options.clone();
         change(&mut options);
@@ -192,10 +191,8 @@ fn a_scene_that_is_left_is_kept() {
         model.open(&format!("builtin:{name}"));
         until(&mut model, "opened", |model| model.scene().name == name);
         assert_eq!(undoable(&model), edits);
-        assert_eq!(
-            model.panel.settings.seed, 7,
-            "a new scene is baked as the one before"
-        );
+        // A new scene is baked as the one before.
+        assert_eq!(model.panel.settings.seed, 7);
     }
     assert_eq!(model.navigator.travel(), Travel::Orbit);
     assert!(model.poll_files().is_none());

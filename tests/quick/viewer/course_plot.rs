@@ -7,10 +7,7 @@ use nephroid::viewer::panel::accuracy::course::{Curve, Frame};
 use super::*;
 
 fn towards(target: f64) -> BakeSettings {
-    BakeSettings {
-        max_error: Some(target),
-        ..BakeSettings::default()
-    }
+    with(BakeSettings::default(), |it| it.max_error = Some(target))
 }
 
 /// The part open, after three levels: half the error for three times the time.
@@ -86,10 +83,7 @@ fn drag_along_the_curve_sets_the_target() {
 
 #[test]
 fn a_time_stays_a_time() {
-    let mut panel = panel(BakeSettings {
-        max_time_s: Some(1.0),
-        ..towards(LEAST_MAX_ERROR)
-    });
+    let mut panel = panel(with(towards(LEAST_MAX_ERROR), |it| it.max_time_s = Some(1.0)));
     let rect = plot(&panel);
     panel.click_at(rect.right_center() - vec2(0.1 * rect.width(), 0.0));
     let limit_s = panel.settings().max_time_s.expect("still a time");

@@ -13,7 +13,6 @@ pub fn line(effect: Effect, on: bool, reason: &str) -> EffectLine {
     }
 }
 
-/// The section open, after a bake of this plan.
 pub fn panel(effects: Vec<EffectLine>) -> Headless {
     let mut panel = Headless::new(BakeSettings::default());
     assert!(!panel.says("refraction"), "closed at first");

@@ -5,7 +5,6 @@ use nephroid::viewer::exporting::{Exporter, folder_name};
 use super::fixtures::{map, scene};
 use super::*;
 
-/// What an export comes to; the thread has to say that it is done.
 fn export(what: Export, folder: &Path) -> ExportState {
     let news = Arc::new(AtomicUsize::new(0));
     let of_thread = Arc::clone(&news);

@@ -17,10 +17,7 @@ fn assert_shows(map: &IlluminationMap, texel: usize, codes: [u8; 3]) {
 fn errors_show_relative_to_the_mean() {
     // Texels of 4 and 2 W/m² over 1 and 3 m²: the mean is 2.5 W/m².
     let without = caustic(chart(0, 2, 1, vec![1.0, 3.0]), vec![[4.0; 3], [2.0; 3]]);
-    let with = IlluminationMap {
-        error: Some(vec![0.25, 0.025]),
-        ..without.clone()
-    };
+    let with = with(without.clone(), |it| it.error = Some(vec![0.25, 0.025]));
     assert!(!error_view::is_available(std::slice::from_ref(&without)));
     let maps = [without, with];
     assert!(error_view::is_available(&maps));

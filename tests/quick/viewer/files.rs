@@ -5,7 +5,6 @@ use nephroid::viewer::files::{FileFacts, typed};
 
 use super::*;
 
-/// A baked scene with one edit, and the folder of its log.
 fn model() -> (Model, tempfile::TempDir) {
     let folder = folder();
     let mut model = fixtures::model(&ViewerOptions {
@@ -31,10 +30,8 @@ fn another_scene_takes_the_place_of_the_first() {
     let ring = Arc::clone(model.scene());
     let path = scene_file::glb(folder.path(), "second", "100");
     model.open(&format!(" \"{}\" ", path.display()));
-    assert!(
-        Arc::ptr_eq(model.scene(), &ring),
-        "the first stays until the other is there"
-    );
+    // The first stays until the other is there.
+    assert!(Arc::ptr_eq(model.scene(), &ring));
     until(&mut model, "opened", |model| model.scene().name == "second");
     assert_eq!(model.edits().history().undoable(), 0);
     assert!(Arc::ptr_eq(model.edits().loaded(), model.scene()));
@@ -47,11 +44,8 @@ fn another_scene_takes_the_place_of_the_first() {
     model.open("builtin:ball");
     until(&mut model, "opened", |model| model.scene().name == "ball");
     assert_eq!(opened(&folder), ["second", "ball"]);
-    assert_eq!(
-        model.files.recent.paths().len(),
-        1,
-        "built-in scenes are no files"
-    );
+    // Built-in scenes are no files.
+    assert_eq!(model.files.recent.paths().len(), 1);
 }
 
 #[test]

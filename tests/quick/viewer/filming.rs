@@ -40,15 +40,10 @@ fn a_lean_takes_the_shorter_way() {
     let leaning = |degrees: f64| {
         let level = camera(1.0);
         let (sine, cosine) = degrees.to_radians().sin_cos();
-        Camera {
-            up: level.up * cosine + level.right() * sine,
-            ..level
-        }
+        let up = level.up * cosine + level.right() * sine;
+        with(level, |it| it.up = up)
     };
-    let mut film = Film {
-        frames: 3,
-        ..Film::default()
-    };
+    let mut film = with(Film::default(), |it| it.frames = 3);
     for (key, degrees) in [170.0, -150.0].into_iter().enumerate() {
         film.record(None, &leaning(degrees), DVec3::ZERO, 3.0);
         let there = film.camera_at(key, DVec3::ZERO).expect("it is recorded");

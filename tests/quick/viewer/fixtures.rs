@@ -15,6 +15,7 @@ use nephroid::viewer::files::FilesOptions;
 use nephroid::viewer::model::Model;
 use nephroid::viewer::panel::Wishes;
 use nephroid::viewer::worker::BakedLevel;
+use support::scenes::map_of;
 use tempfile::TempDir;
 
 /// Only a failing test waits as long.
@@ -56,23 +57,10 @@ pub fn chart(object: usize, width: usize, height: usize, texel_areas_m2: Vec<f64
     })
 }
 
-/// A map of one layer of caustics.
-pub fn caustic(chart: Arc<Chart>, irradiance: Vec<[f32; 3]>) -> IlluminationMap {
-    IlluminationMap {
-        chart,
-        layers: vec![Layer {
-            kind: LayerKind::Caustic,
-            irradiance,
-        }],
-        error: None,
-        estimated_relative_rmse: None,
-    }
-}
-
 /// Four by two texels on the floor, brightest at the right, with known errors.
 pub fn map() -> IlluminationMap {
     let ramp = |scale: f32| (0..8).map(|texel| [scale * (texel % 4) as f32; 3]).collect();
-    let mut map = caustic(chart(0, 4, 2, vec![1.0]), ramp(2.0));
+    let mut map = map_of(chart(0, 4, 2, vec![1.0]), ramp(2.0));
     map.layers.push(Layer {
         kind: LayerKind::Direct,
         irradiance: ramp(1.0),
@@ -141,11 +129,23 @@ pub fn bake(model: &mut Model) {
     });
 }
 
+/// What a frame asks for.
+fn wishes(set: impl FnOnce(&mut Wishes)) -> Wishes {
+    let mut wishes = Wishes::default();
+    set(&mut wishes);
+    wishes
+}
+
 pub fn wish(edit: Edit) -> Wishes {
-    Wishes {
-        edit: Some(edit),
-        ..Wishes::default()
-    }
+    wishes(|wishes| wishes.edit = Some(edit))
+}
+
+pub fn undo() -> Wishes {
+    wishes(|wishes| wishes.undo = true)
+}
+
+pub fn redo() -> Wishes {
+    wishes(|wishes| wishes.redo = true)
 }
 
 pub fn intensity(light: usize, value: f64) -> Edit {
@@ -162,27 +162,11 @@ pub fn added(light: Light) -> Edit {
     }
 }
 
-pub fn undo() -> Wishes {
-    Wishes {
-        undo: true,
-        ..Wishes::default()
-    }
-}
-
-pub fn redo() -> Wishes {
-    Wishes {
-        redo: true,
-        ..Wishes::default()
-    }
-}
-
 /// The lines of an event log.
 pub fn events(log: &Path) -> Vec<serde_json::Value> {
     let text = std::fs::read_to_string(log).expect("there is a log");
-    let lines = text.lines();
-    lines
-        .map(|line| serde_json::from_str(line).expect("a line is JSON"))
-        .collect()
+    let event = |line| serde_json::from_str(line).expect("a line is JSON");
+    text.lines().map(event).collect()
 }
 
 pub fn read(path: &Path) -> Scene {

@@ -17,7 +17,6 @@ fn of<const N: usize>(pictures: [[f64; 3]; N]) -> FrameTimes {
     times
 }
 
-/// The section open.
 fn panel(times: Option<FrameTimes>) -> Headless {
     let mut panel = Headless::new(BakeSettings::default());
     panel.tell(|told| told.frame_times = times.map(|times| leak(times) as &_));

@@ -108,11 +108,8 @@ fn nodes_move_and_come_back_bit_for_bit() {
         translation: DVec3::ZERO,
     };
     let tilted = edited(&loaded, &[tilt]);
-    assert_eq!(
-        Placement::of(ball, &loaded, &tilted),
-        None,
-        "no turn about the vertical"
-    );
+    // No turn about the vertical.
+    assert_eq!(Placement::of(ball, &loaded, &tilted), None);
 }
 
 /// Pulls a handle by some points of the picture; the scene after each edit that asks for.

@@ -152,11 +152,7 @@ impl DerefMut for Headless {
 impl Headless {
     /// An empty scene, in a window in which everything has room.
     pub fn new(settings: BakeSettings) -> Self {
-        let scene = Scene {
-            name: "test".into(),
-            ..Scene::default()
-        };
-        Self::with_scene(scene, settings, ((1280.0, 1800.0), 1.0))
+        Self::with_scene(Scene::default(), settings, ((1280.0, 1800.0), 1.0))
     }
 
     pub fn with_scene(
@@ -435,10 +431,8 @@ impl Headless {
         for (role, name, _) in self.controls() {
             assert!(!name.trim().is_empty(), "a {role:?} without a name");
             // A slider and its number share a name.
-            assert!(
-                seen.insert((format!("{role:?}"), name.clone())),
-                "two {role:?} {name:?}"
-            );
+            let is_new = seen.insert((format!("{role:?}"), name.clone()));
+            assert!(is_new, "two {role:?} {name:?}");
         }
         assert!(seen.len() > 80, "{}", seen.len());
     }
@@ -449,15 +443,11 @@ impl Headless {
         for (role, name, rect) in &found {
             // A field for text shows some of it.
             let least = if *role == Role::TextInput { 60.0 } else { 5.0 };
-            assert!(
-                Self::is_inside(*rect) && rect.width() > least,
-                "{role:?} {name} at {rect}"
-            );
+            let fits = Self::is_inside(*rect) && rect.width() > least;
+            assert!(fits, "{role:?} {name} at {rect}");
         }
-        for label in self
-            .nodes()
-            .filter(|node| node.accesskit_node().role() == Role::Label)
-        {
+        let is_label = |node: &Node<'_>| node.accesskit_node().role() == Role::Label;
+        for label in self.nodes().filter(is_label) {
             assert!(
                 Self::is_inside(label.rect()),
                 "{:?} at {}",
@@ -470,10 +460,8 @@ impl Headless {
         for (index, (_, a, first)) in below.iter().enumerate() {
             for (_, b, second) in &below[index + 1..] {
                 let common = first.intersect(*second);
-                assert!(
-                    common.width() < 1.0 || common.height() < 1.0,
-                    "{a} at {first} and {b} at {second}"
-                );
+                let are_apart = common.width() < 1.0 || common.height() < 1.0;
+                assert!(are_apart, "{a} at {first} and {b} at {second}");
             }
         }
     }

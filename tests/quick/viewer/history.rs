@@ -18,7 +18,6 @@ fn model() -> (Model, tempfile::NamedTempFile) {
     (model, log)
 }
 
-/// A frame in which the panel was changed like this.
 fn change(model: &mut Model, is_dragging: bool, change: impl FnOnce(&mut Panel)) {
     let before = (model.panel.settings.clone(), model.panel.display);
     change(&mut model.panel);
@@ -84,13 +83,7 @@ fn camera_path_and_automatic_are_undone() {
     let (mut model, _log) = model();
     for _ in 0..2 {
         let film = Some(FilmWish::Record(None));
-        act(
-            &mut model,
-            Wishes {
-                film,
-                ..Wishes::default()
-            },
-        );
+        act(&mut model, with(Wishes::default(), |it| it.film = film));
     }
     let before = model.panel.film.clone();
     assert_eq!(before.keys.len(), 2);
@@ -143,10 +136,7 @@ fn a_drag_is_one_step() {
 
     // A thousand steps are kept.
     let mut edits = EditedScene::new(options("ring").scene);
-    let of_seed = |seed| BakeSettings {
-        seed,
-        ..BakeSettings::default()
-    };
+    let of_seed = |seed| with(BakeSettings::default(), |it| it.seed = seed);
     for seed in 0..1100 {
         edits.note_settings(&of_seed(seed), &of_seed(seed + 1));
         edits.release();

@@ -141,7 +141,6 @@ fn lights_come_into_files_and_go_from_them() {
     }
 }
 
-/// What a light's place, direction and shape are made of.
 fn vectors(kind: &LightKind) -> Vec<DVec3> {
     let mut vectors: Vec<DVec3> = kind.position().into_iter().collect();
     match *kind {
@@ -229,25 +228,16 @@ fn brightest_texel_is_found_where_it_lies() {
 
 #[test]
 fn window_adds_a_light_and_tells_the_brightest() {
-    let mut model = fixtures::model(&ViewerOptions {
-        exposure_stops: Some(0.0),
-        ..options("ring")
-    });
+    let mut model = fixtures::model(&with(options("ring"), |it| it.exposure_stops = Some(0.0)));
     let before = model.scene().lights.len();
-    let wish = Wishes {
-        new_light: Some(NewLight::Spot),
-        ..Wishes::default()
-    };
+    let wish = with(Wishes::default(), |it| it.new_light = Some(NewLight::Spot));
     act(&mut model, wish);
     until(&mut model, "the light", |model| {
         model.scene().lights.len() > before
     });
     assert_eq!(model.edits().history().next_undo(), Some("`spot`, a new light"));
     bake(&mut model);
-    let wish = Wishes {
-        brightest: true,
-        ..Wishes::default()
-    };
+    let wish = with(Wishes::default(), |it| it.brightest = true);
     act(&mut model, wish);
     until(&mut model, "the answer", |model| {
         model.probed().is_some_and(|probed| probed.explanation.is_some())

@@ -64,7 +64,6 @@ use nephroid::viewer::placement::Placement;
 use nephroid::viewer::worker::{BakeState, BakedLevel};
 
 use crate::prelude::*;
-use fixtures::{
-    act, bake, caustic, chart, edited, events, folder, intensity, options, undo, until, wait_for, wish,
-};
+use fixtures::{act, bake, chart, edited, events, folder, intensity, options, undo, until, wait_for, wish};
 use headless::{Headless, finished, leak, splats};
+use support::scenes::map_of as caustic;

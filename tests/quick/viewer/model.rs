@@ -5,13 +5,11 @@ use super::*;
 /// Rays per steradian of a bake that takes longer than a test waits between its steps.
 const LONG: f64 = 3e7;
 
-/// A window that begins to bake, with its event log.
 fn model() -> (Model, tempfile::NamedTempFile) {
     let log = tempfile::NamedTempFile::new().expect("a file");
-    let model = fixtures::model(&ViewerOptions {
-        event_log: Some(log.path().to_owned()),
-        ..options("ring")
-    });
+    let model = fixtures::model(&with(options("ring"), |it| {
+        it.event_log = Some(log.path().to_owned())
+    }));
     (model, log)
 }
 
@@ -21,16 +19,12 @@ fn baked() -> (Model, tempfile::NamedTempFile) {
     (model, log)
 }
 
-/// A frame at some time.
 fn act_at(model: &mut Model, now: Instant) {
     model.act(&Wishes::default(), now);
 }
 
 fn rebake() -> Wishes {
-    Wishes {
-        rebake: true,
-        ..Wishes::default()
-    }
+    with(Wishes::default(), |it| it.rebake = true)
 }
 
 /// Names of events, levels left out: how many of them are seen depends on when one looks.
@@ -161,10 +155,7 @@ fn edits_are_baked_and_undone() {
     let LightKind::Point { intensity: first, .. } = original.lights[0].kind else {
         panic!("the ring has a lamp")
     };
-    let drag = |times: f64| Wishes {
-        is_dragging: true,
-        ..wish(intensity(0, first.0 * times))
-    };
+    let drag = |times: f64| with(wish(intensity(0, first.0 * times)), |it| it.is_dragging = true);
     assert!(!model.traces_lights(), "the layer holds direct light");
     // Two steps of one drag, then the mouse is let go.
     for times in [2.0, 4.0] {
@@ -185,10 +176,7 @@ fn edits_are_baked_and_undone() {
     assert!(!model.traces_lights(), "the layer is that of the brighter light");
 
     // The second finds nothing to take back; the end of a drag and the wish to take it back may come in one frame.
-    let both = Wishes {
-        undo: true,
-        ..drag(8.0)
-    };
+    let both = with(drag(8.0), |it| it.undo = true);
     for wishes in [undo(), undo(), both] {
         act(&mut model, wishes);
         assert_eq!(model.scene().lights, original.lights);
@@ -230,10 +218,7 @@ fn cancelling_keeps_the_shown_maps() {
     let (mut model, _log) = baked();
     model.panel.settings.density_per_sr = LONG;
     act(&mut model, rebake());
-    let cancel = Wishes {
-        cancel: true,
-        ..Wishes::default()
-    };
+    let cancel = with(Wishes::default(), |it| it.cancel = true);
     act(&mut model, cancel);
     until(&mut model, "the end", |model| !model.state().is_baking());
     assert_eq!(*model.state(), BakeState::Cancelled);
@@ -257,10 +242,7 @@ fn cancelling_keeps_the_shown_maps() {
 #[test]
 fn given_maps_are_shown_without_a_bake() {
     let (first, _log) = baked();
-    let mut model = fixtures::model(&ViewerOptions {
-        maps: Some(first.maps().to_vec()),
-        ..options("ring")
-    });
+    let mut model = fixtures::model(&with(options("ring"), |it| it.maps = Some(first.maps().to_vec())));
     let now = Instant::now();
     assert!(!model.poll());
     for now in [now, now + QUIET] {
@@ -277,10 +259,7 @@ fn given_maps_are_shown_without_a_bake() {
 #[test]
 fn a_log_that_cannot_be_written_is_told() {
     let file = tempfile::NamedTempFile::new().expect("a file");
-    let options = ViewerOptions {
-        event_log: Some(file.path().join("x")),
-        ..options("ring")
-    };
+    let options = with(options("ring"), |it| it.event_log = Some(file.path().join("x")));
     let error = Model::new(&options, || ()).expect_err("a file is no folder");
     says(error, "event log cannot be written");
 }

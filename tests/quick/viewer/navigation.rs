@@ -14,10 +14,7 @@ fn cube(side_m: f64, centre: DVec3, cameras: Vec<Camera>) -> Scene {
         triangles: vec![[0, 1, 2]],
         ..Mesh::default()
     };
-    let mut scene = Scene {
-        cameras,
-        ..Scene::default()
-    };
+    let mut scene = with(Scene::default(), |it| it.cameras = cameras);
     parts::add(&mut scene, "cube", mesh, Material::default());
     scene
 }
@@ -262,7 +259,6 @@ fn room(boxes: &[[f64; 5]]) -> Boxes {
     Boxes(all)
 }
 
-/// Across the whole room.
 const WALL: [f64; 5] = [-10.0, -3.2, 10.0, -3.0, 3.0];
 
 fn walker(position: DVec3, forward: DVec3, solid: &Boxes, held: &str) -> Navigator {
@@ -272,7 +268,6 @@ fn walker(position: DVec3, forward: DVec3, solid: &Boxes, held: &str) -> Navigat
     navigator
 }
 
-/// Some seconds, in so many frames.
 fn pass(navigator: &mut Navigator, solid: &Boxes, seconds: f64, frames: usize) {
     for _ in 0..frames {
         navigator.advance_among(seconds / frames as f64, solid);

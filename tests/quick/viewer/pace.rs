@@ -38,18 +38,12 @@ fn traced_scale_follows_the_frame_time() {
         let pace = settled(Pace::default(), specular);
         let found = (pace.walking().traced_scale, pace.resting().traced_scale);
         assert_eq!(found, (walking, resting), "{specular} ms");
-        assert_eq!(
-            settled(pace.clone(), specular).walking(),
-            pace.walking(),
-            "it settles"
-        );
+        // It settles.
+        assert_eq!(settled(pace.clone(), specular).walking(), pace.walking());
     }
     assert_eq!(slow.walking().traced_scale, 0.25);
-    assert_eq!(
-        settled(slow, 3.0).walking().traced_scale,
-        2.0,
-        "a calm view is fine again"
-    );
+    // A calm view is fine again.
+    assert_eq!(settled(slow, 3.0).walking().traced_scale, 2.0);
 }
 
 #[test]

@@ -212,10 +212,7 @@ fn looking_changes_nothing() {
 
 #[test]
 fn what_means_nothing_cannot_be_set() {
-    let mut panel = Headless::new(BakeSettings {
-        kernel: Kernel::Disc,
-        ..splats()
-    });
+    let mut panel = Headless::new(with(splats(), |it| it.kernel = Kernel::Disc));
     assert!(panel.is_disabled(Role::Slider, "Sigma [radii²]"));
     panel.drag("Sigma [radii²]", 0.5, 0.9);
     assert_eq!(panel.settings().sigma, Sigma::Constant(1.0));
@@ -254,10 +251,7 @@ fn what_means_nothing_cannot_be_set() {
     panel.settle();
     panel.assert_says(&["come without an estimate of their error"]);
 
-    let mut panel = Headless::new(BakeSettings {
-        branch_threshold: Some(-1.0),
-        ..splats()
-    });
+    let mut panel = Headless::new(with(splats(), |it| it.branch_threshold = Some(-1.0)));
     let sentence = panel.settings().validate().expect_err("negative").to_string();
     panel.assert_says(&[&sentence]);
     panel.press("Re-bake");
@@ -337,10 +331,7 @@ fn ledgers_are_summed_and_gaps_told() {
             deposited: 1.0,
             absorbed: 0.25,
             escaped: 0.625,
-            truncated: Truncated {
-                depth: 0.125,
-                ..Truncated::default()
-            },
+            truncated: with(Truncated::default(), |it| it.depth = 0.125),
         },
         not_emitted_w: 0.0,
         emitted_radiant_w: None,

@@ -16,7 +16,6 @@ fn panel_of(scene: Scene) -> Headless {
     panel
 }
 
-/// The fixture's lights, and two with a surface.
 fn scene() -> Scene {
     let mut scene = fixtures::scene();
     let panel = LightKind::Panel {

@@ -18,7 +18,6 @@ fn picture() -> Picture {
     }
 }
 
-/// The names of the files, or why there are none.
 fn save(folder: &Path, scene: &str, has_radiance: bool) -> Result<Vec<String>, String> {
     let view = View {
         camera: Camera::framing("all", (-DVec3::ONE, DVec3::ONE), 1.5),
@@ -76,11 +75,8 @@ fn names_are_new_and_form_no_path() {
         let names = save(folder.path(), scene, has_radiance).expect("it is saved");
         assert_eq!(names.len(), 1 + usize::from(has_radiance));
         assert_eq!(names.last().map(String::as_str), Some(last));
-        assert_eq!(
-            names[0].strip_suffix(".png"),
-            last.get(..last.len() - 4),
-            "one number"
-        );
+        // One number.
+        assert_eq!(names[0].strip_suffix(".png"), last.get(..last.len() - 4));
     }
     assert_eq!(fs::read(mine).expect("it is there"), b"mine");
     let gone = folder.path().join("gone");

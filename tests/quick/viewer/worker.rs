@@ -22,18 +22,11 @@ fn result(rays: u64, partial: bool) -> BakeResult {
     result
 }
 
-/// A request on a scene of that name.
 fn named(name: &str, density_per_sr: f64) -> BakeRequest {
-    let scene = Scene {
-        name: name.into(),
-        ..Scene::default()
-    };
+    let scene = with(Scene::default(), |it| it.name = name.into());
     BakeRequest {
         scene: Arc::new(scene),
-        settings: BakeSettings {
-            density_per_sr,
-            ..BakeSettings::splat()
-        },
+        settings: with(BakeSettings::splat(), |it| it.density_per_sr = density_per_sr),
     }
 }
 
@@ -124,7 +117,6 @@ impl Drop for Scripted {
 pub struct Bench {
     pub worker: Worker,
     started: Arc<AtomicUsize>,
-    /// Bakers that exist.
     pub alive: Arc<AtomicUsize>,
     pub made: Arc<AtomicUsize>,
     woken: Arc<AtomicUsize>,
@@ -169,7 +161,6 @@ impl Bench {
         self.gate.send(()).expect("the baker listens");
     }
 
-    /// Waits until so many bakes have begun.
     fn begun(&self, count: usize) {
         wait_for("the start", || self.started.load(Ordering::SeqCst) == count);
     }
@@ -193,7 +184,6 @@ impl Bench {
         level.map(|level| level.result.counts.rays)
     }
 
-    /// Waits for the next maps.
     fn next(&self) -> BakedLevel {
         let mut level = None;
         wait_for("maps", || {
@@ -210,11 +200,8 @@ fn a_request_is_answered() {
     assert_eq!(bench.worker.state(), BakeState::Idle);
     assert_eq!(bench.take(), None);
     bench.worker.cancel();
-    assert_eq!(
-        bench.worker.state(),
-        BakeState::Idle,
-        "there is nothing to cancel"
-    );
+    // There is nothing to cancel.
+    assert_eq!(bench.worker.state(), BakeState::Idle);
     bench.ask(AT_ONCE);
     assert_eq!(bench.settled(), BakeState::Done);
     let level = bench.worker.take_level().expect("there are maps");
@@ -332,11 +319,8 @@ fn a_late_bake_does_not_pass_for_the_cancelled() {
     bench.ask(AT_ONCE);
     bench.worker.cancel();
     bench.open_gate();
-    assert_eq!(
-        bench.settled(),
-        BakeState::Cancelled,
-        "what was asked last was never baked"
-    );
+    // What was asked last was never baked.
+    assert_eq!(bench.settled(), BakeState::Cancelled);
     assert_eq!(bench.take(), None, "and what it replaced is not shown");
 }
 

@@ -6,13 +6,11 @@ use super::effects::{line, panel};
 use super::worker::{AT_ONCE, Bench, ENDLESS, FAILING, PANICKING, STUBBORN, asked, bench};
 use super::*;
 
-/// Maps that a script would bake at this density.
 fn level(density_per_sr: f64) -> Arc<BakedLevel> {
     let request = asked(density_per_sr);
     Arc::new(finished(&request.scene, &request.settings))
 }
 
-/// A bench whose session has baked once.
 fn baked() -> Bench {
     let bench = bench();
     assert!(bench.answer(AT_ONCE).is_some());
@@ -108,15 +106,10 @@ fn failures_spoil_nothing_and_bakes_come_first() {
 #[test]
 fn shown_until_other_maps_come() {
     let mut model = fixtures::model(&options("ring"));
-    let wish = || Wishes {
-        worth: Some(Effect::Reflection),
-        ..Wishes::default()
-    };
+    let wish = || with(Wishes::default(), |it| it.worth = Some(Effect::Reflection));
     act(&mut model, wish());
-    assert!(
-        model.state().is_baking(),
-        "nothing is compared before there are maps"
-    );
+    // Nothing is compared before there are maps.
+    assert!(model.state().is_baking());
     bake(&mut model);
     let before = Arc::clone(model.last.as_ref().expect("there are maps"));
     assert_eq!(model.quantity(), Quantity::Light);
