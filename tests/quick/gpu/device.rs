@@ -97,8 +97,8 @@ fn assert_refused(small: &Gpu, (scene, maps): &(Scene, Vec<IlluminationMap>), wo
     assert_eq!(rig.renderer.chain_refusal(), None, "nothing was asked of it yet");
     assert_eq!(rig.picture(view).radiance, without.radiance);
     let refusal = rig.renderer.chain_refusal().expect("it is too small");
-    says(&refusal, words);
-    says(&refusal, "they are drawn without what is seen in them");
+    says(refusal, words);
+    says(refusal, "they are drawn without what is seen in them");
     let counts = rig.renderer.counts();
     assert_eq!((counts.chain_bytes, counts.specular_pipelines), (0, 0));
     // Forced on it is the same, and no fault.

@@ -174,7 +174,7 @@ fn clear_rough_glass_absorbs_nothing() {
                 });
                 assert!(back.ray.direction.y * direction.y < 0.0, "{back:?}");
                 assert_eq!(shares.absorbed.g, 0.0);
-                near(back.share.g + through, 1.0, 1e-12, &shares);
+                near(back.share.g + through, 1.0, 1e-12, shares);
                 total += usize::from(back.event == Event::TotalInternalReflection);
             }
         }

@@ -121,6 +121,6 @@ fn impossible_colours_are_refused() {
         (rgb(0.5, 0.5, f64::INFINITY), "finite"),
     ] {
         says(SmoothSpectrum::from_colour(wrong).expect_err("impossible"), fault);
-        says(Emission::from_colour(wrong).err().expect("impossible"), fault);
+        says(Emission::from_colour(wrong).expect_err("impossible"), fault);
     }
 }
