@@ -129,6 +129,13 @@ fn merged_shards_are_the_bake_bit_by_bit() {
         });
         assert!(whole == merged, "{name}");
     }
+    // A bit that turned on the disk.
+    let mut sums = std::fs::read(sandbox.path("part2/sums.bin")).expect("written");
+    let late = sums.len() - 40;
+    sums[late] ^= 0x10;
+    sandbox.write("part2/sums.bin", sums);
+    let torn = sandbox.run("merge part2 part1 -o torn --scene moved.gltf");
+    torn.failed_in_one_sentence(1, &["part2", "damaged", "again"]);
 }
 
 #[test]

@@ -142,14 +142,22 @@ fn shapes_are_those_of_the_references() {
         }
         assert_eq!(open_edges(ring), 2 * 1024, "both rims, no seam along the wall");
     }
-    for p in object(&built_in("pool"), "water")
-        .mesh
-        .positions
-        .iter()
-        .step_by(97)
-    {
-        let waves = (9.0 * p.x + 1.0).cos() + (7.0 * p.z + 2.0).cos() + (6.0 * p.x + 5.0 * p.z).cos();
-        assert_close(p.y, 1.0 + 0.02 * waves, 1e-14, "height");
+}
+
+#[test]
+fn pool_has_its_waves() {
+    let scene = built_in("pool");
+    let water = &object(&scene, "water").mesh;
+    let height = |x: f64, z: f64| {
+        1.0 + 0.02 * ((9.0 * x + 1.0).cos() + (7.0 * z + 2.0).cos() + (6.0 * x + 5.0 * z).cos())
+    };
+    let step = 1e-5;
+    for (p, normal) in water.positions.iter().zip(&water.normals).step_by(97) {
+        assert_close(p.y, height(p.x, p.z), 1e-14, "height");
+        let slope_x = (height(p.x + step, p.z) - height(p.x - step, p.z)) / (2.0 * step);
+        let slope_z = (height(p.x, p.z + step) - height(p.x, p.z - step)) / (2.0 * step);
+        let expected = DVec3::new(-slope_x, 1.0, -slope_z).normalize();
+        assert!(normal.distance(expected) < 1e-9, "{normal} instead of {expected}");
     }
     let scene = built_in("paraboloid");
     let dish = &object(&scene, "paraboloid").mesh;
@@ -161,6 +169,12 @@ fn shapes_are_those_of_the_references() {
         near(to_focus.cross(reflected), DVec3::ZERO, 1e-14, position);
         assert!(reflected.dot(to_focus) > 0.0);
     }
+    let across = |triangle: usize| {
+        let [a, b, c] = dish.corners(triangle);
+        0.5 * (b - a).cross(c - a).dot(-direction)
+    };
+    let opening_m2: f64 = (0..dish.triangles.len()).map(across).sum();
+    assert_close(opening_m2, PI * 0.16, 1e-4, "opening across the beam");
 }
 
 /// A plane surface's TEXCOORD_0 fills the unit square without overlap: area in uv of 1.
@@ -207,5 +221,239 @@ fn prism_has_minimum_deviation() {
     for (nm, degrees) in [(400.0, 51.637_754_065_4), (700.0, 49.182_654_092_7)] {
         let (_, found) = deviation(glass.index_at(Nanometres(nm)));
         assert_close(found.to_degrees(), degrees, 1e-6, "deviation");
+    }
+}
+
+/// Where a ray meets the wall of `spectrum`.
+fn at_wall(origin: DVec3, direction: DVec3) -> DVec3 {
+    origin + direction * ((-0.6 - origin.z) / direction.z)
+}
+
+/// On the way through a flat face of a mesh, from where it is met.
+fn through_face(mesh: &Mesh, origin: DVec3, direction: DVec3, eta: f64) -> (DVec3, DVec3) {
+    let ray = |triangle: usize| {
+        let [a, b, c] = mesh.corners(triangle);
+        let normal = (b - a).cross(c - a).normalize();
+        let distance = (a - origin).dot(normal) / direction.dot(normal);
+        let point = origin + direction * distance;
+        let is_inside = [(a, b), (b, c), (c, a)]
+            .iter()
+            .all(|(from, to)| (*to - *from).cross(point - *from).dot(normal) >= 0.0);
+        (distance > 1e-9 && is_inside).then_some((distance, point, normal))
+    };
+    let hits = (0..mesh.triangles.len()).filter_map(ray);
+    let (_, point, normal) = hits.min_by(|a, b| a.0.total_cmp(&b.0)).expect("it meets a face");
+    let facing = if direction.dot(normal) > 0.0 {
+        -normal
+    } else {
+        normal
+    };
+    (point, refract(direction, facing, eta).expect("it goes through"))
+}
+
+/// One reflection within a ball, from where a ray meets it: the way of a rainbow's light.
+fn through_ball(centre: DVec3, radius: f64, origin: DVec3, direction: DVec3, n: f64) -> (DVec3, DVec3) {
+    let meet = |origin: DVec3, direction: DVec3, first: bool| {
+        let to = origin - centre;
+        let half = to.dot(direction);
+        let root = (half * half - to.length_squared() + radius * radius).sqrt();
+        let point = origin + direction * (if first { -half - root } else { -half + root });
+        (point, (point - centre).normalize())
+    };
+    let (point, normal) = meet(origin, direction, true);
+    let inside = refract(direction, normal, n).expect("it enters");
+    let (point, normal) = meet(point, inside, false);
+    let back = reflect(inside, normal);
+    let (point, normal) = meet(point, back, false);
+    (point, refract(back, -normal, 1.0 / n).expect("it leaves"))
+}
+
+/// Whether a point is in the picture of the scene's first camera, 3 wide and 2 high.
+fn is_in_view(scene: &Scene, point: DVec3) -> bool {
+    let camera = &scene.cameras[0];
+    let to = point - camera.position;
+    let (depth, half) = (to.dot(camera.forward), (0.5 * camera.vertical_fov_rad).tan());
+    let (x, y) = (to.dot(camera.right()) / depth, to.dot(camera.up) / depth);
+    depth > 0.0 && y.abs() < half && x.abs() < 1.5 * half
+}
+
+#[test]
+fn spectra_fall_on_the_wall_in_view() {
+    let scene = built_in("spectrum");
+    let (prism, ball) = (object(&scene, "prism"), object(&scene, "ball"));
+    let glass = &scene.materials[prism.material];
+    let (low, high) = ball.mesh.bounds().expect("has vertices");
+    let centre = 0.5 * (low + high);
+    let beam = |index: usize| match scene.lights[index].kind {
+        LightKind::Spot {
+            position, direction, ..
+        } => (position, direction),
+        other => panic!("{other:?} is no beam"),
+    };
+    let hits = |nm: f64| {
+        let n = glass.index_at(Nanometres(nm));
+        let (origin, direction) = beam(0);
+        let (entry, inside) = through_face(&prism.mesh, origin, direction, n);
+        let (exit, out) = through_face(&prism.mesh, entry, inside, 1.0 / n);
+        let (origin, direction) = beam(1);
+        let (last, back) = through_ball(centre, 0.06, origin, direction, n);
+        [at_wall(exit, out), at_wall(last, back)]
+    };
+    let [violet, green, red] = [400.0, 550.0, 700.0].map(hits);
+    for (index, what, least_m) in [(0, "prism", 0.08), (1, "ball", 0.015)] {
+        let places = [violet[index], green[index], red[index]];
+        for place in places {
+            assert!(
+                (0.0..1.0).contains(&place.y) && place.x.abs() < 1.3,
+                "{what}: {place} is off the wall"
+            );
+            assert!(is_in_view(&scene, place), "{what}: {place}");
+        }
+        let spread = places[0].distance(places[2]);
+        assert!(spread > least_m, "{what}: {spread} m from violet to red");
+        let share = places[0].distance(places[1]) / spread;
+        assert!(
+            (0.5..0.9).contains(&share),
+            "{what}: green at {share}, nearer to red"
+        );
+    }
+    // Rays beside the middle of the ball's beam leave it alike: a rainbow, not a blur.
+    let n = glass.index_at(D_LINE);
+    let (origin, direction) = beam(1);
+    let way = |aside_m: f64| through_ball(centre, 0.06, origin + DVec3::X * aside_m, direction, n).1;
+    assert!(way(0.001).angle_between(way(-0.001)) < 1e-3);
+}
+
+#[test]
+fn bowl_stands_in_daylight() {
+    let scene = built_in("bowl");
+    let bowl = object(&scene, "bowl");
+    // Between the half of an ellipsoid that is missing and the cone frustums around: rather thick.
+    let filled_m3 = volume_m3(&bowl.mesh) + 2.0 / 3.0 * PI * 0.128 * 0.128 * 0.084;
+    assert!((0.0033..0.0040).contains(&filled_m3), "{filled_m3} m³");
+    let (low, _) = bowl.mesh.bounds().expect("has vertices");
+    assert!(low.y > 0.0, "it does not stand in the table");
+    let glass = &scene.materials[bowl.material];
+    assert!(glass.is_dispersive());
+    // F2 by SCHOTT's data sheet.
+    assert_close(glass.ior, 1.62004, 1e-5, "index");
+    assert!(scene.lights[0].spectrum.is_some());
+    assert!(
+        [0.14, -0.14]
+            .iter()
+            .all(|x| is_in_view(&scene, DVec3::new(*x, 0.1, 0.0)))
+    );
+}
+
+/// What the references were computed with, to more digits than their maps can show.
+#[test]
+fn casters_are_those_of_the_references() {
+    for (name, part, surface, ior, triangles, area_m2, tolerance) in [
+        ("ring", "ring", SurfaceKind::Mirror, None, 2048, PI, 1e-5),
+        ("nephroid", "ring", SurfaceKind::Mirror, None, 2048, PI, 1e-5),
+        ("ball", "ball", SurfaceKind::Dielectric, Some(1.5), 0, PI, 3e-5),
+        (
+            "slab",
+            "slab",
+            SurfaceKind::Dielectric,
+            Some(1.5),
+            0,
+            2.0 * (64.0 + 2.0 * 2.4),
+            1e-14,
+        ),
+        (
+            "pool",
+            "water",
+            SurfaceKind::Dielectric,
+            Some(1.333),
+            2 * 512 * 512,
+            0.0,
+            0.0,
+        ),
+        ("mirror", "mirror", SurfaceKind::Mirror, None, 0, 0.6 * 0.5, 1e-14),
+    ] {
+        let scene = built_in(name);
+        let Object { material, mesh, .. } = object(&scene, part);
+        let material = &scene.materials[*material];
+        assert_eq!(material.surface, surface, "{name}");
+        assert!(ior.is_none_or(|ior| material.ior == ior), "{name}");
+        assert!(triangles == 0 || mesh.triangles.len() == triangles, "{name}");
+        assert!(
+            area_m2 == 0.0 || (mesh.area_m2() / area_m2 - 1.0).abs() < tolerance,
+            "{name}: area"
+        );
+    }
+    for name in ["ball", "slab"] {
+        let scene = built_in(name);
+        assert!(
+            scene.materials[object(&scene, name).material].volume.is_some(),
+            "{name}"
+        );
+    }
+    let bounds = |name: &str, part: &str| object(&built_in(name), part).mesh.bounds().expect("has vertices");
+    let (low, high) = bounds("ring", "ring");
+    assert_eq!((low.y, high.y), (0.0, 0.5));
+    let (low, high) = bounds("pool", "water");
+    assert_eq!((low.x, low.z, high.x, high.z), (-1.5, -1.5, 1.5, 1.5));
+    let (low, high) = bounds("mirror", "mirror");
+    // Turned by fifteen degrees.
+    assert_close(0.5 * (high.x - low.x), 0.077_645_7, 1e-6, "half width in x");
+    assert_close(0.5 * (high.z - low.z), 0.289_777_7, 1e-6, "half width in z");
+    assert_close(low.y, 0.2, 1e-14, "lower edge");
+    assert_close(high.y, 0.7, 1e-14, "upper edge");
+    let ball = built_in("ball");
+    let mesh = &object(&ball, "ball").mesh;
+    for (position, normal) in mesh.positions.iter().zip(&mesh.normals) {
+        let from_centre = *position - DVec3::new(0.0, 0.8, 0.0);
+        assert_close(from_centre.length(), 0.5, 2e-5, "radius");
+        assert!((from_centre.normalize() - *normal).length() < 1e-14);
+    }
+}
+
+#[test]
+fn lights_have_the_references_power() {
+    for (name, position) in [
+        ("ring", [-0.7, 1.2, 0.0]),
+        ("ball", [0.0, 3.0, 0.0]),
+        ("mirror", [-0.1, 1.2, 0.1]),
+        ("slab", [0.1, 2.0, -0.05]),
+    ] {
+        let light = built_in(name).lights[0].clone();
+        let LightKind::Point {
+            position: at,
+            intensity,
+        } = light.kind
+        else {
+            panic!("{name} is lit by a point light");
+        };
+        assert_eq!(at.to_array(), position);
+        assert_close(
+            intensity.0 * 4.0 * PI * light.colour.luminance(),
+            100.0,
+            1e-12,
+            name,
+        );
+    }
+    for (name, along) in [
+        ("pool", DVec3::new(0.3, -1.0, 0.2)),
+        ("paraboloid", DVec3::new(0.8, -0.6, 0.0)),
+        (
+            "nephroid",
+            DVec3::new(0.939_692_620_785_908_4, -0.342_020_143_325_668_7, 0.0),
+        ),
+    ] {
+        let light = built_in(name).lights[0].clone();
+        let LightKind::Sun {
+            direction,
+            normal_irradiance,
+        } = light.kind
+        else {
+            panic!("{name} is lit by a sun");
+        };
+        assert!(
+            (direction - along.normalize()).length() < 1e-15,
+            "{name}: {direction}"
+        );
+        assert_close(normal_irradiance.0 * light.colour.luminance(), 1.0, 1e-12, name);
     }
 }

@@ -4,6 +4,114 @@ use crate::prelude::*;
 use support::glb::load_path;
 use support::{project_file, reference_map, shared_or_skip};
 
+const PAIRS: [(&str, &str); 7] = [
+    ("S1", "ring"),
+    ("S2", "ball"),
+    ("S3", "pool"),
+    ("S5", "mirror"),
+    ("S6", "slab"),
+    ("S7", "paraboloid"),
+    ("S8", "nephroid"),
+];
+
+fn floor(scene: &Scene) -> &Mesh {
+    let floor = scene.objects.iter().find(|object| object.name == "floor");
+    &floor.expect("there is a floor").mesh
+}
+
+fn caster(scene: &Scene) -> usize {
+    let casters = |index: &usize| scene.material_of(*index).surface.is_specular();
+    let mut found = (0..scene.objects.len()).filter(casters);
+    let caster = found.next().expect("there is something specular");
+    assert_eq!(found.next(), None);
+    caster
+}
+
+fn assert_same_light(file: &Scene, ours: &Scene) {
+    assert_eq!((file.lights.len(), ours.lights.len()), (1, 1));
+    // The files state 32-bit numbers.
+    let near = |a: DVec3, b: DVec3| assert!((a - b).length() < 1e-6, "{a} and {b}");
+    match (file.lights[0].kind, ours.lights[0].kind) {
+        (
+            LightKind::Point { position, intensity },
+            LightKind::Point {
+                position: p,
+                intensity: i,
+            },
+        ) => {
+            near(position, p);
+            assert_close(intensity.0, i.0, 1e-6, "radiant intensity");
+        }
+        (
+            LightKind::Sun {
+                direction,
+                normal_irradiance,
+            },
+            LightKind::Sun {
+                direction: d,
+                normal_irradiance: e,
+            },
+        ) => {
+            near(direction, d);
+            assert_close(normal_irradiance.0, e.0, 1e-6, "irradiance");
+        }
+        kinds => panic!("{kinds:?}"),
+    }
+}
+
+#[test]
+fn files_and_built_in_scenes_agree() {
+    for (file, name) in PAIRS {
+        let Some(path) = shared_or_skip(&format!("oracle/{file}.glb")) else {
+            return;
+        };
+        let scene = load_path(&path, &LoadOptions::default()).unwrap_or_else(|error| panic!("{error}"));
+        let ours = built_in(name);
+        assert!(scene.warnings.is_empty(), "{file}: {:?}", scene.warnings);
+        assert_same_light(&scene, &ours);
+        let (a, b) = (floor(&scene), floor(&ours));
+        assert_close(a.area_m2(), b.area_m2(), 1e-6, "floor");
+        let corner = |mesh: &Mesh| {
+            let uvs = mesh.uv0.as_ref().expect("floor has TEXCOORD_0");
+            let at = uvs
+                .iter()
+                .position(|uv| *uv == glam::DVec2::new(1.0, 0.0))
+                .expect("has a corner at (1, 0)");
+            mesh.positions[at]
+        };
+        assert!(
+            (corner(a) - corner(b)).length() < 1e-6,
+            "{file}: the maps lie alike"
+        );
+        let (a, b) = (caster(&scene), caster(&ours));
+        assert_eq!(
+            scene.material_of(a).surface,
+            ours.material_of(b).surface,
+            "{file}"
+        );
+        assert_close(
+            scene.material_of(a).ior,
+            ours.material_of(b).ior,
+            1e-12,
+            "refractive index",
+        );
+        let (a, b) = (&scene.objects[a].mesh, &ours.objects[b].mesh);
+        assert_close(a.area_m2(), b.area_m2(), 1e-5, file);
+        assert!(
+            b.triangles.len() >= a.triangles.len(),
+            "{file}: {} < {}",
+            b.triangles.len(),
+            a.triangles.len()
+        );
+        let (low, high) = a.bounds().expect("has vertices");
+        let (our_low, our_high) = b.bounds().expect("has vertices");
+        assert!(
+            (low - our_low).length() + (high - our_high).length() < 2e-5,
+            "{file}: bounds"
+        );
+    }
+}
+
 /// The maps' headers and means are those that `assets/SOURCES.md` states, to six decimals.
 #[test]
 fn references_are_whole() {
@@ -42,16 +150,7 @@ fn prism_is_that_of_its_file() {
     let scene = load_path(&path, &LoadOptions::default()).unwrap_or_else(|error| panic!("{error}"));
     let ours = built_in("prism");
     warns_not(&scene);
-    let sun = |scene: &Scene| match scene.lights[0].kind {
-        LightKind::Sun {
-            direction,
-            normal_irradiance,
-        } => (direction, normal_irradiance.0),
-        kind => panic!("{kind:?}"),
-    };
-    // The file states 32-bit numbers.
-    near(sun(&scene).0, sun(&ours).0, 1e-6, "direction");
-    assert_close(sun(&scene).1, sun(&ours).1, 1e-6, "irradiance");
+    assert_same_light(&scene, &ours);
     assert_eq!(scene.objects.len(), ours.objects.len());
     for (index, (theirs, own)) in scene.objects.iter().zip(&ours.objects).enumerate() {
         assert_eq!(corners(&theirs.mesh), corners(&own.mesh), "{}", own.name);
