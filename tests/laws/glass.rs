@@ -13,7 +13,7 @@ use nephroid::units::Flux;
 use support::laws::law::*;
 use support::laws::scenes::*;
 use support::laws::{Baked, Table};
-use support::tools::{at, settings};
+use support::tools::{at, set, settings};
 
 pub fn fill(t: &mut Table) {
     slabs_and_angles(t);
@@ -106,10 +106,7 @@ fn bodies(t: &mut Table) {
         .bake(glass_ball(4).glass(1.5, inner), 4e3, 32)
         .watts_as_first("watts as without it", 2e-3)
         .as_first_within_errors();
-    let bright_branches = || BakeSettings {
-        branch_threshold: Some(1e-4),
-        ..at(1e3, 16)
-    };
+    let bright_branches = || set(at(1e3, 16), |s| s.branch_threshold = Some(1e-4));
     t.case("touching-glass")
         .check(
             "the common face is found, a gap of a micrometre is none",

@@ -7,6 +7,7 @@ use nephroid::illumination::IlluminationMap;
 use nephroid::optics::LinearSrgb;
 use nephroid::scene::builtin::{self, parts, shapes};
 use nephroid::scene::{LightKind, LightSize, PanelShape, Scene, Volume};
+use nephroid::session::BakeResult;
 use nephroid::settings::{
     BakeSettings, Footprint, Kernel, KernelSampling, LayerKind, MapResolution, RayPlacement, Sigma,
 };
@@ -15,7 +16,7 @@ use nephroid::units::{Flux, Radiance};
 use support::laws::law::*;
 use support::laws::scenes::*;
 use support::laws::{Baked, Table, books_open, is_long};
-use support::tools::{at, bake, builtin_scene, settings, transformed};
+use support::tools::{at, bake, builtin_scene, set, settings, transformed};
 
 pub fn fill(t: &mut Table) {
     for (name, scene) in [
@@ -112,10 +113,7 @@ fn uniform_scale(t: &mut Table) {
         radiance: Radiance(1.0),
     };
     let ceiling = shapes::rectangle(DVec3::Y, DVec3::X * 0.5, DVec3::Z * 0.5);
-    let of_eight_places = BakeSettings {
-        wavefronts: Some(8),
-        ..at(1e3, 32)
-    };
+    let of_eight_places = set(at(1e3, 32), |s| s.wavefronts = Some(8));
     for (name, scene, power) in [
         ("mirror", before(upright()), -2),
         ("tinted-ball", tinted, -2),
@@ -143,34 +141,53 @@ fn uniform_scale(t: &mut Table) {
 }
 
 fn threads(t: &mut Table) {
-    for (name, rays) in [("ring", RayPlacement::Lattice), ("ball", RayPlacement::Jittered)] {
-        let splats = BakeSettings {
-            rays,
-            map_resolution: MapResolution::Auto,
-            ..settings(2e4, 0)
-        };
-        for (settings, many) in [
-            (at(2e3, 32), &[64][..]),
-            (settings(2e3, 32), &[64]),
-            (splats, &[2, 4, 7]),
-        ] {
-            let same = t
-                .case(format!("threads-{name}"))
-                .bake_with(builtin_scene(name), settings.clone());
-            for threads in many.iter().copied() {
-                same.bake_with(
-                    builtin_scene(name),
-                    BakeSettings {
-                        threads,
-                        ..settings.clone()
-                    },
-                )
+    let mut soft = builtin_scene("mirror");
+    soft.lights[0].size = LightSize::Radius { radius_m: 0.1 };
+    for material in &mut soft.materials {
+        if material.surface.is_specular() {
+            material.roughness = 0.2;
+        }
+    }
+    let refined = |side, error| {
+        set(at(BakeSettings::starting_density_per_sr(error), side), |s| {
+            s.max_error = Some(error)
+        })
+    };
+    let splats = |rays| BakeSettings {
+        rays,
+        map_resolution: MapResolution::Auto,
+        ..settings(2e4, 0)
+    };
+    let [ring, ball] = ["ring", "ball"].map(builtin_scene);
+    for (name, scene, settings, many) in [
+        ("ring", &ring, at(2e3, 32), &[64][..]),
+        ("ring", &ring, settings(2e3, 32), &[64]),
+        ("ring", &ring, splats(RayPlacement::Lattice), &[2, 4, 7]),
+        ("ball", &ball, at(3e3, 128), &[2, 4, 7, 64]),
+        ("ball", &ball, settings(2e3, 32), &[64]),
+        ("ball", &ball, splats(RayPlacement::Jittered), &[2, 4, 7]),
+        ("ball-refined", &ball, refined(128, 0.03), &[2, 4, 7]),
+        ("rough-mirror", &soft, refined(32, 0.1), &[3]),
+    ] {
+        let same = t
+            .case(format!("threads-{name}"))
+            .bake_with(scene.clone(), set(settings.clone(), |s| s.threads = 1));
+        for threads in many.iter().copied() {
+            same.bake_with(scene.clone(), set(settings.clone(), |s| s.threads = threads))
                 .bits_as_first("the same map, bit for bit")
-                .compare("the same ledgers and counts", 0.0, |many, one| {
+                .compare("the same ledgers, errors and counts", 0.0, |many, one| {
                     let [many, one] = [many, one].map(|bake| &bake.result);
-                    no(many.ledgers == one.ledgers && many.counts == one.counts)
+                    let errors = |result: &BakeResult| {
+                        result
+                            .maps
+                            .iter()
+                            .map(|map| map.error.clone())
+                            .collect::<Vec<_>>()
+                    };
+                    no(many.ledgers == one.ledgers
+                        && many.counts == one.counts
+                        && errors(many) == errors(one))
                 });
-            }
         }
     }
 }
@@ -180,14 +197,8 @@ fn seeds(t: &mut Table) {
     let mut soft = builtin_scene("ring");
     soft.lights[0].size = LightSize::Radius { radius_m: 0.1 };
     let wall = shapes::rectangle(DVec3::new(-0.4, 0.4, 0.0), DVec3::Y * 0.4, DVec3::Z * 0.4);
-    let jittered = BakeSettings {
-        rays: RayPlacement::Jittered,
-        ..settings(2e3, 16)
-    };
-    let of_few_places = BakeSettings {
-        wavefronts: Some(2),
-        ..at(500.0, 16)
-    };
+    let jittered = set(settings(2e3, 16), |s| s.rays = RayPlacement::Jittered);
+    let of_few_places = set(at(500.0, 16), |s| s.wavefronts = Some(2));
     let indirect = BakeSettings {
         layers: vec![LayerKind::Indirect],
         max_error: Some(0.3),
@@ -202,10 +213,7 @@ fn seeds(t: &mut Table) {
             indirect,
         ),
     ] {
-        let with = |seed: u64| BakeSettings {
-            seed,
-            ..settings.clone()
-        };
+        let with = |seed: u64| set(settings.clone(), |s| s.seed = seed);
         let case = t.case(format!("seed-of-{name}"));
         if name == "indirect-paths" {
             case.without_books();

@@ -17,7 +17,7 @@ use nephroid::units::{Irradiance, Radiance, RadiantIntensity};
 use support::laws::law::*;
 use support::laws::scenes::*;
 use support::laws::{Baked, Table, values};
-use support::tools::{at, builtin_scene, settings};
+use support::tools::{at, builtin_scene, set, settings};
 
 pub fn fill(t: &mut Table) {
     // Powers from the smallest that single precision knows to the largest: the map is a scale of itself.
@@ -262,10 +262,7 @@ fn sent_to_a_mirror(t: &mut Table) {
                 t.case(format!("{name}-above-a-mirror"))
                     .bake_with(
                         over.clone().lit(light(kind)),
-                        BakeSettings {
-                            item_buffer,
-                            ..settings
-                        },
+                        set(settings, |s| s.item_buffer = item_buffer),
                     )
                     .sent(3.0 * share, 3e-3);
             }

@@ -13,7 +13,7 @@ use nephroid::transport::{MediumStack, Tracer};
 use support::laws::law::*;
 use support::laws::scenes::*;
 use support::laws::{Baked, Table, is_long};
-use support::tools::{at, builtin_scene, settings};
+use support::tools::{at, builtin_scene, set, settings};
 
 pub fn fill(t: &mut Table) {
     t.case("focus-paraboloid")
@@ -49,10 +49,9 @@ pub fn fill(t: &mut Table) {
         .bake_with(hall().lamp(HALL_LAMP), depth(40, at(1e3, 32)))
         .e("that of all mirrored lamps", 0.01, all_mirrored);
     for (name, reflectance) in [("mirror-box", 1.0), ("dim-mirror-box", 0.9)] {
-        let to_the_end = BakeSettings {
-            branch_threshold: Some(0.0),
-            ..depth(10_000, settings(40.0, 16))
-        };
+        let to_the_end = set(depth(10_000, settings(40.0, 16)), |s| {
+            s.branch_threshold = Some(0.0)
+        });
         let splats = t.case(name).bake_with(box_of_mirrors(reflectance), to_the_end);
         splats.share("escapes", 0.0, |energy| energy.escaped);
         if reflectance == 1.0 {
@@ -68,10 +67,9 @@ pub fn fill(t: &mut Table) {
     }
     t.case("mirror-box-10000-bounces")
         .check("10,000 reflections only change signs", ten_thousand_bounces);
-    let above_a_thousandth = BakeSettings {
-        branch_threshold: Some(1e-3),
-        ..depth(1000, settings(20.0, 16))
-    };
+    let above_a_thousandth = set(depth(1000, settings(20.0, 16)), |s| {
+        s.branch_threshold = Some(1e-3)
+    });
     t.case("mirror-box-with-glass")
         .bake_with(
             box_of_mirrors(1.0).glass(1.5, ball_in_the_box(2)),
@@ -171,10 +169,7 @@ pub fn fill(t: &mut Table) {
     t.case("pinhole-before-a-mirror")
         .bake(blocked(&plates_around_a_hole()), 5e7, 32)
         .watts(4e-6 * 0.5_f64.sqrt(), 0.15);
-    let of_eight_places = BakeSettings {
-        wavefronts: Some(8),
-        ..at(500.0, 16)
-    };
+    let of_eight_places = set(at(500.0, 16), |s| s.wavefronts = Some(8));
     t.case("rough-lobe-below-the-horizon")
         .bake_with(rough_at_grazing(), of_eight_places)
         .must("light reaches the wall", |bake| deposited_w(bake) > 0.0)
@@ -184,10 +179,7 @@ pub fn fill(t: &mut Table) {
 }
 
 fn depth(max_depth: u32, settings: BakeSettings) -> BakeSettings {
-    BakeSettings {
-        max_depth,
-        ..settings
-    }
+    set(settings, |s| s.max_depth = max_depth)
 }
 
 /// Share of the light that is missing in the middle texel of the floor.

@@ -8,14 +8,14 @@ use nephroid::export::float_image::{Channel, FloatImage};
 use nephroid::illumination::accumulator::{FluxAccumulator, FluxUnit};
 use nephroid::optics::LinearSrgb;
 use nephroid::scene::builtin::{parts, shapes};
-use nephroid::settings::{BakeSettings, LayerKind, MapResolution, Sigma};
+use nephroid::settings::{LayerKind, MapResolution, Sigma};
 use nephroid::units::Flux;
 
 use crate::mirrors::paraboloid;
 use support::laws::law::*;
 use support::laws::scenes::*;
 use support::laws::{Baked, Table, is_long};
-use support::tools::{at, settings, transformed};
+use support::tools::{at, set, settings, transformed};
 
 pub fn fill(t: &mut Table) {
     t.case("small-deposits-in-one-texel")
@@ -24,9 +24,10 @@ pub fn fill(t: &mut Table) {
         .check("they keep their precision at any power", units_of_flux);
     t.case("coarse-map-on-a-finer-one")
         .check("every count is kept, and even light stays even", spread_map);
-    let sized = |width, height| BakeSettings {
-        map_resolution: MapResolution::Fixed { width, height },
-        ..at(1e3, 1)
+    let sized = |width, height| {
+        set(at(1e3, 1), |s| {
+            s.map_resolution = MapResolution::Fixed { width, height }
+        })
     };
     for (name, scene) in [("mirror", before(upright())), ("ball", glass_ball(3))] {
         let scaled = t
@@ -63,19 +64,13 @@ pub fn fill(t: &mut Table) {
         });
     if is_long() {
         // All light of a focus in the finest map that 256 MB hold, the rest of which is dark.
-        let little_memory = BakeSettings {
-            memory_bytes: 256 << 20,
-            ..sized(16384, 16384)
-        };
+        let little_memory = set(sized(16384, 16384), |s| s.memory_bytes = 256 << 20);
         t.case("maps-of-16384-with-one-lit-tile")
             .bake_with(paraboloid(), little_memory)
             .watts(0.64, 1e-3);
     }
     // Spreads from a millionth of a footprint to ten thousand of them.
-    let of_sigma = |sigma, settings| BakeSettings {
-        sigma: Sigma::Constant(sigma),
-        ..settings
-    };
+    let of_sigma = |sigma, settings| set(settings, |s| s.sigma = Sigma::Constant(sigma));
     for sigma in [1e-6, 1.0, 1e4] {
         for settings in [settings(2e3, 32), at(1e3, 32)] {
             t.case("sigma-from-nothing-to-huge")

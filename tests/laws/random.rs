@@ -11,7 +11,7 @@ use nephroid::settings::{BakeSettings, LayerKind};
 use support::laws::law::*;
 use support::laws::{Baked, Table, is_long};
 use support::random_scenes::{MOST_LAMPS, scene};
-use support::tools::{at, settings, transformed};
+use support::tools::{at, set, settings, transformed};
 
 /// What may be done to a scene.
 const CHANGES: u64 = 8;
@@ -45,13 +45,7 @@ pub fn fill(t: &mut Table) {
     for (plain, settings) in scenes(2) {
         t.case("random-scenes-by-threads")
             .bake_with(plain.clone(), settings.clone())
-            .bake_with(
-                plain,
-                BakeSettings {
-                    threads: 3,
-                    ..settings
-                },
-            )
+            .bake_with(plain, set(settings, |s| s.threads = 3))
             .bits_as_first("three threads for one: the same bits");
     }
     for (plain, settings) in scenes(3) {

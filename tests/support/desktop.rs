@@ -1,5 +1,6 @@
 //! A screen without a monitor, the program on it, and hands: Xvfb, xdotool and ImageMagick.
 
+use std::cell::Cell;
 use std::fs;
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
@@ -12,7 +13,11 @@ use nephroid::viewer::navigation::Navigator;
 use nephroid::viewer::panel::WIDTH;
 use serde_json::Value;
 use x11rb::connection::Connection as _;
-use x11rb::protocol::xproto::{AtomEnum, ClientMessageEvent, ConnectionExt as _, EventMask};
+use x11rb::protocol::Event;
+use x11rb::protocol::xproto::{
+    ChangeWindowAttributesAux, ClientMessageEvent, ConnectionExt as _, EventMask,
+};
+use x11rb::rust_connection::RustConnection;
 
 use crate::evidence::keep_bytes;
 use crate::program::program;
@@ -97,9 +102,56 @@ impl Drop for Screen {
     }
 }
 
+/// What a window manager says to a window, and hears from it.
+struct Manager {
+    server: RustConnection,
+    pings: Cell<u32>,
+}
+
+impl Manager {
+    fn new(display: &str) -> Self {
+        let (server, screen) = x11rb::connect(Some(display)).expect("the server answers");
+        // Answers go to the root window.
+        let aux = ChangeWindowAttributesAux::new().event_mask(EventMask::SUBSTRUCTURE_NOTIFY);
+        let root = server.setup().roots[screen].root;
+        let asked = server.change_window_attributes(root, &aux).expect("it is sent");
+        asked.check().expect("it is granted");
+        let pings = Cell::new(0);
+        Self { server, pings }
+    }
+
+    fn atom(&self, name: &str) -> u32 {
+        let asked = self.server.intern_atom(false, name.as_bytes());
+        asked.expect("it is sent").reply().expect("it is answered").atom
+    }
+
+    fn say(&self, window: u32, [what, a, b]: [u32; 3]) {
+        let message = ClientMessageEvent::new(32, window, self.atom("WM_PROTOCOLS"), [what, a, b, 0, 0]);
+        let sent = self.server.send_event(false, window, EventMask::NO_EVENT, message);
+        sent.expect("it is sent").check().expect("the window is there");
+    }
+
+    /// Asks whether the window still hears, and waits for the answer: then it has heard what was done before.
+    fn ping(&self, window: u32) {
+        let (number, ping) = (self.pings.get() + 1, self.atom("_NET_WM_PING"));
+        self.pings.set(number);
+        self.say(window, [ping, number, window]);
+        let start = Instant::now();
+        loop {
+            match self.server.poll_for_event().expect("the server answers") {
+                Some(Event::ClientMessage(answer)) if answer.data.as_data32()[..2] == [ping, number] => break,
+                Some(_) => {}
+                None => std::thread::sleep(Duration::from_millis(5)),
+            }
+            assert!(start.elapsed() < PATIENCE, "the window does not answer");
+        }
+    }
+}
+
 /// The program with its window open.
 pub struct Viewer<'a> {
     screen: &'a Screen,
+    manager: Manager,
     program: Child,
     window: String,
     folder: tempfile::TempDir,
@@ -135,11 +187,11 @@ impl<'a> Viewer<'a> {
             .stderr(stderr)
             .spawn()
             .expect("the program starts");
-        let window = String::new();
         let mut viewer = Self {
             screen,
+            manager: Manager::new(&screen.display),
             program,
-            window,
+            window: String::new(),
             folder,
             read: 0,
             pulls: false,
@@ -149,18 +201,37 @@ impl<'a> Viewer<'a> {
             .xdotool(&["search", "--name", "Nephroid"])
             .trim()
             .to_owned();
-        assert!(
-            viewer.window.parse::<u32>().is_ok(),
-            "one window: {:?}",
-            viewer.window
-        );
         viewer.hands(&format!("windowfocus --sync {}", viewer.window));
         viewer
     }
 
-    /// Hands that do several things in a row, in xdotool's words.
-    pub fn hands(&self, what: &str) {
+    fn number(&self) -> u32 {
+        let number = self.window.parse();
+        number.unwrap_or_else(|_| panic!("one window: {:?}", self.window))
+    }
+
+    /// Hands that do several things in a row, in xdotool's words, and wait for nothing.
+    pub fn hasty_hands(&self, what: &str) {
         self.screen.xdotool(&what.split_whitespace().collect::<Vec<_>>());
+    }
+
+    /// The same, until the window has drawn what comes of it: one that is late would take it all in at once, and meet a
+    /// click where the mouse is by then.
+    pub fn hands(&self, what: &str) {
+        self.hasty_hands(what);
+        // Each is answered before a frame: the second after the one that saw the deed, the third after the one that
+        // this asked for.
+        for _ in 0..3 {
+            std::thread::sleep(Duration::from_millis(20));
+            self.manager.ping(self.number());
+        }
+    }
+
+    /// Holds a key for some seconds.
+    pub fn hold(&self, key: &str, seconds: f64) {
+        self.hands(&format!("keydown {key}"));
+        std::thread::sleep(Duration::from_secs_f64(seconds));
+        self.hands(&format!("keyup {key}"));
     }
 
     /// The display that its window is on, and the window's number.
@@ -241,16 +312,11 @@ impl<'a> Viewer<'a> {
         self.next("maps", is_shown).1
     }
 
-    /// Holds a key for half a second, and tells where the camera rests then. A window that is late sees the key go down and up
-    /// in one frame, and does not move: then once more.
+    /// Flies by a key for half a second, and tells where the camera rests then.
     pub fn fly(&mut self, key: &str, from: DVec3) -> DVec3 {
-        let before = self.screenshot();
+        self.hands("mousemove 900 300");
         self.forget();
-        poll(&|| format!("{key} does not move the camera"), || {
-            self.hands(&format!("keydown {key} sleep 0.5 keyup {key}"));
-            let has_moved = (0..20).any(|_| difference(&before, &self.screenshot()) > 0.02);
-            has_moved.then_some(())
-        });
+        self.hold(key, 0.5);
         self.wait_for_move(from)
     }
 
@@ -259,21 +325,33 @@ impl<'a> Viewer<'a> {
         position(&self.wait_for("rest", |rest| position(rest).distance(from) > 1e-6))
     }
 
-    /// Left, top, right and bottom of the first control of the panel that fits, by its role and name [pixels]; waits until
-    /// it is there and rests.
-    pub fn control(&self, what: &str, fits: impl Fn(&str, &str) -> bool) -> [f64; 4] {
+    /// The controls that the panel has now: role, name and left, top, right and bottom [pixels].
+    fn controls(&self) -> Vec<(String, String, [f64; 4])> {
+        let text = |value: &Value| value.as_str().unwrap_or_default().to_owned();
+        let known = self.all("controls").pop();
+        let all = known.iter().flat_map(|event| event["controls"].as_array());
+        all.flatten()
+            .map(|control| {
+                let side = |side: usize| control["rect_pixels"][side].as_f64().expect("a number");
+                (text(&control["role"]), text(&control["name"]), [0, 1, 2, 3].map(side))
+            })
+            .collect()
+    }
+
+    /// Left, top, right and bottom of the first control of the panel with that name and, where one is given, that role
+    /// [pixels]; waits until it is there and rests.
+    fn control(&self, role: Option<&str>, name: &str) -> [f64; 4] {
         let mut last = None;
-        poll(&|| format!("no {what}"), || {
-            let controls = self.all("controls").pop()?;
-            let text = |control: &Value, key: &str| control[key].as_str().unwrap_or_default().to_owned();
-            let mut all = controls["controls"].as_array()?.iter();
-            let found = all.find(|control| fits(&text(control, "role"), &text(control, "name")))?;
-            let rect = [0, 1, 2, 3].map(|side| found["rect_pixels"][side].as_f64().expect("a number"));
-            if last == Some(rect) {
+        poll(&|| format!("no {name} in {:?}", self.controls()), || {
+            let mut all = self.controls().into_iter();
+            let found = all.find(|(r, n, _)| n == name && role.is_none_or(|role| r == role));
+            let rect = found.map(|(.., rect)| rect);
+            if rect.is_some() && last == rect {
                 return last;
             }
-            last = Some(rect);
-            std::thread::sleep(Duration::from_millis(200));
+            last = rect;
+            // A panel that glides moves with every picture, and pictures may take half a second.
+            self.hands("sleep 0.1");
             None
         })
     }
@@ -282,8 +360,8 @@ impl<'a> Viewer<'a> {
     pub fn centre(&self, role: &str, name: &str) -> (i32, i32) {
         let mut last_top = None;
         for _ in 0..40 {
-            let [left, top, right, bottom] = self.control(name, |r, n| r == role && n == name);
-            let [.., bake] = self.control("Re-bake", |_, name| name == "Re-bake");
+            let [left, top, right, bottom] = self.control(Some(role), name);
+            let [.., bake] = self.control(None, "Re-bake");
             // What stands above the sections, or over the picture, does not scroll.
             let is_fixed = ABOVE.iter().any(|above| name.starts_with(above)) || left >= f64::from(WIDTH);
             let highest = if is_fixed { 0.0 } else { bake + BELOW_BAKE };
@@ -294,22 +372,23 @@ impl<'a> Viewer<'a> {
             }
             last_top = Some(top);
             let wheel = if top > highest { 5 } else { 4 };
-            // The panel glides, picture by picture, and pictures may take half a second.
-            self.hands(&format!("mousemove 20 300 click {wheel} sleep 1"));
+            self.hands("mousemove 20 300");
+            self.hands(&format!("click {wheel}"));
         }
         panic!("{role} {name} cannot be scrolled to");
     }
 
     /// Places on a slider of the panel, by the share of the way along it [pixels].
     pub fn on_slider<const N: usize>(&self, name: &str, shares: [f64; N]) -> [(i32, i32); N] {
-        let [left, top, _, bottom] = self.control(name, |r, n| r == "Slider" && n == name);
+        let [left, top, _, bottom] = self.control(Some("Slider"), name);
         shares.map(|share| ((left + 4.0 + share * 104.0) as i32, (0.5 * (top + bottom)) as i32))
     }
 
-    /// Clicks at a place [pixels], and stays there: a window that is late sees all of it in one frame. Where it sees the
-    /// button go up later than it went down, it may take that for a drag.
+    /// Clicks at a place [pixels].
     pub fn click_at(&self, (x, y): (i32, i32)) {
-        self.hands(&format!("mousemove {x} {y} sleep 0.3 click 1 sleep 0.3"));
+        self.hands(&format!("mousemove {x} {y}"));
+        self.hands("mousedown 1");
+        self.hands("mouseup 1");
     }
 
     /// Clicks a control of the panel as a person would.
@@ -317,15 +396,32 @@ impl<'a> Viewer<'a> {
         self.click_at(self.centre(role, name));
     }
 
-    /// Opens sections of the panel, or closes them: what stands below moves.
-    pub fn toggle_sections(&self, names: &[&str]) {
-        for name in names {
-            let before = self.all("controls").len();
+    /// Opens sections of the panel that are closed: the program opens some by itself.
+    pub fn open_sections(&self, names: &[&str]) {
+        names.iter().for_each(|name| self.set_section(name, true));
+    }
+
+    /// Closes sections of the panel that are open: what stands below comes into sight.
+    pub fn close_sections(&self, names: &[&str]) {
+        names.iter().for_each(|name| self.set_section(name, false));
+    }
+
+    fn set_section(&self, name: &str, is_open: bool) {
+        if self.is_open(name) != is_open {
             self.click("DisclosureTriangle", name);
-            poll(&|| format!("{name} does not open"), || {
-                (self.all("controls").len() > before).then_some(())
-            });
         }
+        poll(&|| format!("{name} stays: {:?}", self.controls()), || {
+            (self.is_open(name) == is_open).then_some(())
+        });
+    }
+
+    /// Whether a control of its own stands below a section's title, not the next title.
+    fn is_open(&self, section: &str) -> bool {
+        let [_, top, ..] = self.control(Some("DisclosureTriangle"), section);
+        let controls = self.controls();
+        let is_below = |[left, its_top, ..]: [f64; 4]| left < f64::from(WIDTH) && its_top > top + 1.0;
+        let mut below = controls.iter().filter(|(.., rect)| is_below(*rect));
+        below.next().is_some_and(|(role, ..)| role != "DisclosureTriangle")
     }
 
     /// Chooses what the picture shows, and waits until the log tells so.
@@ -338,31 +434,26 @@ impl<'a> Viewer<'a> {
     /// Types over what a field of the panel holds, and confirms.
     pub fn type_into(&self, role: &str, name: &str, text: &str) {
         self.click_at(self.centre(role, name));
-        self.hands("key ctrl+a sleep 0.2");
+        self.hands("key ctrl+a");
         self.screen.xdotool(&["type", "--delay", "20", text]);
-        self.hands("sleep 0.3 key Return");
+        self.hands("key Return");
     }
 
-    /// Presses the mouse at the first place and pulls to the others [pixels]; it stays down. A window has to see the button
-    /// go down in a frame before the mouse moves, or go up before it leaves.
+    /// Presses the mouse at the first place and pulls to the others [pixels]; it stays down.
     pub fn pull(&mut self, places: &[(i32, i32)]) {
         self.forget();
         self.pulls = true;
-        let mut deeds = String::new();
         for (index, (x, y)) in places.iter().enumerate() {
-            let press = if index == 0 {
-                "sleep 1 mousedown 1 sleep 1"
-            } else {
-                ""
-            };
-            deeds += &format!("mousemove {x} {y} {press} sleep 0.3 ");
+            self.hands(&format!("mousemove {x} {y}"));
+            if index == 0 {
+                self.hands("mousedown 1");
+            }
         }
-        self.hands(&deeds);
     }
 
     /// Lets the mouse go.
     pub fn let_go(&mut self) {
-        self.hands("sleep 0.3 mouseup 1 sleep 1");
+        self.hands("mouseup 1");
         self.pulls = false;
     }
 
@@ -410,17 +501,8 @@ impl<'a> Viewer<'a> {
     /// and all events.
     #[track_caller]
     pub fn close(mut self) -> (String, Vec<Value>) {
-        let (server, _) = x11rb::connect(Some(&self.screen.display)).expect("the server answers");
-        let atom = |name: &str| {
-            let asked = server.intern_atom(false, name.as_bytes()).expect("it is sent");
-            asked.reply().expect("it is answered").atom
-        };
-        let window = self.window.parse().expect("a number");
-        let data = [atom("WM_DELETE_WINDOW"), AtomEnum::NONE.into(), 0, 0, 0];
-        let message = ClientMessageEvent::new(32, window, atom("WM_PROTOCOLS"), data);
-        let sent = server.send_event(false, window, EventMask::NO_EVENT, message);
-        sent.expect("it is sent");
-        server.flush().expect("it is sent");
+        let close = self.manager.atom("WM_DELETE_WINDOW");
+        self.manager.say(self.number(), [close, 0, 0]);
         self.wait_for("closing", |_| true);
         let status = self.wait_for_end();
         let stderr = self.stderr();

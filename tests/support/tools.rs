@@ -14,6 +14,12 @@ pub fn builtin_scene(name: &str) -> Scene {
     builtin::build(name).unwrap_or_else(|| panic!("there is no built-in scene {name}"))
 }
 
+/// Settings with one of them changed.
+pub fn set(mut settings: BakeSettings, change: impl FnOnce(&mut BakeSettings)) -> BakeSettings {
+    change(&mut settings);
+    settings
+}
+
 /// Default settings at a density [1/sr] and a map side.
 pub fn settings(density_per_sr: f64, side: usize) -> BakeSettings {
     BakeSettings {

@@ -279,6 +279,8 @@ pub struct Wishes {
 /// Dark, since the picture beside it is what is to be judged; without animations, so that an idle window rests.
 pub fn set_style(context: &egui::Context) {
     context.set_theme(egui::Theme::Dark);
+    // A press is a click however long the frame takes that first sees it.
+    context.options_mut(|options| options.input_options.max_click_duration = f64::INFINITY);
     context.all_styles_mut(|style| {
         style.animation_time = 0.0;
         style.interaction.tooltip_delay = 0.3;

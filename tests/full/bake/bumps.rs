@@ -10,7 +10,7 @@ use nephroid::settings::BakeSettings;
 
 use crate::bake::common::{self, all_bits, edit, rmse, run, session};
 use support::bump_scenes::{by_image, by_waves};
-use support::tools::{at, bake, energy_fault, settings};
+use support::tools::{at, bake, energy_fault, set, settings};
 
 fn correlation(a: &[f64], b: &[f64]) -> f64 {
     let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
@@ -113,10 +113,9 @@ fn waves_finer_than_any_cell_blur_light() {
 fn bumps_off_bakes_the_mesh_itself() {
     let wavy = bumped(AMPLITUDE_M);
     for settings in [at(1e3, 32), settings(1e4, 32)] {
-        let off = BakeSettings {
-            effects: EffectSwitches::default().with(Effect::Bumps, EffectSwitch::Off),
-            ..settings.clone()
-        };
+        let off = set(settings.clone(), |s| {
+            s.effects = EffectSwitches::default().with(Effect::Bumps, EffectSwitch::Off)
+        });
         let mut session = session(&wavy);
         let [with, without, again] = [&settings, &off, &settings].map(|settings| run(&mut session, settings));
         assert!(with.plan.is_on(Effect::Bumps) && !without.plan.is_on(Effect::Bumps));

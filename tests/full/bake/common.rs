@@ -13,7 +13,7 @@ use nephroid::settings::{BakeSettings, LayerKind, MapResolution};
 use nephroid::study::brute_force::brute_force;
 use nephroid::transport::Tracer;
 
-use support::tools::{at, bits, caustic, map_of, settings};
+use support::tools::{at, bits, caustic, map_of, set, settings};
 
 pub fn session(scene: &Scene) -> BakeSession {
     BakeSession::new(Arc::new(scene.clone())).expect("a session")
@@ -31,32 +31,22 @@ pub fn edit(session: &mut BakeSession, edit: &Edit) {
 
 /// Settings of a bake that ends at an error, with maps of `side` texels each way.
 pub fn towards(target: f64, side: usize) -> BakeSettings {
-    BakeSettings {
-        max_error: Some(target),
-        ..at(BakeSettings::starting_density_per_sr(target), side)
-    }
+    set(at(BakeSettings::starting_density_per_sr(target), side), |s| {
+        s.max_error = Some(target)
+    })
 }
 
 pub fn sized(settings: BakeSettings, (width, height): (usize, usize)) -> BakeSettings {
     let map_resolution = MapResolution::Fixed { width, height };
-    BakeSettings {
-        map_resolution,
-        ..settings
-    }
+    set(settings, |s| s.map_resolution = map_resolution)
 }
 
 pub fn automatic(settings: BakeSettings) -> BakeSettings {
-    BakeSettings {
-        map_resolution: MapResolution::Auto,
-        ..settings
-    }
+    set(settings, |s| s.map_resolution = MapResolution::Auto)
 }
 
 pub fn with_layers(layers: &[LayerKind], settings: BakeSettings) -> BakeSettings {
-    BakeSettings {
-        layers: layers.to_vec(),
-        ..settings
-    }
+    set(settings, |s| s.layers = layers.to_vec())
 }
 
 pub const CAUSTIC_AND_DIRECT: [LayerKind; 2] = [LayerKind::Caustic, LayerKind::Direct];

@@ -10,6 +10,7 @@ use nephroid::light_pass::wavefront::coverage::{CoverageReport, FluxTriangle, de
 use proptest::prelude::*;
 
 use crate::bake::common::with_threads;
+use crate::bake::tiles;
 
 /// Counts of a triangle in most tests: enough for the counts to be as good as real numbers.
 const FLUX: i64 = 1_000_000_000_000;
@@ -408,7 +409,12 @@ fn mixture(size: (usize, usize), count: usize) -> Vec<FluxTriangle> {
 #[test]
 fn threads_calls_and_order_change_nothing() {
     let size = (96, 70);
-    for chart in [full_chart(size), gappy_chart(size)] {
+    let in_tiles = tiles::chart(Some(tiles::mixed()));
+    for (chart, size) in [
+        (full_chart(size), size),
+        (gappy_chart(size), size),
+        (in_tiles, tiles::SIZE),
+    ] {
         let mut triangles = mixture(size, 30_000);
         let expected = with_threads(1, || deposit_on(&chart, &triangles, triangles.len()));
         for threads in [2, 4, 7] {

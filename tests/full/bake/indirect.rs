@@ -18,7 +18,7 @@ use nephroid::units::Radiance;
 use crate::bake::common::{self, all_bits, run, towards, with_layers};
 use support::meshes::{cuboid, floor, quad, sphere};
 use support::scenes::{diffuse, light, point_light, scene, sun, surface};
-use support::tools::bake;
+use support::tools::{bake, set};
 
 fn settings(layers: &[LayerKind], side: usize, max_error: f64) -> BakeSettings {
     with_layers(layers, towards(max_error, side))
@@ -300,10 +300,7 @@ fn small_room() -> Scene {
 #[test]
 fn same_bits_for_any_threads_and_any_past() {
     let [one, two] = [1, 2].map(|threads| {
-        let settings = BakeSettings {
-            threads,
-            ..settings(&LIT, 32, 0.1)
-        };
+        let settings = set(settings(&LIT, 32, 0.1), |s| s.threads = threads);
         bake(small_room(), &settings)
     });
     assert!(all_bits(&one) == all_bits(&two), "two threads");
@@ -347,10 +344,7 @@ fn lights_add_up_to_the_layer() {
         colour: LinearSrgb::new(0.2, 0.5, 1.0),
         ..point_light(DVec3::new(0.8, 0.4, 1.7), 2.0)
     });
-    let settings = BakeSettings {
-        per_light: true,
-        ..settings(&LIT, 32, 0.1)
-    };
+    let settings = set(settings(&LIT, 32, 0.1), |s| s.per_light = true);
     let result = bake(scene, &settings);
     for map in &result.maps {
         let whole = map.layer(LayerKind::Indirect).expect("the layer");

@@ -5,13 +5,13 @@ use nephroid::export::map_folder::MapFolder;
 use nephroid::progress::Control;
 use nephroid::scene::builtin::parts;
 use nephroid::session::BakeResult;
-use nephroid::settings::{BakeSettings, LayerKind};
+use nephroid::settings::LayerKind;
 use nephroid::units::Flux;
 
 use glam::DVec3;
 
 use crate::bake::common::{CAUSTIC_AND_DIRECT, automatic, session, with_layers};
-use support::tools::{at, bake, builtin_scene, energy_fault, map_of, settings};
+use support::tools::{at, bake, builtin_scene, energy_fault, map_of, set, settings};
 
 #[test]
 fn automatic_maps_grow_with_the_density() {
@@ -65,10 +65,9 @@ fn each_light_has_its_part_of_each_layer() {
     let mut scene = builtin_scene("mirror");
     let second = parts::point_light("second lamp", DVec3::new(0.1, 1.0, -0.2), Flux(30.0));
     scene.lights.push(second);
-    let settings = BakeSettings {
-        per_light: true,
-        ..with_layers(&CAUSTIC_AND_DIRECT, at(5_000.0, 32))
-    };
+    let settings = set(with_layers(&CAUSTIC_AND_DIRECT, at(5_000.0, 32)), |s| {
+        s.per_light = true
+    });
     let result = bake(scene.clone(), &settings);
     let map = map_of(&result, &scene, "floor");
     let part = |light: usize, kind: LayerKind| {

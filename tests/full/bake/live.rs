@@ -20,7 +20,7 @@ use rand_pcg::rand_core::{Rng, SeedableRng};
 use crate::bake::common::{
     CAUSTIC_AND_DIRECT, all_bits, assert_same, automatic, difference, edit, run, session, sized, with_layers,
 };
-use support::tools::{at, bake, builtin_scene, energy_fault, settings};
+use support::tools::{at, bake, builtin_scene, energy_fault, set, settings};
 
 /// Fails unless a session now gives what a fresh bake of its scene gives.
 #[track_caller]
@@ -79,10 +79,7 @@ fn another_deposit_of_splats_takes_no_ray() {
         if name == "ring" {
             scene.lights[0].colour = LinearSrgb::new(1.0, 0.7, 0.2);
         }
-        let base = BakeSettings {
-            rays,
-            ..settings(1e4, 48)
-        };
+        let base = set(settings(1e4, 48), |s| s.rays = rays);
         let mut session = session(&scene);
         assert!(run(&mut session, &base).counts.rays > 0);
         for change in changes {
@@ -101,10 +98,7 @@ fn another_deposit_of_patches_takes_no_ray() {
     let mut session = session(&scene);
     let first = run(&mut session, &at(5e3, 64));
     assert!(first.counts.rays > 0);
-    let smoothed = BakeSettings {
-        sigma: Sigma::Constant(4.0),
-        ..at(5e3, 64)
-    };
+    let smoothed = set(at(5e3, 64), |s| s.sigma = Sigma::Constant(4.0));
     for other in [at(5e3, 192), smoothed] {
         let (again, fresh) = assert_fresh(&mut session, &other, "deposited again");
         assert_eq!((again.counts.rays, again.counts.segments), (0, 0));
@@ -148,10 +142,9 @@ fn light_beyond_its_memory_is_not_kept() {
     let mut side = 32;
     let mut rays = |memory_bytes: u64| {
         side += 2;
-        let settings = BakeSettings {
-            memory_bytes,
-            ..sized(settings(2e4, 32), (side, side))
-        };
+        let settings = set(sized(settings(2e4, 32), (side, side)), |s| {
+            s.memory_bytes = memory_bytes
+        });
         run(&mut session, &settings).counts.rays
     };
     let (little, much) = (1 << 20, 256 << 20);
@@ -195,10 +188,7 @@ fn dimming_and_smoothing_take_no_work() {
         if let Some(change) = &change {
             edit(&mut session, change);
         }
-        let settings = BakeSettings {
-            sigma: Sigma::Constant(sigma),
-            ..base.clone()
-        };
+        let settings = set(base.clone(), |s| s.sigma = Sigma::Constant(sigma));
         let what = format!("sigma {sigma}, {change:?}");
         let (again, _) = assert_fresh(&mut session, &settings, &what);
         assert_eq!(again.counts, Default::default(), "{what}");
@@ -222,10 +212,7 @@ fn rays_of_the_next_level_are_not_retraced() {
 
 #[test]
 fn a_deeper_path_traces_what_goes_deeper() {
-    let with = |max_depth| BakeSettings {
-        max_depth,
-        ..at(2e3, 64)
-    };
+    let with = |max_depth| set(at(2e3, 64), |s| s.max_depth = max_depth);
     let mut session = session(&builtin_scene("ball"));
     run(&mut session, &with(3));
     let (deeper, whole) = assert_fresh(&mut session, &with(8), "deeper");

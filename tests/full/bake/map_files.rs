@@ -3,8 +3,7 @@
 use std::sync::Arc;
 
 use glam::DVec3;
-use nephroid::export::exr::{decode, encode, encode_map, image_of_picture};
-use nephroid::eye_pass::Picture;
+use nephroid::export::exr::{decode, encode_map};
 use nephroid::illumination::parametrisation::DEFAULT_NOMINAL_SIDE;
 use nephroid::illumination::tiles::TileLayout;
 use nephroid::illumination::{Chart, IlluminationMap, Layer, Parametrisation, parametrise};
@@ -110,16 +109,4 @@ fn a_larger_file_holds_the_same_light() {
     // The first texel of the file lies within the first of the map.
     assert_eq!(values[0], map.layers[0].irradiance[0][1]);
     assert_eq!(values[width * height - 1], map.layers[0].irradiance[11][1]);
-}
-
-#[test]
-fn pictures_keep_their_channels() {
-    let picture = Picture {
-        width: 3,
-        height: 2,
-        radiance: irradiance(0, 6),
-    };
-    let bytes = encode(image_of_picture(&picture), "", "a file").expect("it fits");
-    let image = decode(&bytes, "a file").expect("an image");
-    assert_eq!(image.rgb("").expect("three channels"), picture.radiance);
 }

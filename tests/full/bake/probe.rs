@@ -9,11 +9,11 @@ use nephroid::light_pass::explain::{Explanation, LightPath, Limits, Target, expl
 use nephroid::optics::LinearSrgb;
 use nephroid::progress::Control;
 use nephroid::scene::{LightKind, Scene};
-use nephroid::settings::{BakeSettings, LayerKind};
+use nephroid::settings::LayerKind;
 use nephroid::transport::{Event, HitPlace, Tracer};
 
 use crate::bake::common::{CAUSTIC_AND_DIRECT, floor, with_layers};
-use support::tools::{at, bake, builtin_scene, map_of};
+use support::tools::{at, bake, builtin_scene, map_of, set};
 
 const LIMITS: Limits = Limits {
     max_depth: 16,
@@ -101,10 +101,9 @@ fn fault(scene: &Scene, target: &Target, path: &LightPath) -> Option<String> {
 /// Explains texels of the floor from the brightest to the darkest of a built-in scene, and checks every path and the sums.
 fn explained(name: &str, density_per_sr: f64) -> Vec<(f64, Explanation)> {
     let scene = Arc::new(builtin_scene(name));
-    let settings = BakeSettings {
-        max_error: Some(0.002),
-        ..with_layers(&CAUSTIC_AND_DIRECT, at(density_per_sr, 64))
-    };
+    let settings = set(with_layers(&CAUSTIC_AND_DIRECT, at(density_per_sr, 64)), |s| {
+        s.max_error = Some(0.002)
+    });
     let result = bake(Scene::clone(&scene), &settings);
     let map = map_of(&result, &scene, "floor");
     let tracer = Tracer::new(Arc::clone(&scene));

@@ -11,7 +11,7 @@ use nephroid::settings::{BakeSettings, LayerKind, MapResolution, Sigma, Waveleng
 use nephroid::units::Radiance;
 
 use crate::bake::common::{assert_same, session, with_layers};
-use support::tools::{at, bake, builtin_scene, settings};
+use support::tools::{at, bake, builtin_scene, set, settings};
 
 /// Shards in memory.
 struct Shards(Vec<ShardSums>);
@@ -69,10 +69,9 @@ fn assert_adds_up(scene: &Scene, settings: &BakeSettings, counts: &[u32]) {
 
 #[test]
 fn patches_add_up() {
-    let per_light = BakeSettings {
-        per_light: true,
-        ..with_layers(&LayerKind::ALL, at(3000.0, 24))
-    };
+    let per_light = set(with_layers(&LayerKind::ALL, at(3000.0, 24)), |s| {
+        s.per_light = true
+    });
     let mut scene = builtin_scene("mirror");
     let mut other = scene.lights[0].clone();
     other.colour = LinearSrgb::new(0.2, 1.0, 3.0);
@@ -85,10 +84,7 @@ fn patches_add_up() {
 #[test]
 fn splats_add_up() {
     assert_adds_up(&builtin_scene("ball"), &settings(15_000.0, 32), &[4]);
-    let adaptive = BakeSettings {
-        sigma: Sigma::Adaptive,
-        ..settings(10_000.0, 32)
-    };
+    let adaptive = set(settings(10_000.0, 32), |s| s.sigma = Sigma::Adaptive);
     assert_adds_up(&builtin_scene("ring"), &adaptive, &[2]);
 }
 
@@ -96,10 +92,7 @@ fn splats_add_up() {
 #[test]
 fn too_little_memory_to_keep_rays_adds_up() {
     for (settings, memory_bytes) in [(at(20_000.0, 16), 4 << 20), (settings(20_000.0, 16), 1 << 20)] {
-        let scarce = BakeSettings {
-            memory_bytes,
-            ..settings
-        };
+        let scarce = set(settings, |s| s.memory_bytes = memory_bytes);
         assert_adds_up(&builtin_scene("ball"), &scarce, &[3]);
     }
 }
@@ -128,10 +121,7 @@ fn soft_light_adds_up() {
         radiance: Radiance(800.0),
     };
     for settings in [at(1500.0, 24), settings(3000.0, 24)] {
-        let settings = BakeSettings {
-            wavefronts: Some(8),
-            ..settings
-        };
+        let settings = set(settings, |s| s.wavefronts = Some(8));
         assert_adds_up(&scene, &settings, &[3]);
     }
 }

@@ -5,11 +5,10 @@ use glam::DVec3;
 use nephroid::optics::LinearSrgb;
 use nephroid::scene::builtin::{parts, shapes};
 use nephroid::scene::{LightKind, LightSize, PanelShape, Scene};
-use nephroid::settings::BakeSettings;
 use nephroid::units::Radiance;
 
-use crate::bake::common::{assert_same, floor, off_brute_force, rmse, towards};
-use support::tools::{at, bake, builtin_scene, energy_fault};
+use crate::bake::common::{floor, off_brute_force, rmse, towards};
+use support::tools::{at, bake, builtin_scene, energy_fault, set};
 
 /// The ring with a square lamp of a side [m] that shines downwards, with the same intensity on its axis whatever its side.
 fn ring_under_square_lamp(side_m: f64) -> Scene {
@@ -97,10 +96,7 @@ fn a_rough_white_mirror_loses_nothing() {
     let walls = shapes::cuboid(DVec3::new(-1.0, -0.001, -1.0), DVec3::new(1.0, 2.0, 1.0));
     let white = parts::matte("walls", LinearSrgb::WHITE);
     parts::add(&mut scene, "walls", walls, white);
-    let settings = BakeSettings {
-        wavefronts: Some(16),
-        ..at(2_000.0, 16)
-    };
+    let settings = set(at(2_000.0, 16), |s| s.wavefronts = Some(16));
     let result = bake(scene, &settings);
     let energy = result.ledgers[0].energy_w;
     assert_eq!(energy_fault(&result), None);
@@ -112,26 +108,8 @@ fn a_rough_white_mirror_loses_nothing() {
 }
 
 #[test]
-fn threads_change_no_bit_of_soft_maps() {
-    let mut scene = roughened("mirror", 0.2);
-    scene.lights[0].size = LightSize::Radius { radius_m: 0.1 };
-    let [one, three] = [1, 3].map(|threads| {
-        let settings = BakeSettings {
-            threads,
-            ..towards(0.1, 32)
-        };
-        bake(scene.clone(), &settings)
-    });
-    assert_same(&one, &three, "three threads");
-    assert_eq!(one.counts, three.counts);
-}
-
-#[test]
 fn as_many_wavefronts_as_asked_for() {
-    let with = |wavefronts| BakeSettings {
-        wavefronts: Some(wavefronts),
-        ..at(2_000.0, 16)
-    };
+    let with = |wavefronts| set(at(2_000.0, 16), |s| s.wavefronts = Some(wavefronts));
     let rays = [16, 32].map(|wavefronts| {
         let result = bake(roughened("mirror", 0.2), &with(wavefronts));
         assert_eq!(energy_fault(&result), None);

@@ -11,7 +11,7 @@ use nephroid::units::Flux;
 use crate::bake::common::{
     CAUSTIC_AND_DIRECT, assert_same, automatic, rmse, sized, torus, towards, with_layers,
 };
-use support::tools::{at, bake, builtin_scene, caustic, energy_fault, map_of};
+use support::tools::{at, bake, builtin_scene, caustic, energy_fault, map_of, set};
 
 fn auto(density_per_sr: f64) -> BakeSettings {
     automatic(at(density_per_sr, 1))
@@ -93,10 +93,7 @@ fn a_tenth_of_the_memory_costs_what_it_says() {
         ("fixed", sized(ample.clone(), size), dense / 10),
         ("fixed, a hundredth", sized(ample.clone(), size), dense / 100),
     ] {
-        let scarce = BakeSettings {
-            memory_bytes,
-            ..settings
-        };
+        let scarce = set(settings, |s| s.memory_bytes = memory_bytes);
         let result = bake(scene.clone(), &scarce);
         let (taken, _) = memory(&result);
         let fits = memory_bytes / 4..=memory_bytes;
@@ -120,10 +117,7 @@ fn however_little_memory_there_are_maps() {
         ("mirror", &[LayerKind::Caustic][..]),
         ("showroom", &CAUSTIC_AND_DIRECT),
     ] {
-        let settings = BakeSettings {
-            memory_bytes: 20_000,
-            ..with_layers(layers, at(1e3, 512))
-        };
+        let settings = set(with_layers(layers, at(1e3, 512)), |s| s.memory_bytes = 20_000);
         let result = bake(builtin_scene(name), &settings);
         assert!(!result.maps.is_empty(), "{name}");
         assert_eq!(energy_fault(&result), None, "{name}");
@@ -142,10 +136,7 @@ fn tiles_keep_bits_and_direct_light() {
     let scene = torus_over_a_wide_floor();
     let settings = with_layers(&CAUSTIC_AND_DIRECT, auto(500.0));
     let [one, three] = [1, 3].map(|threads| {
-        let settings = BakeSettings {
-            threads,
-            ..settings.clone()
-        };
+        let settings = set(settings.clone(), |s| s.threads = threads);
         bake(scene.clone(), &settings)
     });
     assert_same(&one, &three, "three threads");

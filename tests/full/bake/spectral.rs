@@ -18,17 +18,14 @@ use nephroid::transport::{MediumStack, Tracer};
 use nephroid::units::{Flux, Irradiance};
 
 use crate::bake::common::sized;
-use support::tools::{bake, builtin_scene, energy_fault};
+use support::tools::{bake, builtin_scene, energy_fault, set};
 
 fn settings(side: usize) -> BakeSettings {
     sized(BakeSettings::default(), (side, side))
 }
 
 fn at_wavelengths(wavelengths: Wavelengths, settings: BakeSettings) -> BakeSettings {
-    BakeSettings {
-        wavelengths,
-        ..settings
-    }
+    set(settings, |s| s.wavelengths = wavelengths)
 }
 
 fn sampled(count: u32, estimator: Estimator, side: usize) -> BakeSettings {
@@ -237,10 +234,7 @@ fn each_wavelength_lands_in_its_texel() {
         let mut scene = scene.clone();
         scene.lights[0].set_spectrum(lamp(&format!("line:{nm}")));
         // The slit is a millimetre wide: half of that between rays.
-        let fine = BakeSettings {
-            density_per_sr: 1.2e7,
-            ..settings(side)
-        };
+        let fine = set(settings(side), |s| s.density_per_sr = 1.2e7);
         let texels = caustic(&bake(scene.clone(), &fine), &scene, "wall");
         let expected = (wall_y + 0.2) / 1.4 * side as f64;
         let (mut sum, mut weighted) = (0.0, 0.0);
@@ -261,10 +255,7 @@ fn kept_bands_add_up_to_their_colour() {
     let mut scene = ball_of("N-SF11");
     scene.lights[0].set_spectrum(lamp("E"));
     for estimator in [Estimator::Wavefront, Estimator::Splat] {
-        let kept = BakeSettings {
-            keep_spectrum: true,
-            ..sampled(7, estimator, 64)
-        };
+        let kept = set(sampled(7, estimator, 64), |s| s.keep_spectrum = true);
         let result = bake(scene.clone(), &kept);
         let texels = caustic(&result, &scene, "floor");
         let floor = result.maps[0].chart.receiver;
@@ -335,10 +326,10 @@ fn more_wavelengths_come_nearer_to_all() {
     assert!(errors[1] < errors[0] && errors[2] < 0.3 * errors[0], "{errors:?}");
     // Splats over the whole spectrum see the same colours, as far as kernels are sharp.
     let [all, one] = [Wavelengths::Continuous, Wavelengths::Fixed(1)].map(|wavelengths| {
-        error(&BakeSettings {
-            density_per_sr: 4e5,
-            ..at_wavelengths(wavelengths, sampled(1, Estimator::Splat, 64))
-        })
+        error(&set(
+            at_wavelengths(wavelengths, sampled(1, Estimator::Splat, 64)),
+            |s| s.density_per_sr = 4e5,
+        ))
     });
     assert!(all < 0.5 * one, "{all} of all wavelengths, {one} of one");
 }
@@ -350,10 +341,7 @@ fn all_wavelengths_are_as_many_alone() {
     let scene = ball_of("N-BK7");
     let side = 128;
     let [all, many] = [Wavelengths::Continuous, Wavelengths::Fixed(10)].map(|wavelengths| {
-        let coarse = BakeSettings {
-            density_per_sr: 4e3,
-            ..settings(side)
-        };
+        let coarse = set(settings(side), |s| s.density_per_sr = 4e3);
         floor(&scene, &at_wavelengths(wavelengths, coarse))
     });
     let middle = 0.5 * side as f64;
@@ -389,10 +377,7 @@ fn plain_glass_traces_no_wavelengths() {
 fn a_prism_throws_a_spectrum_without_bands() {
     let scene = builtin_scene("prism");
     let wall = |wavelengths: Wavelengths| {
-        let fine = BakeSettings {
-            density_per_sr: 1e8,
-            ..settings(512)
-        };
+        let fine = set(settings(512), |s| s.density_per_sr = 1e8);
         caustic(
             &bake(scene.clone(), &at_wavelengths(wavelengths, fine)),
             &scene,
@@ -450,10 +435,9 @@ fn gold_under_glass(spectrum: &Arc<Spectrum>) -> Scene {
 /// What comes to the ceiling of each luminous-equivalent watt that comes to the pane [W per channel].
 fn to_ceiling(spectrum: &Arc<Spectrum>, wavelengths: Wavelengths) -> LinearSrgb {
     let side = 64;
-    let settings = BakeSettings {
-        branch_threshold: Some(1e-5),
-        ..at_wavelengths(wavelengths, settings(side))
-    };
+    let settings = set(at_wavelengths(wavelengths, settings(side)), |s| {
+        s.branch_threshold = Some(1e-5)
+    });
     let scene = gold_under_glass(spectrum);
     let result = bake(scene, &settings);
     let texel_m2 = (2.0 * CEILING_HALF_M / side as f64).powi(2);

@@ -9,13 +9,12 @@ use nephroid::illumination::lookup::{bilinear, in_chart};
 use nephroid::illumination::tiles::{self, SIDE, TileLayout};
 use nephroid::light_pass::wavefront::coverage::{CoverageReport, FluxTriangle};
 
-use crate::bake::common::with_threads;
 use crate::bake::coverage::{deposit_on, full_chart, sum};
 
 /// Tiles of which none is square but the first.
-const SIZE: (usize, usize) = (5 * SIDE + 32, 3 * SIDE + 48);
+pub(super) const SIZE: (usize, usize) = (5 * SIDE + 32, 3 * SIDE + 48);
 
-fn chart(layout: Option<TileLayout>) -> Chart {
+pub(super) fn chart(layout: Option<TileLayout>) -> Chart {
     let areas = |layout: &TileLayout| {
         let tiles = layout.tiles();
         tiles
@@ -35,7 +34,7 @@ fn layout_of(level: impl Fn(usize) -> u8) -> TileLayout {
     TileLayout::new(SIZE, &levels, &levels)
 }
 
-fn mixed() -> TileLayout {
+pub(super) fn mixed() -> TileLayout {
     layout_of(|tile| (tile * 9 % 7) as u8)
 }
 
@@ -148,17 +147,6 @@ fn triangles_within_leave_nothing_outside() {
     assert!(triangles.len() > 2_000);
     let (_, report) = deposited(Some(mixed()), &triangles);
     assert_eq!(report.outside, [0; 3]);
-}
-
-#[test]
-fn neither_threads_nor_calls_change_a_count() {
-    let triangles = triangles(6_000);
-    let chart = chart(Some(mixed()));
-    let expected = deposit_on(&chart, &triangles, triangles.len());
-    for threads in [1, 3] {
-        let found = with_threads(threads, || deposit_on(&chart, &triangles, 777));
-        assert!(found == expected, "{threads} threads");
-    }
 }
 
 #[test]

@@ -1,13 +1,11 @@
 //! The wavefront estimator against an independent solver, and by its counters.
 
-use glam::{DMat3, DVec3};
 use nephroid::scene::{LoadOptions, load};
 use nephroid::session::BakeResult;
-use nephroid::settings::BakeSettings;
 
-use crate::bake::common::{assert_same, floor, rmse, towards};
+use crate::bake::common::{floor, rmse, towards};
 use support::references::references;
-use support::tools::{at, bake, builtin_scene, energy_fault, map_of, settings, transformed};
+use support::tools::{at, bake, builtin_scene, energy_fault, map_of, set, settings};
 use support::{assert_close, project_file, reference_map, shared_or_skip};
 
 /// The others are in the quick tests.
@@ -26,28 +24,6 @@ fn few_rays_agree_with_the_solver() {
             let texel_m = map_of(&result, &scene, "floor").chart.texel_area_m2(0).sqrt();
             check_far_field(&floor(&result, &scene), texel_m);
         }
-    }
-}
-
-/// As a lamp's irradiance falls with the square of the size, and a sun's does not.
-#[test]
-fn moved_and_scaled_scenes_agree() {
-    let rotation = DMat3::from_axis_angle(DVec3::new(0.3, -0.8, 0.52).normalize(), 1.234);
-    let size = 3.7;
-    let references = references();
-    for reference in references
-        .iter()
-        .filter(|reference| ["ring", "pool"].contains(&reference.builtin))
-    {
-        let offset = DVec3::new(5.0, -3.0, 11.0);
-        let scene = transformed(builtin_scene(reference.builtin), rotation, size, offset);
-        let (density, most) = reference.by_wavefronts;
-        reference.check(
-            &bake(scene.clone(), &at(density, 256)),
-            &scene,
-            size,
-            (most, 0.001),
-        );
     }
 }
 
@@ -135,10 +111,7 @@ fn tighter_targets_err_less() {
     for (name, reference) in [("ring", "S1"), ("ball", "S2")] {
         let scene = builtin_scene(name);
         let found = [0.05, 0.02, 0.01].map(|target| {
-            let settings = BakeSettings {
-                max_error: Some(target),
-                ..at(40.0 / target, 256)
-            };
+            let settings = set(at(40.0 / target, 256), |s| s.max_error = Some(target));
             let result = bake(scene.clone(), &settings);
             assert_eq!(energy_fault(&result), None, "{name}");
             let off = rmse(&floor(&result, &scene), &reference_map(reference));
@@ -149,24 +122,6 @@ fn tighter_targets_err_less() {
                 pair[1].0 > pair[0].0 && pair[1].1 < pair[0].1,
                 "{name}: {found:?}"
             );
-        }
-    }
-}
-
-#[test]
-fn any_threads_give_the_same_bits() {
-    for max_error in [None, Some(0.03)] {
-        let bakes = [1, 2, 4, 7].map(|threads| {
-            let settings = BakeSettings {
-                threads,
-                max_error,
-                ..at(3e3, 128)
-            };
-            bake(builtin_scene("ball"), &settings)
-        });
-        for many in &bakes[1..] {
-            assert_same(&bakes[0], many, "more threads");
-            assert_eq!(bakes[0].counts, many.counts);
         }
     }
 }
@@ -205,10 +160,9 @@ fn a_tighter_target_follows_weaker_branches() {
     assert!(shares.windows(2).all(|pair| pair[1] < pair[0]), "{shares:?}");
     // Rays of splats are always the same, their segments are not.
     let splats = targets.map(|target| {
-        let settings = BakeSettings {
-            branch_threshold: Some(towards(target, 64).path_threshold()),
-            ..settings(4_000.0, 64)
-        };
+        let settings = set(settings(4_000.0, 64), |s| {
+            s.branch_threshold = Some(towards(target, 64).path_threshold())
+        });
         let result = bake(builtin_scene("ball"), &settings);
         (result.counts.rays, result.counts.segments, left_out(&result))
     });
@@ -220,10 +174,7 @@ fn a_tighter_target_follows_weaker_branches() {
 
 #[test]
 fn a_named_threshold_is_taken_as_it_is() {
-    let named = BakeSettings {
-        branch_threshold: Some(0.02),
-        ..towards(0.01, 64)
-    };
+    let named = set(towards(0.01, 64), |s| s.branch_threshold = Some(0.02));
     assert_eq!(named.path_threshold().to_bits(), 0.02_f64.to_bits());
     assert!(towards(0.1, 64).path_threshold() > towards(0.01, 64).path_threshold());
 }

@@ -4,8 +4,6 @@ mod cache;
 #[cfg(unix)]
 mod faults;
 #[cfg(feature = "gpu")]
-mod render;
-#[cfg(feature = "gpu")]
 mod render_path;
 #[cfg(unix)]
 mod signals;

@@ -17,7 +17,7 @@ use nephroid::settings::{BakeSettings, LayerKind};
 
 use super::mutate::Damage;
 use super::watch::{Tally, Way, alone, attack};
-use support::tools::{at, bake, builtin_scene};
+use support::tools::{at, bake, builtin_scene, set};
 
 /// Memory that reading or merging so little may take [bytes].
 const MOST_BYTES: usize = 32 << 20;
@@ -73,10 +73,7 @@ fn maps() {
             let scene = builtin_scene(name);
             let folder = tempfile::tempdir().expect("temporary folder");
             let layers = vec![LayerKind::Caustic, LayerKind::Direct];
-            let settings = BakeSettings {
-                layers,
-                ..at(500.0, 16)
-            };
+            let settings = set(at(500.0, 16), |s| s.layers = layers);
             let result = bake(scene.clone(), &settings);
             let written = MapFolder::open(folder.path(), false).expect("writable");
             written.write(&scene, &settings, &result).expect("writable");
@@ -166,10 +163,7 @@ impl Shards {
         let shards = ShardSet::open(&folders)?;
         shards.check_scene(&self.scene)?;
         let settings = shards.manifest()?.settings.clone();
-        let settings = BakeSettings {
-            memory_bytes,
-            ..settings
-        };
+        let settings = set(settings, |s| s.memory_bytes = memory_bytes);
         let mut session = BakeSession::new(self.scene.clone())?;
         session.merge(&settings, Box::new(shards), &(), &Control::default())
     }

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use glam::DVec3;
 use nephroid::effect::{Effect, EffectSwitch};
-use nephroid::eye_pass::reference::{ChainLimits, EyeRays, ReferenceSettings, first_hits};
+use nephroid::eye_pass::reference::{ChainLimits, EyeRays, ReferenceSettings};
 use nephroid::eye_pass::{Picture, View};
 use nephroid::illumination::IlluminationMap;
 use nephroid::optics::LinearSrgb;
@@ -60,20 +60,6 @@ impl Lit {
         };
         seen(&self.0, &self.1, view, &settings)
     }
-}
-
-#[test]
-fn chains_cost_no_ray_without_anything_specular() {
-    let lit = Lit::under(surface(SurfaceKind::Dielectric, 1.5));
-    let [ahead, away] = ahead_and_away();
-    for switch in [EffectSwitch::Auto, EffectSwitch::On, EffectSwitch::Off] {
-        let rays = lit.seen(&away, switch).1;
-        assert_eq!((rays.camera_rays, rays.chain_rays), (24 * 16, 0), "{switch:?}");
-    }
-    let rays = lit.seen(&ahead, EffectSwitch::Auto).1;
-    let hits = first_hits(&lit.0, &ahead);
-    let on_glass = hits.iter().filter(|hit| **hit == Some(1)).count() as u64;
-    assert!(rays.chain_rays >= 2 * on_glass && on_glass > 20, "{rays:?}");
 }
 
 #[test]

@@ -342,28 +342,6 @@ fn lamp_on_its_receiver_stays_finite() {
 }
 
 #[test]
-fn nothing_comes_from_no_area_or_a_black_sky() {
-    let line = Mesh {
-        positions: [0.0, 1.0, 2.0].map(|x| DVec3::new(x, 1.0, 0.0)).to_vec(),
-        normals: vec![DVec3::NEG_Y; 3],
-        triangles: vec![[0, 1, 2]],
-        ..Mesh::default()
-    };
-    let lamps = vec![
-        glowing(1, 1.0),
-        panel(0.0, 1.0, 1.0, PanelShape::Disc),
-        sky_light(1.0),
-    ];
-    let black = Environment::new(2, 1, vec![[0.0; 3]; 2]).expect("sound");
-    for sky in [None, Some(Arc::new(black))] {
-        let parts = vec![matte(floor(1.0, 0.0)), matte(line.clone())];
-        let mut scene = scene(parts, lamps.clone());
-        scene.environment = sky;
-        assert_eq!(lit(&Tracer::new(Arc::new(scene)), 0, 4), [[0.0; 3]; 16]);
-    }
-}
-
-#[test]
 fn same_bytes_for_any_number_of_threads() {
     let sky = Environment::new(2, 2, vec![[1.0, 0.5, 0.2], [0.3; 3], [0.0; 3], [0.1; 3]]);
     let ball = sphere(DVec3::new(0.0, 0.4, 0.0), 0.3, 24, 12);

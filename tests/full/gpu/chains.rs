@@ -12,7 +12,7 @@ use nephroid::optics::LinearSrgb;
 use nephroid::plan;
 use nephroid::scene::builtin::{parts, shapes};
 use nephroid::scene::{Camera, Material, Scene, SurfaceKind, Volume, Wave, Waves};
-use nephroid::settings::{BakeSettings, LayerKind};
+use nephroid::settings::LayerKind;
 use nephroid::transport::Tracer;
 use nephroid::units::Flux;
 
@@ -21,7 +21,7 @@ use support::bump_scenes::by_image;
 use support::effect_scenes::all;
 use support::flip::mean_flip;
 use support::scenes::{bits, seen, view_of};
-use support::tools::{bake, builtin_scene, settings};
+use support::tools::{bake, builtin_scene, set, settings};
 
 /// Largest mean FLIP between the device's picture and the CPU's of every chain.
 const LARGEST_FLIP: f64 = 0.02;
@@ -72,10 +72,7 @@ fn compare(scene: Scene) {
     if crate::gpu::rig::gpu().is_none() {
         return;
     }
-    let baking = BakeSettings {
-        layers: both_layers(),
-        ..settings(8000.0, 256)
-    };
+    let baking = set(settings(8000.0, 256), |s| s.layers = both_layers());
     let maps = bake(scene.clone(), &baking).maps;
     let tracer = Tracer::new(Arc::new(scene.clone()));
     let view = view_of(scene.cameras[0].clone(), SIZE);
@@ -215,10 +212,7 @@ fn chains_only_where_something_specular_is_in_view() {
     let (mut hidden, mut dark) = (Vec::new(), Vec::new());
     for case in all() {
         let (name, scene) = (case.name, &case.scene);
-        let baking = BakeSettings {
-            layers: case.layers.clone(),
-            ..settings(3000.0, 32)
-        };
+        let baking = set(settings(3000.0, 32), |s| s.layers = case.layers.clone());
         let maps = bake(scene.clone(), &baking).maps;
         let tracer = Tracer::new(Arc::new(scene.clone()));
         let view = View {

@@ -5,13 +5,13 @@ use nephroid::eye_pass::renderer::EyeQuality;
 use nephroid::eye_pass::{ToneMap, View};
 use nephroid::optics::LinearSrgb;
 use nephroid::scene::{Camera, LoadOptions, Scene, SurfaceKind, builtin, load};
-use nephroid::settings::{BakeSettings, LayerKind};
+use nephroid::settings::LayerKind;
 
 use crate::gpu::rays::Numbers;
 use crate::gpu::rig::{FORMAT, Rig, gpu, or_skip};
 use support::scenes::view_of;
 use support::shared_or_skip;
-use support::tools::{bake, builtin_scene, settings};
+use support::tools::{bake, builtin_scene, set, settings};
 
 const PLACES: usize = 12;
 
@@ -57,10 +57,9 @@ fn cameras(scene: &Scene) -> Vec<Camera> {
 fn fly(scene: &Scene) -> Option<[f64; 2]> {
     let gpu = gpu()?;
     // Maps of few splats: a moment whatever the glass.
-    let baking = BakeSettings {
-        layers: vec![LayerKind::Caustic, LayerKind::Direct],
-        ..settings(200.0, 32)
-    };
+    let baking = set(settings(200.0, 32), |s| {
+        s.layers = vec![LayerKind::Caustic, LayerKind::Direct]
+    });
     let maps = bake(scene.clone(), &baking).maps;
     let mut rig = Rig::with_format(gpu, scene, &maps, FORMAT, 4);
     // Light of few wavelengths is no colour of a display: a channel of it may be negative.

@@ -7,13 +7,13 @@ use nephroid::eye_pass::{Picture, View};
 use nephroid::optics::LinearSrgb;
 use nephroid::scene::builtin::{parts, shapes};
 use nephroid::scene::{Light, LightKind, PanelShape, Scene, Volume};
-use nephroid::settings::{BakeSettings, LayerKind};
+use nephroid::settings::LayerKind;
 use nephroid::units::{Irradiance, Radiance, RadiantIntensity};
 
 use crate::gpu::rig::{AS_CPU, Rig, or_skip};
 use support::floors::{diffuse, floor_scene};
 use support::scenes::{light, view};
-use support::tools::{at, bake};
+use support::tools::{at, bake, set};
 
 fn lamp(colour: [f64; 3], kind: LightKind) -> Light {
     Light {
@@ -70,10 +70,7 @@ fn ahead() -> View {
 }
 
 fn by_layer(scene: &Scene) -> Picture {
-    let settings = BakeSettings {
-        layers: vec![LayerKind::Direct],
-        ..at(500.0, 512)
-    };
+    let settings = set(at(500.0, 512), |s| s.layers = vec![LayerKind::Direct]);
     let maps = bake(scene.clone(), &settings).maps;
     let mut rig = Rig::at(AS_CPU, scene, &maps).expect("there is a device");
     rig.picture(&ahead())

@@ -68,15 +68,16 @@ fn random_input_breaks_nothing() {
     let start = Instant::now();
     while start.elapsed() < PART * effort().clamp(1, MOST_PARTS) as u32 {
         let deeds: String = (0..DEEDS).map(|_| deed(&mut random, viewer.place().1)).collect();
-        viewer.hands(&deeds);
+        viewer.hasty_hands(&deeds);
         assert!(viewer.runs(), "it ended: {}", viewer.stderr());
     }
     // Everything is let go, and whatever is baked now is stopped.
     let let_go: String = HELD.iter().map(|key| format!("keyup {key} ")).collect();
     let size = format!("windowsize {} {} {}", viewer.place().1, SIZE.0, SIZE.1);
-    viewer.hands(&format!("{let_go} mouseup 1 mouseup 3 {size} sleep 0.3"));
+    viewer.hands(&format!("{let_go} mouseup 1 mouseup 3 {size}"));
     viewer.forget();
-    viewer.hands("mousemove 900 300 key Escape sleep 0.2 key Escape");
+    viewer.hands("mousemove 900 300 key Escape");
+    viewer.hands("key Escape");
     for bad in ["fault", "device_lost"] {
         assert!(viewer.all(bad).is_empty(), "{:?}", viewer.all(bad));
     }
@@ -113,10 +114,10 @@ fn long_bake_leaves_room_for_input_and_ends() {
             (700 + 5 * step, 300)
         };
         let key = if step % 8 == 7 { "key c" } else { "" };
-        viewer.hands(&format!("mousemove {x} {y} {key} sleep 0.1"));
+        viewer.hasty_hands(&format!("mousemove {x} {y} {key} sleep 0.1"));
     }
     // It closes while it reads and while it bakes.
-    viewer.toggle_sections(&["Scene"]);
+    viewer.open_sections(&["Scene"]);
     viewer.type_into("TextInput", "File", "builtin:showroom");
     viewer.wait_for("opening", |_| true);
     let (_, log) = viewer.close();

@@ -8,7 +8,7 @@ use nephroid::session::CostPoint;
 use nephroid::settings::BakeSettings;
 use nephroid::viewer::time_left::{in_words, time_left_s};
 use nephroid::viewer::worker::{BakeRequest, BakeState, BakedLevel};
-use support::tools::{at, bake, builtin_scene};
+use support::tools::{at, bake, builtin_scene, set};
 
 fn request(settings: BakeSettings) -> BakeRequest {
     BakeRequest::new(Arc::new(builtin_scene("ring")), settings)
@@ -42,10 +42,7 @@ fn a_stage_keeps_its_pace_within_a_limit() {
         (Some(100.0), 12.0),
         (Some(3.0), 0.0),
     ] {
-        let wanted = request(BakeSettings {
-            max_time_s,
-            ..BakeSettings::default()
-        });
+        let wanted = request(set(BakeSettings::default(), |s| s.max_time_s = max_time_s));
         let left = left(&wanted, None, 0.25, 4.0).expect("it is known");
         assert!((left - expected).abs() < 1e-9, "{left} s with {max_time_s:?}");
     }
@@ -53,10 +50,7 @@ fn a_stage_keeps_its_pace_within_a_limit() {
 
 #[test]
 fn the_course_tells_what_is_left_of_it() {
-    let wanted = request(BakeSettings {
-        max_error: Some(0.01),
-        ..BakeSettings::default()
-    });
+    let wanted = request(set(BakeSettings::default(), |s| s.max_error = Some(0.01)));
     let point = |cpu_s, relative_rmse| CostPoint {
         rays: 1000,
         cpu_s,

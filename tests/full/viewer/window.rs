@@ -39,7 +39,7 @@ fn picture_is_saved_flown_and_resized() {
     save(&mut viewer, &seen, stops.expect("a number"));
     takes_no_time_at_rest(&viewer);
     for size in ["1 1", "345 2", "3000 2000", "700 400", "1280 720"] {
-        viewer.hands(&format!("windowsize {} {size} sleep 0.3", viewer.place().1));
+        viewer.hands(&format!("windowsize {} {size}", viewer.place().1));
     }
     viewer.screenshot_that("shows the same again", |again| difference(&seen, again) < ALIKE);
     fly(&mut viewer, &seen, &rest);
@@ -121,9 +121,10 @@ fn fly(viewer: &mut Viewer<'_>, seen: &RgbImage, rest: &Value) {
         "it flew along {path}"
     );
     let closer = viewer.screenshot_that("shows the flight", |shot| difference(seen, shot) > 0.05);
-    viewer.hands("mousemove 800 400 mousedown 3 sleep 0.2");
+    viewer.hands("mousemove 800 400");
+    viewer.hands("mousedown 3");
     for _ in 0..4 {
-        viewer.hands("mousemove_relative 30 0 sleep 0.05");
+        viewer.hands("mousemove_relative 30 0");
     }
     viewer.hands("mouseup 3");
     viewer.screenshot_that("looks elsewhere", |shot| difference(&closer, shot) > 0.05);
@@ -138,11 +139,14 @@ fn views_maps_worth_and_split_are_shown() {
     viewer.wait_for_bake();
     views(&mut viewer);
     undo_sigma(&mut viewer);
-    viewer.toggle_sections(&["Light pass", "Accuracy", "Scene", "Compare"]);
+    viewer.close_sections(&["Light pass", "Accuracy"]);
+    viewer.open_sections(&["Scene", "Compare"]);
     split(&mut viewer);
-    viewer.toggle_sections(&["Scene", "Compare", "Effects"]);
+    viewer.close_sections(&["Scene", "Compare"]);
+    viewer.open_sections(&["Effects"]);
     worth(&mut viewer);
-    viewer.toggle_sections(&["Effects", "Maps"]);
+    viewer.close_sections(&["Effects"]);
+    viewer.open_sections(&["Maps"]);
     maps(&mut viewer);
     viewer.close();
 }
@@ -296,7 +300,8 @@ fn exposure_suits_a_room_that_is_walked() {
 /// Who walks falls to the ground, stops at walls and finds a kept view again.
 fn walk(viewer: &mut Viewer<'_>, rest: &Value) {
     // Over the floor, lower than eyes are.
-    viewer.hands("mousemove 900 300 keydown w sleep 1 keyup w");
+    viewer.hands("mousemove 900 300");
+    viewer.hold("w", 1.0);
     let start = viewer.wait_for_move(position(rest));
     viewer.hands("key ctrl+1");
     viewer.wait_for("bookmark", |event| event["number"] == 1 && event["kept"] == true);
@@ -314,7 +319,9 @@ fn walk(viewer: &mut Viewer<'_>, rest: &Value) {
     for _ in 0..8 {
         let before = stopped;
         viewer.forget();
-        viewer.hands("keydown shift keydown w sleep 10 keyup w keyup shift");
+        viewer.hands("keydown shift");
+        viewer.hold("w", 10.0);
+        viewer.hands("keyup shift");
         stopped = viewer.wait_for_move(before);
         let walked_m = before.distance(stopped);
         assert!(walked_m > 0.3, "it walked {walked_m} m");
@@ -329,7 +336,7 @@ fn walk(viewer: &mut Viewer<'_>, rest: &Value) {
         "{stopped} in {low}, {high}"
     );
     // A wall that is pressed against does not let go on.
-    viewer.hands("keydown w sleep 2 keyup w sleep 0.5");
+    viewer.hold("w", 2.0);
     let shot = viewer.screenshot();
     viewer.hands("key 1");
     viewer.wait_for("bookmark", |event| event["number"] == 1 && event["kept"] == false);

@@ -76,7 +76,7 @@ fn handles_and_lamps_are_pulled_and_undone() {
     undo(&mut viewer);
 
     // Four times the power, at the place where the mouse is held: no ray is traced for it.
-    viewer.toggle_sections(&["Scene"]);
+    viewer.open_sections(&["Scene"]);
     viewer.centre("Slider", "Intensity [W/sr]");
     let slider = viewer.on_slider("Intensity [W/sr]", [0.5, 0.65]);
     viewer.pull(&slider);
@@ -125,7 +125,7 @@ fn dark_file_is_lit_and_its_spot_explained() {
     let mut viewer = Viewer::open(&screen, &format!("{} {coarse}", dark.display()));
     viewer.wait_for_bake();
     let under_sun = viewer.screenshot();
-    viewer.toggle_sections(&["Scene"]);
+    viewer.open_sections(&["Scene"]);
     viewer.click("Button", "Add spot");
     viewer.wait_for("edit", is_edit_of("LightList"));
     viewer.wait_for("picked", |event| event["name"] == "spot");

@@ -30,7 +30,7 @@ fn scenes_take_each_others_place() {
     let mut viewer = Viewer::open(&screen, &format!("builtin:ring {COARSE}"));
     viewer.wait_for_bake();
     let ring = viewer.screenshot();
-    viewer.toggle_sections(&["Scene"]);
+    viewer.open_sections(&["Scene"]);
 
     // From a list, as many objects, lights and images, and others of each.
     viewer.click("Button", "Built-in");
@@ -150,7 +150,8 @@ fn path_is_recorded_played_and_filmed() {
     viewer.hands("key k");
     viewer.wait_for("recorded", |event| event["keys"] == 2);
 
-    viewer.toggle_sections(&["Light pass", "Accuracy", "Display", "Camera path"]);
+    viewer.close_sections(&["Light pass", "Accuracy", "Display"]);
+    viewer.open_sections(&["Camera path"]);
     viewer.click("Button", "Key 1: go");
     viewer.wait_for("rest", |event| position(event).distance(start) < 1e-9);
     viewer.type_into("SpinButton", "Frames", "4");
