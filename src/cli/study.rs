@@ -490,10 +490,7 @@ impl Desk<'_> {
             maps: folder.write(&scene, &settings, &result)?.maps,
         };
         let path = output.join("reference.json");
-        let json = serde_json::to_vec_pretty(&report).map_err(|error| {
-            let what = format!("it is not valid JSON ({error})");
-            Error::failure(path.display().to_string(), what, "report this")
-        })?;
+        let json = files::to_json(&report, &path.display().to_string())?;
         files::write_atomically(&path, |writer| writer.write_all(&json))?;
         self.terminal.print_result(&report.text(output), &report)
     }

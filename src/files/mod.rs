@@ -3,6 +3,7 @@
 pub mod cache;
 mod folder;
 mod part;
+mod png;
 mod read;
 mod slug;
 mod staged;
@@ -10,7 +11,8 @@ mod write;
 
 pub use folder::{OutputFolder, check_output_file, remove_file};
 pub use part::{file_bytes, read_part};
+pub use png::png;
 pub use read::read_file;
 pub use slug::slug;
 pub use staged::StagedFolder;
-pub use write::write_atomically;
+pub use write::{to_json, write_atomically};

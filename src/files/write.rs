@@ -5,6 +5,8 @@ use std::path::Path;
 
 use tempfile::{Builder, NamedTempFile};
 
+use serde::Serialize;
+
 use crate::error::{Error, Result};
 
 /// Writes a file aside in the same folder, brings it to the disk and then gives it its name, so that a reader finds
@@ -79,4 +81,13 @@ pub(super) fn unwritable(path: &Path, error: &io::Error) -> Error {
         ),
     };
     Error::failure(path.display().to_string(), what, remedy)
+}
+
+/// A value as JSON for people to read; `location` is named in errors.
+///
+/// # Errors
+/// A value that JSON cannot hold.
+pub fn to_json(value: &impl Serialize, location: &str) -> Result<Vec<u8>> {
+    serde_json::to_vec_pretty(value)
+        .map_err(|error| Error::failure(location, format!("is not valid JSON ({error})"), "report this"))
 }

@@ -32,7 +32,7 @@ pub use adjacency::Adjacency;
 pub use alpha_mask::AlphaMask;
 pub use camera::Camera;
 pub use camera_path::{CameraPath, PathPlan};
-pub use edit::{Edit, EditTarget, LightOrigin, why_light_stays};
+pub use edit::{Edit, EditTarget, why_light_stays};
 pub use environment::Environment;
 pub use gltf::guard::is_guarded;
 pub use gltf::{Glb, Opened};

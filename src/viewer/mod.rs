@@ -18,7 +18,6 @@ pub mod flat_map;
 pub mod frame_times;
 pub mod gizmo;
 mod graphics;
-pub mod history;
 mod input;
 mod interface;
 pub mod latency;

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::DVec3;
 use serde_json::{Value, json};
 
-use super::background::{Background, Wake};
+use super::background::Background;
 use crate::geometry::Ray;
 use crate::illumination::{self, IlluminationMap, Side};
 use crate::light_pass::explain::{Explanation, LightPath, Limits, Target, explain};
@@ -210,23 +210,21 @@ fn scale_w_m2(maps: &[IlluminationMap], target: &Target, texel: &ProbedTexel) ->
 /// The point that is asked about, and what is known of it.
 #[derive(Debug)]
 pub struct Prober {
-    wake: Wake,
     gaze: Option<Ray>,
     /// Whether the gaze is still to be followed.
     is_due: bool,
     shown: Option<Probed>,
-    coming: Option<Background<Explanation>>,
+    coming: Background<(), Explanation>,
 }
 
 impl Prober {
     /// Asks nothing yet; `wake` is called from another thread when there is something.
     pub fn new(wake: Arc<dyn Fn() + Send + Sync>) -> Self {
         Self {
-            wake: Wake(wake),
             gaze: None,
             is_due: false,
             shown: None,
-            coming: None,
+            coming: Background::new("probe", wake),
         }
     }
 
@@ -234,7 +232,7 @@ impl Prober {
     pub fn ask(&mut self, gaze: Option<Ray>) {
         self.gaze = gaze;
         self.is_due = gaze.is_some();
-        self.coming = None;
+        self.coming.stop();
         self.shown = None;
     }
 
@@ -259,7 +257,7 @@ impl Prober {
             return;
         };
         self.is_due = false;
-        self.coming = None;
+        self.coming.stop();
         self.shown = None;
         let Some(seen) = seen(tracer, &gaze) else { return };
         let (probed, target) = read(tracer, maps, &seen);
@@ -267,17 +265,18 @@ impl Prober {
             let scale = scale_w_m2(maps, &target, texel);
             let tracer = Arc::clone(tracer);
             let search = move |control: &Control| explain(&tracer, &target, limits, scale, control);
-            self.coming = Background::start("probe", &self.wake, search).ok();
+            if let Err(error) = self.coming.start((), search) {
+                log::warn!("{error}");
+            }
         }
         self.shown = Some(probed);
     }
 
     /// Looks whether the paths were found since the last time.
     pub fn poll(&mut self) -> bool {
-        let Some(outcome) = self.coming.as_ref().and_then(Background::poll) else {
+        let Some(((), outcome)) = self.coming.take() else {
             return false;
         };
-        self.coming = None;
         let is_found = outcome.is_some();
         if let Some(shown) = &mut self.shown {
             shown.explanation = outcome.or_else(|| shown.explanation.take());

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use super::manifest::{self, ShardManifest, ShardNumber};
 use super::sums_file;
 use crate::error::{Error, Result};
-use crate::files::{OutputFolder, StagedFolder};
+use crate::files::{self, OutputFolder, StagedFolder};
 use crate::light_pass::share::Share;
 use crate::session::ShardSums;
 
@@ -63,13 +63,7 @@ impl ShardFolder {
     /// A disk that is full, a place that cannot be written any more; another shard that was written there meanwhile.
     pub fn write(self, manifest: &ShardManifest, sums: &ShardSums) -> Result<()> {
         self.refuse_another()?;
-        let json = serde_json::to_vec_pretty(manifest).map_err(|error| {
-            Error::failure(
-                self.path.display().to_string(),
-                format!("the manifest is not valid JSON ({error})"),
-                "report this",
-            )
-        })?;
+        let json = files::to_json(manifest, &self.path.display().to_string())?;
         let mut staged = StagedFolder::new(self.root)?;
         staged.write(sums_file::FILE_NAME, &sums_file::encode(manifest, &sums.passes))?;
         staged.write(manifest::FILE_NAME, &json)?;

@@ -3,7 +3,6 @@
 use serde::{Deserialize, Serialize};
 
 use super::{Encoding, Loss, TextureOptions};
-use crate::error::{Error, Result};
 use crate::export::manifest::{MapEntry, SceneSummary};
 use crate::export::map_reader::MapReader;
 use crate::illumination::{Side, UvSet};
@@ -146,17 +145,6 @@ impl TextureIndex {
             scene: reader.scene_summary().clone(),
             textures,
         }
-    }
-
-    /// The file.
-    pub(super) fn to_json(&self) -> Result<Vec<u8>> {
-        serde_json::to_vec_pretty(self).map_err(|error| {
-            Error::failure(
-                FILE_NAME,
-                format!("the index is not valid JSON ({error})"),
-                "report this",
-            )
-        })
     }
 
     /// Names of all files that it speaks of.

@@ -29,6 +29,7 @@ use super::manifest::MapEntry;
 use super::map_reader::{MapReader, StoredMap};
 use super::white;
 use crate::error::{Error, Result, Warning};
+use crate::files;
 use crate::progress::Control;
 
 /// What stored values are multiplied by.
@@ -94,7 +95,7 @@ pub fn write(
         None => writer.write_each(reader)?,
     };
     let index = TextureIndex::new(reader, options, writer.exposure_stops, textures);
-    let json = index.to_json()?;
+    let json = files::to_json(&index, index::FILE_NAME)?;
     writer.put(index::FILE_NAME.into(), &json)?;
     let (bytes, warnings) = (writer.bytes, writer.warnings);
     folder.commit(&index)?;

@@ -1,7 +1,5 @@
 //! Edits of lights.
 
-use std::mem::replace;
-
 use glam::DVec3;
 
 use super::Edit;
@@ -14,20 +12,17 @@ use crate::units::{Irradiance, RadiantIntensity};
 /// A direction whose squared length is this near to 1 is unit already and stays bit for bit.
 const UNIT: f64 = 1e-12;
 
-/// Edits a light, and gives the edit that undoes this one.
-pub(super) fn apply(edit: &Edit, index: usize, light: &mut Light) -> Result<Edit> {
+/// Edits a light.
+pub(super) fn apply(edit: &Edit, light: &mut Light) -> Result<()> {
     let owner = format!("light `{}`", light.name);
     let lacks = |what: &str, remedy: &str| Error::usage(&owner, format!("has no {what}"), remedy);
     let kind = &mut light.kind;
-    Ok(match edit {
+    match edit {
         Edit::LightIntensity { intensity: new, .. } => {
             let instead = "set its normal irradiance";
             let old = intensity(kind).ok_or_else(|| lacks("radiant intensity, as it is a sun", instead))?;
             check_power(new.0, "W/sr", &owner)?;
-            Edit::LightIntensity {
-                light: index,
-                intensity: replace(old, *new),
-            }
+            *old = *new;
         }
         Edit::LightNormalIrradiance {
             normal_irradiance: new,
@@ -37,54 +32,31 @@ pub(super) fn apply(edit: &Edit, index: usize, light: &mut Light) -> Result<Edit
             let old = normal_irradiance(kind)
                 .ok_or_else(|| lacks("normal irradiance, as it is no sun", instead))?;
             check_power(new.0, "W/m²", &owner)?;
-            Edit::LightNormalIrradiance {
-                light: index,
-                normal_irradiance: replace(old, *new),
-            }
+            *old = *new;
         }
         Edit::LightPosition { position: new, .. } => {
             let old = position(kind).ok_or_else(|| lacks("position, as it is a sun", "set its direction"))?;
             check_place(*new, &owner)?;
-            Edit::LightPosition {
-                light: index,
-                position: replace(old, *new),
-            }
+            *old = *new;
         }
         Edit::LightDirection { direction: new, .. } => {
             let why = "direction, as it shines everywhere alike";
             let old = direction(kind).ok_or_else(|| lacks(why, "set its position"))?;
-            Edit::LightDirection {
-                light: index,
-                direction: replace(old, unit(*new, &owner)?),
-            }
+            *old = unit(*new, &owner)?;
         }
         Edit::LightBrightness { brightness: new, .. } => {
             let why = "brightness of its own, since it is a point or a direction";
             let old = brightness(&mut light.kind).ok_or_else(|| lacks(why, "set its intensity"))?;
             check_power(*new, "W/(m² sr)", &owner)?;
-            Edit::LightBrightness {
-                light: index,
-                brightness: replace(old, *new),
-            }
+            *old = *new;
         }
         Edit::LightSize { size: new, .. } => {
             check_size(&light.kind, *new, &owner)?;
-            Edit::LightSize {
-                light: index,
-                size: replace(&mut light.size, *new),
-            }
+            light.size = *new;
         }
         Edit::LightColour { colour: new, .. } => {
             check_colour(*new, &owner)?;
-            let inverse = match light.spectrum {
-                Some(_) => spectrum(index, light),
-                None => Edit::LightColour {
-                    light: index,
-                    colour: light.colour,
-                },
-            };
             (light.colour, light.spectrum) = (*new, None);
-            inverse
         }
         Edit::LightSpectrum {
             colour,
@@ -100,21 +72,11 @@ pub(super) fn apply(edit: &Edit, index: usize, light: &mut Light) -> Result<Edit
                     "what has a luminance above 0",
                 ));
             }
-            let inverse = spectrum(index, light);
             (light.colour, light.spectrum) = (*colour, new.clone());
-            inverse
         }
         _ => return Err(lacks("such property", "edit what it has")),
-    })
-}
-
-/// A light's spectrum and colour, as the edit that gives it those.
-fn spectrum(index: usize, light: &Light) -> Edit {
-    Edit::LightSpectrum {
-        light: index,
-        colour: light.colour,
-        spectrum: light.spectrum.clone(),
     }
+    Ok(())
 }
 
 fn intensity(kind: &mut LightKind) -> Option<&mut RadiantIntensity> {

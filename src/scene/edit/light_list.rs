@@ -2,55 +2,20 @@
 
 use std::sync::Arc;
 
-use super::{Edit, existing};
+use super::existing;
 use crate::error::{Error, Result};
 use crate::scene::{Light, LightKind, Scene};
 
-/// Where a light that is put into a scene comes from.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub enum LightOrigin {
-    /// It is a new one.
-    #[default]
-    New,
-    /// It was taken out before: that of the scene as it was loaded, at this place there.
-    Loaded(usize),
-    /// It was taken out before, and looked like this when it was new.
-    Added(Arc<Light>),
-}
-
-/// Puts a light into a scene, and gives the edit that takes it out again. New ones stand behind those of the file.
-pub(super) fn add(
-    scene: &mut Scene,
-    light: Option<usize>,
-    added: &Arc<Light>,
-    origin: &LightOrigin,
-) -> Result<Edit> {
-    let index = light.unwrap_or(scene.lights.len());
-    let of_file = scene.lights.len() - scene.light_list.added.len();
-    let places = match origin {
-        LightOrigin::Loaded(_) => 0..=of_file,
-        LightOrigin::New | LightOrigin::Added(_) => of_file..=scene.lights.len(),
-    };
-    if !places.contains(&index) {
-        return Err(Error::usage(
-            format!("light `{}`", added.name),
-            format!("cannot become light {index}: its place is one of {places:?}"),
-            "leave its place open",
-        ));
-    }
+/// Puts a light into a scene, behind those that are there.
+pub(super) fn add(scene: &mut Scene, added: &Arc<Light>) -> Result<()> {
     check(added)?;
-    scene.lights.insert(index, Light::clone(added));
-    let list = &mut scene.light_list;
-    match origin {
-        LightOrigin::New => list.added.insert(index - of_file, Arc::clone(added)),
-        LightOrigin::Added(at_first) => list.added.insert(index - of_file, Arc::clone(at_first)),
-        LightOrigin::Loaded(place) => list.removed.retain(|removed| removed != place),
-    }
-    Ok(Edit::LightRemoved { light: index })
+    scene.lights.push(Light::clone(added));
+    scene.light_list.added.push(Arc::clone(added));
+    Ok(())
 }
 
-/// Takes a light out of a scene, and gives the edit that puts it back.
-pub(super) fn remove(scene: &mut Scene, index: usize) -> Result<Edit> {
+/// Takes a light out of a scene.
+pub(super) fn remove(scene: &mut Scene, index: usize) -> Result<()> {
     let found = existing(&mut scene.lights, index, "light")?;
     if let Some(why) = why_light_stays(&found.kind) {
         return Err(Error::usage(
@@ -60,20 +25,16 @@ pub(super) fn remove(scene: &mut Scene, index: usize) -> Result<Edit> {
         ));
     }
     let of_file = scene.lights.len() - scene.light_list.added.len();
-    let origin = match scene.light_when_loaded(index) {
+    match scene.light_when_loaded(index) {
         Some(place) => {
             let removed = &mut scene.light_list.removed;
             removed.push(place);
             removed.sort_unstable();
-            LightOrigin::Loaded(place)
         }
-        None => LightOrigin::Added(scene.light_list.added.remove(index - of_file)),
-    };
-    Ok(Edit::LightAdded {
-        light: Some(index),
-        added: Arc::new(scene.lights.remove(index)),
-        origin,
-    })
+        None => drop(scene.light_list.added.remove(index - of_file)),
+    }
+    scene.lights.remove(index);
+    Ok(())
 }
 
 /// Why a light cannot be taken out of its scene; `None` where it can.

@@ -17,7 +17,7 @@ use super::images::Images;
 use super::numbers::widen;
 use super::report::{Budget, Report};
 use super::substance::{self, Substance};
-use super::{names, spectrum, waves};
+use super::{extras, names, spectrum, waves};
 use crate::error::Result;
 use crate::optics::LinearSrgb;
 use crate::scene::{AlphaMask, Material, NormalMap, SurfaceKind, TextureRef, Volume};
@@ -69,13 +69,14 @@ pub fn read_all(
     sources
         .map(|(index, source)| {
             let name = names::name(source.name.as_ref(), "material", index);
+            let stated = |key: &str| extras::stated(&document.extras.materials, index, key);
             let mut reading = Reading {
                 owner: format!("material `{name}`"),
                 source,
-                waves: document.waves.get(index).and_then(Option::as_ref),
-                glass: document.glasses.get(index).and_then(Option::as_ref),
-                metal: document.metals.get(index).and_then(Option::as_ref),
-                spectrum: document.emission_spectra.get(index).and_then(Option::as_ref),
+                waves: stated(waves::KEY),
+                glass: stated(substance::GLASS_KEY),
+                metal: stated(substance::METAL_KEY),
+                spectrum: stated(spectrum::KEY),
                 folder,
                 images: &mut *images,
                 budget: &mut *budget,

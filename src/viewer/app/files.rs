@@ -5,8 +5,7 @@ use std::path::{Path, PathBuf};
 use super::App;
 use crate::scene::load::was_dark;
 use crate::viewer::files::dialog::{Choice, Chosen};
-use crate::viewer::files::loader::Purpose;
-use crate::viewer::files::saver::free_name;
+use crate::viewer::files::{Purpose, free_names};
 use crate::viewer::model::Model;
 use crate::viewer::screenshot;
 use serde_json::json;
@@ -29,8 +28,12 @@ impl App {
             }
             // Beside the original it is found again, and the notice says where.
             Some(Chosen::NoDialog(Choice::SaveScene, _)) => {
-                if let Some(path) = free_name(&self.original()) {
-                    self.save_scene_as(path);
+                let original = self.original();
+                let stem = original.file_stem().unwrap_or_default().to_string_lossy();
+                let folder = original.parent().unwrap_or(Path::new(""));
+                match free_names(folder, |number| [format!("{stem}-edited-{number}.glb")]) {
+                    Ok([path]) => self.save_scene_as(path),
+                    Err(error) => self.tell_unsaved(&error.to_string()),
                 }
             }
             Some(Chosen::Nothing) | None => {}
@@ -38,7 +41,7 @@ impl App {
         if let Some(purpose) = self.model.poll_files() {
             self.begin_scene(purpose);
         }
-        match self.model.files.saver.take() {
+        match self.model.files.take_saved() {
             Some(Ok(path)) => {
                 let files = [path];
                 self.model.log.write("saved", json!({"files": files}));

@@ -9,7 +9,7 @@ use super::kept::Kept;
 use super::recent::Recent;
 use crate::error::{Error, Result};
 use crate::files::cache::ContentHash;
-use crate::files::{read_file, slug, write_atomically};
+use crate::files::{read_file, slug, to_json, write_atomically};
 
 /// Most that is read of one file [bytes]: far more than anything here takes.
 const MOST_BYTES: u64 = 16 << 20;
@@ -133,8 +133,7 @@ fn set_aside(path: &Path, why: &str) -> String {
 fn write<T: Serialize>(path: &Path, value: &T) -> Result<()> {
     let location = path.display().to_string();
     let unwritable = |what: String| Error::failure(&location, what, "check the folder's permissions");
-    let mut text = serde_json::to_vec_pretty(value)
-        .map_err(|error| unwritable(format!("cannot be put into words ({error})")))?;
+    let mut text = to_json(value, &location)?;
     text.push(b'\n');
     if let Some(folder) = path.parent() {
         std::fs::create_dir_all(folder)

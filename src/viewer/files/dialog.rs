@@ -8,7 +8,7 @@ use rfd::FileDialog;
 use winit::window::Window;
 
 use crate::progress::Control;
-use crate::viewer::background::{Background, Wake};
+use crate::viewer::background::Background;
 
 /// Nobody sees a dialog and closes it in so short a time: there was none.
 const NO_DIALOG_WITHIN: Duration = Duration::from_millis(400);
@@ -40,30 +40,23 @@ pub enum Chosen {
 /// A dialog, open or not.
 #[derive(Debug)]
 pub struct Dialog {
-    wake: Wake,
-    open: Option<Open>,
-}
-
-#[derive(Debug)]
-struct Open {
-    choice: Choice,
-    since: Instant,
-    /// `None` where the system gives no thread.
-    answer: Option<Background<Option<PathBuf>>>,
+    open: Background<(Choice, Instant), Option<PathBuf>>,
+    /// Asked for where the system gives no thread.
+    refused: Option<Choice>,
 }
 
 impl Dialog {
     /// None is open; `wake` is called from another thread when a file was chosen.
     pub fn new(wake: Arc<dyn Fn() + Send + Sync>) -> Self {
         Self {
-            wake: Wake(wake),
-            open: None,
+            open: Background::new("dialog", wake),
+            refused: None,
         }
     }
 
     /// Asks for a file, unless a dialog is open already. It begins in the folder of the file that is in the window.
     pub fn ask(&mut self, choice: Choice, window: &Window, present: &Path) {
-        if self.open.is_some() {
+        if self.open.of().is_some() {
             return;
         }
         let mut dialog = FileDialog::new()
@@ -80,23 +73,20 @@ impl Dialog {
             Choice::Open => dialog.pick_file(),
             Choice::SaveScene => dialog.save_file(),
         };
-        self.open = Some(Open {
-            choice,
-            since: Instant::now(),
-            answer: Background::start("dialog", &self.wake, ask).ok(),
-        });
+        let is_refused = self.open.start((choice, Instant::now()), ask).is_err();
+        self.refused = is_refused.then_some(choice);
     }
 
     /// What was chosen, once.
     pub fn take(&mut self) -> Option<Chosen> {
-        let open = self.open.as_ref()?;
-        let answer = open.answer.as_ref().map_or(Some(None), Background::poll)?;
-        let chosen = match answer {
-            Some(Some(path)) => Chosen::File(open.choice, path),
-            Some(None) if open.since.elapsed() >= NO_DIALOG_WITHIN => Chosen::Nothing,
-            Some(None) | None => Chosen::NoDialog(open.choice, NONE),
-        };
-        self.open = None;
-        Some(chosen)
+        if let Some(choice) = self.refused.take() {
+            return Some(Chosen::NoDialog(choice, NONE));
+        }
+        let ((choice, since), answer) = self.open.take()?;
+        Some(match answer {
+            Some(Some(path)) => Chosen::File(choice, path),
+            Some(None) if since.elapsed() >= NO_DIALOG_WITHIN => Chosen::Nothing,
+            Some(None) | None => Chosen::NoDialog(choice, NONE),
+        })
     }
 }

@@ -58,7 +58,7 @@ impl Watch {
         let thread = thread::Builder::new()
             .name("watch".into())
             .spawn(move || look(&of_thread, stamps, &*wake))
-            .map_err(|error| no_thread("watch", "watch files", &error))?;
+            .map_err(|error| no_thread("watch", &error))?;
         Ok(Self {
             shared,
             thread: Some(thread),

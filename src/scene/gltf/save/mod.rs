@@ -21,6 +21,7 @@ use super::document::{self, Document};
 use super::light::Origin;
 use super::nodes::Placed;
 use super::report::Report;
+use super::write::lights as written_lights;
 use super::{area_light, light, nodes};
 use crate::error::{Error, Result};
 use crate::files;
@@ -106,7 +107,7 @@ impl Patch<'_> {
                 Some(place) => (Some(&self.loaded.lights[place]), origins.get(place)),
                 None => (None, None),
             };
-            let is_foreign = origin.is_none() && new_lights::can_be_written(&is.kind);
+            let is_foreign = origin.is_none() && written_lights::stated(is).is_some();
             match (was, origin) {
                 _ if is_foreign && is_to_be_written(index, self.loaded, self.edited) => {
                     new_lights::write(is, shift, self.document, self.json)?;
