@@ -24,10 +24,10 @@ use strum::VariantArray;
 use super::args::{RunOptions, SceneOptions};
 use super::bake_options::BakeOptions;
 use super::compare::read_luminance;
-use super::interrupt::Interrupt;
+use super::job::MissingLight;
 use super::job::{scene_input, threads};
-use super::progress_bar::StageBar;
-use super::scene_input::MissingLight;
+use super::terminal::Interrupt;
+use super::terminal::StageBar;
 
 use super::terminal::Terminal;
 use super::values;

@@ -4,7 +4,7 @@ use glam::DVec2;
 
 use super::{Bits, Carrier, GlbOptions};
 use crate::error::{Error, Result};
-use crate::export::{Quantity, white::white};
+use crate::export::quantity::{Quantity, white};
 use crate::files;
 use crate::illumination::{Chart, IlluminationMap};
 use crate::optics::LinearSrgb;

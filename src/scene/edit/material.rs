@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::Edit;
-use super::ranges::out_of_range;
+use super::out_of_range;
 use crate::error::{Error, Result};
 use crate::optics::LinearSrgb;
 use crate::optics::glass::{Dispersion, Glass};

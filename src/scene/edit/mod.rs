@@ -1,22 +1,21 @@
 //! Edits of a scene as data: each gives the edited scene and the edit that takes it back, bit for bit.
 
-mod light;
-mod light_list;
-mod material;
-mod ranges;
-mod shape;
-
 use std::sync::Arc;
 
 use glam::{DQuat, DVec3};
 use serde::{Deserialize, Serialize};
 
-pub use self::light_list::why_light_stays;
 use super::{Light, LightSize, Mesh, Scene, Waves};
 use crate::error::{Error, Result};
 use crate::optics::spectrum::Spectrum;
 use crate::optics::{Glass, LinearSrgb, Metal};
 use crate::units::{Irradiance, RadiantIntensity};
+
+mod light;
+mod material;
+mod shape;
+
+pub use self::light::why_light_stays;
 
 /// One change of a scene. Indices are those of [`Scene::lights`], [`Scene::materials`] and [`Scene::objects`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -279,8 +278,8 @@ impl Edit {
                 let found = existing(&mut scene.lights, *light, "light")?;
                 light::apply(self, found)
             }
-            Self::LightAdded { added } => light_list::add(scene, added),
-            Self::LightRemoved { light } => light_list::remove(scene, *light),
+            Self::LightAdded { added } => light::add(scene, added),
+            Self::LightRemoved { light } => light::remove(scene, *light),
             Self::MaterialIor { material, .. }
             | Self::MaterialSubstance { material, .. }
             | Self::MaterialTint { material, .. }
@@ -322,4 +321,23 @@ fn existing<'a, T>(list: &'a mut [T], index: usize, noun: &str) -> Result<&'a mu
             format!("choose a {noun} of the scene"),
         )
     })
+}
+
+/// Farthest that anything is moved to [m]: beyond it, squares of distances lose the scene.
+const FARTHEST_M: f64 = 1e12;
+
+fn out_of_range(owner: &str, what: &str, value: impl std::fmt::Display, range: &str) -> Error {
+    Error::usage(
+        owner,
+        format!("a {what} of {value} is outside {range}"),
+        "give a value in that range",
+    )
+}
+
+fn check_place(place: DVec3, owner: &str) -> Result<()> {
+    if place.is_finite() && place.abs().max_element() <= FARTHEST_M {
+        return Ok(());
+    }
+    let range = format!("−{FARTHEST_M:e} to {FARTHEST_M:e} m");
+    Err(out_of_range(owner, "place", format!("{place} m"), &range))
 }

@@ -2,7 +2,7 @@
 
 use glam::{DQuat, DVec3};
 
-use super::ranges::{check_place, out_of_range};
+use super::{check_place, out_of_range};
 use crate::error::{Error, Result};
 use crate::scene::Mesh;
 

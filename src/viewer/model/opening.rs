@@ -14,7 +14,7 @@ use crate::viewer::ViewerOptions;
 use crate::viewer::edits::EditedScene;
 use crate::viewer::files;
 use crate::viewer::files::Purpose;
-use crate::viewer::files::watch::Stamps;
+use crate::viewer::files::keeper::Stamps;
 use crate::viewer::filming::Film;
 use crate::viewer::navigation::Navigator;
 use crate::viewer::worker::BakedLevel;

@@ -3,7 +3,7 @@
 use glam::DVec3;
 use serde_json::json;
 
-use super::json_document::JsonDocument;
+use super::JsonDocument;
 use crate::error::{Error, Result};
 use crate::scene::Material;
 use crate::scene::gltf::substance::Stated;

@@ -3,7 +3,7 @@
 use glam::DVec3;
 use serde_json::json;
 
-use super::json_document::JsonDocument;
+use super::JsonDocument;
 use crate::error::{Error, Result};
 use crate::scene::Light;
 use crate::scene::gltf::document::Document;
