@@ -7,7 +7,6 @@
 )]
 
 use std::alloc::{GlobalAlloc, Layout, System};
-use std::fmt::Write as _;
 use std::io::Write as _;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
@@ -16,22 +15,6 @@ use std::time::Duration;
 #[derive(Debug)]
 pub struct OrOneSentence;
 
-/// Text on the stack: where there is no memory, none can be asked for.
-struct Line {
-    bytes: [u8; 256],
-    len: usize,
-}
-
-impl std::fmt::Write for Line {
-    fn write_str(&mut self, text: &str) -> std::fmt::Result {
-        let end = (self.len + text.len()).min(self.bytes.len());
-        let fits = end - self.len;
-        self.bytes[self.len..end].copy_from_slice(&text.as_bytes()[..fits]);
-        self.len = end;
-        Ok(())
-    }
-}
-
 /// Set by the thread that tells of it: of several only the first does.
 static TOLD: AtomicBool = AtomicBool::new(false);
 
@@ -39,18 +22,14 @@ fn refused(bytes: usize) -> ! {
     while TOLD.swap(true, Ordering::Relaxed) {
         std::thread::sleep(Duration::from_secs(1));
     }
-    let mut line = Line {
-        bytes: [0; 256],
-        len: 0,
-    };
+    // Standard error has no buffer, and formats without asking for memory.
     let _ = writeln!(
-        line,
+        std::io::stderr(),
         "error: memory: the system refused {} bytes more; give less --map-resolution, less density or fewer --threads, \
          or more memory (ulimit -v)",
         bytes
     );
     // Neither buffered nor locked by a thread that waits for memory itself.
-    let _ = std::io::stderr().write_all(&line.bytes[..line.len]);
     std::process::exit(1)
 }
 

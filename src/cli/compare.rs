@@ -5,7 +5,7 @@ use std::path::Path;
 
 use clap::ValueEnum;
 use nephroid::error::{Error, Result};
-use nephroid::export::{FloatImage, png};
+use nephroid::export::{FloatImage, picture};
 use nephroid::files;
 use nephroid::illumination::compare::{Comparison, Grid, at_common_size, compare};
 use serde::Serialize;
@@ -229,7 +229,7 @@ fn write_difference(path: &Path, map: &Grid, reference: &Grid) -> Result<Differe
         .collect();
     let location = path.display().to_string();
     // Sides are at most 16384.
-    let bytes = png::encode(map.width as u32, map.height as u32, rgba, &location)?;
+    let bytes = picture::encode(map.width as u32, map.height as u32, rgba, &location)?;
     files::write_atomically(path, |writer| writer.write_all(&bytes))?;
     Ok(Difference {
         file: location,

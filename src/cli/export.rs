@@ -10,7 +10,7 @@ use nephroid::scene::{self, LoadOptions, Scene};
 use super::args::ExportArguments;
 use super::export_glb::GlbJob;
 use super::export_textures::TextureJob;
-use super::interrupt::Interrupt;
+use super::terminal::Interrupt;
 use super::terminal::Terminal;
 
 /// Exposures beyond that many stops are a slip.

@@ -17,7 +17,7 @@ use super::export::{
     BitsChoice, ContentChoice, ExportFormat, PackingChoice, Source, TransferChoice, UnitsChoice, cut_of,
     refuse,
 };
-use super::interrupt::Interrupt;
+use super::terminal::Interrupt;
 use super::terminal::Terminal;
 
 /// A validated `export` of textures.

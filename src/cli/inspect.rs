@@ -2,21 +2,25 @@
 
 use std::fmt::Write as _;
 
-use nephroid::effect::Effect;
-use nephroid::error::{Result, Warning};
-use nephroid::light_pass::emitter::Emitter;
-use nephroid::optics::Metal;
-use nephroid::plan::{self, EffectLine, EffectPlan};
-use nephroid::scene::{Camera, Light, LightKind, LightSize, Scene, SurfaceKind};
-use nephroid::session::{BakeSession, Survey};
 use serde::Serialize;
 
 use super::bake::{self, Clock};
-use super::interrupt::Interrupt;
 use super::job::InspectJob;
-use super::spectral_report::{GlassReport, SpectrumReport};
-use super::survey_report::SurveyReport;
+use super::terminal::Interrupt;
 use super::terminal::Terminal;
+use nephroid::effect::Effect;
+use nephroid::error::{Result, Warning};
+use nephroid::illumination::parametrisation::refused_sets;
+use nephroid::illumination::{Side, UvSet};
+use nephroid::light_pass::emitter::Emitter;
+use nephroid::optics::spectrum::Spectrum;
+use nephroid::optics::spectrum::temperature::correlated_temperature;
+use nephroid::optics::wavelength::VISIBLE;
+use nephroid::optics::{Glass, Metal};
+use nephroid::plan::{self, EffectLine, EffectPlan};
+use nephroid::scene::{Camera, Light, LightKind, LightSize, Scene, SurfaceKind};
+use nephroid::session::{BakeCounts, BakeSession, CostPoint, Forecast, ItemBufferReport, Survey};
+use nephroid::settings::Preset;
 
 /// The result, as `--json` prints it.
 #[derive(Debug, Serialize)]
@@ -327,6 +331,225 @@ fn text(report: &Report) -> String {
         line(name, value);
     }
     text
+}
+
+/// A glass, as `--json` prints it.
+#[derive(Debug, Serialize)]
+pub struct GlassReport {
+    name: String,
+    n_d: f64,
+    /// `None` where there is no dispersion.
+    abbe_number: Option<f64>,
+    /// What its formula was fitted to; `None` where nobody said.
+    range_nm: Option<[f64; 2]>,
+    /// Whether that is all that the eye sees.
+    covers_the_visible: bool,
+}
+
+/// The spectrum of a lamp, as `--json` prints it.
+#[derive(Debug, Serialize)]
+pub struct SpectrumReport {
+    /// Of an illuminant or a file; `None` where it has none.
+    name: Option<String>,
+    /// Of the nearest black body; `None` where none is near.
+    correlated_temperature_k: Option<f64>,
+    /// Luminous flux by radiant flux between 360 and 830 nm.
+    lumens_per_watt: f64,
+    /// First and last wavelength of its table.
+    range_nm: [f64; 2],
+}
+
+impl GlassReport {
+    /// Of a material's glass.
+    pub fn new(glass: &Glass) -> Self {
+        let range = glass.range.as_ref();
+        let abbe_number = glass.dispersion.abbe_number();
+        Self {
+            name: glass.name.clone(),
+            n_d: glass.dispersion.n_d(),
+            abbe_number: abbe_number.is_finite().then_some(abbe_number),
+            range_nm: range.map(|range| [range.start().0, range.end().0]),
+            covers_the_visible: glass.is_within(*VISIBLE.start()) && glass.is_within(*VISIBLE.end()),
+        }
+    }
+
+    /// "N-SF11 (V_d 25.8, measured from 370 to 2500 nm)".
+    pub fn line(&self) -> String {
+        let mut notes = vec![match self.abbe_number {
+            Some(abbe_number) => format!("V_d {abbe_number:.1}"),
+            None => "no dispersion".into(),
+        }];
+        if let Some([first, last]) = self.range_nm.filter(|_| !self.covers_the_visible) {
+            notes.push(format!("measured from {first:.0} to {last:.0} nm"));
+        }
+        format!("{} ({})", self.name, notes.join(", "))
+    }
+}
+
+impl SpectrumReport {
+    /// Of a lamp's spectrum.
+    pub fn new(spectrum: &Spectrum) -> Self {
+        let range = spectrum.range();
+        Self {
+            name: spectrum.name().map(str::to_owned),
+            correlated_temperature_k: correlated_temperature(spectrum.xyz()).map(|nearest| nearest.kelvin),
+            lumens_per_watt: spectrum.luminous_flux_lm() / spectrum.radiant(),
+            range_nm: [range.start().0, range.end().0],
+        }
+    }
+
+    /// "spectrum `D65` of 6504 K, 360 to 830 nm, 204 lm/W".
+    pub fn line(&self) -> String {
+        let name = (self.name.as_ref()).map_or_else(String::new, |name| format!(" `{name}`"));
+        let colour = match self.correlated_temperature_k {
+            Some(kelvin) => format!("of {kelvin:.0} K"),
+            None => "far from any black body".into(),
+        };
+        let [first, last] = self.range_nm;
+        format!(
+            "spectrum{name} {colour}, {first:.0} to {last:.0} nm, {:.0} lm/W",
+            self.lumens_per_watt
+        )
+    }
+}
+
+/// As `--json` prints it.
+#[derive(Debug, Serialize)]
+pub struct SurveyReport {
+    /// Maps that light reaches.
+    maps: Vec<MapReport>,
+    /// What each preset is expected to take.
+    presets: Vec<PresetReport>,
+    /// What that was learnt from.
+    pilot: PilotReport,
+}
+
+#[derive(Debug, Serialize)]
+struct MapReport {
+    surface: String,
+    side: Side,
+    uv_set: UvSet,
+    /// Sets of the file that cannot serve, and why.
+    refused_uv_sets: Vec<String>,
+    width: usize,
+    height: usize,
+    /// While it is baked.
+    bytes: u64,
+}
+
+#[derive(Debug, Serialize)]
+struct PresetReport {
+    preset: Preset,
+    #[serde(flatten)]
+    forecast: Option<Forecast>,
+}
+
+#[derive(Debug, Serialize)]
+struct PilotReport {
+    /// Of the whole survey, on the wall.
+    seconds: f64,
+    counts: BakeCounts,
+    course: Vec<CostPoint>,
+    item_buffers: Vec<ItemBufferReport>,
+}
+
+impl SurveyReport {
+    /// Of a survey of a scene.
+    pub fn new(scene: &Scene, survey: &Survey) -> Self {
+        let maps = survey.pilot.maps.iter().map(|map| MapReport {
+            surface: scene.objects[map.chart.object()].name.clone(),
+            side: map.chart.receiver.side(),
+            uv_set: map.chart.uv_set,
+            refused_uv_sets: refused_sets(&scene.objects[map.chart.object()].mesh)
+                .into_iter()
+                .map(|(set, refusal)| format!("{set}: {refusal}"))
+                .collect(),
+            width: map.width(),
+            height: map.height(),
+            bytes: map.chart.texel_count() as u64 * nephroid::session::BYTES_PER_TEXEL,
+        });
+        Self {
+            maps: maps.collect(),
+            presets: survey
+                .presets
+                .iter()
+                .map(|preset| PresetReport {
+                    preset: preset.preset,
+                    forecast: preset.forecast,
+                })
+                .collect(),
+            pilot: PilotReport {
+                seconds: survey.seconds,
+                counts: survey.pilot.counts,
+                course: survey.pilot.course.clone(),
+                item_buffers: survey.pilot.item_buffers.clone(),
+            },
+        }
+    }
+
+    /// Name and value of each line of the text.
+    pub fn lines(&self) -> Vec<(&'static str, String)> {
+        let counts = &self.pilot.counts;
+        let taken = format!(
+            "{} light rays, {} shadow rays, {} gather rays",
+            counts.rays, counts.shadow_rays, counts.gather_rays
+        );
+        let mut lines = vec![("pilot", taken)];
+        for map in &self.maps {
+            lines.push(("map", map_line(map)));
+        }
+        for preset in &self.presets {
+            lines.push((preset.preset.name(), preset_line(preset.forecast.as_ref())));
+        }
+        lines
+    }
+}
+
+/// "floor, front: 512 x 512, 4.2 MB, generated (TEXCOORD_0: it overlaps itself)".
+fn map_line(map: &MapReport) -> String {
+    let side = match map.side {
+        Side::Front => "front",
+        Side::Back => "back",
+    };
+    let set = match map.uv_set {
+        UvSet::TexCoord0 => "TEXCOORD_0",
+        UvSet::TexCoord1 => "TEXCOORD_1",
+        UvSet::Generated => "generated",
+    };
+    let size = format!("{} x {}, {}", map.width, map.height, bytes(map.bytes));
+    let mut text = format!("{}, {side}: {size}, {set}", map.surface);
+    if !map.refused_uv_sets.is_empty() {
+        text += &format!(" ({})", map.refused_uv_sets.join("; "));
+    }
+    text
+}
+
+fn preset_line(forecast: Option<&Forecast>) -> String {
+    let Some(forecast) = forecast else {
+        return "not known: the pilot found no error to go by".into();
+    };
+    let doubt = if forecast.factor > 1.0 {
+        format!("within a factor of {:.1}", forecast.factor)
+    } else {
+        "as measured".into()
+    };
+    format!(
+        "{:.1} % error: {} rays, {:.2} s of CPU, {}, {doubt}",
+        100.0 * forecast.target,
+        forecast.rays,
+        forecast.cpu_s,
+        bytes(forecast.bytes)
+    )
+}
+
+/// A size with its unit.
+pub fn bytes(count: u64) -> String {
+    match count {
+        0..1_000 => format!("{count} B"),
+        1_000..1_000_000 => format!("{:.1} kB", count as f64 / 1e3),
+        1_000_000..1_000_000_000 => format!("{:.1} MB", count as f64 / 1e6),
+        _ => format!("{:.2} GB", count as f64 / 1e9),
+    }
 }
 
 #[cfg(test)]

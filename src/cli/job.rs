@@ -2,30 +2,28 @@
 
 use std::path::{Path, PathBuf};
 
-#[cfg(feature = "gpu")]
-use nephroid::effect::{Effect, EffectSwitch};
-use nephroid::error::{Error, Result};
-use nephroid::eye_pass::{ToneMap, WhiteBalance};
-use nephroid::light_pass::share::Share;
-use nephroid::settings::{BakeSettings, LayerKind};
-
 use super::args::{
     Arguments, Backend, BakeArguments, Command, CompareArguments, InspectArguments, MapsOption,
     MergeArguments, PictureOptions, RenderArguments, RunOptions, SceneOptions, ViewArguments,
 };
 use super::bake_options::BakeOptions;
-use super::compare;
 use super::export::{self, ExportJob};
-use super::interrupt::Interrupt;
-use super::merge;
-#[cfg(feature = "gpu")]
-use super::render_path;
-use super::scene_input::{MissingLight, SceneInput};
-use super::shard;
 use super::study::{self, StudyArguments};
+use super::terminal::Interrupt;
 use super::terminal::Terminal;
 use super::values::Exposure;
-use super::{bake, inspect, render, view};
+use super::{bake, compare, inspect, merge, render, shard, view};
+use nephroid::error::{Error, Result};
+use nephroid::eye_pass::{ToneMap, WhiteBalance};
+use nephroid::light_pass::share::Share;
+use nephroid::scene::{self, LoadOptions, Scene};
+use nephroid::settings::{BakeSettings, LayerKind};
+
+#[cfg(feature = "gpu")]
+use nephroid::effect::{Effect, EffectSwitch};
+
+#[cfg(feature = "gpu")]
+use super::render_path;
 
 /// Scene of `view` when none is named.
 const DEFAULT_SCENE: &str = "builtin:gallery";
@@ -445,5 +443,55 @@ fn picture_format(path: &Path) -> Result<PictureFormat> {
             "a picture's name has to say its format",
             "name a file that ends in .png or .exr",
         )),
+    }
+}
+
+/// What to do with a scene without light.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MissingLight {
+    /// Refuse, and name the flag that adds one.
+    Fail,
+    /// Leave it dark.
+    Keep,
+    /// Add a sun, with a warning.
+    Add,
+}
+
+/// A scene as the user named it.
+#[derive(Clone, Debug)]
+pub struct SceneInput {
+    /// A path, or `builtin:NAME`.
+    pub source: String,
+    pub missing_light: MissingLight,
+    pub solid_glass: bool,
+    /// Image that lies around the scene.
+    pub environment: Option<PathBuf>,
+}
+
+impl SceneInput {
+    /// How its file is read.
+    pub fn load_options(&self) -> LoadOptions {
+        LoadOptions {
+            solid_glass: self.solid_glass,
+            default_light: self.missing_light == MissingLight::Add,
+            environment: self.environment.clone(),
+            ..LoadOptions::default()
+        }
+    }
+
+    /// The scene, with a light where one was missing and is to be added.
+    ///
+    /// # Errors
+    /// A scene that cannot be read, is unknown, or has no light where one is needed.
+    pub fn load(&self) -> Result<Scene> {
+        let scene = scene::load(&self.source, &self.load_options())?;
+        if scene.lights.is_empty() && self.missing_light == MissingLight::Fail {
+            return Err(Error::failure(
+                &self.source,
+                "the scene has no light",
+                "add one to the file, a sun with --default-light or a sky with --environment",
+            ));
+        }
+        Ok(scene)
     }
 }

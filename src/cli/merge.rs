@@ -8,9 +8,9 @@ use nephroid::settings::BakeSettings;
 
 use super::args::MergeArguments;
 use super::bake::{self, Clock};
-use super::interrupt::Interrupt;
-use super::progress_bar::StageBar;
-use super::scene_input::{MissingLight, SceneInput};
+use super::job::{MissingLight, SceneInput};
+use super::terminal::Interrupt;
+use super::terminal::StageBar;
 use super::terminal::Terminal;
 
 /// Reads, adds up and writes.

@@ -1,6 +1,5 @@
 //! The command line: parse, a validated [`Job`] before any long work, run, exit code.
 
-mod address_space;
 mod args;
 mod bake;
 mod bake_options;
@@ -9,28 +8,22 @@ mod export;
 mod export_glb;
 mod export_textures;
 mod inspect;
-mod interrupt;
 mod job;
 mod merge;
-mod picture;
-mod progress_bar;
 mod render;
 #[cfg(feature = "gpu")]
 mod render_path;
-mod scene_input;
 mod shard;
-mod spectral_report;
 mod study;
-mod survey_report;
 mod terminal;
 mod values;
 mod view;
 
 use std::process::ExitCode;
 
-use interrupt::Interrupt;
 use job::Job;
 use nephroid::error::{Error, ErrorKind, Result};
+use terminal::Interrupt;
 use terminal::Terminal;
 
 /// Parses, runs, and says how it went: 0 done, 1 failed, 2 bad usage, 128 + signal when a signal stopped it.

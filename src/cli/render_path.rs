@@ -13,12 +13,12 @@ use nephroid::scene::{CameraPath, turntable};
 use serde::Serialize;
 
 use super::bake::{self, Clock};
-use super::interrupt::Interrupt;
 use super::job::{Motion, PathJob};
-use super::progress_bar::StageBar;
+use super::render;
+use super::terminal::Interrupt;
+use super::terminal::StageBar;
 use super::terminal::Terminal;
 use super::values::Exposure;
-use super::{picture, render};
 
 /// The result, as `--json` prints it.
 #[derive(Debug, Serialize)]
@@ -73,7 +73,7 @@ pub fn run(job: &PathJob, terminal: &Terminal, interrupt: &Interrupt) -> Result<
     let cameras = match way {
         Way::Path(path) => path.cameras(loaded.scene.origin_world),
         Way::Turntable(frames) => {
-            let first = picture::choose_camera(&loaded.scene, &job.picture)?;
+            let first = render::choose_camera(&loaded.scene, &job.picture)?;
             turntable::around(&loaded.scene, &first, frames)
         }
     };

@@ -7,13 +7,12 @@ use nephroid::export::shards::{SceneOrigin, ShardFolder, ShardManifest};
 use nephroid::light_pass::share::Share;
 use nephroid::session::BakeSession;
 
-use super::address_space;
 use super::bake::{self, Clock};
-use super::interrupt::Interrupt;
+use super::inspect::bytes;
 use super::job::BakeJob;
-use super::progress_bar::StageBar;
-use super::scene_input::MissingLight;
-use super::survey_report::bytes;
+use super::job::MissingLight;
+use super::terminal::Interrupt;
+use super::terminal::StageBar;
 use super::terminal::Terminal;
 
 /// Loads, bakes the share and writes its sums.
@@ -27,7 +26,7 @@ pub fn run(job: &BakeJob, share: Share, terminal: &Terminal, interrupt: &Interru
     interrupt.check(&loaded.scene.source)?;
     let mut session = BakeSession::new(loaded.scene.clone())?;
     let bar = StageBar::new(terminal);
-    let settings = address_space::within_reach(&job.settings, terminal);
+    let settings = bake::within_reach(&job.settings, terminal);
     let mut sums = session.bake_shard(&settings, share, &bar, interrupt.control())?;
     drop(bar);
     (sums.timings_s.load, sums.cpu_s.load) = loaded.load_s;

@@ -24,10 +24,10 @@ use strum::VariantArray;
 use super::args::{RunOptions, SceneOptions};
 use super::bake_options::BakeOptions;
 use super::compare::read_luminance;
-use super::interrupt::Interrupt;
+use super::job::MissingLight;
 use super::job::{scene_input, threads};
-use super::progress_bar::StageBar;
-use super::scene_input::MissingLight;
+use super::terminal::Interrupt;
+use super::terminal::StageBar;
 
 use super::terminal::Terminal;
 use super::values;
@@ -490,10 +490,7 @@ impl Desk<'_> {
             maps: folder.write(&scene, &settings, &result)?.maps,
         };
         let path = output.join("reference.json");
-        let json = serde_json::to_vec_pretty(&report).map_err(|error| {
-            let what = format!("it is not valid JSON ({error})");
-            Error::failure(path.display().to_string(), what, "report this")
-        })?;
+        let json = files::to_json(&report, &path.display().to_string())?;
         files::write_atomically(&path, |writer| writer.write_all(&json))?;
         self.terminal.print_result(&report.text(output), &report)
     }

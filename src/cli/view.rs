@@ -7,10 +7,10 @@ use nephroid::export::map_folder::MapFolder;
 use nephroid::files;
 
 use super::bake::{self, Clock, LoadedScene};
-use super::interrupt::Interrupt;
 use super::job::{MapSource, PictureFormat, ViewJob};
+use super::render;
+use super::terminal::Interrupt;
 use super::terminal::{self, Terminal};
-use super::{picture, render};
 
 /// Time of the light pass where neither quality nor time is asked for [s].
 const HURRIED_S: f64 = 5.0;
@@ -64,7 +64,7 @@ fn window(job: &ViewJob, loaded: &LoadedScene, terminal: &Terminal, interrupt: &
         MapSource::Folder(folder, _) => Some(render::read_maps(folder, loaded, terminal)?),
     };
     let camera = match &job.picture.camera {
-        Some(_) => Some(picture::choose_camera(&loaded.scene, &job.picture)?.name),
+        Some(_) => Some(render::choose_camera(&loaded.scene, &job.picture)?.name),
         None => None,
     };
     let options = viewer::ViewerOptions {
@@ -125,7 +125,7 @@ fn headless(
     let location = picture_path.display().to_string();
     if let MapSource::Folder(folder, _) = &job.maps {
         let maps = render::read_maps(folder, loaded, terminal)?;
-        let made = picture::make(
+        let made = render::make(
             &loaded.scene,
             &maps,
             job.maps.settings(),
@@ -146,7 +146,7 @@ fn headless(
     let settings = &settings;
     let result = bake::bake(loaded, settings, clock, terminal, interrupt)?;
     if !result.partial {
-        let made = picture::make(
+        let made = render::make(
             &loaded.scene,
             &result.maps,
             settings,

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::png;
+use super::picture::encode;
 use crate::error::{Error, Result};
 use crate::files::{self, OutputFolder};
 
@@ -33,7 +33,7 @@ impl FrameFolder {
     /// The file cannot be written.
     pub fn write(&self, frame: usize, (width, height): (u32, u32), rgba: Vec<u8>) -> Result<()> {
         let file = self.0.path().join(file_name(frame));
-        let bytes = png::encode(width, height, rgba, &file.display().to_string())?;
+        let bytes = encode(width, height, rgba, &file.display().to_string())?;
         files::write_atomically(&file, |writer| writer.write_all(&bytes))
     }
 }

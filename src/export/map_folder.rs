@@ -67,13 +67,7 @@ impl MapFolder {
         }
         let manifest = Manifest::new(scene, settings, result, entries);
         let path = self.path().join(manifest::FILE_NAME);
-        let json = serde_json::to_vec_pretty(&manifest).map_err(|error| {
-            Error::failure(
-                path.display().to_string(),
-                format!("the manifest is not valid JSON ({error})"),
-                "report this",
-            )
-        })?;
+        let json = files::to_json(&manifest, &path.display().to_string())?;
         files::write_atomically(&path, |writer| writer.write_all(&json))?;
         for outdated in self.previous.iter().filter(|file| !manifest.names(file)) {
             files::remove_file(&self.path().join(outdated))?;

@@ -7,15 +7,12 @@ pub mod glb;
 pub mod manifest;
 pub mod map_folder;
 pub mod map_reader;
-mod map_rows;
 pub mod pfm;
 pub mod picture;
-pub mod png;
 mod quantity;
 pub mod shards;
 pub mod textures;
 pub mod uv_file;
-mod white;
 
 pub use float_image::FloatImage;
 pub use quantity::Quantity;

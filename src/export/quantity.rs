@@ -43,3 +43,38 @@ impl Quantity {
         }
     }
 }
+
+/// The least value above which there is no more than that share of all light, so that dim light has finer steps; `None`
+/// where no value is above 0.
+pub fn white(values: impl Iterator<Item = f64>, cut: f64) -> Option<f64> {
+    let mut values: Vec<f64> = values.filter(|value| *value > 0.0).collect();
+    values.sort_unstable_by(|a, b| b.total_cmp(a));
+    let all: f64 = values.iter().sum();
+    let most = *values.first()?;
+    let mut above = 0.0;
+    for (count, pair) in values.windows(2).enumerate() {
+        // Between two neighbours what is cut grows evenly.
+        let wider = above + (pair[0] - pair[1]) * (count + 1) as f64;
+        if wider > cut * all {
+            return Some((pair[0] - (cut * all - above) / (count + 1) as f64).min(most));
+        }
+        above = wider;
+    }
+    Some(most)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn white_leaves_out_the_share_that_it_may() {
+        let light = || (-3..=100).map(f64::from);
+        for cut in [0.0, 0.001, 0.01, 0.1, 0.5] {
+            let white = white(light(), cut).expect("there is light");
+            let above: f64 = light().map(|light| (light - white).max(0.0)).sum();
+            assert!((above / 5050.0 - cut).abs() < 1e-12, "{cut}: {above}");
+        }
+        assert_eq!(white([0.0, -1.0].into_iter(), 0.1), None);
+    }
+}

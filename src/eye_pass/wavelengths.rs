@@ -9,7 +9,7 @@ use std::sync::LazyLock;
 
 use glam::{DMat3, DVec3};
 
-use crate::optics::spectrum::quadrature::{integrate, visible_knots};
+use crate::optics::spectrum::luminous::{integrate, visible_knots};
 use crate::optics::spectrum::{WavelengthSampler, Xyz, illuminants, xyz_bar};
 use crate::optics::wavelength::{D_LINE, VISIBLE};
 use crate::optics::{ColourBasis, LinearSrgb, Nanometres};

@@ -1,9 +1,11 @@
 //! Places to write to, tried before the long work.
 
-use std::fs;
-use std::io;
 use std::path::{Path, PathBuf};
+use std::{fs, io};
 
+use tempfile::TempDir;
+
+use super::write_atomically;
 use crate::error::{Error, Result};
 
 /// A folder that can be written. One that was made for it is removed again unless something was written into it.
@@ -129,4 +131,122 @@ fn unwritable(path: &Path, error: &io::Error) -> Error {
         format!("nothing can be written there ({error})"),
         "choose another place or change its permissions",
     )
+}
+
+/// Files that are written aside, within the folder that they are for, and get their places when all of them are on the
+/// disk: a full disk or a cancelled run leaves the folder as it was.
+#[derive(Debug)]
+pub struct StagedFolder {
+    /// Goes first, so that a folder that was made for nothing is empty when it is removed.
+    aside: TempDir,
+    root: OutputFolder,
+    names: Vec<String>,
+}
+
+impl StagedFolder {
+    /// For a folder that can be written.
+    ///
+    /// # Errors
+    /// A place that cannot be written any more.
+    pub fn new(root: OutputFolder) -> Result<Self> {
+        let mut builder = tempfile::Builder::new();
+        builder.prefix(".nephroid-").suffix(".part");
+        let aside = builder.tempdir_in(root.path());
+        Ok(Self {
+            aside: aside.map_err(|error| unwritable(root.path(), &error))?,
+            root,
+            names: Vec::new(),
+        })
+    }
+
+    /// Where the files will be.
+    pub fn path(&self) -> &Path {
+        self.root.path()
+    }
+
+    /// Writes a file of a plain name aside; one of the same name is replaced.
+    ///
+    /// # Errors
+    /// A disk that is full; a folder of that name where the file is to be.
+    pub fn write(&mut self, name: &str, bytes: &[u8]) -> Result<()> {
+        let place = self.root.path().join(name);
+        if place.is_dir() {
+            return Err(Error::failure(
+                place.display().to_string(),
+                "is a folder, where a file is to be written",
+                "choose another place or remove the folder",
+            ));
+        }
+        let written = write_atomically(&self.aside.path().join(name), |writer| writer.write_all(bytes));
+        // Errors name the place that the user knows.
+        written.map_err(|error| Error {
+            location: place.display().to_string(),
+            ..error
+        })?;
+        if !self.names.iter().any(|known| known == name) {
+            self.names.push(name.into());
+        }
+        Ok(())
+    }
+
+    /// Gives all files their places, in the order in which they were written.
+    ///
+    /// # Errors
+    /// A file that the system does not let be replaced.
+    pub fn commit(self) -> Result<()> {
+        for name in &self.names {
+            let place = self.root.path().join(name);
+            fs::rename(self.aside.path().join(name), &place).map_err(|error| unwritable(&place, &error))?;
+        }
+        sync(self.root.path()).map_err(|error| unwritable(self.root.path(), &error))
+    }
+}
+
+/// Brings the names in a folder to the disk, where the system knows how.
+fn sync(folder: &Path) -> io::Result<()> {
+    if cfg!(unix) {
+        return fs::File::open(folder)?.sync_all();
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(folder: &Path) -> Vec<String> {
+        let entries = fs::read_dir(folder).expect("it is there");
+        let name = |entry: io::Result<fs::DirEntry>| entry.expect("it can be listed").file_name();
+        let mut names: Vec<String> = entries
+            .map(|entry| name(entry).to_string_lossy().into_owned())
+            .collect();
+        names.sort();
+        names
+    }
+
+    #[test]
+    fn files_appear_together_or_not_at_all() {
+        let around = tempfile::tempdir().expect("a temporary folder");
+        let path = around.path().join("a/b");
+        let open = || StagedFolder::new(OutputFolder::open(&path).expect("writable")).expect("writable");
+        let mut staged = open();
+        staged.write("one", b"1").expect("writable");
+        assert!(!path.join("one").exists());
+        drop(staged);
+        assert_eq!(names(around.path()), [""; 0], "what was made for nothing is gone");
+
+        let mut staged = open();
+        staged.write("one", b"1").expect("writable");
+        staged.write("two", b"2").expect("writable");
+        staged.commit().expect("writable");
+        assert_eq!(names(&path), ["one", "two"]);
+        let mut staged = open();
+        staged.write("one", b"3").expect("writable");
+        assert_eq!(fs::read(path.join("one")).expect("there"), b"1");
+        staged.commit().expect("writable");
+        assert_eq!(fs::read(path.join("one")).expect("there"), b"3");
+        fs::create_dir(path.join("three")).expect("it can be made");
+        let refused = open().write("three", b"4").expect_err("a folder is there");
+        assert!(refused.location.ends_with("three"), "{refused}");
+    }
 }

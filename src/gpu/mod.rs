@@ -1,14 +1,12 @@
 //! The graphics device: adapter, shaders, struct layouts, read-back. Knows no scene and no pass.
 
-mod faults;
-mod filled;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use crate::error::{Error, Result};
+
 pub mod layout;
 pub mod readback;
 pub mod shader;
-
-use faults::Faults;
-
-use crate::error::{Error, Result};
 
 /// A device that is ready to draw, with what went wrong on it so far.
 ///
@@ -138,7 +136,7 @@ impl Gpu {
         }
         polled
             .map(|_| ())
-            .map_err(|error| faults::device_error(&error.to_string()))
+            .map_err(|error| device_error(&error.to_string()))
     }
 
     /// Refuses a picture or map that no texture of this device can hold; `location` says which.
@@ -189,4 +187,88 @@ fn request_adapter(
              where there is OpenGL alone, or use --backend cpu",
         )
     })
+}
+
+impl Gpu {
+    /// A buffer that holds these bytes, with zeros up to the next multiple of four, and four bytes at least. On a lost
+    /// device nothing is written: what is made there is of no use, and [`Gpu::take_error`] tells why.
+    pub fn filled_buffer(&self, label: &str, contents: &[u8], usage: wgpu::BufferUsages) -> wgpu::Buffer {
+        let whole = contents.len().max(1) as u64;
+        let buffer = self.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some(label),
+            size: whole.next_multiple_of(wgpu::COPY_BUFFER_ALIGNMENT),
+            usage,
+            mapped_at_creation: true,
+        });
+        if let Ok(mut range) = buffer.get_mapped_range_mut(..) {
+            range.slice(..contents.len()).copy_from_slice(contents);
+        }
+        buffer.unmap();
+        buffer
+    }
+}
+
+#[derive(Debug, Default)]
+struct State {
+    first_error: Option<Error>,
+    lost: bool,
+}
+
+/// Shared between a device's callbacks and its owner.
+#[derive(Clone, Debug, Default)]
+struct Faults(Arc<Mutex<State>>);
+
+impl Faults {
+    /// Sets both callbacks of a device.
+    fn listen_to(device: &wgpu::Device) -> Self {
+        let faults = Self::default();
+        let on_error = faults.clone();
+        device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
+            log::error!("graphics device: {error}");
+            on_error.record(device_error(&error.to_string()), false);
+        }));
+        let on_lost = faults.clone();
+        device.set_device_lost_callback(move |reason, message| {
+            // Dropping the last handle of a device is no fault.
+            if reason != wgpu::DeviceLostReason::Destroyed {
+                log::error!("graphics device lost: {message}");
+            }
+            on_lost.record(device_error(&format!("the device was lost ({message})")), true);
+        });
+        faults
+    }
+
+    fn take(&self) -> Option<Error> {
+        self.with(|state| state.first_error.take())
+    }
+
+    fn is_lost(&self) -> bool {
+        self.with(|state| state.lost)
+    }
+
+    fn record(&self, error: Error, lost: bool) {
+        self.with(|state| {
+            state.lost |= lost;
+            // Later faults are mostly consequences of the first one.
+            state.first_error.get_or_insert(error);
+        });
+    }
+
+    fn with<T>(&self, act: impl FnOnce(&mut State) -> T) -> T {
+        act(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+}
+
+/// A fault in one sentence: drivers answer with many lines, of which the last names the cause.
+fn device_error(message: &str) -> Error {
+    let lines: Vec<&str> = message
+        .lines()
+        .map(str::trim)
+        .filter(|line| !line.is_empty())
+        .collect();
+    Error::failure(
+        "graphics device",
+        lines.join(" "),
+        "close other programs that use it or update its driver, or use --backend cpu",
+    )
 }

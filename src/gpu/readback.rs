@@ -1,6 +1,6 @@
 //! From the device back to the processor.
 
-use super::{Gpu, faults};
+use super::Gpu;
 use crate::error::Result;
 
 /// The texels of level 0 of a 2D texture (usage `COPY_SRC`), row by row without padding.
@@ -68,6 +68,6 @@ fn mapped(gpu: &Gpu, buffer: &wgpu::Buffer) -> Result<Vec<u8>> {
     gpu.wait()?;
     let range = buffer
         .get_mapped_range(..)
-        .map_err(|error| faults::device_error(&error.to_string()))?;
+        .map_err(|error| super::device_error(&error.to_string()))?;
     Ok(range.to_vec())
 }

@@ -30,6 +30,16 @@ pub struct IlluminationMap {
 }
 
 impl IlluminationMap {
+    /// A map of one layer alone, without an estimate of its error.
+    pub fn of_layer(chart: Arc<Chart>, kind: LayerKind, irradiance: Vec<[f32; 3]>) -> Self {
+        Self {
+            chart,
+            layers: vec![Layer { kind, irradiance }],
+            error: None,
+            estimated_relative_rmse: None,
+        }
+    }
+
     /// Texels across.
     pub fn width(&self) -> usize {
         self.chart.width

@@ -1,6 +1,12 @@
 //! Colours in linear light.
 
+use std::sync::LazyLock;
+
 use serde::{Deserialize, Serialize};
+
+use super::Nanometres;
+use super::spectrum::csv::columns;
+use super::wavelength::VISIBLE;
 
 /// A triple in linear sRGB (Rec. 709 primaries, D65 white). As a factor it has no unit; as a quantity its name says
 /// the unit, and its [luminance](Self::luminance) is the luminous-equivalent value.
@@ -133,5 +139,126 @@ impl std::ops::Div<f64> for LinearSrgb {
     type Output = Self;
     fn div(self, divisor: f64) -> Self {
         self.map(|channel| channel / divisor)
+    }
+}
+
+/// A linear map from linear sRGB to three channels, such as CIE XYZ; a row for each channel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ColourMatrix([[f64; 3]; 3]);
+
+impl ColourMatrix {
+    /// All stays as it is.
+    pub const IDENTITY: Self = Self([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
+    /// Nothing is left.
+    pub const ZERO: Self = Self([[0.0; 3]; 3]);
+
+    /// For light of one wavelength that has such values in the channels.
+    pub fn of_wavelength(channels: [f64; 3], wavelength: Nanometres) -> Self {
+        let row = ColourBasis::at(wavelength).row();
+        Self(channels.map(|channel| row.map(|part| channel * part)))
+    }
+
+    /// From its rows, one after the other.
+    pub fn from_array(values: [f64; 9]) -> Self {
+        Self(std::array::from_fn(|row| {
+            std::array::from_fn(|column| values[3 * row + column])
+        }))
+    }
+
+    /// Its rows, one after the other.
+    pub fn to_array(self) -> [f64; 9] {
+        std::array::from_fn(|index| self.0[index / 3][index % 3])
+    }
+
+    /// The channels of a colour.
+    pub fn apply(&self, colour: LinearSrgb) -> LinearSrgb {
+        let colour = colour.to_array();
+        let row = |row: &[f64; 3]| row[0] * colour[0] + row[1] * colour[1] + row[2] * colour[2];
+        LinearSrgb::new(row(&self.0[0]), row(&self.0[1]), row(&self.0[2]))
+    }
+
+    /// What white becomes.
+    pub fn of_white(&self) -> LinearSrgb {
+        self.apply(LinearSrgb::WHITE)
+    }
+
+    /// For light of a colour: channel by channel, the parts that red, green and blue have in it.
+    #[must_use]
+    pub fn weighing(&self, colour: LinearSrgb) -> Self {
+        let colour = colour.to_array();
+        Self(
+            self.0
+                .map(|row| std::array::from_fn(|column| row[column] * colour[column])),
+        )
+    }
+
+    /// For factors on light whose channels are made of such parts: what a factor is in each channel. Of a channel that
+    /// has nothing, as in its neighbours: the mean of the three.
+    #[must_use]
+    pub fn per_channel(&self) -> Self {
+        Self(self.0.map(|row| {
+            let sum: f64 = row.iter().sum();
+            if sum > 0.0 {
+                row.map(|part| part / sum)
+            } else {
+                [1.0 / 3.0; 3]
+            }
+        }))
+    }
+}
+
+impl std::ops::Add for ColourMatrix {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        let (a, b) = (self.to_array(), other.to_array());
+        Self::from_array(std::array::from_fn(|index| a[index] + b[index]))
+    }
+}
+
+impl std::iter::Sum for ColourMatrix {
+    fn sum<I: Iterator<Item = Self>>(parts: I) -> Self {
+        parts.fold(Self::ZERO, |sum, part| sum + part)
+    }
+}
+
+/// The parts that red, green and blue have in a factor at one wavelength; they add up to 1, so that grey stays what it
+/// is and shares that add up to 1 still do.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ColourBasis([f64; 3]);
+
+/// The parts every [`STEP_NM`] of the visible.
+static TABLE: LazyLock<Vec<[f64; 3]>> = LazyLock::new(|| {
+    columns(include_str!("../../assets/spectra/srgb_parts.csv"))
+        .map(|row| [row[1], row[2], row[3]])
+        .collect()
+});
+
+/// Between two rows [nm].
+const STEP_NM: f64 = 5.0;
+
+impl ColourBasis {
+    /// At a wavelength: linear between rows of the table; outside of the visible as at its end.
+    pub fn at(wavelength: Nanometres) -> Self {
+        let last = TABLE.len() - 1;
+        let place = ((wavelength.0 - VISIBLE.start().0) / STEP_NM).clamp(0.0, last as f64);
+        let index = (place as usize).min(last - 1);
+        let along = place - index as f64;
+        let (below, above) = (TABLE[index], TABLE[index + 1]);
+        Self(std::array::from_fn(|i| below[i] + along * (above[i] - below[i])))
+    }
+
+    /// The parts of red, green and blue, [0, 1]: what a factor's channels are multiplied by and added up.
+    pub fn row(&self) -> [f64; 3] {
+        self.0
+    }
+
+    /// A factor [0, 1] per channel, as the same grey in all channels.
+    pub fn tone(&self, factor: LinearSrgb) -> LinearSrgb {
+        if factor.r == factor.g && factor.g == factor.b {
+            return factor;
+        }
+        let [r, g, b] = self.0;
+        LinearSrgb::grey(r * factor.r + g * factor.g + b * factor.b)
     }
 }

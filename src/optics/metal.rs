@@ -7,11 +7,11 @@ use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use super::conductor::conductor_reflectance;
-use super::names::{key, nearest};
 use super::spectrum::xyz::colour_under_d65;
 use super::spectrum::{Spectrum, xyz_bar};
 use super::wavelength::VISIBLE;
 use super::{ColourBasis, LinearSrgb, Nanometres};
+use super::{key, nearest};
 use crate::error::Error;
 
 /// Name and table of each: columns wavelength [nm], n, k; from below 360 to above 830 nm (see assets/SOURCES.md).

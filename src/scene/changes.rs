@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::{DMat3, DQuat, DVec3};
 use serde::{Deserialize, Serialize};
 
-use super::{Edit, Light, LightKind, LightOrigin, Material, Mesh, Scene};
+use super::{Edit, Light, LightKind, Material, Mesh, Scene};
 use crate::optics::Glass;
 
 /// Corners that lie so near to where a motion puts them are put there by it, as a share of the mesh's extent [1].
@@ -76,9 +76,7 @@ impl Changes {
             let edits = match edited.light_when_loaded(index) {
                 Some(place) => of_light(place, &loaded.lights[place], now),
                 None => vec![Edit::LightAdded {
-                    light: None,
                     added: Arc::new(now.clone()),
-                    origin: LightOrigin::New,
                 }],
             };
             self.extend(&now.name, edits);
@@ -167,7 +165,7 @@ impl Edit {
             | Self::MaterialRoughness { material, .. }
             | Self::MaterialWaves { material, .. } => Part::Material(material),
             Self::ObjectMoved { object, .. } | Self::ObjectMesh { object, .. } => Part::Object(object),
-            Self::LightAdded { .. } | Self::Several(_) => return None,
+            Self::LightAdded { .. } | Self::Several(_) | Self::Whole(_) => return None,
         })
     }
 }

@@ -120,6 +120,17 @@ pub struct LightList {
 }
 
 impl Light {
+    /// A white light without a size or a spectrum.
+    pub fn new(name: impl Into<String>, kind: LightKind) -> Self {
+        Self {
+            name: name.into(),
+            colour: LinearSrgb::WHITE,
+            spectrum: None,
+            kind,
+            size: LightSize::None,
+        }
+    }
+
     /// What its maps are multiplied by per channel: [`LightKind::strength`] times the colour.
     pub fn strength(&self) -> LinearSrgb {
         self.colour * self.kind.strength()
@@ -149,11 +160,9 @@ impl Light {
             LightKind::Environment { scale } => *scale = 1.0,
         }
         Self {
-            name: self.name.clone(),
             colour: LinearSrgb::WHITE,
-            spectrum: self.spectrum.clone(),
             kind,
-            size: self.size,
+            ..self.clone()
         }
     }
 
@@ -192,39 +201,12 @@ impl LightKind {
     }
 
     /// The same light moved by `offset` [m].
-    pub fn moved(self, offset: DVec3) -> Self {
-        match self {
-            Self::Point { position, intensity } => Self::Point {
-                position: position + offset,
-                intensity,
-            },
-            Self::Spot {
-                position,
-                direction,
-                intensity,
-                inner_cone_rad,
-                outer_cone_rad,
-            } => Self::Spot {
-                position: position + offset,
-                direction,
-                intensity,
-                inner_cone_rad,
-                outer_cone_rad,
-            },
-            Self::Panel {
-                centre,
-                across,
-                down,
-                shape,
-                radiance,
-            } => Self::Panel {
-                centre: centre + offset,
-                across,
-                down,
-                shape,
-                radiance,
-            },
-            far @ (Self::Sun { .. } | Self::Surface { .. } | Self::Environment { .. }) => far,
+    pub fn moved(mut self, offset: DVec3) -> Self {
+        match &mut self {
+            Self::Point { position, .. } | Self::Spot { position, .. } => *position += offset,
+            Self::Panel { centre, .. } => *centre += offset,
+            Self::Sun { .. } | Self::Surface { .. } | Self::Environment { .. } => {}
         }
+        self
     }
 }

@@ -5,9 +5,8 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::{Light, LightKind, LightSize, Opened, Scene, builtin, contact, environment, gltf};
+use super::{Light, LightKind, Opened, Scene, builtin, contact, environment, gltf};
 use crate::error::{Error, Result, Warning};
-use crate::optics::LinearSrgb;
 use crate::units::Irradiance;
 
 /// How a scene is read.
@@ -123,13 +122,9 @@ fn unknown_builtin(source: &str) -> Error {
 fn add_environment(scene: &mut Scene, path: &Path, memory_limit_bytes: u64) -> Result<()> {
     let environment = environment::read(path, memory_limit_bytes)?;
     if environment.total_w_per_m2() > 0.0 {
-        scene.lights.push(Light {
-            name: "environment".into(),
-            colour: LinearSrgb::WHITE,
-            spectrum: None,
-            kind: LightKind::Environment { scale: 1.0 },
-            size: LightSize::None,
-        });
+        scene
+            .lights
+            .push(Light::new("environment", LightKind::Environment { scale: 1.0 }));
     } else {
         scene.warnings.push(Warning::new(
             path.display().to_string(),
@@ -153,16 +148,13 @@ pub fn was_dark(loaded: &Scene) -> bool {
 }
 
 fn add_default_light(scene: &mut Scene) {
-    scene.lights.push(Light {
-        name: DEFAULT_SUN_NAME.into(),
-        colour: LinearSrgb::WHITE,
-        spectrum: None,
-        kind: LightKind::Sun {
+    scene.lights.push(Light::new(
+        DEFAULT_SUN_NAME,
+        LightKind::Sun {
             direction: DVec3::new(0.4, -0.8, -0.45).normalize(),
             normal_irradiance: DEFAULT_SUN,
         },
-        size: LightSize::None,
-    });
+    ));
     scene.warnings.push(Warning::new(
         scene.source.clone(),
         format!(

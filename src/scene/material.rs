@@ -3,7 +3,9 @@
 
 use std::sync::Arc;
 
-use super::{AlphaMask, NormalMap, TextureRef, Waves};
+use glam::DVec2;
+
+use super::{NormalMap, Texture, TextureRef, Waves};
 use crate::optics::spectrum::Spectrum;
 use crate::optics::wavelength::D_LINE;
 use crate::optics::{Glass, LinearSrgb, Metal, Nanometres};
@@ -212,5 +214,22 @@ impl Default for Material {
             normal_map: None,
             double_sided: true,
         }
+    }
+}
+
+/// A surface is there where its alpha, `factor` times that of its base colour texture, is at least `cutoff`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AlphaMask {
+    /// Alpha from which on it is there.
+    pub cutoff: f64,
+    /// Alpha of the base colour, [0, 1].
+    pub factor: f64,
+}
+
+impl AlphaMask {
+    /// Whether the surface is there at a texture coordinate; without a texture it is everywhere or nowhere.
+    pub fn is_there(&self, texture: Option<(&Texture, DVec2)>) -> bool {
+        let alpha = texture.map_or(1.0, |(texture, uv)| texture.alpha(uv));
+        self.factor * alpha >= self.cutoff
     }
 }

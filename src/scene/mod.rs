@@ -1,15 +1,22 @@
 //! What is lit: surfaces, materials, lights, cameras. All coordinates are scene coordinates in metres, y up:
 //! world coordinates less [`Scene::origin_world`], which is zero unless the scene lies far from the world's origin.
 
+use std::fmt::{self, Write as _};
+use std::sync::Arc;
+
+use glam::DVec3;
+
+use crate::error::Warning;
+use crate::files::cache::ContentHash;
+use crate::optics::LinearSrgb;
+
 pub mod adjacency;
-pub mod alpha_mask;
 pub mod builtin;
 pub mod camera;
 pub mod camera_path;
 pub mod changes;
 pub mod closed;
 pub mod contact;
-mod content_hash;
 pub mod edit;
 pub mod emitter;
 pub mod environment;
@@ -18,34 +25,26 @@ pub mod light;
 pub mod load;
 pub mod material;
 pub mod mesh;
-mod middle_light;
 pub mod normal_map;
 pub mod texture;
 pub mod turntable;
 pub mod waves;
 
-use std::sync::Arc;
-
-use glam::DVec3;
-
 pub use adjacency::Adjacency;
-pub use alpha_mask::AlphaMask;
 pub use camera::Camera;
 pub use camera_path::{CameraPath, PathPlan};
-pub use edit::{Edit, EditTarget, LightOrigin, why_light_stays};
+pub use edit::{Edit, EditTarget, why_light_stays};
 pub use environment::Environment;
 pub use gltf::guard::is_guarded;
 pub use gltf::{Glb, Opened};
 pub use light::{Light, LightKind, LightList, LightSize, PanelShape};
 pub use load::{LoadOptions, load, open_document};
+pub use material::AlphaMask;
 pub use material::{Material, SurfaceKind, Volume};
 pub use mesh::Mesh;
 pub use normal_map::NormalMap;
 pub use texture::{Texture, TextureRef};
 pub use waves::{Wave, Waves};
-
-use crate::error::Warning;
-use crate::optics::LinearSrgb;
 
 /// One mesh primitive of one node: the unit that has a material and, when light reaches it, an illumination map.
 #[derive(Clone, Debug)]
@@ -148,5 +147,91 @@ impl Scene {
             .iter()
             .map(|object| object.mesh.triangles.len())
             .sum()
+    }
+}
+
+/// Takes text, eight bytes a word.
+#[derive(Default)]
+struct Text {
+    hash: ContentHash,
+    word: [u8; 8],
+    filled: usize,
+}
+
+impl fmt::Write for Text {
+    fn write_str(&mut self, text: &str) -> fmt::Result {
+        for &byte in text.as_bytes() {
+            self.word[self.filled] = byte;
+            self.filled += 1;
+            if self.filled == self.word.len() {
+                self.hash.take(u64::from_le_bytes(self.word));
+                self.filled = 0;
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Scene {
+    /// The same for scenes that are the same in everything that light meets, to the last bit: their numbers are written
+    /// out in full, so that no field of a material or a light can be forgotten. Names of files, cameras and warnings do
+    /// not count.
+    pub fn content_hash(&self) -> u64 {
+        let Self {
+            name: _,
+            source: _,
+            origin_world,
+            objects,
+            materials,
+            textures,
+            lights,
+            light_list: _,
+            environment,
+            cameras: _,
+            warnings: _,
+        } = self;
+        let mut text = Text::default();
+        // Text takes whatever it is given.
+        let _ = write!(
+            text,
+            "{origin_world:?}\n{objects:?}\n{materials:?}\n{textures:?}\n{lights:?}\n{environment:?}"
+        );
+        let rest = &text.word[..text.filled];
+        rest.iter().for_each(|&byte| text.hash.take(u64::from(byte)));
+        text.hash.value()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use crate::scene::{LoadOptions, Scene, load};
+
+    #[test]
+    fn whatever_light_meets_counts() {
+        let scene = load("builtin:showroom", &LoadOptions::default()).expect("it is built in");
+        let same = Scene {
+            name: "other".into(),
+            source: "elsewhere".into(),
+            ..scene.clone()
+        };
+        assert_eq!(scene.content_hash(), same.content_hash());
+        type Change = fn(&mut Scene);
+        let changes: [Change; 5] = [
+            |scene| {
+                let x = &mut Arc::make_mut(&mut scene.objects[0].mesh).positions[0].x;
+                *x = x.next_up();
+            },
+            |scene| scene.materials[0].ior += 1e-9,
+            |scene| scene.lights[0].colour.g = scene.lights[0].colour.g.next_down(),
+            |scene| scene.objects.truncate(1),
+            |scene| scene.origin_world.z += 1.0,
+        ];
+        for change in changes {
+            let mut other = scene.clone();
+            change(&mut other);
+            assert_ne!(scene.content_hash(), other.content_hash());
+        }
     }
 }

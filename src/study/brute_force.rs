@@ -17,7 +17,7 @@ use crate::error::{Error, Result};
 use crate::illumination::accumulator::{FluxCount, FluxUnit};
 use crate::illumination::gutter::fill_gutter;
 use crate::illumination::parametrisation::parametrise;
-use crate::illumination::{Chart, IlluminationMap, Layer, Receiver};
+use crate::illumination::{Chart, IlluminationMap, Receiver};
 use crate::light_pass::caustic::pass::Stopwatch;
 use crate::light_pass::caustic::path::{Arrival, PathLimits, PathTracer};
 use crate::light_pass::caustic::setup::{Aim, AimedLight, Aiming};
@@ -402,13 +402,8 @@ impl Target {
         }
         fill_gutter(&self.chart, &mut irradiance);
         let mut map = IlluminationMap {
-            chart: self.chart.clone(),
-            layers: vec![Layer {
-                kind: LayerKind::Caustic,
-                irradiance,
-            }],
             error: Some(error),
-            estimated_relative_rmse: None,
+            ..IlluminationMap::of_layer(self.chart.clone(), LayerKind::Caustic, irradiance)
         };
         map.estimated_relative_rmse = Some(relative_noise(std::slice::from_ref(&map))?);
         Some(map)

@@ -9,7 +9,7 @@ use super::plot::{Curve, Plot};
 use super::references::{Reference, Truth, lit_side};
 use super::table::{Cell, Table};
 use crate::error::{Error, Result};
-use crate::export::png;
+use crate::export::picture::encode;
 use crate::illumination::difference::{self, Difference};
 use crate::progress::{Control, Progress};
 use crate::scene::{Camera, Scene};
@@ -462,7 +462,7 @@ impl Outcome {
         }
         for picture in &self.pictures {
             let ((width, height), rgba) = (picture.size, picture.rgba.clone());
-            let bytes = png::encode(width, height, rgba, &picture.file)?;
+            let bytes = encode(width, height, rgba, &picture.file)?;
             files.push((format!("{}.png", picture.file), bytes));
         }
         files.push((format!("{}.md", self.name), self.page().into_bytes()));

@@ -3,7 +3,6 @@
 mod drawing;
 mod files;
 mod hands;
-mod saving;
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -16,7 +15,7 @@ use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoopProxy};
 use winit::keyboard::ModifiersState;
 use winit::window::WindowId;
 
-use super::files::dialog::{Choice, Dialog};
+use super::files::{Choice, Dialog};
 use super::frame_times::{FrameTimes, sum_ms};
 use super::gizmo::Gizmo;
 use super::graphics::{Graphics, RETRY_AFTER, Shown};
@@ -27,7 +26,7 @@ use super::model::Model;
 use super::overlay;
 use super::pace::Pace;
 use super::panel::{Facts, Wishes};
-use super::{ViewerOptions, accessibility, error_view, probe_lines, sketching, split};
+use super::{ViewerOptions, accessibility, beside, error_view, probe, sketching};
 use crate::error::{Error, Result};
 use crate::plan::EffectLine;
 use crate::progress::Control;
@@ -415,7 +414,7 @@ impl App {
             let scale = panel.display.scale;
             *picture_rect = overlay::show(ui, picture, &facts, (quantity, &scale), notice.as_deref());
             if let Some((beside, reference)) = beside.zip(reference.as_ref()) {
-                split::show(ui, *picture_rect, divider, (beside, reference));
+                beside::show(ui, *picture_rect, divider, (beside, reference));
             }
             let camera = navigator.camera_for(f64::from(picture_rect.aspect_ratio()));
             let lens = Lens {
@@ -426,14 +425,13 @@ impl App {
                 sketching::draw(ui.painter(), &lens, sketch, panel.sketched);
             }
             if let Some(probed) = &probed {
-                probe_lines::draw(ui.painter(), &lens, probed);
+                probe::draw(ui.painter(), &lens, probed);
             }
             let pulled = gizmo.show(ui, &lens, panel.held(), (&scene, &loaded));
             wishes.edit = pulled.or(wishes.edit.take());
         });
         if let Some(controls) = &painting.moved_controls {
-            let control =
-                |c: &super::controls::Control| json!({"role": c.role, "name": c.name, "rect_pixels": c.rect});
+            let control = |c: &super::interface::Control| json!({"role": c.role, "name": c.name, "rect_pixels": c.rect});
             let controls: Vec<Value> = controls.iter().map(control).collect();
             log.write("controls", json!({"controls": controls}));
         }

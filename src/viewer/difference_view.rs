@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::illumination::difference::{Difference, SignedMap};
-use crate::illumination::{IlluminationMap, Layer, difference_colours};
+use crate::illumination::{IlluminationMap, difference_colours};
 use crate::optics::LinearSrgb;
 use crate::settings::LayerKind;
 
@@ -15,13 +15,5 @@ pub fn maps(difference: &Difference) -> Vec<IlluminationMap> {
 fn coloured(map: &SignedMap) -> IlluminationMap {
     let linear = |colour: [u8; 3]| colour.map(|code| LinearSrgb::decode_channel(code) as f32);
     let colours = difference_colours::of_map(map).map(linear);
-    IlluminationMap {
-        chart: Arc::clone(&map.chart),
-        layers: vec![Layer {
-            kind: LayerKind::Caustic,
-            irradiance: colours.collect(),
-        }],
-        error: None,
-        estimated_relative_rmse: None,
-    }
+    IlluminationMap::of_layer(Arc::clone(&map.chart), LayerKind::Caustic, colours.collect())
 }

@@ -1,13 +1,19 @@
-//! The scene that the user edits, with the history of everything that can be taken back.
+//! What the user changes, step by step, in the order in which it is taken back: the scene, and the settings that it is
+//! baked and shown with.
 
+use std::mem::discriminant;
 use std::sync::Arc;
 
+use serde::Serialize;
+
 use super::filming::Film;
-use super::history::{Change, History, Step};
 use super::panel::Display;
 use crate::error::Result;
-use crate::scene::{Edit, Scene};
+use crate::scene::{Edit, EditTarget, Scene};
 use crate::settings::BakeSettings;
+
+/// Steps that can be taken back. Scenes share the meshes that no step between them changed.
+const MOST_STEPS: usize = 1000;
 
 /// A scene with its history, and that of the settings it is baked and shown with.
 #[derive(Clone, Debug)]
@@ -17,19 +23,80 @@ pub struct EditedScene {
     history: History,
 }
 
-/// What the panel is to be set to once a step was taken back or done again.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Restored {
-    /// Nothing: the scene was changed.
-    Scene,
-    /// These settings.
+/// One of the things that a step changes, as it was before the step or as it is since.
+#[derive(Clone, Debug)]
+pub enum Part {
+    /// The scene.
+    Scene(Arc<Scene>),
+    /// The settings of a bake.
     Settings(Box<BakeSettings>),
-    /// This path of the camera.
+    /// The camera's path.
     Film(Box<Film>),
     /// Whether changes are baked by themselves.
     Automatic(bool),
-    /// What differs between both, to what it is in the second.
-    Display(Display, Display),
+    /// How the picture shows the maps.
+    Display(Display),
+}
+
+#[derive(Clone, Debug)]
+struct Step {
+    /// What was changed, in the panel's words.
+    text: String,
+    /// What of the scene.
+    target: Option<EditTarget>,
+    before: Part,
+    after: Part,
+}
+
+impl Step {
+    /// Whether a drag that did this step goes on in the next one.
+    fn goes_on_in(&self, next: &Self) -> bool {
+        let is_of_same = discriminant(&self.after) == discriminant(&next.after)
+            && self.text == next.text
+            && self.target == next.target;
+        is_of_same && !matches!(self.after, Part::Automatic(_)) && self.target != Some(EditTarget::LightList)
+    }
+}
+
+/// Steps that were done, and steps that were taken back and can be done again.
+#[derive(Clone, Debug, Default)]
+pub struct History {
+    done: Vec<Step>,
+    undone: Vec<Step>,
+    /// Whether the newest step still goes on: the mouse is down, or a number is being typed.
+    is_open: bool,
+}
+
+impl History {
+    /// Adds a step. Steps of the same while one goes on are taken back together; what was taken back is forgotten.
+    fn record(&mut self, step: Step) {
+        self.undone.clear();
+        match self.done.last_mut() {
+            Some(last) if self.is_open && last.goes_on_in(&step) => last.after = step.after,
+            _ => {
+                self.done.push(step);
+                if self.done.len() > MOST_STEPS {
+                    self.done.remove(0);
+                }
+            }
+        }
+        self.is_open = true;
+    }
+
+    /// Steps that can be taken back.
+    pub fn undoable(&self) -> usize {
+        self.done.len()
+    }
+
+    /// What would be taken back.
+    pub fn next_undo(&self) -> Option<&str> {
+        self.done.last().map(|step| step.text.as_str())
+    }
+
+    /// What would be done again.
+    pub fn next_redo(&self) -> Option<&str> {
+        self.undone.last().map(|step| step.text.as_str())
+    }
 }
 
 impl EditedScene {
@@ -60,96 +127,138 @@ impl EditedScene {
     /// Edits the scene. Edits of one target while the mouse is down are taken back together.
     ///
     /// # Errors
-    /// As [`Edit::apply`]: the scene stays.
+    /// What the edit is refused for; nothing is changed then.
     pub fn edit(&mut self, edit: &Edit) -> Result<()> {
-        let (scene, inverse) = edit.apply(&self.scene)?;
-        self.scene = Arc::new(scene);
-        self.history.record(Step::of_edit(edit, inverse, &self.scene));
+        let (scene, _) = edit.apply(&self.scene)?;
+        let before = std::mem::replace(&mut self.scene, Arc::new(scene));
+        let target = edit.target();
+        let text = match edit {
+            Edit::LightAdded { added } => format!("`{}`, a new light", added.name),
+            Edit::LightRemoved { light } => format!("removal of `{}`", before.lights[*light].name),
+            _ => name_of(&target, &self.scene),
+        };
+        self.history.record(Step {
+            text,
+            target: Some(target),
+            before: Part::Scene(before),
+            after: Part::Scene(Arc::clone(&self.scene)),
+        });
         Ok(())
     }
 
-    /// Notes that settings were changed in the panel.
+    fn note(&mut self, text: String, before: Part, after: Part) {
+        self.history.record(Step {
+            text,
+            target: None,
+            before,
+            after,
+        });
+    }
+
+    /// Notes that settings were changed, if they were.
     pub fn note_settings(&mut self, before: &BakeSettings, after: &BakeSettings) {
-        if let Some(step) = Step::of_settings(before, after) {
-            self.history.record(step);
+        if before != after {
+            let parts = [before, after].map(|settings| Part::Settings(Box::new(settings.clone())));
+            let [from, to] = parts;
+            self.note(changed(before, after), from, to);
         }
     }
 
-    /// Notes that the maps are shown otherwise.
+    /// Notes that the maps are shown in another way, if they are.
     pub fn note_display(&mut self, before: Display, after: Display) {
-        if let Some(step) = Step::of_display(before, after) {
-            self.history.record(step);
+        if before != after {
+            self.note(
+                changed(&before, &after),
+                Part::Display(before),
+                Part::Display(after),
+            );
         }
     }
 
-    /// Notes that the camera's path is another one.
+    /// Notes another path for the camera.
     pub fn note_film(&mut self, before: &Film, after: &Film) {
-        self.history.record(Step::of_film(before, after));
+        let [from, to] = [before, after].map(|film| Part::Film(Box::new(film.clone())));
+        self.note(before.change_to(after).into(), from, to);
     }
 
-    /// Notes that changes are baked by themselves from now on, or no longer.
+    /// Notes that baking by itself was switched.
     pub fn note_automatic(&mut self, after: bool) {
-        self.history.record(Step::of_automatic(after));
+        self.note(
+            "automatic".into(),
+            Part::Automatic(!after),
+            Part::Automatic(after),
+        );
     }
 
-    /// The mouse is up: the next edit is one of its own.
+    /// The next step is one of its own.
     pub fn release(&mut self) {
-        self.history.release();
+        self.history.is_open = false;
     }
 
-    /// Takes the last step back; `None` where there was none. With its name and what is left to be restored.
-    ///
-    /// # Errors
-    /// As [`Edit::apply`].
-    pub fn undo(&mut self) -> Result<Option<(String, Restored)>> {
-        let Some(step) = self.history.take_done() else {
-            return Ok(None);
-        };
-        let (step, restored) = self.turn(step, true)?;
+    /// Takes the newest step back, or does the one again that was taken back last: its name, and what was changed, from
+    /// what to what. The scene is changed here.
+    pub fn turn(&mut self, is_back: bool) -> Option<(String, [Part; 2])> {
+        let History {
+            done,
+            undone,
+            is_open,
+        } = &mut self.history;
+        *is_open = false;
+        let (from, to) = if is_back { (done, undone) } else { (undone, done) };
+        let step = from.pop()?;
+        let mut parts = [step.before.clone(), step.after.clone()];
+        if is_back {
+            parts.reverse();
+        }
+        if let Part::Scene(scene) = &parts[1] {
+            self.scene = Arc::clone(scene);
+        }
         let text = step.text.clone();
-        self.history.put_undone(step);
-        Ok(Some((text, restored)))
+        to.push(step);
+        Some((text, parts))
     }
+}
 
-    /// Does again what was taken back last; `None` where there was nothing. As [`undo`](Self::undo).
-    ///
-    /// # Errors
-    /// As [`Edit::apply`].
-    pub fn redo(&mut self) -> Result<Option<(String, Restored)>> {
-        let Some(step) = self.history.take_undone() else {
-            return Ok(None);
-        };
-        let (step, restored) = self.turn(step, false)?;
-        let text = step.text.clone();
-        self.history.put_done(step);
-        Ok(Some((text, restored)))
-    }
+/// "power of `lamp`".
+fn name_of(target: &EditTarget, scene: &Scene) -> String {
+    let light = |index: &usize| scene.lights[*index].name.as_str();
+    let material = |index: &usize| scene.materials[*index].name.as_str();
+    let object = |index: &usize| scene.objects[*index].name.as_str();
+    let (what, whose) = match target {
+        EditTarget::LightPower(index) => ("power", light(index)),
+        EditTarget::LightSize(index) => ("size", light(index)),
+        EditTarget::LightPosition(index) => ("position", light(index)),
+        EditTarget::LightDirection(index) => ("direction", light(index)),
+        EditTarget::LightColour(index) => ("colour", light(index)),
+        EditTarget::MaterialIor(index) => ("refractive index", material(index)),
+        EditTarget::MaterialTint(index) => ("base colour", material(index)),
+        EditTarget::MaterialSubstance(index) => ("substance", material(index)),
+        EditTarget::MaterialRoughness(index) => ("roughness", material(index)),
+        EditTarget::MaterialWaves(index) => ("waves", material(index)),
+        EditTarget::ObjectPlace(index) => ("place", object(index)),
+        EditTarget::LightList | EditTarget::Whole => return "scene".into(),
+        EditTarget::Several(targets) => {
+            let first = targets.first();
+            return first.map_or("nothing".into(), |first| name_of(first, scene));
+        }
+    };
+    format!("{what} of `{whose}`")
+}
 
-    /// Goes a step back or forth; gives the step for the other way.
-    fn turn(&mut self, step: Step, is_back: bool) -> Result<(Step, Restored)> {
-        let (change, restored) = match step.change {
-            Change::Scene { target, inverse } => {
-                let (scene, inverse) = inverse.apply(&self.scene)?;
-                self.scene = Arc::new(scene);
-                (Change::Scene { target, inverse }, Restored::Scene)
-            }
-            Change::Settings { before, after } => {
-                let to = if is_back { before.clone() } else { after.clone() };
-                (Change::Settings { before, after }, Restored::Settings(to))
-            }
-            Change::Film { before, after } => {
-                let to = if is_back { before.clone() } else { after.clone() };
-                (Change::Film { before, after }, Restored::Film(to))
-            }
-            Change::Automatic { after } => {
-                (Change::Automatic { after }, Restored::Automatic(after != is_back))
-            }
-            Change::Display { before, after } => {
-                let (from, to) = if is_back { (after, before) } else { (before, after) };
-                (Change::Display { before, after }, Restored::Display(from, to))
-            }
-        };
-        let text = step.text;
-        Ok((Step { text, change }, restored))
-    }
+/// The names of fields that differ, without their units.
+fn changed<T: Serialize>(before: &T, after: &T) -> String {
+    let [before, after] = [before, after].map(|part| serde_json::to_value(part).unwrap_or_default());
+    let fields = after.as_object().into_iter().flatten();
+    let changed = fields.filter(|(name, value)| before.get(name) != Some(value));
+    let words = changed.map(|(name, _)| match name.as_str() {
+        "density_per_sr" => "ray density".into(),
+        "max_time_s" => "max time".into(),
+        "map_resolution" => "map size".into(),
+        "branch_threshold" => "weakest branch".into(),
+        "exposure_stops" => "exposure".into(),
+        "layer" => "light shown".into(),
+        "quantity" => "map shown".into(),
+        _ => name.replace('_', " "),
+    });
+    words.collect::<Vec<String>>().join(", ")
 }

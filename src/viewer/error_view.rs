@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::illumination::{IlluminationMap, Layer};
+use crate::illumination::IlluminationMap;
 use crate::optics::LinearSrgb;
 use crate::settings::LayerKind;
 
@@ -50,15 +50,11 @@ pub fn maps(maps: &[IlluminationMap]) -> Vec<IlluminationMap> {
                 let relative = if mean > 0.0 { f64::from(*error) / mean } else { 0.0 };
                 colour(relative).map(|code| LinearSrgb::decode_channel(code) as f32)
             });
-            Some(IlluminationMap {
-                chart: Arc::clone(&map.chart),
-                layers: vec![Layer {
-                    kind: LayerKind::Caustic,
-                    irradiance: colours.collect(),
-                }],
-                error: None,
-                estimated_relative_rmse: None,
-            })
+            Some(IlluminationMap::of_layer(
+                Arc::clone(&map.chart),
+                LayerKind::Caustic,
+                colours.collect(),
+            ))
         })
         .collect()
 }

@@ -6,15 +6,13 @@ use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
 use std::thread::JoinHandle;
 
 use super::background::Wake;
+use super::files::free_names;
 use super::filming::Shooting;
 use super::worker::BakedLevel;
 use crate::error::{Error, Result};
 use crate::export::map_folder::{self, MapFolder};
 use crate::files;
 use crate::progress::{Control, Progress, Stage};
-
-/// Numbers that are tried before the folder counts as full.
-const NUMBERS: std::ops::RangeInclusive<u32> = 1..=9999;
 
 /// Which maps are to be written.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -197,22 +195,11 @@ fn write(export: &Export, level: &BakedLevel, folder: &Path) -> Result<PathBuf> 
                 files::slug(&scene.name, "scene"),
                 map_folder::stem(scene, map)
             );
-            let path = free_name(folder, &stem)?;
+            let [path] = free_names(folder, |number| [format!("{stem}-{number}.exr")])?;
             map_folder::write_map(&path, scene, settings, map, &level.result)?;
             Ok(path)
         }
     }
-}
-
-fn free_name(folder: &Path, stem: &str) -> Result<PathBuf> {
-    let mut names = NUMBERS.map(|number| folder.join(format!("{stem}-{number:04}.exr")));
-    names.find(|name| !name.exists()).ok_or_else(|| {
-        Error::failure(
-            folder.display().to_string(),
-            format!("it holds {} files of this map", NUMBERS.end()),
-            "move some of them elsewhere",
-        )
-    })
 }
 
 /// The folder that all maps of a scene go to unless another is named.

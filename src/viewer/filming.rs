@@ -6,8 +6,9 @@ use std::sync::Arc;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
+use super::files::free_names;
 use crate::effect::{Effect, EffectSwitches};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::export::frame_folder::FrameFolder;
 use crate::eye_pass::View;
 use crate::eye_pass::frame_times::{self, Walk};
@@ -21,8 +22,6 @@ use crate::scene::{Camera, CameraPath, Scene};
 
 /// Frames that a path is played with [1/s].
 pub const FRAMES_PER_S: f64 = 30.0;
-/// Numbers that are tried before the working folder counts as full.
-const NUMBERS: std::ops::RangeInclusive<u32> = 1..=9999;
 /// A camera leans no less than this [degrees].
 const LEVEL_DEG: f64 = 1e-6;
 /// What errors name.
@@ -213,12 +212,6 @@ impl Shooting {
 
 fn free_name(folder: &Path, scene: &str, kind: &str, ending: &str) -> Result<PathBuf> {
     let stem = format!("nephroid-{}-{kind}", files::slug(scene, "scene"));
-    let mut names = NUMBERS.map(|number| folder.join(format!("{stem}-{number:04}{ending}")));
-    names.find(|name| !name.exists()).ok_or_else(|| {
-        Error::failure(
-            folder.display().to_string(),
-            format!("it holds {} of these already", NUMBERS.end()),
-            "move some of them elsewhere",
-        )
-    })
+    let [path] = free_names(folder, |number| [format!("{stem}-{number}{ending}")])?;
+    Ok(path)
 }

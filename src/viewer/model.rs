@@ -12,7 +12,7 @@ use std::time::Instant;
 
 use super::beside::Reference;
 use super::debounce::Debounce;
-use super::edits::{EditedScene, Restored};
+use super::edits::{EditedScene, Part};
 use super::event_log::{self, EventLog};
 use super::exporting::{Export, Exporter};
 use super::files::keeper::Keeper;
@@ -313,14 +313,12 @@ impl Model {
             };
         };
         let with_kind = maps.iter().filter(receives).filter_map(|map| {
-            let layer = map.layer(kind)?.clone();
-            let chart = Arc::clone(&map.chart);
-            Some(IlluminationMap {
-                chart,
-                layers: vec![layer],
-                error: None,
-                estimated_relative_rmse: None,
-            })
+            let irradiance = map.layer(kind)?.irradiance.clone();
+            Some(IlluminationMap::of_layer(
+                Arc::clone(&map.chart),
+                kind,
+                irradiance,
+            ))
         });
         Cow::Owned(with_kind.collect())
     }
@@ -653,7 +651,7 @@ impl Model {
             outcome = self.edits.edit(edit);
         }
         if outcome.is_ok() && (wishes.undo || wishes.redo) {
-            outcome = self.turn_back(wishes.undo);
+            self.turn_back(wishes.undo);
         }
         if wishes.edit.is_some() || wishes.undo || wishes.redo {
             self.refusal = outcome.err().map(|error| error.to_string());
@@ -664,25 +662,20 @@ impl Model {
     }
 
     /// Takes the last change back, or does again what was taken back.
-    fn turn_back(&mut self, is_back: bool) -> Result<()> {
-        let turned = if is_back {
-            self.edits.undo()?
-        } else {
-            self.edits.redo()?
+    fn turn_back(&mut self, is_back: bool) {
+        let Some((text, [from, to])) = self.edits.turn(is_back) else {
+            return;
         };
-        let Some((text, restored)) = turned else {
-            return Ok(());
-        };
-        match restored {
-            Restored::Scene => {}
-            Restored::Settings(settings) => self.panel.settings = *settings,
-            Restored::Display(from, to) => self.panel.display.restore(&from, &to),
-            Restored::Film(film) => self.panel.film = *film,
-            Restored::Automatic(automatic) => self.panel.automatic = automatic,
+        match (from, to) {
+            (_, Part::Settings(settings)) => self.panel.settings = *settings,
+            (Part::Display(from), Part::Display(to)) => self.panel.display.restore(&from, &to),
+            (_, Part::Film(film)) => self.panel.film = *film,
+            (_, Part::Automatic(automatic)) => self.panel.automatic = automatic,
+            // The scene, which is changed already.
+            _ => {}
         }
         let event = if is_back { "undone" } else { "redone" };
         self.log.write(event, json!({"what": text}));
-        Ok(())
     }
 
     /// Bakes with the panel's settings, unless one of them is out of its range: the panel tells so.

@@ -5,7 +5,7 @@ use std::f64::consts::FRAC_PI_2;
 use glam::{DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 
-use super::files::kept::KeptViews;
+use super::files::config::KeptViews;
 use super::solid::Solid;
 use super::walking::{self, Walker};
 use crate::scene::{Camera, Scene};

@@ -2,10 +2,12 @@
 
 use std::sync::Arc;
 
+use egui::{Color32, Painter, Stroke, pos2};
 use glam::DVec3;
 use serde_json::{Value, json};
 
-use super::background::{Background, Wake};
+use super::background::Background;
+use super::lens::Lens;
 use crate::geometry::Ray;
 use crate::illumination::{self, IlluminationMap, Side};
 use crate::light_pass::explain::{Explanation, LightPath, Limits, Target, explain};
@@ -210,23 +212,21 @@ fn scale_w_m2(maps: &[IlluminationMap], target: &Target, texel: &ProbedTexel) ->
 /// The point that is asked about, and what is known of it.
 #[derive(Debug)]
 pub struct Prober {
-    wake: Wake,
     gaze: Option<Ray>,
     /// Whether the gaze is still to be followed.
     is_due: bool,
     shown: Option<Probed>,
-    coming: Option<Background<Explanation>>,
+    coming: Background<(), Explanation>,
 }
 
 impl Prober {
     /// Asks nothing yet; `wake` is called from another thread when there is something.
     pub fn new(wake: Arc<dyn Fn() + Send + Sync>) -> Self {
         Self {
-            wake: Wake(wake),
             gaze: None,
             is_due: false,
             shown: None,
-            coming: None,
+            coming: Background::new("probe", wake),
         }
     }
 
@@ -234,7 +234,7 @@ impl Prober {
     pub fn ask(&mut self, gaze: Option<Ray>) {
         self.gaze = gaze;
         self.is_due = gaze.is_some();
-        self.coming = None;
+        self.coming.stop();
         self.shown = None;
     }
 
@@ -259,7 +259,7 @@ impl Prober {
             return;
         };
         self.is_due = false;
-        self.coming = None;
+        self.coming.stop();
         self.shown = None;
         let Some(seen) = seen(tracer, &gaze) else { return };
         let (probed, target) = read(tracer, maps, &seen);
@@ -267,21 +267,63 @@ impl Prober {
             let scale = scale_w_m2(maps, &target, texel);
             let tracer = Arc::clone(tracer);
             let search = move |control: &Control| explain(&tracer, &target, limits, scale, control);
-            self.coming = Background::start("probe", &self.wake, search).ok();
+            if let Err(error) = self.coming.start((), search) {
+                log::warn!("{error}");
+            }
         }
         self.shown = Some(probed);
     }
 
     /// Looks whether the paths were found since the last time.
     pub fn poll(&mut self) -> bool {
-        let Some(outcome) = self.coming.as_ref().and_then(Background::poll) else {
+        let Some(((), outcome)) = self.coming.take() else {
             return false;
         };
-        self.coming = None;
         let is_found = outcome.is_some();
         if let Some(shown) = &mut self.shown {
             shown.explanation = outcome.or_else(|| shown.explanation.take());
         }
         is_found
+    }
+}
+
+/// Paths that are drawn: the strongest.
+const MOST_PATHS: usize = 24;
+const CAUSTIC: Color32 = Color32::from_rgb(255, 196, 64);
+const DIRECT: Color32 = Color32::from_rgb(120, 190, 255);
+const POINT: Color32 = Color32::from_rgb(255, 80, 80);
+
+/// Draws the paths over a picture as the camera sees them: the wider, the larger their share.
+pub fn draw(painter: &Painter, lens: &Lens<'_>, probed: &Probed) {
+    let painter = painter.with_clip_rect(lens.picture);
+    let paths = probed.explanation.iter().flat_map(|told| &told.paths);
+    for path in paths.take(MOST_PATHS) {
+        let share = probed.share(path) as f32;
+        let colour = if path.vertices.is_empty() { DIRECT } else { CAUSTIC };
+        let stroke = Stroke::new(1.2 + 2.5 * share.clamp(0.0, 1.0), colour.gamma_multiply(0.9));
+        let corners = path.vertices.iter().map(|vertex| vertex.point);
+        let mut from = path.start;
+        for to in corners.chain([path.end]) {
+            if let Some(ends) = lens.line(from, to) {
+                painter.line_segment(ends, stroke);
+            }
+            from = to;
+        }
+        for vertex in &path.vertices {
+            if lens.is_before(vertex.point) {
+                painter.circle_filled(lens.place(vertex.point), 3.0, colour);
+            }
+        }
+        if lens.is_before(path.start) {
+            painter.circle_stroke(lens.place(path.start), 5.0, Stroke::new(1.5, colour));
+        }
+    }
+    if lens.is_before(probed.point) {
+        let at = lens.place(probed.point);
+        for (x, y) in [(6.0, 0.0), (0.0, 6.0)] {
+            let ends = [pos2(at.x - x, at.y - y), pos2(at.x + x, at.y + y)];
+            painter.line_segment(ends, Stroke::new(2.0, POINT));
+        }
+        painter.circle_stroke(at, 5.0, Stroke::new(1.5, POINT));
     }
 }

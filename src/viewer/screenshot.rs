@@ -2,14 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::error::{Error, Result};
+use super::files::free_names;
+use crate::error::Result;
 use crate::export::picture::{display_png, radiance_exr};
 use crate::eye_pass::{Picture, View};
 use crate::files;
 use crate::optics::spectrum::xyz::Matrix3;
-
-/// Numbers that are tried before the folder counts as full.
-const NUMBERS: std::ops::RangeInclusive<u32> = 1..=9999;
 
 /// Writes `nephroid-SCENE-NNNN.png`, `picture` as `view` shows it in this white balance, and with `has_radiance` `.exr`, its radiance
 /// [W/(m² sr)]. The number is the first of which the folder holds neither. Returns what was written.
@@ -24,7 +22,9 @@ pub fn save(
     white_balance: &Matrix3,
     has_radiance: bool,
 ) -> Result<Vec<PathBuf>> {
-    let [png, exr] = free_names(folder, scene)?;
+    let stem = format!("nephroid-{}", files::slug(scene, "scene"));
+    let names = |number: &str| ["png", "exr"].map(|extension| format!("{stem}-{number}.{extension}"));
+    let [png, exr] = free_names(folder, names)?;
     let location = png.display().to_string();
     let shown = display_png(
         picture,
@@ -45,20 +45,6 @@ pub fn save(
         return Err(error);
     }
     Ok(vec![png, exr])
-}
-
-fn free_names(folder: &Path, scene: &str) -> Result<[PathBuf; 2]> {
-    let stem = format!("nephroid-{}", files::slug(scene, "scene"));
-    let names =
-        |number: u32| ["png", "exr"].map(|extension| folder.join(format!("{stem}-{number:04}.{extension}")));
-    let is_free = |names: &[PathBuf; 2]| !names.iter().any(|name| name.exists());
-    NUMBERS.map(names).find(is_free).ok_or_else(|| {
-        Error::failure(
-            folder.display().to_string(),
-            format!("it holds {} pictures of this scene", NUMBERS.end()),
-            "move some of them elsewhere",
-        )
-    })
 }
 
 /// What is told of files that were written.

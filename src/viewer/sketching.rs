@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use egui::{Color32, Painter, Stroke};
 
-use super::background::{Background, Wake};
+use super::background::Background;
 use super::lens::Lens;
 use crate::light_pass::sketch::{Sketch, SketchLimits, sketch};
 use crate::progress::Control;
@@ -34,19 +34,17 @@ impl Sketched {
 /// Finds it, and keeps what it found.
 #[derive(Debug)]
 pub struct Sketcher {
-    wake: Wake,
     /// Of these surfaces.
     shown: Option<(Arc<Tracer>, SketchLimits, Arc<Sketch>)>,
-    coming: Option<(Arc<Tracer>, SketchLimits, Background<Sketch>)>,
+    coming: Background<(Arc<Tracer>, SketchLimits), Sketch>,
 }
 
 impl Sketcher {
     /// Nothing yet; `wake` is called from another thread when there is something.
     pub fn new(wake: Arc<dyn Fn() + Send + Sync>) -> Self {
         Self {
-            wake: Wake(wake),
             shown: None,
-            coming: None,
+            coming: Background::new("sketch", wake),
         }
     }
 
@@ -57,25 +55,21 @@ impl Sketcher {
 
     /// Nothing is drawn any more.
     pub fn forget(&mut self) {
-        (self.shown, self.coming) = (None, None);
+        self.shown = None;
+        self.coming.stop();
     }
 
     /// Keeps what is shown that of these surfaces; tells whether something new was found. While a search goes on, surfaces
     /// that come after its own wait.
     pub fn follow(&mut self, tracer: &Arc<Tracer>, limits: SketchLimits) -> bool {
-        let mut is_new = false;
-        if let Some((of, with, coming)) = &self.coming
-            && let Some(outcome) = coming.poll()
-        {
-            is_new = outcome.is_some();
-            if let Some(sketch) = outcome {
-                self.shown = Some((Arc::clone(of), *with, Arc::new(sketch)));
-            }
-            self.coming = None;
+        let found = self.coming.take();
+        let is_new = matches!(found, Some((_, Some(_))));
+        if let Some(((of, with), Some(sketch))) = found {
+            self.shown = Some((of, with, Arc::new(sketch)));
         }
         let is_of_these =
             |(of, with, _): &(Arc<Tracer>, SketchLimits, _)| Arc::ptr_eq(of, tracer) && *with == limits;
-        if self.coming.is_none() && !self.shown.as_ref().is_some_and(is_of_these) {
+        if self.coming.of().is_none() && !self.shown.as_ref().is_some_and(is_of_these) {
             self.start(tracer, limits);
         }
         is_new
@@ -84,8 +78,9 @@ impl Sketcher {
     fn start(&mut self, tracer: &Arc<Tracer>, limits: SketchLimits) {
         let of = Arc::clone(tracer);
         let search = move |control: &Control| sketch(&of, limits, control);
-        let started = Background::start("sketch", &self.wake, search);
-        self.coming = started.ok().map(|coming| (Arc::clone(tracer), limits, coming));
+        if let Err(error) = self.coming.start((Arc::clone(tracer), limits), search) {
+            log::warn!("{error}");
+        }
     }
 }
 

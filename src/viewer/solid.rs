@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::background::{Background, Wake};
+use super::background::Background;
 use crate::geometry::Ray;
 use crate::progress::Control;
 use crate::scene::Scene;
@@ -31,37 +31,30 @@ impl Solid for Tracer {
 /// The surfaces of the scene in the window, once somebody asks for them.
 #[derive(Debug)]
 pub struct Surroundings {
-    wake: Wake,
     found: Option<(Arc<Scene>, Arc<Tracer>)>,
-    coming: Option<(Arc<Scene>, Background<Tracer>)>,
+    coming: Background<Arc<Scene>, Tracer>,
 }
 
 impl Surroundings {
     /// Nothing yet; `wake` is called from another thread when there is something.
     pub fn new(wake: Arc<dyn Fn() + Send + Sync>) -> Self {
         Self {
-            wake: Wake(wake),
             found: None,
-            coming: None,
+            coming: Background::new("surroundings", wake),
         }
     }
 
     /// The surfaces of a scene; `None` until they are found, and where the system gives no thread to find them on.
     pub fn of(&mut self, scene: &Arc<Scene>) -> Option<Arc<Tracer>> {
-        if let Some((of, coming)) = &self.coming
-            && let Some(outcome) = coming.poll()
-        {
-            if let Some(tracer) = outcome {
-                self.found = Some((Arc::clone(of), Arc::new(tracer)));
-            }
-            self.coming = None;
+        if let Some((of, Some(tracer))) = self.coming.take() {
+            self.found = Some((of, Arc::new(tracer)));
         }
         if let Some((of, tracer)) = &self.found
             && Arc::ptr_eq(of, scene)
         {
             return Some(Arc::clone(tracer));
         }
-        if self.coming.is_none() {
+        if self.coming.of().is_none() {
             self.start(scene);
         }
         None
@@ -74,8 +67,9 @@ impl Surroundings {
             Some(before) => before.edited(of),
             None => Tracer::new(of),
         };
-        let started = Background::start("surroundings", &self.wake, search);
-        self.coming = started.ok().map(|coming| (Arc::clone(scene), coming));
+        if let Err(error) = self.coming.start(Arc::clone(scene), search) {
+            log::warn!("{error}");
+        }
     }
 }
 

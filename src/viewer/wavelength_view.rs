@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::illumination::{IlluminationMap, Layer};
+use crate::illumination::IlluminationMap;
 use crate::optics::spectrum::xyz::to_display_gamut;
 use crate::optics::spectrum::{Hue, Xyz, dominant, xyz_bar};
 use crate::optics::{LinearSrgb, Nanometres};
@@ -45,14 +45,12 @@ pub fn maps(maps: &[IlluminationMap]) -> Vec<IlluminationMap> {
         };
         colour.to_array().map(|channel| channel as f32)
     };
-    let coloured = |(map, total): (&IlluminationMap, &Vec<[f32; 3]>)| IlluminationMap {
-        chart: Arc::clone(&map.chart),
-        layers: vec![Layer {
-            kind: LayerKind::Caustic,
-            irradiance: total.iter().map(shown).collect(),
-        }],
-        error: None,
-        estimated_relative_rmse: None,
+    let coloured = |(map, total): (&IlluminationMap, &Vec<[f32; 3]>)| {
+        IlluminationMap::of_layer(
+            Arc::clone(&map.chart),
+            LayerKind::Caustic,
+            total.iter().map(shown).collect(),
+        )
     };
     maps.iter().zip(&totals).map(coloured).collect()
 }

@@ -1,12 +1,11 @@
 //! Maps as sRGB-encoded images.
 
-use std::io::Cursor;
-
 use glam::DVec2;
 
 use super::{Bits, Carrier, GlbOptions};
 use crate::error::{Error, Result};
-use crate::export::{Quantity, white::white};
+use crate::export::quantity::{Quantity, white};
+use crate::files;
 use crate::illumination::{Chart, IlluminationMap};
 use crate::optics::LinearSrgb;
 use crate::scene::{Scene, TextureRef};
@@ -151,12 +150,12 @@ pub fn encode(
         .map(|light| light.to_array().map(|value| (value / white).clamp(0.0, 1.0)))
         .collect();
     let bytes = match options.bits {
-        Bits::Eight => png::<u8>(diffused(&relative, width), (width, height), name)?,
+        Bits::Eight => png::<image::Rgb<u8>>(diffused(&relative, width), (width, height), name)?,
         Bits::Sixteen => {
             let code =
                 |value: &f64| (LinearSrgb::encode_channel(*value) * f64::from(u16::MAX)).round() as u16;
             let codes = relative.as_flattened().iter().map(code).collect();
-            png::<u16>(codes, (width, height), name)?
+            png::<image::Rgb<u16>>(codes, (width, height), name)?
         }
     };
     Ok(LightImage {
@@ -168,22 +167,15 @@ pub fn encode(
     })
 }
 
-fn png<T>(codes: Vec<T>, (width, height): (usize, usize), name: &str) -> Result<Vec<u8>>
+fn png<P>(codes: Vec<P::Subpixel>, (width, height): (usize, usize), name: &str) -> Result<Vec<u8>>
 where
-    image::Rgb<T>: image::PixelWithColorType<Subpixel = T>,
-    T: image::Primitive,
-    [T]: image::EncodableLayout,
+    P: image::PixelWithColorType,
+    [P::Subpixel]: image::EncodableLayout,
 {
-    let unusable = |why: String| {
+    files::png::<P>(width as u32, height as u32, codes).map_err(|why| {
         let what = format!("its map cannot be written ({why})");
         Error::failure(format!("surface `{name}`"), what, "bake smaller maps")
-    };
-    let image = image::ImageBuffer::<image::Rgb<T>, _>::from_raw(width as u32, height as u32, codes);
-    let image = image.ok_or_else(|| unusable(format!("{width}x{height} is not its size")))?;
-    let mut bytes = Cursor::new(Vec::new());
-    let written = image.write_to(&mut bytes, image::ImageFormat::Png);
-    written.map_err(|error| unusable(error.to_string()))?;
-    Ok(bytes.into_inner())
+    })
 }
 
 /// Codes of eight bits for values in [0, 1], row by row. What a code is off is made up for by those beside and below

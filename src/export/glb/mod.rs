@@ -2,11 +2,6 @@
 //! the maps as images, for programs that know light maps (MOZ_lightmap), for those that know none (emissive), and for
 //! those that shall not light at all (unlit).
 
-mod geometry;
-mod images;
-mod lights;
-mod materials;
-
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
@@ -18,6 +13,9 @@ use crate::error::{Error, Result, Warning};
 use crate::illumination::{IlluminationMap, Side};
 use crate::scene::{Glb, Opened, Scene};
 use crate::settings::LayerKind;
+
+mod geometry;
+mod images;
 
 /// How materials carry the light.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -147,7 +145,7 @@ pub fn encode(
         report.maps.push(exported);
     }
     if options.lights == SceneLights::Remove {
-        lights::remove(&mut glb.json);
+        remove(&mut glb.json);
     }
     glb.json["asset"]["extras"]["nephroid"] = json!({
         "unit": report.unit,
@@ -225,13 +223,13 @@ fn add_map(
         json!({ "magFilter": 9729, "minFilter": 9729, "wrapS": 33071, "wrapT": 33071 }),
     );
     let texture = glb.push("textures", json!({ "source": image_index, "sampler": sampler }));
-    let carried = materials::Carried {
+    let carried = Carried {
         texture: json!({ "index": texture, "texCoord": coordinates.tex_coord }),
         intensity: image.white,
         options,
     };
     let path = (object.node, object.primitive);
-    materials::give(glb, path, &carried);
+    give(glb, path, &carried);
     Ok(ExportedMap {
         surface: object.name.clone(),
         node: object.node,
@@ -272,4 +270,88 @@ impl Glb {
         let mesh = self.json["nodes"][node]["mesh"].as_u64().unwrap_or(0);
         &mut self.json["meshes"][mesh as usize]["primitives"][primitive]
     }
+}
+
+const LISTS: [&str; 2] = ["KHR_lights_punctual", "EXT_lights_area"];
+
+/// Removes every light that stands at a node, and their lists. What glows stays: it is seen.
+pub fn remove(document: &mut Value) {
+    for node in document["nodes"].as_array_mut().into_iter().flatten() {
+        remove_extensions(node);
+    }
+    remove_extensions(document);
+    for list in ["extensionsUsed", "extensionsRequired"] {
+        if let Some(names) = document[list].as_array_mut() {
+            names.retain(|name| !LISTS.iter().any(|list| name == list));
+        }
+        if document[list].as_array().is_none_or(Vec::is_empty)
+            && let Some(fields) = document.as_object_mut()
+        {
+            fields.remove(list);
+        }
+    }
+}
+
+fn remove_extensions(owner: &mut Value) {
+    let Some(fields) = owner.as_object_mut() else {
+        return;
+    };
+    if let Some(extensions) = fields.get_mut("extensions").and_then(Value::as_object_mut) {
+        for list in LISTS {
+            extensions.remove(list);
+        }
+        if extensions.is_empty() {
+            fields.remove("extensions");
+        }
+    }
+}
+
+const LIGHT_MAP: &str = "MOZ_lightmap";
+const STRENGTH: &str = "KHR_materials_emissive_strength";
+const UNLIT: &str = "KHR_materials_unlit";
+
+/// What a material is given.
+pub struct Carried {
+    /// Reference to the texture of the light.
+    pub texture: Value,
+    /// The value of its white, in the export's unit.
+    pub intensity: f64,
+    /// How it is carried.
+    pub options: GlbOptions,
+}
+
+/// Gives a primitive a material of its own that carries a map. Colours and textures of the one that it had stay.
+pub fn give(glb: &mut Glb, place: (usize, usize), carried: &Carried) {
+    let index = glb.primitive(place)["material"].as_u64();
+    let mut material = index.map_or(json!({}), |index| glb.json["materials"][index as usize].clone());
+    if let Some(name) = material["name"].as_str() {
+        material["name"] = json!(format!("{name}, lit"));
+    }
+    match carried.options.carrier {
+        Carrier::LightMap => {
+            let mut light = carried.texture.clone();
+            light["intensity"] = json!(carried.intensity);
+            material["extensions"][LIGHT_MAP] = light;
+            glb.use_extension(LIGHT_MAP);
+        }
+        Carrier::Emissive => {
+            material["emissiveTexture"] = carried.texture.clone();
+            material["emissiveFactor"] = json!([1.0, 1.0, 1.0]);
+            material["extensions"][STRENGTH] = json!({ "emissiveStrength": carried.intensity });
+            glb.use_extension(STRENGTH);
+            if carried.options.lights == SceneLights::Remove {
+                // Any light that a program adds would be light twice.
+                material["pbrMetallicRoughness"] = json!({ "baseColorFactor": [0.0, 0.0, 0.0, 1.0],
+                    "metallicFactor": 0.0, "roughnessFactor": 1.0 });
+            }
+        }
+        Carrier::Unlit => {
+            material["pbrMetallicRoughness"] = json!({ "baseColorTexture": carried.texture,
+                "metallicFactor": 0.0, "roughnessFactor": 1.0 });
+            material["extensions"] = json!({ UNLIT: {} });
+            glb.use_extension(UNLIT);
+        }
+    }
+    let material = glb.push("materials", material);
+    glb.primitive(place)["material"] = json!(material);
 }

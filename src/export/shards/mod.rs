@@ -5,11 +5,10 @@
 //! [bytes] (64 bits each); a hash of all that (64 bits); then the sums of one pass after the other, each a Zstandard frame
 //! with a checksum.
 
-mod folder;
 mod manifest;
 mod set;
 mod sums_file;
 
-pub use folder::ShardFolder;
 pub use manifest::{SceneOrigin, ShardManifest};
+pub use set::ShardFolder;
 pub use set::ShardSet;

@@ -1,7 +1,7 @@
 //! The values of a texture, before they are encoded.
 
 use super::index::Rectangle;
-use crate::export::map_rows::shares;
+use crate::export::exr::shares;
 use crate::export::{FloatImage, exr};
 use crate::illumination::Chart;
 use crate::illumination::gutter::{GUTTER_REACH_TEXELS, neighbours};

@@ -2,7 +2,6 @@
 //! Chains are one path in RGB until they meet glass that parts wavelengths, and from there one for each of several.
 
 mod radiance;
-mod spectral;
 
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -16,8 +15,8 @@ use crate::optics::LinearSrgb;
 use crate::progress::{Control, Progress, Stage};
 use crate::scene::Camera;
 use crate::transport::{MediumStack, Tracer, media_at};
+use radiance::SpectralScene;
 use radiance::{LitScene, visible_hit};
-use spectral::SpectralScene;
 
 pub use radiance::{ChainLimits, EyeRays};
 

@@ -1,8 +1,7 @@
 //! The mean of several pictures of the same view: edges of what is seen in mirrors and through glass become as smooth
 //! as all others.
 
-use super::bindings::{bind_group, bind_group_layout, texture, uniform};
-use super::cover;
+use super::bindings::{bind_group, bind_group_layout, cover_pipeline, texture, uniform};
 use super::shaders::ACCUMULATED;
 use super::uniforms::Accumulation;
 use crate::gpu::Gpu;
@@ -54,7 +53,7 @@ impl Mean {
             views: [0, 1].map(|index: usize| pictures[index].create_view(&Default::default())),
             pictures,
             count: 0,
-            pipeline: cover::pipeline(
+            pipeline: cover_pipeline(
                 gpu,
                 &ACCUMULATED.module(&gpu.device),
                 &layout,

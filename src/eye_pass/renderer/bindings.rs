@@ -1,5 +1,7 @@
 //! Bind groups, numbered in order.
 
+use bytemuck::Pod;
+
 use crate::gpu::Gpu;
 
 /// A binding's type with the stages that see it.
@@ -76,5 +78,89 @@ pub(super) fn bind_group<const N: usize>(
         label: Some(label),
         layout,
         entries: &entries,
+    })
+}
+
+/// A pipeline whose fragment stage `entry_point` fills targets of a format; its module has `shared/cover`.
+pub(super) fn cover_pipeline(
+    gpu: &Gpu,
+    module: &wgpu::ShaderModule,
+    layout: &wgpu::BindGroupLayout,
+    entry_point: &str,
+    constants: &[(&str, f64)],
+    target: wgpu::TextureFormat,
+) -> wgpu::RenderPipeline {
+    gpu.device
+        .create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+            label: Some(entry_point),
+            layout: Some(&pipeline_layout(gpu, &[layout])),
+            vertex: wgpu::VertexState {
+                module,
+                entry_point: Some("cover"),
+                compilation_options: Default::default(),
+                buffers: &[],
+            },
+            primitive: Default::default(),
+            depth_stencil: None,
+            multisample: Default::default(),
+            fragment: Some(wgpu::FragmentState {
+                module,
+                entry_point: Some(entry_point),
+                compilation_options: wgpu::PipelineCompilationOptions {
+                    constants,
+                    ..Default::default()
+                },
+                targets: &[Some(target.into())],
+            }),
+            multiview_mask: None,
+            cache: None,
+        })
+}
+
+/// A buffer that shaders read, with a copy of what it holds.
+#[derive(Debug)]
+pub(super) struct Storage {
+    label: &'static str,
+    buffer: wgpu::Buffer,
+    written: Vec<u8>,
+}
+
+/// Buffers have some size even without content [bytes].
+const LEAST_BYTES: u64 = 256;
+
+impl Storage {
+    pub(super) fn new(gpu: &Gpu, label: &'static str) -> Self {
+        Self {
+            label,
+            buffer: buffer(gpu, label, LEAST_BYTES),
+            written: Vec::new(),
+        }
+    }
+
+    /// Holds these items; sends them where they differ from what it held, and tells how many bytes that took.
+    pub(super) fn write<T: Pod>(&mut self, gpu: &Gpu, items: &[T]) -> usize {
+        let bytes: &[u8] = bytemuck::cast_slice(items);
+        if bytes == self.written {
+            return 0;
+        }
+        if bytes.len() as u64 > self.buffer.size() {
+            self.buffer = buffer(gpu, self.label, (bytes.len() as u64).next_power_of_two());
+        }
+        gpu.queue.write_buffer(&self.buffer, 0, bytes);
+        self.written = bytes.to_vec();
+        bytes.len()
+    }
+
+    pub(super) fn binding(&self) -> wgpu::BindingResource<'_> {
+        self.buffer.as_entire_binding()
+    }
+}
+
+fn buffer(gpu: &Gpu, label: &str, size: u64) -> wgpu::Buffer {
+    gpu.device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some(label),
+        size,
+        usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
+        mapped_at_creation: false,
     })
 }

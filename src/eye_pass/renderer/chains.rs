@@ -5,10 +5,10 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
+use super::bindings::Storage;
 use super::bindings::bind_group;
 use super::geometry::Geometry;
 use super::objects::absorption_per_m;
-use super::storage::Storage;
 use super::uniforms::{ChainStart, LightRecord, Node, SeenWavelengths, Triangle, rgb};
 use crate::error::{Error, Result};
 use crate::eye_pass::View;

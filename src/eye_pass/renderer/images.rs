@@ -2,13 +2,12 @@
 
 use std::sync::Arc;
 
-use super::budget;
+use super::bindings::Storage;
 use super::maps::{DeviceMap, ShownMap};
-use super::paging::{PagedImage, TilePool, Uploaded};
-use super::storage::Storage;
-use super::textures;
+use super::paging::{Level, PagedImage, TILE, Texels, TilePool, Uploaded, is_halved};
 use crate::gpu::Gpu;
 use crate::illumination::Receiver;
+use crate::optics::LinearSrgb;
 use crate::scene::{Material, Scene, Texture};
 
 /// What an object refers to in place of an image that it does not have; `NO_IMAGE` in the shaders.
@@ -27,7 +26,7 @@ pub(super) struct Images {
     maps: Vec<Option<DeviceMap>>,
     /// As `textures` hold them.
     sources: Vec<Arc<Texture>>,
-    textures: Vec<PagedImage<textures::Texel>>,
+    textures: Vec<PagedImage<Texel>>,
     /// What bends normals, by object: the image of normals, if there is one, and the words that follow it.
     bumps: Vec<Option<(Option<usize>, Vec<u32>)>>,
     /// Records of images and where their tiles are, and of what bends normals.
@@ -82,7 +81,7 @@ impl Images {
             self.sources.clone_from(&scene.textures);
             self.textures.clear();
             for texture in &self.sources {
-                let (image, bytes) = textures::upload(gpu, &mut self.texture_pool, texture);
+                let (image, bytes) = upload(gpu, &mut self.texture_pool, texture);
                 self.textures.push(image);
                 uploaded += bytes;
             }
@@ -107,7 +106,7 @@ impl Images {
                     }
                     // A map beyond the budget starts with its coarsest level.
                     let finest = shown.map(|shown| {
-                        let tiles = budget::tiles_of(shown.chart.width, shown.chart.height);
+                        let tiles = tiles_of(shown.chart.width, shown.chart.height);
                         if tiles * MAP_TILE_BYTES > self.budget_bytes {
                             usize::MAX
                         } else {
@@ -137,13 +136,13 @@ impl Images {
             .enumerate()
             .filter_map(|(object, map)| Some((object, map.as_ref()?)))
             .collect();
-        let costs = maps.iter().map(|(object, map)| budget::Cost {
+        let costs = maps.iter().map(|(object, map)| Cost {
             need: needs.get(*object).copied().unwrap_or(f64::INFINITY),
             tiles: (0..map.image.level_count())
                 .map(|level| map.image.tiles_of_level(level))
                 .collect(),
         });
-        let finest = budget::finest_levels(&costs.collect::<Vec<_>>(), self.budget_bytes / MAP_TILE_BYTES);
+        let finest = finest_levels(&costs.collect::<Vec<_>>(), self.budget_bytes / MAP_TILE_BYTES);
         let wanted: Vec<(usize, usize)> = maps.iter().map(|(object, _)| *object).zip(finest).collect();
         let mut uploaded = Uploaded::default();
         // What goes makes room for what comes.
@@ -164,7 +163,7 @@ impl Images {
     pub(super) fn may_exceed_budget(&self) -> bool {
         let tiles = self.maps.iter().flatten().map(|map| {
             let [width, height] = map.image.size();
-            budget::tiles_of(width, height)
+            tiles_of(width, height)
         });
         tiles.sum::<u64>() * MAP_TILE_BYTES > self.budget_bytes
     }
@@ -258,4 +257,106 @@ fn bumps(material: &Material) -> Option<(Option<usize>, Vec<u32>)> {
         words.extend(numbers.map(|number| (number as f32).to_bits()));
     }
     Some((map.map(|map| map.image.texture), words))
+}
+
+/// What a map would take.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Cost {
+    /// The finest level that can be told from coarser ones where it is seen nearest; negative where even the finest is
+    /// seen coarsely.
+    pub(super) need: f64,
+    /// Tiles of each level, from fine to coarse.
+    pub(super) tiles: Vec<u64>,
+}
+
+/// Upper bound on the tiles of a map with all its coarser levels.
+pub(super) fn tiles_of(width: usize, height: usize) -> u64 {
+    let (mut width, mut height, mut tiles) = (width, height, 0);
+    loop {
+        tiles += (width.div_ceil(TILE) * height.div_ceil(TILE)) as u64;
+        if !is_halved([width, height]) {
+            return tiles;
+        }
+        (width, height) = (width.div_ceil(2), height.div_ceil(2));
+    }
+}
+
+/// The finest level to be held of each map, so that together they take no more than `budget` tiles where the coarsest
+/// levels alone do: as long as they take more, the map whose finest level is needed least loses it.
+pub(super) fn finest_levels(costs: &[Cost], budget: u64) -> Vec<usize> {
+    let mut finest = vec![0; costs.len()];
+    let mut total: u64 = costs.iter().flat_map(|cost| &cost.tiles).sum();
+    while total > budget {
+        // Positive where the finest level held is finer than needed.
+        let spare = |index: usize| costs[index].need - finest[index] as f64;
+        let can_lose = |index: &usize| finest[*index] + 1 < costs[*index].tiles.len();
+        let candidates = (0..costs.len()).filter(can_lose);
+        let Some(least) = candidates.max_by(|a, b| spare(*a).total_cmp(&spare(*b)).then(b.cmp(a))) else {
+            break;
+        };
+        total -= costs[least].tiles[finest[least]];
+        finest[least] += 1;
+    }
+    finest
+}
+
+/// An sRGB-encoded texel.
+pub(super) type Texel = [u8; 4];
+
+/// Uploads an image with its coarser levels.
+pub(super) fn upload(gpu: &Gpu, pool: &mut TilePool, texture: &Texture) -> (PagedImage<Texel>, Uploaded) {
+    let (image, uploaded) = PagedImage::new(gpu, pool, mip_chain(texture), texture.wrap, 0);
+    (image, Uploaded::other(uploaded.tile_bytes as usize))
+}
+
+/// Texels across and down, and row by row.
+type Image = ([usize; 2], Vec<Texel>);
+
+/// The image and its halvings down to a few texels.
+fn mip_chain(texture: &Texture) -> Vec<Level<Texel>> {
+    let size = [texture.width as usize, texture.height as usize];
+    let mut images: Vec<Image> = vec![(size, texture.rgba.clone())];
+    while let Some(last) = images.last().filter(|(size, _)| is_halved(*size)) {
+        images.push(halved(last));
+    }
+    let level = |(size, texels): Image| Level {
+        size,
+        extent: size.map(|side| side as f32),
+        texels: Texels::Rows(texels),
+    };
+    images.into_iter().map(level).collect()
+}
+
+/// Means of 2×2 texels in linear light; an odd last row or column is left out of its neighbour's mean.
+fn halved((fine_size, fine): &Image) -> Image {
+    let [fine_width, fine_height] = *fine_size;
+    let (width, height) = ((fine_width / 2).max(1), (fine_height / 2).max(1));
+    let linear: Vec<f32> = (0..=u8::MAX)
+        .map(|code| LinearSrgb::decode_channel(code) as f32)
+        .collect();
+    let texel = |x: usize, y: usize| {
+        let (x, y) = (x.min(fine_width - 1), y.min(fine_height - 1));
+        fine[y * fine_width + x]
+    };
+    let mean = |x: usize, y: usize| {
+        let four = [
+            texel(2 * x, 2 * y),
+            texel(2 * x + 1, 2 * y),
+            texel(2 * x, 2 * y + 1),
+            texel(2 * x + 1, 2 * y + 1),
+        ];
+        std::array::from_fn(|channel| {
+            let codes = four.map(|texel| texel[channel]);
+            if channel == 3 {
+                return (codes.iter().map(|code| u32::from(*code)).sum::<u32>() / 4) as u8;
+            }
+            let light = codes.iter().map(|code| linear[usize::from(*code)]).sum::<f32>() / 4.0;
+            (LinearSrgb::encode_channel(f64::from(light)) * 255.0).round() as u8
+        })
+    };
+    let texels = (0..height)
+        .flat_map(|y| (0..width).map(move |x| (x, y)))
+        .map(|(x, y)| mean(x, y))
+        .collect();
+    ([width, height], texels)
 }

@@ -3,8 +3,8 @@
 use half::f16;
 
 use super::accumulation::Mean;
+use super::draws::Sample;
 use super::draws::visible_objects;
-use super::quality::Sample;
 use super::{EyeCounts, EyeQuality, MapStyle, Renderer};
 use crate::effect::{Effect, EffectSwitches};
 use crate::error::Result;

@@ -1,11 +1,12 @@
 //! The passes of one picture: what is traced, then all surfaces.
 
+use glam::{DMat4, DVec3, DVec4};
+
 use super::bindings::bind_group;
-use super::camera;
 use super::chains::ChainScene;
 use super::draws::{Draw, DrawList, Manner, visible_objects};
+use super::draws::{EyeQuality, Sample};
 use super::pipelines::Writes;
-use super::quality::{EyeQuality, Sample};
 use super::sky::Sky;
 use super::targets::{Targets, TracedTargets};
 use super::timing::Timing;
@@ -13,9 +14,8 @@ use super::uniforms::{Frame, SeenWavelengths, rgb};
 use super::{MapStyle, Renderer};
 use crate::effect::EffectSwitch;
 use crate::error::Result;
-use crate::eye_pass::View;
 use crate::eye_pass::reference::ChainLimits;
-use crate::eye_pass::wavelengths;
+use crate::eye_pass::{View, wavelengths};
 use crate::gpu::Gpu;
 use crate::optics::LinearSrgb;
 
@@ -260,16 +260,16 @@ impl Renderer {
             FINEST
         };
         Frame {
-            clip_from_camera: camera::clip_from_camera(view),
-            camera_position: camera::single(camera.position),
+            clip_from_camera: clip_from_camera(view),
+            camera_position: single(camera.position),
             radiance_scale: radiance_scale as f32,
             background: rgb(self.background(view)),
             level_bias: level_bias as f32,
-            forward: camera::single(camera.forward),
+            forward: single(camera.forward),
             traced_width: traced[0] as f32,
-            right: camera::single(camera.right() * (half_height * size[0] / size[1])),
+            right: single(camera.right() * (half_height * size[0] / size[1])),
             traced_height: traced_height as f32,
-            up: camera::single(camera.up * half_height),
+            up: single(camera.up * half_height),
             pixel_rad: (2.0 * half_height / traced_height) as f32,
             jitter: jitter(view, sample.offset),
             traced_per_pixel: traced_per_pixel.map(|ratio| ratio as f32),
@@ -336,4 +336,29 @@ impl Renderer {
 fn jitter(view: &View, [right, down]: [f64; 2]) -> [f32; 2] {
     let half = |pixels: f64, size: u32| (2.0 * pixels / f64::from(size)) as f32;
     [half(right, view.width), -half(down, view.height)]
+}
+
+/// Clip from world axes with the camera at the origin: perspective with depth near/distance, so that it is 1 at the
+/// near plane, 0 infinitely far, and floats resolve all distances alike.
+pub(super) fn clip_from_camera(view: &View) -> [[f32; 4]; 4] {
+    let camera = &view.camera;
+    let aspect = f64::from(view.width) / f64::from(view.height);
+    let focal = 1.0 / (0.5 * camera.vertical_fov_rad).tan();
+    let x = camera.right() * (focal / aspect);
+    let y = camera.up * focal;
+    let rows = [
+        x.extend(0.0),
+        y.extend(0.0),
+        DVec4::new(0.0, 0.0, 0.0, camera.near_m),
+        camera.forward.extend(0.0),
+    ];
+    DMat4::from_cols_array_2d(&rows.map(|row| row.to_array()))
+        .transpose()
+        .as_mat4()
+        .to_cols_array_2d()
+}
+
+/// A point in single precision [m].
+pub(super) fn single(point: DVec3) -> [f32; 3] {
+    point.as_vec3().to_array()
 }

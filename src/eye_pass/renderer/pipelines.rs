@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use super::bindings::{bind_group_layout, pipeline_layout, storage, texture, uniform};
 use super::geometry::{CORNER_LAYOUT, MAP_UV_LAYOUT};
-use super::inspection::Inspected;
+use super::objects::Inspected;
 use super::objects::surface_code;
 use super::shaders::{
     COMPOSED, INSPECTED, PARTED, PARTED_UNDER_SKY, SURFACE, TRACED, TRACED_UNDER_SKY, UNDER_LIGHTS,

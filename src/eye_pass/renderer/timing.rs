@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, Ordering};
 
 use super::EyeQuality;
-use super::counts::GpuMs;
+use super::draws::GpuMs;
 use crate::gpu::Gpu;
 
 /// Marks of each pass: where it begins and where it ends.

@@ -2,8 +2,7 @@
 
 use std::collections::HashMap;
 
-use super::bindings::{bind_group, bind_group_layout, texture, uniform};
-use super::cover;
+use super::bindings::{bind_group, bind_group_layout, cover_pipeline, texture, uniform};
 use super::shaders::TONE_MAPPING;
 use super::uniforms::DisplayWhite;
 use crate::eye_pass::ToneMap;
@@ -65,7 +64,7 @@ impl ToneMappingPipelines {
     ) {
         if !self.made.contains_key(&tone_map) {
             let constants = constants(tone_map, !self.target.is_srgb());
-            let pipeline = cover::pipeline(
+            let pipeline = cover_pipeline(
                 gpu,
                 &self.module,
                 &self.layout,

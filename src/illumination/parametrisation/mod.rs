@@ -2,7 +2,6 @@
 
 pub mod coverage;
 mod given;
-mod overlap;
 mod plane;
 mod unwrap;
 
@@ -74,7 +73,7 @@ fn choose(mesh: &Mesh, nominal_side: usize) -> Option<(UvSet, Vec<[DVec2; 3]>)> 
     }
     let flat = normal.map(|normal| project_flat(mesh, normal));
     let generated = match flat {
-        Some(set) if !overlap::overlaps(&set, 256) => set,
+        Some(set) if !given::overlaps(&set, 256) => set,
         _ => unwrap::unwrap(mesh, nominal_side)?,
     };
     Some((UvSet::Generated, generated))

@@ -4,7 +4,7 @@ use std::sync::LazyLock;
 
 use super::{Dispersion, Glass, GlassError};
 use crate::optics::Nanometres;
-use crate::optics::names::{key, nearest};
+use crate::optics::{key, nearest};
 
 struct Entry {
     glass: Glass,

@@ -6,7 +6,7 @@ use super::csv::columns;
 use super::temperature::planck;
 use super::{Spectrum, SpectrumError};
 use crate::optics::Nanometres;
-use crate::optics::names::{key, nearest};
+use crate::optics::{key, nearest};
 
 /// Names of CIE that need a table or formula, apart from the tables in [`TABLES`].
 const OWN: [&str; 3] = ["A", "D65", "E"];

@@ -3,9 +3,9 @@
 use std::ops::RangeInclusive;
 use std::sync::LazyLock;
 
-use super::quadrature::knots_within;
 use super::{Spectrum, SpectrumError, xyz_bar};
 use crate::optics::Nanometres;
+use crate::optics::wavelength::VISIBLE;
 
 /// Where the colours of the rainbow meet [nm]: violet, indigo, blue, green, yellow, orange, red. The limits between
 /// the six spectral colours are those in common use (T. J. Bruno and P. D. N. Svoronos, CRC Handbook of Fundamental
@@ -139,4 +139,46 @@ impl WavelengthSampler {
         let (from, to) = (self.knots_nm[index], self.knots_nm[index + 1]);
         Some((index, (nm - from) / (to - from)))
     }
+}
+
+/// ∫ f dλ over pieces between increasing knots [nm]; in the unit of `f` times nm.
+pub fn integrate<const N: usize>(knots_nm: &[f64], f: impl Fn(Nanometres) -> [f64; N]) -> [f64; N] {
+    let mut sum = [0.0; N];
+    for (wavelength, weight_nm) in points(knots_nm) {
+        for (sum, value) in sum.iter_mut().zip(f(wavelength)) {
+            *sum += weight_nm * value;
+        }
+    }
+    sum
+}
+
+/// Where the rule looks, with the weight of each place [nm].
+pub fn points(knots_nm: &[f64]) -> impl Iterator<Item = (Nanometres, f64)> + '_ {
+    knots_nm.windows(2).flat_map(|piece| {
+        let half = 0.5 * (piece[1] - piece[0]);
+        let middle = 0.5 * (piece[1] + piece[0]);
+        let offset = half / 3f64.sqrt();
+        [middle - offset, middle + offset].map(|place| (Nanometres(place), half))
+    })
+}
+
+/// The knots of the colour-matching functions, every whole nanometre, within a range and with its ends, and those of
+/// a table as well; increasing, each once. Empty where the range lies outside of the visible.
+pub fn knots_within(range: RangeInclusive<Nanometres>, own_nm: &[f64]) -> Vec<f64> {
+    let first = range.start().0.max(VISIBLE.start().0);
+    let last = range.end().0.min(VISIBLE.end().0);
+    if first >= last {
+        return Vec::new();
+    }
+    let whole = (first.ceil() as u32..=last.floor() as u32).map(f64::from);
+    let own = own_nm.iter().copied().filter(|nm| (first..=last).contains(nm));
+    let mut knots: Vec<f64> = [first, last].into_iter().chain(whole).chain(own).collect();
+    knots.sort_by(f64::total_cmp);
+    knots.dedup();
+    knots
+}
+
+/// Every whole nanometre that is visible.
+pub fn visible_knots() -> Vec<f64> {
+    knots_within(VISIBLE, &[])
 }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
-use super::quadrature::{integrate, knots_within};
+use super::luminous::{integrate, knots_within};
 use super::{SpectrumError, Xyz, xyz_bar};
 use crate::optics::Nanometres;
 use crate::optics::wavelength::VISIBLE;
@@ -142,7 +142,7 @@ impl Spectrum {
         self.values[above - 1] + along * (self.values[above] - self.values[above - 1])
     }
 
-    /// ∫ Φ(λ) w(λ) dλ over the visible part of a range, by the rule of [`quadrature`](super::quadrature): exact
+    /// ∫ Φ(λ) w(λ) dλ over the visible part of a range, by the rule of [`quadrature`](super::luminous): exact
     /// where `weight` is linear or quadratic between whole nanometres.
     pub fn integral_times<const N: usize>(
         &self,

@@ -1,6 +1,6 @@
 //! Black bodies, and the temperature of the one whose colour is nearest to a lamp's.
 
-use super::quadrature::{integrate, visible_knots};
+use super::luminous::{integrate, visible_knots};
 use super::{Xyz, xyz_bar};
 use crate::optics::Nanometres;
 

@@ -7,7 +7,7 @@ use std::sync::LazyLock;
 
 use glam::{DMat3, DVec3};
 
-use super::quadrature::{points, visible_knots};
+use super::luminous::{points, visible_knots};
 use super::{Spectrum, SpectrumError, Xyz, illuminants, xyz_bar};
 use crate::optics::wavelength::VISIBLE;
 use crate::optics::{LinearSrgb, Nanometres};

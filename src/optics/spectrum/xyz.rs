@@ -1,7 +1,11 @@
 //! CIE 1931 XYZ, and its way to linear sRGB and back.
 
-use super::quadrature::{integrate, visible_knots};
-use super::{illuminants, xyz_bar};
+use std::sync::LazyLock;
+
+use super::csv::columns;
+use super::illuminants;
+use super::luminous::{integrate, visible_knots};
+use crate::optics::wavelength::VISIBLE;
 use crate::optics::{LinearSrgb, Nanometres};
 
 /// Rows of three.
@@ -190,4 +194,24 @@ fn inverse(matrix: &Matrix3) -> Matrix3 {
     glam::DMat3::from_cols_array_2d(matrix)
         .inverse()
         .to_cols_array_2d()
+}
+
+/// x̄, ȳ, z̄ at each whole nanometre (CIE 018:2019; see assets/SOURCES.md).
+static TABLE: LazyLock<Vec<[f64; 3]>> = LazyLock::new(|| {
+    columns(include_str!("../../../assets/spectra/cie_1931_2deg.csv"))
+        .map(|row| [row[1], row[2], row[3]])
+        .collect()
+});
+
+/// Colour-matching functions x̄, ȳ, z̄ [1] of CIE 1931, linear between whole nanometres; 0 outside 360 to 830 nm.
+/// ȳ is V(λ), the luminous efficiency that 683 lm/W goes with.
+pub fn xyz_bar(wavelength: Nanometres) -> [f64; 3] {
+    if !VISIBLE.contains(&wavelength) {
+        return [0.0; 3];
+    }
+    let place = wavelength.0 - VISIBLE.start().0;
+    let index = (place as usize).min(TABLE.len() - 2);
+    let along = place - index as f64;
+    let (below, above) = (TABLE[index], TABLE[index + 1]);
+    std::array::from_fn(|i| below[i] + along * (above[i] - below[i]))
 }

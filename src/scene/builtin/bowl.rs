@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use super::{parts, shapes};
 use crate::optics::LinearSrgb;
-use crate::scene::{Camera, Mesh, Scene};
+use crate::scene::{Mesh, Scene};
 use crate::units::Flux;
 
 /// Flint glass, a third of it lead.
@@ -39,18 +39,8 @@ pub fn build() -> Scene {
     let lamp = parts::point_light("lamp", DVec3::new(0.5, 0.62, -0.4), Flux(20.0));
     scene.lights.push(parts::daylight(lamp));
     scene.cameras = vec![
-        Camera::look_at(
-            "camera",
-            DVec3::new(-0.12, 0.52, 0.58),
-            DVec3::new(-0.07, 0.0, 0.02),
-            0.7,
-        ),
-        Camera::look_at(
-            "caustic",
-            DVec3::new(-0.3, 0.35, 0.45),
-            DVec3::new(-0.25, 0.0, 0.18),
-            0.6,
-        ),
+        parts::look("camera", [-0.12, 0.52, 0.58], [-0.07, 0.0, 0.02], 0.7),
+        parts::look("caustic", [-0.3, 0.35, 0.45], [-0.25, 0.0, 0.18], 0.6),
     ];
     scene
 }

@@ -3,6 +3,7 @@
 //! form.
 
 mod ball;
+mod basin;
 mod bowl;
 mod gallery;
 mod mirror;

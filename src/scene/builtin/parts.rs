@@ -69,27 +69,18 @@ pub fn daylight(mut light: Light) -> Light {
 pub fn point_light(name: &str, position: DVec3, power: Flux) -> Light {
     let sphere = SolidAngle(4.0 * std::f64::consts::PI);
     let intensity: RadiantIntensity = power / sphere;
-    Light {
-        name: name.into(),
-        colour: LinearSrgb::WHITE,
-        spectrum: None,
-        kind: LightKind::Point { position, intensity },
-        size: crate::scene::LightSize::None,
-    }
+    Light::new(name, LightKind::Point { position, intensity })
 }
 
 /// White parallel light along `direction` (of any length).
 pub fn sun(name: &str, direction: DVec3, normal_irradiance: Irradiance) -> Light {
-    Light {
-        name: name.into(),
-        colour: LinearSrgb::WHITE,
-        spectrum: None,
-        kind: LightKind::Sun {
+    Light::new(
+        name,
+        LightKind::Sun {
             direction: direction.normalize(),
             normal_irradiance,
         },
-        size: crate::scene::LightSize::None,
-    }
+    )
 }
 
 /// White light that sends `power` in all into a narrow cone, even within three quarters of its half-angle [rad].
@@ -98,25 +89,58 @@ pub fn beam(name: &str, position: DVec3, direction: DVec3, half_angle_rad: f64, 
     let (cos_inner, cos_outer) = (inner_cone_rad.cos(), half_angle_rad.cos());
     // The mean of the squared ramp at the edge is a third.
     let cone = SolidAngle(std::f64::consts::TAU * (1.0 - cos_inner + (cos_inner - cos_outer) / 3.0));
-    Light {
-        name: name.into(),
-        colour: LinearSrgb::WHITE,
-        spectrum: None,
-        kind: LightKind::Spot {
+    Light::new(
+        name,
+        LightKind::Spot {
             position,
             direction: direction.normalize(),
             intensity: power / cone,
             inner_cone_rad,
             outer_cone_rad: half_angle_rad,
         },
-        size: crate::scene::LightSize::None,
+    )
+}
+
+/// Puts a material into the scene, and gives its index.
+pub fn material(scene: &mut Scene, material: Material) -> usize {
+    scene.materials.push(material);
+    scene.materials.len() - 1
+}
+
+/// A camera at a place that looks at another [m], with its vertical angle of view [rad].
+pub fn look(name: &str, from: impl Into<DVec3>, to: impl Into<DVec3>, vertical_fov_rad: f64) -> Camera {
+    Camera::look_at(name, from.into(), to.into(), vertical_fov_rad)
+}
+
+/// Four plates in one plane that leave a slit between them: its half sides along two axes, and how far they reach [m].
+pub fn add_slit(
+    scene: &mut Scene,
+    (name, material): (&str, usize),
+    centre: DVec3,
+    [across, along]: [DVec3; 2],
+    ([near, long], far): ([f64; 2], f64),
+    plate: impl Fn(DVec3, DVec3, DVec3) -> Mesh,
+) {
+    let plates = [
+        ([near, far], [-far, far]),
+        ([-far, -near], [-far, far]),
+        ([-near, near], [long, far]),
+        ([-near, near], [-far, -long]),
+    ];
+    for (index, (u, v)) in plates.into_iter().enumerate() {
+        let middle = centre + across * (0.5 * (u[0] + u[1])) + along * (0.5 * (v[0] + v[1]));
+        let mesh = plate(
+            middle,
+            across * (0.5 * (u[1] - u[0])),
+            along * (0.5 * (v[1] - v[0])),
+        );
+        add_with(scene, &format!("{name} {}", index + 1), mesh, material);
     }
 }
 
 /// Adds an object with a material of its own.
 pub fn add(scene: &mut Scene, name: &str, mesh: Mesh, material: Material) {
-    scene.materials.push(material);
-    let material = scene.materials.len() - 1;
+    let material = self::material(scene, material);
     add_with(scene, name, mesh, material);
 }
 

@@ -18,6 +18,17 @@ pub struct Wave {
     pub phase_rad: f64,
 }
 
+impl Wave {
+    /// A·cos(k·x + φ).
+    pub const fn new(amplitude_m: f64, wave_vector: [f64; 2], phase_rad: f64) -> Self {
+        Self {
+            amplitude_m,
+            wave_vector,
+            phase_rad,
+        }
+    }
+}
+
 /// Open water sheet, normals up: `quads` across and down over `half` [m] in x and z around `centre`.
 pub fn water(centre: DVec3, half: [f64; 2], quads: [u32; 2], waves: &[Wave]) -> Mesh {
     shapes::sheet(quads[0], quads[1], |u, v| {
@@ -44,12 +55,8 @@ const HALF_M: f64 = 1.5;
 
 /// The waves of the pool, each of the given amplitude [m].
 pub fn waves(amplitude_m: f64) -> [Wave; 3] {
-    let wave = |kx, kz, phase_rad| Wave {
-        amplitude_m,
-        wave_vector: [kx, kz],
-        phase_rad,
-    };
-    [wave(9.0, 0.0, 1.0), wave(0.0, 7.0, 2.0), wave(6.0, 5.0, 0.0)]
+    [([9.0, 0.0], 1.0), ([0.0, 7.0], 2.0), ([6.0, 5.0], 0.0)]
+        .map(|(vector, phase_rad)| Wave::new(amplitude_m, vector, phase_rad))
 }
 
 /// A sheet of 3 m × 3 m, n = 1.333, 1 m above a floor of 2 m × 2 m; the sun shines with 1 W/m².

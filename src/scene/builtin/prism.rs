@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::{parts, shapes};
 use crate::optics::LinearSrgb;
-use crate::scene::{Camera, Scene};
+use crate::scene::Scene;
 use crate::units::Irradiance;
 
 /// Silicate flint glass: n_d = 1.635, V_d = 57.7.
@@ -89,41 +89,23 @@ pub fn build() -> Scene {
     add_slit(&mut scene, prism.entry() - direction * SLIT_DISTANCE_M, direction);
     scene.lights.push(parts::sun("light", direction, Irradiance(1.0)));
     scene.cameras = vec![
-        Camera::look_at(
-            "camera",
-            DVec3::new(0.2, 1.0, 1.8),
-            DVec3::new(0.6, 0.7, 0.0),
-            0.9,
-        ),
-        Camera::look_at(
-            "spectrum",
-            DVec3::new(1.2, 0.4, 0.2),
-            DVec3::new(1.5, 0.3, 0.0),
-            0.6,
-        ),
+        parts::look("camera", [0.2, 1.0, 1.8], [0.6, 0.7, 0.0], 0.9),
+        parts::look("spectrum", [1.2, 0.4, 0.2], [1.5, 0.3, 0.0], 0.6),
     ];
     scene
 }
 
 /// Four black plates around a slit across the light, whose long side is z.
 fn add_slit(scene: &mut Scene, centre: DVec3, direction: DVec3) {
-    scene.materials.push(parts::matte("plate", LinearSrgb::BLACK));
-    let material = scene.materials.len() - 1;
+    let material = parts::material(scene, parts::matte("plate", LinearSrgb::BLACK));
     let across = DVec3::Z.cross(direction);
-    let ([near, along], far) = (SLIT_HALF_M, PLATE_HALF_M);
-    let plates = [
-        ([near, far], [-far, far]),
-        ([-far, -near], [-far, far]),
-        ([-near, near], [along, far]),
-        ([-near, near], [-far, -along]),
-    ];
-    for (index, (u, z)) in plates.into_iter().enumerate() {
-        let middle = centre + across * (0.5 * (u[0] + u[1])) + DVec3::Z * (0.5 * (z[0] + z[1]));
-        let plate = shapes::rectangle(
-            middle,
-            DVec3::Z * (0.5 * (z[1] - z[0])),
-            across * (0.5 * (u[1] - u[0])),
-        );
-        parts::add_with(scene, &format!("plate {}", index + 1), plate, material);
-    }
+    let half_m = (SLIT_HALF_M, PLATE_HALF_M);
+    parts::add_slit(
+        scene,
+        ("plate", material),
+        centre,
+        [across, DVec3::Z],
+        half_m,
+        |middle, u, v| shapes::rectangle(middle, v, u),
+    );
 }

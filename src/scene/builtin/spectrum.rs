@@ -6,7 +6,7 @@ use glam::DVec3;
 use super::prism::{GLASS, Prism};
 use super::{parts, shapes};
 use crate::optics::LinearSrgb;
-use crate::scene::{Camera, Light, Scene};
+use crate::scene::{Light, Scene};
 use crate::units::Flux;
 
 /// Half-angle of the beams [degrees]: much less than what the prism spreads white light over, 2.5.
@@ -42,24 +42,9 @@ pub fn build() -> Scene {
         parts::point_light("lamp", DVec3::new(-0.2, 0.75, 0.5), Flux(1.5)),
     ];
     scene.cameras = vec![
-        Camera::look_at(
-            "camera",
-            DVec3::new(0.05, 0.5, 1.2),
-            DVec3::new(0.07, 0.0, -0.2),
-            0.72,
-        ),
-        Camera::look_at(
-            "spectrum",
-            DVec3::new(0.4, 0.12, -0.2),
-            DVec3::new(0.56, 0.05, WALL_Z),
-            0.5,
-        ),
-        Camera::look_at(
-            "rainbow",
-            DVec3::new(0.0, 0.12, -0.2),
-            DVec3::new(0.03, 0.06, WALL_Z),
-            0.5,
-        ),
+        parts::look("camera", [0.05, 0.5, 1.2], [0.07, 0.0, -0.2], 0.72),
+        parts::look("spectrum", [0.4, 0.12, -0.2], [0.56, 0.05, WALL_Z], 0.5),
+        parts::look("rainbow", [0.0, 0.12, -0.2], [0.03, 0.06, WALL_Z], 0.5),
     ];
     scene
 }

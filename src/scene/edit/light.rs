@@ -1,33 +1,29 @@
 //! Edits of lights.
 
-use std::mem::replace;
+use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::Edit;
-use super::ranges::{check_place, out_of_range};
+use super::{Edit, check_place, existing, out_of_range};
 use crate::error::{Error, Result};
 use crate::optics::LinearSrgb;
-use crate::scene::{Light, LightKind, LightSize};
+use crate::scene::{Light, LightKind, LightSize, Scene};
 use crate::units::{Irradiance, RadiantIntensity};
 
 /// A direction whose squared length is this near to 1 is unit already and stays bit for bit.
 const UNIT: f64 = 1e-12;
 
-/// Edits a light, and gives the edit that undoes this one.
-pub(super) fn apply(edit: &Edit, index: usize, light: &mut Light) -> Result<Edit> {
+/// Edits a light.
+pub(super) fn apply(edit: &Edit, light: &mut Light) -> Result<()> {
     let owner = format!("light `{}`", light.name);
     let lacks = |what: &str, remedy: &str| Error::usage(&owner, format!("has no {what}"), remedy);
     let kind = &mut light.kind;
-    Ok(match edit {
+    match edit {
         Edit::LightIntensity { intensity: new, .. } => {
             let instead = "set its normal irradiance";
             let old = intensity(kind).ok_or_else(|| lacks("radiant intensity, as it is a sun", instead))?;
             check_power(new.0, "W/sr", &owner)?;
-            Edit::LightIntensity {
-                light: index,
-                intensity: replace(old, *new),
-            }
+            *old = *new;
         }
         Edit::LightNormalIrradiance {
             normal_irradiance: new,
@@ -37,54 +33,31 @@ pub(super) fn apply(edit: &Edit, index: usize, light: &mut Light) -> Result<Edit
             let old = normal_irradiance(kind)
                 .ok_or_else(|| lacks("normal irradiance, as it is no sun", instead))?;
             check_power(new.0, "W/m²", &owner)?;
-            Edit::LightNormalIrradiance {
-                light: index,
-                normal_irradiance: replace(old, *new),
-            }
+            *old = *new;
         }
         Edit::LightPosition { position: new, .. } => {
             let old = position(kind).ok_or_else(|| lacks("position, as it is a sun", "set its direction"))?;
             check_place(*new, &owner)?;
-            Edit::LightPosition {
-                light: index,
-                position: replace(old, *new),
-            }
+            *old = *new;
         }
         Edit::LightDirection { direction: new, .. } => {
             let why = "direction, as it shines everywhere alike";
             let old = direction(kind).ok_or_else(|| lacks(why, "set its position"))?;
-            Edit::LightDirection {
-                light: index,
-                direction: replace(old, unit(*new, &owner)?),
-            }
+            *old = unit(*new, &owner)?;
         }
         Edit::LightBrightness { brightness: new, .. } => {
             let why = "brightness of its own, since it is a point or a direction";
             let old = brightness(&mut light.kind).ok_or_else(|| lacks(why, "set its intensity"))?;
             check_power(*new, "W/(m² sr)", &owner)?;
-            Edit::LightBrightness {
-                light: index,
-                brightness: replace(old, *new),
-            }
+            *old = *new;
         }
         Edit::LightSize { size: new, .. } => {
             check_size(&light.kind, *new, &owner)?;
-            Edit::LightSize {
-                light: index,
-                size: replace(&mut light.size, *new),
-            }
+            light.size = *new;
         }
         Edit::LightColour { colour: new, .. } => {
             check_colour(*new, &owner)?;
-            let inverse = match light.spectrum {
-                Some(_) => spectrum(index, light),
-                None => Edit::LightColour {
-                    light: index,
-                    colour: light.colour,
-                },
-            };
             (light.colour, light.spectrum) = (*new, None);
-            inverse
         }
         Edit::LightSpectrum {
             colour,
@@ -100,21 +73,11 @@ pub(super) fn apply(edit: &Edit, index: usize, light: &mut Light) -> Result<Edit
                     "what has a luminance above 0",
                 ));
             }
-            let inverse = spectrum(index, light);
             (light.colour, light.spectrum) = (*colour, new.clone());
-            inverse
         }
         _ => return Err(lacks("such property", "edit what it has")),
-    })
-}
-
-/// A light's spectrum and colour, as the edit that gives it those.
-fn spectrum(index: usize, light: &Light) -> Edit {
-    Edit::LightSpectrum {
-        light: index,
-        colour: light.colour,
-        spectrum: light.spectrum.clone(),
     }
+    Ok(())
 }
 
 fn intensity(kind: &mut LightKind) -> Option<&mut RadiantIntensity> {
@@ -199,4 +162,83 @@ fn unit(direction: DVec3, owner: &str) -> Result<DVec3> {
     direction
         .try_normalize()
         .ok_or_else(|| out_of_range(owner, "direction", direction, "what has a length"))
+}
+
+/// Puts a light into a scene, behind those that are there.
+pub(super) fn add(scene: &mut Scene, added: &Arc<Light>) -> Result<()> {
+    check(added)?;
+    scene.lights.push(Light::clone(added));
+    scene.light_list.added.push(Arc::clone(added));
+    Ok(())
+}
+
+/// Takes a light out of a scene.
+pub(super) fn remove(scene: &mut Scene, index: usize) -> Result<()> {
+    let found = existing(&mut scene.lights, index, "light")?;
+    if let Some(why) = why_light_stays(&found.kind) {
+        return Err(Error::usage(
+            format!("light `{}`", found.name),
+            why,
+            "dim it instead",
+        ));
+    }
+    let of_file = scene.lights.len() - scene.light_list.added.len();
+    match scene.light_when_loaded(index) {
+        Some(place) => {
+            let removed = &mut scene.light_list.removed;
+            removed.push(place);
+            removed.sort_unstable();
+        }
+        None => drop(scene.light_list.added.remove(index - of_file)),
+    }
+    scene.lights.remove(index);
+    Ok(())
+}
+
+/// Why a light cannot be taken out of its scene; `None` where it can.
+pub fn why_light_stays(kind: &LightKind) -> Option<&'static str> {
+    match kind {
+        LightKind::Surface { .. } => Some("is the glow of an object, which would be seen without it"),
+        LightKind::Environment { .. } => {
+            Some("is what lies around the scene, which would be seen without it")
+        }
+        LightKind::Point { .. }
+        | LightKind::Spot { .. }
+        | LightKind::Sun { .. }
+        | LightKind::Panel { .. } => None,
+    }
+}
+
+/// What was kept may have been written by hand.
+fn check(light: &Light) -> Result<()> {
+    let numbers = |values: &[f64]| values.iter().all(|value| value.is_finite());
+    let is_sound = match light.kind {
+        LightKind::Point { position, .. } => numbers(&position.to_array()),
+        LightKind::Spot {
+            position,
+            direction,
+            inner_cone_rad,
+            outer_cone_rad,
+            ..
+        } => {
+            let is_cone = 0.0 <= inner_cone_rad
+                && inner_cone_rad < outer_cone_rad
+                && outer_cone_rad <= std::f64::consts::FRAC_PI_2;
+            numbers(&position.to_array()) && direction.is_normalized() && is_cone
+        }
+        LightKind::Sun { direction, .. } => direction.is_normalized(),
+        LightKind::Panel {
+            centre, across, down, ..
+        } => numbers(&centre.to_array()) && across.cross(down).length() > 0.0,
+        LightKind::Surface { .. } | LightKind::Environment { .. } => false,
+    };
+    let strength = light.strength().luminance();
+    if is_sound && strength > 0.0 && strength.is_finite() {
+        return Ok(());
+    }
+    Err(Error::usage(
+        format!("light `{}`", light.name),
+        "is none that can be added: it needs a place, a direction and a power",
+        "add a lamp, a spot, a sun or a panel",
+    ))
 }

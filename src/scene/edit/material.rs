@@ -1,48 +1,31 @@
 //! Edits of materials.
 
-use std::mem::replace;
 use std::sync::Arc;
 
 use super::Edit;
-use super::ranges::out_of_range;
+use super::out_of_range;
 use crate::error::{Error, Result};
 use crate::optics::LinearSrgb;
 use crate::optics::glass::{Dispersion, Glass};
 use crate::scene::Material;
 
-/// Edits a material, and gives the edit that undoes this one.
-pub(super) fn apply(edit: &Edit, index: usize, material: &mut Material) -> Result<Edit> {
+/// Edits a material; its class follows where it did before.
+pub(super) fn apply(edit: &Edit, material: &mut Material) -> Result<()> {
     let owner = format!("material `{}`", material.name);
     // A class that a file sets otherwise (unlit) is not ours to change.
     let follows = material.surface == material.classified();
-    let inverse = match edit {
+    match edit {
         Edit::MaterialIor { ior, .. } => {
             check_index(*ior, &owner)?;
             let glass = material
                 .glass
                 .as_deref()
                 .map(|glass| Arc::new(of_index(glass, *ior)));
-            let inverse = match glass {
-                Some(_) => substance(index, material),
-                None => Edit::MaterialIor {
-                    material: index,
-                    ior: material.ior,
-                },
-            };
             (material.ior, material.glass) = (*ior, glass);
-            inverse
         }
         Edit::MaterialTint { base_colour, .. } => {
             check_colour(*base_colour, &owner)?;
-            let inverse = match material.metal {
-                Some(_) => substance(index, material),
-                None => Edit::MaterialTint {
-                    material: index,
-                    base_colour: material.base_colour,
-                },
-            };
             (material.base_colour, material.metal) = (*base_colour, None);
-            inverse
         }
         Edit::MaterialSubstance {
             ior,
@@ -53,43 +36,24 @@ pub(super) fn apply(edit: &Edit, index: usize, material: &mut Material) -> Resul
         } => {
             check_index(*ior, &owner)?;
             check_colour(*base_colour, &owner)?;
-            let inverse = substance(index, material);
             (material.ior, material.glass) = (*ior, glass.clone());
             (material.base_colour, material.metal) = (*base_colour, *metal);
-            inverse
         }
         Edit::MaterialRoughness { roughness, .. } => {
             if !(0.0..=1.0).contains(roughness) {
                 return Err(out_of_range(&owner, "roughness", roughness, "0 to 1"));
             }
-            Edit::MaterialRoughness {
-                material: index,
-                roughness: replace(&mut material.roughness, *roughness),
-            }
+            material.roughness = *roughness;
         }
-        Edit::MaterialWaves { waves, .. } => Edit::MaterialWaves {
-            material: index,
-            waves: replace(&mut material.waves, waves.clone()),
-        },
+        Edit::MaterialWaves { waves, .. } => material.waves.clone_from(waves),
         _ => {
             return Err(Error::usage(owner, "has no such property", "edit what it has"));
         }
-    };
+    }
     if follows {
         material.surface = material.classified();
     }
-    Ok(inverse)
-}
-
-/// What a material is made of, as the edit that makes it so.
-fn substance(index: usize, material: &Material) -> Edit {
-    Edit::MaterialSubstance {
-        material: index,
-        ior: material.ior,
-        glass: material.glass.clone(),
-        base_colour: material.base_colour,
-        metal: material.metal,
-    }
+    Ok(())
 }
 
 /// A glass of another index at 587.56 nm and the same Abbe number.

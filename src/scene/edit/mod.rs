@@ -1,22 +1,21 @@
 //! Edits of a scene as data: each gives the edited scene and the edit that takes it back, bit for bit.
 
-mod light;
-mod light_list;
-mod material;
-mod ranges;
-mod shape;
-
 use std::sync::Arc;
 
 use glam::{DQuat, DVec3};
 use serde::{Deserialize, Serialize};
 
-pub use self::light_list::{LightOrigin, why_light_stays};
 use super::{Light, LightSize, Mesh, Scene, Waves};
 use crate::error::{Error, Result};
 use crate::optics::spectrum::Spectrum;
 use crate::optics::{Glass, LinearSrgb, Metal};
 use crate::units::{Irradiance, RadiantIntensity};
+
+mod light;
+mod material;
+mod shape;
+
+pub use self::light::why_light_stays;
 
 /// One change of a scene. Indices are those of [`Scene::lights`], [`Scene::materials`] and [`Scene::objects`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -81,13 +80,8 @@ pub enum Edit {
     },
     /// One light more.
     LightAdded {
-        /// Its index; `None` for behind all others.
-        light: Option<usize>,
-        /// What it is.
+        /// As it looks; its place is behind the others.
         added: Arc<Light>,
-        /// Where it comes from. Not written down: for another time it is new.
-        #[serde(skip)]
-        origin: LightOrigin,
     },
     /// One light less: not of the glow of an object, nor of the environment.
     LightRemoved {
@@ -145,7 +139,7 @@ pub enum Edit {
         /// [m].
         translation: DVec3,
     },
-    /// Another shape for an object: what takes a movement back. Not written down.
+    /// Another shape for an object. Not written down.
     #[serde(skip)]
     ObjectMesh {
         /// Which object.
@@ -155,6 +149,19 @@ pub enum Edit {
     },
     /// Several edits, one after the other.
     Several(Vec<Self>),
+    /// A whole scene: what takes an edit back. Not written down.
+    #[serde(skip)]
+    Whole(Snapshot),
+}
+
+/// A scene as it was, which shares meshes and images with what it became.
+#[derive(Clone, Debug)]
+pub struct Snapshot(Arc<Scene>);
+
+impl PartialEq for Snapshot {
+    fn eq(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.0, &other.0)
+    }
 }
 
 /// What an edit sets: edits of the same target replace one another.
@@ -186,6 +193,8 @@ pub enum EditTarget {
     ObjectPlace(usize),
     /// All of these.
     Several(Vec<Self>),
+    /// Everything.
+    Whole,
 }
 
 impl Edit {
@@ -196,8 +205,8 @@ impl Edit {
     /// An index that the scene lacks, a property that the light does not have, a value outside its range.
     pub fn apply(&self, scene: &Scene) -> Result<(Scene, Self)> {
         let mut edited = scene.clone();
-        let inverse = self.apply_to(&mut edited)?;
-        Ok((edited, inverse))
+        self.apply_to(&mut edited)?;
+        Ok((edited, Self::Whole(Snapshot(Arc::new(scene.clone())))))
     }
 
     /// An object's mesh at an offset [m] from its place in `mesh`; that mesh itself where the offset is 0.
@@ -252,10 +261,11 @@ impl Edit {
                 EditTarget::ObjectPlace(*object)
             }
             Self::Several(edits) => EditTarget::Several(edits.iter().map(Self::target).collect()),
+            Self::Whole(_) => EditTarget::Whole,
         }
     }
 
-    fn apply_to(&self, scene: &mut Scene) -> Result<Self> {
+    fn apply_to(&self, scene: &mut Scene) -> Result<()> {
         match self {
             Self::LightIntensity { light, .. }
             | Self::LightNormalIrradiance { light, .. }
@@ -266,17 +276,17 @@ impl Edit {
             | Self::LightColour { light, .. }
             | Self::LightSpectrum { light, .. } => {
                 let found = existing(&mut scene.lights, *light, "light")?;
-                light::apply(self, *light, found)
+                light::apply(self, found)
             }
-            Self::LightAdded { light, added, origin } => light_list::add(scene, *light, added, origin),
-            Self::LightRemoved { light } => light_list::remove(scene, *light),
+            Self::LightAdded { added } => light::add(scene, added),
+            Self::LightRemoved { light } => light::remove(scene, *light),
             Self::MaterialIor { material, .. }
             | Self::MaterialSubstance { material, .. }
             | Self::MaterialTint { material, .. }
             | Self::MaterialRoughness { material, .. }
             | Self::MaterialWaves { material, .. } => {
                 let found = existing(&mut scene.materials, *material, "material")?;
-                material::apply(self, *material, found)
+                material::apply(self, found)
             }
             Self::ObjectMoved {
                 object,
@@ -284,19 +294,19 @@ impl Edit {
                 translation,
             } => {
                 let found = existing(&mut scene.objects, *object, "object")?;
-                let moved = shape::moved(&found.mesh, *rotation, *translation, &found.name)?;
-                Ok(shape::replace_mesh(*object, &mut found.mesh, Arc::new(moved)))
+                found.mesh = shape::moved(&found.mesh, *rotation, *translation, &found.name)?.into();
+                Ok(())
             }
             Self::ObjectMesh { object, mesh } => {
                 let found = existing(&mut scene.objects, *object, "object")?;
                 shape::check_mesh(mesh, &found.name)?;
-                Ok(shape::replace_mesh(*object, &mut found.mesh, Arc::clone(mesh)))
+                found.mesh = Arc::clone(mesh);
+                Ok(())
             }
-            Self::Several(edits) => {
-                let inverses: Result<Vec<Self>> = edits.iter().map(|edit| edit.apply_to(scene)).collect();
-                let mut inverses = inverses?;
-                inverses.reverse();
-                Ok(Self::Several(inverses))
+            Self::Several(edits) => edits.iter().try_for_each(|edit| edit.apply_to(scene)),
+            Self::Whole(Snapshot(whole)) => {
+                scene.clone_from(whole);
+                Ok(())
             }
         }
     }
@@ -311,4 +321,23 @@ fn existing<'a, T>(list: &'a mut [T], index: usize, noun: &str) -> Result<&'a mu
             format!("choose a {noun} of the scene"),
         )
     })
+}
+
+/// Farthest that anything is moved to [m]: beyond it, squares of distances lose the scene.
+const FARTHEST_M: f64 = 1e12;
+
+fn out_of_range(owner: &str, what: &str, value: impl std::fmt::Display, range: &str) -> Error {
+    Error::usage(
+        owner,
+        format!("a {what} of {value} is outside {range}"),
+        "give a value in that range",
+    )
+}
+
+fn check_place(place: DVec3, owner: &str) -> Result<()> {
+    if place.is_finite() && place.abs().max_element() <= FARTHEST_M {
+        return Ok(());
+    }
+    let range = format!("−{FARTHEST_M:e} to {FARTHEST_M:e} m");
+    Err(out_of_range(owner, "place", format!("{place} m"), &range))
 }

@@ -1,21 +1,10 @@
 //! Edits of places and shapes.
 
-use std::sync::Arc;
-
 use glam::{DQuat, DVec3};
 
-use super::Edit;
-use super::ranges::{check_place, out_of_range};
+use super::{check_place, out_of_range};
 use crate::error::{Error, Result};
 use crate::scene::Mesh;
-
-/// Puts another mesh in place, and gives the edit that puts the old one back.
-pub(super) fn replace_mesh(object: usize, place: &mut Arc<Mesh>, mesh: Arc<Mesh>) -> Edit {
-    Edit::ObjectMesh {
-        object,
-        mesh: std::mem::replace(place, mesh),
-    }
-}
 
 /// A mesh turned about the middle of its box, and then moved.
 pub(super) fn moved(mesh: &Mesh, rotation: DQuat, translation: DVec3, name: &str) -> Result<Mesh> {

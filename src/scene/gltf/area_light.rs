@@ -16,7 +16,7 @@ use super::report::Report;
 use super::spectrum;
 use crate::error::Result;
 use crate::optics::LinearSrgb;
-use crate::scene::{Light, LightKind, LightSize, PanelShape};
+use crate::scene::{Light, LightKind, PanelShape};
 use crate::units::{LUMENS_PER_WATT, Radiance};
 
 pub(super) const NAME: &str = "EXT_lights_area";
@@ -91,13 +91,10 @@ pub fn add_all(
         match lamp(on_node, sources, placed) {
             Ok((index, colour, kind)) => {
                 let mut light = Light {
-                    name: light_name(placed, lights.len()),
                     colour,
-                    spectrum: None,
-                    kind,
-                    size: LightSize::None,
+                    ..Light::new(light_name(placed, lights.len()), kind)
                 };
-                let stated = spectrum::stated(document, placed.node, &document.area_light_spectra, index);
+                let stated = spectrum::stated(document, placed.node, &document.extras.area_lights, index);
                 spectrum::apply(&mut light, stated, folder, &owner, report)?;
                 let (node, list) = (placed.node, NAME);
                 lights.push((light, Origin { node, list, index }));

@@ -4,9 +4,9 @@ use gltf::json::{Root, Value};
 use serde::Deserialize;
 use serde_json::Map;
 
+use super::extras::Extras;
 use super::report::Report;
-use super::sizes::StatedSize;
-use super::{extensions, extras, faults, spectrum, substance, waves};
+use super::{extensions, faults};
 use crate::error::{Error, Result};
 
 /// The typed JSON, with node transforms in double precision beside it.
@@ -16,24 +16,8 @@ pub struct Document {
     pub root: Root,
     /// One per node.
     pub transforms: Vec<NodeTransform>,
-    /// Waves of each material, as its extras state them.
-    pub waves: Vec<Option<Value>>,
-    /// Glass of each material, as its extras state it.
-    pub glasses: Vec<Option<Value>>,
-    /// Metal of each material, as its extras state it.
-    pub metals: Vec<Option<Value>>,
-    /// Spectrum of the light of each material, as its extras state it.
-    pub emission_spectra: Vec<Option<Value>>,
-    /// One per node: what its `extras` say of the size of its light.
-    pub node_sizes: Vec<StatedSize>,
-    /// One per light of KHR_lights_punctual.
-    pub light_sizes: Vec<StatedSize>,
-    /// One per node: what its `extras` say of the spectrum of its light.
-    pub node_spectra: Vec<Option<Value>>,
-    /// One per light of KHR_lights_punctual.
-    pub light_spectra: Vec<Option<Value>>,
-    /// One per light of EXT_lights_area.
-    pub area_light_spectra: Vec<Option<Value>>,
+    /// What is stated in `extras`.
+    pub extras: Extras,
 }
 
 /// A node's own transform as the file states it, unchecked.
@@ -63,17 +47,7 @@ pub fn parse(json: &[u8], report: &mut Report) -> Result<Document> {
     let required = strings(file, "extensionsRequired")?;
     extensions::check(&required, &strings(file, "extensionsUsed")?, report)?;
     leave_out_what_is_not_read(file, report);
-    let of_materials = |key: &str| extras::of_each(value.get("materials"), key);
-    let waves = of_materials(waves::KEY);
-    let glasses = of_materials(substance::GLASS_KEY);
-    let metals = of_materials(substance::METAL_KEY);
-    let emission_spectra = of_materials(spectrum::KEY);
-    let node_sizes = StatedSize::of_each(value.get("nodes"));
-    let light_sizes = StatedSize::of_each(value.pointer("/extensions/KHR_lights_punctual/lights"));
-    let node_spectra = extras::of_each(value.get("nodes"), spectrum::KEY);
-    let of_lights = |list: &str| extras::of_each(value.pointer(list), spectrum::KEY);
-    let light_spectra = of_lights("/extensions/KHR_lights_punctual/lights");
-    let area_light_spectra = of_lights("/extensions/EXT_lights_area/lights");
+    let extras = Extras::of(&value);
     remove_extras(&mut value);
 
     let transforms = match value.get("nodes") {
@@ -85,15 +59,7 @@ pub fn parse(json: &[u8], report: &mut Report) -> Result<Document> {
     Ok(Document {
         root,
         transforms,
-        waves,
-        glasses,
-        metals,
-        emission_spectra,
-        node_sizes,
-        light_sizes,
-        node_spectra,
-        light_spectra,
-        area_light_spectra,
+        extras,
     })
 }
 

@@ -4,11 +4,37 @@ use gltf::json::Value;
 
 use crate::error::{Error, ErrorKind, Result};
 
-/// What the extras of each item of a list have under a key, in file order; none where it is no list.
-pub fn of_each(list: Option<&Value>, key: &str) -> Vec<Option<Value>> {
-    let items = list.and_then(Value::as_array);
-    let stated = |item: &Value| item.get("extras")?.get(key).cloned();
-    items.into_iter().flatten().map(stated).collect()
+/// The extras of items, in file order; null where an item has none.
+#[derive(Clone, Debug)]
+pub struct Extras {
+    pub materials: Vec<Value>,
+    pub nodes: Vec<Value>,
+    /// Of KHR_lights_punctual.
+    pub lights: Vec<Value>,
+    /// Of EXT_lights_area.
+    pub area_lights: Vec<Value>,
+}
+
+impl Extras {
+    /// Those of a file.
+    pub fn of(file: &Value) -> Self {
+        let of_each = |list: &str| {
+            let items = file.pointer(list).and_then(Value::as_array);
+            let extras = |item: &Value| item.get("extras").cloned().unwrap_or_default();
+            items.into_iter().flatten().map(extras).collect()
+        };
+        Self {
+            materials: of_each("/materials"),
+            nodes: of_each("/nodes"),
+            lights: of_each("/extensions/KHR_lights_punctual/lights"),
+            area_lights: of_each("/extensions/EXT_lights_area/lights"),
+        }
+    }
+}
+
+/// What an item of a list states under a key.
+pub fn stated<'a>(list: &'a [Value], item: usize, key: &str) -> Option<&'a Value> {
+    list.get(item)?.get(key)
 }
 
 /// What has to be a text. `owner` has it, under `key`.

@@ -11,8 +11,7 @@ use super::document::Document;
 use super::nodes::Placed;
 use super::numbers::{widen, widen_all};
 use super::report::Report;
-use super::sizes::StatedSize;
-use super::spectrum;
+use super::{sizes, spectrum};
 use crate::error::Result;
 use crate::optics::LinearSrgb;
 use crate::scene::{Light, LightKind};
@@ -39,7 +38,6 @@ pub fn read_all(
         let extensions = root.nodes[placed.node].extensions.as_ref()?;
         Some(extensions.khr_lights_punctual.as_ref()?.light.value())
     };
-    let unstated = StatedSize::default();
     let mut lights = Vec::new();
     for placed in placed {
         let Some(index) = on_node(placed) else { continue };
@@ -55,16 +53,14 @@ pub fn read_all(
                 continue;
             }
         };
-        let of_node = document.node_sizes.get(placed.node).unwrap_or(&unstated);
-        let of_light = document.light_sizes.get(index).unwrap_or(&unstated);
+        let extras = &document.extras;
+        let sizes = [extras.nodes.get(placed.node), extras.lights.get(index)];
         let mut light = Light {
-            name: light_name(placed, lights.len()),
             colour: widen_all(source.color).into(),
-            spectrum: None,
-            kind,
-            size: of_node.read(of_light, &kind, &owner, report),
+            size: sizes::read(sizes, &kind, &owner, report),
+            ..Light::new(light_name(placed, lights.len()), kind)
         };
-        let stated = spectrum::stated(document, placed.node, &document.light_spectra, index);
+        let stated = spectrum::stated(document, placed.node, &extras.lights, index);
         spectrum::apply(&mut light, stated, folder, &owner, report)?;
         let (node, list) = (placed.node, NAME);
         lights.push((light, Origin { node, list, index }));

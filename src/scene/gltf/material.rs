@@ -11,15 +11,15 @@ use gltf::json::validation::Checked;
 use gltf::json::{Index, Value};
 use serde::Deserialize;
 
-use super::coat::{self, Coat};
 use super::document::Document;
 use super::images::Images;
 use super::numbers::widen;
 use super::report::{Budget, Report};
 use super::substance::{self, Substance};
-use super::{names, spectrum, waves};
+use super::{extras, names, spectrum, waves};
 use crate::error::Result;
 use crate::optics::LinearSrgb;
+use crate::scene::material::SPECULAR_ROUGHNESS_LIMIT;
 use crate::scene::{AlphaMask, Material, NormalMap, SurfaceKind, TextureRef, Volume};
 use crate::units::LUMENS_PER_WATT;
 
@@ -69,13 +69,14 @@ pub fn read_all(
     sources
         .map(|(index, source)| {
             let name = names::name(source.name.as_ref(), "material", index);
+            let stated = |key: &str| extras::stated(&document.extras.materials, index, key);
             let mut reading = Reading {
                 owner: format!("material `{name}`"),
                 source,
-                waves: document.waves.get(index).and_then(Option::as_ref),
-                glass: document.glasses.get(index).and_then(Option::as_ref),
-                metal: document.metals.get(index).and_then(Option::as_ref),
-                spectrum: document.emission_spectra.get(index).and_then(Option::as_ref),
+                waves: stated(waves::KEY),
+                glass: stated(substance::GLASS_KEY),
+                metal: stated(substance::METAL_KEY),
+                spectrum: stated(spectrum::KEY),
                 folder,
                 images: &mut *images,
                 budget: &mut *budget,
@@ -422,7 +423,7 @@ impl Reading<'_, '_> {
 
     /// A lacquer over the surface, where the file has one.
     fn coat(&mut self, material: &mut Material, extensions: &extension::Material) {
-        let Some(stated) = extensions.others.get(coat::NAME) else {
+        let Some(stated) = extensions.others.get(CLEARCOAT) else {
             return;
         };
         let Ok(stated) = Coat::deserialize(stated) else {
@@ -442,7 +443,7 @@ impl Reading<'_, '_> {
                 "split the mesh where the lacquer changes",
             );
         }
-        if let Err(why) = coat::put_on(material, factor, roughness) {
+        if let Err(why) = put_on(material, factor, roughness) {
             self.warn(why, "expect it to look and bake as if it were not there");
         }
     }
@@ -581,7 +582,7 @@ impl Reading<'_, '_> {
             extensions
                 .others
                 .keys()
-                .filter(|key| ![coat::NAME, substance::NAME].contains(&key.as_str()))
+                .filter(|key| ![CLEARCOAT, substance::NAME].contains(&key.as_str()))
                 .map(|key| names::name(Some(key), "extension", 0)),
         );
         if !ignored.is_empty() {
@@ -606,4 +607,70 @@ fn coordinates(tex_coord: u32, transform: Option<&TextureTransform>) -> (usize, 
         vector(transform.offset.0),
     );
     (transform.tex_coord.unwrap_or(tex_coord) as usize, matrix)
+}
+
+/// Name of the extension.
+const CLEARCOAT: &str = "KHR_materials_clearcoat";
+
+/// n of the lacquer, as the extension fixes it.
+const IOR: f64 = 1.5;
+
+/// Reflectance of the lacquer at normal incidence: ((n − 1)/(n + 1))².
+const F0: f64 = 0.04;
+
+/// The lacquer as the file states it; textures are named and not read.
+#[derive(Debug, Default, Deserialize)]
+#[serde(default, rename_all = "camelCase")]
+pub struct Coat {
+    /// Part of the surface that it covers.
+    pub clearcoat_factor: f32,
+    /// Of its surface.
+    pub clearcoat_roughness_factor: f32,
+    clearcoat_texture: Option<Value>,
+    clearcoat_roughness_texture: Option<Value>,
+    clearcoat_normal_texture: Option<Value>,
+}
+
+impl Coat {
+    /// Whether an image changes it from place to place.
+    pub fn has_texture(&self) -> bool {
+        let textures = [
+            &self.clearcoat_texture,
+            &self.clearcoat_roughness_texture,
+            &self.clearcoat_normal_texture,
+        ];
+        textures.iter().any(|texture| texture.is_some())
+    }
+}
+
+/// Puts a lacquer of a factor and a roughness, both in [0, 1], over a material whose class is known.
+///
+/// # Errors
+/// Why it has to be left out, to go after the name of the material.
+pub fn put_on(material: &mut Material, factor: f64, roughness: f64) -> std::result::Result<(), String> {
+    match material.surface {
+        SurfaceKind::Diffuse if roughness > SPECULAR_ROUGHNESS_LIMIT => Err(format!(
+            "its clearcoat of roughness {roughness:.2} was left out, as it hardly shines"
+        )),
+        SurfaceKind::Diffuse => {
+            // What is below is matte, whatever it was.
+            (material.metallic, material.transmission, material.volume) = (0.0, 0.0, None);
+            (material.roughness, material.ior, material.polish) = (roughness, IOR, factor);
+            material.surface = SurfaceKind::Mixed;
+            Ok(())
+        }
+        SurfaceKind::Mirror => {
+            // 1 − R = (1 − coat)(1 − metal) at normal incidence; towards grazing angles both tend to 1.
+            let left = 1.0 - factor * F0;
+            material.base_colour = LinearSrgb::WHITE - (LinearSrgb::WHITE - material.base_colour) * left;
+            Ok(())
+        }
+        SurfaceKind::Mixed => {
+            material.polish = factor + (1.0 - factor) * material.polish;
+            Ok(())
+        }
+        SurfaceKind::Dielectric | SurfaceKind::ThinWall => {
+            Err("its clearcoat was left out, as light goes through it".into())
+        }
+    }
 }

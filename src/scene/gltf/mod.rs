@@ -3,18 +3,30 @@
 //! The `gltf` crate gives the typed JSON; its accessors are not used, since they panic on what its own validation
 //! lets pass.
 
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use glam::DAffine3;
+use gltf::json::Value;
+use report::{Budget, Report};
+
+use self::save::Parts;
+use super::{LoadOptions, Scene};
+use crate::error::{Error, Result, Warning};
+use crate::files;
+use crate::scene::{Light, LightKind, LightSize};
+use crate::units::Radiance;
+
 mod accessor;
 mod area_light;
-mod base64;
 mod buffers;
-mod coat;
 mod container;
 mod document;
 mod extensions;
 mod extras;
 mod faults;
 mod glb;
-mod glow;
 pub(super) mod guard;
 mod images;
 mod light;
@@ -22,34 +34,19 @@ mod material;
 mod names;
 mod nodes;
 mod numbers;
-mod opened;
 mod primitive;
-mod rebase;
 mod report;
 mod save;
-mod shading;
 mod sizes;
 mod spectrum;
 mod substance;
 mod surface;
 mod triangles;
 mod uri;
-mod viewpoint;
 mod waves;
 mod write;
 
-use std::path::{Path, PathBuf};
-use std::sync::Arc;
-
-use gltf::json::Value;
-
-use super::{LoadOptions, Scene};
-use crate::error::{Error, Result};
-use crate::files;
 pub use glb::Glb;
-pub use opened::Opened;
-pub(super) use opened::open;
-use report::{Budget, Report};
 pub(super) use save::save;
 
 /// Reads a `.glb` or `.gltf` file with the buffers and images beside it.
@@ -141,10 +138,122 @@ fn read_scene(bytes: &[u8], path: &Path, options: &LoadOptions) -> Result<Scene>
     let mut lights = light::read_all(&document, &placed, folder, &mut report)?;
     area_light::add_all(&mut lights, &document, &placed, folder, &mut report)?;
     scene.lights = lights.into_iter().map(|(light, _)| light).collect();
-    glow::add_lights(&mut scene);
-    scene.cameras = viewpoint::read_all(&document.root, &placed, &mut report);
+    add_lights(&mut scene);
+    scene.cameras = nodes::read_all(&document.root, &placed, &mut report);
     substance::warn_of_ranges(&scene, &mut report);
-    rebase::rebase(&mut scene);
+    rebase(&mut scene);
     scene.warnings = report.into_warnings();
     Ok(scene)
+}
+
+/// A scene whose middle is farther away than this many of its own extents would lose digits.
+const FAR_IN_EXTENTS: f64 = 16.0;
+
+/// Makes the middle of a far scene its origin, and leaves any other scene alone.
+pub fn rebase(scene: &mut Scene) {
+    let Some((low, high)) = scene.bounds() else {
+        return;
+    };
+    let centre = 0.5 * (low + high);
+    if centre.length() <= FAR_IN_EXTENTS * (high - low).length() {
+        return;
+    }
+    scene.origin_world = centre;
+    for position in scene
+        .objects
+        .iter_mut()
+        .flat_map(|object| &mut Arc::make_mut(&mut object.mesh).positions)
+    {
+        *position -= centre;
+    }
+    for light in &mut scene.lights {
+        light.kind = light.kind.moved(-centre);
+    }
+    for material in &mut scene.materials {
+        material.waves = material.waves.as_ref().map(|waves| waves.with_origin(centre));
+    }
+    for camera in &mut scene.cameras {
+        camera.position -= centre;
+    }
+}
+
+/// Adds a light for every object whose material emits light, in their order. Its radiance is the luminance of what is
+/// emitted, its colour has a luminance of 1, and its
+/// spectrum is the material's.
+pub fn add_lights(scene: &mut Scene) {
+    for (object, part) in scene.objects.iter().enumerate() {
+        let material = scene.material_of(object);
+        let emitted = material.emitted_radiance;
+        let spectrum = material.emission_spectrum.clone();
+        let luminance = emitted.luminance();
+        if luminance > 0.0 && part.mesh.area_m2() > 0.0 {
+            scene.lights.push(Light {
+                name: part.name.clone(),
+                colour: emitted / luminance,
+                spectrum,
+                kind: LightKind::Surface {
+                    object,
+                    radiance: Radiance(luminance),
+                },
+                size: LightSize::None,
+            });
+        }
+    }
+}
+
+/// A document with everything that it needs.
+#[derive(Debug)]
+pub struct Opened {
+    /// Document and data.
+    pub glb: Glb,
+    /// From each node to the world, by glTF index; nodes outside the scene are missing.
+    pub world_from_node: BTreeMap<usize, DAffine3>,
+    /// What the document cannot hold of the scene.
+    pub warnings: Vec<Warning>,
+}
+
+/// The document of a scene: its file as it is, or for a built-in one a new one.
+///
+/// # Errors
+/// A file that cannot be read any more or whose first buffer lies where nothing can be added.
+pub fn open(scene: &Scene, most_bytes: u64) -> Result<Opened> {
+    if scene.source.starts_with("builtin:") {
+        let (glb, warnings) = write::document(scene)?;
+        let world_from_node = (0..scene.objects.len())
+            .map(|node| (node, DAffine3::IDENTITY))
+            .collect();
+        return Ok(Opened {
+            glb,
+            world_from_node,
+            warnings,
+        });
+    }
+    let path = Path::new(&scene.source);
+    let bytes = files::read_file(path, most_bytes)?;
+    let mut report = Report::default();
+    let split = container::split(&bytes, &mut report)?;
+    let typed = document::parse(split.json, &mut report)?;
+    let placed = nodes::place(&typed, &mut report)?;
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let parts = Parts::of(&bytes, split.json, folder, most_bytes)?;
+    let broken = |what: String| Error::failure(&scene.source, what, "export the file again");
+    let json: Value =
+        serde_json::from_str(&parts.json.into_text()).map_err(|error| broken(error.to_string()))?;
+    let has_elsewhere = json["buffers"][0].get("uri").is_some();
+    if has_elsewhere {
+        return Err(broken(
+            "has its first buffer within its text, where nothing can be added".into(),
+        ));
+    }
+    let binary = parts.chunks.get(8..).unwrap_or_default();
+    let stated = json["buffers"][0]["byteLength"].as_u64().unwrap_or(0);
+    let length = usize::try_from(stated).unwrap_or(usize::MAX).min(binary.len());
+    Ok(Opened {
+        glb: Glb::from_parts(json, binary[..length].to_vec()),
+        world_from_node: placed
+            .into_iter()
+            .map(|placed| (placed.node, placed.world_from_node))
+            .collect(),
+        warnings: Vec::new(),
+    })
 }

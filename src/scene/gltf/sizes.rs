@@ -6,68 +6,40 @@ use gltf::json::Value;
 use super::report::Report;
 use crate::scene::{LightKind, LightSize};
 
-/// What `extras` say of a size, unchecked.
-#[derive(Clone, Debug, Default)]
-pub struct StatedSize {
-    radius_m: Option<Value>,
-    angular_diameter_deg: Option<Value>,
-}
-
-impl StatedSize {
-    /// Of a node or a light, as the JSON has it.
-    pub fn of(owner: &Value) -> Self {
-        let extras = owner.get("extras");
-        let stated = |key: &str| extras.and_then(|extras| extras.get(key)).cloned();
-        Self {
-            radius_m: stated("radius_m"),
-            angular_diameter_deg: stated("angular_diameter_deg"),
-        }
-    }
-
-    /// Of each item of a list; none where it is no list.
-    pub fn of_each(list: Option<&Value>) -> Vec<Self> {
-        let items = list.and_then(Value::as_array);
-        items.into_iter().flatten().map(Self::of).collect()
-    }
-
-    /// The size of a light of that kind, where `self` or else `otherwise` states one that can be; 0 is none. What is
-    /// stated and not taken is named.
-    pub fn read(&self, otherwise: &Self, kind: &LightKind, owner: &str, report: &mut Report) -> LightSize {
-        let radius_m = self.radius_m.as_ref().or(otherwise.radius_m.as_ref());
-        let angle_deg = self
-            .angular_diameter_deg
-            .as_ref()
-            .or(otherwise.angular_diameter_deg.as_ref());
-        let is_sun = matches!(kind, LightKind::Sun { .. });
-        let (stated, other) = if is_sun {
-            (angle_deg, radius_m)
+/// The size of a light of that kind, where the extras of its node or else its own state one that can be; 0 is none. What
+/// is stated and not taken is named.
+pub fn read(extras: [Option<&Value>; 2], kind: &LightKind, owner: &str, report: &mut Report) -> LightSize {
+    let stated = |key: &str| extras.into_iter().flatten().find_map(|extras| extras.get(key));
+    let (radius_m, angle_deg) = (stated("radius_m"), stated("angular_diameter_deg"));
+    let is_sun = matches!(kind, LightKind::Sun { .. });
+    let (stated, other) = if is_sun {
+        (angle_deg, radius_m)
+    } else {
+        (radius_m, angle_deg)
+    };
+    if other.is_some() {
+        let (what, remedy) = if is_sun {
+            ("radius_m", "state angular_diameter_deg for a sun")
         } else {
-            (radius_m, angle_deg)
+            ("angular_diameter_deg", "state radius_m for a lamp")
         };
-        if other.is_some() {
-            let (what, remedy) = if is_sun {
-                ("radius_m", "state angular_diameter_deg for a sun")
-            } else {
-                ("angular_diameter_deg", "state radius_m for a lamp")
-            };
-            report.warn(owner, format!("its {what} was ignored"), remedy);
-        }
-        let Some(stated) = stated else {
-            return LightSize::None;
-        };
-        let size = stated
-            .as_f64()
-            .and_then(|number| if is_sun { angle(number) } else { radius(number) });
-        size.unwrap_or_else(|| {
-            let (what, range) = if is_sun {
-                ("angular_diameter_deg", "use degrees from 0 to 180")
-            } else {
-                ("radius_m", "use metres from 0 up")
-            };
-            report.warn(owner, format!("its {what} was ignored, as it is no size"), range);
-            LightSize::None
-        })
+        report.warn(owner, format!("its {what} was ignored"), remedy);
     }
+    let Some(stated) = stated else {
+        return LightSize::None;
+    };
+    let size = stated
+        .as_f64()
+        .and_then(|number| if is_sun { angle(number) } else { radius(number) });
+    size.unwrap_or_else(|| {
+        let (what, range) = if is_sun {
+            ("angular_diameter_deg", "use degrees from 0 to 180")
+        } else {
+            ("radius_m", "use metres from 0 up")
+        };
+        report.warn(owner, format!("its {what} was ignored, as it is no size"), range);
+        LightSize::None
+    })
 }
 
 fn radius(radius_m: f64) -> Option<LightSize> {

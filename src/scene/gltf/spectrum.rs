@@ -7,7 +7,7 @@ use std::sync::Arc;
 use gltf::json::Value;
 
 use super::document::Document;
-use super::extras::{of_file, text};
+use super::extras::{self, of_file, text};
 use super::report::Report;
 use super::uri;
 use crate::error::{Error, Result};
@@ -26,11 +26,11 @@ const MOST_CSV_BYTES: u64 = 16 << 20;
 pub fn stated<'a>(
     document: &'a Document,
     node: usize,
-    of_lights: &'a [Option<Value>],
+    of_lights: &'a [Value],
     light: usize,
 ) -> Option<&'a Value> {
-    let of_node = document.node_spectra.get(node).and_then(Option::as_ref);
-    of_node.or_else(|| of_lights.get(light).and_then(Option::as_ref))
+    let of_node = extras::stated(&document.extras.nodes, node, KEY);
+    of_node.or_else(|| extras::stated(of_lights, light, KEY))
 }
 
 /// Gives a lamp the spectrum that is stated for it, if any, in place of its colour.

@@ -4,6 +4,7 @@
 use glam::DVec3;
 use gltf::json::Value;
 use serde::Deserialize;
+use serde_json::json;
 
 use super::report::Report;
 use crate::scene::{Wave, Waves};
@@ -55,4 +56,14 @@ fn wave(stated: &Stated) -> Result<Wave, String> {
         direction,
         phase_rad: stated.phase_rad,
     })
+}
+
+/// Waves as a file states them, of a scene whose origin is shifted by so much [m].
+pub fn written(waves: &Waves, shift: DVec3) -> Value {
+    let stated = Vec::<Wave>::from(waves.with_origin(-shift));
+    let wave = |wave: &Wave| {
+        json!({ "amplitude_m": wave.amplitude_m, "wavelength_m": wave.wavelength_m,
+            "direction": wave.direction.to_array(), "phase_rad": wave.phase_rad })
+    };
+    stated.iter().map(wave).collect()
 }

@@ -2,14 +2,16 @@
 
 use std::path::{Path, PathBuf};
 
-use super::App;
-use crate::scene::load::was_dark;
-use crate::viewer::files::dialog::{Choice, Chosen};
-use crate::viewer::files::loader::Purpose;
-use crate::viewer::files::saver::free_name;
-use crate::viewer::model::Model;
-use crate::viewer::screenshot;
 use serde_json::json;
+
+use super::App;
+use super::drawing::without_backdrop;
+use crate::error::{Error, Result};
+use crate::scene::load::was_dark;
+use crate::viewer::files::{Choice, Chosen, Purpose, free_names, working_folder};
+use crate::viewer::model::Model;
+use crate::viewer::panel::Quantity;
+use crate::viewer::screenshot;
 
 /// What who opens a file without light is told first.
 pub(super) fn dark_notice(model: &Model) -> Option<String> {
@@ -29,8 +31,12 @@ impl App {
             }
             // Beside the original it is found again, and the notice says where.
             Some(Chosen::NoDialog(Choice::SaveScene, _)) => {
-                if let Some(path) = free_name(&self.original()) {
-                    self.save_scene_as(path);
+                let original = self.original();
+                let stem = original.file_stem().unwrap_or_default().to_string_lossy();
+                let folder = original.parent().unwrap_or(Path::new(""));
+                match free_names(folder, |number| [format!("{stem}-edited-{number}.glb")]) {
+                    Ok([path]) => self.save_scene_as(path),
+                    Err(error) => self.tell_unsaved(&error.to_string()),
                 }
             }
             Some(Chosen::Nothing) | None => {}
@@ -38,7 +44,7 @@ impl App {
         if let Some(purpose) = self.model.poll_files() {
             self.begin_scene(purpose);
         }
-        match self.model.files.saver.take() {
+        match self.model.files.take_saved() {
             Some(Ok(path)) => {
                 let files = [path];
                 self.model.log.write("saved", json!({"files": files}));
@@ -95,5 +101,43 @@ impl App {
             let name = &self.model.scene().name;
             graphics.window().set_title(&format!("Nephroid – {name}"));
         }
+    }
+}
+
+impl App {
+    /// Writes the picture to files in the working folder, and tells where over the picture.
+    pub(super) fn save_picture(&mut self) {
+        let outcome = self.written_picture();
+        let notice = match &outcome {
+            Ok(files) => {
+                self.model.log.write("saved", json!({"files": files}));
+                screenshot::told(files)
+            }
+            Err(error) => {
+                let sentence = error.to_string();
+                self.model.log.write("not_saved", json!({"sentence": sentence}));
+                sentence
+            }
+        };
+        self.notice = Some(notice);
+        self.request_redraw();
+    }
+
+    pub(super) fn written_picture(&mut self) -> Result<Vec<PathBuf>> {
+        let white_balance = self.white_balance();
+        let (Some(view), Some(graphics)) = (self.view(), &mut self.graphics) else {
+            return Err(Error::failure(
+                "picture",
+                "the window has no room for it",
+                "make the window larger",
+            ));
+        };
+        let view = without_backdrop(view);
+        let picture = graphics.radiance(&view)?;
+        let folder = working_folder();
+        // False colours are no radiance.
+        let has_radiance = self.model.quantity() == Quantity::Light;
+        let scene = &self.model.scene().name;
+        screenshot::save(&folder, scene, &picture, &view, &white_balance, has_radiance)
     }
 }

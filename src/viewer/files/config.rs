@@ -2,14 +2,20 @@
 
 use std::path::{Path, PathBuf};
 
-use serde::Serialize;
 use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
 
-use super::kept::Kept;
 use super::recent::Recent;
 use crate::error::{Error, Result};
 use crate::files::cache::ContentHash;
-use crate::files::{read_file, slug, write_atomically};
+use crate::files::{read_file, slug, to_json, write_atomically};
+use crate::scene::Camera;
+use crate::scene::changes::Change;
+use crate::settings::BakeSettings;
+use crate::viewer::filming::Film;
+use crate::viewer::navigation::{BOOKMARKS, Travel};
+use crate::viewer::panel::Display;
 
 /// Most that is read of one file [bytes]: far more than anything here takes.
 const MOST_BYTES: u64 = 16 << 20;
@@ -133,12 +139,69 @@ fn set_aside(path: &Path, why: &str) -> String {
 fn write<T: Serialize>(path: &Path, value: &T) -> Result<()> {
     let location = path.display().to_string();
     let unwritable = |what: String| Error::failure(&location, what, "check the folder's permissions");
-    let mut text = serde_json::to_vec_pretty(value)
-        .map_err(|error| unwritable(format!("cannot be put into words ({error})")))?;
+    let mut text = to_json(value, &location)?;
     text.push(b'\n');
     if let Some(folder) = path.parent() {
         std::fs::create_dir_all(folder)
             .map_err(|error| unwritable(format!("its folder cannot be made ({error})")))?;
     }
     write_atomically(path, |writer| writer.write_all(&text))
+}
+
+/// From where a scene is seen, and how the camera gets about.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct KeptViews {
+    /// `None` for the file's first.
+    pub camera: Option<Camera>,
+    /// How it gets about.
+    pub travel: Travel,
+    /// Views under the numbers from 1 on.
+    pub bookmarks: [Option<Camera>; BOOKMARKS],
+}
+
+/// All that is kept of a scene.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Kept {
+    /// The file by its full path, or `builtin:NAME`: for who reads the folder.
+    pub source: String,
+    /// Camera and bookmarks.
+    pub views: KeptViews,
+    /// Of the bake, by their names: a later version may have more of them, and others.
+    pub settings: Value,
+    /// Of the picture.
+    pub display: Display,
+    /// The camera's path.
+    pub film: Film,
+    /// Whether a change is baked by itself.
+    pub automatic: Option<bool>,
+    /// Whether the scene is read again when its files change.
+    pub watch: bool,
+    /// Edits of what was loaded.
+    pub changes: Vec<Change>,
+}
+
+impl Kept {
+    /// Settings as they were kept; those that this version does not know, or that are outside their ranges, are left as
+    /// `otherwise` has them.
+    pub fn settings_or(&self, otherwise: &BakeSettings) -> BakeSettings {
+        let (Value::Object(kept), Ok(mut known)) = (&self.settings, serde_json::to_value(otherwise)) else {
+            return otherwise.clone();
+        };
+        for (name, value) in kept {
+            let Some(place) = known.get_mut(name) else {
+                continue;
+            };
+            let before = std::mem::replace(place, value.clone());
+            let is_read = BakeSettings::deserialize(&known).is_ok();
+            if !is_read && let Some(place) = known.get_mut(name) {
+                *place = before;
+            }
+        }
+        let settings = BakeSettings::deserialize(&known).ok();
+        settings
+            .filter(|settings| settings.validate().is_ok())
+            .unwrap_or_else(|| otherwise.clone())
+    }
 }

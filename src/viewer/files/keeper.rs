@@ -1,14 +1,17 @@
 //! Writes what is kept on a thread of its own, soon after it changed and at the end.
 
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{self, JoinHandle};
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime};
 
-use super::config::ConfigFolder;
-use super::kept::Kept;
+use super::config::{ConfigFolder, Kept};
 use super::recent::Recent;
+use crate::error::Result;
 use crate::scene::Scene;
 use crate::scene::changes::Changes;
+use crate::viewer::background::no_thread;
 
 /// Longest that a change waits: a program that is killed loses no more than this.
 pub const SOON: Duration = Duration::from_secs(1);
@@ -33,51 +36,27 @@ impl Snapshot {
     }
 }
 
-#[derive(Debug, Default)]
-struct Slot {
-    snapshots: Vec<Snapshot>,
-    recent: Option<Recent>,
-    is_writing: bool,
-    ends: bool,
-}
-
-#[derive(Debug, Default)]
-struct Shared {
-    slot: Mutex<Slot>,
-    news: Condvar,
-}
-
-impl Shared {
-    /// No code that can panic runs under the lock, so a poisoned one still holds a valid slot.
-    fn lock(&self) -> MutexGuard<'_, Slot> {
-        self.slot.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
-
 /// Keeps scenes in a folder; dropping it writes what is still to be written.
 #[derive(Debug)]
 pub struct Keeper {
-    shared: Arc<Shared>,
-    thread: Option<JoinHandle<()>>,
+    folder: ConfigFolder,
     /// As it was handed over last, or read back.
     known: Option<Snapshot>,
     /// What is another one since some time.
     waiting: Option<(Instant, Snapshot)>,
+    /// What is being written.
+    writing: Option<JoinHandle<()>>,
 }
 
 impl Keeper {
-    /// Starts the thread; `None` where the system gives none: nothing is kept then.
-    pub fn start(folder: ConfigFolder) -> Option<Self> {
-        let shared = Arc::new(Shared::default());
-        let of_thread = Arc::clone(&shared);
-        let thread = thread::Builder::new().name("keeper".into());
-        let thread = thread.spawn(move || serve(&of_thread, &folder)).ok()?;
-        Some(Self {
-            shared,
-            thread: Some(thread),
+    /// Keeps nothing yet.
+    pub fn new(folder: ConfigFolder) -> Self {
+        Self {
+            folder,
             known: None,
             waiting: None,
-        })
+            writing: None,
+        }
     }
 
     /// What is in the window from now on, as it was read back: only what comes to differ from it is written.
@@ -103,73 +82,51 @@ impl Keeper {
     }
 
     /// Keeps the list of files that were opened.
-    pub fn keep_recent(&self, recent: &Recent) {
-        self.shared.lock().recent = Some(recent.clone());
-        self.shared.news.notify_all();
+    pub fn keep_recent(&mut self, recent: &Recent) {
+        let (folder, recent) = (self.folder.clone(), recent.clone());
+        self.write(move || {
+            if let Err(error) = folder.write_recent(&recent) {
+                log::warn!("{error}");
+            }
+        });
     }
 
     /// Writes what waits, and comes back when it is on the disk: for who reads it back at once.
     pub fn settle(&mut self) {
         self.flush();
-        let mut slot = self.shared.lock();
-        while slot.is_writing || !slot.snapshots.is_empty() {
-            slot = self
-                .shared
-                .news
-                .wait(slot)
-                .unwrap_or_else(PoisonError::into_inner);
-        }
+        self.wait();
     }
 
-    /// Hands over what waits.
+    /// Begins to write what waits.
     fn flush(&mut self) {
         if let Some((_, snapshot)) = self.waiting.take() {
             self.known = Some(snapshot.clone());
-            let mut slot = self.shared.lock();
-            slot.snapshots
-                .retain(|other| other.kept.source != snapshot.kept.source);
-            slot.snapshots.push(snapshot);
-            drop(slot);
-            self.shared.news.notify_all();
+            let folder = self.folder.clone();
+            self.write(move || write(&folder, snapshot));
         }
     }
-}
 
-impl Drop for Keeper {
-    fn drop(&mut self) {
-        self.flush();
-        self.shared.lock().ends = true;
-        self.shared.news.notify_all();
-        if let Some(thread) = self.thread.take()
-            && thread.join().is_err()
+    /// Writes on a thread, after what is being written.
+    fn write(&mut self, work: impl FnOnce() + Send + 'static) {
+        self.wait();
+        match thread::Builder::new().name("keeper".into()).spawn(work) {
+            Ok(writing) => self.writing = Some(writing),
+            Err(error) => log::warn!("what is kept cannot be written: {error}"),
+        }
+    }
+
+    fn wait(&mut self) {
+        if let Some(writing) = self.writing.take()
+            && writing.join().is_err()
         {
             log::error!("the thread that keeps settings panicked");
         }
     }
 }
 
-/// The thread's life.
-fn serve(shared: &Shared, folder: &ConfigFolder) {
-    loop {
-        let (snapshots, recent) = {
-            let mut slot = shared.lock();
-            while slot.snapshots.is_empty() && slot.recent.is_none() {
-                if slot.ends {
-                    return;
-                }
-                slot = shared.news.wait(slot).unwrap_or_else(PoisonError::into_inner);
-            }
-            slot.is_writing = true;
-            (std::mem::take(&mut slot.snapshots), slot.recent.take())
-        };
-        for snapshot in snapshots {
-            write(folder, snapshot);
-        }
-        if let Some(Err(error)) = recent.map(|recent| folder.write_recent(&recent)) {
-            log::warn!("{error}");
-        }
-        shared.lock().is_writing = false;
-        shared.news.notify_all();
+impl Drop for Keeper {
+    fn drop(&mut self) {
+        self.settle();
     }
 }
 
@@ -189,5 +146,95 @@ fn write(folder: &ConfigFolder, snapshot: Snapshot) {
     }
     if let Err(error) = folder.write_scene(&kept) {
         log::warn!("{error}");
+    }
+}
+
+/// Time between two looks. A change counts once it is the same at two of them: who writes has come to rest.
+pub const BETWEEN_LOOKS: Duration = Duration::from_millis(500);
+
+/// When files were written last, and how long they are; `None` for one that is not there.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Stamps(Vec<(PathBuf, Option<(SystemTime, u64)>)>);
+
+impl Stamps {
+    /// As the files are now.
+    pub fn of(paths: Vec<PathBuf>) -> Self {
+        let stamp = |path: PathBuf| {
+            let data = std::fs::metadata(&path).ok();
+            let stamp = data.and_then(|data| Some((data.modified().ok()?, data.len())));
+            (path, stamp)
+        };
+        Self(paths.into_iter().map(stamp).collect())
+    }
+
+    /// Of the same files now.
+    fn again(&self) -> Self {
+        Self::of(self.0.iter().map(|(path, _)| path.clone()).collect())
+    }
+}
+
+/// What both threads look at.
+#[derive(Debug, Default)]
+struct Shared {
+    ends: AtomicBool,
+    has_changed: AtomicBool,
+}
+
+/// Watches files until it is dropped.
+#[derive(Debug)]
+pub struct Watch {
+    shared: Arc<Shared>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Watch {
+    /// Watches files that were as `stamps` say; `wake` is called from another thread when they changed.
+    ///
+    /// # Errors
+    /// The system gives no thread.
+    pub fn start(stamps: Stamps, wake: Arc<dyn Fn() + Send + Sync>) -> Result<Self> {
+        let shared = Arc::new(Shared::default());
+        let of_thread = Arc::clone(&shared);
+        let thread = thread::Builder::new()
+            .name("watch".into())
+            .spawn(move || look(&of_thread, stamps, &*wake))
+            .map_err(|error| no_thread("watch", &error))?;
+        Ok(Self {
+            shared,
+            thread: Some(thread),
+        })
+    }
+
+    /// Whether they changed since it was asked last.
+    pub fn take_change(&self) -> bool {
+        self.shared.has_changed.swap(false, Ordering::AcqRel)
+    }
+}
+
+impl Drop for Watch {
+    fn drop(&mut self) {
+        self.shared.ends.store(true, Ordering::Release);
+        if let Some(thread) = self.thread.take() {
+            thread.thread().unpark();
+            // It can only have ended.
+            let _ = thread.join();
+        }
+    }
+}
+
+fn look(shared: &Shared, mut known: Stamps, wake: &dyn Fn()) {
+    let mut before = known.clone();
+    loop {
+        thread::park_timeout(BETWEEN_LOOKS);
+        if shared.ends.load(Ordering::Acquire) {
+            return;
+        }
+        let now = known.again();
+        if now == before && now != known {
+            known = now.clone();
+            shared.has_changed.store(true, Ordering::Release);
+            wake();
+        }
+        before = now;
     }
 }

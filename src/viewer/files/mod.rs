@@ -1,26 +1,34 @@
 //! Scenes that are opened while the window is open.
 
-pub mod config;
-pub mod dialog;
-pub mod keeper;
-pub mod kept;
-pub mod loader;
-pub mod recent;
-pub mod saver;
-pub mod watch;
-
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 
+use rfd::FileDialog;
+use winit::window::Window;
+
+use self::config::Kept;
 use self::config::{ConfigFolder, ReadBack};
 use self::keeper::Keeper;
-use self::kept::Kept;
-use self::loader::Loader;
+use self::keeper::{Stamps, Watch};
 use self::recent::Recent;
-use self::saver::Saver;
-use self::watch::{Stamps, Watch};
-use crate::scene::LoadOptions;
-use crate::viewer::background::Wake;
+use crate::error::{Error, Result};
+use crate::progress::Control;
+use crate::scene::{LoadOptions, Scene, load};
+use crate::viewer::background::{Background, Wake};
+
+pub mod config;
+pub mod keeper;
+pub mod recent;
+
+/// What a scene is read for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Purpose {
+    /// To take the place of the one in the window.
+    Open,
+    /// Its files have changed.
+    Reload,
+}
 
 /// How scenes are opened in the window.
 #[derive(Clone, Debug, Default)]
@@ -42,10 +50,8 @@ pub struct FilesOptions {
 pub struct Files {
     /// How scenes are read.
     pub load: LoadOptions,
-    /// Reads the scene that comes next.
-    pub loader: Loader,
-    /// Writes the edited scene.
-    pub saver: Saver,
+    loader: Background<(String, Purpose), Result<Scene>>,
+    saver: Background<PathBuf, Result<()>>,
     /// What was opened before.
     pub recent: Recent,
     /// Why the last scene could not be opened.
@@ -67,13 +73,13 @@ impl Files {
         let (recent, warning) = recent.unwrap_or_default();
         Self {
             load: options.load.clone(),
-            loader: Loader::new(Arc::clone(&wake)),
-            saver: Saver::new(Arc::clone(&wake)),
+            loader: Background::new("loader", Arc::clone(&wake)),
+            saver: Background::new("saver", Arc::clone(&wake)),
             recent: recent.unwrap_or_default(),
             refusal: None,
             warning,
             watch: None,
-            keeper: options.config.clone().and_then(Keeper::start),
+            keeper: options.config.clone().map(Keeper::new),
             config: options.config.clone(),
             wake: Wake(wake),
         }
@@ -82,9 +88,60 @@ impl Files {
     /// A scene was opened.
     pub fn opened(&mut self, source: &str) {
         self.recent.opened(source);
-        if let Some(keeper) = &self.keeper {
+        if let Some(keeper) = &mut self.keeper {
             keeper.keep_recent(&self.recent);
         }
+    }
+
+    /// Reads a scene; one that is still being read is forgotten.
+    ///
+    /// # Errors
+    /// The system gives no thread.
+    pub fn read(&mut self, source: &str, purpose: Purpose) -> Result<()> {
+        let (named, options) = (source.to_owned(), self.load.clone());
+        self.loader
+            .start((source.to_owned(), purpose), move |_| load(&named, &options))
+    }
+
+    /// The scene that was read, once, with where it comes from and what it was read for.
+    pub fn take_read(&mut self) -> Option<((String, Purpose), Result<Scene>)> {
+        let (of, outcome) = self.loader.take()?;
+        let broken = || {
+            Err(Error::failure(
+                &of.0,
+                "reading it broke off",
+                "check the file and try again",
+            ))
+        };
+        let outcome = outcome.unwrap_or_else(broken);
+        Some((of, outcome))
+    }
+
+    /// Writes an edited scene, unless one is being written.
+    ///
+    /// # Errors
+    /// The system gives no thread.
+    pub fn save(&mut self, target: PathBuf, loaded: Arc<Scene>, edited: Arc<Scene>) -> Result<()> {
+        if self.saver.of().is_some() {
+            return Ok(());
+        }
+        let (path, options) = (target.clone(), self.load.clone());
+        self.saver
+            .start(target, move |_| load::save(&path, &loaded, &edited, &options))
+    }
+
+    /// Where the scene was written, once, or why it was not.
+    pub fn take_saved(&mut self) -> Option<Result<PathBuf>> {
+        let (target, outcome) = self.saver.take()?;
+        let location = target.display().to_string();
+        let broken = || {
+            Err(Error::failure(
+                location,
+                "writing it broke off",
+                "try again, or choose another place",
+            ))
+        };
+        Some(outcome.unwrap_or_else(broken).map(|()| target))
     }
 
     /// What was kept of a scene by its full path, and a sentence where that cannot be understood.
@@ -104,7 +161,7 @@ impl Files {
     /// What the panel tells of them.
     pub fn facts(&self) -> FileFacts<'_> {
         FileFacts {
-            loading: self.loader.loading(),
+            loading: self.loader.of().map(|(source, _)| source.as_str()),
             recent: self.recent.paths(),
             refusal: self.refusal.as_deref(),
             warning: self.warning.as_deref(),
@@ -144,4 +201,106 @@ pub fn typed(text: &str) -> String {
 /// started.
 pub fn working_folder() -> PathBuf {
     std::env::current_dir().unwrap_or_else(|_| PathBuf::from("."))
+}
+
+const NUMBERS: std::ops::RangeInclusive<u32> = 1..=9999;
+
+/// Names for files of one number, none of which there is yet.
+///
+/// # Errors
+/// All numbers are taken.
+pub fn free_names<const N: usize>(
+    folder: &Path,
+    named: impl Fn(&str) -> [String; N],
+) -> Result<[PathBuf; N]> {
+    let paths = |number: u32| named(&format!("{number:04}")).map(|name| folder.join(name));
+    let is_free = |paths: &[PathBuf; N]| !paths.iter().any(|path| path.exists());
+    NUMBERS.map(paths).find(is_free).ok_or_else(|| {
+        Error::failure(
+            folder.display().to_string(),
+            format!("it holds {} of these already", NUMBERS.end()),
+            "move some of them elsewhere",
+        )
+    })
+}
+
+/// Nobody sees a dialog and closes it in so short a time: there was none.
+const NO_DIALOG_WITHIN: Duration = Duration::from_millis(400);
+
+/// Told where no dialog can be had.
+const NONE: &str =
+    "This system offers no dialog to choose a file in: type its path, or drop the file on the window.";
+
+/// What a file is chosen for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Choice {
+    /// A scene to be opened.
+    Open,
+    /// The edited scene to be saved.
+    SaveScene,
+}
+
+/// What came of a dialog.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Chosen {
+    /// This file, for that.
+    File(Choice, PathBuf),
+    /// The user thought better of it.
+    Nothing,
+    /// There is no dialog to choose it in: one sentence.
+    NoDialog(Choice, &'static str),
+}
+
+/// A dialog, open or not.
+#[derive(Debug)]
+pub struct Dialog {
+    open: Background<(Choice, Instant), Option<PathBuf>>,
+    /// Asked for where the system gives no thread.
+    refused: Option<Choice>,
+}
+
+impl Dialog {
+    /// None is open; `wake` is called from another thread when a file was chosen.
+    pub fn new(wake: Arc<dyn Fn() + Send + Sync>) -> Self {
+        Self {
+            open: Background::new("dialog", wake),
+            refused: None,
+        }
+    }
+
+    /// Asks for a file, unless a dialog is open already. It begins in the folder of the file that is in the window.
+    pub fn ask(&mut self, choice: Choice, window: &Window, present: &Path) {
+        if self.open.of().is_some() {
+            return;
+        }
+        let mut dialog = FileDialog::new()
+            .set_parent(window)
+            .add_filter("glTF scenes", &["glb", "gltf"]);
+        if let Some(folder) = present.parent().filter(|folder| folder.is_dir()) {
+            dialog = dialog.set_directory(folder);
+        }
+        if choice == Choice::SaveScene {
+            let stem = present.file_stem().unwrap_or_default().to_string_lossy();
+            dialog = dialog.set_file_name(format!("{stem}-edited.glb"));
+        }
+        let ask = move |_: &Control| match choice {
+            Choice::Open => dialog.pick_file(),
+            Choice::SaveScene => dialog.save_file(),
+        };
+        let is_refused = self.open.start((choice, Instant::now()), ask).is_err();
+        self.refused = is_refused.then_some(choice);
+    }
+
+    /// What was chosen, once.
+    pub fn take(&mut self) -> Option<Chosen> {
+        if let Some(choice) = self.refused.take() {
+            return Some(Chosen::NoDialog(choice, NONE));
+        }
+        let ((choice, since), answer) = self.open.take()?;
+        Some(match answer {
+            Some(Some(path)) => Chosen::File(choice, path),
+            Some(None) if since.elapsed() >= NO_DIALOG_WITHIN => Chosen::Nothing,
+            Some(None) | None => Chosen::NoDialog(choice, NONE),
+        })
+    }
 }

@@ -8,9 +8,9 @@ use serde_json::Value;
 use super::Model;
 use crate::scene::changes::Change;
 use crate::settings::BakeSettings;
+use crate::viewer::files::config::Kept;
 use crate::viewer::files::config::full_source;
 use crate::viewer::files::keeper::Snapshot;
-use crate::viewer::files::kept::Kept;
 use serde_json::json;
 
 /// What of a kept scene is taken over.

@@ -13,8 +13,8 @@ use crate::scene::{Scene, load};
 use crate::viewer::ViewerOptions;
 use crate::viewer::edits::EditedScene;
 use crate::viewer::files;
-use crate::viewer::files::loader::{Loaded, Purpose};
-use crate::viewer::files::watch::Stamps;
+use crate::viewer::files::Purpose;
+use crate::viewer::files::keeper::Stamps;
 use crate::viewer::filming::Film;
 use crate::viewer::navigation::Navigator;
 use crate::viewer::worker::BakedLevel;
@@ -47,17 +47,16 @@ impl Model {
         }
     }
 
-    /// Writes the edited scene to a `.glb` file, on a thread: [`Saver::take`] tells what came of it.
+    /// Writes the edited scene to a `.glb` file, on a thread: [`Files::take_saved`] tells what came of it.
     ///
     /// # Errors
-    /// As [`Saver::start`].
+    /// As [`Files::save`].
     ///
-    /// [`Saver::take`]: crate::viewer::files::saver::Saver::take
-    /// [`Saver::start`]: crate::viewer::files::saver::Saver::start
+    /// [`Files::take_saved`]: crate::viewer::files::Files::take_saved
+    /// [`Files::save`]: crate::viewer::files::Files::save
     pub fn save_scene(&mut self, target: PathBuf) -> Result<()> {
         let (loaded, edited) = (Arc::clone(self.edits.loaded()), Arc::clone(self.edits.scene()));
-        let options = self.files.load.clone();
-        self.files.saver.start(target, loaded, edited, options)
+        self.files.save(target, loaded, edited)
     }
 
     /// Whether these maps are of the first bake of the scene in the window.
@@ -73,8 +72,7 @@ impl Model {
     fn read(&mut self, source: &str, purpose: Purpose) {
         self.files.refusal = None;
         self.log.write("opening", json!({"source": source}));
-        let options = self.files.load.clone();
-        if let Err(error) = self.files.loader.start(source, purpose, &options) {
+        if let Err(error) = self.files.read(source, purpose) {
             self.refuse(source, &error.to_string());
         }
     }
@@ -92,11 +90,7 @@ impl Model {
             let source = self.edits.loaded().source.clone();
             self.read(&source, Purpose::Reload);
         }
-        let Loaded {
-            source,
-            purpose,
-            outcome,
-        } = self.files.loader.take()?;
+        let ((source, purpose), outcome) = self.files.take_read()?;
         let scene = match outcome {
             Ok(scene) => scene,
             Err(error) => {

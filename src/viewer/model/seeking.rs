@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use super::Model;
 use crate::geometry::Ray;
-use crate::scene::{Edit, LightOrigin};
+use crate::scene::Edit;
 use crate::transport::Tracer;
 use crate::viewer::brightest::{self, Spot};
 use crate::viewer::gizmo::Held;
@@ -61,9 +61,7 @@ impl Model {
         let stops = self.panel.display.exposure_stops;
         let added = light.make((surfaces, radius_m), &aim, stops, &scene);
         let edit = Edit::LightAdded {
-            light: None,
             added: Arc::new(added),
-            origin: LightOrigin::New,
         };
         self.log
             .write("edit", json!({"target": format!("{:?}", edit.target())}));

@@ -7,18 +7,9 @@ pub mod target;
 
 use egui::{Response, Ui};
 
-use super::control::{About, choice, rows, setting};
+use super::control::{choice, rows, setting};
 use super::light_pass;
 use crate::settings::{BakeSettings, MapResolution};
-
-const MAP_RESOLUTION: About = About {
-    label: "Map size [texels]",
-    what: "Texels across and down of every map; automatic maps of flat surfaces are finer where light is finer.",
-    range: "auto, 64 to 4096",
-    default: "auto",
-    accuracy: "details finer than a texel are averaged",
-    cost: "memory and the direct layer's time grow with its square",
-};
 
 /// Shows the section; `settings` holds what the user chose.
 pub fn show(ui: &mut Ui, settings: &mut BakeSettings) {
@@ -27,7 +18,7 @@ pub fn show(ui: &mut Ui, settings: &mut BakeSettings) {
         preset::show(ui, settings);
         target::show(ui, settings, no_caustic);
         let value = (&mut settings.map_resolution, &MapResolution::Auto);
-        setting(ui, &MAP_RESOLUTION, None, value, map_resolution);
+        setting(ui, "Map size [texels]", None, value, map_resolution);
     });
 }
 
@@ -41,29 +32,19 @@ fn map_resolution(ui: &mut Ui, resolution: &mut MapResolution) -> Response {
         width: side,
         height: side,
     };
-    let selected = match *resolution {
-        MapResolution::Auto => "auto".into(),
-        MapResolution::Fixed { width, height } if width == height => width.to_string(),
+    let custom = match *resolution {
+        MapResolution::Auto => String::new(),
         MapResolution::Fixed { width, height } => format!("{width} × {height}"),
     };
-    choice(
-        ui,
-        "map size",
-        resolution,
-        &selected,
-        &[
-            (
-                MapResolution::Auto,
-                "auto",
-                "starts coarse and doubles while footprints are finer than texels",
-            ),
-            (square(64), "64", "64 × 64"),
-            (square(128), "128", "128 × 128"),
-            (square(256), "256", "256 × 256"),
-            (square(512), "512", "512 × 512"),
-            (square(1024), "1024", "1024 × 1024"),
-            (square(2048), "2048", "2048 × 2048"),
-            (square(4096), "4096", "4096 × 4096: 200 MB per map and layer"),
-        ],
-    )
+    let sides = (6..=12).map(|power| 1_usize << power);
+    let sides: Vec<(usize, String)> = sides.map(|side| (side, side.to_string())).collect();
+    let auto = "starts coarse and doubles while footprints are finer than texels";
+    let fixed = "so many across and down; 4096 take 200 MB per map and layer";
+    let sides = sides
+        .iter()
+        .map(|(side, name)| (square(*side), name.as_str(), fixed));
+    let choices: Vec<_> = std::iter::once((MapResolution::Auto, "auto", auto))
+        .chain(sides)
+        .collect();
+    choice(ui, "map size", resolution, &custom, &choices)
 }

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use egui::{Color32, Grid, ProgressBar, RichText, Ui};
 
-use super::control::{counted, grouped};
+use super::control::{button, counted, grouped};
 use super::{Facts, Panel, Wishes};
 use crate::illumination::IlluminationMap;
 use crate::light_pass::ledger::EnergyLedger;
@@ -22,18 +22,10 @@ pub const ATTENTION: Color32 = Color32::from_rgb(250, 190, 90);
 pub fn show(ui: &mut Ui, panel: &mut Panel, facts: &Facts<'_>, wishes: &mut Wishes) {
     let refused = panel.settings.validate().err();
     ui.horizontal(|ui| {
-        let rebake = ui
-            .add_enabled(refused.is_none(), egui::Button::new("Re-bake"))
-            .on_hover_text(
-                "Bakes with the settings below (R). The shown maps stay until the new ones are complete.",
-            )
-            .on_disabled_hover_text("A setting is out of its range.");
-        wishes.rebake |= rebake.clicked();
-        let cancel = ui
-            .add_enabled(facts.state.is_working(), egui::Button::new("Cancel"))
-            .on_hover_text("Stops the bake and drops its unfinished maps; the shown maps stay.")
-            .on_disabled_hover_text("No bake is running.");
-        wishes.cancel |= cancel.clicked();
+        let invalid = refused.is_some().then_some("A setting is out of its range.");
+        wishes.rebake |= button(ui, "Re-bake", invalid);
+        let idle = (!facts.state.is_working()).then_some("No bake is running.");
+        wishes.cancel |= button(ui, "Cancel", idle);
         ui.checkbox(&mut panel.automatic, "automatic")
             .on_hover_text(
                 "Bakes every change of a setting or of the scene, at the pace of first levels while it is dragged. \

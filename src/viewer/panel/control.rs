@@ -1,6 +1,12 @@
 //! One labelled control per row, each with a text that says what it does and what it costs.
 
+use std::borrow::Cow;
+use std::collections::HashMap;
+use std::sync::LazyLock;
+
 use egui::{Button, ComboBox, EventFilter, Grid, Key, Response, RichText, Ui, vec2};
+use serde::Deserialize;
+use strum::{EnumMessage, VariantArray};
 
 /// Width of the control beside its label [points].
 pub const CONTROL_WIDTH: f32 = 186.0;
@@ -8,14 +14,14 @@ pub const CONTROL_WIDTH: f32 = 186.0;
 const LABEL_WIDTH: f32 = 124.0;
 /// Size of what sets a value back to its default [points].
 const RESET: egui::Vec2 = vec2(16.0, 18.0);
+/// Most height of an open list [points].
+const LIST_HEIGHT: f32 = 320.0;
 /// Width of a slider without its value [points].
 const SLIDER_WIDTH: f32 = 112.0;
 
 /// What a control is for, in the user's terms.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Deserialize)]
 pub struct About {
-    /// Name, with its unit where it has one.
-    pub label: &'static str,
     /// What it sets.
     pub what: &'static str,
     /// Its values.
@@ -23,23 +29,53 @@ pub struct About {
     /// What it is set back to.
     pub default: &'static str,
     /// What it does to accuracy.
-    pub accuracy: &'static str,
+    accuracy: &'static str,
     /// What it does to time and memory.
-    pub cost: &'static str,
+    cost: &'static str,
 }
 
 impl About {
     fn text(&self) -> String {
-        let Self {
-            what,
-            range,
-            default,
-            accuracy,
-            cost,
-            ..
-        } = self;
-        format!("{what}\n\nRange: {range}\nDefault: {default}\nAccuracy: {accuracy}\nCost: {cost}")
+        format!(
+            "{}\n\nRange: {}\nDefault: {}\nAccuracy: {}\nCost: {}",
+            self.what, self.range, self.default, self.accuracy, self.cost
+        )
     }
+}
+
+/// All that is told, by the labels of rows and by the names of buttons.
+#[derive(Deserialize)]
+struct Texts {
+    #[serde(borrow)]
+    rows: HashMap<&'static str, About>,
+    #[serde(borrow)]
+    buttons: HashMap<&'static str, &'static str>,
+}
+
+static TEXTS: LazyLock<Texts> = LazyLock::new(|| {
+    let texts = include_str!("about.json");
+    serde_json::from_str(texts).expect("the file is part of the program")
+});
+
+/// What is told about the control of a label.
+pub fn about(label: &str) -> &'static About {
+    TEXTS.rows.get(label).expect("about.json tells about every row")
+}
+
+/// What is told about a button.
+pub fn about_button(name: &str) -> &'static str {
+    TEXTS
+        .buttons
+        .get(name)
+        .expect("about.json tells about every button")
+}
+
+/// A button, greyed where there is a reason why not; whether it was clicked.
+pub fn button(ui: &mut Ui, name: &str, why_not: Option<&str>) -> bool {
+    ui.add_enabled(why_not.is_none(), Button::new(name))
+        .on_hover_text(about_button(name))
+        .on_disabled_hover_text(why_not.unwrap_or_default())
+        .clicked()
 }
 
 /// A grid of label, control and what sets it back.
@@ -57,11 +93,11 @@ pub fn rows(ui: &mut Ui, name: &str, add: impl FnOnce(&mut Ui)) {
 /// A row of what has no default; greyed, with the reason on hover, where the control is `unavailable`.
 pub fn row(
     ui: &mut Ui,
-    about: &About,
+    label: &str,
     unavailable: Option<&str>,
     add: impl FnOnce(&mut Ui) -> Response,
 ) -> Response {
-    let response = labelled(ui, about, unavailable, add);
+    let response = labelled(ui, label, unavailable, add);
     ui.end_row();
     response
 }
@@ -69,23 +105,19 @@ pub fn row(
 /// A row of a value, with what sets it back where it is not its default.
 pub fn setting<T: PartialEq + Clone>(
     ui: &mut Ui,
-    about: &About,
+    label: &str,
     unavailable: Option<&str>,
     (value, default): (&mut T, &T),
     add: impl FnOnce(&mut Ui, &mut T) -> Response,
 ) {
-    labelled(ui, about, unavailable, |ui| add(ui, value));
-    if value != default && unavailable.is_none() && reset(ui, about) {
+    labelled(ui, label, unavailable, |ui| add(ui, value));
+    if value != default && unavailable.is_none() && reset_to(ui, label, about(label).default) {
         value.clone_from(default);
     }
     ui.end_row();
 }
 
 /// A button that sets a value back; tells whether it was pressed.
-fn reset(ui: &mut Ui, about: &About) -> bool {
-    reset_to(ui, about.label, about.default)
-}
-
 /// The same, for what is not in a row.
 pub fn reset_to(ui: &mut Ui, label: &str, default: &str) -> bool {
     let name = format!("Reset {label}");
@@ -101,12 +133,12 @@ pub fn reset_to(ui: &mut Ui, label: &str, default: &str) -> bool {
 
 fn labelled(
     ui: &mut Ui,
-    about: &About,
+    label: &str,
     unavailable: Option<&str>,
     add: impl FnOnce(&mut Ui) -> Response,
 ) -> Response {
-    let text = about.text();
-    let mut name = RichText::new(about.label);
+    let text = about(label).text();
+    let mut name = RichText::new(label);
     if unavailable.is_some() {
         name = name.weak();
     }
@@ -123,7 +155,7 @@ fn labelled(
 }
 
 /// Steps that the arrow keys ask for while a closed list has the keyboard: down is 1.
-pub fn arrow_steps(ui: &Ui, list: &Response) -> isize {
+fn arrow_steps(ui: &Ui, list: &Response) -> isize {
     if !list.has_focus() {
         return 0;
     }
@@ -136,77 +168,92 @@ pub fn arrow_steps(ui: &Ui, list: &Response) -> isize {
     presses(Key::ArrowDown) - presses(Key::ArrowUp)
 }
 
-/// The index so many steps away, as far as there are any.
-pub fn stepped(index: usize, steps: isize, count: usize) -> usize {
-    index.saturating_add_signed(steps).min(count.saturating_sub(1))
-}
+/// An entry of a drop-down list: its name, a text for hovering, and why it cannot be picked if it cannot.
+pub type Entry<'a> = (&'a str, Cow<'a, str>, Option<&'a str>);
 
-/// A long drop-down list of names, some with a hover text: what is shown, and at which place of the list that is, if at
-/// any. The place that was picked, by mouse or arrow keys.
-pub fn pick<'a>(
+/// A drop-down list: what is shown, and at which place of the list that is, if at any. The place that was picked, by
+/// mouse or arrow keys.
+pub fn pick(
     ui: &mut Ui,
-    id: &str,
+    (id, width): (&str, f32),
     (shown, at): (&str, Option<usize>),
-    names: impl ExactSizeIterator<Item = (&'a str, Option<String>)>,
+    entries: &[Entry<'_>],
 ) -> (Response, Option<usize>) {
-    let count = names.len();
     let mut picked = None;
+    let mut entry = |ui: &mut Ui, index: usize, (name, hover, why_not): &Entry<'_>| {
+        ui.add_enabled_ui(why_not.is_none(), |ui| {
+            let mut label = ui
+                .push_id(index, |ui| ui.selectable_label(at == Some(index), *name))
+                .inner;
+            if !hover.is_empty() {
+                label = label.on_hover_text(&**hover);
+            }
+            let label = label.on_disabled_hover_text(why_not.unwrap_or_default());
+            if label.clicked() {
+                picked = Some(index);
+            }
+        });
+    };
     let list = ComboBox::from_id_salt(id)
-        .width(CONTROL_WIDTH)
+        .width(width)
+        .height(LIST_HEIGHT)
         .selected_text(shown)
+        .truncate()
         .show_ui(ui, |ui| {
-            for (index, (name, hover)) in names.enumerate() {
-                let mut label = ui.selectable_label(at == Some(index), name);
-                if let Some(hover) = hover {
-                    label = label.on_hover_text(hover);
-                }
-                if label.clicked() {
-                    picked = Some(index);
-                }
+            for (index, offered) in entries.iter().enumerate() {
+                entry(ui, index, offered);
             }
         });
     if list.inner.is_none() {
+        let open: Vec<usize> = (0..entries.len())
+            .filter(|index| entries[*index].2.is_none())
+            .collect();
         let steps = arrow_steps(ui, &list.response);
-        if steps != 0 {
-            picked = Some(at.map_or(0, |at| stepped(at, steps, count)));
+        if steps != 0 && !open.is_empty() {
+            let place = open.iter().position(|index| Some(*index) == at);
+            let next = place.map_or(0, |place| place.saturating_add_signed(steps).min(open.len() - 1));
+            picked = Some(open[next]);
         }
     }
     (list.response, picked)
 }
 
-/// A drop-down list of named values, each with its own hover text.
+/// A drop-down list of values, each with a name and a text for hovering; `custom` is shown for one that is not among
+/// them.
 pub fn choice<T: PartialEq + Copy>(
     ui: &mut Ui,
     name: &str,
     value: &mut T,
-    selected: &str,
+    custom: &str,
     choices: &[(T, &str, &str)],
 ) -> Response {
-    let list = ComboBox::from_id_salt(name)
-        .width(CONTROL_WIDTH)
-        .selected_text(selected)
-        .show_ui(ui, |ui| {
-            for (candidate, label, hover) in choices {
-                ui.selectable_value(value, *candidate, *label)
-                    .on_hover_text(*hover);
-            }
-        });
-    if list.inner.is_none() {
-        let steps = arrow_steps(ui, &list.response);
-        let index = choices.iter().position(|(candidate, ..)| candidate == value);
-        if steps != 0 {
-            *value = choices[index.map_or(0, |index| stepped(index, steps, choices.len()))].0;
-        }
+    let at = choices.iter().position(|(candidate, ..)| candidate == value);
+    let entries: Vec<Entry> = choices
+        .iter()
+        .map(|(_, name, hover)| (*name, (*hover).into(), None))
+        .collect();
+    let shown = at.map_or(custom, |at| choices[at].1);
+    let (response, picked) = pick(ui, (name, CONTROL_WIDTH), (shown, at), &entries);
+    if let Some(index) = picked {
+        *value = choices[index].0;
     }
-    list.response
+    response
 }
 
-/// The name of the value that is chosen; "custom" where it is none of the list.
-pub fn chosen<'a, T: PartialEq>(value: &T, choices: &[(T, &'a str, &'a str)]) -> &'a str {
-    choices
-        .iter()
-        .find(|(candidate, ..)| candidate == value)
-        .map_or("custom", |(_, label, _)| label)
+/// A drop-down list of all values of a setting, by the names and texts that they have on the command line.
+pub fn listed<T>(ui: &mut Ui, name: &str, value: &mut T) -> Response
+where
+    T: VariantArray + EnumMessage + Into<&'static str> + PartialEq + Copy,
+{
+    let choices = T::VARIANTS.iter();
+    let choices = choices.map(|value| {
+        (
+            *value,
+            (*value).into(),
+            value.get_documentation().unwrap_or_default(),
+        )
+    });
+    choice(ui, name, value, "custom", &choices.collect::<Vec<_>>())
 }
 
 /// A number in four significant digits; very large and very small ones in powers of ten.

@@ -1,80 +1,16 @@
 //! Section *Display*: how the picture shows the maps. Nothing here changes a bake.
 
-use egui::{ComboBox, DragValue, Response, Slider, SliderClamping, Ui};
+use egui::{DragValue, Response, Slider, SliderClamping, Ui};
 
-use super::control::{
-    About, CONTROL_WIDTH, arrow_steps, choice, chosen, counted, row, rows, setting, short, stepped,
-};
+use super::control::{CONTROL_WIDTH, about, choice, counted, pick, row, rows, setting, short};
 use super::{Display, Facts, LayerShown, Quantity, Wishes, bake};
 use crate::eye_pass::{ToneMap, WhiteBalance};
 use crate::optics::spectrum::temperature::CAMERA_KELVIN;
 use crate::settings::LayerKind;
 use crate::viewer::views::{IrradianceUnit, ScaleChoice};
 
-const EXPOSURE: About = About {
-    label: "Exposure [stops]",
-    what: "Radiance is multiplied by 2 to this power before tone mapping.",
-    range: "−20 to 20",
-    default: "measured from the first picture; Auto measures again",
-    accuracy: "none: only the picture changes",
-    cost: "none",
-};
 const AUTO_EXPOSURE: &str = "Measures the present picture and sets the exposure once, so that brightness stays \
                              comparable afterwards. Takes one small picture.";
-const TONE_MAP: About = About {
-    label: "Tone map",
-    what: "How radiance beyond what the display shows is brought into its range.",
-    range: "neutral, AgX, ACES, none",
-    default: "neutral",
-    accuracy: "none: only the picture changes",
-    cost: "none",
-};
-const WHITE_BALANCE: About = About {
-    label: "White balance",
-    what: "Which light is shown as white, by chromatic adaptation (Bradford): the display's own (D65), what the lamps \
-           send to the middle of the scene, or light of a colour temperature, as on a camera.",
-    range: "none, from the lamps, 1000 to 25,000 K",
-    default: "none",
-    accuracy: "none: only the picture changes",
-    cost: "none",
-};
-const LAYER: About = About {
-    label: "Light shown",
-    what: "Which baked light the picture shows.",
-    range: "all, caustic, direct",
-    default: "all",
-    accuracy: "none: only the picture changes",
-    cost: "none",
-};
-
-const QUANTITY: About = About {
-    label: "View",
-    what: "What surfaces are shown by: their light, or something about it or about them in its place. Texels that hold \
-           no finite number are magenta in every view.",
-    range: "light, irradiance, error, difference, texels, texel density, normals, texture uv, map uv",
-    default: "light",
-    accuracy: "none: only the picture changes",
-    cost: "none: the error is estimated in every bake, and the difference was found when an effect's worth was asked \
-           for",
-};
-const SCALE: About = About {
-    label: "Scale",
-    what: "How irradiance becomes a colour: the unit of its legend (lux is W/m² times 683), and whether equal ratios or \
-           equal differences are equal steps.",
-    range: "W/m² or lx, logarithmic or linear",
-    default: "logarithmic in W/m²",
-    accuracy: "none: only the picture changes",
-    cost: "none",
-};
-const RANGE: About = About {
-    label: "From, to",
-    what: "Irradiance at the dark and at the bright end of the colours.",
-    range: "automatic: up to the brightest texel, rounded up, from a ten-thousandth of it (logarithmic) or from 0; typed: any \
-            above 0",
-    default: "automatic",
-    accuracy: "none: only the picture changes",
-    cost: "none",
-};
 const NO_DIFFERENCE: &str = "Ask under Effects what an effect is worth.";
 const NO_ERRORS: &str = "These maps come without an estimate of their error.";
 
@@ -110,7 +46,7 @@ const DAYLIGHT_KELVIN: f64 = 6504.0;
 pub fn show(ui: &mut Ui, display: &mut Display, facts: &Facts<'_>, wishes: &mut Wishes) {
     let baked = facts.layers;
     rows(ui, "display", |ui| {
-        row(ui, &EXPOSURE, None, |ui| {
+        row(ui, "Exposure [stops]", None, |ui| {
             ui.horizontal(|ui| {
                 // A button stands beside it.
                 ui.spacing_mut().slider_width = 74.0;
@@ -123,23 +59,22 @@ pub fn show(ui: &mut Ui, display: &mut Display, facts: &Facts<'_>, wishes: &mut 
         });
         let default = Display::default();
         let white = (&mut display.white_balance, &default.white_balance);
-        setting(ui, &WHITE_BALANCE, None, white, white_balance);
+        setting(ui, "White balance", None, white, white_balance);
         let tone_map = (&mut display.tone_map, &default.tone_map);
-        setting(ui, &TONE_MAP, None, tone_map, |ui, tone_map| {
-            let selected = chosen(tone_map, &TONE_MAPS);
-            choice(ui, "tone map", tone_map, selected, &TONE_MAPS)
+        setting(ui, "Tone map", None, tone_map, |ui, tone_map| {
+            choice(ui, "tone map", tone_map, "custom", &TONE_MAPS)
         });
         let nothing = baked.is_empty().then_some("There are no maps yet.");
         let shown = (&mut display.layer, &default.layer);
-        setting(ui, &LAYER, nothing, shown, |ui, shown| layer(ui, shown, baked));
-        let shown = (&mut display.quantity, &default.quantity);
-        setting(ui, &QUANTITY, nothing, shown, |ui, shown| {
-            quantity(ui, shown, facts)
+        setting(ui, "Light shown", nothing, shown, |ui, shown| {
+            layer(ui, shown, baked)
         });
+        let shown = (&mut display.quantity, &default.quantity);
+        setting(ui, "View", nothing, shown, |ui, shown| quantity(ui, shown, facts));
         if display.quantity == Quantity::Irradiance {
             let chosen = (&mut display.scale, &default.scale);
-            setting(ui, &SCALE, None, chosen, scale);
-            row(ui, &RANGE, None, |ui| range(ui, &mut display.scale, facts));
+            setting(ui, "Scale", None, chosen, scale);
+            row(ui, "From, to", None, |ui| range(ui, &mut display.scale, facts));
         }
     });
     if facts.survey.faults > 0 {
@@ -178,8 +113,7 @@ fn white_balance(ui: &mut Ui, white: &mut WhiteBalance) -> Response {
         ),
     ];
     ui.vertical(|ui| {
-        let selected = chosen(white, &choices);
-        let response = choice(ui, "white balance", white, selected, &choices);
+        let response = choice(ui, "white balance", white, "custom", &choices);
         if let WhiteBalance::Kelvin(kelvin) = white {
             let [least, most] = CAMERA_KELVIN;
             let slider = Slider::new(kelvin, least..=most)
@@ -189,15 +123,13 @@ fn white_balance(ui: &mut Ui, white: &mut WhiteBalance) -> Response {
                 .suffix(" K");
             ui.add(slider)
                 .accessible_name("White balance [K]")
-                .on_hover_text(WHITE_BALANCE.what);
+                .on_hover_text(about("White balance").what);
         }
         response
     })
     .inner
 }
 
-/// Of their list: all in sight [points].
-const VIEWS_HEIGHT: f32 = 320.0;
 const VIEWS: [(Quantity, &str); 10] = [
     (Quantity::Light, "The lit scene."),
     (
@@ -244,30 +176,13 @@ fn quantity(ui: &mut Ui, shown: &mut Quantity, facts: &Facts<'_>) -> Response {
         Quantity::Difference if !has_difference => Some(NO_DIFFERENCE),
         _ => None,
     };
-    let list = ComboBox::from_id_salt("view")
-        .width(CONTROL_WIDTH)
-        .height(VIEWS_HEIGHT)
-        .selected_text(shown.name())
-        .show_ui(ui, |ui| {
-            for (kind, hover) in VIEWS {
-                let why_not = why_not(kind);
-                ui.add_enabled_ui(why_not.is_none(), |ui| {
-                    ui.selectable_value(shown, kind, kind.name())
-                        .on_hover_text(hover)
-                        .on_disabled_hover_text(why_not.unwrap_or_default());
-                });
-            }
-        });
-    if list.inner.is_none() {
-        let offered = VIEWS.map(|(kind, _)| kind).into_iter();
-        let offered: Vec<Quantity> = offered.filter(|kind| why_not(*kind).is_none()).collect();
-        let steps = arrow_steps(ui, &list.response);
-        let index = offered.iter().position(|kind| kind == shown).unwrap_or(0);
-        if steps != 0 {
-            *shown = offered[stepped(index, steps, offered.len())];
-        }
+    let entries = VIEWS.map(|(kind, hover)| (kind.name(), hover.into(), why_not(kind)));
+    let at = VIEWS.iter().position(|(kind, _)| kind == shown);
+    let (response, picked) = pick(ui, ("view", CONTROL_WIDTH), (shown.name(), at), &entries);
+    if let Some(index) = picked {
+        *shown = VIEWS[index].0;
     }
-    list.response
+    response
 }
 
 fn scale(ui: &mut Ui, choice: &mut ScaleChoice) -> Response {
@@ -275,10 +190,10 @@ fn scale(ui: &mut Ui, choice: &mut ScaleChoice) -> Response {
         ui.spacing_mut().item_spacing.x = 5.0;
         for unit in [IrradianceUnit::WattsPerM2, IrradianceUnit::Lux] {
             ui.radio_value(&mut choice.unit, unit, unit.symbol())
-                .on_hover_text(SCALE.what);
+                .on_hover_text(about("Scale").what);
         }
         ui.checkbox(&mut choice.is_logarithmic, "logarithmic")
-            .on_hover_text(SCALE.what);
+            .on_hover_text(about("Scale").what);
     })
     .response
 }
@@ -287,7 +202,7 @@ fn range(ui: &mut Ui, choice: &mut ScaleChoice, facts: &Facts<'_>) -> Response {
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 5.0;
         ui.checkbox(&mut choice.is_automatic, "auto")
-            .on_hover_text(RANGE.range);
+            .on_hover_text(about("From, to").range);
         let factor = choice.unit.per_w_m2();
         if choice.is_automatic {
             let scale = facts.survey.scale(Quantity::Irradiance, choice);
@@ -302,7 +217,9 @@ fn range(ui: &mut Ui, choice: &mut ScaleChoice, facts: &Facts<'_>) -> Response {
                     .speed(speed)
                     .range((range.start() * factor)..=(range.end() * factor))
                     .custom_formatter(|value, _| short(value));
-                ui.add(drag).accessible_name(name).on_hover_text(RANGE.what);
+                ui.add(drag)
+                    .accessible_name(name)
+                    .on_hover_text(about("From, to").what);
                 shown / factor
             };
             choice.typed_w_m2[0] = field("Scale: from", low, LEAST_W_M2..=high / LEAST_RATIO);
@@ -323,7 +240,7 @@ fn layer(ui: &mut Ui, shown: &mut LayerShown, baked: &[LayerKind]) -> Response {
         for kind in LayerKind::ALL {
             ui.add_enabled_ui(baked.contains(&kind), |ui| {
                 ui.radio_value(shown, LayerShown::Only(kind), kind.name())
-                    .on_hover_text(LAYER.what)
+                    .on_hover_text(about("Light shown").what)
                     .on_disabled_hover_text("This layer was not baked: switch it on under Light pass.");
             });
         }

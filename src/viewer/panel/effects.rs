@@ -4,11 +4,14 @@ use std::borrow::Cow;
 
 use egui::{Button, Frame, RichText, Role, Ui, WidgetInfo, vec2};
 
-use super::control::{grouped, reset_to};
-use super::{Facts, Wishes, worth};
+use super::bake::{FAILED, two_digits};
+use super::control::{grouped, reset_to, significant};
+use super::{Facts, Wishes};
 use crate::effect::{Effect, EffectSwitch, EffectSwitches};
+use crate::illumination::difference::Difference;
 use crate::plan::{self, EffectLine};
 use crate::session::BakeCounts;
+use crate::viewer::worker::{BakeState, Worth};
 
 /// Width of the three switches of an effect [points].
 const SWITCHES_WIDTH: f32 = 128.0;
@@ -79,7 +82,7 @@ fn entry(ui: &mut Ui, effect: Effect, switch: &mut EffectSwitch, facts: &Facts<'
     ui.horizontal(|ui| {
         title(ui, &name, is_on).on_hover_text(effect.description());
         if has_worth {
-            is_asked = worth::button(ui, effect, facts);
+            is_asked = button(ui, effect, facts);
         }
         ui.add_space((ui.available_width() - SWITCHES_WIDTH - RESET_WIDTH).max(0.0));
         segments(ui, &name, switch);
@@ -99,7 +102,7 @@ fn entry(ui: &mut Ui, effect: Effect, switch: &mut EffectSwitch, facts: &Facts<'
                 .on_hover_text("Traced by this bake up to the maps that are shown; what was kept from before is not counted.");
         }
         if has_worth {
-            worth::line(ui, effect, facts);
+            line(ui, effect, facts);
         }
     });
     is_asked
@@ -154,4 +157,72 @@ fn rays(effect: Effect, counts: &BakeCounts) -> Option<String> {
         _ => return None,
     };
     (rays > 0).then(|| format!("{} {name}", grouped(rays)))
+}
+
+const BUTTON: &str = "Bakes once more without this effect, beside the maps that are shown, and shows in false colours \
+                      where it adds light and where it takes light away. Costs a whole bake; any change stops it.";
+const LINE: &str = "Light on all maps and layers with the effect minus without it, in luminous-equivalent watts; the \
+                    root mean square of the difference over the mean with it.";
+
+/// A button that asks what an effect is worth, unless that is known or being found; tells whether it was pressed.
+pub fn button(ui: &mut Ui, effect: Effect, facts: &Facts<'_>) -> bool {
+    if found(effect, facts).is_some_and(|worth| worth.difference.is_ok()) || progress(effect, facts).is_some()
+    {
+        return false;
+    }
+    let is_ready = !facts.state.is_working() && facts.last.is_some_and(|last| last.is_final);
+    let button = ui
+        .add_enabled(is_ready, Button::new("worth?").small())
+        .on_hover_text(BUTTON)
+        .on_disabled_hover_text("Known once the bake is done.");
+    let name = effect.name().replace('_', " ");
+    button.widget_info(|| WidgetInfo::labeled(Role::Button, is_ready, format!("{name}: worth")));
+    button.clicked()
+}
+
+/// What was found, or how far that is.
+pub fn line(ui: &mut Ui, effect: Effect, facts: &Facts<'_>) {
+    if let Some(text) = progress(effect, facts) {
+        ui.label(RichText::new(text).size(COUNTER));
+        return;
+    }
+    match found(effect, facts).map(|worth| &worth.difference) {
+        Some(Ok(found)) => {
+            let text = RichText::new(sentence(found)).size(COUNTER).strong();
+            ui.label(text).on_hover_text(LINE);
+        }
+        Some(Err(sentence)) => drop(ui.colored_label(FAILED, sentence)),
+        None => {}
+    }
+}
+
+fn found<'a>(effect: Effect, facts: &Facts<'a>) -> Option<&'a Worth> {
+    facts.worth.filter(|worth| worth.effect == effect)
+}
+
+fn progress(effect: Effect, facts: &Facts<'_>) -> Option<String> {
+    match facts.state {
+        BakeState::Comparing {
+            effect: left_out,
+            stage,
+            fraction,
+        } if *left_out == effect => {
+            let per_cent = 100.0 * fraction;
+            Some(format!("baking without it: {} {per_cent:.0} %", stage.name()))
+        }
+        _ => None,
+    }
+}
+
+/// "+12.3 W of 16.1 W deposited; maps differ by 84 % (relative RMSE)".
+fn sentence(found: &Difference) -> String {
+    let sign = if found.difference_w() < 0.0 { "−" } else { "+" };
+    let difference = significant(found.difference_w().abs());
+    let with = significant(found.with_w);
+    let differ = found
+        .relative_rmse
+        .map_or("there is no light with it".into(), |rmse| {
+            format!("maps differ by {} % (relative RMSE)", two_digits(100.0 * rmse))
+        });
+    format!("{sign}{difference} W of {with} W deposited; {differ}")
 }

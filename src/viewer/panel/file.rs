@@ -4,19 +4,9 @@ use std::path::Path;
 
 use egui::{Checkbox, Key, TextEdit, Ui, vec2};
 
-use super::control::{About, CONTROL_WIDTH, row, rows};
+use super::control::{CONTROL_WIDTH, row, rows};
 use super::{Facts, Wishes, bake};
 use crate::scene::builtin;
-
-const FILE: About = About {
-    label: "File",
-    what: "The scene in the window: a .glb or .gltf file, or builtin:NAME. Enter opens what is typed; files can also be \
-           dropped on the window.",
-    range: "any path",
-    default: "what the program was started with",
-    accuracy: "none",
-    cost: "the scene is read and baked anew; until it is there, the present one stays",
-};
 
 const WATCH: &str = "Reads the scene again whenever its file, or a buffer or an image that the file refers to, is written. \
                      Camera, settings and edits stay, as far as the new file has a place for them. Default: off.";
@@ -53,7 +43,7 @@ pub fn show(ui: &mut Ui, file: &mut FileRow, facts: &Facts<'_>, wishes: &mut Wis
         file.text.clone_from(&facts.scene.source);
     }
     rows(ui, "file", |ui| {
-        row(ui, &FILE, None, |ui| {
+        row(ui, "File", None, |ui| {
             let size = vec2(CONTROL_WIDTH, ui.spacing().interact_size.y);
             let field = ui.add_sized(size, TextEdit::singleline(&mut file.text));
             if field.lost_focus() && ui.input(|input| input.key_pressed(Key::Enter)) {

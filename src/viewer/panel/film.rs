@@ -1,42 +1,15 @@
 //! Section *Camera path*: keys, playing, and frames as files.
 
-use egui::{Button, DragValue, Response, RichText, TextEdit, Ui};
+use egui::{DragValue, Response, RichText, TextEdit, Ui};
 
-use super::control::{About, counted, rows, setting};
+use super::control::{about_button, button, counted, rows, setting};
 use super::{Facts, FilmWish, Wishes, export};
 use crate::scene::camera_path::MAX_FRAMES;
 use crate::viewer::filming::{FRAMES_PER_S, Film};
 
-const RECORD: &str = "Adds the present place and gaze as the path's last key (K).";
-const PLAY: &str = "Moves the camera along the path, 30 frames a second where pictures come as quickly; a movement key ends \
-                    it.";
-const SAVE: &str = "Writes the path to nephroid-SCENE-path-NNNN.json in the working folder, which `nephroid render --path` \
-                    reads.";
-const LOAD: &str = "Takes keys, frames and angle of view from a file such as Save path writes.";
-const FILM: &str = "Draws every frame of the path as light, with the present exposure, white balance and tone map, and \
-                    writes them as frame-NNNNN.png to a new folder in the working folder. Takes place beside the window, on \
-                    a device of its own.";
-const TURNTABLE: &str = "The same for one turn of the present camera around the middle of the scene.";
-const STOP: &str = "Ends the film after the present frame; those that are written stay.";
 const TOO_FEW: &str = "A path has at least two keys.";
 const FIELD: &str = "Path file";
 
-const FRAMES: About = About {
-    label: "Frames",
-    what: "Pictures from the first key to the last, or of one turn; keys are equally far apart in time.",
-    range: "1 to 10,000",
-    default: "120: four seconds at 30 frames a second",
-    accuracy: "none: maps stay as they are",
-    cost: "each frame is drawn and written once",
-};
-const SIZE: About = About {
-    label: "Frame size",
-    what: "Width and height of each frame [pixels].",
-    range: "16 to 8192 each, as far as the graphics device goes",
-    default: "1280 × 720",
-    accuracy: "none: maps stay as they are",
-    cost: "time, memory and disk space grow with the number of pixels",
-};
 /// Sides of a frame that can be set [pixels].
 const SIDES: std::ops::RangeInclusive<u32> = 16..=8192;
 
@@ -45,14 +18,14 @@ pub fn show(ui: &mut Ui, film: &mut Film, file: &mut String, facts: &Facts<'_>, 
     let too_few = (film.keys.len() < 2).then_some(TOO_FEW);
     let mut wish = |asked: FilmWish| wishes.film = Some(asked);
     ui.horizontal(|ui| {
-        if ui.button("Add key").on_hover_text(RECORD).clicked() {
+        if button(ui, "Add key", None) {
             wish(FilmWish::Record(None));
         }
         if facts.is_playing {
-            if ui.button("Stop playing").on_hover_text(PLAY).clicked() {
+            if button(ui, "Stop playing", None) {
                 wish(FilmWish::Play(false));
             }
-        } else if button(ui, "Play", PLAY, too_few) {
+        } else if button(ui, "Play", too_few) {
             wish(FilmWish::Play(true));
         }
         ui.label(RichText::new(length(film)).weak());
@@ -64,37 +37,39 @@ pub fn show(ui: &mut Ui, film: &mut Film, file: &mut String, facts: &Facts<'_>, 
     rows(ui, "film", |ui| {
         setting(
             ui,
-            &FRAMES,
+            "Frames",
             None,
             (&mut film.frames, &default.frames),
             |ui, frames| ui.add(DragValue::new(frames).range(1..=MAX_FRAMES)),
         );
-        setting(ui, &SIZE, None, (&mut film.size, &default.size), size);
+        setting(ui, "Frame size", None, (&mut film.size, &default.size), size);
     });
     ui.horizontal(|ui| {
-        if button(ui, "Save path", SAVE, too_few) {
+        if button(ui, "Save path", too_few) {
             wish(FilmWish::Save);
         }
         let field = TextEdit::singleline(file)
             .hint_text("path.json")
             .desired_width(150.0);
-        ui.add(field).accessible_name(FIELD).on_hover_text(LOAD);
+        ui.add(field)
+            .accessible_name(FIELD)
+            .on_hover_text(about_button("Load path"));
         let none = file.trim().is_empty().then_some("Type a file first.");
-        if button(ui, "Load path", LOAD, none) {
+        if button(ui, "Load path", none) {
             wish(FilmWish::Load(file.trim().into()));
         }
     });
     let no_light = facts.layers.is_empty().then_some("There are no maps yet.");
     let busy = facts.export.is_running().then_some("Something is being written.");
     ui.horizontal(|ui| {
-        if button(ui, "Export frames", FILM, too_few.or(no_light).or(busy)) {
+        if button(ui, "Export frames", too_few.or(no_light).or(busy)) {
             wish(FilmWish::Shoot { turns: false });
         }
-        if button(ui, "Export turntable", TURNTABLE, no_light.or(busy)) {
+        if button(ui, "Export turntable", no_light.or(busy)) {
             wish(FilmWish::Shoot { turns: true });
         }
         let idle = (!facts.export.is_running()).then_some("Nothing is filmed now.");
-        if button(ui, "Stop", STOP, idle) {
+        if button(ui, "Stop", idle) {
             wish(FilmWish::Stop);
         }
     });
@@ -105,13 +80,6 @@ pub fn show(ui: &mut Ui, film: &mut Film, file: &mut String, facts: &Facts<'_>, 
 }
 
 /// A button that says what it does, or why it cannot; tells whether it was pressed.
-fn button(ui: &mut Ui, name: &str, what: &str, why_not: Option<&str>) -> bool {
-    ui.add_enabled(why_not.is_none(), Button::new(name))
-        .on_hover_text(what)
-        .on_disabled_hover_text(why_not.unwrap_or_default())
-        .clicked()
-}
-
 fn length(film: &Film) -> String {
     let keys = counted(film.keys.len(), "key");
     let seconds = film.frames as f64 / FRAMES_PER_S;

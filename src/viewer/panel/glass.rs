@@ -5,29 +5,11 @@ use std::sync::Arc;
 use egui::{Response, Slider, SliderClamping, Ui};
 
 use super::Wishes;
-use super::control::{About, pick, setting};
+use super::control::{CONTROL_WIDTH, Entry, pick, setting};
 use crate::optics::Glass;
 use crate::optics::glass::{Dispersion, catalogue};
 use crate::scene::{Edit, Material};
 
-const GLASS: About = About {
-    label: "Glass",
-    what: "What the body is made of, by name: its index at every wavelength. The refractive index above becomes that at \
-           588 nm.",
-    range: "one index at all wavelengths, or the catalogue's glasses, liquids, crystals and plastics",
-    default: "as in the file",
-    accuracy: "formulas of their makers, good to about 1e-5",
-    cost: "light that meets this material is traced anew; parted by wavelength, where effects allow it",
-};
-const DISPERSION: About = About {
-    label: "Dispersion [20/V]",
-    what: "How much more blue light is bent than red: 20 over the Abbe number, as in glTF's KHR_materials_dispersion. 0 is \
-           none, crown glass has 0.3, flint 0.6.",
-    range: "0 to 1; larger values can be typed",
-    default: "as in the file",
-    accuracy: "colours need several wavelengths: more rays for the same error",
-    cost: GLASS.cost,
-};
 const ONE_INDEX: &str = "one index";
 /// Said where only figures make it up.
 const BY_NUMBERS: &str = "by numbers";
@@ -42,11 +24,11 @@ pub fn show(
 ) {
     let mut glass = shown.glass.clone();
     let value = (&mut glass, &of_file.glass);
-    setting(ui, &GLASS, why_not, value, by_name);
+    setting(ui, "Glass", why_not, value, by_name);
     let mut dispersion = dispersion_of(shown);
     let (before, default) = (dispersion, dispersion_of(of_file));
     let value = (&mut dispersion, &default);
-    setting(ui, &DISPERSION, why_not, value, |ui, dispersion| {
+    setting(ui, "Dispersion [20/V]", why_not, value, |ui, dispersion| {
         let slider = Slider::new(dispersion, 0.0..=1.0).clamping(SliderClamping::Never);
         ui.add(slider.fixed_decimals(3))
     });
@@ -98,13 +80,13 @@ fn by_name(ui: &mut Ui, glass: &mut Option<Arc<Glass>>) -> Response {
             None => (BY_NUMBERS, None),
         },
     };
-    let mut names = vec![(ONE_INDEX, None)];
+    let mut names: Vec<Entry> = vec![(ONE_INDEX, "".into(), None)];
     names.extend(all.iter().map(|glass| {
         let (n_d, abbe) = (glass.dispersion.n_d(), glass.dispersion.abbe_number());
         let hover = format!("n = {n_d:.4}, Abbe number {abbe:.1}");
-        (glass.name.as_str(), Some(hover))
+        (glass.name.as_str(), hover.into(), None)
     }));
-    let (response, picked) = pick(ui, "glass", (shown, at), names.into_iter());
+    let (response, picked) = pick(ui, ("glass", CONTROL_WIDTH), (shown, at), &names);
     if let Some(index) = picked {
         *glass = index.checked_sub(1).map(|index| Arc::new(all[index].clone()));
     }

@@ -5,28 +5,11 @@ use std::sync::Arc;
 use egui::{Response, Ui};
 
 use super::Wishes;
-use super::control::{About, pick, setting};
+use super::control::{CONTROL_WIDTH, Entry, pick, setting};
 use crate::optics::LinearSrgb;
 use crate::optics::spectrum::{Spectrum, illuminants};
 use crate::scene::{Edit, Light};
 
-const COLOUR: About = About {
-    label: "Colour",
-    what: "Colour of a light, which takes the place of a spectrum; multiplies its strength per channel, linear sRGB.",
-    range: "0 to 1 per channel, not all 0",
-    default: "as in the file, spectrum included",
-    accuracy: "none: light scales with it",
-    cost: "none: baked light is scaled; in place of a spectrum, light that meets dispersive glass is traced anew",
-};
-const SPECTRUM: About = About {
-    label: "Spectrum",
-    what: "Light by wavelength, by the lamp's name: as bright as before, in its own colour.",
-    range: "a colour alone; CIE's illuminants (A incandescent, D daylight, FL fluorescent, LED), black bodies by kelvin, \
-            lines by nanometre",
-    default: "as in the file",
-    accuracy: "tables of CIE, every nanometre",
-    cost: "light of this lamp is weighted anew; what meets dispersive glass is traced anew",
-};
 const COLOUR_ALONE: &str = "a colour alone";
 /// Of those that are called by a number.
 const BY_NUMBER: [&str; 7] = [
@@ -42,10 +25,10 @@ const BY_NUMBER: [&str; 7] = [
 /// Shows the rows of a light with that of the file; what is changed goes to `wishes`.
 pub fn show(ui: &mut Ui, index: usize, (light, of_file): (&Light, &Light), wishes: &mut Wishes) {
     let mut colour = light.colour;
-    setting(ui, &COLOUR, None, (&mut colour, &of_file.colour), button);
+    setting(ui, "Colour", None, (&mut colour, &of_file.colour), button);
     let mut spectrum = light.spectrum.clone();
     let value = (&mut spectrum, &of_file.spectrum);
-    setting(ui, &SPECTRUM, None, value, by_name);
+    setting(ui, "Spectrum", None, value, by_name);
     let as_in_file = || Edit::LightSpectrum {
         light: index,
         colour: of_file.colour,
@@ -98,12 +81,8 @@ fn by_name(ui: &mut Ui, spectrum: &mut Option<Arc<Spectrum>>) -> Response {
         Some(spectrum) => spectrum.name().unwrap_or("of the file"),
     };
     let at = names.iter().position(|name| *name == shown);
-    let (response, picked) = pick(
-        ui,
-        "spectrum",
-        (shown, at),
-        names.iter().map(|name| (*name, None)),
-    );
+    let entries: Vec<Entry> = names.iter().map(|name| (*name, "".into(), None)).collect();
+    let (response, picked) = pick(ui, ("spectrum", CONTROL_WIDTH), (shown, at), &entries);
     if let Some(index) = picked {
         // Every name of the list is one of a lamp.
         *spectrum = match index {

@@ -3,26 +3,8 @@
 use egui::{DragValue, Response, Ui};
 
 use super::Wishes;
-use super::control::{About, setting};
+use super::control::setting;
 use crate::scene::{Edit, Light, LightKind, LightSize};
-
-const RADIUS: About = About {
-    label: "Radius [m]",
-    what: "Of a point light, that makes it a ball, or of a spot, that makes it a disc across its axis; 0 makes it a \
-           point. Its power stays.",
-    range: "0 up",
-    default: "as in the file",
-    accuracy: "soft caustics are means over many places of the lamp and need more rays for the same error",
-    cost: "this light is traced anew",
-};
-const ANGLE: About = About {
-    label: "Diameter [°]",
-    what: "Angle across the disc of a sun; 0 makes its light parallel. The real sun has 0.53°. Its irradiance stays.",
-    range: "0 to 180",
-    default: "as in the file",
-    accuracy: RADIUS.accuracy,
-    cost: RADIUS.cost,
-};
 
 /// Drag of one point, as a share of the radius, or [m] where that is 0.
 const RADIUS_SPEED: f64 = 0.01;
@@ -34,8 +16,8 @@ pub fn show(ui: &mut Ui, index: usize, (light, of_file): (&Light, &Light), wishe
     let mut size = light.size;
     let value = (&mut size, &of_file.size);
     match light.kind {
-        LightKind::Point { .. } | LightKind::Spot { .. } => setting(ui, &RADIUS, None, value, radius),
-        LightKind::Sun { .. } => setting(ui, &ANGLE, None, value, diameter),
+        LightKind::Point { .. } | LightKind::Spot { .. } => setting(ui, "Radius [m]", None, value, radius),
+        LightKind::Sun { .. } => setting(ui, "Diameter [°]", None, value, diameter),
         LightKind::Panel { .. } | LightKind::Surface { .. } | LightKind::Environment { .. } => {}
     }
     if size != light.size {

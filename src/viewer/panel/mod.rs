@@ -21,7 +21,6 @@ mod maps;
 mod probe;
 mod scene;
 mod waves;
-mod worth;
 
 use std::path::PathBuf;
 use std::sync::Arc;

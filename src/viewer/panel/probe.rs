@@ -2,7 +2,7 @@
 
 use egui::{Grid, Ui};
 
-use super::control::{counted, grouped, significant};
+use super::control::{button, counted, grouped, significant};
 use super::{Facts, Wishes};
 use crate::light_pass::explain::LightPath;
 use crate::transport::Event;
@@ -13,9 +13,6 @@ use crate::viewer::sketching::Sketched;
 const TURN_ON: &str = "Click on a surface to see what lights it (P): irradiance and its error, and the light paths that \
                        come there, drawn through every glass surface. Looks through glass and over mirrors to what is \
                        seen in them. Changes nothing in a bake; paths take a second or so on a thread of their own.";
-const CLEAR: &str = "Forgets the point and takes its lines away.";
-const BRIGHTEST: &str = "Finds the texel with the most of the light that is shown, goes where it is seen, and tells what \
-                         lights it. Changes nothing in a bake.";
 const HITS: &str = "Draws a dot wherever one of some thousand light rays lands that went over glass, mirrors or water: the \
                     caustic's light before it is spread. The rays are evenly thin over each light, and not those of the \
                     bake. Lamps shine from their middles, rough surfaces as if smooth. Changes nothing in a bake.";
@@ -34,16 +31,10 @@ pub fn show(
 ) {
     ui.horizontal(|ui| {
         ui.toggle_value(is_on, "Probe").on_hover_text(TURN_ON);
-        let clear = ui.add_enabled(facts.probed.is_some(), egui::Button::new("Clear probe"));
-        let clear = clear
-            .on_hover_text(CLEAR)
-            .on_disabled_hover_text("Nothing is probed yet.");
-        wishes.clear_probe |= clear.clicked();
-        let brightest = ui.add_enabled(!facts.maps.is_empty(), egui::Button::new("Brightest spot"));
-        let brightest = brightest
-            .on_hover_text(BRIGHTEST)
-            .on_disabled_hover_text("No light is baked yet.");
-        wishes.brightest |= brightest.clicked();
+        let none = facts.probed.is_none().then_some("Nothing is probed yet.");
+        wishes.clear_probe |= button(ui, "Clear probe", none);
+        let dark = facts.maps.is_empty().then_some("No light is baked yet.");
+        wishes.brightest |= button(ui, "Brightest spot", dark);
     });
     sketch(ui, sketched, facts);
     let Some(probed) = facts.probed else {

@@ -1,9 +1,9 @@
 //! Section *Scene*: lights, materials and places, changed while they are looked at.
 
-use egui::{ComboBox, DragValue, Response, RichText, Slider, SliderClamping, Ui};
+use egui::{DragValue, Response, RichText, Slider, SliderClamping, Ui};
 use glam::DVec3;
 
-use super::control::{About, CONTROL_WIDTH, arrow_steps, counted, row, rows, setting, significant, stepped};
+use super::control::{CONTROL_WIDTH, Entry, about, counted, pick, row, rows, setting, significant};
 use super::{Facts, Wishes, bake, glass, light_colour, light_size, waves};
 use crate::optics::LinearSrgb;
 use crate::scene::{Edit, LightKind, Scene, SurfaceKind, why_light_stays};
@@ -21,139 +21,13 @@ const SAME_DIRECTION: f64 = 1e-9;
 /// Least distance that one point of a drag moves, as a share of the scene's extent.
 const DRAG_SHARE: f64 = 1e-3;
 
-const ADD: About = About {
-    label: "Add light",
-    what: "It comes before what the camera looks at, as bright as suits the exposure, with handles to move it. It can be \
-           undone and removed, and goes into a saved scene.",
-    range: "lamp, spot, sun or panel",
-    default: "none is added",
-    accuracy: "more light needs more rays for the same error",
-    cost: "the scene is baked anew",
-};
 /// What the list of lights leaves for the button beside it [points].
 const REMOVE_WIDTH: f32 = 66.0;
-const LIGHT: About = About {
-    label: "Light",
-    what: "Which light the rows below change.",
-    range: "the scene's lights",
-    default: "the first",
-    accuracy: "none",
-    cost: "none",
-};
-const INTENSITY: About = About {
-    label: "Intensity [W/sr]",
-    what: "Radiant intensity of a point light, of a spot on its axis: glTF's candela divided by 683.",
-    range: "a hundredth to a hundred times that of the file; logarithmic; any value above 0 can be typed",
-    default: "as in the file",
-    accuracy: "none: light is as exact as before",
-    cost: "little: no ray is traced again, the deposits are scaled",
-};
-const IRRADIANCE: About = About {
-    label: "Irradiance [W/m²]",
-    what: "Of the sun, measured across its beam: glTF's lux divided by 683.",
-    range: INTENSITY.range,
-    default: "as in the file",
-    accuracy: INTENSITY.accuracy,
-    cost: INTENSITY.cost,
-};
-const BRIGHTNESS: About = About {
-    label: "Brightness",
-    what: "Radiance of a lamp with a surface [W/(m² sr)], or how many times as bright as its image an environment is.",
-    range: "a hundredth to a hundred times the file's value; others can be typed",
-    default: "as in the file",
-    accuracy: "none: light scales with it",
-    cost: "none: baked light is scaled",
-};
-const POSITION: About = About {
-    label: "Position [m]",
-    what: "Place of the light in scene coordinates: x, y (up), z.",
-    range: "any; drag sideways, or click and type",
-    default: "as in the file",
-    accuracy: "none: light is as exact as before",
-    cost: "this light is traced anew",
-};
-const DIRECTION: About = About {
-    label: "Direction [°]",
-    what: "The way the light travels: azimuth, clockwise from −z as seen from above, and elevation; −90 is straight \
-           down.",
-    range: "azimuth −180 to 180, elevation −89.99 to 89.99",
-    default: "as in the file",
-    accuracy: "none: light is as exact as before",
-    cost: "this light is traced anew",
-};
-const LIGHT_HANDLES: About = About {
-    label: "By mouse",
-    what: "Handles in the picture that move the light along x, y and z; or a click or drag on a surface that puts it before \
-           that, as far off as it is now.",
-    range: "lights with a place",
-    default: "off",
-    accuracy: "none: light is as exact as before",
-    cost: "this light is traced anew while it moves",
-};
-const OBJECT_HANDLES: About = About {
-    label: "Handles",
-    what: "In the picture, to move the object with all parts of its node along x, y and z and to turn it about the \
-           vertical. A click on an object in the picture brings them up, Esc takes them away.",
-    range: "on or off",
-    default: "off",
-    accuracy: "none: light is as exact as before",
-    cost: "light that meets the old or the new place is traced anew while it moves",
-};
 const AIM: &str = "A click or drag in the picture turns the light: a spot to the surface there; a sun goes where it is seen there \
                    in the sky, or would be seen if the surface there were a mirror.";
 const NO_HAND: &str = "Not for this light.";
 const NO_PLACE: &str = "This light has neither a place nor a direction that could be changed.";
-const TURN: About = About {
-    label: "Turn [°]",
-    what: "About the vertical through the middle of the object's node, counter-clockwise as seen from above.",
-    range: "any; drag sideways, or click and type",
-    default: "0: as in the file",
-    accuracy: "none: light is as exact as before",
-    cost: "light that meets the old or the new place is traced anew",
-};
 const NO_TURN: &str = "Its shape is another one than the file gives it.";
-const OBJECT: About = About {
-    label: "Object",
-    what: "Which object the rows below change; its material may be that of others too.",
-    range: "the scene's objects",
-    default: "the first",
-    accuracy: "none",
-    cost: "none",
-};
-const IOR: About = About {
-    label: "Refractive index",
-    what: "Of glass, water and polish at 588 nm: bends light and sets how much is reflected.",
-    range: "1 to 3; larger values can be typed",
-    default: "as in the file",
-    accuracy: "sharper caustics need more rays for the same error",
-    cost: "light that meets this material is traced anew",
-};
-const ROUGHNESS: About = About {
-    label: "Roughness",
-    what: "How wide the lobe is in which mirrors, glass and polish send light on (GGX). Metal and glass above 0.6, and \
-           polish above 0.3, are matte.",
-    range: "0 to 1",
-    default: "as in the file",
-    accuracy: "wide lobes need more wavefronts for the same error",
-    cost: "light that meets this material is traced anew where the class changes",
-};
-const TINT: About = About {
-    label: "Base colour",
-    what: "Tint of glass per crossing, reflectance of a mirror, albedo of what is matte; linear sRGB.",
-    range: "0 to 1 per channel",
-    default: "as in the file",
-    accuracy: "none",
-    cost: "specular: light that meets it is weighted anew; matte: only the picture changes",
-};
-const OFFSET: About = About {
-    label: "Offset [m]",
-    what: "How far the object, with all parts of its node, stands from its place in the file: x, y (up), z.",
-    range: "any; drag sideways, or click and type; 0 is the file's place exactly",
-    default: "0: as in the file",
-    accuracy: "none: light is as exact as before",
-    cost: "light that meets the old or the new place is traced anew",
-};
-
 /// What the section has in hand.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Selection {
@@ -244,7 +118,7 @@ pub fn show(ui: &mut Ui, selection: &mut Selection, facts: &Facts<'_>, wishes: &
         add_light(ui, wishes);
         if !scene.lights.is_empty() {
             let names = scene.lights.iter().map(|light| light.name.as_str());
-            row(ui, &LIGHT, None, |ui| {
+            row(ui, "Light", None, |ui| {
                 ui.horizontal(|ui| {
                     let list = one_of(
                         ui,
@@ -262,19 +136,19 @@ pub fn show(ui: &mut Ui, selection: &mut Selection, facts: &Facts<'_>, wishes: &
         }
         if !scene.objects.is_empty() {
             let names = scene.objects.iter().map(|object| object.name.as_str());
-            row(ui, &OBJECT, None, |ui| {
+            row(ui, "Object", None, |ui| {
                 one_of(ui, ("object", CONTROL_WIDTH), &mut selection.object, names)
             });
             material(ui, selection.object, facts, wishes);
             place_of_object(ui, selection.object, facts, wishes);
-            row(ui, &OBJECT_HANDLES, None, |ui| {
+            row(ui, "Handles", None, |ui| {
                 ui.horizontal(|ui| {
                     hand(
                         ui,
                         &mut selection.hand,
                         Hand::Object,
                         ("Move object", "Move object"),
-                        OBJECT_HANDLES.what,
+                        about("Handles").what,
                     );
                 })
                 .response
@@ -285,14 +159,14 @@ pub fn show(ui: &mut Ui, selection: &mut Selection, facts: &Facts<'_>, wishes: &
 
 /// Buttons for lights that are to be added.
 fn add_light(ui: &mut Ui, wishes: &mut Wishes) {
-    row(ui, &ADD, None, |ui| {
+    row(ui, "Add light", None, |ui| {
         ui.horizontal(|ui| {
             ui.spacing_mut().item_spacing.x = 3.0;
             for light in NewLight::ALL {
                 let button = ui
                     .button(light.name())
                     .accessible_name(format!("Add {}", light.name()))
-                    .on_hover_text(format!("{} {}", what_of(light), ADD.what));
+                    .on_hover_text(format!("{} {}", what_of(light), about("Add light").what));
                 if button.clicked() {
                     wishes.new_light = Some(light);
                 }
@@ -336,19 +210,10 @@ fn one_of<'a>(
 ) -> Response {
     let names: Vec<&str> = names.collect();
     *chosen = (*chosen).min(names.len().saturating_sub(1));
-    let list = ComboBox::from_id_salt(name)
-        .width(width)
-        .selected_text(names[*chosen])
-        .truncate()
-        .show_ui(ui, |ui| {
-            for (index, name) in names.iter().enumerate() {
-                ui.push_id(index, |ui| ui.selectable_value(chosen, index, *name));
-            }
-        });
-    if list.inner.is_none() {
-        *chosen = stepped(*chosen, arrow_steps(ui, &list.response), names.len());
-    }
-    list.response
+    let entries: Vec<Entry> = names.iter().map(|name| (*name, "".into(), None)).collect();
+    let (response, picked) = pick(ui, (name, width), (names[*chosen], Some(*chosen)), &entries);
+    *chosen = picked.unwrap_or(*chosen);
+    response
 }
 
 fn light(ui: &mut Ui, light: usize, facts: &Facts<'_>, wishes: &mut Wishes) {
@@ -365,8 +230,8 @@ fn light(ui: &mut Ui, light: usize, facts: &Facts<'_>, wishes: &mut Wishes) {
     }
     if let (Some(position), Some(default)) = (kind.position(), of_file.kind.position()) {
         let mut moved = position;
-        setting(ui, &POSITION, None, (&mut moved, &default), |ui, moved| {
-            place(ui, POSITION.label, moved, facts.scene)
+        setting(ui, "Position [m]", None, (&mut moved, &default), |ui, moved| {
+            place(ui, "Position [m]", moved, facts.scene)
         });
         if moved != position {
             let position = moved;
@@ -375,7 +240,7 @@ fn light(ui: &mut Ui, light: usize, facts: &Facts<'_>, wishes: &mut Wishes) {
     }
     if let (Some(present), Some(default)) = (direction(&kind), direction(&of_file.kind)) {
         let mut turned = present;
-        setting(ui, &DIRECTION, None, (&mut turned, &default), angles);
+        setting(ui, "Direction [°]", None, (&mut turned, &default), angles);
         if turned != present {
             let direction = turned;
             wishes.edit = Some(Edit::LightDirection { light, direction });
@@ -392,9 +257,9 @@ fn direction(kind: &LightKind) -> Option<DVec3> {
 
 fn power(ui: &mut Ui, light: usize, (kind, of_file): (&LightKind, &LightKind), wishes: &mut Wishes) {
     let about = match kind {
-        LightKind::Sun { .. } => &IRRADIANCE,
-        LightKind::Point { .. } | LightKind::Spot { .. } => &INTENSITY,
-        LightKind::Panel { .. } | LightKind::Surface { .. } | LightKind::Environment { .. } => &BRIGHTNESS,
+        LightKind::Sun { .. } => "Irradiance [W/m²]",
+        LightKind::Point { .. } | LightKind::Spot { .. } => "Intensity [W/sr]",
+        LightKind::Panel { .. } | LightKind::Surface { .. } | LightKind::Environment { .. } => "Brightness",
     };
     let (present, default) = (kind.strength(), of_file.strength());
     let mut value = present;
@@ -490,17 +355,23 @@ fn material(ui: &mut Ui, object: usize, facts: &Facts<'_>, wishes: &mut Wishes) 
     let no_ior = matches!(shown.surface, SurfaceKind::Diffuse | SurfaceKind::Mirror)
         .then_some("Only glass, water and polish have one; this surface is matte or a mirror.");
     let mut ior = shown.ior;
-    setting(ui, &IOR, no_ior, (&mut ior, &of_file.ior), |ui, ior| {
-        let slider = Slider::new(ior, 1.0..=3.0).clamping(SliderClamping::Never);
-        ui.add(slider.fixed_decimals(3))
-    });
+    setting(
+        ui,
+        "Refractive index",
+        no_ior,
+        (&mut ior, &of_file.ior),
+        |ui, ior| {
+            let slider = Slider::new(ior, 1.0..=3.0).clamping(SliderClamping::Never);
+            ui.add(slider.fixed_decimals(3))
+        },
+    );
     if ior != shown.ior {
         wishes.edit = Some(Edit::MaterialIor { material, ior });
     }
     glass::show(ui, material, (shown, of_file), no_ior, wishes);
     let mut roughness = shown.roughness;
     let value = (&mut roughness, &of_file.roughness);
-    setting(ui, &ROUGHNESS, None, value, |ui, roughness| {
+    setting(ui, "Roughness", None, value, |ui, roughness| {
         let slider = Slider::new(roughness, 0.0..=1.0).clamping(SliderClamping::Never);
         ui.add(slider.fixed_decimals(2))
     });
@@ -512,7 +383,7 @@ fn material(ui: &mut Ui, object: usize, facts: &Facts<'_>, wishes: &mut Wishes) 
     }
     let mut base_colour = shown.base_colour;
     let value = (&mut base_colour, &of_file.base_colour);
-    setting(ui, &TINT, None, value, |ui, base_colour| {
+    setting(ui, "Base colour", None, value, |ui, base_colour| {
         let mut colour = base_colour.to_array().map(|channel| channel as f32);
         let response = ui.color_edit_button_rgb(&mut colour);
         if response.changed() {
@@ -544,9 +415,9 @@ fn light_hand(ui: &mut Ui, selection: &mut Selection, facts: &Facts<'_>) {
     let kind = &facts.scene.lights[selection.light].kind;
     let (has_place, has_direction) = (kind.position().is_some(), direction(kind).is_some());
     let why_not = (!has_place && !has_direction).then_some(NO_PLACE);
-    row(ui, &LIGHT_HANDLES, why_not, |ui| {
+    row(ui, "By mouse", why_not, |ui| {
         ui.horizontal(|ui| {
-            let what = LIGHT_HANDLES.what;
+            let what = about("By mouse").what;
             ui.spacing_mut().item_spacing.x = 3.0;
             ui.add_enabled_ui(has_place, |ui| {
                 hand(ui, &mut selection.hand, Hand::Light, ("Move", "Move light"), what);
@@ -573,13 +444,13 @@ fn place_of_object(ui: &mut Ui, object: usize, facts: &Facts<'_>, wishes: &mut W
     let present = found.unwrap_or_default();
     let mut wanted = present;
     let offset_m = (&mut wanted.offset_m, &DVec3::ZERO);
-    setting(ui, &OFFSET, why_not, offset_m, |ui, offset_m| {
-        place(ui, OFFSET.label, offset_m, facts.scene)
+    setting(ui, "Offset [m]", why_not, offset_m, |ui, offset_m| {
+        place(ui, "Offset [m]", offset_m, facts.scene)
     });
     // To the digits that are shown: a look at the number changes nothing.
     let present_deg = (present.yaw_rad.to_degrees() * 1e2).round() / 1e2;
     let mut turn_deg = present_deg;
-    setting(ui, &TURN, why_not, (&mut turn_deg, &0.0), |ui, turn_deg| {
+    setting(ui, "Turn [°]", why_not, (&mut turn_deg, &0.0), |ui, turn_deg| {
         ui.add(DragValue::new(turn_deg).speed(0.5).max_decimals(2))
     });
     if turn_deg != present_deg {

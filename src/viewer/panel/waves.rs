@@ -5,27 +5,9 @@ use glam::DVec3;
 
 use super::Wishes;
 use super::bake::FAILED;
-use super::control::{About, setting};
+use super::control::setting;
 use crate::scene::waves::STEEPEST_SLOPE;
 use crate::scene::{Edit, Wave, Waves};
-
-const SLOPE: About = About {
-    label: "Waves' slope",
-    what: "Steepest slope A·2π/λ of all waves together; sets their heights, each in proportion.",
-    range: "0 to 1; flatter waves focus farther away",
-    default: "as in the file",
-    accuracy: "sharper caustics need more rays for the same error",
-    cost: "light that meets this material is traced anew",
-};
-const WAVE: About = About {
-    label: "Wave",
-    what: "One wave of the normals: height A between rest and crest [m], length λ [m], and the direction it runs to, as \
-           an azimuth clockwise from −z as seen from above [°].",
-    range: "A from 0, λ above 0; slopes of at most 1 altogether",
-    default: "as in the file",
-    accuracy: "cells become as short as a quarter of the shortest wave",
-    cost: "light that meets this material is traced anew; short waves need more rays",
-};
 
 /// Least height that a drag starts from [m].
 const LEAST_HEIGHT_M: f64 = 1e-6;
@@ -39,7 +21,7 @@ pub fn show(ui: &mut Ui, material: usize, (waves, of_file): (&Waves, Option<&Wav
     slope(ui, &mut list, in_file);
     for (index, wave) in list.iter_mut().enumerate() {
         let default = *in_file.get(index).unwrap_or(wave);
-        setting(ui, &WAVE, None, (wave, &default), one);
+        setting(ui, "Wave", None, (wave, &default), one);
     }
     if list == waves.list() {
         return;
@@ -66,7 +48,7 @@ fn slope(ui: &mut Ui, list: &mut [Wave], in_file: &[Wave]) {
     let is_as_in_file = (present - in_file).abs() < SAME_SLOPE;
     let default = if is_as_in_file { present } else { in_file };
     let mut wanted = present;
-    setting(ui, &SLOPE, None, (&mut wanted, &default), |ui, wanted| {
+    setting(ui, "Waves' slope", None, (&mut wanted, &default), |ui, wanted| {
         let slider = Slider::new(wanted, 0.0..=STEEPEST_SLOPE).clamping(SliderClamping::Never);
         ui.add(slider.fixed_decimals(3))
     });

@@ -59,14 +59,14 @@ fn a_refused_file_leaves_all_as_it_was() {
         until(&mut model, "refused", |model| model.files.refusal.is_some());
         let sentence = model.files.refusal.clone().expect("it is refused");
         assert!(sentence.contains(source), "{sentence}");
-        assert!(model.files.loader.loading().is_none());
+        assert!(model.files.facts().loading.is_none());
         assert!(Arc::ptr_eq(model.scene(), &scene));
         assert!(Arc::ptr_eq(model.last.as_ref().expect("it was baked"), &last));
         assert_eq!(model.edits().history().undoable(), 1);
     }
     assert_eq!(opened(&folder), [""; 0]);
     model.open("  ");
-    assert!(model.files.loader.loading().is_none(), "nothing was typed");
+    assert!(model.files.facts().loading.is_none(), "nothing was typed");
 }
 
 #[test]

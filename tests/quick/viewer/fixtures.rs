@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use glam::{DVec2, DVec3};
 use nephroid::illumination::{Chart, IlluminationMap, Layer, Receiver, UvSet};
 use nephroid::scene::builtin::{self, parts, shapes};
-use nephroid::scene::{Edit, Light, LightKind, LightOrigin, LoadOptions, Scene, load};
+use nephroid::scene::{Edit, Light, LightKind, LoadOptions, Scene, load};
 use nephroid::settings::{BakeSettings, LayerKind, MapResolution};
 use nephroid::units::{Flux, Irradiance, RadiantIntensity};
 use nephroid::viewer::ViewerOptions;
@@ -156,9 +156,7 @@ pub fn intensity(light: usize, value: f64) -> Edit {
 /// A light that somebody adds.
 pub fn added(light: Light) -> Edit {
     Edit::LightAdded {
-        light: None,
         added: Arc::new(light),
-        origin: LightOrigin::New,
     }
 }
 

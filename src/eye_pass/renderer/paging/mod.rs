@@ -1,13 +1,14 @@
 //! Images in tiles through a page table: all maps and all textures of a scene in two bindings, sent to the device tile
 //! by tile, and dropped from it level by level where memory is short.
 
+use bytemuck::Pod;
+
+use crate::gpu::Gpu;
+
 mod image;
-mod level;
-mod pool;
 
 pub(super) use image::PagedImage;
-pub(super) use level::{Level, Texels, stored};
-pub(super) use pool::TilePool;
+pub(super) use image::{Level, Texels, stored};
 
 /// Side of a tile [texels]; `TILE` in the shader.
 pub(super) const TILE: usize = 64;
@@ -49,4 +50,141 @@ impl std::ops::AddAssign for Uploaded {
         self.tile_bytes += other.tile_bytes;
         self.other_bytes += other.other_bytes;
     }
+}
+
+/// Places side by side in a layer; `POOL_ACROSS` in the shader.
+const ACROSS: u32 = 31;
+/// Places of a full layer.
+const PER_LAYER: u32 = ACROSS * ACROSS;
+
+/// Places for tiles of one texel format, made as they are called for.
+#[derive(Debug)]
+pub(in super::super) struct TilePool {
+    texture: wgpu::Texture,
+    format: wgpu::TextureFormat,
+    label: &'static str,
+    /// Rows of places in the only layer, or layers of full height.
+    rows: u32,
+    layers: u32,
+    /// Places that were handed out at some time.
+    used: u32,
+    free: Vec<u32>,
+    /// Whether the texture is another one than when this was last asked.
+    is_new: bool,
+}
+
+impl TilePool {
+    pub(in super::super) fn new(gpu: &Gpu, label: &'static str, format: wgpu::TextureFormat) -> Self {
+        Self {
+            texture: texture(gpu, label, format, 1, 1),
+            format,
+            label,
+            rows: 1,
+            layers: 1,
+            used: 0,
+            free: Vec::new(),
+            is_new: true,
+        }
+    }
+
+    /// Room for this many more tiles; `None` where the device's textures cannot give it.
+    fn reserve(&mut self, gpu: &Gpu, tiles: u32) -> Option<()> {
+        let wanted = (self.used + tiles).saturating_sub(self.free.len() as u32);
+        if wanted <= self.capacity() {
+            return Some(());
+        }
+        let rows = wanted.div_ceil(ACROSS).next_power_of_two().min(ACROSS);
+        let layers = wanted.div_ceil(PER_LAYER);
+        if layers > gpu.limits().max_texture_array_layers {
+            return None;
+        }
+        let grown = texture(gpu, self.label, self.format, rows, layers);
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        encoder.copy_texture_to_texture(
+            self.texture.as_image_copy(),
+            grown.as_image_copy(),
+            self.texture.size(),
+        );
+        gpu.queue.submit([encoder.finish()]);
+        (self.texture, self.rows, self.layers, self.is_new) = (grown, rows, layers, true);
+        Some(())
+    }
+
+    /// A place that was reserved.
+    fn take(&mut self) -> u32 {
+        self.free.pop().unwrap_or_else(|| {
+            self.used += 1;
+            self.used - 1
+        })
+    }
+
+    /// Gives a place back.
+    fn release(&mut self, place: u32) {
+        self.free.push(place);
+    }
+
+    /// Fills a place from its corner on with texels, so many in a row.
+    fn write<T: Pod>(&self, gpu: &Gpu, place: u32, texels: &[T], width: usize) {
+        let within = place % PER_LAYER;
+        let side = STORED as u32;
+        gpu.queue.write_texture(
+            wgpu::TexelCopyTextureInfo {
+                texture: &self.texture,
+                mip_level: 0,
+                origin: wgpu::Origin3d {
+                    x: within % ACROSS * side,
+                    y: within / ACROSS * side,
+                    z: place / PER_LAYER,
+                },
+                aspect: wgpu::TextureAspect::All,
+            },
+            bytemuck::cast_slice(texels),
+            wgpu::TexelCopyBufferLayout {
+                offset: 0,
+                bytes_per_row: Some((width * size_of::<T>()) as u32),
+                rows_per_image: None,
+            },
+            wgpu::Extent3d {
+                width: width as u32,
+                height: (texels.len() / width) as u32,
+                depth_or_array_layers: 1,
+            },
+        );
+    }
+
+    /// Places in use.
+    pub(in super::super) fn tiles(&self) -> u64 {
+        u64::from(self.used) - self.free.len() as u64
+    }
+
+    /// All places, as shaders read them.
+    pub(in super::super) fn view(&self) -> wgpu::TextureView {
+        self.texture.create_view(&wgpu::TextureViewDescriptor {
+            dimension: Some(wgpu::TextureViewDimension::D2Array),
+            ..Default::default()
+        })
+    }
+
+    fn capacity(&self) -> u32 {
+        self.rows * ACROSS * self.layers
+    }
+}
+
+fn texture(gpu: &Gpu, label: &str, format: wgpu::TextureFormat, rows: u32, layers: u32) -> wgpu::Texture {
+    gpu.device.create_texture(&wgpu::TextureDescriptor {
+        label: Some(label),
+        size: wgpu::Extent3d {
+            width: ACROSS * STORED as u32,
+            height: rows * STORED as u32,
+            depth_or_array_layers: layers,
+        },
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format,
+        usage: wgpu::TextureUsages::TEXTURE_BINDING
+            | wgpu::TextureUsages::COPY_DST
+            | wgpu::TextureUsages::COPY_SRC,
+        view_formats: &[],
+    })
 }

@@ -4,7 +4,8 @@ use glam::DVec3;
 
 use super::room;
 use crate::optics::LinearSrgb;
-use crate::scene::builtin::pool::{Wave, water};
+use crate::scene::builtin::basin::Basin;
+use crate::scene::builtin::pool::Wave;
 use crate::scene::builtin::prism::Prism;
 use crate::scene::builtin::ring::cylinder;
 use crate::scene::builtin::{bowl, parts, shapes};
@@ -39,10 +40,7 @@ const GAP_M: f64 = 0.001;
 
 /// All of them.
 pub fn add(scene: &mut Scene) {
-    scene
-        .materials
-        .push(parts::matte("white lacquer", LinearSrgb::grey(0.78)));
-    let white = scene.materials.len() - 1;
+    let white = parts::material(scene, parts::matte("white lacquer", LinearSrgb::grey(0.78)));
     add_basin(scene, white);
     add_ring(scene);
     add_sideboard(scene, white);
@@ -68,62 +66,30 @@ fn add_stand(scene: &mut Scene, name: &str, x: [f64; 2], z: [f64; 2], y: [f64; 2
     }
 }
 
-/// Inner half width and depth, height of rim, water and bottom, and thickness of the walls [m].
-const BASIN_HALF_M: [f64; 2] = [0.65, 0.45];
-const RIM_M: f64 = 0.46;
-const WATER_M: f64 = 0.41;
-const BOTTOM_M: f64 = 0.05;
-const WALL_M: f64 = 0.06;
-
-fn add_basin(scene: &mut Scene, material: usize) {
-    let [half_x, half_z] = BASIN_HALF_M;
-    let x = [BASIN.x - half_x, BASIN.x + half_x];
-    let z = [BASIN.z - half_z, BASIN.z + half_z];
-    let bottom = parts::matte("tiles", LinearSrgb::new(0.26, 0.42, 0.46));
-    parts::add(scene, "basin bottom", shapes::floor(x, z, BOTTOM_M), bottom);
-    for (side, outward, half_inner, half_along) in [
-        ("left", DVec3::NEG_X, half_x, half_z),
-        ("right", DVec3::X, half_x, half_z),
-        ("back", DVec3::NEG_Z, half_z, half_x),
-        ("front", DVec3::Z, half_z, half_x),
-    ] {
-        let up = DVec3::Y * (0.5 * RIM_M);
-        let along = DVec3::Y.cross(outward);
-        let outer = half_inner + WALL_M;
-        let at = |distance: f64| BASIN + outward * distance;
-        let inside = shapes::rectangle(at(half_inner) + up, -along * half_along, up);
-        let outside = shapes::rectangle(at(outer) + up, along * (half_along + WALL_M), up);
-        let rim = shapes::rectangle(
-            at(0.5 * (half_inner + outer)) + 2.0 * up,
-            along * (half_along + WALL_M),
-            -outward * (0.5 * WALL_M),
-        );
-        for (part, mesh) in [("inside", inside), ("outside", outside), ("rim", rim)] {
-            parts::add_with(scene, &format!("basin {side} {part}"), mesh, material);
-        }
-    }
-    let wave = |amplitude_m, kx, kz, phase_rad| Wave {
-        amplitude_m,
-        wave_vector: [kx, kz],
-        phase_rad,
+fn add_basin(scene: &mut Scene, walls: usize) {
+    let tiles = parts::material(scene, parts::matte("tiles", LinearSrgb::new(0.26, 0.42, 0.46)));
+    let basin = Basin {
+        centre: BASIN,
+        half_m: [0.65, 0.45],
+        wall_m: 0.06,
+        rim_m: 0.46,
+        bottom_m: 0.05,
+        water_m: 0.41,
+        quads: [272, 200],
+        waves: &[
+            Wave::new(0.0075, [24.0, 5.0], 1.0),
+            Wave::new(0.0065, [-8.0, 22.0], 2.0),
+            Wave::new(0.004, [19.0, 21.0], 0.0),
+            Wave::new(0.0025, [32.0, -23.0], 4.0),
+        ],
     };
-    let waves = [
-        wave(0.0075, 24.0, 5.0, 1.0),
-        wave(0.0065, -8.0, 22.0, 2.0),
-        wave(0.004, 19.0, 21.0, 0.0),
-        wave(0.0025, 32.0, -23.0, 4.0),
-    ];
-    // The sheet ends inside the walls, so that no light slips past it.
-    let half = BASIN_HALF_M.map(|half| half + 0.5 * WALL_M);
-    let surface = water(BASIN + DVec3::Y * WATER_M, half, [272, 200], &waves);
-    parts::add(scene, "water", surface, parts::dielectric("water", 1.333));
+    basin.add(scene, tiles, walls);
 }
 
 fn add_ring(scene: &mut Scene) {
     let (x, z) = ([RING.x - 0.62, RING.x + 0.62], [RING.z - 0.5, RING.z + 0.5]);
     // Grey: the sun alone would leave no room for what the ring adds.
-    scene.materials.push(parts::matte("slate", LinearSrgb::grey(0.2)));
-    let slate = scene.materials.len() - 1;
+    let slate = parts::material(scene, parts::matte("slate", LinearSrgb::grey(0.2)));
     add_stand(scene, "table", x, z, [0.0, TABLE_M], slate);
     let ring = cylinder(RING + DVec3::Y * GAP_M, 0.27, 0.11);
     parts::add(scene, "ring", ring, parts::mirror());
@@ -177,28 +143,18 @@ fn add_prism(scene: &mut Scene, white: usize) {
     parts::add(scene, "prism", prism.mesh(PRISM_LENGTH_M), parts::glass(FLINT));
     let direction = prism.incoming(n);
     add_card(scene, &prism, n, white);
-    scene
-        .materials
-        .push(parts::matte("black plate", LinearSrgb::BLACK));
-    let black = scene.materials.len() - 1;
+    let black = parts::material(scene, parts::matte("black plate", LinearSrgb::BLACK));
     let centre = prism.entry() - direction * TO_PRISM_M;
     let across = DVec3::Y.cross(direction);
-    let ([near, along], far) = (SLIT_HALF_M, PLATE_HALF_M);
-    let plates = [
-        ([near, far], [-far, far]),
-        ([-far, -near], [-far, far]),
-        ([-near, near], [along, far]),
-        ([-near, near], [-far, -along]),
-    ];
-    for (index, (u, y)) in plates.into_iter().enumerate() {
-        let middle = centre + across * (0.5 * (u[0] + u[1])) + DVec3::Y * (0.5 * (y[0] + y[1]));
-        let plate = shapes::rectangle(
-            middle,
-            across * (0.5 * (u[1] - u[0])),
-            DVec3::Y * (0.5 * (y[1] - y[0])),
-        );
-        parts::add_with(scene, &format!("slit {}", index + 1), plate, black);
-    }
+    let half_m = (SLIT_HALF_M, PLATE_HALF_M);
+    parts::add_slit(
+        scene,
+        ("slit", black),
+        centre,
+        [across, DVec3::Y],
+        half_m,
+        shapes::rectangle,
+    );
 }
 
 /// Half the sides of the card on the back wall [m].

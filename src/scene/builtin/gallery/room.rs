@@ -36,10 +36,7 @@ pub fn add(scene: &mut Scene) {
         ceiling,
         parts::matte("ceiling", LinearSrgb::grey(0.8)),
     );
-    scene
-        .materials
-        .push(parts::matte("plaster", LinearSrgb::new(0.74, 0.72, 0.68)));
-    let plaster = scene.materials.len() - 1;
+    let plaster = parts::material(scene, parts::matte("plaster", LinearSrgb::new(0.74, 0.72, 0.68)));
     let back = shapes::rectangle(middle - front, right, up);
     parts::add_with(scene, "back wall", back, plaster);
     let rear = shapes::rectangle(middle + front, -right, up);

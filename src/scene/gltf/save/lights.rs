@@ -4,7 +4,7 @@ use glam::{DAffine3, DQuat, DVec3};
 use gltf::json::Value;
 use serde_json::json;
 
-use super::json_document::JsonDocument;
+use super::JsonDocument;
 use super::placing::Placing;
 use crate::error::{Error, Result};
 use crate::optics::LinearSrgb;

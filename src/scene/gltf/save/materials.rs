@@ -3,11 +3,11 @@
 use glam::DVec3;
 use serde_json::json;
 
-use super::json_document::JsonDocument;
+use super::JsonDocument;
 use crate::error::{Error, Result};
+use crate::scene::Material;
 use crate::scene::gltf::substance::Stated;
 use crate::scene::gltf::{substance, waves};
-use crate::scene::{Material, Wave};
 
 /// Writes a material, which is number `index` of the file. The world's origin lies at −`shift` of the scene [m].
 ///
@@ -86,17 +86,5 @@ fn write_waves(path: &str, is: &Material, shift: DVec3, json: &mut JsonDocument)
         json.remove(path);
         return;
     };
-    let in_world = Vec::<Wave>::from(waves.with_origin(-shift));
-    let stated: Vec<_> = in_world
-        .iter()
-        .map(|wave| {
-            json!({
-                "amplitude_m": wave.amplitude_m,
-                "wavelength_m": wave.wavelength_m,
-                "direction": wave.direction.to_array(),
-                "phase_rad": wave.phase_rad,
-            })
-        })
-        .collect();
-    json.set(path, json!(stated));
+    json.set(path, waves::written(waves, shift));
 }

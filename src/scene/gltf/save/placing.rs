@@ -6,7 +6,7 @@ use glam::{DAffine3, DMat4, DQuat, DVec3};
 use gltf::json::Root;
 use serde_json::json;
 
-use super::json_document::JsonDocument;
+use super::JsonDocument;
 use crate::error::{Error, Result};
 use crate::scene::gltf::document::Document;
 use crate::scene::gltf::nodes::Placed;

@@ -20,7 +20,7 @@ pub fn add_all(scene: &Scene, glb: &mut Glb, warnings: &mut Vec<Warning>) {
             let remedy = "name it when the file is opened (--environment)";
             Warning::new(format!("light `{}`", source.name), what.to_owned(), remedy)
         };
-        let Some((list, mut stated)) = stated(source) else {
+        let Some((list, stated)) = stated(source) else {
             if matches!(source.kind, LightKind::Environment { .. }) {
                 warnings.push(lost(
                     "is an environment, which glTF has no place for; it was left out",
@@ -28,28 +28,11 @@ pub fn add_all(scene: &Scene, glb: &mut Glb, warnings: &mut Vec<Warning>) {
             }
             continue;
         };
-        let mut colour = source.colour;
-        let mut extras = json!({});
-        match (
-            &source.spectrum,
-            source.spectrum.as_ref().and_then(|spectrum| spectrum.name()),
-        ) {
-            (Some(_), Some(name)) if illuminant(name).is_ok() => {
-                extras[spectrum::KEY] = json!(name);
-                colour = LinearSrgb::WHITE;
-            }
-            (Some(_), _) => warnings.push(lost(
+        let (extras, is_whole) = extras(source);
+        if !is_whole {
+            warnings.push(lost(
                 "has a spectrum without a name; its colour was written instead",
-            )),
-            (None, _) => {}
-        }
-        stated["color"] = json!(colour.to_array().map(|channel| channel.max(0.0)));
-        match source.size {
-            LightSize::None => {}
-            LightSize::Radius { radius_m } => extras["radius_m"] = json!(radius_m),
-            LightSize::Angle { diameter_rad } => {
-                extras["angular_diameter_deg"] = json!(diameter_rad.to_degrees());
-            }
+            ));
         }
         let mut node = node(source, scene.origin_world);
         if extras != json!({}) {
@@ -78,7 +61,40 @@ fn add_to_list(list: &str, stated: Value, glb: &mut Glb) -> usize {
 }
 
 /// The extension that lists a light, and its entry without the colour.
-fn stated(source: &Light) -> Option<(&'static str, Value)> {
+pub fn stated(source: &Light) -> Option<(&'static str, Value)> {
+    let (list, mut stated) = by_kind(source)?;
+    let colour = match named_spectrum(source) {
+        Some(_) => LinearSrgb::WHITE,
+        None => source.colour,
+    };
+    stated["color"] = json!(colour.to_array().map(|channel| channel.max(0.0)));
+    Some((list, stated))
+}
+
+/// The name of a light's spectrum, by which it is found again.
+fn named_spectrum(source: &Light) -> Option<&str> {
+    let name = source.spectrum.as_ref()?.name()?;
+    illuminant(name).is_ok().then_some(name)
+}
+
+/// What glTF has no place for, and whether all of it could be stated: a spectrum without a name cannot.
+pub fn extras(source: &Light) -> (Value, bool) {
+    let mut extras = json!({});
+    let name = named_spectrum(source);
+    if let Some(name) = name {
+        extras[spectrum::KEY] = json!(name);
+    }
+    match source.size {
+        LightSize::None => {}
+        LightSize::Radius { radius_m } => extras["radius_m"] = json!(radius_m),
+        LightSize::Angle { diameter_rad } => {
+            extras["angular_diameter_deg"] = json!(diameter_rad.to_degrees());
+        }
+    }
+    (extras, name.is_some() == source.spectrum.is_some())
+}
+
+fn by_kind(source: &Light) -> Option<(&'static str, Value)> {
     let photometric = source.kind.strength() * LUMENS_PER_WATT;
     let punctual = |kind: &str| json!({ "type": kind, "intensity": photometric });
     match source.kind {
@@ -109,7 +125,7 @@ fn stated(source: &Light) -> Option<(&'static str, Value)> {
 }
 
 /// A node whose −z is the way that the light goes.
-fn node(source: &Light, shift: DVec3) -> Value {
+pub fn node(source: &Light, shift: DVec3) -> Value {
     let position = source
         .kind
         .position()

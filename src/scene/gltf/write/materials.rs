@@ -7,7 +7,7 @@ use serde_json::json;
 use super::super::glb::Glb;
 use super::super::{substance, waves};
 use crate::error::Warning;
-use crate::scene::{Material, TextureRef, Wave};
+use crate::scene::{Material, TextureRef};
 use crate::units::LUMENS_PER_WATT;
 
 /// A material; extensions that it takes are named among those of the file. The world's origin lies at −`shift` of the
@@ -40,12 +40,7 @@ pub fn written(material: &Material, shift: DVec3, glb: &mut Glb, warnings: &mut 
     write_dielectric(material, &mut written, glb);
     write_substance(material, &mut written, glb, warnings);
     if let Some(waves) = &material.waves {
-        let stated = Vec::<Wave>::from(waves.with_origin(-shift));
-        let stated = stated.iter().map(|wave| {
-            json!({ "amplitude_m": wave.amplitude_m, "wavelength_m": wave.wavelength_m,
-                "direction": wave.direction.to_array(), "phase_rad": wave.phase_rad })
-        });
-        written["extras"][waves::KEY] = stated.collect();
+        written["extras"][waves::KEY] = waves::written(waves, shift);
     }
     written
 }

@@ -1,9 +1,7 @@
 //! A scene of our own as glTF: every object a node, every light a node, every camera a node.
 
-mod lights;
+pub(super) mod lights;
 mod materials;
-
-use std::io::Cursor;
 
 use glam::{DMat3, DQuat, DVec3};
 use gltf::json::Value;
@@ -11,6 +9,7 @@ use serde_json::json;
 
 use super::glb::Glb;
 use crate::error::{Error, Result, Warning};
+use crate::files;
 use crate::scene::{Camera, Mesh, Object, Scene, Texture, texture::Wrap};
 
 /// The document of a scene. Node `i` is object `i`, its mesh's one primitive the object's. What glTF has no words for is
@@ -61,16 +60,10 @@ fn add_texture(texture: &Texture, glb: &mut Glb) -> Result<()> {
 }
 
 fn png(width: u32, height: u32, rgba: Vec<u8>, name: &str) -> Result<Vec<u8>> {
-    let unusable = |why: String| {
+    files::png::<image::Rgba<u8>>(width, height, rgba).map_err(|why| {
         let what = format!("cannot be written as PNG ({why})");
         Error::failure(format!("image `{name}`"), what, "replace that image")
-    };
-    let image = image::RgbaImage::from_raw(width, height, rgba);
-    let image = image.ok_or_else(|| unusable("its size is wrong".into()))?;
-    let mut bytes = Cursor::new(Vec::new());
-    let written = image.write_to(&mut bytes, image::ImageFormat::Png);
-    written.map_err(|error| unusable(error.to_string()))?;
-    Ok(bytes.into_inner())
+    })
 }
 
 fn add_object(object: &Object, shift: DVec3, glb: &mut Glb) {

@@ -3,33 +3,8 @@
 use egui::{Response, Slider, SliderClamping, Ui};
 
 use crate::settings::{BakeSettings, MOST_WAVEFRONTS};
-use crate::viewer::panel::control::{About, choice, chosen, rows, setting, significant};
+use crate::viewer::panel::control::{choice, rows, setting, significant};
 use crate::viewer::panel::light_pass;
-
-const DEPTH: About = About {
-    label: "Max depth",
-    what: "Largest number of glass, mirror and water surfaces on a light path.",
-    range: "1 to 1,000; logarithmic; more can be typed",
-    default: "16",
-    accuracy: "light beyond it is missing from the maps and booked as truncated",
-    cost: "little where light leaves the glass soon; light caught in a ring of mirrors takes time in proportion",
-};
-const THRESHOLD: About = About {
-    label: "Weakest branch",
-    what: "Where glass splits light, branches that carry less than this share of their light ray's flux are not followed.",
-    range: "0.000001 to 0.5; logarithmic; 0 can be typed",
-    default: "0.003 of the max error; 0.0001 without one",
-    accuracy: "what is left out is missing from the maps and booked as truncated",
-    cost: "a tenth of it follows about one more reflection inside each piece of glass",
-};
-const WAVEFRONTS: About = About {
-    label: "Wavefronts",
-    what: "How many places on a lamp that has a size, or on a rough surface, soft light is the mean of.",
-    range: "as needed, or a power of two from 1 to 16,384",
-    default: "as needed for the max error; 32 without one",
-    accuracy: "few show as separate edges in soft shadows and caustics",
-    cost: "time grows in proportion to it; lamps without a size on smooth surfaces take none of it",
-};
 
 /// Ends of the slider; every share that settings may have can be typed.
 const SHARES: std::ops::RangeInclusive<f64> = 1e-6..=0.5;
@@ -42,16 +17,16 @@ pub fn show(ui: &mut Ui, settings: &mut BakeSettings) {
     let automatic = settings.path_threshold();
     rows(ui, "limits", |ui| {
         let depth = (&mut settings.max_depth, &default.max_depth);
-        setting(ui, &DEPTH, no_caustic, depth, |ui, depth| {
+        setting(ui, "Max depth", no_caustic, depth, |ui, depth| {
             let slider = Slider::new(depth, DEPTHS).logarithmic(true);
             ui.add(slider.clamping(SliderClamping::Never))
         });
         let share = (&mut settings.branch_threshold, &default.branch_threshold);
-        setting(ui, &THRESHOLD, no_caustic, share, |ui, share| {
+        setting(ui, "Weakest branch", no_caustic, share, |ui, share| {
             threshold(ui, share, automatic)
         });
         let count = (&mut settings.wavefronts, &default.wavefronts);
-        setting(ui, &WAVEFRONTS, no_caustic, count, wavefronts);
+        setting(ui, "Wavefronts", no_caustic, count, wavefronts);
     });
 }
 
@@ -78,6 +53,5 @@ fn wavefronts(ui: &mut Ui, count: &mut Option<u32>) -> Response {
         "as many as the max error needs; 32 without one",
     );
     let choices: Vec<_> = std::iter::once(needed).chain(exactly).collect();
-    let selected = chosen(count, &choices).to_owned();
-    choice(ui, "wavefronts", count, &selected, &choices)
+    choice(ui, "wavefronts", count, "custom", &choices)
 }

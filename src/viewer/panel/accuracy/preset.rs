@@ -1,36 +1,10 @@
 //! How carefully to bake, by name: the presets of the command line.
 
 use egui::Ui;
+use strum::EnumMessage;
 
 use crate::settings::{BakeSettings, Estimator, MapResolution, Preset};
-use crate::viewer::panel::control::{About, choice, chosen, setting};
-
-const PRESET: About = About {
-    label: "Preset",
-    what: "How carefully to bake. Sets what ends the bake, the ray density, the map size and the limits; custom once one \
-           of them is set otherwise.",
-    range: "draft 10 %, preview 3 %, final 1 % of relative RMSE; splats 12,500, 100,000 and 800,000 rays/sr",
-    default: "preview",
-    accuracy: "as the name says, by the estimate",
-    cost: "preview takes some ten times as long as a draft, final some ten times as long as a preview",
-};
-const PRESETS: [(Option<Preset>, &str, &str); 3] = [
-    (
-        Some(Preset::Draft),
-        "draft",
-        "10 % of relative RMSE (splat: 12,500 rays/sr): to place lamps and glass",
-    ),
-    (
-        Some(Preset::Preview),
-        "preview",
-        "3 % (splat: 100,000 rays/sr): to judge the light",
-    ),
-    (
-        Some(Preset::Final),
-        "final",
-        "1 % (splat: 800,000 rays/sr): to keep the maps",
-    ),
-];
+use crate::viewer::panel::control::{choice, setting};
 
 /// Sets all that a preset stands for; the estimator stays.
 pub fn apply(preset: Preset, settings: &mut BakeSettings) {
@@ -63,9 +37,12 @@ pub fn show(ui: &mut Ui, settings: &mut BakeSettings) {
     let before = of(settings);
     let mut preset = before;
     let value = (&mut preset, &Some(Preset::Preview));
-    setting(ui, &PRESET, None, value, |ui, preset| {
-        let selected = chosen(preset, &PRESETS);
-        choice(ui, "preset", preset, selected, &PRESETS)
+    setting(ui, "Preset", None, value, |ui, preset| {
+        let choices = Preset::ALL.map(|preset| {
+            let hover = preset.get_documentation().unwrap_or_default();
+            (Some(preset), preset.name(), hover)
+        });
+        choice(ui, "preset", preset, "custom", &choices)
     });
     if let Some(preset) = preset.filter(|_| preset != before) {
         apply(preset, settings);

@@ -1,36 +1,9 @@
 //! What ends a bake: a density, an error or a time.
 
-use egui::{ComboBox, Response, Slider, SliderClamping, Ui};
+use egui::{Response, Slider, SliderClamping, Ui};
 
 use crate::settings::{BakeSettings, Estimator, LEAST_MAX_ERROR, Preset};
-use crate::viewer::panel::control::{About, CONTROL_WIDTH, arrow_steps, setting, stepped};
-
-const TARGET: About = About {
-    label: "Bake until",
-    what: "What ends a bake: exactly the lattice of the ray density, an estimated error (relative RMSE over all maps) \
-           that is small enough, or time that is up.",
-    range: "ray density, max error, max time",
-    default: "max error; ray density for splats, which do not refine",
-    accuracy: "a max error is kept by the estimate, not by a reference; after a max time the finest complete maps are \
-               shown",
-    cost: "halving the error takes about four times the rays",
-};
-const ERROR: About = About {
-    label: "Max error [%]",
-    what: "Relative RMSE over all maps, as it is estimated, that is small enough.",
-    range: "0.01 to 100; logarithmic",
-    default: "3",
-    accuracy: "kept by the estimate, not by a reference",
-    cost: "halving it takes about four times the rays",
-};
-const TIME: About = About {
-    label: "Max time [s]",
-    what: "Wall-clock time after which the light pass ends.",
-    range: "0.001 to 10,000; logarithmic",
-    default: "10",
-    accuracy: "the finest maps that were complete are shown; their error is estimated",
-    cost: "so much time, unless the maps cannot become better",
-};
+use crate::viewer::panel::control::{self, CONTROL_WIDTH, setting};
 
 /// The first time that is offered [s].
 const FIRST_TIME_S: f64 = 10.0;
@@ -155,9 +128,13 @@ pub fn show(ui: &mut Ui, settings: &mut BakeSettings, unavailable: Option<&str>)
         _ => target,
     };
     let shown = kind;
-    setting(ui, &TARGET, unavailable, (&mut kind, &default), |ui, kind| {
-        list(ui, kind, settings.estimator)
-    });
+    setting(
+        ui,
+        "Bake until",
+        unavailable,
+        (&mut kind, &default),
+        |ui, kind| list(ui, kind, settings.estimator),
+    );
     if kind != shown {
         target = kind;
     }
@@ -165,12 +142,24 @@ pub fn show(ui: &mut Ui, settings: &mut BakeSettings, unavailable: Option<&str>)
         Target::Density => {}
         Target::Error(error) => {
             let default = Preset::default().max_error();
-            setting(ui, &ERROR, unavailable, (error, &default), percent_slider);
+            setting(
+                ui,
+                "Max error [%]",
+                unavailable,
+                (error, &default),
+                percent_slider,
+            );
         }
-        Target::Time(time_s) => setting(ui, &TIME, unavailable, (time_s, &FIRST_TIME_S), |ui, time_s| {
-            let slider = Slider::new(time_s, TIMES_S).logarithmic(true).suffix(" s");
-            ui.add(slider.clamping(SliderClamping::Edits).max_decimals(3))
-        }),
+        Target::Time(time_s) => setting(
+            ui,
+            "Max time [s]",
+            unavailable,
+            (time_s, &FIRST_TIME_S),
+            |ui, time_s| {
+                let slider = Slider::new(time_s, TIMES_S).logarithmic(true).suffix(" s");
+                ui.add(slider.clamping(SliderClamping::Edits).max_decimals(3))
+            },
+        ),
     }
     if target != before {
         target.set(settings);
@@ -190,36 +179,16 @@ fn list(ui: &mut Ui, target: &mut Target, estimator: Estimator) -> Response {
         (Target::Time(FIRST_TIME_S), "Until the time is up."),
     ];
     let can = |target: Target| estimator == Estimator::Wavefront || !matches!(target, Target::Error(_));
-    let list = ComboBox::from_id_salt("target")
-        .width(CONTROL_WIDTH)
-        .selected_text(target.name())
-        .show_ui(ui, |ui| {
-            for (candidate, hover) in targets {
-                ui.add_enabled_ui(can(candidate), |ui| {
-                    let is_chosen = candidate.name() == target.name();
-                    let entry = ui.selectable_label(is_chosen, candidate.name());
-                    let entry = entry.on_hover_text(hover).on_disabled_hover_text(NO_ERRORS);
-                    if entry.clicked() && !is_chosen {
-                        *target = candidate;
-                    }
-                });
-            }
-        });
-    if list.inner.is_none() {
-        let possible: Vec<_> = targets
-            .iter()
-            .map(|(target, _)| *target)
-            .filter(|t| can(*t))
-            .collect();
-        let index = possible
-            .iter()
-            .position(|candidate| candidate.name() == target.name());
-        let steps = arrow_steps(ui, &list.response);
-        if let Some(index) = index.filter(|_| steps != 0) {
-            *target = possible[stepped(index, steps, possible.len())];
-        }
+    let why_not = |target: Target| (!can(target)).then_some(NO_ERRORS);
+    let entries = targets.map(|(target, hover)| (target.name(), hover.into(), why_not(target)));
+    let at = targets
+        .iter()
+        .position(|(candidate, _)| candidate.name() == target.name());
+    let (response, picked) = control::pick(ui, ("target", CONTROL_WIDTH), (target.name(), at), &entries);
+    if let Some(index) = picked.filter(|index| Some(*index) != at) {
+        *target = targets[index].0;
     }
-    list.response
+    response
 }
 
 fn percent_slider(ui: &mut Ui, error: &mut f64) -> Response {
