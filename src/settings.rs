@@ -50,8 +50,13 @@ impl LayerKind {
 #[serde(rename_all = "lowercase")]
 #[strum(serialize_all = "lowercase")]
 pub enum Estimator {
+    /// Patches or photons, light by light: whichever a pilot of both measures to be cheaper for the target; photons where
+    /// there is no target.
+    Auto,
     /// Patches of the wavefront between neighbouring rays, spread exactly over the texels they cover.
     Wavefront,
+    /// Photons: paths that go one way at every surface, each counted into the texel it hits.
+    Photon,
     /// A kernel of flux per ray, scaled to the wavefront (Collins 1994).
     Splat,
 }
@@ -250,9 +255,6 @@ pub struct BakeSettings {
     pub max_error: Option<f64>,
     /// Ends the light pass after so many seconds of wall-clock time, > 0, with the finest maps that were complete.
     pub max_time_s: Option<f64>,
-    /// Wavefronts of lights with a size and on rough surfaces, a power of two up to [`MOST_WAVEFRONTS`]: as many exactly.
-    /// `None`: as the target needs, or 32 without one.
-    pub wavefronts: Option<u32>,
     /// Lattice or jittered.
     pub rays: RayPlacement,
     /// Spread of the gaussian.
@@ -263,6 +265,9 @@ pub struct BakeSettings {
     pub kernel_sampling: KernelSampling,
     /// What sets a splat's size.
     pub footprint: Footprint,
+    /// Whether the noise of photons is filtered where that lowers the error (auto and photon).
+    #[serde(default)]
+    pub filter: bool,
     /// How the item buffer divides directions.
     pub item_buffer: ItemBufferKind,
     /// Size of the maps.
@@ -305,9 +310,6 @@ const THRESHOLD_PER_ERROR: f64 = 0.003;
 /// Least target for the relative RMSE [1].
 pub const LEAST_MAX_ERROR: f64 = 1e-4;
 
-/// Most wavefronts of one light.
-pub const MOST_WAVEFRONTS: u32 = 1 << 14;
-
 /// Most wavelengths of a bake.
 pub const MOST_WAVELENGTHS: u32 = 1000;
 
@@ -325,12 +327,12 @@ impl Default for BakeSettings {
             density_per_sr: Estimator::Wavefront.preview_density_per_sr(),
             max_error: None,
             max_time_s: None,
-            wavefronts: None,
             rays: RayPlacement::Lattice,
             sigma: Estimator::Wavefront.default_sigma(),
             kernel: Kernel::Gaussian,
             kernel_sampling: KernelSampling::Integrated,
             footprint: Footprint::Ellipse,
+            filter: true,
             item_buffer: ItemBufferKind::Equal,
             map_resolution: MapResolution::Auto,
             max_depth: 16,
@@ -352,29 +354,40 @@ impl Estimator {
     /// Light rays per steradian of a preview [1/sr]: patches need fewer than splats.
     pub fn preview_density_per_sr(self) -> f64 {
         match self {
-            Self::Wavefront => 25_000.0,
+            Self::Auto | Self::Wavefront => 25_000.0,
+            Self::Photon => 1e6,
             Self::Splat => 100_000.0,
         }
+    }
+
+    /// Whether it goes on until a target is reached.
+    pub fn refines(self) -> bool {
+        self != Self::Splat
     }
 
     /// Patches are exact without smoothing; splats are one footprint wide.
     pub fn default_sigma(self) -> Sigma {
         match self {
-            Self::Wavefront => Sigma::Constant(0.0),
+            Self::Auto | Self::Wavefront | Self::Photon => Sigma::Constant(0.0),
             Self::Splat => Sigma::Constant(1.0),
         }
     }
 }
 
 impl BakeSettings {
-    /// The paper's estimator with its defaults.
-    pub fn splat() -> Self {
+    /// An estimator with its defaults.
+    pub fn of(estimator: Estimator) -> Self {
         Self {
-            estimator: Estimator::Splat,
-            density_per_sr: Estimator::Splat.preview_density_per_sr(),
-            sigma: Estimator::Splat.default_sigma(),
+            estimator,
+            density_per_sr: estimator.preview_density_per_sr(),
+            sigma: estimator.default_sigma(),
             ..Self::default()
         }
+    }
+
+    /// The paper's estimator with its defaults.
+    pub fn splat() -> Self {
+        Self::of(Estimator::Splat)
     }
 
     /// Density that refinement towards a relative RMSE begins from [rays/sr]: coarse enough that refinement decides, fine
@@ -448,20 +461,13 @@ impl BakeSettings {
         if let Some(limit_s) = self.max_time_s {
             finite_in("--max-time", limit_s, 1e-3, 1e7)?;
         }
-        if let Some(count) = self.wavefronts
-            && !(count.is_power_of_two() && count <= MOST_WAVEFRONTS)
-        {
-            return Err(Error::usage(
-                "--wavefronts",
-                format!("{count} is no power of two from 1 to {MOST_WAVEFRONTS}"),
-                "give one, such as 64",
-            ));
-        }
         match (self.estimator, self.sigma) {
-            (Estimator::Wavefront, Sigma::Constant(sigma)) => finite_in("--sigma", sigma, 0.0, 1e4)?,
-            (Estimator::Splat, Sigma::Constant(sigma)) => finite_in("--sigma", sigma, 1e-6, 1e4)?,
+            (estimator, Sigma::Constant(sigma)) if estimator.refines() => {
+                finite_in("--sigma", sigma, 0.0, 1e4)?;
+            }
+            (_, Sigma::Constant(sigma)) => finite_in("--sigma", sigma, 1e-6, 1e4)?,
             (Estimator::Splat, Sigma::Adaptive) => {}
-            (Estimator::Wavefront, Sigma::Adaptive) => {
+            (_, Sigma::Adaptive) => {
                 return Err(Error::usage(
                     "--sigma",
                     "only splats have footprints to adapt a sigma to",

@@ -42,9 +42,6 @@ const LEAST_STATISTICS_SIDE: usize = 32;
 /// How much coarser than the last one a coarse lattice is deposited at most.
 pub(super) const MOST_COARSE: f64 = 16.0;
 
-/// Branches of soft light are given up at so many times the usual share: each is traced for many wavefronts.
-const SOFT_THRESHOLD: f64 = 5.0;
-
 /// How coarse triangles may be for a target, relative to those of a bake without one: over this relative RMSE.
 const USUAL_ERROR: f64 = 0.012;
 
@@ -99,14 +96,14 @@ impl CausticLayer<'_> {
                 is_dim: !climb.is_underrated && self.is_dim(light),
                 ..self.trace_key(light, size, before_last as i32, &climb.rounds)
             },
-            resolved: None,
+            photons: None,
             sizes: sizes.clone(),
             coarseness: coarseness(self.settings.max_error, climb.goal)
                 * (before_last as f64).exp2().min(MOST_COARSE),
             kernels: self.kernels(),
             stride: match self.settings.estimator {
-                Estimator::Wavefront => 1,
-                Estimator::Splat => LEVEL_STRIDES[step.min(LEVEL_STRIDES.len() - 1)],
+                estimator if estimator.refines() => 1,
+                _ => LEVEL_STRIDES[step.min(LEVEL_STRIDES.len() - 1)],
             },
         }
     }
@@ -127,7 +124,7 @@ impl CausticLayer<'_> {
             item_buffer: settings.item_buffer,
             ..BakeSettings::default()
         };
-        if settings.estimator == Estimator::Splat {
+        if settings.estimator != Estimator::Wavefront {
             (paths.rays, paths.seed) = (settings.rays, settings.seed);
         }
         TraceKey {
@@ -135,7 +132,7 @@ impl CausticLayer<'_> {
             effects: EffectSet::of(self.plan),
             splits: self.splits(),
             size,
-            coarser: if settings.estimator == Estimator::Wavefront && self.has_bumps() {
+            coarser: if settings.estimator.refines() && self.has_bumps() {
                 coarser
             } else {
                 0
@@ -155,8 +152,8 @@ impl CausticLayer<'_> {
         let settings = self.settings;
         let usual = BakeSettings::default();
         match settings.estimator {
-            Estimator::Wavefront => usual,
-            Estimator::Splat => BakeSettings {
+            estimator if estimator.refines() => usual,
+            _ => BakeSettings {
                 sigma: settings.sigma,
                 kernel: settings.kernel,
                 kernel_sampling: settings.kernel_sampling,
@@ -195,19 +192,18 @@ impl CausticLayer<'_> {
             placement: self.settings.rays,
             centre: DVec2::splat(0.5),
             seed: self.settings.seed,
-            limits: self.limits(light),
+            limits: self.limits(),
             unit,
         }
     }
 
     /// Of the paths of a wavefront.
-    pub(super) fn limits(&self, light: &AimedLight) -> PathLimits {
-        let softly = if self.is_soft(light) { SOFT_THRESHOLD } else { 1.0 };
+    pub(super) fn limits(&self) -> PathLimits {
         PathLimits {
             max_depth: self.settings.max_depth,
-            branch_threshold: self.settings.path_threshold() * softly,
+            branch_threshold: self.settings.path_threshold(),
             effects: EffectSet::of(self.plan),
-            microfacets: light.microfacets,
+            microfacets: None,
         }
     }
 
@@ -246,8 +242,10 @@ impl CausticLayer<'_> {
                     let unit = self.unit(light)?;
                     let state = states.of_mut(light.light);
                     statistics.merge(&match self.settings.estimator {
-                        Estimator::Wavefront => self.wavefront_statistics(light, unit, state, course),
-                        Estimator::Splat => self.splat_statistics(light, unit, state, course),
+                        estimator if estimator.refines() => {
+                            self.wavefront_statistics(light, unit, state, course)
+                        }
+                        _ => self.splat_statistics(light, unit, state, course),
                     });
                 }
                 // What a cancelled run saw is not all.

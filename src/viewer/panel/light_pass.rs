@@ -94,11 +94,21 @@ const ITEM_BUFFER: About = About {
     cost: "nearly the same",
 };
 
-const ESTIMATORS: [(Estimator, &str, &str); 2] = [
+const ESTIMATORS: [(Estimator, &str, &str); 4] = [
+    (
+        Estimator::Auto,
+        "auto",
+        "patches or photons, whichever reaches the target sooner",
+    ),
     (
         Estimator::Wavefront,
         "wavefront",
         "patches between neighbouring rays, spread exactly over texels",
+    ),
+    (
+        Estimator::Photon,
+        "photon",
+        "sampled paths, each counted into the texel it hits",
     ),
     (
         Estimator::Splat,
@@ -153,13 +163,9 @@ const NOT_GAUSSIAN: &str = "Sigma is the spread of the gaussian kernel; the chos
 
 /// What the settings are set back to: what the program begins with for an estimator.
 pub fn defaults(estimator: Estimator) -> BakeSettings {
-    let settings = match estimator {
-        Estimator::Wavefront => BakeSettings::default(),
-        Estimator::Splat => BakeSettings::splat(),
-    };
     BakeSettings {
         layers: vec![LayerKind::Caustic, LayerKind::Direct],
-        ..settings
+        ..BakeSettings::of(estimator)
     }
 }
 
@@ -174,7 +180,7 @@ fn default_density_per_sr(settings: &BakeSettings) -> f64 {
 /// Shows the section; `settings` holds what the user chose.
 pub fn show(ui: &mut Ui, settings: &mut BakeSettings) {
     let no_caustic = no_caustic(settings);
-    let is_wavefront = settings.estimator == Estimator::Wavefront;
+    let refines = settings.estimator.refines();
     let no_sigma = no_sigma(settings);
     let default = defaults(settings.estimator);
     rows(ui, "light pass", |ui| {
@@ -195,7 +201,7 @@ pub fn show(ui: &mut Ui, settings: &mut BakeSettings) {
             &SIGMA,
             no_sigma,
             (&mut settings.sigma, &default.sigma),
-            |ui, value| sigma(ui, value, is_wavefront),
+            |ui, value| sigma(ui, value, refines),
         );
     });
 }
@@ -203,8 +209,7 @@ pub fn show(ui: &mut Ui, settings: &mut BakeSettings) {
 /// Shows what is seldom changed.
 pub fn show_details(ui: &mut Ui, settings: &mut BakeSettings) {
     let no_caustic = no_caustic(settings);
-    let is_wavefront = settings.estimator == Estimator::Wavefront;
-    let no_splats = no_caustic.or(is_wavefront.then_some(NO_SPLATS));
+    let no_splats = no_caustic.or(settings.estimator.refines().then_some(NO_SPLATS));
     let no_sigma = no_sigma(settings);
     let default = defaults(settings.estimator);
     rows(ui, "rays and kernels", |ui| {
