@@ -255,6 +255,9 @@ pub struct BakeSettings {
     pub max_error: Option<f64>,
     /// Ends the light pass after so many seconds of wall-clock time, > 0, with the finest maps that were complete.
     pub max_time_s: Option<f64>,
+    /// Wavefronts of lights with a size and on rough surfaces, a power of two up to [`MOST_WAVEFRONTS`]: as many exactly.
+    /// `None`: as the target needs, or 32 without one.
+    pub wavefronts: Option<u32>,
     /// Lattice or jittered.
     pub rays: RayPlacement,
     /// Spread of the gaussian.
@@ -310,6 +313,9 @@ const THRESHOLD_PER_ERROR: f64 = 0.003;
 /// Least target for the relative RMSE [1].
 pub const LEAST_MAX_ERROR: f64 = 1e-4;
 
+/// Most wavefronts of one light.
+pub const MOST_WAVEFRONTS: u32 = 1 << 14;
+
 /// Most wavelengths of a bake.
 pub const MOST_WAVELENGTHS: u32 = 1000;
 
@@ -327,6 +333,7 @@ impl Default for BakeSettings {
             density_per_sr: Estimator::Wavefront.preview_density_per_sr(),
             max_error: None,
             max_time_s: None,
+            wavefronts: None,
             rays: RayPlacement::Lattice,
             sigma: Estimator::Wavefront.default_sigma(),
             kernel: Kernel::Gaussian,
@@ -460,6 +467,15 @@ impl BakeSettings {
         }
         if let Some(limit_s) = self.max_time_s {
             finite_in("--max-time", limit_s, 1e-3, 1e7)?;
+        }
+        if let Some(count) = self.wavefronts
+            && !(count.is_power_of_two() && count <= MOST_WAVEFRONTS)
+        {
+            return Err(Error::usage(
+                "--wavefronts",
+                format!("{count} is no power of two from 1 to {MOST_WAVEFRONTS}"),
+                "give one, such as 64",
+            ));
         }
         match (self.estimator, self.sigma) {
             (estimator, Sigma::Constant(sigma)) if estimator.refines() => {

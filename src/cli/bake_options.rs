@@ -31,6 +31,10 @@ pub struct BakeOptions {
     /// --max-error, refines as far as that goes (wavefront)
     #[arg(long, value_name = "TIME", value_parser = values::seconds, allow_hyphen_values = true)]
     max_time: Option<f64>,
+    /// Wavefronts of lights with a size and on rough surfaces, a power of two [default: as the target needs, 32 without
+    /// one]
+    #[arg(long, value_name = "N")]
+    wavefronts: Option<u32>,
     /// Where in its lattice cell a light ray starts (splat) [default: lattice]
     #[arg(long, value_parser = values::one_of::<RayPlacement>(), value_name = "PLACEMENT")]
     rays: Option<RayPlacement>,
@@ -110,6 +114,7 @@ impl BakeOptions {
             estimator,
             max_error,
             max_time_s: self.max_time,
+            wavefronts: self.wavefronts,
             density_per_sr: self.density.unwrap_or_else(|| match (estimator, max_error) {
                 (Estimator::Splat, _) => preset.splat_density_per_sr(),
                 (_, Some(target)) => BakeSettings::starting_density_per_sr(target),

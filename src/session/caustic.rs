@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use super::BakeCounts;
-use super::carrier::{self, Carrier};
+use super::carrier::Carrier;
 use super::clock::Clock;
 use super::finish::Shown;
 use super::forecast::{CostPoint, Forecast, forecast};
@@ -12,13 +12,14 @@ use super::light_level::{KeptError, LevelKey, LightLevel, LightState, LightState
 use super::map_size::Sizes;
 use super::shards::{Labour, PassSums};
 use super::sizes::MapSizes;
+use super::soft_level::SOFT_BEGINNING;
 use super::spectra::Spectra;
 use crate::error::{Error, Result, Warning};
 use crate::illumination::accumulator::FluxUnit;
 use crate::illumination::{Receiver, Side};
 use crate::light_pass::accuracy::{self, Before, Images, LightError};
 use crate::light_pass::caustic::pass::{PassReport, Stopwatch};
-use crate::light_pass::caustic::setup::{Aim, AimedLight};
+use crate::light_pass::caustic::setup::{Aim, AimedLight, Aiming};
 use crate::light_pass::caustic::statistics::FootprintStatistics;
 use crate::light_pass::receiver_maps::ChartFor;
 use crate::light_pass::share::Share;
@@ -26,7 +27,7 @@ use crate::light_pass::wavefront::refine::Round;
 use crate::optics::LinearSrgb;
 use crate::plan::{Effect, EffectPlan};
 use crate::progress::{Control, Progress};
-use crate::settings::{BakeSettings, Estimator};
+use crate::settings::{BakeSettings, Estimator, ItemBufferKind};
 use crate::transport::Tracer;
 
 /// Levels that an error estimate needs: each lattice with half the steps of the one before.
@@ -92,10 +93,6 @@ pub(super) struct Climb {
     pub(super) carrier: Carrier,
     /// The first photons, which tell what more of them would cost; shown until patches are better.
     pub(super) pilot: Option<LightLevel>,
-    /// What the patches so far cost, in segments of photons.
-    pub(super) patch_cost: f64,
-    /// And the last level of them.
-    pub(super) last_patch_cost: f64,
     /// The coarsest first.
     pub(super) levels: Vec<LightLevel>,
     pub(super) rounds: Vec<Round>,
@@ -163,6 +160,12 @@ impl Course<'_> {
 }
 
 impl CausticLayer<'_> {
+    /// How item buffers are made, and how thoroughly what cannot matter is left out.
+    pub(super) fn aiming(&self) -> (ItemBufferKind, Aiming) {
+        let (item_buffer, aiming, _) = super::aim_key(self.settings);
+        (item_buffer, aiming)
+    }
+
     /// Bakes all lights, taking from the states what still holds. `show` is called whenever there is a better picture
     /// than before, but for the last.
     ///
@@ -207,7 +210,7 @@ impl CausticLayer<'_> {
         let mut climbs = Vec::with_capacity(lights.len());
         for light in &lights {
             climbs.push(Climb {
-                carrier: self.carrier(light)?,
+                carrier: self.carrier(light),
                 ..Climb::default()
             });
         }
@@ -246,8 +249,11 @@ impl CausticLayer<'_> {
         }
         outcome.stopped = self.stopped(&lights, &climbs, &limited);
         for (light, mut climb) in lights.iter().zip(climbs) {
-            if climb.shown().is_some_and(|level| level.key.photons.is_some()) {
-                climb.levels.extend(climb.pilot.take());
+            // The last level is the picture; a pilot that is not is kept for the next bake.
+            let is_shown = climb.shown().is_some_and(|level| level.key.photons.is_some());
+            if let Some(pilot) = climb.pilot.take() {
+                let place = if is_shown { climb.levels.len() } else { 0 };
+                climb.levels.insert(place, pilot);
             }
             if let Some(level) = climb.levels.last() {
                 outcome.finished.push(light.light);
@@ -284,6 +290,8 @@ impl CausticLayer<'_> {
                 let begins = self.lattices(light).len();
                 let begins = if climb.carrier == Carrier::Photons {
                     1
+                } else if self.is_soft(light) {
+                    SOFT_BEGINNING
                 } else {
                     begins
                 };
@@ -349,7 +357,7 @@ impl CausticLayer<'_> {
     ) -> Result<()> {
         if climb.carrier == Carrier::Undecided {
             let is_first = climb.pilot.is_none();
-            self.decide_carrier(light, sizes, climb, course)?;
+            self.decide_carrier(light, sizes, state, climb, course)?;
             if is_first && climb.pilot.is_some() {
                 // Shown before anything that takes longer.
                 return Ok(());
@@ -358,7 +366,9 @@ impl CausticLayer<'_> {
         if climb.carrier == Carrier::Photons {
             return self.climb_photons(light, sizes, state, climb, course);
         }
-        let before = carrier::patch_cost(&course.outcome.counts);
+        if self.is_soft(light) {
+            return self.climb_soft(light, sizes, state, climb, course);
+        }
         let unit = self.unit(light)?;
         let step = climb.levels.len();
         let key = self.key(light, step, climb, sizes);
@@ -366,8 +376,6 @@ impl CausticLayer<'_> {
             Some(level) => Some(level),
             None => self.make(light, key, unit, state, course)?,
         };
-        climb.last_patch_cost = carrier::patch_cost(&course.outcome.counts) - before;
-        climb.patch_cost += climb.last_patch_cost;
         let Some(mut level) = made else {
             return Ok(());
         };
@@ -412,6 +420,10 @@ impl CausticLayer<'_> {
                     let is_good = climb.error().is_some_and(|error| error.relative_rmse <= target);
                     is_good || !self.has_next_level(light, climb)
                 }
+                Goal::Refine(target) if self.is_soft(light) => {
+                    let is_good = climb.error().is_some_and(|error| error.relative_rmse <= target);
+                    is_good || !self.has_next_level(light, climb)
+                }
                 Goal::Refine(target) => !self.refine(climb, target),
             };
         }
@@ -420,6 +432,8 @@ impl CausticLayer<'_> {
     fn has_next_level(&self, light: &AimedLight, climb: &Climb) -> bool {
         if climb.carrier == Carrier::Photons {
             self.next_photons(light, climb).is_some()
+        } else if self.is_soft(light) {
+            self.next_resolved(light, climb).is_some()
         } else {
             climb.levels.len() < self.lattices(light).len()
         }

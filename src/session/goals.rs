@@ -128,6 +128,11 @@ impl CausticLayer<'_> {
         dim[kept..].iter().map(|light| light.index).collect()
     }
 
+    /// Whether levels of a light are no lattices.
+    fn has_no_ladder(&self, light: &AimedLight, climb: &Climb) -> bool {
+        climb.carrier == Carrier::Photons || self.is_soft(light)
+    }
+
     /// Errors of all lights; `None` where one is not known yet.
     pub(super) fn errors(&self, lights: &[&AimedLight], climbs: &[Climb]) -> Option<Errors> {
         let known = self.known_errors(lights, climbs);
@@ -168,7 +173,7 @@ impl CausticLayer<'_> {
     /// What each light aims at next.
     pub(super) fn goals(&self, lights: &[&AimedLight], climbs: &[Climb]) -> Vec<Goal> {
         let has_ladder = |light: &AimedLight, climb: &Climb| {
-            climb.carrier != Carrier::Photons && climb.levels.len() < self.lattices(light).len()
+            !self.has_no_ladder(light, climb) && climb.levels.len() < self.lattices(light).len()
         };
         let known = self.known_errors(lights, climbs);
         let all_known = known.lights.len() == lights.len();
@@ -201,7 +206,7 @@ impl CausticLayer<'_> {
             let is_known = known.lights.iter().any(|light| light.index == index);
             if !is_known
                 && !has_ladder(lights[index], &climbs[index])
-                && climbs[index].carrier != Carrier::Photons
+                && !self.has_no_ladder(lights[index], &climbs[index])
             {
                 *goal = Goal::Enough;
             }

@@ -42,6 +42,9 @@ const LEAST_STATISTICS_SIDE: usize = 32;
 /// How much coarser than the last one a coarse lattice is deposited at most.
 pub(super) const MOST_COARSE: f64 = 16.0;
 
+/// Branches of soft light are given up at so many times the usual share: each is traced for many wavefronts.
+const SOFT_THRESHOLD: f64 = 5.0;
+
 /// How coarse triangles may be for a target, relative to those of a bake without one: over this relative RMSE.
 const USUAL_ERROR: f64 = 0.012;
 
@@ -96,6 +99,7 @@ impl CausticLayer<'_> {
                 is_dim: !climb.is_underrated && self.is_dim(light),
                 ..self.trace_key(light, size, before_last as i32, &climb.rounds)
             },
+            resolved: None,
             photons: None,
             sizes: sizes.clone(),
             coarseness: coarseness(self.settings.max_error, climb.goal)
@@ -192,18 +196,19 @@ impl CausticLayer<'_> {
             placement: self.settings.rays,
             centre: DVec2::splat(0.5),
             seed: self.settings.seed,
-            limits: self.limits(),
+            limits: self.limits(light),
             unit,
         }
     }
 
     /// Of the paths of a wavefront.
-    pub(super) fn limits(&self) -> PathLimits {
+    pub(super) fn limits(&self, light: &AimedLight) -> PathLimits {
+        let softly = if self.is_soft(light) { SOFT_THRESHOLD } else { 1.0 };
         PathLimits {
             max_depth: self.settings.max_depth,
-            branch_threshold: self.settings.path_threshold(),
+            branch_threshold: self.settings.path_threshold() * softly,
             effects: EffectSet::of(self.plan),
-            microfacets: None,
+            microfacets: light.microfacets,
         }
     }
 

@@ -21,6 +21,7 @@ pub mod result;
 mod scene_change;
 pub mod shards;
 mod sizes;
+mod soft_level;
 mod spectra;
 mod splat_level;
 pub mod survey;

@@ -123,10 +123,14 @@ impl CausticLayer<'_> {
         &self,
         light: &AimedLight,
         sizes: &Sizes,
+        state: &mut LightState,
         course: &mut Course,
     ) -> Result<Option<LightLevel>> {
         let key = self.photon_key(light, FIRST_PHOTONS, sizes);
-        self.make_photons(light, key, None, course)
+        match state.take(&key) {
+            Some(level) => Ok(Some(level)),
+            None => self.make_photons(light, key, None, course),
+        }
     }
 
     fn photon_key(&self, light: &AimedLight, photons: u32, sizes: &Sizes) -> LevelKey {

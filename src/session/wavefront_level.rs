@@ -3,12 +3,13 @@
 use glam::DVec2;
 
 use super::caustic::{CausticLayer, Course};
-use super::light_level::{LevelKey, LightLevel, LightState, TraceKey};
+use super::light_level::{LevelKey, LightLevel, LightState, SoftParts, TraceKey};
+use super::part_maps::PartMaps;
 use super::shards::PassSums;
 use crate::error::Result;
 use crate::illumination::Receiver;
 use crate::illumination::accumulator::FluxUnit;
-use crate::light_pass::caustic::pass::Listener;
+use crate::light_pass::caustic::pass::{Listener, PassReport};
 use crate::light_pass::caustic::setup::AimedLight;
 use crate::light_pass::caustic::statistics::FootprintStatistics;
 use crate::light_pass::ledger_sum::{Account, LedgerSum};
@@ -17,6 +18,7 @@ use crate::light_pass::wavefront::bodies::SmallBodies;
 use crate::light_pass::wavefront::bumps::BumpCells;
 use crate::light_pass::wavefront::cell::Splits;
 use crate::light_pass::wavefront::closeness::Closeness;
+use crate::light_pass::wavefront::kept_rays::KeptRays;
 use crate::light_pass::wavefront::lattice::WavefrontLattice;
 use crate::light_pass::wavefront::pass::{Room, WavefrontDepositor};
 use crate::light_pass::wavefront::receivers::Receivers;
@@ -62,7 +64,7 @@ impl CausticLayer<'_> {
         let mut sums = course.pass(&chart_for, nothing, |course, share, mut sums| {
             let maps = &mut sums.maps[0];
             let size = self.spectra.part_size(light.light, key.trace.size);
-            let bodies = self.small_bodies(light, size, self.closeness(&key.trace));
+            let bodies = self.small_bodies(light, size, self.closeness(light, &key.trace));
             for (number, (band, part)) in self.spectra.parts(light.light).into_iter().enumerate() {
                 let share = share.map(|share| share.shifted(number as u64));
                 let depositor = WavefrontDepositor {
@@ -106,6 +108,7 @@ impl CausticLayer<'_> {
             strays,
             overreaches: report.overreaches,
             traced,
+            work: (report.cells, report.receiver_queries),
             ..self.level(light, (key, unit), (maps, bands), report.ledger)
         }))
     }
@@ -130,9 +133,45 @@ impl CausticLayer<'_> {
             noise: None,
             error: None,
             photons: None,
+            work: (0, 0),
             traced: None,
             has_own_colour: self.spectra.has(light.light),
+            parts: SoftParts::default(),
         }
+    }
+
+    /// Traces and deposits one wavefront of a soft light onto maps.
+    pub(super) fn run_patches(
+        &self,
+        light: &AimedLight,
+        key: &LevelKey,
+        unit: FluxUnit,
+        (receivers, chart_for): (&Receivers, &ChartFor),
+        maps: &mut PartMaps,
+        course: &Course,
+    ) -> PassReport {
+        let size = self.spectra.part_size(light.light, key.trace.size);
+        let bodies = self.small_bodies(light, size, self.closeness(light, &key.trace));
+        let listener = Listener {
+            progress: &(),
+            control: course.control,
+            done: 0,
+            total: 0,
+        };
+        let mut report = PassReport::default();
+        for (band, part) in self.spectra.parts(light.light) {
+            let depositor = WavefrontDepositor {
+                receivers,
+                chart_for,
+                lattice: self.bumpy_lattice(light, part, &key.trace, &bodies, unit, course.control),
+                reference_w: reference_w(light),
+                coarseness: key.coarseness,
+            };
+            let mut rays = KeptRays::default();
+            let maps = Some(maps.of(band));
+            report.merge(depositor.run(None, &mut rays, maps, &listener, Room::default()).0);
+        }
+        report
     }
 
     /// Sizes of lit areas at the density that maps are meant for, from a thinner lattice.
@@ -209,8 +248,8 @@ impl CausticLayer<'_> {
         }
     }
 
-    fn closeness(&self, trace: &TraceKey) -> Closeness {
-        if trace.is_dim {
+    fn closeness(&self, light: &AimedLight, trace: &TraceKey) -> Closeness {
+        if self.is_soft(light) || trace.is_dim {
             Closeness::SOFT
         } else {
             Closeness::SHARP
@@ -240,7 +279,7 @@ impl CausticLayer<'_> {
     ) -> WavefrontLattice<'a> {
         let size = self.spectra.part_size(light.light, trace.size);
         let mut lattice = self.wavefront_lattice(light, part, size, bodies, unit, control);
-        lattice.tracer = lattice.tracer.with_closeness(self.closeness(trace));
+        lattice.tracer = lattice.tracer.with_closeness(self.closeness(light, trace));
         lattice.tracer.bumps = BumpCells::for_lattice(lattice.cell_count(), trace.coarser);
         lattice
     }
@@ -258,7 +297,7 @@ impl CausticLayer<'_> {
         let tracer = StrandTracer::new(
             self.tracer,
             &light.launch,
-            self.limits(),
+            self.limits(light),
             [1.0 / size.0 as f64, 1.0 / size.1 as f64],
             control,
         );

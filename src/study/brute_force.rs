@@ -251,7 +251,7 @@ impl Run<'_> {
                 let emitter = Emitter::sample(&source, self.tracer.scene(), square);
                 let there = emitter
                     .filter(|_| !heard.control.is_cancelled())
-                    .and_then(|emitter| light.another(self.tracer, self.aiming, &emitter));
+                    .and_then(|emitter| light.another(self.tracer, self.aiming, Some(emitter), None));
                 let part = Part {
                     half: Some(half),
                     share: 1.0 / (HALVES * PLACES) as f64,

@@ -12,7 +12,7 @@ use crate::light_pass::launch::Launch;
 use crate::plan::{Reach, Sight};
 use crate::scene::{Scene, SurfaceKind};
 use crate::settings::ItemBufferKind;
-use crate::transport::{Tracer, media_at};
+use crate::transport::{Microfacets, Tracer, media_at};
 
 /// A light that sees something specular: one wavefront of it.
 #[derive(Clone, Debug)]
@@ -29,6 +29,8 @@ pub struct AimedLight {
     pub reach_m: f64,
     /// What rays are aimed at (indices of specular objects), wherever they start.
     casters: Arc<[usize]>,
+    /// Which micro-facets rough surfaces show; `None` where all are smooth.
+    pub microfacets: Option<Microfacets>,
 }
 
 impl AimedLight {
@@ -53,23 +55,31 @@ impl AimedLight {
         own_w.max(self.launch.emitter().strength.max_channel() * (high - low).length_squared())
     }
 
-    /// The wavefront of another place of the light; `None` where it sends nothing to a caster.
+    /// The wavefront of another place of the light, for other micro-facets; `None` where it sends nothing to a caster.
     pub fn another(
         &self,
         tracer: &Tracer,
         (item_buffer, aiming): (ItemBufferKind, Aiming),
-        emitter: &Emitter,
+        emitter: Option<Emitter>,
+        microfacets: Option<Microfacets>,
     ) -> Option<Self> {
+        let Some(emitter) = emitter else {
+            return Some(Self {
+                microfacets,
+                ..self.clone()
+            });
+        };
         let aimer = Aimer {
             tracer,
             item_buffer,
             aiming,
         };
-        let view = aimer.look(emitter, &self.casters)?;
+        let view = aimer.look(&emitter, &self.casters)?;
         (!view.item_buffer.casters.is_empty()).then(|| Self {
             launch: view.launch,
             item_buffer: Arc::new(view.item_buffer),
             visible: view.visible.map(Arc::new),
+            microfacets,
             ..self.clone()
         })
     }
@@ -300,6 +310,7 @@ impl Looker<'_> {
             item_buffer: Arc::new(view.item_buffer),
             visible: view.visible.map(Arc::new),
             casters,
+            microfacets: None,
         };
         (sight, Some(aimed), look)
     }

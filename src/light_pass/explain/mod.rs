@@ -160,9 +160,12 @@ fn explain_light(
             .then(|| Emitter::sample(&unit, scene, even_point(place, 0, PLACES_SEED)));
         let wavefront = match emitter {
             Some(None) => None,
-            Some(Some(emitter)) => {
-                aimed.another(tracer, (ItemBufferKind::Equal, Aiming::Reachable), &emitter)
-            }
+            Some(Some(emitter)) => aimed.another(
+                tracer,
+                (ItemBufferKind::Equal, Aiming::Reachable),
+                Some(emitter),
+                None,
+            ),
             None => Some(aimed.clone()),
         };
         let Some(wavefront) = wavefront else { continue };

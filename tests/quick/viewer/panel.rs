@@ -390,6 +390,7 @@ fn ledgers_are_summed_and_gaps_told() {
                 depth: 0.125,
                 ..Truncated::default()
             },
+            sampling: 0.0,
         },
         not_emitted_w: 0.0,
         emitted_radiant_w: None,

@@ -2,8 +2,8 @@
 
 use egui::{Response, Slider, SliderClamping, Ui};
 
-use crate::settings::BakeSettings;
-use crate::viewer::panel::control::{About, rows, setting, significant};
+use crate::settings::{BakeSettings, MOST_WAVEFRONTS};
+use crate::viewer::panel::control::{About, choice, chosen, rows, setting, significant};
 use crate::viewer::panel::light_pass;
 
 const DEPTH: About = About {
@@ -21,6 +21,14 @@ const THRESHOLD: About = About {
     default: "0.003 of the max error; 0.0001 without one",
     accuracy: "what is left out is missing from the maps and booked as truncated",
     cost: "a tenth of it follows about one more reflection inside each piece of glass",
+};
+const WAVEFRONTS: About = About {
+    label: "Wavefronts",
+    what: "How many places on a lamp that has a size, or on a rough surface, soft light is the mean of.",
+    range: "as needed, or a power of two from 1 to 16,384",
+    default: "as needed for the max error; 32 without one",
+    accuracy: "few show as separate edges in soft shadows and caustics",
+    cost: "time grows in proportion to it; lamps without a size on smooth surfaces take none of it",
 };
 
 /// Ends of the slider; every share that settings may have can be typed.
@@ -42,6 +50,8 @@ pub fn show(ui: &mut Ui, settings: &mut BakeSettings) {
         setting(ui, &THRESHOLD, no_caustic, share, |ui, share| {
             threshold(ui, share, automatic)
         });
+        let count = (&mut settings.wavefronts, &default.wavefronts);
+        setting(ui, &WAVEFRONTS, no_caustic, count, wavefronts);
     });
 }
 
@@ -55,4 +65,19 @@ fn threshold(ui: &mut Ui, share: &mut Option<f64>, automatic: f64) -> Response {
         *share = Some(shown);
     }
     response
+}
+
+fn wavefronts(ui: &mut Ui, count: &mut Option<u32>) -> Response {
+    let powers = (0..=MOST_WAVEFRONTS.ilog2()).map(|power| 1 << power);
+    let named: Vec<(u32, String)> = powers.map(|count: u32| (count, count.to_string())).collect();
+    let exactly = named.iter();
+    let exactly = exactly.map(|(count, name)| (Some(*count), name.as_str(), "exactly so many"));
+    let needed = (
+        None,
+        "as needed",
+        "as many as the max error needs; 32 without one",
+    );
+    let choices: Vec<_> = std::iter::once(needed).chain(exactly).collect();
+    let selected = chosen(count, &choices).to_owned();
+    choice(ui, "wavefronts", count, &selected, &choices)
 }
