@@ -93,6 +93,16 @@ mod tests {
         }
     }
 
+    /// However many photons there are so far, each has its own stratum.
+    #[test]
+    fn codes_fill_strata_one_by_one() {
+        for bits in [0, 5, 10] {
+            let mut strata: Vec<u64> = (0..1_u32 << bits).map(|index| even_code(index, 7) >> (63 - bits) >> 1).collect();
+            strata.sort_unstable();
+            assert!(strata.into_iter().eq(0..1_u64 << bits), "{bits} bits");
+        }
+    }
+
     #[test]
     fn pairs_do_not_follow_each_other() {
         let count = 1024;
