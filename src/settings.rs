@@ -50,8 +50,13 @@ impl LayerKind {
 #[serde(rename_all = "lowercase")]
 #[strum(serialize_all = "lowercase")]
 pub enum Estimator {
+    /// Patches or photons, light by light: whichever a pilot of both measures to be cheaper for the target; photons where
+    /// there is no target.
+    Auto,
     /// Patches of the wavefront between neighbouring rays, spread exactly over the texels they cover.
     Wavefront,
+    /// Photons: paths that go one way at every surface, each counted into the texel it hits.
+    Photon,
     /// A kernel of flux per ray, scaled to the wavefront (Collins 1994).
     Splat,
 }
@@ -263,6 +268,9 @@ pub struct BakeSettings {
     pub kernel_sampling: KernelSampling,
     /// What sets a splat's size.
     pub footprint: Footprint,
+    /// Whether the noise of photons is filtered where that lowers the error (auto and photon).
+    #[serde(default)]
+    pub filter: bool,
     /// How the item buffer divides directions.
     pub item_buffer: ItemBufferKind,
     /// Size of the maps.
@@ -331,6 +339,7 @@ impl Default for BakeSettings {
             kernel: Kernel::Gaussian,
             kernel_sampling: KernelSampling::Integrated,
             footprint: Footprint::Ellipse,
+            filter: true,
             item_buffer: ItemBufferKind::Equal,
             map_resolution: MapResolution::Auto,
             max_depth: 16,
@@ -352,29 +361,40 @@ impl Estimator {
     /// Light rays per steradian of a preview [1/sr]: patches need fewer than splats.
     pub fn preview_density_per_sr(self) -> f64 {
         match self {
-            Self::Wavefront => 25_000.0,
+            Self::Auto | Self::Wavefront => 25_000.0,
+            Self::Photon => 1e6,
             Self::Splat => 100_000.0,
         }
+    }
+
+    /// Whether it goes on until a target is reached.
+    pub fn refines(self) -> bool {
+        self != Self::Splat
     }
 
     /// Patches are exact without smoothing; splats are one footprint wide.
     pub fn default_sigma(self) -> Sigma {
         match self {
-            Self::Wavefront => Sigma::Constant(0.0),
+            Self::Auto | Self::Wavefront | Self::Photon => Sigma::Constant(0.0),
             Self::Splat => Sigma::Constant(1.0),
         }
     }
 }
 
 impl BakeSettings {
-    /// The paper's estimator with its defaults.
-    pub fn splat() -> Self {
+    /// An estimator with its defaults.
+    pub fn of(estimator: Estimator) -> Self {
         Self {
-            estimator: Estimator::Splat,
-            density_per_sr: Estimator::Splat.preview_density_per_sr(),
-            sigma: Estimator::Splat.default_sigma(),
+            estimator,
+            density_per_sr: estimator.preview_density_per_sr(),
+            sigma: estimator.default_sigma(),
             ..Self::default()
         }
+    }
+
+    /// The paper's estimator with its defaults.
+    pub fn splat() -> Self {
+        Self::of(Estimator::Splat)
     }
 
     /// Density that refinement towards a relative RMSE begins from [rays/sr]: coarse enough that refinement decides, fine
@@ -458,10 +478,12 @@ impl BakeSettings {
             ));
         }
         match (self.estimator, self.sigma) {
-            (Estimator::Wavefront, Sigma::Constant(sigma)) => finite_in("--sigma", sigma, 0.0, 1e4)?,
-            (Estimator::Splat, Sigma::Constant(sigma)) => finite_in("--sigma", sigma, 1e-6, 1e4)?,
+            (estimator, Sigma::Constant(sigma)) if estimator.refines() => {
+                finite_in("--sigma", sigma, 0.0, 1e4)?;
+            }
+            (_, Sigma::Constant(sigma)) => finite_in("--sigma", sigma, 1e-6, 1e4)?,
             (Estimator::Splat, Sigma::Adaptive) => {}
-            (Estimator::Wavefront, Sigma::Adaptive) => {
+            (_, Sigma::Adaptive) => {
                 return Err(Error::usage(
                     "--sigma",
                     "only splats have footprints to adapt a sigma to",

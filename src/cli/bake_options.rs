@@ -51,6 +51,9 @@ pub struct BakeOptions {
     /// What sets the size and shape of a splat (splat) [default: ellipse]
     #[arg(long, value_parser = values::one_of::<Footprint>())]
     footprint: Option<Footprint>,
+    /// Whether the noise of photons is filtered where that lowers the error (auto, photon) [default: on]
+    #[arg(long, value_parser = values::on_off, value_name = "on|off")]
+    filter: Option<bool>,
     /// How the sphere of directions around a light is divided [default: equal]
     #[arg(long, value_parser = values::one_of::<ItemBufferKind>(), value_name = "DIVISION")]
     item_buffer: Option<ItemBufferKind>,
@@ -101,10 +104,7 @@ impl BakeOptions {
     pub fn settings(&self, default_layers: &[LayerKind], threads: usize) -> Result<BakeSettings> {
         let estimator = self.estimator.unwrap_or(BakeSettings::default().estimator);
         self.refuse_what_does_not_apply(estimator)?;
-        let defaults = match estimator {
-            Estimator::Wavefront => BakeSettings::default(),
-            Estimator::Splat => BakeSettings::splat(),
-        };
+        let defaults = BakeSettings::of(estimator);
         let mut layers = self.layers.clone().unwrap_or_else(|| default_layers.to_vec());
         layers.sort_unstable();
         layers.dedup();
@@ -117,14 +117,15 @@ impl BakeOptions {
             wavefronts: self.wavefronts,
             density_per_sr: self.density.unwrap_or_else(|| match (estimator, max_error) {
                 (Estimator::Splat, _) => preset.splat_density_per_sr(),
-                (Estimator::Wavefront, Some(target)) => BakeSettings::starting_density_per_sr(target),
-                (Estimator::Wavefront, None) => estimator.preview_density_per_sr(),
+                (_, Some(target)) => BakeSettings::starting_density_per_sr(target),
+                (_, None) => estimator.preview_density_per_sr(),
             }),
             rays: self.rays.unwrap_or(defaults.rays),
             sigma: self.sigma.unwrap_or(defaults.sigma),
             kernel: self.kernel.unwrap_or(defaults.kernel),
             kernel_sampling: self.kernel_sampling.unwrap_or(defaults.kernel_sampling),
             footprint: self.footprint.unwrap_or(defaults.footprint),
+            filter: self.filter.unwrap_or(defaults.filter),
             item_buffer: self.item_buffer.unwrap_or(defaults.item_buffer),
             map_resolution: self.map_resolution.unwrap_or(defaults.map_resolution),
             max_depth: self.max_depth.unwrap_or(defaults.max_depth),
@@ -191,7 +192,7 @@ impl BakeOptions {
             ("--footprint", self.footprint.is_some()),
         ];
         let given = of_splats.iter().find(|(_, is_given)| *is_given);
-        if let (Estimator::Wavefront, Some((option, _))) = (estimator, given) {
+        if let (true, Some((option, _))) = (estimator.refines(), given) {
             return Err(Error::usage(
                 *option,
                 "only the splat estimator has it",
@@ -201,8 +202,8 @@ impl BakeOptions {
         if let (Estimator::Splat, Some(_)) = (estimator, self.max_error) {
             return Err(Error::usage(
                 "--max-error",
-                "only the wavefront estimator refines towards a target",
-                "leave --max-error out or use --estimator wavefront",
+                "the splat estimator does not refine towards a target",
+                "leave --max-error out or use --estimator auto",
             ));
         }
         let kernel = self.kernel.unwrap_or(BakeSettings::default().kernel);

@@ -19,7 +19,6 @@ use nephroid::study::sweep::{Bench, Outcome, Sweep};
 use nephroid::study::table::Table;
 use nephroid::transport::Tracer;
 use serde::Serialize;
-use strum::VariantArray;
 
 use super::args::{RunOptions, SceneOptions};
 use super::bake_options::BakeOptions;
@@ -333,7 +332,7 @@ impl Desk<'_> {
         let mut estimators = study
             .estimators
             .clone()
-            .unwrap_or_else(|| Estimator::VARIANTS.to_vec());
+            .unwrap_or_else(|| vec![Estimator::Wavefront, Estimator::Splat]);
         estimators.dedup();
         let repeats = repeats(study.repeat, &study.common)?;
         let scene = self.load(&study.scene, &study.scene_options)?;

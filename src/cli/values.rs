@@ -49,6 +49,15 @@ pub fn wavelengths(text: &str) -> Result<Wavelengths, String> {
     }
 }
 
+/// `on` or `off`.
+pub fn on_off(text: &str) -> Result<bool, String> {
+    match text {
+        "on" => Ok(true),
+        "off" => Ok(false),
+        _ => Err("give on or off".to_string()),
+    }
+}
+
 /// `2%` or `0.02`.
 pub fn share(text: &str) -> Result<f64, String> {
     let number = match text.strip_suffix('%') {

@@ -93,6 +93,8 @@ pub struct EnergyAccounts {
     pub truncated: f64,
     /// The same by cause.
     pub truncated_by_cause: Truncated,
+    /// Conserved in expectation only, of either sign.
+    pub sampling: f64,
 }
 
 /// Energy of one light in one layer.
@@ -241,6 +243,7 @@ impl From<EnergyLedger> for EnergyAccounts {
             escaped: ledger.escaped,
             truncated: ledger.truncated.total(),
             truncated_by_cause: ledger.truncated,
+            sampling: ledger.sampling,
         }
     }
 }

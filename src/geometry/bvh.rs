@@ -39,6 +39,8 @@ pub struct TriangleBvh {
     bvh: Bvh2,
     /// Corners in the order of the hierarchy's leaves.
     corners: Vec<[DVec3; 3]>,
+    /// The same in single precision, to turn away what a ray clearly misses.
+    screens: Vec<Screen>,
     centre: DVec3,
     /// Single-precision units per metre.
     scale: f64,
@@ -84,12 +86,15 @@ impl TriangleBvh {
             .collect();
         let mut build_time = std::time::Duration::ZERO;
         let bvh = build_bvh2(&aabbs, BvhBuildParams::medium_build(), &mut build_time);
-        let corners = bvh
+        let corners: Vec<[DVec3; 3]> = bvh
             .primitive_indices
             .iter()
             .map(|&triangle| triangles[triangle as usize])
             .collect();
+        let local = |corner: DVec3| (corner - centre) * scale;
+        let screens = corners.iter().map(|corners| Screen::new(corners.map(local)));
         Self {
+            screens: screens.collect(),
             bvh,
             corners,
             centre,
@@ -112,7 +117,10 @@ impl TriangleBvh {
         let mut best: Option<TriangleHit> = None;
         let sheared = ShearedRay::new(ray);
         let (local, advanced_m) = self.local_ray(ray, f64::INFINITY);
-        self.bvh.ray_traverse(local, &mut RayHit::none(), |_, slot| {
+        self.bvh.ray_traverse(local, &mut RayHit::none(), |ray, slot| {
+            if self.screens[slot].is_missed(ray) {
+                return f32::INFINITY;
+            }
             let Some((distance_m, barycentric)) = sheared.intersect(&self.corners[slot]) else {
                 return f32::INFINITY;
             };
@@ -148,16 +156,19 @@ impl TriangleBvh {
     ) -> bool {
         let sheared = ShearedRay::new(ray);
         let (local, _) = self.local_ray(ray, distance_m);
-        !self
-            .bvh
-            .ray_traverse_miss(local, |_, slot| match sheared.intersect(&self.corners[slot]) {
+        !self.bvh.ray_traverse_miss(local, |ray, slot| {
+            if self.screens[slot].is_missed(ray) {
+                return f32::INFINITY;
+            }
+            match sheared.intersect(&self.corners[slot]) {
                 Some((hit_m, barycentric))
                     if hit_m < distance_m && is_there(self.bvh.primitive_indices[slot], barycentric) =>
                 {
                     0.0
                 }
                 _ => f32::INFINITY,
-            })
+            }
+        })
     }
 
     /// The node around all triangles; `None` without any.
@@ -222,6 +233,59 @@ impl TriangleBvh {
     /// A distance [m] along the ray in single-precision units, rounded up so that it never cuts off what it bounds.
     fn local_distance(&self, distance_m: f64, advanced_m: f64) -> f32 {
         (((distance_m - advanced_m) * self.scale).max(0.0) as f32).next_up() + BOX_MARGIN
+    }
+}
+
+/// A triangle in single precision (Möller and Trumbore, "Fast, Minimum Storage Ray/Triangle Intersection", 1997), with
+/// margins wider than all rounding: what it turns away the exact test would turn away, and nothing else is decided here.
+#[derive(Clone, Copy, Debug)]
+struct Screen {
+    corner: Vec3A,
+    edges: [Vec3A; 2],
+    /// Lengths of the edges, rounded up.
+    lengths: [f32; 2],
+}
+
+/// Rounding of a coordinate or of an operation, several times over.
+const ROUNDING: f32 = 1e-6;
+
+impl Screen {
+    /// Of corners in units in which the scene has a radius of about one.
+    fn new([a, b, c]: [DVec3; 3]) -> Self {
+        let edges = [to_single(b - a), to_single(c - a)];
+        Self {
+            corner: to_single(a),
+            edges,
+            lengths: edges.map(|edge| edge.length() * (1.0 + ROUNDING)),
+        }
+    }
+
+    /// Whether a ray clearly misses the triangle, or meets it clearly behind its start or beyond its end. Never true of
+    /// numbers that are not finite.
+    fn is_missed(&self, ray: &obvhs::ray::Ray) -> bool {
+        let [e1, e2] = self.edges;
+        let from_corner = ray.origin - self.corner;
+        // Of a coordinate: of origin and corner, and of the sums and products that follow.
+        let error = ROUNDING * (1.0 + from_corner.length());
+        let p = ray.direction.cross(e2);
+        let determinant = e1.dot(p);
+        let area = self.lengths[0] * self.lengths[1];
+        let size = determinant.abs();
+        let size_error = ROUNDING * area;
+        if !(size > size_error) {
+            return false;
+        }
+        let side = determinant.signum();
+        let u = side * from_corner.dot(p);
+        let q = from_corner.cross(e1);
+        let v = side * ray.direction.dot(q);
+        let [u_error, v_error] = [self.lengths[1] * error, self.lengths[0] * error];
+        if u < -u_error || v < -v_error || u + v > size + size_error + u_error + v_error {
+            return true;
+        }
+        let distance = side * e2.dot(q);
+        let distance_error = area * error;
+        distance < -distance_error || distance > ray.tmax * (size + size_error) + distance_error
     }
 }
 

@@ -37,6 +37,15 @@ pub fn even_point(index: u32, pair: u32, seed: u64) -> DVec2 {
     DVec2::new(unit(x, 0x9e37_79b9), unit(y, 0x7f4a_7c15)) + DVec2::splat((-33_f64).exp2())
 }
 
+/// A place of the sequence in one dimension at an index, as a whole number below 2⁶⁴: the first 2ᵏ indices have one place
+/// in each of 2ᵏ equal parts, and lie anywhere within them. Other indices or seeds are independent.
+pub fn even_code(index: u32, seed: u64) -> u64 {
+    let folded = hash(seed as u32 ^ hash((seed >> 32) as u32 ^ 0x51ed_270b));
+    let high = scrambled(index, folded).reverse_bits();
+    let low = hash(index ^ hash(folded ^ 0x2c1b_3c6d));
+    u64::from(high) << 32 | u64::from(low)
+}
+
 /// Owen's scrambling of reversed bits: every bit is flipped by a hash of the lower ones (Laine and Karras 2011, with
 /// Vegdahl's constants).
 fn scrambled(mut code: u32, seed: u32) -> u32 {
@@ -81,6 +90,18 @@ mod tests {
                     "pair {pair}, {columns} columns"
                 );
             }
+        }
+    }
+
+    /// However many photons there are so far, each has its own stratum.
+    #[test]
+    fn codes_fill_strata_one_by_one() {
+        for bits in [0, 5, 10] {
+            let mut strata: Vec<u64> = (0..1_u32 << bits)
+                .map(|index| even_code(index, 7) >> (63 - bits) >> 1)
+                .collect();
+            strata.sort_unstable();
+            assert!(strata.into_iter().eq(0..1_u64 << bits), "{bits} bits");
         }
     }
 

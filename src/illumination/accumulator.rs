@@ -35,6 +35,15 @@ impl FluxUnit {
         }
     }
 
+    /// The unit of a mean over a number of sums, where this is that of the sums.
+    #[must_use]
+    pub fn per(self, sums: u64) -> Self {
+        Self {
+            watts: self.watts / sums as f64,
+            counts_per_watt: self.counts_per_watt * sums as f64,
+        }
+    }
+
     /// One count [W].
     pub fn watts(self) -> f64 {
         self.watts

@@ -340,11 +340,14 @@ pub type Noise = BTreeMap<Receiver, Vec<f64>>;
 
 /// The noise of the sum of two half sets: their difference has the same variance.
 pub fn half_set_noise(a: &Images, b: &Images) -> Noise {
-    let of = |(&receiver, image): (&Receiver, &Image)| {
-        let squares = image.squared_difference(b.get(&receiver));
+    let of = |(&receiver, image): (&Receiver, &Image), other: &Images| {
+        let squares = image.squared_difference(other.get(&receiver));
         (receiver, image.windowed(&squares))
     };
-    a.iter().map(of).collect()
+    let mut noise: Noise = a.iter().map(|map| of(map, b)).collect();
+    let only_second = b.iter().filter(|(receiver, _)| !a.contains_key(receiver));
+    noise.extend(only_second.map(|map| of(map, a)));
+    noise
 }
 
 /// Share of the noise of a map that its difference from one of every fourth of its rays has, beside that one's own.
@@ -369,6 +372,11 @@ pub fn estimate_splats(
         };
         Some(pairs.map(square).collect())
     })
+}
+
+/// The error of photons: noise by half sets. `None` where no light arrived.
+pub fn by_noise(fine: &Images, noise: &Noise, ledger: &EnergyLedger) -> Option<LightError> {
+    by_squares(fine, ledger, |receiver, _| noise.get(&receiver).cloned())
 }
 
 /// The error of `fine`, of whose squared difference from `other` it has a share of its own. `None` where no light arrived.

@@ -42,6 +42,9 @@ pub struct EnergyLedger {
     pub escaped: f64,
     /// Given up by us.
     pub truncated: Truncated,
+    /// What is conserved only in expectation, of either sign: photons that chance ended less what it gave to others.
+    #[serde(default)]
+    pub sampling: f64,
 }
 
 impl AddAssign for Truncated {
@@ -62,6 +65,7 @@ impl AddAssign for EnergyLedger {
         self.absorbed += other.absorbed;
         self.escaped += other.escaped;
         self.truncated += other.truncated;
+        self.sampling += other.sampling;
     }
 }
 
@@ -80,7 +84,7 @@ impl EnergyLedger {
         if self.emitted == 0.0 {
             return 0.0;
         }
-        let sum = self.deposited + self.absorbed + self.escaped + self.truncated.total();
+        let sum = self.deposited + self.absorbed + self.escaped + self.truncated.total() + self.sampling;
         (self.emitted - sum).abs() / self.emitted
     }
 }

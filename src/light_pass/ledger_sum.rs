@@ -29,9 +29,11 @@ pub enum Account {
     Quadrature,
     /// Belongs to an effect that is switched off.
     SwitchedOff,
+    /// Conserved in expectation only: what chance took less what it gave, of either sign.
+    Sampling,
 }
 
-const ACCOUNTS: usize = Account::SwitchedOff as usize + 1;
+const ACCOUNTS: usize = Account::Sampling as usize + 1;
 
 /// All accounts of one light, exact.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -112,6 +114,7 @@ impl LedgerSum {
                     quadrature: watts(Account::Quadrature),
                     switched_off: watts(Account::SwitchedOff),
                 },
+                sampling: watts(Account::Sampling),
             },
             not_emitted_w: watts(Account::NotEmitted),
             emitted_radiant_w: None,

@@ -9,6 +9,7 @@ pub mod item_buffer;
 pub mod launch;
 pub mod ledger;
 pub mod ledger_sum;
+pub mod photon;
 pub mod receiver_maps;
 pub mod share;
 pub mod sketch;

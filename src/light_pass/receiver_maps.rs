@@ -187,6 +187,11 @@ impl ReceiverMap {
         }
     }
 
+    /// Whether neighbouring texels are neighbours on the surface.
+    pub fn is_one_piece(&self) -> bool {
+        self.islands.is_none() && self.chart.layout.is_none()
+    }
+
     /// The coarsest level at which a smooth kernel of the given spread [texels of the map] is still well resolved.
     pub fn level_for(&self, spread_texels: f64) -> usize {
         let fits = |level: &usize| spread_texels / f64::from(1_u32 << level) >= LEAST_SPREAD_TEXELS;

@@ -177,6 +177,12 @@ impl ColourMatrix {
         LinearSrgb::new(row(&self.0[0]), row(&self.0[1]), row(&self.0[2]))
     }
 
+    /// So many times as much.
+    #[must_use]
+    pub fn scaled(&self, factor: f64) -> Self {
+        Self(self.0.map(|row| row.map(|value| value * factor)))
+    }
+
     /// What white becomes.
     pub fn of_white(&self) -> LinearSrgb {
         self.apply(LinearSrgb::WHITE)

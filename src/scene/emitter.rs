@@ -251,7 +251,7 @@ fn on_sphere(square: DVec2) -> DVec3 {
 }
 
 /// Points of the unit disc, evenly (the concentric map of Shirley and Chiu, 1997: neighbours stay neighbours).
-fn on_disc(square: DVec2) -> DVec2 {
+pub fn on_disc(square: DVec2) -> DVec2 {
     let [x, y] = (square * 2.0 - 1.0).to_array();
     if x == 0.0 && y == 0.0 {
         return DVec2::ZERO;
@@ -266,7 +266,7 @@ fn on_disc(square: DVec2) -> DVec2 {
 }
 
 /// Unit directions within a half-angle [rad] of an axis, evenly by solid angle.
-fn in_cap(axis: DVec3, half_angle_rad: f64, square: DVec2) -> DVec3 {
+pub fn in_cap(axis: DVec3, half_angle_rad: f64, square: DVec2) -> DVec3 {
     let (x, y) = axis.any_orthonormal_pair();
     let place = on_disc(square);
     // 1 − cos of the angle, without a difference of nearly equal numbers.

@@ -3,6 +3,7 @@
 use std::time::{Duration, Instant};
 
 use super::BakeCounts;
+use super::carrier::Carrier;
 use super::clock::Clock;
 use super::finish::Shown;
 use super::forecast::{CostPoint, Forecast, forecast};
@@ -88,6 +89,10 @@ pub(super) enum Stopped {
 /// The levels of one light in the bake under way.
 #[derive(Debug, Default)]
 pub(super) struct Climb {
+    /// What they are made of.
+    pub(super) carrier: Carrier,
+    /// The first photons, which tell what more of them would cost; shown until patches are better.
+    pub(super) pilot: Option<LightLevel>,
     /// The coarsest first.
     pub(super) levels: Vec<LightLevel>,
     pub(super) rounds: Vec<Round>,
@@ -99,6 +104,19 @@ pub(super) struct Climb {
 }
 
 impl Climb {
+    /// The picture: the last level, or the pilot while that is better.
+    pub(super) fn shown(&self) -> Option<&LightLevel> {
+        let rmse = |level: &LightLevel| {
+            let error = level.error.as_ref();
+            error.map_or(f64::INFINITY, |error| error.estimate.relative_rmse)
+        };
+        match (self.levels.last(), &self.pilot) {
+            (Some(level), Some(pilot)) if rmse(pilot) < rmse(level) => Some(pilot),
+            (Some(level), _) => Some(level),
+            (None, pilot) => pilot.as_ref(),
+        }
+    }
+
     /// Of the last level, where it is known.
     pub(super) fn error(&self) -> Option<&LightError> {
         Some(&self.levels.last()?.error.as_ref()?.estimate)
@@ -189,7 +207,13 @@ impl CausticLayer<'_> {
         }
         let sizes = self.sizes_of_maps(states, &lights, &mut course)?;
         course.statistics = states.statistics.as_ref().map(|(_, known)| known.clone());
-        let mut climbs: Vec<Climb> = lights.iter().map(|_| Climb::default()).collect();
+        let mut climbs = Vec::with_capacity(lights.len());
+        for light in &lights {
+            climbs.push(Climb {
+                carrier: self.carrier(light),
+                ..Climb::default()
+            });
+        }
         let limited = match self.settings.max_time_s {
             Some(limit_s) => self
                 .control
@@ -203,6 +227,7 @@ impl CausticLayer<'_> {
             for index in self.underrated(&lights, &climbs) {
                 climbs[index] = Climb {
                     is_underrated: true,
+                    carrier: climbs[index].carrier,
                     ..Climb::default()
                 };
                 let state = states.of_mut(lights[index].light);
@@ -218,12 +243,18 @@ impl CausticLayer<'_> {
             let levels: Vec<Shown> = lights
                 .iter()
                 .zip(&climbs)
-                .filter_map(|(light, climb)| Some((light.light, climb.levels.last()?)))
+                .filter_map(|(light, climb)| Some((light.light, climb.shown()?)))
                 .collect();
             show(&levels, course.outcome, course.clock)?;
         }
         outcome.stopped = self.stopped(&lights, &climbs, &limited);
-        for (light, climb) in lights.iter().zip(climbs) {
+        for (light, mut climb) in lights.iter().zip(climbs) {
+            // The last level is the picture; a pilot that is not is kept for the next bake.
+            let is_shown = climb.shown().is_some_and(|level| level.key.photons.is_some());
+            if let Some(pilot) = climb.pilot.take() {
+                let place = if is_shown { climb.levels.len() } else { 0 };
+                climb.levels.insert(place, pilot);
+            }
             if let Some(level) = climb.levels.last() {
                 outcome.finished.push(light.light);
                 let strays = level.strays.iter().map(|&receiver| self.stray(light, receiver));
@@ -257,7 +288,9 @@ impl CausticLayer<'_> {
             relative_rmse,
             is_coarse: lights.iter().zip(climbs).any(|(light, climb)| {
                 let begins = self.lattices(light).len();
-                let begins = if self.is_soft(light) {
+                let begins = if climb.carrier == Carrier::Photons {
+                    1
+                } else if self.is_soft(light) {
                     SOFT_BEGINNING
                 } else {
                     begins
@@ -322,6 +355,17 @@ impl CausticLayer<'_> {
         climb: &mut Climb,
         course: &mut Course,
     ) -> Result<()> {
+        if climb.carrier == Carrier::Undecided {
+            let is_first = climb.pilot.is_none();
+            self.decide_carrier(light, sizes, state, climb, course)?;
+            if is_first && climb.pilot.is_some() {
+                // Shown before anything that takes longer.
+                return Ok(());
+            }
+        }
+        if climb.carrier == Carrier::Photons {
+            return self.climb_photons(light, sizes, state, climb, course);
+        }
         if self.is_soft(light) {
             return self.climb_soft(light, sizes, state, climb, course);
         }
@@ -371,6 +415,11 @@ impl CausticLayer<'_> {
             climb.done = match goal {
                 Goal::Enough => true,
                 Goal::NextLevel => !self.has_next_level(light, climb),
+                Goal::Refine(target) if climb.carrier == Carrier::Photons => {
+                    climb.goal = Some(target);
+                    let is_good = climb.error().is_some_and(|error| error.relative_rmse <= target);
+                    is_good || !self.has_next_level(light, climb)
+                }
                 Goal::Refine(target) if self.is_soft(light) => {
                     let is_good = climb.error().is_some_and(|error| error.relative_rmse <= target);
                     is_good || !self.has_next_level(light, climb)
@@ -381,7 +430,9 @@ impl CausticLayer<'_> {
     }
 
     fn has_next_level(&self, light: &AimedLight, climb: &Climb) -> bool {
-        if self.is_soft(light) {
+        if climb.carrier == Carrier::Photons {
+            self.next_photons(light, climb).is_some()
+        } else if self.is_soft(light) {
             self.next_resolved(light, climb).is_some()
         } else {
             climb.levels.len() < self.lattices(light).len()
@@ -397,8 +448,8 @@ impl CausticLayer<'_> {
         course: &mut Course,
     ) -> Result<Option<LightLevel>> {
         match self.settings.estimator {
-            Estimator::Wavefront => self.make_wavefront(light, key, unit, state, course),
-            Estimator::Splat => self.make_splats(light, key, unit, state, course),
+            estimator if estimator.refines() => self.make_wavefront(light, key, unit, state, course),
+            _ => self.make_splats(light, key, unit, state, course),
         }
     }
 
@@ -414,8 +465,8 @@ impl CausticLayer<'_> {
         let is_shard = course.labour.is_shard();
         let ledger = level.ledger.report("", level.unit, LinearSrgb::WHITE).energy_w;
         Ok(match self.settings.estimator {
-            Estimator::Wavefront if is_shard => None,
-            Estimator::Wavefront => {
+            estimator if estimator.refines() && is_shard => None,
+            estimator if estimator.refines() => {
                 let watch = Stopwatch::start();
                 let levels = climb.levels.iter().rev().take(ESTIMATED_LEVELS - 1);
                 let coarser: Vec<Images> = levels
@@ -431,7 +482,7 @@ impl CausticLayer<'_> {
                 course.clock.deposit.add(watch.elapsed());
                 estimate
             }
-            Estimator::Splat => {
+            _ => {
                 let thinner = self.thinned_images(light, level, state, course)?;
                 match (thinner, &level.noise) {
                     (Some(thinner), Some(noise)) if !is_shard => {

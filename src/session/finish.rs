@@ -29,7 +29,7 @@ use crate::light_pass::receiver_maps::ReceiverMap;
 use crate::optics::LinearSrgb;
 use crate::plan::{self, Effect, EffectPlan};
 use crate::scene::{Light, Scene};
-use crate::settings::{BakeSettings, Estimator, LayerKind, Sigma};
+use crate::settings::{BakeSettings, LayerKind, Sigma};
 
 /// The finest level of a light, with the light's place in the scene.
 pub(super) type Shown<'a> = (usize, &'a LightLevel);
@@ -240,7 +240,7 @@ impl Finish<'_> {
 
     /// Smooths a map of the wavefront by sigma; maps with gaps are left as they are: their borders are no mirrors.
     pub(super) fn smooth(&self, chart: &Chart, flux: &mut FluxAccumulator) {
-        if let (Estimator::Wavefront, Sigma::Constant(sigma)) = (self.settings.estimator, self.settings.sigma)
+        if let (true, Sigma::Constant(sigma)) = (self.settings.estimator.refines(), self.settings.sigma)
             && chart.is_full()
             && chart.layout.is_none()
         {

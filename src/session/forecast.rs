@@ -79,6 +79,12 @@ const SPLATS: Growth = Growth {
     beginning: 1.0,
 };
 
+/// Noise falls with the square root of their number.
+const PHOTONS: Growth = Growth {
+    usual_exponent: 2.0,
+    beginning: 1.0,
+};
+
 /// The error falls so many times with the lattice that refinement begins from, as a rule.
 const BEGINNING_GAIN: f64 = 3.0;
 
@@ -114,7 +120,8 @@ pub fn forecast(course: &[CostPoint], target: f64, estimator: Estimator) -> Opti
     }
     let last = course.last()?;
     let (growths, is_coarse) = match estimator {
-        Estimator::Wavefront => ([RAYS, SECONDS], last.is_coarse),
+        Estimator::Auto | Estimator::Wavefront => ([RAYS, SECONDS], last.is_coarse),
+        Estimator::Photon => ([PHOTONS, PHOTONS], false),
         Estimator::Splat => ([SPLATS, SPLATS], false),
     };
     let beginning = if is_coarse { BEGINNING_GAIN } else { 1.0 };

@@ -3,6 +3,7 @@
 
 use std::collections::BTreeMap;
 
+use super::carrier::Carrier;
 use super::caustic::{CausticLayer, Climb};
 use crate::light_pass::caustic::setup::AimedLight;
 use crate::light_pass::ledger_sum::Account;
@@ -127,6 +128,11 @@ impl CausticLayer<'_> {
         dim[kept..].iter().map(|light| light.index).collect()
     }
 
+    /// Whether levels of a light are no lattices.
+    fn has_no_ladder(&self, light: &AimedLight, climb: &Climb) -> bool {
+        climb.carrier == Carrier::Photons || self.is_soft(light)
+    }
+
     /// Errors of all lights; `None` where one is not known yet.
     pub(super) fn errors(&self, lights: &[&AimedLight], climbs: &[Climb]) -> Option<Errors> {
         let known = self.known_errors(lights, climbs);
@@ -167,7 +173,7 @@ impl CausticLayer<'_> {
     /// What each light aims at next.
     pub(super) fn goals(&self, lights: &[&AimedLight], climbs: &[Climb]) -> Vec<Goal> {
         let has_ladder = |light: &AimedLight, climb: &Climb| {
-            !self.is_soft(light) && climb.levels.len() < self.lattices(light).len()
+            !self.has_no_ladder(light, climb) && climb.levels.len() < self.lattices(light).len()
         };
         let known = self.known_errors(lights, climbs);
         let all_known = known.lights.len() == lights.len();
@@ -198,7 +204,10 @@ impl CausticLayer<'_> {
         // Without an error there is nothing to aim at once all lattices are through.
         for (index, goal) in goals.iter_mut().enumerate() {
             let is_known = known.lights.iter().any(|light| light.index == index);
-            if !is_known && !has_ladder(lights[index], &climbs[index]) && !self.is_soft(lights[index]) {
+            if !is_known
+                && !has_ladder(lights[index], &climbs[index])
+                && !self.has_no_ladder(lights[index], &climbs[index])
+            {
                 *goal = Goal::Enough;
             }
         }

@@ -100,13 +100,14 @@ impl CausticLayer<'_> {
                 ..self.trace_key(light, size, before_last as i32, &climb.rounds)
             },
             resolved: None,
+            photons: None,
             sizes: sizes.clone(),
             coarseness: coarseness(self.settings.max_error, climb.goal)
                 * (before_last as f64).exp2().min(MOST_COARSE),
             kernels: self.kernels(),
             stride: match self.settings.estimator {
-                Estimator::Wavefront => 1,
-                Estimator::Splat => LEVEL_STRIDES[step.min(LEVEL_STRIDES.len() - 1)],
+                estimator if estimator.refines() => 1,
+                _ => LEVEL_STRIDES[step.min(LEVEL_STRIDES.len() - 1)],
             },
         }
     }
@@ -127,7 +128,7 @@ impl CausticLayer<'_> {
             item_buffer: settings.item_buffer,
             ..BakeSettings::default()
         };
-        if settings.estimator == Estimator::Splat {
+        if settings.estimator != Estimator::Wavefront {
             (paths.rays, paths.seed) = (settings.rays, settings.seed);
         }
         TraceKey {
@@ -135,7 +136,7 @@ impl CausticLayer<'_> {
             effects: EffectSet::of(self.plan),
             splits: self.splits(),
             size,
-            coarser: if settings.estimator == Estimator::Wavefront && self.has_bumps() {
+            coarser: if settings.estimator.refines() && self.has_bumps() {
                 coarser
             } else {
                 0
@@ -155,8 +156,8 @@ impl CausticLayer<'_> {
         let settings = self.settings;
         let usual = BakeSettings::default();
         match settings.estimator {
-            Estimator::Wavefront => usual,
-            Estimator::Splat => BakeSettings {
+            estimator if estimator.refines() => usual,
+            _ => BakeSettings {
                 sigma: settings.sigma,
                 kernel: settings.kernel,
                 kernel_sampling: settings.kernel_sampling,
@@ -246,8 +247,10 @@ impl CausticLayer<'_> {
                     let unit = self.unit(light)?;
                     let state = states.of_mut(light.light);
                     statistics.merge(&match self.settings.estimator {
-                        Estimator::Wavefront => self.wavefront_statistics(light, unit, state, course),
-                        Estimator::Splat => self.splat_statistics(light, unit, state, course),
+                        estimator if estimator.refines() => {
+                            self.wavefront_statistics(light, unit, state, course)
+                        }
+                        _ => self.splat_statistics(light, unit, state, course),
                     });
                 }
                 // What a cancelled run saw is not all.

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use super::band_layers::LevelBand;
 use super::map_size::Sizes;
+use super::part_maps::PartMaps;
 use super::soft_level::Resolved;
 use super::spectra::SpectralKey;
 use crate::illumination::Receiver;
@@ -63,6 +64,8 @@ pub(super) struct LevelKey {
     pub(super) stride: usize,
     /// Of a soft light: its wavefronts.
     pub(super) resolved: Option<Resolved>,
+    /// Of a light by photons: how many each half has.
+    pub(super) photons: Option<u32>,
 }
 
 /// The two dimensions of a soft light's error, as far as they are known.
@@ -101,12 +104,37 @@ pub(super) struct LightLevel {
     pub(super) noise: Option<Noise>,
     /// By the levels before it; `None` where there are none, or no light arrived.
     pub(super) error: Option<KeptError>,
+    /// Of a light by photons: what the next level adds to.
+    pub(super) photons: Option<PhotonSums>,
+    /// Cells of patches and rays that looked for their receivers: what the level took, whatever was known before.
+    pub(super) work: (u64, u64),
     /// To be deposited again; `None` where that was too much to keep.
     pub(super) traced: Option<TracedLight>,
     /// Whether the maps have the light's colour already.
     pub(super) has_own_colour: bool,
     /// Of a soft light: what its error is made of.
     pub(super) parts: SoftParts,
+}
+
+/// What photons have left so far, before it is divided by their number.
+#[derive(Clone, Debug)]
+pub(super) struct PhotonSums {
+    /// Closest-hit queries.
+    pub(super) segments: u64,
+    pub(super) ledger: LedgerSum,
+    /// Maps of both halves, in the channels that the light is followed in.
+    pub(super) halves: Vec<PartMaps>,
+}
+
+impl PhotonSums {
+    /// Adds other photons of the same light.
+    pub(super) fn add(&mut self, other: &Self) {
+        self.segments += other.segments;
+        self.ledger.merge(&other.ledger);
+        for (half, more) in self.halves.iter_mut().zip(&other.halves) {
+            half.add(more.clone());
+        }
+    }
 }
 
 /// An estimate with what it was made from.
@@ -195,7 +223,10 @@ impl LightLevel {
 
     /// Memory of its maps and paths [bytes].
     pub(super) fn bytes(&self) -> u64 {
-        let all = std::iter::once(&self.maps).chain(self.bands.iter().map(|band| &band.maps));
+        let halves = self.photons.iter().flat_map(|sums| &sums.halves);
+        let all = std::iter::once(&self.maps)
+            .chain(self.bands.iter().map(|band| &band.maps))
+            .chain(halves.flat_map(PartMaps::sets));
         let maps = all.flat_map(ReceiverMaps::iter);
         let texels = maps.map(|(_, map)| map.chart.texel_count() as u64);
         texels.sum::<u64>() * size_of::<FluxCount>() as u64

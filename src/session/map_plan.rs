@@ -11,7 +11,7 @@ use crate::illumination::tiles::COARSEST;
 use crate::illumination::{Chart, Receiver};
 use crate::light_pass::caustic::statistics::FootprintStatistics;
 use crate::plan::Effect;
-use crate::settings::{Estimator, MapResolution, Sigma};
+use crate::settings::{MapResolution, Sigma};
 
 impl CausticLayer<'_> {
     /// Whether maps of the size that is set fit into memory, whatever is lit.
@@ -119,7 +119,7 @@ impl CausticLayer<'_> {
     /// Whether a map of a size can be in tiles: the wavefront's, on surfaces that fill their maps, without smoothing,
     /// which goes from texel to texel.
     fn may_be_tiled(&self, object: usize, size: (usize, usize)) -> bool {
-        self.settings.estimator == Estimator::Wavefront
+        self.settings.estimator.refines()
             && self.settings.sigma == Sigma::Constant(0.0)
             && map_size::is_divisible(size)
             && self

@@ -1,6 +1,7 @@
 //! A bake as a session: scene and settings in, maps out. The command line's `bake` is a session that runs once.
 
 mod band_layers;
+mod carrier;
 mod caustic;
 mod clock;
 mod direct_cache;
@@ -15,6 +16,7 @@ mod light_level;
 mod map_plan;
 mod map_size;
 mod part_maps;
+mod photon_level;
 pub mod result;
 mod scene_change;
 pub mod shards;

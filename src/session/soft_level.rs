@@ -85,7 +85,7 @@ impl CausticLayer<'_> {
     }
 
     /// Whether its light comes from many places.
-    fn has_places(&self, light: &AimedLight) -> bool {
+    pub(super) fn has_places(&self, light: &AimedLight) -> bool {
         self.plan.is_on(Effect::AreaLights) && self.tracer.scene().lights[light.light].has_extent()
     }
 
@@ -445,11 +445,11 @@ impl CausticLayer<'_> {
         course: &Course,
     ) -> (PassReport, PartMaps) {
         match self.settings.estimator {
-            Estimator::Wavefront => {
+            estimator if estimator.refines() => {
                 let report = self.run_patches(wavefront, key, unit, lit, &mut maps, course);
                 (report, maps)
             }
-            Estimator::Splat => self.run_splats(wavefront, key, unit, maps, course),
+            _ => self.run_splats(wavefront, key, unit, maps, course),
         }
     }
 }

@@ -12,6 +12,7 @@ use super::band_layers::LevelBand;
 use crate::error::Result;
 use crate::light_pass::caustic::setup::{Aim, AimedLight};
 use crate::light_pass::ledger_sum::LedgerSum;
+use crate::light_pass::photon::spectrum::PhotonSpectrum;
 use crate::light_pass::receiver_maps::ReceiverMaps;
 use crate::light_pass::spectral_node::{SpectralNode, channels_within, to_linear_srgb};
 use crate::light_pass::wavefront::spectrum::{LightPart, LightSpectrum};
@@ -24,6 +25,9 @@ use crate::transport::Tracer;
 
 /// Room above a lamp's largest channel for what becomes of it in linear sRGB: the largest coefficient from XYZ.
 const CHANNEL_MARGIN: f64 = 8.0;
+
+/// Wavelengths that photons draw from where the whole spectrum is asked for.
+const PHOTON_BANDS: u32 = 256;
 
 /// All that chooses the wavelengths of a light's rays.
 #[derive(Clone, Debug, PartialEq)]
@@ -67,6 +71,8 @@ pub(super) struct Spectra {
 struct SpectralLight {
     key: SpectralKey,
     traced: Traced,
+    /// Where photons may carry it.
+    photons: Option<PhotonSpectrum>,
 }
 
 #[derive(Debug)]
@@ -114,9 +120,12 @@ impl Spectra {
                     estimator: settings.estimator,
                 };
                 let traced = spectra.traced(tracer, &key.lamp);
-                spectra
-                    .of_lights
-                    .insert(aimed.light, SpectralLight { key, traced });
+                let photons = matches!(settings.estimator, Estimator::Auto | Estimator::Photon).then(|| {
+                    let bands = nodes(tracer, &key.lamp, &photon_bands(settings));
+                    PhotonSpectrum::new(tracer.with_metals_under(&key.lamp), bands)
+                });
+                let light = SpectralLight { key, traced, photons };
+                spectra.of_lights.insert(aimed.light, light);
             }
         }
         Ok(spectra)
@@ -126,15 +135,7 @@ impl Spectra {
         if self.bands.is_empty() {
             return Traced::Whole(Box::new(LightSpectrum::new(tracer, lamp)));
         }
-        let lit = self.bands.iter().enumerate().filter_map(|(index, band)| {
-            let node = SpectralNode {
-                tracer: tracer.at_wavelength(middle_of(lamp, band)?),
-                channels: channels_within(lamp, band.range(), |_| 1.0),
-                number: index as u32,
-            };
-            Some((index, node))
-        });
-        Traced::Bands(lit.collect())
+        Traced::Bands(nodes(tracer, lamp, &self.bands))
     }
 
     /// What is traced of a light, one lattice after the other, each with its band where there are any.
@@ -159,6 +160,11 @@ impl Spectra {
             }
             Some(Traced::Whole(_)) | None => (columns, rows),
         }
+    }
+
+    /// A light by wavelength for photons.
+    pub(super) fn photons(&self, light: usize) -> Option<&PhotonSpectrum> {
+        self.of_lights.get(&light)?.photons.as_ref()
     }
 
     /// Where in its cell a ray of a band starts, [0, 1)²: bands that share rays out start between each other's, evenly
@@ -200,6 +206,7 @@ impl Spectra {
         let Some(SpectralLight {
             key,
             traced: Traced::Bands(nodes),
+            ..
         }) = self.of_lights.get(&light)
         else {
             return Vec::new();
@@ -245,14 +252,40 @@ impl Spectra {
     }
 }
 
+/// Wavelengths of a lamp, one for each band in which it has light.
+fn nodes(tracer: &Tracer, lamp: &Spectrum, bands: &[SpectralBand]) -> Vec<(usize, SpectralNode)> {
+    let lit = bands.iter().enumerate().filter_map(|(index, band)| {
+        let node = SpectralNode {
+            tracer: tracer.at_wavelength(middle_of(lamp, band)?),
+            channels: channels_within(lamp, band.range(), |_| 1.0),
+            number: index as u32,
+        };
+        Some((index, node))
+    });
+    lit.collect()
+}
+
 /// Bands of equal importance to the eye, or of the rainbow's colours; none where wavelengths are interpolated.
 fn bands(settings: &BakeSettings) -> Vec<SpectralBand> {
+    match (settings.wavelengths, settings.estimator) {
+        (Wavelengths::Continuous, estimator) if estimator.refines() => Vec::new(),
+        (Wavelengths::Continuous, _) => some_bands(settings, CONTINUOUS_BANDS),
+        _ => some_bands(settings, 0),
+    }
+}
+
+/// Bands that photons draw theirs from.
+fn photon_bands(settings: &BakeSettings) -> Vec<SpectralBand> {
+    some_bands(settings, PHOTON_BANDS)
+}
+
+/// As the settings say, or so many where they name the whole spectrum.
+fn some_bands(settings: &BakeSettings, continuous: u32) -> Vec<SpectralBand> {
     let sampler = WavelengthSampler::equal_energy();
-    let bands = match (settings.wavelengths, settings.estimator) {
-        (Wavelengths::Continuous, Estimator::Wavefront) => Vec::new(),
-        (Wavelengths::Continuous, Estimator::Splat) => sampler.bands(CONTINUOUS_BANDS as usize),
-        (Wavelengths::Rainbow, _) => sampler.rainbow_seven(),
-        (Wavelengths::Fixed(count), _) => sampler.bands(count as usize),
+    let bands = match settings.wavelengths {
+        Wavelengths::Continuous => sampler.bands(continuous as usize),
+        Wavelengths::Rainbow => sampler.rainbow_seven(),
+        Wavelengths::Fixed(count) => sampler.bands(count as usize),
     };
     let bands = bands.into_iter().map(|band| SpectralBand {
         from_nm: band.range.start().0,

@@ -7,7 +7,7 @@ use super::{BakeEstimate, BakeResult, BakeSession, StopReason, Timings};
 use crate::error::Result;
 use crate::plan::Effect;
 use crate::progress::Control;
-use crate::settings::{BakeSettings, Estimator, Preset};
+use crate::settings::{BakeSettings, Preset};
 
 /// The pilot's light pass ends after so long [s]; the later ones go on where those before ended, where no error is known
 /// by then.
@@ -64,8 +64,10 @@ impl BakeSession {
             preset,
             forecast: match settings.estimator {
                 _ if !is_on => Some(nothing(preset)),
-                Estimator::Wavefront => forecast(&pilot.course, preset.max_error(), settings.estimator),
-                Estimator::Splat => splat_forecast(&pilot, preset),
+                _ if settings.estimator.refines() => {
+                    forecast(&pilot.course, preset.max_error(), settings.estimator)
+                }
+                _ => splat_forecast(&pilot, preset),
             },
         };
         let presets = Preset::ALL.map(of_preset).to_vec();
@@ -92,18 +94,19 @@ fn added(first: BakeResult, mut second: BakeResult) -> BakeResult {
 }
 
 fn pilot_settings(settings: &BakeSettings, limit_s: f64) -> BakeSettings {
-    match settings.estimator {
-        Estimator::Wavefront => BakeSettings {
+    if settings.estimator.refines() {
+        BakeSettings {
             max_error: Some(PILOT_TARGET),
             max_time_s: Some(limit_s),
             density_per_sr: BakeSettings::starting_density_per_sr(PILOT_TARGET),
             ..settings.clone()
-        },
-        Estimator::Splat => BakeSettings {
+        }
+    } else {
+        BakeSettings {
             density_per_sr: PILOT_DENSITY_PER_SR,
             max_time_s: Some(limit_s),
             ..settings.clone()
-        },
+        }
     }
 }
 

@@ -108,6 +108,7 @@ impl CausticLayer<'_> {
             strays,
             overreaches: report.overreaches,
             traced,
+            work: (report.cells, report.receiver_queries),
             ..self.level(light, (key, unit), (maps, bands), report.ledger)
         }))
     }
@@ -131,6 +132,8 @@ impl CausticLayer<'_> {
             overreaches: Vec::new(),
             noise: None,
             error: None,
+            photons: None,
+            work: (0, 0),
             traced: None,
             has_own_colour: self.spectra.has(light.light),
             parts: SoftParts::default(),

@@ -39,6 +39,11 @@ impl AimedLight {
         self.visible.as_ref().unwrap_or(&self.item_buffer)
     }
 
+    /// What rays are aimed at (indices of specular objects), wherever they start.
+    pub fn casters(&self) -> &[usize] {
+        &self.casters
+    }
+
     /// What any wavefront of the same light may carry [W], but for another strength.
     pub fn power_bound_w(&self, scene: &Scene) -> f64 {
         let own_w = self.launch.power_bound_w();

@@ -20,13 +20,9 @@ const NOT_GAUSSIAN: &str = "Sigma is the spread of the gaussian kernel; the chos
 
 /// What the settings are set back to: what the program begins with for an estimator.
 pub fn defaults(estimator: Estimator) -> BakeSettings {
-    let settings = match estimator {
-        Estimator::Wavefront => BakeSettings::default(),
-        Estimator::Splat => BakeSettings::splat(),
-    };
     BakeSettings {
         layers: vec![LayerKind::Caustic, LayerKind::Direct],
-        ..settings
+        ..BakeSettings::of(estimator)
     }
 }
 
@@ -41,7 +37,7 @@ fn default_density_per_sr(settings: &BakeSettings) -> f64 {
 /// Shows the section; `settings` holds what the user chose.
 pub fn show(ui: &mut Ui, settings: &mut BakeSettings) {
     let no_caustic = no_caustic(settings);
-    let is_wavefront = settings.estimator == Estimator::Wavefront;
+    let refines = settings.estimator.refines();
     let no_sigma = no_sigma(settings);
     let default = defaults(settings.estimator);
     rows(ui, "light pass", |ui| {
@@ -68,7 +64,7 @@ pub fn show(ui: &mut Ui, settings: &mut BakeSettings) {
             "Sigma [radii²]",
             no_sigma,
             (&mut settings.sigma, &default.sigma),
-            |ui, value| sigma(ui, value, is_wavefront),
+            |ui, value| sigma(ui, value, refines),
         );
     });
 }
@@ -76,8 +72,7 @@ pub fn show(ui: &mut Ui, settings: &mut BakeSettings) {
 /// Shows what is seldom changed.
 pub fn show_details(ui: &mut Ui, settings: &mut BakeSettings) {
     let no_caustic = no_caustic(settings);
-    let is_wavefront = settings.estimator == Estimator::Wavefront;
-    let no_splats = no_caustic.or(is_wavefront.then_some(NO_SPLATS));
+    let no_splats = no_caustic.or(settings.estimator.refines().then_some(NO_SPLATS));
     let no_sigma = no_sigma(settings);
     let default = defaults(settings.estimator);
     rows(ui, "rays and kernels", |ui| {

@@ -1,4 +1,5 @@
 //! Bakes of reference scenes: against an independent solver, against the law of energy, against themselves.
 
 mod effects;
+mod photon;
 mod reference;

@@ -75,7 +75,7 @@ fn files_and_built_in_scenes_agree() {
             let uvs = mesh.uv0.as_ref().expect("floor has TEXCOORD_0");
             let at = uvs
                 .iter()
-                .position(|uv| *uv == glam::DVec2::new(1.0, 0.0))
+                .position(|uv| *uv == DVec2::new(1.0, 0.0))
                 .expect("has a corner at (1, 0)");
             mesh.positions[at]
         };

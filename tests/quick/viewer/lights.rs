@@ -2,7 +2,8 @@
 
 use nephroid::illumination::{Chart, Receiver};
 use nephroid::scene::changes::Change;
-use nephroid::scene::{LightOrigin, load};
+use nephroid::scene::load;
+use nephroid::scene::load::save;
 use nephroid::units::Flux;
 use nephroid::viewer::brightest;
 use nephroid::viewer::new_light::Aim;

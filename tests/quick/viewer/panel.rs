@@ -332,6 +332,7 @@ fn ledgers_are_summed_and_gaps_told() {
             absorbed: 0.25,
             escaped: 0.625,
             truncated: with(Truncated::default(), |it| it.depth = 0.125),
+            sampling: 0.0,
         },
         not_emitted_w: 0.0,
         emitted_radiant_w: None,

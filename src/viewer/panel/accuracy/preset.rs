@@ -3,17 +3,16 @@
 use egui::Ui;
 use strum::EnumMessage;
 
-use crate::settings::{BakeSettings, Estimator, MapResolution, Preset};
+use crate::settings::{BakeSettings, MapResolution, Preset};
 use crate::viewer::panel::control::{choice, setting};
 
 /// Sets all that a preset stands for; the estimator stays.
 pub fn apply(preset: Preset, settings: &mut BakeSettings) {
-    (settings.max_error, settings.density_per_sr) = match settings.estimator {
-        Estimator::Wavefront => {
-            let target = preset.max_error();
-            (Some(target), BakeSettings::starting_density_per_sr(target))
-        }
-        Estimator::Splat => (None, preset.splat_density_per_sr()),
+    (settings.max_error, settings.density_per_sr) = if settings.estimator.refines() {
+        let target = preset.max_error();
+        (Some(target), BakeSettings::starting_density_per_sr(target))
+    } else {
+        (None, preset.splat_density_per_sr())
     };
     let default = BakeSettings::default();
     settings.max_time_s = None;

@@ -37,9 +37,7 @@ impl Target {
         (settings.max_error, settings.max_time_s) = match self {
             Self::Density => (None, None),
             Self::Error(error) => (Some(error), None),
-            Self::Time(time_s) if settings.estimator == Estimator::Wavefront => {
-                (Some(LEAST_MAX_ERROR), Some(time_s))
-            }
+            Self::Time(time_s) if settings.estimator.refines() => (Some(LEAST_MAX_ERROR), Some(time_s)),
             Self::Time(time_s) => (None, Some(time_s)),
         };
         match settings.max_error {
@@ -59,9 +57,10 @@ impl Target {
 
     /// What a bake by an estimator ends with unless something else is set.
     fn default_of(estimator: Estimator) -> Self {
-        match estimator {
-            Estimator::Wavefront => Self::Error(Preset::default().max_error()),
-            Estimator::Splat => Self::Density,
+        if estimator.refines() {
+            Self::Error(Preset::default().max_error())
+        } else {
+            Self::Density
         }
     }
 }
@@ -94,11 +93,11 @@ pub fn pick(settings: &mut BakeSettings, seconds: f64, error: f64) {
         (Target::Time(_), _) => {
             Target::Time(rounded(seconds).clamp(*TIMES_S.start(), *TIMES_S.end())).set(settings);
         }
-        (_, Estimator::Wavefront) => {
+        (_, estimator) if estimator.refines() => {
             Target::Error(rounded(error).clamp(PERCENTS.start() / 100.0, PERCENTS.end() / 100.0))
                 .set(settings);
         }
-        (_, Estimator::Splat) => {}
+        _ => {}
     }
 }
 
@@ -178,7 +177,7 @@ fn list(ui: &mut Ui, target: &mut Target, estimator: Estimator) -> Response {
         ),
         (Target::Time(FIRST_TIME_S), "Until the time is up."),
     ];
-    let can = |target: Target| estimator == Estimator::Wavefront || !matches!(target, Target::Error(_));
+    let can = |target: Target| estimator.refines() || !matches!(target, Target::Error(_));
     let why_not = |target: Target| (!can(target)).then_some(NO_ERRORS);
     let entries = targets.map(|(target, hover)| (target.name(), hover.into(), why_not(target)));
     let at = targets

@@ -1,0 +1,199 @@
+//! Noise of photons, taken out where the light is smooth: every texel becomes a mean over as wide a window as lowers its
+//! error.
+//!
+//! Of two independent halves A and B and their means A', B' over a window, E(A' − B)² = bias² + var A' + var B, so that
+//! the window's bias shows without a reference. Expectations are means over a neighbourhood that is wider than the
+//! window. Windows never reach beyond a chart; charts of several islands and maps in tiles stay as they are.
+
+use rayon::prelude::*;
+
+use crate::illumination::Receiver;
+use crate::illumination::accumulator::FluxUnit;
+use crate::light_pass::accuracy::Noise;
+use crate::light_pass::receiver_maps::{ReceiverMap, ReceiverMaps};
+
+/// Radii of windows [texels]; each is a box, applied twice.
+const RADII: [usize; 6] = [0, 1, 2, 4, 8, 16];
+
+/// Expectations are taken over windows of at least this radius [texels].
+const LEAST_POOL: usize = 8;
+
+/// And of at least so many times the window's own.
+const POOL_PER_RADIUS: usize = 2;
+
+/// Filters the sum of two halves, and gives the squared error of each texel that is left [W²/m⁴]. `sum` holds the light of
+/// both; maps that are not filtered keep their noise.
+pub fn filter(sum: &mut ReceiverMaps, halves: [&ReceiverMaps; 2], unit: FluxUnit, noise: &mut Noise) {
+    let receivers: Vec<Receiver> = sum.iter().map(|(receiver, _)| receiver).collect();
+    for receiver in receivers {
+        let [a, b] = halves.map(|half| half.get(receiver));
+        let Some(map) = sum.get_mut(receiver).filter(|map| map.is_one_piece()) else {
+            continue;
+        };
+        let filtered = Filter::new(map, [a, b], unit);
+        let (widths, squares) = filtered.choose();
+        filtered.apply(map, &widths);
+        noise.insert(receiver, squares);
+    }
+}
+
+/// One map under work.
+struct Filter {
+    size: (usize, usize),
+    areas_m2: Vec<f64>,
+    /// Flux of each half as if it were all the light [W].
+    halves: [Vec<f64>; 2],
+}
+
+impl Filter {
+    fn new(map: &ReceiverMap, halves: [Option<&ReceiverMap>; 2], unit: FluxUnit) -> Self {
+        let chart = &map.chart;
+        let texels = chart.texel_count();
+        let luminance = |half: Option<&ReceiverMap>| match half {
+            Some(half) => {
+                let flux = half.levels()[0].texels().par_iter();
+                flux.map(|&count| 2.0 * unit.flux_w(count).luminance()).collect()
+            }
+            None => vec![0.0; texels],
+        };
+        Self {
+            size: (chart.width, chart.height),
+            areas_m2: (0..texels).map(|texel| chart.texel_area_m2(texel)).collect(),
+            halves: halves.map(luminance),
+        }
+    }
+
+    /// For each texel the index of its radius, and its squared error [W²/m⁴].
+    fn choose(&self) -> (Vec<u8>, Vec<f64>) {
+        let raw = self
+            .halves
+            .each_ref()
+            .map(|flux| self.per_area(flux, &self.areas_m2));
+        let mut widths = vec![0_u8; self.areas_m2.len()];
+        let mut squares = vec![f64::INFINITY; self.areas_m2.len()];
+        for (index, &radius) in RADII.iter().enumerate() {
+            let area = blurred(&self.areas_m2, self.size, radius);
+            let means = self
+                .halves
+                .each_ref()
+                .map(|flux| self.per_area(&blurred(flux, self.size, radius), &area));
+            let pool = LEAST_POOL.max(POOL_PER_RADIUS * radius);
+            let pooled_area = blurred(&self.areas_m2, self.size, pool);
+            let expected = |square: &(dyn Fn(usize) -> f64 + Sync)| {
+                let squares: Vec<f64> = (0..self.areas_m2.len())
+                    .into_par_iter()
+                    .map(|texel| square(texel) * self.areas_m2[texel])
+                    .collect();
+                self.per_area(&blurred(&squares, self.size, pool), &pooled_area)
+            };
+            let half_square = |a: f64, b: f64| 0.5 * (a - b) * (a - b);
+            let across = expected(&|texel| {
+                half_square(means[0][texel], raw[1][texel]) + half_square(means[1][texel], raw[0][texel])
+            });
+            let variance = expected(&|texel| half_square(means[0][texel], means[1][texel]));
+            let raw_variance = expected(&|texel| half_square(raw[0][texel], raw[1][texel]));
+            for texel in 0..squares.len() {
+                let bias = (across[texel] - variance[texel] - raw_variance[texel]).max(0.0);
+                let square = bias + 0.5 * variance[texel];
+                if square <= squares[texel] {
+                    (squares[texel], widths[texel]) = (square, index as u8);
+                }
+            }
+        }
+        (widths, squares)
+    }
+
+    /// Puts the means in the place of the map's flux; each channel keeps its sum.
+    fn apply(&self, map: &mut ReceiverMap, widths: &[u8]) {
+        let level = &mut map.levels_mut()[0];
+        for channel in 0..3 {
+            let flux: Vec<f64> = level.texels().iter().map(|count| count[channel] as f64).collect();
+            let mut means = flux.clone();
+            for (index, &radius) in RADII.iter().enumerate().skip(1) {
+                if !widths.contains(&(index as u8)) {
+                    continue;
+                }
+                let area = blurred(&self.areas_m2, self.size, radius);
+                let mean = self.per_area(&blurred(&flux, self.size, radius), &area);
+                let chosen = means
+                    .iter_mut()
+                    .enumerate()
+                    .filter(|(texel, _)| widths[*texel] == index as u8);
+                chosen.for_each(|(texel, value)| *value = mean[texel] * self.areas_m2[texel]);
+            }
+            let [before, after] = [&flux, &means].map(|flux| flux.iter().sum::<f64>());
+            let scale = if after != 0.0 { before / after } else { 1.0 };
+            for (count, mean) in level.texels_mut().iter_mut().zip(means) {
+                count[channel] = (mean * scale).round() as i64;
+            }
+        }
+    }
+
+    /// Flux over area; nothing where there is none.
+    fn per_area(&self, flux: &[f64], area: &[f64]) -> Vec<f64> {
+        let of = |((flux, area), own): ((&f64, &f64), &f64)| {
+            if *own > 0.0 { flux / area } else { 0.0 }
+        };
+        flux.par_iter().zip(area).zip(&self.areas_m2).map(of).collect()
+    }
+}
+
+/// Sums over a square window, applied twice: weights fall towards its ends.
+fn blurred(values: &[f64], size: (usize, usize), radius: usize) -> Vec<f64> {
+    if radius == 0 {
+        return values.to_vec();
+    }
+    let once = box_sums(values, size, radius);
+    box_sums(&once, size, radius)
+}
+
+fn box_sums(values: &[f64], (width, height): (usize, usize), radius: usize) -> Vec<f64> {
+    let mut across = vec![0.0; values.len()];
+    across
+        .par_chunks_mut(width)
+        .zip(values.par_chunks(width))
+        .for_each(|(sums, line)| line_sums(line, sums, radius));
+    // Running sums begin anew at fixed rows, so that rounding does not depend on the number of threads.
+    let mut down = vec![0.0; values.len()];
+    down.par_chunks_mut(width * ROWS_PER_BAND)
+        .enumerate()
+        .for_each(|(band, rows)| {
+            let first = band * ROWS_PER_BAND;
+            let row_of = |row: usize| &across[row * width..(row + 1) * width];
+            let mut sums = vec![0.0; width];
+            for row in first.saturating_sub(radius)..(first + radius).min(height) {
+                sums.iter_mut()
+                    .zip(row_of(row))
+                    .for_each(|(sum, value)| *sum += value);
+            }
+            for (row, line) in rows.chunks_mut(width).enumerate() {
+                let row = first + row;
+                if row + radius < height {
+                    sums.iter_mut()
+                        .zip(row_of(row + radius))
+                        .for_each(|(sum, value)| *sum += value);
+                }
+                line.copy_from_slice(&sums);
+                if row >= radius {
+                    sums.iter_mut()
+                        .zip(row_of(row - radius))
+                        .for_each(|(sum, value)| *sum -= value);
+                }
+            }
+        });
+    down
+}
+
+/// Rows whose running sums begin together.
+const ROWS_PER_BAND: usize = 64;
+
+fn line_sums(line: &[f64], sums: &mut [f64], radius: usize) {
+    let mut sum: f64 = line.iter().take(radius).sum();
+    for index in 0..line.len() {
+        sum += line.get(index + radius).unwrap_or(&0.0);
+        sums[index] = sum;
+        if index >= radius {
+            sum -= line[index - radius];
+        }
+    }
+}

@@ -1,0 +1,10 @@
+//! Photons: paths sampled from a light, one branch an event, each hit counted into its texel.
+//!
+//! Where patches of a wavefront shatter (cut glass, rough glass, many inner reflections) or would have to be averaged
+//! over a lamp, photons cost what a path costs. Lamp, micro-normals and wavelength are dimensions of the path.
+
+pub mod filter;
+pub mod launch;
+pub mod pass;
+pub mod spectrum;
+pub mod walk;

@@ -1,0 +1,280 @@
+//! One photon's path: at every surface it goes one way, drawn by the share of light that goes there.
+
+use super::launch::{LAMP_DIMENSION, Start};
+use super::spectrum::{Hue, PhotonSpectrum};
+use crate::geometry::Ray;
+use crate::geometry::sampling::even_point;
+use crate::illumination::accumulator::FluxUnit;
+use crate::illumination::{Receiver, Side};
+use crate::light_pass::ledger_sum::{Account, LedgerSum};
+use crate::optics::{ColourMatrix, LinearSrgb};
+use crate::scene::SurfaceKind;
+use crate::transport::{Branch, EffectSet, Interaction, MediumStack, Tracer};
+
+/// A photon whose flux (largest channel) has become less than this part of what it started with goes on by chance, with
+/// this part of it or not at all.
+const ROULETTE_BELOW: f64 = 0.1;
+
+/// Dimension of [`even_point`] that wavelengths are drawn from.
+const WAVELENGTH_DIMENSION: u32 = 1 << 16;
+
+/// What a photon leaves on a diffuse surface.
+#[derive(Clone, Copy, Debug)]
+pub struct Hit {
+    /// Whose light it becomes.
+    pub receiver: Receiver,
+    /// Index into the object's triangles.
+    pub triangle: usize,
+    /// Of the triangle's corners.
+    pub barycentric: [f64; 3],
+    /// Incident flux [W per channel of the light] if it were the only photon, before the albedo.
+    pub flux_w: LinearSrgb,
+    /// Band of its wavelength, where it has one.
+    pub band: Option<usize>,
+}
+
+/// What all photons of a light share.
+#[derive(Clone, Copy, Debug)]
+pub struct PhotonRules<'a> {
+    /// The scene.
+    pub tracer: &'a Tracer,
+    /// Of a light whose wavelengths go different ways.
+    pub spectrum: Option<&'a PhotonSpectrum>,
+    /// What paths may need.
+    pub effects: EffectSet,
+    /// Most specular events.
+    pub max_depth: u32,
+    /// Of the accounts: that of a single photon.
+    pub unit: FluxUnit,
+    /// Of everything random.
+    pub seed: u64,
+}
+
+/// Follows photons, one after the other, and books what becomes of their flux.
+#[derive(Debug)]
+pub struct PhotonWalk<'a> {
+    rules: PhotonRules<'a>,
+    /// Accounts of all photons so far.
+    pub ledger: LedgerSum,
+    /// Closest-hit queries so far.
+    pub segments: u64,
+}
+
+/// The photon under way.
+struct Photon<'a> {
+    hue: Hue<'a>,
+    flux_w: LinearSrgb,
+    index: u32,
+    random: Random,
+}
+
+impl<'a> PhotonWalk<'a> {
+    /// With empty accounts.
+    pub fn new(rules: PhotonRules<'a>) -> Self {
+        Self {
+            rules,
+            ledger: LedgerSum::default(),
+            segments: 0,
+        }
+    }
+
+    fn book(&mut self, account: Account, channels: &ColourMatrix, flux_w: LinearSrgb) {
+        if flux_w != LinearSrgb::BLACK {
+            let count = self.rules.unit.count(self.apply(channels, flux_w));
+            self.ledger.book(account, count);
+        }
+    }
+
+    /// Flux in the channels of the light.
+    fn apply(&self, channels: &ColourMatrix, flux_w: LinearSrgb) -> LinearSrgb {
+        match self.rules.spectrum {
+            Some(_) => channels.apply(flux_w),
+            None => flux_w,
+        }
+    }
+
+    /// Follows the photon of an index to its end; hits on diffuse surfaces after at least one specular event are handed to
+    /// `arrive`. `Deposited` is not booked here but by who places the flux.
+    pub fn follow(&mut self, index: u32, start: &Start, mut arrive: impl FnMut(Hit)) {
+        let whole = match self.rules.spectrum {
+            Some(spectrum) => spectrum.whole(),
+            None => Hue {
+                tracer: self.rules.tracer,
+                channels: ColourMatrix::IDENTITY,
+                band: None,
+            },
+        };
+        let mut photon = Photon {
+            hue: whole,
+            flux_w: start.flux_w,
+            random: Random::new(index, self.rules.seed),
+            index,
+        };
+        let (mut ray, mut media) = (start.ray, start.media);
+        let brightest_w = start.flux_w.max_channel();
+        if !(brightest_w > 0.0 && start.flux_w.is_finite()) {
+            return;
+        }
+        for depth in 0.. {
+            let Some(branch) = self.step(&mut photon, depth, &ray, &media, &mut arrive) else {
+                return;
+            };
+            if depth >= self.rules.max_depth {
+                return self.book(Account::Depth, &photon.hue.channels, photon.flux_w);
+            }
+            if !self.survives(&mut photon, ROULETTE_BELOW * brightest_w) {
+                return;
+            }
+            (ray, media) = (branch.ray, branch.media);
+        }
+    }
+
+    /// To the next surface, and the way on from there.
+    fn step(
+        &mut self,
+        photon: &mut Photon<'a>,
+        depth: u32,
+        ray: &Ray,
+        media: &MediumStack,
+        arrive: &mut impl FnMut(Hit),
+    ) -> Option<Branch> {
+        self.segments += 1;
+        let Some(hit) = photon.hue.tracer.closest_hit(ray) else {
+            let account = if depth == 0 {
+                Account::NotEmitted
+            } else {
+                Account::Escaped
+            };
+            self.book(account, &photon.hue.channels, photon.flux_w);
+            return None;
+        };
+        let scene = photon.hue.tracer.scene();
+        let material = scene.material_of(hit.object);
+        if depth == 0 && !material.surface.is_specular() {
+            self.book(Account::NotEmitted, &photon.hue.channels, photon.flux_w);
+            return None;
+        }
+        let effects = self.rules.effects;
+        let (sent_w, sent_hue) = (photon.flux_w, photon.hue);
+        if effects.absorption && media.absorbs(scene) {
+            photon.flux_w = photon.flux_w * media.transmittance(scene, hit.distance_m);
+        }
+        if material.surface == SurfaceKind::Dielectric && material.is_dispersive() {
+            self.part(photon);
+        }
+        let micro = (effects.lobes && material.is_rough())
+            .then(|| even_point(photon.index, LAMP_DIMENSION + 1 + depth, self.rules.seed));
+        let tracer = photon.hue.tracer;
+        let interaction = tracer.interact_with(effects, &hit, ray.direction, media, micro);
+        let deposit_w = photon.flux_w * interaction.deposit;
+        if depth == 0 {
+            // What a surface takes on the first hit is direct light.
+            self.book(Account::NotEmitted, &sent_hue.channels, deposit_w);
+            self.book(Account::Emitted, &sent_hue.channels, sent_w - deposit_w);
+        } else if deposit_w.max_channel() > 0.0 {
+            arrive(Hit {
+                receiver: Receiver::new(hit.object, Side::met(ray.direction, hit.geometric_normal)),
+                triangle: hit.triangle,
+                barycentric: hit.barycentric,
+                flux_w: self.apply(&photon.hue.channels, deposit_w),
+                band: photon.hue.band,
+            });
+        }
+        self.book(Account::Absorbed, &sent_hue.channels, sent_w - photon.flux_w);
+        self.book(
+            Account::Absorbed,
+            &photon.hue.channels,
+            photon.flux_w * interaction.absorbed,
+        );
+        self.book(
+            Account::SwitchedOff,
+            &photon.hue.channels,
+            photon.flux_w * interaction.switched_off,
+        );
+        self.choose(photon, &interaction)
+    }
+
+    /// Gives a photon that has all wavelengths one of them.
+    fn part(&mut self, photon: &mut Photon<'a>) {
+        let (Some(spectrum), None) = (self.rules.spectrum, photon.hue.band) else {
+            return;
+        };
+        let place = even_point(photon.index, WAVELENGTH_DIMENSION, self.rules.seed).x;
+        if let Some(one) = spectrum.one(place) {
+            self.book(Account::Sampling, &photon.hue.channels, photon.flux_w);
+            self.book(Account::Sampling, &one.channels, photon.flux_w * -1.0);
+            photon.hue = one;
+        }
+    }
+
+    /// Draws the way on by the flux that goes there.
+    fn choose(&mut self, photon: &mut Photon<'a>, interaction: &Interaction) -> Option<Branch> {
+        let arriving_w = photon.flux_w;
+        let carried = |branch: &Option<Branch>| {
+            let flux_w = branch
+                .as_ref()
+                .map_or(LinearSrgb::BLACK, |branch| arriving_w * branch.share);
+            (flux_w, flux_w.to_array().iter().sum::<f64>())
+        };
+        let (reflected_w, reflected) = carried(&interaction.reflection);
+        let (transmitted_w, transmitted) = carried(&interaction.transmission);
+        let both = reflected + transmitted;
+        if both <= 0.0 {
+            return None;
+        }
+        let share = reflected / both;
+        let (branch, flux_w) = if share >= 1.0 || (share > 0.0 && photon.random.next() < share) {
+            (interaction.reflection, reflected_w * share.recip())
+        } else {
+            (interaction.transmission, transmitted_w * (1.0 - share).recip())
+        };
+        let branch = branch?;
+        if !(flux_w.is_finite() && branch.ray.direction.is_finite() && branch.ray.origin.is_finite()) {
+            let lost_w = (reflected_w + transmitted_w).map(|w| if w.is_finite() { w } else { 0.0 });
+            self.book(Account::NonFinite, &photon.hue.channels, lost_w);
+            return None;
+        }
+        self.book(
+            Account::Sampling,
+            &photon.hue.channels,
+            reflected_w + transmitted_w - flux_w,
+        );
+        photon.flux_w = flux_w;
+        Some(branch)
+    }
+
+    /// Russian roulette with what has become too little to follow.
+    fn survives(&mut self, photon: &mut Photon<'a>, least_w: f64) -> bool {
+        let probability = photon.flux_w.max_channel() / least_w;
+        if probability >= 1.0 {
+            return true;
+        }
+        let survives = photon.random.next() < probability;
+        let (before_w, channels) = (photon.flux_w, photon.hue.channels);
+        photon.flux_w = if survives {
+            before_w * probability.recip()
+        } else {
+            LinearSrgb::BLACK
+        };
+        self.book(Account::Sampling, &channels, before_w - photon.flux_w);
+        survives
+    }
+}
+
+/// Numbers in [0, 1) that belong to one photon (Steele, Lea and Flood, "Fast Splittable Pseudorandom Number Generators",
+/// 2014).
+struct Random(u64);
+
+impl Random {
+    fn new(index: u32, seed: u64) -> Self {
+        Self(seed.rotate_left(32) ^ u64::from(index).wrapping_mul(0xd134_2543_de82_ef95))
+    }
+
+    fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 11) as f64 * (-53_f64).exp2()
+    }
+}

@@ -1,0 +1,95 @@
+//! What carries a light: patches of its wavefront, or photons.
+//!
+//! Light of many places and on rough surfaces is for photons. Of any other light `auto` makes a few photons first; they
+//! tell what the target would cost by photons, and patches go on while they cost less than that. Costs are counted
+//! operations, so that the choice does not depend on the machine.
+
+use super::caustic::{CausticLayer, Climb, Course};
+use super::light_level::{LightLevel, LightState};
+use super::map_size::Sizes;
+use crate::error::Result;
+use crate::light_pass::caustic::setup::AimedLight;
+use crate::light_pass::photon::pass::HALVES;
+use crate::settings::Estimator;
+
+/// Time of a cell of patches over that of a photon's segment, where a photon has but one; it grows with the cube of their
+/// number, as the branches do that patches follow.
+const CELL: f64 = 2.5;
+
+/// Time of a ray that only looks for its receiver, with its triangle's deposit, over that of a photon's segment.
+const RECEIVER_QUERY: f64 = 0.4;
+
+/// A level of patches costs so many times the one before it.
+const LEVEL_GROWTH: f64 = 4.0;
+
+/// What carries a light.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum Carrier {
+    /// Patches, or photons once they are known to be cheaper.
+    Undecided,
+    /// Patches of the wavefront.
+    #[default]
+    Patches,
+    /// Photons.
+    Photons,
+    /// The paper's kernels.
+    Splats,
+}
+
+impl CausticLayer<'_> {
+    /// What carries a light to begin with.
+    pub(super) fn carrier(&self, light: &AimedLight) -> Carrier {
+        match self.settings.estimator {
+            Estimator::Photon => Carrier::Photons,
+            Estimator::Auto if self.settings.max_error.is_none() || self.is_soft(light) => Carrier::Photons,
+            Estimator::Auto => Carrier::Undecided,
+            Estimator::Wavefront => Carrier::Patches,
+            Estimator::Splat => Carrier::Splats,
+        }
+    }
+
+    /// Of a light that may have either: makes the photons that tell their cost, then decides whether another level of
+    /// patches is worth it.
+    pub(super) fn decide_carrier(
+        &self,
+        light: &AimedLight,
+        sizes: &Sizes,
+        state: &mut LightState,
+        climb: &mut Climb,
+        course: &mut Course,
+    ) -> Result<()> {
+        let Some(target) = self.settings.max_error else {
+            return Ok(());
+        };
+        if climb.pilot.is_none() {
+            climb.pilot = self.first_photons(light, sizes, state, course)?;
+        }
+        let costs = climb.pilot.as_ref().and_then(|pilot| photon_costs(pilot, target));
+        let Some((by_photons, per_photon)) = costs else {
+            // Nothing arrived: patches find what is too rare for a few photons.
+            climb.carrier = Carrier::Patches;
+            return Ok(());
+        };
+        let cost = |level: &LightLevel| {
+            let (cells, queries) = level.work;
+            CELL * per_photon.powi(3) * cells as f64 + RECEIVER_QUERY * queries as f64
+        };
+        let so_far: f64 = climb.levels.iter().map(cost).sum();
+        let next = climb.levels.last().map_or(0.0, cost) * LEVEL_GROWTH;
+        if so_far + next > by_photons {
+            climb.carrier = Carrier::Photons;
+            climb.rounds.clear();
+            climb.levels = climb.pilot.take().into_iter().collect();
+        }
+        Ok(())
+    }
+}
+
+/// Segments that photons are expected to take for a target, and those of one photon; `None` where none arrived.
+fn photon_costs(pilot: &LightLevel, target: f64) -> Option<(f64, f64)> {
+    let rmse = pilot.error.as_ref()?.estimate.relative_rmse;
+    let segments = pilot.photons.as_ref()?.segments as f64;
+    let photons = HALVES as f64 * f64::from(pilot.key.photons?);
+    let times = (rmse / target).powi(2).max(1.0);
+    (rmse > 0.0).then_some((segments * times, segments / photons))
+}

@@ -1,0 +1,270 @@
+//! One level of one light by photons: twice as many as before or more, those of earlier levels included.
+
+use super::caustic::{CausticLayer, Climb, Course};
+use super::light_level::{KeptError, LevelKey, LightLevel, LightState, PhotonSums};
+use super::map_size::Sizes;
+use super::shards::PassSums;
+use crate::error::{Error, Result};
+use crate::illumination::Receiver;
+use crate::illumination::accumulator::FluxUnit;
+use crate::light_pass::accuracy;
+use crate::light_pass::caustic::pass::Listener;
+use crate::light_pass::caustic::setup::AimedLight;
+use crate::light_pass::ledger_sum::LedgerSum;
+use crate::light_pass::photon::filter;
+use crate::light_pass::photon::launch::PhotonLaunch;
+use crate::light_pass::photon::pass::{HALVES, PhotonPass};
+use crate::light_pass::photon::walk::PhotonRules;
+use crate::optics::LinearSrgb;
+use crate::transport::EffectSet;
+
+/// Photons of each half of the first picture.
+const FIRST_PHOTONS: u32 = 1 << 13;
+
+/// Photons of each half, at most.
+const MAX_PHOTONS: u32 = 1 << 31;
+
+/// A light that has given no error by so many photons of each half gives none.
+const MAX_WITHOUT_ERROR: u32 = 1 << 20;
+
+/// Growth from level to level, least and most.
+const GROWTH: (f64, f64) = (1.5, 8.0);
+
+/// Somewhat more photons than the target should need, so that no level is made for little.
+const MARGIN: f64 = 1.1;
+
+/// The mean flux of all photons may be so many times that of the first ones.
+const MEAN_MARGIN: f64 = 16.0;
+
+impl CausticLayer<'_> {
+    /// Photons of each half of the next level; `None` where there is nothing more.
+    pub(super) fn next_photons(&self, light: &AimedLight, climb: &Climb) -> Option<u32> {
+        let last = climb.levels.last();
+        let before = last.and_then(|level| level.key.photons);
+        let Some(target) = self.settings.max_error else {
+            let wanted = self.photons_at_density(light);
+            return match before {
+                None => Some(FIRST_PHOTONS.min(wanted)),
+                Some(before) => (before < wanted).then_some(wanted),
+            };
+        };
+        let Some(before) = before else {
+            return Some(FIRST_PHOTONS);
+        };
+        let known = last
+            .and_then(|level| level.error.as_ref())
+            .map(|error| error.estimate.relative_rmse);
+        let goal = climb.goal.unwrap_or(target);
+        let times = match known.filter(|error| error.is_finite() && *error > 0.0) {
+            Some(error) => (MARGIN * (error / goal).powi(2)).clamp(GROWTH.0, GROWTH.1),
+            None if before >= MAX_WITHOUT_ERROR => return None,
+            None => GROWTH.1,
+        };
+        let wanted = (f64::from(before) * times / f64::from(FIRST_PHOTONS)).ceil() * f64::from(FIRST_PHOTONS);
+        (before < MAX_PHOTONS).then_some(wanted.min(f64::from(MAX_PHOTONS)) as u32)
+    }
+
+    /// Photons of each half at the density of the settings.
+    fn photons_at_density(&self, light: &AimedLight) -> u32 {
+        let launch_measure = self.with_launch(light, |launch| launch.measure());
+        let per_measure = if light.launch.is_fitted() {
+            self.settings.density_per_sr / (light.reach_m * light.reach_m)
+        } else {
+            self.settings.density_per_sr
+        };
+        (per_measure * launch_measure / HALVES as f64)
+            .ceil()
+            .clamp(1.0, f64::from(MAX_PHOTONS)) as u32
+    }
+
+    fn with_launch<T>(&self, light: &AimedLight, f: impl FnOnce(&PhotonLaunch) -> T) -> T {
+        let source = self.tracer.scene().lights[light.light].of_unit_strength();
+        if self.has_places(light) {
+            f(&PhotonLaunch::of_places(
+                self.tracer,
+                &source,
+                light.casters(),
+                self.settings.seed,
+            ))
+        } else {
+            f(&PhotonLaunch::of_cells(light))
+        }
+    }
+
+    /// One level more of a light by photons.
+    ///
+    /// # Errors
+    /// A light whose power is no number.
+    pub(super) fn climb_photons(
+        &self,
+        light: &AimedLight,
+        sizes: &Sizes,
+        state: &mut LightState,
+        climb: &mut Climb,
+        course: &mut Course,
+    ) -> Result<()> {
+        let Some(photons) = self.next_photons(light, climb) else {
+            climb.done = true;
+            return Ok(());
+        };
+        let key = self.photon_key(light, photons, sizes);
+        let made = match state.take(&key) {
+            Some(level) => Some(level),
+            None => self.make_photons(light, key, climb.levels.last(), course)?,
+        };
+        // Not known better, and not worth knowing.
+        climb.done |= !climb.is_underrated && made.is_some() && self.is_dim(light);
+        climb.levels.extend(made);
+        Ok(())
+    }
+
+    /// The level that tells what more photons would cost; `None` where it was stopped.
+    pub(super) fn first_photons(
+        &self,
+        light: &AimedLight,
+        sizes: &Sizes,
+        state: &mut LightState,
+        course: &mut Course,
+    ) -> Result<Option<LightLevel>> {
+        let key = self.photon_key(light, FIRST_PHOTONS, sizes);
+        match state.take(&key) {
+            Some(level) => Ok(Some(level)),
+            None => self.make_photons(light, key, None, course),
+        }
+    }
+
+    fn photon_key(&self, light: &AimedLight, photons: u32, sizes: &Sizes) -> LevelKey {
+        LevelKey {
+            photons: Some(photons),
+            ..self.key(light, 0, &Climb::default(), sizes)
+        }
+    }
+
+    /// Follows the photons that are missing; `None` where it was stopped.
+    fn make_photons(
+        &self,
+        light: &AimedLight,
+        key: LevelKey,
+        before: Option<&LightLevel>,
+        course: &mut Course,
+    ) -> Result<Option<LightLevel>> {
+        let unit = self.photon_unit(light)?;
+        let photons = key.photons.unwrap_or(FIRST_PHOTONS);
+        let earlier = before.filter(|before| before.key.trace == key.trace && before.key.sizes == key.sizes);
+        let earlier = earlier.and_then(|level| Some((level.key.photons?, level.photons.as_ref()?)));
+        let first = earlier.map_or(0, |(count, _)| count);
+        let chart_for = |receiver: Receiver| self.chart(receiver, &key.sizes);
+        let nothing = PassSums::new(vec![self.part_maps(), self.part_maps()]);
+        let spectrum = self.spectra.photons(light.light);
+        let sums = course.pass(&chart_for, nothing, |course, share, mut sums| {
+            let rules = PhotonRules {
+                tracer: self.tracer,
+                spectrum,
+                effects: EffectSet::of(self.plan),
+                max_depth: self.settings.max_depth,
+                unit,
+                seed: self.settings.seed,
+            };
+            let listener = Listener {
+                progress: self.progress,
+                control: course.control,
+                done: course.outcome.counts.rays,
+                total: course.outcome.counts.rays + HALVES as u64 * u64::from(photons - first),
+            };
+            let mut halves = sums.maps.iter_mut().map(|maps| maps.sets_mut());
+            let mut halves = [halves.next(), halves.next()].map(|half| half.unwrap_or(&mut []));
+            sums.report = self.with_launch(light, |launch| {
+                let pass = PhotonPass {
+                    launch,
+                    rules,
+                    chart_for: &chart_for,
+                };
+                pass.run(first..photons, share, &mut halves, &listener)
+            });
+            sums
+        })?;
+        course.outcome.count(&sums.report, course.clock);
+        if sums.report.cancelled {
+            return Ok(None);
+        }
+        let mut raw = PhotonSums {
+            segments: sums.report.segments,
+            ledger: sums.report.ledger,
+            halves: sums.maps,
+        };
+        if let Some((_, earlier)) = earlier {
+            raw.add(earlier);
+        }
+        let unit = unit.per(u64::from(photons) * HALVES as u64);
+        let is_shard = course.labour.is_shard();
+        let level = course.clock.time(
+            |clock| &mut clock.deposit,
+            || self.photon_level(light, (key, unit), raw, is_shard),
+        );
+        Ok(Some(level))
+    }
+
+    fn photon_level(
+        &self,
+        light: &AimedLight,
+        (key, unit): (LevelKey, FluxUnit),
+        raw: PhotonSums,
+        is_shard: bool,
+    ) -> LightLevel {
+        let mut ledger = raw.ledger;
+        let mut none = LedgerSum::default();
+        let mut halves = raw.halves.iter().map(|half| {
+            let (mut maps, bands) = half.clone().into_sum();
+            self.spectra.to_linear_srgb(light.light, &mut maps, &mut none);
+            (maps, bands)
+        });
+        let (mut maps, mut bands) = halves.next().unwrap_or_else(|| (self.no_maps(), Vec::new()));
+        let (second, more) = halves.next().unwrap_or_else(|| (self.no_maps(), Vec::new()));
+        drop(halves);
+        self.spectra
+            .to_linear_srgb(light.light, &mut self.no_maps(), &mut ledger);
+        let mut noise = {
+            let [a, b] = [&maps, &second].map(|maps| accuracy::images(maps, unit));
+            accuracy::half_set_noise(&a, &b)
+        };
+        if self.settings.filter {
+            let first = maps.clone();
+            maps.add(second.clone());
+            filter::filter(&mut maps, [&first, &second], unit, &mut noise);
+        } else {
+            maps.add(second);
+        }
+        for (band, more) in bands.iter_mut().zip(more) {
+            band.add(more);
+        }
+        let energy = ledger.report("", unit, LinearSrgb::WHITE).energy_w;
+        let estimate = accuracy::by_noise(&accuracy::images(&maps, unit), &noise, &energy);
+        let error = estimate.filter(|_| !is_shard).map(|estimate| KeptError {
+            predecessors: 0,
+            estimate,
+        });
+        LightLevel {
+            error,
+            photons: Some(raw),
+            ..self.level(light, (key, unit), (maps, bands), ledger)
+        }
+    }
+
+    /// The unit of a single photon, for the sums of as many as there may be.
+    fn photon_unit(&self, light: &AimedLight) -> Result<FluxUnit> {
+        let power_w = self.with_launch(light, |launch| launch.mean_flux_w(self.settings.seed)) * MEAN_MARGIN;
+        let source = &self.tracer.scene().lights[light.light];
+        let real_w = power_w * source.strength().max_channel();
+        if power_w.is_finite() && real_w.is_finite() {
+            let bound_w = power_w * self.spectra.most_of_a_channel(light.light);
+            return Ok(FluxUnit::for_power(
+                bound_w * f64::from(MAX_PHOTONS) * HALVES as f64,
+            ));
+        }
+        Err(Error::failure(
+            &self.tracer.scene().source,
+            format!("light `{}` sends {real_w:e} W", source.name),
+            "give it an intensity that makes that a finite number",
+        ))
+    }
+}
