@@ -25,9 +25,10 @@ pub(super) const NAME: &str = "EXT_lights_area";
 #[derive(Deserialize)]
 #[serde(default)]
 struct Source {
-    /// The draft's schema requires `shape` and then describes `type`.
-    #[serde(rename = "type", alias = "shape")]
-    shape: String,
+    /// The draft's schema requires `shape` and then describes `type`: files have either or both.
+    #[serde(rename = "type")]
+    kind: Option<String>,
+    shape: Option<String>,
     color: [f64; 3],
     /// [cd/m²].
     intensity: f64,
@@ -46,7 +47,8 @@ struct Rect {
 impl Default for Source {
     fn default() -> Self {
         Self {
-            shape: "rect".into(),
+            kind: None,
+            shape: None,
             color: [1.0; 3],
             intensity: 1000.0,
             size: 1.0,
@@ -128,7 +130,7 @@ fn lamp(
     if radiance * colour.luminance() == 0.0 {
         return Err("has no power".into());
     }
-    let (shape, aspect) = match source.shape.as_str() {
+    let (shape, aspect) = match source.kind.or(source.shape).as_deref().unwrap_or("rect") {
         "rect" => (PanelShape::Rectangle, source.rect.aspect),
         "disk" => (PanelShape::Disc, 1.0),
         _ => return Err("is of an unknown shape".into()),

@@ -14,6 +14,11 @@ use support::tools::{bake, bits, builtin_scene, caustic, energy_fault, map_of};
 
 const SIDE: usize = 64;
 const BLOCK: usize = 8;
+/// Fine enough that light is smooth from texel to texel.
+const FINE: MapResolution = MapResolution::Fixed {
+    width: 256,
+    height: 256,
+};
 
 fn photons(density_per_sr: f64) -> BakeSettings {
     BakeSettings {
@@ -70,9 +75,9 @@ fn lamp_in_green_glass() -> Scene {
     scene
 }
 
-/// Blocks of the floor whose means are more than three standard errors apart.
-fn outliers(result: &BakeResult, reference: &BakeResult, scene: &Scene) -> usize {
-    let [ours, theirs] = [result, reference].map(|result| map_of(result, scene, "floor"));
+/// Blocks of a map whose means are more than three standard errors apart.
+fn outliers(result: &BakeResult, reference: &BakeResult, scene: &Scene, receiver: &str) -> usize {
+    let [ours, theirs] = [result, reference].map(|result| map_of(result, scene, receiver));
     let [a, b] = [ours, theirs].map(caustic);
     let square = |map: &IlluminationMap, texel: usize| {
         map.error
@@ -109,7 +114,12 @@ fn photons_are_unbiased() {
         let result = bake(scene.clone(), &photons(density_per_sr));
         assert_eq!(energy_fault(&result), None, "{what}");
         let reference = brute(&scene, &photons(density_per_sr), 300_000);
-        let count = outliers(&result, &reference, &scene);
+        let count = outliers(
+            &result,
+            &reference,
+            &scene,
+            if what == "prism" { "wall" } else { "floor" },
+        );
         println!(
             "{what}: {} photons, {count} outliers, {:?}",
             result.counts.rays, result.estimated_relative_rmse
@@ -140,13 +150,14 @@ fn targets_are_met_and_filtering_saves_photons() {
     let scene = frosted_ball(0.3);
     let [raw, filtered] = [false, true].map(|filter| {
         let settings = BakeSettings {
-            max_error: Some(0.1),
+            max_error: Some(0.15),
+            map_resolution: FINE,
             filter,
             ..photons(1e4)
         };
         let result = bake(scene.clone(), &settings);
         assert_eq!(energy_fault(&result), None);
-        assert!(result.estimated_relative_rmse.expect("an estimate") <= 0.1);
+        assert!(result.estimated_relative_rmse.expect("an estimate") <= 0.15);
         result
     });
     assert!(
@@ -155,7 +166,11 @@ fn targets_are_met_and_filtering_saves_photons() {
         filtered.counts.rays,
         raw.counts.rays
     );
-    let reference = bake(scene.clone(), &photons(1e8));
+    let fine = BakeSettings {
+        map_resolution: FINE,
+        ..photons(3e7)
+    };
+    let reference = bake(scene.clone(), &fine);
     let truth = caustic(map_of(&reference, &scene, "floor"));
     for result in [&raw, &filtered] {
         let map = caustic(map_of(result, &scene, "floor"));
@@ -163,7 +178,7 @@ fn targets_are_met_and_filtering_saves_photons() {
         let mean = truth.iter().sum::<f64>() / truth.len() as f64;
         let off = (squares.sum::<f64>() / truth.len() as f64).sqrt() / mean;
         println!("{} photons: off by {off}", result.counts.rays);
-        assert!(off <= 0.2, "{off}");
+        assert!(off <= 0.3, "{off}");
     }
 }
 

@@ -54,7 +54,7 @@ fn bake_prints_the_manifest_that_it_writes() {
     assert!(number(&counts["rays"]) > 0.0 && number(&counts["shadow_rays"]) > 0.0);
     assert_keys(
         &manifest["energy_w"],
-        "emitted deposited absorbed escaped truncated truncated_by_cause",
+        "emitted deposited absorbed escaped truncated truncated_by_cause sampling",
     );
     let map = &manifest["maps"][0];
     assert_keys(

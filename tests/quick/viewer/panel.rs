@@ -453,11 +453,12 @@ fn keyboard_alone_changes_values() {
     assert!(matches!(panel.settings().sigma, Sigma::Constant(sigma) if sigma > 1.0));
     panel.focus(Role::ComboBox, "Estimator");
     for (key, expected) in [
+        (Key::ArrowUp, Estimator::Photon),
         (Key::ArrowUp, Estimator::Wavefront),
+        (Key::ArrowUp, Estimator::Auto),
         // The first stays.
-        (Key::ArrowUp, Estimator::Wavefront),
-        (Key::ArrowDown, Estimator::Splat),
-        (Key::ArrowUp, Estimator::Wavefront),
+        (Key::ArrowUp, Estimator::Auto),
+        (Key::ArrowDown, Estimator::Wavefront),
     ] {
         panel.strike(key);
         assert_eq!(panel.settings().estimator, expected, "{key:?}");
