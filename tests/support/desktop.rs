@@ -40,7 +40,7 @@ const BELOW_BAKE: f64 = 160.0;
 /// Beginnings of the names of what stands above the sections and does not scroll.
 const ABOVE: [&str; 5] = ["Re-bake", "Cancel", "automatic", "Undo", "Redo"];
 
-/// Asks until there is an answer.
+/// The same, with something to tell where there is none.
 #[track_caller]
 fn poll<T>(what: &dyn Fn() -> String, mut ask: impl FnMut() -> Option<T>) -> T {
     let start = Instant::now();
@@ -51,6 +51,12 @@ fn poll<T>(what: &dyn Fn() -> String, mut ask: impl FnMut() -> Option<T>) -> T {
         assert!(start.elapsed() < PATIENCE, "{}", what());
         std::thread::sleep(Duration::from_millis(50));
     }
+}
+
+/// Asks until there is an answer.
+#[track_caller]
+pub fn wait_until<T>(what: &str, ask: impl FnMut() -> Option<T>) -> T {
+    poll(&|| format!("never: {what}"), ask)
 }
 
 /// An X server of its own on a display number that was free.

@@ -132,7 +132,7 @@ pub fn glass_bowl() -> Scene {
     let mut scene = named("glass_bowl", parts::reference_scene(1.0));
     let (centre, outer_m, inner_m) = (DVec3::new(0.0, 0.65, 0.0), 0.5, 0.44);
     let mut bowl = cap(96, 48, |direction| (centre + direction * outer_m, direction));
-    append(
+    shapes::append(
         &mut bowl,
         &cap(96, 48, |direction| (centre + direction * inner_m, -direction)),
     );
@@ -141,7 +141,7 @@ pub fn glass_bowl() -> Scene {
         let radius = inner_m + (outer_m - inner_m) * v;
         (centre + DVec3::new(cosine, 0.0, sine) * radius, DVec3::Y)
     });
-    append(&mut bowl, &rim);
+    shapes::append(&mut bowl, &rim);
     parts::add(&mut scene, "bowl", bowl, parts::dielectric("glass", 1.5));
     lamp(&mut scene, centre + DVec3::new(0.15, 0.6, 0.1));
     scene
@@ -293,12 +293,4 @@ fn cap(columns: u32, rows: u32, surface: impl Fn(DVec3) -> (DVec3, DVec3)) -> Me
         let (sine_v, cosine_v) = (0.5 * PI * v).sin_cos();
         surface(DVec3::new(sine_v * cosine_u, -cosine_v, sine_v * sine_u))
     })
-}
-
-fn append(mesh: &mut Mesh, part: &Mesh) {
-    let offset = mesh.positions.len() as u32;
-    mesh.positions.extend(&part.positions);
-    mesh.normals.extend(&part.normals);
-    mesh.triangles
-        .extend(part.triangles.iter().map(|t| t.map(|vertex| vertex + offset)));
 }

@@ -10,9 +10,8 @@ use nephroid::scene::builtin::shapes;
 use nephroid::scene::{Edit, Mesh, Scene};
 use nephroid::session::{BakeResult, BakeSession};
 use nephroid::settings::{BakeSettings, LayerKind, MapResolution};
-use nephroid::study::brute_force::brute_force;
-use nephroid::transport::Tracer;
 
+use support::brute_force::brute;
 use support::tools::{at, bits, caustic, map_of, set, settings};
 
 pub fn session(scene: &Scene) -> BakeSession {
@@ -125,9 +124,7 @@ pub fn with_threads<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) ->
 /// `most_noise`; and the watts of both.
 pub fn off_brute_force(result: &BakeResult, scene: &Scene, rays: u64, most_noise: f64) -> (f64, [f64; 2]) {
     let side = map_of(result, scene, "floor").width();
-    let tracer = Tracer::new(Arc::new(scene.clone()));
-    let reference = brute_force(&tracer, &settings(1.0, side), rays, &(), &Control::default());
-    let reference = reference.expect("a reference");
+    let reference = brute(scene, &settings(1.0, side), rays);
     let noise = map_of(&reference, scene, "floor").estimated_relative_rmse;
     let noise = noise.expect("a noise");
     assert!(noise < most_noise, "noise {noise}");

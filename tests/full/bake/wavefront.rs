@@ -107,26 +107,6 @@ fn more_rays_find_the_meshs_own_error() {
 }
 
 #[test]
-fn tighter_targets_err_less() {
-    for (name, reference) in [("ring", "S1"), ("ball", "S2")] {
-        let scene = builtin_scene(name);
-        let found = [0.05, 0.02, 0.01].map(|target| {
-            let settings = set(at(40.0 / target, 256), |s| s.max_error = Some(target));
-            let result = bake(scene.clone(), &settings);
-            assert_eq!(energy_fault(&result), None, "{name}");
-            let off = rmse(&floor(&result, &scene), &reference_map(reference));
-            (result.counts.rays, off)
-        });
-        for pair in found.windows(2) {
-            assert!(
-                pair[1].0 > pair[0].0 && pair[1].1 < pair[0].1,
-                "{name}: {found:?}"
-            );
-        }
-    }
-}
-
-#[test]
 fn what_refinement_leaves_open_shrinks() {
     let [coarse, fine] = [1e3, 3e4].map(|density| {
         let result = bake(builtin_scene("ball"), &at(density, 64));

@@ -4,10 +4,11 @@ use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 use nephroid::scene::CameraPath;
+use nephroid::viewer::files::config::ConfigFolder;
 use serde_json::{Value, json};
 
 use super::scene_file;
-use support::desktop::{ALIKE, Screen, Viewer, difference, picture, position};
+use support::desktop::{ALIKE, Screen, Viewer, difference, picture, position, wait_until};
 use support::file_drop::drop_file;
 
 /// Coarse enough to be baked in a second.
@@ -101,8 +102,13 @@ fn killed_window_comes_back_and_watches() {
         event["settings"]["layers"] == json!(["direct"])
     });
     viewer.wait_for("done", |_| true);
-    // A second, as promised, and what a busy machine needs to write.
-    std::thread::sleep(std::time::Duration::from_secs(3));
+    // It is written within a second, or what that is on a busy machine.
+    let kept = ConfigFolder::new(config.clone()).scene_file(&source);
+    wait_until("what was set is kept", || {
+        let kept = std::fs::read(&kept).ok()?;
+        let kept: Value = serde_json::from_slice(&kept).ok()?;
+        (kept["settings"]["layers"] == json!(["direct"])).then_some(())
+    });
     viewer.signal("KILL");
 
     let arguments = format!("{source} --watch --exposure 0");
