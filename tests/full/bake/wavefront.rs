@@ -1,11 +1,13 @@
 //! The wavefront estimator against an independent solver, and by its counters.
 
+use glam::{DMat3, DVec3};
 use nephroid::scene::{LoadOptions, load};
 use nephroid::session::BakeResult;
 
 use crate::bake::common::{floor, rmse, towards};
+use support::hard_scenes;
 use support::references::references;
-use support::tools::{at, bake, builtin_scene, energy_fault, map_of, set, settings};
+use support::tools::{at, bake, builtin_scene, energy_fault, map_of, set, settings, transformed};
 use support::{assert_close, project_file, reference_map, shared_or_skip};
 
 /// The others are in the quick tests.
@@ -24,6 +26,21 @@ fn few_rays_agree_with_the_solver() {
             let texel_m = map_of(&result, &scene, "floor").chart.texel_area_m2(0).sqrt();
             check_far_field(&floor(&result, &scene), texel_m);
         }
+    }
+}
+
+/// As a lamp's irradiance falls with the square of the size, and a sun's does not.
+#[test]
+fn splats_of_moved_scenes_agree() {
+    let rotation = DMat3::from_axis_angle(DVec3::new(0.3, -0.8, 0.52).normalize(), 1.234);
+    let size = 3.7;
+    let references = references();
+    let plain = ["mirror", "slab", "nephroid"];
+    for reference in references.iter().filter(|it| plain.contains(&it.builtin)) {
+        let scene = transformed(builtin_scene(reference.builtin), rotation, size, DVec3::ZERO);
+        let (density, most) = reference.by_splats.expect("held to it");
+        let result = bake(scene.clone(), &settings(density, 256));
+        reference.check(&result, &scene, size, (most, 0.005));
     }
 }
 
@@ -157,4 +174,17 @@ fn a_named_threshold_is_taken_as_it_is() {
     let named = set(towards(0.01, 64), |s| s.branch_threshold = Some(0.02));
     assert_eq!(named.path_threshold().to_bits(), 0.02_f64.to_bits());
     assert!(towards(0.1, 64).path_threshold() > towards(0.01, 64).path_threshold());
+}
+
+#[test]
+fn a_floor_of_two_objects_takes_the_same_light() {
+    for name in ["ring", "pool"] {
+        let whole = builtin_scene(name);
+        let cut = hard_scenes::with_cut_floor(whole.clone());
+        let [whole, cut] = [whole, cut].map(|scene| bake(scene, &at(1e4, 128)));
+        assert_eq!(energy_fault(&cut), None, "{name}");
+        assert_eq!(cut.maps.len(), 2, "{name}");
+        let deposited = |result: &BakeResult| result.ledgers[0].energy_w.deposited;
+        assert_close(deposited(&cut), deposited(&whole), 5e-4, name);
+    }
 }

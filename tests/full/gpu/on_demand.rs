@@ -10,8 +10,9 @@ use nephroid::eye_pass::renderer::{MapStyle, Renderer};
 use nephroid::eye_pass::{ToneMap, View};
 use nephroid::illumination::IlluminationMap;
 use nephroid::optics::LinearSrgb;
-use nephroid::scene::builtin::{parts, shapes};
-use nephroid::scene::{Material, Scene, SurfaceKind};
+use nephroid::plan;
+use nephroid::scene::builtin::{self, parts, shapes};
+use nephroid::scene::{Camera, Material, Scene, SurfaceKind};
 use nephroid::transport::Tracer;
 
 use crate::gpu::rig::{Rig, or_skip};
@@ -238,5 +239,27 @@ fn device_tells_how_long_it_took() {
         assert!(times.opaque >= 0.0 && sum > 0.0 && sum.is_finite(), "{times:?}");
         assert!(has_specular || times.specular == 0.0, "{times:?}");
         assert_eq!(times.tone_mapping, 0.0, "radiance is read back as it is");
+    }
+}
+
+#[test]
+fn built_in_scenes_look_the_same_on_auto_and_on() {
+    for name in builtin::NAMES {
+        let scene = builtin::build(name).expect("listed");
+        let (Some(mut auto), Some(mut on)) = (Rig::new(&scene, &[]), Rig::new(&scene, &[])) else {
+            return;
+        };
+        on.set_chains(EffectSwitch::On);
+        let camera = &scene.cameras[0];
+        for forward in [camera.forward, -camera.forward] {
+            let mut view = to_matte();
+            view.camera = Camera {
+                forward,
+                ..camera.clone()
+            };
+            assert!(bits(&auto.picture(&view)) == bits(&on.picture(&view)), "{name}");
+            let line = plan::chains(&scene, Some((&view.camera, 1.5)), EffectSwitch::Auto);
+            assert_eq!(drawn(&auto.renderer).1 > 0, line.on, "{name}: {}", line.reason);
+        }
     }
 }
