@@ -8,7 +8,6 @@ mod coverage;
 mod indirect;
 mod layers;
 mod live;
-mod map_files;
 mod nested;
 mod plan;
 mod probe;

@@ -3,6 +3,7 @@
 mod folders;
 mod glb;
 mod ktx2;
+mod map_files;
 mod maps;
 mod shards;
 mod textures;
