@@ -272,7 +272,7 @@ impl Screen {
         let area = self.lengths[0] * self.lengths[1];
         let size = determinant.abs();
         let size_error = ROUNDING * area;
-        if !(size > size_error) {
+        if size.is_nan() || size <= size_error {
             return false;
         }
         let side = determinant.signum();
