@@ -304,19 +304,6 @@ fn effects_are_worth_what_maps_say() {
             "{effect} adds light"
         );
     }
-    // A later study without an effect leaves no picture of it behind, and other files alone.
-    sandbox.write("out/notes.txt", "keep me");
-    study(
-        &sandbox,
-        "effects builtin:mirror -o out --density 1e3 --map-resolution 16 --repeat 1",
-    );
-    let files = sandbox.files("out");
-    let pictures: Vec<&String> = files.iter().filter(|name| name.ends_with(".png")).collect();
-    assert_eq!(
-        pictures,
-        ["difference_light_pass.png", "difference_reflection.png"]
-    );
-    assert!(files.contains(&"notes.txt".into()), "{files:?}");
 }
 
 #[test]
