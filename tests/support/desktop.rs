@@ -432,7 +432,16 @@ impl<'a> Viewer<'a> {
 
     /// Chooses what the picture shows, and waits until the log tells so.
     pub fn choose_view(&mut self, view: &str) {
-        self.click("ComboBox", "View");
+        // A list that a late window has closed again is opened once more.
+        poll(&|| format!("no {view} in {:?}", self.controls()), || {
+            self.click("ComboBox", "View");
+            let is_listed = || {
+                std::thread::sleep(Duration::from_millis(200));
+                let mut controls = self.controls().into_iter();
+                controls.any(|(role, name, _)| role == "Button" && name == view)
+            };
+            (0..20).any(|_| is_listed()).then_some(())
+        });
         self.click("Button", view);
         self.wait_for("shows", |shows| shows["what"] == view);
     }
