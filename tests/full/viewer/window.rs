@@ -302,7 +302,7 @@ fn exposure_suits_a_room_that_is_walked() {
 fn walk(viewer: &mut Viewer<'_>, rest: &Value) {
     // Over the floor, lower than eyes are.
     viewer.hands("mousemove 900 300");
-    viewer.hold("w", 1.0);
+    viewer.hands("keydown w sleep 1 keyup w");
     let start = viewer.wait_for_move(position(rest));
     viewer.hands("key ctrl+1");
     viewer.wait_for("bookmark", |event| event["number"] == 1 && event["kept"] == true);
@@ -321,7 +321,7 @@ fn walk(viewer: &mut Viewer<'_>, rest: &Value) {
         let before = stopped;
         viewer.forget();
         viewer.hands("keydown shift");
-        viewer.hold("w", 10.0);
+        viewer.hands("keydown w sleep 10 keyup w");
         viewer.hands("keyup shift");
         stopped = viewer.wait_for_move(before);
         let walked_m = before.distance(stopped);
@@ -337,7 +337,7 @@ fn walk(viewer: &mut Viewer<'_>, rest: &Value) {
         "{stopped} in {low}, {high}"
     );
     // A wall that is pressed against does not let go on.
-    viewer.hold("w", 2.0);
+    viewer.hands("keydown w sleep 2 keyup w");
     let shot = viewer.screenshot();
     viewer.hands("key 1");
     viewer.wait_for("bookmark", |event| event["number"] == 1 && event["kept"] == false);
