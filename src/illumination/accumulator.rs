@@ -8,7 +8,7 @@ use crate::optics::LinearSrgb;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FluxUnit {
     watts: f64,
-    /// Exact, as `watts` is a power of two.
+    /// Exact while `watts` is a power of two.
     counts_per_watt: f64,
 }
 
@@ -23,15 +23,6 @@ impl FluxUnit {
         Self {
             watts: exponent.exp2(),
             counts_per_watt: (-exponent).exp2(),
-        }
-    }
-
-    /// The unit of a mean over a number of sums, a power of two, where this is that of the sums.
-    #[must_use]
-    pub fn shared(self, sums: u32) -> Self {
-        Self {
-            watts: self.watts / f64::from(sums),
-            counts_per_watt: self.counts_per_watt * f64::from(sums),
         }
     }
 

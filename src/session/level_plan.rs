@@ -169,13 +169,19 @@ impl CausticLayer<'_> {
 
     /// The unit of a light's sums: by its own launch, so that other lights do not change a bit.
     pub(super) fn unit(&self, light: &AimedLight) -> Result<FluxUnit> {
+        self.unit_for(light, light.launch.power_bound_w(), 1.0)
+    }
+
+    /// The unit of so many sums of a light, each of up to `power_w` [W per channel] at unit strength.
+    ///
+    /// # Errors
+    /// A power that is no number, or none at all.
+    pub(super) fn unit_for(&self, light: &AimedLight, power_w: f64, sums: f64) -> Result<FluxUnit> {
         let source = &self.tracer.scene().lights[light.light];
-        let power_w = light.launch.power_bound_w();
         let real_w = power_w * source.strength().max_channel();
         if power_w.is_finite() && power_w > 0.0 && real_w.is_finite() {
-            return Ok(FluxUnit::for_power(
-                power_w * self.spectra.most_of_a_channel(light.light),
-            ));
+            let bound_w = power_w * self.spectra.most_of_a_channel(light.light);
+            return Ok(FluxUnit::for_power(bound_w * sums));
         }
         Err(Error::failure(
             &self.tracer.scene().source,

@@ -4,7 +4,7 @@ use super::caustic::{CausticLayer, Climb, Course};
 use super::light_level::{KeptError, LevelKey, LightLevel, LightState, PhotonSums};
 use super::map_size::Sizes;
 use super::shards::PassSums;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::illumination::Receiver;
 use crate::illumination::accumulator::FluxUnit;
 use crate::light_pass::accuracy;
@@ -252,19 +252,9 @@ impl CausticLayer<'_> {
 
     /// The unit of a single photon, for the sums of as many as there may be.
     fn photon_unit(&self, light: &AimedLight) -> Result<FluxUnit> {
-        let power_w = self.with_launch(light, |launch| launch.mean_flux_w(self.settings.seed)) * MEAN_MARGIN;
-        let source = &self.tracer.scene().lights[light.light];
-        let real_w = power_w * source.strength().max_channel();
-        if power_w.is_finite() && real_w.is_finite() {
-            let bound_w = power_w * self.spectra.most_of_a_channel(light.light);
-            return Ok(FluxUnit::for_power(
-                bound_w * f64::from(MAX_PHOTONS) * HALVES as f64,
-            ));
-        }
-        Err(Error::failure(
-            &self.tracer.scene().source,
-            format!("light `{}` sends {real_w:e} W", source.name),
-            "give it an intensity that makes that a finite number",
-        ))
+        let mean_w = self.with_launch(light, |launch| launch.mean_flux_w(self.settings.seed));
+        // Where no photon starts, any unit will do.
+        let power_w = (mean_w * MEAN_MARGIN).max(f64::MIN_POSITIVE);
+        self.unit_for(light, power_w, f64::from(MAX_PHOTONS) * HALVES as f64)
     }
 }

@@ -13,7 +13,7 @@ use super::map_size::{MapSize, Sizes};
 use super::part_maps::PartMaps;
 use super::shards::PassSums;
 use super::wavefront_level::take_strays;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::geometry::sampling::even_point;
 use crate::illumination::Receiver;
 use crate::illumination::accumulator::FluxUnit;
@@ -236,17 +236,7 @@ impl CausticLayer<'_> {
     /// The unit of sums over all wavefronts that there may be.
     fn soft_unit(&self, light: &AimedLight) -> Result<FluxUnit> {
         let power_w = light.power_bound_w(self.tracer.scene()) * STRENGTH_MARGIN;
-        let source = &self.tracer.scene().lights[light.light];
-        let real_w = power_w * source.strength().max_channel();
-        if power_w.is_finite() && power_w > 0.0 && real_w.is_finite() {
-            let bound_w = power_w * self.spectra.most_of_a_channel(light.light);
-            return Ok(FluxUnit::for_power(bound_w * f64::from(MOST_WAVEFRONTS)));
-        }
-        Err(Error::failure(
-            &self.tracer.scene().source,
-            format!("light `{}` sends {real_w:e} W", source.name),
-            "give it an intensity that makes that a finite number",
-        ))
+        self.unit_for(light, power_w, f64::from(MOST_WAVEFRONTS))
     }
 
     /// Traces and deposits the wavefronts that are missing; `None` where it was stopped.
@@ -306,7 +296,7 @@ impl CausticLayer<'_> {
             },
             ..self.level(
                 light,
-                (key, unit.shared(resolved.wavefronts)),
+                (key, unit.per(u64::from(resolved.wavefronts))),
                 (maps, bands),
                 ledger,
             )
