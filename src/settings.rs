@@ -61,6 +61,30 @@ pub enum Estimator {
     Splat,
 }
 
+/// What a target for the error means.
+#[derive(
+    Clone,
+    Copy,
+    Debug,
+    Default,
+    PartialEq,
+    Eq,
+    Serialize,
+    Deserialize,
+    EnumMessage,
+    IntoStaticStr,
+    VariantArray,
+)]
+#[serde(rename_all = "lowercase")]
+#[strum(serialize_all = "lowercase")]
+pub enum ErrorMetric {
+    /// As an eye sees it: relative to how bright a place is, with what exposure makes of the dark.
+    #[default]
+    Visible,
+    /// Root mean square over all maps, over their mean: ruled by the brightest light.
+    Rmse,
+}
+
 /// Shape of a splat. All have the same area at the same footprint: disc r = 1, box side √π, cone base √3 (footprint
 /// radii), gaussian exp(−r²/2σ).
 #[derive(
@@ -250,14 +274,14 @@ pub struct BakeSettings {
     pub estimator: Estimator,
     /// Light rays per steradian [1/sr]; for suns density/D² rays per m².
     pub density_per_sr: f64,
-    /// Target for the estimated relative RMSE of maps, [`LEAST_MAX_ERROR`] to 1: the lattice of `density_per_sr` is
-    /// refined where that needs it (wavefront). `None`: exactly that lattice.
+    /// Target for the estimated error of maps, [`LEAST_MAX_ERROR`] to 1: light goes on from `density_per_sr` until it is
+    /// met (not splat). `None`: exactly that density.
     pub max_error: Option<f64>,
+    /// What that error is.
+    #[serde(default)]
+    pub error_metric: ErrorMetric,
     /// Ends the light pass after so many seconds of wall-clock time, > 0, with the finest maps that were complete.
     pub max_time_s: Option<f64>,
-    /// Wavefronts of lights with a size and on rough surfaces, a power of two up to [`MOST_WAVEFRONTS`]: as many exactly.
-    /// `None`: as the target needs, or 32 without one.
-    pub wavefronts: Option<u32>,
     /// Lattice or jittered.
     pub rays: RayPlacement,
     /// Spread of the gaussian.
@@ -275,8 +299,9 @@ pub struct BakeSettings {
     pub item_buffer: ItemBufferKind,
     /// Size of the maps.
     pub map_resolution: MapResolution,
-    /// Largest number of specular surfaces on a path, ≥ 1.
-    pub max_depth: u32,
+    /// Largest number of specular surfaces on a path, ≥ 1. `None`: as suits what carries the light, see [`Self::depth`] and
+    /// [`Self::photon_depth`].
+    pub max_depth: Option<u32>,
     /// Branches that carry less than this share of their light ray's flux are not followed; booked as truncated. `None`:
     /// as the target allows, see [`Self::path_threshold`].
     pub branch_threshold: Option<f64>,
@@ -306,15 +331,16 @@ const COARSEST_START_PER_SR: f64 = 1_600.0;
 /// Least share of a light ray's flux that is followed without a target [1].
 const USUAL_THRESHOLD: f64 = 1e-4;
 
-/// Least share that is followed, over the relative RMSE that is aimed at. More would save segments and cost more rays
+/// Surfaces on a path without a limit of its own: of all branches, and of one.
+const USUAL_DEPTH: u32 = 16;
+const USUAL_PHOTON_DEPTH: u32 = 256;
+
+/// Least share that is followed, over the error that is aimed at. More would save segments and cost more rays
 /// than that: where branches end for their weakness alone, borders appear that the wavefront looks for.
 const THRESHOLD_PER_ERROR: f64 = 0.003;
 
-/// Least target for the relative RMSE [1].
+/// Least target for the error [1].
 pub const LEAST_MAX_ERROR: f64 = 1e-4;
-
-/// Most wavefronts of one light.
-pub const MOST_WAVEFRONTS: u32 = 1 << 14;
 
 /// Most wavelengths of a bake.
 pub const MOST_WAVELENGTHS: u32 = 1000;
@@ -326,23 +352,23 @@ pub const CONTINUOUS_BANDS: u32 = 64;
 pub const MAX_MAP_SIDE: usize = 16384;
 
 impl Default for BakeSettings {
-    /// The wavefront estimator at its preview density, without smoothing.
+    /// Both carriers at their preview density, without smoothing.
     fn default() -> Self {
         Self {
-            estimator: Estimator::Wavefront,
-            density_per_sr: Estimator::Wavefront.preview_density_per_sr(),
+            estimator: Estimator::Auto,
+            density_per_sr: Estimator::Auto.preview_density_per_sr(),
             max_error: None,
+            error_metric: ErrorMetric::Visible,
             max_time_s: None,
-            wavefronts: None,
             rays: RayPlacement::Lattice,
-            sigma: Estimator::Wavefront.default_sigma(),
+            sigma: Estimator::Auto.default_sigma(),
             kernel: Kernel::Gaussian,
             kernel_sampling: KernelSampling::Integrated,
             footprint: Footprint::Ellipse,
             filter: true,
             item_buffer: ItemBufferKind::Equal,
             map_resolution: MapResolution::Auto,
-            max_depth: 16,
+            max_depth: None,
             branch_threshold: None,
             layers: vec![LayerKind::Caustic],
             per_light: false,
@@ -397,7 +423,7 @@ impl BakeSettings {
         Self::of(Estimator::Splat)
     }
 
-    /// Density that refinement towards a relative RMSE begins from [rays/sr]: coarse enough that refinement decides, fine
+    /// Density that refinement towards an error begins from [rays/sr]: coarse enough that refinement decides, fine
     /// enough that no caster falls through.
     pub fn starting_density_per_sr(target: f64) -> f64 {
         if target <= LEAST_MAX_ERROR {
@@ -415,6 +441,16 @@ impl BakeSettings {
             // No target, or as much as time allows.
             _ => USUAL_THRESHOLD,
         })
+    }
+
+    /// Largest number of specular surfaces on a path, where every branch is followed.
+    pub fn depth(&self) -> u32 {
+        self.max_depth.unwrap_or(USUAL_DEPTH)
+    }
+
+    /// The same where one branch is: light that is caught in a body for long is followed until it comes out.
+    pub fn photon_depth(&self) -> u32 {
+        self.max_depth.unwrap_or(USUAL_PHOTON_DEPTH)
     }
 
     /// How rays and wavelengths go together: as it is set, or as suits the estimator.
@@ -468,15 +504,6 @@ impl BakeSettings {
         if let Some(limit_s) = self.max_time_s {
             finite_in("--max-time", limit_s, 1e-3, 1e7)?;
         }
-        if let Some(count) = self.wavefronts
-            && !(count.is_power_of_two() && count <= MOST_WAVEFRONTS)
-        {
-            return Err(Error::usage(
-                "--wavefronts",
-                format!("{count} is no power of two from 1 to {MOST_WAVEFRONTS}"),
-                "give one, such as 64",
-            ));
-        }
         match (self.estimator, self.sigma) {
             (estimator, Sigma::Constant(sigma)) if estimator.refines() => {
                 finite_in("--sigma", sigma, 0.0, 1e4)?;
@@ -499,7 +526,9 @@ impl BakeSettings {
             finite_in("--map-resolution", height as f64, 1.0, MAX_MAP_SIDE as f64)?;
         }
         self.validate_wavelengths()?;
-        finite_in("--max-depth", f64::from(self.max_depth), 1.0, 100_000.0)?;
+        if let Some(depth) = self.max_depth {
+            finite_in("--max-depth", f64::from(depth), 1.0, 100_000.0)?;
+        }
         finite_in("--threads", self.threads as f64, 0.0, 1024.0)?;
         if self.layers.is_empty() {
             return Err(Error::usage(
@@ -522,10 +551,10 @@ impl BakeSettings {
             ));
         }
         let is_continuous = self.wavelengths == Wavelengths::Continuous;
-        if self.spectral_sampling.is_some() && is_continuous && self.estimator == Estimator::Wavefront {
+        if self.spectral_sampling.is_some() && is_continuous && self.estimator.refines() {
             return Err(Error::usage(
                 "--spectral-sampling",
-                "a wavefront over the whole spectrum is interpolated, not sampled",
+                "only splats divide their rays between wavelengths of the whole spectrum",
                 "add --wavelengths N, or --estimator splat",
             ));
         }

@@ -142,15 +142,19 @@ pub fn summary(manifest: &Manifest, result: &BakeResult, folder: &str) -> String
         cells => format!("{cells} cells, {} splats", counts.splats),
     };
     line("rays", format!("{}, {pieces}", counts.rays));
-    if let Some(error) = result.estimated_relative_rmse {
-        let percent = 100.0 * error;
+    let (visible, rmse) = (result.estimated_visible, result.estimated_relative_rmse);
+    if let Some((visible, rmse)) = visible.zip(rmse) {
         let why = match result.stop_reason {
             StopReason::MaxError => ": the target is met",
             StopReason::MaxTime => ": the time was up",
             StopReason::Memory => ": the target takes more memory",
             _ => "",
         };
-        line("error", format!("{percent:.2} % (relative RMSE, estimated){why}"));
+        let [visible, rmse] = [visible, rmse].map(|error| 100.0 * error);
+        line(
+            "error",
+            format!("{visible:.2} % visible, {rmse:.2} % relative RMSE, estimated{why}"),
+        );
     }
     if let Some(report) = &result.forecast {
         line("forecast", told(report));
@@ -185,7 +189,7 @@ fn told(report: &ForecastReport) -> String {
     format!(
         "{}, was expected at {:.1} %; it took {:.2} s, {} rays",
         report.expected.in_words(),
-        100.0 * made_at.relative_rmse,
+        100.0 * made_at.error,
         actual.wall_s,
         actual.rays
     )
@@ -193,7 +197,7 @@ fn told(report: &ForecastReport) -> String {
 
 /// What the next better round target would take.
 fn next_target(result: &BakeResult, estimator: Estimator) -> Option<Forecast> {
-    let reached = result.course.last()?.relative_rmse;
+    let reached = result.course.last()?.error;
     let target = ROUND_TARGETS.into_iter().find(|target| *target < 0.9 * reached)?;
     forecast(&result.course, target, estimator)
 }

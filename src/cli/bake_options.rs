@@ -4,8 +4,8 @@ use clap::Args;
 use nephroid::effect::{Effect, EffectSwitch, EffectSwitches};
 use nephroid::error::{Error, Result};
 use nephroid::settings::{
-    BakeSettings, Estimator, Footprint, ItemBufferKind, Kernel, KernelSampling, LEAST_MAX_ERROR, LayerKind,
-    MapResolution, Preset, RayPlacement, Sigma, SpectralSampling, Wavelengths,
+    BakeSettings, ErrorMetric, Estimator, Footprint, ItemBufferKind, Kernel, KernelSampling, LEAST_MAX_ERROR,
+    LayerKind, MapResolution, Preset, RayPlacement, Sigma, SpectralSampling, Wavelengths,
 };
 
 use super::values;
@@ -17,28 +17,27 @@ pub struct BakeOptions {
     /// Target error by name [default: preview, unless density, error or time is given]
     #[arg(long, value_parser = values::one_of::<Preset>())]
     preset: Option<Preset>,
-    /// How light rays become irradiance [default: wavefront]
+    /// How light rays become irradiance [default: auto]
     #[arg(long, value_parser = values::one_of::<Estimator>())]
     estimator: Option<Estimator>,
     /// Light rays per steradian, and no refinement; with --max-error, to begin with. For suns density/D² rays per m², D
     /// from the casters' centre to their farthest receiver
     #[arg(long, value_name = "RAYS_PER_SR", allow_negative_numbers = true)]
     density: Option<f64>,
-    /// Refines until the estimated relative RMSE of the maps is below this, such as 2% (wavefront)
+    /// Goes on until the estimated error of the maps is below this, such as 2% (not splat)
     #[arg(long, value_name = "SHARE", value_parser = values::share, allow_hyphen_values = true)]
     max_error: Option<f64>,
+    /// What that error is: as an eye sees it, or the relative RMSE over all maps (not splat) [default: visible]
+    #[arg(long, value_parser = values::one_of::<ErrorMetric>(), value_name = "METRIC")]
+    error_metric: Option<ErrorMetric>,
     /// Ends the light pass after so long, such as 10s, with the finest maps that are complete by then; without
-    /// --max-error, refines as far as that goes (wavefront)
+    /// --max-error, refines as far as that goes (not splat)
     #[arg(long, value_name = "TIME", value_parser = values::seconds, allow_hyphen_values = true)]
     max_time: Option<f64>,
-    /// Wavefronts of lights with a size and on rough surfaces, a power of two [default: as the target needs, 32 without
-    /// one]
-    #[arg(long, value_name = "N")]
-    wavefronts: Option<u32>,
     /// Where in its lattice cell a light ray starts (splat) [default: lattice]
     #[arg(long, value_parser = values::one_of::<RayPlacement>(), value_name = "PLACEMENT")]
     rays: Option<RayPlacement>,
-    /// Spread of the gaussian kernel in squared footprint radii, or `adaptive` (splat) [default: 1]; for the wavefront,
+    /// Spread of the gaussian kernel in squared footprint radii, or `adaptive` (splat) [default: 1]; for the others,
     /// smoothing of the map in squared texel radii [default: 0, none]
     #[arg(long, value_name = "S|adaptive", value_parser = values::sigma, allow_negative_numbers = true)]
     sigma: Option<Sigma>,
@@ -60,7 +59,7 @@ pub struct BakeOptions {
     /// Texels of every map: as needed, N by N, or W by H [default: auto]
     #[arg(long, value_name = "auto|N|WxH", value_parser = values::map_resolution, allow_hyphen_values = true)]
     map_resolution: Option<MapResolution>,
-    /// Largest number of specular surfaces on a light path [default: 16]
+    /// Largest number of specular surfaces on a light path [default: 16, by photons 256]
     #[arg(long, value_name = "N")]
     max_depth: Option<u32>,
     /// Branches that carry less than this share of their light ray's flux are not followed, and booked as truncated
@@ -113,8 +112,8 @@ impl BakeOptions {
         let settings = BakeSettings {
             estimator,
             max_error,
+            error_metric: self.error_metric.unwrap_or(defaults.error_metric),
             max_time_s: self.max_time,
-            wavefronts: self.wavefronts,
             density_per_sr: self.density.unwrap_or_else(|| match (estimator, max_error) {
                 (Estimator::Splat, _) => preset.splat_density_per_sr(),
                 (_, Some(target)) => BakeSettings::starting_density_per_sr(target),
@@ -128,7 +127,7 @@ impl BakeOptions {
             filter: self.filter.unwrap_or(defaults.filter),
             item_buffer: self.item_buffer.unwrap_or(defaults.item_buffer),
             map_resolution: self.map_resolution.unwrap_or(defaults.map_resolution),
-            max_depth: self.max_depth.unwrap_or(defaults.max_depth),
+            max_depth: self.max_depth,
             branch_threshold: self.branch_threshold,
             layers,
             per_light: self.per_light,
@@ -173,7 +172,7 @@ impl BakeOptions {
         self.preset.is_some() || self.density.is_some() || self.max_error.is_some() || self.max_time.is_some()
     }
 
-    /// The relative RMSE to refine towards.
+    /// The error to refine towards.
     fn target(&self, estimator: Estimator, preset: Preset) -> Option<f64> {
         let is_exact = self.density.is_some() || estimator == Estimator::Splat;
         self.max_error.or(match (is_exact, self.preset, self.max_time) {
@@ -199,11 +198,16 @@ impl BakeOptions {
                 format!("leave {option} out or add --estimator splat"),
             ));
         }
-        if let (Estimator::Splat, Some(_)) = (estimator, self.max_error) {
+        let of_targets = [
+            ("--max-error", self.max_error.is_some()),
+            ("--error-metric", self.error_metric.is_some()),
+        ];
+        let given = of_targets.iter().find(|(_, is_given)| *is_given);
+        if let (Estimator::Splat, Some((option, _))) = (estimator, given) {
             return Err(Error::usage(
-                "--max-error",
+                *option,
                 "the splat estimator does not refine towards a target",
-                "leave --max-error out or use --estimator auto",
+                format!("leave {option} out or use --estimator auto"),
             ));
         }
         let kernel = self.kernel.unwrap_or(BakeSettings::default().kernel);

@@ -121,6 +121,8 @@ pub struct LedgerEntry {
 pub struct ErrorEstimate {
     /// Of the whole bake; `None` where it was not estimated.
     pub estimated_relative_rmse: Option<f64>,
+    /// The same as an eye sees it.
+    pub estimated_visible: Option<f64>,
 }
 
 /// One map.
@@ -158,6 +160,9 @@ pub struct MapEntry {
     pub units: String,
     /// Of this map; `None` where it was not estimated.
     pub estimated_relative_rmse: Option<f64>,
+    /// The same as an eye sees it.
+    #[serde(default)]
+    pub estimated_visible: Option<f64>,
     /// Memory that the map took in the bake [bytes].
     #[serde(default)]
     pub memory_bytes: u64,
@@ -228,6 +233,7 @@ impl Manifest {
             ledgers: result.ledgers.iter().map(LedgerEntry::from).collect(),
             error: ErrorEstimate {
                 estimated_relative_rmse: result.estimated_relative_rmse,
+                estimated_visible: result.estimated_visible,
             },
             maps,
         }
@@ -302,6 +308,7 @@ impl MapEntry {
             texel_area_m2: mean_texel_area_m2(map, width * height),
             units: UNITS.into(),
             estimated_relative_rmse: map.estimated_relative_rmse,
+            estimated_visible: map.estimated_visible,
             memory_bytes: map.chart.texel_count() as u64 * BYTES_PER_TEXEL,
             dense_bytes: (width * height) as u64 * BYTES_PER_TEXEL,
         }

@@ -209,6 +209,7 @@ impl<'a> MapReader<'a> {
             layers,
             error: image.channel("error.Y").map(<[f32]>::to_vec),
             estimated_relative_rmse: entry.estimated_relative_rmse,
+            estimated_visible: entry.estimated_visible,
         };
         Ok((map, image))
     }

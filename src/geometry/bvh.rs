@@ -6,15 +6,21 @@ use obvhs::{
     BvhBuildParams,
     aabb::Aabb,
     bvh2::{Bvh2, builder::build_bvh2},
-    ray::RayHit,
 };
 
 use super::packed::{self, PackedBvh, PackedNode};
+use super::wide::{WideBvh, WideRay};
 use super::{Ray, triangle::ShearedRay};
 
 /// Boxes are widened by this share of the scene's size, so that no rounding of the single-precision box test can lose
 /// a hit: origin, direction and slab distances err by at most some 2⁻²⁰ of the size.
 const BOX_MARGIN: f32 = 1.0 / (1 << 19) as f32;
+
+/// Leaves hold what is tested at once.
+const BUILD: BvhBuildParams = BvhBuildParams {
+    max_prims_per_leaf: 4,
+    ..BvhBuildParams::medium_build()
+};
 
 /// Rays that start farther from the centre than this many scene radii are advanced before the box tests, which would
 /// lose their precision out there.
@@ -39,8 +45,8 @@ pub struct TriangleBvh {
     bvh: Bvh2,
     /// Corners in the order of the hierarchy's leaves.
     corners: Vec<[DVec3; 3]>,
-    /// The same in single precision, to turn away what a ray clearly misses.
-    screens: Vec<Screen>,
+    /// Finds what a ray may meet.
+    wide: WideBvh,
     centre: DVec3,
     /// Single-precision units per metre.
     scale: f64,
@@ -85,16 +91,16 @@ impl TriangleBvh {
             })
             .collect();
         let mut build_time = std::time::Duration::ZERO;
-        let bvh = build_bvh2(&aabbs, BvhBuildParams::medium_build(), &mut build_time);
+        let bvh = build_bvh2(&aabbs, BUILD, &mut build_time);
         let corners: Vec<[DVec3; 3]> = bvh
             .primitive_indices
             .iter()
             .map(|&triangle| triangles[triangle as usize])
             .collect();
         let local = |corner: DVec3| (corner - centre) * scale;
-        let screens = corners.iter().map(|corners| Screen::new(corners.map(local)));
+        let singles: Vec<[DVec3; 3]> = corners.iter().map(|corners| corners.map(local)).collect();
         Self {
-            screens: screens.collect(),
+            wide: WideBvh::new(&bvh, &singles),
             bvh,
             corners,
             centre,
@@ -117,10 +123,7 @@ impl TriangleBvh {
         let mut best: Option<TriangleHit> = None;
         let sheared = ShearedRay::new(ray);
         let (local, advanced_m) = self.local_ray(ray, f64::INFINITY);
-        self.bvh.ray_traverse(local, &mut RayHit::none(), |ray, slot| {
-            if self.screens[slot].is_missed(ray) {
-                return f32::INFINITY;
-            }
+        self.wide.search(local, |slot| {
             let Some((distance_m, barycentric)) = sheared.intersect(&self.corners[slot]) else {
                 return f32::INFINITY;
             };
@@ -156,19 +159,16 @@ impl TriangleBvh {
     ) -> bool {
         let sheared = ShearedRay::new(ray);
         let (local, _) = self.local_ray(ray, distance_m);
-        !self.bvh.ray_traverse_miss(local, |ray, slot| {
-            if self.screens[slot].is_missed(ray) {
-                return f32::INFINITY;
-            }
-            match sheared.intersect(&self.corners[slot]) {
-                Some((hit_m, barycentric))
-                    if hit_m < distance_m && is_there(self.bvh.primitive_indices[slot], barycentric) =>
-                {
-                    0.0
-                }
-                _ => f32::INFINITY,
-            }
-        })
+        let mut is_blocked = false;
+        self.wide.search(local, |slot| {
+            is_blocked = sheared
+                .intersect(&self.corners[slot])
+                .is_some_and(|(hit_m, barycentric)| {
+                    hit_m < distance_m && is_there(self.bvh.primitive_indices[slot], barycentric)
+                });
+            if is_blocked { -1.0 } else { f32::INFINITY }
+        });
+        is_blocked
     }
 
     /// The node around all triangles; `None` without any.
@@ -213,7 +213,7 @@ impl TriangleBvh {
     }
 
     /// The ray in single-precision coordinates, with the distance [m] by which its origin was advanced.
-    fn local_ray(&self, ray: &Ray, limit_m: f64) -> (obvhs::ray::Ray, f64) {
+    fn local_ray(&self, ray: &Ray, limit_m: f64) -> (WideRay, f64) {
         let towards_centre = (self.centre - ray.origin).dot(ray.direction);
         let advanced_m = (towards_centre - FAR_RADII * self.radius_m).max(0.0);
         let origin = to_single((ray.at(advanced_m) - self.centre) * self.scale);
@@ -224,68 +224,17 @@ impl TriangleBvh {
         } else {
             f32::INFINITY
         };
-        (
-            obvhs::ray::Ray::new(origin.clamp(-Vec3A::MAX, Vec3A::MAX), direction, 0.0, limit),
-            advanced_m,
-        )
+        let local = WideRay {
+            origin: origin.clamp(-Vec3A::MAX, Vec3A::MAX),
+            direction,
+            end: limit,
+        };
+        (local, advanced_m)
     }
 
     /// A distance [m] along the ray in single-precision units, rounded up so that it never cuts off what it bounds.
     fn local_distance(&self, distance_m: f64, advanced_m: f64) -> f32 {
         (((distance_m - advanced_m) * self.scale).max(0.0) as f32).next_up() + BOX_MARGIN
-    }
-}
-
-/// A triangle in single precision (Möller and Trumbore, "Fast, Minimum Storage Ray/Triangle Intersection", 1997), with
-/// margins wider than all rounding: what it turns away the exact test would turn away, and nothing else is decided here.
-#[derive(Clone, Copy, Debug)]
-struct Screen {
-    corner: Vec3A,
-    edges: [Vec3A; 2],
-    /// Lengths of the edges, rounded up.
-    lengths: [f32; 2],
-}
-
-/// Rounding of a coordinate or of an operation, several times over.
-const ROUNDING: f32 = 1e-6;
-
-impl Screen {
-    /// Of corners in units in which the scene has a radius of about one.
-    fn new([a, b, c]: [DVec3; 3]) -> Self {
-        let edges = [to_single(b - a), to_single(c - a)];
-        Self {
-            corner: to_single(a),
-            edges,
-            lengths: edges.map(|edge| edge.length() * (1.0 + ROUNDING)),
-        }
-    }
-
-    /// Whether a ray clearly misses the triangle, or meets it clearly behind its start or beyond its end. Never true of
-    /// numbers that are not finite.
-    fn is_missed(&self, ray: &obvhs::ray::Ray) -> bool {
-        let [e1, e2] = self.edges;
-        let from_corner = ray.origin - self.corner;
-        // Of a coordinate: of origin and corner, and of the sums and products that follow.
-        let error = ROUNDING * (1.0 + from_corner.length());
-        let p = ray.direction.cross(e2);
-        let determinant = e1.dot(p);
-        let area = self.lengths[0] * self.lengths[1];
-        let size = determinant.abs();
-        let size_error = ROUNDING * area;
-        if size.is_nan() || size <= size_error {
-            return false;
-        }
-        let side = determinant.signum();
-        let u = side * from_corner.dot(p);
-        let q = from_corner.cross(e1);
-        let v = side * ray.direction.dot(q);
-        let [u_error, v_error] = [self.lengths[1] * error, self.lengths[0] * error];
-        if u < -u_error || v < -v_error || u + v > size + size_error + u_error + v_error {
-            return true;
-        }
-        let distance = side * e2.dot(q);
-        let distance_error = area * error;
-        distance < -distance_error || distance > ray.tmax * (size + size_error) + distance_error
     }
 }
 

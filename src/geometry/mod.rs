@@ -8,6 +8,7 @@ pub mod packed;
 pub mod ray;
 pub mod sampling;
 pub mod triangle;
+mod wide;
 
 pub use bvh::{TriangleBvh, TriangleHit};
 pub use frustum::Frustum;

@@ -39,8 +39,9 @@ impl ShearedRay {
 
     /// Distance in units of the ray's direction and barycentric coordinates of the hit in front of the origin; both
     /// sides count. Two triangles that share an edge or a vertex leave no gap between them.
+    #[inline]
     pub fn intersect(&self, corners: &[DVec3; 3]) -> Option<(f64, [f64; 3])> {
-        let [a, b, c] = corners.map(|corner| corner - self.origin);
+        let [a, b, c] = corners.map(|corner| (corner - self.origin).to_array());
         let [kx, ky, kz] = self.axes;
         let (sx, sy) = (self.shear.x, self.shear.y);
         let (ax, ay) = (a[kx] - sx * a[kz], a[ky] - sy * a[kz]);

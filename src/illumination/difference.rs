@@ -186,6 +186,7 @@ mod tests {
             }],
             error: None,
             estimated_relative_rmse: None,
+            estimated_visible: None,
         }
     }
 

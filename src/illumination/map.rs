@@ -27,6 +27,8 @@ pub struct IlluminationMap {
     pub error: Option<Vec<f32>>,
     /// Estimated relative RMSE of this map, where it was estimated.
     pub estimated_relative_rmse: Option<f64>,
+    /// Estimated visible error of this map, where it was estimated.
+    pub estimated_visible: Option<f64>,
 }
 
 impl IlluminationMap {
@@ -37,6 +39,7 @@ impl IlluminationMap {
             layers: vec![Layer { kind, irradiance }],
             error: None,
             estimated_relative_rmse: None,
+            estimated_visible: None,
         }
     }
 

@@ -110,7 +110,8 @@ impl Image {
         }
     }
 
-    fn area_m2(&self, texel: usize) -> f64 {
+    /// Of a texel's surface [m²].
+    pub fn area_m2(&self, texel: usize) -> f64 {
         if self.texel_areas_m2.len() == 1 {
             self.texel_areas_m2[0]
         } else {
@@ -147,7 +148,7 @@ impl Image {
     }
 
     /// Sums over tiles, each texel by its area.
-    fn tile_sums(&self, squares: &[f64]) -> Vec<f64> {
+    pub fn tile_sums(&self, squares: &[f64]) -> Vec<f64> {
         let (columns, rows) = tile_counts(self.width, self.height);
         let mut sums = vec![0.0; columns * rows];
         let tiles = self.tiles();
@@ -418,28 +419,6 @@ fn by_squares(
     (flux_w > 0.0).then_some(error)
 }
 
-/// Two independent parts of one error.
-pub fn together(a: &LightError, b: &LightError) -> LightError {
-    let mut sum = a.clone();
-    sum.relative_rmse = a.relative_rmse.hypot(b.relative_rmse);
-    for (receiver, part) in &b.maps {
-        match sum.maps.get_mut(receiver) {
-            Some(map) if map.size == part.size => {
-                for (texel, more) in map.texels.iter_mut().zip(&part.texels) {
-                    *texel = texel.hypot(*more);
-                }
-                for (tile, more) in map.tiles.iter_mut().zip(&part.tiles) {
-                    *tile += more;
-                }
-            }
-            _ => {
-                sum.maps.insert(*receiver, part.clone());
-            }
-        }
-    }
-    sum
-}
-
 /// R = e₂/e from three levels, half-way to the first-order ratio.
 fn measured_ratio(middle: &Images, coarse: &Images, fine: &BTreeMap<Receiver, (Vec<f64>, Vec<f64>)>) -> f64 {
     let newer: f64 = fine.values().flat_map(|(_, tiles)| tiles).sum();
@@ -473,11 +452,19 @@ pub fn given_up_share(ledger: &EnergyLedger) -> f64 {
 }
 
 /// The roughest tiles, as many as have to be refined for a relative RMSE of `goal`: refining divides their error by the
-/// ratio of the levels. All that have some error, where that is not enough.
-pub fn rough_tiles(error: &LightError, goal: f64) -> RoughTiles {
+/// ratio of the levels. All that have some error, where that is not enough. `counted`: squared errors of tiles, where they
+/// do not all count alike.
+pub fn rough_tiles(
+    error: &LightError,
+    goal: f64,
+    counted: Option<&BTreeMap<Receiver, Vec<f64>>>,
+) -> RoughTiles {
     let mut tiles: Vec<(f64, Receiver, usize)> = Vec::new();
     for (&receiver, map) in &error.maps {
-        let with_error = map.tiles.iter().enumerate().filter(|(_, square)| **square > 0.0);
+        let squares = counted
+            .and_then(|counted| counted.get(&receiver))
+            .unwrap_or(&map.tiles);
+        let with_error = squares.iter().enumerate().filter(|(_, square)| **square > 0.0);
         tiles.extend(with_error.map(|(tile, &square)| (square, receiver, tile)));
     }
     // The roughest first; equals by their place.

@@ -21,12 +21,22 @@ pub struct Mesh {
 impl Mesh {
     /// Corner positions of a triangle [m].
     pub fn corners(&self, triangle: usize) -> [DVec3; 3] {
-        self.triangles[triangle].map(|vertex| self.positions[vertex as usize])
+        let [a, b, c] = self.triangles[triangle];
+        [
+            self.positions[a as usize],
+            self.positions[b as usize],
+            self.positions[c as usize],
+        ]
     }
 
     /// Vertex normals of a triangle.
     pub fn corner_normals(&self, triangle: usize) -> [DVec3; 3] {
-        self.triangles[triangle].map(|vertex| self.normals[vertex as usize])
+        let [a, b, c] = self.triangles[triangle];
+        [
+            self.normals[a as usize],
+            self.normals[b as usize],
+            self.normals[c as usize],
+        ]
     }
 
     /// Unit normal of a triangle by its winding; zero for a degenerate one.

@@ -7,9 +7,10 @@
 use super::caustic::{CausticLayer, Climb, Course};
 use super::light_level::{LightLevel, LightState};
 use super::map_size::Sizes;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::light_pass::caustic::setup::AimedLight;
 use crate::light_pass::photon::pass::HALVES;
+use crate::plan::Effect;
 use crate::settings::Estimator;
 
 /// Time of a cell of patches over that of a photon's segment, where a photon has but one; it grows with the cube of their
@@ -37,6 +38,59 @@ pub(super) enum Carrier {
 }
 
 impl CausticLayer<'_> {
+    /// Whether its light comes from many places.
+    pub(super) fn has_places(&self, light: &AimedLight) -> bool {
+        self.plan.is_on(Effect::AreaLights) && self.tracer.scene().lights[light.light].has_extent()
+    }
+
+    /// A rough surface that light meets.
+    fn rough_object(&self, light: &AimedLight) -> Option<usize> {
+        let scene = self.tracer.scene();
+        let reached = self.aim.sights[light.light].reached.iter();
+        let mut objects = reached.map(|&(object, _)| object);
+        let rough = objects.find(|&object| scene.material_of(object).is_rough());
+        rough.filter(|_| self.plan.is_on(Effect::Roughness))
+    }
+
+    /// Whether only photons can carry a light.
+    fn is_soft(&self, light: &AimedLight) -> bool {
+        self.has_places(light) || self.rough_object(light).is_some()
+    }
+
+    /// # Errors
+    /// A light of many places or on rough surfaces, for an estimator that has neither.
+    pub(super) fn refuse_soft_light(&self, lights: &[&AimedLight]) -> Result<()> {
+        let estimator = self.settings.estimator;
+        if matches!(estimator, Estimator::Auto | Estimator::Photon) {
+            return Ok(());
+        }
+        let scene = self.tracer.scene();
+        for light in lights {
+            let source = &scene.lights[light.light];
+            let (cause, effect) = if self.has_places(light) {
+                (String::from("has a size"), Effect::AreaLights)
+            } else if let Some(object) = self.rough_object(light) {
+                let name = &scene.objects[object].name;
+                (format!("shines on `{name}`, which is rough"), Effect::Roughness)
+            } else {
+                continue;
+            };
+            return Err(Error::failure(
+                &scene.source,
+                format!(
+                    "light `{}` {cause}, which the {} estimator cannot follow",
+                    source.name,
+                    <&str>::from(estimator)
+                ),
+                format!(
+                    "use --estimator auto or photon, or leave the effect out with --effects {}=off",
+                    effect.name()
+                ),
+            ));
+        }
+        Ok(())
+    }
+
     /// What carries a light to begin with.
     pub(super) fn carrier(&self, light: &AimedLight) -> Carrier {
         match self.settings.estimator {
@@ -64,7 +118,10 @@ impl CausticLayer<'_> {
         if climb.pilot.is_none() {
             climb.pilot = self.first_photons(light, sizes, state, course)?;
         }
-        let costs = climb.pilot.as_ref().and_then(|pilot| photon_costs(pilot, target));
+        let costs = climb
+            .pilot
+            .as_ref()
+            .and_then(|pilot| photon_costs(pilot, climb.aim.unwrap_or(target)));
         let Some((by_photons, per_photon)) = costs else {
             // Nothing arrived: patches find what is too rare for a few photons.
             climb.carrier = Carrier::Patches;

@@ -7,19 +7,19 @@ use super::carrier::Carrier;
 use super::clock::Clock;
 use super::finish::Shown;
 use super::forecast::{CostPoint, Forecast, forecast};
-use super::goals::Goal;
+use super::goals::{Errors, Goal};
 use super::light_level::{KeptError, LevelKey, LightLevel, LightState, LightStates};
 use super::map_size::Sizes;
+use super::metric::{Backdrop, Counting};
 use super::shards::{Labour, PassSums};
 use super::sizes::MapSizes;
-use super::soft_level::SOFT_BEGINNING;
 use super::spectra::Spectra;
 use crate::error::{Error, Result, Warning};
 use crate::illumination::accumulator::FluxUnit;
 use crate::illumination::{Receiver, Side};
 use crate::light_pass::accuracy::{self, Before, Images, LightError};
 use crate::light_pass::caustic::pass::{PassReport, Stopwatch};
-use crate::light_pass::caustic::setup::{Aim, AimedLight, Aiming};
+use crate::light_pass::caustic::setup::{Aim, AimedLight};
 use crate::light_pass::caustic::statistics::FootprintStatistics;
 use crate::light_pass::receiver_maps::ChartFor;
 use crate::light_pass::share::Share;
@@ -27,7 +27,7 @@ use crate::light_pass::wavefront::refine::Round;
 use crate::optics::LinearSrgb;
 use crate::plan::{Effect, EffectPlan};
 use crate::progress::{Control, Progress};
-use crate::settings::{BakeSettings, Estimator, ItemBufferKind};
+use crate::settings::{BakeSettings, Estimator};
 use crate::transport::Tracer;
 
 /// Levels that an error estimate needs: each lattice with half the steps of the one before.
@@ -98,6 +98,8 @@ pub(super) struct Climb {
     pub(super) rounds: Vec<Round>,
     /// Relative RMSE that the last round aims at.
     pub(super) goal: Option<f64>,
+    /// Relative RMSE of its own maps that the target of the whole bake asks for.
+    pub(super) aim: Option<f64>,
     pub(super) done: bool,
     /// Whether it was taken to be dim and is not.
     pub(super) is_underrated: bool,
@@ -123,8 +125,32 @@ impl Climb {
     }
 }
 
-/// Takes a picture that is not the last: levels, where the bake stands, and the clock.
-pub(super) type ShowLevels<'a> = dyn FnMut(&[Shown], &CausticOutcome, &mut Clock) -> Result<()> + 'a;
+/// Who watches a bake.
+pub(super) trait Onlooker {
+    /// Takes a picture that is not the last: levels, where the bake stands, and the clock.
+    ///
+    /// # Errors
+    /// What ends the bake.
+    fn show(&mut self, _levels: &[Shown], _so_far: &CausticOutcome, _clock: &mut Clock) -> Result<()> {
+        Ok(())
+    }
+
+    /// The light of other layers on the maps of these levels and of all others.
+    fn backdrop(&mut self, _levels: &[Shown]) -> Backdrop {
+        Backdrop::new()
+    }
+}
+
+/// Nobody.
+impl Onlooker for () {}
+
+/// The pictures of all lights so far.
+pub(super) fn shown<'a>(lights: &[&AimedLight], climbs: &'a [Climb]) -> Vec<Shown<'a>> {
+    let pictures = lights.iter().zip(climbs);
+    pictures
+        .filter_map(|(light, climb)| Some((light.light, climb.shown()?)))
+        .collect()
+}
 
 /// Works on a bake in its course.
 pub(super) struct Course<'a> {
@@ -160,14 +186,7 @@ impl Course<'_> {
 }
 
 impl CausticLayer<'_> {
-    /// How item buffers are made, and how thoroughly what cannot matter is left out.
-    pub(super) fn aiming(&self) -> (ItemBufferKind, Aiming) {
-        let (item_buffer, aiming, _) = super::aim_key(self.settings);
-        (item_buffer, aiming)
-    }
-
-    /// Bakes all lights, taking from the states what still holds. `show` is called whenever there is a better picture
-    /// than before, but for the last.
+    /// Bakes all lights, taking from the states what still holds. The onlooker sees every picture but the last.
     ///
     /// # Errors
     /// A light whose power is no number.
@@ -175,7 +194,7 @@ impl CausticLayer<'_> {
         &self,
         states: &mut LightStates,
         (clock, labour): (&mut Clock, &mut Labour),
-        show: &mut ShowLevels,
+        onlooker: &mut dyn Onlooker,
     ) -> Result<CausticOutcome> {
         if labour.is_cut() && !self.fits_anyway() {
             return Err(Error::failure(
@@ -190,9 +209,16 @@ impl CausticLayer<'_> {
         }
         let mut outcome = CausticOutcome::default();
         let lights: Vec<&AimedLight> = self.lit().collect();
+        self.refuse_soft_light(&lights)?;
         let whole = self.control.without_deadline();
+        let limited = match self.settings.max_time_s {
+            Some(limit_s) => self
+                .control
+                .with_deadline(self.began + Duration::from_secs_f64(limit_s)),
+            None => self.control.without_deadline(),
+        };
         let mut course = Course {
-            control: &whole,
+            control: &limited,
             clock,
             outcome: &mut outcome,
             labour,
@@ -214,17 +240,14 @@ impl CausticLayer<'_> {
                 ..Climb::default()
             });
         }
-        let limited = match self.settings.max_time_s {
-            Some(limit_s) => self
-                .control
-                .with_deadline(self.began + Duration::from_secs_f64(limit_s)),
-            None => self.control.without_deadline(),
-        };
-        loop {
+        course.control = &whole;
+        let errors = loop {
             for (light, climb) in lights.iter().zip(&mut climbs).filter(|(_, climb)| !climb.done) {
                 self.climb(light, &sizes, states.of_mut(light.light), climb, &mut course)?;
             }
-            for index in self.underrated(&lights, &climbs) {
+            let mut counting = self.counting(&lights, &climbs, onlooker);
+            let mut errors = self.errors(&lights, &climbs, &counting);
+            for index in self.underrated(&errors, &climbs) {
                 climbs[index] = Climb {
                     is_underrated: true,
                     carrier: climbs[index].carrier,
@@ -232,22 +255,19 @@ impl CausticLayer<'_> {
                 };
                 let state = states.of_mut(lights[index].light);
                 self.climb(lights[index], &sizes, state, &mut climbs[index], &mut course)?;
+                counting = self.counting(&lights, &climbs, onlooker);
+                errors = self.errors(&lights, &climbs, &counting);
             }
-            self.decide(&lights, &mut climbs);
-            self.note_cost(states, &lights, &climbs, &mut course);
+            self.decide(&lights, &mut climbs, &errors, &counting);
+            self.note_cost(states, &lights, &climbs, &errors, &mut course);
             // The first picture is worth waiting for, the others have their time.
             course.control = &limited;
             if limited.is_cancelled() || climbs.iter().all(|climb| climb.done) {
-                break;
+                break errors;
             }
-            let levels: Vec<Shown> = lights
-                .iter()
-                .zip(&climbs)
-                .filter_map(|(light, climb)| Some((light.light, climb.shown()?)))
-                .collect();
-            show(&levels, course.outcome, course.clock)?;
-        }
-        outcome.stopped = self.stopped(&lights, &climbs, &limited);
+            onlooker.show(&shown(&lights, &climbs), course.outcome, course.clock)?;
+        };
+        outcome.stopped = self.stopped(&climbs, &errors, &limited);
         for (light, mut climb) in lights.iter().zip(climbs) {
             // The last level is the picture; a pilot that is not is kept for the next bake.
             let is_shown = climb.shown().is_some_and(|level| level.key.photons.is_some());
@@ -267,12 +287,21 @@ impl CausticLayer<'_> {
     }
 
     /// Writes down what the error of this level took, where it is known.
-    fn note_cost(&self, states: &LightStates, lights: &[&AimedLight], climbs: &[Climb], course: &mut Course) {
-        let Some(errors) = self.errors(lights, climbs) else {
-            return;
-        };
-        let relative_rmse = errors.relative_rmse();
-        if !relative_rmse.is_finite() {
+    fn note_cost(
+        &self,
+        states: &LightStates,
+        lights: &[&AimedLight],
+        climbs: &[Climb],
+        errors: &Errors,
+        course: &mut Course,
+    ) {
+        let error = errors.error();
+        // What the first photons cost says nothing of patches.
+        let is_open = climbs.iter().any(|climb| {
+            climb.carrier == Carrier::Undecided
+                && climb.levels.last().is_none_or(|level| level.error.is_none())
+        });
+        if !Self::knows_all(errors, lights) || !error.is_finite() || is_open {
             return;
         }
         let held = climbs
@@ -285,13 +314,11 @@ impl CausticLayer<'_> {
             cpu_s: clock.plan.cpu + clock.trace.cpu + clock.deposit.cpu,
             wall_s: clock.plan.wall + clock.trace.wall + clock.deposit.wall,
             bytes: states.bytes() + held.sum::<u64>(),
-            relative_rmse,
+            error,
             is_coarse: lights.iter().zip(climbs).any(|(light, climb)| {
                 let begins = self.lattices(light).len();
                 let begins = if climb.carrier == Carrier::Photons {
                     1
-                } else if self.is_soft(light) {
-                    SOFT_BEGINNING
                 } else {
                     begins
                 };
@@ -327,7 +354,7 @@ impl CausticLayer<'_> {
     }
 
     /// Why there is no finer level.
-    fn stopped(&self, lights: &[&AimedLight], climbs: &[Climb], limited: &Control) -> Option<Stopped> {
+    fn stopped(&self, climbs: &[Climb], errors: &Errors, limited: &Control) -> Option<Stopped> {
         if self.control.is_cancelled() {
             return Some(Stopped::Cancelled);
         }
@@ -335,8 +362,7 @@ impl CausticLayer<'_> {
             return Some(Stopped::Time);
         }
         let target = self.settings.max_error?;
-        let known = self.known_errors(lights, climbs);
-        (known.lights.is_empty() || known.relative_rmse() <= target).then_some(Stopped::Target)
+        (errors.is_empty() || errors.error() <= target).then_some(Stopped::Target)
     }
 
     /// Lights that see something specular and shine at all.
@@ -365,9 +391,6 @@ impl CausticLayer<'_> {
         }
         if climb.carrier == Carrier::Photons {
             return self.climb_photons(light, sizes, state, climb, course);
-        }
-        if self.is_soft(light) {
-            return self.climb_soft(light, sizes, state, climb, course);
         }
         let unit = self.unit(light)?;
         let step = climb.levels.len();
@@ -406,8 +429,8 @@ impl CausticLayer<'_> {
     }
 
     /// Which lights go on, and what each of them aims at.
-    fn decide(&self, lights: &[&AimedLight], climbs: &mut [Climb]) {
-        let goals = self.goals(lights, climbs);
+    fn decide(&self, lights: &[&AimedLight], climbs: &mut [Climb], errors: &Errors, counting: &Counting) {
+        let goals = self.goals(lights, climbs, errors);
         for ((light, climb), goal) in lights.iter().zip(climbs).zip(goals) {
             if climb.done {
                 continue;
@@ -416,15 +439,10 @@ impl CausticLayer<'_> {
                 Goal::Enough => true,
                 Goal::NextLevel => !self.has_next_level(light, climb),
                 Goal::Refine(target) if climb.carrier == Carrier::Photons => {
-                    climb.goal = Some(target);
                     let is_good = climb.error().is_some_and(|error| error.relative_rmse <= target);
                     is_good || !self.has_next_level(light, climb)
                 }
-                Goal::Refine(target) if self.is_soft(light) => {
-                    let is_good = climb.error().is_some_and(|error| error.relative_rmse <= target);
-                    is_good || !self.has_next_level(light, climb)
-                }
-                Goal::Refine(target) => !self.refine(climb, target),
+                Goal::Refine(target) => !self.refine(climb, target, counting),
             };
         }
     }
@@ -432,8 +450,6 @@ impl CausticLayer<'_> {
     fn has_next_level(&self, light: &AimedLight, climb: &Climb) -> bool {
         if climb.carrier == Carrier::Photons {
             self.next_photons(light, climb).is_some()
-        } else if self.is_soft(light) {
-            self.next_resolved(light, climb).is_some()
         } else {
             climb.levels.len() < self.lattices(light).len()
         }
@@ -496,7 +512,7 @@ impl CausticLayer<'_> {
     }
 
     /// Decides on another round of refinement towards a relative RMSE; false where there is nothing more to do.
-    fn refine(&self, climb: &mut Climb, target: f64) -> bool {
+    fn refine(&self, climb: &mut Climb, target: f64, counting: &Counting) -> bool {
         let Some(error) = climb.error() else {
             return false;
         };
@@ -508,9 +524,17 @@ impl CausticLayer<'_> {
         if self.settings.estimator == Estimator::Splat || climb.rounds.len() >= MOST_ROUNDS {
             return false;
         }
-        let tiles = accuracy::rough_tiles(error, goal);
+        let Some(level) = climb.levels.last() else {
+            return false;
+        };
+        let tiles = match counting {
+            Counting::Rmse => accuracy::rough_tiles(error, goal, None),
+            Counting::Visible(counts) => {
+                accuracy::rough_tiles(error, goal, Some(&counts.of_tiles(level, error)))
+            }
+        };
         let is_any = !tiles.is_empty();
-        let overreaches = climb.levels.last().map_or(&[][..], |level| &level.overreaches);
+        let overreaches = &level.overreaches[..];
         let round = Round::new(tiles, overreaches);
         climb.rounds.push(round);
         climb.goal = Some(goal);

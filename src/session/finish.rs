@@ -22,6 +22,7 @@ use crate::illumination::lookup::bilinear;
 use crate::illumination::resolution::variance_within;
 use crate::illumination::smoothing::smooth;
 use crate::illumination::tiles::{Tile, TileLayout};
+use crate::illumination::visible::visible_error;
 use crate::illumination::{Chart, IlluminationMap, Layer, Receiver};
 use crate::light_pass::accuracy;
 use crate::light_pass::ledger::LightLedger;
@@ -29,7 +30,7 @@ use crate::light_pass::receiver_maps::ReceiverMap;
 use crate::optics::LinearSrgb;
 use crate::plan::{self, Effect, EffectPlan};
 use crate::scene::{Light, Scene};
-use crate::settings::{BakeSettings, LayerKind, Sigma};
+use crate::settings::{BakeSettings, ErrorMetric, LayerKind, Sigma};
 
 /// The finest level of a light, with the light's place in the scene.
 pub(super) type Shown<'a> = (usize, &'a LightLevel);
@@ -74,15 +75,22 @@ impl Finish<'_> {
             ledger.with_radiant(level.radiant, level.deposited_radiant_w(light))
         });
         let ledgers: Vec<LightLedger> = ledgers.collect();
-        let estimated_relative_rmse = relative_rmse(&maps).map(|rmse| rmse.hypot(given_up_share(&ledgers)));
+        let given_up = given_up_share(&ledgers);
+        let estimated_relative_rmse = relative_rmse(&maps).map(|rmse| rmse.hypot(given_up));
+        let (estimated_visible, of_maps) = visible_error(&maps, given_up);
+        for (map, error) in maps.iter_mut().zip(of_maps) {
+            map.estimated_visible = error;
+        }
+        let estimated_error = match self.settings.error_metric {
+            ErrorMetric::Visible => estimated_visible,
+            ErrorMetric::Rmse => estimated_relative_rmse,
+        };
         let is_scarce = outcome.warnings.iter().any(|warning| warning.location == MEMORY);
         let target = self.settings.max_error.unwrap_or(f64::INFINITY);
         let stop_reason = match outcome.stopped {
             Some(Stopped::Cancelled) => StopReason::Cancelled,
             Some(Stopped::Time) => StopReason::MaxTime,
-            Some(Stopped::Target) if is_scarce && estimated_relative_rmse > Some(target) => {
-                StopReason::Memory
-            }
+            Some(Stopped::Target) if is_scarce && estimated_error > Some(target) => StopReason::Memory,
             Some(Stopped::Target) => StopReason::MaxError,
             None if self.plan.is_on(Effect::LightPass) || self.plan.is_on(Effect::Direct) => {
                 StopReason::Density
@@ -93,6 +101,7 @@ impl Finish<'_> {
         warnings.extend(beyond_single(&maps));
         BakeResult {
             estimated_relative_rmse,
+            estimated_visible,
             band_layers: self.band_layers(&maps, levels),
             maps,
             light_layers,
@@ -204,6 +213,7 @@ impl Finish<'_> {
             layers,
             error,
             estimated_relative_rmse: None,
+            estimated_visible: None,
         }
     }
 
@@ -279,7 +289,7 @@ impl Finish<'_> {
         layers
     }
 
-    fn direct_layer(&self, chart: &Arc<Chart>, direct: &DirectCache) -> Option<Layer> {
+    pub(super) fn direct_layer(&self, chart: &Arc<Chart>, direct: &DirectCache) -> Option<Layer> {
         self.direct_of(chart, direct, 0..self.scene.lights.len())
     }
 

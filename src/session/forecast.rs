@@ -19,8 +19,9 @@ pub struct CostPoint {
     pub wall_s: f64,
     /// Memory held for maps, rays and patches [bytes].
     pub bytes: u64,
-    /// Of all maps, estimated.
-    pub relative_rmse: f64,
+    /// Of all maps, estimated, in the metric of the bake.
+    #[serde(alias = "relative_rmse")]
+    pub error: f64,
     /// Whether the lattice that refinement begins from is still to come: no bake ends before it.
     pub is_coarse: bool,
 }
@@ -28,7 +29,7 @@ pub struct CostPoint {
 /// What a target is expected to cost.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Forecast {
-    /// Relative RMSE that is aimed at.
+    /// Error that is aimed at.
     pub target: f64,
     /// Light rays.
     pub rays: u64,
@@ -103,9 +104,8 @@ const WHOLE_ROUND: f64 = 2.0;
 /// What `target` is expected to cost by an estimator; `None` where nothing is known of the error yet. Splats are not
 /// refined: for them it is the cost of another bake, with more rays.
 pub fn forecast(course: &[CostPoint], target: f64, estimator: Estimator) -> Option<Forecast> {
-    let met = |point: &&CostPoint| {
-        (!point.is_coarse || estimator == Estimator::Splat) && point.relative_rmse <= target
-    };
+    let met =
+        |point: &&CostPoint| (!point.is_coarse || estimator == Estimator::Splat) && point.error <= target;
     let of_point = |point: &CostPoint, times: [f64; 2], factor: f64| Forecast {
         target,
         rays: (point.rays.max(1) as f64 * times[0]) as u64,
@@ -125,7 +125,7 @@ pub fn forecast(course: &[CostPoint], target: f64, estimator: Estimator) -> Opti
         Estimator::Splat => ([SPLATS, SPLATS], false),
     };
     let beginning = if is_coarse { BEGINNING_GAIN } else { 1.0 };
-    let gain = (last.relative_rmse / beginning / target).max(1.0);
+    let gain = (last.error / beginning / target).max(1.0);
     let costs: [fn(&CostPoint) -> f64; 2] = [|point| point.rays as f64, |point| point.cpu_s];
     let times = [0, 1].map(|which| {
         let begun = if is_coarse { growths[which].beginning } else { 1.0 };
@@ -151,7 +151,7 @@ impl Slope {
     /// rests on little.
     fn of(course: &[CostPoint], cost: fn(&CostPoint) -> f64, usual: f64) -> Self {
         let is_measured = |point: &&CostPoint| !point.is_coarse && cost(point) > 0.0;
-        let logarithms = |point: &CostPoint| (-point.relative_rmse.ln(), cost(point).ln());
+        let logarithms = |point: &CostPoint| (-point.error.ln(), cost(point).ln());
         let points: Vec<(f64, f64)> = course.iter().filter(is_measured).map(logarithms).collect();
         let count = points.len().max(1) as f64;
         let sums = points
@@ -174,7 +174,7 @@ impl Slope {
 /// for the last of all. `None` of a course of one level.
 pub fn stood_at(course: &[CostPoint], error: f64) -> Option<usize> {
     let before_end = course.len().checked_sub(2)?;
-    let first = course.iter().position(|point| point.relative_rmse <= error);
+    let first = course.iter().position(|point| point.error <= error);
     Some(first.unwrap_or(before_end).min(before_end))
 }
 
@@ -221,13 +221,13 @@ fn rounded_count(count: f64) -> String {
 mod tests {
     use super::*;
 
-    fn point(rays: u64, cpu_s: f64, relative_rmse: f64) -> CostPoint {
+    fn point(rays: u64, cpu_s: f64, error: f64) -> CostPoint {
         CostPoint {
             rays,
             cpu_s,
             wall_s: 0.5 * cpu_s,
             bytes: 1000,
-            relative_rmse,
+            error,
             is_coarse: false,
         }
     }
@@ -289,7 +289,7 @@ mod tests {
         let many: Vec<_> = (0..8)
             .map(|level| point(1_000 << level, 0.1, 0.5_f64.powi(level + 1)))
             .collect();
-        let target = many[7].relative_rmse / 500.0;
+        let target = many[7].error / 500.0;
         assert!(factor(&many, target) < factor(&one, 0.001));
     }
 

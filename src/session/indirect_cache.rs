@@ -43,7 +43,7 @@ impl IndirectCache {
     pub(super) fn prepare(&mut self, tracer: &Tracer, sizes: &MapSizes, settings: &BakeSettings) {
         let key = Key {
             grids: sizes.grid_sizes(settings, most_texels(settings)),
-            max_depth: settings.max_depth,
+            max_depth: settings.depth(),
             seed: settings.seed,
         };
         if self.network.as_ref().is_some_and(|(known, _)| *known == key) {

@@ -40,10 +40,7 @@ const UNIT_DENSITY_PER_SR: f64 = 1e5;
 const LEAST_STATISTICS_SIDE: usize = 32;
 
 /// How much coarser than the last one a coarse lattice is deposited at most.
-pub(super) const MOST_COARSE: f64 = 16.0;
-
-/// Branches of soft light are given up at so many times the usual share: each is traced for many wavefronts.
-const SOFT_THRESHOLD: f64 = 5.0;
+const MOST_COARSE: f64 = 16.0;
 
 /// How coarse triangles may be for a target, relative to those of a bake without one: over this relative RMSE.
 const USUAL_ERROR: f64 = 0.012;
@@ -99,7 +96,6 @@ impl CausticLayer<'_> {
                 is_dim: !climb.is_underrated && self.is_dim(light),
                 ..self.trace_key(light, size, before_last as i32, &climb.rounds)
             },
-            resolved: None,
             photons: None,
             sizes: sizes.clone(),
             coarseness: coarseness(self.settings.max_error, climb.goal)
@@ -202,19 +198,18 @@ impl CausticLayer<'_> {
             placement: self.settings.rays,
             centre: DVec2::splat(0.5),
             seed: self.settings.seed,
-            limits: self.limits(light),
+            limits: self.limits(),
             unit,
         }
     }
 
     /// Of the paths of a wavefront.
-    pub(super) fn limits(&self, light: &AimedLight) -> PathLimits {
-        let softly = if self.is_soft(light) { SOFT_THRESHOLD } else { 1.0 };
+    pub(super) fn limits(&self) -> PathLimits {
         PathLimits {
-            max_depth: self.settings.max_depth,
-            branch_threshold: self.settings.path_threshold() * softly,
+            max_depth: self.settings.depth(),
+            branch_threshold: self.settings.path_threshold(),
             effects: EffectSet::of(self.plan),
-            microfacets: light.microfacets,
+            microfacets: None,
         }
     }
 
@@ -285,7 +280,7 @@ impl CausticLayer<'_> {
 }
 
 /// How coarse triangles may be for a target or, in a round of refinement, its goal.
-pub(super) fn coarseness(target: Option<f64>, goal: Option<f64>) -> f64 {
+fn coarseness(target: Option<f64>, goal: Option<f64>) -> f64 {
     match (target, goal) {
         (None, _) => 1.0,
         (Some(target), None) => (target / USUAL_ERROR).clamp(1.0, 8.0),

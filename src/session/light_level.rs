@@ -5,7 +5,6 @@ use std::collections::BTreeMap;
 use super::band_layers::LevelBand;
 use super::map_size::Sizes;
 use super::part_maps::PartMaps;
-use super::soft_level::Resolved;
 use super::spectra::SpectralKey;
 use crate::illumination::Receiver;
 use crate::illumination::accumulator::{FluxCount, FluxUnit};
@@ -62,21 +61,8 @@ pub(super) struct LevelKey {
     pub(super) kernels: BakeSettings,
     /// Every so many-th ray alone (splats).
     pub(super) stride: usize,
-    /// Of a soft light: its wavefronts.
-    pub(super) resolved: Option<Resolved>,
     /// Of a light by photons: how many each half has.
     pub(super) photons: Option<u32>,
-}
-
-/// The two dimensions of a soft light's error, as far as they are known.
-#[derive(Clone, Debug, Default)]
-pub(super) struct SoftParts {
-    /// By the number of wavefronts.
-    pub(super) spread: Option<LightError>,
-    /// By the lattice.
-    pub(super) lattice: Option<LightError>,
-    /// The maps of all wavefronts on a coarser lattice.
-    pub(super) coarse: Option<ReceiverMaps>,
 }
 
 /// Levels that are kept whatever they take: an error needs them.
@@ -112,8 +98,6 @@ pub(super) struct LightLevel {
     pub(super) traced: Option<TracedLight>,
     /// Whether the maps have the light's colour already.
     pub(super) has_own_colour: bool,
-    /// Of a soft light: what its error is made of.
-    pub(super) parts: SoftParts,
 }
 
 /// What photons have left so far, before it is divided by their number.

@@ -15,13 +15,14 @@ mod level_plan;
 mod light_level;
 mod map_plan;
 mod map_size;
+mod metric;
 mod part_maps;
 mod photon_level;
 pub mod result;
 mod scene_change;
 pub mod shards;
+mod showing;
 mod sizes;
-mod soft_level;
 mod spectra;
 mod splat_level;
 pub mod survey;
@@ -49,7 +50,7 @@ use crate::progress::{Control, Progress, Stage};
 use crate::scene::Scene;
 use crate::settings::{BakeSettings, ItemBufferKind};
 use crate::transport::Tracer;
-use caustic::{CausticLayer, CausticOutcome, ShowLevels, Stopped};
+use caustic::{CausticLayer, CausticOutcome, Onlooker, Stopped};
 use clock::Clock;
 use direct_cache::DirectCache;
 use direct_work::DirectWork;
@@ -59,6 +60,7 @@ use indirect_work::{Gathering, IndirectWork};
 use light_level::LightStates;
 use scene_change::SceneChange;
 use shards::Labour;
+use showing::{Showing, TakeLevel};
 use sizes::MapSizes;
 use spectra::Spectra;
 
@@ -259,7 +261,7 @@ impl BakeSession {
         settings: &BakeSettings,
         progress: &dyn Progress,
         control: &Control,
-        level: Option<&mut (dyn FnMut(BakeResult) + Send)>,
+        level: Option<&mut TakeLevel>,
     ) -> Result<BakeResult> {
         settings.validate()?;
         self.threads
@@ -315,7 +317,7 @@ impl BakeSession {
         settings: &BakeSettings,
         progress: &dyn Progress,
         control: &Control,
-        mut level: Option<&mut (dyn FnMut(BakeResult) + Send)>,
+        level: Option<&mut TakeLevel>,
         labour: &mut Labour,
     ) -> Result<BakeResult> {
         let whole = Stopwatch::start();
@@ -336,37 +338,29 @@ impl BakeSession {
             settings,
             plan,
         };
-        let (lights, direct, indirect) = (&mut self.lights, &mut self.direct, &mut self.indirect);
-        let mut lamps = DirectWork::default();
-        let mut is_first = true;
-        let show: &mut ShowLevels = &mut |levels, so_far, clock| {
-            let Some(level) = &mut level else {
-                return Ok(());
-            };
-            let (charts, scarce) = finish.charts(levels);
-            let direct_charts = finish.direct_charts(&charts);
-            // The first picture is to come soon: direct light follows with the second.
-            let waits =
-                std::mem::take(&mut is_first) && !direct.knows(finish.scene.lights.len(), &direct_charts);
-            if !waits && plan.is_on(Effect::Direct) {
-                lamps.shine(tracer, &direct_charts, direct, (progress, control));
-            }
-            let mut so_far = lamps.added_to(so_far);
-            so_far.counts.item_buffer_tests = item_buffer_tests;
-            so_far.warnings.extend(scarce);
-            let (mut maps, mut parts) = finish.maps(levels, &charts, direct);
-            if plan.is_on(Effect::Indirect) && !waits {
-                let mut known = IndirectWork::default();
-                known.remember(indirect, &maps);
-                known.add_to(indirect, &mut maps, &mut parts);
-            }
-            let mut result = finish.result((maps, parts), levels, &so_far);
-            clock.total = whole.elapsed();
-            account(&mut result, &finish, aim, &lamps.clock(clock));
-            level(result);
-            Ok(())
+        let lights = &mut self.lights;
+        let mut showing = Showing {
+            finish: &finish,
+            tracer,
+            aim,
+            progress,
+            control,
+            watch: &whole,
+            item_buffer_tests,
+            level,
+            direct: &mut self.direct,
+            indirect: &mut self.indirect,
+            lamps: DirectWork::default(),
+            is_first: true,
         };
-        let mut outcome = ground.bake(&self.sizes, lights, &mut clock, labour, show)?;
+        let mut outcome = ground.bake(&self.sizes, lights, &mut clock, labour, &mut showing)?;
+        let Showing {
+            mut lamps,
+            direct,
+            indirect,
+            mut level,
+            ..
+        } = showing;
         let finished: Vec<Shown> = outcome
             .finished
             .iter()
@@ -472,7 +466,7 @@ impl Ground<'_> {
         lights: &mut LightStates,
         clock: &mut Clock,
         labour: &mut Labour,
-        show: &mut ShowLevels,
+        onlooker: &mut dyn Onlooker,
     ) -> Result<CausticOutcome> {
         if !self.plan.is_on(Effect::LightPass) {
             return Ok(CausticOutcome::default());
@@ -490,7 +484,7 @@ impl Ground<'_> {
             control: self.control,
             began: self.began,
         };
-        layer.bake(lights, (clock, labour), show)
+        layer.bake(lights, (clock, labour), onlooker)
     }
 }
 

@@ -33,6 +33,9 @@ const GROWTH: (f64, f64) = (1.5, 8.0);
 /// Somewhat more photons than the target should need, so that no level is made for little.
 const MARGIN: f64 = 1.1;
 
+/// Noise that is this part of the error aimed at is little enough, whatever else the error holds.
+const LEAST_NOISE: f64 = 0.3;
+
 /// The mean flux of all photons may be so many times that of the first ones.
 const MEAN_MARGIN: f64 = 16.0;
 
@@ -51,12 +54,23 @@ impl CausticLayer<'_> {
         let Some(before) = before else {
             return Some(FIRST_PHOTONS);
         };
-        let known = last
-            .and_then(|level| level.error.as_ref())
-            .map(|error| error.estimate.relative_rmse);
-        let goal = climb.goal.unwrap_or(target);
-        let times = match known.filter(|error| error.is_finite() && *error > 0.0) {
-            Some(error) => (MARGIN * (error / goal).powi(2)).clamp(GROWTH.0, GROWTH.1),
+        let known = last.and_then(|level| {
+            let error = level.error.as_ref()?.estimate.relative_rmse;
+            let ledger = level.ledger.report("", level.unit, LinearSrgb::WHITE);
+            let given_up = accuracy::given_up_share(&ledger.energy_w);
+            (error.is_finite() && error > 0.0).then_some((error, given_up))
+        });
+        let goal = climb.aim.unwrap_or(target);
+        let times = match known {
+            Some((error, given_up)) => {
+                // More photons do not bring back what was given up.
+                let noise2 = error * error - given_up * given_up;
+                let wanted2 = (goal * goal - given_up * given_up).max((LEAST_NOISE * goal).powi(2));
+                if noise2 <= wanted2 {
+                    return None;
+                }
+                (MARGIN * noise2 / wanted2).clamp(GROWTH.0, GROWTH.1)
+            }
             None if before >= MAX_WITHOUT_ERROR => return None,
             None => GROWTH.1,
         };
@@ -161,7 +175,7 @@ impl CausticLayer<'_> {
                 tracer: self.tracer,
                 spectrum,
                 effects: EffectSet::of(self.plan),
-                max_depth: self.settings.max_depth,
+                max_depth: self.settings.photon_depth(),
                 unit,
                 seed: self.settings.seed,
             };

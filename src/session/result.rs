@@ -8,7 +8,7 @@ use crate::error::Warning;
 use crate::illumination::{IlluminationMap, Receiver};
 use crate::light_pass::ledger::LightLedger;
 use crate::plan::EffectPlan;
-use crate::settings::LayerKind;
+use crate::settings::{ErrorMetric, LayerKind};
 
 /// Why a bake ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -131,10 +131,22 @@ pub struct BakeResult {
     pub cpu_s: Timings,
     /// Estimated relative RMSE over all maps; `None` where nothing was estimated.
     pub estimated_relative_rmse: Option<f64>,
+    /// Estimated visible error of all maps; `None` where nothing was estimated.
+    pub estimated_visible: Option<f64>,
     /// Why it ended.
     pub stop_reason: StopReason,
     /// True where it was stopped before it was done.
     pub partial: bool,
     /// What the user should know of.
     pub warnings: Vec<Warning>,
+}
+
+impl BakeResult {
+    /// The estimated error of all maps, in a metric.
+    pub fn estimated_error(&self, metric: ErrorMetric) -> Option<f64> {
+        match metric {
+            ErrorMetric::Visible => self.estimated_visible,
+            ErrorMetric::Rmse => self.estimated_relative_rmse,
+        }
+    }
 }

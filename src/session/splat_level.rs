@@ -172,28 +172,6 @@ impl CausticLayer<'_> {
         }
     }
 
-    /// Traces and deposits one wavefront of a soft light onto maps.
-    pub(super) fn run_splats(
-        &self,
-        light: &AimedLight,
-        key: &LevelKey,
-        unit: FluxUnit,
-        maps: PartMaps,
-        course: &Course,
-    ) -> (PassReport, PartMaps) {
-        let lattice = Lattice {
-            size: key.trace.size,
-            ..self.lattice(light, unit)
-        };
-        let worker = Worker {
-            share: None,
-            source: Source::Rays { keep_bytes: 0 },
-        };
-        let (mut sums, _) =
-            self.deposit_parts(light, lattice, worker, key, PassSums::new(vec![maps]), course);
-        (sums.report, sums.maps.swap_remove(0))
-    }
-
     /// Maps of every second ray across and down, each for four.
     pub(super) fn thinned_images(
         &self,

@@ -127,7 +127,7 @@ fn splat_forecast(pilot: &BakeResult, preset: Preset) -> Option<Forecast> {
     let gain = preset.splat_density_per_sr() / PILOT_DENSITY_PER_SR;
     Some(Forecast {
         // Twice as exact with four times the rays, as a rule.
-        target: last.relative_rmse / gain.sqrt(),
+        target: last.error / gain.sqrt(),
         rays: (last.rays as f64 * gain) as u64,
         cpu_s: last.cpu_s * gain,
         wall_s: last.wall_s * gain,

@@ -2,14 +2,14 @@
 
 use glam::DVec2;
 
+use super::carrier::Carrier;
 use super::caustic::{CausticLayer, Course};
-use super::light_level::{LevelKey, LightLevel, LightState, SoftParts, TraceKey};
-use super::part_maps::PartMaps;
+use super::light_level::{LevelKey, LightLevel, LightState, TraceKey};
 use super::shards::PassSums;
 use crate::error::Result;
 use crate::illumination::Receiver;
 use crate::illumination::accumulator::FluxUnit;
-use crate::light_pass::caustic::pass::{Listener, PassReport};
+use crate::light_pass::caustic::pass::Listener;
 use crate::light_pass::caustic::setup::AimedLight;
 use crate::light_pass::caustic::statistics::FootprintStatistics;
 use crate::light_pass::ledger_sum::{Account, LedgerSum};
@@ -30,6 +30,9 @@ use crate::settings::Estimator;
 
 /// Relative RMSE up to which automatic maps are as fine as for a preview.
 const USUAL_MAP_ERROR: f64 = 0.03;
+
+/// Light that is less than this share of its ray's says nothing of the sizes of maps.
+const LEAST_SIZED_SHARE: f64 = 0.01;
 
 impl CausticLayer<'_> {
     /// Traces and deposits a level, or deposits again what was traced for other maps; `None` where it was stopped.
@@ -64,7 +67,7 @@ impl CausticLayer<'_> {
         let mut sums = course.pass(&chart_for, nothing, |course, share, mut sums| {
             let maps = &mut sums.maps[0];
             let size = self.spectra.part_size(light.light, key.trace.size);
-            let bodies = self.small_bodies(light, size, self.closeness(light, &key.trace));
+            let bodies = self.small_bodies(light, size, Self::closeness(&key.trace));
             for (number, (band, part)) in self.spectra.parts(light.light).into_iter().enumerate() {
                 let share = share.map(|share| share.shifted(number as u64));
                 let depositor = WavefrontDepositor {
@@ -136,42 +139,7 @@ impl CausticLayer<'_> {
             work: (0, 0),
             traced: None,
             has_own_colour: self.spectra.has(light.light),
-            parts: SoftParts::default(),
         }
-    }
-
-    /// Traces and deposits one wavefront of a soft light onto maps.
-    pub(super) fn run_patches(
-        &self,
-        light: &AimedLight,
-        key: &LevelKey,
-        unit: FluxUnit,
-        (receivers, chart_for): (&Receivers, &ChartFor),
-        maps: &mut PartMaps,
-        course: &Course,
-    ) -> PassReport {
-        let size = self.spectra.part_size(light.light, key.trace.size);
-        let bodies = self.small_bodies(light, size, self.closeness(light, &key.trace));
-        let listener = Listener {
-            progress: &(),
-            control: course.control,
-            done: 0,
-            total: 0,
-        };
-        let mut report = PassReport::default();
-        for (band, part) in self.spectra.parts(light.light) {
-            let depositor = WavefrontDepositor {
-                receivers,
-                chart_for,
-                lattice: self.bumpy_lattice(light, part, &key.trace, &bodies, unit, course.control),
-                reference_w: reference_w(light),
-                coarseness: key.coarseness,
-            };
-            let mut rays = KeptRays::default();
-            let maps = Some(maps.of(band));
-            report.merge(depositor.run(None, &mut rays, maps, &listener, Room::default()).0);
-        }
-        report
     }
 
     /// Sizes of lit areas at the density that maps are meant for, from a thinner lattice.
@@ -187,14 +155,23 @@ impl CausticLayer<'_> {
         let receivers = Receivers::new(self.tracer, chart_for);
         let none = SmallBodies::default();
         let size = self.statistics_size(light);
+        let mut lattice = WavefrontLattice {
+            // Light that goes very many ways lies as wide as its cells: pieces of them say nothing of it.
+            splits: Splits::NONE,
+            ..self.wavefront_lattice(light, LightPart::White, size, &none, unit, course.control)
+        };
+        // Rays that patches can go on with are kept; where photons may do the rest, few ways are enough.
+        let is_for_patches = self.carrier(light) == Carrier::Patches;
+        let mut own = KeptRays::default();
+        let rays = if is_for_patches { &mut state.rays } else { &mut own };
+        if !is_for_patches {
+            let threshold = &mut lattice.tracer.limits.branch_threshold;
+            *threshold = threshold.max(LEAST_SIZED_SHARE);
+        }
         let depositor = WavefrontDepositor {
             receivers: &receivers,
             chart_for,
-            lattice: WavefrontLattice {
-                // Light that goes very many ways lies as wide as its cells: pieces of them say nothing of it.
-                splits: Splits::NONE,
-                ..self.wavefront_lattice(light, LightPart::White, size, &none, unit, course.control)
-            },
+            lattice,
             reference_w: reference_w(light),
             coarseness: 1.0,
         };
@@ -208,7 +185,7 @@ impl CausticLayer<'_> {
             bands_bytes: 0,
             ..self.room()
         };
-        let (mut report, _) = depositor.run(None, &mut state.rays, None, &listener, room);
+        let (mut report, _) = depositor.run(None, rays, None, &listener, room);
         // Its patches are in no map.
         (report.cells, report.splats) = (0, 0);
         course.outcome.count(&report, course.clock);
@@ -248,9 +225,9 @@ impl CausticLayer<'_> {
         }
     }
 
-    fn closeness(&self, light: &AimedLight, trace: &TraceKey) -> Closeness {
-        if self.is_soft(light) || trace.is_dim {
-            Closeness::SOFT
+    fn closeness(trace: &TraceKey) -> Closeness {
+        if trace.is_dim {
+            Closeness::DIM
         } else {
             Closeness::SHARP
         }
@@ -279,7 +256,7 @@ impl CausticLayer<'_> {
     ) -> WavefrontLattice<'a> {
         let size = self.spectra.part_size(light.light, trace.size);
         let mut lattice = self.wavefront_lattice(light, part, size, bodies, unit, control);
-        lattice.tracer = lattice.tracer.with_closeness(self.closeness(light, trace));
+        lattice.tracer = lattice.tracer.with_closeness(Self::closeness(trace));
         lattice.tracer.bumps = BumpCells::for_lattice(lattice.cell_count(), trace.coarser);
         lattice
     }
@@ -297,7 +274,7 @@ impl CausticLayer<'_> {
         let tracer = StrandTracer::new(
             self.tracer,
             &light.launch,
-            self.limits(light),
+            self.limits(),
             [1.0 / size.0 as f64, 1.0 / size.1 as f64],
             control,
         );

@@ -102,7 +102,7 @@ fn run(
     let run = Run {
         tracer,
         limits: PathLimits {
-            max_depth: settings.max_depth,
+            max_depth: settings.photon_depth(),
             branch_threshold: settings.path_threshold(),
             effects: EffectSet::EVERYTHING,
             microfacets: None,
@@ -251,7 +251,7 @@ impl Run<'_> {
                 let emitter = Emitter::sample(&source, self.tracer.scene(), square);
                 let there = emitter
                     .filter(|_| !heard.control.is_cancelled())
-                    .and_then(|emitter| light.another(self.tracer, self.aiming, Some(emitter), None));
+                    .and_then(|emitter| light.from_place(self.tracer, self.aiming, &emitter));
                 let part = Part {
                     half: Some(half),
                     share: 1.0 / (HALVES * PLACES) as f64,
@@ -470,6 +470,7 @@ fn empty_result(plan: EffectPlan, nothing_to_do: bool) -> BakeResult {
         timings_s: Timings::default(),
         cpu_s: Timings::default(),
         estimated_relative_rmse: None,
+        estimated_visible: None,
         stop_reason: if nothing_to_do {
             StopReason::NothingToDo
         } else {

@@ -205,7 +205,7 @@ const ACCURACY: &[Column] = &[
     },
     Column {
         name: "predicted_at_rmse",
-        value: |m| share(predicted(m).map(|(made_at, _)| made_at.relative_rmse)),
+        value: |m| share(predicted(m).map(|(made_at, _)| made_at.error)),
     },
     Column {
         name: "predicted_rays",

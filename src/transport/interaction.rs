@@ -69,17 +69,6 @@ pub struct Interaction {
     pub switched_off: LinearSrgb,
 }
 
-impl Interaction {
-    /// No light is anywhere yet.
-    const NOTHING: Self = Self {
-        reflection: None,
-        transmission: None,
-        deposit: LinearSrgb::BLACK,
-        absorbed: LinearSrgb::BLACK,
-        switched_off: LinearSrgb::BLACK,
-    };
-}
-
 /// Orientation of a hit: normals on the side of the incoming ray.
 struct Facing {
     /// Whether the outside was met.
@@ -199,15 +188,118 @@ impl Facing {
     }
 }
 
+/// The shares of the light at one hit, before any of it is followed: its ways on are made when they are asked for.
+pub struct Meeting<'a> {
+    hit: &'a SurfaceHit,
+    incident: DVec3,
+    media: &'a MediumStack,
+    facing: Facing,
+    /// Goes back, where something does.
+    pub reflected: Option<LinearSrgb>,
+    /// Goes through, where something does.
+    pub transmitted: Option<LinearSrgb>,
+    /// Taken by the illumination map, before the albedo.
+    pub deposit: LinearSrgb,
+    /// Turned into heat here.
+    pub absorbed: LinearSrgb,
+    /// What a branch would have taken that is switched off.
+    pub switched_off: LinearSrgb,
+    through: Through,
+}
+
+/// What lies behind a surface.
+enum Through {
+    /// Nothing: all that does not go back stays.
+    Nothing,
+    /// A medium that light cannot enter at this angle.
+    Unreachable,
+    /// The other side of a thin wall.
+    ThinWall,
+    /// Another medium.
+    Medium {
+        turned: Turned,
+        media: MediumStack,
+        ior_ratio: f64,
+    },
+}
+
+impl Meeting<'_> {
+    /// The way back.
+    #[inline]
+    pub fn reflection(&self) -> Option<Branch> {
+        let share = self.reflected?;
+        let turned = self.facing.reflected(self.incident);
+        Some(Branch {
+            ray: self.hit.spawn(turned.direction),
+            share,
+            event: match self.through {
+                Through::Unreachable => Event::TotalInternalReflection,
+                _ => Event::Reflection,
+            },
+            media: *self.media,
+            ior_ratio: 1.0,
+            normal: turned.normal,
+            by: turned.by,
+        })
+    }
+
+    /// The way through.
+    #[inline]
+    pub fn transmission(&self) -> Option<Branch> {
+        let share = self.transmitted?;
+        let passed;
+        let (turned, event, media, ior_ratio) = match &self.through {
+            Through::Nothing | Through::Unreachable => return None,
+            Through::ThinWall => {
+                passed = self.facing.passed(self.incident);
+                (&passed, Event::ThinTransmission, self.media, 1.0)
+            }
+            Through::Medium {
+                turned,
+                media,
+                ior_ratio,
+            } => (turned, Event::Refraction, media, *ior_ratio),
+        };
+        Some(Branch {
+            ray: self.hit.spawn(turned.direction),
+            share,
+            event,
+            media: *media,
+            ior_ratio,
+            normal: turned.normal,
+            by: turned.by,
+        })
+    }
+
+    /// A share goes back, or would if that were on.
+    fn sends_back(&mut self, effects: EffectSet, share: LinearSrgb) {
+        if effects.reflection {
+            self.reflected = Some(share);
+        } else {
+            self.switched_off += share;
+        }
+    }
+
+    /// What does not go back goes through, but for what the surface's tint takes.
+    fn lets_through(&mut self, effects: EffectSet, reflectance: f64, tint: impl FnOnce() -> LinearSrgb) {
+        let beneath = LinearSrgb::grey(1.0 - reflectance);
+        if effects.transmission {
+            let share = tint() * (1.0 - reflectance);
+            self.absorbed = beneath - share;
+            self.transmitted = Some(share);
+        } else {
+            self.switched_off += beneath;
+        }
+    }
+}
+
 impl Tracer {
     /// What becomes of light that arrives at `hit` along the unit direction `incident`, within `media`, with every effect.
     pub fn interact(&self, hit: &SurfaceHit, incident: DVec3, media: &MediumStack) -> Interaction {
         self.interact_with(EffectSet::EVERYTHING, hit, incident, media, None)
     }
 
-    /// The same with some effects. Light that would need a branch which is not among them is `switched_off`; where
-    /// textures are not, the material's factor alone tints. `micro`: which micro-facet a rough surface shows, as a point
-    /// of the unit square; rough surfaces are smooth without it, or without lobes among the effects.
+    /// The same with some effects, as of [`Self::meet`].
     pub fn interact_with(
         &self,
         effects: EffectSet,
@@ -216,6 +308,29 @@ impl Tracer {
         media: &MediumStack,
         micro: Option<DVec2>,
     ) -> Interaction {
+        let meeting = self.meet(effects, hit, incident, media, micro);
+        Interaction {
+            reflection: meeting.reflection(),
+            transmission: meeting.transmission(),
+            deposit: meeting.deposit,
+            absorbed: meeting.absorbed,
+            switched_off: meeting.switched_off,
+        }
+    }
+
+    /// How light that arrives at `hit` along the unit direction `incident`, within `media`, is shared out. Light that
+    /// would need a branch which is not among the effects is `switched_off`; where textures are not, the material's factor
+    /// alone tints. `micro`: which micro-facet a rough surface shows, as a point of the unit square; rough surfaces are
+    /// smooth without it, or without lobes among the effects.
+    #[inline]
+    pub fn meet<'a>(
+        &self,
+        effects: EffectSet,
+        hit: &'a SurfaceHit,
+        incident: DVec3,
+        media: &'a MediumStack,
+        micro: Option<DVec2>,
+    ) -> Meeting<'a> {
         let material = self.scene().material_of(hit.object);
         let micro = micro
             .filter(|_| effects.lobes && material.is_rough())
@@ -223,34 +338,81 @@ impl Tracer {
                 alpha: material.roughness * material.roughness,
                 point,
             });
-        let facing = Facing::new(hit, incident, micro);
-        let cos_incident = facing.cos_incident(incident);
+        let mut meeting = Meeting {
+            hit,
+            incident,
+            media,
+            facing: Facing::new(hit, incident, micro),
+            reflected: None,
+            transmitted: None,
+            deposit: LinearSrgb::BLACK,
+            absorbed: LinearSrgb::BLACK,
+            switched_off: LinearSrgb::BLACK,
+            through: Through::Nothing,
+        };
         match material.surface {
-            SurfaceKind::Diffuse => Interaction {
-                deposit: LinearSrgb::WHITE,
-                ..Interaction::NOTHING
-            },
+            SurfaceKind::Diffuse => meeting.deposit = LinearSrgb::WHITE,
             SurfaceKind::Mirror => {
+                let cos_incident = meeting.facing.cos_incident(incident);
                 let share = self.metal_share(effects, hit, material, cos_incident);
-                let back = || reflection(hit, &facing, incident, media, share);
-                Interaction {
-                    absorbed: LinearSrgb::WHITE - share,
-                    ..sent_back(effects, share, back)
-                }
+                meeting.absorbed = LinearSrgb::WHITE - share;
+                meeting.sends_back(effects, share);
             }
             SurfaceKind::Mixed => {
                 let eta = material.ior / media.ior(self.scene());
+                let cos_incident = meeting.facing.cos_incident(incident);
                 let reflectance = fresnel::dielectric_reflectance(cos_incident, eta);
                 let share = LinearSrgb::grey(material.polish * reflectance);
-                let back = || reflection(hit, &facing, incident, media, share);
-                Interaction {
-                    deposit: LinearSrgb::WHITE - share,
-                    ..sent_back(effects, share, back)
-                }
+                meeting.deposit = LinearSrgb::WHITE - share;
+                meeting.sends_back(effects, share);
             }
-            SurfaceKind::ThinWall => self.thin_wall(effects, hit, &facing, incident, media, material),
-            SurfaceKind::Dielectric => self.dielectric(effects, hit, &facing, incident, media, material),
+            SurfaceKind::ThinWall => {
+                let eta = material.ior / media.ior(self.scene());
+                let cos_incident = meeting.facing.cos_incident(incident);
+                let reflectance = fresnel::thin_wall_reflectance(cos_incident, eta);
+                meeting.through = Through::ThinWall;
+                meeting.sends_back(effects, LinearSrgb::grey(reflectance));
+                meeting.lets_through(effects, reflectance, || self.tint(effects, hit, material));
+            }
+            SurfaceKind::Dielectric => self.meet_dielectric(effects, material, &mut meeting),
         }
+        meeting
+    }
+
+    fn meet_dielectric(&self, effects: EffectSet, material: &Material, meeting: &mut Meeting) {
+        let &mut Meeting {
+            hit, incident, media, ..
+        } = meeting;
+        let is_front = meeting.facing.front;
+        let beyond = if is_front {
+            media.entered(hit.object)
+        } else {
+            media.left(hit.object)
+        };
+        let (ior_near, ior_far) = if is_front {
+            (media.ior(self.scene()), material.ior)
+        } else if beyond == *media {
+            // Never entered: an open sheet, or a start within.
+            (material.ior, media.ior(self.scene()))
+        } else {
+            // Where bodies overlap, the one that was entered last is the medium until it is left.
+            (media.ior(self.scene()), beyond.ior(self.scene()))
+        };
+        let eta = ior_far / ior_near;
+        let Some(turned) = meeting.facing.refracted(incident, eta) else {
+            meeting.through = Through::Unreachable;
+            return meeting.sends_back(effects, LinearSrgb::WHITE);
+        };
+        meeting.through = Through::Medium {
+            turned,
+            media: beyond,
+            ior_ratio: ior_near / ior_far,
+        };
+        let reflectance = fresnel::dielectric_reflectance(meeting.facing.cos_incident(incident), eta);
+        if reflectance > 0.0 {
+            meeting.sends_back(effects, LinearSrgb::grey(reflectance));
+        }
+        meeting.lets_through(effects, reflectance, || self.tint(effects, hit, material));
     }
 
     /// Base colour at a hit, its texture included where textures are.
@@ -282,138 +444,5 @@ impl Tracer {
         let kept = self.texture_colour(hit);
         let rise = fresnel::metal_reflectance(cos_incident, LinearSrgb::BLACK);
         clean * kept + rise * (LinearSrgb::WHITE - kept)
-    }
-
-    fn thin_wall(
-        &self,
-        effects: EffectSet,
-        hit: &SurfaceHit,
-        facing: &Facing,
-        incident: DVec3,
-        media: &MediumStack,
-        material: &Material,
-    ) -> Interaction {
-        let cos_incident = facing.cos_incident(incident);
-        let reflectance =
-            fresnel::thin_wall_reflectance(cos_incident, material.ior / media.ior(self.scene()));
-        let share = LinearSrgb::grey(reflectance);
-        let returned = sent_back(effects, share, || reflection(hit, facing, incident, media, share));
-        let_through(effects, returned, reflectance, || {
-            let turned = facing.passed(incident);
-            Branch {
-                ray: hit.spawn(turned.direction),
-                share: self.tint(effects, hit, material) * (1.0 - reflectance),
-                event: Event::ThinTransmission,
-                media: *media,
-                ior_ratio: 1.0,
-                normal: turned.normal,
-                by: turned.by,
-            }
-        })
-    }
-
-    fn dielectric(
-        &self,
-        effects: EffectSet,
-        hit: &SurfaceHit,
-        facing: &Facing,
-        incident: DVec3,
-        media: &MediumStack,
-        material: &Material,
-    ) -> Interaction {
-        let beyond = if facing.front {
-            media.entered(hit.object)
-        } else {
-            media.left(hit.object)
-        };
-        let (ior_near, ior_far) = if facing.front {
-            (media.ior(self.scene()), material.ior)
-        } else if beyond == *media {
-            // Never entered: an open sheet, or a start within.
-            (material.ior, media.ior(self.scene()))
-        } else {
-            // Where bodies overlap, the one that was entered last is the medium until it is left.
-            (media.ior(self.scene()), beyond.ior(self.scene()))
-        };
-        let eta = ior_far / ior_near;
-        let Some(turned) = facing.refracted(incident, eta) else {
-            return sent_back(effects, LinearSrgb::WHITE, || {
-                let mut total = reflection(hit, facing, incident, media, LinearSrgb::WHITE);
-                total.event = Event::TotalInternalReflection;
-                total
-            });
-        };
-        let reflectance = fresnel::dielectric_reflectance(facing.cos_incident(incident), eta);
-        let share = LinearSrgb::grey(reflectance);
-        let returned = if reflectance > 0.0 {
-            sent_back(effects, share, || reflection(hit, facing, incident, media, share))
-        } else {
-            Interaction::NOTHING
-        };
-        let_through(effects, returned, reflectance, || Branch {
-            ray: hit.spawn(turned.direction),
-            share: self.tint(effects, hit, material) * (1.0 - reflectance),
-            event: Event::Refraction,
-            media: beyond,
-            ior_ratio: ior_near / ior_far,
-            normal: turned.normal,
-            by: turned.by,
-        })
-    }
-}
-
-/// What does not go back goes through, but for what the surface's tint takes.
-fn let_through(
-    effects: EffectSet,
-    returned: Interaction,
-    reflectance: f64,
-    branch: impl FnOnce() -> Branch,
-) -> Interaction {
-    let beneath = LinearSrgb::grey(1.0 - reflectance);
-    if !effects.transmission {
-        return Interaction {
-            switched_off: returned.switched_off + beneath,
-            ..returned
-        };
-    }
-    let transmission = branch();
-    Interaction {
-        absorbed: beneath - transmission.share,
-        transmission: Some(transmission),
-        ..returned
-    }
-}
-
-/// A share of the light goes back.
-fn sent_back(effects: EffectSet, share: LinearSrgb, branch: impl FnOnce() -> Branch) -> Interaction {
-    if effects.reflection {
-        Interaction {
-            reflection: Some(branch()),
-            ..Interaction::NOTHING
-        }
-    } else {
-        Interaction {
-            switched_off: share,
-            ..Interaction::NOTHING
-        }
-    }
-}
-
-fn reflection(
-    hit: &SurfaceHit,
-    facing: &Facing,
-    incident: DVec3,
-    media: &MediumStack,
-    share: LinearSrgb,
-) -> Branch {
-    let turned = facing.reflected(incident);
-    Branch {
-        ray: hit.spawn(turned.direction),
-        share,
-        event: Event::Reflection,
-        media: *media,
-        ior_ratio: 1.0,
-        normal: turned.normal,
-        by: turned.by,
     }
 }

@@ -310,7 +310,8 @@ impl Tracer {
         let mesh = &self.scene.objects[object].mesh;
         let corners = mesh.corners(triangle);
         let (point, point_error) = ray::point_with_error(&corners, hit.barycentric);
-        let geometric_normal = mesh.face_normal(triangle);
+        let [a, b, c] = corners;
+        let geometric_normal = (b - a).cross(c - a).normalize_or_zero();
         let [a, b, c] = mesh.corner_normals(triangle);
         let [wa, wb, wc] = hit.barycentric;
         let interpolated_normal = (a * wa + b * wb + c * wc)

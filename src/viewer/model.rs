@@ -416,7 +416,7 @@ impl Model {
         };
         let settings = &self.panel.settings;
         let limits = SketchLimits {
-            max_depth: settings.max_depth,
+            max_depth: settings.depth(),
             branch_threshold: settings.path_threshold().max(SKETCHED_SHARE),
             cells: SKETCHED_CELLS,
         };
@@ -442,7 +442,7 @@ impl Model {
         {
             let settings = &self.panel.settings;
             let limits = Limits {
-                max_depth: settings.max_depth,
+                max_depth: settings.depth(),
                 branch_threshold: settings.path_threshold(),
                 most_rays: MOST_PROBE_RAYS,
             };
@@ -529,9 +529,10 @@ impl Model {
         if is_next || !new.request.differs_in_accuracy_only(&shown.request) {
             return true;
         }
+        let metric = new.request.settings.error_metric;
         match (
-            new.result.estimated_relative_rmse,
-            shown.result.estimated_relative_rmse,
+            new.result.estimated_error(metric),
+            shown.result.estimated_error(metric),
         ) {
             (Some(new), Some(shown)) => new <= shown,
             (Some(_), None) => true,

@@ -17,7 +17,7 @@ use nephroid::scene::builtin::{self, parts, shapes};
 use nephroid::scene::edit::Edit;
 use nephroid::scene::{LightKind, Scene};
 use nephroid::session::{BakeResult, BakeSession};
-use nephroid::settings::{BakeSettings, MapResolution, Sigma};
+use nephroid::settings::{BakeSettings, Estimator, MapResolution, Sigma};
 use nephroid::transport::{MediumStack, Tracer};
 use nephroid::units::{Flux, RadiantIntensity};
 use rayon::prelude::*;
@@ -100,7 +100,7 @@ fn edits(what: &str, mut step: impl FnMut(f64) -> BakeResult) {
 }
 
 fn drags(name: &str) {
-    let base = at(BakeSettings::default(), 25_000.0, 512);
+    let base = at(BakeSettings::of(Estimator::Wavefront), 25_000.0, 512);
     let mut session = session(name);
     run(&mut session, &base);
     let with_sigma = |settings: &BakeSettings, sigma| BakeSettings {
@@ -148,7 +148,7 @@ fn first_picture(name: &str) {
         let mut see = |level: BakeResult| {
             first.get_or_insert((1e3 * start.elapsed().as_secs_f64(), level.counts.rays));
         };
-        let settings = at(BakeSettings::default(), 25_000.0, 256);
+        let settings = at(BakeSettings::of(Estimator::Wavefront), 25_000.0, 256);
         session
             .bake_levels(&settings, &(), &Control::default(), &mut see)
             .unwrap();
@@ -162,7 +162,7 @@ fn first_picture(name: &str) {
 
 /// From asking a bake to stop to its return.
 fn cancelling(name: &str) {
-    let settings = at(BakeSettings::default(), 400_000.0, 512);
+    let settings = at(BakeSettings::of(Estimator::Wavefront), 400_000.0, 512);
     let late_ms = (0..TIMES).map(|index| {
         let mut session = session(name);
         session.tracer();
@@ -190,8 +190,8 @@ fn cancelling(name: &str) {
 fn bake() {
     for (first, second) in [(256, 256), (256, 512), (512, 512)] {
         for (name, density, settings) in [
-            ("ring", 1e4, BakeSettings::default()),
-            ("pool", 1e3, BakeSettings::default()),
+            ("ring", 1e4, BakeSettings::of(Estimator::Wavefront)),
+            ("pool", 1e3, BakeSettings::of(Estimator::Wavefront)),
             ("ring", 1e6, BakeSettings::splat()),
         ] {
             let estimator: &str = settings.estimator.into();
@@ -223,7 +223,7 @@ fn deposit() {
     // The floor of the ring: a square.
     let chart = run(
         &mut session("ring"),
-        &at(BakeSettings::default(), 1e2, DEPOSIT_SIDE),
+        &at(BakeSettings::of(Estimator::Wavefront), 1e2, DEPOSIT_SIDE),
     )
     .maps[0]
         .chart
@@ -370,7 +370,10 @@ fn segments_per_s(scene: Scene, density_per_sr: f64) {
     });
     let [bare, ..] = spread(bare.collect());
     let mut session = BakeSession::new(Arc::clone(&scene)).unwrap();
-    let result = run(&mut session, &at(BakeSettings::default(), density_per_sr, 256));
+    let result = run(
+        &mut session,
+        &at(BakeSettings::of(Estimator::Wavefront), density_per_sr, 256),
+    );
     let traced = result.counts.segments as f64 / result.cpu_s.trace;
     let (counts, cpu_s) = (&result.counts, &result.cpu_s);
     println!(

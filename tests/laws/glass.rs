@@ -203,7 +203,7 @@ fn given_up(t: &mut Table) {
     let r = dielectric_reflectance(1.0, 1.5);
     for (few, many) in [(at(1e3, 16), at(4e3, 16)), (settings(1e4, 16), settings(4e4, 16))] {
         let at_most = |max_depth, branch_threshold, settings: &BakeSettings| BakeSettings {
-            max_depth,
+            max_depth: Some(max_depth),
             branch_threshold,
             ..settings.clone()
         };
@@ -222,7 +222,7 @@ fn given_up(t: &mut Table) {
             .share("given up by depth", 0.0, |e| e.truncated.depth);
         t.case("given-up-light-is-in-the-error")
             .bake_with(scene.clone(), many.clone())
-            .bake_with(scene.clone(), at_most(many.max_depth, Some(0.05), &many))
+            .bake_with(scene.clone(), at_most(many.depth(), Some(0.05), &many))
             .compare(
                 "missing or given up, over the estimated error",
                 1.0,

@@ -16,7 +16,7 @@ use nephroid::units::{Flux, Radiance};
 use support::laws::law::*;
 use support::laws::scenes::*;
 use support::laws::{Baked, Table, books_open, is_long};
-use support::tools::{at, bake, builtin_scene, set, settings, transformed};
+use support::tools::{at, bake, builtin_scene, photons, set, settings, transformed};
 
 pub fn fill(t: &mut Table) {
     for (name, scene) in [
@@ -113,23 +113,28 @@ fn uniform_scale(t: &mut Table) {
         radiance: Radiance(1.0),
     };
     let ceiling = shapes::rectangle(DVec3::Y, DVec3::X * 0.5, DVec3::Z * 0.5);
-    let of_eight_places = set(at(1e3, 32), |s| s.wavefronts = Some(8));
-    for (name, scene, power) in [
-        ("mirror", before(upright()), -2),
-        ("tinted-ball", tinted, -2),
-        ("ball-under-a-sun", sunny.sun(DVec3::new(0.2, -1.0, 0.1)), 0),
+    for (name, scene, power, settings) in [
+        ("mirror", before(upright()), -2, at(1e3, 32)),
+        ("tinted-ball", tinted, -2, at(1e3, 32)),
+        (
+            "ball-under-a-sun",
+            sunny.sun(DVec3::new(0.2, -1.0, 0.1)),
+            0,
+            at(1e3, 32),
+        ),
         (
             "panel-below-a-mirror",
             floor(0.5).mirror(ceiling).lit(light(panel)),
             0,
+            photons(1e4, 32),
         ),
     ] {
         for scale in [0.25_f64, 8.0] {
             t.case(format!("uniform-scale-{name}"))
-                .bake_with(scene.clone(), of_eight_places.clone())
+                .bake_with(scene.clone(), settings.clone())
                 .bake_with(
                     transformed(scene.clone(), DMat3::IDENTITY, scale, DVec3::ZERO),
-                    of_eight_places.clone(),
+                    settings.clone(),
                 )
                 .as_first(
                     "E as 1/s² of lamps, as it is of suns and panels",
@@ -198,7 +203,6 @@ fn seeds(t: &mut Table) {
     soft.lights[0].size = LightSize::Radius { radius_m: 0.1 };
     let wall = shapes::rectangle(DVec3::new(-0.4, 0.4, 0.0), DVec3::Y * 0.4, DVec3::Z * 0.4);
     let jittered = set(settings(2e3, 16), |s| s.rays = RayPlacement::Jittered);
-    let of_few_places = set(at(500.0, 16), |s| s.wavefronts = Some(2));
     let indirect = BakeSettings {
         layers: vec![LayerKind::Indirect],
         max_error: Some(0.3),
@@ -206,7 +210,7 @@ fn seeds(t: &mut Table) {
     };
     for (name, scene, settings) in [
         ("rays", builtin_scene("ring"), jittered),
-        ("places-of-lamps", soft, of_few_places),
+        ("places-of-lamps", soft, photons(1e3, 16)),
         (
             "indirect-paths",
             builtin_scene("ring").diffuse("wall", wall),

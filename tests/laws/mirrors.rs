@@ -13,7 +13,7 @@ use nephroid::transport::{MediumStack, Tracer};
 use support::laws::law::*;
 use support::laws::scenes::*;
 use support::laws::{Baked, Table, is_long};
-use support::tools::{at, builtin_scene, set, settings};
+use support::tools::{at, builtin_scene, photons, set, settings};
 
 pub fn fill(t: &mut Table) {
     t.case("focus-paraboloid")
@@ -169,9 +169,8 @@ pub fn fill(t: &mut Table) {
     t.case("pinhole-before-a-mirror")
         .bake(blocked(&plates_around_a_hole()), 5e7, 32)
         .watts(4e-6 * 0.5_f64.sqrt(), 0.15);
-    let of_eight_places = set(at(500.0, 16), |s| s.wavefronts = Some(8));
     t.case("rough-lobe-below-the-horizon")
-        .bake_with(rough_at_grazing(), of_eight_places)
+        .bake_with(rough_at_grazing(), photons(1e4, 16))
         .must("light reaches the wall", |bake| deposited_w(bake) > 0.0)
         .measure("goes through to the floor, W", 1e-9, |bake| {
             floor_map(bake).map_or(0.0, |map| map.flux_w(LayerKind::Caustic).luminance())
@@ -179,7 +178,7 @@ pub fn fill(t: &mut Table) {
 }
 
 fn depth(max_depth: u32, settings: BakeSettings) -> BakeSettings {
-    set(settings, |s| s.max_depth = max_depth)
+    set(settings, |s| s.max_depth = Some(max_depth))
 }
 
 /// Share of the light that is missing in the middle texel of the floor.

@@ -120,7 +120,7 @@ fn of(seed: u64) -> BakeSettings {
         settings(1e3, 32)
     };
     BakeSettings {
-        max_depth: 4,
+        max_depth: Some(4),
         branch_threshold: Some(1e-2),
         ..estimator
     }

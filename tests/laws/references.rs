@@ -301,6 +301,7 @@ fn read_map(scene: &Scene, surface: &str, file: &str) -> IlluminationMap {
         }],
         error: None,
         estimated_relative_rmse: None,
+        estimated_visible: None,
     }
 }
 

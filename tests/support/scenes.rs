@@ -117,6 +117,7 @@ pub fn map_of(chart: impl Into<Arc<Chart>>, irradiance: Vec<[f32; 3]>) -> Illumi
         }],
         error: None,
         estimated_relative_rmse: None,
+        estimated_visible: None,
     }
 }
 

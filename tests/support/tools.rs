@@ -7,7 +7,7 @@ use nephroid::illumination::IlluminationMap;
 use nephroid::progress::Control;
 use nephroid::scene::{Camera, LightKind, Scene, builtin};
 use nephroid::session::{BakeResult, BakeSession};
-use nephroid::settings::{BakeSettings, LayerKind, MapResolution};
+use nephroid::settings::{BakeSettings, ErrorMetric, Estimator, LayerKind, MapResolution};
 
 /// A built-in scene that must exist.
 pub fn builtin_scene(name: &str) -> Scene {
@@ -32,7 +32,7 @@ pub fn settings(density_per_sr: f64, side: usize) -> BakeSettings {
     }
 }
 
-/// Wavefront settings at a density [rays/sr], with maps of `side` texels each way.
+/// Wavefront settings at a density [rays/sr], for targets in relative RMSE, with maps of `side` texels each way.
 pub fn at(density_per_sr: f64, side: usize) -> BakeSettings {
     BakeSettings {
         density_per_sr,
@@ -40,7 +40,22 @@ pub fn at(density_per_sr: f64, side: usize) -> BakeSettings {
             width: side,
             height: side,
         },
-        ..BakeSettings::default()
+        error_metric: ErrorMetric::Rmse,
+        ..BakeSettings::of(Estimator::Wavefront)
+    }
+}
+
+/// The same by photons, unfiltered, with maps of `side` texels each way.
+pub fn photons(density_per_sr: f64, side: usize) -> BakeSettings {
+    BakeSettings {
+        density_per_sr,
+        map_resolution: MapResolution::Fixed {
+            width: side,
+            height: side,
+        },
+        error_metric: ErrorMetric::Rmse,
+        filter: false,
+        ..BakeSettings::of(Estimator::Photon)
     }
 }
 

@@ -12,9 +12,9 @@ use crate::light_pass::launch::Launch;
 use crate::plan::{Reach, Sight};
 use crate::scene::{Scene, SurfaceKind};
 use crate::settings::ItemBufferKind;
-use crate::transport::{Microfacets, Tracer, media_at};
+use crate::transport::{Tracer, media_at};
 
-/// A light that sees something specular: one wavefront of it.
+/// A light that sees something specular.
 #[derive(Clone, Debug)]
 pub struct AimedLight {
     /// Index into `Scene::lights`.
@@ -29,8 +29,6 @@ pub struct AimedLight {
     pub reach_m: f64,
     /// What rays are aimed at (indices of specular objects), wherever they start.
     casters: Arc<[usize]>,
-    /// Which micro-facets rough surfaces show; `None` where all are smooth.
-    pub microfacets: Option<Microfacets>,
 }
 
 impl AimedLight {
@@ -43,8 +41,10 @@ impl AimedLight {
     pub fn casters(&self) -> &[usize] {
         &self.casters
     }
+}
 
-    /// What any wavefront of the same light may carry [W], but for another strength.
+impl AimedLight {
+    /// What any place of the light may send [W], but for another strength.
     pub fn power_bound_w(&self, scene: &Scene) -> f64 {
         let own_w = self.launch.power_bound_w();
         if !self.launch.is_fitted() {
@@ -55,31 +55,23 @@ impl AimedLight {
         own_w.max(self.launch.emitter().strength.max_channel() * (high - low).length_squared())
     }
 
-    /// The wavefront of another place of the light, for other micro-facets; `None` where it sends nothing to a caster.
-    pub fn another(
+    /// The same light as if all of it came from one of its places; `None` where that sends nothing to a caster.
+    pub fn from_place(
         &self,
         tracer: &Tracer,
         (item_buffer, aiming): (ItemBufferKind, Aiming),
-        emitter: Option<Emitter>,
-        microfacets: Option<Microfacets>,
+        emitter: &Emitter,
     ) -> Option<Self> {
-        let Some(emitter) = emitter else {
-            return Some(Self {
-                microfacets,
-                ..self.clone()
-            });
-        };
         let aimer = Aimer {
             tracer,
             item_buffer,
             aiming,
         };
-        let view = aimer.look(&emitter, &self.casters)?;
+        let view = aimer.look(emitter, &self.casters)?;
         (!view.item_buffer.casters.is_empty()).then(|| Self {
             launch: view.launch,
             item_buffer: Arc::new(view.item_buffer),
             visible: view.visible.map(Arc::new),
-            microfacets,
             ..self.clone()
         })
     }
@@ -310,7 +302,6 @@ impl Looker<'_> {
             item_buffer: Arc::new(view.item_buffer),
             visible: view.visible.map(Arc::new),
             casters,
-            microfacets: None,
         };
         (sight, Some(aimed), look)
     }

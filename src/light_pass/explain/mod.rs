@@ -160,12 +160,9 @@ fn explain_light(
             .then(|| Emitter::sample(&unit, scene, even_point(place, 0, PLACES_SEED)));
         let wavefront = match emitter {
             Some(None) => None,
-            Some(Some(emitter)) => aimed.another(
-                tracer,
-                (ItemBufferKind::Equal, Aiming::Reachable),
-                Some(emitter),
-                None,
-            ),
+            Some(Some(emitter)) => {
+                aimed.from_place(tracer, (ItemBufferKind::Equal, Aiming::Reachable), &emitter)
+            }
             None => Some(aimed.clone()),
         };
         let Some(wavefront) = wavefront else { continue };

@@ -9,7 +9,7 @@ use crate::illumination::{Receiver, Side};
 use crate::light_pass::ledger_sum::{Account, LedgerSum};
 use crate::optics::{ColourMatrix, LinearSrgb};
 use crate::scene::SurfaceKind;
-use crate::transport::{Branch, EffectSet, Interaction, MediumStack, Tracer};
+use crate::transport::{Branch, EffectSet, MediumStack, Meeting, Tracer};
 
 /// A photon whose flux (largest channel) has become less than this part of what it started with goes on by chance, with
 /// this part of it or not at all.
@@ -78,6 +78,7 @@ impl<'a> PhotonWalk<'a> {
         }
     }
 
+    #[inline]
     fn book(&mut self, account: Account, channels: &ColourMatrix, flux_w: LinearSrgb) {
         if flux_w != LinearSrgb::BLACK {
             let count = self.rules.unit.count(self.apply(channels, flux_w));
@@ -165,8 +166,8 @@ impl<'a> PhotonWalk<'a> {
         let micro = (effects.lobes && material.is_rough())
             .then(|| even_point(photon.index, LAMP_DIMENSION + 1 + depth, self.rules.seed));
         let tracer = photon.hue.tracer;
-        let interaction = tracer.interact_with(effects, &hit, ray.direction, media, micro);
-        let deposit_w = photon.flux_w * interaction.deposit;
+        let meeting = tracer.meet(effects, &hit, ray.direction, media, micro);
+        let deposit_w = photon.flux_w * meeting.deposit;
         if depth == 0 {
             // What a surface takes on the first hit is direct light.
             self.book(Account::NotEmitted, &sent_hue.channels, deposit_w);
@@ -184,14 +185,14 @@ impl<'a> PhotonWalk<'a> {
         self.book(
             Account::Absorbed,
             &photon.hue.channels,
-            photon.flux_w * interaction.absorbed,
+            photon.flux_w * meeting.absorbed,
         );
         self.book(
             Account::SwitchedOff,
             &photon.hue.channels,
-            photon.flux_w * interaction.switched_off,
+            photon.flux_w * meeting.switched_off,
         );
-        self.choose(photon, &interaction)
+        self.choose(photon, &meeting)
     }
 
     /// Gives a photon that has all wavelengths one of them.
@@ -208,27 +209,23 @@ impl<'a> PhotonWalk<'a> {
     }
 
     /// Draws the way on by the flux that goes there.
-    fn choose(&mut self, photon: &mut Photon<'a>, interaction: &Interaction) -> Option<Branch> {
-        let arriving_w = photon.flux_w;
-        let carried = |branch: &Option<Branch>| {
-            let flux_w = branch
-                .as_ref()
-                .map_or(LinearSrgb::BLACK, |branch| arriving_w * branch.share);
+    fn choose(&mut self, photon: &mut Photon<'a>, meeting: &Meeting) -> Option<Branch> {
+        let carried = |share: Option<LinearSrgb>| {
+            let flux_w = share.map_or(LinearSrgb::BLACK, |share| photon.flux_w * share);
             (flux_w, flux_w.to_array().iter().sum::<f64>())
         };
-        let (reflected_w, reflected) = carried(&interaction.reflection);
-        let (transmitted_w, transmitted) = carried(&interaction.transmission);
+        let (reflected_w, reflected) = carried(meeting.reflected);
+        let (transmitted_w, transmitted) = carried(meeting.transmitted);
         let both = reflected + transmitted;
         if both <= 0.0 {
             return None;
         }
         let share = reflected / both;
         let (branch, flux_w) = if share >= 1.0 || (share > 0.0 && photon.random.next() < share) {
-            (interaction.reflection, reflected_w * share.recip())
+            (meeting.reflection()?, reflected_w * share.recip())
         } else {
-            (interaction.transmission, transmitted_w * (1.0 - share).recip())
+            (meeting.transmission()?, transmitted_w * (1.0 - share).recip())
         };
-        let branch = branch?;
         if !(flux_w.is_finite() && branch.ray.direction.is_finite() && branch.ray.origin.is_finite()) {
             let lost_w = (reflected_w + transmitted_w).map(|w| if w.is_finite() { w } else { 0.0 });
             self.book(Account::NonFinite, &photon.hue.channels, lost_w);

@@ -12,15 +12,15 @@ pub struct Closeness {
 }
 
 impl Closeness {
-    /// A wavefront that is all there is: each border shows on the map. A corner is cut off in a 1,024th of its cell.
+    /// Each border shows on the map. A corner is cut off in a 1,024th of its cell.
     pub const SHARP: Self = Self {
         cut_bits: 8,
         corner_levels: 5,
         cells_across_casters: 160.0,
     };
 
-    /// One of many wavefronts: the borders of all lie beside each other, and their faults of either sign.
-    pub const SOFT: Self = Self {
+    /// Light that hardly shows beside that of others.
+    pub const DIM: Self = Self {
         cut_bits: 5,
         corner_levels: 1,
         cells_across_casters: 32.0,

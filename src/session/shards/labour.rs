@@ -47,11 +47,6 @@ impl Labour {
         matches!(self, Self::Shard { .. })
     }
 
-    /// Whether others have done the work, whose times count.
-    pub(in crate::session) fn is_merge(&self) -> bool {
-        matches!(self, Self::Merge(_))
-    }
-
     /// The share of the next pass; `None` where nobody shares.
     pub(in crate::session) fn share(&self) -> Option<Share> {
         match self {

@@ -108,13 +108,7 @@ impl BakeSession {
             let ground = self.ground(settings, progress, control, &mut clock);
             let mut labour = Labour::shard(share);
             let mut states = LightStates::default();
-            ground.bake(
-                &self.sizes,
-                &mut states,
-                &mut clock,
-                &mut labour,
-                &mut |_, _, _| Ok(()),
-            )?;
+            ground.bake(&self.sizes, &mut states, &mut clock, &mut labour, &mut ())?;
             if control.is_cancelled() {
                 return Err(Error::cancelled(&self.scene.source));
             }

@@ -151,7 +151,7 @@ pub fn energy(ui: &mut Ui, last: Option<&BakedLevel>) {
 
 /// "estimated error 2.1 %, 0.42 s: level 2, goes on": one line of the panel.
 fn level_line(last: &BakedLevel) -> String {
-    let error = match last.result.estimated_relative_rmse {
+    let error = match last.result.estimated_error(last.request.settings.error_metric) {
         Some(error) => format!("estimated error {} %", two_digits(100.0 * error)),
         None => "error not estimated".into(),
     };

@@ -42,7 +42,7 @@ pub fn show(ui: &mut Ui, settings: &mut BakeSettings) {
     let default = defaults(settings.estimator);
     rows(ui, "light pass", |ui| {
         let before = settings.estimator;
-        let estimator = (&mut settings.estimator, &Estimator::Wavefront);
+        let estimator = (&mut settings.estimator, &Estimator::Auto);
         setting(ui, "Estimator", no_caustic, estimator, |ui, estimator| {
             listed(ui, "estimator", estimator)
         });

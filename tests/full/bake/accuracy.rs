@@ -52,7 +52,7 @@ fn check_forecast(name: &str, result: &BakeResult, target: f64) {
     let ratio = expected.rays as f64 / actual as f64;
     println!(
         "{name:<11} at {:5.2} %, {:>6} rays: {:>6} expected, {actual:>6} taken, ratio {ratio:.2}",
-        100.0 * course[made].relative_rmse,
+        100.0 * course[made].error,
         course[made].rays,
         expected.rays
     );

@@ -121,7 +121,7 @@ fn what_changes_the_rays_traces_them_again() {
         |settings| settings.density_per_sr = 6e3,
         |settings| settings.rays = RayPlacement::Jittered,
         |settings| settings.seed = 1,
-        |settings| settings.max_depth = 2,
+        |settings| settings.max_depth = Some(2),
         |settings| settings.branch_threshold = Some(0.01),
         |settings| settings.item_buffer = ItemBufferKind::Cube,
     ];
@@ -212,7 +212,7 @@ fn rays_of_the_next_level_are_not_retraced() {
 
 #[test]
 fn a_deeper_path_traces_what_goes_deeper() {
-    let with = |max_depth| set(at(2e3, 64), |s| s.max_depth = max_depth);
+    let with = |max_depth| set(at(2e3, 64), |s| s.max_depth = Some(max_depth));
     let mut session = session(&builtin_scene("ball"));
     run(&mut session, &with(3));
     let (deeper, whole) = assert_fresh(&mut session, &with(8), "deeper");
@@ -331,7 +331,7 @@ impl Storm {
                 let side = [48, 64, 96][self.below(3)];
                 self.settings = sized(self.settings.clone(), (side, side));
             }
-            3 => self.settings.max_depth = 2 + self.below(5) as u32,
+            3 => self.settings.max_depth = Some(2 + self.below(5) as u32),
             4 => {
                 let intensity = RadiantIntensity(0.1 + self.unit());
                 return Some(Edit::LightIntensity { light, intensity });

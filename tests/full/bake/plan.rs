@@ -296,7 +296,7 @@ fn assert_plan_changes_nothing(base: &BakeSettings, seeds: impl Iterator<Item = 
         let [planned, forced] = [EffectSwitches::default(), everything.clone()].map(|effects| {
             let settings = BakeSettings {
                 // Glass in boxes has branches without end.
-                max_depth: 4,
+                max_depth: Some(4),
                 branch_threshold: Some(1e-2),
                 effects,
                 ..base.clone()

@@ -2,13 +2,16 @@
 //! energy.
 
 use glam::DVec3;
+use nephroid::effect::{Effect, EffectSwitch, EffectSwitches};
 use nephroid::optics::LinearSrgb;
+use nephroid::progress::Control;
 use nephroid::scene::builtin::{parts, shapes};
 use nephroid::scene::{LightKind, LightSize, PanelShape, Scene};
+use nephroid::settings::{BakeSettings, Estimator};
 use nephroid::units::Radiance;
 
-use crate::bake::common::{floor, off_brute_force, rmse, towards};
-use support::tools::{at, bake, builtin_scene, energy_fault, set};
+use crate::bake::common::{floor, off_brute_force, rmse, session, towards};
+use support::tools::{at, bake, builtin_scene, energy_fault, photons, set, settings};
 
 /// The ring with a square lamp of a side [m] that shines downwards, with the same intensity on its axis whatever its side.
 fn ring_under_square_lamp(side_m: f64) -> Scene {
@@ -23,11 +26,16 @@ fn ring_under_square_lamp(side_m: f64) -> Scene {
     scene
 }
 
+/// Photons until a target is reached, with maps of `side` texels each way.
+fn soft(target: f64, side: usize) -> BakeSettings {
+    set(towards(target, side), |s| s.estimator = Estimator::Photon)
+}
+
 #[test]
 fn a_square_lamp_tends_to_a_point() {
     let map_at = |side_m: f64| {
         let scene = ring_under_square_lamp(side_m);
-        let result = bake(scene.clone(), &towards(0.02, 32));
+        let result = bake(scene.clone(), &soft(0.02, 32));
         assert_eq!(energy_fault(&result), None);
         floor(&result, &scene)
     };
@@ -48,7 +56,7 @@ fn roughened(name: &str, roughness: f64) -> Scene {
     scene
 }
 
-/// A plate of frosted glass over the floor. Wider lobes take thousands of wavefronts: minutes.
+/// A plate of frosted glass over the floor.
 fn frosted_plate() -> Scene {
     let mut scene = builtin_scene("mirror");
     scene.objects.truncate(1);
@@ -75,7 +83,7 @@ fn soft_light_is_as_brute_force_has_it() {
         ("frosted glass", frosted_plate(), 0.02, true),
     ];
     for (what, scene, target, is_rough) in cases {
-        let result = bake(scene.clone(), &towards(target, 48));
+        let result = bake(scene.clone(), &soft(target, 48));
         assert_eq!(energy_fault(&result), None, "{what}");
         let estimated = result.estimated_relative_rmse.expect("an estimate");
         let rays = if is_rough { 1_700_000 } else { 1_400_000 };
@@ -96,27 +104,36 @@ fn a_rough_white_mirror_loses_nothing() {
     let walls = shapes::cuboid(DVec3::new(-1.0, -0.001, -1.0), DVec3::new(1.0, 2.0, 1.0));
     let white = parts::matte("walls", LinearSrgb::WHITE);
     parts::add(&mut scene, "walls", walls, white);
-    let settings = set(at(2_000.0, 16), |s| s.wavefronts = Some(16));
-    let result = bake(scene, &settings);
+    let result = bake(scene, &photons(1e6, 16));
     let energy = result.ledgers[0].energy_w;
     assert_eq!(energy_fault(&result), None);
     let given_up = energy.truncated.total();
-    let lost = energy.emitted - energy.deposited - given_up;
+    let lost = energy.emitted - energy.deposited - given_up - energy.sampling;
     assert!(lost.abs() < 1e-9 * energy.emitted, "{energy:?}");
     assert!(given_up.abs() < 1e-3 * energy.emitted, "{energy:?}");
     assert_eq!(energy.absorbed, 0.0);
 }
 
 #[test]
-fn as_many_wavefronts_as_asked_for() {
-    let with = |wavefronts| set(at(2_000.0, 16), |s| s.wavefronts = Some(wavefronts));
-    let rays = [16, 32].map(|wavefronts| {
-        let result = bake(roughened("mirror", 0.2), &with(wavefronts));
-        assert_eq!(energy_fault(&result), None);
-        result.counts.rays
-    });
-    let ratio = rays[1] as f64 / rays[0] as f64;
-    assert!((1.8..2.2).contains(&ratio), "{rays:?}");
-    let error = with(48).validate().expect_err("48 is no power of two");
-    assert!(error.to_string().contains("--wavefronts"), "{error}");
+fn soft_light_is_refused_by_what_cannot_carry_it() {
+    for (scene, cause) in [
+        (roughened("mirror", 0.2), "is rough"),
+        (ring_under_square_lamp(0.2), "has a size"),
+    ] {
+        for settings in [at(2_000.0, 16), settings(2_000.0, 16)] {
+            let refused = session(&scene).bake(&settings, &(), &Control::default());
+            let error = refused.expect_err(cause).to_string();
+            let has = |part: &str| error.contains(part);
+            assert!(has(cause) && has("--estimator auto or photon"), "{error}");
+        }
+        let named = if cause == "is rough" {
+            Effect::Roughness
+        } else {
+            Effect::AreaLights
+        };
+        let off = set(at(2_000.0, 16), |s| {
+            s.effects = EffectSwitches::default().with(named, EffectSwitch::Off);
+        });
+        assert_eq!(energy_fault(&bake(scene, &off)), None, "{cause}");
+    }
 }

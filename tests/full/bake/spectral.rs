@@ -21,7 +21,7 @@ use crate::bake::common::sized;
 use support::tools::{bake, builtin_scene, energy_fault, set};
 
 fn settings(side: usize) -> BakeSettings {
-    sized(BakeSettings::default(), (side, side))
+    sized(BakeSettings::of(Estimator::Wavefront), (side, side))
 }
 
 fn at_wavelengths(wavelengths: Wavelengths, settings: BakeSettings) -> BakeSettings {

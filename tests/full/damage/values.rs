@@ -3,7 +3,7 @@
 use super::mutate::{Damage, effort};
 use support::program::{Run, Sandbox};
 
-const OPTIONS: &str = "--preset --estimator --density --max-error --max-time --wavefronts --rays --sigma --kernel \
+const OPTIONS: &str = "--preset --estimator --density --max-error --max-time --rays --sigma --kernel \
     --kernel-sampling --footprint --item-buffer --map-resolution --max-depth --branch-threshold --layers --effects --seed \
     --memory --threads --environment --log --solid-glass --per-light";
 

@@ -51,12 +51,12 @@ fn a_stage_keeps_its_pace_within_a_limit() {
 #[test]
 fn the_course_tells_what_is_left_of_it() {
     let wanted = request(set(BakeSettings::default(), |s| s.max_error = Some(0.01)));
-    let point = |cpu_s, relative_rmse| CostPoint {
+    let point = |cpu_s, error| CostPoint {
         rays: 1000,
         cpu_s,
         wall_s: cpu_s / 2.0,
         bytes: 0,
-        relative_rmse,
+        error,
         is_coarse: false,
     };
     let mut level = BakedLevel {

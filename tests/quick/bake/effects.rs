@@ -5,7 +5,7 @@ use nephroid::session::BakeResult;
 
 use crate::prelude::*;
 use support::effect_scenes::{EffectScene, all};
-use support::tools::{at, bake, bits, energy_fault, settings};
+use support::tools::{at, bake, bits, energy_fault, photons, settings};
 
 /// All but the indirect layer and the eye's chains.
 const EFFECTS: [Effect; 10] = [
@@ -31,7 +31,6 @@ fn check(case: &EffectScene, settings: &BakeSettings) {
     let bake = |effects: EffectSwitches| {
         let settings = BakeSettings {
             layers: case.layers.clone(),
-            wavefronts: Some(4),
             effects,
             ..settings.clone()
         };
@@ -89,6 +88,11 @@ fn only_what_is_called_for() {
     assert!(result.maps.is_empty());
     assert_eq!(result.plan.effects[0].reason, "the scene has no light");
     for case in &scenes {
+        check(case, &photons(30_000.0, 24));
+        let soft = [Effect::AreaLights, Effect::Roughness];
+        if soft.iter().any(|effect| case.calls_for.contains(effect)) {
+            continue;
+        }
         for settings in [at(3_000.0, 48), settings(6_000.0, 48)] {
             check(case, &settings);
         }

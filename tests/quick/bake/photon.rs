@@ -10,7 +10,7 @@ use nephroid::units::Radiance;
 
 use support::brute_force::brute;
 use support::hard_scenes::cut_glass;
-use support::tools::{bake, bits, builtin_scene, caustic, energy_fault, map_of};
+use support::tools::{bake, bits, builtin_scene, caustic, energy_fault, map_of, photons};
 
 const SIDE: usize = 64;
 const BLOCK: usize = 8;
@@ -19,18 +19,6 @@ const FINE: MapResolution = MapResolution::Fixed {
     width: 256,
     height: 256,
 };
-
-fn photons(density_per_sr: f64) -> BakeSettings {
-    BakeSettings {
-        density_per_sr,
-        map_resolution: MapResolution::Fixed {
-            width: SIDE,
-            height: SIDE,
-        },
-        filter: false,
-        ..BakeSettings::of(Estimator::Photon)
-    }
-}
 
 fn ring_under_square_lamp() -> Scene {
     let mut scene = builtin_scene("ring");
@@ -111,9 +99,9 @@ fn photons_are_unbiased() {
         ("frosted ball", frosted_ball(0.3), 1e6),
         ("lamp in green glass", lamp_in_green_glass(), 3e4),
     ] {
-        let result = bake(scene.clone(), &photons(density_per_sr));
+        let result = bake(scene.clone(), &photons(density_per_sr, SIDE));
         assert_eq!(energy_fault(&result), None, "{what}");
-        let reference = brute(&scene, &photons(density_per_sr), 60_000);
+        let reference = brute(&scene, &photons(density_per_sr, SIDE), 60_000);
         let count = outliers(
             &result,
             &reference,
@@ -134,7 +122,7 @@ fn threads_change_no_photon() {
         let settings = BakeSettings {
             threads,
             filter: true,
-            ..photons(3e5)
+            ..photons(3e5, SIDE)
         };
         bake(frosted_ball(0.3), &settings)
     });
@@ -153,7 +141,7 @@ fn targets_are_met_and_filtering_saves_photons() {
             max_error: Some(0.15),
             map_resolution: FINE,
             filter,
-            ..photons(1e4)
+            ..photons(1e4, SIDE)
         };
         let result = bake(scene.clone(), &settings);
         assert_eq!(energy_fault(&result), None);
@@ -168,7 +156,7 @@ fn targets_are_met_and_filtering_saves_photons() {
     );
     let fine = BakeSettings {
         map_resolution: FINE,
-        ..photons(1e7)
+        ..photons(1e7, SIDE)
     };
     let reference = bake(scene.clone(), &fine);
     let truth = caustic(map_of(&reference, &scene, "floor"));
@@ -189,7 +177,7 @@ fn auto_takes_what_costs_less() {
         let settings = BakeSettings {
             max_error: Some(0.05),
             estimator: Estimator::Auto,
-            ..photons(1_600.0)
+            ..photons(1_600.0, SIDE)
         };
         let result = bake(scene, &settings);
         assert_eq!(energy_fault(&result), None);

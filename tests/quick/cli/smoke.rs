@@ -24,7 +24,7 @@ fn assert_keys(object: &Value, expected: &str) {
 #[test]
 fn bake_prints_the_manifest_that_it_writes() {
     let sandbox = Sandbox::new();
-    let bake = "bake builtin:mirror -o out --density 1e4 --map-resolution 64x32 --layers direct,caustic";
+    let bake = "bake builtin:mirror -o out --estimator wavefront --density 1e4 --map-resolution 64x32 --layers direct,caustic";
     let run = sandbox.succeed(&format!("{bake} --json"));
     let manifest = sandbox.manifest("out");
     assert_eq!((run.json(), run.stderr.as_str()), (manifest.clone(), ""));
@@ -60,7 +60,7 @@ fn bake_prints_the_manifest_that_it_writes() {
     assert_keys(
         map,
         "surface node primitive side file width height uv_set uv_file layers texel_area_m2 units \
-         estimated_relative_rmse memory_bytes dense_bytes",
+         estimated_relative_rmse estimated_visible memory_bytes dense_bytes",
     );
     let error = number(&manifest["error"]["estimated_relative_rmse"]);
     assert!((1e-6..0.2).contains(&error), "an error of {error}");
@@ -89,7 +89,7 @@ fn bake_prints_the_manifest_that_it_writes() {
 #[test]
 fn a_bake_tells_its_forecast() {
     let sandbox = Sandbox::new();
-    let bake = "bake builtin:ring -o out --max-error 2% --map-resolution 64 --json";
+    let bake = "bake builtin:ring -o out --error-metric rmse --max-error 0.5% --map-resolution 64 --json";
     let manifest = sandbox.succeed(bake).json();
     let forecast = &manifest["forecast"];
     let rays = |part: &str| number(&forecast[part]["rays"]);
@@ -104,7 +104,7 @@ fn a_bake_tells_its_forecast() {
 fn merged_shards_are_the_bake_bit_by_bit() {
     let sandbox = Sandbox::new();
     sandbox.write("lamps.gltf", files::mirror_under_lamps());
-    let bake = "bake lamps.gltf --density 4000 --map-resolution 24 --wavefronts 4 --layers caustic,direct --per-light";
+    let bake = "bake lamps.gltf --density 4000 --map-resolution 24 --layers caustic,direct --per-light";
     sandbox.succeed(&format!("{bake} -o whole"));
     for number in [1, 2] {
         let shard = sandbox.succeed(&format!("{bake} --shard {number}/2 -o part{number} --json"));

@@ -64,7 +64,7 @@ fn bad_bake_options_are_refused() {
          --keep-spectrum => no bands to keep
          --wavelengths 0 => outside 1 to 1000
          --wavelengths many => a number, `rainbow` or `continuous`
-         --spectral-sampling split => interpolated, not sampled
+         --spectral-sampling split => only splats
          --effects refraction=sideways => auto, on or off",
     );
 }

@@ -39,6 +39,7 @@ fn map(chart: Chart) -> IlluminationMap {
             .into(),
         error: Some((0..texels).map(|texel| value(3, texel, 0)).collect()),
         estimated_relative_rmse: None,
+        estimated_visible: None,
     }
 }
 

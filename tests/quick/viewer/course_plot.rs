@@ -20,7 +20,7 @@ fn panel(settings: BakeSettings) -> Headless {
             cpu_s: 0.2 * 3_f64.powi(level),
             wall_s: 0.1 * 3_f64.powi(level),
             bytes: 0,
-            relative_rmse: 0.2 * 0.5_f64.powi(level),
+            error: 0.2 * 0.5_f64.powi(level),
             is_coarse: false,
         };
         last.result.course = (0..3).map(point).collect();
@@ -51,11 +51,11 @@ fn target_stands_where_the_forecast_has_it() {
     let rect = Rect::from_min_max(pos2(10.0, 20.0), pos2(330.0, 140.0));
     let frame = Frame::around(&curve, rect);
     for point in &curve.past {
-        let place = frame.place(point.wall_s, point.relative_rmse);
+        let place = frame.place(point.wall_s, point.error);
         assert!(rect.contains(place), "{place}");
         let (seconds, error) = frame.at(place);
         near(seconds / point.wall_s, 1.0, 1e-4, "time");
-        near(error / point.relative_rmse, 1.0, 1e-4, "error");
+        near(error / point.error, 1.0, 1e-4, "error");
     }
     let at = frame.place(1.0, 0.1);
     assert!(at.y < frame.place(1.0, 0.01).y, "errors go up");

@@ -98,6 +98,7 @@ pub fn nothing() -> BakeResult {
         timings_s: Timings::default(),
         cpu_s: Timings::default(),
         estimated_relative_rmse: None,
+        estimated_visible: None,
         stop_reason: StopReason::NothingToDo,
         partial: false,
         warnings: Vec::new(),

@@ -29,7 +29,7 @@ fn controls_set_what_they_name() {
     panel.open("Rays and kernels");
     panel.open("Limits");
     type Set = fn(&mut BakeSettings);
-    let rows: [(Gesture, Set); 10] = [
+    let rows: [(Gesture, Set); 9] = [
         (Check("indirect"), |set| set.layers.push(LayerKind::Indirect)),
         (Type("Sigma [radii²]", "2.5"), |set| {
             set.sigma = Sigma::Constant(2.5)
@@ -48,8 +48,7 @@ fn controls_set_what_they_name() {
         (Choose("Map size [texels]", "256"), |set| {
             set.map_resolution = fixed(256, 256)
         }),
-        (Type("Max depth", "4"), |set| set.max_depth = 4),
-        (Choose("Wavefronts", "64"), |set| set.wavefronts = Some(64)),
+        (Type("Max depth", "4"), |set| set.max_depth = Some(4)),
     ];
     let mut expected = splats();
     for (gesture, set) in rows {
@@ -58,7 +57,7 @@ fn controls_set_what_they_name() {
         assert_eq!(*panel.settings(), expected, "{gesture:?}");
     }
     let (before, _) = *panel.wishes.changed.take().expect("it was changed");
-    assert_eq!(before.wavefronts, None, "what was before is told");
+    assert_eq!(before.max_depth, None, "what was before is told");
 }
 
 #[test]
@@ -315,7 +314,7 @@ fn states_are_told_in_words() {
         panel.tell_level(|last| {
             (last.level, last.seconds, last.is_final) = (2, 0.42, is_final);
             last.result.stop_reason = StopReason::MaxTime;
-            last.result.estimated_relative_rmse = error;
+            last.result.estimated_visible = error;
         });
         panel.assert_says(&[told]);
     }
@@ -463,7 +462,8 @@ fn keyboard_alone_changes_values() {
         panel.strike(key);
         assert_eq!(panel.settings().estimator, expected, "{key:?}");
     }
-    // From the list to the first layer, which Space switches.
+    // From the list, by the button that sets it back, to the first layer, which Space switches.
+    panel.strike(Key::Tab);
     panel.strike(Key::Tab);
     assert!(panel.named(Role::CheckBox, "caustic").is_focused());
     panel.strike(Key::Space);

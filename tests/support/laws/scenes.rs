@@ -124,7 +124,7 @@ pub fn glass_ball(levels: u32) -> Scene {
 pub fn thoroughly(settings: BakeSettings) -> BakeSettings {
     BakeSettings {
         branch_threshold: Some(1e-9),
-        max_depth: 1000,
+        max_depth: Some(1000),
         ..settings
     }
 }

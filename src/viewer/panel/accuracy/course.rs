@@ -69,7 +69,7 @@ pub fn show(ui: &mut Ui, settings: &mut BakeSettings, last: Option<&BakedLevel>)
         let (made_at, actual) = (report.made_at, report.actual);
         ui.label(RichText::new(format!(
             "expected at {} %: {} s; taken: {} s",
-            two_digits(100.0 * made_at.relative_rmse),
+            two_digits(100.0 * made_at.error),
             two_digits(report.expected.wall_s),
             two_digits(actual.wall_s)
         )).size(SMALL))
@@ -94,9 +94,9 @@ impl Curve {
     /// Of a bake; `None` where no error is known.
     pub fn new(settings: &BakeSettings, last: &BakedLevel) -> Option<Self> {
         let estimator = last.request.settings.estimator;
-        let is_shown = |point: &&CostPoint| point.wall_s > 0.0 && point.relative_rmse > 0.0;
+        let is_shown = |point: &&CostPoint| point.wall_s > 0.0 && point.error > 0.0;
         let past: Vec<CostPoint> = last.result.course.iter().filter(is_shown).copied().collect();
-        let reached = past.last()?.relative_rmse;
+        let reached = past.last()?.error;
         let expected = |target: f64| forecast(&past, target, estimator);
         let picked = target::picked(settings);
         let wanted = match picked {
@@ -130,7 +130,7 @@ impl Curve {
 
     fn in_words(&self) -> String {
         let now = self.past.last().map_or(String::new(), |last| {
-            let error = two_digits(100.0 * last.relative_rmse);
+            let error = two_digits(100.0 * last.error);
             format!("{error} % after {} s", two_digits(last.wall_s))
         });
         match self.target {
@@ -146,7 +146,7 @@ fn at_seconds(past: &[CostPoint], future: &[Forecast], seconds: f64) -> Option<F
     let expected = future.iter().rev().find(|point| point.wall_s <= seconds);
     let error = expected
         .map(|point| point.target)
-        .or(reached.map(|point| point.relative_rmse))?;
+        .or(reached.map(|point| point.error))?;
     let rays = expected.map_or(0, |point| point.rays);
     Some(Forecast {
         target: error,
@@ -171,7 +171,7 @@ pub struct Frame {
 impl Frame {
     /// Around all that a curve shows.
     pub fn around(curve: &Curve, rect: Rect) -> Self {
-        let past = curve.past.iter().map(|point| (point.wall_s, point.relative_rmse));
+        let past = curve.past.iter().map(|point| (point.wall_s, point.error));
         let future = curve.future.iter().map(|point| (point.wall_s, point.target));
         let target = curve.target.iter().map(|point| (point.wall_s, point.target));
         let all: Vec<(f64, f64)> = past.chain(future).chain(target).collect();
@@ -274,7 +274,7 @@ fn draw(ui: &Ui, curve: &Curve, frame: &Frame) {
     let past = curve
         .past
         .iter()
-        .map(|point| frame.place(point.wall_s, point.relative_rmse));
+        .map(|point| frame.place(point.wall_s, point.error));
     let past: Vec<Pos2> = past.collect();
     for point in &past {
         painter.circle_filled(*point, 3.0, PAST);

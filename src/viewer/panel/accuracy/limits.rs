@@ -1,33 +1,52 @@
-//! Rows of the section *Accuracy* for where the light pass gives up.
+//! Rows of the section *Accuracy* for where the light pass gives up, and what its error means.
 
 use egui::{Response, Slider, SliderClamping, Ui};
 
-use crate::settings::{BakeSettings, MOST_WAVEFRONTS};
-use crate::viewer::panel::control::{choice, rows, setting, significant};
+use crate::settings::{BakeSettings, Estimator};
+use crate::viewer::panel::control::{listed, rows, setting, significant};
 use crate::viewer::panel::light_pass;
 
 /// Ends of the slider; every share that settings may have can be typed.
 const SHARES: std::ops::RangeInclusive<f64> = 1e-6..=0.5;
 const DEPTHS: std::ops::RangeInclusive<u32> = 1..=1000;
 
+const NO_TARGET: &str = "No error is aimed at.";
+
 /// Shows the rows.
 pub fn show(ui: &mut Ui, settings: &mut BakeSettings) {
     let no_caustic = light_pass::no_caustic(settings);
     let default = BakeSettings::default();
     let automatic = settings.path_threshold();
+    let usual_depth = match settings.estimator {
+        Estimator::Auto | Estimator::Photon => settings.photon_depth(),
+        Estimator::Wavefront | Estimator::Splat => settings.depth(),
+    };
+    let no_metric = no_caustic.or(settings.max_error.is_none().then_some(NO_TARGET));
     rows(ui, "limits", |ui| {
+        let metric = (&mut settings.error_metric, &default.error_metric);
+        setting(ui, "Error is", no_metric, metric, |ui, metric| {
+            listed(ui, "error metric", metric)
+        });
         let depth = (&mut settings.max_depth, &default.max_depth);
         setting(ui, "Max depth", no_caustic, depth, |ui, depth| {
-            let slider = Slider::new(depth, DEPTHS).logarithmic(true);
-            ui.add(slider.clamping(SliderClamping::Never))
+            automatic_depth(ui, depth, usual_depth)
         });
         let share = (&mut settings.branch_threshold, &default.branch_threshold);
         setting(ui, "Weakest branch", no_caustic, share, |ui, share| {
             threshold(ui, share, automatic)
         });
-        let count = (&mut settings.wavefronts, &default.wavefronts);
-        setting(ui, "Wavefronts", no_caustic, count, wavefronts);
     });
+}
+
+/// The depth that counts; automatic until it is touched.
+fn automatic_depth(ui: &mut Ui, depth: &mut Option<u32>, automatic: u32) -> Response {
+    let mut shown = depth.unwrap_or(automatic);
+    let slider = Slider::new(&mut shown, DEPTHS).logarithmic(true);
+    let response = ui.add(slider.clamping(SliderClamping::Never));
+    if response.changed() {
+        *depth = Some(shown);
+    }
+    response
 }
 
 /// The share that counts; automatic until it is touched.
@@ -40,18 +59,4 @@ fn threshold(ui: &mut Ui, share: &mut Option<f64>, automatic: f64) -> Response {
         *share = Some(shown);
     }
     response
-}
-
-fn wavefronts(ui: &mut Ui, count: &mut Option<u32>) -> Response {
-    let powers = (0..=MOST_WAVEFRONTS.ilog2()).map(|power| 1 << power);
-    let named: Vec<(u32, String)> = powers.map(|count: u32| (count, count.to_string())).collect();
-    let exactly = named.iter();
-    let exactly = exactly.map(|(count, name)| (Some(*count), name.as_str(), "exactly so many"));
-    let needed = (
-        None,
-        "as needed",
-        "as many as the max error needs; 32 without one",
-    );
-    let choices: Vec<_> = std::iter::once(needed).chain(exactly).collect();
-    choice(ui, "wavefronts", count, "custom", &choices)
 }

@@ -16,8 +16,8 @@ pub fn apply(preset: Preset, settings: &mut BakeSettings) {
     };
     let default = BakeSettings::default();
     settings.max_time_s = None;
+    settings.error_metric = default.error_metric;
     settings.map_resolution = MapResolution::Auto;
-    settings.wavefronts = default.wavefronts;
     settings.max_depth = default.max_depth;
     settings.branch_threshold = default.branch_threshold;
 }

@@ -10,7 +10,7 @@ const FIRST_TIME_S: f64 = 10.0;
 /// Ends of the sliders.
 const PERCENTS: std::ops::RangeInclusive<f64> = 0.01..=100.0;
 const TIMES_S: std::ops::RangeInclusive<f64> = 1e-3..=1e4;
-const NO_ERRORS: &str = "Only the wavefront estimator refines until an error is reached.";
+const NO_ERRORS: &str = "Splats do not refine until an error is reached.";
 
 /// Which of the targets is chosen.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -68,7 +68,7 @@ impl Target {
 /// A point on the curve of error against time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Picked {
-    /// Relative RMSE [1].
+    /// Of all maps [1].
     Error(f64),
     /// Wall-clock time [s].
     Seconds(f64),
@@ -173,7 +173,7 @@ fn list(ui: &mut Ui, target: &mut Target, estimator: Estimator) -> Response {
         ),
         (
             Target::Error(Preset::default().max_error()),
-            "Until the estimated relative RMSE over all maps is below it.",
+            "Until the estimated error of all maps is below it.",
         ),
         (Target::Time(FIRST_TIME_S), "Until the time is up."),
     ];

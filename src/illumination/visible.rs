@@ -1,0 +1,246 @@
+//! The error as an eye sees it: relative to how bright a place is, and in the dark to what exposure lifts out of it. A focus
+//! cannot rule a room by it, nor can what nobody sees.
+//!
+//! Over blocks of 8×8 texels of all maps it is √(Σ w (ΔE/n)² / Σ w): E is the luminance of all layers, C that of caustic and
+//! indirect light together, whose error is ΔE; n is E in the light, √(E·white) in the dark and white/16 in the night; w is the
+//! block's area times min(1, C/n), so that light which is missing counts in full however small its place in the room. The
+//! square root is that of Dammertz et al., "A Hierarchical Automatic Stopping Condition for Monte Carlo Global
+//! Illumination" (WSCG 2010), as adaptive sampling of path tracers has it.
+
+use super::{Chart, IlluminationMap};
+use crate::optics::LinearSrgb;
+use crate::settings::LayerKind;
+
+/// Side of a block [texels].
+const SIDE: usize = 8;
+
+/// Places darker than this part of the mean tell nothing of the exposure.
+const NIGHT: f64 = 1e-4;
+
+/// Share of the area, of the darkest and of the brightest places, that tells nothing of it either.
+const TRIMMED: f64 = 0.1;
+
+/// What exposure makes of the mean brightness, of white.
+const MIDDLE_GREY: f64 = 0.18;
+
+/// Below this part of white it is night.
+const DARKEST: f64 = 1.0 / 256.0;
+
+/// The block that each texel of a map lies in.
+#[derive(Clone, Debug)]
+pub struct Blocks {
+    of_texel: Vec<u32>,
+    areas_m2: Vec<f64>,
+}
+
+impl Blocks {
+    /// Of a chart; within each tile where it is in tiles.
+    pub fn new(chart: &Chart) -> Self {
+        let mut of_texel = Vec::with_capacity(chart.texel_count());
+        let mut count = 0;
+        let mut add = |(width, height): (usize, usize)| {
+            let across = width.div_ceil(SIDE);
+            for texel in 0..width * height {
+                of_texel.push((count + texel / width / SIDE * across + texel % width / SIDE) as u32);
+            }
+            count += across * height.div_ceil(SIDE);
+        };
+        match &chart.layout {
+            Some(layout) => layout.tiles().for_each(|tile| add(tile.size)),
+            None => add((chart.width, chart.height)),
+        }
+        let mut areas_m2 = vec![0.0; count];
+        for (texel, &block) in of_texel.iter().enumerate() {
+            areas_m2[block as usize] += chart.texel_area_m2(texel);
+        }
+        Self { of_texel, areas_m2 }
+    }
+
+    /// Number of blocks.
+    pub fn count(&self) -> usize {
+        self.areas_m2.len()
+    }
+
+    /// The block of each texel.
+    pub fn of_texels(&self) -> &[u32] {
+        &self.of_texel
+    }
+
+    /// Means of a value of texels over each block, by area; 0 where the surface does not reach.
+    pub fn means(&self, chart: &Chart, value: impl Fn(usize) -> f64) -> Vec<f64> {
+        let mut sums = vec![0.0; self.count()];
+        for (texel, &block) in self.of_texel.iter().enumerate() {
+            sums[block as usize] += value(texel) * chart.texel_area_m2(texel);
+        }
+        for (sum, area_m2) in sums.iter_mut().zip(&self.areas_m2) {
+            *sum = if *area_m2 > 0.0 { *sum / area_m2 } else { 0.0 };
+        }
+        sums
+    }
+
+    /// The blocks with their light, by means over each.
+    pub fn lit(&self, all: &[f64], traced: &[f64]) -> impl Iterator<Item = Lit> {
+        let light = all.iter().zip(traced);
+        let blocks = light.zip(&self.areas_m2);
+        blocks.map(|((&all, &traced), &area_m2)| Lit { area_m2, all, traced })
+    }
+}
+
+/// The light of one block.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Lit {
+    /// Of its surface [m²].
+    pub area_m2: f64,
+    /// Mean luminance of E, of all layers [W/m²].
+    pub all: f64,
+    /// Of caustic and indirect light [W/m²].
+    pub traced: f64,
+}
+
+impl Lit {
+    /// What an error is relative to here [W/m²].
+    pub fn scale(&self, white: f64) -> f64 {
+        if self.all >= white {
+            self.all
+        } else {
+            (self.all.max(DARKEST * white) * white).sqrt()
+        }
+    }
+
+    /// How much of the whole an error here counts [m²].
+    pub fn weight_m2(&self, white: f64) -> f64 {
+        self.area_m2 * (self.traced / self.scale(white)).clamp(0.0, 1.0)
+    }
+}
+
+/// Luminance of E [W/m²] that exposure makes white: by the mean logarithm of E, of the area that is neither in the night
+/// nor among its darkest or brightest tenth. `None` without light.
+pub fn white(blocks: impl Iterator<Item = Lit>) -> Option<f64> {
+    let mut blocks: Vec<Lit> = blocks.filter(|block| block.area_m2 > 0.0).collect();
+    let (sum, area_m2) = blocks.iter().fold((0.0, 0.0), |(sum, area_m2), block| {
+        (sum + block.all * block.area_m2, area_m2 + block.area_m2)
+    });
+    let night = NIGHT * sum / area_m2;
+    blocks.retain(|block| block.all > night);
+    blocks.sort_by(|a, b| a.all.total_cmp(&b.all));
+    let area_m2: f64 = blocks.iter().map(|block| block.area_m2).sum();
+    let (low_m2, high_m2) = (TRIMMED * area_m2, (1.0 - TRIMMED) * area_m2);
+    let (mut logarithms, mut counted_m2, mut before_m2) = (0.0, 0.0, 0.0);
+    for block in &blocks {
+        let after_m2 = before_m2 + block.area_m2;
+        let part_m2 = (after_m2.min(high_m2) - f64::max(before_m2, low_m2)).max(0.0);
+        logarithms += block.all.ln() * part_m2;
+        counted_m2 += part_m2;
+        before_m2 = after_m2;
+    }
+    let white = (logarithms / counted_m2).exp() / MIDDLE_GREY;
+    (counted_m2 > 0.0 && white.is_finite() && white > 0.0).then_some(white)
+}
+
+/// The visible error of maps, and of each of them by itself; `given_up` is the share of caustic light that is missing
+/// beside that. `None` where the error of a map is not known, and where no
+/// caustic or indirect light arrived.
+pub fn visible_error(maps: &[IlluminationMap], given_up: f64) -> (Option<f64>, Vec<Option<f64>>) {
+    let none = || (None, vec![None; maps.len()]);
+    let mut lit = Vec::with_capacity(maps.len());
+    for map in maps {
+        let traced_of_texels = map.luminance_of(&[LayerKind::Caustic, LayerKind::Indirect]);
+        if map.error.is_none() && traced_of_texels.iter().any(|e| *e > 0.0) {
+            return none();
+        }
+        let blocks = Blocks::new(&map.chart);
+        let all = map.luminance_of(&LayerKind::ALL);
+        let [all, traced] =
+            [&all, &traced_of_texels].map(|values| blocks.means(&map.chart, |texel| values[texel]));
+        let squares = blocks.means(&map.chart, |texel| {
+            let error = map.error.as_ref().map_or(0.0, |error| f64::from(error[texel]));
+            error * error + (given_up * traced_of_texels[texel]).powi(2)
+        });
+        let light: Vec<Lit> = blocks.lit(&all, &traced).collect();
+        lit.push((light, squares));
+    }
+    let Some(white) = white(lit.iter().flat_map(|(light, _)| light.iter().copied())) else {
+        return none();
+    };
+    let sums = lit.iter().map(|(light, squares)| {
+        light
+            .iter()
+            .zip(squares)
+            .fold((0.0, 0.0), |sums, (block, square)| {
+                let weight_m2 = block.weight_m2(white);
+                (
+                    sums.0 + weight_m2 * square / block.scale(white).powi(2),
+                    sums.1 + weight_m2,
+                )
+            })
+    });
+    let sums: Vec<(f64, f64)> = sums.collect();
+    let root = |(squares, weight_m2): (f64, f64)| (weight_m2 > 0.0).then(|| (squares / weight_m2).sqrt());
+    let all = sums
+        .iter()
+        .fold((0.0, 0.0), |all, one| (all.0 + one.0, all.1 + one.1));
+    (root(all), sums.into_iter().map(root).collect())
+}
+
+/// Of E [W/m²].
+pub fn luminance(e: &[f32; 3]) -> f64 {
+    LinearSrgb::from(e.map(f64::from)).luminance()
+}
+
+impl IlluminationMap {
+    /// Luminance of E of some layers together, texel by texel [W/m²].
+    fn luminance_of(&self, kinds: &[LayerKind]) -> Vec<f64> {
+        let mut sums = vec![0.0; self.chart.texel_count()];
+        for layer in kinds.iter().filter_map(|&kind| self.layer(kind)) {
+            for (sum, e) in sums.iter_mut().zip(&layer.irradiance) {
+                *sum += luminance(e);
+            }
+        }
+        sums
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn even(all: f64, traced: f64) -> Lit {
+        Lit {
+            area_m2: 2.0,
+            all,
+            traced,
+        }
+    }
+
+    #[test]
+    fn white_is_what_exposure_makes_of_an_even_light() {
+        let found = white([even(0.36, 0.0); 5].into_iter()).expect("it is lit");
+        assert!((found - 2.0).abs() < 1e-12, "{found}");
+        assert_eq!(white([even(0.0, 0.0); 3].into_iter()), None);
+        assert_eq!(white(std::iter::empty()), None);
+    }
+
+    /// A tenth of the area at either end and what lies in the night are left out.
+    #[test]
+    fn the_ends_tell_nothing() {
+        let mut blocks = vec![even(0.18, 0.0); 8];
+        blocks.extend([even(0.01, 0.0), even(100.0, 0.0), even(1e-9, 0.0)]);
+        let found = white(blocks.into_iter()).expect("it is lit");
+        assert!((found - 1.0).abs() < 1e-12, "{found}");
+    }
+
+    #[test]
+    fn errors_are_relative_to_what_the_eye_makes_out() {
+        for (all, scale) in [
+            (4.0, 4.0),
+            (1.0, 1.0),
+            (0.25, 0.5),
+            (1.0 / 256.0, 1.0 / 16.0),
+            (0.0, 1.0 / 16.0),
+        ] {
+            assert!((even(all, 0.0).scale(1.0) - scale).abs() < 1e-12, "{all}");
+        }
+        assert_eq!(even(0.25, 0.1).weight_m2(1.0), 0.4);
+        assert_eq!(even(4.0, 8.0).weight_m2(1.0), 2.0);
+    }
+}

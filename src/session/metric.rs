@@ -1,0 +1,140 @@
+//! What errors of texels count for in the error that a bake aims at.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use super::caustic::{CausticLayer, Climb, Onlooker, shown};
+use super::light_level::LightLevel;
+use crate::illumination::visible::{self, Blocks, Lit};
+use crate::illumination::{Chart, Receiver};
+use crate::light_pass::accuracy::{self, Image, LightError};
+use crate::light_pass::caustic::setup::AimedLight;
+use crate::optics::LinearSrgb;
+use crate::settings::ErrorMetric;
+
+/// Light of other layers: luminance of E of each texel [W/m²], by receiver.
+pub(super) type Backdrop = BTreeMap<Receiver, (Arc<Chart>, Vec<f64>)>;
+
+/// What the error of a bake is made of.
+pub(super) enum Counting {
+    /// The relative RMSE.
+    Rmse,
+    /// What an eye sees.
+    Visible(Counts),
+}
+
+/// What a texel's squared error counts, times its area [m²/W²], by receiver.
+pub(super) struct Counts(BTreeMap<Receiver, Vec<f64>>);
+
+impl CausticLayer<'_> {
+    /// How errors count, by the pictures of all lights so far, beside light of other layers.
+    pub(super) fn counting(
+        &self,
+        lights: &[&AimedLight],
+        climbs: &[Climb],
+        onlooker: &mut dyn Onlooker,
+    ) -> Counting {
+        if self.settings.error_metric == ErrorMetric::Rmse || self.settings.max_error.is_none() {
+            return Counting::Rmse;
+        }
+        let backdrop = onlooker.backdrop(&shown(lights, climbs));
+        Counting::Visible(self.visible_counts(lights, climbs, &backdrop))
+    }
+
+    fn visible_counts(&self, lights: &[&AimedLight], climbs: &[Climb], backdrop: &Backdrop) -> Counts {
+        let mut charts: BTreeMap<Receiver, Arc<Chart>> = BTreeMap::new();
+        let mut traced: BTreeMap<Receiver, Vec<f64>> = BTreeMap::new();
+        for (light, climb) in lights.iter().zip(climbs) {
+            let Some(level) = climb.shown() else {
+                continue;
+            };
+            let strength = level.strength(&self.tracer.scene().lights[light.light]);
+            for (receiver, image) in accuracy::images(&level.maps, level.unit) {
+                let sums = traced.entry(receiver);
+                let sums = sums.or_insert_with(|| vec![0.0; image.luminance.len()]);
+                for (sum, e) in sums.iter_mut().zip(&image.luminance) {
+                    *sum += e * strength.luminance();
+                }
+            }
+            let known = level
+                .maps
+                .iter()
+                .map(|(receiver, map)| (receiver, Arc::clone(&map.chart)));
+            charts.extend(known);
+        }
+        for (&receiver, (chart, _)) in backdrop {
+            charts.entry(receiver).or_insert_with(|| Arc::clone(chart));
+        }
+        let lit = charts.iter().map(|(receiver, chart)| {
+            let blocks = Blocks::new(chart);
+            let own = traced.get(receiver);
+            // Charts of another size are those of a level that was not shown.
+            let beside = backdrop
+                .get(receiver)
+                .map(|(_, e)| e)
+                .filter(|e| e.len() == chart.texel_count());
+            let at = |values: Option<&Vec<f64>>, texel: usize| values.map_or(0.0, |values| values[texel]);
+            let own_means = blocks.means(chart, |texel| at(own, texel));
+            let all = blocks.means(chart, |texel| at(own, texel) + at(beside, texel));
+            let light: Vec<Lit> = blocks.lit(&all, &own_means).collect();
+            (*receiver, blocks, light)
+        });
+        let lit: Vec<(Receiver, Blocks, Vec<Lit>)> = lit.collect();
+        let blocks = || lit.iter().flat_map(|(_, _, light)| light.iter().copied());
+        let Some(white) = visible::white(blocks()) else {
+            return Counts(BTreeMap::new());
+        };
+        let all_m2: f64 = blocks().map(|block| block.weight_m2(white)).sum();
+        let counts = lit.iter().map(|(receiver, blocks, light)| {
+            let of_block = |block: &Lit| {
+                if block.area_m2 > 0.0 && all_m2 > 0.0 {
+                    block.weight_m2(white) / (block.scale(white).powi(2) * block.area_m2 * all_m2)
+                } else {
+                    0.0
+                }
+            };
+            let of_blocks: Vec<f64> = light.iter().map(of_block).collect();
+            let of_texels = blocks.of_texels().iter().map(|&block| of_blocks[block as usize]);
+            (*receiver, of_texels.collect())
+        });
+        Counts(counts.collect())
+    }
+}
+
+impl Counts {
+    /// The error of a light's maps, of unit strength [1 per unit of strength].
+    pub(super) fn of_light(&self, level: &LightLevel, error: &LightError) -> f64 {
+        let ledger = level.ledger.report("", level.unit, LinearSrgb::WHITE).energy_w;
+        let given_up = accuracy::given_up_share(&ledger);
+        let images = accuracy::images(&level.maps, level.unit);
+        let squares = images.iter().map(|(receiver, image)| {
+            let squares = self.squares(*receiver, image, error, given_up);
+            let by_area = squares.iter().enumerate();
+            by_area
+                .map(|(texel, square)| square * image.area_m2(texel))
+                .sum::<f64>()
+        });
+        squares.sum::<f64>().sqrt()
+    }
+
+    /// Squared errors of tiles, as they count.
+    pub(super) fn of_tiles(&self, level: &LightLevel, error: &LightError) -> BTreeMap<Receiver, Vec<f64>> {
+        let images = accuracy::images(&level.maps, level.unit);
+        let tiles = images.iter().map(|(&receiver, image)| {
+            let squares = self.squares(receiver, image, error, 0.0);
+            (receiver, image.tile_sums(&squares))
+        });
+        tiles.collect()
+    }
+
+    /// Squared errors of texels, with what was given up of their light, as they count.
+    fn squares(&self, receiver: Receiver, image: &Image, error: &LightError, given_up: f64) -> Vec<f64> {
+        let (Some(counts), Some(map)) = (self.0.get(&receiver), error.maps.get(&receiver)) else {
+            return vec![0.0; image.luminance.len()];
+        };
+        let texels = counts.iter().zip(&map.texels).zip(&image.luminance);
+        texels
+            .map(|((count, error), e)| count * (error * error + (given_up * e).powi(2)))
+            .collect()
+    }
+}

@@ -1,0 +1,92 @@
+//! Pictures on the way, and the light of other layers that the caustics are seen beside.
+
+use super::caustic::{CausticOutcome, Onlooker};
+use super::clock::Clock;
+use super::direct_cache::DirectCache;
+use super::direct_work::DirectWork;
+use super::finish::{Finish, Shown};
+use super::indirect_cache::IndirectCache;
+use super::indirect_work::IndirectWork;
+use super::metric::Backdrop;
+use super::{BakeResult, account};
+use crate::error::Result;
+use crate::illumination::visible::luminance;
+use crate::light_pass::caustic::pass::Stopwatch;
+use crate::light_pass::caustic::setup::Aim;
+use crate::plan::Effect;
+use crate::progress::{Control, Progress};
+use crate::transport::Tracer;
+
+/// Takes pictures.
+pub(super) type TakeLevel<'a> = dyn FnMut(BakeResult) + Send + 'a;
+
+/// Shows a bake to whoever takes its levels.
+pub(super) struct Showing<'a, 'level> {
+    pub(super) finish: &'a Finish<'a>,
+    pub(super) tracer: &'a Tracer,
+    pub(super) aim: &'a Aim,
+    pub(super) progress: &'a dyn Progress,
+    pub(super) control: &'a Control,
+    /// Of the whole bake.
+    pub(super) watch: &'a Stopwatch,
+    /// Tests that looking around took.
+    pub(super) item_buffer_tests: u64,
+    pub(super) level: Option<&'a mut TakeLevel<'level>>,
+    pub(super) direct: &'a mut DirectCache,
+    pub(super) indirect: &'a mut IndirectCache,
+    pub(super) lamps: DirectWork,
+    /// Whether nothing was shown yet.
+    pub(super) is_first: bool,
+}
+
+impl Onlooker for Showing<'_, '_> {
+    fn show(&mut self, levels: &[Shown], so_far: &CausticOutcome, clock: &mut Clock) -> Result<()> {
+        let is_first = std::mem::take(&mut self.is_first);
+        if self.level.is_none() {
+            return Ok(());
+        }
+        let (finish, plan) = (self.finish, self.finish.plan);
+        let (charts, scarce) = finish.charts(levels);
+        let direct_charts = finish.direct_charts(&charts);
+        // The first picture is to come soon: direct light follows with the second.
+        let waits = is_first && !self.direct.knows(finish.scene.lights.len(), &direct_charts);
+        if !waits && plan.is_on(Effect::Direct) {
+            let on_whom = (self.progress, self.control);
+            self.lamps
+                .shine(self.tracer, &direct_charts, self.direct, on_whom);
+        }
+        let mut so_far = self.lamps.added_to(so_far);
+        so_far.counts.item_buffer_tests = self.item_buffer_tests;
+        so_far.warnings.extend(scarce);
+        let (mut maps, mut parts) = finish.maps(levels, &charts, self.direct);
+        if plan.is_on(Effect::Indirect) && !waits {
+            let mut known = IndirectWork::default();
+            known.remember(self.indirect, &maps);
+            known.add_to(self.indirect, &mut maps, &mut parts);
+        }
+        let mut result = finish.result((maps, parts), levels, &so_far);
+        clock.total = self.watch.elapsed();
+        account(&mut result, finish, self.aim, &self.lamps.clock(clock));
+        if let Some(level) = &mut self.level {
+            level(result);
+        }
+        Ok(())
+    }
+
+    fn backdrop(&mut self, levels: &[Shown]) -> Backdrop {
+        let finish = self.finish;
+        if !finish.plan.is_on(Effect::Direct) {
+            return Backdrop::new();
+        }
+        let (charts, _) = finish.charts(levels);
+        let on_whom = (self.progress, self.control);
+        self.lamps
+            .shine(self.tracer, &finish.direct_charts(&charts), self.direct, on_whom);
+        let lit = charts.into_iter().filter_map(|(receiver, chart)| {
+            let layer = finish.direct_layer(&chart, self.direct)?;
+            let e = layer.irradiance.iter().map(luminance).collect();
+            Some((receiver, (chart, e)))
+        });
+        lit.collect()
+    }
+}
