@@ -31,6 +31,8 @@ const FAR_RADII: f64 = 4.0;
 pub struct TriangleHit {
     /// Index in the order that the triangles were given to [`TriangleBvh::build`].
     pub triangle: u32,
+    /// Its place among the hierarchy's leaves, for [`TriangleBvh::corners`].
+    pub slot: u32,
     /// Distance from the ray's origin [m].
     pub distance_m: f64,
     /// Of the three corners; they add up to 1.
@@ -137,6 +139,7 @@ impl TriangleBvh {
             }
             best = Some(TriangleHit {
                 triangle,
+                slot: slot as u32,
                 distance_m,
                 barycentric,
             });
@@ -200,6 +203,11 @@ impl TriangleBvh {
             depth: packed::depth(&nodes),
             nodes,
         }
+    }
+
+    /// Corners of the triangle in a slot [m].
+    pub fn corners(&self, slot: u32) -> &[DVec3; 3] {
+        &self.corners[slot as usize]
     }
 
     /// Number of triangles.

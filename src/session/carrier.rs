@@ -15,13 +15,20 @@ use crate::settings::Estimator;
 
 /// Time of a cell of patches over that of a photon's segment, where a photon has but one; it grows with the cube of their
 /// number, as the branches do that patches follow.
-const CELL: f64 = 2.5;
+const CELL: f64 = 8.0;
 
 /// Time of a ray that only looks for its receiver, with its triangle's deposit, over that of a photon's segment.
 const RECEIVER_QUERY: f64 = 0.4;
 
 /// A level of patches costs so many times the one before it.
 const LEVEL_GROWTH: f64 = 4.0;
+
+/// Patches have to promise the target for this part of what photons take: they may promise too much, and what they took is
+/// lost with the change.
+const PROMISE: f64 = 0.5;
+
+/// Work grows with the inverse of the error to a power between these.
+const POWERS: (f64, f64) = (1.0, 2.5);
 
 /// What carries a light.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -115,13 +122,11 @@ impl CausticLayer<'_> {
         let Some(target) = self.settings.max_error else {
             return Ok(());
         };
+        let goal = climb.aim.unwrap_or(target);
         if climb.pilot.is_none() {
             climb.pilot = self.first_photons(light, sizes, state, course)?;
         }
-        let costs = climb
-            .pilot
-            .as_ref()
-            .and_then(|pilot| photon_costs(pilot, climb.aim.unwrap_or(target)));
+        let costs = climb.pilot.as_ref().and_then(|pilot| photon_costs(pilot, goal));
         let Some((by_photons, per_photon)) = costs else {
             // Nothing arrived: patches find what is too rare for a few photons.
             climb.carrier = Carrier::Patches;
@@ -133,13 +138,34 @@ impl CausticLayer<'_> {
         };
         let so_far: f64 = climb.levels.iter().map(cost).sum();
         let next = climb.levels.last().map_or(0.0, cost) * LEVEL_GROWTH;
-        if so_far + next > by_photons {
+        let promised = promised(&climb.levels, cost, goal).unwrap_or(0.0);
+        if so_far + next > by_photons || promised > PROMISE * by_photons {
             climb.carrier = Carrier::Photons;
             climb.rounds.clear();
             climb.levels = climb.pilot.take().into_iter().collect();
         }
         Ok(())
     }
+}
+
+/// What patches are expected to take for a goal, by their last two levels whose errors are known.
+fn promised(levels: &[LightLevel], cost: impl Fn(&LightLevel) -> f64, goal: f64) -> Option<f64> {
+    let mut so_far = 0.0;
+    let mut known = Vec::new();
+    for level in levels {
+        so_far += cost(level);
+        known.extend(
+            level
+                .error
+                .as_ref()
+                .map(|error| (so_far, error.estimate.relative_rmse)),
+        );
+    }
+    let [.., (before, coarse), (after, fine)] = known[..] else {
+        return None;
+    };
+    let power = ((after / before).ln() / (coarse / fine).ln()).clamp(POWERS.0, POWERS.1);
+    (fine > 0.0 && power.is_finite()).then(|| after * (fine / goal).max(1.0).powf(power))
 }
 
 /// Segments that photons are expected to take for a target, and those of one photon; `None` where none arrived.

@@ -34,7 +34,7 @@ const GROWTH: (f64, f64) = (1.5, 8.0);
 const MARGIN: f64 = 1.1;
 
 /// Noise that is this part of the error aimed at is little enough, whatever else the error holds.
-const LEAST_NOISE: f64 = 0.3;
+const LEAST_NOISE: f64 = 0.7;
 
 /// The mean flux of all photons may be so many times that of the first ones.
 const MEAN_MARGIN: f64 = 16.0;

@@ -10,7 +10,7 @@ use super::corners::{sharp_corners, sharp_edges};
 use super::curvature::NormalField;
 use super::normal_texture::{TextureBump, texel_m};
 use super::smoothing::smoothing_groups;
-use crate::geometry::{Ray, TriangleBvh, ray};
+use crate::geometry::{Ray, TriangleBvh, TriangleHit, ray};
 use crate::optics::spectrum::Spectrum;
 use crate::optics::{LinearSrgb, Nanometres};
 use crate::scene::{Adjacency, Mesh, Scene, TextureRef, Waves};
@@ -284,33 +284,47 @@ impl Tracer {
 
     /// The nearest surface in front of the ray's origin.
     pub fn closest_hit(&self, ray: &Ray) -> Option<SurfaceHit> {
-        Some(self.surface_at(&self.closest_place(ray)?))
+        let hit = self.closest_triangle(ray)?;
+        // They lie where the search just was, those of the mesh do not.
+        let corners = self.hierarchy.bvh.corners(hit.slot);
+        Some(self.surface_with(&self.place_of(&hit), corners))
     }
 
     /// Where the nearest surface in front of the ray's origin is met.
     pub fn closest_place(&self, ray: &Ray) -> Option<HitPlace> {
+        Some(self.place_of(&self.closest_triangle(ray)?))
+    }
+
+    fn closest_triangle(&self, ray: &Ray) -> Option<TriangleHit> {
         let bvh = &self.hierarchy.bvh;
-        let hit = if self.has_masks {
-            bvh.closest_hit_where(ray, |triangle, barycentric| self.is_there(triangle, barycentric))?
+        if self.has_masks {
+            bvh.closest_hit_where(ray, |triangle, barycentric| self.is_there(triangle, barycentric))
         } else {
-            bvh.closest_hit(ray)?
-        };
+            bvh.closest_hit(ray)
+        }
+    }
+
+    fn place_of(&self, hit: &TriangleHit) -> HitPlace {
         let (object, triangle) = self.hierarchy.triangles[hit.triangle as usize];
-        Some(HitPlace {
+        HitPlace {
             object,
             triangle,
             barycentric: hit.barycentric,
             distance_m: hit.distance_m,
-        })
+        }
     }
 
     /// The surface at a place that a ray met.
     pub fn surface_at(&self, hit: &HitPlace) -> SurfaceHit {
+        let mesh = &self.scene.objects[hit.object as usize].mesh;
+        self.surface_with(hit, &mesh.corners(hit.triangle as usize))
+    }
+
+    fn surface_with(&self, hit: &HitPlace, corners: &[DVec3; 3]) -> SurfaceHit {
         let (object, triangle) = (hit.object as usize, hit.triangle as usize);
         let mesh = &self.scene.objects[object].mesh;
-        let corners = mesh.corners(triangle);
-        let (point, point_error) = ray::point_with_error(&corners, hit.barycentric);
-        let [a, b, c] = corners;
+        let (point, point_error) = ray::point_with_error(corners, hit.barycentric);
+        let [a, b, c] = *corners;
         let geometric_normal = (b - a).cross(c - a).normalize_or_zero();
         let [a, b, c] = mesh.corner_normals(triangle);
         let [wa, wb, wc] = hit.barycentric;

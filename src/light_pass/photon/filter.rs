@@ -16,10 +16,10 @@ use crate::light_pass::receiver_maps::{ReceiverMap, ReceiverMaps};
 const RADII: [usize; 6] = [0, 1, 2, 4, 8, 16];
 
 /// Expectations are taken over windows of at least this radius [texels].
-const LEAST_POOL: usize = 8;
+const LEAST_POOL: usize = 10;
 
 /// And of at least so many times the window's own.
-const POOL_PER_RADIUS: usize = 2;
+const POOL_PER_RADIUS: usize = 3;
 
 /// Filters the sum of two halves, and gives the squared error of each texel that is left [W²/m⁴]. `sum` holds the light of
 /// both; maps that are not filtered keep their noise.
@@ -78,13 +78,13 @@ impl Filter {
                 .each_ref()
                 .map(|flux| self.per_area(&blurred(flux, self.size, radius), &area));
             let pool = LEAST_POOL.max(POOL_PER_RADIUS * radius);
-            let pooled_area = blurred(&self.areas_m2, self.size, pool);
+            let pooled_area = box_sums(&self.areas_m2, self.size, pool);
             let expected = |square: &(dyn Fn(usize) -> f64 + Sync)| {
                 let squares: Vec<f64> = (0..self.areas_m2.len())
                     .into_par_iter()
                     .map(|texel| square(texel) * self.areas_m2[texel])
                     .collect();
-                self.per_area(&blurred(&squares, self.size, pool), &pooled_area)
+                self.per_area(&box_sums(&squares, self.size, pool), &pooled_area)
             };
             let half_square = |a: f64, b: f64| 0.5 * (a - b) * (a - b);
             let across = expected(&|texel| {
@@ -94,7 +94,8 @@ impl Filter {
             let raw_variance = expected(&|texel| half_square(raw[0][texel], raw[1][texel]));
             for texel in 0..squares.len() {
                 let bias = (across[texel] - variance[texel] - raw_variance[texel]).max(0.0);
-                let square = bias + 0.5 * variance[texel];
+                // Running sums of what cancels may end below nothing.
+                let square = bias + 0.5 * variance[texel].max(0.0);
                 if square <= squares[texel] {
                     (squares[texel], widths[texel]) = (square, index as u8);
                 }

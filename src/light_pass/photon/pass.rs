@@ -17,7 +17,7 @@ use crate::light_pass::receiver_maps::{ChartFor, ReceiverMaps};
 use crate::light_pass::share::Share;
 use crate::progress::Stage;
 
-/// Photons of a block: followed along the domain's curve, so that neighbours meet the same triangles.
+/// Photons of a block, about: a short stretch of the domain's curve, so that neighbours meet the same triangles.
 const BLOCK: u32 = 1 << 14;
 
 /// Blocks that are followed before their hits are counted.
@@ -68,13 +68,10 @@ impl PhotonPass<'_> {
         halves: &mut [&mut [ReceiverMaps]],
         listener: &Listener,
     ) -> PassReport {
-        let blocks: Vec<(usize, Range<u32>)> = indices
-            .clone()
-            .step_by(BLOCK as usize)
-            .flat_map(|first| {
-                let last = first.saturating_add(BLOCK).min(indices.end);
-                (0..HALVES).map(move |half| (half, first..last))
-            })
+        // Indices that are alike in their last bits have places that are alike in their first ones.
+        let stride = (indices.end / BLOCK).max(1).next_power_of_two();
+        let blocks: Vec<(usize, u32)> = (0..stride)
+            .flat_map(|first| (0..HALVES).map(move |half| (half, first)))
             .enumerate()
             .filter(|(number, _)| share.is_none_or(|share| share.has(*number as u64)))
             .map(|(_, block)| block)
@@ -86,9 +83,11 @@ impl PhotonPass<'_> {
         for chunk in blocks.chunks(BLOCKS_AT_ONCE).chain([&[][..]]) {
             let watch = Stopwatch::start();
             let follow = || -> Vec<Block> {
-                let of = |(half, indices): &(usize, Range<u32>)| {
+                let of = |&(half, first): &(usize, u32)| {
                     let cancelled = listener.control.is_cancelled();
-                    (!cancelled).then(|| self.block(*half, indices.clone(), &charts))
+                    let own = (first..indices.end).step_by(stride as usize);
+                    let own = own.filter(|index| *index >= indices.start);
+                    (!cancelled).then(|| self.block(half, own, &charts))
                 };
                 chunk.par_iter().filter_map(of).collect()
             };
@@ -112,20 +111,20 @@ impl PhotonPass<'_> {
         report
     }
 
-    fn block(&self, half: usize, indices: Range<u32>, charts: &KnownCharts) -> Block {
+    fn block(&self, half: usize, indices: impl Iterator<Item = u32>, charts: &KnownCharts) -> Block {
         let rules = PhotonRules {
             seed: half_seed(self.rules.seed, half),
             ..self.rules
         };
         let mut block = Block {
             half,
-            rays: indices.len() as u64,
             ..Block::default()
         };
         let mut order: Vec<(u64, u32)> = indices
             .map(|index| (PhotonLaunch::place(index, rules.seed), index))
             .collect();
         order.sort_unstable();
+        block.rays = order.len() as u64;
         let mut walk = PhotonWalk::new(rules);
         let mut placed = LedgerSum::default();
         for (place, index) in order {
