@@ -7,6 +7,7 @@
 use super::caustic::{CausticLayer, Climb, Course};
 use super::light_level::{LightLevel, LightState};
 use super::map_size::Sizes;
+use super::photon_level::GROWTH;
 use crate::error::{Error, Result};
 use crate::light_pass::caustic::setup::AimedLight;
 use crate::light_pass::photon::pass::HALVES;
@@ -22,6 +23,9 @@ const RECEIVER_QUERY: f64 = 0.4;
 
 /// A level of patches costs so many times the one before it.
 const LEVEL_GROWTH: f64 = 4.0;
+
+/// Light whose photons have more segments than this goes more ways than patches should follow.
+const MOST_WAYS: f64 = 4.0;
 
 /// Patches have to promise the target for this part of what photons take: they may promise too much, and what they took is
 /// lost with the change.
@@ -109,8 +113,8 @@ impl CausticLayer<'_> {
         }
     }
 
-    /// Of a light that may have either: makes the photons that tell their cost, then decides whether another level of
-    /// patches is worth it.
+    /// Of a light that may have either: makes the photons that tell their cost, and more of them while they cost less than
+    /// the first patches would; then decides whether another level of patches is worth it. True where it made photons.
     pub(super) fn decide_carrier(
         &self,
         light: &AimedLight,
@@ -118,19 +122,25 @@ impl CausticLayer<'_> {
         state: &mut LightState,
         climb: &mut Climb,
         course: &mut Course,
-    ) -> Result<()> {
+    ) -> Result<bool> {
         let Some(target) = self.settings.max_error else {
-            return Ok(());
+            return Ok(false);
         };
         let goal = climb.aim.unwrap_or(target);
-        if climb.pilot.is_none() {
-            climb.pilot = self.first_photons(light, sizes, state, course)?;
+        let is_first = climb.pilot.is_none();
+        if is_first || self.are_photons_sooner(light, climb) {
+            let made = self.pilot_photons(light, sizes, state, climb, course)?;
+            let is_made = made.is_some();
+            climb.pilot = made.or(climb.pilot.take());
+            if is_made || !is_first {
+                return Ok(is_made);
+            }
         }
         let costs = climb.pilot.as_ref().and_then(|pilot| photon_costs(pilot, goal));
         let Some((by_photons, per_photon)) = costs else {
             // Nothing arrived: patches find what is too rare for a few photons.
             climb.carrier = Carrier::Patches;
-            return Ok(());
+            return Ok(false);
         };
         let cost = |level: &LightLevel| {
             let (cells, queries) = level.work;
@@ -139,12 +149,34 @@ impl CausticLayer<'_> {
         let so_far: f64 = climb.levels.iter().map(cost).sum();
         let next = climb.levels.last().map_or(0.0, cost) * LEVEL_GROWTH;
         let promised = promised(&climb.levels, cost, goal).unwrap_or(0.0);
-        if so_far + next > by_photons || promised > PROMISE * by_photons {
+        let goes_many_ways = climb.levels.is_empty() && per_photon > MOST_WAYS;
+        if goes_many_ways || so_far + next > by_photons || promised > PROMISE * by_photons {
             climb.carrier = Carrier::Photons;
             climb.rounds.clear();
             climb.levels = climb.pilot.take().into_iter().collect();
         }
-        Ok(())
+        Ok(false)
+    }
+
+    /// Whether another level of photons takes less than the first one of patches.
+    fn are_photons_sooner(&self, light: &AimedLight, climb: &Climb) -> bool {
+        let pilot = climb.pilot.as_ref();
+        let known = pilot
+            .and_then(|pilot| Some((pilot.photons.as_ref()?.segments as f64, photon_costs(pilot, 1.0)?)));
+        let (Some((segments, (_, per_photon))), true) = (known, climb.levels.is_empty()) else {
+            return false;
+        };
+        let cells: f64 = self
+            .spectra
+            .parts(light.light)
+            .iter()
+            .map(|(_, part)| {
+                let size = self.spectra.part_size(light.light, self.lattices(light)[0]);
+                let cells = light.item_buffer.lattice_cells(light.launch.face_count(), size);
+                cells as f64 * part.node_count() as f64
+            })
+            .sum();
+        GROWTH.1 * segments < CELL * per_photon.powi(3) * cells
     }
 }
 

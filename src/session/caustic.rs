@@ -382,10 +382,9 @@ impl CausticLayer<'_> {
         course: &mut Course,
     ) -> Result<()> {
         if climb.carrier == Carrier::Undecided {
-            let is_first = climb.pilot.is_none();
-            self.decide_carrier(light, sizes, state, climb, course)?;
-            if is_first && climb.pilot.is_some() {
-                // Shown before anything that takes longer.
+            let is_shown = self.decide_carrier(light, sizes, state, climb, course)?;
+            if is_shown {
+                // Before anything that takes longer.
                 return Ok(());
             }
         }
@@ -449,7 +448,7 @@ impl CausticLayer<'_> {
 
     fn has_next_level(&self, light: &AimedLight, climb: &Climb) -> bool {
         if climb.carrier == Carrier::Photons {
-            self.next_photons(light, climb).is_some()
+            self.next_photons(light, climb.levels.last(), climb.aim).is_some()
         } else {
             climb.levels.len() < self.lattices(light).len()
         }

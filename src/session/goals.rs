@@ -145,22 +145,24 @@ impl CausticLayer<'_> {
 
     /// By area and flux: the relative RMSE over all maps.
     fn errors_by_rmse(&self, lights: &[&AimedLight], climbs: &[Climb]) -> Errors {
-        let mut areas_m2 = BTreeMap::new();
+        let (mut areas_m2, mut all_w) = (BTreeMap::new(), 0.0);
         let of = |(index, (light, climb)): (usize, (&&AimedLight, &Climb))| {
             let level = climb.shown()?;
-            let error = &level.error.as_ref()?.estimate;
+            let flux_w = self.flux_w(light, climb)?;
+            // Light whose error is not known yet counts as well.
+            all_w += flux_w;
             let of_light = level.maps.iter();
             let of_light: Vec<_> = of_light
                 .map(|(receiver, map)| (receiver, map.chart.area_m2()))
                 .collect();
             areas_m2.extend(of_light.iter().copied());
             let area_m2: f64 = of_light.iter().map(|(_, m2)| m2).sum();
-            Some((index, error.relative_rmse, self.flux_w(light, climb)?, area_m2))
+            let error = &level.error.as_ref()?.estimate;
+            Some((index, error.relative_rmse, flux_w, area_m2))
         };
         let known: Vec<(usize, f64, f64, f64)> =
             lights.iter().zip(climbs).enumerate().filter_map(of).collect();
         let all_m2: f64 = areas_m2.values().sum();
-        let all_w: f64 = known.iter().map(|(_, _, flux_w, _)| flux_w).sum();
         let of = |&(index, relative_rmse, flux_w, area_m2): &(usize, f64, f64, f64)| ErrorOfLight {
             index,
             relative_rmse,

@@ -28,7 +28,7 @@ const MAX_PHOTONS: u32 = 1 << 31;
 const MAX_WITHOUT_ERROR: u32 = 1 << 20;
 
 /// Growth from level to level, least and most.
-const GROWTH: (f64, f64) = (1.5, 8.0);
+pub(super) const GROWTH: (f64, f64) = (1.5, 8.0);
 
 /// Somewhat more photons than the target should need, so that no level is made for little.
 const MARGIN: f64 = 1.1;
@@ -40,9 +40,14 @@ const LEAST_NOISE: f64 = 0.7;
 const MEAN_MARGIN: f64 = 16.0;
 
 impl CausticLayer<'_> {
-    /// Photons of each half of the next level; `None` where there is nothing more.
-    pub(super) fn next_photons(&self, light: &AimedLight, climb: &Climb) -> Option<u32> {
-        let last = climb.levels.last();
+    /// Photons of each half of the level after one, of a light that aims at a relative RMSE; `None` where there is nothing
+    /// more.
+    pub(super) fn next_photons(
+        &self,
+        light: &AimedLight,
+        last: Option<&LightLevel>,
+        aim: Option<f64>,
+    ) -> Option<u32> {
         let before = last.and_then(|level| level.key.photons);
         let Some(target) = self.settings.max_error else {
             let wanted = self.photons_at_density(light);
@@ -60,7 +65,7 @@ impl CausticLayer<'_> {
             let given_up = accuracy::given_up_share(&ledger.energy_w);
             (error.is_finite() && error > 0.0).then_some((error, given_up))
         });
-        let goal = climb.aim.unwrap_or(target);
+        let goal = aim.unwrap_or(target);
         let times = match known {
             Some((error, given_up)) => {
                 // More photons do not bring back what was given up.
@@ -117,7 +122,7 @@ impl CausticLayer<'_> {
         climb: &mut Climb,
         course: &mut Course,
     ) -> Result<()> {
-        let Some(photons) = self.next_photons(light, climb) else {
+        let Some(photons) = self.next_photons(light, climb.levels.last(), climb.aim) else {
             climb.done = true;
             return Ok(());
         };
@@ -132,18 +137,23 @@ impl CausticLayer<'_> {
         Ok(())
     }
 
-    /// The level that tells what more photons would cost; `None` where it was stopped.
-    pub(super) fn first_photons(
+    /// The first photons, which tell what more of them would cost, or more of them; `None` where it was stopped.
+    pub(super) fn pilot_photons(
         &self,
         light: &AimedLight,
         sizes: &Sizes,
         state: &mut LightState,
+        climb: &Climb,
         course: &mut Course,
     ) -> Result<Option<LightLevel>> {
-        let key = self.photon_key(light, FIRST_PHOTONS, sizes);
+        let before = climb.pilot.as_ref();
+        let Some(photons) = self.next_photons(light, before, climb.aim) else {
+            return Ok(None);
+        };
+        let key = self.photon_key(light, photons, sizes);
         match state.take(&key) {
             Some(level) => Ok(Some(level)),
-            None => self.make_photons(light, key, None, course),
+            None => self.make_photons(light, key, before, course),
         }
     }
 

@@ -5,7 +5,7 @@ use nephroid::illumination::IlluminationMap;
 use nephroid::optics::LinearSrgb;
 use nephroid::scene::{LoadOptions, load};
 
-use support::tools::{bake, energy_fault, settings};
+use support::tools::{bake, energy_fault, photons};
 
 /// The first texel that holds no light there can be: not finite, or negative. Light of one wavelength lies outside sRGB, so
 /// that a channel may be negative where wavelengths part; its luminance may not, but for what single precision rounds off.
@@ -43,7 +43,7 @@ fn real_files_bake() {
     for file in files {
         let scene = load(file.to_str().expect("a readable path"), &options).expect("a valid file");
         let name = scene.name.clone();
-        let result = bake(scene, &settings(3e3, 64));
+        let result = bake(scene, &photons(3e4, 64));
         assert_eq!(energy_fault(&result), None, "{name}");
         let parts = result.plan.is_on(Effect::Dispersion);
         for map in &result.maps {

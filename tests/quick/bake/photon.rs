@@ -170,6 +170,23 @@ fn targets_are_met_and_filtering_saves_photons() {
     }
 }
 
+/// Few photons leave most texels empty: what is left of the noise there is still a number.
+#[test]
+fn errors_of_few_filtered_photons_are_numbers() {
+    let settings = BakeSettings {
+        max_error: Some(1.0),
+        map_resolution: FINE,
+        filter: true,
+        ..photons(1e4, SIDE)
+    };
+    let result = bake(builtin_scene("ring"), &settings);
+    for error in [result.estimated_relative_rmse, result.estimated_visible] {
+        assert!(error.is_some_and(|error| error < 10.0), "{error:?}");
+    }
+    let mut errors = result.maps.iter().flat_map(|map| map.error.iter().flatten());
+    assert!(errors.all(|error| *error >= 0.0 && *error < f32::MAX));
+}
+
 /// Smooth light is for patches, light that goes very many ways for photons.
 #[test]
 fn auto_takes_what_costs_less() {
