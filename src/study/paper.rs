@@ -23,7 +23,8 @@ use crate::scene::{Camera, LightKind, Mesh, Scene};
 use crate::session::forecast::{forecast, stood_at};
 use crate::session::{BakeResult, CostPoint, Forecast, StopReason};
 use crate::settings::{
-    BakeSettings, Estimator, Footprint, ItemBufferKind, Kernel, KernelSampling, RayPlacement, Sigma,
+    BakeSettings, ErrorMetric, Estimator, Footprint, ItemBufferKind, Kernel, KernelSampling, RayPlacement,
+    Sigma,
 };
 use crate::transport::{EffectSet, MediumStack, Tracer};
 use crate::units::Flux;
@@ -244,6 +245,7 @@ fn accuracy(bench: &Bench) -> Result<Sweep> {
     }
     let towards = |target: f64, limit_s: f64| BakeSettings {
         max_error: Some(target),
+        error_metric: ErrorMetric::Rmse,
         max_time_s: Some(limit_s),
         ..bench.at(
             wavefront(BakeSettings::starting_density_per_sr(target)),

@@ -17,7 +17,7 @@ pub(super) fn baked(baked: &BakedLevel) -> Value {
         "request": baked.serial,
         "level": baked.level,
         "bake_s": baked.seconds,
-        "error": baked.result.estimated_relative_rmse,
+        "error": baked.result.estimated_error(baked.request.settings.error_metric),
         "stop_reason": baked.result.stop_reason,
         "rays": baked.result.counts.rays,
         "splats": baked.result.counts.splats,

@@ -172,7 +172,7 @@ fn threads(t: &mut Table) {
         ("ball", &ball, settings(2e3, 32), &[64]),
         ("ball", &ball, splats(RayPlacement::Jittered), &[2, 4, 7]),
         ("ball-refined", &ball, refined(128, 0.03), &[2, 4, 7]),
-        ("rough-mirror", &soft, refined(32, 0.1), &[3]),
+        ("rough-mirror", &soft, photons(1e5, 32), &[3]),
     ] {
         let same = t
             .case(format!("threads-{name}"))

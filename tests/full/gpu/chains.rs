@@ -21,7 +21,7 @@ use support::bump_scenes::by_image;
 use support::effect_scenes::all;
 use support::flip::mean_flip;
 use support::scenes::{bits, seen, view_of};
-use support::tools::{bake, builtin_scene, set, settings};
+use support::tools::{bake, builtin_scene, photons, set, settings};
 
 /// Largest mean FLIP between the device's picture and the CPU's of every chain.
 const LARGEST_FLIP: f64 = 0.02;
@@ -212,7 +212,7 @@ fn chains_only_where_something_specular_is_in_view() {
     let (mut hidden, mut dark) = (Vec::new(), Vec::new());
     for case in all() {
         let (name, scene) = (case.name, &case.scene);
-        let baking = set(settings(3000.0, 32), |s| s.layers = case.layers.clone());
+        let baking = set(photons(3e4, 32), |s| s.layers = case.layers.clone());
         let maps = bake(scene.clone(), &baking).maps;
         let tracer = Tracer::new(Arc::new(scene.clone()));
         let view = View {

@@ -11,7 +11,7 @@ use crate::gpu::rays::Numbers;
 use crate::gpu::rig::{FORMAT, Rig, gpu, or_skip};
 use support::scenes::view_of;
 use support::shared_or_skip;
-use support::tools::{bake, builtin_scene, set, settings};
+use support::tools::{bake, builtin_scene, photons, set};
 
 const PLACES: usize = 12;
 
@@ -56,8 +56,8 @@ fn cameras(scene: &Scene) -> Vec<Camera> {
 /// Share of the pixels that are lit, from a scene's own camera, and from others.
 fn fly(scene: &Scene) -> Option<[f64; 2]> {
     let gpu = gpu()?;
-    // Maps of few splats: a moment whatever the glass.
-    let baking = set(settings(200.0, 32), |s| {
+    // Maps of few photons: a moment whatever the glass.
+    let baking = set(photons(2e3, 32), |s| {
         s.layers = vec![LayerKind::Caustic, LayerKind::Direct]
     });
     let maps = bake(scene.clone(), &baking).maps;

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use glam::DVec2;
 use nephroid::scene::Edit;
+use nephroid::settings::Estimator;
 use nephroid::viewer::ViewerOptions;
 use nephroid::viewer::files::FilesOptions;
 
@@ -30,6 +31,7 @@ fn camera_settings_and_edits_stay() {
     act(&mut model, wish(rough));
     model.navigator.look(DVec2::new(100.0, 30.0));
     model.panel.settings.seed = 7;
+    model.panel.settings.estimator = Estimator::Photon;
     bake(&mut model);
     let (gaze, was) = (model.navigator.camera().forward, Arc::clone(model.scene()));
 

@@ -11,7 +11,7 @@ use support::desktop::{ALIKE, SIZE, Screen, Viewer, difference, picture, pixel_o
 
 /// The caustic alone, refined until its error is small: several levels, and a bake of seconds, so that no window is so slow
 /// that it sees the last maps only.
-const REFINED: &str = "builtin:ring --max-error 0.05% --map-resolution 128 --layers caustic";
+const REFINED: &str = "builtin:ring --estimator wavefront --error-metric rmse --max-error 0.05% --map-resolution 128 --layers caustic";
 
 /// Takes the last change back.
 fn undo(viewer: &mut Viewer<'_>) {
