@@ -320,7 +320,7 @@ impl Desk<'_> {
         let settings = BakeSettings {
             map_resolution: study.map_resolution.unwrap_or(square(SIDE)),
             threads: threads(&study.common.run)?,
-            ..BakeSettings::default()
+            ..BakeSettings::of(Estimator::Wavefront)
         };
         let few = if study.common.quick {
             QUICK_DENSITIES
@@ -381,7 +381,7 @@ impl Desk<'_> {
             map_resolution: study.map_resolution.unwrap_or(square(SPECTRUM_SIDE)),
             density_per_sr: study.density.unwrap_or(BEAM_DENSITY_PER_SR),
             threads: threads(&study.common.run)?,
-            ..BakeSettings::default()
+            ..BakeSettings::of(Estimator::Wavefront)
         };
         for &count in &study.wavelengths {
             let way = BakeSettings {

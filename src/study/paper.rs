@@ -142,7 +142,7 @@ fn splat(density_per_sr: f64) -> BakeSettings {
 fn wavefront(density_per_sr: f64) -> BakeSettings {
     BakeSettings {
         density_per_sr,
-        ..BakeSettings::default()
+        ..BakeSettings::of(Estimator::Wavefront)
     }
 }
 
