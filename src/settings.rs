@@ -79,9 +79,9 @@ pub enum Estimator {
 #[strum(serialize_all = "lowercase")]
 pub enum ErrorMetric {
     /// As an eye sees it: relative to how bright a place is, with what exposure makes of the dark.
-    #[default]
     Visible,
     /// Root mean square over all maps, over their mean: ruled by the brightest light.
+    #[default]
     Rmse,
 }
 
@@ -358,7 +358,7 @@ impl Default for BakeSettings {
             estimator: Estimator::Auto,
             density_per_sr: Estimator::Auto.preview_density_per_sr(),
             max_error: None,
-            error_metric: ErrorMetric::Visible,
+            error_metric: ErrorMetric::Rmse,
             max_time_s: None,
             rays: RayPlacement::Lattice,
             sigma: Estimator::Auto.default_sigma(),
