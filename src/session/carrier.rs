@@ -107,6 +107,8 @@ impl CausticLayer<'_> {
         match self.settings.estimator {
             Estimator::Photon => Carrier::Photons,
             Estimator::Auto if self.settings.max_error.is_none() || self.is_soft(light) => Carrier::Photons,
+            // Among many lights, what one of them takes says little of what all do.
+            Estimator::Auto if self.lit().nth(1).is_some() => Carrier::Patches,
             Estimator::Auto => Carrier::Undecided,
             Estimator::Wavefront => Carrier::Patches,
             Estimator::Splat => Carrier::Splats,
