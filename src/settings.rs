@@ -50,8 +50,8 @@ impl LayerKind {
 #[serde(rename_all = "lowercase")]
 #[strum(serialize_all = "lowercase")]
 pub enum Estimator {
-    /// Patches or photons, light by light: whichever a pilot of both measures to be cheaper for the target; photons where
-    /// there is no target.
+    /// Photons for lights with a size, for light on rough surfaces, and without a target; else patches or, of a single
+    /// light, whichever a pilot of both measures to be cheaper for the target.
     Auto,
     /// Patches of the wavefront between neighbouring rays, spread exactly over the texels they cover.
     Wavefront,
@@ -403,6 +403,16 @@ impl Estimator {
         match self {
             Self::Auto | Self::Wavefront | Self::Photon => Sigma::Constant(0.0),
             Self::Splat => Sigma::Constant(1.0),
+        }
+    }
+}
+
+impl ErrorMetric {
+    /// The one of two errors that is meant.
+    pub fn of<T>(self, visible: T, rmse: T) -> T {
+        match self {
+            Self::Visible => visible,
+            Self::Rmse => rmse,
         }
     }
 }

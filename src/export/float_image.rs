@@ -6,7 +6,7 @@ use super::{exr, pfm};
 use crate::error::{Error, Result};
 use crate::files;
 use crate::illumination::compare::Grid;
-use crate::optics::LinearSrgb;
+use crate::optics::luminance;
 use crate::settings::MAX_MAP_SIDE;
 
 /// Largest file that is read [bytes].
@@ -71,7 +71,7 @@ impl FloatImage {
     /// Luminance of the channels `PREFIX.R/G/B`; for an empty prefix a lone `Y` serves as well.
     pub fn luminance(&self, prefix: &str) -> Option<Grid> {
         let values = match self.rgb(prefix) {
-            Some(rgb) => rgb.into_iter().map(luminance).collect(),
+            Some(rgb) => rgb.iter().map(luminance).collect(),
             None if prefix.is_empty() => self.channel("Y")?.iter().map(|y| f64::from(*y)).collect(),
             None => return None,
         };
@@ -105,8 +105,4 @@ pub(super) fn check_size(width: usize, height: usize, location: &str) -> Result<
         format!("its size of {width}x{height} texels is outside 1 to {MAX_MAP_SIDE} a side"),
         "use a smaller image",
     ))
-}
-
-fn luminance(rgb: [f32; 3]) -> f64 {
-    LinearSrgb::from(rgb.map(f64::from)).luminance()
 }

@@ -2,7 +2,7 @@
 //! `shaders/shared/tone_map.wgsl`.
 
 use super::{Picture, ToneMap};
-use crate::optics::LinearSrgb;
+use crate::optics::{LinearSrgb, luminance};
 
 /// Where auto exposure brings the log-average luminance: the 18 % grey card.
 const MIDDLE_GREY: f64 = 0.18;
@@ -158,7 +158,6 @@ pub fn display_rgba8(picture: &Picture, exposure_stops: f64, tone_map: ToneMap) 
 /// Pixels more than 8 stops below the mean count as unlit, so that neither black surroundings nor the last traces of
 /// light decide.
 pub fn auto_exposure_stops(picture: &Picture) -> f64 {
-    let luminance = |rgb: &[f32; 3]| LinearSrgb::from(rgb.map(f64::from)).luminance();
     let mut lit: Vec<f64> = picture.radiance.iter().map(luminance).collect();
     lit.retain(|luminance| luminance.is_finite() && *luminance > 0.0);
     let mean = lit.iter().sum::<f64>() / picture.radiance.len().max(1) as f64;

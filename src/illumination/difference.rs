@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::{Chart, IlluminationMap, Receiver};
 use crate::error::{Error, Result};
-use crate::optics::LinearSrgb;
+use crate::optics::luminance;
 
 /// The difference on one surface.
 #[derive(Clone, Debug)]
@@ -89,7 +89,6 @@ struct Side<'a> {
 
 impl<'a> Side<'a> {
     fn of(map: &'a IlluminationMap) -> Self {
-        let luminance = |rgb: &[f32; 3]| LinearSrgb::from(rgb.map(f64::from)).luminance();
         Self {
             chart: &map.chart,
             luminance: map.total().iter().map(luminance).collect(),

@@ -8,7 +8,7 @@
 //! Illumination" (WSCG 2010), as adaptive sampling of path tracers has it.
 
 use super::{Chart, IlluminationMap};
-use crate::optics::LinearSrgb;
+use crate::optics::luminance;
 use crate::settings::LayerKind;
 
 /// Side of a block [texels].
@@ -180,11 +180,6 @@ pub fn visible_error(maps: &[IlluminationMap], given_up: f64) -> (Option<f64>, V
         .iter()
         .fold((0.0, 0.0), |all, one| (all.0 + one.0, all.1 + one.1));
     (root(all), sums.into_iter().map(root).collect())
-}
-
-/// Of E [W/m²].
-pub fn luminance(e: &[f32; 3]) -> f64 {
-    LinearSrgb::from(e.map(f64::from)).luminance()
 }
 
 impl IlluminationMap {

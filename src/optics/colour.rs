@@ -89,6 +89,11 @@ impl LinearSrgb {
     }
 }
 
+/// Luminance of a triple in linear sRGB, as maps and pictures hold them.
+pub fn luminance(rgb: &[f32; 3]) -> f64 {
+    LinearSrgb::from(rgb.map(f64::from)).luminance()
+}
+
 impl From<[f64; 3]> for LinearSrgb {
     fn from([r, g, b]: [f64; 3]) -> Self {
         Self { r, g, b }

@@ -12,6 +12,7 @@ pub mod wavelength;
 pub use colour::ColourBasis;
 pub use colour::ColourMatrix;
 pub use colour::LinearSrgb;
+pub use colour::luminance;
 pub use glass::Glass;
 pub use metal::Metal;
 pub use wavelength::Nanometres;

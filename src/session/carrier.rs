@@ -1,8 +1,8 @@
 //! What carries a light: patches of its wavefront, or photons.
 //!
-//! Light of many places and on rough surfaces is for photons. Of any other light `auto` makes a few photons first; they
-//! tell what the target would cost by photons, and patches go on while they cost less than that. Costs are counted
-//! operations, so that the choice does not depend on the machine.
+//! Light of many places and on rough surfaces is for photons, and any other is for patches where there are several lights.
+//! Of a single one `auto` makes a few photons first; they tell what the target would cost by photons, and patches go on
+//! while they cost less than that. Costs are counted operations, so that the choice does not depend on the machine.
 
 use super::caustic::{CausticLayer, Climb, Course};
 use super::light_level::{LightLevel, LightState};
@@ -131,7 +131,8 @@ impl CausticLayer<'_> {
         let goal = climb.aim.unwrap_or(target);
         let is_first = climb.pilot.is_none();
         if is_first || self.are_photons_sooner(light, climb) {
-            let made = self.pilot_photons(light, sizes, state, climb, course)?;
+            let before = (climb.pilot.as_ref(), climb.aim);
+            let made = self.more_photons(light, sizes, state, before, course)?;
             let is_made = made.is_some();
             climb.pilot = made.or(climb.pilot.take());
             if is_made || !is_first {

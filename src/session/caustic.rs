@@ -1,6 +1,6 @@
 //! The caustic layer of all lights, level by level: a coarse whole picture first, then finer ones, each with its error.
 
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use super::BakeCounts;
 use super::carrier::Carrier;
@@ -211,12 +211,7 @@ impl CausticLayer<'_> {
         let lights: Vec<&AimedLight> = self.lit().collect();
         self.refuse_soft_light(&lights)?;
         let whole = self.control.without_deadline();
-        let limited = match self.settings.max_time_s {
-            Some(limit_s) => self
-                .control
-                .with_deadline(self.began + Duration::from_secs_f64(limit_s)),
-            None => self.control.without_deadline(),
-        };
+        let limited = super::limited(self.control, self.settings, self.began);
         let mut course = Course {
             control: &limited,
             clock,
@@ -247,7 +242,8 @@ impl CausticLayer<'_> {
             }
             let mut counting = self.counting(&lights, &climbs, onlooker);
             let mut errors = self.errors(&lights, &climbs, &counting);
-            for index in self.underrated(&errors, &climbs) {
+            let underrated = self.underrated(&errors, &climbs);
+            for &index in &underrated {
                 climbs[index] = Climb {
                     is_underrated: true,
                     carrier: climbs[index].carrier,
@@ -255,6 +251,8 @@ impl CausticLayer<'_> {
                 };
                 let state = states.of_mut(lights[index].light);
                 self.climb(lights[index], &sizes, state, &mut climbs[index], &mut course)?;
+            }
+            if !underrated.is_empty() {
                 counting = self.counting(&lights, &climbs, onlooker);
                 errors = self.errors(&lights, &climbs, &counting);
             }
@@ -301,7 +299,7 @@ impl CausticLayer<'_> {
             climb.carrier == Carrier::Undecided
                 && climb.levels.last().is_none_or(|level| level.error.is_none())
         });
-        if !Self::knows_all(errors, lights) || !error.is_finite() || is_open {
+        if !errors.are_of_all(lights) || !error.is_finite() || is_open {
             return;
         }
         let held = climbs
@@ -316,11 +314,9 @@ impl CausticLayer<'_> {
             bytes: states.bytes() + held.sum::<u64>(),
             error,
             is_coarse: lights.iter().zip(climbs).any(|(light, climb)| {
-                let begins = self.lattices(light).len();
-                let begins = if climb.carrier == Carrier::Photons {
-                    1
-                } else {
-                    begins
+                let begins = match climb.carrier {
+                    Carrier::Photons => 1,
+                    _ => self.lattices(light).len(),
                 };
                 !climb.done && climb.levels.len() < begins
             }),
@@ -382,9 +378,9 @@ impl CausticLayer<'_> {
         course: &mut Course,
     ) -> Result<()> {
         if climb.carrier == Carrier::Undecided {
-            let is_shown = self.decide_carrier(light, sizes, state, climb, course)?;
-            if is_shown {
-                // Before anything that takes longer.
+            // Photons are shown before anything that takes longer.
+            let made_photons = self.decide_carrier(light, sizes, state, climb, course)?;
+            if made_photons {
                 return Ok(());
             }
         }
@@ -526,12 +522,11 @@ impl CausticLayer<'_> {
         let Some(level) = climb.levels.last() else {
             return false;
         };
-        let tiles = match counting {
-            Counting::Rmse => accuracy::rough_tiles(error, goal, None),
-            Counting::Visible(counts) => {
-                accuracy::rough_tiles(error, goal, Some(&counts.of_tiles(level, error)))
-            }
+        let counted = match counting {
+            Counting::Rmse => None,
+            Counting::Visible(counts) => Some(counts.of_tiles(level, error)),
         };
+        let tiles = accuracy::rough_tiles(error, goal, counted.as_ref());
         let is_any = !tiles.is_empty();
         let overreaches = &level.overreaches[..];
         let round = Round::new(tiles, overreaches);

@@ -27,10 +27,10 @@ use crate::illumination::{Chart, IlluminationMap, Layer, Receiver};
 use crate::light_pass::accuracy;
 use crate::light_pass::ledger::LightLedger;
 use crate::light_pass::receiver_maps::ReceiverMap;
-use crate::optics::LinearSrgb;
+use crate::optics::{LinearSrgb, luminance};
 use crate::plan::{self, Effect, EffectPlan};
 use crate::scene::{Light, Scene};
-use crate::settings::{BakeSettings, ErrorMetric, LayerKind, Sigma};
+use crate::settings::{BakeSettings, LayerKind, Sigma};
 
 /// The finest level of a light, with the light's place in the scene.
 pub(super) type Shown<'a> = (usize, &'a LightLevel);
@@ -81,10 +81,8 @@ impl Finish<'_> {
         for (map, error) in maps.iter_mut().zip(of_maps) {
             map.estimated_visible = error;
         }
-        let estimated_error = match self.settings.error_metric {
-            ErrorMetric::Visible => estimated_visible,
-            ErrorMetric::Rmse => estimated_relative_rmse,
-        };
+        let metric = self.settings.error_metric;
+        let estimated_error = metric.of(estimated_visible, estimated_relative_rmse);
         let is_scarce = outcome.warnings.iter().any(|warning| warning.location == MEMORY);
         let target = self.settings.max_error.unwrap_or(f64::INFINITY);
         let stop_reason = match outcome.stopped {
@@ -382,7 +380,6 @@ fn with_resolution(chart: &Chart, lit: &[Lit], layers: &[Layer], error: Vec<f32>
     let Some(caustic) = caustic.filter(|_| is_coarser) else {
         return error;
     };
-    let luminance = |e: &[f32; 3]| LinearSrgb::from(e.map(f64::from)).luminance();
     let values: Vec<f64> = caustic.irradiance.iter().map(luminance).collect();
     let variances = variance_within(chart, &values, halved);
     let both = |(error, variance): (f32, f64)| single((f64::from(error).powi(2) + variance).sqrt());
@@ -432,8 +429,7 @@ fn relative_rmse(maps: &[IlluminationMap]) -> Option<f64> {
             let texel_m2 = map.chart.texel_area_m2(texel);
             squares += f64::from(*error) * f64::from(*error) * texel_m2;
             for layer in &layers {
-                let irradiance = LinearSrgb::from(layer.irradiance[texel].map(f64::from));
-                flux_w += irradiance.luminance() * texel_m2;
+                flux_w += luminance(&layer.irradiance[texel]) * texel_m2;
             }
             area_m2 += texel_m2;
         }

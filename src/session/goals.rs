@@ -51,6 +51,11 @@ impl Errors {
         squares.sqrt()
     }
 
+    /// Whether the error of every light is known.
+    pub(super) fn are_of_all(&self, lights: &[&AimedLight]) -> bool {
+        !lights.is_empty() && self.lights.len() == lights.len()
+    }
+
     /// Whether no light has one.
     pub(super) fn is_empty(&self) -> bool {
         self.lights.is_empty()
@@ -178,11 +183,6 @@ impl CausticLayer<'_> {
         }
     }
 
-    /// Whether the error of every light is known.
-    pub(super) fn knows_all(errors: &Errors, lights: &[&AimedLight]) -> bool {
-        !lights.is_empty() && errors.lights.len() == lights.len()
-    }
-
     /// What each light aims at next; sets what it aims at in the end.
     pub(super) fn goals(&self, lights: &[&AimedLight], climbs: &mut [Climb], errors: &Errors) -> Vec<Goal> {
         let has_ladder = |light: &AimedLight, climb: &Climb| {
@@ -191,7 +191,7 @@ impl CausticLayer<'_> {
         let Some(target) = self.settings.max_error else {
             return vec![Goal::NextLevel; lights.len()];
         };
-        let all_known = Self::knows_all(errors, lights);
+        let all_known = errors.are_of_all(lights);
         let level = errors.level(target);
         // Without an error there is nothing to aim at once all lattices are through.
         let without_error = |(light, climb): (&&AimedLight, &Climb)| {

@@ -383,10 +383,7 @@ impl BakeSession {
         clock.deposit.add(watch.elapsed());
         if plan.is_on(Effect::Indirect) {
             let mut gathered = IndirectWork::default();
-            let limited = match settings.max_time_s {
-                Some(limit_s) => control.with_deadline(began + Duration::from_secs_f64(limit_s)),
-                None => control.without_deadline(),
-            };
+            let limited = limited(control, settings, began);
             let gathering = Gathering {
                 tracer,
                 sizes: &self.sizes,
@@ -419,6 +416,14 @@ impl BakeSession {
         clock.total = whole.elapsed();
         account(&mut result, &finish, aim, &clock);
         Ok(result)
+    }
+}
+
+/// What the user asks, and the time that a light pass has since it began.
+fn limited(control: &Control, settings: &BakeSettings, began: Instant) -> Control {
+    match settings.max_time_s {
+        Some(limit_s) => control.with_deadline(began + Duration::from_secs_f64(limit_s)),
+        None => control.without_deadline(),
     }
 }
 

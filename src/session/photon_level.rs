@@ -122,45 +122,40 @@ impl CausticLayer<'_> {
         climb: &mut Climb,
         course: &mut Course,
     ) -> Result<()> {
-        let Some(photons) = self.next_photons(light, climb.levels.last(), climb.aim) else {
+        let last = climb.levels.last();
+        if self.next_photons(light, last, climb.aim).is_none() {
             climb.done = true;
             return Ok(());
-        };
-        let key = self.photon_key(light, photons, sizes);
-        let made = match state.take(&key) {
-            Some(level) => Some(level),
-            None => self.make_photons(light, key, climb.levels.last(), course)?,
-        };
+        }
+        let made = self.more_photons(light, sizes, state, (last, climb.aim), course)?;
         // Not known better, and not worth knowing.
         climb.done |= !climb.is_underrated && made.is_some() && self.is_dim(light);
         climb.levels.extend(made);
         Ok(())
     }
 
-    /// The first photons, which tell what more of them would cost, or more of them; `None` where it was stopped.
-    pub(super) fn pilot_photons(
+    /// The level after one, of a light that aims at a relative RMSE; `None` where there is nothing more, or it was stopped.
+    ///
+    /// # Errors
+    /// A light whose power is no number.
+    pub(super) fn more_photons(
         &self,
         light: &AimedLight,
         sizes: &Sizes,
         state: &mut LightState,
-        climb: &Climb,
+        (last, aim): (Option<&LightLevel>, Option<f64>),
         course: &mut Course,
     ) -> Result<Option<LightLevel>> {
-        let before = climb.pilot.as_ref();
-        let Some(photons) = self.next_photons(light, before, climb.aim) else {
+        let Some(photons) = self.next_photons(light, last, aim) else {
             return Ok(None);
         };
-        let key = self.photon_key(light, photons, sizes);
-        match state.take(&key) {
-            Some(level) => Ok(Some(level)),
-            None => self.make_photons(light, key, before, course),
-        }
-    }
-
-    fn photon_key(&self, light: &AimedLight, photons: u32, sizes: &Sizes) -> LevelKey {
-        LevelKey {
+        let key = LevelKey {
             photons: Some(photons),
             ..self.key(light, 0, &Climb::default(), sizes)
+        };
+        match state.take(&key) {
+            Some(level) => Ok(Some(level)),
+            None => self.make_photons(light, key, last, course),
         }
     }
 

@@ -144,9 +144,6 @@ pub struct BakeResult {
 impl BakeResult {
     /// The estimated error of all maps, in a metric.
     pub fn estimated_error(&self, metric: ErrorMetric) -> Option<f64> {
-        match metric {
-            ErrorMetric::Visible => self.estimated_visible,
-            ErrorMetric::Rmse => self.estimated_relative_rmse,
-        }
+        metric.of(self.estimated_visible, self.estimated_relative_rmse)
     }
 }

@@ -3,7 +3,7 @@
 use glam::{DVec2, DVec3};
 
 use crate::illumination::{Chart, IlluminationMap};
-use crate::optics::LinearSrgb;
+use crate::optics::luminance;
 use crate::scene::Scene;
 
 /// A place of a surface.
@@ -22,7 +22,7 @@ pub fn find(scene: &Scene, maps: &[IlluminationMap]) -> Option<Spot> {
     let brightest = maps.iter().filter_map(|map| {
         let total = map.total();
         let lit = (0..total.len()).filter(|texel| map.chart.texel_area_m2(*texel) > 0.0);
-        let values = lit.map(|texel| (texel, LinearSrgb::from(total[texel].map(f64::from)).luminance()));
+        let values = lit.map(|texel| (texel, luminance(&total[texel])));
         let (texel, value) = values
             .filter(|(_, value)| value.is_finite())
             .max_by(|a, b| a.1.total_cmp(&b.1))?;

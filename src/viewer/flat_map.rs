@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use crate::eye_pass::tone_mapping::{auto_exposure_stops, display_rgba8};
 use crate::eye_pass::{Picture, ToneMap};
 use crate::illumination::IlluminationMap;
-use crate::optics::LinearSrgb;
+use crate::optics::luminance;
 use crate::settings::LayerKind;
 
 /// Longest side of a thumbnail [pixels].
@@ -93,12 +93,11 @@ pub fn show(map: &IlluminationMap, part: Part, size: [usize; 2], exposure_stops:
 pub fn read(map: &IlluminationMap, x: f64, y: f64) -> Option<Reading> {
     let (column, row) = inside(map, x, y)?;
     let texel = map.chart.texel_at(column, row);
-    let luminance = |e: [f32; 3]| LinearSrgb::from(e.map(f64::from)).luminance();
     let layers = map.layers.iter();
     Some(Reading {
         texel: [column, row],
         layers_w_per_m2: layers
-            .map(|layer| (layer.kind, luminance(layer.irradiance[texel])))
+            .map(|layer| (layer.kind, luminance(&layer.irradiance[texel])))
             .collect(),
         error_w_per_m2: map.error.as_ref().map(|error| f64::from(error[texel])),
     })

@@ -9,9 +9,9 @@ use serde_json::{Value, json};
 use super::background::Background;
 use super::lens::Lens;
 use crate::geometry::Ray;
-use crate::illumination::{self, IlluminationMap, Side};
+use crate::illumination::{IlluminationMap, Side};
 use crate::light_pass::explain::{Explanation, LightPath, Limits, Target, explain};
-use crate::optics::LinearSrgb;
+use crate::optics::{LinearSrgb, luminance};
 use crate::progress::Control;
 use crate::settings::LayerKind;
 use crate::transport::{MediumStack, SurfaceHit, Tracer, media_at};
@@ -186,11 +186,9 @@ pub fn read(tracer: &Tracer, maps: &[IlluminationMap], seen: &Seen) -> (Probed, 
 }
 
 fn layers_at(map: &IlluminationMap, texel: usize) -> Vec<(LayerKind, f64)> {
-    let luminance =
-        |layer: &illumination::Layer| LinearSrgb::from(layer.irradiance[texel].map(f64::from)).luminance();
     map.layers
         .iter()
-        .map(|layer| (layer.kind, luminance(layer)))
+        .map(|layer| (layer.kind, luminance(&layer.irradiance[texel])))
         .collect()
 }
 

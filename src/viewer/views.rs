@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::eye_pass::renderer::{Inspected, MapStyle};
 use crate::illumination::IlluminationMap;
 use crate::illumination::false_colours::ColourScale;
-use crate::optics::LinearSrgb;
+use crate::optics::luminance;
 use crate::units::LUMENS_PER_WATT;
 
 /// Least of most on a logarithmic scale that follows the maps.
@@ -148,8 +148,7 @@ impl MapSurvey {
         for map in maps {
             for rgb in map.total() {
                 if rgb.iter().all(|value| value.is_finite()) {
-                    let luminance = LinearSrgb::from(rgb.map(f64::from)).luminance();
-                    survey.peak_w_m2 = survey.peak_w_m2.max(luminance);
+                    survey.peak_w_m2 = survey.peak_w_m2.max(luminance(&rgb));
                 } else {
                     survey.faults += 1;
                 }

@@ -20,20 +20,8 @@ pub fn set(mut settings: BakeSettings, change: impl FnOnce(&mut BakeSettings)) -
     settings
 }
 
-/// Default settings at a density [1/sr] and a map side.
-pub fn settings(density_per_sr: f64, side: usize) -> BakeSettings {
-    BakeSettings {
-        density_per_sr,
-        map_resolution: MapResolution::Fixed {
-            width: side,
-            height: side,
-        },
-        ..BakeSettings::splat()
-    }
-}
-
-/// Wavefront settings at a density [rays/sr], for targets in relative RMSE, with maps of `side` texels each way.
-pub fn at(density_per_sr: f64, side: usize) -> BakeSettings {
+/// An estimator at a density [1/sr], for targets in relative RMSE, with maps of `side` texels each way.
+fn by(estimator: Estimator, density_per_sr: f64, side: usize) -> BakeSettings {
     BakeSettings {
         density_per_sr,
         map_resolution: MapResolution::Fixed {
@@ -41,21 +29,25 @@ pub fn at(density_per_sr: f64, side: usize) -> BakeSettings {
             height: side,
         },
         error_metric: ErrorMetric::Rmse,
-        ..BakeSettings::of(Estimator::Wavefront)
+        ..BakeSettings::of(estimator)
     }
 }
 
-/// The same by photons, unfiltered, with maps of `side` texels each way.
+/// Default settings of splats at a density [rays/sr] and a map side.
+pub fn settings(density_per_sr: f64, side: usize) -> BakeSettings {
+    by(Estimator::Splat, density_per_sr, side)
+}
+
+/// The same of wavefronts.
+pub fn at(density_per_sr: f64, side: usize) -> BakeSettings {
+    by(Estimator::Wavefront, density_per_sr, side)
+}
+
+/// The same of photons, unfiltered.
 pub fn photons(density_per_sr: f64, side: usize) -> BakeSettings {
     BakeSettings {
-        density_per_sr,
-        map_resolution: MapResolution::Fixed {
-            width: side,
-            height: side,
-        },
-        error_metric: ErrorMetric::Rmse,
         filter: false,
-        ..BakeSettings::of(Estimator::Photon)
+        ..by(Estimator::Photon, density_per_sr, side)
     }
 }
 

@@ -6,7 +6,7 @@ use super::{Encoding, TextureOptions};
 use crate::export::manifest::{MapEntry, SceneSummary};
 use crate::export::map_reader::MapReader;
 use crate::illumination::{Side, UvSet};
-use crate::optics::LinearSrgb;
+use crate::optics::luminance;
 use crate::settings::LayerKind;
 
 /// Version of the format.
@@ -189,7 +189,7 @@ impl Loss {
                 all += f64::from(value.max(0.0));
                 cut += (f64::from(*value) - f64::from(most)).max(0.0);
             }
-            let [wanted, got] = [wanted, got].map(|rgb| LinearSrgb::from(rgb.map(f64::from)).luminance());
+            let [wanted, got] = [wanted, got].map(luminance);
             mean += wanted;
             squares += (got - wanted) * (got - wanted);
         }

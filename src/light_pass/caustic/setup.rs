@@ -41,9 +41,7 @@ impl AimedLight {
     pub fn casters(&self) -> &[usize] {
         &self.casters
     }
-}
 
-impl AimedLight {
     /// What any place of the light may send [W], but for another strength.
     pub fn power_bound_w(&self, scene: &Scene) -> f64 {
         let own_w = self.launch.power_bound_w();

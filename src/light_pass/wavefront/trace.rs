@@ -219,10 +219,9 @@ impl<'a> StrandTracer<'a> {
             let transmittance = from.media.transmittance(self.tracer.scene(), hit.distance_m);
             incident = incident * transmittance;
         }
-        let micro = self.limits.microfacets.map(|facets| facets.at(from.depth));
         let interaction = self
             .tracer
-            .interact_with(effects, &hit, from.ray.direction, &from.media, micro);
+            .interact_with(effects, &hit, from.ray.direction, &from.media, None);
         self.scatter(from, &hit, incident, &interaction, floor_w, sample, waiting);
     }
 

@@ -151,7 +151,7 @@ fn entry(
 /// "512 × 512 texels, 14.7 MB, error 2.1 %".
 fn figures(map: &IlluminationMap) -> String {
     let memory = bytes(map.chart.texel_count() as u64 * BYTES_PER_TEXEL);
-    let error = map.estimated_visible.map_or(String::new(), |error| {
+    let error = map.estimated_relative_rmse.map_or(String::new(), |error| {
         format!(", error {} %", two_digits(100.0 * error))
     });
     format!("{} × {} texels, {memory}{error}", map.width(), map.height())

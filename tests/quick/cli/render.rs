@@ -38,7 +38,7 @@ fn stored_maps_look_as_those_baked_for_it() {
 #[test]
 fn a_png_shows_radiance_as_its_options_say() {
     let sandbox = Sandbox::new();
-    sandbox.succeed("bake builtin:mirror -o maps --density 1e3 --map-resolution 32 --layers caustic,direct");
+    sandbox.succeed("bake builtin:mirror -o maps --estimator wavefront --density 1e3 --map-resolution 32 --layers caustic,direct");
     let render = |file: &str, options: &str| {
         let line = "render builtin:mirror --size 40x30 --backend cpu --maps maps --json --camera 0";
         sandbox.succeed(&format!("{line} -o {file} {options}")).json()

@@ -66,7 +66,7 @@ pub fn map() -> IlluminationMap {
         irradiance: ramp(1.0),
     });
     map.error = Some(vec![0.25; 8]);
-    map.estimated_visible = Some(0.0213);
+    map.estimated_relative_rmse = Some(0.0213);
     map
 }
 
