@@ -272,7 +272,7 @@ impl Preset {
 pub struct BakeSettings {
     /// How rays become irradiance.
     pub estimator: Estimator,
-    /// Light rays per steradian [1/sr]; for suns density/D² rays per m².
+    /// Light rays per steradian [1/sr]; for suns density/D² rays per m². Sigma's radius follows it, refined or not.
     pub density_per_sr: f64,
     /// Target for the estimated error of maps, [`LEAST_MAX_ERROR`] to 1: light goes on from `density_per_sr` until it is
     /// met (not splat). `None`: exactly that density.
@@ -292,9 +292,10 @@ pub struct BakeSettings {
     pub kernel_sampling: KernelSampling,
     /// What sets a splat's size.
     pub footprint: Footprint,
-    /// Whether the noise of photons is filtered where that lowers the error (auto and photon).
+    /// Whether the noise of photons is filtered where that lowers the error (auto and photon). `None`: with a target; who
+    /// asks for a density wants to see its grain.
     #[serde(default)]
-    pub filter: bool,
+    pub filter: Option<bool>,
     /// How the item buffer divides directions.
     pub item_buffer: ItemBufferKind,
     /// Size of the maps.
@@ -365,7 +366,7 @@ impl Default for BakeSettings {
             kernel: Kernel::Gaussian,
             kernel_sampling: KernelSampling::Integrated,
             footprint: Footprint::Ellipse,
-            filter: true,
+            filter: None,
             item_buffer: ItemBufferKind::Equal,
             map_resolution: MapResolution::Auto,
             max_depth: None,
@@ -461,6 +462,11 @@ impl BakeSettings {
     /// The same where one branch is: light that is caught in a body for long is followed until it comes out.
     pub fn photon_depth(&self) -> u32 {
         self.max_depth.unwrap_or(USUAL_PHOTON_DEPTH)
+    }
+
+    /// Whether photons are filtered.
+    pub fn filters(&self) -> bool {
+        self.filter.unwrap_or(self.max_error.is_some())
     }
 
     /// How rays and wavelengths go together: as it is set, or as suits the estimator.

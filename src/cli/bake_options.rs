@@ -38,7 +38,7 @@ pub struct BakeOptions {
     #[arg(long, value_parser = values::one_of::<RayPlacement>(), value_name = "PLACEMENT")]
     rays: Option<RayPlacement>,
     /// Spread of the gaussian kernel in squared footprint radii, or `adaptive` (splat) [default: 1]; for the others,
-    /// smoothing of the map in squared texel radii [default: 0, none]
+    /// smoothing of the map in squared radii of a ray's footprint at the density [default: 0, none]
     #[arg(long, value_name = "S|adaptive", value_parser = values::sigma, allow_negative_numbers = true)]
     sigma: Option<Sigma>,
     /// Shape of a splat (splat) [default: gaussian]
@@ -50,7 +50,8 @@ pub struct BakeOptions {
     /// What sets the size and shape of a splat (splat) [default: ellipse]
     #[arg(long, value_parser = values::one_of::<Footprint>())]
     footprint: Option<Footprint>,
-    /// Whether the noise of photons is filtered where that lowers the error (auto, photon) [default: on]
+    /// Whether the noise of photons is filtered where that lowers the error (auto, photon) [default: on
+    /// with a target, off at a density]
     #[arg(long, value_parser = values::on_off, value_name = "on|off")]
     filter: Option<bool>,
     /// How the sphere of directions around a light is divided [default: equal]
@@ -124,7 +125,7 @@ impl BakeOptions {
             kernel: self.kernel.unwrap_or(defaults.kernel),
             kernel_sampling: self.kernel_sampling.unwrap_or(defaults.kernel_sampling),
             footprint: self.footprint.unwrap_or(defaults.footprint),
-            filter: self.filter.unwrap_or(defaults.filter),
+            filter: self.filter,
             item_buffer: self.item_buffer.unwrap_or(defaults.item_buffer),
             map_resolution: self.map_resolution.unwrap_or(defaults.map_resolution),
             max_depth: self.max_depth,

@@ -1,8 +1,12 @@
 //! Smoothing of a map's flux: a gaussian that moves counts between texels and loses none.
+//!
+//! A wide gaussian works on a coarser map: 2ⁿ × 2ⁿ texels are summed, the sums are smoothed and spread again by linear
+//! interpolation. Sums and interpolation together add a variance of a quarter of a coarse texel's squared side.
 
 use rayon::prelude::*;
 
 use super::accumulator::{FluxAccumulator, FluxCount};
+use super::tiles::TileLayout;
 
 /// Spreads at which the gaussian is cut off.
 const CUT_SPREADS: f64 = 4.0;
@@ -13,19 +17,203 @@ const LEAST_SPREAD_TEXELS: f64 = 1e-4;
 /// Spreads over the map's side from which a line becomes flat.
 const FLAT_SPREADS: f64 = 2.0;
 
-/// Smooths flux with a gaussian of standard deviation `spread_texels` [texels], cut off at four of them, across and
-/// down; borders mirror. Nothing happens at 0 (or less, or at what is no number).
+/// Coarse texels per spread, at least: fewer would show the interpolation.
+const COARSE_PER_SPREAD: f64 = 2.0;
+
+/// Coarse texels are at most 2 to this as long as the finest: rounding stays below 2⁻³⁴ of the light's power.
+const COARSEST: u32 = 6;
+
+/// Texels of a map in tiles that are smoothed at once.
+const MOST_AT_ONCE: usize = 2048 * 2048;
+
+/// Smooths flux with a gaussian of standard deviation `spread_texels` [texels of the finest size], cut off at four of
+/// them, across and down; borders mirror. Nothing happens at 0 (or less, or at what is no number), nor where a map in
+/// tiles is too large for so small a spread: under half a 2048th of its side.
 ///
-/// No count is lost, in no channel of any row: a texel gets the difference of two rounded cumulative sums. The result
-/// does not depend on the number of threads.
-pub fn smooth(flux: &mut FluxAccumulator, spread_texels: f64) {
+/// No count is lost, in no channel. The result does not depend on the number of threads.
+pub fn smooth(flux: &mut FluxAccumulator, layout: Option<&TileLayout>, spread_texels: f64) {
     if spread_texels < LEAST_SPREAD_TEXELS || spread_texels.is_nan() {
         return;
     }
-    let (width, height) = (flux.width(), flux.height());
+    let (width, height) = layout.map_or((flux.width(), flux.height()), TileLayout::size);
     if width == 0 || height == 0 {
         return;
     }
+    let whole = (width | height).trailing_zeros().min(COARSEST);
+    let most_at_once = if layout.is_some() {
+        MOST_AT_ONCE
+    } else {
+        usize::MAX
+    };
+    let mut level = 0;
+    while level < whole
+        && (spread_texels >= COARSE_PER_SPREAD * f64::from(2_u32 << level)
+            || (width >> level) * (height >> level) > most_at_once)
+    {
+        level += 1;
+    }
+    if level == 0 && layout.is_none() {
+        return smooth_evenly(flux, spread_texels);
+    }
+    let side = f64::from(1_u32 << level);
+    let added = if level == 0 { 0.0 } else { 0.25 };
+    let left = (spread_texels / side).powi(2) - added;
+    if left >= 0.0 {
+        let mut coarse = summed(flux, layout, level);
+        smooth_evenly(&mut coarse, left.sqrt());
+        spread(&coarse, flux, layout, level);
+    }
+}
+
+/// Texels of one size, row by row: a tile, or a row of a map without tiles.
+struct Block {
+    /// Its texels are 2^level times as long as the finest.
+    level: u32,
+    /// [finest texels]
+    origin: (usize, usize),
+    /// [own texels]
+    size: (usize, usize),
+}
+
+/// All texels in the order in which they are kept.
+fn blocks(flux: &FluxAccumulator, layout: Option<&TileLayout>) -> Vec<Block> {
+    match layout {
+        Some(layout) => layout
+            .tiles()
+            .map(|tile| Block {
+                level: u32::from(tile.level),
+                origin: tile.origin,
+                size: tile.size,
+            })
+            .collect(),
+        None => (0..flux.height())
+            .map(|row| Block {
+                level: 0,
+                origin: (0, row),
+                size: (flux.width(), 1),
+            })
+            .collect(),
+    }
+}
+
+impl Block {
+    /// Places of its texels [finest texels].
+    fn places(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
+        let place = |origin: usize, index: usize| origin + (index << self.level);
+        let (columns, rows) = self.size;
+        (0..rows).flat_map(move |row| {
+            (0..columns).map(move |column| (place(self.origin.0, column), place(self.origin.1, row)))
+        })
+    }
+}
+
+/// A map of one size, 2^level times as coarse as the finest texels.
+fn summed(flux: &FluxAccumulator, layout: Option<&TileLayout>, level: u32) -> FluxAccumulator {
+    let (width, height) = layout.map_or((flux.width(), flux.height()), TileLayout::size);
+    let mut coarse = FluxAccumulator::new(width >> level, height >> level);
+    let across = coarse.width();
+    let sums = coarse.texels_mut();
+    let mut texels = flux.texels().iter();
+    for block in blocks(flux, layout) {
+        for ((column, row), counts) in block.places().zip(&mut texels) {
+            if *counts == [0; 3] {
+                continue;
+            }
+            let first = (row >> level) * across + (column >> level);
+            let under = 1 << block.level.saturating_sub(level);
+            let share = counts.map(|count| count / (under * under) as i64);
+            for below in 0..under {
+                for sum in &mut sums[first + below * across..][..under] {
+                    add(sum, share);
+                }
+            }
+            let rest =
+                std::array::from_fn(|channel| counts[channel] - share[channel] * (under * under) as i64);
+            add(&mut sums[first], rest);
+        }
+    }
+    coarse
+}
+
+fn add(sum: &mut FluxCount, more: FluxCount) {
+    for (sum, more) in sum.iter_mut().zip(more) {
+        *sum += more;
+    }
+}
+
+/// Gives coarse texels back to the texels of a map, linearly interpolated. What rounding leaves goes to the first that
+/// a coarse texel covers.
+fn spread(coarse: &FluxAccumulator, flux: &mut FluxAccumulator, layout: Option<&TileLayout>, level: u32) {
+    let (across, down) = (coarse.width(), coarse.height());
+    let side = 1_i64 << level;
+    let whole = weight(side, 2 * side).pow(2);
+    let shares: Vec<FluxCount> = coarse
+        .texels()
+        .iter()
+        .map(|counts| counts.map(|count| count / whole))
+        .collect();
+    let texels: Vec<FluxCount> = blocks(flux, layout)
+        .par_iter()
+        .flat_map_iter(|block| {
+            let shares = &shares;
+            let length = 1_i64 << block.level;
+            block.places().map(move |(column, row)| {
+                let mut sum = [0; 3];
+                for (y, weight_y) in weights(row as i64, length, side) {
+                    let line = y.clamp(0, down as i64 - 1) as usize * across;
+                    for (x, weight_x) in weights(column as i64, length, side) {
+                        let share = shares[line + x.clamp(0, across as i64 - 1) as usize];
+                        add(&mut sum, share.map(|share| share * weight_x * weight_y));
+                    }
+                }
+                sum
+            })
+        })
+        .collect();
+    flux.texels_mut().copy_from_slice(&texels);
+    let width = flux.width();
+    for (index, (counts, share)) in coarse.texels().iter().zip(&shares).enumerate() {
+        let (column, row) = ((index % across) << level, (index / across) << level);
+        let texel = layout.map_or(row * width + column, |layout| layout.texel(column, row));
+        let rest = std::array::from_fn(|channel| counts[channel] - share[channel] * whole);
+        add(&mut flux.texels_mut()[texel], rest);
+    }
+}
+
+/// Coarse texels whose light reaches an interval of so many finest texels, with what each gives. Those beyond a border
+/// stand for their mirror images.
+fn weights(begin: i64, length: i64, side: i64) -> impl Iterator<Item = (i64, i64)> {
+    let end = begin + length;
+    // Light of a coarse texel reaches half its side farther than itself.
+    let reach = side / 2;
+    let first = (begin - reach).div_euclid(side);
+    let last = (end - 1 + reach).div_euclid(side);
+    (first..=last).map(move |coarse| {
+        let origin = coarse * side - reach;
+        (coarse, weight(side, end - origin) - weight(side, begin - origin))
+    })
+}
+
+/// What a coarse texel gives to the finest texels before a place, counted from the first that it reaches: the integral
+/// of a triangle of twice its side; of one finest texel, all of it.
+fn weight(side: i64, place: i64) -> i64 {
+    if side == 1 {
+        return place.clamp(0, 1);
+    }
+    let place = place.clamp(0, 2 * side);
+    if place <= side {
+        place * place
+    } else {
+        2 * side * side - (2 * side - place).pow(2)
+    }
+}
+
+/// The same for a map of one size, at that size.
+fn smooth_evenly(flux: &mut FluxAccumulator, spread_texels: f64) {
+    if spread_texels < LEAST_SPREAD_TEXELS {
+        return;
+    }
+    let (width, height) = (flux.width(), flux.height());
     let texels = flux.texels_mut();
     smooth_lines(texels, width, spread_texels);
     let mut columns = transposed(texels, width, height);

@@ -7,7 +7,6 @@ use super::caustic::path::Arrival;
 use super::caustic::splat::Coverage;
 use crate::illumination::accumulator::FluxAccumulator;
 use crate::illumination::islands::Islands;
-use crate::illumination::smoothing::smooth;
 use crate::illumination::{Chart, Receiver};
 use crate::optics::LinearSrgb;
 
@@ -73,19 +72,6 @@ impl ReceiverMaps {
         match &self.slots[receiver.index()] {
             Slot::Allocated(map) => Some(map),
             Slot::Untouched | Slot::Refused => None,
-        }
-    }
-
-    /// Smooths all maps by a gaussian [texels, standard deviation]; nothing at 0. Maps with gaps are left as they are:
-    /// their borders are no mirrors; and so are maps in tiles.
-    pub fn smooth(&mut self, spread_texels: f64) {
-        for slot in &mut self.slots {
-            if let Slot::Allocated(map) = slot
-                && map.chart.is_full()
-                && map.chart.layout.is_none()
-            {
-                smooth(&mut map.levels[0], spread_texels);
-            }
         }
     }
 

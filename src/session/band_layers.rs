@@ -62,7 +62,7 @@ impl Finish<'_> {
                 continue;
             };
             let mut flux = lit.flux();
-            self.smooth(chart, &mut flux);
+            self.smooth(chart, level, &mut flux);
             let strength = level.strength(&self.scene.lights[*light]).luminance();
             let width_nm = band.band.to_nm - band.band.from_nm;
             let scale = strength * level.unit.watts() * band.radiant / width_nm;

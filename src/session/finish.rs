@@ -221,7 +221,7 @@ impl Finish<'_> {
             .iter()
             .map(|(light, level, map)| {
                 let mut flux = map.flux();
-                self.smooth(chart, &mut flux);
+                self.smooth(chart, level, &mut flux);
                 (flux, level.strength(light) * level.unit.watts())
             })
             .collect();
@@ -246,14 +246,16 @@ impl Finish<'_> {
         }
     }
 
-    /// Smooths a map of the wavefront by sigma; maps with gaps are left as they are: their borders are no mirrors.
-    pub(super) fn smooth(&self, chart: &Chart, flux: &mut FluxAccumulator) {
+    /// Smooths light on a map by sigma, but for splats, whose kernels have it: the radius is that of the footprint which
+    /// a ray at the nominal density has at the light's reach, however far the bake refines. Maps with gaps are left as
+    /// they are: their borders are no mirrors.
+    pub(super) fn smooth(&self, chart: &Chart, level: &LightLevel, flux: &mut FluxAccumulator) {
         if let (true, Sigma::Constant(sigma)) = (self.settings.estimator.refines(), self.settings.sigma)
             && chart.is_full()
-            && chart.layout.is_none()
         {
-            // A texel is a footprint of its own area: a disc of radius 1/√π.
-            smooth(flux, (sigma / std::f64::consts::PI).sqrt());
+            let texel_m = (chart.area_m2() / (chart.width * chart.height) as f64).sqrt();
+            let radius_m = level.reach_m / (std::f64::consts::PI * self.settings.density_per_sr).sqrt();
+            smooth(flux, chart.layout.as_deref(), sigma.sqrt() * radius_m / texel_m);
         }
     }
 

@@ -80,6 +80,8 @@ pub(super) struct LightLevel {
     pub(super) radiant: Option<f64>,
     /// Of the flux.
     pub(super) unit: FluxUnit,
+    /// From the casters to the farthest receiver [m].
+    pub(super) reach_m: f64,
     /// Of all paths.
     pub(super) ledger: LedgerSum,
     /// Maps that were given up: next to no light was on them.

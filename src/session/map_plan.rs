@@ -11,7 +11,7 @@ use crate::illumination::tiles::COARSEST;
 use crate::illumination::{Chart, Receiver};
 use crate::light_pass::caustic::statistics::FootprintStatistics;
 use crate::plan::Effect;
-use crate::settings::{MapResolution, Sigma};
+use crate::settings::MapResolution;
 
 impl CausticLayer<'_> {
     /// Whether maps of the size that is set fit into memory, whatever is lit.
@@ -116,11 +116,9 @@ impl CausticLayer<'_> {
         None
     }
 
-    /// Whether a map of a size can be in tiles: the wavefront's, on surfaces that fill their maps, without smoothing,
-    /// which goes from texel to texel.
+    /// Whether a map of a size can be in tiles: where the estimator refines, on surfaces that fill their maps.
     fn may_be_tiled(&self, object: usize, size: (usize, usize)) -> bool {
         self.settings.estimator.refines()
-            && self.settings.sigma == Sigma::Constant(0.0)
             && map_size::is_divisible(size)
             && self
                 .sizes

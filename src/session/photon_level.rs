@@ -246,7 +246,7 @@ impl CausticLayer<'_> {
             let [a, b] = [&maps, &second].map(|maps| accuracy::images(maps, unit));
             accuracy::half_set_noise(&a, &b)
         };
-        if self.settings.filter {
+        if self.settings.filters() {
             let first = maps.clone();
             maps.add(second.clone());
             filter::filter(&mut maps, [&first, &second], unit, &mut noise);

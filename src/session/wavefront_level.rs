@@ -130,6 +130,7 @@ impl CausticLayer<'_> {
             bands: self.spectra.level_bands(light.light, bands),
             radiant: self.spectra.radiant(light.light),
             unit,
+            reach_m: light.reach_m,
             ledger,
             strays: Vec::new(),
             overreaches: Vec::new(),

@@ -46,7 +46,7 @@ pub fn at(density_per_sr: f64, side: usize) -> BakeSettings {
 /// The same of photons, unfiltered.
 pub fn photons(density_per_sr: f64, side: usize) -> BakeSettings {
     BakeSettings {
-        filter: false,
+        filter: Some(false),
         ..by(Estimator::Photon, density_per_sr, side)
     }
 }

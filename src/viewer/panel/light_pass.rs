@@ -58,7 +58,12 @@ pub fn show(ui: &mut Ui, settings: &mut BakeSettings) {
         );
         let default_density_per_sr = default_density_per_sr(settings);
         let density_per_sr = (&mut settings.density_per_sr, &default_density_per_sr);
+        let before = *density_per_sr.0;
         setting(ui, "Ray density [rays/sr]", no_caustic, density_per_sr, density);
+        if settings.density_per_sr != before {
+            // What is asked for is seen: refinement would go on to the same picture from any density.
+            target::aim_at_density(settings);
+        }
         setting(
             ui,
             "Sigma [radii²]",

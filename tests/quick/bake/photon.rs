@@ -121,7 +121,7 @@ fn threads_change_no_photon() {
     let [one, three] = [1, 3].map(|threads| {
         let settings = BakeSettings {
             threads,
-            filter: true,
+            filter: Some(true),
             ..photons(3e5, SIDE)
         };
         bake(frosted_ball(0.3), &settings)
@@ -140,7 +140,7 @@ fn targets_are_met_and_filtering_saves_photons() {
         let settings = BakeSettings {
             max_error: Some(0.15),
             map_resolution: FINE,
-            filter,
+            filter: Some(filter),
             ..photons(1e4, SIDE)
         };
         let result = bake(scene.clone(), &settings);
@@ -176,7 +176,7 @@ fn errors_of_few_filtered_photons_are_numbers() {
     let settings = BakeSettings {
         max_error: Some(1.0),
         map_resolution: FINE,
-        filter: true,
+        filter: Some(true),
         ..photons(1e4, SIDE)
     };
     let result = bake(builtin_scene("ring"), &settings);

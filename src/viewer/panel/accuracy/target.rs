@@ -106,6 +106,11 @@ fn percent(share: f64) -> f64 {
     (share * 1e6).round() / 1e4
 }
 
+/// The density as it is set ends the bake.
+pub fn aim_at_density(settings: &mut BakeSettings) {
+    (settings.max_error, settings.max_time_s) = (None, None);
+}
+
 /// Keeps what ends a bake where another estimator can: splats do not refine.
 pub fn after_change_of_estimator(settings: &mut BakeSettings) {
     match (Target::of(settings), settings.estimator) {
@@ -167,10 +172,7 @@ pub fn show(ui: &mut Ui, settings: &mut BakeSettings, unavailable: Option<&str>)
 
 fn list(ui: &mut Ui, target: &mut Target, estimator: Estimator) -> Response {
     let targets = [
-        (
-            Target::Density,
-            "Exactly the lattice of that density, without refinement.",
-        ),
+        (Target::Density, "Exactly that many rays, without refinement."),
         (
             Target::Error(Preset::default().max_error()),
             "Until the estimated error of all maps is below it.",
