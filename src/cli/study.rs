@@ -13,8 +13,8 @@ use nephroid::scene::Scene;
 use nephroid::settings::{BakeSettings, Estimator, LayerKind, MapResolution, Wavelengths};
 use nephroid::study::brute_force::{brute_force, check_rays, relative_noise};
 use nephroid::study::one_scene::{self, CONVERGENCE, EFFECTS, SPECTRUM};
-use nephroid::study::paper;
 use nephroid::study::references::Reference;
+use nephroid::study::studies;
 use nephroid::study::sweep::{Bench, Outcome, Sweep};
 use nephroid::study::table::Table;
 use nephroid::transport::Tracer;
@@ -215,7 +215,7 @@ fn ray_count(text: &str) -> std::result::Result<u64, String> {
 
 impl Subcommand for BuiltStudy {
     fn augment_subcommands(command: clap::Command) -> clap::Command {
-        let names = paper::STUDIES.iter().map(|study| (study.name, study.what));
+        let names = studies::STUDIES.iter().map(|study| (study.name, study.what));
         names.chain([ALL]).fold(command, |command, (name, what)| {
             command.subcommand(Common::augment_args(clap::Command::new(name).about(what)))
         })
@@ -226,7 +226,7 @@ impl Subcommand for BuiltStudy {
     }
 
     fn has_subcommand(name: &str) -> bool {
-        name == ALL.0 || paper::STUDIES.iter().any(|study| study.name == name)
+        name == ALL.0 || studies::STUDIES.iter().any(|study| study.name == name)
     }
 }
 
@@ -289,7 +289,7 @@ fn list(terminal: &Terminal) -> Result<()> {
         what: &'static str,
     }
     let own = [CONVERGENCE, REFERENCE, EFFECTS, SPECTRUM, ALL].into_iter();
-    let built = paper::STUDIES.iter().map(|study| (study.name, study.what));
+    let built = studies::STUDIES.iter().map(|study| (study.name, study.what));
     let lines: Vec<Line> = own.chain(built).map(|(name, what)| Line { name, what }).collect();
     let text: Vec<String> = lines
         .iter()
@@ -400,7 +400,7 @@ impl Desk<'_> {
     }
 
     fn built(self, study: &BuiltStudy) -> Result<()> {
-        let found = paper::STUDIES.iter().find(|known| known.name == study.name);
+        let found = studies::STUDIES.iter().find(|known| known.name == study.name);
         let found = found.ok_or_else(|| Error::usage("study", "there is no such study", "use --list"))?;
         let make = |bench: &Bench| found.sweep(bench);
         self.tell(&self.study(found.name, &study.common, &study.common.output, make)?)
@@ -409,7 +409,7 @@ impl Desk<'_> {
     /// Each is told as soon as it is done, but for JSON, which is one document.
     fn all(self, common: &Common) -> Result<()> {
         let mut reports = Vec::new();
-        for study in &paper::STUDIES {
+        for study in &studies::STUDIES {
             let folder = common.output.join(study.name);
             let told = self.study(study.name, common, &folder, |bench| study.sweep(bench))?;
             if !self.terminal.json {

@@ -1,5 +1,4 @@
-//! The studies of built-in scenes: what accuracy costs, how cost grows, and the paper's table, figures and plates
-//! (Collins 1994, *Adaptive Splatting for Specular to Diffuse Light Transport*).
+//! The table, figures and plates of the paper (Collins 1994, *Adaptive Splatting for Specular to Diffuse Light Transport*).
 
 use std::sync::Arc;
 
@@ -9,8 +8,8 @@ use rayon::prelude::*;
 use super::plot::Plot;
 use super::references::Reference;
 use super::sweep::{
-    ARD, Against, Bench, CPU_S, Column, EYE_PASS_CPU_S, FLUX_RATIO, Group, MEMORY_MB, Measured, RAYS,
-    REFERENCE, RELATIVE_RMSE, Sweep, Variant, WALL_S, number, share,
+    ARD, Against, Bench, CPU_S, Column, EYE_PASS_CPU_S, FLUX_RATIO, Group, RAYS, RELATIVE_RMSE, Sweep,
+    Variant,
 };
 use super::table::Cell;
 use crate::error::{Error, Result};
@@ -20,108 +19,27 @@ use crate::light_pass::caustic::path::{PathLimits, PathTracer};
 use crate::optics::LinearSrgb;
 use crate::scene::builtin::{self, parts, pool, shapes};
 use crate::scene::{Camera, LightKind, Mesh, Scene};
-use crate::session::forecast::{forecast, stood_at};
-use crate::session::{BakeResult, CostPoint, Forecast, StopReason};
+use crate::session::BakeResult;
 use crate::settings::{
-    BakeSettings, ErrorMetric, Estimator, Footprint, ItemBufferKind, Kernel, KernelSampling, RayPlacement,
-    Sigma,
+    BakeSettings, Estimator, Footprint, ItemBufferKind, Kernel, KernelSampling, RayPlacement, Sigma,
 };
 use crate::transport::{EffectSet, MediumStack, Tracer};
 use crate::units::Flux;
 
-/// A study of built-in scenes.
-#[derive(Clone, Copy, Debug)]
-pub struct Study {
-    /// On the command line.
-    pub name: &'static str,
-    /// What it finds out, in one line.
-    pub what: &'static str,
-    sweep: fn(&Bench) -> Result<Sweep>,
-}
-
-impl Study {
-    const fn new(name: &'static str, what: &'static str, sweep: fn(&Bench) -> Result<Sweep>) -> Self {
-        Self { name, what, sweep }
-    }
-
-    /// Its bakes.
-    ///
-    /// # Errors
-    /// Never for built-in scenes and references as they are shipped.
-    pub fn sweep(&self, bench: &Bench) -> Result<Sweep> {
-        Ok(Sweep {
-            name: self.name,
-            what: self.what,
-            ..(self.sweep)(bench)?
-        })
-    }
-}
-
-/// All of them, in the order of the paper, what it has not first.
-pub const STUDIES: [Study; 11] = [
-    Study::new(
-        "accuracy",
-        "error against CPU time and rays for every built-in scene, with what was predicted",
-        accuracy,
-    ),
-    Study::new(
-        "scaling",
-        "how cost grows with rays, triangles, texels and threads",
-        scaling,
-    ),
-    Study::new(
-        "table1",
-        "Table 1: error, rays and times at the paper's three densities, beside its own figures",
-        table1,
-    ),
-    Study::new("rays", "Figure 6a: error against the number of light rays", rays),
-    Study::new("sigma", "Figure 6b: error against sigma", sigma),
-    Study::new(
-        "resolution",
-        "Plate 6: maps of 30, 100 and 300 texels across",
-        resolution,
-    ),
-    Study::new(
-        "kernels",
-        "Figure 5, Plates 1 and 2: shapes and sizes of kernels",
-        kernels,
-    ),
-    Study::new(
-        "connectivity",
-        "Figure 3: density of nearest hits against areas between neighbouring rays",
-        connectivity,
-    ),
-    Study::new(
-        "item-buffer",
-        "section 3.1.2: cells of a cube against cells of equal solid angle",
-        item_buffer,
-    ),
-    Study::new(
-        "pool",
-        "Plates 7 and 8: a pool from above and from below, its waves as a mesh and as bumps",
-        pool_plates,
-    ),
-    Study::new(
-        "complex",
-        "Plate 9: how a mesh of some 4,000 polygons shows in its caustic",
-        complex,
-    ),
-];
-
 /// The paper's densest lattice but one [1/sr].
 const DENSITY_PER_SR: f64 = 79_577.5;
 
-type Way = (&'static str, fn(f64) -> BakeSettings);
+pub(super) type Way = (&'static str, fn(f64) -> BakeSettings);
 const AS_PAPER: Way = ("splat, as the paper", paper);
-const SPLAT: Way = ("splat", splat);
-const WAVEFRONT: Way = ("wavefront", wavefront);
+pub(super) const SPLAT: Way = ("splat", splat);
+pub(super) const WAVEFRONT: Way = ("wavefront", wavefront);
 
 /// What "as the paper" means.
 const AS_PAPER_NOTE: &str = "As the paper: jittered rays, a cube around the light, discs of the wavefront's area, point samples \
                              of a gaussian with σ = 1.";
 
 /// The paper's own choices.
-fn paper(density_per_sr: f64) -> BakeSettings {
+pub(super) fn paper(density_per_sr: f64) -> BakeSettings {
     BakeSettings {
         footprint: Footprint::Disc,
         rays: RayPlacement::Jittered,
@@ -131,7 +49,7 @@ fn paper(density_per_sr: f64) -> BakeSettings {
     }
 }
 
-fn splat(density_per_sr: f64) -> BakeSettings {
+pub(super) fn splat(density_per_sr: f64) -> BakeSettings {
     BakeSettings {
         density_per_sr,
         ..BakeSettings::splat()
@@ -139,7 +57,7 @@ fn splat(density_per_sr: f64) -> BakeSettings {
 }
 
 /// Exactly one lattice.
-fn wavefront(density_per_sr: f64) -> BakeSettings {
+pub(super) fn wavefront(density_per_sr: f64) -> BakeSettings {
     BakeSettings {
         density_per_sr,
         ..BakeSettings::of(Estimator::Wavefront)
@@ -147,13 +65,13 @@ fn wavefront(density_per_sr: f64) -> BakeSettings {
 }
 
 /// A built-in scene with the name that it has on the command line.
-fn scene(name: &str) -> Result<Arc<Scene>> {
+pub(super) fn scene(name: &str) -> Result<Arc<Scene>> {
     let scene = builtin::build(name).map(Arc::new);
     scene.ok_or_else(|| Error::failure(name, "there is no built-in scene of that name", "report this"))
 }
 
 /// A built-in scene with its analytic map.
-fn scene_and_truth(name: &str) -> Result<(Arc<Scene>, Against)> {
+pub(super) fn scene_and_truth(name: &str) -> Result<(Arc<Scene>, Against)> {
     let scene = scene(name)?;
     match Reference::analytic(&scene)? {
         Some(reference) => Ok((scene, Against::Known(reference))),
@@ -161,7 +79,7 @@ fn scene_and_truth(name: &str) -> Result<(Arc<Scene>, Against)> {
     }
 }
 
-const fn error_against_rays(file: &'static str, by: &'static [&'static str]) -> Plot {
+pub(super) const fn error_against_rays(file: &'static str, by: &'static [&'static str]) -> Plot {
     Plot {
         file,
         x: "rays",
@@ -171,227 +89,8 @@ const fn error_against_rays(file: &'static str, by: &'static [&'static str]) -> 
     }
 }
 
-/// What a bake that got to its target was expected to take when its error was first at most five times that, and where it
-/// stood then.
-fn predicted(measured: &Measured) -> Option<(CostPoint, Forecast)> {
-    let (result, target) = (measured.result, measured.variant.settings.max_error?);
-    let made = stood_at(&result.course, 5.0 * target)?;
-    let expected = forecast(&result.course[..=made], target, Estimator::Wavefront)?;
-    (result.stop_reason == StopReason::MaxError).then_some((result.course[made], expected))
-}
-
-/// Predicted over actual.
-fn predicted_over_actual(measured: &Measured, of: fn(&Forecast) -> f64, cost: fn(&CostPoint) -> f64) -> Cell {
-    let actual = measured.result.course.last().map(cost);
-    number(
-        predicted(measured)
-            .zip(actual)
-            .map(|((_, expected), actual)| of(&expected) / actual),
-    )
-}
-
-const ACCURACY: &[Column] = &[
-    RAYS,
-    CPU_S,
-    WALL_S,
-    MEMORY_MB,
-    Column {
-        name: "estimated_rmse",
-        value: |m| share(m.result.estimated_relative_rmse),
-    },
-    RELATIVE_RMSE,
-    Column {
-        name: "stop",
-        value: |m| format!("{:?}", m.result.stop_reason).into(),
-    },
-    Column {
-        name: "predicted_at_rmse",
-        value: |m| share(predicted(m).map(|(made_at, _)| made_at.error)),
-    },
-    Column {
-        name: "predicted_rays",
-        value: |m| number(predicted(m).map(|(_, expected)| expected.rays as f64)),
-    },
-    Column {
-        name: "predicted_cpu_s",
-        value: |m| number(predicted(m).map(|(_, expected)| expected.cpu_s)),
-    },
-    Column {
-        name: "rays_ratio",
-        value: |m| predicted_over_actual(m, |f| f.rays as f64, |p| p.rays as f64),
-    },
-    Column {
-        name: "cpu_ratio",
-        value: |m| predicted_over_actual(m, |f| f.cpu_s, |p| p.cpu_s),
-    },
-    REFERENCE,
-];
-
-fn accuracy(bench: &Bench) -> Result<Sweep> {
-    const TARGETS: [f64; 5] = [0.10, 0.05, 0.02, 0.01, 0.005];
-    const DENSITIES: [f64; 4] = [1e4, 1e5, 1e6, 4e6];
-    const PLOTS: &[Plot] = &[
-        by_scene("wavefront-cpu", "cpu_s", "wavefront"),
-        by_scene("wavefront-rays", "rays", "wavefront"),
-        by_scene("splat-cpu", "cpu_s", "splat"),
-        by_scene("splat-rays", "rays", "splat"),
-    ];
-    const fn by_scene(file: &'static str, x: &'static str, estimator: &'static str) -> Plot {
-        Plot {
-            x,
-            only: Some(("estimator", estimator)),
-            ..error_against_rays(file, &["scene"])
-        }
-    }
-    let towards = |target: f64, limit_s: f64| BakeSettings {
-        max_error: Some(target),
-        error_metric: ErrorMetric::Rmse,
-        max_time_s: Some(limit_s),
-        ..bench.at(
-            wavefront(BakeSettings::starting_density_per_sr(target)),
-            bench.side(),
-        )
-    };
-    let names = if bench.quick {
-        &["mirror", "pool"][..]
-    } else {
-        &builtin::NAMES
-    };
-    let mut groups = Vec::new();
-    for &name in names {
-        let scene = scene(name)?;
-        let against = match Reference::analytic(&scene)? {
-            Some(reference) => Against::Known(reference),
-            None => Against::Bake(Arc::clone(&scene), Box::new(towards(0.002, 60.0))),
-        };
-        let variant = |way: Way, target, settings: BakeSettings| {
-            let labels = vec![
-                name.into(),
-                way.0.into(),
-                share(target),
-                settings.density_per_sr.into(),
-            ];
-            Variant::new(labels, &scene, settings)
-        };
-        let targets = bench.some(&TARGETS, 4).iter();
-        let targets = targets.map(|&target| variant(WAVEFRONT, Some(target), towards(target, 20.0)));
-        let densities = bench.some(&DENSITIES, 2).iter();
-        let splats = densities.map(|&density| {
-            let settings = BakeSettings {
-                max_time_s: Some(20.0),
-                ..bench.at(splat(density), bench.side())
-            };
-            variant(SPLAT, None, settings)
-        });
-        groups.push(Group {
-            against,
-            variants: targets.chain(splats).collect(),
-        });
-    }
-    Ok(Sweep {
-        note: "The wavefront refines towards each target; splats trace lattices of given densities. Bakes end after 20 s. Predictions \
-               are of when the error was first at most five times the target. A scene without a map that is known is measured against a bake \
-               to 0.2 % of 60 s, where that gets to 1 %."
-            .into(),
-        labels: &["scene", "estimator", "target", "density_per_sr"],
-        columns: ACCURACY,
-        groups,
-        plots: PLOTS,
-        ..Sweep::default()
-    })
-}
-
-const SCALING: &[Column] = &[
-    RAYS,
-    Column {
-        name: "segments_per_ray",
-        value: |m| per_ray(m, m.result.counts.segments as f64),
-    },
-    Column {
-        name: "plan_cpu_s",
-        value: |m| m.result.cpu_s.plan.into(),
-    },
-    Column {
-        name: "us_per_ray",
-        value: |m| per_ray(m, 1e6 * (m.result.cpu_s.trace + m.result.cpu_s.deposit)),
-    },
-    WALL_S,
-    MEMORY_MB,
-];
-
-fn per_ray(measured: &Measured, amount: f64) -> Cell {
-    (amount / measured.result.counts.rays.max(1) as f64).into()
-}
-
-fn scaling(bench: &Bench) -> Result<Sweep> {
-    const DENSITIES: [f64; 6] = [1e3, 1e4, 1e5, 1e6, 1e7, 1e8];
-    const LEVELS: [u32; 5] = [2, 4, 6, 8, 9];
-    const SIDES: [usize; 8] = [64, 128, 256, 512, 1024, 2048, 4096, 8192];
-    const PLOTS: &[Plot] = &[
-        ladder("scaling-rays", "us_per_ray", "rays"),
-        ladder("scaling-memory", "memory_mb", "rays"),
-        ladder("scaling-triangles", "us_per_ray", "triangles"),
-        ladder("scaling-texels", "wall_s", "texels"),
-    ];
-    const fn ladder(file: &'static str, y: &'static str, what: &'static str) -> Plot {
-        Plot {
-            file,
-            x: "value",
-            y,
-            by: &["what"],
-            only: Some(("what", what)),
-        }
-    }
-    let ring = scene("ring")?;
-    // So little that what was traced is not kept for later changes.
-    let thrifty = |settings: BakeSettings| BakeSettings {
-        memory_bytes: 16 << 20,
-        ..bench.at(settings, 256)
-    };
-    let usual = splat(if bench.quick { 1e4 } else { 3e5 });
-    let step = |what: &str, value: f64, scene: &Arc<Scene>, settings| {
-        Variant::new(vec![what.into(), value.into()], scene, settings)
-    };
-    let mut variants = Vec::new();
-    for &density in bench.some(&DENSITIES, 3) {
-        variants.push(step("rays", density, &ring, thrifty(splat(density))));
-    }
-    for &levels in bench.some(&LEVELS, 3) {
-        let mesh = shapes::sphere(DVec3::new(0.0, 0.8, 0.0), 0.5, levels);
-        let ball = over_a_floor(0.6, ("ball", mesh), DVec3::new(0.0, 3.0, 0.0));
-        let triangles = 20.0 * 4_f64.powi(levels as i32);
-        variants.push(step("triangles", triangles, &ball, bench.at(usual.clone(), 256)));
-    }
-    for &side in bench.some(&SIDES, 3) {
-        variants.push(step(
-            "texels",
-            (side * side) as f64,
-            &ring,
-            bench.at(usual.clone(), side),
-        ));
-    }
-    for threads in [1, 2] {
-        let settings = BakeSettings {
-            threads,
-            ..thrifty(splat(if bench.quick { 1e4 } else { 1e7 }))
-        };
-        variants.push(step("threads", threads as f64, &ring, settings));
-    }
-    Ok(Sweep {
-        note: "Splats on `ring`, maps of 256 × 256 texels but where those are counted; triangles: a glass ball over a floor.".into(),
-        labels: &["what", "value"],
-        columns: SCALING,
-        groups: vec![Group {
-            against: Against::Nothing,
-            variants,
-        }],
-        plots: PLOTS,
-        ..Sweep::default()
-    })
-}
-
 /// Something of glass over a floor of that half width, below a lamp.
-fn over_a_floor(half_m: f64, (name, mesh): (&str, Mesh), lamp: DVec3) -> Arc<Scene> {
+pub(super) fn over_a_floor(half_m: f64, (name, mesh): (&str, Mesh), lamp: DVec3) -> Arc<Scene> {
     let mut scene = parts::reference_scene(half_m);
     scene.name = name.into();
     parts::add(&mut scene, name, mesh, parts::dielectric("glass", 1.5));
@@ -399,7 +98,7 @@ fn over_a_floor(half_m: f64, (name, mesh): (&str, Mesh), lamp: DVec3) -> Arc<Sce
     Arc::new(scene)
 }
 
-fn table1(bench: &Bench) -> Result<Sweep> {
+pub(super) fn table1(bench: &Bench) -> Result<Sweep> {
     /// Rays per steradian, light rays, light-pass seconds, eye-pass seconds (a 486 at 66 MHz).
     const TABLE: [(f64, u64, f64, f64); 3] = [
         (7_957.7, 3_467, 11.57, 148.33),
@@ -436,7 +135,7 @@ fn table1(bench: &Bench) -> Result<Sweep> {
     })
 }
 
-fn rays(bench: &Bench) -> Result<Sweep> {
+pub(super) fn rays(bench: &Bench) -> Result<Sweep> {
     const DENSITIES: [f64; 7] = [1e3, 3e3, 1e4, 3e4, 1e5, 3e5, 1e6];
     let (scene, against) = scene_and_truth("ring")?;
     let variants = [AS_PAPER, SPLAT, WAVEFRONT]
@@ -462,7 +161,7 @@ fn rays(bench: &Bench) -> Result<Sweep> {
     })
 }
 
-fn sigma(bench: &Bench) -> Result<Sweep> {
+pub(super) fn sigma(bench: &Bench) -> Result<Sweep> {
     const SIGMAS: [f64; 12] = [0.1, 0.3, 0.5, 1.0, 3.0, 0.2, 0.4, 0.7, 0.9, 1.4, 2.0, 5.0];
     /// σ counts squared lengths: in squares of half the side of the square of the footprint's area instead of squares of the
     /// radius of its disc, the same kernel has a σ so many times as large.
@@ -507,7 +206,7 @@ fn sigma(bench: &Bench) -> Result<Sweep> {
     })
 }
 
-fn resolution(bench: &Bench) -> Result<Sweep> {
+pub(super) fn resolution(bench: &Bench) -> Result<Sweep> {
     let scene = scene("ring")?;
     let finer = wavefront(if bench.quick { 8e3 } else { 4.0 * DENSITY_PER_SR });
     let groups = bench.some(&[30, 100, 300], 2).iter().map(|&side| {
@@ -560,7 +259,7 @@ const KERNELS: &[Column] = &[
     },
 ];
 
-fn kernels(bench: &Bench) -> Result<Sweep> {
+pub(super) fn kernels(bench: &Bench) -> Result<Sweep> {
     const SHAPES: [(&str, Kernel, Sigma); 7] = [
         ("box", Kernel::Box, Sigma::Constant(1.0)),
         ("disc", Kernel::Disc, Sigma::Constant(1.0)),
@@ -613,7 +312,7 @@ fn kernels(bench: &Bench) -> Result<Sweep> {
     })
 }
 
-fn connectivity(bench: &Bench) -> Result<Sweep> {
+pub(super) fn connectivity(bench: &Bench) -> Result<Sweep> {
     let (scene, against) = scene_and_truth("ring")?;
     let density = if bench.quick { 8e3 } else { DENSITY_PER_SR };
     let variant = |name: &str, hits: Option<u64>, (_, settings): Way| Variant {
@@ -707,7 +406,7 @@ fn hits(scene: &Arc<Scene>, density_per_sr: f64) -> Vec<(DVec2, f64)> {
     hits
 }
 
-fn item_buffer(bench: &Bench) -> Result<Sweep> {
+pub(super) fn item_buffer(bench: &Bench) -> Result<Sweep> {
     let mut groups = Vec::new();
     for &name in bench.some(&["ring", "ball"], 1) {
         let (scene, against) = scene_and_truth(name)?;
@@ -740,7 +439,7 @@ fn item_buffer(bench: &Bench) -> Result<Sweep> {
     })
 }
 
-fn pool_plates(bench: &Bench) -> Result<Sweep> {
+pub(super) fn pool_plates(bench: &Bench) -> Result<Sweep> {
     let (mesh, against) = scene_and_truth("pool")?;
     let mut waters = vec![
         ("mesh of 512 × 512 quads".to_string(), Arc::clone(&mesh)),
@@ -784,7 +483,7 @@ fn pool_plates(bench: &Bench) -> Result<Sweep> {
     })
 }
 
-fn complex(bench: &Bench) -> Result<Sweep> {
+pub(super) fn complex(bench: &Bench) -> Result<Sweep> {
     /// Quads around and along the knot's tube: the second has about as many triangles as the paper's object (3,958).
     const MESHES: [(u32, u32); 3] = [(11, 45), (22, 90), (44, 180)];
     let settings = bench.at(wavefront(if bench.quick { 500.0 } else { 3e3 }), bench.side());

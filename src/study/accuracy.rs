@@ -1,0 +1,239 @@
+//! What accuracy costs on the built-in scenes, what was expected, and how cost grows.
+
+use std::sync::Arc;
+
+use glam::DVec3;
+
+use super::paper::{SPLAT, WAVEFRONT, Way, error_against_rays, over_a_floor, scene, splat, wavefront};
+use super::plot::Plot;
+use super::references::Reference;
+use super::sweep::{
+    Against, Bench, CPU_S, Column, Group, MEMORY_MB, Measured, RAYS, REFERENCE, RELATIVE_RMSE, Sweep,
+    Variant, WALL_S, number, share,
+};
+use super::table::Cell;
+use crate::error::Result;
+use crate::scene::Scene;
+use crate::scene::builtin::{self, shapes};
+use crate::session::forecast::{forecast, stood_at};
+use crate::session::{CostPoint, Forecast, StopReason};
+use crate::settings::{BakeSettings, ErrorMetric, Estimator};
+
+/// What a bake that got to its target was expected to take when its error was first at most five times that, and where it
+/// stood then.
+fn predicted(measured: &Measured) -> Option<(CostPoint, Forecast)> {
+    let (result, target) = (measured.result, measured.variant.settings.max_error?);
+    let made = stood_at(&result.course, 5.0 * target)?;
+    let expected = forecast(&result.course[..=made], target, Estimator::Wavefront)?;
+    (result.stop_reason == StopReason::MaxError).then_some((result.course[made], expected))
+}
+
+/// Predicted over actual.
+fn predicted_over_actual(measured: &Measured, of: fn(&Forecast) -> f64, cost: fn(&CostPoint) -> f64) -> Cell {
+    let actual = measured.result.course.last().map(cost);
+    number(
+        predicted(measured)
+            .zip(actual)
+            .map(|((_, expected), actual)| of(&expected) / actual),
+    )
+}
+
+const ACCURACY: &[Column] = &[
+    RAYS,
+    CPU_S,
+    WALL_S,
+    MEMORY_MB,
+    Column {
+        name: "estimated_rmse",
+        value: |m| share(m.result.estimated_relative_rmse),
+    },
+    RELATIVE_RMSE,
+    Column {
+        name: "stop",
+        value: |m| format!("{:?}", m.result.stop_reason).into(),
+    },
+    Column {
+        name: "predicted_at_rmse",
+        value: |m| share(predicted(m).map(|(made_at, _)| made_at.error)),
+    },
+    Column {
+        name: "predicted_rays",
+        value: |m| number(predicted(m).map(|(_, expected)| expected.rays as f64)),
+    },
+    Column {
+        name: "predicted_cpu_s",
+        value: |m| number(predicted(m).map(|(_, expected)| expected.cpu_s)),
+    },
+    Column {
+        name: "rays_ratio",
+        value: |m| predicted_over_actual(m, |f| f.rays as f64, |p| p.rays as f64),
+    },
+    Column {
+        name: "cpu_ratio",
+        value: |m| predicted_over_actual(m, |f| f.cpu_s, |p| p.cpu_s),
+    },
+    REFERENCE,
+];
+
+pub(super) fn accuracy(bench: &Bench) -> Result<Sweep> {
+    const TARGETS: [f64; 5] = [0.10, 0.05, 0.02, 0.01, 0.005];
+    const DENSITIES: [f64; 4] = [1e4, 1e5, 1e6, 4e6];
+    const PLOTS: &[Plot] = &[
+        by_scene("wavefront-cpu", "cpu_s", "wavefront"),
+        by_scene("wavefront-rays", "rays", "wavefront"),
+        by_scene("splat-cpu", "cpu_s", "splat"),
+        by_scene("splat-rays", "rays", "splat"),
+    ];
+    const fn by_scene(file: &'static str, x: &'static str, estimator: &'static str) -> Plot {
+        Plot {
+            x,
+            only: Some(("estimator", estimator)),
+            ..error_against_rays(file, &["scene"])
+        }
+    }
+    let towards = |target: f64, limit_s: f64| BakeSettings {
+        max_error: Some(target),
+        error_metric: ErrorMetric::Rmse,
+        max_time_s: Some(limit_s),
+        ..bench.at(
+            wavefront(BakeSettings::starting_density_per_sr(target)),
+            bench.side(),
+        )
+    };
+    let names = if bench.quick {
+        &["mirror", "pool"][..]
+    } else {
+        &builtin::NAMES
+    };
+    let mut groups = Vec::new();
+    for &name in names {
+        let scene = scene(name)?;
+        let against = match Reference::analytic(&scene)? {
+            Some(reference) => Against::Known(reference),
+            None => Against::Bake(Arc::clone(&scene), Box::new(towards(0.002, 60.0))),
+        };
+        let variant = |way: Way, target, settings: BakeSettings| {
+            let labels = vec![
+                name.into(),
+                way.0.into(),
+                share(target),
+                settings.density_per_sr.into(),
+            ];
+            Variant::new(labels, &scene, settings)
+        };
+        let targets = bench.some(&TARGETS, 4).iter();
+        let targets = targets.map(|&target| variant(WAVEFRONT, Some(target), towards(target, 20.0)));
+        let densities = bench.some(&DENSITIES, 2).iter();
+        let splats = densities.map(|&density| {
+            let settings = BakeSettings {
+                max_time_s: Some(20.0),
+                ..bench.at(splat(density), bench.side())
+            };
+            variant(SPLAT, None, settings)
+        });
+        groups.push(Group {
+            against,
+            variants: targets.chain(splats).collect(),
+        });
+    }
+    Ok(Sweep {
+        note: "The wavefront refines towards each target; splats trace lattices of given densities. Bakes end after 20 s. Predictions \
+               are of when the error was first at most five times the target. A scene without a map that is known is measured against a bake \
+               to 0.2 % of 60 s, where that gets to 1 %."
+            .into(),
+        labels: &["scene", "estimator", "target", "density_per_sr"],
+        columns: ACCURACY,
+        groups,
+        plots: PLOTS,
+        ..Sweep::default()
+    })
+}
+
+const SCALING: &[Column] = &[
+    RAYS,
+    Column {
+        name: "segments_per_ray",
+        value: |m| per_ray(m, m.result.counts.segments as f64),
+    },
+    Column {
+        name: "plan_cpu_s",
+        value: |m| m.result.cpu_s.plan.into(),
+    },
+    Column {
+        name: "us_per_ray",
+        value: |m| per_ray(m, 1e6 * (m.result.cpu_s.trace + m.result.cpu_s.deposit)),
+    },
+    WALL_S,
+    MEMORY_MB,
+];
+
+fn per_ray(measured: &Measured, amount: f64) -> Cell {
+    (amount / measured.result.counts.rays.max(1) as f64).into()
+}
+
+pub(super) fn scaling(bench: &Bench) -> Result<Sweep> {
+    const DENSITIES: [f64; 6] = [1e3, 1e4, 1e5, 1e6, 1e7, 1e8];
+    const LEVELS: [u32; 5] = [2, 4, 6, 8, 9];
+    const SIDES: [usize; 8] = [64, 128, 256, 512, 1024, 2048, 4096, 8192];
+    const PLOTS: &[Plot] = &[
+        ladder("scaling-rays", "us_per_ray", "rays"),
+        ladder("scaling-memory", "memory_mb", "rays"),
+        ladder("scaling-triangles", "us_per_ray", "triangles"),
+        ladder("scaling-texels", "wall_s", "texels"),
+    ];
+    const fn ladder(file: &'static str, y: &'static str, what: &'static str) -> Plot {
+        Plot {
+            file,
+            x: "value",
+            y,
+            by: &["what"],
+            only: Some(("what", what)),
+        }
+    }
+    let ring = scene("ring")?;
+    // So little that what was traced is not kept for later changes.
+    let thrifty = |settings: BakeSettings| BakeSettings {
+        memory_bytes: 16 << 20,
+        ..bench.at(settings, 256)
+    };
+    let usual = splat(if bench.quick { 1e4 } else { 3e5 });
+    let step = |what: &str, value: f64, scene: &Arc<Scene>, settings| {
+        Variant::new(vec![what.into(), value.into()], scene, settings)
+    };
+    let mut variants = Vec::new();
+    for &density in bench.some(&DENSITIES, 3) {
+        variants.push(step("rays", density, &ring, thrifty(splat(density))));
+    }
+    for &levels in bench.some(&LEVELS, 3) {
+        let mesh = shapes::sphere(DVec3::new(0.0, 0.8, 0.0), 0.5, levels);
+        let ball = over_a_floor(0.6, ("ball", mesh), DVec3::new(0.0, 3.0, 0.0));
+        let triangles = 20.0 * 4_f64.powi(levels as i32);
+        variants.push(step("triangles", triangles, &ball, bench.at(usual.clone(), 256)));
+    }
+    for &side in bench.some(&SIDES, 3) {
+        variants.push(step(
+            "texels",
+            (side * side) as f64,
+            &ring,
+            bench.at(usual.clone(), side),
+        ));
+    }
+    for threads in [1, 2] {
+        let settings = BakeSettings {
+            threads,
+            ..thrifty(splat(if bench.quick { 1e4 } else { 1e7 }))
+        };
+        variants.push(step("threads", threads as f64, &ring, settings));
+    }
+    Ok(Sweep {
+        note: "Splats on `ring`, maps of 256 × 256 texels but where those are counted; triangles: a glass ball over a floor.".into(),
+        labels: &["what", "value"],
+        columns: SCALING,
+        groups: vec![Group {
+            against: Against::Nothing,
+            variants,
+        }],
+        plots: PLOTS,
+        ..Sweep::default()
+    })
+}
