@@ -1,7 +1,7 @@
 """Nephroid beside other programs: error of the floor's caustic against CPU seconds, on the same meshes and maps.
 
 Writes DIR/compare.csv (every step), DIR/compare.md (the page), DIR/SCENE_PROGRAM.png (the last maps beside the reference) and
-DIR/steps (every map).
+DIR/steps (every map). DIR/scenes holds their meshes.
 """
 
 import argparse
@@ -9,11 +9,13 @@ import os
 import shutil
 import subprocess
 import sys
-import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy
+
 import figures
+import glass
 import machine
 import nephroid
 import page
@@ -23,6 +25,21 @@ HERE = Path(__file__).parent
 REFERENCES = HERE.parent.parent / "assets" / "reference"
 SCENES = {"ring": "S1", "ball": "S2", "pool": "S3"}
 SIDE = 256
+# Specular surfaces on a path, as many as photons have by default.
+DEPTH = 256
+# Maps of a scene of glass that differ by their seeds alone.
+ALIKE = 8
+# Reference maps whose noise is known, and the depth of their paths.
+KNOWN = {"wine": (0.0124, None), "tumbler": (0.0117, 15), "lens": (0.0102, None)}
+
+
+@dataclass
+class SceneFile:
+    """Meshes that every program reads, their reference where it is known before, and what is asked of paths' depth."""
+
+    file: Path
+    reference: figures.Reference | None
+    depth: int | None = None
 
 
 @dataclass
@@ -41,6 +58,8 @@ class Program:
 
 PROGRAMS = [
     Program("wavefront", "Nephroid, wavefront", "", ["wavefront"]),
+    Program("photon", "Nephroid, photon", "", ["photon"]),
+    Program("auto", "Nephroid, auto", "", ["auto"]),
     Program("splat", "Nephroid, splat", "", ["splat"]),
     Program("aimed", "aimed rays on Mitsuba's intersector", "aimed.py", ["line"], needs_llvm=True),
     Program("aimed_beside", "aimed rays, started by Mitsuba's `spawn_ray`", "aimed.py", ["beside"], needs_llvm=True),
@@ -49,6 +68,10 @@ PROGRAMS = [
     Program("cycles_paths", "Cycles bake, path traced", "blender.py", ["paths"], True),
     Program("cycles_mnee", "Cycles bake, MNEE", "blender.py", ["mnee"], True),
 ]
+BRUTE_FORCE = Program("brute", "brute force", "", [])
+GLASS = [each for each in PROGRAMS if each.key in ["photon", "auto", "aimed"]] + [BRUTE_FORCE]
+# Programs whose blocks are compared.
+PAIRS = [("photon", "aimed"), ("photon", "brute"), ("aimed", "brute")]
 
 
 def arguments():
@@ -57,8 +80,10 @@ def arguments():
     parser.add_argument("--nephroid", type=Path, required=True)
     parser.add_argument("--output", type=Path, required=True, metavar="DIR")
     parser.add_argument("--budget", type=float, default=60.0, metavar="SECONDS", help="CPU seconds, per program and scene")
-    parser.add_argument("--scenes", type=Path, metavar="DIR", help="S1.glb, S2.glb, S3.glb in place of the built-in scenes")
-    parser.add_argument("--only", help="names of programs, with commas", default=",".join(each.key for each in PROGRAMS))
+    parser.add_argument("--glass", action="store_true", help="scenes of glass in place of the reference scenes")
+    parser.add_argument("--scenes", type=Path, metavar="DIR", help="S1.glb, S2.glb, S3.glb in place of the built-in scenes; of "
+                        "glass: NAME.glb with NAME.pfm beside the others")
+    parser.add_argument("--only", metavar="NAMES", help="programs or scenes, with commas", type=lambda names: names.split(","))
     parser.add_argument("--page", action="store_true", help="measures nothing: the page of what a run left in DIR/steps")
     return parser.parse_args()
 
@@ -69,57 +94,87 @@ def measure(program, given, scene, folder):
         raise RuntimeError("libLLVM 16 or newer was not found")
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
-    if not program.script:
-        nephroid.take(given.nephroid, scene, folder, given.budget, SIDE, *program.last)
+    alike = ALIKE if given.glass and program.key != "auto" else 0
+    if program is BRUTE_FORCE:
+        nephroid.brute_force(given.nephroid, scene, folder, given.budget, SIDE, alike)
         return
-    command = [sys.executable, HERE / program.script, scene, folder, given.budget, SIDE, *program.last]
+    if not program.script:
+        nephroid.take(given.nephroid, scene, folder, given.budget, SIDE, *program.last, alike)
+        return
+    aimed = [scene.depth or DEPTH, alike] if program.script == "aimed.py" else []
+    command = [sys.executable, HERE / program.script, scene.file, folder, given.budget, SIDE, *aimed, *program.last]
     done = subprocess.run([str(part) for part in command], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
     if done.returncode != 0:
         raise RuntimeError(" ".join(done.stdout.split()[-40:]))
 
 
-def scene_file(given, name, folder):
-    """The meshes that every program reads."""
-    if given.scenes:
-        return given.scenes / f"{SCENES[name]}.glb"
-    return nephroid.export_scene(given.nephroid, name, folder)
+def scene_files(given, folder):
+    """What is compared, by name."""
+    if not given.glass:
+        return {name: SceneFile(
+            given.scenes / f"{key}.glb" if given.scenes else nephroid.export_scene(given.nephroid, name, folder),
+            figures.read_pfm(REFERENCES / f"{key}.pfm"),
+        ) for name, key in SCENES.items()}
+    found = {}
+    for file in sorted(given.scenes.glob("*.glb")) if given.scenes else []:
+        noise, depth = KNOWN.get(file.stem, (0.0, None))
+        found[file.stem] = SceneFile(file, figures.read_pfm(file.with_suffix(".pfm"), noise), depth)
+    return found | {name: SceneFile(glass.write(name, folder), None) for name in glass.SCENES}
 
 
-def measured(given, wanted):
-    """Every program on every scene: courses by (scene, program), and why some are left out, by program."""
-    courses, left_out = {}, {}
-    with tempfile.TemporaryDirectory() as folder:
-        for name, reference_name in SCENES.items():
-            scene = None if given.page else scene_file(given, name, Path(folder))
-            reference = figures.read_pfm(REFERENCES / f"{reference_name}.pfm")
-            for program in wanted:
-                steps = given.output / "steps" / name / program.key
-                try:
-                    if not given.page:
-                        measure(program, given, scene, steps)
-                    found = figures.course(steps, reference, bool(program.script), program.is_pooled)
-                except (RuntimeError, OSError) as error:
-                    left_out[program.name] = str(error)
-                    print(f"compare: {program.name} on {name} is LEFT OUT: {error}", file=sys.stderr, flush=True)
-                    continue
-                if (name, program.starts_as) in courses:
-                    found.bias = min(max(found.bias, courses[name, program.starts_as].bias), found.error[-1])
-                courses[name, program.key] = found
-                pictures.write(given.output / f"{name}_{program.key}.png", found.last, reference)
-                print(page.line(name, program, found), flush=True)
-    return courses, left_out
+def chosen(items, only):
+    """Of names and what they mean, those that are asked for; all where none of them is."""
+    wanted = {name: item for name, item in items.items() if name in (only or [])}
+    return wanted or items
+
+
+def measured(given, wanted, scenes):
+    """Every program on every scene: courses by (scene, program), scores of blocks by (scene, pair), and why some are left out."""
+    courses, scores, left_out = {}, {}, {}
+    for name, scene in scenes.items():
+        folder, done = given.output / "steps" / name, []
+        for program in wanted:
+            try:
+                if not given.page:
+                    measure(program, given, scene, folder / program.key)
+                done.append(program)
+            except (RuntimeError, OSError) as error:
+                left_out[f"{program.name} on `{name}`"] = str(error)
+                print(f"compare: {program.name} on {name} is LEFT OUT: {error}", file=sys.stderr, flush=True)
+        alike = {each.key: numpy.load(file) for each in done if (file := folder / each.key / "alike.npy").exists()}
+        for first, second in PAIRS:
+            if first in alike and second in alike:
+                scores[name, (first, second)], _ = figures.block_scores(alike[first], alike[second])
+        reference = scene.reference or figures.pooled(alike.get("aimed", alike.get("brute")))
+        for program in done:
+            if not (folder / program.key / "steps.json").exists():
+                continue
+            found = figures.course(folder / program.key, reference, bool(program.script), program.is_pooled)
+            if (name, program.starts_as) in courses:
+                found.bias = min(max(found.bias, courses[name, program.starts_as].bias), found.error[-1])
+            courses[name, program.key] = found
+            pictures.write(given.output / f"{name}_{program.key}.png", found.last, reference.irradiance)
+            print(page.line(name, program, found), flush=True)
+    return courses, scores, left_out
 
 
 def main():
     given = arguments()
     given.output.mkdir(parents=True, exist_ok=True)
-    names = {each.key: each.name for each in PROGRAMS}
+    programs = GLASS if given.glass else PROGRAMS
+    names = {each.key: each.name for each in programs}
     heading = given.output / "heading.txt"
     if not given.page:
         heading.write_text(machine.heading(given))
-    courses, left_out = measured(given, [each for each in PROGRAMS if each.key in given.only.split(",")])
+    (given.output / "scenes").mkdir(exist_ok=True)
+    scenes = chosen(scene_files(given, given.output / "scenes"), given.only)
+    wanted = list(chosen({each.key: each for each in programs}, given.only).values())
+    courses, scores, left_out = measured(given, wanted, scenes)
     (given.output / "compare.csv").write_text(page.csv(courses, names))
-    text = page.markdown(courses, names, left_out, heading.read_text())
+    if given.glass:
+        text = page.glass_markdown(courses, names, left_out, heading.read_text(), scores)
+    else:
+        text = page.markdown(courses, names, left_out, heading.read_text())
     (given.output / "compare.md").write_text(text)
     print(text)
 

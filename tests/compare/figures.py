@@ -8,6 +8,8 @@ import numpy
 
 # A bias is held for one where it is this many standard errors above nothing.
 CERTAIN = 3.0
+# Texels along a block whose means are compared.
+BLOCK = 8
 
 
 @dataclass
@@ -72,9 +74,51 @@ class Course:
         return Cost("", self.cpu_s[index - 1] * (self.cpu_s[index] / self.cpu_s[index - 1]) ** share)
 
 
+@dataclass
+class Reference:
+    """What a scene's map should be, and the mean square of what noise is left in it [(W/m²)²]."""
+
+    irradiance: numpy.ndarray
+    variance: float = 0.0
+
+    @property
+    def mean(self):
+        """[W/m²]."""
+        return self.irradiance.mean()
+
+    @property
+    def noise(self):
+        """As a relative RMSE."""
+        return math.sqrt(self.variance) / self.mean
+
+
+def pooled(alike):
+    """The reference that maps of independent noise make, [maps, rows, columns]."""
+    return Reference(alike.mean(axis=0), float(alike.var(axis=0, ddof=1).mean() / len(alike)))
+
+
 def relative_rmse(irradiance, reference):
-    """sqrt(mean((I − R)²)) / mean(R)."""
-    return float(numpy.sqrt(((irradiance - reference) ** 2).mean()) / reference.mean())
+    """sqrt(mean((I − R)²)) / mean(R), without the reference's noise: at least a tenth of that."""
+    square = float(((irradiance - reference.irradiance) ** 2).mean()) - reference.variance
+    return math.sqrt(max(square, 0.01 * reference.variance)) / reference.mean
+
+
+def block_scores(found, reference):
+    """How many standard errors the means over blocks of maps differ, [maps, rows, columns] each: (scores of a normal
+    distribution, shares of the reference's mean).
+
+    Errors are those of either side's maps among each other. Student's t becomes normal by Wallace (1959), with the degrees of
+    freedom of Welch (1947). Blocks that some map has no light in are left out: nothing is normal there.
+    """
+    means = [maps.reshape(len(maps), maps.shape[1] // BLOCK, BLOCK, -1, BLOCK).mean(axis=(2, 4)) for maps in (found, reference)]
+    lit = numpy.logical_and(*[(each > 0.0).all(axis=0) for each in means])
+    (a, b), (n, m) = [each[:, lit] for each in means], map(len, means)
+    of_a, of_b = a.var(axis=0, ddof=1) / n, b.var(axis=0, ddof=1) / m
+    variance = numpy.maximum(of_a + of_b, 1e-300)
+    difference = a.mean(axis=0) - b.mean(axis=0)
+    freedom = variance**2 / (of_a**2 / (n - 1) + of_b**2 / (m - 1) + 1e-300)
+    size = numpy.sqrt(freedom * numpy.log1p(difference**2 / variance / freedom)) * (8 * freedom + 1) / (8 * freedom + 3)
+    return numpy.sign(difference) * size, difference / means[1].mean()
 
 
 def common_error(first, second, reference):
@@ -83,9 +127,9 @@ def common_error(first, second, reference):
     Noise of one is not that of the other, so that the mean product of their errors a and b is the square of the bias. Its
     variance is the sum of ((a + b)/2 (a − b))² over the texels, by their number squared: what it is where noise is even.
     """
-    a, b = ((each - reference) / reference.mean() for each in (first, second))
+    a, b = ((each - reference.irradiance) / reference.mean for each in (first, second))
     doubt = math.sqrt(((0.5 * (a + b) * (a - b)) ** 2).sum()) / a.size
-    return math.sqrt(max((a * b).mean() - CERTAIN * doubt, 0.0))
+    return math.sqrt(max((a * b).mean() - reference.noise**2 - CERTAIN * doubt, 0.0))
 
 
 def course(folder, reference, is_random, is_pooled):
@@ -107,13 +151,14 @@ def course(folder, reference, is_random, is_pooled):
     bias = common_error(shown[-2], maps[-1], reference) if is_random and len(maps) > 1 else 0.0
     # What remains cannot be more than what there is.
     bias = min(bias, errors[-1])
-    return Course(seconds, rays, errors, steps, bias, float(shown[-1].mean() / reference.mean()), is_pooled, shown[-1])
+    return Course(seconds, rays, errors, steps, bias, float(shown[-1].mean() / reference.mean), is_pooled, shown[-1])
 
 
-def read_pfm(path):
-    """A portable float map of one channel, little-endian; rows in the order in which they are stored."""
+def read_pfm(path, noise=0.0):
+    """A reference whose noise is known, of a portable float map of one channel, little-endian; rows as they are stored."""
     kind, size, scale, data = path.read_bytes().split(b"\n", 3)
     if kind != b"Pf" or float(scale) >= 0.0:
         raise ValueError(f"{path}: one channel, little-endian, is what is read here")
     width, height = map(int, size.split())
-    return numpy.frombuffer(data, "<f4", width * height).reshape(height, width).astype(float)
+    irradiance = numpy.frombuffer(data, "<f4", width * height).reshape(height, width).astype(float)
+    return Reference(irradiance, (noise * irradiance.mean()) ** 2)

@@ -13,8 +13,8 @@ def heading(given):
     programs = [
         nephroid.run(given.nephroid, "--version").strip().capitalize(),
         f"Mitsuba {metadata.version('mitsuba')} (Dr.Jit {metadata.version('drjit')}, {llvm()})",
-        f"Blender {metadata.version('bpy')}",
     ]
+    programs += [] if given.glass else [f"Blender {metadata.version('bpy')}"]
     machine = f"{processor()}, {os.cpu_count()} cores"
     return f"{', '.join(programs)}; {machine}; {given.budget:g} CPU seconds for each program and scene"
 

@@ -1,14 +1,19 @@
 """Bakes by Nephroid, written as the steps of the other programs are."""
 
 import json
+import math
 import subprocess
 
 import numpy
 import OpenEXR
 
-TARGETS = [0.2, 0.1, 0.05, 0.02, 0.01, 0.005, 0.002, 0.001, 0.0005]
+from steps import ALIKE_SEED
+
+TARGETS = [0.4, 0.2, 0.14, 0.1, 0.07, 0.05, 0.03, 0.02, 0.014, 0.01, 0.007, 0.005, 0.002, 0.001, 0.0005]
 # Rays per steradian; under a sun, of the casters seen from their farthest receiver.
 DENSITIES = [5e4 * 2**power for power in range(14)]
+# Of brute force, to begin with.
+LEAST_RAYS = 20_000
 LUMINANCE = numpy.array([0.2126, 0.7152, 0.0722])
 
 
@@ -28,22 +33,36 @@ def export_scene(program, name, folder):
     return file
 
 
-def take(program, scene, folder, budget_s, side, estimator):
-    """Bakes with smaller and smaller errors (wavefront) or denser and denser rays (splat), each within the budget.
+def bake(program, scene, maps, side, estimator, quality, seed):
+    """Bakes the floor's caustic: (map, manifest, CPU seconds of the light pass)."""
+    depth = ["--max-depth", scene.depth] if scene.depth else []
+    unfiltered = ["--filter", "off"] if estimator == "photon" else []
+    run(program, "bake", scene.file, "-o", maps, "--estimator", estimator, *quality, *depth, *unfiltered, "--seed", seed,
+        "--map-resolution", side, "--quiet", "--force", "--no-cache")
+    manifest = json.loads((maps / "manifest.json").read_text())
+    taken_s = sum(manifest["cpu_s"][part] for part in ["plan", "trace", "deposit"])
+    return floor_of(maps, manifest), manifest, taken_s
+
+
+def quality_of(estimator, value):
+    """Options for a target, or for rays per steradian of splats."""
+    if estimator == "splat":
+        return ["--density", value]
+    return ["--max-error", f"{100 * value:.4g}%", "--error-metric", "rmse"]
+
+
+def take(program, scene, folder, budget_s, side, estimator, alike=0):
+    """Bakes with smaller and smaller errors, or denser and denser rays (splat), each within the budget.
 
     Seconds are those of the light pass, of all threads; loading and the hierarchy are apart. Every bake has its own seed.
+    `alike` bakes that differ by their seeds alone take the budget once more, together.
     """
-    steps, growth = [], 2.0
-    for number, value in enumerate(TARGETS if estimator == "wavefront" else DENSITIES):
-        quality = ["--max-error", f"{100 * value:g}%"] if estimator == "wavefront" else ["--density", value]
-        maps = folder / "maps"
-        run(program, "bake", scene, "-o", maps, "--estimator", estimator, *quality, "--seed", number,
-            "--map-resolution", side, "--quiet", "--force", "--no-cache")
-        manifest = json.loads((maps / "manifest.json").read_text())
-        taken_s = sum(manifest["cpu_s"][part] for part in ["plan", "trace", "deposit"])
-        if taken_s > budget_s:
+    steps, growth, maps = [], 2.0, folder / "maps"
+    for number, value in enumerate(DENSITIES if estimator == "splat" else TARGETS):
+        irradiance, manifest, taken_s = bake(program, scene, maps, side, estimator, quality_of(estimator, value), number)
+        if taken_s > budget_s and len(steps) > 1:
             break
-        numpy.save(folder / f"step_{number:02}.npy", floor_of(maps, manifest))
+        numpy.save(folder / f"step_{number:02}.npy", irradiance)
         steps.append({"cpu_s": taken_s, "samples": value, "rays": manifest["counts"]["rays"],
                       "before_s": manifest["cpu_s"]["load"] + manifest["cpu_s"]["build"],
                       "estimated": manifest["error"]["estimated_relative_rmse"]})
@@ -51,6 +70,26 @@ def take(program, scene, folder, budget_s, side, estimator):
         growth = taken_s / steps[-2]["cpu_s"] if len(steps) > 1 else growth
         if taken_s * growth > budget_s:
             break
+    if alike:
+        target = min(steps[-1]["estimated"] * math.sqrt(steps[-1]["cpu_s"] * alike / budget_s), 1.0)
+        quality = quality_of(estimator, target)
+        found = [bake(program, scene, maps, side, estimator, quality, ALIKE_SEED + seed)[0] for seed in range(alike)]
+        numpy.save(folder / "alike.npy", found)
+
+
+def brute_force(program, scene, folder, budget_s, side, alike):
+    """Maps by brute force, which differ by their seeds alone."""
+    found, rays, maps = [], LEAST_RAYS, folder / "maps"
+    for seed in range(-1, alike):
+        # The first tells how many rays the others can have.
+        run(program, "study", "reference", scene.file, "-o", maps, "--rays", max(int(rays), LEAST_RAYS), "--seed", ALIKE_SEED + seed,
+            "--map-resolution", side, "--quiet", "--force", "--no-cache")
+        manifest = json.loads((maps / "reference.json").read_text())
+        if seed < 0:
+            rays = manifest["rays"] * budget_s / alike / manifest["cpu_s"]
+        else:
+            found.append(floor_of(maps, manifest))
+    numpy.save(folder / "alike.npy", found)
 
 
 def floor_of(maps, manifest):

@@ -1,17 +1,25 @@
 """The page: tables in Markdown and CSV, and what they say in words. No sentence has a result but those that are found here."""
 
 import math
+from statistics import median
 
 from figures import CERTAIN
 
 TARGETS = [0.05, 0.02, 0.01]
 OURS = "wavefront"
-NEPHROID = ["wavefront", "splat"]
+NEPHROID = ["wavefront", "photon", "auto", "splat"]
 LEGEND = """*slope* is the exponent of error against CPU time, by least squares of logarithms through all steps. Seconds are
 interpolated between steps; `<` is the first step, which is better already; `~` goes on from the last one, with the square
 root of time where independent samples are averaged, else as measured; `never` is a bias. What two independent runs have in
 common, by three standard errors, counts as bias; `ptracer`, whose noise hides it, has that of aimed rays that start as its
 own do."""
+GLASS_LEGEND = """*true/estimated* is of the last bake by photons. *ratio* is the photons' seconds over those of aimed rays. Where a scene has
+no map of its own, the reference is the mean of all of the aimed rays' maps that differ by their seeds alone, or of brute force
+where light is dispersed; its noise is taken from all errors."""
+BLOCK_LEGEND = """Means over 8 × 8 texels of maps that differ by their seeds alone: blocks that are more than three standard errors apart,
+both sides' noise included, beside how many chance allows, and the root mean square of all, in standard errors (1 is chance)."""
+# Of the normal distribution, beyond three standard errors.
+BEYOND = 0.0027
 # Watts that are off by more than this are told.
 FLUX_BOUND = 0.02
 
@@ -48,11 +56,12 @@ def line(scene, program, course):
 
 def csv(courses, names):
     """Every step."""
-    rows = ["scene,program,step,rays,cpu_s,relative_rmse,bias,flux_ratio,slope,cpu_s_to_5,cpu_s_to_2,cpu_s_to_1,left_out_cpu_s"]
+    rows = ["scene,program,step,rays,cpu_s,relative_rmse,estimated,bias,flux_ratio,slope,cpu_s_to_5,cpu_s_to_2,cpu_s_to_1,left_out_cpu_s"]
     for (scene, key), course in courses.items():
         costs = ",".join(cost(course.cost(target)).replace(",", "") for target in TARGETS)
         for step, (rays, seconds, error) in enumerate(zip(course.rays, course.cpu_s, course.error)):
-            rows.append(f'{scene},"{names[key]}",{step},{rays:.0f},{seconds:.4f},{error:.6g},{course.bias:.4g},'
+            rows.append(f'{scene},"{names[key]}",{step},{rays:.0f},{seconds:.4f},{error:.6g},'
+                        f"{course.steps[step].get('estimated') or math.nan:.4g},{course.bias:.4g},"
                         f"{course.flux:.5f},{course.slope():.3f},{costs},{course.steps[0]['before_s']:.3f}")
     return "\n".join(rows) + "\n"
 
@@ -62,11 +71,61 @@ def markdown(courses, names, left_out, heading):
     scenes = list(dict.fromkeys(scene for scene, _ in courses))
     parts = [heading + ":", table(courses, names), LEGEND]
     parts += [sentence for scene in scenes for sentence in verdicts(scene, of_scene(courses, scene), names)]
-    ours = {scene: course for (scene, key), course in courses.items() if key == OURS}
+    ours = {(scene, names[key]): course for (scene, key), course in courses.items() if key in NEPHROID and key != "splat"}
     parts += [asked(ours), worse_than_asked(ours)] if ours else []
     parts += [stuck(courses, names), watts(courses, names), not_counted(courses, names)]
     parts += [f"{name} is left out: {reason}." for name, reason in left_out.items()]
     return "\n\n".join(part for part in parts if part) + "\n"
+
+
+def glass_markdown(courses, names, left_out, heading, scores):
+    """The page of scenes of glass; `scores` of blocks by scene and pair of programs."""
+    parts = [heading + ":", glass_table(courses), GLASS_LEGEND, block_table(scores, names), BLOCK_LEGEND, table(courses, names), LEGEND]
+    parts += [stuck(courses, names), watts(courses, names), not_counted(courses, names)]
+    parts += [f"{name} is left out: {reason}." for name, reason in left_out.items()]
+    return "\n\n".join(part for part in parts if part) + "\n"
+
+
+def glass_table(courses):
+    """CPU seconds to the coarsest target, and whether photons know their error."""
+    target = TARGETS[0]
+    rows = [f"| scene | photon, CPU s to {percent(target)} | auto | aimed rays | ratio | estimated | true | true/estimated |",
+            "|---|---|---|---|---|---|---|---|"]
+    ratios, doubts = [], []
+    for scene in dict.fromkeys(scene for scene, _ in courses):
+        programs = of_scene(courses, scene)
+        costs = {key: programs[key].cost(target) for key in ["photon", "auto", "aimed"] if key in programs}
+        cells = [cost(costs[key]) if key in costs else "" for key in ["photon", "auto", "aimed"]]
+        ratio = costs["photon"].cpu_s / costs["aimed"].cpu_s if {"photon", "aimed"} <= costs.keys() else math.nan
+        cells.append("" if math.isnan(ratio) else number(ratio))
+        ratios += [] if math.isnan(ratio) else [ratio]
+        if "photon" in programs and programs["photon"].steps[-1]["estimated"]:
+            true, estimated = programs["photon"].error[-1], programs["photon"].steps[-1]["estimated"]
+            cells += [percent(estimated), percent(true), f"{true / estimated:.2f}"]
+            doubts.append(true / estimated)
+        else:
+            cells += ["", "", ""]
+        rows.append(f"| `{scene}` | {' | '.join(cells)} |")
+    middle = [f"{median(found):.2f}" if found else "" for found in (ratios, doubts)]
+    return "\n".join([*rows, f"| median | | | | {middle[0]} | | | {middle[1]} |"])
+
+
+def block_table(scores, names):
+    """Blocks that differ by more than three standard errors."""
+    pairs = list(dict.fromkeys(pair for _, pair in scores))
+    heads = [f"{names[first]} against {names[second]}" for first, second in pairs]
+    rows = ["| scene | " + " | ".join(heads) + " |", "|---" * (1 + len(pairs)) + "|"]
+    for scene in dict.fromkeys(scene for scene, _ in scores):
+        cells = []
+        for pair in pairs:
+            found = scores.get((scene, pair))
+            if found is None or not len(found):
+                cells.append("")
+                continue
+            beyond, size = sum(abs(found) > CERTAIN), math.sqrt((found**2).mean())
+            cells.append(f"{beyond} of {len(found)} ({BEYOND * len(found):.1f}); {size:.2f}")
+        rows.append(f"| `{scene}` | " + " | ".join(cells) + " |")
+    return "\n".join(rows)
 
 
 def of_scene(courses, scene):
@@ -89,22 +148,22 @@ def table(courses, names):
 
 
 def bakes(ours):
-    """Nephroid's bakes to the table's targets: (scene, step, true error)."""
-    for scene, course in ours.items():
-        yield from ((scene, step, error) for step, error in zip(course.steps, course.error) if step["samples"] in TARGETS)
+    """Nephroid's bakes to the table's targets: (scene, program, step, true error)."""
+    for (scene, name), course in ours.items():
+        yield from ((scene, name, step, error) for step, error in zip(course.steps, course.error) if step["samples"] in TARGETS)
 
 
 def asked(ours):
     """What Nephroid was asked for, what it thought it had, and what it had."""
-    rows = ["| scene | `--max-error` | estimated | true | rays | CPU s |", "|---|---|---|---|---|---|"]
-    rows += [f"| `{scene}` | {percent(step['samples'])} | {percent(step['estimated'])} | {percent(error)} | "
-             f"{step['rays']:,} | {number(step['cpu_s'])} |" for scene, step, error in bakes(ours)]
+    rows = ["| scene | program | `--max-error` | estimated | true | rays | CPU s |", "|---|---|---|---|---|---|---|"]
+    rows += [f"| `{scene}` | {name} | {percent(step['samples'])} | {percent(step['estimated'])} | {percent(error)} | "
+             f"{step['rays']:,} | {number(step['cpu_s'])} |" for scene, name, step, error in bakes(ours)]
     return "\n".join(rows)
 
 
 def worse_than_asked(ours):
     """Where Nephroid promised too much."""
-    said = [f"{percent(step['samples'])} on `{scene}`" for scene, step, error in bakes(ours) if error > step["samples"]]
+    said = [f"{percent(step['samples'])} on `{scene}` ({name})" for scene, name, step, error in bakes(ours) if error > step["samples"]]
     return f"The true error is above what was asked for in {len(said)} of {len(list(bakes(ours)))} bakes" + (
         f": {listed(said)}." if said else ".")
 

@@ -1,6 +1,7 @@
-"""What the compared programs need of a .glb file: its floor, what is specular, its lamp. Metres, y up, world coordinates."""
+"""What the compared programs need of a .glb file: its floor, what is specular, its lamps. Metres, y up, world coordinates."""
 
 import json
+import math
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,34 +20,64 @@ class Caster:
     normals: numpy.ndarray
     triangles: numpy.ndarray
     ior: float | None  # of a dielectric; None is a mirror that reflects everything
+    roughness: float
+    is_dispersive: bool
 
 
 @dataclass
 class Lamp:
-    """A point light at `position` [m] of radiant intensity `amount` [W/sr], or a sun towards `direction` of `amount` W/m²."""
+    """What shines: `kind` is point, spot, directional or panel. Sizes are 0 where there is none.
 
-    is_sun: bool
-    position: numpy.ndarray
-    direction: numpy.ndarray
+    `amount` is radiant intensity [W/sr], on the axis of a spot; W/m² across the light of a sun; radiance [W/(m² sr)] of a panel.
+    """
+
+    kind: str
+    position: numpy.ndarray  # [m], of a panel its middle
+    direction: numpy.ndarray  # unit, where spots and panels look and a sun's light goes
     amount: float
+    radius_m: float = 0.0  # of a ball, or of a spot's disc
+    half_angle_rad: float = 0.0  # of a sun
+    cone_rad: tuple[float, float] = (0.0, 0.0)  # of a spot: from its axis to where it begins to fade, and to its end
+    half_axes_m: tuple = ()  # of a panel: from its middle to two of its sides
+
+    @property
+    def is_sun(self):
+        """Whether its light comes from afar."""
+        return self.kind == "directional"
+
+    @property
+    def has_size(self):
+        """Whether its light comes from more than one place."""
+        return self.radius_m > 0.0 or self.half_angle_rad > 0.0 or self.kind == "panel"
 
 
 @dataclass
 class Scene:
-    """One horizontal floor, square, seen by its lamp by way of casters. Map row 0 lies at z0, column 0 at x0."""
+    """One horizontal floor, square, seen by its lamps by way of casters. Map row 0 lies at z0, column 0 at x0."""
 
     x0: float
     z0: float
     side_m: float
     height_m: float
     casters: list[Caster]
-    lamp: Lamp
+    lamps: list[Lamp]
+
+    @property
+    def lamp(self):
+        """The only one."""
+        (lamp,) = self.lamps
+        return lamp
+
+    @property
+    def is_dispersive(self):
+        """Whether wavelengths go different ways."""
+        return any(caster.is_dispersive for caster in self.casters)
 
 
 def read(path):
     """The scene in a .glb file."""
     document, binary = chunks(Path(path).read_bytes())
-    casters, floor, lamp = [], None, None
+    casters, floor, lamps = [], None, []
     for node, world in nodes(document):
         if "mesh" in node:
             primitives = document["meshes"][node["mesh"]]["primitives"]
@@ -54,13 +85,13 @@ def read(path):
                 floor = place(world, accessor(document, binary, primitives[0]["attributes"]["POSITION"]))
             else:
                 casters += [caster(document, binary, primitive, world) for primitive in primitives]
-        light = node.get("extensions", {}).get("KHR_lights_punctual")
-        if light:
-            lamp = lamp_of(document["extensions"]["KHR_lights_punctual"]["lights"][light["light"]], world)
-    if floor is None or lamp is None or not casters:
+        for name, on_node in node.get("extensions", {}).items():
+            light = document["extensions"][name]["lights"][on_node["light"]]
+            lamps.append((panel if name == "EXT_lights_area" else lamp_of)(light, world, node.get("extras", {})))
+    if floor is None or not lamps or not casters:
         raise ValueError(f"{path}: a floor, a lamp and something specular are needed")
     low, high = floor.min(axis=0), floor.max(axis=0)
-    return Scene(float(low[0]), float(low[2]), float(high[0] - low[0]), float(low[1]), casters, lamp)
+    return Scene(float(low[0]), float(low[2]), float(high[0] - low[0]), float(low[1]), casters, lamps)
 
 
 def ior_above_floor(scene):
@@ -137,15 +168,30 @@ def caster(document, binary, primitive, world):
         normals / numpy.linalg.norm(normals, axis=1, keepdims=True),
         accessor(document, binary, primitive["indices"]).reshape(-1, 3),
         None if is_mirror else extensions.get("KHR_materials_ior", {}).get("ior", 1.5),
+        material.get("pbrMetallicRoughness", {}).get("roughnessFactor", 1.0),
+        "KHR_materials_dispersion" in extensions,
     )
 
 
-def lamp_of(light, world):
-    """A lamp in watts: candela and lux are lumens, of which 683 are a watt."""
-    direction = -world[:3, 2]
+def axis(world, column):
+    """A unit vector along an axis of a node."""
+    return world[:3, column] / numpy.linalg.norm(world[:3, column])
+
+
+def lamp_of(light, world, extras):
+    """A punctual lamp in watts: candela and lux are lumens, of which 683 are a watt."""
+    spot = light.get("spot", {})
     return Lamp(
-        light["type"] == "directional",
-        world[:3, 3],
-        direction / numpy.linalg.norm(direction),
-        light.get("intensity", 1.0) / LUMENS_PER_WATT,
+        light["type"], world[:3, 3], -axis(world, 2), light.get("intensity", 1.0) / LUMENS_PER_WATT,
+        extras.get("radius_m", 0.0), 0.5 * math.radians(extras.get("angular_diameter_deg", 0.0)),
+        (spot.get("innerConeAngle", 0.0), spot.get("outerConeAngle", math.pi / 4)),
     )
+
+
+def panel(light, world, _):
+    """A rectangle of EXT_lights_area."""
+    if light["type"] != "rect":
+        raise ValueError("panels are rectangles here")
+    half_m = 0.5 * light["size"] * max(numpy.linalg.norm(world[:3, :3], axis=0))
+    sides = (half_m * light["rect"]["aspect"] * axis(world, 0), half_m * axis(world, 1))
+    return Lamp("panel", world[:3, 3], -axis(world, 2), light["intensity"] / LUMENS_PER_WATT, half_axes_m=sides)

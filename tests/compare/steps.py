@@ -8,6 +8,8 @@ import numpy
 
 # A last run that would be shorter than this share of the budget is left out.
 LEAST_SHARE = 0.1
+# Seeds of maps that are all made alike start here.
+ALIKE_SEED = 1000
 
 
 def cpu_s():
@@ -16,11 +18,12 @@ def cpu_s():
     return usage.ru_utime + usage.ru_stime
 
 
-def take(folder, budget_s, first, trace, *, pooled, build_s=0.0, rays_per_sample=1):
+def take(folder, budget_s, first, trace, *, pooled, build_s=0.0, rays_per_sample=1, alike=0):
     """Writes `step_NN.npy` (maps of irradiance [W/m²]) and `steps.json`: their CPU seconds and rays, and the seconds before.
 
     `trace(samples, seed)` makes a map, independent of all others; `build_s` is what each call takes before it samples.
     Pooled maps share the budget, since all of them are averaged; others have it each for itself.
+    `alike` maps that differ by their seeds alone, `alike.npy`, take the budget once more, together.
     """
     folder = Path(folder)
     steps, samples, spent_s, before_s = [], first, 0.0, cpu_s()
@@ -36,3 +39,6 @@ def take(folder, budget_s, first, trace, *, pooled, build_s=0.0, rays_per_sample
         if budget_s - spent_s < LEAST_SHARE * budget_s:
             break
         samples = min(2 * samples, int(left_s * samples / taken_s))
+    if alike:
+        each = max(int(steps[-1]["samples"] * budget_s / steps[-1]["cpu_s"] / alike), 1)
+        numpy.save(folder / "alike.npy", [trace(each, ALIKE_SEED + number) for number in range(alike)])
