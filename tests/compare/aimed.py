@@ -4,7 +4,7 @@ Usage: aimed.py SCENE.glb FOLDER BUDGET_S SIDE DEPTH SAMPLES line|beside
 
 Rays fill the casters' bounding cone around a lamp, or their bounding rectangle across a sun's light, one in each cell of a
 square grid; of lamps with a size, the cone or disc of the casters' bounding ball, from a place that is drawn. At every surface
-a ray goes one way, by Fresnel, first by numbers that are even among neighbours. It starts a little further on its own line; or
+a ray goes one way, by Fresnel, by numbers that are even among neighbours. It starts a little further on its own line; or
 beside it, where Mitsuba's `spawn_ray` has it, as all of Mitsuba's integrators do.
 
 Surfaces are those that Nephroid's README describes: the triangle says which side is met, and turns light where its interpolated
@@ -35,7 +35,8 @@ FIRST_THOUSANDS = 500
 # Steps along a grid's two axes whose sums are spread evenly over [0, 1): 0.7549 and 0.5698 (powers of the root of
 # x³ = x + 1), in units of 2⁻³², so that they wrap around exactly.
 EVEN_STEPS = (3242174889, 2447445414)
-# Where those begin for a seed.
+LAST_DIGIT = 2.0**-24
+# Spreads seeds over where those begin.
 HASH = 0x9E3779B97F4A7C15
 
 
@@ -251,8 +252,12 @@ def land(around, ray, choice, random):
         near, far, inner, outer = around.cross(body, is_front, top, below)
         eta = dr.select(far > 0.0, far / near, 1.0)
         reflectance, _, _, _ = mi.fresnel(-dr.dot(direction, micro), eta)
-        is_reflected = (choice < reflectance) | (dr.gather(mi.Float, around.ior, body) == 0.0)
-        choice = random.next_float32()
+        reflectance = dr.select(dr.gather(mi.Float, around.ior, body) == 0.0, 1.0, reflectance)
+        is_reflected = choice < reflectance
+        # What is left of the number serves for the next choice, with new last digits.
+        probability = dr.select(is_reflected, reflectance, 1.0 - reflectance)
+        choice = dr.select(is_reflected, choice, choice - reflectance) / probability
+        choice = dr.minimum(choice + LAST_DIGIT / probability * random.next_float32(), 1.0 - LAST_DIGIT)
         back, through = mirrored(direction, micro), refracted(direction, micro, eta)
         if around.is_rough:
             # What a micro-facet sends to the wrong side of its surface.
@@ -288,7 +293,7 @@ def main():
         v = (across + random.next_float32()) / mi.Float(width)
         turn = down * EVEN_STEPS[0] + across * EVEN_STEPS[1] + dr.opaque(mi.UInt32, seed * HASH >> 8 & 0xFFFFFFFF)
         ray, share = ray_of(u, v, random)
-        place, landed = land(around, ray, mi.Float(turn >> 8) * 2.0**-24, random)
+        place, landed = land(around, ray, mi.Float(turn >> 8) * LAST_DIGIT, random)
         column = mi.Int32((place.x - scene.x0) * (side / scene.side_m))
         row = mi.Int32((place.z - scene.z0) * (side / scene.side_m))
         inside = landed & (place.x >= scene.x0) & (place.z >= scene.z0) & (column < side) & (row < side)

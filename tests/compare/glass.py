@@ -113,10 +113,14 @@ def bottle():
         lamp("directional", (0.5, 0.7, 0.3), (0, 0, 0), 100.0, angular_diameter_deg=0.53)]
 
 
+def stone(segments):
+    """A cut stone, hung aslant."""
+    profile = [(0, -0.0110), (0.0050, -0.0060), (0.0118, 0.0), (0.0120, 0.0006), (0.0100, 0.0030), (0.0065, 0.0048), (0, 0.0048)]
+    return moved(turned(lathe(profile, segments, FLAT), (1, 0, 0.3), 17), (0, 0.022, 0))
+
+
 def gem():
-    stone = lathe([(0, -0.0110), (0.0050, -0.0060), (0.0118, 0.0), (0.0120, 0.0006), (0.0100, 0.0030), (0.0065, 0.0048), (0, 0.0048)],
-                  12, FLAT)
-    return [body(moved(turned(stone, (1, 0, 0.3), 17), (0, 0.022, 0)), 2.42)], [lamp("point", (0.10, 0.25, 0.04), (0, 0, 0), 0.1)]
+    return [body(stone(12), 2.42)], [lamp("point", (0.10, 0.25, 0.04), (0, 0, 0), 0.1)]
 
 
 def block():
@@ -126,9 +130,8 @@ def block():
 
 
 def series():
-    lens_profile = [(0.03 * math.sin(turn), 0.062 - 0.058 * math.cos(0.5 * turn)) for turn in numpy.linspace(0, math.pi / 2, 24)]
-    lens_profile = [(0.035 * share, -0.008 + 0.006 * share**2) for share in numpy.linspace(0, 1, 24)]
-    lens = lathe(lens_profile + [(r, -y) for r, y in reversed(lens_profile)], 96, SMOOTH)
+    lower = [(0.035 * share, -0.008 + 0.006 * share**2) for share in numpy.linspace(0, 1, 24)]
+    lens = lathe(lower + [(radius, -height) for radius, height in reversed(lower)], 96, SMOOTH)
     return [body(moved(turned(lens, (0, 0, 1), -20), (0.045, 0.125, 0)), 1.6), body(ball(0.025, (0, 0.045, 0)), 1.5)], [
         lamp("spot", (0.16, 0.42, 0), (0.045, 0.125, 0), 0.5, cone=(9, 12), radius_m=0.006)]
 
@@ -151,9 +154,7 @@ def frosted():
 
 
 def dispersive():
-    prism = lathe([(0, -0.03), (0.025, -0.03), (0.025, 0.03), (0, 0.03)], 3, FLAT)
-    return [body(moved(turned(prism, (1, 0, 0), 90), (0, 0.06, 0)), 1.62, dispersion=0.55)], [
-        lamp("spot", (0.30, 0.22, 0.03), (0, 0.06, 0), 0.6, cone=(8, 10))]
+    return [body(stone(8), 1.62, dispersion=0.8)], [lamp("spot", (-0.14, 0.30, 0.02), (0, 0.02, 0), 0.3, cone=(4, 5))]
 
 
 def many_lamps():
@@ -168,7 +169,7 @@ def many_lamps():
 # By name: what makes bodies and lamps, and the floor's side [m].
 SCENES = {
     "goblet": (goblet, 0.5), "bottle": (bottle, 0.4), "gem": (gem, 0.2), "block": (block, 0.3), "series": (series, 0.2),
-    "drink": (drink, 0.4), "lamp_in_glass": (lamp_in_glass, 0.4), "frosted": (frosted, 0.2), "dispersive": (dispersive, 0.6),
+    "drink": (drink, 0.4), "lamp_in_glass": (lamp_in_glass, 0.4), "frosted": (frosted, 0.2), "dispersive": (dispersive, 0.2),
     "many_lamps": (many_lamps, 0.4),
 }
 
