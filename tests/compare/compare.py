@@ -28,7 +28,7 @@ SIDE = 256
 # Specular surfaces on a path, as many as photons have by default.
 DEPTH = 256
 # Maps of a scene of glass that differ by their seeds alone.
-ALIKE = 8
+ALIKE = {"photon": 8, "aimed": 8, "brute": 6}
 # Reference maps whose noise is known, and the depth of their paths.
 KNOWN = {"wine": (0.0124, None), "tumbler": (0.0117, 15), "lens": (0.0102, None)}
 
@@ -94,7 +94,7 @@ def measure(program, given, scene, folder):
         raise RuntimeError("libLLVM 16 or newer was not found")
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
-    alike = ALIKE if given.glass and program.key != "auto" else 0
+    alike = ALIKE.get(program.key, 0) if given.glass else 0
     if program is BRUTE_FORCE:
         nephroid.brute_force(given.nephroid, scene, folder, given.budget, SIDE, alike)
         return
@@ -144,10 +144,10 @@ def measured(given, wanted, scenes):
         alike = {each.key: numpy.load(file) for each in done if (file := folder / each.key / "alike.npy").exists()}
         for first, second in PAIRS:
             if first in alike and second in alike:
-                scores[name, (first, second)], _ = figures.block_scores(alike[first], alike[second])
-        reference = scene.reference or figures.pooled(alike.get("aimed", alike.get("brute")))
+                scores[name, (first, second)] = figures.block_scores(alike[first], alike[second])
+        reference = scene.reference or next((figures.pooled(alike[key]) for key in ["aimed", "brute"] if key in alike), None)
         for program in done:
-            if not (folder / program.key / "steps.json").exists():
+            if reference is None or not (folder / program.key / "steps.json").exists():
                 continue
             found = figures.course(folder / program.key, reference, bool(program.script), program.is_pooled)
             if (name, program.starts_as) in courses:

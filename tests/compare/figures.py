@@ -104,8 +104,7 @@ def relative_rmse(irradiance, reference):
 
 
 def block_scores(found, reference):
-    """How many standard errors the means over blocks of maps differ, [maps, rows, columns] each: (scores of a normal
-    distribution, shares of the reference's mean).
+    """How many standard errors the means over blocks of maps differ, [maps, rows, columns] each, as of a normal distribution.
 
     Errors are those of either side's maps among each other. Student's t becomes normal by Wallace (1959), with the degrees of
     freedom of Welch (1947). Blocks that some map has no light in are left out: nothing is normal there.
@@ -118,7 +117,7 @@ def block_scores(found, reference):
     difference = a.mean(axis=0) - b.mean(axis=0)
     freedom = variance**2 / (of_a**2 / (n - 1) + of_b**2 / (m - 1) + 1e-300)
     size = numpy.sqrt(freedom * numpy.log1p(difference**2 / variance / freedom)) * (8 * freedom + 1) / (8 * freedom + 3)
-    return numpy.sign(difference) * size, difference / means[1].mean()
+    return numpy.sign(difference) * size
 
 
 def common_error(first, second, reference):

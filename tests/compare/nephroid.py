@@ -12,8 +12,8 @@ from steps import ALIKE_SEED
 TARGETS = [0.4, 0.2, 0.14, 0.1, 0.07, 0.05, 0.03, 0.02, 0.014, 0.01, 0.007, 0.005, 0.002, 0.001, 0.0005]
 # Rays per steradian; under a sun, of the casters seen from their farthest receiver.
 DENSITIES = [5e4 * 2**power for power in range(14)]
-# Of brute force, to begin with.
-LEAST_RAYS = 20_000
+# Of brute force, for each map.
+LEAST_RAYS = 100_000
 LUMINANCE = numpy.array([0.2126, 0.7152, 0.0722])
 
 
@@ -28,7 +28,7 @@ def run(*command):
 def export_scene(program, name, folder):
     """A built-in scene as a .glb file, by way of a coarse bake."""
     maps, file = folder / f"{name}_maps", folder / f"{name}.glb"
-    run(program, "bake", f"builtin:{name}", "-o", maps, "--density", "1000", "--map-resolution", "32", "--quiet")
+    run(program, "bake", f"builtin:{name}", "-o", maps, "--density", "1000", "--map-resolution", "32", "--quiet", "--force")
     run(program, "export", maps, "-o", file, "--lights", "keep")
     return file
 
@@ -78,17 +78,17 @@ def take(program, scene, folder, budget_s, side, estimator, alike=0):
 
 
 def brute_force(program, scene, folder, budget_s, side, alike):
-    """Maps by brute force, which differ by their seeds alone."""
+    """Maps by brute force, which differ by their seeds alone and take the budget together, or more where it is too short."""
     found, rays, maps = [], LEAST_RAYS, folder / "maps"
-    for seed in range(-1, alike):
-        # The first tells how many rays the others can have.
-        run(program, "study", "reference", scene.file, "-o", maps, "--rays", max(int(rays), LEAST_RAYS), "--seed", ALIKE_SEED + seed,
+    while len(found) < alike:
+        run(program, "study", "reference", scene.file, "-o", maps, "--rays", rays, "--seed", ALIKE_SEED + len(found),
             "--map-resolution", side, "--quiet", "--force", "--no-cache")
         manifest = json.loads((maps / "reference.json").read_text())
-        if seed < 0:
-            rays = manifest["rays"] * budget_s / alike / manifest["cpu_s"]
-        else:
-            found.append(floor_of(maps, manifest))
+        wanted = int(rays * budget_s / alike / manifest["cpu_s"])
+        if not found and wanted > 2 * rays:
+            rays = wanted
+            continue
+        found.append(floor_of(maps, manifest))
     numpy.save(folder / "alike.npy", found)
 
 
