@@ -129,8 +129,9 @@ def chosen(items, only):
 
 
 def measured(given, wanted, scenes):
-    """Every program on every scene: courses by (scene, program), scores of blocks by (scene, pair), and why some are left out."""
-    courses, scores, left_out = {}, {}, {}
+    """Every program on every scene: courses by (scene, program), references by scene, scores of blocks by (scene, pair), and why
+    some are left out."""
+    courses, references, scores, left_out = {}, {}, {}, {}
     for name, scene in scenes.items():
         folder, done = given.output / "steps" / name, []
         for program in wanted:
@@ -147,6 +148,7 @@ def measured(given, wanted, scenes):
                 scores[name, (first, second)] = figures.block_scores(alike[first], alike[second])
         reference = scene.reference or next((figures.pooled(alike[key]) for key in ["aimed", "brute"] if key in alike), None)
         for program in done:
+            references[name] = reference
             if reference is None or not (folder / program.key / "steps.json").exists():
                 continue
             found = figures.course(folder / program.key, reference, bool(program.script), program.is_pooled)
@@ -155,7 +157,7 @@ def measured(given, wanted, scenes):
             courses[name, program.key] = found
             pictures.write(given.output / f"{name}_{program.key}.png", found.last, reference.irradiance)
             print(page.line(name, program, found), flush=True)
-    return courses, scores, left_out
+    return courses, references, scores, left_out
 
 
 def main():
@@ -169,10 +171,10 @@ def main():
     (given.output / "scenes").mkdir(exist_ok=True)
     scenes = chosen(scene_files(given, given.output / "scenes"), given.only)
     wanted = list(chosen({each.key: each for each in programs}, given.only).values())
-    courses, scores, left_out = measured(given, wanted, scenes)
+    courses, references, scores, left_out = measured(given, wanted, scenes)
     (given.output / "compare.csv").write_text(page.csv(courses, names))
     if given.glass:
-        text = page.glass_markdown(courses, names, left_out, heading.read_text(), scores)
+        text = page.glass_markdown(courses, names, left_out, heading.read_text(), references, scores)
     else:
         text = page.markdown(courses, names, left_out, heading.read_text())
     (given.output / "compare.md").write_text(text)

@@ -79,6 +79,8 @@ def take(program, scene, folder, budget_s, side, estimator, alike=0):
 
 def brute_force(program, scene, folder, budget_s, side, alike):
     """Maps by brute force, which differ by their seeds alone and take the budget together, or more where it is too short."""
+    if scene.depth:
+        raise RuntimeError("`study reference` has no --max-depth")
     found, rays, maps = [], LEAST_RAYS, folder / "maps"
     while len(found) < alike:
         run(program, "study", "reference", scene.file, "-o", maps, "--rays", rays, "--seed", ALIKE_SEED + len(found),

@@ -13,7 +13,7 @@ interpolated between steps; `<` is the first step, which is better already; `~` 
 root of time where independent samples are averaged, else as measured; `never` is a bias. What two independent runs have in
 common, by three standard errors, counts as bias; `ptracer`, whose noise hides it, has that of aimed rays that start as its
 own do."""
-GLASS_LEGEND = """*true/estimated* is of the last bake by photons. *ratio* is the photons' seconds over those of aimed rays. Where a scene has
+GLASS_LEGEND = """*true/estimated* is of the last bake. *ratio* is the photons' seconds over those of aimed rays. Where a scene has
 no map of its own, the reference is the mean of all of the aimed rays' maps that differ by their seeds alone, or of brute force
 where light is dispersed; its noise is taken from all errors."""
 BLOCK_LEGEND = """Means over 8 × 8 texels of maps that differ by their seeds alone: blocks that are more than three standard errors apart,
@@ -78,36 +78,34 @@ def markdown(courses, names, left_out, heading):
     return "\n\n".join(part for part in parts if part) + "\n"
 
 
-def glass_markdown(courses, names, left_out, heading, scores):
-    """The page of scenes of glass; `scores` of blocks by scene and pair of programs."""
-    parts = [heading + ":", glass_table(courses), GLASS_LEGEND, block_table(scores, names), BLOCK_LEGEND, table(courses, names), LEGEND]
+def glass_markdown(courses, names, left_out, heading, references, scores):
+    """The page of scenes of glass: references by scene, and scores of blocks by scene and pair of programs."""
+    parts = [heading + ":", glass_table(courses, references), GLASS_LEGEND, block_table(scores, names), BLOCK_LEGEND, table(courses, names), LEGEND]
     parts += [stuck(courses, names), watts(courses, names), not_counted(courses, names)]
     parts += [f"{name} is left out: {reason}." for name, reason in left_out.items()]
     return "\n\n".join(part for part in parts if part) + "\n"
 
 
-def glass_table(courses):
-    """CPU seconds to the coarsest target, and whether photons know their error."""
-    target = TARGETS[0]
-    rows = [f"| scene | photon, CPU s to {percent(target)} | auto | aimed rays | ratio | estimated | true | true/estimated |",
-            "|---|---|---|---|---|---|---|---|"]
-    ratios, doubts = [], []
+def glass_table(courses, references):
+    """CPU seconds to the coarsest target, and whether Nephroid knows its error."""
+    target = percent(TARGETS[0])
+    rows = [f"| scene | photon, CPU s to {target} | auto, to {target} | aimed rays, to {target} | ratio "
+            "| photon: true/estimated | auto: true/estimated | noise of the reference |", "|---" * 8 + "|"]
+    ratios, doubts = [], {"photon": [], "auto": []}
     for scene in dict.fromkeys(scene for scene, _ in courses):
         programs = of_scene(courses, scene)
-        costs = {key: programs[key].cost(target) for key in ["photon", "auto", "aimed"] if key in programs}
+        costs = {key: programs[key].cost(TARGETS[0]) for key in ["photon", "auto", "aimed"] if key in programs}
         cells = [cost(costs[key]) if key in costs else "" for key in ["photon", "auto", "aimed"]]
         ratio = costs["photon"].cpu_s / costs["aimed"].cpu_s if {"photon", "aimed"} <= costs.keys() else math.nan
-        cells.append("" if math.isnan(ratio) else number(ratio))
         ratios += [] if math.isnan(ratio) else [ratio]
-        if "photon" in programs and programs["photon"].steps[-1]["estimated"]:
-            true, estimated = programs["photon"].error[-1], programs["photon"].steps[-1]["estimated"]
-            cells += [percent(estimated), percent(true), f"{true / estimated:.2f}"]
-            doubts.append(true / estimated)
-        else:
-            cells += ["", "", ""]
-        rows.append(f"| `{scene}` | {' | '.join(cells)} |")
-    middle = [f"{median(found):.2f}" if found else "" for found in (ratios, doubts)]
-    return "\n".join([*rows, f"| median | | | | {middle[0]} | | | {middle[1]} |"])
+        cells.append("" if math.isnan(ratio) else number(ratio))
+        for key, found in doubts.items():
+            estimated = programs[key].steps[-1]["estimated"] if key in programs else None
+            found += [programs[key].error[-1] / estimated] if estimated else []
+            cells.append(f"{percent(programs[key].error[-1])} / {percent(estimated)} = {found[-1]:.2f}" if estimated else "")
+        rows.append(f"| `{scene}` | {' | '.join(cells)} | {percent(references[scene].noise)} |")
+    middle = [f"{median(found):.2f}" if found else "" for found in (ratios, *doubts.values())]
+    return "\n".join([*rows, f"| median | | | | {' | '.join(middle)} | |"])
 
 
 def block_table(scores, names):
