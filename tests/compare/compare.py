@@ -30,7 +30,7 @@ DEPTH = 256
 # Maps of a scene of glass that differ by their seeds alone.
 ALIKE = {"photon": 8, "aimed": 8, "brute": 6}
 # Reference maps whose noise is known, and the depth of their paths.
-KNOWN = {"wine": (0.0124, None), "tumbler": (0.0117, 15), "lens": (0.0102, None)}
+KNOWN = {"wine": (0.0124, 15), "tumbler": (0.0117, 15), "lens": (0.0102, 15)}
 
 
 @dataclass

@@ -10,6 +10,8 @@ import numpy
 CERTAIN = 3.0
 # Texels along a block whose means are compared.
 BLOCK = 8
+# Largest standard error of a block that is compared, of its light: noise is not normal beyond.
+KNOWN = 0.1
 
 
 @dataclass
@@ -107,11 +109,11 @@ def block_scores(found, reference):
     """How many standard errors the means over blocks of maps differ, [maps, rows, columns] each, as of a normal distribution.
 
     Errors are those of either side's maps among each other. Student's t becomes normal by Wallace (1959), with the degrees of
-    freedom of Welch (1947). Blocks that some map has no light in are left out: nothing is normal there.
+    freedom of Welch (1947). Blocks that a side knows worse than by a share of their light are left out: few rays, nothing normal.
     """
-    means = [maps.reshape(len(maps), maps.shape[1] // BLOCK, BLOCK, -1, BLOCK).mean(axis=(2, 4)) for maps in (found, reference)]
-    lit = numpy.logical_and(*[(each > 0.0).all(axis=0) for each in means])
-    (a, b), (n, m) = [each[:, lit] for each in means], map(len, means)
+    a, b = [maps.reshape(len(maps), maps.shape[1] // BLOCK, BLOCK, -1, BLOCK).mean(axis=(2, 4)) for maps in (found, reference)]
+    known = numpy.logical_and(*[each.std(axis=0, ddof=1) < KNOWN * math.sqrt(len(each)) * each.mean(axis=0) for each in (a, b)])
+    a, b, n, m = a[:, known], b[:, known], len(a), len(b)
     of_a, of_b = a.var(axis=0, ddof=1) / n, b.var(axis=0, ddof=1) / m
     variance = numpy.maximum(of_a + of_b, 1e-300)
     difference = a.mean(axis=0) - b.mean(axis=0)
