@@ -70,8 +70,8 @@ PROGRAMS = [
 ]
 BRUTE_FORCE = Program("brute", "brute force", "", [])
 GLASS = [each for each in PROGRAMS if each.key in ["photon", "auto", "aimed"]] + [BRUTE_FORCE]
-# Programs whose blocks are compared.
-PAIRS = [("photon", "aimed"), ("photon", "brute"), ("aimed", "brute")]
+# Programs whose blocks are compared; of one with itself, the even maps with the odd ones.
+PAIRS = [("photon", "photon"), ("photon", "aimed"), ("photon", "brute"), ("aimed", "brute")]
 
 
 def arguments():
@@ -145,7 +145,8 @@ def measured(given, wanted, scenes):
         alike = {each.key: numpy.load(file) for each in done if (file := folder / each.key / "alike.npy").exists()}
         for first, second in PAIRS:
             if first in alike and second in alike:
-                scores[name, (first, second)] = figures.block_scores(alike[first], alike[second])
+                sides = (alike[first], alike[second]) if first != second else (alike[first][::2], alike[first][1::2])
+                scores[name, (first, second)] = figures.block_scores(*sides)
         reference = scene.reference or next((figures.pooled(alike[key]) for key in ["aimed", "brute"] if key in alike), None)
         for program in done:
             references[name] = reference

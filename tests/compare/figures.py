@@ -130,14 +130,14 @@ def common_error(first, second, reference):
     """
     a, b = ((each - reference.irradiance) / reference.mean for each in (first, second))
     doubt = math.sqrt(((0.5 * (a + b) * (a - b)) ** 2).sum()) / a.size
-    return math.sqrt(max((a * b).mean() - reference.noise**2 - CERTAIN * doubt, 0.0))
+    return math.sqrt(max((a * b).mean() - CERTAIN * doubt, 0.0))
 
 
 def course(folder, reference, is_random, is_pooled):
     """Reads the steps in a folder. Pooled ones are averaged, by samples, with all before them.
 
     Only random samples are independent from step to step, so that what two of them have in common is bias. Errors of lattices
-    are alike, and shrink all the same.
+    are alike, and shrink all the same. A reference with noise of its own would pass for a bias.
     """
     steps = json.loads((folder / "steps.json").read_text())
     maps = [numpy.load(folder / f"step_{number:02}.npy") for number in range(len(steps))]
@@ -149,7 +149,7 @@ def course(folder, reference, is_random, is_pooled):
         shown = list(sums / numpy.cumsum(weights)[:, None, None])
         seconds, rays = list(numpy.cumsum(seconds)), list(numpy.cumsum(rays))
     errors = [relative_rmse(each, reference) for each in shown]
-    bias = common_error(shown[-2], maps[-1], reference) if is_random and len(maps) > 1 else 0.0
+    bias = common_error(shown[-2], maps[-1], reference) if is_random and len(maps) > 1 and not reference.variance else 0.0
     # What remains cannot be more than what there is.
     bias = min(bias, errors[-1])
     return Course(seconds, rays, errors, steps, bias, float(shown[-1].mean() / reference.mean), is_pooled, shown[-1])

@@ -68,7 +68,8 @@ def take(program, scene, folder, budget_s, side, estimator, alike=0):
                       "estimated": manifest["error"]["estimated_relative_rmse"]})
         (folder / "steps.json").write_text(json.dumps(steps))
         growth = taken_s / steps[-2]["cpu_s"] if len(steps) > 1 else growth
-        if taken_s * growth > budget_s:
+        # Two steps at least tell a slope.
+        if taken_s * growth > budget_s and len(steps) > 1:
             break
     if alike:
         target = min(steps[-1]["estimated"] * math.sqrt(steps[-1]["cpu_s"] * alike / budget_s), 1.0)

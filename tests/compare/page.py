@@ -17,7 +17,8 @@ GLASS_LEGEND = """*true/estimated* is of the last bake. *ratio* is the photons' 
 no map of its own, the reference is the mean of all of the aimed rays' maps that differ by their seeds alone, or of brute force
 where light is dispersed; its noise is taken from all errors."""
 BLOCK_LEGEND = """Means over 8 × 8 texels of maps that differ by their seeds alone: blocks that are more than three standard errors apart,
-both sides' noise included, beside how many chance allows, and the root mean square of all, in standard errors (1 is chance)."""
+both sides' noise included, beside how many a normal distribution allows, and the root mean square of all, in standard errors (1 is chance). Noise of few
+rays has longer tails: photons against themselves show by how much."""
 # Of the normal distribution, beyond three standard errors.
 BEYOND = 0.0027
 # Watts that are off by more than this are told.
@@ -111,7 +112,7 @@ def glass_table(courses, references):
 def block_table(scores, names):
     """Blocks that differ by more than three standard errors."""
     pairs = list(dict.fromkeys(pair for _, pair in scores))
-    heads = [f"{names[first]} against {names[second]}" for first, second in pairs]
+    heads = [f"{names[first]} against {names[second] if first != second else 'itself'}" for first, second in pairs]
     rows = ["| scene | " + " | ".join(heads) + " |", "|---" * (1 + len(pairs)) + "|"]
     for scene in dict.fromkeys(scene for scene, _ in scores):
         cells = []
