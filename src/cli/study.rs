@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use clap::{ArgMatches, Args, FromArgMatches, Subcommand};
+use nephroid::effect::Effect;
 use nephroid::error::{Error, Result};
 use nephroid::export::manifest::MapEntry;
 use nephroid::export::map_folder::MapFolder;
@@ -373,7 +374,15 @@ impl Desk<'_> {
             let sweep = one_scene::effects(&scene, &settings)?;
             Ok(Sweep { repeats, ..sweep })
         };
-        self.tell(&self.study(EFFECTS.0, &study.common, &study.common.output, make)?)
+        let told = self.study(EFFECTS.0, &study.common, &study.common.output, make)?;
+        for effect in Effect::ALL {
+            let picture = format!("difference_{}.png", effect.name());
+            if !told.1.files.contains(&picture) {
+                // An earlier study of this folder may have had the effect.
+                files::remove_file(&study.common.output.join(picture))?;
+            }
+        }
+        self.tell(&told)
     }
 
     fn spectrum(self, study: &SpectrumArguments) -> Result<()> {

@@ -26,9 +26,7 @@ pub fn even_point(index: u32, pair: u32, seed: u64) -> DVec2 {
     let seed = hash(seed as u32 ^ hash((seed >> 32) as u32 ^ hash(pair)));
     let index = scrambled(index.reverse_bits(), seed).reverse_bits();
     let x = index.reverse_bits();
-    let y = (0..32)
-        .filter(|bit| index >> bit & 1 == 1)
-        .fold(0, |y, bit| y ^ SECOND[bit as usize]);
+    let y = second(index);
     let unit = |code: u32, dimension: u32| {
         let code = scrambled(code.reverse_bits(), hash(seed ^ dimension)).reverse_bits();
         f64::from(code) * (-32_f64).exp2()
@@ -38,12 +36,27 @@ pub fn even_point(index: u32, pair: u32, seed: u64) -> DVec2 {
 }
 
 /// A place of the sequence in one dimension at an index, as a whole number below 2⁶⁴: the first 2ᵏ indices have one place
-/// in each of 2ᵏ equal parts, and lie anywhere within them. Other indices or seeds are independent.
+/// in each of 2ᵏ equal parts, and lie anywhere within them. Other seeds are independent.
 pub fn even_code(index: u32, seed: u64) -> u64 {
     let folded = hash(seed as u32 ^ hash((seed >> 32) as u32 ^ 0x51ed_270b));
     let high = scrambled(index, folded).reverse_bits();
     let low = hash(index ^ hash(folded ^ 0x2c1b_3c6d));
     u64::from(high) << 32 | u64::from(low)
+}
+
+/// A number in [0, 1) that goes with the code of an index: codes and numbers of 2ᵏ indices are a net, so that numbers are
+/// even among neighbours along the codes, in every part of 2ʲ codes one in each 2ʲth of the interval.
+pub fn even_number(index: u32, seed: u64) -> f64 {
+    let folded = hash(seed as u32 ^ hash((seed >> 32) as u32 ^ 0x6d2b_79f5));
+    let high = scrambled(second(index).reverse_bits(), folded).reverse_bits();
+    let low = hash(index ^ hash(folded ^ 0x1b87_3593));
+    (u64::from(high) << 21 | u64::from(low >> 11)) as f64 * (-53_f64).exp2()
+}
+
+/// Sobol's second dimension.
+fn second(index: u32) -> u32 {
+    let bits = (0..32).filter(|bit| index >> bit & 1 == 1);
+    bits.fold(0, |code, bit| code ^ SECOND[bit as usize])
 }
 
 /// Owen's scrambling of reversed bits: every bit is flipped by a hash of the lower ones (Laine and Karras 2011, with
@@ -102,6 +115,21 @@ mod tests {
                 .collect();
             strata.sort_unstable();
             assert!(strata.into_iter().eq(0..1_u64 << bits), "{bits} bits");
+        }
+    }
+
+    /// Among neighbours along the codes, numbers are even.
+    #[test]
+    fn codes_and_numbers_are_nets() {
+        for across in 0..=8_u32 {
+            let (columns, rows) = (1_u64 << across, 256 >> across);
+            let mut seen = vec![0; 256];
+            for index in 256..512 {
+                let column = (u128::from(even_code(index, 3)) * u128::from(columns) >> 64) as usize;
+                let row = (even_number(index, 3) * f64::from(rows)) as usize;
+                seen[row * columns as usize + column] += 1;
+            }
+            assert!(seen.iter().all(|&count| count == 1), "{columns} columns");
         }
     }
 

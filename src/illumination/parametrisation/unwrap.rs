@@ -1,7 +1,9 @@
 //! Gives every point of a bent surface its place in a map: charts by uvunwrap, laid side by side with gutters.
 
+use std::collections::HashMap;
+
 use glam::DVec2;
-use uvunwrap::{Density, MeshInput, Options};
+use uvunwrap::{Density, MeshInput, Options, Packing};
 
 use crate::files::cache::{self, ContentHash};
 use crate::scene::Mesh;
@@ -15,11 +17,11 @@ const CHART_ANGLE_DEG: f32 = 50.0;
 /// Largest ratio between a facet's share of the map and of the surface, either way.
 const DISTORTION: f32 = 1.5;
 
-/// Meshes of fewer triangles are unwrapped in no time.
+/// Meshes of fewer triangles are unwrapped in no time, and their charts packed as densely as they go.
 const LEAST_KEPT: usize = 2000;
 
 /// Changes with whatever changes the coordinates of a mesh: a new version of uvunwrap, other options.
-const LAYOUT_VERSION: u64 = 1;
+const LAYOUT_VERSION: u64 = 2;
 
 /// Least and largest side of a map that charts are laid out for [texels].
 const SIDES: (usize, usize) = (16, 8192);
@@ -93,8 +95,17 @@ fn lay_out(mesh: &Mesh, side: usize) -> Option<Vec<[DVec2; 3]>> {
     let size_m = (high - low).max_element();
     // Single precision is for what lies around zero.
     let local = |point: &glam::DVec3| ((*point - (low + high) * 0.5) / size_m).as_vec3().to_array();
-    let positions: Vec<[f32; 3]> = mesh.positions.iter().map(local).collect();
-    let indices: Vec<u32> = mesh.triangles.iter().flatten().copied().collect();
+    // Corners that differ in normals or coordinates alone are one: a chart goes on over them.
+    let (mut positions, mut known) = (Vec::new(), HashMap::new());
+    let mut welded = |vertex: &u32| {
+        // Both zeros are one.
+        let position = local(&mesh.positions[*vertex as usize]).map(|value| value + 0.0);
+        *known.entry(position.map(f32::to_bits)).or_insert_with(|| {
+            positions.push(position);
+            positions.len() as u32 - 1
+        })
+    };
+    let indices: Vec<u32> = mesh.triangles.iter().flatten().map(&mut welded).collect();
     let input = MeshInput::new(&positions, &indices);
     let mut side = side.clamp(SIDES.0, SIDES.1);
     loop {
@@ -105,6 +116,11 @@ fn lay_out(mesh: &Mesh, side: usize) -> Option<Vec<[DVec2; 3]>> {
                 page_size: side as u32,
             },
             padding: PADDING_TEXELS,
+            packing: if mesh.triangles.len() < LEAST_KEPT {
+                Packing::Shape
+            } else {
+                Packing::Fast
+            },
             ..Options::default()
         };
         match uvunwrap::generate(&[input], &options) {

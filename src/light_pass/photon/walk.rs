@@ -3,7 +3,7 @@
 use super::launch::{LAMP_DIMENSION, Start};
 use super::spectrum::{Hue, PhotonSpectrum};
 use crate::geometry::Ray;
-use crate::geometry::sampling::even_point;
+use crate::geometry::sampling::{even_number, even_point};
 use crate::illumination::accumulator::FluxUnit;
 use crate::illumination::{Receiver, Side};
 use crate::light_pass::ledger_sum::{Account, LedgerSum};
@@ -65,7 +65,7 @@ struct Photon<'a> {
     hue: Hue<'a>,
     flux_w: LinearSrgb,
     index: u32,
-    random: Random,
+    choice: Choice,
 }
 
 impl<'a> PhotonWalk<'a> {
@@ -108,7 +108,7 @@ impl<'a> PhotonWalk<'a> {
         let mut photon = Photon {
             hue: whole,
             flux_w: start.flux_w,
-            random: Random::new(index, self.rules.seed),
+            choice: Choice::new(index, self.rules.seed),
             index,
         };
         let (mut ray, mut media) = (start.ray, start.media);
@@ -221,7 +221,7 @@ impl<'a> PhotonWalk<'a> {
             return None;
         }
         let share = reflected / both;
-        let (branch, flux_w) = if share >= 1.0 || (share > 0.0 && photon.random.next() < share) {
+        let (branch, flux_w) = if share >= 1.0 || (share > 0.0 && photon.choice.falls_below(share)) {
             (meeting.reflection()?, reflected_w * share.recip())
         } else {
             (meeting.transmission()?, transmitted_w * (1.0 - share).recip())
@@ -246,7 +246,7 @@ impl<'a> PhotonWalk<'a> {
         if probability >= 1.0 {
             return true;
         }
-        let survives = photon.random.next() < probability;
+        let survives = photon.choice.falls_below(probability);
         let (before_w, channels) = (photon.flux_w, photon.hue.channels);
         photon.flux_w = if survives {
             before_w * probability.recip()
@@ -255,6 +255,44 @@ impl<'a> PhotonWalk<'a> {
         };
         self.book(Account::Sampling, &channels, before_w - photon.flux_w);
         survives
+    }
+}
+
+/// Part of the interval [0, 1) in which a choice has no certain digits left.
+const LEAST_WIDTH: f64 = 1e-7;
+
+/// What makes all decisions of a photon: one number that is even among those of its neighbours. Within the part of the
+/// interval that a decision took it is even again, and serves for the next one.
+struct Choice {
+    number: f64,
+    /// How much of the first interval is left.
+    width: f64,
+    random: Random,
+}
+
+impl Choice {
+    fn new(index: u32, seed: u64) -> Self {
+        Self {
+            number: even_number(index, seed),
+            width: 1.0,
+            random: Random::new(index, seed),
+        }
+    }
+
+    /// Decides with a probability in (0, 1).
+    fn falls_below(&mut self, probability: f64) -> bool {
+        let is_below = self.number < probability;
+        let (first, part) = if is_below {
+            (0.0, probability)
+        } else {
+            (probability, 1.0 - probability)
+        };
+        self.number = (self.number - first) / part;
+        self.width *= part;
+        if self.width < LEAST_WIDTH {
+            (self.number, self.width) = (self.random.next(), 1.0);
+        }
+        is_below
     }
 }
 
