@@ -56,7 +56,11 @@ fn add_stand(scene: &mut Scene, name: &str, top: DVec3, half_m: f64, material: u
 
 fn add_basin(scene: &mut Scene, stone: usize) {
     let mosaic = patterns::add(scene, "mosaic", 0.6, |place| {
-        patterns::tiles(place, 16, [DVec3::new(88.0, 142.0, 146.0), DVec3::new(150.0, 160.0, 156.0)])
+        patterns::tiles(
+            place,
+            16,
+            [DVec3::new(88.0, 142.0, 146.0), DVec3::new(150.0, 160.0, 156.0)],
+        )
     });
     let basin = Basin {
         centre: BASIN,
@@ -110,7 +114,14 @@ fn add_prism(scene: &mut Scene, stone: usize) {
     let centre = prism.entry() - direction * TO_PRISM_M;
     let across = DVec3::Y.cross(direction);
     let half_m = (SLIT_HALF_M, PLATE_HALF_M);
-    parts::add_slit(scene, ("slit", black), centre, [across, DVec3::Y], half_m, shapes::rectangle);
+    parts::add_slit(
+        scene,
+        ("slit", black),
+        centre,
+        [across, DVec3::Y],
+        half_m,
+        shapes::rectangle,
+    );
 }
 
 /// Middle of the spectrum on the back wall [m].
@@ -130,8 +141,8 @@ pub fn prism_beam() -> Light {
 }
 
 /// Middle of the block, and the lamp before it [m].
-const BLOCK: DVec3 = DVec3::new(1.1, 1.27, -0.8);
-pub const BLOCK_LAMP: DVec3 = DVec3::new(0.75, 1.45, 0.7);
+const BLOCK: DVec3 = DVec3::new(1.0, 1.27, -0.8);
+pub const BLOCK_LAMP: DVec3 = DVec3::new(-0.3, 1.5, 0.4);
 
 pub fn block() -> Block {
     let forward = (BLOCK - BLOCK_LAMP).normalize();
@@ -154,12 +165,30 @@ pub fn picture() -> DVec3 {
 
 fn add_block(scene: &mut Scene, stone: usize) {
     let block = block();
-    parts::add(scene, "block", block.mesh(), parts::dielectric("acrylic", block.ior));
+    parts::add(
+        scene,
+        "block",
+        block.mesh(),
+        parts::dielectric("acrylic", block.ior),
+    );
     // Nothing of the lamp's light goes past it.
     let black = parts::material(scene, parts::matte("black frame", LinearSrgb::grey(0.02)));
     let half_m = 0.5 * block.side_m - 0.002;
     let (centre, axes) = (block.centre - block.forward * 0.004, block.axes());
-    parts::add_slit(scene, ("block frame", black), centre, axes, ([half_m, half_m], half_m + 0.035), shapes::rectangle);
+    parts::add_slit(
+        scene,
+        ("block frame", black),
+        centre,
+        axes,
+        ([half_m, half_m], half_m + 0.07),
+        shapes::rectangle,
+    );
     let foot = block.centre + block.forward * (0.5 * block.thickness_m);
-    add_stand(scene, "block pedestal", foot.with_y(BLOCK.y - 0.5 * block.side_m - 0.012), 0.085, stone);
+    add_stand(
+        scene,
+        "block pedestal",
+        foot.with_y(BLOCK.y - 0.5 * block.side_m - 0.012),
+        0.085,
+        stone,
+    );
 }

@@ -1,8 +1,8 @@
-//! What is turned on a lathe: wine glass, wine, lens.
+//! What is turned on a lathe: wine glass and wine.
 
 use std::f64::consts::TAU;
 
-use glam::{DMat3, DVec2, DVec3};
+use glam::{DVec2, DVec3};
 
 use crate::scene::Mesh;
 use crate::scene::builtin::shapes;
@@ -57,24 +57,13 @@ fn between(points: &[DVec2], piece: usize, part: f64) -> (DVec2, DVec2) {
         + m0 * (t3 - 2.0 * t2 + t)
         + to * (3.0 * t2 - 2.0 * t3)
         + m1 * (t3 - t2);
-    let derivative = (from - to) * (6.0 * t2 - 6.0 * t)
-        + m0 * (3.0 * t2 - 4.0 * t + 1.0)
-        + m1 * (3.0 * t2 - 2.0 * t);
+    let derivative =
+        (from - to) * (6.0 * t2 - 6.0 * t) + m0 * (3.0 * t2 - 4.0 * t + 1.0) + m1 * (3.0 * t2 - 2.0 * t);
     (at, derivative)
 }
 
-/// A mesh with its y axis along `axis`, its origin at `origin` [m].
-#[must_use]
-pub fn placed(mut mesh: Mesh, axis: DVec3, origin: DVec3) -> Mesh {
-    let x = axis.any_orthonormal_vector();
-    let turn = DMat3::from_cols(x, axis, x.cross(axis));
-    mesh.positions.iter_mut().for_each(|position| *position = origin + turn * *position);
-    mesh.normals.iter_mut().for_each(|normal| *normal = turn * *normal);
-    mesh
-}
-
-/// Of glass, 26 cm high.
-pub const WINE_GLASS_M: [[f64; 2]; 27] = [
+/// Of glass, 18 cm high, on a short stem, so that the sun is gathered where it stands.
+pub const WINE_GLASS_M: [[f64; 2]; 25] = [
     [0.0, 0.002],
     [0.02, 0.002],
     [0.036, 0.001],
@@ -83,58 +72,35 @@ pub const WINE_GLASS_M: [[f64; 2]; 27] = [
     [0.041, 0.0042],
     [0.02, 0.0085],
     [0.0085, 0.0155],
-    [0.0052, 0.032],
-    [0.0048, 0.07],
-    [0.0058, 0.1],
-    [0.014, 0.1145],
-    [0.0335, 0.133],
-    [0.048, 0.16],
-    [0.051, 0.187],
-    [0.0475, 0.22],
-    [0.0415, 0.2585],
-    [0.0405, 0.26],
-    [0.0395, 0.2585],
-    [0.0455, 0.22],
-    [0.0489, 0.187],
-    [0.0459, 0.1605],
-    [0.032, 0.1358],
-    [0.016, 0.1232],
-    [0.0105, 0.1212],
-    [0.005, 0.1203],
-    [0.0, 0.12],
+    [0.0062, 0.024],
+    [0.014, 0.0365],
+    [0.0335, 0.055],
+    [0.048, 0.082],
+    [0.051, 0.109],
+    [0.0475, 0.142],
+    [0.0415, 0.1805],
+    [0.0405, 0.182],
+    [0.0395, 0.1805],
+    [0.0455, 0.142],
+    [0.0489, 0.109],
+    [0.0459, 0.0825],
+    [0.032, 0.0578],
+    [0.016, 0.0452],
+    [0.0105, 0.0432],
+    [0.005, 0.0423],
+    [0.0, 0.042],
 ];
 
 /// Of the wine in it: its side lies within the wall, so that no air is between them.
 pub const WINE_M: [&[[f64; 2]]; 2] = [
     &[
-        [0.0, 0.1192],
-        [0.005, 0.1195],
-        [0.0105, 0.1204],
-        [0.016, 0.1222],
-        [0.0328, 0.1345],
-        [0.047, 0.1603],
-        [0.0494, 0.177],
+        [0.0, 0.0412],
+        [0.005, 0.0415],
+        [0.0105, 0.0424],
+        [0.016, 0.0442],
+        [0.0328, 0.0565],
+        [0.047, 0.0823],
+        [0.0494, 0.099],
     ],
-    &[[0.0494, 0.177], [0.0, 0.177]],
+    &[[0.0494, 0.099], [0.0, 0.099]],
 ];
-
-/// Half-width of the lens and half its thickness [m]: with sides of 0.229 m radius its focal length is 0.22 m.
-pub const LENS_M: [f64; 2] = [0.06, 0.008];
-/// Both its sides.
-pub fn lens() -> Mesh {
-    let [half_m, bulge_m] = LENS_M;
-    let radius_m = 0.5 * (half_m * half_m / bulge_m + bulge_m);
-    let cap = |side: f64| {
-        let point = |step: u32| {
-            let r = half_m * f64::from(step) / 8.0;
-            [r, side * ((radius_m * radius_m - r * r).sqrt() + bulge_m - radius_m)]
-        };
-        let mut points: Vec<[f64; 2]> = (0..=8).map(point).collect();
-        points[8] = [half_m, 0.0];
-        if side > 0.0 {
-            points.reverse();
-        }
-        points
-    };
-    turned(&[&cap(-1.0), &cap(1.0)], [128, 4])
-}

@@ -65,7 +65,9 @@ fn noise(place: DVec2, cells: [i32; 2], seed: u32) -> f64 {
 
 /// The same over several octaves, the coarsest of `cells`.
 fn turbulence(place: DVec2, cells: [i32; 2], octaves: u32, seed: u32) -> f64 {
-    let octave = |index: u32| noise(place, cells.map(|count| count << index), seed + index) * 0.5_f64.powi(index as i32);
+    let octave = |index: u32| {
+        noise(place, cells.map(|count| count << index), seed + index) * 0.5_f64.powi(index as i32)
+    };
     (0..octaves).map(octave).sum::<f64>() / (2.0 - 0.5_f64.powi(octaves as i32 - 1))
 }
 
@@ -106,19 +108,8 @@ pub fn stone(place: DVec2, mean: Code) -> Code {
 /// Square tiles between joints, none quite like the next.
 pub fn tiles(place: DVec2, across: i32, [tile, joint]: [Code; 2]) -> Code {
     let at = place * f64::from(across);
-    let tone = 0.86 + 0.28 * hash(at.x as i32, at.y as i32, 41) + 0.1 * (turbulence(place, [8, 8], 4, 43) - 0.5);
+    let tone =
+        0.86 + 0.28 * hash(at.x as i32, at.y as i32, 41) + 0.1 * (turbulence(place, [8, 8], 4, 43) - 0.5);
     let between = line(at.x, 0.02, 0.02).max(line(at.y, 0.02, 0.02));
     (tile * tone).lerp(joint, between)
-}
-
-/// A sheet of paper with lines of writing.
-pub fn paper(place: DVec2) -> Code {
-    let lines = place.y * 24.0;
-    let letters = noise(DVec2::new(place.x, lines.floor() / 24.0), [110, 24], 53);
-    let words = noise(DVec2::new(place.x, lines.floor() / 24.0), [17, 24], 59);
-    let inside = place.x > 0.1 && place.x < 0.9 && place.y > 0.1 && place.y < 0.88;
-    let height = 0.12 + 0.2 * letters;
-    let ink = if inside && words > 0.32 { line(lines - 0.5, height, 0.15) } else { 0.0 };
-    let sheet = Code::new(238.0, 232.0, 216.0) * (0.97 + 0.05 * turbulence(place, [16, 16], 3, 61));
-    sheet.lerp(Code::new(62.0, 56.0, 60.0), 0.8 * ink * (0.4 + 0.6 * letters))
 }

@@ -57,7 +57,10 @@ impl Block {
         let factors = potential(&butterfly());
         let [right, up] = self.axes();
         let at = |u: f64, v: f64, out: f64| {
-            self.centre + right * ((u - 0.5) * self.side_m) + up * ((v - 0.5) * self.side_m) + self.forward * out
+            self.centre
+                + right * ((u - 0.5) * self.side_m)
+                + up * ((v - 0.5) * self.side_m)
+                + self.forward * out
         };
         let front = |u: f64, v: f64| {
             let (height, slope) = cosine_sum(&factors, DVec2::new(u, v));
@@ -66,7 +69,10 @@ impl Block {
             (at(u, v, self.thickness_m + height_m * height), normal.normalize())
         };
         let mut mesh = shapes::sheet(QUADS, QUADS, front);
-        shapes::append(&mut mesh, &shapes::sheet(QUADS, QUADS, |u, v| (at(u, v, 0.0), -self.forward)));
+        shapes::append(
+            &mut mesh,
+            &shapes::sheet(QUADS, QUADS, |u, v| (at(u, v, 0.0), -self.forward)),
+        );
         let edges: [(DVec3, fn(f64) -> (f64, f64)); 4] = [
             (-up, |s| (s, 0.0)),
             (up, |s| (s, 1.0)),
@@ -96,7 +102,10 @@ fn butterfly() -> Grid {
         .collect();
     let brightness = |index: usize| {
         let place = middle(index);
-        let nearest = points.iter().map(|point| point.distance_squared(place)).fold(1.0, f64::min);
+        let nearest = points
+            .iter()
+            .map(|point| point.distance_squared(place))
+            .fold(1.0, f64::min);
         1.0 + (CONTRAST - 1.0) * (-0.5 * nearest / (LINE * LINE)).exp()
     };
     let grid: Grid = (0..CELLS * CELLS).map(brightness).collect();
@@ -124,13 +133,20 @@ fn potential(target: &Grid) -> Grid {
     let mut factors = vec![0.0; CELLS * CELLS];
     for _ in 0..ROUNDS {
         let phi = evaluated(&factors, &waves);
-        let laplacian: Grid = (0..CELLS * CELLS).map(|index| wanted_laplacian(&phi, target, index)).collect();
+        let laplacian: Grid = (0..CELLS * CELLS)
+            .map(|index| wanted_laplacian(&phi, target, index))
+            .collect();
         factors = analysed(&laplacian, &waves);
         for (index, factor) in factors.iter_mut().enumerate() {
             let (m, n) = ((index % CELLS) as f64, (index / CELLS) as f64);
             // The cosine of each cell's step, so that it solves the differences below.
-            let eigenvalue = |wave: f64| (2.0 - 2.0 * (PI * wave / CELLS as f64).cos()) * (CELLS * CELLS) as f64;
-            *factor = if index == 0 { 0.0 } else { -*factor / (eigenvalue(m) + eigenvalue(n)) };
+            let eigenvalue =
+                |wave: f64| (2.0 - 2.0 * (PI * wave / CELLS as f64).cos()) * (CELLS * CELLS) as f64;
+            *factor = if index == 0 {
+                0.0
+            } else {
+                -*factor / (eigenvalue(m) + eigenvalue(n))
+            };
         }
     }
     factors
@@ -156,7 +172,8 @@ fn wanted_laplacian(phi: &[f64], target: &[f64], index: usize) -> f64 {
 
 /// cos(π m x) for each wave m (row) and each middle of a cell x (column).
 fn cosines() -> Grid {
-    let value = |index: usize| (PI * (index / CELLS) as f64 * ((index % CELLS) as f64 + 0.5) / CELLS as f64).cos();
+    let value =
+        |index: usize| (PI * (index / CELLS) as f64 * ((index % CELLS) as f64 + 0.5) / CELLS as f64).cos();
     (0..CELLS * CELLS).map(value).collect()
 }
 
@@ -165,14 +182,18 @@ fn product(a: &[f64], b: &[f64]) -> Grid {
     let mut result = vec![0.0; CELLS * CELLS];
     for (sums, row) in result.chunks_mut(CELLS).zip(a.chunks(CELLS)) {
         for (factor, other) in row.iter().zip(b.chunks(CELLS)) {
-            sums.iter_mut().zip(other).for_each(|(sum, value)| *sum += factor * value);
+            sums.iter_mut()
+                .zip(other)
+                .for_each(|(sum, value)| *sum += factor * value);
         }
     }
     result
 }
 
 fn transposed(a: &[f64]) -> Grid {
-    (0..CELLS * CELLS).map(|index| a[index % CELLS * CELLS + index / CELLS]).collect()
+    (0..CELLS * CELLS)
+        .map(|index| a[index % CELLS * CELLS + index / CELLS])
+        .collect()
 }
 
 /// Values of a sum of cosines in the middles of the cells.

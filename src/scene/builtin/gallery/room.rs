@@ -15,11 +15,11 @@ const HEIGHT_M: f64 = 2.7;
 
 /// The opening in the right wall: along it and up [m].
 const WINDOW_Z: [f64; 2] = [-0.9, 0.5];
-const WINDOW_Y: [f64; 2] = [0.9, 2.3];
+const WINDOW_Y: [f64; 2] = [0.9, 2.4];
 /// How deep the wall is there [m].
 const REVEAL_M: f64 = 0.14;
-/// Where the sun goes: 23 degrees below the horizon, away from the window.
-pub const SUN_DIRECTION: DVec3 = DVec3::new(-0.8, -0.36, 0.22);
+/// Where the sun goes: 27 degrees below the horizon, away from the window.
+pub const SUN_DIRECTION: DVec3 = DVec3::new(-0.8, -0.43, 0.22);
 
 /// Everything but what is shown in it.
 pub fn add(scene: &mut Scene) {
@@ -28,7 +28,11 @@ pub fn add(scene: &mut Scene) {
     let half_y = 0.5 * HEIGHT_M;
     let (right, up, front) = (DVec3::X * half_x, DVec3::Y * half_y, DVec3::Z * half_z);
     let tiles = patterns::add(scene, "floor tiles", 1.8, |place| {
-        patterns::tiles(place, 6, [DVec3::new(132.0, 104.0, 86.0), DVec3::new(92.0, 84.0, 78.0)])
+        patterns::tiles(
+            place,
+            6,
+            [DVec3::new(132.0, 104.0, 86.0), DVec3::new(92.0, 84.0, 78.0)],
+        )
     });
     let plaster = patterns::add(scene, "plaster", 2.4, |place| {
         patterns::plaster(place, DVec3::new(218.0, 208.0, 192.0))
@@ -37,8 +41,16 @@ pub fn add(scene: &mut Scene) {
         ("floor", shapes::floor(X, Z, 0.0), tiles),
         ("ceiling", shapes::rectangle(middle + up, right, front), plaster),
         ("back wall", shapes::rectangle(middle - front, right, up), plaster),
-        ("front wall", shapes::rectangle(middle + front, -right, up), plaster),
-        ("left wall", shapes::rectangle(middle - right, -front, up), plaster),
+        (
+            "front wall",
+            shapes::rectangle(middle + front, -right, up),
+            plaster,
+        ),
+        (
+            "left wall",
+            shapes::rectangle(middle - right, -front, up),
+            plaster,
+        ),
     ];
     for (name, mesh, material) in faces {
         parts::add_with(scene, name, in_metres(mesh), material);
@@ -94,6 +106,11 @@ fn add_window_wall(scene: &mut Scene, plaster: usize) {
         ("window jamb before", along, up, depth),
     ];
     for (name, offset, u, v) in sides {
-        parts::add_with(scene, name, in_metres(shapes::rectangle(centre + offset, u, v)), plaster);
+        parts::add_with(
+            scene,
+            name,
+            in_metres(shapes::rectangle(centre + offset, u, v)),
+            plaster,
+        );
     }
 }

@@ -1,4 +1,4 @@
-//! The table in the sun and what stands on it: wine glass, tumbler, ring, magnifying glass, mirror.
+//! The table in the sun and what stands on it: wine glass, tumbler, ring, mirror.
 
 use glam::DVec3;
 
@@ -18,18 +18,15 @@ const Z: [f64; 2] = [-0.4, 0.8];
 const THICK_M: f64 = 0.06;
 
 /// Middles of what stands on it [m].
-pub const WINE_GLASS: DVec3 = DVec3::new(0.42, TOP_M, 0.24);
-pub const TUMBLER: DVec3 = DVec3::new(0.86, TOP_M, 0.1);
+pub const WINE_GLASS: DVec3 = DVec3::new(0.4, TOP_M, 0.42);
+pub const TUMBLER: DVec3 = DVec3::new(0.74, TOP_M, 0.08);
 pub const RING: DVec3 = DVec3::new(-0.3, TOP_M + 0.001, 0.52);
-pub const MIRROR: DVec3 = DVec3::new(-0.2, TOP_M + 0.19, -0.3);
-/// Where the magnifying glass gathers the sun [m].
-pub const SPOT: DVec3 = DVec3::new(-0.84, TOP_M, 0.12);
+pub const MIRROR: DVec3 = DVec3::new(-0.45, TOP_M + 0.19, -0.24);
 
 /// All of it.
 pub fn add(scene: &mut Scene) {
     add_table(scene);
-    let glass = parts::material(scene, parts::dielectric("glass", 1.52));
-    add_wine_glass(scene, glass);
+    add_wine_glass(scene);
     let tumbler = shapes::moved(TUMBLER_CUT.mesh(), TUMBLER);
     parts::add(scene, "tumbler", tumbler, parts::dielectric("lead glass", 1.56));
     let gold = Material {
@@ -38,13 +35,16 @@ pub fn add(scene: &mut Scene) {
         ..parts::mirror()
     };
     parts::add(scene, "ring", cylinder(RING, 0.16, 0.06), gold);
-    add_magnifying_glass(scene, glass);
     add_mirror(scene);
 }
 
 fn add_table(scene: &mut Scene) {
     let walnut = patterns::add(scene, "walnut", 1.1, |place| {
-        patterns::wood(place, 6, [DVec3::new(50.0, 33.0, 24.0), DVec3::new(122.0, 84.0, 58.0)])
+        patterns::wood(
+            place,
+            6,
+            [DVec3::new(42.0, 28.0, 21.0), DVec3::new(106.0, 74.0, 52.0)],
+        )
     });
     let top = room::in_metres(shapes::floor(X, Z, TOP_M));
     parts::add_with(scene, "table top", top, walnut);
@@ -66,7 +66,10 @@ fn add_table(scene: &mut Scene) {
     parts::add_with(scene, "table underside", room::in_metres(below), walnut);
     let inset = DVec3::new(0.09, 0.0, 0.09);
     let leg = DVec3::new(0.07, 0.0, 0.07);
-    for (index, (x, z)) in [(X[0], Z[0]), (X[1], Z[0]), (X[0], Z[1]), (X[1], Z[1])].into_iter().enumerate() {
+    for (index, (x, z)) in [(X[0], Z[0]), (X[1], Z[0]), (X[0], Z[1]), (X[1], Z[1])]
+        .into_iter()
+        .enumerate()
+    {
         let corner = DVec3::new(x, 0.0, z);
         let inwards = (middle.with_y(0.0) - corner).signum() * DVec3::new(1.0, 0.0, 1.0);
         let foot = corner + inwards * inset;
@@ -80,9 +83,14 @@ fn add_table(scene: &mut Scene) {
     }
 }
 
-fn add_wine_glass(scene: &mut Scene, glass: usize) {
+fn add_wine_glass(scene: &mut Scene) {
     let outline = glassware::turned(&[&glassware::WINE_GLASS_M], [128, 5]);
-    parts::add_with(scene, "wine glass", shapes::moved(outline, WINE_GLASS), glass);
+    parts::add(
+        scene,
+        "wine glass",
+        shapes::moved(outline, WINE_GLASS),
+        parts::dielectric("glass", 1.52),
+    );
     let wine = Material {
         volume: Some(Volume {
             attenuation_distance_m: 0.05,
@@ -103,44 +111,23 @@ const TUMBLER_CUT: CutGlass = CutGlass {
     squareness: 5.0,
 };
 
-/// On a stand, across the sun's way; its focus lies a little below the paper.
-fn add_magnifying_glass(scene: &mut Scene, glass: usize) {
-    let [half_m, _] = glassware::LENS_M;
-    let axis = -room::SUN_DIRECTION.normalize();
-    let centre = SPOT + axis * 0.19;
-    parts::add_with(scene, "lens", glassware::placed(glassware::lens(), axis, centre), glass);
-    let (inner, outer, thick) = (half_m - 0.0012, half_m + 0.004, 0.005);
-    let corners = [[inner, -thick], [outer, -thick], [outer, thick], [inner, thick], [inner, -thick]];
-    let sides: Vec<&[[f64; 2]]> = corners.windows(2).collect();
-    let rim = glassware::placed(glassware::turned(&sides, [48, 1]), axis, centre);
-    let brass = parts::material(scene, parts::matte("brass", LinearSrgb::new(0.4, 0.28, 0.1)));
-    parts::add_with(scene, "lens rim", rim, brass);
-    let sideways = axis.cross(DVec3::Y).normalize();
-    let handle_from = centre - sideways * outer;
-    let (handle_m, thick_m) = (0.13, 0.009);
-    let handle = [[0.0, 0.0], [0.5 * thick_m, 0.0]];
-    let grip: [&[[f64; 2]]; 3] = [&handle, &[[0.5 * thick_m, 0.0], [thick_m, handle_m]], &[[thick_m, handle_m], [0.0, handle_m]]];
-    let wood = parts::material(scene, parts::matte("ebony", LinearSrgb::new(0.06, 0.035, 0.025)));
-    let handle = glassware::placed(glassware::turned(&grip, [24, 1]), -sideways, handle_from);
-    parts::add_with(scene, "lens handle", handle, wood);
-    let foot = (handle_from - sideways * (handle_m - 0.015)).with_y(TOP_M);
-    let post_m = centre.y - TOP_M;
-    let half = DVec3::new(0.006, 0.0, 0.006);
-    parts::add_with(scene, "lens post", shapes::cuboid(foot - half, foot + half + DVec3::Y * post_m), brass);
-    let sheet = patterns::add(scene, "paper", 1.0, patterns::paper);
-    let turn = DVec3::new(0.96, 0.0, -0.28);
-    let middle = SPOT + DVec3::new(0.0, 0.0008, 0.0);
-    let paper = shapes::rectangle(middle, turn * 0.15, turn.cross(DVec3::NEG_Y) * 0.21);
-    parts::add_with(scene, "paper", paper, sheet);
-}
-
 /// Leans back a little.
 fn add_mirror(scene: &mut Scene) {
     let turn = DVec3::new(0.97, 0.0, 0.24);
     let up = DVec3::new(0.0, 0.97, -0.24);
     let up = (up - turn * up.dot(turn)).normalize();
     let (right, up, normal) = (turn * 0.22, up * 0.18, turn.cross(up).normalize());
-    parts::add(scene, "standing mirror", shapes::rectangle(MIRROR, right, up), parts::mirror());
+    parts::add(
+        scene,
+        "standing mirror",
+        shapes::rectangle(MIRROR, right, up),
+        parts::mirror(),
+    );
     let board = shapes::rectangle(MIRROR - normal * 0.006, right * 1.06, up * 1.07);
-    parts::add(scene, "mirror board", board, parts::matte("board", LinearSrgb::new(0.07, 0.045, 0.03)));
+    parts::add(
+        scene,
+        "mirror board",
+        board,
+        parts::matte("board", LinearSrgb::new(0.07, 0.045, 0.03)),
+    );
 }
