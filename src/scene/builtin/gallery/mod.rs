@@ -15,7 +15,7 @@ use crate::optics::LinearSrgb;
 use crate::scene::{Camera, Light, LightSize, Scene};
 use crate::units::{Flux, Irradiance};
 
-/// A room of 4.6 m × 4.5 m, 2.7 m high: a sun of 1.0 W/m² through the window in its right wall, three spots.
+/// A room of 4.6 m × 4.5 m, 2.7 m high: a sun of 1.8 W/m² through the window in its right wall, three spots.
 pub fn build() -> Scene {
     let mut scene = Scene::default();
     room::add(&mut scene);
@@ -42,10 +42,10 @@ fn lights() -> Vec<Light> {
             size: LightSize::Angle {
                 diameter_rad: 0.53_f64.to_radians(),
             },
-            ..tinted(parts::sun("sun", room::SUN_DIRECTION, Irradiance(1.0)), SUN)
+            ..tinted(parts::sun("sun", room::SUN_DIRECTION, Irradiance(1.8)), SUN)
         },
         tinted(
-            parts::beam("basin spot", basin_lamp, water - basin_lamp, 0.17, Flux(0.8)),
+            parts::beam("basin spot", basin_lamp, water - basin_lamp, 0.17, Flux(0.5)),
             WARM,
         ),
         tinted(
