@@ -73,15 +73,15 @@ impl Block {
             &mut mesh,
             &shapes::sheet(QUADS, QUADS, |u, v| (at(u, v, 0.0), -self.forward)),
         );
-        let edges: [(DVec3, fn(f64) -> (f64, f64)); 4] = [
-            (-up, |s| (s, 0.0)),
-            (up, |s| (s, 1.0)),
-            (-right, |s| (0.0, s)),
-            (right, |s| (1.0, s)),
-        ];
-        for (outward, edge) in edges {
+        // Along u at v = 0 and 1, along v at u = 0 and 1.
+        for (outward, is_along_u, end) in [
+            (-up, true, 0.0),
+            (up, true, 1.0),
+            (-right, false, 0.0),
+            (right, false, 1.0),
+        ] {
             let side = shapes::sheet(QUADS, 1, |s, out| {
-                let (u, v) = edge(s);
+                let (u, v) = if is_along_u { (s, end) } else { (end, s) };
                 let position = if out == 0.0 { at(u, v, 0.0) } else { front(u, v).0 };
                 (position, outward)
             });
