@@ -5,6 +5,7 @@
 mod ball;
 mod basin;
 mod bowl;
+mod cut_glass;
 mod gallery;
 mod mirror;
 mod paraboloid;

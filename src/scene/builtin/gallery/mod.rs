@@ -1,20 +1,25 @@
-//! `gallery`: a room to walk through, with daylight through a window and an exhibit for each way that glass, mirrors and
-//! water turn light.
+//! `gallery`: a room to walk through, with low sun on a table of glass, and along the wall what water, a prism and a lens
+//! that was solved for a picture make of a lamp.
 
 mod exhibits;
+mod glassware;
+mod patterns;
+mod picture;
 mod room;
+mod table;
 
 use glam::DVec3;
 
 use super::parts;
 use crate::optics::LinearSrgb;
-use crate::scene::{Camera, Light, Scene};
+use crate::scene::{Camera, Light, LightSize, Scene};
 use crate::units::{Flux, Irradiance};
 
-/// A room of 7.2 m × 5.6 m, 3 m high: a sun of 0.8 W/m² through the window in its right wall, a spot on each exhibit.
+/// A room of 4.6 m × 4.5 m, 2.7 m high: a sun of 1.8 W/m² through the window in its right wall, three spots.
 pub fn build() -> Scene {
     let mut scene = Scene::default();
     room::add(&mut scene);
+    table::add(&mut scene);
     exhibits::add(&mut scene);
     scene.lights = lights();
     scene.cameras = cameras();
@@ -25,41 +30,30 @@ pub fn build() -> Scene {
 const WARM: LinearSrgb = LinearSrgb::new(1.12, 0.98, 0.8);
 
 /// Low daylight.
-const SUN: LinearSrgb = LinearSrgb::new(1.1, 0.99, 0.84);
+const SUN: LinearSrgb = LinearSrgb::new(1.07, 0.99, 0.88);
 
 fn lights() -> Vec<Light> {
     let tinted = |light: Light, colour: LinearSrgb| Light { colour, ..light };
-    let sun = parts::sun("sun", room::SUN_DIRECTION, Irradiance(0.8));
-    let spots = [
-        (
-            "basin spot",
-            exhibits::BASIN + DVec3::new(-0.5, 2.9, -0.3),
-            exhibits::BASIN,
-            0.27,
-            Flux(4.5),
+    let water = exhibits::BASIN.with_y(exhibits::WATER_M);
+    let basin_lamp = water + DVec3::new(0.35, 1.15, 1.4);
+    let block = exhibits::block();
+    vec![
+        Light {
+            size: LightSize::Angle {
+                diameter_rad: 0.53_f64.to_radians(),
+            },
+            ..tinted(parts::sun("sun", room::SUN_DIRECTION, Irradiance(1.8)), SUN)
+        },
+        tinted(
+            parts::beam("basin spot", basin_lamp, water - basin_lamp, 0.17, Flux(0.5)),
+            WARM,
         ),
-        (
-            "bowl spot",
-            exhibits::BOWL + DVec3::new(0.42, 0.62, -0.3),
-            exhibits::BOWL + DVec3::Y * 0.04,
-            0.24,
-            Flux(0.02),
+        tinted(
+            parts::beam("block spot", exhibits::BLOCK_LAMP, block.forward, 0.1, Flux(0.07)),
+            WARM,
         ),
-        (
-            "ball spot",
-            exhibits::BALL + DVec3::new(0.3, 0.75, -0.55),
-            exhibits::BALL,
-            0.16,
-            Flux(0.035),
-        ),
-    ];
-    let spots = spots.into_iter().map(|(name, from, to, half_angle_rad, power)| {
-        tinted(parts::beam(name, from, to - from, half_angle_rad, power), WARM)
-    });
-    let mut lights = vec![tinted(sun, SUN)];
-    lights.extend(spots);
-    lights.push(parts::daylight(exhibits::prism_beam()));
-    lights
+        parts::daylight(exhibits::prism_beam()),
+    ]
 }
 
 fn cameras() -> Vec<Camera> {
@@ -67,16 +61,37 @@ fn cameras() -> Vec<Camera> {
         Camera::look_at(name, DVec3::from_array(from), to, fov_rad)
     };
     vec![
-        look("overview", [3.1, 1.8, 2.7], DVec3::new(-0.85, 0.62, -0.9), 0.85),
-        look("basin", [-0.6, 1.5, 2.4], exhibits::BASIN + DVec3::Y * 0.2, 0.75),
-        look("ring", [3.15, 1.55, 0.7], exhibits::RING, 0.62),
-        look("bowl", [-2.1, 1.5, -0.9], exhibits::BOWL, 0.6),
-        look("ball", [-0.6, 1.25, -0.7], exhibits::BALL, 0.6),
+        look("overview", [0.24, 1.4, 1.72], DVec3::new(0.0, 0.9, -0.4), 0.84),
         look(
-            "prism",
-            [1.9, 1.5, -1.1],
-            exhibits::PRISM.lerp(exhibits::spectrum(), 0.55),
+            "wine glass",
+            [0.1, 1.22, 0.85],
+            table::WINE_GLASS + DVec3::new(-0.16, 0.04, 0.0),
             0.6,
         ),
+        look(
+            "tumbler",
+            [0.5, 1.15, 1.15],
+            table::TUMBLER + DVec3::new(-0.08, 0.03, 0.0),
+            0.5,
+        ),
+        look("ring", [-0.25, 1.3, 1.15], table::RING, 0.5),
+        look("mirror", [0.15, 1.2, 0.9], table::MIRROR, 0.5),
+        look(
+            "basin",
+            [-1.1, 1.5, 0.3],
+            exhibits::BASIN + DVec3::new(0.0, 0.85, -0.2),
+            0.95,
+        ),
+        look(
+            "prism",
+            [0.2, 1.6, 0.1],
+            exhibits::PRISM.lerp(exhibits::spectrum(), 0.55),
+            0.8,
+        ),
+        look("picture", [0.7, 1.45, -0.1], block_and_picture(), 0.75),
     ]
+}
+
+fn block_and_picture() -> DVec3 {
+    exhibits::block().centre.lerp(exhibits::picture(), 0.6)
 }

@@ -1,25 +1,25 @@
 //! The room: floor, walls, ceiling, and a window.
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
-use crate::optics::LinearSrgb;
-use crate::scene::Scene;
+use super::patterns;
 use crate::scene::builtin::{parts, shapes};
+use crate::scene::{Mesh, Scene};
 
 /// Inner borders [m].
-pub const X: [f64; 2] = [-3.6, 3.6];
+pub const X: [f64; 2] = [-2.3, 2.3];
 /// Inner borders [m].
-pub const Z: [f64; 2] = [-2.6, 3.0];
+pub const Z: [f64; 2] = [-1.6, 2.9];
 /// Height [m].
-pub const HEIGHT_M: f64 = 3.0;
+const HEIGHT_M: f64 = 2.7;
 
 /// The opening in the right wall: along it and up [m].
-const WINDOW_Z: [f64; 2] = [-1.5, 0.5];
-const WINDOW_Y: [f64; 2] = [0.8, 2.5];
+const WINDOW_Z: [f64; 2] = [-0.9, 0.5];
+const WINDOW_Y: [f64; 2] = [0.9, 2.4];
 /// How deep the wall is there [m].
-const REVEAL_M: f64 = 0.18;
-/// Where the sun goes: 36 degrees below the horizon, away from the window.
-pub const SUN_DIRECTION: DVec3 = DVec3::new(-0.72, -0.55, 0.25);
+const REVEAL_M: f64 = 0.14;
+/// Where the sun goes: 27 degrees below the horizon, away from the window.
+pub const SUN_DIRECTION: DVec3 = DVec3::new(-0.8, -0.43, 0.22);
 
 /// Everything but what is shown in it.
 pub fn add(scene: &mut Scene) {
@@ -27,28 +27,50 @@ pub fn add(scene: &mut Scene) {
     let (half_x, half_z) = (0.5 * (X[1] - X[0]), 0.5 * (Z[1] - Z[0]));
     let half_y = 0.5 * HEIGHT_M;
     let (right, up, front) = (DVec3::X * half_x, DVec3::Y * half_y, DVec3::Z * half_z);
-    let oak = parts::matte("oak", LinearSrgb::new(0.46, 0.34, 0.24));
-    parts::add(scene, "floor", shapes::floor(X, Z, 0.0), oak);
-    let ceiling = shapes::rectangle(middle + up, right, front);
-    parts::add(
-        scene,
-        "ceiling",
-        ceiling,
-        parts::matte("ceiling", LinearSrgb::grey(0.8)),
-    );
-    let plaster = parts::material(scene, parts::matte("plaster", LinearSrgb::new(0.74, 0.72, 0.68)));
-    let back = shapes::rectangle(middle - front, right, up);
-    parts::add_with(scene, "back wall", back, plaster);
-    let rear = shapes::rectangle(middle + front, -right, up);
-    parts::add_with(scene, "front wall", rear, plaster);
-    let left = parts::matte("blue wall", LinearSrgb::new(0.24, 0.36, 0.46));
-    parts::add(
-        scene,
-        "left wall",
-        shapes::rectangle(middle - right, -front, up),
-        left,
-    );
+    let tiles = patterns::add(scene, "floor tiles", 1.8, |place| {
+        patterns::tiles(
+            place,
+            6,
+            [DVec3::new(132.0, 104.0, 86.0), DVec3::new(92.0, 84.0, 78.0)],
+        )
+    });
+    let plaster = patterns::add(scene, "plaster", 2.4, |place| {
+        patterns::plaster(place, DVec3::new(218.0, 208.0, 192.0))
+    });
+    let faces = [
+        ("floor", shapes::floor(X, Z, 0.0), tiles),
+        ("ceiling", shapes::rectangle(middle + up, right, front), plaster),
+        ("back wall", shapes::rectangle(middle - front, right, up), plaster),
+        (
+            "front wall",
+            shapes::rectangle(middle + front, -right, up),
+            plaster,
+        ),
+        (
+            "left wall",
+            shapes::rectangle(middle - right, -front, up),
+            plaster,
+        ),
+    ];
+    for (name, mesh, material) in faces {
+        parts::add_with(scene, name, in_metres(mesh), material);
+    }
     add_window_wall(scene, plaster);
+}
+
+/// A rectangle whose textures are as large as they are on every other: its TEXCOORD_0 in metres, along its sides.
+/// TEXCOORD_1 has what was there, for maps.
+#[must_use]
+pub fn in_metres(mut mesh: Mesh) -> Mesh {
+    mesh.uv1 = mesh.uv0.take();
+    let [first, second, _, last] = mesh.positions[..] else {
+        return mesh;
+    };
+    let [u, v] = [second - first, last - first].map(DVec3::normalize);
+    // From the scene's origin: faces side by side go on where the other ends.
+    let place = |position: &DVec3| DVec2::new(position.dot(u), -position.dot(v));
+    mesh.uv0 = Some(mesh.positions.iter().map(place).collect());
+    mesh
 }
 
 /// Four pieces around the opening, and its four sides.
@@ -67,7 +89,7 @@ fn add_window_wall(scene: &mut Scene, plaster: usize) {
             DVec3::Z * (0.5 * (z[1] - z[0])),
             DVec3::Y * (0.5 * (y[1] - y[0])),
         );
-        parts::add_with(scene, name, piece, plaster);
+        parts::add_with(scene, name, in_metres(piece), plaster);
     }
     let centre = DVec3::new(
         x + 0.5 * REVEAL_M,
@@ -84,6 +106,11 @@ fn add_window_wall(scene: &mut Scene, plaster: usize) {
         ("window jamb before", along, up, depth),
     ];
     for (name, offset, u, v) in sides {
-        parts::add_with(scene, name, shapes::rectangle(centre + offset, u, v), plaster);
+        parts::add_with(
+            scene,
+            name,
+            in_metres(shapes::rectangle(centre + offset, u, v)),
+            plaster,
+        );
     }
 }

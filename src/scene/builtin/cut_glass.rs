@@ -1,0 +1,138 @@
+//! Vessels of cut glass: bowl and tumbler.
+
+use std::f64::consts::{FRAC_PI_2, TAU};
+
+use glam::DVec3;
+
+use super::shapes;
+use crate::scene::Mesh;
+
+/// Segments of the smooth inside around for each corner.
+const FINER: u32 = 6;
+/// Height of the foot above the table: faces in the same place would have no order [m].
+const GAP_M: f64 = 0.001;
+
+/// Flat facets outside and below, a flat rim, a smooth inside.
+#[derive(Clone, Copy, Debug)]
+pub struct CutGlass {
+    /// Corners of the cut outside, around.
+    pub corners: u32,
+    /// Radius and height above the foot of each ring of corners, from the foot to the rim [m]; every other ring is turned
+    /// by half a corner.
+    pub rings_m: &'static [[f64; 2]],
+    /// Radius of the inside at the rim [m].
+    pub inside_m: f64,
+    /// Depth of the inside [m].
+    pub depth_m: f64,
+    /// Exponent of the inside: 2 is half an ellipsoid, more is nearer to a cylinder.
+    pub squareness: f64,
+}
+
+impl CutGlass {
+    /// Closed: flat facets outside and below, a flat rim, a smooth inside; its foot around the origin.
+    pub fn mesh(&self) -> Mesh {
+        let mut mesh = Mesh::default();
+        self.add_foot(&mut mesh);
+        for ring in 1..self.rings_m.len() {
+            self.add_band(&mut mesh, ring);
+        }
+        self.add_rim(&mut mesh);
+        // The lower half of an ellipsoid, or of something squarer, hollow side up.
+        let inside = shapes::sheet(self.corners * FINER, 20, |u, v| self.inside_at(u, v));
+        shapes::append(&mut mesh, &inside);
+        mesh
+    }
+
+    /// A corner of a ring; the first is also the last, bit for bit.
+    fn corner(&self, ring: usize, index: u32) -> DVec3 {
+        let turned = if ring % 2 == 1 { 0.5 } else { 0.0 };
+        let angle = TAU * (f64::from(index % self.corners) + turned) / f64::from(self.corners);
+        let [radius_m, height_m] = self.rings_m[ring];
+        let (sine, cosine) = angle.sin_cos();
+        DVec3::new(radius_m * cosine, GAP_M + height_m, radius_m * sine)
+    }
+
+    fn add_foot(&self, mesh: &mut Mesh) {
+        let middle = DVec3::Y * GAP_M;
+        for index in 0..self.corners {
+            shapes::append(
+                mesh,
+                &shapes::facet([middle, self.corner(0, index), self.corner(0, index + 1)]),
+            );
+        }
+    }
+
+    /// The triangles between a ring and the one below.
+    fn add_band(&self, mesh: &mut Mesh, ring: usize) {
+        let below = ring - 1;
+        // The corner above lies half a corner after the one below, or before it.
+        let shift = below % 2;
+        for index in 0..self.corners {
+            let [low, next_low] = [self.corner(below, index), self.corner(below, index + 1)];
+            let top = |step: u32| self.corner(ring, index + step + shift as u32);
+            shapes::append(mesh, &shapes::facet([low, top(0), next_low]));
+            // The rim is finer: the facet below it shares its corners.
+            let is_rim = ring + 1 == self.rings_m.len();
+            let pieces = if is_rim { FINER } else { 1 };
+            for piece in 0..pieces {
+                let [from, to] = [piece, piece + 1].map(|step| between(top(0), top(1), step, pieces));
+                shapes::append(mesh, &shapes::facet([next_low, from, to]));
+            }
+        }
+    }
+
+    /// The flat ring between the cut edge and the smooth inside.
+    fn add_rim(&self, mesh: &mut Mesh) {
+        let last = self.rings_m.len() - 1;
+        let outer = |step: u32| {
+            let (index, piece) = (step / FINER, step % FINER);
+            between(
+                self.corner(last, index),
+                self.corner(last, index + 1),
+                piece,
+                FINER,
+            )
+        };
+        let inner = |step: u32| {
+            self.inside_at(f64::from(step) / f64::from(self.corners * FINER), 0.0)
+                .0
+        };
+        for step in 0..self.corners * FINER {
+            let [a, b] = [outer(step), outer(step + 1)];
+            let [c, d] = [inner(step + 1), inner(step)];
+            shapes::append(mesh, &shapes::facet([a, c, b]));
+            shapes::append(mesh, &shapes::facet([a, d, c]));
+        }
+    }
+
+    /// Position and normal of the inside: `u` around, `v` from the rim to the bottom.
+    fn inside_at(&self, u: f64, v: f64) -> (DVec3, DVec3) {
+        let (sine, cosine) = (TAU * u.fract()).sin_cos();
+        let (down, out) = if v == 1.0 {
+            (1.0, 0.0)
+        } else {
+            let (sine, cosine) = (FRAC_PI_2 * v).sin_cos();
+            let power = 2.0 / self.squareness;
+            (sine.powf(power), cosine.powf(power))
+        };
+        let rim = self.rings_m[self.rings_m.len() - 1][1] + GAP_M;
+        let position = DVec3::new(
+            self.inside_m * out * cosine,
+            rim - self.depth_m * down,
+            self.inside_m * out * sine,
+        );
+        let steep = |part: f64| part.powf(self.squareness - 1.0);
+        let (sideways, up) = (steep(out) / self.inside_m, steep(down) / self.depth_m);
+        let normal = DVec3::new(-sideways * cosine, up, -sideways * sine);
+        (position, normal.normalize())
+    }
+}
+
+/// A point on the way from one corner to the next, at a step of so many; the corners themselves bit for bit.
+fn between(from: DVec3, to: DVec3, step: u32, steps: u32) -> DVec3 {
+    match step {
+        0 => from,
+        _ if step == steps => to,
+        _ => from + (to - from) * (f64::from(step) / f64::from(steps)),
+    }
+}
