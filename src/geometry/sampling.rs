@@ -125,7 +125,7 @@ mod tests {
             let (columns, rows) = (1_u64 << across, 256 >> across);
             let mut seen = vec![0; 256];
             for index in 256..512 {
-                let column = (u128::from(even_code(index, 3)) * u128::from(columns) >> 64) as usize;
+                let column = ((u128::from(even_code(index, 3)) * u128::from(columns)) >> 64) as usize;
                 let row = (even_number(index, 3) * f64::from(rows)) as usize;
                 seen[row * columns as usize + column] += 1;
             }
