@@ -152,8 +152,8 @@ pub fn display_rgba8(picture: &Picture, exposure_stops: f64, tone_map: ToneMap) 
     picture.radiance.iter().flat_map(pixel).collect()
 }
 
-/// Exposure [stops] that brings the log-average luminance of the lit pixels to middle grey, or less where their
-/// brightest tenth would go beyond white; 0 for a black picture.
+/// Exposure [stops] that brings the log-average luminance of the lit pixels, but for their darkest and their brightest
+/// tenth, to middle grey, or less where that tenth would go beyond white; 0 for a black picture.
 ///
 /// Pixels more than 8 stops below the mean count as unlit, so that neither black surroundings nor the last traces of
 /// light decide.
@@ -165,8 +165,9 @@ pub fn auto_exposure_stops(picture: &Picture) -> f64 {
     if lit.is_empty() {
         return 0.0;
     }
-    let log_average = lit.iter().map(|luminance| luminance.log2()).sum::<f64>() / lit.len() as f64;
-    let tenth = lit.len() * 9 / 10;
-    let (_, bright, _) = lit.select_nth_unstable_by(tenth, f64::total_cmp);
+    lit.sort_unstable_by(f64::total_cmp);
+    let tenth = lit.len() / 10;
+    let (most, bright) = (&lit[tenth..lit.len() - tenth], lit[lit.len() * 9 / 10]);
+    let log_average = most.iter().map(|luminance| luminance.log2()).sum::<f64>() / most.len() as f64;
     (MIDDLE_GREY.log2() - log_average).min(-bright.log2())
 }

@@ -36,6 +36,11 @@ impl DirectCache {
         self.layers.retain(|key, _| key.0 != light);
     }
 
+    /// Whether nothing is known.
+    pub(super) fn is_empty(&self) -> bool {
+        self.layers.is_empty()
+    }
+
     /// Whether all lights are known on all charts.
     pub(super) fn knows(&self, lights: usize, charts: &BTreeMap<Receiver, Arc<Chart>>) -> bool {
         (0..lights).all(|light| {

@@ -23,7 +23,7 @@ use crate::illumination::resolution::variance_within;
 use crate::illumination::smoothing::smooth;
 use crate::illumination::tiles::{Tile, TileLayout};
 use crate::illumination::visible::visible_error;
-use crate::illumination::{Chart, IlluminationMap, Layer, Receiver};
+use crate::illumination::{Chart, IlluminationMap, Layer, Receiver, UvSet};
 use crate::light_pass::accuracy;
 use crate::light_pass::ledger::LightLedger;
 use crate::light_pass::receiver_maps::ReceiverMap;
@@ -36,11 +36,14 @@ use crate::settings::{BakeSettings, LayerKind, Sigma};
 pub(super) type Shown<'a> = (usize, &'a LightLevel);
 
 /// All that finishing needs.
+#[derive(Clone, Copy)]
 pub(super) struct Finish<'a> {
     pub(super) scene: &'a Scene,
     pub(super) sizes: &'a MapSizes,
     pub(super) settings: &'a BakeSettings,
     pub(super) plan: &'a EffectPlan,
+    /// Halvings of maps of direct light below the size that is asked for.
+    pub(super) coarsening: u32,
 }
 
 /// Levels of all lights that have maps, in the scene's order.
@@ -150,7 +153,7 @@ impl Finish<'_> {
                 charts.insert(receiver, map.chart.clone());
             } else if is_everywhere
                 && self.sizes.may_see_lights(receiver)
-                && let Some(size) = self.sizes.direct_size(receiver.object(), self.settings)
+                && let Some(size) = self.direct_size(receiver.object())
             {
                 wishes.insert(receiver, Wish::dense(size));
             }
@@ -179,13 +182,22 @@ impl Finish<'_> {
             .collect()
     }
 
+    fn direct_size(&self, object: usize) -> Option<(usize, usize)> {
+        let size = self.sizes.direct_size(object, self.settings)?;
+        Some(map_size::halved(size, self.coarsening))
+    }
+
     fn direct_chart(&self, chart: &Arc<Chart>) -> Option<Arc<Chart>> {
-        if chart.layout.is_none() {
+        // Unwrapped charts lie elsewhere in maps of other sizes.
+        let is_fixed = chart.uv_set == UvSet::Generated || self.coarsening == 0;
+        if chart.layout.is_none() && is_fixed {
             return Some(Arc::clone(chart));
         }
-        let size = (chart.width, chart.height);
-        let times = self.sizes.direct_halvings(chart.object(), size, self.settings);
-        self.sizes.chart(chart.receiver, map_size::halved(size, times))
+        let (width, height) = (chart.width, chart.height);
+        let least = self.direct_size(chart.object())?;
+        let times = (width / least.0).min(height / least.1).checked_ilog2();
+        let size = map_size::halved((width, height), times.unwrap_or(0));
+        self.sizes.chart(chart.receiver, size)
     }
 
     fn map(&self, chart: &Arc<Chart>, levels: &Levels, direct: &DirectCache) -> IlluminationMap {
@@ -308,6 +320,7 @@ impl Finish<'_> {
             kind: LayerKind::Direct,
             irradiance: match &chart.layout {
                 Some(layout) => in_tiles(layout, &own, &irradiance),
+                None if own.texel_count() < chart.texel_count() => finer(chart, &own, &irradiance),
                 None => irradiance,
             },
         })
@@ -336,6 +349,19 @@ fn beyond_single(maps: &[IlluminationMap]) -> Option<Warning> {
             "make the lights weaker",
         )
     })
+}
+
+/// Values of a chart at the middle of each texel of a finer one.
+fn finer(chart: &Chart, own: &Chart, values: &[[f32; 3]]) -> Vec<[f32; 3]> {
+    let size = DVec2::new(chart.width as f64, chart.height as f64);
+    let middle = |texel: usize| {
+        let corner = DVec2::new((texel % chart.width) as f64, (texel / chart.width) as f64);
+        (corner + 0.5) / size
+    };
+    (0..chart.texel_count())
+        .map(|texel| bilinear(values, own.width, own.height, middle(texel)))
+        .map(|value| value.to_array().map(single))
+        .collect()
 }
 
 /// Values of a chart at the middle of each texel of a map in tiles, means where the texels are larger than the chart's.

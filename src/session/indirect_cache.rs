@@ -39,10 +39,16 @@ impl IndirectCache {
         self.network.as_ref().map(|(_, network)| network)
     }
 
-    /// Makes ready for settings: what was traced for others goes.
-    pub(super) fn prepare(&mut self, tracer: &Tracer, sizes: &MapSizes, settings: &BakeSettings) {
+    /// Makes ready for settings, with so many texels of all grids at most: what was traced for others goes.
+    pub(super) fn prepare(
+        &mut self,
+        tracer: &Tracer,
+        sizes: &MapSizes,
+        settings: &BakeSettings,
+        most_texels: u64,
+    ) {
         let key = Key {
-            grids: sizes.grid_sizes(settings, most_texels(settings)),
+            grids: sizes.grid_sizes(settings, most_texels),
             max_depth: settings.depth(),
             seed: settings.seed,
         };
@@ -76,7 +82,7 @@ impl IndirectCache {
 }
 
 /// Most texels of all grids: as the target needs, and as memory allows for.
-fn most_texels(settings: &BakeSettings) -> u64 {
+pub(super) fn most_texels(settings: &BakeSettings) -> u64 {
     let wanted = match settings.max_error {
         Some(target) if target >= 0.1 => DRAFT_TEXELS,
         Some(target) if target <= 0.01 => 16 * DRAFT_TEXELS,

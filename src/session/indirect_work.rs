@@ -2,7 +2,7 @@
 
 use super::caustic::CausticOutcome;
 use super::clock::Clock;
-use super::indirect_cache::{IndirectCache, link_bytes};
+use super::indirect_cache::{IndirectCache, link_bytes, most_texels};
 use super::result::LightLayer;
 use super::sizes::MapSizes;
 use crate::error::Warning;
@@ -65,7 +65,8 @@ impl IndirectWork {
         better: &mut dyn FnMut(&Self, &IndirectCache),
     ) -> bool {
         let watch = Stopwatch::start();
-        cache.prepare(gathering.tracer, gathering.sizes, gathering.settings);
+        let settings = gathering.settings;
+        cache.prepare(gathering.tracer, gathering.sizes, settings, most_texels(settings));
         self.seconds.add(watch.elapsed());
         let target = gathering.settings.max_error.unwrap_or(USUAL_TARGET);
         (self.target, self.solution) = (target, None);
@@ -127,11 +128,13 @@ impl IndirectWork {
     }
 
     /// Solves with what was traced for maps before, if anything was: for pictures on the way.
-    pub(super) fn remember(&mut self, cache: &IndirectCache, maps: &[IlluminationMap]) {
+    pub(super) fn of_known(cache: &IndirectCache, maps: &[IlluminationMap]) -> Self {
+        let mut known = Self::default();
         if let Some(network) = cache.network().filter(|_| !cache.passes.is_empty()) {
-            self.passes.clone_from(&cache.passes);
-            self.solution = Some(network.solve(&sources(network, maps), &self.passes));
+            known.passes.clone_from(&cache.passes);
+            known.solution = Some(network.solve(&sources(network, maps), &known.passes));
         }
+        known
     }
 
     /// Adds the layer to the maps, and its error to theirs; each light's part where there are parts of the other layers.

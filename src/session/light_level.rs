@@ -140,6 +140,11 @@ pub(super) struct LightStates {
 }
 
 impl LightStates {
+    /// Whether nothing is known of any light.
+    pub(super) fn is_empty(&self) -> bool {
+        self.by_light.is_empty()
+    }
+
     /// Of a light, by its place in the scene.
     pub(super) fn of_mut(&mut self, light: usize) -> &mut LightState {
         self.by_light.entry(light).or_default()

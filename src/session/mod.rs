@@ -7,6 +7,7 @@ mod clock;
 mod direct_cache;
 mod direct_work;
 mod finish;
+mod first_look;
 pub mod forecast;
 mod goals;
 mod indirect_cache;
@@ -55,6 +56,7 @@ use clock::Clock;
 use direct_cache::DirectCache;
 use direct_work::DirectWork;
 use finish::{Finish, Shown};
+use first_look::FirstLook;
 use indirect_cache::IndirectCache;
 use indirect_work::{Gathering, IndirectWork};
 use light_level::LightStates;
@@ -337,7 +339,10 @@ impl BakeSession {
             sizes: &self.sizes,
             settings,
             plan,
+            coarsening: 0,
         };
+        let is_new = self.lights.is_empty() && self.direct.is_empty();
+        let first_look = (is_new && level.is_some()).then(FirstLook::default);
         let lights = &mut self.lights;
         let mut showing = Showing {
             finish: &finish,
@@ -352,7 +357,9 @@ impl BakeSession {
             indirect: &mut self.indirect,
             lamps: DirectWork::default(),
             is_first: true,
+            first_look,
         };
+        showing.begin(&mut clock);
         let mut outcome = ground.bake(&self.sizes, lights, &mut clock, labour, &mut showing)?;
         let Showing {
             mut lamps,

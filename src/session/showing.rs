@@ -5,11 +5,13 @@ use super::clock::Clock;
 use super::direct_cache::DirectCache;
 use super::direct_work::DirectWork;
 use super::finish::{Finish, Shown};
+use super::first_look::FirstLook;
 use super::indirect_cache::IndirectCache;
 use super::indirect_work::IndirectWork;
 use super::metric::Backdrop;
-use super::{BakeResult, account};
+use super::{BakeResult, LightLayer, account};
 use crate::error::Result;
+use crate::illumination::IlluminationMap;
 use crate::light_pass::caustic::pass::Stopwatch;
 use crate::light_pass::caustic::setup::Aim;
 use crate::optics::luminance;
@@ -35,8 +37,47 @@ pub(super) struct Showing<'a, 'level> {
     pub(super) direct: &'a mut DirectCache,
     pub(super) indirect: &'a mut IndirectCache,
     pub(super) lamps: DirectWork,
-    /// Whether nothing was shown yet.
+    /// Whether no caustics were shown yet.
     pub(super) is_first: bool,
+    /// What stands in for layers that are not baked yet, where nothing was shown before the bake.
+    pub(super) first_look: Option<FirstLook>,
+}
+
+impl Showing<'_, '_> {
+    /// Shows direct and indirect light before there are caustics, where nothing else is shown.
+    pub(super) fn begin(&mut self, clock: &mut Clock) {
+        if let Some(mut look) = self.first_look.take() {
+            self.show_coarsely(&mut look, &[], &CausticOutcome::default(), clock);
+            self.first_look = Some(look);
+        }
+    }
+
+    fn show_coarsely(
+        &mut self,
+        look: &mut FirstLook,
+        levels: &[Shown],
+        so_far: &CausticOutcome,
+        clock: &mut Clock,
+    ) {
+        let on_whom = (self.progress, self.control);
+        let maps = look.maps(self.finish, self.tracer, levels, on_whom);
+        self.hand_out(maps, levels, so_far, clock);
+    }
+
+    fn hand_out(
+        &mut self,
+        maps: (Vec<IlluminationMap>, Vec<LightLayer>),
+        levels: &[Shown],
+        so_far: &CausticOutcome,
+        clock: &mut Clock,
+    ) {
+        let mut result = self.finish.result(maps, levels, so_far);
+        clock.total = self.watch.elapsed();
+        account(&mut result, self.finish, self.aim, &self.lamps.clock(clock));
+        if let (Some(level), false) = (&mut self.level, result.maps.is_empty()) {
+            level(result);
+        }
+    }
 }
 
 impl Onlooker for Showing<'_, '_> {
@@ -45,10 +86,15 @@ impl Onlooker for Showing<'_, '_> {
         if self.level.is_none() {
             return Ok(());
         }
+        if is_first && let Some(mut look) = self.first_look.take() {
+            self.show_coarsely(&mut look, levels, so_far, clock);
+            self.first_look = Some(look);
+            return Ok(());
+        }
         let (finish, plan) = (self.finish, self.finish.plan);
         let (charts, scarce) = finish.charts(levels);
         let direct_charts = finish.direct_charts(&charts);
-        // The first picture is to come soon: direct light follows with the second.
+        // The first picture after a change is to come soon: direct light follows with the second.
         let waits = is_first && !self.direct.knows(finish.scene.lights.len(), &direct_charts);
         if !waits && plan.is_on(Effect::Direct) {
             let on_whom = (self.progress, self.control);
@@ -60,16 +106,11 @@ impl Onlooker for Showing<'_, '_> {
         so_far.warnings.extend(scarce);
         let (mut maps, mut parts) = finish.maps(levels, &charts, self.direct);
         if plan.is_on(Effect::Indirect) && !waits {
-            let mut known = IndirectWork::default();
-            known.remember(self.indirect, &maps);
-            known.add_to(self.indirect, &mut maps, &mut parts);
+            let look = self.first_look.as_ref();
+            let known = look.map_or(&*self.indirect, FirstLook::indirect);
+            IndirectWork::of_known(known, &maps).add_to(known, &mut maps, &mut parts);
         }
-        let mut result = finish.result((maps, parts), levels, &so_far);
-        clock.total = self.watch.elapsed();
-        account(&mut result, finish, self.aim, &self.lamps.clock(clock));
-        if let Some(level) = &mut self.level {
-            level(result);
-        }
+        self.hand_out((maps, parts), levels, &so_far, clock);
         Ok(())
     }
 

@@ -15,6 +15,7 @@ use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoopProxy};
 use winit::keyboard::ModifiersState;
 use winit::window::WindowId;
 
+use super::exposure::AutoExposure;
 use super::files::{Choice, Dialog};
 use super::frame_times::{FrameTimes, sum_ms};
 use super::gizmo::Gizmo;
@@ -26,6 +27,7 @@ use super::model::Model;
 use super::overlay;
 use super::pace::Pace;
 use super::panel::{Facts, Wishes};
+use super::warm_up::WarmUp;
 use super::{ViewerOptions, accessibility, beside, error_view, probe, sketching};
 use crate::error::{Error, Result};
 use crate::plan::EffectLine;
@@ -84,9 +86,11 @@ pub struct App {
     moved_until: Instant,
     /// When the next frame is due though nothing happens.
     wake_at: Option<Instant>,
-    must_measure_exposure: bool,
-    /// The exposure that was measured last [stops], and how many layers the maps had then.
-    measured: Option<(f64, usize)>,
+    /// Compiles what mirrors and glass take.
+    warm_up: WarmUp,
+    exposure: AutoExposure,
+    /// When the exposure was last brought on its way.
+    exposed: Instant,
     must_set_maps: bool,
     must_set_beside: bool,
     /// Where the picture's two parts meet, as a share of its width.
@@ -133,7 +137,9 @@ impl App {
         };
         let model = Model::new(options, wake.clone())?;
         Ok(Self {
-            must_measure_exposure: options.exposure_stops.is_none() && !model.keeps_exposure(),
+            exposure: AutoExposure::new(options.exposure_stops.is_none() && !model.keeps_exposure()),
+            exposed: Instant::now(),
+            warm_up: WarmUp::new(Arc::new(wake.clone())),
             notice: files::dark_notice(&model),
             model,
             graphics: None,
@@ -147,7 +153,6 @@ impl App {
             clicks_at: None,
             moved_until: Instant::now(),
             wake_at: None,
-            measured: None,
             must_set_maps: true,
             must_set_beside: false,
             divider: 0.5,
@@ -165,7 +170,7 @@ impl App {
             reports_due: 0,
             latencies: Latencies::default(),
             modifiers: ModifiersState::empty(),
-            dialog: Dialog::new(Arc::new(wake.clone())),
+            dialog: Dialog::new(Arc::new(wake)),
             failure: None,
         })
     }
@@ -202,6 +207,12 @@ impl App {
     }
 
     fn close(&mut self, event_loop: &ActiveEventLoop) {
+        self.closing();
+        event_loop.exit();
+    }
+
+    /// The window goes, or has gone.
+    pub fn closing(&mut self) {
         self.model.log.write(
             "latency",
             json!({
@@ -210,7 +221,6 @@ impl App {
             }),
         );
         self.model.log.write("closing", Value::Null);
-        event_loop.exit();
     }
 
     fn fail(&mut self, event_loop: &ActiveEventLoop, error: Error) {
@@ -294,7 +304,9 @@ impl App {
             // The legend comes with the next frame.
             self.request_redraw();
         }
-        self.must_measure_exposure |= wishes.measure_exposure;
+        if wishes.measure_exposure {
+            self.exposure.ask();
+        }
         if let Err(error) = self.draw_picture() {
             self.tell_fault(&error);
         }
@@ -448,7 +460,7 @@ impl App {
             }
             Shown::Hidden => Duration::MAX,
             Shown::Later => RETRY_AFTER,
-            Shown::Yes if self.model.is_moving() => Duration::ZERO,
+            Shown::Yes if self.model.is_moving() || self.is_exposing() => Duration::ZERO,
             Shown::Yes if self.is_refining => self.pace.pause(now),
             Shown::Yes if self.model.state().is_working() => repaint_after.min(BAKING_FRAME),
             Shown::Yes => repaint_after,
@@ -474,7 +486,8 @@ impl App {
             .min();
         // A frame that could not be shown yet is no rest.
         let is_working = self.model.state().is_working() || self.is_refining || is_report_due;
-        let is_working = is_working || shown == Shown::Later || self.model.is_moving();
+        let is_working =
+            is_working || shown == Shown::Later || self.model.is_moving() || self.is_exposing();
         if self.rested_at != self.pictures && !is_working {
             self.rested_at = self.pictures;
             let (pictures, frames) = (self.pictures, self.frames);

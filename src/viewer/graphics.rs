@@ -22,7 +22,7 @@ use crate::scene::Scene;
 /// Smallest inner size of the window [logical pixels]: the panel and a picture of its width.
 const SMALLEST: LogicalSize<u32> = LogicalSize::new(700, 400);
 /// Samples per pixel of the scene's edges.
-const SAMPLES: u32 = 4;
+pub(super) const SAMPLES: u32 = 4;
 
 /// Whether a frame reached the window.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

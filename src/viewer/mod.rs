@@ -11,6 +11,7 @@ pub mod edits;
 pub mod error_view;
 pub mod event_log;
 pub mod exporting;
+pub mod exposure;
 pub mod files;
 pub mod filming;
 pub mod flat_map;
@@ -24,6 +25,7 @@ pub mod lens;
 pub mod model;
 pub mod navigation;
 pub mod new_light;
+mod orphaned;
 mod overlay;
 pub mod pace;
 pub mod panel;
@@ -35,6 +37,7 @@ pub mod solid;
 pub mod time_left;
 pub mod views;
 pub mod walking;
+mod warm_up;
 pub mod wavelength_view;
 pub mod worker;
 
@@ -84,13 +87,16 @@ const DISPLAY: &str = "display";
 pub fn run(options: ViewerOptions) -> Result<()> {
     let event_loop = event_loop()?;
     let mut app = App::new(&options, event_loop.create_proxy())?;
-    event_loop.run_app(&mut app).map_err(|error| {
-        Error::failure(
-            "window",
-            format!("the system ended it ({error})"),
-            "check the display and start again",
-        )
-    })?;
+    match orphaned::run(|| event_loop.run_app(&mut app)) {
+        Some(outcome) => outcome.map_err(|error| {
+            Error::failure(
+                "window",
+                format!("the system ended it ({error})"),
+                "check the display and start again",
+            )
+        })?,
+        None => app.closing(),
+    }
     app.failure().map_or(Ok(()), Err)
 }
 

@@ -167,7 +167,10 @@ pub fn baking_threads(asked: usize, cores: usize) -> usize {
     }
 }
 
-/// Handle of the thread; dropping it cancels the bake and waits for the thread's end.
+/// How long a bake is waited for that was asked to stop.
+const ENDS_WITHIN: Duration = Duration::from_millis(300);
+
+/// Handle of the thread; dropping it cancels the bake, and waits a moment for the thread's end.
 #[derive(Debug)]
 pub struct Worker {
     shared: Arc<Shared>,
@@ -282,9 +285,12 @@ impl Drop for Worker {
         slot.cancel_running();
         drop(slot);
         self.shared.news.notify_all();
-        if let Some(thread) = self.thread.take()
-            && thread.join().is_err()
-        {
+        let asked = Instant::now();
+        let Some(thread) = self.thread.take() else { return };
+        while !thread.is_finished() && asked.elapsed() < ENDS_WITHIN {
+            std::thread::sleep(Duration::from_millis(2));
+        }
+        if thread.is_finished() && thread.join().is_err() {
             log::error!("the baking thread panicked");
         }
     }

@@ -43,7 +43,7 @@ impl App {
         let Some(mut view) = self.view() else {
             return Ok(());
         };
-        let (wants_exposure, chains) = (self.wants_exposure(), self.chains_switch());
+        let chains = self.warm_up.switch(self.chains_switch());
         let dispersion = self.model.panel.settings.effects.get(Effect::Dispersion);
         let white_balance = self.white_balance();
         let Some(graphics) = &mut self.graphics else {
@@ -59,6 +59,7 @@ impl App {
         let start = Instant::now();
         let mut uploaded = graphics.set_scene(self.model.scene())?;
         let mut is_new = uploaded != Uploaded::default();
+        let has_new_maps = self.must_set_maps;
         if std::mem::take(&mut self.must_set_maps) || is_new {
             let (maps, style) = self.model.maps_to_show(traces_lights);
             uploaded += graphics.set_maps(&maps, style)?;
@@ -89,16 +90,10 @@ impl App {
         graphics.set_chains(chains)?;
         graphics.set_dispersion(dispersion);
         graphics.set_white_balance(&white_balance);
-        if wants_exposure {
-            self.must_measure_exposure = false;
-            view.exposure_stops = graphics.measure_exposure(&without_backdrop(view.clone()))?;
-            self.model.panel.display.exposure_stops = view.exposure_stops;
-            view.background = backdrop(&self.model, view.exposure_stops);
-            self.measured = Some((view.exposure_stops, self.model.layers().len()));
-            self.model
-                .log
-                .write("exposure", json!({"stops": view.exposure_stops}));
-        }
+        self.expose(&mut view, has_new_maps)?;
+        let Some(graphics) = &mut self.graphics else {
+            return Ok(());
+        };
         // Drawing would take them in without a word.
         if let Some(ms) = graphics.take_times() {
             if let Some(quality) = graphics.counts().timed_quality {
@@ -114,6 +109,10 @@ impl App {
         if graphics.draw_picture(&view, self.pace.walking())? {
             self.pictures += 1;
             self.reports_due = MOST_REPORTS;
+        }
+        if !self.model.maps().is_empty() {
+            let qualities = [self.pace.walking(), self.pace.resting()];
+            self.warm_up.begin(self.model.scene(), &view, qualities);
         }
         Ok(())
     }
@@ -139,17 +138,30 @@ impl App {
         Ok(())
     }
 
-    /// Whether the exposure is to be measured: because it was asked for, or because the first bake has brought a layer
-    /// since it was measured and nobody changed it. The very first maps come without direct light, and the exposure
-    /// that suits them does not suit the scene.
-    pub(super) fn wants_exposure(&self) -> bool {
-        let (model, now_stops) = (&self.model, self.model.panel.display.exposure_stops);
+    /// Chooses the exposure of a view of light. The maps of the first bake may move it, until somebody else does.
+    fn expose(&mut self, view: &mut View, has_new_maps: bool) -> Result<()> {
+        let (model, mut shown) = (&mut self.model, view.exposure_stops);
+        let since = std::mem::replace(&mut self.exposed, Instant::now()).elapsed();
+        if model.quantity() != Quantity::Light || model.maps().is_empty() {
+            return Ok(());
+        }
         let is_first = model.last.as_ref().is_some_and(|last| model.is_first(last));
-        let is_outdated = self.measured.is_some_and(|(measured_stops, layers)| {
-            measured_stops == now_stops && layers < model.layers().len()
-        });
-        let shows_light = model.quantity() == Quantity::Light && !model.maps().is_empty();
-        shows_light && (self.must_measure_exposure || (is_first && is_outdated))
+        if self.exposure.wants(has_new_maps && is_first, shown)
+            && let Some(graphics) = &mut self.graphics
+        {
+            let stops = graphics.measure_exposure(&without_backdrop(view.clone()))?;
+            shown = self.exposure.take(stops, shown);
+            model.log.write("exposure", json!({"stops": stops}));
+        }
+        view.exposure_stops = self.exposure.next(shown, since);
+        view.background = backdrop(model, view.exposure_stops);
+        model.panel.display.exposure_stops = view.exposure_stops;
+        Ok(())
+    }
+
+    /// Whether the exposure is on its way.
+    pub(super) fn is_exposing(&self) -> bool {
+        self.exposure.is_moving(self.model.panel.display.exposure_stops)
     }
 
     /// What the picture is to show; `None` while it has no area.

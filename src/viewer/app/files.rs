@@ -8,6 +8,7 @@ use super::App;
 use super::drawing::without_backdrop;
 use crate::error::{Error, Result};
 use crate::scene::load::was_dark;
+use crate::viewer::exposure::AutoExposure;
 use crate::viewer::files::{Choice, Chosen, Purpose, free_names, working_folder};
 use crate::viewer::model::Model;
 use crate::viewer::panel::Quantity;
@@ -94,8 +95,7 @@ impl App {
         self.must_set_maps = true;
         if purpose == Purpose::Open {
             self.notice = dark_notice(&self.model);
-            self.must_measure_exposure = !self.model.keeps_exposure();
-            self.measured = None;
+            self.exposure = AutoExposure::new(!self.model.keeps_exposure());
         }
         if let Some(graphics) = &self.graphics {
             let name = &self.model.scene().name;

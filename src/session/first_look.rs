@@ -1,0 +1,67 @@
+//! Direct light and what surfaces send each other of it, coarsely: what is shown until both are as fine as asked for.
+
+use super::direct_cache::DirectCache;
+use super::direct_work::DirectWork;
+use super::finish::{Finish, Levels};
+use super::indirect_cache::IndirectCache;
+use super::indirect_work::IndirectWork;
+use super::result::LightLayer;
+use crate::illumination::IlluminationMap;
+use crate::light_pass::indirect::{LEAST_PASSES, Network};
+use crate::plan::Effect;
+use crate::progress::{Control, Progress};
+use crate::transport::Tracer;
+
+/// Halvings of maps of direct light below the size that is asked for.
+const HALVINGS: u32 = 2;
+
+/// Elements of all grids of indirect light.
+const ELEMENTS: u64 = 1_500;
+
+/// The rays of both, kept while the bake goes on.
+#[derive(Debug, Default)]
+pub(super) struct FirstLook {
+    direct: DirectCache,
+    indirect: IndirectCache,
+}
+
+impl FirstLook {
+    /// All maps: caustics of the levels, with both layers where they are asked for.
+    pub(super) fn maps(
+        &mut self,
+        finish: &Finish,
+        tracer: &Tracer,
+        levels: &Levels,
+        on_whom: (&dyn Progress, &Control),
+    ) -> (Vec<IlluminationMap>, Vec<LightLayer>) {
+        let finish = &Finish {
+            coarsening: HALVINGS,
+            ..*finish
+        };
+        let (charts, _) = finish.charts(levels);
+        if finish.plan.is_on(Effect::Direct) {
+            let direct_charts = finish.direct_charts(&charts);
+            DirectWork::default().shine(tracer, &direct_charts, &mut self.direct, on_whom);
+        }
+        let (mut maps, mut parts) = finish.maps(levels, &charts, &self.direct);
+        if finish.plan.is_on(Effect::Indirect) {
+            self.trace(finish, tracer, on_whom);
+            IndirectWork::of_known(&self.indirect, &maps).add_to(&self.indirect, &mut maps, &mut parts);
+        }
+        (maps, parts)
+    }
+
+    fn trace(&mut self, finish: &Finish, tracer: &Tracer, on_whom: (&dyn Progress, &Control)) {
+        let indirect = &mut self.indirect;
+        indirect.prepare(tracer, finish.sizes, finish.settings, ELEMENTS);
+        let passes = vec![LEAST_PASSES; indirect.network().map_or(0, Network::element_count)];
+        if indirect.trace(tracer, &passes, on_whom) {
+            indirect.passes = passes;
+        }
+    }
+
+    /// What surfaces send each other.
+    pub(super) fn indirect(&self) -> &IndirectCache {
+        &self.indirect
+    }
+}

@@ -1,0 +1,71 @@
+//! Compiles what mirrors and glass take before the window draws with it: seconds, where the driver has it in no cache.
+//!
+//! A device of its own draws the view once, small. Drivers compile at the latest then, and keep what they compiled for
+//! every device.
+
+use std::sync::Arc;
+
+use super::background::Background;
+use super::graphics::{Picture, SAMPLES};
+use crate::effect::EffectSwitch;
+use crate::error::Result;
+use crate::eye_pass::View;
+use crate::eye_pass::renderer::{EyeQuality, Renderer};
+use crate::gpu::Gpu;
+use crate::scene::Scene;
+
+/// Pixels of the picture across.
+const WIDTH: u32 = 64;
+
+/// Whether mirrors and glass may be drawn.
+#[derive(Debug)]
+pub struct WarmUp {
+    work: Background<(), Result<()>>,
+    is_done: bool,
+}
+
+impl WarmUp {
+    /// Nothing is compiled; `wake` is called from another thread when it is.
+    pub fn new(wake: Arc<dyn Fn() + Send + Sync>) -> Self {
+        Self {
+            work: Background::new("shaders", wake),
+            is_done: false,
+        }
+    }
+
+    /// Begins, unless that was done before.
+    pub fn begin(&mut self, scene: &Arc<Scene>, view: &View, qualities: [EyeQuality; 2]) {
+        if self.is_done || self.work.of().is_some() {
+            return;
+        }
+        let scene = Arc::clone(scene);
+        let view = View {
+            width: WIDTH,
+            height: (WIDTH * view.height).div_ceil(view.width),
+            ..view.clone()
+        };
+        let started = self.work.start((), move |_| draw(&scene, &view, qualities));
+        self.is_done = started.is_err();
+    }
+
+    /// How chains are switched in the window, where `wanted` is asked for.
+    pub fn switch(&mut self, wanted: EffectSwitch) -> EffectSwitch {
+        if let Some((_, outcome)) = self.work.take() {
+            self.is_done = true;
+            if let Some(Err(error)) = outcome {
+                log::warn!("shaders could not be compiled beside the window: {error}");
+            }
+        }
+        if self.is_done { wanted } else { EffectSwitch::Off }
+    }
+}
+
+fn draw(scene: &Scene, view: &View, qualities: [EyeQuality; 2]) -> Result<()> {
+    let gpu = Gpu::headless()?;
+    let mut renderer = Renderer::new(&gpu, scene, Picture::FORMAT, SAMPLES)?;
+    for quality in qualities {
+        renderer.set_quality(quality);
+        renderer.radiance(&gpu, view)?;
+    }
+    Ok(())
+}
