@@ -222,6 +222,13 @@ impl Interrupt {
         Ok(())
     }
 
+    /// Ends the process, with the code that a signal calls for or 0. What libraries tidy up at an ordinary end is left:
+    /// threads of graphics drivers may be at work on it.
+    #[cfg(feature = "viewer")]
+    pub fn leave(&self) -> ! {
+        signal_hook::low_level::exit(self.exit_code.load(Ordering::SeqCst).into())
+    }
+
     /// The exit code that a signal calls for, if one came.
     pub fn exit_code(&self) -> Option<ExitCode> {
         match self.exit_code.load(Ordering::SeqCst) {

@@ -28,36 +28,26 @@ const HEADLESS_PICTURE: &str = "picture.png";
 pub fn run(job: ViewJob, terminal: &Terminal, interrupt: &Interrupt) -> Result<()> {
     let clock = Clock::start();
     let loaded = bake::load(&job.scene, &clock, terminal)?;
-    match window(&job, &loaded, terminal, interrupt)? {
-        Shown::Closed => Ok(()),
-        Shown::Not(why) => {
-            terminal.print_note(&format!(
-                "{why}: writing maps and a picture to ./{HEADLESS_FOLDER}/ instead of opening a window"
-            ));
-            headless(&job, &loaded, &clock, terminal, interrupt)
-        }
-    }
+    let why = window(&job, &loaded, terminal, interrupt)?;
+    terminal.print_note(&format!(
+        "{why}: writing maps and a picture to ./{HEADLESS_FOLDER}/ instead of opening a window"
+    ));
+    headless(&job, &loaded, &clock, terminal, interrupt)
 }
 
-/// What became of the window.
-enum Shown {
-    /// The user closed it.
-    #[cfg_attr(
-        not(feature = "viewer"),
-        expect(dead_code, reason = "there is no window to close")
-    )]
-    Closed,
-    /// It could not be opened, for this reason.
-    Not(&'static str),
-}
-
+/// Shows the window, and ends the process when that is closed; returns why it could not be opened.
 #[cfg(feature = "viewer")]
-fn window(job: &ViewJob, loaded: &LoadedScene, terminal: &Terminal, interrupt: &Interrupt) -> Result<Shown> {
+fn window(
+    job: &ViewJob,
+    loaded: &LoadedScene,
+    terminal: &Terminal,
+    interrupt: &Interrupt,
+) -> Result<&'static str> {
     use super::values::Exposure;
     use nephroid::{gpu, viewer};
 
     if !has_display() {
-        return Ok(Shown::Not("no display"));
+        return Ok("no display");
     }
     let maps = match &job.maps {
         MapSource::Bake(_) => None,
@@ -88,18 +78,16 @@ fn window(job: &ViewJob, loaded: &LoadedScene, terminal: &Terminal, interrupt: &
         },
     };
     match viewer::run(options) {
-        Ok(()) => Ok(Shown::Closed),
-        Err(error) if viewer::is_no_display(&error) => Ok(Shown::Not("no display")),
-        Err(error) if gpu::is_no_adapter(&error) => Ok(Shown::Not("no graphics adapter")),
+        Ok(()) => interrupt.leave(),
+        Err(error) if viewer::is_no_display(&error) => Ok("no display"),
+        Err(error) if gpu::is_no_adapter(&error) => Ok("no graphics adapter"),
         Err(error) => Err(error),
     }
 }
 
 #[cfg(not(feature = "viewer"))]
-fn window(_: &ViewJob, _: &LoadedScene, _: &Terminal, _: &Interrupt) -> Result<Shown> {
-    Ok(Shown::Not(
-        "no display: this program was built without the viewer feature",
-    ))
+fn window(_: &ViewJob, _: &LoadedScene, _: &Terminal, _: &Interrupt) -> Result<&'static str> {
+    Ok("no display: this program was built without the viewer feature")
 }
 
 /// Whether the session has a screen to show windows on.

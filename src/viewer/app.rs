@@ -53,8 +53,9 @@ impl From<accessibility::Event> for News {
 const PIXELS_PER_NOTCH: f64 = 40.0;
 /// How often a window at rest looks whether it was asked to stop.
 const LOOK_FOR_STOP: Duration = Duration::from_millis(200);
-/// Time between frames that only show how a bake gets on.
+/// Time between frames that only show how a bake gets on; where the processor draws them, the bake waits for them.
 const BAKING_FRAME: Duration = Duration::from_millis(100);
+const BAKING_FRAME_OF_SOFTWARE: Duration = Duration::from_millis(500);
 /// Time between a picture and the frame that tells what it took.
 const REPORT_AFTER: Duration = Duration::from_millis(40);
 /// A device that has not told in so many frames how long a picture took is not asked again until the next one.
@@ -211,8 +212,13 @@ impl App {
         event_loop.exit();
     }
 
-    /// The window goes, or has gone.
-    pub fn closing(&mut self) {
+    /// The window has gone: nothing of it may be touched any more, not even to be dropped.
+    pub fn lose_window(&mut self) {
+        std::mem::forget(self.graphics.take());
+        self.closing();
+    }
+
+    fn closing(&mut self) {
         self.model.log.write(
             "latency",
             json!({
@@ -450,6 +456,15 @@ impl App {
         Some(painting)
     }
 
+    fn baking_frame(&self) -> Duration {
+        let graphics = self.graphics.as_ref();
+        if graphics.is_some_and(|graphics| graphics.gpu().is_software()) {
+            BAKING_FRAME_OF_SOFTWARE
+        } else {
+            BAKING_FRAME
+        }
+    }
+
     /// Decides when the next frame comes.
     fn schedule(&mut self, event_loop: &ActiveEventLoop, shown: Shown, repaint_after: Duration) {
         let now = Instant::now();
@@ -462,7 +477,7 @@ impl App {
             Shown::Later => RETRY_AFTER,
             Shown::Yes if self.model.is_moving() || self.is_exposing() => Duration::ZERO,
             Shown::Yes if self.is_refining => self.pace.pause(now),
-            Shown::Yes if self.model.state().is_working() => repaint_after.min(BAKING_FRAME),
+            Shown::Yes if self.model.state().is_working() => repaint_after.min(self.baking_frame()),
             Shown::Yes => repaint_after,
         };
         let is_report_due = self.reports_due > 0 && shown == Shown::Yes;
@@ -486,8 +501,8 @@ impl App {
             .min();
         // A frame that could not be shown yet is no rest.
         let is_working = self.model.state().is_working() || self.is_refining || is_report_due;
-        let is_working =
-            is_working || shown == Shown::Later || self.model.is_moving() || self.is_exposing();
+        let is_coming = self.is_exposing() || self.warm_up.is_coming();
+        let is_working = is_working || shown == Shown::Later || self.model.is_moving() || is_coming;
         if self.rested_at != self.pictures && !is_working {
             self.rested_at = self.pictures;
             let (pictures, frames) = (self.pictures, self.frames);
@@ -498,6 +513,7 @@ impl App {
                     "pictures": pictures,
                     "frames": frames,
                     "position_m": position,
+                    "exposure_stops": self.model.panel.display.exposure_stops,
                     "device_ms": self.frame_times.newest().copied().map(sum_ms),
                 }),
             );

@@ -91,6 +91,11 @@ impl AutoExposure {
         self.set
     }
 
+    /// Where it goes [stops].
+    pub fn goal(&self) -> f64 {
+        self.goal
+    }
+
     /// Whether it is on its way.
     pub fn is_moving(&self, shown: f64) -> bool {
         self.is_own(shown) && self.set != self.goal

@@ -284,7 +284,7 @@ impl Graphics {
             height: view.height.div_ceil(8),
             ..view.clone()
         };
-        let picture = self.renderer.radiance(&self.gpu, &part)?;
+        let picture = self.renderer.glance(&self.gpu, &part)?;
         Ok(tone_mapping::auto_exposure_stops(&picture))
     }
 

@@ -95,7 +95,7 @@ pub fn run(options: ViewerOptions) -> Result<()> {
                 "check the display and start again",
             )
         })?,
-        None => app.closing(),
+        None => app.lose_window(),
     }
     app.failure().map_or(Ok(()), Err)
 }

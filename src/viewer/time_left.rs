@@ -3,7 +3,13 @@
 use std::time::{Duration, Instant};
 
 use super::worker::{BakeRequest, BakeState, BakedLevel};
+use crate::plan::is_wanted;
+use crate::progress::Stage;
 use crate::session::forecast::forecast;
+use crate::settings::LayerKind;
+
+/// A forecast that may be wrong by more than this is not told [1].
+const MOST_FACTOR: f64 = 2.0;
 
 /// Less of a stage than this tells nothing of its pace [1].
 const LEAST_FRACTION: f64 = 0.1;
@@ -11,24 +17,35 @@ const LEAST_FRACTION: f64 = 0.1;
 /// Time until a bake is done [s, ≥ 0], rounded by nobody; `None` where nothing is known yet or no bake is running. `wanted` is
 /// what is baked, `last` the newest maps.
 ///
-/// Where the bake refines towards an error, its course so far tells what that will cost; else the pace of the present stage
-/// tells when that ends. It never takes longer than it may.
+/// Where the caustics are refined towards an error, their course so far tells what that will cost, unless indirect light
+/// follows, of which it tells nothing; without such an error, the pace of the present stage tells when that ends. It never
+/// takes longer than it may.
 pub fn time_left_s(
     state: &BakeState,
     wanted: &BakeRequest,
     last: Option<&BakedLevel>,
     now: Instant,
 ) -> Option<f64> {
-    let BakeState::Baking { fraction, since, .. } = *state else {
+    let BakeState::Baking {
+        stage,
+        fraction,
+        since,
+    } = *state
+    else {
         return None;
     };
+    let is_last = stage == Stage::Caustic && !is_wanted(&wanted.settings, LayerKind::Indirect);
     let elapsed_s = now.saturating_duration_since(since).as_secs_f64();
-    let own = last.filter(|last| !last.is_final && last.request.is_same(wanted));
+    let own = last.filter(|last| is_last && !last.is_final && last.request.is_same(wanted));
     let by_course = own.and_then(|level| {
         let target = wanted.settings.max_error?;
         let course = &level.result.course;
-        let spent_cpu_s = course.last()?.cpu_s;
-        let more_cpu_s = forecast(course, target, wanted.settings.estimator)?.cpu_s - spent_cpu_s;
+        let spent_cpu_s = course.last().filter(|point| !point.is_coarse)?.cpu_s;
+        let expected = forecast(course, target, wanted.settings.estimator)?;
+        if expected.factor > MOST_FACTOR {
+            return None;
+        }
+        let more_cpu_s = expected.cpu_s - spent_cpu_s;
         // Threads work as they did up to that level.
         let seconds_per_cpu_s = level.seconds / spent_cpu_s;
         let left_s = more_cpu_s * seconds_per_cpu_s - (elapsed_s - level.seconds);
@@ -44,7 +61,8 @@ pub fn time_left_s(
         .map(|limit_s| (limit_s - elapsed_s).max(0.0));
     match (by_course.or_else(by_pace), at_most_s) {
         (Some(left_s), Some(at_most_s)) => Some(left_s.min(at_most_s)),
-        (left_s, at_most_s) => left_s.or(at_most_s),
+        (None, Some(at_most_s)) if wanted.settings.max_error.is_none() => Some(at_most_s),
+        (left_s, _) => left_s,
     }
 }
 

@@ -48,6 +48,11 @@ impl WarmUp {
         self.is_done = started.is_err();
     }
 
+    /// Whether it is under way.
+    pub fn is_coming(&self) -> bool {
+        self.work.of().is_some()
+    }
+
     /// How chains are switched in the window, where `wanted` is asked for.
     pub fn switch(&mut self, wanted: EffectSwitch) -> EffectSwitch {
         if let Some((_, outcome)) = self.work.take() {

@@ -179,7 +179,7 @@ pub struct Worker {
 
 impl Worker {
     /// Starts the thread. `make_baker` is called there with the scene of the first request, and again after a bake
-    /// that panicked. `wake` is called from any thread when there is news, at most about every 50 ms for mere progress.
+    /// that panicked. `wake` is called from any thread when there is news, but not for mere progress.
     ///
     /// # Errors
     /// The system gives no thread.
@@ -451,16 +451,10 @@ fn serve<B: Baker>(shared: &Shared, make_baker: &impl Fn(Arc<Scene>) -> Result<B
     let mut baker = None;
     while let Some((request, control, meter)) = shared.next() {
         (shared.wake.0)();
-        let progress = Reporter {
-            meter: &meter,
-            wake: &*shared.wake.0,
-            start: Instant::now(),
-            next_wake_ms: AtomicU64::new(0),
-        };
         match &request.task {
             Task::Bake { serial } => {
                 let state = serve_bake(
-                    shared, &mut baker, make_baker, &request, *serial, &progress, &control,
+                    shared, &mut baker, make_baker, &request, *serial, &*meter, &control,
                 );
                 shared.settle(*serial, state);
             }
@@ -468,7 +462,7 @@ fn serve<B: Baker>(shared: &Shared, make_baker: &impl Fn(Arc<Scene>) -> Result<B
                 // The session of the maps that are shown keeps all it has.
                 let mut own = None;
                 let ignore = &mut |_| ();
-                let outcome = bake(&mut own, make_baker, &request.asked, &progress, &control, ignore);
+                let outcome = bake(&mut own, make_baker, &request.asked, &*meter, &control, ignore);
                 drop(own);
                 let worth = worth(*effect, with, outcome);
                 shared.end_comparison(worth, &control);
@@ -588,9 +582,6 @@ fn panic_sentence(panic: &(dyn std::any::Any + Send)) -> String {
     )
 }
 
-/// Shortest time between two wake-ups of the window by progress.
-const WAKE_EVERY: Duration = Duration::from_millis(50);
-
 /// Stage and fraction in one word, so that they are read together: stage in the upper half, fraction × 2³¹ below.
 #[derive(Debug, Default)]
 pub(super) struct Meter {
@@ -625,29 +616,8 @@ impl Meter {
     }
 }
 
-/// Progress of one bake; wakes the window now and then.
-pub(super) struct Reporter<'a> {
-    pub(super) meter: &'a Meter,
-    pub(super) wake: &'a (dyn Fn() + Send + Sync),
-    pub(super) start: Instant,
-    /// When the window may be woken again [ms after `start`].
-    pub(super) next_wake_ms: AtomicU64,
-}
-
-impl Progress for Reporter<'_> {
+impl Progress for Meter {
     fn advance(&self, stage: Stage, done: u64, total: u64) {
-        self.meter.write(stage, done as f64 / total.max(1) as f64);
-        let now_ms = self.start.elapsed().as_millis() as u64;
-        let due_ms = self.next_wake_ms.load(Ordering::Relaxed);
-        let next_ms = now_ms + WAKE_EVERY.as_millis() as u64;
-        // Of several threads that come at once, one wakes.
-        if now_ms >= due_ms
-            && self
-                .next_wake_ms
-                .compare_exchange(due_ms, next_ms, Ordering::Relaxed, Ordering::Relaxed)
-                .is_ok()
-        {
-            (self.wake)();
-        }
+        self.write(stage, done as f64 / total.max(1) as f64);
     }
 }

@@ -515,9 +515,19 @@ impl<'a> Viewer<'a> {
     /// Asks the window to close as a window manager does. The program ends with success and without a panic; its stderr
     /// and all events.
     #[track_caller]
-    pub fn close(mut self) -> (String, Vec<Value>) {
+    pub fn close(self) -> (String, Vec<Value>) {
         let close = self.manager.atom("WM_DELETE_WINDOW");
         self.manager.say(self.number(), [close, 0, 0]);
+        self.ended()
+    }
+
+    /// Destroys the window as another program can, and tells the same.
+    pub fn destroy(self) -> (String, Vec<Value>) {
+        self.hasty_hands(&format!("windowclose {}", self.window));
+        self.ended()
+    }
+
+    fn ended(mut self) -> (String, Vec<Value>) {
         self.wait_for("closing", |_| true);
         let status = self.wait_for_end();
         let stderr = self.stderr();

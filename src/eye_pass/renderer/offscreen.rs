@@ -6,7 +6,7 @@ use super::accumulation::Mean;
 use super::draws::Sample;
 use super::draws::visible_objects;
 use super::{EyeCounts, EyeQuality, MapStyle, Renderer};
-use crate::effect::{Effect, EffectSwitches};
+use crate::effect::{Effect, EffectSwitch, EffectSwitches};
 use crate::error::Result;
 use crate::eye_pass::{Picture, View};
 use crate::gpu::{Gpu, readback};
@@ -36,6 +36,17 @@ impl Renderer {
     /// A size of 0 or above the device's limit; a lost device.
     pub fn radiance(&mut self, gpu: &Gpu, view: &View) -> Result<Picture> {
         self.radiance_sampled(gpu, view, 1)
+    }
+
+    /// [`radiance`](Self::radiance) without what is seen in mirrors and through glass: enough to tell how bright it is.
+    ///
+    /// # Errors
+    /// Those of [`radiance`](Self::radiance).
+    pub fn glance(&mut self, gpu: &Gpu, view: &View) -> Result<Picture> {
+        let chains = std::mem::replace(&mut self.chains, EffectSwitch::Off);
+        let picture = self.radiance(gpu, view);
+        self.chains = chains;
+        picture
     }
 
     /// Mean radiance of `samples_per_side`² places of each pixel, those of the CPU eye pass; of at least 16 pictures

@@ -151,7 +151,10 @@ impl App {
         {
             let stops = graphics.measure_exposure(&without_backdrop(view.clone()))?;
             shown = self.exposure.take(stops, shown);
-            model.log.write("exposure", json!({"stops": stops}));
+            let goal = self.exposure.goal();
+            model
+                .log
+                .write("exposure", json!({"stops": stops, "exposure_stops": goal}));
         }
         view.exposure_stops = self.exposure.next(shown, since);
         view.background = backdrop(model, view.exposure_stops);

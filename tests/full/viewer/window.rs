@@ -24,8 +24,9 @@ fn picture_is_saved_flown_and_resized() {
         return;
     };
     let mut viewer = Viewer::open(&screen, RING);
-    let stops = viewer.wait_for("exposure", |_| true)["stops"].as_f64();
+    viewer.wait_for("exposure", |_| true);
     let rest = viewer.wait_for("rest", |_| true);
+    let stops = rest["exposure_stops"].as_f64();
     // What the picture took has come back by then, from a device that can tell.
     let gpu = Gpu::headless().expect("the window has an adapter too");
     let tells = gpu.device.features().contains(wgpu::Features::TIMESTAMP_QUERY);
