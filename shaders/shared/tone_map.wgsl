@@ -4,6 +4,7 @@ const TONE_MAP_NONE: u32 = 0u;
 const TONE_MAP_NEUTRAL: u32 = 1u;
 const TONE_MAP_AGX: u32 = 2u;
 const TONE_MAP_ACES: u32 = 3u;
+const TONE_MAP_SOFT: u32 = 4u;
 
 // Khronos PBR Neutral: exact below its shoulder, hue kept above it.
 fn tone_map_neutral(exposed: vec3f) -> vec3f {
@@ -73,12 +74,27 @@ fn tone_map_aces(exposed: vec3f) -> vec3f {
     return fitted * ACES_OUTPUT;
 }
 
+// Exact up to its shoulder, then logarithmic up to 16; hue kept, but for the brightest.
+fn tone_map_soft(exposed: vec3f) -> vec3f {
+    let shoulder = 0.4;
+    let step = 0.12387274177484112;
+    let peak = max(exposed.r, max(exposed.g, exposed.b));
+    if peak <= shoulder {
+        return exposed;
+    }
+    let rise = step * log(1.0 + (peak - shoulder) / step);
+    let new_peak = min(shoulder + rise, 1.0);
+    let part = (new_peak - shoulder) / (1.0 - shoulder);
+    return mix(exposed * (new_peak / peak), vec3f(new_peak), 0.4 * part * part * part);
+}
+
 fn tone_map(exposed: vec3f, kind: u32) -> vec3f {
     var display = max(exposed, vec3f(0.0));
     switch kind {
         case TONE_MAP_NEUTRAL: { display = tone_map_neutral(display); }
         case TONE_MAP_AGX: { display = tone_map_agx(display); }
         case TONE_MAP_ACES: { display = tone_map_aces(display); }
+        case TONE_MAP_SOFT: { display = tone_map_soft(display); }
         default: {}
     }
     return clamp(display, vec3f(0.0), vec3f(1.0));

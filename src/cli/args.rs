@@ -213,7 +213,7 @@ pub struct RenderArguments {
     pub stats: bool,
     #[command(flatten)]
     pub maps: MapsOption,
-    /// How radiance becomes display colour [default: neutral]
+    /// How radiance becomes display colour [default: soft]
     #[arg(long, value_parser = values::one_of::<ToneMap>())]
     pub tone_map: Option<ToneMap>,
     /// Which light is shown as white: the display's, the lamps', or light of a temperature or chromaticity

@@ -126,6 +126,23 @@ fn aces(exposed: LinearSrgb) -> LinearSrgb {
     transform(&OUTPUT, transform(&INPUT, exposed).map(curve))
 }
 
+/// Exact up to 0.4, then logarithmic: 1 is shown as 0.62, each stop above it as a tenth more, and four stops above it as
+/// white. Keeps hues, but for the brightest, of which up to two fifths turn white.
+fn soft(exposed: LinearSrgb) -> LinearSrgb {
+    const SHOULDER: f64 = 0.4;
+    /// Brings 16 to 1, with slope 1 at the shoulder.
+    const STEP: f64 = 0.123_872_741_774_841_12;
+    const MOST_WHITENESS: f64 = 0.4;
+    let peak = exposed.max_channel();
+    if peak <= SHOULDER {
+        return exposed;
+    }
+    let rise = STEP * ((peak - SHOULDER) / STEP).ln_1p();
+    let new_peak = (SHOULDER + rise).min(1.0);
+    let whiteness = MOST_WHITENESS * ((new_peak - SHOULDER) / (1.0 - SHOULDER)).powi(3);
+    exposed * (new_peak / peak) * (1.0 - whiteness) + LinearSrgb::grey(new_peak * whiteness)
+}
+
 impl ToneMap {
     /// Display light [0, 1] from exposed radiance, where 1 is the display's white. Negative channels count as 0.
     pub fn apply(self, exposed: LinearSrgb) -> LinearSrgb {
@@ -135,6 +152,7 @@ impl ToneMap {
             Self::Neutral => neutral(exposed),
             Self::AgX => agx(exposed),
             Self::Aces => aces(exposed),
+            Self::Soft => soft(exposed),
         };
         display.map(|channel| channel.clamp(0.0, 1.0))
     }

@@ -27,17 +27,19 @@ pub enum ToneMap {
     /// Cut at 1.
     None,
     /// Khronos PBR Neutral: keeps hues, rolls highlights off.
-    #[default]
     Neutral,
     /// AgX: soft shoulder, saturated lights turn white.
     AgX,
     /// ACES, in the fit of Stephen Hill: more contrast, darker middle tones.
     Aces,
+    /// Exact in dark and middle tones, logarithmic above: what is up to 16 times as bright as white can be told apart.
+    #[default]
+    Soft,
 }
 
 impl ToneMap {
     /// Every one.
-    pub const ALL: [Self; 4] = [Self::None, Self::Neutral, Self::AgX, Self::Aces];
+    pub const ALL: [Self; 5] = [Self::None, Self::Neutral, Self::AgX, Self::Aces, Self::Soft];
 }
 
 /// One picture to be made.

@@ -227,6 +227,12 @@ pub struct AlphaMask {
 }
 
 impl AlphaMask {
+    /// Takes all of a surface away.
+    pub const NOWHERE: Self = Self {
+        cutoff: f64::INFINITY,
+        factor: 0.0,
+    };
+
     /// Whether the surface is there at a texture coordinate; without a texture it is everywhere or nowhere.
     pub fn is_there(&self, texture: Option<(&Texture, DVec2)>) -> bool {
         let alpha = texture.map_or(1.0, |(texture, uv)| texture.alpha(uv));

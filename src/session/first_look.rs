@@ -1,4 +1,7 @@
 //! Direct light and what surfaces send each other of it, coarsely: what is shown until both are as fine as asked for.
+//!
+//! Before there are caustics, light goes straight through clear bodies: where it comes to lie is wrong, but not how much
+//! of it there is.
 
 use super::direct_cache::DirectCache;
 use super::direct_work::DirectWork;
@@ -18,10 +21,9 @@ const HALVINGS: u32 = 2;
 /// Elements of all grids of indirect light.
 const ELEMENTS: u64 = 1_500;
 
-/// The rays of both, kept while the bake goes on.
+/// The rays between surfaces, kept while the bake goes on.
 #[derive(Debug, Default)]
 pub(super) struct FirstLook {
-    direct: DirectCache,
     indirect: IndirectCache,
 }
 
@@ -39,11 +41,15 @@ impl FirstLook {
             ..*finish
         };
         let (charts, _) = finish.charts(levels);
+        let mut direct = DirectCache::default();
         if finish.plan.is_on(Effect::Direct) {
+            let passes_glass = levels.is_empty() && finish.plan.is_on(Effect::LightPass);
+            let passing = passes_glass.then(|| tracer.without_clear_bodies());
             let direct_charts = finish.direct_charts(&charts);
-            DirectWork::default().shine(tracer, &direct_charts, &mut self.direct, on_whom);
+            let lit_by = passing.as_ref().unwrap_or(tracer);
+            DirectWork::default().shine(lit_by, &direct_charts, &mut direct, on_whom);
         }
-        let (mut maps, mut parts) = finish.maps(levels, &charts, &self.direct);
+        let (mut maps, mut parts) = finish.maps(levels, &charts, &direct);
         if finish.plan.is_on(Effect::Indirect) {
             self.trace(finish, tracer, on_whom);
             IndirectWork::of_known(&self.indirect, &maps).add_to(&self.indirect, &mut maps, &mut parts);

@@ -13,7 +13,7 @@ use super::smoothing::smoothing_groups;
 use crate::geometry::{Ray, TriangleBvh, TriangleHit, ray};
 use crate::optics::spectrum::Spectrum;
 use crate::optics::{LinearSrgb, Nanometres};
-use crate::scene::{Adjacency, Mesh, Scene, TextureRef, Waves};
+use crate::scene::{Adjacency, AlphaMask, Material, Mesh, Scene, TextureRef, Waves};
 
 /// A scene with its hierarchy. What edits of the scene leave as it is, edited copies share.
 #[derive(Debug)]
@@ -185,6 +185,17 @@ impl Tracer {
             has_masks: self.has_masks,
             wavelength: self.wavelength,
         }
+    }
+
+    /// The same scene for rays that pass clear bodies as if these were not there.
+    #[must_use]
+    pub fn without_clear_bodies(&self) -> Self {
+        let mut scene = Scene::clone(&self.scene);
+        let is_clear = |material: &&mut Material| !material.surface.is_opaque();
+        for material in scene.materials.iter_mut().filter(is_clear) {
+            material.alpha_mask = Some(AlphaMask::NOWHERE);
+        }
+        self.edited(Arc::new(scene))
     }
 
     /// The same scene with the refractive indices of one wavelength; colours stay as they are.

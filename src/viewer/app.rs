@@ -52,7 +52,7 @@ impl From<accessibility::Event> for News {
 /// A scroll of this many pixels counts as one notch of the wheel.
 const PIXELS_PER_NOTCH: f64 = 40.0;
 /// How often a window at rest looks whether it was asked to stop.
-const LOOK_FOR_STOP: Duration = Duration::from_millis(200);
+const LOOK_FOR_STOP: Duration = Duration::from_millis(100);
 /// Time between frames that only show how a bake gets on; where the processor draws them, the bake waits for them.
 const BAKING_FRAME: Duration = Duration::from_millis(100);
 const BAKING_FRAME_OF_SOFTWARE: Duration = Duration::from_millis(500);
@@ -567,6 +567,7 @@ impl ApplicationHandler<News> for App {
         }
         match event {
             WindowEvent::CloseRequested | WindowEvent::Destroyed => self.close(event_loop),
+            WindowEvent::RedrawRequested if event_loop.exiting() => {}
             WindowEvent::RedrawRequested => self.redraw(event_loop),
             WindowEvent::Resized(_) | WindowEvent::ScaleFactorChanged { .. } => {
                 graphics.resize();

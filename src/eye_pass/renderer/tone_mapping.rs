@@ -115,6 +115,7 @@ pub(super) fn constants(tone_map: ToneMap, encode_srgb: bool) -> [(&'static str,
         ToneMap::Neutral => 1.0,
         ToneMap::AgX => 2.0,
         ToneMap::Aces => 3.0,
+        ToneMap::Soft => 4.0,
     };
     [
         ("TONE_MAP", code),

@@ -14,7 +14,12 @@ const AUTO_EXPOSURE: &str = "Measures the present picture and sets the exposure 
 const NO_DIFFERENCE: &str = "Ask under Effects what an effect is worth.";
 const NO_ERRORS: &str = "These maps come without an estimate of their error.";
 
-const TONE_MAPS: [(ToneMap, &str, &str); 4] = [
+const TONE_MAPS: [(ToneMap, &str, &str); 5] = [
+    (
+        ToneMap::Soft,
+        "soft",
+        "Exact in dark and middle tones; highlights up to 16 times white can be told apart",
+    ),
     (
         ToneMap::Neutral,
         "neutral",

@@ -73,7 +73,7 @@ fn save(viewer: &mut Viewer<'_>, seen: &RgbImage, stops: f64) {
     let on_screen: Vec<u8> = picture(seen).flat_map(|(.., rgb)| rgb).collect();
     let off = most(&on_screen, shown.as_raw());
     assert!(off <= Some(1), "{off:?} codes between the screen and the file");
-    let by_cpu = display_rgba8(&radiance, stops, ToneMap::Neutral);
+    let by_cpu = display_rgba8(&radiance, stops, ToneMap::default());
     let by_cpu: Vec<u8> = by_cpu.chunks(4).flat_map(|rgba| rgba[..3].to_vec()).collect();
     let off = most(&by_cpu, shown.as_raw());
     assert!(off <= Some(1), "{off:?} codes between the two files");
@@ -276,18 +276,19 @@ fn exposure_suits_a_room_that_is_walked() {
     let Some(screen) = Screen::start() else {
         return;
     };
-    // Caustic and direct light: the first maps come without the second, unless the bake outruns the window.
     let mut viewer = Viewer::open(&screen, "builtin:showroom --map-resolution 64 --max-error 50%");
     let (_, rest) = viewer.wait_for_bake();
     let measured = viewer.all("exposure");
     let stops: Vec<f64> = measured
         .iter()
-        .filter_map(|event| event["stops"].as_f64())
+        .filter_map(|event| event["exposure_stops"].as_f64())
         .collect();
-    match stops[..] {
-        [of_the_caustic, of_both] => assert!(of_both < of_the_caustic - 2.0, "{stops:?}"),
-        [of_both] => assert!(of_both.abs() < 2.0, "{of_both}"),
-        _ => panic!("measured again and again: {measured:?}"),
+    assert!(!stops.is_empty());
+    for of_maps in &stops {
+        assert!(
+            of_maps.abs() < 2.0 && (of_maps - stops[0]).abs() <= 0.5,
+            "{stops:?}"
+        );
     }
     let shot = viewer.screenshot();
     let share = |is_so: fn([u8; 3]) -> bool| {

@@ -62,7 +62,10 @@ fn a_png_shows_radiance_as_its_options_say() {
     assert_eq!(stops, tone_mapping::auto_exposure_stops(&seen));
     assert!(auto == tone_mapping::display_rgba8(&seen, stops, ToneMap::default()));
     let mut all = vec![auto];
-    for (name, tone_map) in ["none", "neutral", "agx", "aces"].into_iter().zip(ToneMap::ALL) {
+    for (name, tone_map) in ["none", "neutral", "agx", "aces", "soft"]
+        .into_iter()
+        .zip(ToneMap::ALL)
+    {
         let (picture, stops) = shown(&format!("--exposure 1 --tone-map {name}"));
         assert!(
             picture == tone_mapping::display_rgba8(&seen, 1.0, tone_map),

@@ -38,6 +38,21 @@ fn greys_stay_grey_and_rise() {
             near(shown, LinearSrgb::grey(shown.g), 2e-5, tone_map);
         }
     }
+    // Soft is exact in the middle, and tells stops above white apart by a tenth.
+    near(
+        ToneMap::Soft.apply(rgb(0.4, 0.2, 0.1)),
+        rgb(0.4, 0.2, 0.1),
+        1e-12,
+        "soft",
+    );
+    for [low, high] in [[1.0, 2.0], [2.0, 4.0], [4.0, 8.0], [8.0, 15.9]] {
+        near(
+            grey(ToneMap::Soft, high) - grey(ToneMap::Soft, low),
+            0.095,
+            0.015,
+            low,
+        );
+    }
     // Below the shoulder of Neutral it only takes off 0.04, the reflection of the dielectrics that it was made for.
     for value in [0.1, 0.3, 0.7] {
         near(

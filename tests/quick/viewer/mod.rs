@@ -5,6 +5,7 @@ mod course_plot;
 mod debounce;
 mod effects;
 mod exporting;
+mod exposure;
 mod false_colours;
 mod files;
 mod filming;
