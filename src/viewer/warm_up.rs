@@ -6,7 +6,7 @@
 use std::sync::Arc;
 
 use super::background::Background;
-use super::graphics::{Picture, SAMPLES};
+use super::graphics::{Picture, SAMPLES, texture};
 use crate::effect::EffectSwitch;
 use crate::error::Result;
 use crate::eye_pass::View;
@@ -34,7 +34,7 @@ impl WarmUp {
     }
 
     /// Begins, unless that was done before.
-    pub fn begin(&mut self, scene: &Arc<Scene>, view: &View, qualities: [EyeQuality; 2]) {
+    pub fn begin(&mut self, scene: &Arc<Scene>, view: &View, quality: EyeQuality) {
         if self.is_done || self.work.of().is_some() {
             return;
         }
@@ -44,7 +44,7 @@ impl WarmUp {
             height: (WIDTH * view.height).div_ceil(view.width),
             ..view.clone()
         };
-        let started = self.work.start((), move |_| draw(&scene, &view, qualities));
+        let started = self.work.start((), move |_| draw(&scene, &view, quality));
         self.is_done = started.is_err();
     }
 
@@ -65,12 +65,13 @@ impl WarmUp {
     }
 }
 
-fn draw(scene: &Scene, view: &View, qualities: [EyeQuality; 2]) -> Result<()> {
+fn draw(scene: &Scene, view: &View, quality: EyeQuality) -> Result<()> {
     let gpu = Gpu::headless()?;
     let mut renderer = Renderer::new(&gpu, scene, Picture::FORMAT, SAMPLES)?;
-    for quality in qualities {
-        renderer.set_quality(quality);
-        renderer.radiance(&gpu, view)?;
-    }
-    Ok(())
+    renderer.set_quality(quality);
+    let target = texture(&gpu.device, [view.width, view.height]);
+    let mut encoder = gpu.device.create_command_encoder(&Default::default());
+    renderer.draw(&gpu, &mut encoder, &target, view)?;
+    gpu.queue.submit([encoder.finish()]);
+    gpu.wait()
 }

@@ -111,8 +111,8 @@ impl App {
             self.reports_due = MOST_REPORTS;
         }
         if !self.model.maps().is_empty() {
-            let qualities = [self.pace.walking(), self.pace.resting()];
-            self.warm_up.begin(self.model.scene(), &view, qualities);
+            let quality = self.pace.walking();
+            self.warm_up.begin(self.model.scene(), &view, quality);
         }
         Ok(())
     }
