@@ -21,6 +21,7 @@ const WIDTH: u32 = 64;
 #[derive(Debug)]
 pub struct WarmUp {
     work: Background<(), Result<()>>,
+    is_lit: bool,
     is_done: bool,
 }
 
@@ -29,13 +30,15 @@ impl WarmUp {
     pub fn new(wake: Arc<dyn Fn() + Send + Sync>) -> Self {
         Self {
             work: Background::new("shaders", wake),
+            is_lit: false,
             is_done: false,
         }
     }
 
-    /// Begins, unless that was done before.
+    /// Begins with the second picture of light, so that the first one waits for nothing.
     pub fn begin(&mut self, scene: &Arc<Scene>, view: &View, quality: EyeQuality) {
-        if self.is_done || self.work.of().is_some() {
+        let was_lit = std::mem::replace(&mut self.is_lit, true);
+        if !was_lit || self.is_done || self.is_coming() {
             return;
         }
         let scene = Arc::clone(scene);

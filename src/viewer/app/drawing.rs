@@ -101,6 +101,10 @@ impl App {
             }
             self.frame_times.push(ms);
         }
+        if !self.model.maps().is_empty() {
+            let quality = self.pace.walking();
+            self.warm_up.begin(self.model.scene(), &view, quality);
+        }
         if graphics.shows(&view) {
             return self.refine_picture(&view);
         }
@@ -109,10 +113,6 @@ impl App {
         if graphics.draw_picture(&view, self.pace.walking())? {
             self.pictures += 1;
             self.reports_due = MOST_REPORTS;
-        }
-        if !self.model.maps().is_empty() {
-            let quality = self.pace.walking();
-            self.warm_up.begin(self.model.scene(), &view, quality);
         }
         Ok(())
     }
