@@ -85,7 +85,7 @@ fn tone_map_soft(exposed: vec3f) -> vec3f {
     let rise = step * log(1.0 + (peak - shoulder) / step);
     let new_peak = min(shoulder + rise, 1.0);
     let part = (new_peak - shoulder) / (1.0 - shoulder);
-    return mix(exposed * (new_peak / peak), vec3f(new_peak), 0.4 * part * part * part);
+    return new_peak * mix(exposed / peak, vec3f(1.0), 0.4 * part * part * part);
 }
 
 fn tone_map(exposed: vec3f, kind: u32) -> vec3f {

@@ -140,7 +140,8 @@ fn soft(exposed: LinearSrgb) -> LinearSrgb {
     let rise = STEP * ((peak - SHOULDER) / STEP).ln_1p();
     let new_peak = (SHOULDER + rise).min(1.0);
     let whiteness = MOST_WHITENESS * ((new_peak - SHOULDER) / (1.0 - SHOULDER)).powi(3);
-    exposed * (new_peak / peak) * (1.0 - whiteness) + LinearSrgb::grey(new_peak * whiteness)
+    // A grey stays the same grey to the last bit.
+    ((exposed / peak) * (1.0 - whiteness) + LinearSrgb::grey(whiteness)) * new_peak
 }
 
 impl ToneMap {
