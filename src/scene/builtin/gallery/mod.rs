@@ -70,7 +70,7 @@ fn cameras() -> Vec<Camera> {
         ),
         look(
             "tumbler",
-            [0.5, 1.15, 1.15],
+            [0.62, 1.08, 0.62],
             table::TUMBLER + DVec3::new(-0.08, 0.03, 0.0),
             0.5,
         ),
@@ -85,10 +85,10 @@ fn cameras() -> Vec<Camera> {
         look(
             "prism",
             [0.2, 1.6, 0.1],
-            exhibits::PRISM.lerp(exhibits::spectrum(), 0.55),
+            exhibits::PRISM.lerp(exhibits::spectrum(), 0.42),
             0.8,
         ),
-        look("picture", [0.7, 1.45, -0.1], block_and_picture(), 0.75),
+        look("picture", [1.9, 1.45, 0.35], block_and_picture(), 0.75),
     ]
 }
 

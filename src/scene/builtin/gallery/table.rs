@@ -84,7 +84,7 @@ fn add_table(scene: &mut Scene) {
 }
 
 fn add_wine_glass(scene: &mut Scene) {
-    let outline = glassware::turned(&[&glassware::WINE_GLASS_M], [128, 5]);
+    let outline = glassware::turned(&[&glassware::WINE_GLASS_M], [96, 14]);
     parts::add(
         scene,
         "wine glass",
@@ -98,7 +98,7 @@ fn add_wine_glass(scene: &mut Scene) {
         }),
         ..parts::dielectric("wine", 1.345)
     };
-    let body = glassware::turned(&glassware::WINE_M, [128, 5]);
+    let body = glassware::turned(&glassware::WINE_M, [96, 14]);
     parts::add(scene, "wine", shapes::moved(body, WINE_GLASS), wine);
 }
 
