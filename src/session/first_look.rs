@@ -11,7 +11,7 @@ use super::indirect_work::IndirectWork;
 use super::result::LightLayer;
 use crate::illumination::IlluminationMap;
 use crate::light_pass::indirect::{LEAST_PASSES, Network};
-use crate::plan::Effect;
+use crate::plan::{Effect, wants_caustics};
 use crate::progress::{Control, Progress};
 use crate::transport::Tracer;
 
@@ -43,7 +43,7 @@ impl FirstLook {
         let (charts, _) = finish.charts(levels);
         let mut direct = DirectCache::default();
         if finish.plan.is_on(Effect::Direct) {
-            let passes_glass = levels.is_empty() && finish.plan.is_on(Effect::LightPass);
+            let passes_glass = levels.is_empty() && wants_caustics(finish.settings);
             let passing = passes_glass.then(|| tracer.without_clear_bodies());
             let direct_charts = finish.direct_charts(&charts);
             let lit_by = passing.as_ref().unwrap_or(tracer);

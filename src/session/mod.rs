@@ -314,6 +314,35 @@ impl BakeSession {
         }
     }
 
+    /// Shows direct and indirect light before anybody has looked for caustics, unless something was shown before.
+    fn first_look(
+        &mut self,
+        settings: &BakeSettings,
+        (progress, control): (&dyn Progress, &Control),
+        (level, clock): (&mut Option<&mut TakeLevel>, &mut Clock),
+    ) -> Option<FirstLook> {
+        let is_new = self.lights.is_empty() && self.direct.is_empty();
+        let level = level.as_mut().filter(|_| is_new)?;
+        progress.advance(Stage::Build, 0, 1);
+        let tracer = clock.time(|clock| &mut clock.build, || self.tracer());
+        let finish = Finish {
+            scene: &self.scene,
+            sizes: &self.sizes,
+            settings,
+            plan: &plan::decide(&self.scene, settings, &[]),
+            coarsening: 0,
+        };
+        let mut look = FirstLook::default();
+        let maps = look.maps(&finish, &tracer, &[], (progress, control));
+        let mut result = finish.result(maps, &[], &CausticOutcome::default());
+        // What there is to do is not known yet.
+        result.plan = EffectPlan::default();
+        if !result.maps.is_empty() {
+            level(result);
+        }
+        Some(look)
+    }
+
     fn bake_here(
         &mut self,
         settings: &BakeSettings,
@@ -324,6 +353,8 @@ impl BakeSession {
     ) -> Result<BakeResult> {
         let whole = Stopwatch::start();
         let mut clock = Clock::default();
+        let mut level = level;
+        let first_look = self.first_look(settings, (progress, control), (&mut level, &mut clock));
         let ground = self.ground(settings, progress, control, &mut clock);
         let Ground {
             tracer,
@@ -341,8 +372,6 @@ impl BakeSession {
             plan,
             coarsening: 0,
         };
-        let is_new = self.lights.is_empty() && self.direct.is_empty();
-        let first_look = (is_new && level.is_some()).then(FirstLook::default);
         let lights = &mut self.lights;
         let mut showing = Showing {
             finish: &finish,
@@ -359,7 +388,6 @@ impl BakeSession {
             is_first: true,
             first_look,
         };
-        showing.begin(&mut clock);
         let mut outcome = ground.bake(&self.sizes, lights, &mut clock, labour, &mut showing)?;
         let Showing {
             mut lamps,

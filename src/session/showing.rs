@@ -44,26 +44,6 @@ pub(super) struct Showing<'a, 'level> {
 }
 
 impl Showing<'_, '_> {
-    /// Shows direct and indirect light before there are caustics, where nothing else is shown.
-    pub(super) fn begin(&mut self, clock: &mut Clock) {
-        if let Some(mut look) = self.first_look.take() {
-            self.show_coarsely(&mut look, &[], &CausticOutcome::default(), clock);
-            self.first_look = Some(look);
-        }
-    }
-
-    fn show_coarsely(
-        &mut self,
-        look: &mut FirstLook,
-        levels: &[Shown],
-        so_far: &CausticOutcome,
-        clock: &mut Clock,
-    ) {
-        let on_whom = (self.progress, self.control);
-        let maps = look.maps(self.finish, self.tracer, levels, on_whom);
-        self.hand_out(maps, levels, so_far, clock);
-    }
-
     fn hand_out(
         &mut self,
         maps: (Vec<IlluminationMap>, Vec<LightLayer>),
@@ -74,7 +54,7 @@ impl Showing<'_, '_> {
         let mut result = self.finish.result(maps, levels, so_far);
         clock.total = self.watch.elapsed();
         account(&mut result, self.finish, self.aim, &self.lamps.clock(clock));
-        if let (Some(level), false) = (&mut self.level, result.maps.is_empty()) {
+        if let Some(level) = &mut self.level {
             level(result);
         }
     }
@@ -86,9 +66,10 @@ impl Onlooker for Showing<'_, '_> {
         if self.level.is_none() {
             return Ok(());
         }
-        if is_first && let Some(mut look) = self.first_look.take() {
-            self.show_coarsely(&mut look, levels, so_far, clock);
-            self.first_look = Some(look);
+        if is_first && let Some(look) = &mut self.first_look {
+            let on_whom = (self.progress, self.control);
+            let maps = look.maps(self.finish, self.tracer, levels, on_whom);
+            self.hand_out(maps, levels, so_far, clock);
             return Ok(());
         }
         let (finish, plan) = (self.finish, self.finish.plan);
