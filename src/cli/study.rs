@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use clap::{ArgMatches, Args, FromArgMatches, Subcommand};
 use nephroid::effect::Effect;
-use nephroid::error::{Error, Result};
+use nephroid::error::{Error, Result, Warning};
 use nephroid::export::manifest::MapEntry;
 use nephroid::export::map_folder::MapFolder;
 use nephroid::files::{self, OutputFolder};
@@ -483,6 +483,13 @@ impl Desk<'_> {
         settings.validate()?;
         check_rays(study.rays)?;
         let scene = self.load(&study.scene, &study.scene_options)?;
+        if (0..scene.objects.len()).any(|object| scene.material_of(object).is_dispersive()) {
+            self.terminal.print_warnings(&[Warning::new(
+                &scene.source,
+                "brute force bends light of all wavelengths alike, as at 587.56 nm",
+                "compare its maps with those of a bake with --effects dispersion=off",
+            )]);
+        }
         let output = &study.common.output;
         let folder = MapFolder::open(output, study.common.force)?;
         self.interrupt.check(&scene.source)?;

@@ -16,7 +16,10 @@ fn help_names_what_there_is() {
     }
     let render = sandbox.succeed("render -h").stdout;
     let words: Vec<&str> = render.split_whitespace().collect();
-    assert!(words.join(" ").contains("none, neutral, agx, aces, soft]"), "{render}");
+    assert!(
+        words.join(" ").contains("none, neutral, agx, aces, soft]"),
+        "{render}"
+    );
     let version = sandbox.succeed("--version").stdout;
     assert_eq!(version, format!("nephroid {}\n", env!("CARGO_PKG_VERSION")));
 }

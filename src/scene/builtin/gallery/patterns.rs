@@ -85,7 +85,7 @@ pub fn wood(place: DVec2, boards: i32, [dark, light]: [Code; 2]) -> Code {
     let rings = 0.5 + 0.5 * (TAU * (9.0 * waver + 5.0 * place.y * f64::from(boards))).sin();
     let fibre = turbulence(place, [6, 256], 2, seed + 5);
     let pores = noise(place, [24, 256], seed + 9).powi(6);
-    let tone = 0.42 * rings.powi(2) + 0.5 * fibre + 0.24 * hash(board as i32, 3, 7) - 0.35 * pores;
+    let tone = 0.2 * rings.powi(2) + 0.6 * fibre + 0.24 * hash(board as i32, 3, 7) - 0.35 * pores;
     let gap = line(place.y * f64::from(boards), 0.006, 0.012);
     (dark + (light - dark) * tone.clamp(0.0, 1.0)) * (1.0 - 0.75 * gap)
 }

@@ -111,12 +111,10 @@ const TUMBLER_CUT: CutGlass = CutGlass {
     squareness: 5.0,
 };
 
-/// Leans back a little.
+/// Upright, and turned so that the overview sees the ring in it.
 fn add_mirror(scene: &mut Scene) {
-    let turn = DVec3::new(0.97, 0.0, 0.24);
-    let up = DVec3::new(0.0, 0.97, -0.24);
-    let up = (up - turn * up.dot(turn)).normalize();
-    let (right, up, normal) = (turn * 0.22, up * 0.18, turn.cross(up).normalize());
+    let (turn, up) = (DVec3::new(0.965, 0.0, -0.264).normalize(), DVec3::Y);
+    let (right, up, normal) = (turn * 0.22, up * 0.18, turn.cross(up));
     parts::add(
         scene,
         "standing mirror",
