@@ -123,7 +123,8 @@ pub fn fill(t: &mut Table) {
             .bake(scene, 1e3, 32)
             .must("every pixel is finite", is_picture_finite);
     }
-    let gallery = t.case("gallery").splat(builtin_scene("gallery"), 1e4, 16);
+    let gallery = t.case("gallery");
+    gallery.bake_with(builtin_scene("gallery"), photons(1e4, 16));
     gallery.must("every lamp has its caster", |bake| {
         let ledgers = &bake.result.ledgers;
         let is_lit = |light: &Light| {
