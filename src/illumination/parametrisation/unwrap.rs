@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use glam::DVec2;
-use uvunwrap::{Density, MeshInput, Options, Packing};
+use uvunwrap::{Density, MeshInput, Options};
 
 use crate::files::cache::{self, ContentHash};
 use crate::scene::Mesh;
@@ -17,7 +17,7 @@ const CHART_ANGLE_DEG: f32 = 50.0;
 /// Largest ratio between a facet's share of the map and of the surface, either way.
 const DISTORTION: f32 = 1.5;
 
-/// Meshes of fewer triangles are unwrapped in no time, and their charts packed as densely as they go.
+/// Meshes of fewer triangles are unwrapped in no time.
 const LEAST_KEPT: usize = 2000;
 
 /// Changes with whatever changes the coordinates of a mesh: a new version of uvunwrap, other options.
@@ -89,23 +89,41 @@ fn decode(bytes: &[u8], triangles: usize) -> Option<Vec<[DVec2; 3]>> {
     is_sound.then(|| corners.iter().map(triangle).collect())
 }
 
+/// More vertices than this for each place are no seams any more: files split them all over for normals or coordinates.
+const MOST_SPLIT: f64 = 1.5;
+
+/// Positions and indices of a mesh. Where most of its vertices differ in normals or coordinates alone, those of one place
+/// are one: a chart goes on over them, or there would be as many charts as facets.
+fn welded(mesh: &Mesh, local: impl Fn(&glam::DVec3) -> [f32; 3]) -> (Vec<[f32; 3]>, Vec<u32>) {
+    let split: Vec<[f32; 3]> = mesh.positions.iter().map(local).collect();
+    let indices: Vec<u32> = mesh.triangles.iter().flatten().copied().collect();
+    let (mut positions, mut known) = (Vec::new(), HashMap::new());
+    let mut vertex_at = |position: &[f32; 3]| {
+        // Both zeros are one.
+        *known
+            .entry(position.map(|value| (value + 0.0).to_bits()))
+            .or_insert_with(|| {
+                positions.push(*position);
+                positions.len() as u32 - 1
+            })
+    };
+    let vertices: Vec<u32> = split.iter().map(&mut vertex_at).collect();
+    if (split.len() as f64) < MOST_SPLIT * positions.len() as f64 {
+        return (split, indices);
+    }
+    (
+        positions,
+        indices.iter().map(|&index| vertices[index as usize]).collect(),
+    )
+}
+
 /// Unwraps, whatever was done before.
 fn lay_out(mesh: &Mesh, side: usize) -> Option<Vec<[DVec2; 3]>> {
     let (low, high) = mesh.bounds()?;
     let size_m = (high - low).max_element();
     // Single precision is for what lies around zero.
     let local = |point: &glam::DVec3| ((*point - (low + high) * 0.5) / size_m).as_vec3().to_array();
-    // Corners that differ in normals or coordinates alone are one: a chart goes on over them.
-    let (mut positions, mut known) = (Vec::new(), HashMap::new());
-    let mut welded = |vertex: &u32| {
-        // Both zeros are one.
-        let position = local(&mesh.positions[*vertex as usize]).map(|value| value + 0.0);
-        *known.entry(position.map(f32::to_bits)).or_insert_with(|| {
-            positions.push(position);
-            positions.len() as u32 - 1
-        })
-    };
-    let indices: Vec<u32> = mesh.triangles.iter().flatten().map(&mut welded).collect();
+    let (positions, indices) = welded(mesh, local);
     let input = MeshInput::new(&positions, &indices);
     let mut side = side.clamp(SIDES.0, SIDES.1);
     loop {
@@ -116,11 +134,6 @@ fn lay_out(mesh: &Mesh, side: usize) -> Option<Vec<[DVec2; 3]>> {
                 page_size: side as u32,
             },
             padding: PADDING_TEXELS,
-            packing: if mesh.triangles.len() < LEAST_KEPT {
-                Packing::Shape
-            } else {
-                Packing::Fast
-            },
             ..Options::default()
         };
         match uvunwrap::generate(&[input], &options) {

@@ -86,12 +86,12 @@ fn no_spread_changes_nothing() {
 
 #[test]
 fn points_spread_by_the_variance() {
-    let (width, height) = (96, 80);
+    let (width, height) = (128, 112);
     // The last two go by way of a coarser map, in which places are rounded: the mean of points at all of them.
     for (spread, places) in [(0.2, 1), (0.5, 1), (1.0, 1), (3.0, 1), (4.5, 4), (9.0, 4)] {
         let [mut x, mut y, mut xx, mut yy, mut peak] = [0.0; 5];
         for place in 0..places {
-            let (across, down) = (48 + place, 40 + place);
+            let (across, down) = (64 + place, 56 + place);
             let mut flux = FluxAccumulator::new(width, height);
             flux.texels_mut()[down * width + across] = [1 << 50; 3];
             smooth(&mut flux, None, spread);

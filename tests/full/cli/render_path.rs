@@ -163,7 +163,9 @@ fn frames_are_the_pictures_of_render() {
 fn a_turntable_goes_around_in_equal_steps() {
     let sandbox = Sandbox::new();
     let turn = |frames: usize, folder: &str| {
-        format!("render builtin:mirror --turntable {frames} -o {folder} {QUICK} --exposure 1 --json")
+        format!(
+            "render builtin:mirror --turntable {frames} -o {folder} {QUICK} --estimator wavefront --exposure 1 --json"
+        )
     };
     let Some(four) = run(&sandbox, "turntable", &turn(4, "four")) else {
         return;
