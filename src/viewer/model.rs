@@ -1,5 +1,6 @@
 //! Everything that the window shows and does, without the window.
 
+mod comparing;
 mod filming;
 mod keeping;
 mod opening;
@@ -19,19 +20,17 @@ use super::files::keeper::Keeper;
 use super::files::{Files, working_folder};
 use super::filming::Player;
 use super::navigation::{Navigator, Travel};
-use super::panel::{CompareWish, LayerShown, Panel, Quantity, Wishes};
+use super::panel::{LayerShown, Panel, Quantity, Wishes};
 use super::probe::{Probed, Prober};
 use super::sketching::Sketcher;
 use super::solid::{Solid, Surroundings};
 use super::views::MapSurvey;
 use super::worker::{BakeRequest, BakeState, BakedLevel, Worker, Worth};
 use super::{ViewerOptions, difference_view, error_view, wavelength_view};
-use crate::effect::Effect;
 use crate::error::Result;
 use crate::eye_pass::renderer::MapStyle;
 use crate::geometry::Ray;
 use crate::illumination::IlluminationMap;
-use crate::illumination::difference::Difference;
 use crate::light_pass::explain::Limits;
 use crate::light_pass::sketch::{Sketch, SketchLimits};
 use crate::scene::Scene;
@@ -237,11 +236,6 @@ impl Model {
         }
     }
 
-    /// What an effect adds to the maps that are shown or takes from them, where that was found.
-    fn difference(&self) -> Option<&Difference> {
-        self.worth.as_ref()?.difference.as_ref().ok()
-    }
-
     /// Whether direct light is to be traced and not looked up: it is shown, and its layer is not baked yet, or a light or
     /// an object was moved since.
     pub fn traces_lights(&self) -> bool {
@@ -326,46 +320,6 @@ impl Model {
     /// The maps' light, whatever the picture shows in its place.
     fn lit_maps(&self) -> Cow<'_, [IlluminationMap]> {
         self.with_quantity(self.maps(), Quantity::Light)
-    }
-
-    /// What the present maps are held against.
-    pub fn reference(&self) -> Option<&Reference> {
-        self.reference.as_ref()
-    }
-
-    /// The reference's maps as they are to be shown.
-    pub fn reference_to_show(&self) -> Option<(&Arc<Scene>, Vec<IlluminationMap>)> {
-        let reference = self.reference.as_ref()?;
-        Some((&reference.scene, self.as_shown(&reference.maps).into_owned()))
-    }
-
-    /// Begins or ends a comparison.
-    fn compare_with(&mut self, wish: &CompareWish) {
-        let scene = self.edits.scene();
-        let reference = match wish {
-            CompareWish::Keep => Reference::kept(scene, self.maps()).map(Some),
-            CompareWish::Load(folder) => Reference::of_folder(folder, scene).map(Some),
-            CompareWish::End => Ok(None),
-        };
-        match reference {
-            Ok(reference) => {
-                self.reference = reference;
-                self.refusal = None;
-                self.compare_again();
-            }
-            Err(error) => self.refusal = Some(error.to_string()),
-        }
-    }
-
-    /// Holds the maps that are shown now against the reference.
-    fn compare_again(&mut self) {
-        let present = self.last.as_ref().map_or(&self.given, |last| &last.result.maps);
-        if let Some(reference) = &mut self.reference {
-            reference.compare(present);
-            let relative_rmse = reference.relative_rmse.as_ref().ok();
-            let more = json!({"name": reference.name, "relative_rmse": relative_rmse});
-            self.log.write("against", more);
-        }
     }
 
     /// Maps as they are to be shown next, looked at as a whole, with what their values stand for.
@@ -505,20 +459,6 @@ impl Model {
         has_maps
     }
 
-    /// Shows what an effect is worth; tells whether there is anything new to be shown.
-    fn take_worth(&mut self, worth: Worth) -> bool {
-        let is_of_shown = |last: &Arc<BakedLevel>| Arc::ptr_eq(last, &worth.with);
-        if !self.last.as_ref().is_some_and(is_of_shown) {
-            return false;
-        }
-        self.log.write("compared", event_log::compared(&worth));
-        if worth.difference.is_ok() {
-            self.panel.display.quantity = Quantity::Difference;
-        }
-        self.worth = Some(worth);
-        true
-    }
-
     /// Whether maps are to replace those that are shown. Coarse maps of other light do, since what is shown is wrong
     /// then; coarse maps of the same light only where they are better than what is shown.
     fn improves_on_what_is_shown(&self, new: &BakedLevel) -> bool {
@@ -601,16 +541,6 @@ impl Model {
         let last = Arc::clone(last);
         self.exporter.start(export.clone(), last, working_folder());
         self.log.write_export(self.exporter.state());
-    }
-
-    /// Finds what an effect is worth to the maps that are shown, once these are done.
-    fn compare(&mut self, effect: Effect) {
-        let Some(last) = self.last.as_ref().filter(|last| last.is_final) else {
-            return;
-        };
-        if self.worker.compare(effect, Arc::clone(last)) {
-            self.state = self.worker.state();
-        }
     }
 
     /// Whether something else is wanted than what was asked for last.

@@ -106,9 +106,11 @@ fn percent(share: f64) -> f64 {
     (share * 1e6).round() / 1e4
 }
 
-/// The density as it is set ends the bake.
+/// The density as it is set ends a bake that was to refine.
 pub fn aim_at_density(settings: &mut BakeSettings) {
-    (settings.max_error, settings.max_time_s) = (None, None);
+    if settings.max_error.take().is_some() {
+        settings.max_time_s = None;
+    }
 }
 
 /// Keeps what ends a bake where another estimator can: splats do not refine.
