@@ -23,6 +23,8 @@ use std::process::ExitCode;
 
 use job::Job;
 use nephroid::error::{Error, ErrorKind, Result};
+#[cfg(feature = "viewer")]
+use nephroid::viewer::is_orphaned as is_of_lost_window;
 use terminal::Interrupt;
 use terminal::Terminal;
 
@@ -30,8 +32,8 @@ use terminal::Terminal;
 pub fn run() -> ExitCode {
     let usual = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |info| {
-        // Those of damaged files become errors.
-        if !nephroid::scene::is_guarded() {
+        // Those of damaged files become errors, that of a lost window its end.
+        if !nephroid::scene::is_guarded() && !is_of_lost_window(info) {
             usual(info);
         }
     }));
@@ -44,6 +46,11 @@ pub fn run() -> ExitCode {
         Ok(code) => code,
         Err(error) => report(&error),
     }
+}
+
+#[cfg(not(feature = "viewer"))]
+fn is_of_lost_window(_: &std::panic::PanicHookInfo<'_>) -> bool {
+    false
 }
 
 /// Runs a job; a signal decides the exit code even where what there was could still be written.

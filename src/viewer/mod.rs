@@ -41,6 +41,8 @@ mod warm_up;
 pub mod wavelength_view;
 pub mod worker;
 
+pub use orphaned::is_orphaned;
+
 use std::path::PathBuf;
 use std::sync::Arc;
 

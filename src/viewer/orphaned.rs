@@ -2,31 +2,26 @@
 //! window, and panics where it does not.
 
 use std::panic::{self, AssertUnwindSafe, PanicHookInfo};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Runs the window; `None` where winit panicked, without a word.
-pub(super) fn run<T>(window: impl FnOnce() -> T) -> Option<T> {
-    let is_orphaned = Arc::new(AtomicBool::new(false));
-    let usual: Arc<dyn Fn(&PanicHookInfo<'_>) + Send + Sync> = Arc::from(panic::take_hook());
-    let (found, tell) = (Arc::clone(&is_orphaned), Arc::clone(&usual));
-    panic::set_hook(Box::new(move |info| {
-        if is_of_winit(info) {
-            found.store(true, Ordering::Relaxed);
-        } else {
-            tell(info);
-        }
-    }));
-    let outcome = panic::catch_unwind(AssertUnwindSafe(window));
-    panic::set_hook(Box::new(move |info| usual(info)));
-    match outcome {
-        Ok(outcome) => Some(outcome),
-        Err(_) if is_orphaned.load(Ordering::Relaxed) => None,
-        Err(panic) => panic::resume_unwind(panic),
-    }
+/// Whether winit has panicked.
+static IS_ORPHANED: AtomicBool = AtomicBool::new(false);
+
+/// Notes a panic of winit, and tells whether it is one: then the window has gone, and [`run`](super::run) ends as if it
+/// had been closed. For the program's panic hook, which need not report it; without that the panic goes on.
+pub fn is_orphaned(info: &PanicHookInfo<'_>) -> bool {
+    let is_of_winit = info
+        .location()
+        .is_some_and(|place| place.file().contains("/winit-") || place.file().contains("\\winit-"));
+    IS_ORPHANED.fetch_or(is_of_winit, Ordering::Relaxed);
+    is_of_winit
 }
 
-fn is_of_winit(info: &PanicHookInfo<'_>) -> bool {
-    info.location()
-        .is_some_and(|place| place.file().contains("/winit-") || place.file().contains("\\winit-"))
+/// Runs the window; `None` where winit panicked.
+pub(super) fn run<T>(window: impl FnOnce() -> T) -> Option<T> {
+    match panic::catch_unwind(AssertUnwindSafe(window)) {
+        Ok(outcome) => Some(outcome),
+        Err(_) if IS_ORPHANED.load(Ordering::Relaxed) => None,
+        Err(panic) => panic::resume_unwind(panic),
+    }
 }
