@@ -170,7 +170,7 @@ fn glass_ball_is_probed_and_bends_otherwise() {
     };
     let mut viewer = Viewer::open(
         &screen,
-        "builtin:ball --density 20000 --map-resolution 128 --layers caustic,direct",
+        "builtin:ball --estimator wavefront --density 20000 --map-resolution 128 --layers caustic,direct",
     );
     let (first, _) = viewer.wait_for_bake();
     probe(&mut viewer);
