@@ -476,7 +476,8 @@ impl App {
             Shown::Hidden => Duration::MAX,
             Shown::Later => RETRY_AFTER,
             Shown::Yes if self.model.is_moving() || self.is_exposing() => Duration::ZERO,
-            Shown::Yes if self.is_refining => self.pace.pause(now),
+            // The panel glides on while the picture waits for hands to rest.
+            Shown::Yes if self.is_refining => self.pace.pause(now).min(repaint_after),
             Shown::Yes if self.model.state().is_working() => repaint_after.min(self.baking_frame()),
             Shown::Yes => repaint_after,
         };

@@ -365,14 +365,16 @@ impl<'a> Viewer<'a> {
     /// The middle of a control of the panel [pixels], scrolled into the window where it is not.
     pub fn centre(&self, role: &str, name: &str) -> (i32, i32) {
         let mut last_top = None;
-        for _ in 0..40 {
+        let mut unmoved = 0;
+        for _ in 0..60 {
             let [left, top, right, bottom] = self.control(Some(role), name);
             let [.., bake] = self.control(None, "Re-bake");
             // What stands above the sections, or over the picture, does not scroll.
             let is_fixed = ABOVE.iter().any(|above| name.starts_with(above)) || left >= f64::from(WIDTH);
             let highest = if is_fixed { 0.0 } else { bake + BELOW_BAKE };
-            // What stands at the very top cannot be scrolled any lower.
-            let is_at_top = last_top == Some(top) && top > 0.0;
+            unmoved = if last_top == Some(top) { unmoved + 1 } else { 0 };
+            // What stands at the very top cannot be scrolled any lower, however often one tries.
+            let is_at_top = unmoved >= 3 && top > 0.0;
             if bottom < f64::from(SIZE.1) && (top > highest || is_at_top) {
                 return ((0.5 * (left + right)) as i32, (0.5 * (top + bottom)) as i32);
             }

@@ -26,13 +26,7 @@ use crate::transport::Tracer;
 use facet::Facet;
 use lighting::{Arriving, Beam};
 use source::{Emission, Source};
-use texel::{Lit, Part, Row, Sample, Texel, TexelSum, mark_of};
-
-/// Samples across and down a texel where light is all there or all away.
-const COARSE_SIDE: usize = 2;
-
-/// Samples across and down a texel at a border between light and shadow.
-const FINE_SIDE: usize = 8;
+use texel::{Lit, Look, Part, Row, Sample, Texel, TexelSum, mark_of};
 
 /// Moves all samples by a millionth of a texel, so that none lies on the diagonal of a square of two triangles, where
 /// both would count it.
@@ -58,18 +52,25 @@ pub fn bake_direct(
     progress: &dyn Progress,
     control: &Control,
 ) -> Vec<DirectLayer> {
-    let total: u64 = charts.iter().map(|chart| 2 * chart.height as u64).sum();
-    let done = AtomicU64::new(0);
-    let row_done = || progress.advance(Stage::Direct, done.fetch_add(1, Ordering::Relaxed) + 1, total);
     let sources: Vec<Option<Source>> = lights
         .iter()
         .enumerate()
         .map(|(index, light)| Source::new(light, tracer, index))
         .collect();
+    let looks = if has_soft_light(&sources) { 3 } else { 2 };
+    let total: u64 = charts.iter().map(|chart| looks * chart.height as u64).sum();
+    let done = AtomicU64::new(0);
+    let row_done = || progress.advance(Stage::Direct, done.fetch_add(1, Ordering::Relaxed) + 1, total);
     charts
         .iter()
         .map(|chart| Baker::new(tracer, &sources, chart).bake(&row_done, control))
         .collect()
+}
+
+/// Whether one of them has extent.
+fn has_soft_light(sources: &[Option<Source>]) -> bool {
+    let mut sources = sources.iter().flatten();
+    sources.any(|source| matches!(source.emission, Emission::Soft(_)))
 }
 
 struct Baker<'a> {
@@ -114,15 +115,11 @@ impl<'a> Baker<'a> {
         }
     }
 
-    /// A coarse pass everywhere, then a fine one where light meets shadow within a texel or between neighbours.
+    /// A glance everywhere where lights have extent, a coarse look where one of them is partly hidden, and a fine one
+    /// where light meets shadow within a texel or between neighbours.
     fn bake(&self, row_done: &(impl Fn() + Sync), control: &Control) -> DirectLayer {
         let (width, height) = (self.chart.width, self.chart.height);
-        let dark = Texel {
-            irradiance: [0.0; 3],
-            lit: Lit::EMPTY,
-            is_uncertain: false,
-        };
-        let mut texels = vec![dark; width * height];
+        let mut texels = vec![Texel::DARK; width * height];
         let (mut shadow_rays, mut complete) = (0, true);
         let mut take = |rows: Vec<Row>, texels: &mut [Texel]| {
             for (row, content) in rows.into_iter().enumerate() {
@@ -133,10 +130,16 @@ impl<'a> Baker<'a> {
                 }
             }
         };
-        let coarse = self.pass(row_done, control, COARSE_SIDE, |_| true);
-        take(coarse, &mut texels);
-        let fine = self.pass(row_done, control, FINE_SIDE, |texel| {
-            texels[texel].is_uncertain || self.meets_shadow(&texels, texel)
+        let first = self.pass(row_done, control, Look::GLANCE, |_| true);
+        take(first, &mut texels);
+        if has_soft_light(self.sources) {
+            let coarse = self.pass(row_done, control, Look::COARSE, |texel| {
+                texels[texel].is_uncertain || self.meets_other(&texels, texel, |texel| texel.soft_lit)
+            });
+            take(coarse, &mut texels);
+        }
+        let fine = self.pass(row_done, control, Look::FINE, |texel| {
+            texels[texel].is_uncertain || self.meets_other(&texels, texel, |texel| texel.lit)
         });
         take(fine, &mut texels);
         let mut irradiance = texels
@@ -151,12 +154,13 @@ impl<'a> Baker<'a> {
         }
     }
 
-    fn meets_shadow(&self, texels: &[Texel], texel: usize) -> bool {
-        let own = texels[texel].lit;
+    /// Whether other lights reach a neighbour, or a part of the texel.
+    fn meets_other(&self, texels: &[Texel], texel: usize, lit: impl Fn(&Texel) -> Lit) -> bool {
+        let own = lit(&texels[texel]);
         own == Lit::MIXED
             || own != Lit::EMPTY
                 && neighbours(texel, self.chart.width, self.chart.height)
-                    .map(|other| texels[other].lit)
+                    .map(|other| lit(&texels[other]))
                     .any(|other| other != Lit::EMPTY && other != own)
     }
 
@@ -164,7 +168,7 @@ impl<'a> Baker<'a> {
         &self,
         row_done: &(impl Fn() + Sync),
         control: &Control,
-        side: usize,
+        look: Look,
         wanted: impl Fn(usize) -> bool + Sync,
     ) -> Vec<Row> {
         (0..self.chart.height)
@@ -176,14 +180,14 @@ impl<'a> Baker<'a> {
                         ..Row::default()
                     };
                 }
-                let content = self.row(row, side, &wanted);
+                let content = self.row(row, look, &wanted);
                 row_done();
                 content
             })
             .collect()
     }
 
-    fn row(&self, row: usize, side: usize, wanted: &impl Fn(usize) -> bool) -> Row {
+    fn row(&self, row: usize, look: Look, wanted: &impl Fn(usize) -> bool) -> Row {
         let width = self.chart.width;
         let mut sums = vec![TexelSum::EMPTY; width];
         let mut content = Row::default();
@@ -196,7 +200,7 @@ impl<'a> Baker<'a> {
                     let texel = DVec2::new(column as f64, row as f64);
                     let hash = self.hash(row * width + column);
                     let sum = &mut sums[column];
-                    content.shadow_rays += self.add_part(&facet, part, (texel, hash), side, sum);
+                    content.shadow_rays += self.add_part(&facet, part, (texel, hash), look, sum);
                 }
             });
         }
@@ -204,7 +208,12 @@ impl<'a> Baker<'a> {
             if let (true, Some(part)) = (sum.lit == Lit::EMPTY, sum.largest)
                 && let Some(facet) = self.facet(part.triangle)
             {
-                let sample = self.sample(&facet, part.middle, (self.hash(row * width + column), 0, 1));
+                let sample = self.sample(
+                    &facet,
+                    part.middle,
+                    (self.hash(row * width + column), 0),
+                    (1, look),
+                );
                 content.shadow_rays += sample.shadow_rays;
                 sum.add(sample, part.area_m2);
             }
@@ -221,7 +230,7 @@ impl<'a> Baker<'a> {
         facet: &Facet,
         part: &Polygon,
         (texel, hash): (DVec2, u64),
-        side: usize,
+        look: Look,
         sum: &mut TexelSum,
     ) -> u64 {
         let area_m2 = part.area() * facet.m2_per_texel2;
@@ -232,6 +241,7 @@ impl<'a> Baker<'a> {
                 middle: part.centroid(),
             });
         }
+        let side = look.side;
         let step = 1.0 / side as f64;
         let mut shadow_rays = 0;
         for index in 0..side * side {
@@ -239,7 +249,7 @@ impl<'a> Baker<'a> {
                 + DVec2::new((index % side) as f64 + 0.5, (index / side) as f64 + 0.5) * step
                 + OFF_THE_DIAGONALS;
             if part.contains(place) {
-                let sample = self.sample(facet, place, (hash, index, side * side));
+                let sample = self.sample(facet, place, (hash, index), (side * side, look));
                 shadow_rays += sample.shadow_rays;
                 sum.add(sample, facet.m2_per_texel2 * step * step);
             }
@@ -247,12 +257,20 @@ impl<'a> Baker<'a> {
         shadow_rays
     }
 
-    /// What arrives at a place of the map: the `index`th of `places` of a texel with that hash.
-    fn sample(&self, facet: &Facet, place: DVec2, (hash, index, places): (u64, usize, usize)) -> Sample {
+    /// What arrives at a place of the map: the `index`th of the places of a texel with that hash, which a look has so many
+    /// of.
+    fn sample(
+        &self,
+        facet: &Facet,
+        place: DVec2,
+        (hash, index): (u64, usize),
+        look: (usize, Look),
+    ) -> Sample {
         let point = facet.at(place);
         let mut sample = Sample {
             irradiance: LinearSrgb::BLACK,
             mask: 0,
+            soft_mask: Some(0),
             soft: 0.0,
             shadow_rays: 0,
         };
@@ -271,11 +289,16 @@ impl<'a> Baker<'a> {
                     }
                 }
                 Emission::Soft(soft) => {
-                    let run = soft.run(hash, index, places);
+                    let run = soft.run(hash, index, look);
                     let gathered = soft.gather(self.tracer, &point, self.material, &source.within, run);
                     sample.shadow_rays += gathered.shadow_rays;
                     sample.irradiance += gathered.irradiance;
                     sample.soft += gathered.irradiance.luminance();
+                    if gathered.blocked_rays == 0 && gathered.shadow_rays > 0 {
+                        sample.soft_mask = sample.soft_mask.map(|mask| mask ^ mark_of(light));
+                    } else if gathered.blocked_rays < gathered.shadow_rays {
+                        sample.soft_mask = None;
+                    }
                 }
             }
         }

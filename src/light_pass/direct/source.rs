@@ -14,6 +14,7 @@ use super::facet::SurfacePoint;
 use super::lighting::{Arriving, Beam};
 use super::polygon::Polygon;
 use super::surroundings::Surroundings;
+use super::texel::Look;
 use crate::geometry::sampling::even_point;
 use crate::optics::LinearSrgb;
 use crate::scene::emitter::{Emitter, Places};
@@ -24,11 +25,6 @@ use crate::transport::Tracer;
 const READY: usize = 1 << 13;
 /// And of a sky, whose texels need more of them.
 const READY_OF_SKY: usize = 1 << 14;
-/// Samples of a light for a texel that is looked at by few places, up to `FEW_PLACES`, and for others.
-const COARSE: usize = 64;
-const FINE: usize = 256;
-const FINE_OF_SKY: usize = 512;
-const FEW_PLACES: usize = 16;
 /// Surfaces of more triangles are looked at by samples alone.
 const MOST_POLYGONS: usize = 16;
 /// Corners that stand for the edge of a disc.
@@ -91,6 +87,8 @@ pub struct Gathered {
     /// E [W/m²].
     pub irradiance: LinearSrgb,
     pub shadow_rays: u64,
+    /// Those that met something.
+    pub blocked_rays: u64,
 }
 
 impl Source {
@@ -207,13 +205,12 @@ fn shape(light: &Light, scene: &Scene) -> Option<Shape> {
 }
 
 impl Soft {
-    /// The places of the light for one of the `places` of a texel.
-    pub fn run(&self, texel: u64, place: usize, places: usize) -> Range<usize> {
-        let (ready, fine) = match self.places {
-            ManyPlaces::Sky { .. } => (2 * READY_OF_SKY, FINE_OF_SKY),
-            _ => (READY, FINE),
+    /// The places of the light for one of the places of a texel, which a look has so many of.
+    pub fn run(&self, texel: u64, place: usize, (places, look): (usize, Look)) -> Range<usize> {
+        let (ready, of_texel) = match self.places {
+            ManyPlaces::Sky { .. } => (2 * READY_OF_SKY, look.samples_of_sky),
+            _ => (READY, look.samples_of_lamp),
         };
-        let of_texel = if places > FEW_PLACES { fine } else { COARSE };
         let each = (of_texel / places.max(1)).max(2);
         let runs = ready / (each * places.next_power_of_two());
         let run = (mixed(texel ^ mixed(self.light)) % runs.max(1) as u64) as usize;
@@ -240,7 +237,9 @@ impl Soft {
             sum.shadow_rays += 1;
             sum.open += arriving.open;
             let distance_m = arriving.distance_m * (1.0 - BEFORE_LAMP);
-            if !tracer.is_blocked(&point.spawn(arriving.to_light), distance_m) {
+            if tracer.is_blocked(&point.spawn(arriving.to_light), distance_m) {
+                sum.blocked_rays += 1;
+            } else {
                 sum.taken += arriving.strength;
                 sum.irradiance += arriving.irradiance;
             }
@@ -254,6 +253,7 @@ impl Soft {
         Gathered {
             irradiance,
             shadow_rays: sum.shadow_rays,
+            blocked_rays: sum.blocked_rays,
         }
     }
 
@@ -352,6 +352,7 @@ struct Sum {
     open: f64,
     taken: LinearSrgb,
     shadow_rays: u64,
+    blocked_rays: u64,
 }
 
 impl Shape {

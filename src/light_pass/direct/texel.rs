@@ -4,6 +4,34 @@ use glam::DVec2;
 
 use crate::optics::LinearSrgb;
 
+/// How thoroughly a texel is looked at.
+#[derive(Clone, Copy, Debug)]
+pub struct Look {
+    /// Places across and down.
+    pub side: usize,
+    /// Samples of a lamp with extent, over all places.
+    pub samples_of_lamp: usize,
+    /// And of a sky.
+    pub samples_of_sky: usize,
+}
+
+impl Look {
+    /// Where lights with extent are seen whole or not at all.
+    pub const GLANCE: Self = Self::new(2, 8, 8);
+    /// Where light is all there or all away, or fades little.
+    pub const COARSE: Self = Self::new(2, 64, 64);
+    /// At a border between light and shadow.
+    pub const FINE: Self = Self::new(8, 256, 512);
+
+    const fn new(side: usize, samples_of_lamp: usize, samples_of_sky: usize) -> Self {
+        Self {
+            side,
+            samples_of_lamp,
+            samples_of_sky,
+        }
+    }
+}
+
 /// Which lights reach a texel, small enough to be kept for a whole map.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Lit(u32);
@@ -41,6 +69,8 @@ pub struct TexelSum {
     /// Σ A [m²].
     pub area_m2: f64,
     pub lit: Lit,
+    /// The same of lights with extent: mixed where one is partly hidden.
+    pub soft_lit: Lit,
     pub largest: Option<Part>,
     /// Of lights with extent.
     pub soft: Spread,
@@ -89,6 +119,7 @@ impl TexelSum {
         flux: LinearSrgb::BLACK,
         area_m2: 0.0,
         lit: Lit::EMPTY,
+        soft_lit: Lit::EMPTY,
         largest: None,
         soft: Spread {
             count: 0.0,
@@ -101,6 +132,10 @@ impl TexelSum {
         self.flux += sample.irradiance * area_m2;
         self.area_m2 += area_m2;
         self.lit = self.lit.and(sample.mask);
+        self.soft_lit = match sample.soft_mask {
+            Some(mask) => self.soft_lit.and(mask),
+            None => Lit::MIXED,
+        };
         self.soft.add(sample.soft);
     }
 
@@ -108,6 +143,7 @@ impl TexelSum {
         Texel {
             irradiance: (self.flux / self.area_m2).to_array().map(|e| e as f32),
             lit: self.lit,
+            soft_lit: self.soft_lit,
             is_uncertain: self.soft.is_uncertain((self.flux / self.area_m2).luminance()),
         }
     }
@@ -117,8 +153,10 @@ impl TexelSum {
 pub struct Sample {
     /// E [W/m²].
     pub irradiance: LinearSrgb,
-    /// The lights that reach it, folded into a number.
+    /// The points and directions that reach it, folded into a number.
     pub mask: u64,
+    /// The lights with extent that are seen whole; `None` where one is partly hidden.
+    pub soft_mask: Option<u64>,
     /// Luminance of what comes from lights with extent [W/m²].
     pub soft: f64,
     pub shadow_rays: u64,
@@ -129,8 +167,19 @@ pub struct Sample {
 pub struct Texel {
     pub irradiance: [f32; 3],
     pub lit: Lit,
+    pub soft_lit: Lit,
     /// Whether lights with extent were looked for with too few samples.
     pub is_uncertain: bool,
+}
+
+impl Texel {
+    /// Where nothing was looked at.
+    pub const DARK: Self = Self {
+        irradiance: [0.0; 3],
+        lit: Lit::EMPTY,
+        soft_lit: Lit::EMPTY,
+        is_uncertain: false,
+    };
 }
 
 /// The covered texels of one row that were asked for, by column.
