@@ -1,8 +1,7 @@
 //! What carries a light: patches of its wavefront, or photons.
 //!
-//! Light of many places and on rough surfaces is for photons, and any other is for patches where there are several lights.
-//! Of a single one `auto` makes a few photons first; they tell what the target would cost by photons, and patches go on
-//! while they cost less than that. Costs are counted operations, so that the choice does not depend on the machine.
+//! Light of many places and on rough surfaces is for photons. Of any other light `auto` makes a few photons first; they tell
+//! what the target would cost by photons, and patches go on while they cost less than that. Costs are counted operations, so that the choice does not depend on the machine.
 
 use super::caustic::{CausticLayer, Climb, Course};
 use super::light_level::{LightLevel, LightState};
@@ -107,8 +106,6 @@ impl CausticLayer<'_> {
         match self.settings.estimator {
             Estimator::Photon => Carrier::Photons,
             Estimator::Auto if self.settings.max_error.is_none() || self.is_soft(light) => Carrier::Photons,
-            // Among many lights, what one of them takes says little of what all do.
-            Estimator::Auto if self.lit().nth(1).is_some() => Carrier::Patches,
             Estimator::Auto => Carrier::Undecided,
             Estimator::Wavefront => Carrier::Patches,
             Estimator::Splat => Carrier::Splats,

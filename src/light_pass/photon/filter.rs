@@ -63,14 +63,16 @@ impl Filter {
         }
     }
 
-    /// For each texel the index of its radius, and its squared error [W²/m⁴].
+    /// For each texel the index of its radius, and its squared error [W²/m⁴]: that of its neighbourhood, shared out there as
+    /// the light is, whose variance is in proportion to it where photons carry alike.
     fn choose(&self) -> (Vec<u8>, Vec<f64>) {
         let raw = self
             .halves
             .each_ref()
             .map(|flux| self.per_area(flux, &self.areas_m2));
         let mut widths = vec![0_u8; self.areas_m2.len()];
-        let mut squares = vec![f64::INFINITY; self.areas_m2.len()];
+        let mut least = vec![f64::INFINITY; self.areas_m2.len()];
+        let mut squares = least.clone();
         for (index, &radius) in RADII.iter().enumerate() {
             let area = blurred(&self.areas_m2, self.size, radius);
             let means = self
@@ -92,16 +94,39 @@ impl Filter {
             });
             let variance = expected(&|texel| half_square(means[0][texel], means[1][texel]));
             let raw_variance = expected(&|texel| half_square(raw[0][texel], raw[1][texel]));
+            let light = self.light(radius);
+            let pooled_light = expected(&|texel| light[texel]);
+            // All light of a pool in one texel; running sums of what cancels may say more.
+            let most = ((2 * pool + 1) * (2 * pool + 1)) as f64;
             for texel in 0..squares.len() {
                 let bias = (across[texel] - variance[texel] - raw_variance[texel]).max(0.0);
                 // Running sums of what cancels may end below nothing.
                 let square = bias + 0.5 * variance[texel].max(0.0);
-                if square <= squares[texel] {
-                    (squares[texel], widths[texel]) = (square, index as u8);
+                if square <= least[texel] {
+                    (least[texel], widths[texel]) = (square, index as u8);
+                    let share = light[texel] / pooled_light[texel];
+                    squares[texel] = square
+                        * if share.is_finite() {
+                            share.clamp(0.0, most)
+                        } else {
+                            1.0
+                        };
                 }
             }
         }
         (widths, squares)
+    }
+
+    /// Means of both halves over a window that is no smaller than a texel's neighbours [W/m²].
+    fn light(&self, radius: usize) -> Vec<f64> {
+        let both: Vec<f64> = self.halves[0]
+            .iter()
+            .zip(&self.halves[1])
+            .map(|(a, b)| 0.5 * (a + b))
+            .collect();
+        let radius = radius.max(1);
+        let area = blurred(&self.areas_m2, self.size, radius);
+        self.per_area(&blurred(&both, self.size, radius), &area)
     }
 
     /// Puts the means in the place of the map's flux; each channel keeps its sum.
