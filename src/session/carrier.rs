@@ -47,6 +47,15 @@ pub(super) enum Carrier {
     Splats,
 }
 
+impl Climb {
+    /// Goes on from the first photons.
+    pub(super) fn turn_to_photons(&mut self) {
+        self.carrier = Carrier::Photons;
+        self.rounds.clear();
+        self.levels = self.pilot.take().into_iter().collect();
+    }
+}
+
 impl CausticLayer<'_> {
     /// Whether its light comes from many places.
     pub(super) fn has_places(&self, light: &AimedLight) -> bool {
@@ -151,10 +160,10 @@ impl CausticLayer<'_> {
         let promised = promised(&climb.levels, cost, goal).unwrap_or(0.0);
         let goes_many_ways = climb.levels.is_empty() && per_photon > MOST_WAYS;
         if goes_many_ways || so_far + next > by_photons || promised > PROMISE * by_photons {
-            climb.carrier = Carrier::Photons;
-            climb.rounds.clear();
-            climb.levels = climb.pilot.take().into_iter().collect();
+            climb.turn_to_photons();
         }
+        // How many ways its cells have to be divided shows only when they are.
+        course.most_queries = ((by_photons - so_far) / RECEIVER_QUERY) as u64;
         Ok(false)
     }
 

@@ -161,6 +161,8 @@ pub(super) struct Course<'a> {
     pub(super) labour: &'a mut Labour,
     /// Mean footprints, where they are wanted.
     pub(super) statistics: Option<FootprintStatistics>,
+    /// Receivers that the patches of the next level may ask for before it is given up.
+    pub(super) most_queries: u64,
 }
 
 impl Course<'_> {
@@ -218,6 +220,7 @@ impl CausticLayer<'_> {
             outcome: &mut outcome,
             labour,
             statistics: None,
+            most_queries: u64::MAX,
         };
         for light in &lights {
             let state = states.of_mut(light.light);
@@ -394,7 +397,11 @@ impl CausticLayer<'_> {
             Some(level) => Some(level),
             None => self.make(light, key, unit, state, course)?,
         };
+        course.most_queries = u64::MAX;
         let Some(mut level) = made else {
+            if climb.carrier == Carrier::Undecided && !course.control.is_cancelled() {
+                climb.turn_to_photons();
+            }
             return Ok(());
         };
         if level.key.trace.is_dim {

@@ -79,6 +79,7 @@ impl CausticLayer<'_> {
                     },
                     reference_w: reference_w(light),
                     coarseness: key.coarseness,
+                    most_queries: course.most_queries.saturating_sub(sums.report.receiver_queries),
                 };
                 let cells = depositor.lattice.cell_count();
                 let listener = Listener {
@@ -175,6 +176,7 @@ impl CausticLayer<'_> {
             lattice,
             reference_w: reference_w(light),
             coarseness: 1.0,
+            most_queries: u64::MAX,
         };
         let listener = Listener {
             progress: &(),

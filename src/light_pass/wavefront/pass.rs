@@ -66,6 +66,8 @@ pub struct WavefrontDepositor<'a> {
     pub reference_w: f64,
     /// How much coarser (> 1) or finer triangles may be than is usual.
     pub coarseness: f64,
+    /// Receivers that a run may ask for; beyond them it ends as if it were cancelled.
+    pub most_queries: u64,
 }
 
 impl WavefrontDepositor<'_> {
@@ -97,7 +99,7 @@ impl WavefrontDepositor<'_> {
                 report.trace_s.add(watch.elapsed());
                 report.count_traced(&band);
                 self.deposit(&band, maps.as_deref_mut(), listener.control, &mut report);
-                if listener.control.is_cancelled() {
+                if listener.control.is_cancelled() || report.receiver_queries > self.most_queries {
                     report.cancelled = true;
                     return (report, None);
                 }
@@ -153,7 +155,7 @@ impl WavefrontDepositor<'_> {
             .collect();
         let mut maps = maps;
         let (mut rest, mut at_once) = (&tasks[..], FIRST_AT_ONCE);
-        while !rest.is_empty() {
+        while !rest.is_empty() && report.receiver_queries <= self.most_queries {
             let (tasks, later) = rest.split_at(at_once.min(rest.len()));
             rest = later;
             let parts = self.spread(band, tasks, control, maps.is_none());
