@@ -79,6 +79,29 @@ fn hash(mut code: u32) -> u32 {
     code ^ (code >> 16)
 }
 
+/// Column and row of a place along Morton's curve: its odd and its even bits.
+pub fn unfolded(place: u64) -> [u32; 2] {
+    let every_second = |code: u64| {
+        let mut code = code & 0x5555_5555_5555_5555;
+        for (shift, mask) in [
+            (1, 0x3333_3333_3333_3333),
+            (2, 0x0f0f_0f0f_0f0f_0f0f),
+            (4, 0x00ff_00ff_00ff_00ff),
+            (8, 0x0000_ffff_0000_ffff),
+            (16, 0x0000_0000_ffff_ffff),
+        ] {
+            code = (code | code >> shift) & mask;
+        }
+        code as u32
+    };
+    [every_second(place), every_second(place >> 1)]
+}
+
+/// A place along Morton's curve as a point of the unit square.
+pub fn in_square(place: u64) -> DVec2 {
+    DVec2::from(unfolded(place).map(|code| (f64::from(code) + 0.5) * (-32_f64).exp2()))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -99,10 +99,11 @@ impl CausticLayer<'_> {
     fn with_launch<T>(&self, light: &AimedLight, f: impl FnOnce(&PhotonLaunch) -> T) -> T {
         let source = self.tracer.scene().lights[light.light].of_unit_strength();
         if self.has_places(light) {
+            let spheres = light.spheres(self.tracer, &source);
             f(&PhotonLaunch::of_places(
                 self.tracer,
                 &source,
-                light.casters(),
+                spheres,
                 self.settings.seed,
             ))
         } else {

@@ -1,6 +1,6 @@
 //! Looks around from every light, before any ray is traced.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use glam::DVec3;
 
@@ -9,8 +9,9 @@ use crate::geometry::sampling::even_point;
 use crate::light_pass::emitter::Emitter;
 use crate::light_pass::item_buffer::{Hiding, ItemBuffer};
 use crate::light_pass::launch::Launch;
+use crate::light_pass::photon::spheres::Spheres;
 use crate::plan::{Reach, Sight};
-use crate::scene::{Scene, SurfaceKind};
+use crate::scene::{Light, Scene, SurfaceKind};
 use crate::settings::ItemBufferKind;
 use crate::transport::{Tracer, media_at};
 
@@ -29,6 +30,8 @@ pub struct AimedLight {
     pub reach_m: f64,
     /// What rays are aimed at (indices of specular objects), wherever they start.
     casters: Arc<[usize]>,
+    /// What photons are aimed at, where the light has a size; found when they are first wanted.
+    spheres: Arc<OnceLock<Spheres>>,
 }
 
 impl AimedLight {
@@ -40,6 +43,12 @@ impl AimedLight {
     /// What rays are aimed at (indices of specular objects), wherever they start.
     pub fn casters(&self) -> &[usize] {
         &self.casters
+    }
+
+    /// What photons are aimed at from all its places; `source` is the light of unit strength.
+    pub fn spheres(&self, tracer: &Tracer, source: &Light) -> &Spheres {
+        self.spheres
+            .get_or_init(|| Spheres::around(tracer, source, &self.casters))
     }
 
     /// What any place of the light may send [W], but for another strength.
@@ -300,6 +309,7 @@ impl Looker<'_> {
             item_buffer: Arc::new(view.item_buffer),
             visible: view.visible.map(Arc::new),
             casters,
+            spheres: Arc::default(),
         };
         (sight, Some(aimed), look)
     }

@@ -7,4 +7,5 @@ pub mod filter;
 pub mod launch;
 pub mod pass;
 pub mod spectrum;
+pub mod spheres;
 pub mod walk;

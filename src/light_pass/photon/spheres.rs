@@ -1,0 +1,290 @@
+//! What a light with a size aims its photons at: spheres around what is specular, as each of its places sees them, and
+//! there where a few photons met something.
+
+use std::collections::BTreeSet;
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::launch::LAMP_DIMENSION;
+use crate::geometry::Ray;
+use crate::geometry::sampling::{even_code, even_point, in_square, unfolded};
+use crate::scene::emitter::{Emitter, EmitterKind, Places, in_cap, on_disc};
+use crate::scene::{Light, Scene};
+use crate::transport::Tracer;
+
+/// Spheres at most.
+const MAX_SPHERES: usize = 16;
+
+/// Cells across and down the square that directions towards a sphere, or places on its disc, are drawn from: a power of 2.
+const SIDE: usize = 32;
+const CELLS: usize = SIDE * SIDE;
+
+/// Photons that tell which cells meet something specular.
+const PROBES: u32 = 1 << 16;
+
+/// Their seed: other photons than those of any picture, so that these stay unbiased.
+const PROBE_SEED: u64 = 0x7072_6f62_6573;
+
+/// Photons of a cell where nothing was met, over those of one where something was.
+const RARE: f64 = 1.0 / 16.0;
+
+/// Spheres around what is specular.
+#[derive(Clone, Debug, Default)]
+pub struct Spheres(Vec<Guided>);
+
+/// A sphere, with how its photons are shared out.
+#[derive(Clone, Debug)]
+struct Guided {
+    sphere: Sphere,
+    /// Photons of the cells before each along Morton's curve, over those of all cells if each had as many as the best.
+    before: Vec<f64>,
+}
+
+impl Spheres {
+    /// Around casters, for a light of unit strength.
+    pub fn around(tracer: &Tracer, light: &Light, casters: &[usize]) -> Self {
+        let spheres = spheres(tracer.scene(), casters, MAX_SPHERES);
+        let evenly = |sphere| Guided::new(sphere, |_| 1.0);
+        let even = Self(spheres.into_iter().map(evenly).collect());
+        let places = Places::new(light, tracer.scene());
+        let (low, high) = tracer.scene().bounds().unwrap_or_default();
+        let across_m = (high - low).length();
+        let meets = |index: u32| {
+            let emitter = places.sample(even_point(index, LAMP_DIMENSION, PROBE_SEED))?;
+            let (ray, choice) = even.choose(&emitter, even_code(index, PROBE_SEED), across_m)?;
+            let hit = tracer.closest_hit(&ray)?;
+            let surface = tracer.scene().material_of(hit.object).surface;
+            surface.is_specular().then_some((choice.which, choice.cell))
+        };
+        let met: Vec<(usize, usize)> = (0..PROBES).into_par_iter().filter_map(meets).collect();
+        let met: BTreeSet<(usize, [u32; 2])> = met.into_iter().flat_map(with_neighbours).collect();
+        let guided = even.0.into_iter().enumerate().map(|(which, guided)| {
+            Guided::new(guided.sphere, |cell| {
+                if met.contains(&(which, unfolded(cell as u64))) {
+                    1.0
+                } else {
+                    RARE
+                }
+            })
+        });
+        Self(guided.collect())
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// Solid angle [sr] that a place of a lamp sends light into towards them, or their cross-section [m²] in parallel light.
+    pub fn measure(&self, emitter: &Emitter) -> f64 {
+        self.0.iter().map(|guided| guided.sphere.measure(emitter)).sum()
+    }
+
+    /// A ray of a place of a lamp towards one of the spheres, and the measure [sr or m²] that it stands for. `None` for a ray
+    /// that an earlier sphere could have been given: it is that one's.
+    pub fn aim(&self, emitter: &Emitter, place: u64, across_m: f64) -> Option<(Ray, f64)> {
+        let (ray, choice) = self.choose(emitter, place, across_m)?;
+        Some((ray, choice.measure))
+    }
+
+    fn choose(&self, emitter: &Emitter, place: u64, across_m: f64) -> Option<(Ray, Choice)> {
+        let choice = self.cell(emitter, place)?;
+        let sphere = &self.0[choice.which].sphere;
+        let square = in_square(choice.place);
+        let ray = match emitter.kind {
+            EmitterKind::Parallel { direction } => {
+                let (x, y) = direction.any_orthonormal_pair();
+                let offset = on_disc(square) * sphere.radius_m;
+                Ray {
+                    origin: sphere.centre + x * offset.x + y * offset.y - direction * across_m,
+                    direction,
+                }
+            }
+            EmitterKind::Point { position }
+            | EmitterKind::Spot { position, .. }
+            | EmitterKind::Facet { position, .. } => {
+                let axis = (sphere.centre - position).normalize_or(DVec3::Z);
+                Ray {
+                    origin: position,
+                    direction: in_cap(axis, sphere.half_angle_rad(position), square),
+                }
+            }
+        };
+        let mut earlier = self.0[..choice.which].iter().map(|guided| &guided.sphere);
+        let is_taken = earlier.any(|sphere| sphere.has(&ray, emitter) && sphere.measure(emitter) > 0.0);
+        (!is_taken).then_some((ray, choice))
+    }
+
+    fn cell(&self, emitter: &Emitter, place: u64) -> Option<Choice> {
+        let mut measures = [0.0; MAX_SPHERES];
+        for (measure, guided) in measures.iter_mut().zip(&self.0) {
+            *measure = guided.sphere.measure(emitter) * guided.before[CELLS];
+        }
+        let total: f64 = measures.iter().sum();
+        if !(total > 0.0 && total.is_finite()) {
+            return None;
+        }
+        let mut left = place as f64 * (-64_f64).exp2() * total;
+        let mut which = 0;
+        while which + 1 < self.0.len() && left >= measures[which] {
+            left -= measures[which];
+            which += 1;
+        }
+        while measures[which] <= 0.0 {
+            which = which.checked_sub(1)?;
+        }
+        let before = &self.0[which].before;
+        let along = (left / measures[which]).clamp(0.0, 1.0 - f64::EPSILON) * before[CELLS];
+        let cell = before[1..CELLS].partition_point(|&before| before <= along);
+        let density = (before[cell + 1] - before[cell]) * CELLS as f64;
+        let rest = ((along - before[cell]) * CELLS as f64 / density).clamp(0.0, 1.0 - f64::EPSILON);
+        Some(Choice {
+            which,
+            cell,
+            place: ((cell as f64 + rest) / CELLS as f64 * 64_f64.exp2()) as u64,
+            measure: total / density,
+        })
+    }
+}
+
+/// What a place along the curve of all spheres becomes.
+struct Choice {
+    /// The sphere.
+    which: usize,
+    /// Of the sphere's square, along Morton's curve.
+    cell: usize,
+    /// Along the curve of the sphere's square, [0, 2⁶⁴).
+    place: u64,
+    /// What it stands for [sr or m²].
+    measure: f64,
+}
+
+/// A cell of a sphere and those around it: what is small may lie beside the photons that were looked by.
+fn with_neighbours((which, cell): (usize, usize)) -> impl Iterator<Item = (usize, [u32; 2])> {
+    let [column, row] = unfolded(cell as u64);
+    let near = |index: u32| index.saturating_sub(1)..=(index + 1).min(SIDE as u32 - 1);
+    near(column).flat_map(move |column| near(row).map(move |row| (which, [column, row])))
+}
+
+impl Guided {
+    fn new(sphere: Sphere, density: impl Fn(usize) -> f64) -> Self {
+        let mut before = vec![0.0; CELLS + 1];
+        for cell in 0..CELLS {
+            before[cell + 1] = before[cell] + density(cell) / CELLS as f64;
+        }
+        Self { sphere, before }
+    }
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Sphere {
+    centre: DVec3,
+    radius_m: f64,
+}
+
+impl Sphere {
+    /// Solid angle [sr] that a place sends light into towards it, or its cross-section [m²] in parallel light.
+    fn measure(&self, emitter: &Emitter) -> f64 {
+        let Some(position) = emitter.kind.position() else {
+            return std::f64::consts::PI * self.radius_m * self.radius_m;
+        };
+        let towards = self.centre - position;
+        if let EmitterKind::Facet { normal, .. } = emitter.kind
+            && towards.dot(normal) < -self.radius_m
+        {
+            return 0.0;
+        }
+        let half_angle_rad = self.half_angle_rad(position);
+        if let EmitterKind::Spot {
+            direction,
+            outer_cone_rad,
+            ..
+        } = emitter.kind
+            && towards.angle_between(direction) > half_angle_rad + outer_cone_rad
+        {
+            return 0.0;
+        }
+        cap_sr(half_angle_rad)
+    }
+
+    /// Half-angle [rad] of the cone around it; π from within.
+    fn half_angle_rad(&self, position: DVec3) -> f64 {
+        let distance_m = position.distance(self.centre);
+        if distance_m > self.radius_m {
+            (self.radius_m / distance_m).asin()
+        } else {
+            std::f64::consts::PI
+        }
+    }
+
+    /// Whether a ray of an emitter may have been aimed at it.
+    fn has(&self, ray: &Ray, emitter: &Emitter) -> bool {
+        let Some(position) = emitter.kind.position() else {
+            let towards = self.centre - ray.origin;
+            let beside = towards - ray.direction * towards.dot(ray.direction);
+            return beside.length_squared() <= self.radius_m * self.radius_m;
+        };
+        let towards = self.centre - position;
+        let along = towards.dot(ray.direction);
+        let distance2 = towards.length_squared();
+        let radius2 = self.radius_m * self.radius_m;
+        distance2 <= radius2 || (along > 0.0 && distance2 - along * along <= radius2)
+    }
+}
+
+/// Solid angle of a cone [sr].
+fn cap_sr(half_angle_rad: f64) -> f64 {
+    4.0 * std::f64::consts::PI * (0.5 * half_angle_rad).sin().powi(2)
+}
+
+/// Spheres around objects: around each, or around groups of neighbours where there are more than `most`.
+fn spheres(scene: &Scene, objects: &[usize], most: usize) -> Vec<Sphere> {
+    let mut bounded: Vec<(usize, DVec3)> = objects
+        .iter()
+        .filter_map(|&object| {
+            let (low, high) = scene.objects[object].mesh.bounds()?;
+            Some((object, low * 0.5 + high * 0.5))
+        })
+        .collect();
+    let mut found = Vec::new();
+    divide(scene, &mut bounded, most, &mut found);
+    found
+}
+
+fn divide(scene: &Scene, objects: &mut [(usize, DVec3)], most: usize, found: &mut Vec<Sphere>) {
+    if objects.is_empty() {
+        return;
+    }
+    if objects.len() == 1 || most <= 1 {
+        found.extend(around(scene, objects));
+        return;
+    }
+    let centres = || objects.iter().map(|(_, centre)| *centre);
+    let low = centres().fold(DVec3::INFINITY, DVec3::min);
+    let high = centres().fold(DVec3::NEG_INFINITY, DVec3::max);
+    let axis = (high - low).max_position();
+    objects.sort_by(|a, b| a.1[axis].total_cmp(&b.1[axis]).then(a.0.cmp(&b.0)));
+    let (first, second) = objects.split_at_mut(objects.len() / 2);
+    divide(scene, first, most / 2, found);
+    divide(scene, second, most - most / 2, found);
+}
+
+fn around(scene: &Scene, objects: &[(usize, DVec3)]) -> Option<Sphere> {
+    let vertices = || {
+        objects
+            .iter()
+            .flat_map(|(object, _)| &scene.objects[*object].mesh.positions)
+    };
+    let low = vertices().fold(DVec3::INFINITY, |low, position| low.min(*position));
+    let high = vertices().fold(DVec3::NEG_INFINITY, |high, position| high.max(*position));
+    let centre = low * 0.5 + high * 0.5;
+    let radius_m = vertices()
+        .map(|position| position.distance(centre))
+        .fold(0.0, f64::max);
+    // A hair more, so that rounding loses nothing at the rim.
+    (radius_m > 0.0 && radius_m.is_finite()).then_some(Sphere {
+        centre,
+        radius_m: radius_m * (1.0 + 1e-9),
+    })
+}
