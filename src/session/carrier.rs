@@ -52,7 +52,9 @@ impl Climb {
     pub(super) fn turn_to_photons(&mut self) {
         self.carrier = Carrier::Photons;
         self.rounds.clear();
-        self.levels = self.pilot.take().into_iter().collect();
+        let patches = self.levels.pop();
+        self.levels = self.rival.take().into_iter().collect();
+        self.rival = patches;
     }
 }
 
@@ -134,22 +136,25 @@ impl CausticLayer<'_> {
         let Some(target) = self.settings.max_error else {
             return Ok(false);
         };
-        let goal = climb.aim.unwrap_or(target);
-        let is_first = climb.pilot.is_none();
+        let is_first = climb.rival.is_none();
         if is_first || self.are_photons_sooner(light, climb) {
-            let before = (climb.pilot.as_ref(), climb.aim);
+            let before = (climb.rival.as_ref(), climb.aim);
             let made = self.more_photons(light, sizes, state, before, course)?;
             let is_made = made.is_some();
-            climb.pilot = made.or(climb.pilot.take());
+            climb.rival = made.or(climb.rival.take());
             if is_made || !is_first {
                 return Ok(is_made);
             }
         }
-        let costs = climb.pilot.as_ref().and_then(|pilot| photon_costs(pilot, goal));
-        let Some((by_photons, per_photon)) = costs else {
+        let Some((segments, per_photon)) = climb.rival.as_ref().and_then(photon_segments) else {
             // Nothing arrived: patches find what is too rare for a few photons.
             climb.carrier = Carrier::Patches;
             return Ok(false);
+        };
+        let most_share = climb.most_share.unwrap_or(target);
+        let by_photons = match climb.shares.first() {
+            Some((0, share)) => segments * (share / most_share).powi(2).max(1.0),
+            _ => f64::INFINITY,
         };
         let cost = |level: &LightLevel| {
             let (cells, queries) = level.work;
@@ -157,7 +162,7 @@ impl CausticLayer<'_> {
         };
         let so_far: f64 = climb.levels.iter().map(cost).sum();
         let next = climb.levels.last().map_or(0.0, cost) * LEVEL_GROWTH;
-        let promised = promised(&climb.levels, cost, goal).unwrap_or(0.0);
+        let promised = promised(climb, cost, most_share).unwrap_or(0.0);
         let goes_many_ways = climb.levels.is_empty() && per_photon > MOST_WAYS;
         if goes_many_ways || so_far + next > by_photons || promised > PROMISE * by_photons {
             climb.turn_to_photons();
@@ -169,10 +174,8 @@ impl CausticLayer<'_> {
 
     /// Whether another level of photons takes less than the first one of patches.
     fn are_photons_sooner(&self, light: &AimedLight, climb: &Climb) -> bool {
-        let pilot = climb.pilot.as_ref();
-        let known = pilot
-            .and_then(|pilot| Some((pilot.photons.as_ref()?.segments as f64, photon_costs(pilot, 1.0)?)));
-        let (Some((segments, (_, per_photon))), true) = (known, climb.levels.is_empty()) else {
+        let known = climb.rival.as_ref().and_then(photon_segments);
+        let (Some((segments, per_photon)), true) = (known, climb.levels.is_empty()) else {
             return false;
         };
         let cells: f64 = self
@@ -189,31 +192,30 @@ impl CausticLayer<'_> {
     }
 }
 
-/// What patches are expected to take for a goal, by their last two levels whose errors are known.
-fn promised(levels: &[LightLevel], cost: impl Fn(&LightLevel) -> f64, goal: f64) -> Option<f64> {
-    let mut so_far = 0.0;
-    let mut known = Vec::new();
-    for level in levels {
-        so_far += cost(level);
-        known.extend(
-            level
-                .error
-                .as_ref()
-                .map(|error| (so_far, error.estimate.relative_rmse)),
-        );
-    }
+/// What patches are expected to take for a share of the whole error, by their last two levels whose own share is known.
+fn promised(climb: &Climb, cost: impl Fn(&LightLevel) -> f64, most_share: f64) -> Option<f64> {
+    let cost_of = |levels: usize| -> f64 { climb.levels.iter().take(levels).map(&cost).sum() };
+    let has_error = |levels: usize| {
+        let last = levels.checked_sub(1).and_then(|last| climb.levels.get(last));
+        last.is_some_and(|level| level.error.is_some())
+    };
+    let known: Vec<(f64, f64)> = climb
+        .shares
+        .iter()
+        .filter(|(levels, _)| has_error(*levels))
+        .map(|&(levels, share)| (cost_of(levels), share))
+        .collect();
     let [.., (before, coarse), (after, fine)] = known[..] else {
         return None;
     };
     let power = ((after / before).ln() / (coarse / fine).ln()).clamp(POWERS.0, POWERS.1);
-    (fine > 0.0 && power.is_finite()).then(|| after * (fine / goal).max(1.0).powf(power))
+    (fine > 0.0 && power.is_finite()).then(|| after * (fine / most_share).max(1.0).powf(power))
 }
 
-/// Segments that photons are expected to take for a target, and those of one photon; `None` where none arrived.
-fn photon_costs(pilot: &LightLevel, target: f64) -> Option<(f64, f64)> {
-    let rmse = pilot.error.as_ref()?.estimate.relative_rmse;
-    let segments = pilot.photons.as_ref()?.segments as f64;
-    let photons = HALVES as f64 * f64::from(pilot.key.photons?);
-    let times = (rmse / target).powi(2).max(1.0);
-    (rmse > 0.0).then_some((segments * times, segments / photons))
+/// Segments that photons took, and those of one of them; `None` where none arrived.
+fn photon_segments(level: &LightLevel) -> Option<(f64, f64)> {
+    let rmse = level.error.as_ref()?.estimate.relative_rmse;
+    let segments = level.photons.as_ref()?.segments as f64;
+    let photons = HALVES as f64 * f64::from(level.key.photons?);
+    (rmse > 0.0).then_some((segments, segments / photons))
 }

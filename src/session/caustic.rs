@@ -91,8 +91,9 @@ pub(super) enum Stopped {
 pub(super) struct Climb {
     /// What they are made of.
     pub(super) carrier: Carrier,
-    /// The first photons, which tell what more of them would cost; shown until patches are better.
-    pub(super) pilot: Option<LightLevel>,
+    /// The last level of the other carrier, shown until this one is better: photons, which tell what more of them would cost,
+    /// or patches that were given up.
+    pub(super) rival: Option<LightLevel>,
     /// The coarsest first.
     pub(super) levels: Vec<LightLevel>,
     pub(super) rounds: Vec<Round>,
@@ -100,22 +101,33 @@ pub(super) struct Climb {
     pub(super) goal: Option<f64>,
     /// Relative RMSE of its own maps that the target of the whole bake asks for.
     pub(super) aim: Option<f64>,
+    /// What it added to the error of the whole bake while so many levels were there, in the metric that is aimed at.
+    pub(super) shares: Vec<(usize, f64)>,
+    /// What it may add.
+    pub(super) most_share: Option<f64>,
     pub(super) done: bool,
     /// Whether it was taken to be dim and is not.
     pub(super) is_underrated: bool,
 }
 
 impl Climb {
-    /// The picture: the last level, or the pilot while that is better.
+    /// The picture: the last level, or the rival while that is better.
     pub(super) fn shown(&self) -> Option<&LightLevel> {
+        if self.is_rival_better() {
+            self.rival.as_ref()
+        } else {
+            self.levels.last()
+        }
+    }
+
+    fn is_rival_better(&self) -> bool {
         let rmse = |level: &LightLevel| {
             let error = level.error.as_ref();
             error.map_or(f64::INFINITY, |error| error.estimate.relative_rmse)
         };
-        match (self.levels.last(), &self.pilot) {
-            (Some(level), Some(pilot)) if rmse(pilot) < rmse(level) => Some(pilot),
-            (Some(level), _) => Some(level),
-            (None, pilot) => pilot.as_ref(),
+        match (self.levels.last(), &self.rival) {
+            (Some(level), Some(rival)) => rmse(rival) < rmse(level),
+            (level, _) => level.is_none(),
         }
     }
 
@@ -270,11 +282,11 @@ impl CausticLayer<'_> {
         };
         outcome.stopped = self.stopped(&climbs, &errors, &limited);
         for (light, mut climb) in lights.iter().zip(climbs) {
-            // The last level is the picture; a pilot that is not is kept for the next bake.
-            let is_shown = climb.shown().is_some_and(|level| level.key.photons.is_some());
-            if let Some(pilot) = climb.pilot.take() {
-                let place = if is_shown { climb.levels.len() } else { 0 };
-                climb.levels.insert(place, pilot);
+            // The last level is the picture; a rival that is not is kept for the next bake.
+            let is_better = climb.is_rival_better();
+            if let Some(rival) = climb.rival.take() {
+                let place = if is_better { climb.levels.len() } else { 0 };
+                climb.levels.insert(place, rival);
             }
             if let Some(level) = climb.levels.last() {
                 outcome.finished.push(light.light);

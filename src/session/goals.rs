@@ -209,6 +209,9 @@ impl CausticLayer<'_> {
         } in &errors.lights
         {
             let climb = &mut climbs[index];
+            climb.shares.retain(|(levels, _)| *levels < climb.levels.len());
+            climb.shares.push((climb.levels.len(), share));
+            climb.most_share = level.is_finite().then_some(level);
             climb.aim = (share > 0.0 && level.is_finite()).then(|| relative_rmse * level / share);
             goals[index] = if level.is_infinite() && all_known && climb.carrier == Carrier::Undecided {
                 // Its first photons are enough.
