@@ -51,19 +51,26 @@ impl FirstLook {
         }
         let (mut maps, mut parts) = finish.maps(levels, &charts, &direct);
         if finish.plan.is_on(Effect::Indirect) {
-            self.trace(finish, tracer, on_whom);
-            IndirectWork::of_known(&self.indirect, &maps).add_to(&self.indirect, &mut maps, &mut parts);
+            let known = self.traced(finish, tracer, on_whom);
+            IndirectWork::of_known(known, &maps).add_to(known, &mut maps, &mut parts);
         }
         (maps, parts)
     }
 
-    fn trace(&mut self, finish: &Finish, tracer: &Tracer, on_whom: (&dyn Progress, &Control)) {
+    /// What surfaces send each other, traced where it was not yet.
+    pub(super) fn traced(
+        &mut self,
+        finish: &Finish,
+        tracer: &Tracer,
+        on_whom: (&dyn Progress, &Control),
+    ) -> &IndirectCache {
         let indirect = &mut self.indirect;
         indirect.prepare(tracer, finish.sizes, finish.settings, ELEMENTS);
         let passes = vec![LEAST_PASSES; indirect.network().map_or(0, Network::element_count)];
-        if indirect.trace(tracer, &passes, on_whom) {
+        if indirect.passes != passes && indirect.trace(tracer, &passes, on_whom) {
             indirect.passes = passes;
         }
+        indirect
     }
 
     /// What surfaces send each other.

@@ -12,8 +12,15 @@ use crate::light_pass::caustic::setup::AimedLight;
 use crate::optics::LinearSrgb;
 use crate::settings::ErrorMetric;
 
-/// Light of other layers: luminance of E of each texel [W/m²], by receiver.
-pub(super) type Backdrop = BTreeMap<Receiver, (Arc<Chart>, Vec<f64>)>;
+/// Light of other layers, by receiver.
+pub(super) type Backdrop = BTreeMap<Receiver, Beside>;
+
+/// Light of other layers on one map: luminance of E of each texel [W/m²].
+pub(super) struct Beside {
+    pub(super) chart: Arc<Chart>,
+    pub(super) direct: Vec<f64>,
+    pub(super) indirect: Vec<f64>,
+}
 
 /// What the error of a bake is made of.
 pub(super) enum Counting {
@@ -62,20 +69,25 @@ impl CausticLayer<'_> {
                 .map(|(receiver, map)| (receiver, Arc::clone(&map.chart)));
             charts.extend(known);
         }
-        for (&receiver, (chart, _)) in backdrop {
-            charts.entry(receiver).or_insert_with(|| Arc::clone(chart));
+        for (&receiver, beside) in backdrop {
+            charts
+                .entry(receiver)
+                .or_insert_with(|| Arc::clone(&beside.chart));
         }
         let lit = charts.iter().map(|(receiver, chart)| {
             let blocks = Blocks::new(chart);
             let own = traced.get(receiver);
             // Charts of another size are those of a level that was not shown.
-            let beside = backdrop
-                .get(receiver)
-                .map(|(_, e)| e)
-                .filter(|e| e.len() == chart.texel_count());
-            let at = |values: Option<&Vec<f64>>, texel: usize| values.map_or(0.0, |values| values[texel]);
-            let own_means = blocks.means(chart, |texel| at(own, texel));
-            let all = blocks.means(chart, |texel| at(own, texel) + at(beside, texel));
+            let beside = backdrop.get(receiver);
+            let beside = beside.filter(|beside| beside.chart.texel_count() == chart.texel_count());
+            let at = |values: Option<&Vec<f64>>, texel: usize| {
+                values.and_then(|values| values.get(texel)).map_or(0.0, |e| *e)
+            };
+            let traced = |texel: usize| at(own, texel) + at(beside.map(|beside| &beside.indirect), texel);
+            let own_means = blocks.means(chart, traced);
+            let all = blocks.means(chart, |texel| {
+                traced(texel) + at(beside.map(|beside| &beside.direct), texel)
+            });
             let light: Vec<Lit> = blocks.lit(&all, &own_means).collect();
             (*receiver, blocks, light)
         });

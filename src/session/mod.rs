@@ -387,6 +387,7 @@ impl BakeSession {
             lamps: DirectWork::default(),
             is_first: true,
             first_look,
+            glance: None,
         };
         let mut outcome = ground.bake(&self.sizes, lights, &mut clock, labour, &mut showing)?;
         let Showing {

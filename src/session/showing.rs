@@ -1,5 +1,7 @@
 //! Pictures on the way, and the light of other layers that the caustics are seen beside.
 
+use std::sync::Arc;
+
 use super::caustic::{CausticOutcome, Onlooker};
 use super::clock::Clock;
 use super::direct_cache::DirectCache;
@@ -8,7 +10,7 @@ use super::finish::{Finish, Shown};
 use super::first_look::FirstLook;
 use super::indirect_cache::IndirectCache;
 use super::indirect_work::IndirectWork;
-use super::metric::Backdrop;
+use super::metric::{Backdrop, Beside};
 use super::{BakeResult, LightLayer, account};
 use crate::error::Result;
 use crate::illumination::IlluminationMap;
@@ -17,6 +19,7 @@ use crate::light_pass::caustic::setup::Aim;
 use crate::optics::luminance;
 use crate::plan::Effect;
 use crate::progress::{Control, Progress};
+use crate::settings::LayerKind;
 use crate::transport::Tracer;
 
 /// Takes pictures.
@@ -41,6 +44,8 @@ pub(super) struct Showing<'a, 'level> {
     pub(super) is_first: bool,
     /// What stands in for layers that are not baked yet, where nothing was shown before the bake.
     pub(super) first_look: Option<FirstLook>,
+    /// What stands in for indirect light that is not baked yet, where nobody watches.
+    pub(super) glance: Option<FirstLook>,
 }
 
 impl Showing<'_, '_> {
@@ -97,18 +102,36 @@ impl Onlooker for Showing<'_, '_> {
 
     fn backdrop(&mut self, levels: &[Shown]) -> Backdrop {
         let finish = self.finish;
-        if !finish.plan.is_on(Effect::Direct) {
-            return Backdrop::new();
-        }
         let (charts, _) = finish.charts(levels);
         let on_whom = (self.progress, self.control);
-        self.lamps
-            .shine(self.tracer, &finish.direct_charts(&charts), self.direct, on_whom);
-        let lit = charts.into_iter().filter_map(|(receiver, chart)| {
-            let layer = finish.direct_layer(&chart, self.direct)?;
-            let e = layer.irradiance.iter().map(luminance).collect();
-            Some((receiver, (chart, e)))
+        if finish.plan.is_on(Effect::Direct) {
+            self.lamps
+                .shine(self.tracer, &finish.direct_charts(&charts), self.direct, on_whom);
+        }
+        let (mut maps, _) = finish.maps(levels, &charts, self.direct);
+        if finish.plan.is_on(Effect::Indirect) {
+            let known = match &mut self.first_look {
+                Some(look) => look.indirect(),
+                None if self.indirect.network().is_some() => &*self.indirect,
+                None => self
+                    .glance
+                    .get_or_insert_default()
+                    .traced(finish, self.tracer, on_whom),
+            };
+            IndirectWork::of_known(known, &maps).add_to(known, &mut maps, &mut Vec::new());
+        }
+        let beside = maps.into_iter().map(|map| {
+            let of = |kind: LayerKind| {
+                let layer = map.layer(kind);
+                layer.map_or_else(Vec::new, |layer| layer.irradiance.iter().map(luminance).collect())
+            };
+            let beside = Beside {
+                direct: of(LayerKind::Direct),
+                indirect: of(LayerKind::Indirect),
+                chart: Arc::clone(&map.chart),
+            };
+            (map.chart.receiver, beside)
         });
-        lit.collect()
+        beside.collect()
     }
 }
