@@ -3,10 +3,11 @@
 //!
 //! Of two independent halves A and B and their means A', B' over a window, E(A' − B)² = bias² + var A' + var B, so that
 //! the window's bias shows without a reference. Expectations are means over a neighbourhood that is wider than the
-//! window. Windows never reach beyond a chart; charts of several islands and maps in tiles stay as they are.
+//! window. Windows never reach beyond a chart; charts of several islands stay as they are.
 
 use rayon::prelude::*;
 
+use super::tiled_filter::filter_tiles;
 use crate::illumination::Receiver;
 use crate::illumination::accumulator::FluxUnit;
 use crate::light_pass::accuracy::Noise;
@@ -27,9 +28,15 @@ pub fn filter(sum: &mut ReceiverMaps, halves: [&ReceiverMaps; 2], unit: FluxUnit
     let receivers: Vec<Receiver> = sum.iter().map(|(receiver, _)| receiver).collect();
     for receiver in receivers {
         let [a, b] = halves.map(|half| half.get(receiver));
-        let Some(map) = sum.get_mut(receiver).filter(|map| map.is_one_piece()) else {
+        let Some(map) = sum.get_mut(receiver) else {
             continue;
         };
+        if let (Some(layout), Some(squares)) = (map.chart.layout.clone(), noise.get_mut(&receiver)) {
+            filter_tiles(map, &layout, [a, b], unit, squares);
+        }
+        if !map.is_one_piece() {
+            continue;
+        }
         let filtered = Filter::new(map, [a, b], unit);
         let (widths, squares) = filtered.choose();
         filtered.apply(map, &widths);
@@ -38,7 +45,7 @@ pub fn filter(sum: &mut ReceiverMaps, halves: [&ReceiverMaps; 2], unit: FluxUnit
 }
 
 /// One map under work.
-struct Filter {
+pub(super) struct Filter {
     size: (usize, usize),
     areas_m2: Vec<f64>,
     /// Flux of each half as if it were all the light [W].
@@ -46,6 +53,14 @@ struct Filter {
 }
 
 impl Filter {
+    pub(super) fn of(size: (usize, usize), areas_m2: Vec<f64>, halves: [Vec<f64>; 2]) -> Self {
+        Self {
+            size,
+            areas_m2,
+            halves,
+        }
+    }
+
     fn new(map: &ReceiverMap, halves: [Option<&ReceiverMap>; 2], unit: FluxUnit) -> Self {
         let chart = &map.chart;
         let texels = chart.texel_count();
@@ -65,7 +80,7 @@ impl Filter {
 
     /// For each texel the index of its radius, and its squared error [W²/m⁴]: that of its neighbourhood, shared out there as
     /// the light is, whose variance is in proportion to it where photons carry alike.
-    fn choose(&self) -> (Vec<u8>, Vec<f64>) {
+    pub(super) fn choose(&self) -> (Vec<u8>, Vec<f64>) {
         let raw = self
             .halves
             .each_ref()
@@ -134,25 +149,31 @@ impl Filter {
         let level = &mut map.levels_mut()[0];
         for channel in 0..3 {
             let flux: Vec<f64> = level.texels().iter().map(|count| count[channel] as f64).collect();
-            let mut means = flux.clone();
-            for (index, &radius) in RADII.iter().enumerate().skip(1) {
-                if !widths.contains(&(index as u8)) {
-                    continue;
-                }
-                let area = blurred(&self.areas_m2, self.size, radius);
-                let mean = self.per_area(&blurred(&flux, self.size, radius), &area);
-                let chosen = means
-                    .iter_mut()
-                    .enumerate()
-                    .filter(|(texel, _)| widths[*texel] == index as u8);
-                chosen.for_each(|(texel, value)| *value = mean[texel] * self.areas_m2[texel]);
-            }
+            let means = self.smoothed(&flux, widths);
             let [before, after] = [&flux, &means].map(|flux| flux.iter().sum::<f64>());
             let scale = if after != 0.0 { before / after } else { 1.0 };
             for (count, mean) in level.texels_mut().iter_mut().zip(means) {
                 count[channel] = (mean * scale).round() as i64;
             }
         }
+    }
+
+    /// Flux whose density in each texel is the mean over its window.
+    pub(super) fn smoothed(&self, flux: &[f64], widths: &[u8]) -> Vec<f64> {
+        let mut means = flux.to_vec();
+        for (index, &radius) in RADII.iter().enumerate().skip(1) {
+            if !widths.contains(&(index as u8)) {
+                continue;
+            }
+            let area = blurred(&self.areas_m2, self.size, radius);
+            let mean = self.per_area(&blurred(flux, self.size, radius), &area);
+            let chosen = means
+                .iter_mut()
+                .enumerate()
+                .filter(|(texel, _)| widths[*texel] == index as u8);
+            chosen.for_each(|(texel, value)| *value = mean[texel] * self.areas_m2[texel]);
+        }
+        means
     }
 
     /// Flux over area; nothing where there is none.
@@ -173,7 +194,8 @@ fn blurred(values: &[f64], size: (usize, usize), radius: usize) -> Vec<f64> {
     box_sums(&once, size, radius)
 }
 
-fn box_sums(values: &[f64], (width, height): (usize, usize), radius: usize) -> Vec<f64> {
+/// Sums over a square window around each texel.
+pub(super) fn box_sums(values: &[f64], (width, height): (usize, usize), radius: usize) -> Vec<f64> {
     let mut across = vec![0.0; values.len()];
     across
         .par_chunks_mut(width)

@@ -8,4 +8,5 @@ pub mod launch;
 pub mod pass;
 pub mod spectrum;
 pub mod spheres;
+mod tiled_filter;
 pub mod walk;
