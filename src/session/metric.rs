@@ -83,10 +83,12 @@ impl CausticLayer<'_> {
             let at = |values: Option<&Vec<f64>>, texel: usize| {
                 values.and_then(|values| values.get(texel)).map_or(0.0, |e| *e)
             };
-            let traced = |texel: usize| at(own, texel) + at(beside.map(|beside| &beside.indirect), texel);
-            let own_means = blocks.means(chart, traced);
+            // Caustics count where they are seen; indirect light has an error of its own, and is only seen beside them.
+            let own_means = blocks.means(chart, |texel| at(own, texel));
             let all = blocks.means(chart, |texel| {
-                traced(texel) + at(beside.map(|beside| &beside.direct), texel)
+                let others =
+                    beside.map(|beside| at(Some(&beside.direct), texel) + at(Some(&beside.indirect), texel));
+                at(own, texel) + others.unwrap_or(0.0)
             });
             let light: Vec<Lit> = blocks.lit(&all, &own_means).collect();
             (*receiver, blocks, light)

@@ -31,20 +31,20 @@ pub(super) fn filter_tiles(
     let picture = Picture::new(map, layout, halves, unit);
     let counts = map.levels()[0].texels();
     let before = sums(counts);
-    let tiles: Vec<(Tile, Option<Smooth>)> = layout
+    let tiles: Vec<(Tile, Smooth)> = layout
         .tiles()
         .collect::<Vec<_>>()
         .into_par_iter()
         .map(|tile| {
-            let smooth = picture.smooth(&tile);
+            let own = picture.of_own(&tile, &counts[tile.texels.clone()]);
+            let smooth = picture.smooth(&tile, &own).unwrap_or(own);
             (tile, smooth)
         })
         .collect();
     let texels = map.levels_mut()[0].texels_mut();
     for (tile, smooth) in &tiles {
-        let Some(smooth) = smooth else { continue };
         texels[tile.texels.clone()].copy_from_slice(&smooth.counts);
-        squares[tile.texels.clone()].fill(smooth.square);
+        squares[tile.texels.clone()].copy_from_slice(&smooth.squares);
     }
     let after = sums(texels);
     for texel in texels {
@@ -64,8 +64,8 @@ fn sums(texels: &[FluxCount]) -> [f64; 3] {
 /// What a tile becomes.
 struct Smooth {
     counts: Vec<FluxCount>,
-    /// Squared error [W²/m⁴].
-    square: f64,
+    /// Squared errors [W²/m⁴].
+    squares: Vec<f64>,
 }
 
 /// The whole map, coarse and filtered.
@@ -153,8 +153,39 @@ impl Picture {
         bilinear(values, self.size.0, self.size.1, uv)
     }
 
-    /// What the picture makes of a tile; `None` where its own photons are better.
-    fn smooth(&self, tile: &Tile) -> Option<Smooth> {
+    /// A tile filtered by itself.
+    fn of_own(&self, tile: &Tile, counts: &[FluxCount]) -> Smooth {
+        let own = tile.texels.clone();
+        if counts.iter().all(|count| *count == [0; 3]) {
+            return Smooth {
+                counts: counts.to_vec(),
+                squares: vec![0.0; own.len()],
+            };
+        }
+        let areas_m2 = &self.areas_m2[own.clone()];
+        let flux = |e: &Vec<f64>| {
+            e[own.clone()]
+                .iter()
+                .zip(areas_m2)
+                .map(|(e, m2)| e * m2)
+                .collect()
+        };
+        let filter = Filter::of(tile.size, areas_m2.to_vec(), self.raw.each_ref().map(flux));
+        let (widths, squares) = filter.choose();
+        let channels = [0, 1, 2].map(|channel| {
+            let flux: Vec<f64> = counts.iter().map(|count| count[channel] as f64).collect();
+            filter.smoothed(&flux, &widths)
+        });
+        Smooth {
+            counts: (0..own.len())
+                .map(|texel| channels.each_ref().map(|flux| flux[texel].round() as i64))
+                .collect(),
+            squares,
+        }
+    }
+
+    /// What the picture makes of a tile; `None` where the tile by itself is better.
+    fn smooth(&self, tile: &Tile, own: &Smooth) -> Option<Smooth> {
         let step = f64::from(1_u32 << tile.level);
         let origin = DVec2::new(tile.origin.0 as f64, tile.origin.1 as f64);
         let place = |texel: usize| {
@@ -176,7 +207,12 @@ impl Picture {
             area_m2 += own_m2;
         }
         let square = bias.max(0.0) + 0.5 * variance;
-        if area_m2 <= 0.0 || square > 0.5 * noise {
+        // Filtered, a tile has less noise than its photons, but not where it has next to none of them.
+        let shares = tile.texels.clone().zip(&own.squares);
+        let own_square: f64 = shares.map(|(texel, square)| square * self.areas_m2[texel]).sum();
+        let is_known = tile.texels.len() > 1 && own_square > 0.0;
+        let least = if is_known { own_square } else { 0.5 * noise };
+        if area_m2 <= 0.0 || square > least {
             return None;
         }
         let counts = tile.texels.clone().map(|texel| {
@@ -187,7 +223,7 @@ impl Picture {
         });
         Some(Smooth {
             counts: counts.collect(),
-            square: square / area_m2,
+            squares: vec![square / area_m2; tile.texels.len()],
         })
     }
 }
