@@ -79,9 +79,9 @@ pub enum Estimator {
 #[strum(serialize_all = "lowercase")]
 pub enum ErrorMetric {
     /// As an eye sees it: relative to how bright a place is, with what exposure makes of the dark.
+    #[default]
     Visible,
     /// Root mean square over all maps, over their mean: ruled by the brightest light.
-    #[default]
     Rmse,
 }
 
@@ -280,7 +280,7 @@ pub struct BakeSettings {
     /// What that error is.
     #[serde(default)]
     pub error_metric: ErrorMetric,
-    /// Ends the light pass after so many seconds of wall-clock time, > 0, with the finest maps that were complete.
+    /// Ends the bake after so many seconds of wall-clock time, > 0, with the finest maps that were complete.
     pub max_time_s: Option<f64>,
     /// Lattice or jittered.
     pub rays: RayPlacement,
@@ -359,7 +359,7 @@ impl Default for BakeSettings {
             estimator: Estimator::Auto,
             density_per_sr: Estimator::Auto.preview_density_per_sr(),
             max_error: None,
-            error_metric: ErrorMetric::Rmse,
+            error_metric: ErrorMetric::Visible,
             max_time_s: None,
             rays: RayPlacement::Lattice,
             sigma: Estimator::Auto.default_sigma(),

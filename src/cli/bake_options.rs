@@ -30,7 +30,7 @@ pub struct BakeOptions {
     /// What that error is: as an eye sees it, or the relative RMSE over all maps (not splat) [default: rmse]
     #[arg(long, value_parser = values::one_of::<ErrorMetric>(), value_name = "METRIC")]
     error_metric: Option<ErrorMetric>,
-    /// Ends the light pass after so long, such as 10s, with the finest maps that are complete by then; without
+    /// Ends the bake after so long, such as 10s, with the finest maps that are complete by then; without
     /// --max-error, refines as far as that goes (not splat)
     #[arg(long, value_name = "TIME", value_parser = values::seconds, allow_hyphen_values = true)]
     max_time: Option<f64>,

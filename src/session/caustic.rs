@@ -42,6 +42,9 @@ const ROUND_GAIN: f64 = 0.4;
 /// Rounds of refinement at most: cells are then a 2¹⁶th of the first ones.
 const MOST_ROUNDS: usize = 8;
 
+/// Part of the time that there is when light between surfaces is still to be gathered.
+const PART_BEFORE_INDIRECT: f64 = 0.85;
+
 /// All that the layer needs.
 pub(super) struct CausticLayer<'a> {
     pub(super) tracer: &'a Tracer,
@@ -54,7 +57,7 @@ pub(super) struct CausticLayer<'a> {
     pub(super) progress: &'a dyn Progress,
     /// What the user asks.
     pub(super) control: &'a Control,
-    /// When the light pass began.
+    /// When the bake began.
     pub(super) began: Instant,
 }
 
@@ -225,7 +228,13 @@ impl CausticLayer<'_> {
         let lights: Vec<&AimedLight> = self.lit().collect();
         self.refuse_soft_light(&lights)?;
         let whole = self.control.without_deadline();
-        let limited = super::limited(self.control, self.settings, self.began);
+        let part = if self.plan.is_on(Effect::Indirect) {
+            PART_BEFORE_INDIRECT
+        } else {
+            1.0
+        };
+        let limit_s = self.settings.max_time_s.map(|limit_s| part * limit_s);
+        let limited = super::limited(self.control, limit_s, self.began);
         let mut course = Course {
             control: &limited,
             clock,

@@ -293,11 +293,10 @@ impl BakeSession {
         settings: &'a BakeSettings,
         progress: &'a dyn Progress,
         control: &'a Control,
-        clock: &mut Clock,
+        (clock, began): (&mut Clock, Instant),
     ) -> Ground<'a> {
         progress.advance(Stage::Build, 0, 1);
         let tracer = clock.time(|clock| &mut clock.build, || self.tracer());
-        let began = Instant::now();
         progress.advance(Stage::Plan, 0, 1);
         let known = self.aim.as_ref().map(|(_, aim)| Arc::clone(aim));
         let aim = clock.time(|clock| &mut clock.plan, || self.aim(settings));
@@ -351,20 +350,19 @@ impl BakeSession {
         level: Option<&mut TakeLevel>,
         labour: &mut Labour,
     ) -> Result<BakeResult> {
-        let whole = Stopwatch::start();
+        let (whole, began) = (Stopwatch::start(), Instant::now());
         let mut clock = Clock::default();
         let mut level = level;
         let first_look = self.first_look(settings, (progress, control), (&mut level, &mut clock));
-        let ground = self.ground(settings, progress, control, &mut clock);
+        let ground = self.ground(settings, progress, control, (&mut clock, began));
         let Ground {
             tracer,
             aim,
             plan,
-            began,
             item_buffer_tests,
             ..
         } = &ground;
-        let (item_buffer_tests, began) = (*item_buffer_tests, *began);
+        let item_buffer_tests = *item_buffer_tests;
         let finish = Finish {
             scene: &self.scene,
             sizes: &self.sizes,
@@ -419,7 +417,7 @@ impl BakeSession {
         clock.deposit.add(watch.elapsed());
         if plan.is_on(Effect::Indirect) {
             let mut gathered = IndirectWork::default();
-            let limited = limited(control, settings, began);
+            let limited = limited(control, settings.max_time_s, began);
             let gathering = Gathering {
                 tracer,
                 sizes: &self.sizes,
@@ -455,9 +453,9 @@ impl BakeSession {
     }
 }
 
-/// What the user asks, and the time that a light pass has since it began.
-fn limited(control: &Control, settings: &BakeSettings, began: Instant) -> Control {
-    match settings.max_time_s {
+/// What the user asks, and the time that there is since a bake began [s].
+fn limited(control: &Control, limit_s: Option<f64>, began: Instant) -> Control {
+    match limit_s {
         Some(limit_s) => control.with_deadline(began + Duration::from_secs_f64(limit_s)),
         None => control.without_deadline(),
     }
@@ -495,7 +493,7 @@ struct Ground<'a> {
     settings: &'a BakeSettings,
     progress: &'a dyn Progress,
     control: &'a Control,
-    /// When the light pass began.
+    /// When the bake began.
     began: Instant,
 }
 

@@ -19,6 +19,7 @@ use crate::session::{BakeResult, BakeSession, Timings};
 use crate::settings::{BakeSettings, MapResolution};
 pub(super) use labour::Labour;
 pub(super) use pass_sums::PassSums;
+use std::time::Instant;
 
 /// What a shard gives.
 #[derive(Clone, Debug)]
@@ -105,7 +106,7 @@ impl BakeSession {
         check(settings)?;
         self.threads.of(settings)?.install(|| {
             let (whole, mut clock) = (Stopwatch::start(), Clock::default());
-            let ground = self.ground(settings, progress, control, &mut clock);
+            let ground = self.ground(settings, progress, control, (&mut clock, Instant::now()));
             let mut labour = Labour::shard(share);
             let mut states = LightStates::default();
             ground.bake(&self.sizes, &mut states, &mut clock, &mut labour, &mut ())?;

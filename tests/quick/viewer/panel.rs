@@ -314,7 +314,7 @@ fn states_are_told_in_words() {
         panel.tell_level(|last| {
             (last.level, last.seconds, last.is_final) = (2, 0.42, is_final);
             last.result.stop_reason = StopReason::MaxTime;
-            last.result.estimated_relative_rmse = error;
+            last.result.estimated_visible = error;
         });
         panel.assert_says(&[told]);
     }
