@@ -22,7 +22,7 @@ use crate::transport::EffectSet;
 const FIRST_PHOTONS: u32 = 1 << 13;
 
 /// Photons of each half, at most.
-const MAX_PHOTONS: u32 = 1 << 31;
+const MAX_PHOTONS: u32 = 1 << 30;
 
 /// A light that has given no error by so many photons of each half gives none.
 const MAX_WITHOUT_ERROR: u32 = 1 << 20;
@@ -37,7 +37,7 @@ const MARGIN: f64 = 1.1;
 const LEAST_NOISE: f64 = 0.7;
 
 /// The mean flux of all photons may be so many times that of the first ones.
-const MEAN_MARGIN: f64 = 16.0;
+const MEAN_MARGIN: f64 = 4.0;
 
 impl CausticLayer<'_> {
     /// Photons of each half of the level after one, of a light that aims at a relative RMSE; `None` where there is nothing

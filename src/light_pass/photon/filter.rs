@@ -144,18 +144,17 @@ impl Filter {
         self.per_area(&blurred(&both, self.size, radius), &area)
     }
 
-    /// Puts the means in the place of the map's flux; each channel keeps its sum.
+    /// Means in the place of the map's flux.
     fn apply(&self, map: &mut ReceiverMap, widths: &[u8]) {
-        let level = &mut map.levels_mut()[0];
-        for channel in 0..3 {
-            let flux: Vec<f64> = level.texels().iter().map(|count| count[channel] as f64).collect();
-            let means = self.smoothed(&flux, widths);
-            let [before, after] = [&flux, &means].map(|flux| flux.iter().sum::<f64>());
-            let scale = if after != 0.0 { before / after } else { 1.0 };
-            for (count, mean) in level.texels_mut().iter_mut().zip(means) {
-                count[channel] = (mean * scale).round() as i64;
-            }
-        }
+        let counts = map.levels()[0].texels();
+        let means = [0, 1, 2].map(|channel| {
+            let flux: Vec<f64> = counts.iter().map(|count| count[channel] as f64).collect();
+            self.smoothed(&flux, widths)
+        });
+        let flux: Vec<[f64; 3]> = (0..counts.len())
+            .map(|texel| means.each_ref().map(|means| means[texel]))
+            .collect();
+        put(map, &flux);
     }
 
     /// Flux whose density in each texel is the mean over its window.
@@ -182,6 +181,24 @@ impl Filter {
             if *own > 0.0 { flux / area } else { 0.0 }
         };
         flux.par_iter().zip(area).zip(&self.areas_m2).map(of).collect()
+    }
+}
+
+/// Puts other counts in the place of a map's; each channel keeps its sum, to which roundings add up to nothing.
+pub(super) fn put(map: &mut ReceiverMap, flux: &[[f64; 3]]) {
+    let texels = map.levels_mut()[0].texels_mut();
+    for channel in 0..3 {
+        let before: f64 = texels.iter().map(|count| count[channel] as f64).sum();
+        let after: f64 = flux.iter().map(|flux| flux[channel]).sum();
+        let size: f64 = flux.iter().map(|flux| flux[channel].abs()).sum();
+        // Channels of pure colours are negative in places.
+        let missing = if size > 0.0 { (before - after) / size } else { 0.0 };
+        let mut left = 0.0;
+        for (count, flux) in texels.iter_mut().zip(flux) {
+            let wanted = flux[channel] + flux[channel].abs() * missing + left;
+            count[channel] = wanted.round() as i64;
+            left = wanted - count[channel] as f64;
+        }
     }
 }
 

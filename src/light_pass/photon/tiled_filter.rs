@@ -7,7 +7,7 @@
 use glam::DVec2;
 use rayon::prelude::*;
 
-use super::filter::{Filter, box_sums};
+use super::filter::{Filter, box_sums, put};
 use crate::illumination::accumulator::{FluxCount, FluxUnit};
 use crate::illumination::lookup::bilinear;
 use crate::illumination::tiles::{Tile, TileLayout};
@@ -30,7 +30,6 @@ pub(super) fn filter_tiles(
 ) {
     let picture = Picture::new(map, layout, halves, unit);
     let counts = map.levels()[0].texels();
-    let before = sums(counts);
     let tiles: Vec<(Tile, Smooth)> = layout
         .tiles()
         .collect::<Vec<_>>()
@@ -41,29 +40,17 @@ pub(super) fn filter_tiles(
             (tile, smooth)
         })
         .collect();
-    let texels = map.levels_mut()[0].texels_mut();
     for (tile, smooth) in &tiles {
-        texels[tile.texels.clone()].copy_from_slice(&smooth.counts);
         squares[tile.texels.clone()].copy_from_slice(&smooth.squares);
     }
-    let after = sums(texels);
-    for texel in texels {
-        for channel in 0..3 {
-            if after[channel] > 0.0 {
-                let scaled = texel[channel] as f64 * (before[channel] / after[channel]);
-                texel[channel] = scaled.round() as i64;
-            }
-        }
-    }
-}
-
-fn sums(texels: &[FluxCount]) -> [f64; 3] {
-    [0, 1, 2].map(|channel| texels.iter().map(|count| count[channel] as f64).sum())
+    let flux: Vec<[f64; 3]> = tiles.into_iter().flat_map(|(_, smooth)| smooth.flux).collect();
+    put(map, &flux);
 }
 
 /// What a tile becomes.
 struct Smooth {
-    counts: Vec<FluxCount>,
+    /// Counts, by texel.
+    flux: Vec<[f64; 3]>,
     /// Squared errors [W²/m⁴].
     squares: Vec<f64>,
 }
@@ -158,7 +145,7 @@ impl Picture {
         let own = tile.texels.clone();
         if counts.iter().all(|count| *count == [0; 3]) {
             return Smooth {
-                counts: counts.to_vec(),
+                flux: vec![[0.0; 3]; own.len()],
                 squares: vec![0.0; own.len()],
             };
         }
@@ -177,8 +164,8 @@ impl Picture {
             filter.smoothed(&flux, &widths)
         });
         Smooth {
-            counts: (0..own.len())
-                .map(|texel| channels.each_ref().map(|flux| flux[texel].round() as i64))
+            flux: (0..own.len())
+                .map(|texel| channels.each_ref().map(|flux| flux[texel]))
                 .collect(),
             squares,
         }
@@ -215,14 +202,12 @@ impl Picture {
         if area_m2 <= 0.0 || square > least {
             return None;
         }
-        let counts = tile.texels.clone().map(|texel| {
+        let flux = tile.texels.clone().map(|texel| {
             let density = self.at(&self.channels, place(texel - tile.texels.start));
-            density
-                .to_array()
-                .map(|density| (density * self.areas_m2[texel]).round() as i64)
+            density.to_array().map(|density| density * self.areas_m2[texel])
         });
         Some(Smooth {
-            counts: counts.collect(),
+            flux: flux.collect(),
             squares: vec![square / area_m2; tile.texels.len()],
         })
     }
