@@ -3,6 +3,7 @@
 use std::sync::{Arc, OnceLock};
 
 use glam::DVec3;
+use rayon::prelude::*;
 
 use super::pass::{Seconds, Stopwatch};
 use crate::geometry::sampling::even_point;
@@ -255,6 +256,31 @@ fn specular_objects(scene: &Scene) -> Vec<usize> {
         .collect()
 }
 
+/// What all places of a light see.
+#[derive(Default)]
+struct AllSeen {
+    /// The first view of anything specular, or the first one.
+    first: Option<View>,
+    seen: Vec<usize>,
+    visibly: Vec<usize>,
+    hidden_cells: u64,
+    tests: u64,
+}
+
+impl AllSeen {
+    fn add(&mut self, view: View) {
+        self.tests += view.tests;
+        self.hidden_cells = self.hidden_cells.max(view.item_buffer.hidden_cells);
+        self.seen.extend(&view.item_buffer.casters);
+        let visible = view.visible.as_ref().unwrap_or(&view.item_buffer);
+        self.visibly.extend(&visible.casters);
+        let is_blind = |first: &View| first.item_buffer.casters.is_empty();
+        if self.first.as_ref().is_none_or(is_blind) {
+            self.first = Some(view);
+        }
+    }
+}
+
 struct Looker<'a> {
     aimer: Aimer<'a>,
     /// Whether lights have sizes.
@@ -266,27 +292,31 @@ impl Looker<'_> {
     fn look(&self, light: usize) -> (Sight, Option<AimedLight>, LookAround) {
         let scene = self.aimer.tracer.scene();
         let casters: Arc<[usize]> = self.reach.casters(light).into();
-        let mut look = LookAround::default();
-        let (mut first, mut seen, mut visibly): (Option<View>, Vec<usize>, Vec<usize>) = Default::default();
-        let mut hidden_cells = 0;
-        for (place, emitter) in self.places(light) {
-            if place >= PLACES && !seen.is_empty() {
+        let places: Vec<(u32, Emitter)> = self.places(light).collect();
+        let (usual, more) = places.split_at(places.partition_point(|(place, _)| *place < PLACES));
+        let look_from = |(_, emitter): &(u32, Emitter)| self.aimer.look(emitter, &casters);
+        let views: Vec<Option<View>> = usual.par_iter().map(look_from).collect();
+        let mut all = AllSeen::default();
+        views.into_iter().flatten().for_each(|view| all.add(view));
+        for place in more {
+            if !all.seen.is_empty() {
                 break;
             }
-            let Some(view) = self.aimer.look(&emitter, &casters) else {
-                continue;
-            };
-            look.tests += view.tests;
-            hidden_cells = hidden_cells.max(view.item_buffer.hidden_cells);
-            seen.extend(&view.item_buffer.casters);
-            visibly.extend(&view.visible.as_ref().unwrap_or(&view.item_buffer).casters);
-            if first
-                .as_ref()
-                .is_none_or(|first| first.item_buffer.casters.is_empty())
-            {
-                first = Some(view);
+            if let Some(view) = look_from(place) {
+                all.add(view);
             }
         }
+        let AllSeen {
+            first,
+            mut seen,
+            mut visibly,
+            hidden_cells,
+            tests,
+        } = all;
+        let mut look = LookAround {
+            tests,
+            ..LookAround::default()
+        };
         for list in [&mut seen, &mut visibly] {
             list.sort_unstable();
             list.dedup();

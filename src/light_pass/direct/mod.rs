@@ -57,7 +57,7 @@ pub fn bake_direct(
         .enumerate()
         .map(|(index, light)| Source::new(light, tracer, index))
         .collect();
-    let looks = if has_soft_light(&sources) { 3 } else { 2 };
+    let looks = if begins_with_glance(&sources) { 3 } else { 2 };
     let total: u64 = charts.iter().map(|chart| looks * chart.height as u64).sum();
     let done = AtomicU64::new(0);
     let row_done = || progress.advance(Stage::Direct, done.fetch_add(1, Ordering::Relaxed) + 1, total);
@@ -67,10 +67,17 @@ pub fn bake_direct(
         .collect()
 }
 
-/// Whether one of them has extent.
-fn has_soft_light(sources: &[Option<Source>]) -> bool {
-    let mut sources = sources.iter().flatten();
-    sources.any(|source| matches!(source.emission, Emission::Soft(_)))
+/// Whether some lights have extent, and a glance may be enough for each of them.
+fn begins_with_glance(sources: &[Option<Source>]) -> bool {
+    let soft = sources
+        .iter()
+        .flatten()
+        .filter_map(|source| match &source.emission {
+            Emission::Soft(soft) => Some(soft.is_even),
+            Emission::Single(_) => None,
+        });
+    let even: Vec<bool> = soft.collect();
+    !even.is_empty() && even.iter().all(|is_even| *is_even)
 }
 
 struct Baker<'a> {
@@ -115,8 +122,8 @@ impl<'a> Baker<'a> {
         }
     }
 
-    /// A glance everywhere where lights have extent, a coarse look where one of them is partly hidden, and a fine one
-    /// where light meets shadow within a texel or between neighbours.
+    /// A coarse look everywhere or, where a glance is enough for what is seen whole or not at all, at the rest; then a fine
+    /// one where light meets shadow within a texel or between neighbours.
     fn bake(&self, row_done: &(impl Fn() + Sync), control: &Control) -> DirectLayer {
         let (width, height) = (self.chart.width, self.chart.height);
         let mut texels = vec![Texel::DARK; width * height];
@@ -130,12 +137,15 @@ impl<'a> Baker<'a> {
                 }
             }
         };
-        let first = self.pass(row_done, control, Look::GLANCE, |_| true);
-        take(first, &mut texels);
-        if has_soft_light(self.sources) {
+        if begins_with_glance(self.sources) {
+            let glance = self.pass(row_done, control, Look::GLANCE, |_| true);
+            take(glance, &mut texels);
             let coarse = self.pass(row_done, control, Look::COARSE, |texel| {
                 texels[texel].is_uncertain || self.meets_other(&texels, texel, |texel| texel.soft_lit)
             });
+            take(coarse, &mut texels);
+        } else {
+            let coarse = self.pass(row_done, control, Look::COARSE, |_| true);
             take(coarse, &mut texels);
         }
         let fine = self.pass(row_done, control, Look::FINE, |texel| {

@@ -25,6 +25,8 @@ use crate::transport::Tracer;
 const READY: usize = 1 << 13;
 /// And of a sky, whose texels need more of them.
 const READY_OF_SKY: usize = 1 << 14;
+/// Angle of a sun [rad] whose places shine on a surface alike.
+const NARROW_RAD: f64 = 0.03;
 /// Surfaces of more triangles are looked at by samples alone.
 const MOST_POLYGONS: usize = 16;
 /// Corners that stand for the edge of a disc.
@@ -55,6 +57,8 @@ pub struct Soft {
     /// What it is made of, where that is little: E without shadows is exact, and samples say only what is hidden.
     shape: Option<Shape>,
     light: u64,
+    /// Whether a few of its places tell what all do, unless some of them are hidden.
+    pub is_even: bool,
 }
 
 enum ManyPlaces {
@@ -101,10 +105,13 @@ impl Source {
             .and_then(|middle| middle.kind.position())
             .map_or(Surroundings::VACUUM, |place| Surroundings::at(tracer, place));
         let emission = if light.has_extent() {
+            let shape = shape(light, scene);
+            let is_narrow = |size: LightSize| matches!(size, LightSize::Angle { diameter_rad } if diameter_rad <= NARROW_RAD);
             Emission::Soft(Soft {
                 places: ManyPlaces::new(light, scene, index)?,
-                shape: shape(light, scene),
                 light: index as u64,
+                is_even: shape.is_some() || is_narrow(light.size),
+                shape,
             })
         } else {
             Emission::Single(middle?)
