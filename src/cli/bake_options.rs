@@ -27,7 +27,7 @@ pub struct BakeOptions {
     /// Goes on until the estimated error of the maps is below this, such as 2% (not splat)
     #[arg(long, value_name = "SHARE", value_parser = values::share, allow_hyphen_values = true)]
     max_error: Option<f64>,
-    /// What that error is: as an eye sees it, or the relative RMSE over all maps (not splat) [default: rmse]
+    /// What that error is: as an eye sees it, or the relative RMSE over all maps (not splat) [default: visible]
     #[arg(long, value_parser = values::one_of::<ErrorMetric>(), value_name = "METRIC")]
     error_metric: Option<ErrorMetric>,
     /// Ends the bake after so long, such as 10s, with the finest maps that are complete by then; without

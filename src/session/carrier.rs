@@ -1,7 +1,8 @@
 //! What carries a light: patches of its wavefront, or photons.
 //!
-//! Light of many places and on rough surfaces is for photons. Of any other light `auto` makes a few photons first; they tell
-//! what the target would cost by photons, and patches go on while they cost less than that. Costs are counted operations, so that the choice does not depend on the machine.
+//! Light of many places and on rough surfaces is for photons. Of any other light `auto` makes a few photons first; they
+//! tell what the target would cost by photons, and patches go on while they cost less than that. Costs are counted
+//! operations, so that the choice does not depend on the machine.
 
 use super::caustic::{CausticLayer, Climb, Course};
 use super::light_level::{LightLevel, LightState};

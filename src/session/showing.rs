@@ -102,6 +102,9 @@ impl Onlooker for Showing<'_, '_> {
 
     fn backdrop(&mut self, levels: &[Shown]) -> Backdrop {
         let finish = self.finish;
+        if !finish.plan.is_on(Effect::Direct) && !finish.plan.is_on(Effect::Indirect) {
+            return Backdrop::new();
+        }
         let (charts, _) = finish.charts(levels);
         let on_whom = (self.progress, self.control);
         if finish.plan.is_on(Effect::Direct) {
@@ -110,7 +113,7 @@ impl Onlooker for Showing<'_, '_> {
         }
         let (mut maps, _) = finish.maps(levels, &charts, self.direct);
         if finish.plan.is_on(Effect::Indirect) {
-            let known = match &mut self.first_look {
+            let known = match &self.first_look {
                 Some(look) => look.indirect(),
                 None if self.indirect.network().is_some() => &*self.indirect,
                 None => self

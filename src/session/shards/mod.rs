@@ -8,6 +8,8 @@
 mod labour;
 mod pass_sums;
 
+use std::time::Instant;
+
 use crate::error::{Error, Result};
 use crate::light_pass::caustic::pass::Stopwatch;
 use crate::light_pass::share::Share;
@@ -19,7 +21,6 @@ use crate::session::{BakeResult, BakeSession, Timings};
 use crate::settings::{BakeSettings, MapResolution};
 pub(super) use labour::Labour;
 pub(super) use pass_sums::PassSums;
-use std::time::Instant;
 
 /// What a shard gives.
 #[derive(Clone, Debug)]
