@@ -66,7 +66,7 @@ fn pieces(begin: usize, end: usize) -> impl Iterator<Item = (usize, usize)> {
 }
 
 /// Blends the four texels around a place on a map of `size` texels, the last of which may be cut.
-fn blend(size: DVec2, uv: DVec2, texel: impl Fn(usize, usize) -> LinearSrgb) -> LinearSrgb {
+pub fn blend(size: DVec2, uv: DVec2, texel: impl Fn(usize, usize) -> LinearSrgb) -> LinearSrgb {
     let (left, right, across) = between_centres(uv.x, size.x);
     let (top, bottom, down) = between_centres(uv.y, size.y);
     let row = |row: usize| texel(left, row) * (1.0 - across) + texel(right, row) * across;

@@ -2,10 +2,11 @@
 
 use super::caustic::CausticOutcome;
 use super::clock::Clock;
-use super::direct_cache::DirectCache;
-use super::finish::Charts;
+use super::direct_cache::{DirectCache, DirectCharts};
+use super::sizes::MapSizes;
 use crate::light_pass::caustic::pass::{Seconds, Stopwatch};
 use crate::progress::{Control, Progress};
+use crate::settings::BakeSettings;
 use crate::transport::Tracer;
 
 /// Direct light in the course of a bake.
@@ -16,11 +17,24 @@ pub(super) struct DirectWork {
 }
 
 impl DirectWork {
+    /// Finds where light ends within little, which maps are to show.
+    pub(super) fn look_for_borders(
+        &mut self,
+        tracer: &Tracer,
+        sizes: &MapSizes,
+        settings: &BakeSettings,
+        control: &Control,
+    ) {
+        let watch = Stopwatch::start();
+        self.shadow_rays += sizes.find_borders(tracer, settings, control);
+        self.seconds.add(watch.elapsed());
+    }
+
     /// Bakes what is missing; false where it was cancelled.
     pub(super) fn shine(
         &mut self,
         tracer: &Tracer,
-        charts: &Charts,
+        charts: &DirectCharts,
         direct: &mut DirectCache,
         (progress, control): (&dyn Progress, &Control),
     ) -> bool {

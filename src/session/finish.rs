@@ -8,23 +8,24 @@ use glam::DVec2;
 use rayon::prelude::*;
 
 use super::caustic::{CausticOutcome, Stopped};
-use super::direct_cache::DirectCache;
+use super::direct_cache::{DirectCache, DirectChart, DirectCharts};
 use super::forecast::ForecastReport;
 use super::light_level::LightLevel;
 use super::map_plan::MEMORY;
 use super::map_size::{self, Wish};
 use super::sizes::{BYTES_PER_TEXEL, MapSizes};
-use super::{BakeResult, LightLayer, StopReason, Timings, map_plan};
+use super::{BakeResult, LightLayer, StopReason, Timings, map_plan, sizes};
 use crate::error::Warning;
 use crate::illumination::accumulator::FluxAccumulator;
 use crate::illumination::gutter::fill_gutter;
 use crate::illumination::lookup::bilinear;
 use crate::illumination::resolution::variance_within;
 use crate::illumination::smoothing::smooth;
-use crate::illumination::tiles::{Tile, TileLayout};
+use crate::illumination::tiles::Tile;
 use crate::illumination::visible::visible_error;
 use crate::illumination::{Chart, IlluminationMap, Layer, Receiver, UvSet};
 use crate::light_pass::accuracy;
+use crate::light_pass::direct::DirectLayer;
 use crate::light_pass::ledger::LightLedger;
 use crate::light_pass::receiver_maps::ReceiverMap;
 use crate::optics::{LinearSrgb, luminance};
@@ -153,9 +154,9 @@ impl Finish<'_> {
                 charts.insert(receiver, map.chart.clone());
             } else if is_everywhere
                 && self.sizes.may_see_lights(receiver)
-                && let Some(size) = self.direct_size(receiver.object())
+                && let Some(wish) = self.direct_wish(receiver)
             {
-                wishes.insert(receiver, Wish::dense(size));
+                wishes.insert(receiver, wish);
             }
         }
         let caustic: u64 = charts.values().map(|chart| chart.texel_count() as u64).sum();
@@ -175,11 +176,19 @@ impl Finish<'_> {
     }
 
     /// The charts that direct light is baked on: row by row, and no finer than it needs where a map is in tiles.
-    pub(super) fn direct_charts(&self, charts: &Charts) -> Charts {
+    pub(super) fn direct_charts(&self, charts: &Charts) -> DirectCharts {
         let charts = charts.values();
         charts
             .filter_map(|chart| Some((chart.receiver, self.direct_chart(chart)?)))
             .collect()
+    }
+
+    /// A map of direct and indirect light only.
+    fn direct_wish(&self, receiver: Receiver) -> Option<Wish> {
+        if self.coarsening > 0 {
+            return self.direct_size(receiver.object()).map(Wish::dense);
+        }
+        self.sizes.direct_wish(receiver, self.settings)
     }
 
     fn direct_size(&self, object: usize) -> Option<(usize, usize)> {
@@ -187,17 +196,31 @@ impl Finish<'_> {
         Some(map_size::halved(size, self.coarsening))
     }
 
-    fn direct_chart(&self, chart: &Arc<Chart>) -> Option<Arc<Chart>> {
+    fn direct_chart(&self, chart: &Arc<Chart>) -> Option<DirectChart> {
+        let is_divided =
+            self.coarsening == 0 && self.sizes.border_doublings(chart.receiver, self.settings) > 0;
         // Unwrapped charts lie elsewhere in maps of other sizes.
         let is_fixed = chart.uv_set == UvSet::Generated || self.coarsening == 0;
-        if chart.layout.is_none() && is_fixed {
-            return Some(Arc::clone(chart));
+        if chart.layout.is_none() && is_fixed && !is_divided {
+            return Some(DirectChart {
+                own: Arc::clone(chart),
+                smaller: None,
+            });
         }
-        let (width, height) = (chart.width, chart.height);
+        let size = (chart.width, chart.height);
         let least = self.direct_size(chart.object())?;
-        let times = (width / least.0).min(height / least.1).checked_ilog2();
-        let size = map_size::halved((width, height), times.unwrap_or(0));
-        self.sizes.chart(chart.receiver, size)
+        let times = (size.0 / least.0)
+            .min(size.1 / least.1)
+            .checked_ilog2()
+            .unwrap_or(0);
+        let of_size = |times: u32| self.sizes.chart(chart.receiver, map_size::halved(size, times));
+        let finer = times.min(sizes::border_doublings(self.settings));
+        Some(DirectChart {
+            own: of_size(times)?,
+            smaller: (is_divided && finer > 0)
+                .then(|| of_size(times - finer))
+                .flatten(),
+        })
     }
 
     fn map(&self, chart: &Arc<Chart>, levels: &Levels, direct: &DirectCache) -> IlluminationMap {
@@ -293,8 +316,9 @@ impl Finish<'_> {
             if self.plan.is_on(Effect::Direct) {
                 let lights = 0..self.scene.lights.len();
                 layers.extend(lights.filter_map(|light| {
-                    let layer = self.direct_of(chart, direct, light..light + 1)?;
-                    Some(part(light, layer))
+                    let irradiance = self.direct_of(chart, direct, light..light + 1)?;
+                    let kind = LayerKind::Direct;
+                    Some(part(light, Layer { kind, irradiance }))
                 }));
             }
         }
@@ -302,27 +326,38 @@ impl Finish<'_> {
     }
 
     pub(super) fn direct_layer(&self, chart: &Arc<Chart>, direct: &DirectCache) -> Option<Layer> {
-        self.direct_of(chart, direct, 0..self.scene.lights.len())
-    }
-
-    /// Direct light of some lights; `None` where that of one is not known.
-    fn direct_of(&self, chart: &Arc<Chart>, direct: &DirectCache, lights: Range<usize>) -> Option<Layer> {
-        let own = self.direct_chart(chart)?;
-        let mut sums = vec![LinearSrgb::BLACK; own.texel_count()];
-        for light in lights {
-            let strength = self.scene.lights[light].strength();
-            for (sum, unit) in sums.iter_mut().zip(direct.layer(light, &own)?) {
-                *sum += LinearSrgb::from(unit.map(f64::from)) * strength;
-            }
-        }
-        let irradiance: Vec<[f32; 3]> = sums.iter().map(|sum| sum.to_array().map(single)).collect();
+        let lights = 0..self.scene.lights.len();
         Some(Layer {
             kind: LayerKind::Direct,
-            irradiance: match &chart.layout {
-                Some(layout) => in_tiles(layout, &own, &irradiance),
-                None if own.texel_count() < chart.texel_count() => finer(chart, &own, &irradiance),
-                None => irradiance,
-            },
+            irradiance: direct.together(chart, || self.direct_of(chart, direct, lights))?,
+        })
+    }
+
+    /// Direct light of some lights [W/m²]; `None` where that of one is not known.
+    fn direct_of(
+        &self,
+        chart: &Arc<Chart>,
+        direct: &DirectCache,
+        lights: Range<usize>,
+    ) -> Option<Vec<[f32; 3]>> {
+        let baked_on = self.direct_chart(chart)?;
+        let own = &*baked_on.own;
+        let mut sums = vec![LinearSrgb::BLACK; own.texel_count()];
+        let mut lit = Vec::new();
+        for light in lights {
+            let strength = self.scene.lights[light].strength();
+            let layer = direct.layer(light, &baked_on)?;
+            for (sum, unit) in sums.iter_mut().zip(&layer.irradiance) {
+                *sum += LinearSrgb::from(unit.map(f64::from)) * strength;
+            }
+            lit.push((layer, strength));
+        }
+        let irradiance: Vec<[f32; 3]> = sums.iter().map(|sum| sum.to_array().map(single)).collect();
+        let is_other = chart.layout.is_some() || own.texel_count() < chart.texel_count();
+        Some(if is_other {
+            Resampled { chart, own, lit }.of(&irradiance)
+        } else {
+            irradiance
         })
     }
 }
@@ -351,46 +386,79 @@ fn beyond_single(maps: &[IlluminationMap]) -> Option<Warning> {
     })
 }
 
-/// Values of a chart at the middle of each texel of a finer one.
-fn finer(chart: &Chart, own: &Chart, values: &[[f32; 3]]) -> Vec<[f32; 3]> {
-    let size = DVec2::new(chart.width as f64, chart.height as f64);
-    let middle = |texel: usize| {
-        let corner = DVec2::new((texel % chart.width) as f64, (texel / chart.width) as f64);
-        (corner + 0.5) / size
-    };
-    (0..chart.texel_count())
-        .map(|texel| bilinear(values, own.width, own.height, middle(texel)))
-        .map(|value| value.to_array().map(single))
-        .collect()
+/// Direct light on a map whose texels are others than those it was baked on.
+struct Resampled<'a> {
+    chart: &'a Chart,
+    /// What it was baked on.
+    own: &'a Chart,
+    /// By light, of unit strength, and its strength.
+    lit: Vec<(&'a DirectLayer, LinearSrgb)>,
 }
 
-/// Values of a chart at the middle of each texel of a map in tiles, means where the texels are larger than the chart's.
-fn in_tiles(layout: &TileLayout, own: &Chart, values: &[[f32; 3]]) -> Vec<[f32; 3]> {
-    let size = {
-        let (width, height) = layout.size();
-        DVec2::new(width as f64, height as f64)
-    };
-    let own_size = DVec2::new(own.width as f64, own.height as f64);
-    let value = |tile: &Tile, texel: usize| {
-        let across = tile.size.0;
-        let side = f64::from(1_u32 << tile.level);
-        let low = DVec2::new((texel % across) as f64, (texel / across) as f64) * side
-            + DVec2::new(tile.origin.0 as f64, tile.origin.1 as f64);
+impl Resampled<'_> {
+    /// Values at the middle of each texel, of the sum of all lights; means where the texels are larger than its own.
+    fn of(&self, sum: &[[f32; 3]]) -> Vec<[f32; 3]> {
+        let value = |corner: [usize; 2], side: f64| self.value(sum, corner, side).to_array().map(single);
+        let Some(layout) = &self.chart.layout else {
+            let across = self.chart.width;
+            let texels = (0..self.chart.texel_count()).into_par_iter();
+            return texels
+                .map(|texel| value([texel % across, texel / across], 1.0))
+                .collect();
+        };
+        let of_tile = |tile: usize| {
+            let Tile {
+                level, origin, size, ..
+            } = layout.tile(tile);
+            let corner = move |texel: usize| {
+                [
+                    origin.0 + (texel % size.0 << level),
+                    origin.1 + (texel / size.0 << level),
+                ]
+            };
+            (0..size.0 * size.1).map(move |texel| value(corner(texel), f64::from(1_u32 << level)))
+        };
+        let tiles = (0..layout.tile_count()).into_par_iter();
+        tiles.flat_map_iter(of_tile).collect()
+    }
+
+    /// The same of one texel by its corner and side, in texels of the finest size.
+    fn value(&self, sum: &[[f32; 3]], corner: [usize; 2], side: f64) -> LinearSrgb {
+        let size = DVec2::new(self.chart.width as f64, self.chart.height as f64);
+        let own_size = DVec2::new(self.own.width as f64, self.own.height as f64);
+        let low = DVec2::new(corner[0] as f64, corner[1] as f64);
+        if let Some(value) = self.divided((low + 0.5 * side) / size, side / size.x) {
+            return value;
+        }
         let times = (DVec2::splat(side) * own_size / size).ceil().max(DVec2::ONE);
-        let mut sum = LinearSrgb::BLACK;
+        let mut mean = LinearSrgb::BLACK;
         for row in 0..times.y as usize {
             for column in 0..times.x as usize {
                 let part = (DVec2::new(column as f64, row as f64) + 0.5) / times;
-                sum += bilinear(values, own.width, own.height, (low + part * side) / size);
+                mean += bilinear(sum, self.own.width, self.own.height, (low + part * side) / size);
             }
         }
-        (sum / (times.x * times.y)).to_array().map(single)
-    };
-    layout
-        .tiles()
-        .flat_map(|tile| (0..tile.texels.len()).map(move |texel| (tile.clone(), texel)))
-        .map(|(tile, texel)| value(&tile, texel))
-        .collect()
+        mean / (times.x * times.y)
+    }
+
+    /// The sum of all lights where one of them ends within little, for texels as small as those that it was divided into;
+    /// their width is a part of the map's.
+    fn divided(&self, uv: DVec2, width: f64) -> Option<LinearSrgb> {
+        let divided = |layer: &DirectLayer| {
+            let divided = layer.divided.as_ref()?;
+            let smallest = 1.0 / (self.own.width * divided.side()) as f64;
+            (width < 1.5 * smallest).then(|| divided.at(uv)).flatten()
+        };
+        let mut sum = LinearSrgb::BLACK;
+        let mut is_divided = false;
+        for (layer, strength) in &self.lit {
+            let small = divided(layer);
+            is_divided |= small.is_some();
+            let whole = || bilinear(&layer.irradiance, self.own.width, self.own.height, uv);
+            sum += small.unwrap_or_else(whole) * *strength;
+        }
+        is_divided.then_some(sum)
+    }
 }
 
 /// The error with what texels larger than they should be leave out.

@@ -77,10 +77,20 @@ pub(super) struct TileNeed {
 
 impl TileNeed {
     /// Where no light was seen.
-    const NOTHING: Self = Self {
+    pub(super) const NOTHING: Self = Self {
         fineness: MOST_LEVELS,
         dimness: 0.0,
     };
+
+    /// Asks for a level at least.
+    fn refine(&mut self, level: u8) {
+        if self.wished() > f64::from(level) {
+            *self = Self {
+                fineness: f64::from(level),
+                dimness: 0.0,
+            };
+        }
+    }
 
     /// The level at which nothing is missed.
     fn wished(&self) -> f64 {
@@ -95,6 +105,35 @@ impl TileNeed {
 
 /// Dim light has texels that are larger than its footprints by so many levels at most.
 const MOST_DIM: f64 = 1.0;
+
+/// Where light ends within little on a map, or beside a place of it.
+#[derive(Clone, Debug)]
+pub(super) struct Borders {
+    /// Across and down.
+    pub(super) size: (usize, usize),
+    /// Row by row.
+    pub(super) marked: Vec<bool>,
+}
+
+impl Borders {
+    /// Tiles of a map that a border runs through ask for a level at least.
+    pub(super) fn refine(&self, map: (usize, usize), level: u8, needs: &mut [TileNeed]) {
+        let (columns, rows) = tiles::tile_counts(map.0, map.1);
+        // Of the tiles that a place and its neighbours lie in.
+        let reach = |place: usize, places: usize, texels: usize, tiles: usize| {
+            let tile = |place: usize| (place * texels / places / tiles::SIDE).min(tiles - 1);
+            tile(place.saturating_sub(1))..=tile(place + 1)
+        };
+        for place in (0..self.marked.len()).filter(|place| self.marked[*place]) {
+            let (column, row) = (place % self.size.0, place / self.size.0);
+            for row in reach(row, self.size.1, map.1, rows) {
+                for column in reach(column, self.size.0, map.0, columns) {
+                    needs[row * columns + column].refine(level);
+                }
+            }
+        }
+    }
+}
 
 /// What one map wants.
 #[derive(Clone, Debug)]

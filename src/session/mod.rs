@@ -163,6 +163,7 @@ impl BakeSession {
         self.sizes = sizes.edited(scene.clone(), &change.shapes);
         if change.moves_paths() || change.shares {
             self.direct.clear();
+            self.sizes.forget_borders(None);
             self.indirect.clear();
             self.lights.statistics = None;
         }
@@ -188,6 +189,7 @@ impl BakeSession {
         for &light in &change.lights {
             self.lights.forget(light);
             self.direct.forget(light);
+            self.sizes.forget_borders(Some(light));
         }
         self.scene = scene;
     }
@@ -370,6 +372,11 @@ impl BakeSession {
             plan,
             coarsening: 0,
         };
+        self.direct.begin();
+        let mut lamps = DirectWork::default();
+        if plan.is_on(Effect::Direct) {
+            lamps.look_for_borders(tracer, &self.sizes, settings, control);
+        }
         let lights = &mut self.lights;
         let mut showing = Showing {
             finish: &finish,
@@ -382,7 +389,7 @@ impl BakeSession {
             level,
             direct: &mut self.direct,
             indirect: &mut self.indirect,
-            lamps: DirectWork::default(),
+            lamps,
             is_first: true,
             first_look,
             glance: None,

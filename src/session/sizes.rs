@@ -6,13 +6,17 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use glam::DVec3;
 
-use super::map_size::MapSize;
+use super::map_size::{self, Borders, MapSize, TileNeed, Wish};
 use crate::illumination::parametrisation::{DEFAULT_NOMINAL_SIDE, Parametrisation, parametrise};
+use crate::illumination::tiles::tile_counts;
 use crate::illumination::{Chart, Receiver, Side, UvSet};
 use crate::light_pass::caustic::statistics::FootprintStatistics;
+use crate::light_pass::direct::find_borders;
+use crate::progress::Control;
 use crate::scene::closed::is_closed;
 use crate::scene::{LightKind, Scene};
 use crate::settings::{BakeSettings, MapResolution};
+use crate::transport::Tracer;
 
 /// Side of a map before the first doubling [texels].
 pub const FIRST_SIDE: usize = 64;
@@ -41,6 +45,8 @@ pub struct MapSizes {
     tiled: Mutex<Vec<Arc<Chart>>>,
     /// Charts that were asked for.
     asked: AtomicU64,
+    /// Where direct light of each light ends within little on each receiver.
+    borders: Mutex<BTreeMap<(usize, Receiver), Borders>>,
 }
 
 /// Receiver, texels across and down.
@@ -56,7 +62,7 @@ const CHARTS_PER_RECEIVER: usize = 4;
 const LEAST_CHARTS: usize = 256;
 
 /// Charts in tiles that are kept.
-const MOST_TILED_CHARTS: usize = 16;
+const MOST_TILED_CHARTS: usize = 64;
 
 impl MapSizes {
     /// Nothing made yet.
@@ -71,6 +77,7 @@ impl MapSizes {
             charts: Mutex::default(),
             tiled: Mutex::default(),
             asked: AtomicU64::new(0),
+            borders: Mutex::default(),
         }
     }
 
@@ -88,6 +95,12 @@ impl MapSizes {
         let tiled = sizes.tiled.get_mut().unwrap_or_else(PoisonError::into_inner);
         tiled.retain(|chart| !changed.contains(&chart.object()));
         sizes
+    }
+
+    /// A light is not what it was; without one, none of them throws the shadows that it threw.
+    pub fn forget_borders(&mut self, light: Option<usize>) {
+        let borders = self.borders.get_mut().unwrap_or_else(PoisonError::into_inner);
+        borders.retain(|(of, _), _| light.is_some_and(|light| *of != light));
     }
 
     /// The parametrisation of an object; `None` where it has no area.
@@ -249,6 +262,107 @@ impl MapSizes {
         Some((side((texels * aspect).sqrt()), side((texels / aspect).sqrt())))
     }
 
+    /// A map of direct and indirect light only: texels of a 400th of the scene's diagonal, or what is asked; in tiles where
+    /// light ends within little.
+    pub fn direct_wish(&self, receiver: Receiver, settings: &BakeSettings) -> Option<Wish> {
+        let size = self.direct_size(receiver.object(), settings)?;
+        let doublings = self.border_doublings(receiver, settings);
+        let Some(borders) = self.borders(receiver).filter(|_| doublings > 0) else {
+            return Some(Wish::dense(size));
+        };
+        let finest = (size.0 << doublings, size.1 << doublings);
+        let (columns, rows) = tile_counts(finest.0, finest.1);
+        let mut tiles = vec![TileNeed::NOTHING; columns * rows];
+        borders.refine(finest, 0, &mut tiles);
+        Some(Wish {
+            is_even: false,
+            tiles: Some(tiles),
+            coarsest: doublings as u8,
+            ..Wish::dense(finest)
+        })
+    }
+
+    /// How often texels of direct light are halved where it ends within little on a receiver; not at all where it does so
+    /// nowhere.
+    pub fn border_doublings(&self, receiver: Receiver, settings: &BakeSettings) -> u32 {
+        if settings.map_resolution != MapResolution::Auto || !self.has_borders(receiver) {
+            return 0;
+        }
+        let Some(size) = self.direct_size(receiver.object(), settings) else {
+            return 0;
+        };
+        let most = (LARGEST_TILED_SIDE / size.0.max(size.1)).checked_ilog2();
+        let doublings = border_doublings(settings).min(most.unwrap_or(0));
+        if map_size::is_divisible((size.0 << doublings, size.1 << doublings)) {
+            doublings
+        } else {
+            0
+        }
+    }
+
+    fn has_borders(&self, receiver: Receiver) -> bool {
+        let known = self.borders.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut borders = known.iter().filter(|((_, of), _)| *of == receiver);
+        borders.any(|(_, borders)| borders.marked.contains(&true))
+    }
+
+    /// Where direct light ends within little on a receiver; `None` where it does so nowhere.
+    pub fn borders(&self, receiver: Receiver) -> Option<Borders> {
+        let known = self.borders.lock().unwrap_or_else(PoisonError::into_inner);
+        let of_receiver = known.iter().filter(|((_, of), _)| *of == receiver);
+        let all = of_receiver.map(|(_, borders)| borders.clone());
+        let all = all.reduce(|mut all, one| {
+            let marks = all.marked.iter_mut().zip(one.marked);
+            marks.for_each(|(mark, other)| *mark |= other);
+            all
+        });
+        all.filter(|borders| borders.marked.contains(&true))
+    }
+
+    /// Looks where direct light ends within little, on surfaces whose maps may be in tiles; returns the shadow rays that it
+    /// took.
+    pub fn find_borders(&self, tracer: &Tracer, settings: &BakeSettings, control: &Control) -> u64 {
+        if settings.map_resolution != MapResolution::Auto {
+            return 0;
+        }
+        let is_tileable =
+            |known: &Arc<Parametrisation>| known.is_uniform() && known.uv_set != UvSet::Generated;
+        let may_be_tiled = |&receiver: &Receiver| {
+            self.may_see_lights(receiver) && self.parametrisation(receiver.object()).is_some_and(is_tileable)
+        };
+        let charts: Vec<Arc<Chart>> = Receiver::all(self.scene.objects.len())
+            .filter(may_be_tiled)
+            .filter_map(|receiver| {
+                let size = self.direct_size(receiver.object(), settings)?;
+                let (width, height) = map_size::halved(size, 1);
+                let doublings = border_doublings(settings);
+                map_size::is_divisible((size.0 << doublings, size.1 << doublings))
+                    .then(|| self.chart(receiver, (width, height)))
+                    .flatten()
+            })
+            .collect();
+        let mut shadow_rays = 0;
+        for (light, source) in self.scene.lights.iter().enumerate() {
+            let known = || self.borders.lock().unwrap_or_else(PoisonError::into_inner);
+            let missing: Vec<&Chart> = {
+                let known = known();
+                let is_missing = |chart: &&Chart| !known.contains_key(&(light, chart.receiver));
+                charts.iter().map(|chart| &**chart).filter(is_missing).collect()
+            };
+            let found = find_borders(tracer, &source.of_unit_strength(), &missing, control);
+            let Some((found, rays)) = found else {
+                break;
+            };
+            shadow_rays += rays;
+            let found = missing.into_iter().zip(found).map(|(chart, marked)| {
+                let size = (chart.width, chart.height);
+                ((light, chart.receiver), Borders { size, marked })
+            });
+            known().extend(found);
+        }
+        shadow_rays
+    }
+
     /// The sizes of the grids that indirect light goes between, by receiver: texels of twice those of direct light or of
     /// the maps that are asked for, larger where there would be more than `most_texels` of them.
     pub fn grid_sizes(&self, settings: &BakeSettings, most_texels: u64) -> Vec<(Receiver, (usize, usize))> {
@@ -285,6 +399,16 @@ impl MapSizes {
             .map(halved)
             .find(|sizes| texels(sizes) <= most_texels)
             .unwrap_or_else(|| halved(12))
+    }
+}
+
+/// How often texels of direct light are halved where it ends within little: to a 1,600th of the scene's diagonal for a draft,
+/// to half and a quarter of that for better presets.
+pub fn border_doublings(settings: &BakeSettings) -> u32 {
+    match settings.max_error {
+        Some(target) if target >= 0.1 => 2,
+        Some(target) if target <= 0.01 => 4,
+        _ => 3,
     }
 }
 

@@ -177,8 +177,8 @@ SCENES = {
 class File:
     """A .glb file in the making."""
 
-    def __init__(self):
-        self.binary, self.document = b"", {
+    def __init__(self, document=None, binary=b""):
+        self.binary, self.document = binary, document or {
             "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": []}], "nodes": [], "meshes": [], "materials": [],
             "accessors": [], "bufferViews": [], "extensions": {},
         }

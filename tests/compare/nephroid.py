@@ -3,10 +3,13 @@
 import json
 import math
 import subprocess
+from pathlib import Path
 
 import numpy
 import OpenEXR
 
+import glass
+import scene as scenes
 from steps import ALIKE_SEED
 
 TARGETS = [0.4, 0.2, 0.14, 0.1, 0.07, 0.05, 0.03, 0.02, 0.014, 0.01, 0.007, 0.005, 0.002, 0.001, 0.0005]
@@ -14,6 +17,9 @@ TARGETS = [0.4, 0.2, 0.14, 0.1, 0.07, 0.05, 0.03, 0.02, 0.014, 0.01, 0.007, 0.00
 DENSITIES = [5e4 * 2**power for power in range(14)]
 # Of brute force, for each map.
 LEAST_RAYS = 100_000
+# Of brute force in dispersive glass.
+WAVELENGTHS = 24
+SPECTRA = Path(__file__).parent.parent.parent / "assets" / "spectra"
 LUMINANCE = numpy.array([0.2126, 0.7152, 0.0722])
 
 
@@ -82,17 +88,48 @@ def brute_force(program, scene, folder, budget_s, side, alike):
     """Maps by brute force, which differ by their seeds alone and take the budget together, or more where it is too short."""
     if scene.depth:
         raise RuntimeError("`study reference` has no --max-depth")
+    is_dispersive = scenes.read(scene.file).is_dispersive
     found, rays, maps = [], LEAST_RAYS, folder / "maps"
     while len(found) < alike:
-        run(program, "study", "reference", scene.file, "-o", maps, "--rays", rays, "--seed", ALIKE_SEED + len(found),
-            "--map-resolution", side, "--quiet", "--force", "--no-cache")
-        manifest = json.loads((maps / "reference.json").read_text())
-        wanted = int(rays * budget_s / alike / manifest["cpu_s"])
+        seed = ALIKE_SEED + len(found)
+        files = by_wavelength(scene.file, folder, seed) if is_dispersive else [scene.file]
+        total, taken_s = numpy.zeros((side, side)), 0.0
+        for file in files:
+            run(program, "study", "reference", file, "-o", maps, "--rays", max(rays // len(files), 1000), "--seed", seed,
+                "--map-resolution", side, "--quiet", "--force", "--no-cache")
+            manifest = json.loads((maps / "reference.json").read_text())
+            total += floor_of(maps, manifest) / len(files)
+            taken_s += manifest["cpu_s"]
+        wanted = int(rays * budget_s / alike / taken_s)
         if not found and wanted > 2 * rays:
             rays = wanted
             continue
-        found.append(floor_of(maps, manifest))
+        found.append(total)
     numpy.save(folder / "alike.npy", found)
+
+
+def by_wavelength(file, folder, seed):
+    """Copies of a scene with the refractive indices of single wavelengths, at random within parts that are equally bright under
+    D65: brute force, which has no wavelengths, then has them."""
+    observer, daylight = (numpy.loadtxt(SPECTRA / name, delimiter=",", skiprows=1) for name in ["cie_1931_2deg.csv", "d65.csv"])
+    brightness = numpy.cumsum(observer[:, 2] * numpy.interp(observer[:, 0], daylight[:, 0], daylight[:, 1]))
+    places = (numpy.arange(WAVELENGTHS) + numpy.random.default_rng(seed).random(WAVELENGTHS)) / WAVELENGTHS
+    wavelengths_nm = numpy.interp(places, brightness / brightness[-1], observer[:, 0])
+    document, binary = scenes.chunks(file.read_bytes())
+    copies = []
+    for number, wavelength_nm in enumerate(wavelengths_nm):
+        copy = glass.File(json.loads(json.dumps(document)), binary)
+        for material in copy.document["materials"]:
+            extensions = material.get("extensions", {})
+            dispersion = extensions.pop("KHR_materials_dispersion", {}).get("dispersion", 0.0)
+            if dispersion > 0.0:
+                # KHR_materials_dispersion, after Cauchy.
+                index = extensions["KHR_materials_ior"]["ior"]
+                steep = (index - 1.0) * dispersion / 20.0
+                extensions["KHR_materials_ior"]["ior"] = index + steep * (523655.0 / wavelength_nm**2 - 1.5168)
+        copies.append(folder / f"wavelength_{number:02}.glb")
+        copy.write(copies[-1])
+    return copies
 
 
 def floor_of(maps, manifest):

@@ -89,7 +89,7 @@ pub fn chart(tracer: &Tracer, object: usize, width: usize, height: usize) -> Cha
 
 /// The direct layer of an object.
 pub fn direct(tracer: &Tracer, chart: &Chart) -> DirectLayer {
-    let layer = bake_direct(tracer, &tracer.scene().lights, &[chart], &(), &Control::default())
+    let layer = bake_direct(tracer, &tracer.scene().lights, &[(chart, None)], &(), &Control::default())
         .pop()
         .expect("one layer per chart");
     assert!(layer.complete);

@@ -5,6 +5,7 @@
 //! way. Each side of a surface has a
 //! map of its own. Lights with extent are means over their places.
 
+pub mod border;
 pub(super) mod facet;
 mod lighting;
 mod polygon;
@@ -23,6 +24,7 @@ use crate::optics::LinearSrgb;
 use crate::progress::{Control, Progress, Stage};
 use crate::scene::{Light, Material};
 use crate::transport::Tracer;
+use border::{Divided, is_steep};
 use facet::Facet;
 use lighting::{Arriving, Beam};
 use source::{Emission, Source};
@@ -37,33 +39,66 @@ const OFF_THE_DIAGONALS: DVec2 = DVec2::new(0.6e-6, 1.1e-6);
 pub struct DirectLayer {
     /// Mean E over the covered part of each texel [W/m²], gutters filled.
     pub irradiance: Vec<[f32; 3]>,
+    /// The same of smaller texels, where light ends within little.
+    pub divided: Option<Divided<[f32; 3]>>,
     /// Any-hit queries made for it.
     pub shadow_rays: u64,
     /// False where it was cancelled: rows that are missing are black.
     pub complete: bool,
 }
 
-/// Bakes the direct light of some lights onto the charts, one layer each. The same for any number of threads. Progress
-/// counts rows over all charts.
+/// Bakes the direct light of some lights onto charts, one layer each; into smaller texels of the same surface, if there is a
+/// chart of them, where light ends within little. The same for any number of threads. Progress counts rows over all charts.
 pub fn bake_direct(
     tracer: &Tracer,
     lights: &[Light],
-    charts: &[&Chart],
+    charts: &[(&Chart, Option<&Chart>)],
     progress: &dyn Progress,
     control: &Control,
 ) -> Vec<DirectLayer> {
-    let sources: Vec<Option<Source>> = lights
-        .iter()
-        .enumerate()
-        .map(|(index, light)| Source::new(light, tracer, index))
-        .collect();
+    let sources = sources(tracer, lights);
     let looks = if begins_with_glance(&sources) { 3 } else { 2 };
-    let total: u64 = charts.iter().map(|chart| looks * chart.height as u64).sum();
+    let rows = |(chart, smaller): &(&Chart, Option<&Chart>)| {
+        looks * chart.height as u64 + smaller.map_or(0, |smaller| 2 * smaller.height as u64)
+    };
+    let total: u64 = charts.iter().map(rows).sum();
     let done = AtomicU64::new(0);
     let row_done = || progress.advance(Stage::Direct, done.fetch_add(1, Ordering::Relaxed) + 1, total);
-    charts
-        .iter()
-        .map(|chart| Baker::new(tracer, &sources, chart).bake(&row_done, control))
+    let of = |&(chart, smaller): &(&Chart, Option<&Chart>)| {
+        let smaller = smaller.map(|smaller| Baker::new(tracer, &sources, smaller));
+        Baker::new(tracer, &sources, chart).bake(smaller.as_ref(), &row_done, control)
+    };
+    charts.iter().map(of).collect()
+}
+
+/// The texels of charts on or beside which a light ends within little, and the shadow rays that it took to find them; `None`
+/// where it was cancelled. The same for any number of threads.
+pub fn find_borders(
+    tracer: &Tracer,
+    light: &Light,
+    charts: &[&Chart],
+    control: &Control,
+) -> Option<(Vec<Vec<bool>>, u64)> {
+    let sources = sources(tracer, std::slice::from_ref(light));
+    let mut shadow_rays = 0;
+    let of = |chart: &&Chart| {
+        let baker = Baker::new(tracer, &sources, chart);
+        let mut seen = Seen::new(chart);
+        baker.look_around(&mut seen, &|| (), control);
+        shadow_rays += seen.shadow_rays;
+        let texels = &seen.texels;
+        let is_border = |texel: usize| is_steep(chart, texels, texel) && baker.is_unclear(texels, texel);
+        let borders = (0..texels.len()).map(is_border);
+        seen.complete.then(|| borders.collect())
+    };
+    let found: Option<Vec<Vec<bool>>> = charts.iter().map(of).collect();
+    Some((found?, shadow_rays))
+}
+
+fn sources(tracer: &Tracer, lights: &[Light]) -> Vec<Option<Source>> {
+    let lights = lights.iter().enumerate();
+    lights
+        .map(|(index, light)| Source::new(light, tracer, index))
         .collect()
 }
 
@@ -78,6 +113,48 @@ fn begins_with_glance(sources: &[Option<Source>]) -> bool {
         });
     let even: Vec<bool> = soft.collect();
     !even.is_empty() && even.iter().all(|is_even| *is_even)
+}
+
+/// What was seen of a chart so far.
+struct Seen {
+    width: usize,
+    texels: Vec<Texel>,
+    shadow_rays: u64,
+    complete: bool,
+}
+
+impl Seen {
+    fn new(chart: &Chart) -> Self {
+        Self {
+            width: chart.width,
+            texels: vec![Texel::DARK; chart.width * chart.height],
+            shadow_rays: 0,
+            complete: true,
+        }
+    }
+
+    fn take(&mut self, rows: Vec<Row>) {
+        for (row, content) in rows.into_iter().enumerate() {
+            self.count(&content);
+            for (column, texel) in content.texels {
+                self.texels[row * self.width + column as usize] = texel;
+            }
+        }
+    }
+
+    fn take_small(&mut self, rows: Vec<Row>, divided: &mut Divided<Texel>) {
+        for (row, content) in rows.into_iter().enumerate() {
+            self.count(&content);
+            for (column, texel) in content.texels {
+                divided.set(column as usize, row, texel);
+            }
+        }
+    }
+
+    fn count(&mut self, row: &Row) {
+        self.shadow_rays += row.shadow_rays;
+        self.complete &= !row.cancelled;
+    }
 }
 
 struct Baker<'a> {
@@ -123,55 +200,88 @@ impl<'a> Baker<'a> {
     }
 
     /// A coarse look everywhere or, where a glance is enough for what is seen whole or not at all, at the rest; then a fine
-    /// one where light meets shadow within a texel or between neighbours.
-    fn bake(&self, row_done: &(impl Fn() + Sync), control: &Control) -> DirectLayer {
-        let (width, height) = (self.chart.width, self.chart.height);
-        let mut texels = vec![Texel::DARK; width * height];
-        let (mut shadow_rays, mut complete) = (0, true);
-        let mut take = |rows: Vec<Row>, texels: &mut [Texel]| {
-            for (row, content) in rows.into_iter().enumerate() {
-                shadow_rays += content.shadow_rays;
-                complete &= !content.cancelled;
-                for (column, texel) in content.texels {
-                    texels[row * width + column as usize] = texel;
-                }
-            }
-        };
-        if begins_with_glance(self.sources) {
-            let glance = self.pass(row_done, control, Look::GLANCE, |_| true);
-            take(glance, &mut texels);
-            let coarse = self.pass(row_done, control, Look::COARSE, |texel| {
-                texels[texel].is_uncertain || self.meets_other(&texels, texel, |texel| texel.soft_lit)
-            });
-            take(coarse, &mut texels);
-        } else {
-            let coarse = self.pass(row_done, control, Look::COARSE, |_| true);
-            take(coarse, &mut texels);
-        }
-        let fine = self.pass(row_done, control, Look::FINE, |texel| {
-            texels[texel].is_uncertain || self.meets_other(&texels, texel, |texel| texel.lit)
-        });
-        take(fine, &mut texels);
-        let mut irradiance = texels
-            .into_iter()
-            .map(|texel| texel.irradiance)
-            .collect::<Vec<_>>();
+    /// one where light meets shadow within a texel or between neighbours, in smaller texels where it does so within little.
+    fn bake(&self, smaller: Option<&Baker>, row_done: &(impl Fn() + Sync), control: &Control) -> DirectLayer {
+        let mut seen = Seen::new(self.chart);
+        self.look_around(&mut seen, row_done, control);
+        let texels = &seen.texels;
+        let mut unclear: Vec<bool> = (0..texels.len())
+            .map(|texel| texels[texel].is_uncertain || self.meets_other(texels, texel, |texel| texel.lit))
+            .collect();
+        let divided = smaller.map(|smaller| self.divide(smaller, &mut unclear, &mut seen, row_done, control));
+        let fine = self.pass(row_done, control, Look::FINE, |texel| unclear[texel]);
+        seen.take(fine);
+        let irradiance = seen.texels.into_iter().map(|texel| texel.irradiance);
+        let mut irradiance: Vec<[f32; 3]> = irradiance.collect();
         fill_gutter(self.chart, &mut irradiance);
         DirectLayer {
             irradiance,
-            shadow_rays,
-            complete,
+            divided: divided.map(|divided| divided.map(|texel| texel.irradiance)),
+            shadow_rays: seen.shadow_rays,
+            complete: seen.complete,
         }
+    }
+
+    /// The first look at every texel.
+    fn look_around(&self, seen: &mut Seen, row_done: &(impl Fn() + Sync), control: &Control) {
+        if begins_with_glance(self.sources) {
+            seen.take(self.pass(row_done, control, Look::GLANCE, |_| true));
+            let texels = &seen.texels;
+            let coarse = self.pass(row_done, control, Look::COARSE, |texel| {
+                texels[texel].is_uncertain || self.meets_other(texels, texel, |texel| texel.soft_lit)
+            });
+            seen.take(coarse);
+        } else {
+            seen.take(self.pass(row_done, control, Look::COARSE, |_| true));
+        }
+    }
+
+    /// Looks at the smaller texels of those that are unclear and steep, which then are clear.
+    fn divide(
+        &self,
+        smaller: &Baker,
+        unclear: &mut [bool],
+        seen: &mut Seen,
+        row_done: &(impl Fn() + Sync),
+        control: &Control,
+    ) -> Divided<Texel> {
+        let texels = &seen.texels;
+        let steep = |texel: usize| is_steep(self.chart, texels, texel) && self.is_unclear(texels, texel);
+        let steep: Vec<bool> = (0..unclear.len()).map(steep).collect();
+        let side = smaller.chart.width / self.chart.width;
+        let mut divided = Divided::new(self.chart, side, &steep, Texel::DARK);
+        let first = if begins_with_glance(self.sources) {
+            Look::GLANCE
+        } else {
+            Look::COARSE
+        };
+        let rows = smaller.pass(row_done, control, first, |small| divided.get(small).is_some());
+        seen.take_small(rows, &mut divided);
+        let rows = smaller.pass(row_done, control, Look::SMALL, |small| divided.is_unclear(small));
+        seen.take_small(rows, &mut divided);
+        for (texel, unclear) in unclear.iter_mut().enumerate() {
+            let Some(small) = divided.within(texel) else {
+                continue;
+            };
+            *unclear = false;
+            let sum = small.iter().fold([0.0; 3], |sum: [f32; 3], small| {
+                [0, 1, 2].map(|channel| sum[channel] + small.irradiance[channel])
+            });
+            seen.texels[texel].irradiance = sum.map(|sum| sum / small.len() as f32);
+        }
+        divided
+    }
+
+    /// Whether a texel asks for another look.
+    fn is_unclear(&self, texels: &[Texel], texel: usize) -> bool {
+        let around = || neighbours(texel, self.chart.width, self.chart.height).map(|other| texels[other]);
+        texels[texel].is_unclear(around)
     }
 
     /// Whether other lights reach a neighbour, or a part of the texel.
     fn meets_other(&self, texels: &[Texel], texel: usize, lit: impl Fn(&Texel) -> Lit) -> bool {
-        let own = lit(&texels[texel]);
-        own == Lit::MIXED
-            || own != Lit::EMPTY
-                && neighbours(texel, self.chart.width, self.chart.height)
-                    .map(|other| lit(&texels[other]))
-                    .any(|other| other != Lit::EMPTY && other != own)
+        let around = neighbours(texel, self.chart.width, self.chart.height);
+        lit(&texels[texel]).differs(around.map(|other| lit(&texels[other])))
     }
 
     fn pass(

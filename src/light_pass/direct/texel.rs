@@ -20,7 +20,9 @@ impl Look {
     pub const GLANCE: Self = Self::new(2, 8, 8);
     /// Where light is all there or all away, or fades little.
     pub const COARSE: Self = Self::new(2, 64, 64);
-    /// At a border between light and shadow.
+    /// At a border between light and shadow, in texels that were divided for it.
+    pub const SMALL: Self = Self::new(4, 64, 128);
+    /// At a border that lies within a texel.
     pub const FINE: Self = Self::new(8, 256, 512);
 
     const fn new(side: usize, samples_of_lamp: usize, samples_of_sky: usize) -> Self {
@@ -50,6 +52,12 @@ impl Lit {
             seen if seen == sample => seen,
             _ => Self::MIXED,
         }
+    }
+
+    /// Whether others are lit otherwise, or parts of this.
+    pub fn differs(self, mut others: impl Iterator<Item = Self>) -> bool {
+        self == Self::MIXED
+            || self != Self::EMPTY && others.any(|other| other != Self::EMPTY && other != self)
     }
 }
 
@@ -180,6 +188,12 @@ impl Texel {
         soft_lit: Lit::EMPTY,
         is_uncertain: false,
     };
+
+    /// Whether it asks for another look: some of its neighbours or its parts are lit otherwise, or too little is known.
+    pub fn is_unclear<Around: Iterator<Item = Self>>(&self, around: impl Fn() -> Around) -> bool {
+        let differs = |lit: fn(&Self) -> Lit| lit(self).differs(around().map(|other| lit(&other)));
+        self.is_uncertain || differs(|texel| texel.lit) || differs(|texel| texel.soft_lit)
+    }
 }
 
 /// The covered texels of one row that were asked for, by column.

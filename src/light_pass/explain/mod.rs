@@ -292,7 +292,13 @@ fn explain_direct(tracer: &Tracer, target: &Target, control: &Control, found: &m
     let chart = target.chart_of_texel();
     let (low, high) = tracer.scene().bounds().unwrap_or_default();
     for (index, light) in tracer.scene().lights.iter().enumerate() {
-        let baked = bake_direct(tracer, std::slice::from_ref(light), &[&chart], &(), control);
+        let baked = bake_direct(
+            tracer,
+            std::slice::from_ref(light),
+            &[(&chart, None)],
+            &(),
+            control,
+        );
         let irradiance = LinearSrgb::from(baked[0].irradiance[0].map(f64::from));
         if irradiance.max_channel() <= 0.0 {
             continue;

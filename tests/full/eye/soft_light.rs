@@ -353,7 +353,7 @@ fn same_bytes_for_any_number_of_threads() {
     let charts = [chart(&tracer, 0, 24, 24), chart(&tracer, 1, 32, 32)];
     let [one, three] = [1, 3].map(|threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-        let charts: Vec<_> = charts.iter().collect();
+        let charts: Vec<_> = charts.iter().map(|chart| (chart, None)).collect();
         let bake = || bake_direct(&tracer, &tracer.scene().lights, &charts, &(), &Control::default());
         let layers = pool.expect("threads").install(bake).into_iter();
         layers

@@ -278,7 +278,7 @@ fn same_bytes_for_any_number_of_threads() {
         let layers = bake_direct(
             &tracer,
             &lamps,
-            &[&charts[0], &charts[1]],
+            &[(&charts[0], None), (&charts[1], None)],
             &(),
             &Control::default(),
         );
@@ -300,6 +300,6 @@ fn cancelled_bake_says_so() {
     let chart = chart(&tracer, 0, 4, 4);
     let control = Control::default();
     control.cancel();
-    let layers = bake_direct(&tracer, &tracer.scene().lights, &[&chart], &(), &control);
+    let layers = bake_direct(&tracer, &tracer.scene().lights, &[(&chart, None)], &(), &control);
     assert!(!layers[0].complete);
 }

@@ -188,7 +188,7 @@ fn add_block(scene: &mut Scene, stone: usize) {
         scene,
         "block pedestal",
         foot.with_y(BLOCK.y - 0.5 * block.side_m - 0.012),
-        0.085,
+        0.03,
         stone,
     );
 }

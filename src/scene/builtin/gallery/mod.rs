@@ -22,6 +22,7 @@ pub fn build() -> Scene {
     table::add(&mut scene);
     exhibits::add(&mut scene);
     scene.lights = lights();
+    scene.environment = room::sky();
     scene.cameras = cameras();
     scene
 }
@@ -61,7 +62,7 @@ fn cameras() -> Vec<Camera> {
         Camera::look_at(name, DVec3::from_array(from), to, fov_rad)
     };
     vec![
-        look("overview", [0.24, 1.4, 1.72], DVec3::new(0.0, 0.9, -0.4), 0.84),
+        look("overview", [0.3, 1.22, 1.36], DVec3::new(0.04, 0.93, -0.3), 0.84),
         look(
             "wine glass",
             [0.1, 1.22, 0.85],

@@ -94,7 +94,7 @@ pub fn wood(place: DVec2, boards: i32, [dark, light]: [Code; 2]) -> Code {
 pub fn plaster(place: DVec2, mean: Code) -> Code {
     let clouds = turbulence(place, [3, 3], 5, 11) - 0.5;
     let strokes = turbulence(place, [24, 8], 3, 23) - 0.5;
-    mean * (1.0 + 0.16 * clouds + 0.07 * strokes)
+    mean * (1.0 + 0.06 * clouds + 0.07 * strokes)
 }
 
 /// Stone with grains and a few veins.

@@ -1,10 +1,12 @@
 //! The room: floor, walls, ceiling, and a window.
 
+use std::sync::Arc;
+
 use glam::{DVec2, DVec3};
 
 use super::patterns;
 use crate::scene::builtin::{parts, shapes};
-use crate::scene::{Mesh, Scene};
+use crate::scene::{Environment, Mesh, Scene};
 
 /// Inner borders [m].
 pub const X: [f64; 2] = [-2.3, 2.3];
@@ -20,6 +22,23 @@ const WINDOW_Y: [f64; 2] = [0.9, 2.4];
 const REVEAL_M: f64 = 0.14;
 /// Where the sun goes: 27 degrees below the horizon, away from the window.
 pub const SUN_DIRECTION: DVec3 = DVec3::new(-0.8, -0.43, 0.22);
+
+/// Radiance at the zenith, at the horizon and of the land below it [W/(m² sr)].
+const ZENITH: DVec3 = DVec3::new(0.05, 0.09, 0.19);
+const HORIZON: DVec3 = DVec3::new(0.25, 0.24, 0.22);
+const LAND: DVec3 = DVec3::new(0.045, 0.042, 0.03);
+
+/// The sky that is seen through the window and in what reflects it. It is no lamp: on the table it would add 4 % to the sun.
+pub fn sky() -> Option<Arc<Environment>> {
+    const ROWS: usize = 128;
+    let row = |row: usize| {
+        let elevation = (0.5 - (row as f64 + 0.5) / ROWS as f64) * std::f64::consts::PI;
+        let above = HORIZON.lerp(ZENITH, elevation.sin().max(0.0).powf(0.6));
+        let radiance = LAND.lerp(above, ((elevation + 0.02) / 0.04).clamp(0.0, 1.0));
+        radiance.as_vec3().to_array()
+    };
+    Environment::new(1, ROWS, (0..ROWS).map(row).collect()).map(Arc::new)
+}
 
 /// Everything but what is shown in it.
 pub fn add(scene: &mut Scene) {

@@ -1,0 +1,130 @@
+//! Where light ends within little, its texels are divided, so that shadows are as sharp on the map as they are.
+
+use glam::DVec2;
+
+use super::texel::{Lit, Texel};
+use crate::illumination::Chart;
+use crate::illumination::gutter::neighbours;
+use crate::illumination::lookup::blend;
+use crate::optics::{LinearSrgb, luminance};
+
+/// Light ends within little where it changes by this part of itself from the neighbour on one side to that on the other.
+const STEEP: f32 = 0.5;
+
+/// Values of small texels, into which some of a chart's are divided.
+#[derive(Clone, Debug)]
+pub struct Divided<T> {
+    /// Small texels along a side of one.
+    side: usize,
+    /// Texels across and down the chart.
+    size: (usize, usize),
+    /// By texel: first of its small ones, row by row; [`WHOLE`] where it is not divided.
+    begins: Vec<u32>,
+    values: Vec<T>,
+}
+
+const WHOLE: u32 = u32::MAX;
+
+impl<T: Copy> Divided<T> {
+    /// Divides the texels of a chart that are marked, and those around them.
+    pub(super) fn new(chart: &Chart, side: usize, marked: &[bool], value: T) -> Self {
+        let size = (chart.width, chart.height);
+        let mut count = 0;
+        let begin = |texel: usize| {
+            let is_near = marked[texel] || neighbours(texel, size.0, size.1).any(|other| marked[other]);
+            if !is_near {
+                return WHOLE;
+            }
+            count += 1;
+            ((count - 1) * side * side) as u32
+        };
+        let begins: Vec<u32> = (0..marked.len()).map(begin).collect();
+        Self {
+            side,
+            size,
+            values: vec![value; count * side * side],
+            begins,
+        }
+    }
+
+    /// Small texels across and down the whole chart.
+    fn small_size(&self) -> (usize, usize) {
+        (self.size.0 * self.side, self.size.1 * self.side)
+    }
+
+    /// Place of a small texel among the values, where it is there.
+    fn place(&self, column: usize, row: usize) -> Option<usize> {
+        let begin = self.begins[row / self.side * self.size.0 + column / self.side];
+        let within = row % self.side * self.side + column % self.side;
+        (begin != WHOLE).then(|| begin as usize + within)
+    }
+
+    /// A small texel, counted row by row over the whole chart.
+    pub(super) fn get(&self, small: usize) -> Option<&T> {
+        let across = self.size.0 * self.side;
+        Some(&self.values[self.place(small % across, small / across)?])
+    }
+
+    pub(super) fn set(&mut self, column: usize, row: usize, value: T) {
+        if let Some(place) = self.place(column, row) {
+            self.values[place] = value;
+        }
+    }
+
+    /// The small texels of one that is divided.
+    pub(super) fn within(&self, texel: usize) -> Option<&[T]> {
+        let begin = self.begins[texel];
+        (begin != WHOLE).then(|| &self.values[begin as usize..][..self.side * self.side])
+    }
+
+    pub(super) fn map<U>(self, f: impl Fn(T) -> U) -> Divided<U> {
+        Divided {
+            side: self.side,
+            size: self.size,
+            begins: self.begins,
+            values: self.values.into_iter().map(f).collect(),
+        }
+    }
+}
+
+impl Divided<Texel> {
+    /// Whether a small texel asks for another look.
+    pub(super) fn is_unclear(&self, small: usize) -> bool {
+        let (width, height) = self.small_size();
+        let texel = |small: usize| self.get(small).copied().unwrap_or(Texel::DARK);
+        texel(small).is_unclear(|| neighbours(small, width, height).map(texel))
+    }
+}
+
+impl Divided<[f32; 3]> {
+    /// E between the middles of small texels [W/m²], at a place of the map in [0, 1]; `None` where texels are whole.
+    pub fn at(&self, uv: DVec2) -> Option<LinearSrgb> {
+        let (width, height) = self.small_size();
+        let size = DVec2::new(width as f64, height as f64);
+        let column = ((uv.x * size.x) as usize).min(width - 1);
+        let row = ((uv.y * size.y) as usize).min(height - 1);
+        let own = self.place(column, row)?;
+        let value = |column: usize, row: usize| {
+            // Beside what is divided light changes little.
+            let place = self.place(column, row).unwrap_or(own);
+            LinearSrgb::from(self.values[place].map(f64::from))
+        };
+        Some(blend(size, uv, value))
+    }
+
+    /// How many times as long the texels of the chart are.
+    pub fn side(&self) -> usize {
+        self.side
+    }
+}
+
+/// Whether light changes much between the neighbours of a texel.
+pub(super) fn is_steep(chart: &Chart, texels: &[Texel], texel: usize) -> bool {
+    let around = neighbours(texel, chart.width, chart.height).chain([texel]);
+    let covered = around.filter(|&other| texels[other].lit != Lit::EMPTY);
+    let brightness = covered.map(|other| luminance(&texels[other].irradiance) as f32);
+    let (low, high) = brightness.fold((f32::INFINITY, 0.0_f32), |(low, high), e| {
+        (low.min(e), high.max(e))
+    });
+    high - low > STEEP * high
+}
