@@ -42,6 +42,9 @@ const ROUND_GAIN: f64 = 0.4;
 /// Rounds of refinement at most: cells are then a 2¹⁶th of the first ones.
 const MOST_ROUNDS: usize = 8;
 
+/// Patches with more of their light where a part of the spectrum is held in one place look finer than they are.
+const MOST_IN_ONE_PLACE: f64 = 0.3;
+
 /// Part of the time that there is when light between surfaces is still to be gathered.
 const PART_BEFORE_INDIRECT: f64 = 0.85;
 
@@ -425,6 +428,11 @@ impl CausticLayer<'_> {
             }
             return Ok(());
         };
+        if climb.carrier == Carrier::Undecided && level.in_one_place > MOST_IN_ONE_PLACE {
+            climb.turn_to_photons();
+            climb.rival = None;
+            return Ok(());
+        }
         if level.key.trace.is_dim {
             // Not known better, and not worth knowing.
             let whole = accuracy::images(&level.maps, level.unit);

@@ -412,8 +412,8 @@ impl Resampled<'_> {
             } = layout.tile(tile);
             let corner = move |texel: usize| {
                 [
-                    origin.0 + (texel % size.0 << level),
-                    origin.1 + (texel / size.0 << level),
+                    origin.0 + ((texel % size.0) << level),
+                    origin.1 + ((texel / size.0) << level),
                 ]
             };
             (0..size.0 * size.1).map(move |texel| value(corner(texel), f64::from(1_u32 << level)))

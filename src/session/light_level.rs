@@ -96,6 +96,8 @@ pub(super) struct LightLevel {
     pub(super) photons: Option<PhotonSums>,
     /// Cells of patches and rays that looked for their receivers: what the level took, whatever was known before.
     pub(super) work: (u64, u64),
+    /// Of patches: share of their light that holds a part of the spectrum in one place.
+    pub(super) in_one_place: f64,
     /// To be deposited again; `None` where that was too much to keep.
     pub(super) traced: Option<TracedLight>,
     /// Whether the maps have the light's colour already.

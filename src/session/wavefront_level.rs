@@ -113,6 +113,7 @@ impl CausticLayer<'_> {
             overreaches: report.overreaches,
             traced,
             work: (report.cells, report.receiver_queries),
+            in_one_place: report.in_one_place[1] as f64 / report.in_one_place[0].max(1) as f64,
             ..self.level(light, (key, unit), (maps, bands), report.ledger)
         }))
     }
@@ -139,6 +140,7 @@ impl CausticLayer<'_> {
             error: None,
             photons: None,
             work: (0, 0),
+            in_one_place: 0.0,
             traced: None,
             has_own_colour: self.spectra.has(light.light),
         }

@@ -43,6 +43,8 @@ pub struct PassReport {
     pub statistics: FootprintStatistics,
     /// Patches that reach farther than their rays.
     pub overreaches: Vec<Overreach>,
+    /// Luminous flux of all patches [counts], and of those that hold a part of the spectrum in one place.
+    pub in_one_place: [i128; 2],
     /// Wall-clock and CPU seconds of tracing.
     pub trace_s: Seconds,
     /// Wall-clock and CPU seconds of depositing.
@@ -344,6 +346,8 @@ impl PassReport {
         self.receiver_queries += other.receiver_queries;
         self.statistics.merge(&other.statistics);
         self.overreaches.extend(other.overreaches);
+        let flux = self.in_one_place.iter_mut().zip(other.in_one_place);
+        flux.for_each(|(sum, flux)| *sum += flux);
         self.trace_s.add(other.trace_s);
         self.deposit_s.add(other.deposit_s);
         self.cancelled |= other.cancelled;

@@ -164,6 +164,8 @@ impl WavefrontDepositor<'_> {
                 report.receiver_queries += part.queries;
                 report.statistics.merge(&part.statistics);
                 report.overreaches.extend_from_slice(&part.overreaches);
+                let flux = report.in_one_place.iter_mut().zip(part.in_one_place);
+                flux.for_each(|(sum, flux)| *sum += flux);
             }
             let triangles: usize = parts.iter().map(SpreadOutput::triangle_count).sum();
             // Neighbouring patches are divided alike.

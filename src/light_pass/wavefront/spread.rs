@@ -63,6 +63,9 @@ pub struct SpreadOutput {
     pub statistics: FootprintStatistics,
     /// Patches that reach farther than their rays.
     pub overreaches: Vec<Overreach>,
+    /// Luminous flux of all patches [counts], and of those that hold a part of the spectrum in one place: light of other
+    /// wavelengths goes other ways there.
+    pub in_one_place: [i128; 2],
 }
 
 impl SpreadOutput {
@@ -142,9 +145,13 @@ impl Spreader<'_> {
                 self.spread_spectrum(patch, strands, (others, parted), spectrum, out);
             }
             (Tone::Node(node), light) => {
+                let before = out.in_one_place[0];
                 let node = light.node(usize::from(node));
                 let tint = node.map_or(Tint::WHITE, |node| Tint::of_node(node.channels, own));
                 self.spread_strands(patch, own, tint, out);
+                if matches!(light, LightPart::Spectrum(_)) {
+                    out.in_one_place[1] += out.in_one_place[0] - before;
+                }
             }
             (Tone::White | Tone::Spectrum { .. }, _) => self.spread_strands(patch, own, Tint::WHITE, out),
         }
@@ -220,6 +227,7 @@ impl Spreader<'_> {
             channels_w
         };
         out.ledger.book(Account::Quadrature, flux.map(|count| -count));
+        out.in_one_place[0] += i128::from(flux[1]);
         let before: Vec<usize> = out.triangles.iter().map(|(_, list)| list.len()).collect();
         let course = if tint.lands_alike {
             self.course(strands)

@@ -62,7 +62,7 @@ fn cameras() -> Vec<Camera> {
         Camera::look_at(name, DVec3::from_array(from), to, fov_rad)
     };
     vec![
-        look("overview", [0.3, 1.22, 1.36], DVec3::new(0.04, 0.93, -0.3), 0.84),
+        look("overview", [0.28, 1.24, 1.46], DVec3::new(0.14, 0.93, -0.3), 0.84),
         look(
             "wine glass",
             [0.1, 1.22, 0.85],
