@@ -180,6 +180,44 @@ fn shadow_ends_where_geometry_says() {
     }
 }
 
+/// The same shadow in texels of a quarter of the side, where it ends and nowhere else.
+#[test]
+fn texels_are_divided_where_a_shadow_ends() {
+    let parts = vec![(floor(1.0, 0.0), diffuse(0.5)), (floor(0.173, 1.0), diffuse(0.5))];
+    let tracer = tracer(parts, vec![point_light(DVec3::Y * 2.0, 10.0)]);
+    let [whole, small] = [64, 256].map(|side| chart(&tracer, 0, side, side));
+    let charts = [(&whole, Some(&small))];
+    let layer = bake_direct(&tracer, &tracer.scene().lights, &charts, &(), &Control::default()).remove(0);
+    let fine = direct(&tracer, &small);
+    let divided = layer.divided.as_ref().expect("it was asked for");
+    let mut small_texels = 0;
+    for (texel, e) in fine.irradiance.iter().enumerate() {
+        let (column, row) = (texel % 256, texel / 256);
+        let low = [column, row].map(|index| index as f64 / 128.0 - 1.0);
+        let open = exact_point_mean(DVec3::Y * 2.0, 10.0, low, 1.0 / 128.0);
+        let exact = f64::from(e[0]) / open;
+        match divided.at((dvec2(column as f64, row as f64) + 0.5) / 256.0) {
+            Some(found) => {
+                // 4 × 4 places of the small texels beside 8 × 8 of the fine map's.
+                assert!((found.r / open - exact).abs() < 0.19, "{column} {row}");
+                small_texels += 1;
+            }
+            None => assert!(
+                exact == 0.0 || (exact - 1.0).abs() < 1e-3,
+                "{column} {row} {exact}"
+            ),
+        }
+    }
+    assert!((2_000..12_000).contains(&small_texels), "{small_texels}");
+    let [coarse_w, fine_w] = [flux_w(&whole, &layer), flux_w(&small, &fine)];
+    assert!((coarse_w / fine_w - 1.0).abs() < 1e-3, "{coarse_w} W, {fine_w} W");
+    assert!(
+        layer.shadow_rays < fine.shadow_rays / 4,
+        "{} rays",
+        layer.shadow_rays
+    );
+}
+
 /// Light that comes through glass or off a mirror is caustic light: every surface stops direct light.
 #[test]
 fn glass_and_mirrors_stop_direct_light() {
