@@ -14,7 +14,7 @@ use super::light_level::LightLevel;
 use super::map_plan::MEMORY;
 use super::map_size::{self, Wish};
 use super::sizes::{BYTES_PER_TEXEL, MapSizes};
-use super::{BakeResult, LightLayer, StopReason, Timings, map_plan, sizes};
+use super::{BakeResult, LightLayer, StopReason, Timings, map_plan};
 use crate::error::Warning;
 use crate::illumination::accumulator::FluxAccumulator;
 use crate::illumination::gutter::fill_gutter;
@@ -197,11 +197,13 @@ impl Finish<'_> {
     }
 
     fn direct_chart(&self, chart: &Arc<Chart>) -> Option<DirectChart> {
-        let is_divided =
-            self.coarsening == 0 && self.sizes.border_doublings(chart.receiver, self.settings) > 0;
+        let doublings = match self.coarsening {
+            0 => self.sizes.border_doublings(chart.receiver, self.settings),
+            _ => 0,
+        };
         // Unwrapped charts lie elsewhere in maps of other sizes.
         let is_fixed = chart.uv_set == UvSet::Generated || self.coarsening == 0;
-        if chart.layout.is_none() && is_fixed && !is_divided {
+        if chart.layout.is_none() && is_fixed && doublings == 0 {
             return Some(DirectChart {
                 own: Arc::clone(chart),
                 smaller: None,
@@ -214,12 +216,10 @@ impl Finish<'_> {
             .checked_ilog2()
             .unwrap_or(0);
         let of_size = |times: u32| self.sizes.chart(chart.receiver, map_size::halved(size, times));
-        let finer = times.min(sizes::border_doublings(self.settings));
+        let finer = times.min(doublings);
         Some(DirectChart {
             own: of_size(times)?,
-            smaller: (is_divided && finer > 0)
-                .then(|| of_size(times - finer))
-                .flatten(),
+            smaller: (finer > 0).then(|| of_size(times - finer)).flatten(),
         })
     }
 

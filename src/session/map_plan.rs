@@ -89,15 +89,17 @@ impl CausticLayer<'_> {
     fn automatic_wish(&self, receiver: Receiver, seen: &FootprintStatistics) -> Option<Wish> {
         let object = receiver.object();
         let mut times = self.sizes.doublings(receiver, seen, LARGEST_TILED_SIDE)?;
-        let borders = self.sizes.borders(receiver);
-        if self.plan.is_on(Effect::Direct) {
+        let is_direct = self.plan.is_on(Effect::Direct);
+        let finer = if is_direct && self.settings.estimator.refines() {
+            self.sizes.border_doublings(receiver, self.settings)
+        } else {
+            0
+        };
+        if is_direct {
             // Not coarser than direct light on a map of its own.
-            let mut direct = self.sizes.doublings_for_direct(object, self.settings);
-            if self.settings.estimator.refines() {
-                direct += self.sizes.border_doublings(receiver, self.settings);
-            }
-            times = times.max(direct);
+            times = times.max(self.sizes.doublings_for_direct(object, self.settings) + finer);
         }
+        let borders = self.sizes.borders(receiver).filter(|_| finer > 0);
         for times in (0..=times).rev() {
             let size = self.sizes.doubled_size(object, times)?;
             let is_small = size.0.max(size.1) <= LARGEST_AUTOMATIC_SIDE;
@@ -105,8 +107,7 @@ impl CausticLayer<'_> {
             if self.may_be_tiled(object, size) && coarsest > 0 {
                 let mut tiles = map_size::needs(size, seen.spots(receiver));
                 if let Some(borders) = &borders {
-                    let doublings = sizes::border_doublings(self.settings);
-                    borders.refine(size, coarsest.saturating_sub(doublings as u8), &mut tiles);
+                    borders.refine(size, coarsest.saturating_sub(finer as u8), &mut tiles);
                 }
                 let wish = Wish {
                     is_even: false,

@@ -404,7 +404,7 @@ impl MapSizes {
 
 /// How often texels of direct light are halved where it ends within little: to a 1,600th of the scene's diagonal for a draft,
 /// to half and a quarter of that for better presets.
-pub fn border_doublings(settings: &BakeSettings) -> u32 {
+fn border_doublings(settings: &BakeSettings) -> u32 {
     match settings.max_error {
         Some(target) if target >= 0.1 => 2,
         Some(target) if target <= 0.01 => 4,

@@ -17,11 +17,13 @@ use crate::gpu::Gpu;
 use crate::illumination::IlluminationMap;
 use crate::optics::spectrum::xyz::Matrix3;
 use crate::progress::{Control, Progress};
-use crate::scene::camera_path::{Key, PathPlan};
+use crate::scene::camera_path::{Key, MAX_FRAMES, PathPlan};
 use crate::scene::{Camera, CameraPath, Scene};
 
 /// Frames that a path is played with [1/s].
 pub const FRAMES_PER_S: f64 = 30.0;
+/// From one camera to the next on a tour: 4 s.
+const FRAMES_OF_LEG: usize = 120;
 /// A camera leans no less than this [degrees].
 const LEVEL_DEG: f64 = 1e-6;
 /// What errors name.
@@ -82,6 +84,20 @@ impl Film {
             None => self.keys.push(new),
         }
         self.vertical_fov_deg = camera.vertical_fov_rad.to_degrees();
+    }
+
+    /// A path past cameras, and back to the first; pictures keep their size.
+    #[must_use]
+    pub fn tour(&self, cameras: &[Camera], origin_world: DVec3, reach_m: f64) -> Self {
+        let mut tour = Self {
+            keys: Vec::new(),
+            frames: (cameras.len() * FRAMES_OF_LEG).min(MAX_FRAMES),
+            ..*self
+        };
+        for camera in cameras.iter().chain(cameras.first()) {
+            tour.record(None, camera, origin_world, reach_m);
+        }
+        tour
     }
 
     /// The camera of a key, in scene coordinates.

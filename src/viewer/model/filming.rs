@@ -54,6 +54,13 @@ impl Model {
         }
     }
 
+    fn play(&mut self) -> Result<()> {
+        let cameras = self.panel.film.path()?.cameras(self.scene().origin_world);
+        self.player = Player::new(cameras);
+        self.log.write("plays", Value::Null);
+        Ok(())
+    }
+
     /// Does what was asked for in section *Camera path*.
     pub(super) fn film(&mut self, wish: &FilmWish) {
         let before = self.panel.film.clone();
@@ -83,10 +90,12 @@ impl Model {
                     self.navigator.stand_at(&camera);
                 }
             }
-            FilmWish::Play(true) => {
-                let cameras = self.panel.film.path()?.cameras(origin_world);
-                self.player = Player::new(cameras);
-                self.log.write("plays", Value::Null);
+            FilmWish::Play(true) => self.play()?,
+            FilmWish::Tour => {
+                let reach_m = self.navigator.radius_m();
+                self.panel.film = self.panel.film.tour(&self.scene().cameras, origin_world, reach_m);
+                self.tell_keys();
+                self.play()?;
             }
             FilmWish::Play(false) => self.end_play(),
             FilmWish::Save => {

@@ -8,6 +8,7 @@ use crate::scene::camera_path::MAX_FRAMES;
 use crate::viewer::filming::{FRAMES_PER_S, Film};
 
 const TOO_FEW: &str = "A path has at least two keys.";
+const FEW_CAMERAS: &str = "The scene has fewer than two cameras.";
 const FIELD: &str = "Path file";
 
 /// Sides of a frame that can be set [pixels].
@@ -27,6 +28,10 @@ pub fn show(ui: &mut Ui, film: &mut Film, file: &mut String, facts: &Facts<'_>, 
             }
         } else if button(ui, "Play", too_few) {
             wish(FilmWish::Play(true));
+        }
+        let few_cameras = (facts.scene.cameras.len() < 2).then_some(FEW_CAMERAS);
+        if button(ui, "Tour", few_cameras) {
+            wish(FilmWish::Tour);
         }
         ui.label(RichText::new(length(film)).weak());
     });

@@ -215,6 +215,8 @@ pub enum FilmWish {
     GoTo(usize),
     /// Play it, or end that.
     Play(bool),
+    /// Make it one past the scene's cameras, and play that.
+    Tour,
     /// Write it to a file.
     Save,
     /// Read it from a file.

@@ -100,6 +100,36 @@ fn paths_are_played_in_their_own_time() {
 }
 
 #[test]
+fn tours_lead_past_all_cameras_and_back() {
+    let scene = support::tools::builtin_scene("showroom");
+    let tour = film().tour(&scene.cameras, scene.origin_world, 1.0);
+    assert!(scene.cameras.len() > 1);
+    assert_eq!(tour.keys.len(), scene.cameras.len() + 1);
+    assert_eq!(tour.size, film().size);
+    let way = tour.path().expect("a path").cameras(scene.origin_world);
+    for camera in scene.cameras.iter().chain(scene.cameras.first()) {
+        let nearest = way.iter().min_by(|a, b| {
+            let [a, b] = [a, b].map(|on_way| on_way.position.distance(camera.position));
+            a.total_cmp(&b)
+        });
+        let nearest = nearest.expect("frames");
+        assert!(
+            nearest.position.distance(camera.position) < 0.1,
+            "{}",
+            camera.name
+        );
+        assert!(nearest.forward.dot(camera.forward) > 0.99, "{}", camera.name);
+    }
+    let ends = [&way[0], &way[way.len() - 1]].map(|end| end.position);
+    assert!(ends[0].distance(ends[1]) < 1e-9);
+
+    let mut panel = Headless::with_scene(scene, BakeSettings::splat(), ((1280.0, 1800.0), 1.0));
+    panel.open("Camera path");
+    panel.press("Tour");
+    assert_eq!(panel.wishes.film.take(), Some(FilmWish::Tour));
+}
+
+#[test]
 fn buttons_record_play_and_film() {
     let mut panel = Headless::new(BakeSettings::splat());
     panel.open("Camera path");
@@ -108,6 +138,7 @@ fn buttons_record_play_and_film() {
         panel.wishes.film.take()
     };
     assert_eq!(wish(&mut panel, "Play"), None, "there is nothing to be played");
+    assert_eq!(wish(&mut panel, "Tour"), None, "nor is there a camera");
     assert_eq!(wish(&mut panel, "Add key"), Some(FilmWish::Record(None)));
     panel.panel.film = film();
     panel.settle();
