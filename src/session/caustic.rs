@@ -153,6 +153,14 @@ pub(super) trait Onlooker {
         Ok(())
     }
 
+    /// Takes the first picture, where the light of other layers is not known yet.
+    ///
+    /// # Errors
+    /// What ends the bake.
+    fn show_first(&mut self, _levels: &[Shown], _so_far: &CausticOutcome, _clock: &mut Clock) -> Result<()> {
+        Ok(())
+    }
+
     /// The light of other layers on the maps of these levels and of all others.
     fn backdrop(&mut self, _levels: &[Shown]) -> Backdrop {
         Backdrop::new()
@@ -263,9 +271,13 @@ impl CausticLayer<'_> {
             });
         }
         course.control = &whole;
+        let mut is_first = true;
         let errors = loop {
             for (light, climb) in lights.iter().zip(&mut climbs).filter(|(_, climb)| !climb.done) {
                 self.climb(light, &sizes, states.of_mut(light.light), climb, &mut course)?;
+            }
+            if std::mem::take(&mut is_first) && !self.control.is_cancelled() {
+                onlooker.show_first(&shown(&lights, &climbs), course.outcome, course.clock)?;
             }
             let mut counting = self.counting(&lights, &climbs, onlooker);
             let mut errors = self.errors(&lights, &climbs, &counting);

@@ -66,6 +66,17 @@ impl Showing<'_, '_> {
 }
 
 impl Onlooker for Showing<'_, '_> {
+    fn show_first(&mut self, levels: &[Shown], so_far: &CausticOutcome, clock: &mut Clock) -> Result<()> {
+        let (charts, _) = self.finish.charts(levels);
+        let direct_charts = self.finish.direct_charts(&charts);
+        let lights = self.finish.scene.lights.len();
+        let is_known = !self.finish.plan.is_on(Effect::Direct) || self.direct.knows(lights, &direct_charts);
+        if is_known || levels.is_empty() {
+            return Ok(());
+        }
+        self.show(levels, so_far, clock)
+    }
+
     fn show(&mut self, levels: &[Shown], so_far: &CausticOutcome, clock: &mut Clock) -> Result<()> {
         let is_first = std::mem::take(&mut self.is_first);
         if self.level.is_none() {
