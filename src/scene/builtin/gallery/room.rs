@@ -28,7 +28,7 @@ const ZENITH: DVec3 = DVec3::new(0.05, 0.09, 0.19);
 const HORIZON: DVec3 = DVec3::new(0.25, 0.24, 0.22);
 const LAND: DVec3 = DVec3::new(0.045, 0.042, 0.03);
 
-/// The sky that is seen through the window and in what reflects it. It is no lamp: on the table it would add 4 % to the sun.
+/// The sky that is seen through the window and in what reflects it. It is no lamp: beside the sun it would add little.
 pub fn sky() -> Option<Arc<Environment>> {
     const ROWS: usize = 128;
     let row = |row: usize| {
