@@ -492,6 +492,16 @@ impl BakeSettings {
         self.memory_bytes / (1 + bands.div_ceil(2))
     }
 
+    /// How fine what no estimate rules is to be: 0 for the target of a draft, 1 beyond it and without a target, 2 for that of
+    /// a final bake.
+    pub fn detail(&self) -> u32 {
+        match self.max_error {
+            Some(target) if target >= 0.1 => 0,
+            Some(target) if target <= 0.01 => 2,
+            _ => 1,
+        }
+    }
+
     /// Memory that traced light may take until the next bake [bytes]: a quarter of all.
     pub fn kept_light_bytes(&self) -> u64 {
         self.memory_bytes / 4

@@ -83,11 +83,7 @@ impl IndirectCache {
 
 /// Most texels of all grids: as the target needs, and as memory allows for.
 pub(super) fn most_texels(settings: &BakeSettings) -> u64 {
-    let wanted = match settings.max_error {
-        Some(target) if target >= 0.1 => DRAFT_TEXELS,
-        Some(target) if target <= 0.01 => 16 * DRAFT_TEXELS,
-        _ => 4 * DRAFT_TEXELS,
-    };
+    let wanted = DRAFT_TEXELS << (2 * settings.detail());
     wanted.min(link_bytes(settings) / BYTES_OF_FIRST_PASSES).max(1)
 }
 

@@ -67,11 +67,12 @@ impl Showing<'_, '_> {
 
 impl Onlooker for Showing<'_, '_> {
     fn show_first(&mut self, levels: &[Shown], so_far: &CausticOutcome, clock: &mut Clock) -> Result<()> {
+        if self.level.is_none() || levels.is_empty() || !self.finish.plan.is_on(Effect::Direct) {
+            return Ok(());
+        }
         let (charts, _) = self.finish.charts(levels);
         let direct_charts = self.finish.direct_charts(&charts);
-        let lights = self.finish.scene.lights.len();
-        let is_known = !self.finish.plan.is_on(Effect::Direct) || self.direct.knows(lights, &direct_charts);
-        if is_known || levels.is_empty() {
+        if self.direct.knows(self.finish.scene.lights.len(), &direct_charts) {
             return Ok(());
         }
         self.show(levels, so_far, clock)

@@ -405,11 +405,7 @@ impl MapSizes {
 /// How often texels of direct light are halved where it ends within little: to a 1,600th of the scene's diagonal for a draft,
 /// to half and a quarter of that for better presets.
 fn border_doublings(settings: &BakeSettings) -> u32 {
-    match settings.max_error {
-        Some(target) if target >= 0.1 => 2,
-        Some(target) if target <= 0.01 => 4,
-        _ => 3,
-    }
+    2 + settings.detail()
 }
 
 /// Least side of a grid of indirect light, where there is room for it [texels].

@@ -61,7 +61,7 @@ impl<T: Copy> Divided<T> {
 
     /// A small texel, counted row by row over the whole chart.
     pub(super) fn get(&self, small: usize) -> Option<&T> {
-        let across = self.size.0 * self.side;
+        let (across, _) = self.small_size();
         Some(&self.values[self.place(small % across, small / across)?])
     }
 

@@ -224,15 +224,21 @@ impl<'a> Baker<'a> {
 
     /// The first look at every texel.
     fn look_around(&self, seen: &mut Seen, row_done: &(impl Fn() + Sync), control: &Control) {
+        seen.take(self.pass(row_done, control, self.first_look(), |_| true));
         if begins_with_glance(self.sources) {
-            seen.take(self.pass(row_done, control, Look::GLANCE, |_| true));
             let texels = &seen.texels;
             let coarse = self.pass(row_done, control, Look::COARSE, |texel| {
                 texels[texel].is_uncertain || self.meets_other(texels, texel, |texel| texel.soft_lit)
             });
             seen.take(coarse);
+        }
+    }
+
+    fn first_look(&self) -> Look {
+        if begins_with_glance(self.sources) {
+            Look::GLANCE
         } else {
-            seen.take(self.pass(row_done, control, Look::COARSE, |_| true));
+            Look::COARSE
         }
     }
 
@@ -250,12 +256,8 @@ impl<'a> Baker<'a> {
         let steep: Vec<bool> = (0..unclear.len()).map(steep).collect();
         let side = smaller.chart.width / self.chart.width;
         let mut divided = Divided::new(self.chart, side, &steep, Texel::DARK);
-        let first = if begins_with_glance(self.sources) {
-            Look::GLANCE
-        } else {
-            Look::COARSE
-        };
-        let rows = smaller.pass(row_done, control, first, |small| divided.get(small).is_some());
+        let is_there = |small: usize| divided.get(small).is_some();
+        let rows = smaller.pass(row_done, control, self.first_look(), is_there);
         seen.take_small(rows, &mut divided);
         let rows = smaller.pass(row_done, control, Look::SMALL, |small| divided.is_unclear(small));
         seen.take_small(rows, &mut divided);
