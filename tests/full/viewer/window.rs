@@ -276,7 +276,10 @@ fn exposure_suits_a_room_that_is_walked() {
     let Some(screen) = Screen::start() else {
         return;
     };
-    let mut viewer = Viewer::open(&screen, "builtin:showroom --map-resolution 64 --max-error 50%");
+    let mut viewer = Viewer::open(
+        &screen,
+        "builtin:showroom --map-resolution 64 --max-error 50% --camera basin",
+    );
     let (_, rest) = viewer.wait_for_bake();
     let measured = viewer.all("exposure");
     let stops: Vec<f64> = measured
@@ -302,10 +305,9 @@ fn exposure_suits_a_room_that_is_walked() {
 
 /// Who walks falls to the ground, stops at walls and finds a kept view again.
 fn walk(viewer: &mut Viewer<'_>, rest: &Value) {
-    // Over the floor, lower than eyes are.
     viewer.hands("mousemove 900 300");
-    viewer.hands("keydown w sleep 1 keyup w");
-    let start = viewer.wait_for_move(position(rest));
+    // Over the floor, lower than eyes are.
+    let start = position(rest);
     viewer.hands("key ctrl+1");
     viewer.wait_for("bookmark", |event| event["number"] == 1 && event["kept"] == true);
     viewer.hands("key v");
