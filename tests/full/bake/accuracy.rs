@@ -1,17 +1,19 @@
 //! Errors without a reference, against errors against one: a bake of the same mesh with many times the rays.
 
 use glam::{DQuat, DVec3};
+use nephroid::illumination::visible::visible_error;
 use nephroid::scene::builtin::{parts, shapes};
 use nephroid::scene::{Mesh, Scene};
 use nephroid::session::forecast::{forecast, stood_at};
 use nephroid::session::{BakeResult, StopReason};
-use nephroid::settings::{BakeSettings, Estimator, RayPlacement};
+use nephroid::settings::{BakeSettings, ErrorMetric, Estimator, LayerKind, RayPlacement};
 use nephroid::units::{Flux, Irradiance};
 use rand_pcg::Pcg64Mcg;
 use rand_pcg::rand_core::{Rng, SeedableRng};
 
 use crate::bake::common::{CAUSTIC_AND_DIRECT, caustic_like, same_map, torus, towards, turned, with_layers};
-use support::tools::{at, bake, builtin_scene, caustic, settings};
+use support::random_scenes;
+use support::tools::{at, bake, builtin_scene, caustic, photons, settings};
 
 /// Side of all maps [texels].
 const SIDE: usize = 128;
@@ -194,6 +196,90 @@ fn random_scenes_within_a_factor_of_two() {
     assert!(ratios.len() >= 45, "{} scenes are lit", ratios.len());
     assert!(faults.len() <= 2, "{faults:#?}");
     assert!(ratios[0] > 0.33 && ratios[ratios.len() - 1] < 3.0, "{ratios:?}");
+}
+
+/// Relative RMSE and visible error against two independent bakes whose own noise cancels: that of the product of both
+/// differences has no mean.
+fn errors_against(result: &BakeResult, truths: &[BakeResult; 2]) -> [f64; 2] {
+    let mut maps = truths[0].maps.clone();
+    let (mut square, mut flux_w, mut area_m2) = (0.0, 0.0, 0.0);
+    let mut products = Vec::new();
+    for map in &maps {
+        let [values, other] = [result, &truths[1]].map(|bake| caustic_like(bake, map));
+        let own = caustic(map).into_iter().zip(other).zip(values);
+        let product: Vec<f64> = own.map(|((a, b), value)| (value - a) * (value - b)).collect();
+        for (texel, product) in product.iter().enumerate() {
+            square += product * map.chart.texel_area_m2(texel);
+        }
+        flux_w += map.flux_w(LayerKind::Caustic).luminance();
+        area_m2 += map.chart.area_m2();
+        products.push(product);
+    }
+    let mut visible = |sign: f64| {
+        for (map, product) in maps.iter_mut().zip(&products) {
+            map.error = Some(
+                product
+                    .iter()
+                    .map(|product| (sign * product).max(0.0).sqrt() as f32)
+                    .collect(),
+            );
+        }
+        visible_error(&maps, 0.0).0.expect("light").powi(2)
+    };
+    let root = |square: f64| square.max(0.0).sqrt();
+    [
+        root(square * area_m2) / flux_w,
+        root(visible(1.0) - visible(-1.0)),
+    ]
+}
+
+/// By photons and by what is chosen, towards a target in either metric: filtered, as they are by default.
+#[test]
+fn random_glass_within_a_factor_of_two() {
+    let is_glass = |scene: &Scene| {
+        let of = |material: usize| scene.materials[material].name == "glass";
+        scene.objects.iter().any(|object| of(object.material))
+    };
+    let estimators = [Estimator::Photon, Estimator::Auto];
+    let ways = estimators.map(|by| [ErrorMetric::Rmse, ErrorMetric::Visible].map(|metric| (by, metric)));
+    let ways = ways.as_flattened();
+    let mut ratios = vec![Vec::new(); ways.len()];
+    for scene in (0..).map(random_scenes::scene).filter(is_glass) {
+        let few = bake(scene.clone(), &photons(1e4, 64)).counts.rays.max(1);
+        let truths = [1, 2].map(|seed| {
+            let many = photons(1e4 * 6e5 / few as f64, 64);
+            bake(scene.clone(), &BakeSettings { seed, ..many })
+        });
+        for ((estimator, metric), ratios) in ways.iter().zip(&mut ratios) {
+            let by = BakeSettings {
+                estimator: *estimator,
+                error_metric: *metric,
+                max_error: Some(0.1),
+                filter: None,
+                ..photons(1e4, 64)
+            };
+            let result = bake(scene.clone(), &by);
+            // Some lamps see no glass.
+            if let Some(estimate) = metric.of(result.estimated_visible, result.estimated_relative_rmse) {
+                let [rmse, visible] = errors_against(&result, &truths);
+                ratios.push((metric.of(visible, rmse) / estimate, scene.name.clone()));
+            }
+        }
+        if ratios[0].len() == 50 {
+            break;
+        }
+    }
+    for (way, mut ratios) in ways.iter().zip(ratios) {
+        ratios.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let [least, median, most] = [0, ratios.len() / 2, ratios.len() - 1].map(|index| ratios[index].0);
+        println!("{way:?}: true error over estimated {least:.2} to {most:.2}, median {median:.2}");
+        ratios.retain(|(ratio, _)| !(0.5..=2.0).contains(ratio));
+        assert!(
+            ratios.len() <= 2 && least > 0.33 && most < 3.0,
+            "{way:?}: {ratios:?}"
+        );
+        assert!((0.83..=1.2).contains(&median), "{way:?}: {median}");
+    }
 }
 
 /// A splat bake of randomly placed rays against the mean of many such: what is left is noise.

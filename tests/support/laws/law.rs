@@ -1,5 +1,7 @@
 //! Laws: each says how far a bake is from what it must be, as a share unless its wording says otherwise.
 
+use std::sync::Arc;
+
 use glam::{DMat2, DVec2, DVec3};
 use nephroid::illumination::compare::{Grid, relative_rmse};
 use nephroid::illumination::{IlluminationMap, Layer};
@@ -11,6 +13,9 @@ use nephroid::study::agreement::{Agreement, TexelPair, pair_maps};
 
 use super::{Baked, Case, number};
 use crate::tools::bits;
+
+/// Watts by photons may be off by this share.
+const WATTS_BY_CHANCE: f64 = 0.02;
 
 impl Case {
     /// A figure of the last bake.
@@ -55,19 +60,22 @@ impl Case {
     pub fn watts(&mut self, expected_w: f64, bound: f64) -> &mut Self {
         let says = format!("{} W arrive", number(expected_w));
         self.measure(&says, bound, move |bake| off(deposited_w(bake), expected_w))
+            .carried(&says, move |bake| off(deposited_w(bake), expected_w) / (bound + WATTS_BY_CHANCE))
     }
 
     /// What lamps send to mirrors and glass [W].
     pub fn sent(&mut self, expected_w: f64, bound: f64) -> &mut Self {
         let says = format!("{} W are sent", number(expected_w));
         self.measure(&says, bound, move |bake| off(emitted_w(bake), expected_w))
+            .carried(&says, move |bake| off(emitted_w(bake), expected_w) / (bound + WATTS_BY_CHANCE))
     }
 
     /// No light is made: at most a share of what was sent arrives.
     pub fn arrives_of_sent(&mut self, most: f64) -> &mut Self {
-        self.measure("arrives, of what was sent", most, |bake| {
-            deposited_w(bake) / emitted_w(bake).max(f64::MIN_POSITIVE)
-        })
+        let arrives = |bake: &Baked| deposited_w(bake) / emitted_w(bake).max(f64::MIN_POSITIVE);
+        let says = "arrives, of what was sent";
+        self.measure(says, most, arrives)
+            .carried(says, move |bake| arrives(bake) / (most + WATTS_BY_CHANCE))
     }
 
     /// What arrives at most [W].
@@ -76,8 +84,14 @@ impl Case {
     }
 
     /// E of the floor, or of another flat `floor`, point by point [W/m²]: relative RMSE.
-    pub fn e(&mut self, says: &str, bound: f64, theory: impl Fn(DVec3) -> f64 + Send + 'static) -> &mut Self {
-        self.measure(&format!("E is {says}"), bound, move |bake| against_theory(bake, &theory))
+    pub fn e(&mut self, says: &str, bound: f64, theory: impl Fn(DVec3) -> f64 + Send + Sync + 'static) -> &mut Self {
+        let (says, theory) = (format!("E is {says}"), Arc::new(theory));
+        let same = Arc::clone(&theory);
+        self.measure(&says, bound, move |bake| against_theory(bake, &*theory))
+            .carried(&says, move |bake| {
+                let stated = bake.result.estimated_relative_rmse.unwrap_or(0.0);
+                against_theory(bake, &*same) / (bound + 2.0 * stated)
+            })
     }
 
     /// E of a lamp of 1 W/sr at a place.

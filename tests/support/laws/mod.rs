@@ -10,12 +10,15 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use nephroid::illumination::IlluminationMap;
 use nephroid::scene::Scene;
 use nephroid::session::BakeResult;
-use nephroid::settings::{BakeSettings, LayerKind};
+use nephroid::settings::{BakeSettings, ErrorMetric, Estimator, LayerKind};
 
-use crate::tools::{at, bake, settings};
+use crate::tools::{at, bake, photons, settings};
 
 /// Most that ledgers and maps may leave open, of what was emitted or deposited.
 const BOOKS_BOUND: f64 = 1e-6;
+
+/// Photons that tell watts to a percent.
+const LEAST_PHOTONS: f64 = 2e4;
 
 /// Whether the long variants of cases are asked for.
 pub fn is_long() -> bool {
@@ -35,8 +38,14 @@ type Measure = Box<dyn Fn(&[Baked]) -> f64 + Send>;
 type Look = Box<dyn Fn(&[Baked]) + Send>;
 
 enum Step {
-    Bake(Box<(Scene, BakeSettings)>),
+    Bake {
+        what: Box<(Scene, BakeSettings)>,
+        /// Whether the scene is baked by photons and by what is chosen, too.
+        is_carried: bool,
+    },
     Law(String, f64, Measure),
+    /// Of the last bake's scene by photons and by what is chosen.
+    Carried(String, Box<dyn Fn(&Baked) -> f64 + Send>),
     Forget(Look),
 }
 
@@ -78,7 +87,10 @@ impl Case {
 
     /// A bake with settings of its own.
     pub fn bake_with(&mut self, scene: Scene, settings: BakeSettings) -> &mut Self {
-        self.steps.push(Step::Bake(Box::new((scene, settings))));
+        self.steps.push(Step::Bake {
+            what: Box::new((scene, settings)),
+            is_carried: self.steps.is_empty(),
+        });
         self
     }
 
@@ -90,6 +102,17 @@ impl Case {
         of: impl Fn(&[Baked]) -> f64 + Send + 'static,
     ) -> &mut Self {
         self.steps.push(Step::Law(says.into(), bound, Box::new(of)));
+        self
+    }
+
+    /// A law of the last bake's scene by photons and by what is chosen of photons and patches: how far they are off, over what
+    /// chance allows.
+    pub fn carried(&mut self, says: &str, of: impl Fn(&Baked) -> f64 + Send + 'static) -> &mut Self {
+        let mut steps = self.steps.iter_mut().rev();
+        if let Some(Step::Bake { is_carried, .. }) = steps.find(|step| matches!(step, Step::Bake { .. })) {
+            *is_carried = true;
+        }
+        self.steps.push(Step::Carried(says.into(), Box::new(of)));
         self
     }
 
@@ -106,7 +129,7 @@ impl Case {
     }
 
     fn rows(self) -> Vec<Row> {
-        let (mut bakes, mut rows) = (Vec::new(), Vec::new());
+        let (mut bakes, mut carried, mut rows) = (Vec::new(), Vec::new(), Vec::new());
         let (mut open, mut first) = (None, String::new());
         let mut note = |law: String, measured: f64, bound: f64, scene: &str| {
             rows.push(Row {
@@ -120,7 +143,7 @@ impl Case {
         };
         for step in self.steps {
             let is_done = catch_unwind(AssertUnwindSafe(|| match step {
-                Step::Bake(what) => {
+                Step::Bake { what, is_carried } => {
                     let (scene, mut settings) = *what;
                     // Cases run side by side.
                     settings.threads = settings.threads.max(1);
@@ -129,9 +152,18 @@ impl Case {
                         first = described(&scene);
                     }
                     open = Some(books_open(&result).max(open.unwrap_or(0.0)));
+                    carried = if is_carried { by_carriers(&scene, &settings) } else { Vec::new() };
+                    for (_, baked) in carried.iter().filter(|_| !self.is_without_books) {
+                        open = Some(books_open(&baked.result).max(open.unwrap_or(0.0)));
+                    }
                     bakes.push(Baked { scene, result });
                 }
                 Step::Law(says, bound, of) => note(says, of(&bakes), bound, &first),
+                Step::Carried(says, of) => {
+                    for (carrier, baked) in &carried {
+                        note(format!("by {carrier}, over what chance allows: {says}"), of(baked), 1.0, &first);
+                    }
+                }
                 Step::Forget(after) => {
                     after(&bakes);
                     bakes.clear();
@@ -198,6 +230,38 @@ pub fn books_open(result: &BakeResult) -> f64 {
         }
     }
     if is_sound { worst } else { f64::INFINITY }
+}
+
+/// The same scene by photons, and by what is chosen of photons and patches.
+fn by_carriers(scene: &Scene, settings: &BakeSettings) -> Vec<(&'static str, Baked)> {
+    let plain = photons(settings.density_per_sr, 16);
+    let photons = BakeSettings {
+        estimator: Estimator::Photon,
+        rays: plain.rays,
+        sigma: plain.sigma,
+        kernel: plain.kernel,
+        kernel_sampling: plain.kernel_sampling,
+        footprint: plain.footprint,
+        filter: plain.filter,
+        max_error: None,
+        ..settings.clone()
+    };
+    let few = bake(scene.clone(), &photons).counts.rays.max(1);
+    let many = BakeSettings {
+        density_per_sr: photons.density_per_sr * (LEAST_PHOTONS / few as f64).max(1.0),
+        ..photons.clone()
+    };
+    let chosen = BakeSettings {
+        estimator: Estimator::Auto,
+        max_error: Some(0.1),
+        error_metric: ErrorMetric::Rmse,
+        ..photons
+    };
+    let baked = |settings: &BakeSettings| Baked {
+        result: bake(scene.clone(), settings),
+        scene: scene.clone(),
+    };
+    vec![("photons", baked(&many)), ("auto", baked(&chosen))]
 }
 
 /// All values of a map, its errors included.

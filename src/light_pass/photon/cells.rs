@@ -1,0 +1,300 @@
+//! A map's texels and what they add up to, four to a cell from level to level: one grid for maps in tiles and for others.
+//!
+//! Cells of level l are 2^l finest texels long. Where a tile is coarser than that, there are none.
+
+use rayon::prelude::*;
+
+use crate::illumination::Chart;
+use crate::illumination::tiles::{COARSEST, SIDE};
+
+/// No cell, or no texel.
+const NONE: u32 = u32::MAX;
+
+/// The last level has at most so many cells each way.
+const FEWEST_ACROSS: usize = 4;
+
+/// What lies around a cell are cells so many levels coarser.
+const STEPS_AROUND: usize = 2;
+
+/// Weight of a cell, one way, in the mean over such a coarser cell that is interpolated to its own place: 5/8 or 3/4 of a
+/// fourth.
+const OWN_WEIGHTS: [f32; 4] = [5.0 / 32.0, 3.0 / 16.0, 3.0 / 16.0, 5.0 / 32.0];
+
+/// Cells of all levels, finest first.
+pub(super) struct Cells {
+    levels: Vec<Level>,
+}
+
+/// Values of every cell, level by level.
+pub(super) type Values<const N: usize> = Vec<Vec<[f32; N]>>;
+
+/// Cells of one level: those of a tile together, row by row.
+pub(super) struct Level {
+    /// Cells across and down, if there were all.
+    size: (usize, usize),
+    /// A tile is 2^shift cells long.
+    shift: u32,
+    /// First cell of each tile.
+    begins: Vec<u32>,
+    /// Column and row of each cell.
+    places: Vec<(u32, u32)>,
+    /// The texel that a cell is; none where it holds several.
+    texels: Vec<u32>,
+    /// Surface in each cell [m²].
+    areas_m2: Vec<f32>,
+}
+
+impl Level {
+    /// `tiles` are the level, the first texel and the number of each.
+    fn new(level: u8, (width, height): (usize, usize), chart: &Chart) -> Self {
+        let length = 1_usize << level;
+        let size = (width.div_ceil(length), height.div_ceil(length));
+        let side = SIDE.div_ceil(length);
+        let tiles = (size.0.div_ceil(side), size.1.div_ceil(side));
+        let (mut begins, mut places, mut texels) = (Vec::new(), Vec::new(), Vec::new());
+        for tile in 0..tiles.0 * tiles.1 {
+            let (column, row) = (tile % tiles.0 * side, tile / tiles.0 * side);
+            let own = chart
+                .layout
+                .as_ref()
+                .filter(|_| level <= COARSEST)
+                .map(|layout| layout.tile(tile));
+            if own.as_ref().is_some_and(|tile| tile.level > level) {
+                begins.push(NONE);
+                continue;
+            }
+            begins.push(places.len() as u32);
+            let mut next = own
+                .filter(|tile| tile.level == level)
+                .map(|tile| tile.texels.start as u32);
+            for y in row..(row + side).min(size.1) {
+                for x in column..(column + side).min(size.0) {
+                    places.push((x as u32, y as u32));
+                    let plain = (level == 0 && chart.layout.is_none()).then_some((y * width + x) as u32);
+                    texels.push(next.or(plain).unwrap_or(NONE));
+                    next = next.map(|texel| texel + 1);
+                }
+            }
+        }
+        Self {
+            size,
+            shift: side.trailing_zeros(),
+            begins,
+            areas_m2: vec![0.0; places.len()],
+            places,
+            texels,
+        }
+    }
+
+    fn index(&self, column: usize, row: usize) -> Option<usize> {
+        let tiles_across = self.size.0.div_ceil(1 << self.shift);
+        let (tile_column, tile_row) = (column >> self.shift, row >> self.shift);
+        let begin = self.begins[tile_row * tiles_across + tile_column];
+        let (first_column, first_row) = (tile_column << self.shift, tile_row << self.shift);
+        let across = (1 << self.shift).min(self.size.0 - first_column);
+        (begin != NONE).then(|| begin as usize + (row - first_row) * across + column - first_column)
+    }
+
+    /// Sums over the cells of the finer level in each of this one's.
+    fn add_up<const N: usize>(&self, place: (u32, u32), finer: &Self, values: &[[f32; N]]) -> [f32; N] {
+        let mut sum = [0.0; N];
+        let within = |first: u32, end: usize| {
+            (2 * first as usize..2 * first as usize + 2).take_while(move |at| *at < end)
+        };
+        for row in within(place.1, finer.size.1) {
+            for column in within(place.0, finer.size.0) {
+                if let Some(index) = finer.index(column, row) {
+                    sum.iter_mut()
+                        .zip(values[index])
+                        .for_each(|(sum, value)| *sum += value);
+                }
+            }
+        }
+        sum
+    }
+}
+
+impl Cells {
+    pub fn new(chart: &Chart) -> Self {
+        let size = chart
+            .layout
+            .as_ref()
+            .map_or((chart.width, chart.height), |layout| layout.size());
+        let mut cells = Self { levels: Vec::new() };
+        for level in 0.. {
+            cells.levels.push(Level::new(level, size, chart));
+            let last = cells.levels[usize::from(level)].size;
+            if last.0.max(last.1) <= FEWEST_ACROSS && (level >= COARSEST || chart.layout.is_none()) {
+                break;
+            }
+        }
+        let areas = cells.sums(|texel| [chart.texel_area_m2(texel) as f32]);
+        for (level, areas) in cells.levels.iter_mut().zip(areas) {
+            level.areas_m2 = areas.into_iter().map(|[area_m2]| area_m2).collect();
+        }
+        cells
+    }
+
+    /// The first level that has cells everywhere and means of many texels, though not of a large part of the map.
+    pub fn pool(&self) -> usize {
+        let across = self.levels[0].size.0.max(self.levels[0].size.1);
+        let of_tiles = self.levels.iter().position(|level| !level.begins.contains(&NONE));
+        let many = (across.ilog2() as usize).clamp(5, 9) - 3;
+        many.max(of_tiles.unwrap_or(0)).min(self.levels.len() - 1)
+    }
+
+    /// The values of every texel.
+    pub fn texels<const N: usize>(&self, values: &Values<N>) -> Vec<[f32; N]> {
+        let own = |level: &&Level| level.texels.iter().filter(|texel| **texel != NONE).count();
+        let mut of_texels = vec![[0.0; N]; self.levels.iter().map(|level| own(&level)).sum()];
+        for (level, values) in self.levels.iter().zip(values) {
+            for (&texel, &value) in level
+                .texels
+                .iter()
+                .zip(values)
+                .filter(|(texel, _)| **texel != NONE)
+            {
+                of_texels[texel as usize] = value;
+            }
+        }
+        of_texels
+    }
+
+    /// Sums of a value of texels over every cell.
+    pub fn sums<const N: usize>(&self, value: impl Fn(usize) -> [f32; N] + Sync) -> Values<N> {
+        let mut sums: Values<N> = Vec::with_capacity(self.levels.len());
+        for (number, level) in self.levels.iter().enumerate() {
+            let own = level.places.par_iter().zip(&level.texels);
+            let own = own.map(|(&place, &texel)| match texel {
+                NONE => level.add_up(place, &self.levels[number - 1], &sums[number - 1]),
+                texel => value(texel as usize),
+            });
+            sums.push(own.collect());
+        }
+        sums
+    }
+
+    /// The same per area [1/m²]; 0 where there is none.
+    pub fn densities<const N: usize>(&self, value: impl Fn(usize) -> [f32; N] + Sync) -> Values<N> {
+        let mut densities = self.sums(value);
+        for (values, level) in densities.iter_mut().zip(&self.levels) {
+            divide(values, &level.areas_m2);
+        }
+        densities
+    }
+
+    /// Densities of a level's cells, linearly between those of the next coarser level, of which all are known. Where there
+    /// is no such cell, the coarser texel there stands for it.
+    pub fn between<const N: usize>(&self, level: usize, values: &Values<N>) -> Vec<[f32; N]> {
+        self.interpolated(level, |mut column, mut row| {
+            let coarser = (level + 1..self.levels.len()).find_map(|number| {
+                let index = self.levels[number]
+                    .index(column, row)
+                    .map(|index| (number, index));
+                (column, row) = (column / 2, row / 2);
+                index
+            });
+            let (number, index) = coarser?;
+            (self.levels[number].areas_m2[index] > 0.0).then(|| values[number][index])
+        })
+    }
+
+    /// Densities of a level's cells, of their means over cells `steps` levels coarser.
+    pub fn pooled<const N: usize>(&self, level: usize, values: Vec<[f32; N]>, steps: usize) -> Vec<[f32; N]> {
+        let last = (level + steps).min(self.levels.len() - 1);
+        let mut sums = values;
+        let mut areas = vec![
+            self.levels[level]
+                .areas_m2
+                .iter()
+                .map(|area_m2| [*area_m2])
+                .collect::<Vec<_>>(),
+        ];
+        for (values, [area_m2]) in sums.iter_mut().zip(&areas[0]) {
+            values.iter_mut().for_each(|value| *value *= area_m2);
+        }
+        for number in level + 1..=last {
+            let (coarse, fine) = (&self.levels[number], &self.levels[number - 1]);
+            let added = coarse
+                .places
+                .par_iter()
+                .map(|&place| coarse.add_up(place, fine, &sums));
+            sums = added.collect();
+            let finer = areas.last().expect("it has one");
+            let added = coarse
+                .places
+                .par_iter()
+                .map(|&place| coarse.add_up(place, fine, finer));
+            areas.push(added.collect());
+        }
+        let flat: Vec<f32> = areas[last - level].iter().map(|[area_m2]| *area_m2).collect();
+        divide(&mut sums, &flat);
+        for number in (level..last).rev() {
+            let (coarse, areas) = (&self.levels[number + 1], &areas[number + 1 - level]);
+            sums = self.interpolated(number, |column, row| {
+                let index = coarse.index(column, row).filter(|index| areas[*index][0] > 0.0)?;
+                Some(sums[index])
+            });
+        }
+        sums
+    }
+
+    /// The same without what a cell itself adds to its mean, where cells are whole.
+    pub fn around<const N: usize>(&self, level: usize, values: &[[f32; N]]) -> Vec<[f32; N]> {
+        let mut means = self.pooled(level, values.to_vec(), STEPS_AROUND);
+        if level + STEPS_AROUND < self.levels.len() {
+            let own = |place: u32| OWN_WEIGHTS[place as usize % OWN_WEIGHTS.len()];
+            let cells = means.par_iter_mut().zip(values).zip(&self.levels[level].places);
+            cells.for_each(|((means, values), place)| {
+                let weight = own(place.0) * own(place.1);
+                means
+                    .iter_mut()
+                    .zip(values)
+                    .for_each(|(mean, value)| *mean -= weight * value);
+            });
+        }
+        means
+    }
+
+    /// Values at the middles of a level's cells, linearly between those at the middles of the next coarser one's.
+    fn interpolated<const N: usize>(
+        &self,
+        level: usize,
+        at: impl Fn(usize, usize) -> Option<[f32; N]> + Sync,
+    ) -> Vec<[f32; N]> {
+        let (width, height) = self.levels[level + 1].size;
+        // The parent, and the one on the side of which the cell lies.
+        let near = |place: u32, count: usize| {
+            let own = place as usize / 2;
+            let other = if place.is_multiple_of(2) {
+                own.saturating_sub(1)
+            } else {
+                (own + 1).min(count - 1)
+            };
+            [(own, 0.75), (other, 0.25)]
+        };
+        let places = self.levels[level].places.par_iter();
+        let value = |&(column, row): &(u32, u32)| {
+            let (mut sum, mut weights) = ([0.0; N], 0.0);
+            for (row, down) in near(row, height) {
+                for (column, across) in near(column, width) {
+                    if let Some(values) = at(column, row) {
+                        weights += down * across;
+                        sum.iter_mut()
+                            .zip(values)
+                            .for_each(|(sum, value)| *sum += down * across * value);
+                    }
+                }
+            }
+            sum.map(|sum: f32| if weights > 0.0 { sum / weights } else { 0.0 })
+        };
+        places.map(value).collect()
+    }
+}
+
+fn divide<const N: usize>(values: &mut [[f32; N]], areas_m2: &[f32]) {
+    for (values, area_m2) in values.iter_mut().zip(areas_m2) {
+        let per_m2 = if *area_m2 > 0.0 { 1.0 / area_m2 } else { 0.0 };
+        values.iter_mut().for_each(|value| *value *= per_m2);
+    }
+}
