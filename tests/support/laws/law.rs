@@ -14,8 +14,11 @@ use nephroid::study::agreement::{Agreement, TexelPair, pair_maps};
 use super::{Baked, Case, number};
 use crate::tools::bits;
 
-/// Watts by photons may be off by this share.
-const WATTS_BY_CHANCE: f64 = 0.02;
+/// The share by which watts may be off by chance: three standard errors of as many photons as arrived, and a little for
+/// light that is the same for many.
+fn chance(bake: &Baked) -> f64 {
+    0.02 + 3.0 / (bake.result.counts.splats.max(1) as f64).sqrt()
+}
 
 impl Case {
     /// A figure of the last bake.
@@ -60,14 +63,14 @@ impl Case {
     pub fn watts(&mut self, expected_w: f64, bound: f64) -> &mut Self {
         let says = format!("{} W arrive", number(expected_w));
         self.measure(&says, bound, move |bake| off(deposited_w(bake), expected_w))
-            .carried(&says, move |bake| off(deposited_w(bake), expected_w) / (bound + WATTS_BY_CHANCE))
+            .carried(&says, move |bake| off(deposited_w(bake), expected_w) / (bound + chance(bake)))
     }
 
     /// What lamps send to mirrors and glass [W].
     pub fn sent(&mut self, expected_w: f64, bound: f64) -> &mut Self {
         let says = format!("{} W are sent", number(expected_w));
         self.measure(&says, bound, move |bake| off(emitted_w(bake), expected_w))
-            .carried(&says, move |bake| off(emitted_w(bake), expected_w) / (bound + WATTS_BY_CHANCE))
+            .carried(&says, move |bake| off(emitted_w(bake), expected_w) / (bound + chance(bake)))
     }
 
     /// No light is made: at most a share of what was sent arrives.
@@ -75,7 +78,7 @@ impl Case {
         let arrives = |bake: &Baked| deposited_w(bake) / emitted_w(bake).max(f64::MIN_POSITIVE);
         let says = "arrives, of what was sent";
         self.measure(says, most, arrives)
-            .carried(says, move |bake| arrives(bake) / (most + WATTS_BY_CHANCE))
+            .carried(says, move |bake| arrives(bake) / (most + chance(bake)))
     }
 
     /// What arrives at most [W].
