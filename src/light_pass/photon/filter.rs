@@ -13,6 +13,7 @@ use crate::illumination::Receiver;
 use crate::illumination::accumulator::{FluxCount, FluxUnit};
 use crate::light_pass::accuracy::Noise;
 use crate::light_pass::receiver_maps::{ReceiverMap, ReceiverMaps};
+use crate::optics::luminance;
 
 /// What a photon brings is a mean over cells so many levels coarser.
 const PHOTONS_POOLED: usize = 5;
@@ -22,6 +23,9 @@ const CHANCE_PAIRS: f32 = 2.0;
 
 /// The error of a texel is in proportion to this power of its light, among the texels around it.
 const ERROR_BY_LIGHT: f32 = 1.5;
+
+/// Details take no more of the light of a cell than leaves this part of it, where channels may be negative.
+const LEAST_LEFT: f32 = 0.1;
 
 /// Light is told from none down to this part of the map's mean.
 const DARKEST: f32 = 1e-4;
@@ -146,20 +150,31 @@ impl Details {
                 0.0
             };
             let missed = (1.0 - share) * (1.0 - share) * detail[0] * detail[1];
-            let channel = |channel: usize| {
-                let value = smooth[channel] + share * detail[2 + channel];
-                if self.is_signed { value } else { value.max(0.0) }
-            };
+            let [red, green, blue] = self.lit(smooth, detail, share);
             [
-                channel(0),
-                channel(1),
-                channel(2),
+                red,
+                green,
+                blue,
                 smooth[3] + share * detail[0],
                 smooth[4] + share * detail[1],
                 smooth[5] + missed,
             ]
         };
         cells.map(refine).collect()
+    }
+
+    /// The channels of a cell with a share of its detail, less where nothing would be left of its light.
+    fn lit(&self, smooth: &Kept, detail: &Raw, share: f32) -> [f32; 3] {
+        let with = |share: f32| [0, 1, 2].map(|channel| smooth[channel] + share * detail[2 + channel]);
+        if !self.is_signed {
+            return with(share).map(|value| value.max(0.0));
+        }
+        let [before, after] = [0.0, share].map(|share| luminance(&with(share)) as f32);
+        let least = LEAST_LEFT * before.max(0.0);
+        if after >= least.min(before) {
+            return with(share);
+        }
+        with(share * (before - least).max(0.0) / (before - after))
     }
 
     /// The squared error of each texel [W²/m⁴]: what was missed and what is left of the noise, among the texels around it as

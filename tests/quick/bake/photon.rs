@@ -2,10 +2,11 @@
 
 use glam::DVec3;
 use nephroid::illumination::IlluminationMap;
+use nephroid::optics::luminance;
 use nephroid::scene::builtin::{parts, shapes};
 use nephroid::scene::{LightKind, LightSize, Material, PanelShape, Scene};
 use nephroid::session::BakeResult;
-use nephroid::settings::{BakeSettings, Estimator, MapResolution};
+use nephroid::settings::{BakeSettings, Estimator, LayerKind, MapResolution};
 use nephroid::units::Radiance;
 
 use support::brute_force::brute;
@@ -185,6 +186,29 @@ fn errors_of_few_filtered_photons_are_numbers() {
     }
     let mut errors = result.maps.iter().flat_map(|map| map.error.iter().flatten());
     assert!(errors.all(|error| *error >= 0.0 && *error < f32::MAX));
+}
+
+/// Pure colours lie outside of sRGB, filtered too; their luminance is never negative.
+#[test]
+fn filtered_spectra_are_light() {
+    let settings = BakeSettings {
+        filter: Some(true),
+        ..photons(3e4, SIDE)
+    };
+    let scene = builtin_scene("spectrum");
+    let result = bake(scene, &settings);
+    assert_eq!(energy_fault(&result), None);
+    let layers = result.maps.iter().filter_map(|map| map.layer(LayerKind::Caustic));
+    let texels: Vec<[f32; 3]> = layers
+        .flat_map(|layer| layer.irradiance.iter().copied())
+        .collect();
+    assert!(texels.iter().flatten().any(|channel| *channel < 0.0));
+    for texel in texels {
+        let largest = texel
+            .iter()
+            .fold(0.0_f32, |largest, channel| largest.max(channel.abs()));
+        assert!(luminance(&texel) >= -1e-6 * f64::from(largest), "{texel:?}");
+    }
 }
 
 /// Smooth light is for patches, light that goes very many ways for photons.
