@@ -13,7 +13,7 @@ use crate::illumination::Receiver;
 use crate::illumination::accumulator::{FluxCount, FluxUnit};
 use crate::light_pass::accuracy::Noise;
 use crate::light_pass::receiver_maps::{ReceiverMap, ReceiverMaps};
-use crate::optics::luminance;
+use crate::optics::{LinearSrgb, luminance};
 
 /// What a photon brings is a mean over cells so many levels coarser.
 const PHOTONS_POOLED: usize = 5;
@@ -221,21 +221,27 @@ impl Details {
                 let counts = map.chart.texel_area_m2(texel) * counts_per_mean;
                 [0, 1, 2].map(|channel| f64::from(kept[channel]) * counts)
             });
-        put(map, &flux.collect::<Vec<_>>());
+        put(map, &flux.collect::<Vec<_>>(), self.is_signed);
     }
 }
 
-/// Puts other counts in the place of a map's; each channel keeps its sum, to which roundings add up to nothing.
-fn put(map: &mut ReceiverMap, flux: &[[f64; 3]]) {
+/// Puts other counts in the place of a map's; each channel keeps its sum. What is missing is shared out as the channel is, or
+/// as luminance is where channels may be negative: that stays above 0.
+fn put(map: &mut ReceiverMap, flux: &[[f64; 3]], is_signed: bool) {
     let texels = map.levels_mut()[0].texels_mut();
     for channel in 0..3 {
+        let share = |flux: &[f64; 3]| match is_signed {
+            true => LinearSrgb::from(*flux).luminance(),
+            false => flux[channel],
+        };
         let before: f64 = texels.iter().map(|count| count[channel] as f64).sum();
         let after: f64 = flux.iter().map(|flux| flux[channel]).sum();
-        let size: f64 = flux.iter().map(|flux| flux[channel].abs()).sum();
+        let size: f64 = flux.iter().map(share).sum();
         let missing = if size > 0.0 { (before - after) / size } else { 0.0 };
+        // Roundings add up to nothing.
         let mut left = 0.0;
         for (count, flux) in texels.iter_mut().zip(flux) {
-            let wanted = flux[channel] + flux[channel].abs() * missing + left;
+            let wanted = flux[channel] + share(flux) * missing + left;
             count[channel] = wanted.round() as i64;
             left = wanted - count[channel] as f64;
         }
