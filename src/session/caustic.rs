@@ -359,6 +359,7 @@ impl CausticLayer<'_> {
                 };
                 !climb.done && climb.levels.len() < begins
             }),
+            is_by_photons: climbs.iter().any(|climb| climb.carrier == Carrier::Photons),
         };
         course.outcome.course.push(point);
         let Some(target) = self.settings.max_error else {

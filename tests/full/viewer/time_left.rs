@@ -58,6 +58,7 @@ fn the_course_tells_what_is_left_of_it() {
         bytes: 0,
         error,
         is_coarse: false,
+        is_by_photons: false,
     };
     let mut level = BakedLevel {
         serial: 1,

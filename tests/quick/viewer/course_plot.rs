@@ -22,6 +22,7 @@ fn panel(settings: BakeSettings) -> Headless {
             bytes: 0,
             error: 0.2 * 0.5_f64.powi(level),
             is_coarse: false,
+            is_by_photons: false,
         };
         last.result.course = (0..3).map(point).collect();
     });
