@@ -338,7 +338,13 @@ impl CausticLayer<'_> {
             climb.carrier == Carrier::Undecided
                 && climb.levels.last().is_none_or(|level| level.error.is_none())
         });
-        if !errors.are_of_all(lights) || !error.is_finite() || is_open {
+        // Nor does a level that was cut off.
+        let is_known = course
+            .outcome
+            .course
+            .last()
+            .is_some_and(|last| last.error == error);
+        if !errors.are_of_all(lights) || !error.is_finite() || is_open || is_known {
             return;
         }
         let held = climbs

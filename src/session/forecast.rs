@@ -83,10 +83,9 @@ const SPLATS: Growth = Growth {
     beginning: 1.0,
 };
 
-/// Noise falls with the square root of their number, but the fewer they are the more of it is filtered out: the median of
-/// thirteen scenes of glass.
+/// Noise falls with the square root of their number.
 const PHOTONS: Growth = Growth {
-    usual_exponent: 2.5,
+    usual_exponent: 2.0,
     beginning: 1.0,
 };
 

@@ -1,4 +1,4 @@
-//! What a bake would take, before it: a short pilot bake, and what its course says of the presets.
+//! What a bake would take, before it: a short pilot bake of each preset, and what its course says.
 
 use std::time::Instant;
 
@@ -9,12 +9,9 @@ use crate::plan::Effect;
 use crate::progress::Control;
 use crate::settings::{BakeSettings, Preset};
 
-/// The pilot's light pass ends after so long [s]; the later ones go on where those before ended, where no error is known
+/// A pilot's light pass ends after so long [s]; the later ones go on where those before ended, where no error is known
 /// by then.
-const PILOTS_S: [f64; 3] = [1.0, 3.0, 9.0];
-
-/// Relative RMSE that the pilot aims at.
-const PILOT_TARGET: f64 = 0.03;
+const PILOTS_S: [f64; 3] = [0.5, 3.0, 9.0];
 
 /// Density of a pilot of splats [rays/sr].
 const PILOT_DENSITY_PER_SR: f64 = 10_000.0;
@@ -36,7 +33,7 @@ pub struct PresetForecast {
 pub struct Survey {
     /// The plan, and bounds.
     pub estimate: BakeEstimate,
-    /// The pilot bake: which maps there are, and what it took.
+    /// The pilot bake of the default preset: which maps there are, and what it took.
     pub pilot: BakeResult,
     /// All presets.
     pub presets: Vec<PresetForecast>,
@@ -53,30 +50,49 @@ impl BakeSession {
         let began = Instant::now();
         let estimate = self.estimate(settings)?;
         let is_on = estimate.plan.is_on(Effect::LightPass);
-        let mut pilot = self.bake(&pilot_settings(settings, PILOTS_S[0]), &(), control)?;
-        for limit_s in &PILOTS_S[1..] {
-            if is_on && pilot.course.is_empty() && pilot.stop_reason == StopReason::MaxTime {
-                let longer = self.bake(&pilot_settings(settings, *limit_s), &(), control)?;
-                pilot = added(pilot, longer);
+        let mut pilots = Vec::new();
+        for preset in Preset::ALL {
+            if pilots.is_empty() || is_on && settings.estimator.refines() {
+                pilots.push(self.pilot(&pilot_settings(settings, preset), control)?);
             }
         }
-        let of_preset = |preset: Preset| PresetForecast {
-            preset,
-            forecast: match settings.estimator {
-                _ if !is_on => Some(nothing(preset)),
-                _ if settings.estimator.refines() => {
-                    forecast(&pilot.course, preset.max_error(), settings.estimator)
-                }
-                _ => splat_forecast(&pilot, preset),
-            },
+        let of_preset = |(index, preset): (usize, Preset)| {
+            let pilot = &pilots[index.min(pilots.len() - 1)];
+            PresetForecast {
+                preset,
+                forecast: match settings.estimator {
+                    _ if !is_on => Some(nothing(preset)),
+                    _ if settings.estimator.refines() => {
+                        forecast(&pilot.course, preset.max_error(), settings.estimator)
+                    }
+                    _ => splat_forecast(pilot, preset),
+                },
+            }
         };
-        let presets = Preset::ALL.map(of_preset).to_vec();
+        let presets = Preset::ALL.into_iter().enumerate().map(of_preset).collect();
+        let pilot = pilots.swap_remove(pilots.len() / 2);
         Ok(Survey {
             estimate,
             pilot,
             presets,
             seconds: began.elapsed().as_secs_f64(),
         })
+    }
+
+    /// The first moments of a bake: until something is known of its error, or the last limit is reached.
+    fn pilot(&mut self, settings: &BakeSettings, control: &Control) -> Result<BakeResult> {
+        let within = |limit_s| BakeSettings {
+            max_time_s: Some(limit_s),
+            ..settings.clone()
+        };
+        let mut pilot = self.bake(&within(PILOTS_S[0]), &(), control)?;
+        for limit_s in &PILOTS_S[1..] {
+            if pilot.course.is_empty() && pilot.stop_reason == StopReason::MaxTime {
+                let longer = self.bake(&within(*limit_s), &(), control)?;
+                pilot = added(pilot, longer);
+            }
+        }
+        Ok(pilot)
     }
 }
 
@@ -93,18 +109,17 @@ fn added(first: BakeResult, mut second: BakeResult) -> BakeResult {
     second
 }
 
-fn pilot_settings(settings: &BakeSettings, limit_s: f64) -> BakeSettings {
+/// The map's size, and with it the noise of each texel, depends on the target.
+fn pilot_settings(settings: &BakeSettings, preset: Preset) -> BakeSettings {
     if settings.estimator.refines() {
         BakeSettings {
-            max_error: Some(PILOT_TARGET),
-            max_time_s: Some(limit_s),
-            density_per_sr: BakeSettings::starting_density_per_sr(PILOT_TARGET),
+            max_error: Some(preset.max_error()),
+            density_per_sr: BakeSettings::starting_density_per_sr(preset.max_error()),
             ..settings.clone()
         }
     } else {
         BakeSettings {
             density_per_sr: PILOT_DENSITY_PER_SR,
-            max_time_s: Some(limit_s),
             ..settings.clone()
         }
     }

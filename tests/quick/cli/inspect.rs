@@ -42,8 +42,6 @@ fn contents_effects_and_what_presets_take() {
         let [rays, cpu_s, bytes] = ["rays", "cpu_s", "bytes"].map(|field| number(&preset[field]));
         assert!(rays > 100.0 && cpu_s > 0.0 && bytes > 64.0 * 64.0, "{preset}");
     }
-    // On so small a map the pilot may already be good enough for all of them.
-    assert!(number(&list("presets")[0]["rays"]) <= number(&list("presets")[2]["rays"]));
     let map = &list("maps")[0];
     assert_eq!((&map["surface"], &map["width"]), (&"floor".into(), &64.into()));
     let [rays, shadow_rays] = ["rays", "shadow_rays"].map(|name| number(&report["pilot"]["counts"][name]));
