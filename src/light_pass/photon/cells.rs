@@ -45,7 +45,7 @@ pub(super) struct Level {
 }
 
 impl Level {
-    /// `tiles` are the level, the first texel and the number of each.
+    /// Of a map so large [finest texels].
     fn new(level: u8, (width, height): (usize, usize), chart: &Chart) -> Self {
         let length = 1_usize << level;
         let size = (width.div_ceil(length), height.div_ceil(length));
@@ -145,17 +145,14 @@ impl Cells {
 
     /// The values of every texel.
     pub fn texels<const N: usize>(&self, values: &Values<N>) -> Vec<[f32; N]> {
-        let own = |level: &&Level| level.texels.iter().filter(|texel| **texel != NONE).count();
-        let mut of_texels = vec![[0.0; N]; self.levels.iter().map(|level| own(&level)).sum()];
-        for (level, values) in self.levels.iter().zip(values) {
-            for (&texel, &value) in level
-                .texels
-                .iter()
-                .zip(values)
-                .filter(|(texel, _)| **texel != NONE)
-            {
-                of_texels[texel as usize] = value;
-            }
+        let own = |level: usize| {
+            let cells = self.levels[level].texels.iter().zip(&values[level]);
+            cells.filter(|(texel, _)| **texel != NONE)
+        };
+        let count = (0..self.levels.len()).map(|level| own(level).count()).sum();
+        let mut of_texels = vec![[0.0; N]; count];
+        for (&texel, &value) in (0..self.levels.len()).flat_map(own) {
+            of_texels[texel as usize] = value;
         }
         of_texels
     }

@@ -91,8 +91,8 @@ impl Details {
         }
     }
 
-    /// Coarse cells as they are, finer ones with what is kept of their details.
-    fn filtered(&self) -> Values<6> {
+    /// Every texel: coarse cells as they are, finer ones with what is kept of their details.
+    fn filtered(&self) -> Vec<Kept> {
         let coarsest = self.raw.len() - 1;
         let mut kept: Values<6> = vec![Vec::new(); self.raw.len()];
         let as_is = |&[a, b, red, green, blue]: &Raw| [red, green, blue, a, b, 0.0];
@@ -100,7 +100,7 @@ impl Details {
         for level in (0..coarsest).rev() {
             kept[level] = self.refined(level, &kept);
         }
-        kept
+        self.cells.texels(&kept)
     }
 
     /// One level, of all coarser ones.
@@ -179,8 +179,7 @@ impl Details {
 
     /// The squared error of each texel [W²/m⁴]: what was missed and what is left of the noise, among the texels around it as
     /// their light is.
-    fn squares(&self, kept: &Values<6>, map: &ReceiverMap) -> Vec<f64> {
-        let of_texels = self.cells.texels(kept);
+    fn squares(&self, of_texels: &[Kept], map: &ReceiverMap) -> Vec<f64> {
         let expected = |[.., a, b, _]: &Kept| (0.5 * (a + b)).max(DARKEST).powf(ERROR_BY_LIGHT);
         let square = |[.., a, b, missed]: &Kept| missed + 0.25 * (a - b) * (a - b);
         let mut ratios = self.cells.densities(|texel| {
@@ -210,17 +209,12 @@ impl Details {
     }
 
     /// Puts what was kept in the place of a map's counts.
-    fn put(&self, kept: &Values<6>, map: &mut ReceiverMap, unit: FluxUnit) {
+    fn put(&self, of_texels: &[Kept], map: &mut ReceiverMap, unit: FluxUnit) {
         let counts_per_mean = self.mean / unit.watts();
-        let flux = self
-            .cells
-            .texels(kept)
-            .into_iter()
-            .enumerate()
-            .map(|(texel, kept)| {
-                let counts = map.chart.texel_area_m2(texel) * counts_per_mean;
-                [0, 1, 2].map(|channel| f64::from(kept[channel]) * counts)
-            });
+        let flux = of_texels.iter().enumerate().map(|(texel, kept)| {
+            let counts = map.chart.texel_area_m2(texel) * counts_per_mean;
+            [0, 1, 2].map(|channel| f64::from(kept[channel]) * counts)
+        });
         put(map, &flux.collect::<Vec<_>>(), self.is_signed);
     }
 }

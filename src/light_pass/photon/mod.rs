@@ -9,5 +9,4 @@ pub mod launch;
 pub mod pass;
 pub mod spectrum;
 pub mod spheres;
-
 pub mod walk;

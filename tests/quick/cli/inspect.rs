@@ -42,6 +42,8 @@ fn contents_effects_and_what_presets_take() {
         let [rays, cpu_s, bytes] = ["rays", "cpu_s", "bytes"].map(|field| number(&preset[field]));
         assert!(rays > 100.0 && cpu_s > 0.0 && bytes > 64.0 * 64.0, "{preset}");
     }
+    // Each has a pilot of its own: a draft may take more rays, by photons, but never more memory.
+    assert!(number(&list("presets")[0]["bytes"]) <= number(&list("presets")[2]["bytes"]));
     let map = &list("maps")[0];
     assert_eq!((&map["surface"], &map["width"]), (&"floor".into(), &64.into()));
     let [rays, shadow_rays] = ["rays", "shadow_rays"].map(|name| number(&report["pilot"]["counts"][name]));
