@@ -14,7 +14,7 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use super::ledger::EnergyLedger;
-use super::receiver_maps::ReceiverMaps;
+use super::receiver_maps::{ReceiverMap, ReceiverMaps};
 use super::wavefront::refine::{RoughTiles, TILE_SIDE, TileSet, tile_counts};
 use crate::illumination::accumulator::FluxUnit;
 use crate::illumination::tiles::TileLayout;
@@ -77,26 +77,30 @@ pub struct LightError {
 
 /// Luminance of all maps.
 pub fn images(maps: &ReceiverMaps, unit: FluxUnit) -> Images {
-    maps.iter()
-        .map(|(receiver, map)| {
-            let chart = &map.chart;
-            let luminance = map
-                .flux()
-                .texels()
-                .par_iter()
-                .enumerate()
-                .map(|(texel, &count)| {
-                    let area_m2 = chart.texel_area_m2(texel);
-                    if area_m2 > 0.0 {
-                        unit.flux_w(count).luminance() / area_m2
-                    } else {
-                        0.0
-                    }
-                })
-                .collect();
-            (receiver, Image::new(chart, luminance))
-        })
-        .collect()
+    images_of(maps.iter(), unit)
+}
+
+/// Luminance of some maps.
+pub fn images_of<'a>(maps: impl Iterator<Item = (Receiver, &'a ReceiverMap)>, unit: FluxUnit) -> Images {
+    maps.map(|(receiver, map)| {
+        let chart = &map.chart;
+        let luminance = map
+            .flux()
+            .texels()
+            .par_iter()
+            .enumerate()
+            .map(|(texel, &count)| {
+                let area_m2 = chart.texel_area_m2(texel);
+                if area_m2 > 0.0 {
+                    unit.flux_w(count).luminance() / area_m2
+                } else {
+                    0.0
+                }
+            })
+            .collect();
+        (receiver, Image::new(chart, luminance))
+    })
+    .collect()
 }
 
 impl Image {
@@ -376,8 +380,8 @@ pub fn estimate_splats(
 }
 
 /// The error of photons: noise by half sets. `None` where no light arrived.
-pub fn by_noise(fine: &Images, noise: &Noise, ledger: &EnergyLedger) -> Option<LightError> {
-    by_squares(fine, ledger, |receiver, _| noise.get(&receiver).cloned())
+pub fn by_noise(fine: &Images, mut noise: Noise, ledger: &EnergyLedger) -> Option<LightError> {
+    by_squares(fine, ledger, |receiver, _| noise.remove(&receiver))
 }
 
 /// The error of `fine`, of whose squared difference from `other` it has a share of its own. `None` where no light arrived.
@@ -392,7 +396,7 @@ pub fn by_difference(fine: &Images, other: &Images, share: f64, ledger: &EnergyL
 fn by_squares(
     fine: &Images,
     ledger: &EnergyLedger,
-    squares: impl Fn(Receiver, &Image) -> Option<Vec<f64>>,
+    mut squares: impl FnMut(Receiver, &Image) -> Option<Vec<f64>>,
 ) -> Option<LightError> {
     let mut error = LightError {
         ratio: PRIOR_RATIO,

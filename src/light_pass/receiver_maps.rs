@@ -1,11 +1,12 @@
 //! Maps while flux is added to them: allocated when a surface first receives some.
 
 use rayon::prelude::*;
+use std::borrow::Cow;
 use std::sync::Arc;
 
 use super::caustic::path::Arrival;
 use super::caustic::splat::Coverage;
-use crate::illumination::accumulator::FluxAccumulator;
+use crate::illumination::accumulator::{FluxAccumulator, FluxCount};
 use crate::illumination::islands::Islands;
 use crate::illumination::{Chart, Receiver};
 use crate::optics::LinearSrgb;
@@ -15,8 +16,8 @@ use crate::optics::LinearSrgb;
 pub struct ReceiverMap {
     /// How the surface lies in the map.
     pub chart: Arc<Chart>,
-    /// The flux so far: `levels[0]` at the map's size, each further one at half the size of the one before, for
-    /// kernels that are smooth there. Of a map in tiles there is but one.
+    /// The flux so far: `levels[0]` at the map's size, each further one at half the size of the one before, made once a
+    /// kernel is smooth enough for it. Of a map in tiles there is but one.
     levels: Vec<FluxAccumulator>,
     /// Islands of the chart, where there is more than one.
     islands: Option<Islands>,
@@ -92,11 +93,11 @@ impl ReceiverMaps {
     }
 
     /// Adds the flux of other maps of the same sizes.
-    pub fn add(&mut self, other: Self) {
-        for (slot, part) in self.slots.iter_mut().zip(other.slots) {
+    pub fn add(&mut self, other: &Self) {
+        for (slot, part) in self.slots.iter_mut().zip(&other.slots) {
             match (slot, part) {
-                (Slot::Allocated(sum), Slot::Allocated(part)) => sum.add(&part),
-                (slot, part @ Slot::Allocated(_)) => *slot = part,
+                (Slot::Allocated(sum), Slot::Allocated(part)) => sum.add(part),
+                (slot, part @ Slot::Allocated(_)) => *slot = part.clone(),
                 _ => {}
             }
         }
@@ -158,19 +159,39 @@ const LEAST_LEVEL_SIDE: usize = 16;
 impl ReceiverMap {
     fn new(chart: Arc<Chart>, flux: FluxAccumulator) -> Self {
         let islands = Islands::find(&chart);
-        let mut levels = vec![flux];
-        let full = chart.is_full() && chart.layout.is_none();
-        let halves = |side: usize| side.is_multiple_of(2) && side / 2 >= LEAST_LEVEL_SIDE;
-        let (mut width, mut height) = (chart.width, chart.height);
-        while full && halves(width) && halves(height) {
-            (width, height) = (width / 2, height / 2);
-            levels.push(FluxAccumulator::new(width, height));
-        }
         Self {
             chart,
-            levels,
+            levels: vec![flux],
             islands,
         }
+    }
+
+    /// Sizes of the levels that it may have.
+    fn level_sizes(&self) -> impl Iterator<Item = (usize, usize)> {
+        let is_whole = self.chart.is_full() && self.chart.layout.is_none();
+        let halves = |side: usize| side.is_multiple_of(2) && side / 2 >= LEAST_LEVEL_SIDE;
+        let first = (self.chart.width, self.chart.height);
+        std::iter::successors(Some(first), move |&(width, height)| {
+            (is_whole && halves(width) && halves(height)).then_some((width / 2, height / 2))
+        })
+    }
+
+    /// Levels that it may have.
+    pub fn most_levels(&self) -> usize {
+        self.level_sizes().count()
+    }
+
+    /// Makes levels up to one.
+    fn make_levels(&mut self, level: usize) {
+        let missing: Vec<(usize, usize)> = self
+            .level_sizes()
+            .take(level + 1)
+            .skip(self.levels.len())
+            .collect();
+        let empty = missing
+            .into_iter()
+            .map(|(width, height)| FluxAccumulator::new(width, height));
+        self.levels.extend(empty);
     }
 
     /// Whether neighbouring texels are neighbours on the surface.
@@ -181,7 +202,7 @@ impl ReceiverMap {
     /// The coarsest level at which a smooth kernel of the given spread [texels of the map] is still well resolved.
     pub fn level_for(&self, spread_texels: f64) -> usize {
         let fits = |level: &usize| spread_texels / f64::from(1_u32 << level) >= LEAST_SPREAD_TEXELS;
-        (1..self.levels.len()).take_while(fits).last().unwrap_or(0)
+        (1..self.most_levels()).take_while(fits).last().unwrap_or(0)
     }
 
     /// The flux so far, level by level.
@@ -189,9 +210,9 @@ impl ReceiverMap {
         &self.levels
     }
 
-    /// The same, to be added to.
-    pub fn levels_mut(&mut self) -> &mut [FluxAccumulator] {
-        &mut self.levels
+    /// Texels at the map's size, to be added to.
+    pub fn texels_mut(&mut self) -> &mut [FluxCount] {
+        self.levels[0].texels_mut()
     }
 
     /// All that was added to it.
@@ -203,6 +224,7 @@ impl ReceiverMap {
     }
 
     fn add(&mut self, part: &Self) {
+        self.make_levels(part.levels.len() - 1);
         for (level, other) in self.levels.iter_mut().zip(&part.levels) {
             for (texel, more) in level.texels_mut().iter_mut().zip(other.texels()) {
                 for channel in 0..3 {
@@ -213,16 +235,13 @@ impl ReceiverMap {
     }
 
     /// All flux at the map's size: coarser levels spread smoothly.
-    pub fn flux(&self) -> FluxAccumulator {
+    pub fn flux(&self) -> Cow<'_, FluxAccumulator> {
         let mut levels = self.levels.iter().rev();
-        let mut sum = levels
-            .next()
-            .cloned()
-            .unwrap_or_else(|| FluxAccumulator::new(0, 0));
+        let mut sum = Cow::Borrowed(levels.next().expect("a map has a level"));
         for level in levels {
             let mut finer = level.clone();
             sum.spread_into(&mut finer);
-            sum = finer;
+            sum = Cow::Owned(finer);
         }
         sum
     }
@@ -238,6 +257,7 @@ impl ReceiverMap {
 
     /// A level's flux, to be added to, beside what says where it may go.
     pub fn level(&mut self, level: usize) -> (&mut FluxAccumulator, Covered<'_>) {
+        self.make_levels(level);
         let flux = &mut self.levels[level];
         let size = (flux.width(), flux.height());
         // Coarser levels exist only where every texel is covered.

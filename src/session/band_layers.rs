@@ -61,7 +61,7 @@ impl Finish<'_> {
             let Some((band, lit)) = band.and_then(|band| Some((band, band.maps.get(chart.receiver)?))) else {
                 continue;
             };
-            let mut flux = lit.flux();
+            let mut flux = lit.flux().into_owned();
             self.smooth(chart, level, &mut flux);
             let strength = level.strength(&self.scene.lights[*light]).luminance();
             let width_nm = band.band.to_nm - band.band.from_nm;

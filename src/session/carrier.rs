@@ -139,7 +139,7 @@ impl CausticLayer<'_> {
         };
         let is_first = climb.rival.is_none();
         if is_first || self.are_photons_sooner(light, climb) {
-            let before = (climb.rival.as_ref(), climb.aim);
+            let before = (climb.rival.as_mut(), climb.aim);
             let made = self.more_photons(light, sizes, state, before, course)?;
             let is_made = made.is_some();
             climb.rival = made.or(climb.rival.take());
@@ -216,7 +216,7 @@ fn promised(climb: &Climb, cost: impl Fn(&LightLevel) -> f64, most_share: f64) -
 /// Segments that photons took, and those of one of them; `None` where none arrived.
 fn photon_segments(level: &LightLevel) -> Option<(f64, f64)> {
     let rmse = level.error.as_ref()?.estimate.relative_rmse;
-    let segments = level.photons.as_ref()?.segments as f64;
+    let segments = level.work.0 as f64;
     let photons = HALVES as f64 * f64::from(level.key.photons?);
     (rmse > 0.0).then_some((segments, segments / photons))
 }

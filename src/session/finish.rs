@@ -165,13 +165,13 @@ impl Finish<'_> {
             .memory_bytes
             .saturating_sub(caustic * BYTES_PER_TEXEL);
         let wished = map_size::fit(&wishes, u64::MAX);
-        let sizes = map_size::fit(&wishes, left);
+        let sizes = map_size::fit(&wishes, left / BYTES_PER_TEXEL);
         for (&receiver, size) in &sizes {
             if let Some(chart) = self.sizes.chart_of(receiver, size) {
                 charts.insert(receiver, chart);
             }
         }
-        let warning = (sizes != wished).then(|| map_plan::scarce(&wished, &sizes, left));
+        let warning = (sizes != wished).then(|| map_plan::scarce(&wished, &sizes, (left, BYTES_PER_TEXEL)));
         (charts, warning)
     }
 
@@ -255,7 +255,7 @@ impl Finish<'_> {
         let fluxes: Vec<(FluxAccumulator, LinearSrgb)> = lit
             .iter()
             .map(|(light, level, map)| {
-                let mut flux = map.flux();
+                let mut flux = map.flux().into_owned();
                 self.smooth(chart, level, &mut flux);
                 (flux, level.strength(light) * level.unit.watts())
             })

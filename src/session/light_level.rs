@@ -92,9 +92,10 @@ pub(super) struct LightLevel {
     pub(super) noise: Option<Noise>,
     /// By the levels before it; `None` where there are none, or no light arrived.
     pub(super) error: Option<KeptError>,
-    /// Of a light by photons: what the next level adds to.
+    /// Of the last level of a light by photons: what the next one adds to.
     pub(super) photons: Option<PhotonSums>,
-    /// Cells of patches and rays that looked for their receivers: what the level took, whatever was known before.
+    /// What the level took, whatever was known before: cells of patches and rays that looked for their receivers, or
+    /// closest-hit queries of photons and nothing.
     pub(super) work: (u64, u64),
     /// Of patches: share of their light that holds a part of the spectrum in one place.
     pub(super) in_one_place: f64,
@@ -107,8 +108,6 @@ pub(super) struct LightLevel {
 /// What photons have left so far, before it is divided by their number.
 #[derive(Clone, Debug)]
 pub(super) struct PhotonSums {
-    /// Closest-hit queries.
-    pub(super) segments: u64,
     pub(super) ledger: LedgerSum,
     /// Maps of both halves, in the channels that the light is followed in.
     pub(super) halves: Vec<PartMaps>,
@@ -117,10 +116,9 @@ pub(super) struct PhotonSums {
 impl PhotonSums {
     /// Adds other photons of the same light.
     pub(super) fn add(&mut self, other: &Self) {
-        self.segments += other.segments;
         self.ledger.merge(&other.ledger);
         for (half, more) in self.halves.iter_mut().zip(&other.halves) {
-            half.add(more.clone());
+            half.add(more);
         }
     }
 }
@@ -281,9 +279,14 @@ impl LightState {
     /// as memory allows.
     pub(super) fn keep(&mut self, levels: Vec<LightLevel>, memory_bytes: u64) {
         self.levels = levels;
-        let mut bytes: u64 = self.levels.iter().map(LightLevel::bytes).sum();
-        while bytes > memory_bytes / 2 && self.levels.len() > LEVELS_TO_KEEP {
-            bytes -= self.levels.remove(0).bytes();
-        }
+        drop_coarse(&mut self.levels, LEVELS_TO_KEEP, memory_bytes / 2);
+    }
+}
+
+/// Drops the first levels while all take more than so many bytes.
+pub(super) fn drop_coarse(levels: &mut Vec<LightLevel>, least: usize, most_bytes: u64) {
+    let mut bytes: u64 = levels.iter().map(LightLevel::bytes).sum();
+    while bytes > most_bytes && levels.len() > least {
+        bytes -= levels.remove(0).bytes();
     }
 }

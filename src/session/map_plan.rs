@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::caustic::CausticLayer;
 use super::map_size::{self, MapSize, Sizes, Wish};
-use super::sizes::{self, BYTES_PER_TEXEL, LARGEST_AUTOMATIC_SIDE, LARGEST_TILED_SIDE};
+use super::sizes::{self, LARGEST_AUTOMATIC_SIDE, LARGEST_TILED_SIDE};
 use crate::error::Warning;
 use crate::illumination::tiles::COARSEST;
 use crate::illumination::{Chart, Receiver};
@@ -23,8 +23,14 @@ impl CausticLayer<'_> {
         let is_receiver = |&object: &usize| scene.material_of(object).surface.is_receiver();
         // Both sides of each.
         let receivers = 2 * (0..scene.objects.len()).filter(is_receiver).count() as u64;
-        let texels = width as u64 * height as u64;
-        texels.saturating_mul(BYTES_PER_TEXEL).saturating_mul(receivers) <= self.settings.map_memory_bytes()
+        let (limit, per_texel) = self.map_memory();
+        (width as u64 * height as u64).saturating_mul(receivers) <= limit / per_texel
+    }
+
+    /// Bytes that all maps may take, and those of a texel.
+    fn map_memory(&self) -> (u64, u64) {
+        let per_texel = sizes::bytes_per_texel(self.settings.estimator);
+        (self.settings.map_memory_bytes(), per_texel)
     }
 
     /// Sizes of the maps that the coarse run saw lit, with what is to be said of them.
@@ -49,7 +55,8 @@ impl CausticLayer<'_> {
         };
         let wishes: BTreeMap<Receiver, Wish> = receivers.filter_map(wish).collect();
         let wished = map_size::fit(&wishes, u64::MAX);
-        let mut sizes = map_size::fit(&wishes, self.settings.map_memory_bytes());
+        let (limit, per_texel) = self.map_memory();
+        let mut sizes = map_size::fit(&wishes, limit / per_texel);
         let is_scarce = sizes != wished;
         if let (MapResolution::Fixed { width, height }, false) = (self.settings.map_resolution, is_scarce) {
             // What only the full lattice lights.
@@ -58,7 +65,7 @@ impl CausticLayer<'_> {
             }
         }
         let warnings = if is_scarce {
-            vec![scarce(&wished, &sizes, self.settings.map_memory_bytes())]
+            vec![scarce(&wished, &sizes, self.map_memory())]
         } else if let (MapResolution::Auto, Some(statistics)) = (self.settings.map_resolution, statistics) {
             self.coarse_maps(&sizes, statistics)
         } else {
@@ -198,15 +205,15 @@ impl CausticLayer<'_> {
 pub(super) const MEMORY: &str = "--memory";
 
 /// Says that maps are coarser than wished for, for want of memory [bytes].
-pub(super) fn scarce(wished: &Sizes, granted: &Sizes, limit: u64) -> Warning {
+pub(super) fn scarce(wished: &Sizes, granted: &Sizes, (limit, per_texel): (u64, u64)) -> Warning {
     let mebibytes = |bytes: u64| bytes as f64 / f64::from(1 << 20);
     Warning::new(
         MEMORY,
         format!(
             "the maps need {:.1} MiB, the limit is {:.1} MiB: they are coarser than they should be and take {:.1} MiB",
-            mebibytes(map_size::bytes(wished)),
+            mebibytes(per_texel * map_size::texels(wished)),
             mebibytes(limit),
-            mebibytes(map_size::bytes(granted)),
+            mebibytes(per_texel * map_size::texels(granted)),
         ),
         "allow more --memory, or ask for a smaller --map-resolution",
     )

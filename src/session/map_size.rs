@@ -6,7 +6,6 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use super::sizes::BYTES_PER_TEXEL;
 use crate::illumination::Receiver;
 use crate::illumination::tiles::{self, COARSEST, TileLayout};
 use crate::light_pass::caustic::statistics::Spot;
@@ -44,10 +43,9 @@ impl MapSize {
     }
 }
 
-/// Memory of maps of the given sizes [bytes].
-pub(super) fn bytes(sizes: &Sizes) -> u64 {
-    let texels: u64 = sizes.values().map(MapSize::texels).sum();
-    texels.saturating_mul(BYTES_PER_TEXEL)
+/// Texels of all maps.
+pub(super) fn texels(sizes: &Sizes) -> u64 {
+    sizes.values().map(MapSize::texels).sum()
 }
 
 /// Half the size, so many times; never nothing.
@@ -247,8 +245,8 @@ const SPARING_STEP: f64 = 0.125;
 /// Most that texels of whole maps are finer, or coarser, than their light.
 const MOST_LEVELS: f64 = 20.0;
 
-/// Sizes of all maps in so many bytes: as they are wished for, or as little coarser as can be.
-pub(super) fn fit(wishes: &BTreeMap<Receiver, Wish>, limit_bytes: u64) -> Sizes {
+/// Sizes of all maps with so many texels: as they are wished for, or as little coarser as can be.
+pub(super) fn fit(wishes: &BTreeMap<Receiver, Wish>, most_texels: u64) -> Sizes {
     let granted = |sparing: Sparing| -> Sizes {
         wishes
             .iter()
@@ -256,7 +254,7 @@ pub(super) fn fit(wishes: &BTreeMap<Receiver, Wish>, limit_bytes: u64) -> Sizes 
             .collect()
     };
     let wished = granted(Sparing::Nothing);
-    if bytes(&wished) <= limit_bytes {
+    if texels(&wished) <= most_texels {
         return wished;
     }
     // Tiles with far more texels than light needs come first; then every other.
@@ -265,7 +263,7 @@ pub(super) fn fit(wishes: &BTreeMap<Receiver, Wish>, limit_bytes: u64) -> Sizes 
     let (mut low, mut high) = (0, steps);
     while low < high {
         let middle = low + (high - low) / 2;
-        if bytes(&granted(sparing(middle))) <= limit_bytes {
+        if texels(&granted(sparing(middle))) <= most_texels {
             high = middle;
         } else {
             low = middle + 1;

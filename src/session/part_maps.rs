@@ -1,5 +1,7 @@
 //! Maps of one light while they are made: all of it on one set, or band by band of its spectrum.
 
+use std::borrow::Cow;
+
 use crate::light_pass::receiver_maps::ReceiverMaps;
 
 /// One set of maps, or one for each band that is kept.
@@ -29,10 +31,24 @@ impl PartMaps {
     }
 
     /// Adds other light.
-    pub(super) fn add(&mut self, other: Self) {
-        for (sum, part) in self.0.iter_mut().zip(other.0) {
+    pub(super) fn add(&mut self, other: &Self) {
+        for (sum, part) in self.0.iter_mut().zip(&other.0) {
             sum.add(part);
         }
+    }
+
+    /// The sum of all.
+    pub(super) fn sum(&self) -> Cow<'_, ReceiverMaps> {
+        let mut sum = Cow::Borrowed(&self.0[0]);
+        for band in &self.0[1..] {
+            sum.to_mut().add(band);
+        }
+        sum
+    }
+
+    /// Maps of bands, where they are kept.
+    pub(super) fn bands(&self) -> &[ReceiverMaps] {
+        if self.0.len() == 1 { &[] } else { &self.0 }
     }
 
     /// The sum of all, and the bands where they are kept.
@@ -40,10 +56,6 @@ impl PartMaps {
         if self.0.len() == 1 {
             return (self.0.remove(0), Vec::new());
         }
-        let mut sum = self.0[0].clone();
-        for band in &self.0[1..] {
-            sum.add(band.clone());
-        }
-        (sum, self.0)
+        (self.sum().into_owned(), self.0)
     }
 }

@@ -1,7 +1,7 @@
 //! One level of one light by photons: twice as many as before or more, those of earlier levels included.
 
 use super::caustic::{CausticLayer, Climb, Course};
-use super::light_level::{KeptError, LevelKey, LightLevel, LightState, PhotonSums};
+use super::light_level::{KeptError, LevelKey, LightLevel, LightState, PhotonSums, drop_coarse};
 use super::map_size::Sizes;
 use super::shards::PassSums;
 use crate::error::Result;
@@ -15,6 +15,7 @@ use crate::light_pass::photon::filter;
 use crate::light_pass::photon::launch::PhotonLaunch;
 use crate::light_pass::photon::pass::{HALVES, PhotonPass};
 use crate::light_pass::photon::walk::PhotonRules;
+use crate::light_pass::receiver_maps::{ReceiverMap, ReceiverMaps};
 use crate::optics::LinearSrgb;
 use crate::transport::EffectSet;
 
@@ -123,8 +124,8 @@ impl CausticLayer<'_> {
         climb: &mut Climb,
         course: &mut Course,
     ) -> Result<()> {
-        let last = climb.levels.last();
-        if self.next_photons(light, last, climb.aim).is_none() {
+        let last = climb.levels.last_mut();
+        if self.next_photons(light, last.as_deref(), climb.aim).is_none() {
             climb.done = true;
             return Ok(());
         }
@@ -132,6 +133,8 @@ impl CausticLayer<'_> {
         // Not known better, and not worth knowing.
         climb.done |= !climb.is_underrated && made.is_some() && self.is_dim(light);
         climb.levels.extend(made);
+        // None but the last is needed, though a bake after this one is sooner at it with all of them.
+        drop_coarse(&mut climb.levels, 1, self.settings.memory_bytes / 8);
         Ok(())
     }
 
@@ -144,10 +147,10 @@ impl CausticLayer<'_> {
         light: &AimedLight,
         sizes: &Sizes,
         state: &mut LightState,
-        (last, aim): (Option<&LightLevel>, Option<f64>),
+        (last, aim): (Option<&mut LightLevel>, Option<f64>),
         course: &mut Course,
     ) -> Result<Option<LightLevel>> {
-        let Some(photons) = self.next_photons(light, last, aim) else {
+        let Some(photons) = self.next_photons(light, last.as_deref(), aim) else {
             return Ok(None);
         };
         let key = LevelKey {
@@ -165,14 +168,14 @@ impl CausticLayer<'_> {
         &self,
         light: &AimedLight,
         key: LevelKey,
-        before: Option<&LightLevel>,
+        before: Option<&mut LightLevel>,
         course: &mut Course,
     ) -> Result<Option<LightLevel>> {
         let unit = self.photon_unit(light)?;
         let photons = key.photons.unwrap_or(FIRST_PHOTONS);
-        let earlier = before.filter(|before| before.key.trace == key.trace && before.key.sizes == key.sizes);
-        let earlier = earlier.and_then(|level| Some((level.key.photons?, level.photons.as_ref()?)));
-        let first = earlier.map_or(0, |(count, _)| count);
+        let alike = |level: &&mut LightLevel| level.key.trace == key.trace && level.key.sizes == key.sizes;
+        let earlier = before.filter(|level| alike(level) && level.photons.is_some());
+        let first = earlier.as_ref().and_then(|level| level.key.photons).unwrap_or(0);
         let chart_for = |receiver: Receiver| self.chart(receiver, &key.sizes);
         let nothing = PassSums::new(vec![self.part_maps(), self.part_maps()]);
         let spectrum = self.spectra.photons(light.light);
@@ -207,13 +210,15 @@ impl CausticLayer<'_> {
         if sums.report.cancelled {
             return Ok(None);
         }
+        let mut segments = sums.report.segments;
         let mut raw = PhotonSums {
-            segments: sums.report.segments,
             ledger: sums.report.ledger,
             halves: sums.maps,
         };
-        if let Some((_, earlier)) = earlier {
-            raw.add(earlier);
+        if let Some((earlier, so_far)) = earlier.and_then(|level| Some((level.photons.take()?, level.work.0)))
+        {
+            raw.add(&earlier);
+            segments += so_far;
         }
         let unit = unit.per(u64::from(photons) * HALVES as u64);
         let is_shard = course.labour.is_shard();
@@ -221,7 +226,10 @@ impl CausticLayer<'_> {
             |clock| &mut clock.deposit,
             || self.photon_level(light, (key, unit), raw, is_shard),
         );
-        Ok(Some(level))
+        Ok(Some(LightLevel {
+            work: (segments, 0),
+            ..level
+        }))
     }
 
     fn photon_level(
@@ -232,33 +240,36 @@ impl CausticLayer<'_> {
         is_shard: bool,
     ) -> LightLevel {
         let mut ledger = raw.ledger;
-        let mut none = LedgerSum::default();
-        let mut halves = raw.halves.iter().map(|half| {
-            let (mut maps, bands) = half.clone().into_sum();
-            self.spectra.to_linear_srgb(light.light, &mut maps, &mut none);
-            (maps, bands)
-        });
-        let (mut maps, mut bands) = halves.next().unwrap_or_else(|| (self.no_maps(), Vec::new()));
-        let (second, more) = halves.next().unwrap_or_else(|| (self.no_maps(), Vec::new()));
-        drop(halves);
         self.spectra
             .to_linear_srgb(light.light, &mut self.no_maps(), &mut ledger);
+        let [first, second] = [0, 1].map(|half| {
+            let mut maps = raw.halves[half].sum();
+            if self.spectra.has(light.light) {
+                let mut none = LedgerSum::default();
+                self.spectra.to_linear_srgb(light.light, maps.to_mut(), &mut none);
+            }
+            maps
+        });
+        let is_filtered = |map: &ReceiverMap| self.settings.filters() && filter::takes(map);
         let mut noise = {
-            let [a, b] = [&maps, &second].map(|maps| accuracy::images(maps, unit));
-            accuracy::half_set_noise(&a, &b)
+            let as_they_are = |maps: &ReceiverMaps| {
+                let maps = maps.iter().filter(|(_, map)| !is_filtered(map));
+                accuracy::images_of(maps, unit)
+            };
+            accuracy::half_set_noise(&as_they_are(&first), &as_they_are(&second))
         };
+        let mut maps = first.clone().into_owned();
+        maps.add(&second);
         if self.settings.filters() {
-            let first = maps.clone();
-            maps.add(second.clone());
-            filter::filter(&mut maps, [&first, &second], unit, &mut noise);
-        } else {
-            maps.add(second);
+            noise.extend(filter::filter(&mut maps, [&first, &second], unit));
         }
-        for (band, more) in bands.iter_mut().zip(more) {
+        drop((first, second));
+        let mut bands = raw.halves[0].bands().to_vec();
+        for (band, more) in bands.iter_mut().zip(raw.halves[1].bands()) {
             band.add(more);
         }
         let energy = ledger.report("", unit, LinearSrgb::WHITE).energy_w;
-        let estimate = accuracy::by_noise(&accuracy::images(&maps, unit), &noise, &energy);
+        let estimate = accuracy::by_noise(&accuracy::images(&maps, unit), noise, &energy);
         let error = estimate.filter(|_| !is_shard).map(|estimate| KeptError {
             predecessors: 0,
             estimate,

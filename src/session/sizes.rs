@@ -15,7 +15,7 @@ use crate::light_pass::direct::find_borders;
 use crate::progress::Control;
 use crate::scene::closed::is_closed;
 use crate::scene::{LightKind, Scene};
-use crate::settings::{BakeSettings, MapResolution};
+use crate::settings::{BakeSettings, Estimator, MapResolution};
 use crate::transport::Tracer;
 
 /// Side of a map before the first doubling [texels].
@@ -29,6 +29,17 @@ pub const LARGEST_TILED_SIDE: usize = 4096;
 
 /// Memory per texel while flux is summed and finished [bytes]: three 64-bit sums, three floats per layer, an area.
 pub const BYTES_PER_TEXEL: u64 = 24 + 2 * 12 + 8;
+
+/// The same where photons may carry the light: sums of both halves, and their details while they are filtered.
+const BYTES_PER_PHOTON_TEXEL: u64 = 240;
+
+/// Memory that an estimator takes for a texel [bytes].
+pub(super) fn bytes_per_texel(estimator: Estimator) -> u64 {
+    match estimator {
+        Estimator::Auto | Estimator::Photon => BYTES_PER_PHOTON_TEXEL,
+        Estimator::Wavefront | Estimator::Splat => BYTES_PER_TEXEL,
+    }
+}
 
 /// Parametrisations of a scene's surfaces, made on first use.
 #[derive(Debug)]

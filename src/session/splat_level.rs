@@ -87,9 +87,9 @@ impl CausticLayer<'_> {
                 },
             )
         });
-        maps.add(second);
+        maps.add(&second);
         for (band, more) in bands.iter_mut().zip(more) {
-            band.add(more);
+            band.add(&more);
         }
         Ok((!report.cancelled).then(|| LightLevel {
             noise,

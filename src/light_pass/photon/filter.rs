@@ -30,21 +30,25 @@ const LEAST_LEFT: f32 = 0.1;
 /// Light is told from none down to this part of the map's mean.
 const DARKEST: f32 = 1e-4;
 
+/// Whether a map can be filtered: charts of several islands without tiles stay as they are, and keep their noise.
+pub fn takes(map: &ReceiverMap) -> bool {
+    map.chart.layout.is_some() || map.is_one_piece()
+}
+
 /// Filters the sum of two halves, and gives the squared error of each texel that is left [W²/m⁴]. `sum` holds the light of
-/// both. Charts of several islands without tiles stay as they are, and keep their noise.
-pub fn filter(sum: &mut ReceiverMaps, halves: [&ReceiverMaps; 2], unit: FluxUnit, noise: &mut Noise) {
+/// both.
+pub fn filter(sum: &mut ReceiverMaps, halves: [&ReceiverMaps; 2], unit: FluxUnit) -> Noise {
     let receivers: Vec<Receiver> = sum.iter().map(|(receiver, _)| receiver).collect();
+    let mut noise = Noise::new();
     for receiver in receivers {
-        let Some(map) = sum.get_mut(receiver) else {
-            continue;
-        };
-        if map.chart.layout.is_some() || map.is_one_piece() {
+        if let Some(map) = sum.get_mut(receiver).filter(|map| takes(map)) {
             let details = Details::new(map, halves.map(|half| half.get(receiver)), unit);
             let kept = details.filtered();
             noise.insert(receiver, details.squares(&kept, map));
             details.put(&kept, map, unit);
         }
     }
+    noise
 }
 
 /// Densities in a cell, in means of the map: luminance of each half as if it were all the light, and the channels.
@@ -105,19 +109,16 @@ impl Details {
 
     /// One level, of all coarser ones.
     fn refined(&self, level: usize, kept: &Values<6>) -> Vec<Kept> {
-        let below = self.cells.between(level, &self.raw);
-        let smooth = self.cells.between(level, kept);
-        let raw = self.raw[level].par_iter();
-        let details: Vec<Raw> = raw
-            .zip(&below)
-            .map(|(raw, below)| [0, 1, 2, 3, 4].map(|i| raw[i] - below[i]))
-            .collect();
+        let mut details: Vec<Raw> = self.cells.between(level, &self.raw);
+        let cells = details.par_iter_mut().zip(&self.raw[level]);
+        cells.for_each(|(detail, raw)| *detail = [0, 1, 2, 3, 4].map(|i| raw[i] - detail[i]));
+        let mut refined = self.cells.between(level, kept);
         let noise = |[a, b, ..]: &Raw| 0.25 * (a - b) * (a - b);
         // Noise is in proportion to light where photons bring alike.
         let light = |smooth: &Kept| (0.5 * (smooth[3] + smooth[4])).max(1e-2 * DARKEST);
         let both = details
             .par_iter()
-            .zip(&smooth)
+            .zip(&refined)
             .map(|(detail, smooth)| [noise(detail), light(smooth)]);
         let by_light = self.cells.pooled(level, both.collect(), PHOTONS_POOLED);
         let power = details
@@ -141,26 +142,23 @@ impl Details {
                 ]
             });
         let power: Vec<[f32; 2]> = power.collect();
+        drop(by_light);
         let pooled = self.cells.around(level, &power);
-        let cells = details.par_iter().zip(&smooth).zip(&pooled);
-        let refine = |((detail, smooth), [signal, noise]): ((&Raw, &Kept), &[f32; 2])| {
+        drop(power);
+        let cells = refined.par_iter_mut().zip(&details).zip(&pooled);
+        cells.for_each(|((kept, detail), [signal, noise])| {
             let share = if *signal > 0.0 {
                 signal / (signal + noise.max(0.0))
             } else {
                 0.0
             };
             let missed = (1.0 - share) * (1.0 - share) * detail[0] * detail[1];
-            let [red, green, blue] = self.lit(smooth, detail, share);
-            [
-                red,
-                green,
-                blue,
-                smooth[3] + share * detail[0],
-                smooth[4] + share * detail[1],
-                smooth[5] + missed,
-            ]
-        };
-        cells.map(refine).collect()
+            let [red, green, blue] = self.lit(kept, detail, share);
+            let [.., a, b, missed_before] = *kept;
+            let [a, b] = [a + share * detail[0], b + share * detail[1]];
+            *kept = [red, green, blue, a, b, missed_before + missed];
+        });
+        refined
     }
 
     /// The channels of a cell with a share of its detail, less where nothing would be left of its light.
@@ -211,31 +209,36 @@ impl Details {
     /// Puts what was kept in the place of a map's counts.
     fn put(&self, of_texels: &[Kept], map: &mut ReceiverMap, unit: FluxUnit) {
         let counts_per_mean = self.mean / unit.watts();
-        let flux = of_texels.iter().enumerate().map(|(texel, kept)| {
-            let counts = map.chart.texel_area_m2(texel) * counts_per_mean;
-            [0, 1, 2].map(|channel| f64::from(kept[channel]) * counts)
-        });
-        put(map, &flux.collect::<Vec<_>>(), self.is_signed);
+        let chart = map.chart.clone();
+        let flux = |texel: usize| {
+            let counts = chart.texel_area_m2(texel) * counts_per_mean;
+            [0, 1, 2].map(|channel| f64::from(of_texels[texel][channel]) * counts)
+        };
+        put(map, flux, self.is_signed);
     }
 }
 
 /// Puts other counts in the place of a map's; each channel keeps its sum. What is missing is shared out as the channel is, or
 /// as luminance is where channels may be negative: that stays above 0.
-fn put(map: &mut ReceiverMap, flux: &[[f64; 3]], is_signed: bool) {
-    let texels = map.levels_mut()[0].texels_mut();
+fn put(map: &mut ReceiverMap, flux: impl Fn(usize) -> [f64; 3], is_signed: bool) {
+    let texels = map.texels_mut();
     for channel in 0..3 {
         let share = |flux: &[f64; 3]| match is_signed {
             true => LinearSrgb::from(*flux).luminance(),
             false => flux[channel],
         };
         let before: f64 = texels.iter().map(|count| count[channel] as f64).sum();
-        let after: f64 = flux.iter().map(|flux| flux[channel]).sum();
-        let size: f64 = flux.iter().map(share).sum();
+        let (mut after, mut size) = (0.0, 0.0);
+        for flux in (0..texels.len()).map(&flux) {
+            after += flux[channel];
+            size += share(&flux);
+        }
         let missing = if size > 0.0 { (before - after) / size } else { 0.0 };
         // Roundings add up to nothing.
         let mut left = 0.0;
-        for (count, flux) in texels.iter_mut().zip(flux) {
-            let wanted = flux[channel] + share(flux) * missing + left;
+        for (texel, count) in texels.iter_mut().enumerate() {
+            let flux = flux(texel);
+            let wanted = flux[channel] + share(&flux) * missing + left;
             count[channel] = wanted.round() as i64;
             left = wanted - count[channel] as f64;
         }

@@ -180,7 +180,7 @@ impl PhotonPass<'_> {
                 let Some(map) = sets[set].get_mut(run[0].receiver) else {
                     continue;
                 };
-                let texels = map.levels_mut()[0].texels_mut();
+                let texels = map.texels_mut();
                 for deposit in run {
                     let sum = &mut texels[deposit.texel as usize];
                     for (sum, count) in sum.iter_mut().zip(deposit.count) {
