@@ -80,6 +80,12 @@ impl Control {
         }
     }
 
+    /// Until the time that was set for it [s]; `None` without one.
+    pub fn time_left_s(&self) -> Option<f64> {
+        let deadline = self.deadline?;
+        Some(deadline.saturating_duration_since(Instant::now()).as_secs_f64())
+    }
+
     /// Asks the bake to stop soon; what it has is still returned, marked partial.
     pub fn cancel(&self) {
         self.cancelled.store(true, Ordering::Relaxed);

@@ -165,7 +165,8 @@ impl CausticLayer<'_> {
         let next = climb.levels.last().map_or(0.0, cost) * LEVEL_GROWTH;
         let promised = promised(climb, cost, most_share).unwrap_or(0.0);
         let goes_many_ways = climb.levels.is_empty() && per_photon > MOST_WAYS;
-        if goes_many_ways || so_far + next > by_photons || promised > PROMISE * by_photons {
+        let is_late = are_photons_in_time(climb, state, course);
+        if goes_many_ways || is_late || so_far + next > by_photons || promised > PROMISE * by_photons {
             climb.turn_to_photons();
         }
         // How many ways its cells have to be divided shows only when they are.
@@ -191,6 +192,20 @@ impl CausticLayer<'_> {
             .sum();
         GROWTH.1 * segments < CELL * per_photon.powi(3) * cells
     }
+}
+
+/// Whether there is no time left for another level of patches, but for photons that are better than the last one.
+fn are_photons_in_time(climb: &Climb, state: &LightState, course: &Course) -> bool {
+    let (Some(left_s), Some(photon_s)) = (course.limited.time_left_s(), state.photon_s) else {
+        return false;
+    };
+    let photons = climb.rival.as_ref().and_then(|rival| rival.key.photons).unwrap_or(0);
+    let (Some(&(0, of_photons)), Some(&(_, of_patches))) = (climb.shares.first(), climb.shares.last()) else {
+        return false;
+    };
+    let own_s = left_s / course.open_lights as f64;
+    let times = 1.0 + own_s / (photon_s * f64::from(photons));
+    climb.level_s * LEVEL_GROWTH > own_s && of_photons / times.sqrt() < of_patches
 }
 
 /// What patches are expected to take for a share of the whole error, by their last two levels whose own share is known.

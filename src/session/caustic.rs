@@ -102,6 +102,8 @@ pub(super) struct Climb {
     pub(super) rival: Option<LightLevel>,
     /// The coarsest first.
     pub(super) levels: Vec<LightLevel>,
+    /// Wall-clock seconds of the last level of patches.
+    pub(super) level_s: f64,
     pub(super) rounds: Vec<Round>,
     /// Relative RMSE that the last round aims at.
     pub(super) goal: Option<f64>,
@@ -189,6 +191,10 @@ pub(super) struct Course<'a> {
     pub(super) statistics: Option<FootprintStatistics>,
     /// Receivers that the patches of the next level may ask for before it is given up.
     pub(super) most_queries: u64,
+    /// With the time that there is for it.
+    pub(super) limited: &'a Control,
+    /// Lights that are to become better.
+    pub(super) open_lights: usize,
 }
 
 impl Course<'_> {
@@ -253,6 +259,8 @@ impl CausticLayer<'_> {
             labour,
             statistics: None,
             most_queries: u64::MAX,
+            limited: &limited,
+            open_lights: lights.len(),
         };
         for light in &lights {
             let state = states.of_mut(light.light);
@@ -273,6 +281,7 @@ impl CausticLayer<'_> {
         course.control = &whole;
         let mut is_first = true;
         let errors = loop {
+            course.open_lights = climbs.iter().filter(|climb| !climb.done).count();
             for (light, climb) in lights.iter().zip(&mut climbs).filter(|(_, climb)| !climb.done) {
                 self.climb(light, &sizes, states.of_mut(light.light), climb, &mut course)?;
             }
@@ -436,10 +445,12 @@ impl CausticLayer<'_> {
         let unit = self.unit(light)?;
         let step = climb.levels.len();
         let key = self.key(light, step, climb, sizes);
+        let began = Instant::now();
         let made = match state.take(&key) {
             Some(level) => Some(level),
             None => self.make(light, key, unit, state, course)?,
         };
+        climb.level_s = began.elapsed().as_secs_f64();
         course.most_queries = u64::MAX;
         let Some(mut level) = made else {
             if climb.carrier == Carrier::Undecided && !course.control.is_cancelled() {

@@ -185,6 +185,8 @@ pub(super) struct LightState {
     pub(super) rays: KeptRays,
     /// Levels of the last bake, the coarsest first.
     pub(super) levels: Vec<LightLevel>,
+    /// Wall-clock seconds of a photon, of those that were followed last.
+    pub(super) photon_s: Option<f64>,
     /// What splats were made of.
     pub(super) arrivals: Option<(TraceKey, KeptLight)>,
 }

@@ -1,5 +1,7 @@
 //! One level of one light by photons: twice as many as before or more, those of earlier levels included.
 
+use std::time::Instant;
+
 use super::caustic::{CausticLayer, Climb, Course};
 use super::light_level::{KeptError, LevelKey, LightLevel, LightState, PhotonSums, drop_coarse};
 use super::map_size::Sizes;
@@ -39,6 +41,23 @@ const LEAST_NOISE: f64 = 0.7;
 
 /// The mean flux of all photons may be so many times that of the first ones.
 const MEAN_MARGIN: f64 = 4.0;
+
+/// Part of the time left that a level may be expected to take.
+const PART_OF_TIME: f64 = 0.85;
+
+/// Fewer photons than so many times those before are not worth a level.
+const LEAST_GROWTH: f64 = 1.2;
+
+/// Photons of a level after one with fewer, or as many as there is time for: a level that is cut off leaves nothing.
+fn in_time(photons: u32, before: u32, state: &LightState, course: &Course) -> u32 {
+    let (Some(left_s), Some(photon_s)) = (course.control.time_left_s(), state.photon_s) else {
+        return photons;
+    };
+    let own_s = PART_OF_TIME * left_s / course.open_lights as f64;
+    let affordable = f64::from(before) + own_s / photon_s;
+    let least = LEAST_GROWTH * f64::from(before);
+    (affordable.max(least) as u32).min(photons)
+}
 
 impl CausticLayer<'_> {
     /// Photons of each half of the level after one, of a light that aims at a relative RMSE; `None` where there is nothing
@@ -153,13 +172,21 @@ impl CausticLayer<'_> {
         let Some(photons) = self.next_photons(light, last.as_deref(), aim) else {
             return Ok(None);
         };
+        let before = last.as_ref().and_then(|last| last.key.photons).unwrap_or(0);
+        let photons = in_time(photons, before, state, course);
         let key = LevelKey {
             photons: Some(photons),
             ..self.key(light, 0, &Climb::default(), sizes)
         };
         match state.take(&key) {
             Some(level) => Ok(Some(level)),
-            None => self.make_photons(light, key, last, course),
+            None => {
+                let began = Instant::now();
+                let made = self.make_photons(light, key, last, course)?;
+                let took_s = began.elapsed().as_secs_f64();
+                state.photon_s = made.as_ref().map(|_| took_s / f64::from(photons - before));
+                Ok(made)
+            }
         }
     }
 

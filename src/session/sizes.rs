@@ -126,15 +126,21 @@ impl MapSizes {
 
     /// The parametrisation of an object for maps of a side: generated charts keep their gutters at that size.
     fn laid_out(&self, object: usize, side: usize) -> Option<Arc<Parametrisation>> {
-        let usual = self.parametrisation(object)?;
-        if usual.uv_set != UvSet::Generated || side == DEFAULT_NOMINAL_SIDE {
-            return Some(Arc::clone(usual));
+        let usual = &self.parametrisations[object];
+        let is_for_all = |usual: &Arc<Parametrisation>| usual.uv_set != UvSet::Generated;
+        match usual.get() {
+            Some(usual) if usual.as_ref().is_none_or(is_for_all) => return usual.clone(),
+            _ if side == DEFAULT_NOMINAL_SIDE => return self.parametrisation(object).cloned(),
+            _ => {}
         }
         let known = || self.laid_out.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(known) = known().get(&(object, side)) {
             return Some(Arc::clone(known));
         }
         let made = Arc::new(parametrise(object, &self.scene.objects[object].mesh, side)?);
+        if is_for_all(&made) {
+            return usual.get_or_init(|| Some(made)).clone();
+        }
         known().insert((object, side), Arc::clone(&made));
         Some(made)
     }
