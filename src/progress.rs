@@ -1,8 +1,8 @@
 //! What a running bake tells, and how it is stopped.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Instant;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::time::{Duration, Instant};
 
 /// What a bake is doing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -54,19 +54,47 @@ impl<F: Fn(Stage, u64, u64) + Sync> Progress for F {
     }
 }
 
-/// A request to stop: any thread may set it, or a time may be set for it.
+/// A request to stop, or to wait: any thread may set it, or a time may be set for it.
 #[derive(Debug, Default)]
 pub struct Control {
-    cancelled: Arc<AtomicBool>,
+    request: Arc<Request>,
     deadline: Option<Instant>,
 }
+
+#[derive(Debug)]
+struct Request {
+    cancelled: AtomicBool,
+    made: Instant,
+    /// Until when the bake waits [ms since it was made].
+    held_until_ms: AtomicU64,
+}
+
+impl Default for Request {
+    fn default() -> Self {
+        Self {
+            cancelled: AtomicBool::new(false),
+            made: Instant::now(),
+            held_until_ms: AtomicU64::new(0),
+        }
+    }
+}
+
+impl Request {
+    fn is_held(&self) -> bool {
+        let until_ms = self.held_until_ms.load(Ordering::Relaxed);
+        until_ms > 0 && self.made.elapsed().as_millis() < u128::from(until_ms)
+    }
+}
+
+/// A bake that waits looks so often whether it may go on.
+const LOOK_AGAIN: Duration = Duration::from_millis(5);
 
 impl Control {
     /// The same request, that also comes by itself at a given time.
     #[must_use]
     pub fn with_deadline(&self, deadline: Instant) -> Self {
         Self {
-            cancelled: Arc::clone(&self.cancelled),
+            request: Arc::clone(&self.request),
             deadline: Some(deadline),
         }
     }
@@ -75,7 +103,7 @@ impl Control {
     #[must_use]
     pub fn without_deadline(&self) -> Self {
         Self {
-            cancelled: Arc::clone(&self.cancelled),
+            request: Arc::clone(&self.request),
             deadline: None,
         }
     }
@@ -88,12 +116,22 @@ impl Control {
 
     /// Asks the bake to stop soon; what it has is still returned, marked partial.
     pub fn cancel(&self) {
-        self.cancelled.store(true, Ordering::Relaxed);
+        self.request.cancelled.store(true, Ordering::Relaxed);
     }
 
-    /// Whether it was asked to stop.
+    /// Asks the bake to wait for so long from now on: something else needs the processor.
+    pub fn hold(&self, time: Duration) {
+        let until = self.request.made.elapsed() + time;
+        let until_ms = until.as_millis().try_into().unwrap_or(u64::MAX);
+        self.request.held_until_ms.store(until_ms, Ordering::Relaxed);
+    }
+
+    /// Whether it was asked to stop. Returns only when it need not wait any more.
     pub fn is_cancelled(&self) -> bool {
-        self.cancelled.load(Ordering::Relaxed)
-            || self.deadline.is_some_and(|deadline| Instant::now() >= deadline)
+        let is_cancelled = || self.request.cancelled.load(Ordering::Relaxed);
+        while self.request.is_held() && !is_cancelled() {
+            std::thread::sleep(LOOK_AGAIN);
+        }
+        is_cancelled() || self.deadline.is_some_and(|deadline| Instant::now() >= deadline)
     }
 }

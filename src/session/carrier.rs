@@ -199,7 +199,11 @@ fn are_photons_in_time(climb: &Climb, state: &LightState, course: &Course) -> bo
     let (Some(left_s), Some(photon_s)) = (course.limited.time_left_s(), state.photon_s) else {
         return false;
     };
-    let photons = climb.rival.as_ref().and_then(|rival| rival.key.photons).unwrap_or(0);
+    let photons = climb
+        .rival
+        .as_ref()
+        .and_then(|rival| rival.key.photons)
+        .unwrap_or(0);
     let (Some(&(0, of_photons)), Some(&(_, of_patches))) = (climb.shares.first(), climb.shares.last()) else {
         return false;
     };

@@ -56,6 +56,8 @@ const LOOK_FOR_STOP: Duration = Duration::from_millis(100);
 /// Time between frames that only show how a bake gets on; where the processor draws them, the bake waits for them.
 const BAKING_FRAME: Duration = Duration::from_millis(100);
 const BAKING_FRAME_OF_SOFTWARE: Duration = Duration::from_millis(500);
+/// Where the processor draws, a bake waits for so long after a frame of a walk.
+const BAKE_WAITS: Duration = Duration::from_millis(500);
 /// Time between a picture and the frame that tells what it took.
 const REPORT_AFTER: Duration = Duration::from_millis(40);
 /// A device that has not told in so many frames how long a picture took is not asked again until the next one.
@@ -457,17 +459,24 @@ impl App {
     }
 
     fn baking_frame(&self) -> Duration {
-        let graphics = self.graphics.as_ref();
-        if graphics.is_some_and(|graphics| graphics.gpu().is_software()) {
+        if self.is_software() {
             BAKING_FRAME_OF_SOFTWARE
         } else {
             BAKING_FRAME
         }
     }
 
+    fn is_software(&self) -> bool {
+        let graphics = self.graphics.as_ref();
+        graphics.is_some_and(|graphics| graphics.gpu().is_software())
+    }
+
     /// Decides when the next frame comes.
     fn schedule(&mut self, event_loop: &ActiveEventLoop, shown: Shown, repaint_after: Duration) {
         let now = Instant::now();
+        if self.is_software() && (self.model.is_moving() || self.looking_from.is_some()) {
+            self.model.hold_bake(BAKE_WAITS);
+        }
         let wait = match shown {
             Shown::Broken => {
                 self.recover(event_loop);

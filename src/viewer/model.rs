@@ -9,7 +9,7 @@ mod seeking;
 
 use std::borrow::Cow;
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use super::beside::Reference;
 use super::debounce::Debounce;
@@ -619,6 +619,11 @@ impl Model {
         self.log.write("baking", json!({"settings": wanted.settings}));
         self.asked = Some((self.worker.request(wanted.clone()), wanted));
         self.state = self.worker.state();
+    }
+
+    /// Lets the bake wait for so long.
+    pub fn hold_bake(&self, time: Duration) {
+        self.worker.hold(time);
     }
 
     /// Stops the bake and keeps the maps that are shown.

@@ -245,6 +245,13 @@ impl Worker {
         true
     }
 
+    /// Lets what is running wait for so long.
+    pub fn hold(&self, time: Duration) {
+        if let Some(running) = &self.shared.lock().running {
+            running.control.hold(time);
+        }
+    }
+
     /// Stops what is running and forgets what is waiting; unfinished maps are dropped.
     pub fn cancel(&self) {
         let mut slot = self.shared.lock();
@@ -426,9 +433,11 @@ impl Shared {
 
     /// Ends a comparison, and hands out what it found unless something else was asked for in between.
     fn end_comparison(&self, worth: Option<Worth>, control: &Control) {
+        // May wait, which is not to be done under the lock.
+        let is_cancelled = control.is_cancelled();
         let mut slot = self.lock();
         slot.running = None;
-        if !control.is_cancelled() {
+        if !is_cancelled {
             slot.worth = worth;
         }
         drop(slot);

@@ -78,7 +78,7 @@ pub(super) fn deposit_on(
     for part in triangles.chunks(per_call) {
         report.merge(&deposit_triangles(part, map));
     }
-    let flux = map.flux();
+    let flux = map.flux().into_owned();
     assert_eq!(sum(flux.texels().iter().copied()), report.deposited, "deposited");
     let CoverageReport {
         deposited,
