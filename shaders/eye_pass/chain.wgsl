@@ -8,7 +8,7 @@ override TRACES_LIGHTS: bool;
 
 // Surfaces at which both ways on can be followed.
 const MOST_BRANCHING: u32 = 4u;
-// Backs of single-sided surfaces that a gaze passes before it is taken to have left the scene.
+// Holes and backs of single-sided surfaces that a gaze passes before it is taken to have left the scene.
 const MOST_BACKS: u32 = 64u;
 
 struct Gaze {
@@ -36,7 +36,12 @@ fn is_clear(surface: u32) -> bool {
     return surface == SURFACE_DIELECTRIC || surface == SURFACE_THIN_WALL;
 }
 
-// The nearest surface that is drawn: backs of single-sided opaque ones are not.
+// Whether a gaze goes through a hole of a surface.
+fn is_hole(hit: Hit, object: ObjectRecord) -> bool {
+    return HAS_MASK && object.alpha_cutoff > 0.0 && !is_there(object, surface_point(hit).uv);
+}
+
+// The nearest surface that is drawn: backs of single-sided opaque ones and holes are not.
 fn nearest(gaze: Gaze) -> Seen {
     var origin = gaze.origin;
     var passed = 0.0;
@@ -48,11 +53,9 @@ fn nearest(gaze: Gaze) -> Seen {
         let triangle = triangles[hit.triangle];
         let object = objects[triangle.object];
         passed += hit.distance;
-        if is_clear(object.surface) || object.double_sided != 0u {
-            return Seen(hit, passed);
-        }
         let normal = cross(triangle.b - triangle.a, triangle.c - triangle.a);
-        if dot(normal, gaze.direction) <= 0.0 {
+        let has_back = is_clear(object.surface) || object.double_sided != 0u;
+        if (has_back || dot(normal, gaze.direction) <= 0.0) && !is_hole(hit, object) {
             return Seen(hit, passed);
         }
         origin = leave(surface_point(hit), gaze.direction);

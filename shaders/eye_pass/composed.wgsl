@@ -26,6 +26,7 @@ fn beside(found: vec4f, corner: vec2i, wanted: f32) -> vec4f {
 
 @fragment
 fn composed(fragment: Fragment) -> @location(0) vec4f {
+    cut_out(fragment);
     let wanted = f32(fragment.object % MARKS + 1u);
     if !IS_SCALED {
         let sum = add_traced(vec4f(0.0), vec2i(fragment.clip.xy), 1.0, wanted);

@@ -17,9 +17,10 @@ struct Frame {
     traced_offset: vec2f,
     colour_scale: vec2f,
     fault: f32,
+    // Radiance that mirrors show while what they reflect cannot be traced.
+    stand_in: f32,
     padding0: f32,
     padding1: f32,
-    padding2: f32,
 }
 
 @group(0) @binding(0) var<uniform> frame: Frame;

@@ -42,6 +42,8 @@ fn inspected(fragment: Fragment, @builtin(front_facing) is_front: bool) -> @loca
     let down = dpdy(fragment.map_uv);
     let pixel_m2 = length(cross(dpdx(fragment.from_camera), dpdy(fragment.from_camera)));
     let record = map_of(objects[fragment.object], is_front);
+    let level = level_of(record, across, down);
+    cut_out(fragment);
     if INSPECTED == INSPECTED_NORMALS {
         return vec4f(linear_from_srgb(0.5 * normalize(fragment.normal) + 0.5), 1.0);
     }
@@ -51,7 +53,7 @@ fn inspected(fragment: Fragment, @builtin(front_facing) is_front: bool) -> @loca
     if record == NO_IMAGE {
         return vec4f(NO_MAP, 1.0);
     }
-    let lit = irradiance(record, fragment.map_uv, level_of(record, across, down));
+    let lit = irradiance(record, fragment.map_uv, level);
     if lit.a > 0.0 {
         return vec4f(fault_colour(), 1.0);
     }

@@ -15,7 +15,8 @@ struct ObjectRecord {
     back_map: u32,
     // Number of its glass, where that parts wavelengths; else 0.
     glass: u32,
-    padding0: u32,
+    // Alpha of the texture from which on the surface is there; 0 where it always is.
+    alpha_cutoff: f32,
 }
 
 const SURFACE_DIFFUSE: u32 = 0u;

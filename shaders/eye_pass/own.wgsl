@@ -8,7 +8,12 @@ fn own(fragment: Fragment, @builtin(front_facing) is_front: bool) -> @location(0
         is_fault = lit.a > 0.0;
         let diffuse = own_base_colour(fragment) * lit.rgb / PI;
         radiance += (1.0 - own_polish(fragment)) * diffuse;
+    } else {
+        // Lighter above, so that a bent surface has a shape.
+        let up = reflect(normalize(fragment.from_camera), normalize(fragment.normal)).y;
+        radiance += objects[fragment.object].base_colour * (frame.stand_in * (1.0 + 0.5 * up));
     }
+    cut_out(fragment);
     return vec4f(select(scaled(radiance), fault_colour(), is_fault), 1.0);
 }
 
@@ -16,5 +21,6 @@ fn own(fragment: Fragment, @builtin(front_facing) is_front: bool) -> @location(0
 @fragment
 fn map_value(fragment: Fragment, @builtin(front_facing) is_front: bool) -> @location(0) vec4f {
     let value = own_irradiance(fragment, is_front);
+    cut_out(fragment);
     return vec4f(select(scaled(value.rgb), fault_colour(), value.a > 0.0), 1.0);
 }

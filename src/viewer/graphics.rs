@@ -229,6 +229,11 @@ impl Graphics {
         Ok(())
     }
 
+    /// Whether mirrors are grey where chains are switched off, from the next picture on.
+    pub fn set_stand_in(&mut self, has_stand_in: bool) {
+        self.renderer.set_stand_in(has_stand_in);
+    }
+
     /// Switches what glass that parts wavelengths does to the picture, from the next one on.
     pub fn set_dispersion(&mut self, switch: EffectSwitch) {
         if self.dispersion != switch {

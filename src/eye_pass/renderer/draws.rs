@@ -31,6 +31,8 @@ pub(super) struct Manner {
     pub(super) has_sky: bool,
     /// Whether anything that chains may meet parts wavelengths.
     pub(super) parts_wavelengths: bool,
+    /// Whether anything has holes.
+    pub(super) has_masks: bool,
 }
 
 impl Manner {
@@ -80,6 +82,10 @@ impl Manner {
             },
             has_sky: self.has_sky,
             parts_wavelengths: self.parts_wavelengths,
+            has_mask: match writes {
+                Writes::Traced => self.has_masks,
+                _ => look.has_mask(),
+            },
             is_logarithmic: self.style.is_logarithmic(),
         };
         PipelineKey::new(writes, look.surface, faces, how)

@@ -86,6 +86,8 @@ pub struct Renderer {
     targets: Option<Targets>,
     traced: Option<TracedTargets>,
     mean: Option<Mean>,
+    /// Whether mirrors are grey where chains are switched off.
+    has_stand_in: bool,
     /// What `targets` show, if that is what [`draw`](Self::draw) drew last.
     drawn_view: Option<View>,
     map_style: MapStyle,
@@ -140,6 +142,7 @@ impl Renderer {
             traced: None,
             mean: None,
             drawn_view: None,
+            has_stand_in: false,
             map_style: MapStyle::default(),
             chains: EffectSwitch::default(),
             dispersion: EffectSwitch::default(),
@@ -253,6 +256,14 @@ impl Renderer {
     /// from the next picture on. Radiance that is read back stays as it is.
     pub fn set_white_balance(&mut self, gpu: &Gpu, matrix: &Matrix3) {
         if self.tone_mapping.set_white_balance(gpu, matrix) {
+            self.drawn_view = None;
+        }
+    }
+
+    /// Whether mirrors are grey instead of black where chains are switched off, from the next picture on.
+    pub fn set_stand_in(&mut self, has_stand_in: bool) {
+        if self.has_stand_in != has_stand_in {
+            self.has_stand_in = has_stand_in;
             self.drawn_view = None;
         }
     }
@@ -387,6 +398,7 @@ impl Renderer {
             has_tinted_glass: self.objects.has_tinted_glass(),
             has_bumps: self.objects.has_bumps(),
             has_sky: self.shows_sky(),
+            has_masks: self.objects.has_masks(),
             parts_wavelengths: self.dispersion != EffectSwitch::Off && !self.objects.glasses.is_empty(),
         }
     }

@@ -155,6 +155,11 @@ impl Objects {
         looks.any(|look| look.surface.is_specular() && !look.surface.is_receiver() && look.has_texture())
     }
 
+    /// Whether anything has holes.
+    pub(super) fn has_masks(&self) -> bool {
+        self.list.iter().any(Look::has_mask)
+    }
+
     /// Whether normals of anything are bent.
     pub(super) fn has_bumps(&self) -> bool {
         self.list.iter().any(|look| look.has_bumps)
@@ -205,10 +210,15 @@ impl Look {
                 polish: material.polish as f32,
                 back_map: NO_IMAGE,
                 glass: 0,
-                padding0: 0,
+                alpha_cutoff: alpha_cutoff(material),
             },
             base_colour_texture: material.base_colour_texture.as_ref().map(|image| image.texture),
         }
+    }
+
+    /// Whether it has holes.
+    pub(super) fn has_mask(&self) -> bool {
+        self.record.alpha_cutoff > 0.0
     }
 
     pub(super) fn has_texture(&self) -> bool {
@@ -231,6 +241,16 @@ pub(super) fn surface_code(surface: SurfaceKind) -> u32 {
         SurfaceKind::Dielectric => 2,
         SurfaceKind::ThinWall => 3,
         SurfaceKind::Mixed => 4,
+    }
+}
+
+/// Alpha of a texture from which on a surface is there; 0 where it always is.
+fn alpha_cutoff(material: &Material) -> f32 {
+    match material.alpha_mask {
+        Some(mask) if mask.factor >= mask.cutoff => (mask.cutoff / mask.factor).max(0.0) as f32,
+        // Nowhere, whatever its texture.
+        Some(_) => f32::INFINITY,
+        None => 0.0,
     }
 }
 

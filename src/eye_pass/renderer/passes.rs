@@ -23,6 +23,8 @@ use crate::optics::LinearSrgb;
 const LARGEST_SCALED: f64 = 32768.0;
 /// Level that is always finer than the finest.
 const FINEST: f64 = -64.0;
+/// What mirrors show before tone mapping while what they reflect cannot be traced [1].
+const STAND_IN: f64 = 0.15;
 
 impl Renderer {
     /// Radiance times a scale, into this renderer's own targets.
@@ -277,11 +279,15 @@ impl Renderer {
                 let offset = sample.offset[axis] - sample.traced_offset(quality)[axis];
                 (offset * traced_per_pixel[axis]) as f32
             }),
+            stand_in: if self.has_stand_in {
+                (STAND_IN / view.exposure_stops.exp2()) as f32
+            } else {
+                0.0
+            },
             colour_scale: self.map_style.colour_scale().map(|number| number as f32),
             fault: (radiance_scale / view.exposure_stops.exp2()) as f32,
             padding0: 0.0,
             padding1: 0.0,
-            padding2: 0.0,
         }
     }
 

@@ -54,19 +54,6 @@ impl Writes {
             .chain(Inspected::ALL.into_iter().map(Self::Inspected))
     }
 
-    /// Its fragment stage, if it has one.
-    pub(super) fn entry_point(self) -> Option<&'static str> {
-        match self {
-            Self::Own => Some("own"),
-            Self::OwnUnderLights => Some("own_under_lights"),
-            Self::MapValue => Some("map_value"),
-            Self::Inspected(_) => Some("inspected"),
-            Self::Depth => None,
-            Self::Traced => Some("traced"),
-            Self::Composed => Some("composed"),
-        }
-    }
-
     /// Whether it is part of a chain from the eye over specular surfaces.
     pub(super) fn is_specular(self) -> bool {
         matches!(self, Self::Depth | Self::Traced | Self::Composed)
@@ -115,6 +102,8 @@ pub(super) struct DrawnHow {
     pub(super) has_sky: bool,
     /// Whether chains go on by wavelength where glass parts light.
     pub(super) parts_wavelengths: bool,
+    /// Whether the surface has holes; for chains, whether anything in the scene has.
+    pub(super) has_mask: bool,
     /// Whether the scale of false colours is logarithmic.
     pub(super) is_logarithmic: bool,
 }
@@ -149,8 +138,22 @@ impl PipelineKey {
                     && (writes == Writes::Traced || (shows_itself && surface == SurfaceKind::Mixed)),
                 has_sky: how.has_sky && writes == Writes::Traced,
                 parts_wavelengths: how.parts_wavelengths && writes == Writes::Traced,
+                has_mask: how.has_mask,
                 is_logarithmic: how.is_logarithmic && matches!(writes, Writes::Inspected(_)),
             },
+        }
+    }
+
+    /// Its fragment stage, if it has one.
+    pub(super) fn entry_point(self) -> Option<&'static str> {
+        match self.writes {
+            Writes::Own => Some("own"),
+            Writes::OwnUnderLights => Some("own_under_lights"),
+            Writes::MapValue => Some("map_value"),
+            Writes::Inspected(_) => Some("inspected"),
+            Writes::Depth => self.how.has_mask.then_some("masked_depth"),
+            Writes::Traced => Some("traced"),
+            Writes::Composed => Some("composed"),
         }
     }
 
@@ -172,22 +175,26 @@ impl PipelineKey {
 
     /// The values of the shader's overrides.
     pub(super) fn constants(self) -> Vec<(&'static str, f64)> {
+        let mask = ("HAS_MASK", flag(self.how.has_mask));
         match self.writes {
             Writes::Own | Writes::OwnUnderLights | Writes::MapValue | Writes::Depth => vec![
+                mask,
                 ("SURFACE", f64::from(surface_code(self.surface))),
                 ("HAS_TEXTURE", flag(self.how.has_texture)),
                 ("HAS_BUMPS", flag(self.how.has_bumps)),
             ],
             Writes::Inspected(what) => vec![
+                mask,
                 ("INSPECTED", f64::from(what.code())),
                 ("IS_LOGARITHMIC", flag(self.how.is_logarithmic)),
             ],
             Writes::Traced => vec![
+                mask,
                 ("HAS_TINTED_GLASS", flag(self.how.has_texture)),
                 ("TRACES_LIGHTS", flag(self.how.traces_lights)),
                 ("HAS_BUMPS", flag(self.how.has_bumps)),
             ],
-            Writes::Composed => vec![("IS_SCALED", flag(self.how.is_scaled))],
+            Writes::Composed => vec![mask, ("IS_SCALED", flag(self.how.is_scaled))],
         }
     }
 }
@@ -304,14 +311,15 @@ impl SurfacePipelines {
         let module = &self.modules[key.program().name];
         let constants = key.constants();
         let target = [Some(wgpu::ColorTargetState::from(HDR_FORMAT))];
-        let fragment = writes.entry_point().map(|entry_point| wgpu::FragmentState {
+        let targets = if writes == Writes::Depth { &[][..] } else { &target };
+        let fragment = key.entry_point().map(|entry_point| wgpu::FragmentState {
             module,
             entry_point: Some(entry_point),
             compilation_options: wgpu::PipelineCompilationOptions {
                 constants: &constants,
                 ..Default::default()
             },
-            targets: &target,
+            targets,
         });
         // Chains are traced once per pixel: where the surface is the nearest, which was drawn before.
         let (depth_write, depth_compare) = if writes == Writes::Traced {
@@ -321,7 +329,7 @@ impl SurfacePipelines {
         };
         gpu.device
             .create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-                label: Some(writes.entry_point().unwrap_or("depth")),
+                label: Some(key.entry_point().unwrap_or("depth")),
                 layout: Some(&self.layout(gpu, key)),
                 vertex: wgpu::VertexState {
                     module,

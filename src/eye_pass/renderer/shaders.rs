@@ -27,7 +27,7 @@ macro_rules! chains {
     ($name:literal, $indices:literal, $background:literal) => {
         program! { $name:
             "shared/srgb" "shared/refraction" "shared/fresnel" "shared/traversal" "eye_pass/frame"
-            "eye_pass/objects" "eye_pass/images" "eye_pass/bumps" "eye_pass/place" "eye_pass/start"
+            "eye_pass/objects" "eye_pass/images" "eye_pass/bumps" "eye_pass/place" "eye_pass/mask" "eye_pass/start"
             "eye_pass/lights" "eye_pass/corners" $indices "eye_pass/medium" "eye_pass/interaction"
             $background "eye_pass/chain" "eye_pass/traced"
         }
@@ -37,13 +37,13 @@ macro_rules! chains {
 /// Surfaces of the scene by themselves.
 pub(super) const SURFACE: Program = program! { "surface":
     "shared/srgb" "shared/refraction" "shared/fresnel" "eye_pass/frame" "eye_pass/objects" "eye_pass/images"
-    "eye_pass/bumps" "eye_pass/place" "eye_pass/surface" "eye_pass/own"
+    "eye_pass/bumps" "eye_pass/place" "eye_pass/mask" "eye_pass/surface" "eye_pass/own"
 };
 
 /// Surfaces by something else than their light.
 pub(super) const INSPECTED: Program = program! { "inspected":
     "shared/false_colours" "eye_pass/frame" "eye_pass/objects" "eye_pass/images" "eye_pass/place"
-    "eye_pass/inspected"
+    "eye_pass/mask" "eye_pass/inspected"
 };
 
 /// Chains of specular surfaces.
@@ -68,13 +68,13 @@ pub(super) const SKY: Program = program! { "sky":
 /// Surfaces of the scene by themselves, while lights are moved.
 pub(super) const UNDER_LIGHTS: Program = program! { "under_lights":
     "shared/srgb" "shared/refraction" "shared/fresnel" "shared/traversal" "eye_pass/frame"
-    "eye_pass/objects" "eye_pass/images" "eye_pass/bumps" "eye_pass/place" "eye_pass/start"
+    "eye_pass/objects" "eye_pass/images" "eye_pass/bumps" "eye_pass/place" "eye_pass/mask" "eye_pass/start"
     "eye_pass/lights" "eye_pass/surface" "eye_pass/own_under_lights"
 };
 
 /// What was traced, in the picture.
 pub(super) const COMPOSED: Program = program! { "composed":
-    "eye_pass/frame" "eye_pass/place" "eye_pass/composed"
+    "eye_pass/frame" "eye_pass/objects" "eye_pass/images" "eye_pass/place" "eye_pass/mask" "eye_pass/composed"
 };
 
 /// Means of pictures.
@@ -164,7 +164,7 @@ pub fn specialisations() -> Vec<Specialisation> {
     let mut all = vec![alone(ACCUMULATED, "accumulated"), alone(SKY, "sky_drawn")];
     for writes in Writes::all() {
         for kind in KINDS {
-            for flags in 0..32 {
+            for flags in 0..64 {
                 let manner = DrawnHow {
                     has_texture: flags & 1 > 0,
                     is_scaled: flags & 1 > 0,
@@ -172,10 +172,11 @@ pub fn specialisations() -> Vec<Specialisation> {
                     has_bumps: flags & 8 > 0,
                     has_sky: flags & 4 > 0,
                     parts_wavelengths: flags & 16 > 0,
+                    has_mask: flags & 32 > 0,
                     is_logarithmic: flags & 1 > 0,
                 };
                 let key = PipelineKey::new(writes, kind, Faces::Both, manner);
-                all.extend(key.writes.entry_point().map(|entry_point| Specialisation {
+                all.extend(key.entry_point().map(|entry_point| Specialisation {
                     program: key.program().name,
                     entry_point,
                     constants: key.constants(),

@@ -41,9 +41,10 @@ shader_struct! {
         colour_scale: [f32; 2],
         /// What is written in place of what is no number.
         fault: f32,
+        /// Radiance that mirrors show while what they reflect cannot be traced [W/(m² sr)].
+        stand_in: f32,
         padding0: f32,
         padding1: f32,
-        padding2: f32,
     }
 }
 
@@ -116,7 +117,8 @@ shader_struct! {
         back_map: u32,
         /// Number of its glass from 1 on, where that parts wavelengths; else 0.
         glass: u32,
-        padding0: u32,
+        /// Alpha of its texture from which on its surface is there; 0 where it always is.
+        alpha_cutoff: f32,
     }
 }
 

@@ -549,11 +549,7 @@ impl Reading<'_, '_> {
     ) {
         let is_matte = !material.surface.is_specular();
         match self.source.alpha_mode {
-            Checked::Valid(AlphaMode::Opaque) => {}
-            Checked::Valid(AlphaMode::Mask) => self.warn(
-                "light goes through where its alpha mask cuts it out, but the window draws it whole",
-                "render it by --backend cpu for a picture with the cuts",
-            ),
+            Checked::Valid(AlphaMode::Opaque | AlphaMode::Mask) => {}
             Checked::Valid(AlphaMode::Blend) => {
                 self.warn(
                     "its alpha mode BLEND was read as opaque",

@@ -43,7 +43,8 @@ impl App {
         let Some(mut view) = self.view() else {
             return Ok(());
         };
-        let chains = self.warm_up.switch(self.chains_switch());
+        let wanted = self.chains_switch();
+        let chains = self.warm_up.switch(wanted);
         let dispersion = self.model.panel.settings.effects.get(Effect::Dispersion);
         let white_balance = self.white_balance();
         let Some(graphics) = &mut self.graphics else {
@@ -87,6 +88,7 @@ impl App {
             let shown = shown.as_ref().map(|(scene, maps)| (*scene, &maps[..], style));
             graphics.set_beside(shown)?;
         }
+        graphics.set_stand_in(wanted != EffectSwitch::Off && chains == EffectSwitch::Off);
         graphics.set_chains(chains)?;
         graphics.set_dispersion(dispersion);
         graphics.set_white_balance(&white_balance);

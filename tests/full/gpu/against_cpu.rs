@@ -11,7 +11,7 @@ use nephroid::illumination::tiles::{self, COARSEST, TileLayout};
 use nephroid::illumination::{Chart, IlluminationMap};
 use nephroid::optics::LinearSrgb;
 use nephroid::scene::builtin::{parts, shapes};
-use nephroid::scene::{Environment, LightKind, Material, Scene, SurfaceKind};
+use nephroid::scene::{AlphaMask, Environment, LightKind, Material, Scene, SurfaceKind};
 use nephroid::settings::LayerKind;
 use nephroid::transport::Tracer;
 
@@ -185,6 +185,42 @@ fn floors() -> Vec<Case> {
     cases
 }
 
+/// Sheets with holes over a lit floor or a mirror that shows their undersides: by a texture, everywhere, nowhere.
+fn masks() -> Vec<Case> {
+    let mut holes = four_colours();
+    holes.rgba[1][3] = 0;
+    holes.rgba[2][3] = 120;
+    let mut cases = Vec::new();
+    for (below, surface, factor) in [
+        (SurfaceKind::Diffuse, SurfaceKind::Diffuse, 0.9),
+        (SurfaceKind::Diffuse, SurfaceKind::Mirror, 1.0),
+        (SurfaceKind::Mirror, SurfaceKind::Diffuse, 1.0),
+        (SurfaceKind::Mirror, SurfaceKind::Diffuse, 0.4),
+    ] {
+        let mut case = under("sheet with holes", surface, LinearSrgb::WHITE, 0.5);
+        case.scene.materials[0].surface = below;
+        case.scene.textures.push(holes.clone().into());
+        let sheet = &mut case.scene.materials[1];
+        (sheet.base_colour_texture, sheet.double_sided) = (Some(texture_reference()), true);
+        sheet.alpha_mask = Some(AlphaMask { cutoff: 0.5, factor });
+        sheet.emitted_radiance = LinearSrgb::new(0.1, 0.4, 0.2);
+        if below == SurfaceKind::Mirror {
+            case.maps.clear();
+        }
+        // From one side, so that undersides are seen in the mirror.
+        case.view = view(
+            DVec3::new(0.2, 1.3, 1.6),
+            DVec3::new(0.5, 0.2, 0.5),
+            1.0,
+            [120, 80],
+        );
+        case.view.background = LinearSrgb::new(0.5, 0.25, 2.0);
+        (case.of_peak, case.few) = (0.01, 0.004);
+        cases.push(case);
+    }
+    cases
+}
+
 /// A mirror ball and a glass ball over a dark floor, the sky ahead, and back over the seam of its image with the pole in
 /// view; channels that end at the balls' outlines, or go on over many surfaces, may differ.
 fn skies() -> Vec<Case> {
@@ -223,7 +259,7 @@ fn skies() -> Vec<Case> {
 #[test]
 fn device_shows_what_the_cpu_shows() {
     let mut faults = Vec::new();
-    for case in floors().iter().chain(&skies()) {
+    for case in floors().iter().chain(&masks()).chain(&skies()) {
         let mut rig = or_skip!(Rig::at(AS_CPU, &case.scene, &case.maps));
         // Means of several places too, where the picture is small.
         let sides: &[u32] = if case.view.width < 100 { &[1, 3] } else { &[1] };
