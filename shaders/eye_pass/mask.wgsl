@@ -18,9 +18,3 @@ fn cut_out(fragment: Fragment) {
         discard;
     }
 }
-
-// Depths of surfaces with holes.
-@fragment
-fn masked_depth(fragment: Fragment) {
-    cut_out(fragment);
-}

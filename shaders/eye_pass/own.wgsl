@@ -24,3 +24,9 @@ fn map_value(fragment: Fragment, @builtin(front_facing) is_front: bool) -> @loca
     cut_out(fragment);
     return vec4f(select(scaled(value.rgb), fault_colour(), value.a > 0.0), 1.0);
 }
+
+// Depths of surfaces with holes.
+@fragment
+fn masked_depth(fragment: Fragment) {
+    cut_out(fragment);
+}
