@@ -44,8 +44,9 @@ impl Renderer {
     /// Those of [`radiance`](Self::radiance).
     pub fn glance(&mut self, gpu: &Gpu, view: &View) -> Result<Picture> {
         let chains = std::mem::replace(&mut self.chains, EffectSwitch::Off);
+        let has_stand_in = std::mem::take(&mut self.has_stand_in);
         let picture = self.radiance(gpu, view);
-        self.chains = chains;
+        (self.chains, self.has_stand_in) = (chains, has_stand_in);
         picture
     }
 
