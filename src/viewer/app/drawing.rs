@@ -88,7 +88,8 @@ impl App {
             let shown = shown.as_ref().map(|(scene, maps)| (*scene, &maps[..], style));
             graphics.set_beside(shown)?;
         }
-        graphics.set_stand_in(wanted != EffectSwitch::Off && chains == EffectSwitch::Off);
+        let is_compiling = wanted != EffectSwitch::Off && chains == EffectSwitch::Off;
+        graphics.set_stand_in(is_compiling && !self.model.maps().is_empty());
         graphics.set_chains(chains)?;
         graphics.set_dispersion(dispersion);
         graphics.set_white_balance(&white_balance);
