@@ -50,7 +50,7 @@ const LEAST_GROWTH: f64 = 1.2;
 
 /// Photons of a level after one with fewer, or as many as there is time for: a level that is cut off leaves nothing.
 fn in_time(photons: u32, before: u32, state: &LightState, course: &Course) -> u32 {
-    let (Some(left_s), Some(photon_s)) = (course.control.time_left_s(), state.photon_s) else {
+    let (1.., Some(left_s), Some(photon_s)) = (before, course.control.time_left_s(), state.photon_s) else {
         return photons;
     };
     let own_s = PART_OF_TIME * left_s / course.open_lights as f64;
