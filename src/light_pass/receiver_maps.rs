@@ -202,7 +202,8 @@ impl ReceiverMap {
     /// The coarsest level at which a smooth kernel of the given spread [texels of the map] is still well resolved.
     pub fn level_for(&self, spread_texels: f64) -> usize {
         let fits = |level: &usize| spread_texels / f64::from(1_u32 << level) >= LEAST_SPREAD_TEXELS;
-        (1..self.most_levels()).take_while(fits).last().unwrap_or(0)
+        let levels = (0..).zip(self.level_sizes()).map(|(level, _)| level);
+        levels.skip(1).take_while(fits).last().unwrap_or(0)
     }
 
     /// The flux so far, level by level.
