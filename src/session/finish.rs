@@ -13,7 +13,7 @@ use super::forecast::ForecastReport;
 use super::light_level::LightLevel;
 use super::map_plan::MEMORY;
 use super::map_size::{self, Wish};
-use super::sizes::{BYTES_PER_TEXEL, MapSizes};
+use super::sizes::{MapMemory, MapSizes};
 use super::{BakeResult, LightLayer, StopReason, Timings, map_plan};
 use crate::error::Warning;
 use crate::illumination::accumulator::FluxAccumulator;
@@ -159,19 +159,17 @@ impl Finish<'_> {
                 wishes.insert(receiver, wish);
             }
         }
-        let caustic: u64 = charts.values().map(|chart| chart.texel_count() as u64).sum();
-        let left = self
-            .settings
-            .memory_bytes
-            .saturating_sub(caustic * BYTES_PER_TEXEL);
-        let wished = map_size::fit(&wishes, u64::MAX);
-        let sizes = map_size::fit(&wishes, left / BYTES_PER_TEXEL);
+        let memory = MapMemory::PLAIN;
+        let caustic = memory.bytes(charts.values().map(|chart| chart.texel_count() as u64));
+        let left = self.settings.memory_bytes.saturating_sub(caustic);
+        let wished = map_size::wished(&wishes);
+        let sizes = map_size::fit(&wishes, (left, memory));
         for (&receiver, size) in &sizes {
             if let Some(chart) = self.sizes.chart_of(receiver, size) {
                 charts.insert(receiver, chart);
             }
         }
-        let warning = (sizes != wished).then(|| map_plan::scarce(&wished, &sizes, (left, BYTES_PER_TEXEL)));
+        let warning = (sizes != wished).then(|| map_plan::scarce(&wished, &sizes, (left, memory)));
         (charts, warning)
     }
 

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::caustic::CausticLayer;
 use super::map_size::{self, MapSize, Sizes, Wish};
-use super::sizes::{self, LARGEST_AUTOMATIC_SIDE, LARGEST_TILED_SIDE};
+use super::sizes::{self, LARGEST_AUTOMATIC_SIDE, LARGEST_TILED_SIDE, MapMemory};
 use crate::error::Warning;
 use crate::illumination::tiles::COARSEST;
 use crate::illumination::{Chart, Receiver};
@@ -22,15 +22,17 @@ impl CausticLayer<'_> {
         let scene = self.tracer.scene();
         let is_receiver = |&object: &usize| scene.material_of(object).surface.is_receiver();
         // Both sides of each.
-        let receivers = 2 * (0..scene.objects.len()).filter(is_receiver).count() as u64;
-        let (limit, per_texel) = self.map_memory();
-        (width as u64 * height as u64).saturating_mul(receivers) <= limit / per_texel
+        let receivers = 2 * (0..scene.objects.len()).filter(is_receiver).count();
+        let (limit, memory) = self.map_memory();
+        memory.bytes(std::iter::repeat_n(width as u64 * height as u64, receivers)) <= limit
     }
 
-    /// Bytes that all maps may take, and those of a texel.
-    fn map_memory(&self) -> (u64, u64) {
-        let per_texel = sizes::bytes_per_texel(self.settings.estimator);
-        (self.settings.map_memory_bytes(), per_texel)
+    /// Bytes that all maps may take, and what they take.
+    fn map_memory(&self) -> (u64, MapMemory) {
+        (
+            self.settings.map_memory_bytes(),
+            MapMemory::with(self.settings.estimator),
+        )
     }
 
     /// Sizes of the maps that the coarse run saw lit, with what is to be said of them.
@@ -54,9 +56,9 @@ impl CausticLayer<'_> {
             wish.map(|wish| (receiver, wish))
         };
         let wishes: BTreeMap<Receiver, Wish> = receivers.filter_map(wish).collect();
-        let wished = map_size::fit(&wishes, u64::MAX);
-        let (limit, per_texel) = self.map_memory();
-        let mut sizes = map_size::fit(&wishes, limit / per_texel);
+        let (limit, memory) = self.map_memory();
+        let wished = map_size::wished(&wishes);
+        let mut sizes = map_size::fit(&wishes, (limit, memory));
         let is_scarce = sizes != wished;
         if let (MapResolution::Fixed { width, height }, false) = (self.settings.map_resolution, is_scarce) {
             // What only the full lattice lights.
@@ -205,15 +207,16 @@ impl CausticLayer<'_> {
 pub(super) const MEMORY: &str = "--memory";
 
 /// Says that maps are coarser than wished for, for want of memory [bytes].
-pub(super) fn scarce(wished: &Sizes, granted: &Sizes, (limit, per_texel): (u64, u64)) -> Warning {
+pub(super) fn scarce(wished: &Sizes, granted: &Sizes, (limit, memory): (u64, MapMemory)) -> Warning {
     let mebibytes = |bytes: u64| bytes as f64 / f64::from(1 << 20);
+    let taken = |sizes: &Sizes| mebibytes(memory.bytes(sizes.values().map(MapSize::texels)));
     Warning::new(
         MEMORY,
         format!(
             "the maps need {:.1} MiB, the limit is {:.1} MiB: they are coarser than they should be and take {:.1} MiB",
-            mebibytes(per_texel * map_size::texels(wished)),
+            taken(wished),
             mebibytes(limit),
-            mebibytes(per_texel * map_size::texels(granted)),
+            taken(granted),
         ),
         "allow more --memory, or ask for a smaller --map-resolution",
     )

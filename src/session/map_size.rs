@@ -6,6 +6,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use super::sizes::MapMemory;
 use crate::illumination::Receiver;
 use crate::illumination::tiles::{self, COARSEST, TileLayout};
 use crate::light_pass::caustic::statistics::Spot;
@@ -41,11 +42,6 @@ impl MapSize {
             None => self.size.0 as u64 * self.size.1 as u64,
         }
     }
-}
-
-/// Texels of all maps.
-pub(super) fn texels(sizes: &Sizes) -> u64 {
-    sizes.values().map(MapSize::texels).sum()
 }
 
 /// Half the size, so many times; never nothing.
@@ -245,16 +241,23 @@ const SPARING_STEP: f64 = 0.125;
 /// Most that texels of whole maps are finer, or coarser, than their light.
 const MOST_LEVELS: f64 = 20.0;
 
-/// Sizes of all maps with so many texels: as they are wished for, or as little coarser as can be.
-pub(super) fn fit(wishes: &BTreeMap<Receiver, Wish>, most_texels: u64) -> Sizes {
-    let granted = |sparing: Sparing| -> Sizes {
-        wishes
-            .iter()
-            .map(|(&receiver, wish)| (receiver, wish.granted(sparing)))
-            .collect()
-    };
-    let wished = granted(Sparing::Nothing);
-    if texels(&wished) <= most_texels {
+/// Sizes of all maps as they are wished for.
+pub(super) fn wished(wishes: &BTreeMap<Receiver, Wish>) -> Sizes {
+    granted(wishes, Sparing::Nothing)
+}
+
+fn granted(wishes: &BTreeMap<Receiver, Wish>, sparing: Sparing) -> Sizes {
+    wishes
+        .iter()
+        .map(|(&receiver, wish)| (receiver, wish.granted(sparing)))
+        .collect()
+}
+
+/// Sizes of all maps in so much memory [bytes]: as they are wished for, or as little coarser as can be.
+pub(super) fn fit(wishes: &BTreeMap<Receiver, Wish>, (limit, memory): (u64, MapMemory)) -> Sizes {
+    let fits = |sizes: &Sizes| memory.bytes(sizes.values().map(MapSize::texels)) <= limit;
+    let wished = wished(wishes);
+    if fits(&wished) {
         return wished;
     }
     // Tiles with far more texels than light needs come first; then every other.
@@ -263,13 +266,13 @@ pub(super) fn fit(wishes: &BTreeMap<Receiver, Wish>, most_texels: u64) -> Sizes 
     let (mut low, mut high) = (0, steps);
     while low < high {
         let middle = low + (high - low) / 2;
-        if texels(&granted(sparing(middle))) <= most_texels {
+        if fits(&granted(wishes, sparing(middle))) {
             high = middle;
         } else {
             low = middle + 1;
         }
     }
-    granted(sparing(high))
+    granted(wishes, sparing(high))
 }
 
 /// Cells across and down that light is sorted into, at most.

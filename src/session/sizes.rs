@@ -30,14 +30,47 @@ pub const LARGEST_TILED_SIDE: usize = 4096;
 /// Memory per texel while flux is summed and finished [bytes]: three 64-bit sums, three floats per layer, an area.
 pub const BYTES_PER_TEXEL: u64 = 24 + 2 * 12 + 8;
 
-/// The same where photons may carry the light: sums of both halves, and their details while they are filtered.
-const BYTES_PER_PHOTON_TEXEL: u64 = 240;
+/// Sums of both halves of the photons, per texel [bytes].
+const BYTES_PER_PHOTON_TEXEL: u64 = 2 * 24;
 
-/// Memory that an estimator takes for a texel [bytes].
-pub(super) fn bytes_per_texel(estimator: Estimator) -> u64 {
-    match estimator {
-        Estimator::Auto | Estimator::Photon => BYTES_PER_PHOTON_TEXEL,
-        Estimator::Wavefront | Estimator::Splat => BYTES_PER_TEXEL,
+/// A texel of the map whose photons are being filtered, with its details at all levels [bytes].
+const BYTES_PER_FILTERED_TEXEL: u64 = 136;
+
+/// Memory that maps take while they are made.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct MapMemory {
+    /// Of every texel [bytes].
+    per_texel: u64,
+    /// Of every texel of the largest map, beside that [bytes].
+    per_texel_of_largest: u64,
+}
+
+impl MapMemory {
+    /// Of maps that are summed and finished.
+    pub(super) const PLAIN: Self = Self {
+        per_texel: BYTES_PER_TEXEL,
+        per_texel_of_largest: 0,
+    };
+
+    /// With an estimator.
+    pub(super) fn with(estimator: Estimator) -> Self {
+        match estimator {
+            // Maps are filtered one after another.
+            Estimator::Auto | Estimator::Photon => Self {
+                per_texel: BYTES_PER_TEXEL + BYTES_PER_PHOTON_TEXEL,
+                per_texel_of_largest: BYTES_PER_FILTERED_TEXEL,
+            },
+            Estimator::Wavefront | Estimator::Splat => Self::PLAIN,
+        }
+    }
+
+    /// Of maps with so many texels each [bytes].
+    pub(super) fn bytes(self, texels: impl Iterator<Item = u64>) -> u64 {
+        let (all, largest) = texels.fold((0_u64, 0), |(all, largest), texels| {
+            (all.saturating_add(texels), largest.max(texels))
+        });
+        let all = all.saturating_mul(self.per_texel);
+        all.saturating_add(largest.saturating_mul(self.per_texel_of_largest))
     }
 }
 
