@@ -67,6 +67,8 @@ struct Request {
     made: Instant,
     /// Until when the bake waits [ms since it was made].
     held_until_ms: AtomicU64,
+    /// Until when nobody looks at its levels [ms since it was made].
+    unseen_until_ms: AtomicU64,
 }
 
 impl Default for Request {
@@ -75,14 +77,20 @@ impl Default for Request {
             cancelled: AtomicBool::new(false),
             made: Instant::now(),
             held_until_ms: AtomicU64::new(0),
+            unseen_until_ms: AtomicU64::new(0),
         }
     }
 }
 
 impl Request {
-    fn is_held(&self) -> bool {
-        let until_ms = self.held_until_ms.load(Ordering::Relaxed);
+    fn is_before(&self, until_ms: &AtomicU64) -> bool {
+        let until_ms = until_ms.load(Ordering::Relaxed);
         until_ms > 0 && self.made.elapsed().as_millis() < u128::from(until_ms)
+    }
+
+    fn set_until(&self, until_ms: &AtomicU64, time: Duration) {
+        let until = (self.made.elapsed() + time).as_millis();
+        until_ms.store(until.try_into().unwrap_or(u64::MAX), Ordering::Relaxed);
     }
 }
 
@@ -121,15 +129,23 @@ impl Control {
 
     /// Asks the bake to wait for so long from now on: something else needs the processor.
     pub fn hold(&self, time: Duration) {
-        let until = self.request.made.elapsed() + time;
-        let until_ms = until.as_millis().try_into().unwrap_or(u64::MAX);
-        self.request.held_until_ms.store(until_ms, Ordering::Relaxed);
+        self.request.set_until(&self.request.held_until_ms, time);
+    }
+
+    /// Tells the bake that nobody looks at its levels for so long from now on.
+    pub fn look_away(&self, time: Duration) {
+        self.request.set_until(&self.request.unseen_until_ms, time);
+    }
+
+    /// Whether somebody looks at the levels of the bake.
+    pub fn is_watched(&self) -> bool {
+        !self.request.is_before(&self.request.unseen_until_ms)
     }
 
     /// Whether it was asked to stop. Returns only when it need not wait any more.
     pub fn is_cancelled(&self) -> bool {
         let is_cancelled = || self.request.cancelled.load(Ordering::Relaxed);
-        while self.request.is_held() && !is_cancelled() {
+        while self.request.is_before(&self.request.held_until_ms) && !is_cancelled() {
             std::thread::sleep(LOOK_AGAIN);
         }
         is_cancelled() || self.deadline.is_some_and(|deadline| Instant::now() >= deadline)

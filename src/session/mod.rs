@@ -434,7 +434,7 @@ impl BakeSession {
                 limited: &limited,
             };
             let complete = gathered.gather(&gathering, indirect, &maps, &mut |so_far, known| {
-                let Some(level) = &mut level else {
+                let Some(level) = level.as_mut().filter(|_| control.is_watched()) else {
                     return;
                 };
                 let (mut maps, mut parts) = (maps.clone(), parts.clone());

@@ -89,6 +89,9 @@ impl Onlooker for Showing<'_, '_> {
             self.hand_out(maps, levels, so_far, clock);
             return Ok(());
         }
+        if !is_first && !self.control.is_watched() {
+            return Ok(());
+        }
         let (finish, plan) = (self.finish, self.finish.plan);
         let (charts, scarce) = finish.charts(levels);
         let direct_charts = finish.direct_charts(&charts);

@@ -58,6 +58,8 @@ const BAKING_FRAME: Duration = Duration::from_millis(100);
 const BAKING_FRAME_OF_SOFTWARE: Duration = Duration::from_millis(500);
 /// Where the processor draws, a bake waits for so long after a frame of a walk.
 const BAKE_WAITS: Duration = Duration::from_millis(500);
+/// Where the processor draws, a level of a bake is shown for so long before another one is made ready.
+const LEVEL_OF_SOFTWARE: Duration = Duration::from_secs(3);
 /// Time between a picture and the frame that tells what it took.
 const REPORT_AFTER: Duration = Duration::from_millis(40);
 /// A device that has not told in so many frames how long a picture took is not asked again until the next one.
@@ -294,7 +296,12 @@ impl App {
         self.fly();
         let (quantity, style) = (self.model.quantity(), self.model.map_style());
         self.poll_files();
-        self.must_set_maps |= self.model.poll();
+        if self.model.poll() {
+            self.must_set_maps = true;
+            if self.is_software() {
+                self.model.look_away(LEVEL_OF_SOFTWARE);
+            }
+        }
         self.report_chains();
         let layer = self.model.panel.display.layer;
         let mut wishes = std::mem::take(&mut self.pressed);

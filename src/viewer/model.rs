@@ -626,6 +626,11 @@ impl Model {
         self.worker.hold(time);
     }
 
+    /// Lets the bake go on for so long without showing what it has.
+    pub fn look_away(&self, time: Duration) {
+        self.worker.look_away(time);
+    }
+
     /// Stops the bake and keeps the maps that are shown.
     pub fn cancel(&mut self) {
         self.debounce.clear();

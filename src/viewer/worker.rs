@@ -252,6 +252,13 @@ impl Worker {
         }
     }
 
+    /// Tells what is running that nobody looks at its levels for so long.
+    pub fn look_away(&self, time: Duration) {
+        if let Some(running) = &self.shared.lock().running {
+            running.control.look_away(time);
+        }
+    }
+
     /// Stops what is running and forgets what is waiting; unfinished maps are dropped.
     pub fn cancel(&self) {
         let mut slot = self.shared.lock();

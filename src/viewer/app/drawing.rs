@@ -93,17 +93,17 @@ impl App {
         graphics.set_chains(chains)?;
         graphics.set_dispersion(dispersion);
         graphics.set_white_balance(&white_balance);
-        self.expose(&mut view, has_new_maps)?;
-        let Some(graphics) = &mut self.graphics else {
-            return Ok(());
-        };
-        // Drawing would take them in without a word.
+        // Measuring the exposure and drawing would take them in without a word.
         if let Some(ms) = graphics.take_times() {
             if let Some(quality) = graphics.counts().timed_quality {
                 self.pace.learn(ms, quality);
             }
             self.frame_times.push(ms);
         }
+        self.expose(&mut view, has_new_maps)?;
+        let Some(graphics) = &mut self.graphics else {
+            return Ok(());
+        };
         if !self.model.maps().is_empty() {
             let quality = self.pace.walking();
             self.warm_up.begin(self.model.scene(), &view, quality);
