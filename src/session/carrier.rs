@@ -75,7 +75,7 @@ impl CausticLayer<'_> {
     }
 
     /// Whether only photons can carry a light.
-    fn is_soft(&self, light: &AimedLight) -> bool {
+    pub(super) fn is_soft(&self, light: &AimedLight) -> bool {
         self.has_places(light) || self.rough_object(light).is_some()
     }
 

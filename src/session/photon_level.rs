@@ -33,6 +33,9 @@ const MAX_WITHOUT_ERROR: u32 = 1 << 20;
 /// Growth from level to level, least and most.
 pub(super) const GROWTH: (f64, f64) = (1.5, 8.0);
 
+/// Photons grow with the square of the error to this power where bundles become finer with their number.
+const POWER_WITH_BUNDLES: f64 = 0.8;
+
 /// Somewhat more photons than the target should need, so that no level is made for little.
 const MARGIN: f64 = 1.1;
 
@@ -94,7 +97,12 @@ impl CausticLayer<'_> {
                 if noise2 <= wanted2 {
                     return None;
                 }
-                (MARGIN * noise2 / wanted2).clamp(GROWTH.0, GROWTH.1)
+                let power = if self.has_bundles(light) {
+                    POWER_WITH_BUNDLES
+                } else {
+                    1.0
+                };
+                (MARGIN * (noise2 / wanted2).powf(power)).clamp(GROWTH.0, GROWTH.1)
             }
             None if before >= MAX_WITHOUT_ERROR => return None,
             None => GROWTH.1,
@@ -114,6 +122,11 @@ impl CausticLayer<'_> {
         (per_measure * launch_measure / HALVES as f64)
             .ceil()
             .clamp(1.0, f64::from(MAX_PHOTONS)) as u32
+    }
+
+    /// Whether its light may stay together.
+    fn has_bundles(&self, light: &AimedLight) -> bool {
+        !self.is_soft(light) && !self.spectra.has(light.light)
     }
 
     fn with_launch<T>(&self, light: &AimedLight, f: impl FnOnce(&PhotonLaunch) -> T) -> T {
@@ -227,6 +240,7 @@ impl CausticLayer<'_> {
                 let pass = PhotonPass {
                     launch,
                     rules,
+                    has_bundles: self.has_bundles(light),
                     chart_for: &chart_for,
                 };
                 pass.run(first..photons, share, &mut halves, &listener)
@@ -288,7 +302,15 @@ impl CausticLayer<'_> {
         let mut maps = first.clone().into_owned();
         maps.add(&second);
         if self.settings.filters() {
-            noise.extend(filter::filter(&mut maps, [&first, &second], unit));
+            noise.extend(filter::filter(
+                &mut maps,
+                [&first, &second],
+                unit,
+                self.spectra.has(light.light),
+            ));
+        }
+        if !self.spectra.has(light.light) {
+            filter::without_negative(&mut maps);
         }
         drop((first, second));
         let mut bands = raw.halves[0].bands().to_vec();

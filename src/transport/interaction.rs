@@ -23,6 +23,13 @@ pub enum Event {
     ThinTransmission,
 }
 
+impl Event {
+    /// Whether light stays on its side of the surface.
+    pub fn is_reflection(self) -> bool {
+        matches!(self, Self::Reflection | Self::TotalInternalReflection)
+    }
+}
+
 /// One way on from a surface.
 #[derive(Clone, Copy, Debug)]
 pub struct Branch {

@@ -36,19 +36,37 @@ pub fn takes(map: &ReceiverMap) -> bool {
 }
 
 /// Filters the sum of two halves, and gives the squared error of each texel that is left [W²/m⁴]. `sum` holds the light of
-/// both.
-pub fn filter(sum: &mut ReceiverMaps, halves: [&ReceiverMaps; 2], unit: FluxUnit) -> Noise {
+/// both; `is_signed`: channels of its light may be negative.
+pub fn filter(sum: &mut ReceiverMaps, halves: [&ReceiverMaps; 2], unit: FluxUnit, is_signed: bool) -> Noise {
     let receivers: Vec<Receiver> = sum.iter().map(|(receiver, _)| receiver).collect();
     let mut noise = Noise::new();
     for receiver in receivers {
         if let Some(map) = sum.get_mut(receiver).filter(|map| takes(map)) {
-            let details = Details::new(map, halves.map(|half| half.get(receiver)), unit);
+            let details = Details::new(map, halves.map(|half| half.get(receiver)), unit, is_signed);
             let kept = details.filtered();
             noise.insert(receiver, details.squares(&kept, map));
             details.put(&kept, map, unit);
         }
     }
     noise
+}
+
+/// Takes negative counts, which the noise of bundles leaves where there is little light, out of all others.
+pub fn without_negative(maps: &mut ReceiverMaps) {
+    let receivers: Vec<Receiver> = maps.iter().map(|(receiver, _)| receiver).collect();
+    for receiver in receivers {
+        let Some(map) = maps.get_mut(receiver) else {
+            continue;
+        };
+        let counts = map.levels()[0].texels();
+        if counts.iter().flatten().any(|count| *count < 0) {
+            let positive: Vec<[f64; 3]> = counts
+                .iter()
+                .map(|texel| texel.map(|count| count.max(0) as f64))
+                .collect();
+            put(map, |texel| positive[texel], false);
+        }
+    }
 }
 
 /// Densities in a cell, in means of the map: luminance of each half as if it were all the light, and the channels.
@@ -62,12 +80,12 @@ struct Details {
     raw: Values<5>,
     /// Luminance [W/m²].
     mean: f64,
-    /// Channels of pure colours are negative in places.
+    /// Channels may be negative, as those of pure colours are.
     is_signed: bool,
 }
 
 impl Details {
-    fn new(map: &ReceiverMap, halves: [Option<&ReceiverMap>; 2], unit: FluxUnit) -> Self {
+    fn new(map: &ReceiverMap, halves: [Option<&ReceiverMap>; 2], unit: FluxUnit, is_signed: bool) -> Self {
         let cells = Cells::new(&map.chart);
         let counts = map.levels()[0].texels();
         let halves = halves.map(|half| half.map(|half| half.levels()[0].texels()));
@@ -91,7 +109,7 @@ impl Details {
             cells,
             raw,
             mean: flux_w / map.chart.area_m2(),
-            is_signed: counts.iter().flatten().any(|count| *count < 0),
+            is_signed,
         }
     }
 

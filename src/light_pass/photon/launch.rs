@@ -169,30 +169,47 @@ impl<'a> PhotonLaunch<'a> {
         even_code(index, seed)
     }
 
+    /// Cells that the domain is divided into, where its light comes from one place.
+    pub(super) fn cell_count(&self) -> usize {
+        match &self.domain {
+            Domain::Cells { cells, .. } => cells.len(),
+            Domain::Spheres { .. } => 0,
+        }
+    }
+
+    /// The photon that starts at a point of a cell; `None` where there are no cells.
+    pub(super) fn start_in(&self, cell: usize, within: DVec2) -> Option<Start> {
+        let Domain::Cells {
+            launch,
+            cells,
+            full_w,
+        } = &self.domain
+        else {
+            return None;
+        };
+        let count = cells.len();
+        let cell = cells.get(cell)?;
+        let side = CELLS_PER_SIDE as f64;
+        let square = (DVec2::new(f64::from(cell.column), f64::from(cell.row)) + within) / side;
+        let ray = launch.ray(usize::from(cell.face), square);
+        let flux_w = match full_w {
+            Some(full_w) => *full_w * launch.emitter().kind.falloff(ray.direction),
+            None => launch.flux_density_w(square, ray.direction) * cell_share(count),
+        };
+        Some(Start {
+            ray,
+            flux_w,
+            media: *launch.media(),
+        })
+    }
+
     /// The photon of an index at a place along the domain's curve; `None` where its place of the lamp sends nothing to
     /// anything specular.
     pub fn start(&self, index: u32, place: u64, seed: u64) -> Option<Start> {
         match &self.domain {
-            Domain::Cells {
-                launch,
-                cells,
-                full_w,
-            } => {
-                let (cell, rest) = chosen(place, cells.len());
-                let cell = cells[cell];
-                let within = in_square(rest);
-                let side = CELLS_PER_SIDE as f64;
-                let square = (DVec2::new(f64::from(cell.column), f64::from(cell.row)) + within) / side;
-                let ray = launch.ray(usize::from(cell.face), square);
-                let flux_w = match full_w {
-                    Some(full_w) => *full_w * launch.emitter().kind.falloff(ray.direction),
-                    None => launch.flux_density_w(square, ray.direction) * cell_share(cells.len()),
-                };
-                Some(Start {
-                    ray,
-                    flux_w,
-                    media: *launch.media(),
-                })
+            Domain::Cells { .. } => {
+                let (cell, rest) = chosen(place, self.cell_count());
+                self.start_in(cell, in_square(rest))
             }
             Domain::Spheres {
                 places,

@@ -1,12 +1,15 @@
 //! Photons: paths sampled from a light, one branch an event, each hit counted into its texel.
 //!
 //! Where patches of a wavefront shatter (cut glass, rough glass, many inner reflections) or would have to be averaged
-//! over a lamp, photons cost what a path costs. Lamp, micro-normals and wavelength are dimensions of the path.
+//! over a lamp, photons cost what a path costs. Lamp, micro-normals and wavelength are dimensions of the path. Bundles carry
+//! what stays together, photons the difference.
 
+mod bundles;
 mod cells;
 pub mod filter;
 pub mod launch;
 pub mod pass;
 pub mod spectrum;
 pub mod spheres;
+mod survey;
 pub mod walk;

@@ -7,15 +7,18 @@ use std::sync::{Arc, OnceLock};
 use glam::DVec2;
 use rayon::prelude::*;
 
-use super::launch::PhotonLaunch;
-use super::walk::{Hit, PhotonRules, PhotonWalk};
+use super::bundles::Bundles;
+use super::launch::{PhotonLaunch, Start};
+use super::survey::Surveyor;
+use super::walk::{Carried, Hit, PhotonRules, PhotonWalk, Place};
 use crate::illumination::accumulator::FluxCount;
 use crate::illumination::{Chart, Receiver};
 use crate::light_pass::caustic::pass::{Listener, PassReport, Stopwatch};
 use crate::light_pass::ledger_sum::{Account, LedgerSum};
 use crate::light_pass::receiver_maps::{ChartFor, ReceiverMaps};
 use crate::light_pass::share::Share;
-use crate::progress::Stage;
+use crate::light_pass::wavefront::coverage::deposit_triangles;
+use crate::progress::{Control, Stage};
 
 /// Photons of a block, about: a short stretch of the domain's curve, so that neighbours meet the same triangles.
 const BLOCK: u32 = 1 << 14;
@@ -32,6 +35,8 @@ pub struct PhotonPass<'a> {
     pub launch: &'a PhotonLaunch<'a>,
     /// What they share; the seed is that of the first half.
     pub rules: PhotonRules<'a>,
+    /// Whether light may stay together.
+    pub has_bundles: bool,
     /// Charts of maps.
     pub chart_for: &'a ChartFor<'a>,
 }
@@ -79,6 +84,13 @@ impl PhotonPass<'_> {
         let objects = self.rules.tracer.scene().objects.len();
         let charts: KnownCharts = Receiver::all(objects).map(|_| OnceLock::new()).collect();
         let mut report = PassReport::default();
+        let watch = Stopwatch::start();
+        let bundles = self.bundles(&charts, indices.len() as f64, listener.control);
+        if share.is_none_or(|share| share.has(0)) {
+            self.deposit_bundles(&bundles, indices.len() as f64, halves, &mut report);
+        }
+        report.segments += bundles.segments;
+        report.trace_s.add(watch.elapsed());
         let mut waiting: Vec<Block> = Vec::new();
         for chunk in blocks.chunks(BLOCKS_AT_ONCE).chain([&[][..]]) {
             let watch = Stopwatch::start();
@@ -87,7 +99,7 @@ impl PhotonPass<'_> {
                     let cancelled = listener.control.is_cancelled();
                     let own = (first..indices.end).step_by(stride as usize);
                     let own = own.filter(|index| *index >= indices.start);
-                    (!cancelled).then(|| self.block(half, own, &charts))
+                    (!cancelled).then(|| self.block(half, own, &bundles, &charts))
                 };
                 chunk.par_iter().filter_map(of).collect()
             };
@@ -111,7 +123,51 @@ impl PhotonPass<'_> {
         report
     }
 
-    fn block(&self, half: usize, indices: impl Iterator<Item = u32>, charts: &KnownCharts) -> Block {
+    /// Bundles for so many photons of each half.
+    fn bundles(&self, charts: &KnownCharts, photons: f64, control: &Control) -> Bundles {
+        if !self.has_bundles {
+            return Bundles::default();
+        }
+        let chart_of = |receiver: Receiver| self.chart(receiver, charts);
+        let surveyor = Surveyor {
+            launch: self.launch,
+            rules: self.rules,
+            chart_of: &chart_of,
+            control,
+        };
+        Bundles::new(&surveyor, photons * HALVES as f64)
+    }
+
+    /// Puts bundles into the maps of both halves, for so many photons each.
+    fn deposit_bundles(
+        &self,
+        bundles: &Bundles,
+        photons: f64,
+        halves: &mut [&mut [ReceiverMaps]],
+        report: &mut PassReport,
+    ) {
+        let count = |flux_w| self.rules.unit.count(flux_w);
+        bundles.deposit(photons, count, |receiver, triangles| {
+            for sets in halves.iter_mut() {
+                sets[0].touch(receiver, self.chart_for);
+                if let Some(map) = sets[0].get_mut(receiver) {
+                    let placed = deposit_triangles(triangles, map).deposited;
+                    report.ledger.book_sum(Account::Deposited, placed);
+                    report
+                        .ledger
+                        .book_sum(Account::Sampling, placed.map(|count| -count));
+                }
+            }
+        });
+    }
+
+    fn block(
+        &self,
+        half: usize,
+        indices: impl Iterator<Item = u32>,
+        bundles: &Bundles,
+        charts: &KnownCharts,
+    ) -> Block {
         let rules = PhotonRules {
             seed: half_seed(self.rules.seed, half),
             ..self.rules
@@ -128,11 +184,25 @@ impl PhotonPass<'_> {
         let mut walk = PhotonWalk::new(rules);
         let mut placed = LedgerSum::default();
         for (place, index) in order {
-            let Some(start) = self.launch.start(index, place, rules.seed) else {
+            let (start, carried) = if bundles.is_empty() {
+                (self.launch.start(index, place, rules.seed), Carried::NOTHING)
+            } else {
+                let begins = bundles.beginning(place);
+                let start = self.launch.start_in(begins.cell, begins.within);
+                let scaled = start.map(|start| Start {
+                    flux_w: start.flux_w * begins.scale,
+                    ..start
+                });
+                (scaled, Carried::at(&begins))
+            };
+            let Some(start) = start else {
                 continue;
             };
-            walk.follow(index, &start, |hit| {
+            walk.follow(index, &start, carried, |hit| {
                 let count = rules.unit.count(hit.flux_w);
+                if let Place::Map(_) = hit.place {
+                    placed.book(Account::Sampling, count.map(|count| -count));
+                }
                 match self.texel(&hit, charts) {
                     Some(texel) => {
                         placed.book(Account::Deposited, count);
@@ -157,11 +227,22 @@ impl PhotonPass<'_> {
     fn texel(&self, hit: &Hit, charts: &KnownCharts) -> Option<u32> {
         let chart = charts[hit.receiver.index()].get_or_init(|| (self.chart_for)(hit.receiver));
         let chart = chart.as_ref()?;
-        let uv = chart.uv(hit.triangle, hit.barycentric);
         let size = DVec2::new(chart.width as f64, chart.height as f64);
-        let place = (uv * size).clamp(DVec2::ZERO, size - 0.5);
+        let place = match hit.place {
+            Place::Surface {
+                triangle,
+                barycentric,
+            } => chart.uv(triangle, barycentric) * size,
+            Place::Map(place) => place,
+        };
+        let place = place.clamp(DVec2::ZERO, size - 0.5);
         let texel = chart.texel_at(place.x as usize, place.y as usize);
         (chart.texel_area_m2(texel) > 0.0).then_some(texel as u32)
+    }
+
+    fn chart(&self, receiver: Receiver, charts: &KnownCharts) -> Option<Arc<Chart>> {
+        let chart = charts[receiver.index()].get_or_init(|| (self.chart_for)(receiver));
+        chart.clone()
     }
 
     fn deposit(&self, blocks: &[Block], halves: &mut [&mut [ReceiverMaps]]) {

@@ -1,5 +1,8 @@
 //! One photon's path: at every surface it goes one way, drawn by the share of light that goes there.
 
+use glam::DVec2;
+
+use super::bundles::{Beginning, Bundle, Step};
 use super::launch::{LAMP_DIMENSION, Start};
 use super::spectrum::{Hue, PhotonSpectrum};
 use crate::geometry::Ray;
@@ -23,14 +26,54 @@ const WAVELENGTH_DIMENSION: u32 = 1 << 16;
 pub struct Hit {
     /// Whose light it becomes.
     pub receiver: Receiver,
-    /// Index into the object's triangles.
-    pub triangle: usize,
-    /// Of the triangle's corners.
-    pub barycentric: [f64; 3],
+    /// Where.
+    pub place: Place,
     /// Incident flux [W per channel of the light] if it were the only photon, before the albedo.
     pub flux_w: LinearSrgb,
     /// Band of its wavelength, where it has one.
     pub band: Option<usize>,
+}
+
+/// Where a photon arrives.
+#[derive(Clone, Copy, Debug)]
+pub enum Place {
+    /// On the surface.
+    Surface {
+        /// Index into the object's triangles.
+        triangle: usize,
+        /// Of the triangle's corners.
+        barycentric: [f64; 3],
+    },
+    /// On the map [texels], where the flux of a bundle is removed.
+    Map(DVec2),
+}
+
+/// Bundles of the triangle that a photon starts in.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Carried<'a> {
+    bundles: &'a [Bundle],
+    /// Where the photon starts in the triangle.
+    barycentric: [f64; 3],
+    /// Factor of their flux.
+    scale: f64,
+}
+
+impl<'a> Carried<'a> {
+    /// None.
+    pub(super) const NOTHING: Self = Self {
+        bundles: &[],
+        barycentric: [0.0; 3],
+        scale: 1.0,
+    };
+
+    /// Those of a beginning.
+    pub(super) fn at(beginning: &Beginning<'a>) -> Self {
+        Self {
+            bundles: beginning.bundles,
+            barycentric: beginning.barycentric,
+            scale: beginning.scale,
+        }
+    }
 }
 
 /// What all photons of a light share.
@@ -66,6 +109,11 @@ struct Photon<'a> {
     flux_w: LinearSrgb,
     index: u32,
     choice: Choice,
+    carried: Carried<'a>,
+    /// Those that it has followed so far, a bit each.
+    followed: u32,
+    /// Probability of having been drawn to go this way.
+    probability: f64,
 }
 
 impl<'a> PhotonWalk<'a> {
@@ -96,7 +144,13 @@ impl<'a> PhotonWalk<'a> {
 
     /// Follows the photon of an index to its end; hits on diffuse surfaces after at least one specular event are handed to
     /// `arrive`. `Deposited` is not booked here but by who places the flux.
-    pub fn follow(&mut self, index: u32, start: &Start, mut arrive: impl FnMut(Hit)) {
+    pub(super) fn follow(
+        &mut self,
+        index: u32,
+        start: &Start,
+        carried: Carried<'a>,
+        mut arrive: impl FnMut(Hit),
+    ) {
         let whole = match self.rules.spectrum {
             Some(spectrum) => spectrum.whole(),
             None => Hue {
@@ -110,6 +164,9 @@ impl<'a> PhotonWalk<'a> {
             flux_w: start.flux_w,
             choice: Choice::new(index, self.rules.seed),
             index,
+            carried,
+            followed: (1 << carried.bundles.len()) - 1,
+            probability: 1.0,
         };
         let (mut ray, mut media) = (start.ray, start.media);
         let brightest_w = start.flux_w.max_channel();
@@ -141,6 +198,7 @@ impl<'a> PhotonWalk<'a> {
     ) -> Option<Branch> {
         self.segments += 1;
         let Some(hit) = photon.hue.tracer.closest_hit(ray) else {
+            photon.leave_all(arrive);
             let account = if depth == 0 {
                 Account::NotEmitted
             } else {
@@ -152,6 +210,7 @@ impl<'a> PhotonWalk<'a> {
         let scene = photon.hue.tracer.scene();
         let material = scene.material_of(hit.object);
         if depth == 0 && !material.surface.is_specular() {
+            photon.leave_all(arrive);
             self.book(Account::NotEmitted, &photon.hue.channels, photon.flux_w);
             return None;
         }
@@ -168,6 +227,9 @@ impl<'a> PhotonWalk<'a> {
         let tracer = photon.hue.tracer;
         let meeting = tracer.meet(effects, &hit, ray.direction, media, micro);
         let deposit_w = photon.flux_w * meeting.deposit;
+        if photon.followed != 0 {
+            photon.part_at(depth as usize, hit.object, &meeting, arrive);
+        }
         if depth == 0 {
             // What a surface takes on the first hit is direct light.
             self.book(Account::NotEmitted, &sent_hue.channels, deposit_w);
@@ -175,8 +237,10 @@ impl<'a> PhotonWalk<'a> {
         } else if deposit_w.max_channel() > 0.0 {
             arrive(Hit {
                 receiver: Receiver::new(hit.object, Side::met(ray.direction, hit.geometric_normal)),
-                triangle: hit.triangle,
-                barycentric: hit.barycentric,
+                place: Place::Surface {
+                    triangle: hit.triangle,
+                    barycentric: hit.barycentric,
+                },
                 flux_w: self.apply(&photon.hue.channels, deposit_w),
                 band: photon.hue.band,
             });
@@ -192,7 +256,7 @@ impl<'a> PhotonWalk<'a> {
             &photon.hue.channels,
             photon.flux_w * meeting.switched_off,
         );
-        self.choose(photon, &meeting)
+        self.choose(photon, depth as usize, &meeting)
     }
 
     /// Gives a photon that has all wavelengths one of them.
@@ -209,7 +273,7 @@ impl<'a> PhotonWalk<'a> {
     }
 
     /// Draws the way on by the flux that goes there.
-    fn choose(&mut self, photon: &mut Photon<'a>, meeting: &Meeting) -> Option<Branch> {
+    fn choose(&mut self, photon: &mut Photon<'a>, depth: usize, meeting: &Meeting) -> Option<Branch> {
         let carried = |share: Option<LinearSrgb>| {
             let flux_w = share.map_or(LinearSrgb::BLACK, |share| photon.flux_w * share);
             (flux_w, flux_w.to_array().iter().sum::<f64>())
@@ -221,11 +285,16 @@ impl<'a> PhotonWalk<'a> {
             return None;
         }
         let share = reflected / both;
-        let (branch, flux_w) = if share >= 1.0 || (share > 0.0 && photon.choice.falls_below(share)) {
-            (meeting.reflection()?, reflected_w * share.recip())
+        let is_reflected = share >= 1.0 || (share > 0.0 && photon.choice.falls_below(share));
+        let probability = if is_reflected { share } else { 1.0 - share };
+        let (branch, flux_w) = if is_reflected {
+            (meeting.reflection()?, reflected_w * probability.recip())
         } else {
-            (meeting.transmission()?, transmitted_w * (1.0 - share).recip())
+            (meeting.transmission()?, transmitted_w * probability.recip())
         };
+        if photon.followed != 0 {
+            photon.is_drawn(depth, is_reflected, probability);
+        }
         if !(flux_w.is_finite() && branch.ray.direction.is_finite() && branch.ray.origin.is_finite()) {
             let lost_w = (reflected_w + transmitted_w).map(|w| if w.is_finite() { w } else { 0.0 });
             self.book(Account::NonFinite, &photon.hue.channels, lost_w);
@@ -247,6 +316,7 @@ impl<'a> PhotonWalk<'a> {
             return true;
         }
         let survives = photon.choice.falls_below(probability);
+        photon.probability *= probability;
         let (before_w, channels) = (photon.flux_w, photon.hue.channels);
         photon.flux_w = if survives {
             before_w * probability.recip()
@@ -255,6 +325,65 @@ impl<'a> PhotonWalk<'a> {
         };
         self.book(Account::Sampling, &channels, before_w - photon.flux_w);
         survives
+    }
+}
+
+impl Photon<'_> {
+    /// Parts from all bundles that it has followed.
+    #[inline]
+    fn leave_all(&mut self, arrive: &mut impl FnMut(Hit)) {
+        if self.followed != 0 {
+            self.leave_where(|_| true, arrive);
+        }
+    }
+
+    /// Parts from some of the bundles that it has followed: their flux is removed where they say that it arrives.
+    fn leave_where(&mut self, is_left: impl Fn(&Bundle) -> bool, arrive: &mut impl FnMut(Hit)) {
+        let Carried {
+            bundles,
+            barycentric,
+            scale,
+        } = self.carried;
+        for (number, bundle) in bundles.iter().enumerate() {
+            let bit = 1 << number;
+            if self.followed & bit != 0 && is_left(bundle) {
+                self.followed &= !bit;
+                arrive(Hit {
+                    receiver: bundle.receiver,
+                    place: Place::Map(bundle.place(barycentric)),
+                    flux_w: bundle.flux_w() * (-scale / self.probability),
+                    band: None,
+                });
+            }
+        }
+    }
+
+    /// Parts from the bundles that end at a surface, have not met it, or go on from it where no light goes.
+    fn part_at(&mut self, depth: usize, object: usize, meeting: &Meeting, arrive: &mut impl FnMut(Hit)) {
+        let flux_w = self.flux_w;
+        let goes =
+            |share: Option<LinearSrgb>| share.is_some_and(|share| (flux_w * share).max_channel() > 0.0);
+        let (is_reflected, is_transmitted) = (goes(meeting.reflected), goes(meeting.transmitted));
+        let follows = |step: &Step| {
+            let goes_on = if step.is_reflected {
+                is_reflected
+            } else {
+                is_transmitted
+            };
+            step.object as usize == object && goes_on
+        };
+        self.leave_where(|bundle| !bundle.steps.get(depth).is_some_and(follows), arrive);
+    }
+
+    /// Was drawn to go one of two ways: bundles that go the other one are left to other photons.
+    fn is_drawn(&mut self, depth: usize, is_reflected: bool, probability: f64) {
+        for (number, bundle) in self.carried.bundles.iter().enumerate() {
+            let step = bundle.steps.get(depth);
+            if step.is_none_or(|step| step.is_reflected != is_reflected) {
+                self.followed &= !(1 << number);
+            }
+        }
+        self.probability *= probability;
     }
 }
 

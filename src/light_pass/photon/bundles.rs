@@ -1,0 +1,240 @@
+//! Bundles of light that stay together, as a control variate for photons.
+//!
+//! The launch domain is divided into triangles. Where the light of all three corners takes the same way, the triangle has a
+//! *bundle*: flux spread evenly between the three places where that light arrives. Bundles are deposited as they are. A
+//! photon that starts in the triangle removes the bundle's flux where the bundle says that the photon arrives, and leaves
+//! its own flux where it does arrive. The mean of what photons deposit is therefore the difference between the light and its
+//! bundles, whatever is wrong with them: edges that they run across, surfaces that they missed, curvature within them. Only
+//! that difference is noisy (control variates: Hammersley and Handscomb, "Monte Carlo Methods", 1964, section 5.5).
+//!
+//! A photon's way is drawn at random, so it removes a bundle's flux divided by the probability of having followed it: when
+//! both arrive, or where the scene itself parts them. Where a draw parts them, photons with the other outcome remove it.
+//!
+//! More photons start where more is left to them.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use glam::{DVec2, Vec2};
+use rayon::prelude::*;
+
+use super::survey::{LEAST_PHOTONS, Surveyor};
+use crate::geometry::sampling::in_square;
+use crate::illumination::Receiver;
+use crate::illumination::accumulator::FluxCount;
+use crate::light_pass::wavefront::coverage::FluxTriangle;
+use crate::optics::LinearSrgb;
+
+/// Bundles are as fine as so many photons ask for, at most.
+const MOST_PHOTONS: f64 = 8e6;
+
+/// Bundles of a light, about: 60 bytes each.
+const MOST_BUNDLES: usize = 1 << 21;
+
+/// Squares whose bundles are deposited at once.
+const SQUARES_AT_ONCE: usize = 1 << 13;
+
+/// A specular surface of a bundle's way.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Step {
+    pub(super) object: u32,
+    pub(super) is_reflected: bool,
+}
+
+/// Light of a triangle that takes one way.
+#[derive(Clone, Debug)]
+pub(super) struct Bundle {
+    pub(super) steps: Arc<[Step]>,
+    /// Where it arrives.
+    pub(super) receiver: Receiver,
+    /// Where the light of the triangle's corners arrives [texels].
+    pub(super) corners: [Vec2; 3],
+    /// Mean flux of a photon of the triangle [W per channel if it were the only photon].
+    pub(super) flux_w: [f32; 3],
+}
+
+impl Bundle {
+    /// Flux of a photon [W per channel if it were the only one].
+    pub(super) fn flux_w(&self) -> LinearSrgb {
+        LinearSrgb::from(self.flux_w.map(f64::from))
+    }
+
+    /// Where the light of a point of the triangle arrives [texels].
+    pub(super) fn place(&self, barycentric: [f64; 3]) -> DVec2 {
+        let [a, b, c] = self.corners.map(|corner| corner.as_dvec2());
+        a * barycentric[0] + b * barycentric[1] + c * barycentric[2]
+    }
+}
+
+/// The bundles of a light.
+#[derive(Debug, Default)]
+pub(super) struct Bundles {
+    /// Along the domain's curve.
+    squares: Vec<Square>,
+    /// Where each square's part of all photons ends, [0, 2⁶⁴).
+    ends: Vec<u64>,
+    /// Closest-hit queries that they took.
+    pub(super) segments: u64,
+}
+
+/// A square of the launch domain.
+#[derive(Debug)]
+pub(super) struct Square {
+    /// Cell of the item buffer.
+    pub(super) cell: usize,
+    /// Where it begins on the cell's curve.
+    pub(super) begin: u64,
+    /// How often the cell was divided.
+    pub(super) divisions: u32,
+    /// Bundles of its four triangles around the middle: above, right, below, left.
+    pub(super) bundles: Vec<Bundle>,
+    /// Where those of each triangle end.
+    pub(super) ends: [u8; 4],
+    /// Density of photons that suits it, in any unit.
+    pub(super) density: f64,
+    /// Mean density over its own.
+    pub(super) scale: f64,
+}
+
+impl Square {
+    /// Its part of the cell.
+    fn share(&self) -> f64 {
+        0.25_f64.powi(self.divisions as i32)
+    }
+
+    fn of_triangle(&self, triangle: usize) -> &[Bundle] {
+        let begin = triangle.checked_sub(1).map_or(0, |before| self.ends[before]);
+        &self.bundles[usize::from(begin)..usize::from(self.ends[triangle])]
+    }
+}
+
+/// Where a photon starts.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Beginning<'a> {
+    /// Cell of the item buffer.
+    pub(super) cell: usize,
+    /// In the cell.
+    pub(super) within: DVec2,
+    /// Factor of its flux and of its bundles'.
+    pub(super) scale: f64,
+    /// Those of its triangle.
+    pub(super) bundles: &'a [Bundle],
+    /// In the triangle.
+    pub(super) barycentric: [f64; 3],
+}
+
+impl Bundles {
+    /// As fine as suits so many photons; none where they are too few.
+    pub(super) fn new(surveyor: &Surveyor, photons: f64) -> Self {
+        let cells = surveyor.launch.cell_count();
+        let photons = photons.min(MOST_PHOTONS) / cells as f64;
+        if cells == 0 || photons < LEAST_PHOTONS {
+            return Self::default();
+        }
+        let surveyed: Vec<(Vec<Square>, u64)> = (0..cells)
+            .into_par_iter()
+            .map(|cell| surveyor.squares(cell, photons, MOST_BUNDLES / cells))
+            .collect();
+        let segments = surveyed.iter().map(|(_, segments)| segments).sum();
+        let mut squares: Vec<Square> = surveyed.into_iter().flat_map(|(squares, _)| squares).collect();
+        let all: f64 = squares.iter().map(|square| square.share() * square.density).sum();
+        let mut so_far = 0.0;
+        let ends = squares.iter_mut().map(|square| {
+            square.scale = all / (cells as f64 * square.density);
+            so_far += square.share() * square.density;
+            (so_far / all * 64_f64.exp2()) as u64
+        });
+        Self {
+            ends: ends.collect(),
+            squares,
+            segments,
+        }
+    }
+
+    /// Whether there are none.
+    pub(super) fn is_empty(&self) -> bool {
+        self.squares.is_empty()
+    }
+
+    /// Where the photon of a place along the domain's curve starts, once the curve is stretched by density.
+    pub(super) fn beginning(&self, place: u64) -> Beginning<'_> {
+        let number = self.ends.partition_point(|end| *end <= place);
+        let number = number.min(self.squares.len() - 1);
+        let begin = number.checked_sub(1).map_or(0, |before| self.ends[before]);
+        let length = (self.ends[number] - begin).max(1);
+        let along = (place - begin).min(length - 1);
+        let along = ((u128::from(along) << 64) / u128::from(length)) as u64;
+        let square = &self.squares[number];
+        let (triangle, barycentric) = triangle_at(in_square(along));
+        Beginning {
+            cell: square.cell,
+            within: in_square(square.begin | along >> (2 * square.divisions)),
+            scale: square.scale,
+            bundles: square.of_triangle(triangle),
+            barycentric,
+        }
+    }
+
+    /// Hands out all flux for so many photons, each time some of one receiver's; `count`: of a flux [W per channel].
+    pub(super) fn deposit(
+        &self,
+        photons: f64,
+        count: impl Fn(LinearSrgb) -> FluxCount,
+        mut take: impl FnMut(Receiver, &[FluxTriangle]),
+    ) {
+        let cells = self.squares.last().map_or(0, |last| last.cell + 1) as f64;
+        for squares in self.squares.chunks(SQUARES_AT_ONCE) {
+            let mut by_receiver: BTreeMap<Receiver, Vec<FluxTriangle>> = BTreeMap::new();
+            for square in squares {
+                let photons = 0.25 * square.share() * photons / cells;
+                for bundle in &square.bundles {
+                    by_receiver
+                        .entry(bundle.receiver)
+                        .or_default()
+                        .push(FluxTriangle {
+                            corners: bundle.corners.map(|corner| corner.as_dvec2()),
+                            flux: count(bundle.flux_w() * photons),
+                            island: 0,
+                        });
+                }
+            }
+            for (receiver, triangles) in &by_receiver {
+                take(*receiver, triangles);
+            }
+        }
+    }
+}
+
+/// The triangle of a square that a point lies in, and where in it: the middle comes first.
+fn triangle_at(within: DVec2) -> (usize, [f64; 3]) {
+    let [x, y] = (within * 2.0 - 1.0).to_array();
+    let (triangle, outwards, along) = if y <= -x.abs() {
+        (0, -y, x)
+    } else if x >= y.abs() {
+        (1, x, y)
+    } else if y >= x.abs() {
+        (2, y, x)
+    } else {
+        (3, -x, y)
+    };
+    let second = 0.5 * (outwards + along);
+    (triangle, [1.0 - outwards, outwards - second, second])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn triangles_cover_a_square() {
+        const CORNERS: [[f64; 2]; 4] = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]];
+        for number in 0..1000_u64 {
+            let point = in_square(number.wrapping_mul(0x9e37_79b9_7f4a_7c15));
+            let (triangle, [middle, first, second]) = triangle_at(point);
+            let [a, b] = super::super::survey::TRIANGLES[triangle].map(|corner| DVec2::from(CORNERS[corner]));
+            assert!([middle, first, second].iter().all(|part| *part >= 0.0), "{point}");
+            let again = DVec2::splat(0.5) * middle + a * first + b * second;
+            assert!((again - point).length() < 1e-12, "{point}: {again}");
+        }
+    }
+}
