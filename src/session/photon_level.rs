@@ -45,18 +45,22 @@ const LEAST_NOISE: f64 = 0.7;
 /// The mean flux of all photons may be so many times that of the first ones.
 const MEAN_MARGIN: f64 = 4.0;
 
-/// Part of the time left that a level may be expected to take.
+/// Part of the time left that a level may be expected to take by the one before.
 const PART_OF_TIME: f64 = 0.85;
+
+/// The same where bundles come to it.
+const PART_OF_TIME_WITH_BUNDLES: f64 = 0.5;
 
 /// Fewer photons than so many times those before are not worth a level.
 const LEAST_GROWTH: f64 = 1.2;
 
-/// Photons of a level after one with fewer, or as many as there is time for: a level that is cut off leaves nothing.
-fn in_time(photons: u32, before: u32, state: &LightState, course: &Course) -> u32 {
+/// Photons of a level after one with fewer, or as many as there is part of the time for: a level that is cut off leaves
+/// nothing.
+fn in_time(photons: u32, before: u32, part: f64, state: &LightState, course: &Course) -> u32 {
     let (1.., Some(left_s), Some(photon_s)) = (before, course.control.time_left_s(), state.photon_s) else {
         return photons;
     };
-    let own_s = PART_OF_TIME * left_s / course.open_lights as f64;
+    let own_s = part * left_s / course.open_lights as f64;
     let affordable = f64::from(before) + own_s / photon_s;
     let least = LEAST_GROWTH * f64::from(before);
     (affordable.max(least) as u32).min(photons)
@@ -186,7 +190,12 @@ impl CausticLayer<'_> {
             return Ok(None);
         };
         let before = last.as_ref().and_then(|last| last.key.photons).unwrap_or(0);
-        let photons = in_time(photons, before, state, course);
+        let part = if self.has_bundles(light) {
+            PART_OF_TIME_WITH_BUNDLES
+        } else {
+            PART_OF_TIME
+        };
+        let photons = in_time(photons, before, part, state, course);
         let key = LevelKey {
             photons: Some(photons),
             ..self.key(light, 0, &Climb::default(), sizes)

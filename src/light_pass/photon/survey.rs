@@ -24,9 +24,15 @@ const MOST_STEPS: usize = 12;
 /// Ways of a point; further ones are left to photons.
 const MOST_WAYS: usize = 16;
 
-/// A square is divided while so many of its photons would follow no bundle. Four triangles of a quarter take some 60 segments,
-/// a photon 5 to 10.
-pub(super) const LEAST_PHOTONS: f64 = 6.0;
+/// Cells are looked at where so many photons start in them.
+pub(super) const LEAST_PHOTONS: f64 = 24.0;
+
+/// A square is divided where those of its photons that follow no bundle take this part of the segments that its division
+/// takes.
+const WORTH: f64 = 0.25;
+
+/// Points whose light a division follows.
+const POINTS_OF_DIVISION: f64 = 8.0;
 
 /// Divisions of a cell, at most.
 const MOST_DIVISIONS: u32 = 10;
@@ -62,6 +68,8 @@ struct Light {
     lost_w: f64,
     /// Mean segments of a photon.
     segments: f64,
+    /// Segments that were followed.
+    followed: u64,
 }
 
 /// Light of a point at the end of one way.
@@ -107,6 +115,8 @@ struct Outcome {
     lost: f64,
     /// Mean segments of a photon.
     segments: f64,
+    /// Mean segments that the light of a point takes.
+    followed: f64,
 }
 
 /// Squares of a cell so far.
@@ -143,7 +153,8 @@ impl Surveyor<'_> {
 
     fn divide(&self, square: Candidate, survey: &mut Survey) {
         let (bundles, ends, outcome) = square.bundles();
-        let is_fine = outcome.left * square.photons < LEAST_PHOTONS
+        let by_photons = outcome.left * square.photons * outcome.segments;
+        let is_fine = by_photons < WORTH * POINTS_OF_DIVISION * outcome.followed
             || square.divisions == MOST_DIVISIONS
             || survey.bundles_left == 0;
         if is_fine || self.control.is_cancelled() {
@@ -193,7 +204,7 @@ impl Surveyor<'_> {
     }
 
     /// The light of a point of a cell, on all its ways.
-    fn light(&self, cell: usize, within: DVec2, segments: &mut u64) -> Light {
+    fn light(&self, cell: usize, within: DVec2, followed: &mut u64) -> Light {
         let mut light = Light::default();
         let Some(start) = self.launch.start_in(cell, within) else {
             return light;
@@ -210,13 +221,14 @@ impl Surveyor<'_> {
             steps: Vec::new(),
         }];
         while let Some(from) = waiting.pop() {
-            *segments += 1;
+            light.followed += 1;
             light.segments += from.flux_w.max_channel() / light.start_w;
             if let Some(hit) = self.rules.tracer.closest_hit(&from.ray) {
                 self.meet(from, &hit, &mut light, &mut waiting);
             }
         }
         light.segments += LOST_SEGMENTS * light.lost_w / light.start_w;
+        *followed += light.followed;
         light
     }
 
@@ -340,6 +352,7 @@ impl Candidate {
             left: part(arriving_w - carried_w),
             lost: part(mean(&|light| light.lost_w)),
             segments: mean(&|light| light.segments).max(1.0),
+            followed: mean(&|light| light.followed as f64),
         }
     }
 

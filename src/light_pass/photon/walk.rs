@@ -293,7 +293,7 @@ impl<'a> PhotonWalk<'a> {
             (meeting.transmission()?, transmitted_w * probability.recip())
         };
         if photon.followed != 0 {
-            photon.is_drawn(depth, is_reflected, probability);
+            photon.follow_only(depth, is_reflected, probability);
         }
         if !(flux_w.is_finite() && branch.ray.direction.is_finite() && branch.ray.origin.is_finite()) {
             let lost_w = (reflected_w + transmitted_w).map(|w| if w.is_finite() { w } else { 0.0 });
@@ -375,8 +375,8 @@ impl Photon<'_> {
         self.leave_where(|bundle| !bundle.steps.get(depth).is_some_and(follows), arrive);
     }
 
-    /// Was drawn to go one of two ways: bundles that go the other one are left to other photons.
-    fn is_drawn(&mut self, depth: usize, is_reflected: bool, probability: f64) {
+    /// Was drawn to go one of two ways: bundles that go the other one are left to photons that do.
+    fn follow_only(&mut self, depth: usize, is_reflected: bool, probability: f64) {
         for (number, bundle) in self.carried.bundles.iter().enumerate() {
             let step = bundle.steps.get(depth);
             if step.is_none_or(|step| step.is_reflected != is_reflected) {
