@@ -73,8 +73,6 @@ pub(super) struct Bundles {
     squares: Vec<Square>,
     /// Where each square's part of all photons ends, [0, 2⁶⁴).
     ends: Vec<u64>,
-    /// Closest-hit queries that they took.
-    pub(super) segments: u64,
 }
 
 /// A square of the launch domain.
@@ -131,12 +129,11 @@ impl Bundles {
         if cells == 0 || photons < LEAST_PHOTONS {
             return Self::default();
         }
-        let surveyed: Vec<(Vec<Square>, u64)> = (0..cells)
+        let surveyed: Vec<Vec<Square>> = (0..cells)
             .into_par_iter()
             .map(|cell| surveyor.squares(cell, photons, MOST_BUNDLES / cells))
             .collect();
-        let segments = surveyed.iter().map(|(_, segments)| segments).sum();
-        let mut squares: Vec<Square> = surveyed.into_iter().flat_map(|(squares, _)| squares).collect();
+        let mut squares: Vec<Square> = surveyed.into_iter().flatten().collect();
         let all: f64 = squares.iter().map(|square| square.share() * square.density).sum();
         let mut so_far = 0.0;
         let ends = squares.iter_mut().map(|square| {
@@ -147,7 +144,6 @@ impl Bundles {
         Self {
             ends: ends.collect(),
             squares,
-            segments,
         }
     }
 

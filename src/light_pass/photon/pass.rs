@@ -89,7 +89,6 @@ impl PhotonPass<'_> {
         if share.is_none_or(|share| share.has(0)) {
             self.deposit_bundles(&bundles, indices.len() as f64, halves, &mut report);
         }
-        report.segments += bundles.segments;
         report.trace_s.add(watch.elapsed());
         let mut waiting: Vec<Block> = Vec::new();
         for chunk in blocks.chunks(BLOCKS_AT_ONCE).chain([&[][..]]) {

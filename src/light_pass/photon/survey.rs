@@ -123,20 +123,18 @@ struct Outcome {
 #[derive(Default)]
 struct Survey {
     squares: Vec<Square>,
-    segments: u64,
     /// Bundles that it may still have.
     bundles_left: usize,
 }
 
 impl Surveyor<'_> {
-    /// A cell in squares along its curve, and the segments that they took, for so many photons; no finer where it has
-    /// `most_bundles`.
-    pub(super) fn squares(&self, cell: usize, photons: f64, most_bundles: usize) -> (Vec<Square>, u64) {
+    /// A cell in squares along its curve, for so many photons; no finer where it has `most_bundles`.
+    pub(super) fn squares(&self, cell: usize, photons: f64, most_bundles: usize) -> Vec<Square> {
         let mut survey = Survey {
             bundles_left: most_bundles,
             ..Survey::default()
         };
-        let mut light = |x: f64, y: f64| Arc::new(self.light(cell, DVec2::new(x, y), &mut survey.segments));
+        let light = |x: f64, y: f64| Arc::new(self.light(cell, DVec2::new(x, y)));
         let whole = Candidate {
             cell,
             begin: 0,
@@ -148,7 +146,7 @@ impl Surveyor<'_> {
             divisions: 0,
         };
         self.divide(whole, &mut survey);
-        (survey.squares, survey.segments)
+        survey.squares
     }
 
     fn divide(&self, square: Candidate, survey: &mut Survey) {
@@ -173,9 +171,9 @@ impl Surveyor<'_> {
             return;
         }
         let half = 0.5 * square.side;
-        let mut light = |x: f64, y: f64| {
+        let light = |x: f64, y: f64| {
             let within = square.low + DVec2::new(x, y) * half;
-            Arc::new(self.light(square.cell, within, &mut survey.segments))
+            Arc::new(self.light(square.cell, within))
         };
         let sides = [light(1.0, 0.0), light(0.0, 1.0), light(2.0, 1.0), light(1.0, 2.0)];
         let middles = [light(0.5, 0.5), light(1.5, 0.5), light(0.5, 1.5), light(1.5, 1.5)];
@@ -204,7 +202,7 @@ impl Surveyor<'_> {
     }
 
     /// The light of a point of a cell, on all its ways.
-    fn light(&self, cell: usize, within: DVec2, followed: &mut u64) -> Light {
+    fn light(&self, cell: usize, within: DVec2) -> Light {
         let mut light = Light::default();
         let Some(start) = self.launch.start_in(cell, within) else {
             return light;
@@ -228,7 +226,6 @@ impl Surveyor<'_> {
             }
         }
         light.segments += LOST_SEGMENTS * light.lost_w / light.start_w;
-        *followed += light.followed;
         light
     }
 
