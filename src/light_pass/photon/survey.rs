@@ -152,7 +152,7 @@ impl Surveyor<'_> {
     fn divide(&self, square: Candidate, survey: &mut Survey) {
         let (bundles, ends, outcome) = square.bundles();
         let by_photons = outcome.left * square.photons * outcome.segments;
-        let is_fine = by_photons < WORTH * POINTS_OF_DIVISION * outcome.followed
+        let is_fine = by_photons <= WORTH * POINTS_OF_DIVISION * outcome.followed
             || square.divisions == MOST_DIVISIONS
             || survey.bundles_left == 0;
         if is_fine || self.control.is_cancelled() {
@@ -237,7 +237,7 @@ impl Surveyor<'_> {
             return;
         }
         if effects.lobes && material.is_rough() {
-            light.lost_w += from.flux_w.max_channel();
+            light.lose(from.flux_w);
             return;
         }
         let mut flux_w = from.flux_w;
@@ -258,7 +258,7 @@ impl Surveyor<'_> {
                     place,
                     flux_w: taken_w,
                 }),
-                _ => light.lost_w += taken_w.max_channel(),
+                _ => light.lose(taken_w),
             }
         }
         let key = from
@@ -270,7 +270,7 @@ impl Surveyor<'_> {
                 && waiting.len() < MOST_WAYS
                 && flux_w.is_finite();
             if !is_followed || flux_w.max_channel() < least_w {
-                light.lost_w += flux_w.max_channel();
+                light.lose(flux_w);
                 return;
             }
             let mut steps = Vec::with_capacity(from.steps.len() + 1);
@@ -365,6 +365,13 @@ impl Candidate {
 }
 
 impl Light {
+    /// Leaves light to photons; what is no number is theirs to book.
+    fn lose(&mut self, flux_w: LinearSrgb) {
+        if flux_w.is_finite() {
+            self.lost_w += flux_w.max_channel();
+        }
+    }
+
     fn find(&self, key: PathSignature) -> Option<&Arrival> {
         self.arrivals.iter().find(|arrival| arrival.key == key)
     }
