@@ -137,6 +137,15 @@ impl ReceiverMaps {
         Receiver::all(self.slots.len() / 2).filter_map(|receiver| Some((receiver, self.get(receiver)?)))
     }
 
+    /// All maps, to be changed.
+    pub fn iter_mut(&mut self) -> impl Iterator<Item = (Receiver, &mut ReceiverMap)> {
+        let maps = self.receivers().zip(&mut self.slots);
+        maps.filter_map(|(receiver, slot)| match slot {
+            Slot::Allocated(map) => Some((receiver, &mut **map)),
+            Slot::Untouched | Slot::Refused => None,
+        })
+    }
+
     /// The map of a receiver, to be added to.
     pub fn get_mut(&mut self, receiver: Receiver) -> Option<&mut ReceiverMap> {
         match &mut self.slots[receiver.index()] {

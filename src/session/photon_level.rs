@@ -308,17 +308,13 @@ impl CausticLayer<'_> {
             };
             accuracy::half_set_noise(&as_they_are(&first), &as_they_are(&second))
         };
+        let is_signed = self.spectra.has(light.light);
         let mut maps = first.clone().into_owned();
         maps.add(&second);
         if self.settings.filters() {
-            noise.extend(filter::filter(
-                &mut maps,
-                [&first, &second],
-                unit,
-                self.spectra.has(light.light),
-            ));
+            noise.extend(filter::filter(&mut maps, [&first, &second], unit, is_signed));
         }
-        if !self.spectra.has(light.light) {
+        if !is_signed {
             filter::without_negative(&mut maps);
         }
         drop((first, second));

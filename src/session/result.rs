@@ -37,7 +37,7 @@ pub struct BakeCounts {
     pub item_buffer_rays: u64,
     /// Nodes, triangles and cells tested to build item buffers.
     pub item_buffer_tests: u64,
-    /// Closest-hit queries along light paths.
+    /// Closest-hit queries along light paths, without those that look for bundles.
     pub segments: u64,
     /// Any-hit queries of the direct layer.
     pub shadow_rays: u64,

@@ -90,8 +90,6 @@ pub(super) struct Square {
     pub(super) ends: [u8; 4],
     /// Density of photons that suits it, in any unit.
     pub(super) density: f64,
-    /// Mean density over its own.
-    pub(super) scale: f64,
 }
 
 impl Square {
@@ -106,19 +104,14 @@ impl Square {
     }
 }
 
-/// Where a photon starts.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Beginning<'a> {
-    /// Cell of the item buffer.
-    pub(super) cell: usize,
-    /// In the cell.
-    pub(super) within: DVec2,
-    /// Factor of its flux and of its bundles'.
-    pub(super) scale: f64,
-    /// Those of its triangle.
+/// Bundles of the triangle that a photon starts in.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Carried<'a> {
     pub(super) bundles: &'a [Bundle],
-    /// In the triangle.
+    /// Where the photon starts in the triangle.
     pub(super) barycentric: [f64; 3],
+    /// Factor of its flux and of theirs: the mean density of photons over that of its square.
+    pub(super) scale: f64,
 }
 
 impl Bundles {
@@ -133,11 +126,10 @@ impl Bundles {
             .into_par_iter()
             .map(|cell| surveyor.squares(cell, photons, MOST_BUNDLES / cells))
             .collect();
-        let mut squares: Vec<Square> = surveyed.into_iter().flatten().collect();
+        let squares: Vec<Square> = surveyed.into_iter().flatten().collect();
         let all: f64 = squares.iter().map(|square| square.share() * square.density).sum();
         let mut so_far = 0.0;
-        let ends = squares.iter_mut().map(|square| {
-            square.scale = all / (cells as f64 * square.density);
+        let ends = squares.iter().map(|square| {
             so_far += square.share() * square.density;
             (so_far / all * 64_f64.exp2()) as u64
         });
@@ -147,28 +139,29 @@ impl Bundles {
         }
     }
 
-    /// Whether there are none.
-    pub(super) fn is_empty(&self) -> bool {
-        self.squares.is_empty()
+    /// Cells of the domain.
+    fn cells(&self) -> f64 {
+        self.squares.last().map_or(0, |last| last.cell + 1) as f64
     }
 
-    /// Where the photon of a place along the domain's curve starts, once the curve is stretched by density.
-    pub(super) fn beginning(&self, place: u64) -> Beginning<'_> {
-        let number = self.ends.partition_point(|end| *end <= place);
-        let number = number.min(self.squares.len() - 1);
+    /// Cell, place in it and bundles of the photon of a place along the domain's curve, once that is stretched by density;
+    /// `None` where there are no squares.
+    pub(super) fn beginning(&self, place: u64) -> Option<(usize, DVec2, Carried<'_>)> {
+        let last = self.squares.len().checked_sub(1)?;
+        let number = self.ends.partition_point(|end| *end <= place).min(last);
         let begin = number.checked_sub(1).map_or(0, |before| self.ends[before]);
         let length = (self.ends[number] - begin).max(1);
         let along = (place - begin).min(length - 1);
         let along = ((u128::from(along) << 64) / u128::from(length)) as u64;
         let square = &self.squares[number];
+        let within = in_square(square.begin | along >> (2 * square.divisions));
         let (triangle, barycentric) = triangle_at(in_square(along));
-        Beginning {
-            cell: square.cell,
-            within: in_square(square.begin | along >> (2 * square.divisions)),
-            scale: square.scale,
+        let carried = Carried {
             bundles: square.of_triangle(triangle),
             barycentric,
-        }
+            scale: square.share() / self.cells() * 64_f64.exp2() / length as f64,
+        };
+        Some((square.cell, within, carried))
     }
 
     /// Hands out all flux for so many photons, each time some of one receiver's; `count`: of a flux [W per channel].
@@ -178,11 +171,10 @@ impl Bundles {
         count: impl Fn(LinearSrgb) -> FluxCount,
         mut take: impl FnMut(Receiver, &[FluxTriangle]),
     ) {
-        let cells = self.squares.last().map_or(0, |last| last.cell + 1) as f64;
         for squares in self.squares.chunks(SQUARES_AT_ONCE) {
             let mut by_receiver: BTreeMap<Receiver, Vec<FluxTriangle>> = BTreeMap::new();
             for square in squares {
-                let photons = 0.25 * square.share() * photons / cells;
+                let photons = 0.25 * square.share() * photons / self.cells();
                 for bundle in &square.bundles {
                     by_receiver
                         .entry(bundle.receiver)

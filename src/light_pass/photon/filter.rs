@@ -9,7 +9,6 @@
 use rayon::prelude::*;
 
 use super::cells::{Cells, Values};
-use crate::illumination::Receiver;
 use crate::illumination::accumulator::{FluxCount, FluxUnit};
 use crate::light_pass::accuracy::Noise;
 use crate::light_pass::receiver_maps::{ReceiverMap, ReceiverMaps};
@@ -38,26 +37,19 @@ pub fn takes(map: &ReceiverMap) -> bool {
 /// Filters the sum of two halves, and gives the squared error of each texel that is left [W²/m⁴]. `sum` holds the light of
 /// both; `is_signed`: channels of its light may be negative.
 pub fn filter(sum: &mut ReceiverMaps, halves: [&ReceiverMaps; 2], unit: FluxUnit, is_signed: bool) -> Noise {
-    let receivers: Vec<Receiver> = sum.iter().map(|(receiver, _)| receiver).collect();
     let mut noise = Noise::new();
-    for receiver in receivers {
-        if let Some(map) = sum.get_mut(receiver).filter(|map| takes(map)) {
-            let details = Details::new(map, halves.map(|half| half.get(receiver)), unit, is_signed);
-            let kept = details.filtered();
-            noise.insert(receiver, details.squares(&kept, map));
-            details.put(&kept, map, unit);
-        }
+    for (receiver, map) in sum.iter_mut().filter(|(_, map)| takes(map)) {
+        let details = Details::new(map, halves.map(|half| half.get(receiver)), unit, is_signed);
+        let kept = details.filtered();
+        noise.insert(receiver, details.squares(&kept, map));
+        details.put(&kept, map, unit);
     }
     noise
 }
 
 /// Takes negative counts, which the noise of bundles leaves where there is little light, out of all others.
 pub fn without_negative(maps: &mut ReceiverMaps) {
-    let receivers: Vec<Receiver> = maps.iter().map(|(receiver, _)| receiver).collect();
-    for receiver in receivers {
-        let Some(map) = maps.get_mut(receiver) else {
-            continue;
-        };
+    for (_, map) in maps.iter_mut() {
         let counts = map.levels()[0].texels();
         if counts.iter().flatten().any(|count| *count < 0) {
             let positive: Vec<[f64; 3]> = counts

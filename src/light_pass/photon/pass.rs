@@ -7,10 +7,10 @@ use std::sync::{Arc, OnceLock};
 use glam::DVec2;
 use rayon::prelude::*;
 
-use super::bundles::Bundles;
+use super::bundles::{Bundles, Carried};
 use super::launch::{PhotonLaunch, Start};
 use super::survey::Surveyor;
-use super::walk::{Carried, Hit, PhotonRules, PhotonWalk, Place};
+use super::walk::{Hit, PhotonRules, PhotonWalk, Place};
 use crate::illumination::accumulator::FluxCount;
 use crate::illumination::{Chart, Receiver};
 use crate::light_pass::caustic::pass::{Listener, PassReport, Stopwatch};
@@ -183,16 +183,15 @@ impl PhotonPass<'_> {
         let mut walk = PhotonWalk::new(rules);
         let mut placed = LedgerSum::default();
         for (place, index) in order {
-            let (start, carried) = if bundles.is_empty() {
-                (self.launch.start(index, place, rules.seed), Carried::NOTHING)
-            } else {
-                let begins = bundles.beginning(place);
-                let start = self.launch.start_in(begins.cell, begins.within);
-                let scaled = start.map(|start| Start {
-                    flux_w: start.flux_w * begins.scale,
-                    ..start
-                });
-                (scaled, Carried::at(&begins))
+            let (start, carried) = match bundles.beginning(place) {
+                None => (self.launch.start(index, place, rules.seed), Carried::default()),
+                Some((cell, within, carried)) => {
+                    let start = self.launch.start_in(cell, within).map(|start| Start {
+                        flux_w: start.flux_w * carried.scale,
+                        ..start
+                    });
+                    (start, carried)
+                }
             };
             let Some(start) = start else {
                 continue;
@@ -224,8 +223,7 @@ impl PhotonPass<'_> {
 
     /// The texel that a hit lies in; `None` without a map, and where the surface reaches none.
     fn texel(&self, hit: &Hit, charts: &KnownCharts) -> Option<u32> {
-        let chart = charts[hit.receiver.index()].get_or_init(|| (self.chart_for)(hit.receiver));
-        let chart = chart.as_ref()?;
+        let chart = self.chart(hit.receiver, charts)?;
         let size = DVec2::new(chart.width as f64, chart.height as f64);
         let place = match hit.place {
             Place::Surface {
@@ -239,9 +237,9 @@ impl PhotonPass<'_> {
         (chart.texel_area_m2(texel) > 0.0).then_some(texel as u32)
     }
 
-    fn chart(&self, receiver: Receiver, charts: &KnownCharts) -> Option<Arc<Chart>> {
+    fn chart<'c>(&self, receiver: Receiver, charts: &'c KnownCharts) -> Option<&'c Chart> {
         let chart = charts[receiver.index()].get_or_init(|| (self.chart_for)(receiver));
-        chart.clone()
+        chart.as_deref()
     }
 
     fn deposit(&self, blocks: &[Block], halves: &mut [&mut [ReceiverMaps]]) {

@@ -54,7 +54,7 @@ pub(super) const TRIANGLES: [[usize; 2]; 4] = [[0, 1], [1, 3], [2, 3], [0, 2]];
 pub(super) struct Surveyor<'a> {
     pub(super) launch: &'a PhotonLaunch<'a>,
     pub(super) rules: PhotonRules<'a>,
-    pub(super) chart_of: &'a (dyn Fn(Receiver) -> Option<Arc<Chart>> + Sync),
+    pub(super) chart_of: &'a (dyn Fn(Receiver) -> Option<&'a Chart> + Sync),
     pub(super) control: &'a Control,
 }
 
@@ -166,7 +166,6 @@ impl Surveyor<'_> {
                 bundles,
                 ends,
                 density: (left / outcome.segments).sqrt(),
-                scale: 1.0,
             });
             return;
         }

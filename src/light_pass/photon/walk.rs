@@ -2,7 +2,7 @@
 
 use glam::DVec2;
 
-use super::bundles::{Beginning, Bundle, Step};
+use super::bundles::{Bundle, Carried, Step};
 use super::launch::{LAMP_DIMENSION, Start};
 use super::spectrum::{Hue, PhotonSpectrum};
 use crate::geometry::Ray;
@@ -46,34 +46,6 @@ pub enum Place {
     },
     /// On the map [texels], where the flux of a bundle is removed.
     Map(DVec2),
-}
-
-/// Bundles of the triangle that a photon starts in.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Carried<'a> {
-    bundles: &'a [Bundle],
-    /// Where the photon starts in the triangle.
-    barycentric: [f64; 3],
-    /// Factor of their flux.
-    scale: f64,
-}
-
-impl<'a> Carried<'a> {
-    /// None.
-    pub(super) const NOTHING: Self = Self {
-        bundles: &[],
-        barycentric: [0.0; 3],
-        scale: 1.0,
-    };
-
-    /// Those of a beginning.
-    pub(super) fn at(beginning: &Beginning<'a>) -> Self {
-        Self {
-            bundles: beginning.bundles,
-            barycentric: beginning.barycentric,
-            scale: beginning.scale,
-        }
-    }
 }
 
 /// What all photons of a light share.
