@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::error::Warning;
 use crate::files::cache::ContentHash;
 use crate::illumination::{IlluminationMap, Side, UvSet};
-use crate::light_pass::ledger::{EnergyLedger, LightLedger, Truncated};
+use crate::light_pass::ledger::{Carried, EnergyLedger, LightLedger, Truncated};
 use crate::plan::EffectLine;
 use crate::scene::Scene;
 use crate::session::{
@@ -106,6 +106,8 @@ pub struct LedgerEntry {
     pub layer: LayerKind,
     /// Its accounts.
     pub energy_w: EnergyAccounts,
+    /// What was deposited, by what carried it.
+    pub carried_w: Carried,
     /// Flux of launched rays whose first hit was not specular [W].
     pub not_emitted_w: f64,
     /// What was emitted, as radiant flux [W]; of light that is traced by wavelength.
@@ -260,6 +262,7 @@ impl From<&LightLedger> for LedgerEntry {
             light: ledger.light.clone(),
             layer: LayerKind::Caustic,
             energy_w: ledger.energy_w.into(),
+            carried_w: ledger.carried_w,
             not_emitted_w: ledger.not_emitted_w,
             emitted_radiant_w: ledger.emitted_radiant_w,
             deposited_radiant_w: ledger.deposited_radiant_w,

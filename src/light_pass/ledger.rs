@@ -89,6 +89,45 @@ impl EnergyLedger {
     }
 }
 
+/// What carried the light that diffuse surfaces got [W].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Carried {
+    /// Patches of the wavefront.
+    pub patches: f64,
+    /// Bundles, which photons correct.
+    pub bundles: f64,
+    /// Photons, less what they took away from bundles: of either sign.
+    pub photons: f64,
+    /// The paper's kernels.
+    pub splats: f64,
+}
+
+impl Carried {
+    /// "bundles 82.0 %, photons 18.0 %" of what was deposited [W]; `None` where nothing was.
+    pub fn in_words(&self, deposited_w: f64) -> Option<String> {
+        let parts = [
+            ("patches", self.patches),
+            ("bundles", self.bundles),
+            ("photons", self.photons),
+            ("splats", self.splats),
+        ];
+        let carried = parts.iter().filter(|(_, watts)| *watts != 0.0);
+        let words: Vec<String> = carried
+            .map(|(what, watts)| format!("{what} {:.1} %", 100.0 * watts / deposited_w))
+            .collect();
+        (!words.is_empty()).then(|| words.join(", "))
+    }
+}
+
+impl AddAssign for Carried {
+    fn add_assign(&mut self, other: Self) {
+        self.patches += other.patches;
+        self.bundles += other.bundles;
+        self.photons += other.photons;
+        self.splats += other.splats;
+    }
+}
+
 /// The ledger of one light.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LightLedger {
@@ -96,6 +135,8 @@ pub struct LightLedger {
     pub light: String,
     /// Its accounts.
     pub energy_w: EnergyLedger,
+    /// What was deposited, by what carried it.
+    pub carried_w: Carried,
     /// Flux of launched rays whose first hit was not specular [W].
     pub not_emitted_w: f64,
     /// What was emitted, as radiant flux [W]; `None` of light that is not traced by wavelength.

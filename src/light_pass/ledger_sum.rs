@@ -1,6 +1,6 @@
 //! The ledger while it is being summed: exact counts per channel and account.
 
-use super::ledger::{EnergyLedger, LightLedger, Truncated};
+use super::ledger::{Carried, EnergyLedger, LightLedger, Truncated};
 use crate::illumination::accumulator::{FluxCount, FluxUnit};
 use crate::optics::LinearSrgb;
 
@@ -31,9 +31,11 @@ pub enum Account {
     SwitchedOff,
     /// Conserved in expectation only: what chance took less what it gave, of either sign.
     Sampling,
+    /// What bundles laid on diffuse surfaces; told beside the others, which hold it already.
+    Bundled,
 }
 
-const ACCOUNTS: usize = Account::Sampling as usize + 1;
+const ACCOUNTS: usize = Account::Bundled as usize + 1;
 
 /// All accounts of one light, exact.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -116,6 +118,7 @@ impl LedgerSum {
                 },
                 sampling: watts(Account::Sampling),
             },
+            carried_w: Carried::default(),
             not_emitted_w: watts(Account::NotEmitted),
             emitted_radiant_w: None,
             deposited_radiant_w: None,

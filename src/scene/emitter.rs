@@ -142,6 +142,18 @@ impl<'a> Places<'a> {
         self.at(Some(square))
     }
 
+    /// Where a point of the unit square lies on a lamp that faces one way: [−1, 1]², in half-axes from its middle.
+    pub fn offsets(&self) -> Option<fn(DVec2) -> DVec2> {
+        match self.light.kind {
+            LightKind::Sun { .. } | LightKind::Spot { .. } => Some(on_disc),
+            LightKind::Panel { shape, .. } => Some(match shape {
+                PanelShape::Rectangle => in_rectangle,
+                PanelShape::Disc => on_disc,
+            }),
+            LightKind::Point { .. } | LightKind::Surface { .. } | LightKind::Environment { .. } => None,
+        }
+    }
+
     /// Area of all glowing sides of an object [m²]; 0 of other lights.
     pub fn surface_m2(&self) -> f64 {
         self.surface.as_ref().map_or(0.0, Glowing::area_m2)
@@ -213,7 +225,7 @@ impl<'a> Places<'a> {
                 let normal = across.cross(down).try_normalize()?;
                 let place = match (shape, square) {
                     (_, None) => DVec2::ZERO,
-                    (PanelShape::Rectangle, Some(square)) => square * 2.0 - 1.0,
+                    (PanelShape::Rectangle, Some(square)) => in_rectangle(square),
                     (PanelShape::Disc, Some(square)) => on_disc(square),
                 };
                 let position = centre + across * place.x + down * place.y;
@@ -240,6 +252,11 @@ impl<'a> Places<'a> {
             }
         }
     }
+}
+
+/// Points of the square around the origin whose sides are 2, evenly.
+fn in_rectangle(square: DVec2) -> DVec2 {
+    square * 2.0 - 1.0
 }
 
 /// Unit vectors, evenly.

@@ -66,7 +66,7 @@ impl CausticLayer<'_> {
     }
 
     /// A rough surface that light meets.
-    fn rough_object(&self, light: &AimedLight) -> Option<usize> {
+    pub(super) fn rough_object(&self, light: &AimedLight) -> Option<usize> {
         let scene = self.tracer.scene();
         let reached = self.aim.sights[light.light].reached.iter();
         let mut objects = reached.map(|&(object, _)| object);

@@ -76,7 +76,10 @@ impl Finish<'_> {
             let ledger = level
                 .ledger
                 .report(&light.name, level.unit, level.strength(light));
-            ledger.with_radiant(level.radiant, level.deposited_radiant_w(light))
+            LightLedger {
+                carried_w: level.carried_w(ledger.energy_w.deposited, light, self.settings.estimator),
+                ..ledger.with_radiant(level.radiant, level.deposited_radiant_w(light))
+            }
         });
         let ledgers: Vec<LightLedger> = ledgers.collect();
         let given_up = given_up_share(&ledgers);

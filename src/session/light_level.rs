@@ -12,7 +12,8 @@ use crate::light_pass::accuracy::{LightError, Noise};
 use crate::light_pass::caustic::kept::KeptLight;
 use crate::light_pass::caustic::statistics::FootprintStatistics;
 use crate::light_pass::launch::Launch;
-use crate::light_pass::ledger_sum::LedgerSum;
+use crate::light_pass::ledger::Carried;
+use crate::light_pass::ledger_sum::{Account, LedgerSum};
 use crate::light_pass::receiver_maps::ReceiverMaps;
 use crate::light_pass::wavefront::cell::Splits;
 use crate::light_pass::wavefront::kept_rays::KeptRays;
@@ -21,7 +22,7 @@ use crate::light_pass::wavefront::pass::TracedLight;
 use crate::light_pass::wavefront::refine::Round;
 use crate::optics::LinearSrgb;
 use crate::scene::Light;
-use crate::settings::BakeSettings;
+use crate::settings::{BakeSettings, Estimator};
 use crate::transport::EffectSet;
 
 /// All that a light's paths depend on beside the scene.
@@ -212,6 +213,29 @@ impl LightLevel {
         };
         let flux: f64 = self.bands.iter().map(of_band).sum();
         Some(flux * self.unit.watts() * self.strength(light).luminance())
+    }
+
+    /// What it deposited [W], by what carried it.
+    pub(super) fn carried_w(&self, deposited: f64, light: &Light, estimator: Estimator) -> Carried {
+        let bundles = self
+            .ledger
+            .watts(Account::Bundled, self.unit, self.strength(light));
+        let nothing = Carried::default();
+        match (self.key.photons, estimator) {
+            (Some(_), _) => Carried {
+                bundles,
+                photons: deposited - bundles,
+                ..nothing
+            },
+            (None, Estimator::Splat) => Carried {
+                splats: deposited,
+                ..nothing
+            },
+            (None, _) => Carried {
+                patches: deposited,
+                ..nothing
+            },
+        }
     }
 
     /// Memory of its maps and paths [bytes].

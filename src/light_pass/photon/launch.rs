@@ -14,7 +14,7 @@ use crate::light_pass::caustic::setup::AimedLight;
 use crate::light_pass::item_buffer::CELLS_PER_SIDE;
 use crate::light_pass::launch::Launch;
 use crate::optics::LinearSrgb;
-use crate::scene::emitter::Places;
+use crate::scene::emitter::{Emitter, Places};
 use crate::scene::{Light, Scene};
 use crate::transport::{MediumStack, Tracer, media_at};
 
@@ -26,6 +26,9 @@ const FLUX_PROBES: u32 = 1 << 12;
 
 /// Dimension of [`even_point`] that places on lamps are drawn from; those of micro-normals follow.
 pub(super) const LAMP_DIMENSION: u32 = 0;
+
+/// Of a lamp's unit square.
+pub(super) const LAMP_MIDDLE: DVec2 = DVec2::splat(0.5);
 
 /// A photon at its light.
 #[derive(Clone, Copy, Debug)]
@@ -169,23 +172,48 @@ impl<'a> PhotonLaunch<'a> {
         even_code(index, seed)
     }
 
-    /// Cells that the domain is divided into, where its light comes from one place.
+    /// Cells that the domain is divided into, each with as many photons, where neighbours of one have much the same way.
     pub(super) fn cell_count(&self) -> usize {
         match &self.domain {
             Domain::Cells { cells, .. } => cells.len(),
-            Domain::Spheres { .. } => 0,
+            Domain::Spheres { places, spheres, .. } => places.offsets().map_or(0, |_| spheres.cell_count()),
         }
     }
 
-    /// The photon that starts at a point of a cell; `None` where there are no cells.
-    pub(super) fn start_in(&self, cell: usize, within: DVec2) -> Option<Start> {
-        let Domain::Cells {
-            launch,
-            cells,
-            full_w,
-        } = &self.domain
-        else {
-            return None;
+    /// Where on its lamp the photon of an index starts, in the lamp's unit square; the middle of light of one place.
+    pub(super) fn lamp_place(&self, index: u32, seed: u64) -> DVec2 {
+        match &self.domain {
+            Domain::Cells { .. } => LAMP_MIDDLE,
+            Domain::Spheres { .. } => even_point(index, LAMP_DIMENSION, seed),
+        }
+    }
+
+    /// Where a point of the lamp's unit square lies on a lamp that faces one way, in half-axes from its middle.
+    pub(super) fn lamp_offsets(&self) -> Option<fn(DVec2) -> DVec2> {
+        match &self.domain {
+            Domain::Cells { .. } => None,
+            Domain::Spheres { places, .. } => places.offsets(),
+        }
+    }
+
+    /// The photon that starts at a point of a cell, from a point of its lamp's unit square; `None` where nothing does.
+    pub(super) fn start_in(&self, cell: usize, within: DVec2, lamp: DVec2) -> Option<Start> {
+        let (launch, cells, full_w) = match &self.domain {
+            Domain::Cells {
+                launch,
+                cells,
+                full_w,
+            } => (launch, cells, full_w),
+            Domain::Spheres {
+                places,
+                spheres,
+                across_m,
+                ..
+            } => {
+                let emitter = places.sample(lamp)?;
+                let aimed = spheres.aim_in(&emitter, (cell, within), *across_m)?;
+                return Some(self.from_place(&emitter, aimed));
+            }
         };
         let count = cells.len();
         let cell = cells.get(cell)?;
@@ -209,28 +237,38 @@ impl<'a> PhotonLaunch<'a> {
         match &self.domain {
             Domain::Cells { .. } => {
                 let (cell, rest) = chosen(place, self.cell_count());
-                self.start_in(cell, in_square(rest))
+                self.start_in(cell, in_square(rest), LAMP_MIDDLE)
             }
             Domain::Spheres {
                 places,
-                tracer,
                 spheres,
-                media,
                 across_m,
+                ..
             } => {
                 let emitter = places.sample(even_point(index, LAMP_DIMENSION, seed))?;
-                let (ray, measure) = spheres.aim(&emitter, place, *across_m)?;
-                let media = match (media, emitter.kind.position()) {
-                    (Some(media), _) => *media,
-                    (None, Some(position)) => media_at(tracer, position),
-                    (None, None) => MediumStack::default(),
-                };
-                Some(Start {
-                    flux_w: emitter.strength * (emitter.kind.falloff(ray.direction) * measure),
-                    ray,
-                    media,
-                })
+                let aimed = spheres.aim(&emitter, place, *across_m)?;
+                Some(self.from_place(&emitter, aimed))
             }
+        }
+    }
+
+    /// The photon of a ray of a place of a lamp, and the measure [sr or m²] that it stands for.
+    fn from_place(&self, emitter: &Emitter, (ray, measure): (Ray, f64)) -> Start {
+        let media = match (&self.domain, emitter.kind.position()) {
+            (Domain::Cells { launch, .. }, _) => *launch.media(),
+            (
+                Domain::Spheres {
+                    media: Some(media), ..
+                },
+                _,
+            ) => *media,
+            (Domain::Spheres { tracer, .. }, Some(position)) => media_at(tracer, position),
+            (Domain::Spheres { .. }, None) => MediumStack::default(),
+        };
+        Start {
+            flux_w: emitter.strength * (emitter.kind.falloff(ray.direction) * measure),
+            ray,
+            media,
         }
     }
 }

@@ -87,7 +87,9 @@ impl PhotonPass<'_> {
         let watch = Stopwatch::start();
         let bundles = self.bundles(&charts, indices.len() as f64, listener.control);
         if share.is_none_or(|share| share.has(0)) {
-            self.deposit_bundles(&bundles, indices.len() as f64, halves, &mut report);
+            report
+                .ledger
+                .merge(&self.deposit_bundles(&bundles, &indices, halves));
         }
         report.trace_s.add(watch.elapsed());
         let mut waiting: Vec<Block> = Vec::new();
@@ -137,27 +139,33 @@ impl PhotonPass<'_> {
         Bundles::new(&surveyor, photons * HALVES as f64)
     }
 
-    /// Puts bundles into the maps of both halves, for so many photons each.
+    /// Puts bundles into the maps of both halves, for photons with these indices each.
     fn deposit_bundles(
         &self,
         bundles: &Bundles,
-        photons: f64,
+        indices: &Range<u32>,
         halves: &mut [&mut [ReceiverMaps]],
-        report: &mut PassReport,
-    ) {
+    ) -> LedgerSum {
         let count = |flux_w| self.rules.unit.count(flux_w);
-        bundles.deposit(photons, count, |receiver, triangles| {
-            for sets in halves.iter_mut() {
+        let of_half = |(half, sets): (usize, &mut &mut [ReceiverMaps])| {
+            let seed = half_seed(self.rules.seed, half).wrapping_add(u64::from(indices.start));
+            let mut ledger = LedgerSum::default();
+            bundles.deposit(indices.len() as f64, seed, count, |receiver, triangles| {
                 sets[0].touch(receiver, self.chart_for);
                 if let Some(map) = sets[0].get_mut(receiver) {
                     let placed = deposit_triangles(triangles, map).deposited;
-                    report.ledger.book_sum(Account::Deposited, placed);
-                    report
-                        .ledger
-                        .book_sum(Account::Sampling, placed.map(|count| -count));
+                    ledger.book_sum(Account::Deposited, placed);
+                    ledger.book_sum(Account::Bundled, placed);
+                    ledger.book_sum(Account::Sampling, placed.map(|count| -count));
                 }
-            }
-        });
+            });
+            ledger
+        };
+        let ledgers: Vec<LedgerSum> = halves.par_iter_mut().enumerate().map(of_half).collect();
+        ledgers.iter().fold(LedgerSum::default(), |mut sum, ledger| {
+            sum.merge(ledger);
+            sum
+        })
     }
 
     fn block(
@@ -183,20 +191,18 @@ impl PhotonPass<'_> {
         let mut walk = PhotonWalk::new(rules);
         let mut placed = LedgerSum::default();
         for (place, index) in order {
-            let (start, carried) = match bundles.beginning(place) {
+            let lamp = self.launch.lamp_place(index, rules.seed);
+            let (start, carried) = match bundles.beginning(place, lamp) {
                 None => (self.launch.start(index, place, rules.seed), Carried::default()),
                 Some((cell, within, carried)) => {
-                    let start = self.launch.start_in(cell, within).map(|start| Start {
+                    let start = self.launch.start_in(cell, within, lamp).map(|start| Start {
                         flux_w: start.flux_w * carried.scale,
                         ..start
                     });
                     (start, carried)
                 }
             };
-            let Some(start) = start else {
-                continue;
-            };
-            walk.follow(index, &start, carried, |hit| {
+            walk.follow(index, start, carried, |hit| {
                 let count = rules.unit.count(hit.flux_w);
                 if let Place::Map(_) = hit.place {
                     placed.book(Account::Sampling, count.map(|count| -count));

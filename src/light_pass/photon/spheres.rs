@@ -3,7 +3,7 @@
 
 use std::collections::BTreeSet;
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::launch::LAMP_DIMENSION;
@@ -88,10 +88,38 @@ impl Spheres {
         Some((ray, choice.measure))
     }
 
+    /// Cells of all spheres.
+    pub(super) fn cell_count(&self) -> usize {
+        self.0.len() * CELLS
+    }
+
+    /// A ray of a place of a lamp from a point of a cell, and the measure [sr or m²] of a photon whose cell is drawn evenly
+    /// among all. `None` for what is not sent towards the cell's sphere, or is an earlier one's.
+    pub(super) fn aim_in(
+        &self,
+        emitter: &Emitter,
+        (cell, within): (usize, DVec2),
+        across_m: f64,
+    ) -> Option<(Ray, f64)> {
+        let which = cell / CELLS;
+        let measure = self.0.get(which)?.sphere.measure(emitter) * self.0.len() as f64;
+        if !(measure > 0.0 && measure.is_finite()) {
+            return None;
+        }
+        let [column, row] = unfolded((cell % CELLS) as u64).map(f64::from);
+        let square = (DVec2::new(column, row) + within) / SIDE as f64;
+        Some((self.ray(emitter, which, square, across_m)?, measure))
+    }
+
     fn choose(&self, emitter: &Emitter, place: u64, across_m: f64) -> Option<(Ray, Choice)> {
         let choice = self.cell(emitter, place)?;
-        let sphere = &self.0[choice.which].sphere;
-        let square = in_square(choice.place);
+        let ray = self.ray(emitter, choice.which, in_square(choice.place), across_m)?;
+        Some((ray, choice))
+    }
+
+    /// From a place of a lamp to a point of a sphere's square.
+    fn ray(&self, emitter: &Emitter, which: usize, square: DVec2, across_m: f64) -> Option<Ray> {
+        let sphere = &self.0[which].sphere;
         let ray = match emitter.kind {
             EmitterKind::Parallel { direction } => {
                 let (x, y) = direction.any_orthonormal_pair();
@@ -111,9 +139,9 @@ impl Spheres {
                 }
             }
         };
-        let mut earlier = self.0[..choice.which].iter().map(|guided| &guided.sphere);
+        let mut earlier = self.0[..which].iter().map(|guided| &guided.sphere);
         let is_taken = earlier.any(|sphere| sphere.has(&ray, emitter) && sphere.measure(emitter) > 0.0);
-        (!is_taken).then_some((ray, choice))
+        (!is_taken).then_some(ray)
     }
 
     fn cell(&self, emitter: &Emitter, place: u64) -> Option<Choice> {

@@ -3,10 +3,10 @@
 
 use std::sync::Arc;
 
-use glam::DVec2;
+use glam::{DVec2, Vec2};
 
-use super::bundles::{Bundle, Square, Step};
-use super::launch::PhotonLaunch;
+use super::bundles::{Bundle, Square, Step, lamp_step_texels};
+use super::launch::{LAMP_MIDDLE, PhotonLaunch};
 use super::walk::PhotonRules;
 use crate::geometry::Ray;
 use crate::illumination::{Chart, Receiver, Side};
@@ -27,9 +27,8 @@ const MOST_WAYS: usize = 16;
 /// Cells are looked at where so many photons start in them.
 pub(super) const LEAST_PHOTONS: f64 = 24.0;
 
-/// A square is divided where those of its photons that follow no bundle take this part of the segments that its division
-/// takes.
-const WORTH: f64 = 0.25;
+/// A square is divided where those of its photons that follow no bundle take as many segments as its division, times this.
+const WORTH: f64 = 1.0;
 
 /// Points whose light a division follows.
 const POINTS_OF_DIVISION: f64 = 8.0;
@@ -40,6 +39,9 @@ const MOST_DIVISIONS: u32 = 10;
 /// A bundle is of use while the light of the middle of its square arrives no farther than this from the mean of two opposite
 /// corners [texels]. Within its triangles it is wrong by a quarter of that or less.
 const MOST_BENT_TEXELS: f64 = 1.0;
+
+/// Light of one part of a lamp arrives within so many texels.
+const MOST_STEP_TEXELS: f64 = 0.5;
 
 /// Segments of a photon that takes a way without bundles, about.
 const LOST_SEGMENTS: f64 = 10.0;
@@ -102,6 +104,8 @@ struct Candidate {
     /// Along Morton's curve.
     corners: [Arc<Light>; 4],
     middle: Arc<Light>,
+    /// The light of the middle from half-way out on both axes of a lamp with a size.
+    outer: Option<[Light; 2]>,
     /// That start in it.
     photons: f64,
     divisions: u32,
@@ -109,6 +113,10 @@ struct Candidate {
 
 /// What becomes of the light of a square, as parts of what starts.
 struct Outcome {
+    /// Mean flux of a photon [W, largest channel] that bundles carry.
+    carried_w: f64,
+    /// The same that arrives.
+    arriving_w: f64,
     /// Smaller bundles might carry it.
     left: f64,
     /// No bundle could.
@@ -121,20 +129,24 @@ struct Outcome {
 
 /// Squares of a cell so far.
 #[derive(Default)]
-struct Survey {
-    squares: Vec<Square>,
+pub(super) struct Survey {
+    pub(super) squares: Vec<Square>,
+    /// Mean flux of a photon [W, largest channel] that bundles carry.
+    pub(super) carried_w: f64,
+    /// The same that arrives anywhere.
+    pub(super) arriving_w: f64,
     /// Bundles that it may still have.
     bundles_left: usize,
 }
 
 impl Surveyor<'_> {
     /// A cell in squares along its curve, for so many photons; no finer where it has `most_bundles`.
-    pub(super) fn squares(&self, cell: usize, photons: f64, most_bundles: usize) -> Vec<Square> {
+    pub(super) fn survey(&self, cell: usize, photons: f64, most_bundles: usize) -> Survey {
         let mut survey = Survey {
             bundles_left: most_bundles,
             ..Survey::default()
         };
-        let light = |x: f64, y: f64| Arc::new(self.light(cell, DVec2::new(x, y)));
+        let light = |x: f64, y: f64| Arc::new(self.light(cell, DVec2::new(x, y), LAMP_MIDDLE));
         let whole = Candidate {
             cell,
             begin: 0,
@@ -142,11 +154,12 @@ impl Surveyor<'_> {
             side: 1.0,
             corners: [light(0.0, 0.0), light(1.0, 0.0), light(0.0, 1.0), light(1.0, 1.0)],
             middle: light(0.5, 0.5),
+            outer: self.outer(cell, DVec2::splat(0.5)),
             photons,
             divisions: 0,
         };
         self.divide(whole, &mut survey);
-        survey.squares
+        survey
     }
 
     fn divide(&self, square: Candidate, survey: &mut Survey) {
@@ -158,6 +171,9 @@ impl Surveyor<'_> {
         if is_fine || self.control.is_cancelled() {
             // The variance of a photon over its cost.
             let left = (outcome.left + outcome.lost).clamp(LEAST_LEFT, 1.0);
+            let share = 0.25_f64.powi(square.divisions as i32);
+            survey.carried_w += share * outcome.carried_w;
+            survey.arriving_w += share * outcome.arriving_w;
             survey.bundles_left = survey.bundles_left.saturating_sub(bundles.len());
             survey.squares.push(Square {
                 cell: square.cell,
@@ -172,7 +188,7 @@ impl Surveyor<'_> {
         let half = 0.5 * square.side;
         let light = |x: f64, y: f64| {
             let within = square.low + DVec2::new(x, y) * half;
-            Arc::new(self.light(square.cell, within))
+            Arc::new(self.light(square.cell, within, LAMP_MIDDLE))
         };
         let sides = [light(1.0, 0.0), light(0.0, 1.0), light(2.0, 1.0), light(1.0, 2.0)];
         let middles = [light(0.5, 0.5), light(1.5, 0.5), light(0.5, 1.5), light(1.5, 1.5)];
@@ -193,6 +209,7 @@ impl Surveyor<'_> {
                 side: half,
                 corners: corners.map(Arc::clone),
                 middle,
+                outer: self.outer(square.cell, square.low + (offset + 0.5) * half),
                 photons: 0.25 * square.photons,
                 divisions: square.divisions + 1,
             };
@@ -200,10 +217,17 @@ impl Surveyor<'_> {
         }
     }
 
-    /// The light of a point of a cell, on all its ways.
-    fn light(&self, cell: usize, within: DVec2) -> Light {
+    /// The light of a point of a cell from half-way out on both axes of a lamp with a size.
+    fn outer(&self, cell: usize, within: DVec2) -> Option<[Light; 2]> {
+        self.launch.lamp_offsets()?;
+        let half_way = [DVec2::new(0.75, 0.5), DVec2::new(0.5, 0.75)];
+        Some(half_way.map(|lamp| self.light(cell, within, lamp)))
+    }
+
+    /// The light of a point of a cell and of its lamp, on all its ways.
+    fn light(&self, cell: usize, within: DVec2, lamp: DVec2) -> Light {
         let mut light = Light::default();
-        let Some(start) = self.launch.start_in(cell, within) else {
+        let Some(start) = self.launch.start_in(cell, within, lamp) else {
             return light;
         };
         light.start_w = start.flux_w.max_channel();
@@ -302,7 +326,7 @@ impl Candidate {
     /// The bundles of its triangles, where those of each triangle end, and what becomes of the light.
     fn bundles(&self) -> (Vec<Bundle>, [u8; 4], Outcome) {
         let (mut bundles, mut ends) = (Vec::new(), [0; 4]);
-        let mut carried_w = 0.0;
+        let (mut carried_w, mut blurred_w) = (0.0, 0.0);
         for (corners, end) in TRIANGLES.iter().zip(&mut ends) {
             for middle in &self.middle.arrivals {
                 let [first, second] = corners.map(|corner| self.corners[corner].find(middle.key));
@@ -310,24 +334,29 @@ impl Candidate {
                     continue;
                 };
                 let misplaced = self.bent_texels(middle) / MOST_BENT_TEXELS;
+                let flux_w = (middle.flux_w + first.flux_w + second.flux_w) * (1.0 / 3.0);
+                let Some(lamp) = self.lamp_texels(middle) else {
+                    blurred_w += 0.25 * flux_w.max_channel();
+                    continue;
+                };
                 if misplaced >= 1.0 {
                     continue;
                 }
-                let flux_w = (middle.flux_w + first.flux_w + second.flux_w) * (1.0 / 3.0);
                 carried_w += 0.25 * flux_w.max_channel() * (1.0 - misplaced);
                 bundles.push(Bundle {
                     steps: Arc::clone(&middle.steps),
                     receiver: middle.receiver,
                     corners: [middle, first, second].map(|arrival| arrival.place.as_vec2()),
+                    lamp,
                     flux_w: flux_w.to_array().map(|watts| watts as f32),
                 });
             }
             *end = bundles.len() as u8;
         }
-        (bundles, ends, self.outcome(carried_w))
+        (bundles, ends, self.outcome(carried_w, blurred_w))
     }
 
-    fn outcome(&self, carried_w: f64) -> Outcome {
+    fn outcome(&self, carried_w: f64, blurred_w: f64) -> Outcome {
         let mean = |value: &dyn Fn(&Light) -> f64| {
             let points = self.corners.iter().chain([&self.middle]);
             points.map(|point| value(point)).sum::<f64>() / 5.0
@@ -345,11 +374,24 @@ impl Candidate {
             arrivals.map(|arrival| arrival.flux_w.max_channel()).sum()
         });
         Outcome {
-            left: part(arriving_w - carried_w),
-            lost: part(mean(&|light| light.lost_w)),
+            carried_w,
+            arriving_w,
+            left: part(arriving_w - carried_w - blurred_w),
+            lost: part(blurred_w + mean(&|light| light.lost_w)),
             segments: mean(&|light| light.segments).max(1.0),
             followed: mean(&|light| light.followed as f64),
         }
+    }
+
+    /// How far the light of the middle arrives from where it does if it starts half an axis of its lamp from there [texels];
+    /// `None` where it takes another way, or that is too far for its parts.
+    fn lamp_texels(&self, middle: &Arrival) -> Option<[Vec2; 2]> {
+        let Some([first, second]) = &self.outer else {
+            return Some([Vec2::ZERO; 2]);
+        };
+        let moved = |outer: &Light| Some((2.0 * (outer.find(middle.key)?.place - middle.place)).as_vec2());
+        let lamp = [moved(first)?, moved(second)?];
+        (lamp_step_texels(lamp) < MOST_STEP_TEXELS).then_some(lamp)
     }
 
     /// How far the light of the middle arrives from where opposite corners say [texels], where two of them say so.

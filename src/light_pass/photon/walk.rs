@@ -114,12 +114,12 @@ impl<'a> PhotonWalk<'a> {
         }
     }
 
-    /// Follows the photon of an index to its end; hits on diffuse surfaces after at least one specular event are handed to
+    /// Follows the photon of an index, if there is one, to its end; hits on diffuse surfaces after at least one specular event are handed to
     /// `arrive`. `Deposited` is not booked here but by who places the flux.
     pub(super) fn follow(
         &mut self,
         index: u32,
-        start: &Start,
+        start: Option<Start>,
         carried: Carried<'a>,
         mut arrive: impl FnMut(Hit),
     ) {
@@ -133,18 +133,18 @@ impl<'a> PhotonWalk<'a> {
         };
         let mut photon = Photon {
             hue: whole,
-            flux_w: start.flux_w,
+            flux_w: start.map_or(LinearSrgb::BLACK, |start| start.flux_w),
             choice: Choice::new(index, self.rules.seed),
             index,
             carried,
             followed: (1 << carried.bundles.len()) - 1,
             probability: 1.0,
         };
+        let brightest_w = photon.flux_w.max_channel();
+        let Some(start) = start.filter(|_| brightest_w > 0.0 && photon.flux_w.is_finite()) else {
+            return photon.leave_all(&mut arrive);
+        };
         let (mut ray, mut media) = (start.ray, start.media);
-        let brightest_w = start.flux_w.max_channel();
-        if !(brightest_w > 0.0 && start.flux_w.is_finite()) {
-            return;
-        }
         for depth in 0.. {
             let Some(branch) = self.step(&mut photon, depth, &ray, &media, &mut arrive) else {
                 return;
@@ -311,19 +311,15 @@ impl Photon<'_> {
 
     /// Parts from some of the bundles that it has followed: their flux is removed where they say that it arrives.
     fn leave_where(&mut self, is_left: impl Fn(&Bundle) -> bool, arrive: &mut impl FnMut(Hit)) {
-        let Carried {
-            bundles,
-            barycentric,
-            scale,
-        } = self.carried;
-        for (number, bundle) in bundles.iter().enumerate() {
+        let carried = self.carried;
+        for (number, bundle) in carried.bundles.iter().enumerate() {
             let bit = 1 << number;
             if self.followed & bit != 0 && is_left(bundle) {
                 self.followed &= !bit;
                 arrive(Hit {
                     receiver: bundle.receiver,
-                    place: Place::Map(bundle.place(barycentric)),
-                    flux_w: bundle.flux_w() * (-scale / self.probability),
+                    place: Place::Map(bundle.place(&carried)),
+                    flux_w: bundle.flux_w() * (-carried.scale / self.probability),
                     band: None,
                 });
             }

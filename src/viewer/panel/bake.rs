@@ -8,7 +8,7 @@ use egui::{Color32, Grid, ProgressBar, RichText, Ui};
 use super::control::{button, counted, grouped};
 use super::{Facts, Panel, Wishes};
 use crate::illumination::IlluminationMap;
-use crate::light_pass::ledger::EnergyLedger;
+use crate::light_pass::ledger::{Carried, EnergyLedger};
 use crate::session::{BYTES_PER_TEXEL, StopReason};
 use crate::viewer::time_left::{in_words, time_left_s};
 use crate::viewer::worker::{BakeRequest, BakeState, BakedLevel};
@@ -144,10 +144,19 @@ pub fn energy(ui: &mut Ui, last: Option<&BakedLevel>) {
     let total: EnergyLedger = ledgers.iter().map(|light| &light.energy_w).sum();
     if total.emitted > 0.0 {
         ledger(ui, &total);
+        let mut carried = Carried::default();
+        ledgers.iter().for_each(|light| carried += light.carried_w);
+        if let Some(parts) = carried.in_words(total.deposited) {
+            ui.label(format!("Carried by {parts}")).on_hover_text(CARRIERS);
+        }
     } else {
         ui.label(RichText::new("No light meets glass, a mirror or water.").weak());
     }
 }
+
+const CARRIERS: &str = "What brought the deposited light to the maps. Patches of the wavefront are unbeaten where light stays \
+    together, photons where it scatters. Bundles are laid down whole before photons, which carry the difference: less than \
+    nothing where bundles brought too much.";
 
 /// "estimated error 2.1 %, 0.42 s: level 2, goes on": one line of the panel.
 fn level_line(last: &BakedLevel) -> String {

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use egui::Pos2;
 use nephroid::eye_pass::WhiteBalance;
-use nephroid::light_pass::ledger::{EnergyLedger, LightLedger, Truncated};
+use nephroid::light_pass::ledger::{Carried, EnergyLedger, LightLedger, Truncated};
 use nephroid::settings::{Footprint, ItemBufferKind, Kernel, Preset, RayPlacement};
 use nephroid::viewer::panel::accuracy::preset;
 
@@ -333,6 +333,11 @@ fn ledgers_are_summed_and_gaps_told() {
             truncated: with(Truncated::default(), |it| it.depth = 0.125),
             sampling: 0.0,
         },
+        carried_w: Carried {
+            bundles: 0.75,
+            photons: 0.25,
+            ..Carried::default()
+        },
         not_emitted_w: 0.0,
         emitted_radiant_w: None,
         deposited_radiant_w: None,
@@ -342,7 +347,7 @@ fn ledgers_are_summed_and_gaps_told() {
         last.result.counts.rays = 1_234_567;
     });
     panel.open("Energy");
-    let told = "4.000000 W|2.000000 W|1.250000 W|0.500000 W|0.250000 W|0.0e0|1,234,567 rays traced";
+    let told = "4.000000 W|2.000000 W|1.250000 W|0.500000 W|0.250000 W|0.0e0|Carried by bundles 75.0 %, photons 25.0 %|1,234,567 rays traced";
     panel.assert_says(&told.split('|').collect::<Vec<_>>());
     panel.tell_level(|last| {
         last.result.ledgers = vec![ledger.clone(); 2];
