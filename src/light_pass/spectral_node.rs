@@ -13,6 +13,8 @@ pub struct SpectralNode {
     pub tracer: Tracer,
     /// From light in RGB to the CIE XYZ of all wavelengths that it stands for, of a lamp of 1 W (luminous-equivalent).
     pub channels: ColourMatrix,
+    /// In which its tracer follows light.
+    pub wavelength: Nanometres,
     /// Tells its rays from those of the light's other wavelengths.
     pub number: u32,
 }

@@ -130,7 +130,7 @@ impl CausticLayer<'_> {
 
     /// Whether its light may stay together.
     fn has_bundles(&self, light: &AimedLight) -> bool {
-        self.rough_object(light).is_none() && !self.spectra.has(light.light)
+        self.rough_object(light).is_none()
     }
 
     fn with_launch<T>(&self, light: &AimedLight, f: impl FnOnce(&PhotonLaunch) -> T) -> T {

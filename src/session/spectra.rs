@@ -255,8 +255,10 @@ impl Spectra {
 /// Wavelengths of a lamp, one for each band in which it has light.
 fn nodes(tracer: &Tracer, lamp: &Spectrum, bands: &[SpectralBand]) -> Vec<(usize, SpectralNode)> {
     let lit = bands.iter().enumerate().filter_map(|(index, band)| {
+        let wavelength = middle_of(lamp, band)?;
         let node = SpectralNode {
-            tracer: tracer.at_wavelength(middle_of(lamp, band)?),
+            tracer: tracer.at_wavelength(wavelength),
+            wavelength,
             channels: channels_within(lamp, band.range(), |_| 1.0),
             number: index as u32,
         };

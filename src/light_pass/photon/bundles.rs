@@ -19,7 +19,9 @@ use glam::{DVec2, Vec2};
 use rayon::prelude::*;
 
 use super::launch::LAMP_DIMENSION;
+use super::spectrum::{Hue, PhotonSpectrum};
 use super::survey::{LEAST_PHOTONS, Survey, Surveyor};
+use super::walk::WAVELENGTH_DIMENSION;
 use crate::geometry::sampling::{even_point, in_square};
 use crate::illumination::Receiver;
 use crate::illumination::accumulator::FluxCount;
@@ -35,23 +37,73 @@ const TRIED: usize = 16;
 /// Bundles that carry less of what arrives are not worth it.
 const LEAST_CARRIED: f64 = 0.25;
 
-/// Bundles of a light, about: 60 bytes each.
+/// Bundles of a light, about: 100 bytes each.
 const MOST_BUNDLES: usize = 1 << 21;
 
-/// Squares whose bundles are deposited at once.
-const SQUARES_AT_ONCE: usize = 1 << 10;
+/// Triangles that are deposited at once, about.
+const TRIANGLES_AT_ONCE: usize = 1 << 17;
 
 /// Light of one part of a lamp arrives within so many texels, unless there are too many parts.
 const PART_TEXELS: f64 = 0.1;
 
-/// Parts of a lamp along an axis, at most.
+/// Parts of a lamp along an axis for one photon, at most.
 const MOST_LAMP_PARTS: f64 = 8.0;
+
+/// Parts of a spectrum, least and most: few would leave colours to chance.
+const HUE_PARTS: (f64, f64) = (8.0, 64.0);
 
 /// A specular surface of a bundle's way.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Step {
     pub(super) object: u32,
     pub(super) is_reflected: bool,
+}
+
+/// How far light arrives from that of the middle of its lamp and of the middle wavelength [texels].
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Moves {
+    /// From the end of either half-axis of a lamp with a size.
+    pub(super) lamp: [Vec2; 2],
+    /// At the first and the last wavelength of light that is parted.
+    pub(super) hues: [Vec2; 2],
+}
+
+/// Where on its lamp light starts, and of which wavelength it is.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Origin {
+    /// In half-axes from the lamp's middle.
+    pub(super) lamp: DVec2,
+    /// [`Hue::ends`](super::spectrum::Hue::ends).
+    pub(super) ends: [f64; 2],
+}
+
+impl Moves {
+    fn at(&self, origin: &Origin) -> DVec2 {
+        let [x, y] = self.lamp.map(|moved| moved.as_dvec2());
+        let [first, last] = self.hues.map(|moved| moved.as_dvec2());
+        x * origin.lamp.x + y * origin.lamp.y + first * origin.ends[0] + last * origin.ends[1]
+    }
+
+    /// Parts of a lamp that a bundle is deposited for, along both axes, for so many photons of its triangle.
+    fn lamp_parts(&self, photons: f64) -> DVec2 {
+        // What the draw leaves is to be less than the noise of photons.
+        let finer = (photons.sqrt() / MOST_LAMP_PARTS).max(1.0);
+        let parts = |moved: Vec2| (2.0 * finer * f64::from(moved.abs().max_element()) / PART_TEXELS).ceil();
+        DVec2::from(self.lamp.map(parts)).clamp(DVec2::ONE, DVec2::splat((finer * MOST_LAMP_PARTS).floor()))
+    }
+
+    /// How far light of one part of a lamp arrives from that of the next [texels].
+    pub(super) fn lamp_step_texels(&self) -> f64 {
+        let parts = self.lamp_parts(1.0).to_array();
+        let steps = [0, 1].map(|axis| 2.0 * f64::from(self.lamp[axis].abs().max_element()) / parts[axis]);
+        steps[0].max(steps[1])
+    }
+
+    /// Parts of the spectrum that a bundle is deposited for.
+    fn hue_parts(&self) -> f64 {
+        let across = f64::from((self.hues[0] - self.hues[1]).abs().max_element());
+        (across / PART_TEXELS).ceil().clamp(HUE_PARTS.0, HUE_PARTS.1)
+    }
 }
 
 /// Light of a triangle that takes one way.
@@ -62,8 +114,8 @@ pub(super) struct Bundle {
     pub(super) receiver: Receiver,
     /// Where the light of the triangle's corners arrives [texels].
     pub(super) corners: [Vec2; 3],
-    /// How far it arrives from there where it starts half an axis of the lamp from its middle, for both axes [texels].
-    pub(super) lamp: [Vec2; 2],
+    /// How far from there it arrives otherwise.
+    pub(super) moves: Moves,
     /// Mean flux of a photon of the triangle [W per channel if it were the only photon].
     pub(super) flux_w: [f32; 3],
 }
@@ -78,30 +130,8 @@ impl Bundle {
     pub(super) fn place(&self, carried: &Carried) -> DVec2 {
         let [a, b, c] = self.corners.map(|corner| corner.as_dvec2());
         let [first, second, third] = carried.barycentric;
-        a * first + b * second + c * third + self.moved(carried.lamp, carried.lamp_offsets)
+        a * first + b * second + c * third + self.moves.at(&carried.origin)
     }
-
-    /// How far light from a point of the lamp's unit square arrives from that of its middle [texels].
-    fn moved(&self, lamp: DVec2, offsets: Option<fn(DVec2) -> DVec2>) -> DVec2 {
-        let Some(offsets) = offsets else {
-            return DVec2::ZERO;
-        };
-        let offset = offsets(lamp);
-        self.lamp[0].as_dvec2() * offset.x + self.lamp[1].as_dvec2() * offset.y
-    }
-}
-
-/// Parts of a lamp that a bundle is deposited for, along both axes.
-fn lamp_parts(lamp: [Vec2; 2]) -> DVec2 {
-    let parts = |moved: Vec2| (2.0 * f64::from(moved.abs().max_element()) / PART_TEXELS).ceil();
-    DVec2::from(lamp.map(parts)).clamp(DVec2::ONE, DVec2::splat(MOST_LAMP_PARTS))
-}
-
-/// How far light of one part of a lamp arrives from that of the next [texels].
-pub(super) fn lamp_step_texels(lamp: [Vec2; 2]) -> f64 {
-    let parts = lamp_parts(lamp).to_array();
-    let steps = [0, 1].map(|axis| 2.0 * f64::from(lamp[axis].abs().max_element()) / parts[axis]);
-    steps[0].max(steps[1])
 }
 
 /// The bundles of a light.
@@ -152,9 +182,8 @@ pub(super) struct Carried<'a> {
     pub(super) barycentric: [f64; 3],
     /// Factor of its flux and of theirs: the mean density of photons over that of its square.
     pub(super) scale: f64,
-    /// Where it starts in the lamp's unit square.
-    pub(super) lamp: DVec2,
-    lamp_offsets: Option<fn(DVec2) -> DVec2>,
+    /// What it starts as.
+    pub(super) origin: Origin,
 }
 
 impl Bundles {
@@ -190,6 +219,10 @@ impl Bundles {
         }
     }
 
+    fn lamp_offset(&self, lamp: DVec2) -> DVec2 {
+        self.lamp_offsets.map_or(DVec2::ZERO, |offsets| offsets(lamp))
+    }
+
     /// Cells of the domain.
     fn cells(&self) -> f64 {
         self.squares.last().map_or(0, |last| last.cell + 1) as f64
@@ -211,50 +244,106 @@ impl Bundles {
             bundles: square.of_triangle(triangle),
             barycentric,
             scale: square.share() / self.cells() * 64_f64.exp2() / length as f64,
-            lamp,
-            lamp_offsets: self.lamp_offsets,
+            origin: Origin {
+                lamp: self.lamp_offset(lamp),
+                ..Origin::default()
+            },
         };
         Some((square.cell, within, carried))
     }
 
-    /// Hands out all flux for so many photons, each time some of one receiver's; `count`: of a flux [W per channel]. A lamp
-    /// with a size is stood for by one point of each of its parts, which the seed draws.
+    /// Hands out all flux for so many photons, each time some of one receiver's and band's; `count`: of a flux [W per channel].
+    /// A lamp with a size and a spectrum are stood for by one point of each of their parts, which the seed draws.
     pub(super) fn deposit(
         &self,
-        photons: f64,
-        seed: u64,
+        (photons, seed): (f64, u64),
+        spectrum: Option<&PhotonSpectrum>,
         count: impl Fn(LinearSrgb) -> FluxCount,
-        mut take: impl FnMut(Receiver, &[FluxTriangle]),
+        mut take: impl FnMut(Option<usize>, Receiver, &[FluxTriangle]),
     ) {
         let mut drawn = 0..;
-        for squares in self.squares.chunks(SQUARES_AT_ONCE) {
-            let mut by_receiver: BTreeMap<Receiver, Vec<FluxTriangle>> = BTreeMap::new();
-            for square in squares {
-                let photons = 0.25 * square.share() * photons / self.cells();
-                for triangle in 0..4 {
-                    // Neighbours, whose light may arrive at one place, are drawn as different as can be.
-                    let in_part = even_point(drawn.next().unwrap_or(0), LAMP_DIMENSION, seed);
-                    for bundle in square.of_triangle(triangle) {
-                        let parts = lamp_parts(bundle.lamp);
-                        let flux = count(bundle.flux_w() * (photons / parts.element_product()));
-                        let triangles = (0..(parts.x * parts.y) as u32).map(|part| {
-                            let part = f64::from(part);
-                            let part = DVec2::new(part % parts.x, (part / parts.x).floor());
-                            let moved = bundle.moved((part + in_part) / parts, self.lamp_offsets);
-                            FluxTriangle {
+        let mut waiting = Waiting::new();
+        let mut held = 0;
+        for square in &self.squares {
+            let photons = 0.25 * square.share() * photons / self.cells();
+            for triangle in 0..4 {
+                // Neighbours, whose light may arrive at one place, are drawn as different as can be.
+                let number = drawn.next().unwrap_or(0);
+                let on_lamp = even_point(number, LAMP_DIMENSION, seed);
+                let in_hue =
+                    spectrum.map(|spectrum| (spectrum, even_point(number, WAVELENGTH_DIMENSION, seed).x));
+                for bundle in square.of_triangle(triangle) {
+                    let parts = self.parts(&bundle.moves, photons, on_lamp, in_hue);
+                    held += parts.len();
+                    for (origin, hue, share) in parts {
+                        let flux_w = bundle.flux_w() * (photons * share);
+                        let (band, flux_w) = match hue {
+                            Some(hue) => (hue.band, hue.channels.apply(flux_w)),
+                            None => (None, flux_w),
+                        };
+                        let moved = bundle.moves.at(&origin);
+                        waiting
+                            .entry((band, bundle.receiver))
+                            .or_default()
+                            .push(FluxTriangle {
                                 corners: bundle.corners.map(|corner| corner.as_dvec2() + moved),
-                                flux,
+                                flux: count(flux_w),
                                 island: 0,
-                            }
-                        });
-                        by_receiver.entry(bundle.receiver).or_default().extend(triangles);
+                            });
                     }
                 }
             }
-            for (receiver, triangles) in &by_receiver {
-                take(*receiver, triangles);
+            if held > TRIANGLES_AT_ONCE {
+                hand_out(&mut waiting, &mut take);
+                held = 0;
             }
         }
+        hand_out(&mut waiting, &mut take);
+    }
+
+    /// Points of a lamp and wavelengths that stand for all, for so many photons of a triangle, and what either counts.
+    fn parts<'a>(
+        &self,
+        moves: &Moves,
+        photons: f64,
+        on_lamp: DVec2,
+        in_hue: Option<(&'a PhotonSpectrum, f64)>,
+    ) -> Vec<(Origin, Option<Hue<'a>>, f64)> {
+        let lamp_parts = moves.lamp_parts(photons);
+        let hues: Vec<(Option<Hue<'a>>, f64)> = match in_hue {
+            None => vec![(None, 1.0)],
+            Some((spectrum, _)) if photons > spectrum.hues().count() as f64 => {
+                spectrum.hues().map(|(hue, share)| (Some(hue), share)).collect()
+            }
+            Some((spectrum, within)) => {
+                let parts = moves.hue_parts();
+                let one = |part: u32| (spectrum.one((f64::from(part) + within) / parts), 1.0 / parts);
+                (0..parts as u32).map(one).collect()
+            }
+        };
+        let of_lamp = (0..(lamp_parts.x * lamp_parts.y) as u32).map(|part| {
+            let part = f64::from(part);
+            let part = DVec2::new(part % lamp_parts.x, (part / lamp_parts.x).floor());
+            self.lamp_offset((part + on_lamp) / lamp_parts)
+        });
+        let share_of_lamp = lamp_parts.element_product().recip();
+        of_lamp
+            .flat_map(|lamp| {
+                hues.iter().map(move |(hue, share)| {
+                    let ends = hue.map_or([0.0; 2], |hue| hue.ends);
+                    (Origin { lamp, ends }, *hue, share * share_of_lamp)
+                })
+            })
+            .collect()
+    }
+}
+
+/// Triangles of one band and receiver.
+type Waiting = BTreeMap<(Option<usize>, Receiver), Vec<FluxTriangle>>;
+
+fn hand_out(waiting: &mut Waiting, take: &mut impl FnMut(Option<usize>, Receiver, &[FluxTriangle])) {
+    for ((band, receiver), triangles) in std::mem::take(waiting) {
+        take(band, receiver, &triangles);
     }
 }
 

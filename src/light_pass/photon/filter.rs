@@ -24,7 +24,7 @@ const CHANCE_PAIRS: f32 = 2.0;
 const ERROR_BY_LIGHT: f32 = 1.5;
 
 /// Details take no more of the light of a cell than leaves this part of it, where channels may be negative.
-const LEAST_LEFT: f32 = 1e-3;
+const LEAST_LEFT: f32 = 1e-5;
 
 /// Light is told from none down to this part of the map's mean.
 const DARKEST: f32 = 1e-4;

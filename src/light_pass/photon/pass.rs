@@ -150,15 +150,22 @@ impl PhotonPass<'_> {
         let of_half = |(half, sets): (usize, &mut &mut [ReceiverMaps])| {
             let seed = half_seed(self.rules.seed, half).wrapping_add(u64::from(indices.start));
             let mut ledger = LedgerSum::default();
-            bundles.deposit(indices.len() as f64, seed, count, |receiver, triangles| {
-                sets[0].touch(receiver, self.chart_for);
-                if let Some(map) = sets[0].get_mut(receiver) {
-                    let placed = deposit_triangles(triangles, map).deposited;
-                    ledger.book_sum(Account::Deposited, placed);
-                    ledger.book_sum(Account::Bundled, placed);
-                    ledger.book_sum(Account::Sampling, placed.map(|count| -count));
-                }
-            });
+            let photons = (indices.len() as f64, seed);
+            bundles.deposit(
+                photons,
+                self.rules.spectrum,
+                count,
+                |band, receiver, triangles| {
+                    let set = set_of(band, sets.len());
+                    sets[set].touch(receiver, self.chart_for);
+                    if let Some(map) = sets[set].get_mut(receiver) {
+                        let placed = deposit_triangles(triangles, map).deposited;
+                        ledger.book_sum(Account::Deposited, placed);
+                        ledger.book_sum(Account::Bundled, placed);
+                        ledger.book_sum(Account::Sampling, placed.map(|count| -count));
+                    }
+                },
+            );
             ledger
         };
         let ledgers: Vec<LedgerSum> = halves.par_iter_mut().enumerate().map(of_half).collect();
@@ -255,11 +262,7 @@ impl PhotonPass<'_> {
                 .chunk_by(|a, b| (a.band, a.receiver) == (b.band, b.receiver))
             {
                 let sets = &mut *halves[block.half];
-                let set = if sets.len() == 1 {
-                    0
-                } else {
-                    run[0].band.unwrap_or(0)
-                };
+                let set = set_of(run[0].band, sets.len());
                 sets[set].touch(run[0].receiver, self.chart_for);
                 let Some(map) = sets[set].get_mut(run[0].receiver) else {
                     continue;
@@ -274,6 +277,11 @@ impl PhotonPass<'_> {
             }
         }
     }
+}
+
+/// Which of so many sets of maps light of a band goes to: one holds all, or each has one of its own.
+fn set_of(band: Option<usize>, sets: usize) -> usize {
+    if sets == 1 { 0 } else { band.unwrap_or(0) }
 }
 
 /// The seed of a half.

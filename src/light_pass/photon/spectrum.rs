@@ -1,6 +1,6 @@
 //! Wavelengths of photons: all at once until a surface parts them, then one.
 
-use crate::light_pass::spectral_node::SpectralNode;
+use crate::light_pass::spectral_node::{SpectralNode, place_of};
 use crate::optics::ColourMatrix;
 use crate::transport::Tracer;
 
@@ -22,6 +22,8 @@ struct WeightedNode {
     band: usize,
     /// Probability of all nodes up to this one, itself included.
     upto: f64,
+    /// See [`Hue::ends`].
+    ends: [f64; 2],
 }
 
 /// How a photon sees the scene: by all wavelengths, or by one.
@@ -33,6 +35,9 @@ pub struct Hue<'a> {
     pub channels: ColourMatrix,
     /// Its band; `None` while it has all of them.
     pub band: Option<usize>,
+    /// What a value that differs by so much at the spectrum's first and at its last wavelength from that in the middle has of
+    /// either difference: a parabola along which refractive indices are smooth.
+    pub ends: [f64; 2],
 }
 
 impl PhotonSpectrum {
@@ -42,11 +47,13 @@ impl PhotonSpectrum {
             |node: &SpectralNode| node.channels.of_white().to_array().iter().sum::<f64>().max(0.0);
         let total: f64 = bands.iter().map(|(_, node)| brightness(node)).sum();
         let mut upto = 0.0;
+        let places: Vec<f64> = bands.iter().map(|(_, node)| place_of(node.wavelength)).collect();
         let channels = bands.iter().map(|(_, node)| node.channels).sum();
         let nodes = bands
             .into_iter()
-            .filter(|(_, node)| brightness(node) > 0.0)
-            .map(|(band, node)| {
+            .zip(&places)
+            .filter(|((_, node), _)| brightness(node) > 0.0)
+            .map(|((band, node), place)| {
                 let probability = brightness(&node) / total;
                 upto += probability;
                 let channels = node.channels.scaled(1.0 / probability);
@@ -54,6 +61,7 @@ impl PhotonSpectrum {
                     node: SpectralNode { channels, ..node },
                     band,
                     upto,
+                    ends: ends(&places, *place),
                 }
             })
             .collect();
@@ -70,17 +78,52 @@ impl PhotonSpectrum {
             tracer: &self.whole,
             channels: self.channels,
             band: None,
+            ends: [0.0; 2],
         }
+    }
+
+    /// The scene as light of the middle, the first and the last wavelength meets it; `None` of fewer than three.
+    pub fn tracers(&self) -> Option<[&Tracer; 3]> {
+        let [first, .., last] = &self.nodes[..] else {
+            return None;
+        };
+        let middle = &self.nodes[self.nodes.len() / 2];
+        (self.nodes.len() > 2).then_some([middle, first, last].map(|node| &node.node.tracer))
     }
 
     /// One of them, by a number in [0, 1).
     pub fn one(&self, place: f64) -> Option<Hue<'_>> {
         let index = self.nodes.partition_point(|node| node.upto <= place);
-        let chosen = self.nodes.get(index).or(self.nodes.last())?;
-        Some(Hue {
-            tracer: &chosen.node.tracer,
-            channels: chosen.node.channels,
-            band: Some(chosen.band),
-        })
+        self.nodes.get(index).or(self.nodes.last()).map(WeightedNode::hue)
     }
+
+    /// Each of them, with its probability.
+    pub fn hues(&self) -> impl Iterator<Item = (Hue<'_>, f64)> {
+        let before = std::iter::once(0.0).chain(self.nodes.iter().map(|node| node.upto));
+        let nodes = self.nodes.iter().zip(before);
+        nodes.map(|(node, before)| (node.hue(), node.upto - before))
+    }
+}
+
+impl WeightedNode {
+    fn hue(&self) -> Hue<'_> {
+        Hue {
+            tracer: &self.node.tracer,
+            channels: self.node.channels,
+            band: Some(self.band),
+            ends: self.ends,
+        }
+    }
+}
+
+/// See [`Hue::ends`], of a place among those of all wavelengths.
+fn ends(places: &[f64], place: f64) -> [f64; 2] {
+    let [first, .., last] = places else {
+        return [0.0; 2];
+    };
+    let middle = places[places.len() / 2];
+    [
+        (place - middle) * (place - last) / ((first - middle) * (first - last)),
+        (place - middle) * (place - first) / ((last - middle) * (last - first)),
+    ]
 }

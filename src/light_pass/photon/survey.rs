@@ -3,17 +3,18 @@
 
 use std::sync::Arc;
 
-use glam::{DVec2, Vec2};
+use glam::DVec2;
 
-use super::bundles::{Bundle, Square, Step, lamp_step_texels};
+use super::bundles::{Bundle, Moves, Square, Step};
 use super::launch::{LAMP_MIDDLE, PhotonLaunch};
+use super::spectrum::PhotonSpectrum;
 use super::walk::PhotonRules;
 use crate::geometry::Ray;
 use crate::illumination::{Chart, Receiver, Side};
 use crate::light_pass::caustic::path::PathSignature;
 use crate::optics::LinearSrgb;
 use crate::progress::Control;
-use crate::transport::{Branch, MediumStack, SurfaceHit};
+use crate::transport::{Branch, MediumStack, SurfaceHit, Tracer};
 
 /// Ways with less than this part of the light that starts are left to photons.
 const LEAST_SHARE: f64 = 0.01;
@@ -106,6 +107,8 @@ struct Candidate {
     middle: Arc<Light>,
     /// The light of the middle from half-way out on both axes of a lamp with a size.
     outer: Option<[Light; 2]>,
+    /// The light of the middle at the first and the last wavelength of a spectrum.
+    hues: Option<[Light; 2]>,
     /// That start in it.
     photons: f64,
     divisions: u32,
@@ -146,7 +149,7 @@ impl Surveyor<'_> {
             bundles_left: most_bundles,
             ..Survey::default()
         };
-        let light = |x: f64, y: f64| Arc::new(self.light(cell, DVec2::new(x, y), LAMP_MIDDLE));
+        let light = |x: f64, y: f64| Arc::new(self.light(self.tracer(), cell, DVec2::new(x, y), LAMP_MIDDLE));
         let whole = Candidate {
             cell,
             begin: 0,
@@ -155,6 +158,7 @@ impl Surveyor<'_> {
             corners: [light(0.0, 0.0), light(1.0, 0.0), light(0.0, 1.0), light(1.0, 1.0)],
             middle: light(0.5, 0.5),
             outer: self.outer(cell, DVec2::splat(0.5)),
+            hues: self.hues(cell, DVec2::splat(0.5)),
             photons,
             divisions: 0,
         };
@@ -188,7 +192,7 @@ impl Surveyor<'_> {
         let half = 0.5 * square.side;
         let light = |x: f64, y: f64| {
             let within = square.low + DVec2::new(x, y) * half;
-            Arc::new(self.light(square.cell, within, LAMP_MIDDLE))
+            Arc::new(self.light(self.tracer(), square.cell, within, LAMP_MIDDLE))
         };
         let sides = [light(1.0, 0.0), light(0.0, 1.0), light(2.0, 1.0), light(1.0, 2.0)];
         let middles = [light(0.5, 0.5), light(1.5, 0.5), light(0.5, 1.5), light(1.5, 1.5)];
@@ -210,6 +214,7 @@ impl Surveyor<'_> {
                 corners: corners.map(Arc::clone),
                 middle,
                 outer: self.outer(square.cell, square.low + (offset + 0.5) * half),
+                hues: self.hues(square.cell, square.low + (offset + 0.5) * half),
                 photons: 0.25 * square.photons,
                 divisions: square.divisions + 1,
             };
@@ -221,11 +226,23 @@ impl Surveyor<'_> {
     fn outer(&self, cell: usize, within: DVec2) -> Option<[Light; 2]> {
         self.launch.lamp_offsets()?;
         let half_way = [DVec2::new(0.75, 0.5), DVec2::new(0.5, 0.75)];
-        Some(half_way.map(|lamp| self.light(cell, within, lamp)))
+        Some(half_way.map(|lamp| self.light(self.tracer(), cell, within, lamp)))
+    }
+
+    /// The light of a point of a cell at the first and the last wavelength of a spectrum.
+    fn hues(&self, cell: usize, within: DVec2) -> Option<[Light; 2]> {
+        let [_, first, last] = self.rules.spectrum?.tracers()?;
+        Some([first, last].map(|tracer| self.light(tracer, cell, within, LAMP_MIDDLE)))
+    }
+
+    /// The scene as light meets it, of the middle wavelength where they are parted.
+    fn tracer(&self) -> &Tracer {
+        let parted = self.rules.spectrum.and_then(PhotonSpectrum::tracers);
+        parted.map_or(self.rules.tracer, |[middle, ..]| middle)
     }
 
     /// The light of a point of a cell and of its lamp, on all its ways.
-    fn light(&self, cell: usize, within: DVec2, lamp: DVec2) -> Light {
+    fn light(&self, tracer: &Tracer, cell: usize, within: DVec2, lamp: DVec2) -> Light {
         let mut light = Light::default();
         let Some(start) = self.launch.start_in(cell, within, lamp) else {
             return light;
@@ -244,16 +261,22 @@ impl Surveyor<'_> {
         while let Some(from) = waiting.pop() {
             light.followed += 1;
             light.segments += from.flux_w.max_channel() / light.start_w;
-            if let Some(hit) = self.rules.tracer.closest_hit(&from.ray) {
-                self.meet(from, &hit, &mut light, &mut waiting);
+            if let Some(hit) = tracer.closest_hit(&from.ray) {
+                self.meet(tracer, from, &hit, &mut light, &mut waiting);
             }
         }
         light.segments += LOST_SEGMENTS * light.lost_w / light.start_w;
         light
     }
 
-    fn meet(&self, from: Waiting, hit: &SurfaceHit, light: &mut Light, waiting: &mut Vec<Waiting>) {
-        let tracer = self.rules.tracer;
+    fn meet(
+        &self,
+        tracer: &Tracer,
+        from: Waiting,
+        hit: &SurfaceHit,
+        light: &mut Light,
+        waiting: &mut Vec<Waiting>,
+    ) {
         let effects = self.rules.effects;
         let material = tracer.scene().material_of(hit.object);
         if from.steps.is_empty() && !material.surface.is_specular() {
@@ -335,7 +358,7 @@ impl Candidate {
                 };
                 let misplaced = self.bent_texels(middle) / MOST_BENT_TEXELS;
                 let flux_w = (middle.flux_w + first.flux_w + second.flux_w) * (1.0 / 3.0);
-                let Some(lamp) = self.lamp_texels(middle) else {
+                let Some(moves) = self.moves(middle) else {
                     blurred_w += 0.25 * flux_w.max_channel();
                     continue;
                 };
@@ -347,7 +370,7 @@ impl Candidate {
                     steps: Arc::clone(&middle.steps),
                     receiver: middle.receiver,
                     corners: [middle, first, second].map(|arrival| arrival.place.as_vec2()),
-                    lamp,
+                    moves,
                     flux_w: flux_w.to_array().map(|watts| watts as f32),
                 });
             }
@@ -383,15 +406,17 @@ impl Candidate {
         }
     }
 
-    /// How far the light of the middle arrives from where it does if it starts half an axis of its lamp from there [texels];
-    /// `None` where it takes another way, or that is too far for its parts.
-    fn lamp_texels(&self, middle: &Arrival) -> Option<[Vec2; 2]> {
-        let Some([first, second]) = &self.outer else {
-            return Some([Vec2::ZERO; 2]);
-        };
-        let moved = |outer: &Light| Some((2.0 * (outer.find(middle.key)?.place - middle.place)).as_vec2());
-        let lamp = [moved(first)?, moved(second)?];
-        (lamp_step_texels(lamp) < MOST_STEP_TEXELS).then_some(lamp)
+    /// How far the light of the middle arrives from there otherwise; `None` where it takes another way, or its lamp is too large.
+    fn moves(&self, middle: &Arrival) -> Option<Moves> {
+        let mut moves = Moves::default();
+        let moved = |light: &Light| Some((light.find(middle.key)?.place - middle.place).as_vec2());
+        if let Some([x, y]) = &self.outer {
+            moves.lamp = [moved(x)? * 2.0, moved(y)? * 2.0];
+        }
+        if let Some([first, last]) = &self.hues {
+            moves.hues = [moved(first)?, moved(last)?];
+        }
+        (moves.lamp_step_texels() < MOST_STEP_TEXELS).then_some(moves)
     }
 
     /// How far the light of the middle arrives from where opposite corners say [texels], where two of them say so.

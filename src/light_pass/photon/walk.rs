@@ -19,7 +19,7 @@ use crate::transport::{Branch, EffectSet, MediumStack, Meeting, Tracer};
 const ROULETTE_BELOW: f64 = 0.1;
 
 /// Dimension of [`even_point`] that wavelengths are drawn from.
-const WAVELENGTH_DIMENSION: u32 = 1 << 16;
+pub(super) const WAVELENGTH_DIMENSION: u32 = 1 << 16;
 
 /// What a photon leaves on a diffuse surface.
 #[derive(Clone, Copy, Debug)]
@@ -78,6 +78,8 @@ pub struct PhotonWalk<'a> {
 /// The photon under way.
 struct Photon<'a> {
     hue: Hue<'a>,
+    /// What it becomes where wavelengths part.
+    own_hue: Option<Hue<'a>>,
     flux_w: LinearSrgb,
     index: u32,
     choice: Choice,
@@ -120,7 +122,7 @@ impl<'a> PhotonWalk<'a> {
         &mut self,
         index: u32,
         start: Option<Start>,
-        carried: Carried<'a>,
+        mut carried: Carried<'a>,
         mut arrive: impl FnMut(Hit),
     ) {
         let whole = match self.rules.spectrum {
@@ -129,10 +131,19 @@ impl<'a> PhotonWalk<'a> {
                 tracer: self.rules.tracer,
                 channels: ColourMatrix::IDENTITY,
                 band: None,
+                ends: [0.0; 2],
             },
         };
+        let own_hue = self.rules.spectrum.and_then(|spectrum| {
+            let place = even_point(index, WAVELENGTH_DIMENSION, self.rules.seed).x;
+            spectrum.one(place)
+        });
+        if let Some(hue) = own_hue {
+            carried.origin.ends = hue.ends;
+        }
         let mut photon = Photon {
             hue: whole,
+            own_hue,
             flux_w: start.map_or(LinearSrgb::BLACK, |start| start.flux_w),
             choice: Choice::new(index, self.rules.seed),
             index,
@@ -233,11 +244,10 @@ impl<'a> PhotonWalk<'a> {
 
     /// Gives a photon that has all wavelengths one of them.
     fn part(&mut self, photon: &mut Photon<'a>) {
-        let (Some(spectrum), None) = (self.rules.spectrum, photon.hue.band) else {
+        if photon.hue.band.is_some() {
             return;
-        };
-        let place = even_point(photon.index, WAVELENGTH_DIMENSION, self.rules.seed).x;
-        if let Some(one) = spectrum.one(place) {
+        }
+        if let Some(one) = photon.own_hue {
             self.book(Account::Sampling, &photon.hue.channels, photon.flux_w);
             self.book(Account::Sampling, &one.channels, photon.flux_w * -1.0);
             photon.hue = one;
@@ -316,11 +326,12 @@ impl Photon<'_> {
             let bit = 1 << number;
             if self.followed & bit != 0 && is_left(bundle) {
                 self.followed &= !bit;
+                let flux_w = bundle.flux_w() * (-carried.scale / self.probability);
                 arrive(Hit {
                     receiver: bundle.receiver,
                     place: Place::Map(bundle.place(&carried)),
-                    flux_w: bundle.flux_w() * (-carried.scale / self.probability),
-                    band: None,
+                    flux_w: self.own_hue.map_or(flux_w, |hue| hue.channels.apply(flux_w)),
+                    band: self.own_hue.and_then(|hue| hue.band),
                 });
             }
         }

@@ -111,6 +111,7 @@ impl LightSpectrum {
             let wavelength = wavelength_at(places[node]);
             SpectralNode {
                 tracer: tracer.with_indices_at(wavelength),
+                wavelength,
                 channels: whole.own[node],
                 number: node as u32,
             }

@@ -94,7 +94,7 @@ fn photons_are_unbiased() {
     for (what, scene, density_per_sr) in [
         ("glass ball", builtin_scene("ball"), 1e6),
         ("cut glass", cut_glass(), 1e6),
-        ("prism", builtin_scene("prism"), 3e7),
+        ("prism", builtin_scene("prism"), 3e10),
         ("square lamp", ring_under_square_lamp(), 1e5),
         ("disc of the sun", nephroid_under_the_sun(), 2e6),
         ("frosted ball", frosted_ball(0.3), 1e6),
