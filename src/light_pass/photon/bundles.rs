@@ -49,6 +49,9 @@ const PART_TEXELS: f64 = 0.1;
 /// Parts of a lamp along an axis for one photon, at most.
 const MOST_LAMP_PARTS: f64 = 8.0;
 
+/// The same of light that is parted.
+const FEW_LAMP_PARTS: f64 = 2.0;
+
 /// Parts of a spectrum, least and most: few would leave colours to chance.
 const HUE_PARTS: (f64, f64) = (8.0, 64.0);
 
@@ -84,17 +87,17 @@ impl Moves {
         x * origin.lamp.x + y * origin.lamp.y + first * origin.ends[0] + last * origin.ends[1]
     }
 
-    /// Parts of a lamp that a bundle is deposited for, along both axes, for so many photons of its triangle.
-    fn lamp_parts(&self, photons: f64) -> DVec2 {
-        // What the draw leaves is to be less than the noise of photons.
+    /// Parts of a lamp that a bundle is deposited for, along both axes: what the draw of their points leaves is to be less than
+    /// the noise of so many photons. No more than `most` along an axis.
+    fn lamp_parts(&self, photons: f64, most: f64) -> DVec2 {
         let finer = (photons.sqrt() / MOST_LAMP_PARTS).max(1.0);
         let parts = |moved: Vec2| (2.0 * finer * f64::from(moved.abs().max_element()) / PART_TEXELS).ceil();
-        DVec2::from(self.lamp.map(parts)).clamp(DVec2::ONE, DVec2::splat((finer * MOST_LAMP_PARTS).floor()))
+        DVec2::from(self.lamp.map(parts)).clamp(DVec2::ONE, DVec2::splat(most))
     }
 
     /// How far light of one part of a lamp arrives from that of the next [texels].
     pub(super) fn lamp_step_texels(&self) -> f64 {
-        let parts = self.lamp_parts(1.0).to_array();
+        let parts = self.lamp_parts(1.0, MOST_LAMP_PARTS).to_array();
         let steps = [0, 1].map(|axis| 2.0 * f64::from(self.lamp[axis].abs().max_element()) / parts[axis]);
         steps[0].max(steps[1])
     }
@@ -191,18 +194,20 @@ impl Bundles {
     pub(super) fn new(surveyor: &Surveyor, photons: f64) -> Self {
         let cells = surveyor.launch.cell_count();
         let photons = photons.min(MOST_PHOTONS) / cells as f64;
-        if cells == 0 || photons < LEAST_PHOTONS {
+        let has_size = surveyor.launch.lamp_offsets().is_some();
+        if cells == 0 || photons < LEAST_PHOTONS[usize::from(has_size)] {
             return Self::default();
         }
-        let of_cells = |step: usize| -> (Vec<Square>, f64) {
+        let of_cells = |step: usize| -> (Vec<Square>, bool) {
             let of_cell = |cell| surveyor.survey(cell, photons, MOST_BUNDLES / cells);
             let surveys: Vec<Survey> = (0..cells).into_par_iter().step_by(step).map(of_cell).collect();
             let carried_w: f64 = surveys.iter().map(|survey| survey.carried_w).sum();
             let arriving_w: f64 = surveys.iter().map(|survey| survey.arriving_w).sum();
             let squares = surveys.into_iter().flat_map(|survey| survey.squares);
-            (squares.collect(), carried_w / arriving_w)
+            (squares.collect(), carried_w > LEAST_CARRIED * arriving_w)
         };
-        if !(of_cells(TRIED).1 > LEAST_CARRIED) {
+        let (_, is_worth_it) = of_cells(TRIED);
+        if !is_worth_it {
             return Self::default();
         }
         let (squares, _) = of_cells(1);
@@ -309,7 +314,6 @@ impl Bundles {
         on_lamp: DVec2,
         in_hue: Option<(&'a PhotonSpectrum, f64)>,
     ) -> Vec<(Origin, Option<Hue<'a>>, f64)> {
-        let lamp_parts = moves.lamp_parts(photons);
         let hues: Vec<(Option<Hue<'a>>, f64)> = match in_hue {
             None => vec![(None, 1.0)],
             Some((spectrum, _)) if photons > spectrum.hues().count() as f64 => {
@@ -319,6 +323,14 @@ impl Bundles {
                 let parts = moves.hue_parts();
                 let one = |part: u32| (spectrum.one((f64::from(part) + within) / parts), 1.0 / parts);
                 (0..parts as u32).map(one).collect()
+            }
+        };
+        let lamp_parts = match hues.len() {
+            1 => moves.lamp_parts(photons, photons.sqrt().floor().max(MOST_LAMP_PARTS)),
+            // Each of them is deposited at every wavelength.
+            hues => {
+                let photons = photons / hues as f64;
+                moves.lamp_parts(photons, photons.sqrt().floor().max(FEW_LAMP_PARTS))
             }
         };
         let of_lamp = (0..(lamp_parts.x * lamp_parts.y) as u32).map(|part| {

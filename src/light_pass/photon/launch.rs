@@ -212,7 +212,7 @@ impl<'a> PhotonLaunch<'a> {
             } => {
                 let emitter = places.sample(lamp)?;
                 let aimed = spheres.aim_in(&emitter, (cell, within), *across_m)?;
-                return Some(self.from_place(&emitter, aimed));
+                return Some(self.sent_from(&emitter, aimed));
             }
         };
         let count = cells.len();
@@ -247,13 +247,13 @@ impl<'a> PhotonLaunch<'a> {
             } => {
                 let emitter = places.sample(even_point(index, LAMP_DIMENSION, seed))?;
                 let aimed = spheres.aim(&emitter, place, *across_m)?;
-                Some(self.from_place(&emitter, aimed))
+                Some(self.sent_from(&emitter, aimed))
             }
         }
     }
 
     /// The photon of a ray of a place of a lamp, and the measure [sr or m²] that it stands for.
-    fn from_place(&self, emitter: &Emitter, (ray, measure): (Ray, f64)) -> Start {
+    fn sent_from(&self, emitter: &Emitter, (ray, measure): (Ray, f64)) -> Start {
         let media = match (&self.domain, emitter.kind.position()) {
             (Domain::Cells { launch, .. }, _) => *launch.media(),
             (

@@ -25,8 +25,9 @@ const MOST_STEPS: usize = 12;
 /// Ways of a point; further ones are left to photons.
 const MOST_WAYS: usize = 16;
 
-/// Cells are looked at where so many photons start in them.
-pub(super) const LEAST_PHOTONS: f64 = 24.0;
+/// Cells are looked at where so many photons start in them, of light of one place and of a lamp with a size: for that there
+/// are more points to follow.
+pub(super) const LEAST_PHOTONS: [f64; 2] = [24.0, 400.0];
 
 /// A square is divided where those of its photons that follow no bundle take as many segments as its division, times this.
 const WORTH: f64 = 1.0;
