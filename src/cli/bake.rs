@@ -18,7 +18,7 @@ use nephroid::error::{Result, Warning};
 use nephroid::export::manifest::{Manifest, MapEntry};
 use nephroid::export::map_folder::MapFolder;
 use nephroid::files;
-use nephroid::light_pass::ledger::Carried;
+use nephroid::light_pass::ledger::CarriedFlux;
 use nephroid::scene::Scene;
 use nephroid::session::forecast::forecast;
 use nephroid::session::{BakeResult, BakeSession, Forecast, ForecastReport, StopReason};
@@ -171,9 +171,7 @@ pub fn summary(manifest: &Manifest, result: &BakeResult, folder: &str) -> String
             energy.emitted, energy.deposited, energy.absorbed, energy.escaped, energy.truncated
         ),
     );
-    let mut carried = Carried::default();
-    result.ledgers.iter().for_each(|light| carried += light.carried_w);
-    if let Some(parts) = carried.in_words(energy.deposited) {
+    if let Some(parts) = CarriedFlux::sum(&result.ledgers).in_words(energy.deposited) {
         line("carried", parts);
     }
     line(

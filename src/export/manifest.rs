@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::error::Warning;
 use crate::files::cache::ContentHash;
 use crate::illumination::{IlluminationMap, Side, UvSet};
-use crate::light_pass::ledger::{Carried, EnergyLedger, LightLedger, Truncated};
+use crate::light_pass::ledger::{CarriedFlux, EnergyLedger, LightLedger, Truncated};
 use crate::plan::EffectLine;
 use crate::scene::Scene;
 use crate::session::{
@@ -107,7 +107,7 @@ pub struct LedgerEntry {
     /// Its accounts.
     pub energy_w: EnergyAccounts,
     /// What was deposited, by what carried it.
-    pub carried_w: Carried,
+    pub carried_w: CarriedFlux,
     /// Flux of launched rays whose first hit was not specular [W].
     pub not_emitted_w: f64,
     /// What was emitted, as radiant flux [W]; of light that is traced by wavelength.

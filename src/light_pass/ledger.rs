@@ -91,7 +91,7 @@ impl EnergyLedger {
 
 /// What carried the light that diffuse surfaces got [W].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Carried {
+pub struct CarriedFlux {
     /// Patches of the wavefront.
     pub patches: f64,
     /// Bundles, which photons correct.
@@ -102,7 +102,18 @@ pub struct Carried {
     pub splats: f64,
 }
 
-impl Carried {
+impl CarriedFlux {
+    /// Of all lights.
+    pub fn sum(ledgers: &[LightLedger]) -> Self {
+        let sum = |part: fn(&Self) -> f64| ledgers.iter().map(|light| part(&light.carried_w)).sum();
+        Self {
+            patches: sum(|carried| carried.patches),
+            bundles: sum(|carried| carried.bundles),
+            photons: sum(|carried| carried.photons),
+            splats: sum(|carried| carried.splats),
+        }
+    }
+
     /// "bundles 82.0 %, photons 18.0 %" of what was deposited [W]; `None` where nothing was.
     pub fn in_words(&self, deposited_w: f64) -> Option<String> {
         let parts = [
@@ -119,15 +130,6 @@ impl Carried {
     }
 }
 
-impl AddAssign for Carried {
-    fn add_assign(&mut self, other: Self) {
-        self.patches += other.patches;
-        self.bundles += other.bundles;
-        self.photons += other.photons;
-        self.splats += other.splats;
-    }
-}
-
 /// The ledger of one light.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LightLedger {
@@ -136,7 +138,7 @@ pub struct LightLedger {
     /// Its accounts.
     pub energy_w: EnergyLedger,
     /// What was deposited, by what carried it.
-    pub carried_w: Carried,
+    pub carried_w: CarriedFlux,
     /// Flux of launched rays whose first hit was not specular [W].
     pub not_emitted_w: f64,
     /// What was emitted, as radiant flux [W]; `None` of light that is not traced by wavelength.

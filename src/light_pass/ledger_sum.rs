@@ -1,6 +1,6 @@
 //! The ledger while it is being summed: exact counts per channel and account.
 
-use super::ledger::{Carried, EnergyLedger, LightLedger, Truncated};
+use super::ledger::{CarriedFlux, EnergyLedger, LightLedger, Truncated};
 use crate::illumination::accumulator::{FluxCount, FluxUnit};
 use crate::optics::LinearSrgb;
 
@@ -118,7 +118,7 @@ impl LedgerSum {
                 },
                 sampling: watts(Account::Sampling),
             },
-            carried_w: Carried::default(),
+            carried_w: CarriedFlux::default(),
             not_emitted_w: watts(Account::NotEmitted),
             emitted_radiant_w: None,
             deposited_radiant_w: None,

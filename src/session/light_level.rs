@@ -12,7 +12,7 @@ use crate::light_pass::accuracy::{LightError, Noise};
 use crate::light_pass::caustic::kept::KeptLight;
 use crate::light_pass::caustic::statistics::FootprintStatistics;
 use crate::light_pass::launch::Launch;
-use crate::light_pass::ledger::Carried;
+use crate::light_pass::ledger::CarriedFlux;
 use crate::light_pass::ledger_sum::{Account, LedgerSum};
 use crate::light_pass::receiver_maps::ReceiverMaps;
 use crate::light_pass::wavefront::cell::Splits;
@@ -216,22 +216,22 @@ impl LightLevel {
     }
 
     /// What it deposited [W], by what carried it.
-    pub(super) fn carried_w(&self, deposited: f64, light: &Light, estimator: Estimator) -> Carried {
+    pub(super) fn carried_w(&self, deposited: f64, light: &Light, estimator: Estimator) -> CarriedFlux {
         let bundles = self
             .ledger
             .watts(Account::Bundled, self.unit, self.strength(light));
-        let nothing = Carried::default();
+        let nothing = CarriedFlux::default();
         match (self.key.photons, estimator) {
-            (Some(_), _) => Carried {
+            (Some(_), _) => CarriedFlux {
                 bundles,
                 photons: deposited - bundles,
                 ..nothing
             },
-            (None, Estimator::Splat) => Carried {
+            (None, Estimator::Splat) => CarriedFlux {
                 splats: deposited,
                 ..nothing
             },
-            (None, _) => Carried {
+            (None, _) => CarriedFlux {
                 patches: deposited,
                 ..nothing
             },

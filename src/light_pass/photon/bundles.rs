@@ -198,19 +198,20 @@ impl Bundles {
         if cells == 0 || photons < LEAST_PHOTONS[usize::from(has_size)] {
             return Self::default();
         }
-        let of_cells = |step: usize| -> (Vec<Square>, bool) {
-            let of_cell = |cell| surveyor.survey(cell, photons, MOST_BUNDLES / cells);
-            let surveys: Vec<Survey> = (0..cells).into_par_iter().step_by(step).map(of_cell).collect();
-            let carried_w: f64 = surveys.iter().map(|survey| survey.carried_w).sum();
-            let arriving_w: f64 = surveys.iter().map(|survey| survey.arriving_w).sum();
-            let squares = surveys.into_iter().flat_map(|survey| survey.squares);
-            (squares.collect(), carried_w > LEAST_CARRIED * arriving_w)
-        };
-        let (_, is_worth_it) = of_cells(TRIED);
+        let survey = |cell| surveyor.survey(cell, photons, MOST_BUNDLES / cells);
+        let tried = |cell: usize| cell.is_multiple_of(TRIED).then(|| survey(cell));
+        let tried: Vec<Option<Survey>> = (0..cells).into_par_iter().map(tried).collect();
+        let of_tried = |flux_w: fn(&Survey) -> f64| tried.iter().flatten().map(flux_w).sum::<f64>();
+        let is_worth_it =
+            of_tried(|survey| survey.carried_w) > LEAST_CARRIED * of_tried(|survey| survey.arriving_w);
         if !is_worth_it {
             return Self::default();
         }
-        let (squares, _) = of_cells(1);
+        let surveyed = tried.into_par_iter().enumerate();
+        let surveyed: Vec<Survey> = surveyed
+            .map(|(cell, known)| known.unwrap_or_else(|| survey(cell)))
+            .collect();
+        let squares: Vec<Square> = surveyed.into_iter().flat_map(|survey| survey.squares).collect();
         let all: f64 = squares.iter().map(|square| square.share() * square.density).sum();
         let mut so_far = 0.0;
         let ends = squares.iter().map(|square| {

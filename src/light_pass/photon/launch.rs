@@ -57,15 +57,19 @@ enum Domain<'a> {
         full_w: Option<LinearSrgb>,
     },
     /// Light of many: spheres around what is specular, as each place sees them.
-    Spheres {
-        places: Places<'a>,
-        tracer: &'a Tracer,
-        spheres: &'a Spheres,
-        /// Around all places; `None` where they lie in different media.
-        media: Option<MediumStack>,
-        /// Reaches across the whole scene [m].
-        across_m: f64,
-    },
+    Spheres(Lamp<'a>),
+}
+
+/// A lamp with a size.
+#[derive(Debug)]
+struct Lamp<'a> {
+    places: Places<'a>,
+    tracer: &'a Tracer,
+    spheres: &'a Spheres,
+    /// Around all places; `None` where they lie in different media.
+    media: Option<MediumStack>,
+    /// Reaches across the whole scene [m].
+    across_m: f64,
 }
 
 /// A cell of the item buffer.
@@ -119,13 +123,13 @@ impl<'a> PhotonLaunch<'a> {
         let is_same = media.all(|media| media == first);
         let (low, high) = scene.bounds().unwrap_or_default();
         Self {
-            domain: Domain::Spheres {
+            domain: Domain::Spheres(Lamp {
                 spheres,
                 media: is_same.then_some(first),
                 across_m: (high - low).length(),
                 places,
                 tracer,
-            },
+            }),
         }
     }
 
@@ -133,7 +137,7 @@ impl<'a> PhotonLaunch<'a> {
     pub fn is_empty(&self) -> bool {
         match &self.domain {
             Domain::Cells { cells, .. } => cells.is_empty(),
-            Domain::Spheres { spheres, .. } => spheres.is_empty(),
+            Domain::Spheres(lamp) => lamp.spheres.is_empty(),
         }
     }
 
@@ -149,11 +153,11 @@ impl<'a> PhotonLaunch<'a> {
                 };
                 cells.iter().map(of_cell).sum()
             }
-            Domain::Spheres { places, spheres, .. } => {
-                let Some(emitter) = places.sample(DVec2::splat(0.5)) else {
+            Domain::Spheres(lamp) => {
+                let Some(emitter) = lamp.places.sample(LAMP_MIDDLE) else {
                     return 0.0;
                 };
-                spheres.measure(&emitter)
+                lamp.spheres.measure(&emitter)
             }
         }
     }
@@ -176,7 +180,7 @@ impl<'a> PhotonLaunch<'a> {
     pub(super) fn cell_count(&self) -> usize {
         match &self.domain {
             Domain::Cells { cells, .. } => cells.len(),
-            Domain::Spheres { places, spheres, .. } => places.offsets().map_or(0, |_| spheres.cell_count()),
+            Domain::Spheres(lamp) => lamp.places.offsets().map_or(0, |_| lamp.spheres.cell_count()),
         }
     }
 
@@ -184,7 +188,7 @@ impl<'a> PhotonLaunch<'a> {
     pub(super) fn lamp_place(&self, index: u32, seed: u64) -> DVec2 {
         match &self.domain {
             Domain::Cells { .. } => LAMP_MIDDLE,
-            Domain::Spheres { .. } => even_point(index, LAMP_DIMENSION, seed),
+            Domain::Spheres(_) => even_point(index, LAMP_DIMENSION, seed),
         }
     }
 
@@ -192,7 +196,7 @@ impl<'a> PhotonLaunch<'a> {
     pub(super) fn lamp_offsets(&self) -> Option<fn(DVec2) -> DVec2> {
         match &self.domain {
             Domain::Cells { .. } => None,
-            Domain::Spheres { places, .. } => places.offsets(),
+            Domain::Spheres(lamp) => lamp.places.offsets(),
         }
     }
 
@@ -204,15 +208,10 @@ impl<'a> PhotonLaunch<'a> {
                 cells,
                 full_w,
             } => (launch, cells, full_w),
-            Domain::Spheres {
-                places,
-                spheres,
-                across_m,
-                ..
-            } => {
-                let emitter = places.sample(lamp)?;
-                let aimed = spheres.aim_in(&emitter, (cell, within), *across_m)?;
-                return Some(self.sent_from(&emitter, aimed));
+            Domain::Spheres(of) => {
+                let emitter = of.places.sample(lamp)?;
+                let aimed = of.spheres.aim_in(&emitter, (cell, within), of.across_m)?;
+                return Some(of.start(&emitter, aimed));
             }
         };
         let count = cells.len();
@@ -239,31 +238,22 @@ impl<'a> PhotonLaunch<'a> {
                 let (cell, rest) = chosen(place, self.cell_count());
                 self.start_in(cell, in_square(rest), LAMP_MIDDLE)
             }
-            Domain::Spheres {
-                places,
-                spheres,
-                across_m,
-                ..
-            } => {
-                let emitter = places.sample(even_point(index, LAMP_DIMENSION, seed))?;
-                let aimed = spheres.aim(&emitter, place, *across_m)?;
-                Some(self.sent_from(&emitter, aimed))
+            Domain::Spheres(lamp) => {
+                let emitter = lamp.places.sample(self.lamp_place(index, seed))?;
+                let aimed = lamp.spheres.aim(&emitter, place, lamp.across_m)?;
+                Some(lamp.start(&emitter, aimed))
             }
         }
     }
+}
 
-    /// The photon of a ray of a place of a lamp, and the measure [sr or m²] that it stands for.
-    fn sent_from(&self, emitter: &Emitter, (ray, measure): (Ray, f64)) -> Start {
-        let media = match (&self.domain, emitter.kind.position()) {
-            (Domain::Cells { launch, .. }, _) => *launch.media(),
-            (
-                Domain::Spheres {
-                    media: Some(media), ..
-                },
-                _,
-            ) => *media,
-            (Domain::Spheres { tracer, .. }, Some(position)) => media_at(tracer, position),
-            (Domain::Spheres { .. }, None) => MediumStack::default(),
+impl Lamp<'_> {
+    /// The photon of a ray of a place, and the measure [sr or m²] that it stands for.
+    fn start(&self, emitter: &Emitter, (ray, measure): (Ray, f64)) -> Start {
+        let media = match (self.media, emitter.kind.position()) {
+            (Some(media), _) => media,
+            (None, Some(position)) => media_at(self.tracer, position),
+            (None, None) => MediumStack::default(),
         };
         Start {
             flux_w: emitter.strength * (emitter.kind.falloff(ray.direction) * measure),

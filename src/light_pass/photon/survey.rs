@@ -351,15 +351,22 @@ impl Candidate {
     fn bundles(&self) -> (Vec<Bundle>, [u8; 4], Outcome) {
         let (mut bundles, mut ends) = (Vec::new(), [0; 4]);
         let (mut carried_w, mut blurred_w) = (0.0, 0.0);
+        let of_way = |middle| {
+            (
+                middle,
+                self.bent_texels(middle) / MOST_BENT_TEXELS,
+                self.moves(middle),
+            )
+        };
+        let ways: Vec<_> = self.middle.arrivals.iter().map(of_way).collect();
         for (corners, end) in TRIANGLES.iter().zip(&mut ends) {
-            for middle in &self.middle.arrivals {
+            for &(middle, misplaced, moves) in &ways {
                 let [first, second] = corners.map(|corner| self.corners[corner].find(middle.key));
                 let (Some(first), Some(second)) = (first, second) else {
                     continue;
                 };
-                let misplaced = self.bent_texels(middle) / MOST_BENT_TEXELS;
                 let flux_w = (middle.flux_w + first.flux_w + second.flux_w) * (1.0 / 3.0);
-                let Some(moves) = self.moves(middle) else {
+                let Some(moves) = moves else {
                     blurred_w += 0.25 * flux_w.max_channel();
                     continue;
                 };

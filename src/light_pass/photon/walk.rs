@@ -116,8 +116,8 @@ impl<'a> PhotonWalk<'a> {
         }
     }
 
-    /// Follows the photon of an index, if there is one, to its end; hits on diffuse surfaces after at least one specular event are handed to
-    /// `arrive`. `Deposited` is not booked here but by who places the flux.
+    /// Follows the photon of an index, if there is one, to its end; hits on diffuse surfaces after at least one specular event
+    /// are handed to `arrive`. `Deposited` is not booked here but by who places the flux.
     pub(super) fn follow(
         &mut self,
         index: u32,

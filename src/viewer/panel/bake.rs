@@ -8,7 +8,7 @@ use egui::{Color32, Grid, ProgressBar, RichText, Ui};
 use super::control::{button, counted, grouped};
 use super::{Facts, Panel, Wishes};
 use crate::illumination::IlluminationMap;
-use crate::light_pass::ledger::{Carried, EnergyLedger};
+use crate::light_pass::ledger::{CarriedFlux, EnergyLedger};
 use crate::session::{BYTES_PER_TEXEL, StopReason};
 use crate::viewer::time_left::{in_words, time_left_s};
 use crate::viewer::worker::{BakeRequest, BakeState, BakedLevel};
@@ -144,9 +144,7 @@ pub fn energy(ui: &mut Ui, last: Option<&BakedLevel>) {
     let total: EnergyLedger = ledgers.iter().map(|light| &light.energy_w).sum();
     if total.emitted > 0.0 {
         ledger(ui, &total);
-        let mut carried = Carried::default();
-        ledgers.iter().for_each(|light| carried += light.carried_w);
-        if let Some(parts) = carried.in_words(total.deposited) {
+        if let Some(parts) = CarriedFlux::sum(ledgers).in_words(total.deposited) {
             ui.label(format!("Carried by {parts}")).on_hover_text(CARRIERS);
         }
     } else {

@@ -73,19 +73,20 @@ fn outliers(result: &BakeResult, reference: &BakeResult, scene: &Scene, receiver
             .as_ref()
             .map_or(0.0, |error| f64::from(error[texel]).powi(2))
     };
-    let blocks = (0..SIDE / BLOCK).flat_map(|row| (0..SIDE / BLOCK).map(move |column| (row, column)));
-    let is_outlier = |&(row, column): &(usize, usize)| {
-        let texels = (0..BLOCK * BLOCK)
-            .map(|index| (row * BLOCK + index / BLOCK) * SIDE + column * BLOCK + index % BLOCK);
-        let (difference, variance) = texels.fold((0.0, 0.0), |(difference, variance), texel| {
-            (
-                difference + a[texel] - b[texel],
-                variance + square(ours, texel) + square(theirs, texel),
-            )
-        });
-        difference.abs() > 3.0 * variance.sqrt()
-    };
-    blocks.filter(is_outlier).count()
+    let differences = block_sums(|texel| a[texel] - b[texel]);
+    let variances = block_sums(|texel| square(ours, texel) + square(theirs, texel));
+    let blocks = differences.iter().zip(&variances);
+    blocks
+        .filter(|(difference, variance)| difference.abs() > 3.0 * variance.sqrt())
+        .count()
+}
+
+fn block_sums(of_texel: impl Fn(usize) -> f64) -> Vec<f64> {
+    let mut sums = vec![0.0; (SIDE / BLOCK).pow(2)];
+    for texel in 0..SIDE * SIDE {
+        sums[texel / SIDE / BLOCK * (SIDE / BLOCK) + texel % SIDE / BLOCK] += of_texel(texel);
+    }
+    sums
 }
 
 /// Of 64 blocks chance alone puts more than three beyond three standard errors once in 20,000 times.
@@ -119,13 +120,9 @@ fn bundles_of_a_spectrum_are_unbiased() {
     let mut scene = builtin_scene("ball");
     let glass = scene.materials.iter_mut().find(|it| it.surface.is_specular());
     *glass.expect("glass") = parts::glass("N-SF11");
-    let blocks_of = |result: &BakeResult| -> Vec<f64> {
+    let blocks_of = |result: &BakeResult| {
         let light = caustic(map_of(result, &scene, "floor"));
-        let mut blocks = vec![0.0; (SIDE / BLOCK).pow(2)];
-        for (texel, e) in light.iter().enumerate() {
-            blocks[texel / SIDE / BLOCK * (SIDE / BLOCK) + texel % SIDE / BLOCK] += e;
-        }
-        blocks
+        block_sums(|texel| light[texel])
     };
     let baked = |seed: u64, density_per_sr: f64| {
         let settings = BakeSettings {

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use egui::Pos2;
 use nephroid::eye_pass::WhiteBalance;
-use nephroid::light_pass::ledger::{Carried, EnergyLedger, LightLedger, Truncated};
+use nephroid::light_pass::ledger::{CarriedFlux, EnergyLedger, LightLedger, Truncated};
 use nephroid::settings::{Footprint, ItemBufferKind, Kernel, Preset, RayPlacement};
 use nephroid::viewer::panel::accuracy::preset;
 
@@ -333,10 +333,10 @@ fn ledgers_are_summed_and_gaps_told() {
             truncated: with(Truncated::default(), |it| it.depth = 0.125),
             sampling: 0.0,
         },
-        carried_w: Carried {
+        carried_w: CarriedFlux {
             bundles: 0.75,
             photons: 0.25,
-            ..Carried::default()
+            ..CarriedFlux::default()
         },
         not_emitted_w: 0.0,
         emitted_radiant_w: None,
