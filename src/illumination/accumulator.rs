@@ -35,6 +35,15 @@ impl FluxUnit {
         }
     }
 
+    /// The unit of a sum over a number of means, where this is that of the means.
+    #[must_use]
+    pub fn times(self, factor: f64) -> Self {
+        Self {
+            watts: self.watts * factor,
+            counts_per_watt: self.counts_per_watt / factor,
+        }
+    }
+
     /// One count [W].
     pub fn watts(self) -> f64 {
         self.watts

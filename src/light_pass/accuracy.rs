@@ -8,7 +8,7 @@
 //! Neither level can see what both miss, and a difference does not see what all levels share: what was given up on
 //! the way (threshold, depth, no place) is added by its watts.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use rayon::prelude::*;
@@ -73,6 +73,21 @@ pub struct LightError {
     pub relative_rmse: f64,
     /// How many times smaller the error became with the last level.
     pub ratio: f64,
+}
+
+impl LightError {
+    /// Raises the error everywhere alike where its square is found to be larger.
+    pub fn raise_to(&mut self, relative_square: f64) {
+        let factor = relative_square.sqrt() / self.relative_rmse;
+        if !(factor > 1.0 && factor.is_finite()) {
+            return;
+        }
+        self.relative_rmse *= factor;
+        for map in self.maps.values_mut() {
+            map.texels.iter_mut().for_each(|error| *error *= factor);
+            map.tiles.iter_mut().for_each(|square| *square *= factor * factor);
+        }
+    }
 }
 
 /// Luminance of all maps.
@@ -453,6 +468,33 @@ pub fn given_up_share(ledger: &EnergyLedger) -> f64 {
     } else {
         0.0
     }
+}
+
+/// Standard deviations by which a mean square has to exceed zero to be more than noise.
+const SIGNIFICANT: f64 = 4.0;
+
+/// Relative mean square error of `maps` against two independent noisy maps of the same light: the noise of a product of
+/// both differences has no mean. `None` where it may be noise all the same.
+pub fn audited_square(maps: &Images, halves: [&Images; 2]) -> Option<f64> {
+    let noise = half_set_noise(halves[0], halves[1]);
+    let (mut sum, mut variance, mut flux_w, mut area_m2) = (0.0, 0.0, 0.0, 0.0);
+    let receivers: BTreeSet<&Receiver> = maps.keys().chain(noise.keys()).collect();
+    for &receiver in &receivers {
+        let [own, first, second] = [maps, halves[0], halves[1]].map(|images| images.get(receiver));
+        let image = own.or(first).or(second)?;
+        let value = |image: Option<&Image>, texel: usize| image.map_or(0.0, |image| image.luminance[texel]);
+        let noise = noise.get(receiver);
+        for texel in 0..image.luminance.len() {
+            let (own, texel_m2) = (value(own, texel), image.area_m2(texel));
+            sum += (own - value(first, texel)) * (own - value(second, texel)) * texel_m2;
+            // Each half has a half of the variance of their difference.
+            variance += (0.5 * noise.map_or(0.0, |noise| noise[texel]) * texel_m2).powi(2);
+            flux_w += own * texel_m2;
+            area_m2 += texel_m2;
+        }
+    }
+    let is_bias = sum > SIGNIFICANT * variance.sqrt();
+    is_bias.then(|| sum * area_m2 / (flux_w * flux_w))
 }
 
 /// The roughest tiles, as many as have to be refined for a relative RMSE of `goal`: refining divides their error by the

@@ -228,7 +228,11 @@ fn promised(climb: &Climb, cost: impl Fn(&LightLevel) -> f64, most_share: f64) -
     let [.., (before, coarse), (after, fine)] = known[..] else {
         return None;
     };
-    let power = ((after / before).ln() / (coarse / fine).ln()).clamp(POWERS.0, POWERS.1);
+    let power = if fine < coarse {
+        ((after / before).ln() / (coarse / fine).ln()).clamp(POWERS.0, POWERS.1)
+    } else {
+        POWERS.1
+    };
     (fine > 0.0 && power.is_finite()).then(|| after * (fine / most_share).max(1.0).powf(power))
 }
 

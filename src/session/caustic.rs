@@ -470,6 +470,7 @@ impl CausticLayer<'_> {
             let estimate = accuracy::by_difference(&whole, &Images::new(), 1.0, &ledger);
             level.error = estimate.map(|estimate| KeptError {
                 predecessors: 0,
+                auditors: None,
                 estimate,
             });
             climb.levels.push(level);
@@ -477,12 +478,18 @@ impl CausticLayer<'_> {
             return Ok(());
         }
         let predecessors = step.min(ESTIMATED_LEVELS - 1);
-        let is_known = |error: &KeptError| error.predecessors == predecessors;
+        let auditors = climb.rival.as_ref().and_then(|rival| rival.key.photons);
+        let is_known =
+            |error: &KeptError| error.predecessors == predecessors && error.auditors == auditors;
         if !level.error.as_ref().is_some_and(is_known) && !course.control.is_cancelled() {
             let estimate = self.error_of(light, &level, state, climb, course)?;
-            level.error = estimate.map(|estimate| KeptError {
-                predecessors,
-                estimate,
+            level.error = estimate.map(|mut estimate| {
+                self.audit(light, &level, climb.rival.as_ref(), &mut estimate);
+                KeptError {
+                    predecessors,
+                    auditors,
+                    estimate,
+                }
             });
         }
         climb.levels.push(level);

@@ -129,6 +129,8 @@ impl PhotonSums {
 pub(super) struct KeptError {
     /// Coarser levels that it is made from.
     pub(super) predecessors: usize,
+    /// Photons of each half that patches were compared with.
+    pub(super) auditors: Option<u32>,
     pub(super) estimate: LightError,
 }
 

@@ -1,5 +1,6 @@
 //! One level of one light by photons: twice as many as before or more, those of earlier levels included.
 
+use std::borrow::Cow;
 use std::time::Instant;
 
 use super::caustic::{CausticLayer, Climb, Course};
@@ -9,7 +10,7 @@ use super::shards::PassSums;
 use crate::error::Result;
 use crate::illumination::Receiver;
 use crate::illumination::accumulator::FluxUnit;
-use crate::light_pass::accuracy;
+use crate::light_pass::accuracy::{self, LightError};
 use crate::light_pass::caustic::pass::Listener;
 use crate::light_pass::caustic::setup::AimedLight;
 use crate::light_pass::ledger_sum::LedgerSum;
@@ -292,14 +293,7 @@ impl CausticLayer<'_> {
         let mut ledger = raw.ledger;
         self.spectra
             .to_linear_srgb(light.light, &mut self.no_maps(), &mut ledger);
-        let [first, second] = [0, 1].map(|half| {
-            let mut maps = raw.halves[half].sum();
-            if self.spectra.has(light.light) {
-                let mut none = LedgerSum::default();
-                self.spectra.to_linear_srgb(light.light, maps.to_mut(), &mut none);
-            }
-            maps
-        });
+        let [first, second] = self.half_maps(light, &raw);
         let is_filtered = |map: &ReceiverMap| self.settings.filters() && filter::takes(map);
         let mut noise = {
             let as_they_are = |maps: &ReceiverMaps| {
@@ -326,12 +320,45 @@ impl CausticLayer<'_> {
         let estimate = accuracy::by_noise(&accuracy::images(&maps, unit), noise, &energy);
         let error = estimate.filter(|_| !is_shard).map(|estimate| KeptError {
             predecessors: 0,
+            auditors: None,
             estimate,
         });
         LightLevel {
             error,
             photons: Some(raw),
             ..self.level(light, (key, unit), (maps, bands), ledger)
+        }
+    }
+
+    /// Maps of both halves, before they are divided by their photons.
+    fn half_maps<'a>(&self, light: &AimedLight, raw: &'a PhotonSums) -> [Cow<'a, ReceiverMaps>; HALVES] {
+        [0, 1].map(|half| {
+            let mut maps = raw.halves[half].sum();
+            if self.spectra.has(light.light) {
+                let mut none = LedgerSum::default();
+                self.spectra.to_linear_srgb(light.light, maps.to_mut(), &mut none);
+            }
+            maps
+        })
+    }
+
+    /// Raises the estimated error of a level of patches to what photons of the same light see of it: what patches miss
+    /// alike at every level, no difference between levels shows.
+    pub(super) fn audit(
+        &self,
+        light: &AimedLight,
+        level: &LightLevel,
+        photons: Option<&LightLevel>,
+        estimate: &mut LightError,
+    ) {
+        let Some((raw, photons)) = photons.and_then(|rival| Some((rival.photons.as_ref()?, rival))) else {
+            return;
+        };
+        let unit = photons.unit.times(HALVES as f64);
+        let [first, second] = self.half_maps(light, raw).map(|maps| accuracy::images(&maps, unit));
+        let patches = accuracy::images(&level.maps, level.unit);
+        if let Some(square) = accuracy::audited_square(&patches, [&first, &second]) {
+            estimate.raise_to(square);
         }
     }
 

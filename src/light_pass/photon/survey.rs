@@ -293,9 +293,9 @@ impl Surveyor<'_> {
         }
         let meeting = tracer.meet(effects, hit, from.ray.direction, &from.media, None);
         let least_w = LEAST_SHARE * light.start_w;
-        if !from.steps.is_empty() {
+        let taken_w = flux_w * meeting.deposit;
+        if !from.steps.is_empty() && taken_w.max_channel() > 0.0 {
             let receiver = Receiver::new(hit.object, Side::met(from.ray.direction, hit.geometric_normal));
-            let taken_w = flux_w * meeting.deposit;
             let place = self.place(receiver, hit);
             match place.filter(|_| taken_w.is_finite() && light.arrivals.len() < MOST_WAYS) {
                 Some(place) if taken_w.max_channel() >= least_w => light.arrivals.push(Arrival {
