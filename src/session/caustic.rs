@@ -479,8 +479,7 @@ impl CausticLayer<'_> {
         }
         let predecessors = step.min(ESTIMATED_LEVELS - 1);
         let auditors = climb.rival.as_ref().and_then(|rival| rival.key.photons);
-        let is_known =
-            |error: &KeptError| error.predecessors == predecessors && error.auditors == auditors;
+        let is_known = |error: &KeptError| error.predecessors == predecessors && error.auditors == auditors;
         if !level.error.as_ref().is_some_and(is_known) && !course.control.is_cancelled() {
             let estimate = self.error_of(light, &level, state, climb, course)?;
             level.error = estimate.map(|mut estimate| {

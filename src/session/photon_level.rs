@@ -131,7 +131,9 @@ impl CausticLayer<'_> {
 
     /// Whether its light may stay together.
     fn has_bundles(&self, light: &AimedLight) -> bool {
-        self.rough_object(light).is_none()
+        let spectrum = self.spectra.photons(light.light);
+        let is_smooth = spectrum.is_none_or(|spectrum| spectrum.tracers().is_some());
+        is_smooth && self.rough_object(light).is_none()
     }
 
     fn with_launch<T>(&self, light: &AimedLight, f: impl FnOnce(&PhotonLaunch) -> T) -> T {
@@ -355,7 +357,9 @@ impl CausticLayer<'_> {
             return;
         };
         let unit = photons.unit.times(HALVES as f64);
-        let [first, second] = self.half_maps(light, raw).map(|maps| accuracy::images(&maps, unit));
+        let [first, second] = self
+            .half_maps(light, raw)
+            .map(|maps| accuracy::images(&maps, unit));
         let patches = accuracy::images(&level.maps, level.unit);
         if let Some(square) = accuracy::audited_square(&patches, [&first, &second]) {
             estimate.raise_to(square);

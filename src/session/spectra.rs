@@ -122,7 +122,7 @@ impl Spectra {
                 let traced = spectra.traced(tracer, &key.lamp);
                 let photons = matches!(settings.estimator, Estimator::Auto | Estimator::Photon).then(|| {
                     let bands = nodes(tracer, &key.lamp, &photon_bands(settings));
-                    PhotonSpectrum::new(tracer.with_metals_under(&key.lamp), bands)
+                    PhotonSpectrum::new(tracer.with_metals_under(&key.lamp), bands, settings.keep_spectrum)
                 });
                 let light = SpectralLight { key, traced, photons };
                 spectra.of_lights.insert(aimed.light, light);

@@ -12,6 +12,8 @@ pub struct PhotonSpectrum {
     /// From light in RGB to CIE XYZ.
     channels: ColourMatrix,
     nodes: Vec<WeightedNode>,
+    /// Whether a photon has its own wavelength before a surface parts them: where bands have maps of their own.
+    starts_parted: bool,
 }
 
 #[derive(Debug)]
@@ -42,7 +44,7 @@ pub struct Hue<'a> {
 
 impl PhotonSpectrum {
     /// Of bands with what they stand for; each is chosen in proportion to its X + Y + Z.
-    pub fn new(whole: Tracer, bands: Vec<(usize, SpectralNode)>) -> Self {
+    pub fn new(whole: Tracer, bands: Vec<(usize, SpectralNode)>, starts_parted: bool) -> Self {
         let brightness =
             |node: &SpectralNode| node.channels.of_white().to_array().iter().sum::<f64>().max(0.0);
         let total: f64 = bands.iter().map(|(_, node)| brightness(node)).sum();
@@ -69,7 +71,13 @@ impl PhotonSpectrum {
             whole,
             channels,
             nodes,
+            starts_parted,
         }
+    }
+
+    /// Whether a photon has its own wavelength from its start.
+    pub fn starts_parted(&self) -> bool {
+        self.starts_parted
     }
 
     /// All wavelengths.

@@ -155,6 +155,9 @@ impl<'a> PhotonWalk<'a> {
         let Some(start) = start.filter(|_| brightest_w > 0.0 && photon.flux_w.is_finite()) else {
             return photon.leave_all(&mut arrive);
         };
+        if self.rules.spectrum.is_some_and(PhotonSpectrum::starts_parted) {
+            self.part(&mut photon);
+        }
         let (mut ray, mut media) = (start.ray, start.media);
         for depth in 0.. {
             let Some(branch) = self.step(&mut photon, depth, &ray, &media, &mut arrive) else {

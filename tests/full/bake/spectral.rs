@@ -254,7 +254,7 @@ fn each_wavelength_lands_in_its_texel() {
 fn kept_bands_add_up_to_their_colour() {
     let mut scene = ball_of("N-SF11");
     scene.lights[0].set_spectrum(lamp("E"));
-    for estimator in [Estimator::Wavefront, Estimator::Splat] {
+    for estimator in [Estimator::Wavefront, Estimator::Photon, Estimator::Splat] {
         let kept = set(sampled(7, estimator, 64), |s| s.keep_spectrum = true);
         let result = bake(scene.clone(), &kept);
         let texels = caustic(&result, &scene, "floor");
