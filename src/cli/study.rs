@@ -7,7 +7,6 @@ use std::sync::Arc;
 use clap::{ArgMatches, Args, FromArgMatches, Subcommand};
 use nephroid::effect::Effect;
 use nephroid::error::{Error, Result, Warning};
-use nephroid::export::manifest::MapEntry;
 use nephroid::export::map_folder::MapFolder;
 use nephroid::files::{self, OutputFolder};
 use nephroid::scene::Scene;
@@ -20,16 +19,13 @@ use nephroid::study::sweep::{Bench, Outcome, Sweep};
 use nephroid::study::table::Table;
 use nephroid::transport::Tracer;
 use serde::Serialize;
+use serde_json::json;
 
-use super::args::{RunOptions, SceneOptions};
 use super::bake_options::BakeOptions;
 use super::compare::read_luminance;
-use super::job::MissingLight;
-use super::job::{scene_input, threads};
-use super::terminal::Interrupt;
-use super::terminal::StageBar;
-
-use super::terminal::Terminal;
+use super::console::Console;
+use super::loaded::LoadedScene;
+use super::options::{RunOptions, SceneOptions};
 use super::values;
 
 const REFERENCE: (&str, &str) = (
@@ -95,6 +91,32 @@ struct Common {
     run: RunOptions,
 }
 
+/// Of a scene that is named.
+#[derive(Debug, Args)]
+struct BakesOptions {
+    /// Bakes of each kind, whose median CPU time counts [default: 5; 1 with --quick]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    repeat: Option<usize>,
+    #[command(flatten)]
+    scene_options: SceneOptions,
+}
+
+#[derive(Debug, Args)]
+struct SizeOption {
+    /// Texels of every map: N by N, or W by H [default: 256, of spectrum 1024]
+    #[arg(long, value_name = "N|WxH", value_parser = fixed_map_resolution, allow_hyphen_values = true)]
+    map_resolution: Option<MapResolution>,
+}
+
+impl SizeOption {
+    fn or_square(&self, side: usize) -> MapResolution {
+        self.map_resolution.unwrap_or(MapResolution::Fixed {
+            width: side,
+            height: side,
+        })
+    }
+}
+
 /// Studies of built-in scenes, by name.
 #[derive(Debug)]
 struct BuiltStudy {
@@ -124,14 +146,10 @@ struct ConvergenceArguments {
     /// Surface of the reference [default: floor, or the only one that takes light]
     #[arg(long, value_name = "NAME", requires = "reference")]
     surface: Option<String>,
-    /// Texels of every map: N by N, or W by H [default: 256]
-    #[arg(long, value_name = "N|WxH", value_parser = fixed_map_resolution, allow_hyphen_values = true)]
-    map_resolution: Option<MapResolution>,
-    /// Bakes of each kind, whose median CPU time counts [default: 5; 1 with --quick]
-    #[arg(long, value_name = "N", allow_negative_numbers = true)]
-    repeat: Option<usize>,
     #[command(flatten)]
-    scene_options: SceneOptions,
+    size: SizeOption,
+    #[command(flatten)]
+    bakes: BakesOptions,
     #[command(flatten)]
     common: Common,
 }
@@ -143,9 +161,8 @@ struct ReferenceArguments {
     /// Light rays, such as 1e8
     #[arg(long, value_name = "N", value_parser = ray_count, allow_hyphen_values = true)]
     rays: u64,
-    /// Texels of every map: N by N, or W by H [default: 256]
-    #[arg(long, value_name = "N|WxH", value_parser = fixed_map_resolution, allow_hyphen_values = true)]
-    map_resolution: Option<MapResolution>,
+    #[command(flatten)]
+    size: SizeOption,
     /// Seed of the rays
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
@@ -159,11 +176,8 @@ struct ReferenceArguments {
 struct EffectsArguments {
     /// .glb, .gltf or builtin:NAME
     scene: String,
-    /// Bakes of each kind, whose median CPU time counts [default: 5; 1 with --quick]
-    #[arg(long, value_name = "N", allow_negative_numbers = true)]
-    repeat: Option<usize>,
     #[command(flatten)]
-    scene_options: SceneOptions,
+    bakes: BakesOptions,
     #[command(flatten)]
     bake: BakeOptions,
     #[command(flatten)]
@@ -187,14 +201,10 @@ struct SpectrumArguments {
     /// Light rays per steradian; beams are thin [default: 1e8]
     #[arg(long, value_name = "RAYS_PER_SR", allow_negative_numbers = true)]
     density: Option<f64>,
-    /// Texels of every map: N by N, or W by H [default: 1024]
-    #[arg(long, value_name = "N|WxH", value_parser = fixed_map_resolution, allow_hyphen_values = true)]
-    map_resolution: Option<MapResolution>,
-    /// Bakes of each kind, whose median CPU time counts [default: 5; 1 with --quick]
-    #[arg(long, value_name = "N", allow_negative_numbers = true)]
-    repeat: Option<usize>,
     #[command(flatten)]
-    scene_options: SceneOptions,
+    size: SizeOption,
+    #[command(flatten)]
+    bakes: BakesOptions,
     #[command(flatten)]
     common: Common,
 }
@@ -258,52 +268,50 @@ impl StudyArguments {
             Some(Study::Built(study)) => &study.common.run,
         }
     }
-}
 
-/// Checks the arguments, measures, writes, and prints what was found.
-///
-/// # Errors
-/// No study is named; a value outside its range; input, output or a bake that failed; stopped before the end, which
-/// writes nothing of the study that it was at.
-pub fn run(arguments: &StudyArguments, terminal: &Terminal, interrupt: &Interrupt) -> Result<()> {
-    let desk = Desk { terminal, interrupt };
-    match &arguments.study {
-        None if arguments.list => list(terminal),
-        None => Err(Error::usage(
-            "study",
-            "no study is named",
-            "name one, or use --list to see which there are",
-        )),
-        Some(Study::Convergence(study)) => desk.convergence(study),
-        Some(Study::Reference(study)) => desk.reference(study),
-        Some(Study::Effects(study)) => desk.effects(study),
-        Some(Study::Spectrum(study)) => desk.spectrum(study),
-        Some(Study::Built(study)) if study.name == ALL.0 => desk.all(&study.common),
-        Some(Study::Built(study)) => desk.built(study),
+    /// Checks the arguments, measures, writes, and prints what was found.
+    ///
+    /// # Errors
+    /// No study is named; a value outside its range; input, output or a bake that failed; stopped before the end, which
+    /// writes nothing of the study that it was at.
+    pub fn run(&self, console: &Console) -> Result<()> {
+        let desk = Desk { console };
+        match &self.study {
+            None if self.list => list(console),
+            None => Err(Error::usage(
+                "study",
+                "no study is named",
+                "name one, or use --list to see which there are",
+            )),
+            Some(Study::Convergence(study)) => desk.convergence(study),
+            Some(Study::Reference(study)) => desk.reference(study),
+            Some(Study::Effects(study)) => desk.effects(study),
+            Some(Study::Spectrum(study)) => desk.spectrum(study),
+            Some(Study::Built(study)) if study.name == ALL.0 => desk.all(&study.common),
+            Some(Study::Built(study)) => desk.built(study),
+        }
     }
 }
 
-fn list(terminal: &Terminal) -> Result<()> {
-    #[derive(Serialize)]
-    struct Line {
-        name: &'static str,
-        what: &'static str,
-    }
+fn list(console: &Console) -> Result<()> {
     let own = [CONVERGENCE, REFERENCE, EFFECTS, SPECTRUM, ALL].into_iter();
     let built = studies::STUDIES.iter().map(|study| (study.name, study.what));
-    let lines: Vec<Line> = own.chain(built).map(|(name, what)| Line { name, what }).collect();
-    let text: Vec<String> = lines
+    let all: Vec<_> = own.chain(built).collect();
+    let text: String = all
         .iter()
-        .map(|line| format!("{:<12} {}", line.name, line.what))
+        .map(|(name, what)| format!("{name:<12} {what}\n"))
         .collect();
-    terminal.print_result(&text.join("\n"), &lines)
+    let lines: Vec<_> = all
+        .iter()
+        .map(|(name, what)| json!({"name": name, "what": what}))
+        .collect();
+    console.print_result(&text, &lines)
 }
 
 /// Where studies are told of and stopped.
 #[derive(Clone, Copy)]
 struct Desk<'a> {
-    terminal: &'a Terminal,
-    interrupt: &'a Interrupt,
+    console: &'a Console,
 }
 
 /// The result of a study, as `--json` prints it.
@@ -319,8 +327,8 @@ struct Report {
 impl Desk<'_> {
     fn convergence(self, study: &ConvergenceArguments) -> Result<()> {
         let settings = BakeSettings {
-            map_resolution: study.map_resolution.unwrap_or(square(SIDE)),
-            threads: threads(&study.common.run)?,
+            map_resolution: study.size.or_square(SIDE),
+            threads: study.common.run.threads()?,
             ..BakeSettings::of(Estimator::Wavefront)
         };
         let few = if study.common.quick {
@@ -335,8 +343,8 @@ impl Desk<'_> {
             .clone()
             .unwrap_or_else(|| vec![Estimator::Wavefront, Estimator::Splat]);
         estimators.dedup();
-        let repeats = repeats(study.repeat, &study.common)?;
-        let scene = self.load(&study.scene, &study.scene_options)?;
+        let repeats = repeats(study.bakes.repeat, &study.common)?;
+        let scene = self.load(&study.scene, &study.bakes.scene_options)?;
         let make = || {
             let reference = match &study.reference {
                 None => Reference::analytic(&scene)?,
@@ -360,7 +368,7 @@ impl Desk<'_> {
     fn effects(self, study: &EffectsArguments) -> Result<()> {
         let settings = study
             .bake
-            .settings(&[LayerKind::Caustic], threads(&study.common.run)?)?;
+            .settings(&[LayerKind::Caustic], study.common.run.threads()?)?;
         if settings.max_time_s.is_some() {
             return Err(Error::usage(
                 "--max-time",
@@ -368,8 +376,8 @@ impl Desk<'_> {
                 "leave it out, or use --max-error or --density",
             ));
         }
-        let repeats = repeats(study.repeat, &study.common)?;
-        let scene = self.load(&study.scene, &study.scene_options)?;
+        let repeats = repeats(study.bakes.repeat, &study.common)?;
+        let scene = self.load(&study.scene, &study.bakes.scene_options)?;
         let make = |_: &Bench| {
             let sweep = one_scene::effects(&scene, &settings)?;
             Ok(Sweep { repeats, ..sweep })
@@ -387,9 +395,9 @@ impl Desk<'_> {
 
     fn spectrum(self, study: &SpectrumArguments) -> Result<()> {
         let settings = BakeSettings {
-            map_resolution: study.map_resolution.unwrap_or(square(SPECTRUM_SIDE)),
+            map_resolution: study.size.or_square(SPECTRUM_SIDE),
             density_per_sr: study.density.unwrap_or(BEAM_DENSITY_PER_SR),
-            threads: threads(&study.common.run)?,
+            threads: study.common.run.threads()?,
             ..BakeSettings::of(Estimator::Wavefront)
         };
         for &count in &study.wavelengths {
@@ -399,8 +407,8 @@ impl Desk<'_> {
             };
             way.validate()?;
         }
-        let repeats = repeats(study.repeat, &study.common)?;
-        let scene = self.load(&study.scene, &study.scene_options)?;
+        let repeats = repeats(study.bakes.repeat, &study.common)?;
+        let scene = self.load(&study.scene, &study.bakes.scene_options)?;
         let make = |_: &Bench| {
             let sweep = one_scene::spectrum(&scene, &settings, &study.wavelengths)?;
             Ok(Sweep { repeats, ..sweep })
@@ -421,13 +429,13 @@ impl Desk<'_> {
         for study in &studies::STUDIES {
             let folder = common.output.join(study.name);
             let told = self.study(study.name, common, &folder, |bench| study.sweep(bench))?;
-            if !self.terminal.json {
+            if !self.console.json {
                 self.tell(&told)?;
             }
             reports.push(told.1);
         }
-        match self.terminal.json {
-            true => self.terminal.print_result("", &reports),
+        match self.console.json {
+            true => self.console.print_result("", &reports),
             false => Ok(()),
         }
     }
@@ -441,12 +449,12 @@ impl Desk<'_> {
         make: impl FnOnce(&Bench) -> Result<Sweep>,
     ) -> Result<(String, Report)> {
         let folder = open_folder(output, common.force, &format!("{name}.csv"))?;
-        let bar = StageBar::new(self.terminal);
+        let bar = self.console.bar();
         let bench = Bench {
             quick: common.quick,
-            threads: threads(&common.run)?,
+            threads: common.run.threads()?,
             progress: &bar,
-            control: self.interrupt.control(),
+            control: self.console.control(),
         };
         let outcome: Outcome = make(&bench)?.run(&bench)?;
         drop(bar);
@@ -458,7 +466,7 @@ impl Desk<'_> {
             costs: outcome.costs.clone(),
         };
         for (file, bytes) in outcome.files()? {
-            write(&folder, &file, &bytes)?;
+            files::write_atomically(&folder.path().join(&file), |writer| writer.write_all(&bytes))?;
             report.files.push(file);
         }
         let files = report.files.join(", ");
@@ -469,22 +477,22 @@ impl Desk<'_> {
     }
 
     fn tell(self, (text, report): &(String, Report)) -> Result<()> {
-        self.terminal.print_result(text, report)
+        self.console.print_result(text, report)
     }
 
     /// Traces, writes the maps, and says how noisy they are.
     fn reference(self, study: &ReferenceArguments) -> Result<()> {
         let settings = BakeSettings {
-            map_resolution: study.map_resolution.unwrap_or(square(SIDE)),
+            map_resolution: study.size.or_square(SIDE),
             seed: study.seed,
-            threads: threads(&study.common.run)?,
+            threads: study.common.run.threads()?,
             ..BakeSettings::default()
         };
         settings.validate()?;
         check_rays(study.rays)?;
         let scene = self.load(&study.scene, &study.scene_options)?;
         if (0..scene.objects.len()).any(|object| scene.material_of(object).is_dispersive()) {
-            self.terminal.print_warnings(&[Warning::new(
+            self.console.warn(&[Warning::new(
                 &scene.source,
                 "brute force bends light of all wavelengths alike, as at 587.56 nm",
                 "compare its maps with those of a bake with --effects dispersion=off",
@@ -492,36 +500,41 @@ impl Desk<'_> {
         }
         let output = &study.common.output;
         let folder = MapFolder::open(output, study.common.force)?;
-        self.interrupt.check(&scene.source)?;
+        self.console.check(&scene.source)?;
         let tracer = Tracer::new(scene.clone());
-        let bar = StageBar::new(self.terminal);
-        let result = brute_force(&tracer, &settings, study.rays, &bar, self.interrupt.control())?;
+        let (bar, control) = (self.console.bar(), self.console.control());
+        let result = brute_force(&tracer, &settings, study.rays, &bar, control)?;
         drop(bar);
-        let report = ReferenceReport {
-            method: "brute force: random rays, one per cell of two lattices; each arrival's flux into its texel",
-            rays: result.counts.rays,
-            noise: relative_noise(&result.maps),
-            cpu_s: result.cpu_s.total,
-            maps: folder.write(&scene, &settings, &result)?.maps,
-        };
+        let maps = folder.write(&scene, &settings, &result)?.maps;
+        let (rays, cpu_s, noise) = (
+            result.counts.rays,
+            result.cpu_s.total,
+            relative_noise(&result.maps),
+        );
+        let mut text = format!("folder {}\n", output.display());
+        for map in &maps {
+            let noise = 100.0 * map.estimated_relative_rmse.unwrap_or(0.0);
+            let _ = writeln!(text, "map {} of {}, noise {noise:.3} %", map.file, map.surface);
+        }
+        let told = noise.map_or("nothing arrived".into(), |noise| {
+            format!("noise {:.3} % of the mean over all maps", 100.0 * noise)
+        });
+        text += &format!("{rays} rays, {cpu_s:.2} s of CPU, {told}");
+        let report = json!({
+            "method": "brute force: random rays, one per cell of two lattices; each arrival's flux into its texel",
+            "rays": rays,
+            "noise": noise,
+            "cpu_s": cpu_s,
+            "maps": maps,
+        });
         let path = output.join("reference.json");
         let json = files::to_json(&report, &path.display().to_string())?;
         files::write_atomically(&path, |writer| writer.write_all(&json))?;
-        self.terminal.print_result(&report.text(output), &report)
+        self.console.print_result(&text, &report)
     }
 
-    /// Loads a scene and prints its warnings.
     fn load(self, source: &str, options: &SceneOptions) -> Result<Arc<Scene>> {
-        let scene = scene_input(source.into(), options, MissingLight::Fail).load()?;
-        self.terminal.print_warnings(&scene.warnings);
-        Ok(Arc::new(scene))
-    }
-}
-
-const fn square(side: usize) -> MapResolution {
-    MapResolution::Fixed {
-        width: side,
-        height: side,
+        Ok(LoadedScene::load(source, &options.load_options(false), true, self.console)?.scene)
     }
 }
 
@@ -562,7 +575,7 @@ fn check_ladder(densities: &[f64], settings: &BakeSettings) -> Result<()> {
 ///
 /// # Errors
 /// A place that cannot be written; other people's files in it.
-pub fn open_folder(path: &Path, force: bool, table: &str) -> Result<OutputFolder> {
+fn open_folder(path: &Path, force: bool, table: &str) -> Result<OutputFolder> {
     let folder = OutputFolder::open(path)?;
     if force || path.join(table).is_file() || folder.is_empty()? {
         return Ok(folder);
@@ -572,58 +585,4 @@ pub fn open_folder(path: &Path, force: bool, table: &str) -> Result<OutputFolder
         "the folder holds files that are not from a study",
         "choose another folder or add --force",
     ))
-}
-
-/// Writes a file of that name in the folder.
-///
-/// # Errors
-/// A disk that is full, a place that cannot be written any more.
-pub fn write(folder: &OutputFolder, name: &str, bytes: &[u8]) -> Result<()> {
-    files::write_atomically(&folder.path().join(name), |writer| writer.write_all(bytes))
-}
-
-/// `reference.json`.
-#[derive(Serialize)]
-struct ReferenceReport {
-    method: &'static str,
-    rays: u64,
-    /// Standard error over the mean, over all maps.
-    noise: Option<f64>,
-    cpu_s: f64,
-    maps: Vec<MapEntry>,
-}
-
-impl ReferenceReport {
-    fn text(&self, folder: &Path) -> String {
-        let mut text = format!("folder {}\n", folder.display());
-        for map in &self.maps {
-            let noise = 100.0 * map.estimated_relative_rmse.unwrap_or(0.0);
-            let _ = writeln!(text, "map {} of {}, noise {noise:.3} %", map.file, map.surface);
-        }
-        let noise = self.noise.map_or("nothing arrived".into(), |noise| {
-            format!("noise {:.3} % of the mean over all maps", 100.0 * noise)
-        });
-        text + &format!("{} rays, {:.2} s of CPU, {noise}", self.rays, self.cpu_s)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn rays_may_be_written_as_powers_of_ten() {
-        assert_eq!(ray_count("1e8"), Ok(100_000_000));
-        assert_eq!(ray_count("2500"), Ok(2500));
-        for text in ["", "0", "-5", "nan", "1e30", "many"] {
-            assert!(ray_count(text).is_err(), "{text}");
-        }
-    }
-
-    #[test]
-    fn maps_of_studies_have_a_size() {
-        assert!(fixed_map_resolution("auto").is_err());
-        let fixed = MapResolution::Fixed { width: 8, height: 4 };
-        assert_eq!(fixed_map_resolution("8x4"), Ok(fixed));
-    }
 }

@@ -2,7 +2,6 @@
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use nephroid::effect::{Effect, EffectSwitch};
-use nephroid::eye_pass::WhiteBalance;
 use nephroid::light_pass::share::Share;
 use nephroid::scene::camera_path::MAX_FRAMES;
 use nephroid::settings::{MAX_MAP_SIDE, MapResolution, Sigma, Wavelengths};
@@ -145,13 +144,13 @@ pub fn effect_switch(text: &str) -> Result<(Effect, EffectSwitch), String> {
             names()
         ));
     };
-    let effect = named(name).ok_or_else(|| format!("there is no effect {name}; there are {}", names()))?;
-    let switch = named(switch).ok_or_else(|| format!("{switch} is no switch; use auto, on or off"))?;
+    let effect = variant(name).ok_or_else(|| format!("there is no effect {name}; there are {}", names()))?;
+    let switch = variant(switch).ok_or_else(|| format!("{switch} is no switch; use auto, on or off"))?;
     Ok((effect, switch))
 }
 
 /// The variant of that name.
-fn named<T: VariantArray + Copy + Into<&'static str>>(name: &str) -> Option<T> {
+fn variant<T: VariantArray + Copy + Into<&'static str>>(name: &str) -> Option<T> {
     T::VARIANTS
         .iter()
         .copied()
@@ -164,6 +163,22 @@ pub fn log_level() -> impl TypedValueParser<Value = log::LevelFilter> {
     PossibleValuesParser::new(names).try_map(|name| name.parse::<log::LevelFilter>())
 }
 
+/// A name, what it stands for, and what is told about it.
+pub type Named<T> = (&'static str, T, &'static str);
+
+/// Reads one of the names of a table.
+pub fn named<T: Copy + Send + Sync + 'static>(
+    table: &'static [Named<T>],
+) -> impl TypedValueParser<Value = T> {
+    let possible = table
+        .iter()
+        .map(|(name, _, help)| PossibleValue::new(*name).help(*help));
+    PossibleValuesParser::new(possible).try_map(|name| {
+        let found = table.iter().find(|known| known.0 == name);
+        found.map(|known| known.1).ok_or("an unknown name")
+    })
+}
+
 /// Reads one of the names of an enumeration; its documentation becomes the help of each.
 pub fn one_of<T>() -> impl TypedValueParser<Value = T>
 where
@@ -172,7 +187,7 @@ where
     let possible = T::VARIANTS
         .iter()
         .map(|variant| PossibleValue::new((*variant).into()).help(variant.get_documentation()));
-    PossibleValuesParser::new(possible).try_map(|name| named(&name).ok_or("an unknown name"))
+    PossibleValuesParser::new(possible).try_map(|name| variant(&name).ok_or("an unknown name"))
 }
 
 /// `auto` (none) or a number of stops, −64 to 64.
@@ -187,16 +202,10 @@ pub fn exposure(text: &str) -> Result<Exposure, String> {
         .ok_or_else(|| "give `auto` or a number of stops from -64 to 64".to_string())
 }
 
-/// `none`, `lamps`, a temperature [K] or a chromaticity.
-pub fn white_balance(text: &str) -> Result<WhiteBalance, String> {
-    text.parse()
-}
-
 /// How bright a picture is shown.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Exposure {
     /// Chosen from the picture.
-    #[default]
     Auto,
     /// Radiance is multiplied by 2^stops.
     Stops(f64),
