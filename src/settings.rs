@@ -1,5 +1,7 @@
 //! Everything that a user can set about a bake.
 
+pub mod options;
+
 use serde::{Deserialize, Serialize};
 use strum::{EnumMessage, IntoStaticStr, VariantArray};
 
@@ -512,85 +514,44 @@ impl BakeSettings {
     /// # Errors
     /// A usage error that names the option, its value and its range.
     pub fn validate(&self) -> Result<()> {
-        let finite_in = |option: &str, value: f64, low: f64, high: f64| {
-            if value.is_finite() && value >= low && value <= high {
-                Ok(())
-            } else {
-                Err(Error::usage(
-                    option,
-                    format!("{value} is outside {low:e} to {high:e}"),
-                    "give a number in that range",
-                ))
-            }
-        };
-        finite_in("--density", self.density_per_sr, 1.0, 1e12)?;
-        if let Some(target) = self.max_error {
-            finite_in("--max-error", target, LEAST_MAX_ERROR, 1.0)?;
-        }
-        if let Some(limit_s) = self.max_time_s {
-            finite_in("--max-time", limit_s, 1e-3, 1e7)?;
-        }
-        match (self.estimator, self.sigma) {
-            (estimator, Sigma::Constant(sigma)) if estimator.refines() => {
-                finite_in("--sigma", sigma, 0.0, 1e4)?;
-            }
-            (_, Sigma::Constant(sigma)) => finite_in("--sigma", sigma, 1e-6, 1e4)?,
-            (Estimator::Splat, Sigma::Adaptive) => {}
-            (_, Sigma::Adaptive) => {
-                return Err(Error::usage(
-                    "--sigma",
-                    "only splats have footprints to adapt a sigma to",
-                    "give a number from 0, or use --estimator splat",
-                ));
-            }
-        }
-        if let Some(share) = self.branch_threshold {
-            finite_in("--branch-threshold", share, 0.0, 0.5)?;
-        }
-        if let MapResolution::Fixed { width, height } = self.map_resolution {
-            finite_in("--map-resolution", width as f64, 1.0, MAX_MAP_SIDE as f64)?;
-            finite_in("--map-resolution", height as f64, 1.0, MAX_MAP_SIDE as f64)?;
-        }
-        self.validate_wavelengths()?;
-        if let Some(depth) = self.max_depth {
-            finite_in("--max-depth", f64::from(depth), 1.0, 100_000.0)?;
-        }
-        finite_in("--threads", self.threads as f64, 0.0, 1024.0)?;
-        if self.layers.is_empty() {
-            return Err(Error::usage(
-                "--layers",
-                "no layer is named",
-                "name at least one of caustic, direct, indirect",
-            ));
-        }
-        Ok(())
-    }
-
-    fn validate_wavelengths(&self) -> Result<()> {
-        if let Wavelengths::Fixed(count) = self.wavelengths
-            && !(1..=MOST_WAVELENGTHS).contains(&count)
-        {
-            return Err(Error::usage(
-                "--wavelengths",
-                format!("{count} is outside 1 to {MOST_WAVELENGTHS}"),
-                "give a number in that range, rainbow or continuous",
-            ));
+        for option in options::OPTIONS {
+            option.check_limits(self)?;
         }
         let is_continuous = self.wavelengths == Wavelengths::Continuous;
-        if self.spectral_sampling.is_some() && is_continuous && self.estimator.refines() {
-            return Err(Error::usage(
+        let least_sigma = if self.estimator.refines() { 0.0 } else { 1e-6 };
+        let (option, what, remedy) = match self.sigma {
+            Sigma::Constant(sigma) if !(least_sigma..=1e4).contains(&sigma) => (
+                "--sigma",
+                &*format!("{sigma} is outside {least_sigma} to 1e4"),
+                "give a number in that range",
+            ),
+            Sigma::Adaptive if self.estimator.refines() => (
+                "--sigma",
+                "only splats have footprints to adapt a sigma to",
+                "give a number from 0, or use --estimator splat",
+            ),
+            _ if self.spectral_sampling.is_some() && is_continuous && self.estimator.refines() => (
                 "--spectral-sampling",
                 "only splats divide their rays between wavelengths of the whole spectrum",
                 "add --wavelengths N, or --estimator splat",
-            ));
-        }
-        if self.keep_spectrum && is_continuous {
-            return Err(Error::usage(
+            ),
+            _ if self.keep_spectrum && is_continuous => (
                 "--keep-spectrum",
                 "the whole spectrum has no bands to keep",
                 "add --wavelengths N, such as 7, or --wavelengths rainbow",
-            ));
-        }
-        Ok(())
+            ),
+            _ if self.threads > 1024 => (
+                "--threads",
+                &*format!("{} is outside 0 to 1024", self.threads),
+                "give a number in that range",
+            ),
+            _ if self.layers.is_empty() => (
+                "--layers",
+                "no layer is named",
+                "name at least one of caustic, direct, indirect",
+            ),
+            _ => return Ok(()),
+        };
+        Err(Error::usage(option, what, remedy))
     }
 }

@@ -15,6 +15,7 @@ use nephroid::files;
 use nephroid::illumination::IlluminationMap;
 use nephroid::scene::{self, LoadOptions, Scene};
 use nephroid::settings::LayerKind;
+use nephroid::settings::options::share;
 use serde::Serialize;
 
 use super::console::Console;
@@ -174,7 +175,7 @@ pub struct ExportArguments {
     mips: bool,
     /// Of a .glb or .png: share of a map's light that its brightest texels may lose so that dim ones have finer steps
     /// [default: 0.5%]
-    #[arg(long, value_name = "PERCENT", value_parser = values::share, allow_hyphen_values = true)]
+    #[arg(long, value_name = "PERCENT", value_parser = share, allow_hyphen_values = true)]
     cut: Option<f64>,
     /// Stops by which light is multiplied: of a .glb with --as unlit [default: the brightest hundredth is white], of
     /// textures [default: 0; of .png as --cut allows]

@@ -391,32 +391,3 @@ fn preset_line(forecast: Option<&Forecast>) -> String {
         bytes(forecast.bytes)
     )
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use nephroid::light_pass::emitter::spot_falloff;
-    use nephroid::units::RadiantIntensity;
-
-    #[test]
-    fn beam_of_a_spot_is_the_integral_of_its_falloff() {
-        let spot = LightKind::Spot {
-            position: glam::DVec3::ZERO,
-            direction: glam::DVec3::Z,
-            intensity: RadiantIntensity(1.0),
-            inner_cone_rad: 0.3,
-            outer_cone_rad: 0.7,
-        };
-        let steps = 100_000;
-        let width = 2.0 / f64::from(steps);
-        // Slices of equal solid angle between the planes cosine = constant (Archimedes).
-        let integral: f64 = (0..steps)
-            .map(|step| -1.0 + (f64::from(step) + 0.5) * width)
-            .map(|cosine| spot_falloff(cosine, 0.3, 0.7) * width * std::f64::consts::TAU)
-            .sum();
-        assert!(
-            (integral / full_beam_sr(&spot) - 1.0).abs() < 1e-4,
-            "{integral} sr"
-        );
-    }
-}

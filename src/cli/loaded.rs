@@ -141,27 +141,3 @@ fn taken_bytes(status: &str) -> Option<u64> {
     let kibibytes: u64 = line.split_whitespace().next()?.parse().ok()?;
     Some(kibibytes << 10)
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn limits_are_read_as_the_system_writes_them() {
-        let limits = |value: &str| {
-            format!(
-                "Limit                     Soft Limit           Hard Limit           Units     \n\
-                 Max open files            1024                 524288               files     \n\
-                 Max address space         {value}           unlimited            bytes     \n"
-            )
-        };
-        assert_eq!(granted_bytes(&limits("1536000000")), Some(1_536_000_000));
-        assert_eq!(granted_bytes(&limits("unlimited")), None);
-        assert_eq!(granted_bytes(""), None);
-        assert_eq!(
-            taken_bytes("Name:\tnephroid\nVmPeak:\t  300 kB\nVmSize:\t  200 kB\n"),
-            Some(204_800)
-        );
-        assert_eq!(taken_bytes("Name:\tnephroid\n"), None);
-    }
-}

@@ -164,34 +164,3 @@ fn in_one_sentence(error: &clap::Error) -> Error {
         "see nephroid --help",
     )
 }
-
-#[cfg(test)]
-mod tests {
-    use clap::CommandFactory;
-
-    use super::*;
-
-    #[test]
-    fn definitions_hold_together() {
-        Arguments::command().debug_assert();
-    }
-
-    #[test]
-    fn clap_speaks_in_one_sentence() {
-        for line in [
-            "nephroid bake",
-            "nephroid bake a.glb -o b --kernel round",
-            "nephroid bake a.glb -o b --densty 3",
-            "nephroid compare a.exr",
-            "nephroid render a.glb -o b.png --maps c --density 10",
-        ] {
-            let error = Arguments::try_parse_from(line.split(' ')).expect_err(line);
-            let sentence = in_one_sentence(&error).to_string();
-            assert!(
-                !sentence.contains('\n') && !sentence.contains("Usage"),
-                "{sentence}"
-            );
-            assert!(sentence.len() > 40, "{sentence}");
-        }
-    }
-}

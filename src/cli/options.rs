@@ -6,6 +6,7 @@ use clap::Args;
 use nephroid::error::{Error, Result};
 use nephroid::scene::LoadOptions;
 
+use super::bake_options;
 use super::values::{self, Exposure};
 
 /// Most worker threads.
@@ -93,6 +94,6 @@ pub struct PictureOptions {
 #[derive(Debug, Args)]
 pub struct MapsOption {
     /// Use the maps of this folder instead of baking
-    #[arg(long, value_name = "DIR", conflicts_with = "BakeOptions")]
+    #[arg(long, value_name = "DIR", conflicts_with = bake_options::GROUP)]
     pub maps: Option<PathBuf>,
 }

@@ -211,7 +211,7 @@ struct SpectrumArguments {
 
 /// `N` (square) or `WxH` [texels].
 fn fixed_map_resolution(text: &str) -> std::result::Result<MapResolution, String> {
-    match values::map_resolution(text) {
+    match text.parse() {
         Ok(fixed @ MapResolution::Fixed { .. }) => Ok(fixed),
         _ => Err("give N or WxH in texels, such as 512 or 512x256".to_string()),
     }

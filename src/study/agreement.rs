@@ -57,60 +57,64 @@ impl Agreement {
 /// Texels of the caustic layer of all maps beside those of their references; a map that only one side has is dark on
 /// the other. `None` where two maps of one surface differ in size.
 pub fn pair_maps(maps: &[IlluminationMap], references: &[IlluminationMap]) -> Option<Vec<TexelPair>> {
-    let mut pairs = Vec::new();
-    let counterpart = |of: &IlluminationMap, among: &'_ [IlluminationMap]| {
-        among
-            .iter()
-            .position(|map| map.chart.receiver == of.chart.receiver)
+    let pairs = pair_texels(maps, references, caustic_luminance)?.into_iter();
+    let pair = |(image, reference, area_m2)| TexelPair {
+        image,
+        reference,
+        area_m2,
     };
-    for map in maps {
-        let reference = counterpart(map, references).map(|index| &references[index]);
-        pairs.extend(pair(map, Some(map), reference)?);
-    }
-    for reference in references
-        .iter()
-        .filter(|reference| counterpart(reference, maps).is_none())
-    {
-        pairs.extend(pair(reference, None, Some(reference))?);
+    Some(pairs.map(pair).collect())
+}
+
+/// The same of any values that a map has, each pair with the surface under the texel [m²].
+pub fn pair_texels<T: Copy + Default>(
+    maps: &[IlluminationMap],
+    references: &[IlluminationMap],
+    values: fn(&IlluminationMap) -> Vec<T>,
+) -> Option<Vec<(T, T, f64)>> {
+    let of_surface = |map: &IlluminationMap, among: &'_ [IlluminationMap]| {
+        let receiver = map.chart.receiver;
+        among.iter().position(|other| other.chart.receiver == receiver)
+    };
+    let is_alone = |map: &&IlluminationMap| of_surface(map, maps).is_none();
+    let mut pairs = Vec::new();
+    for map in maps.iter().chain(references.iter().filter(is_alone)) {
+        let counterpart = |among: &[IlluminationMap]| match of_surface(map, among).map(|index| &among[index])
+        {
+            Some(other) if (other.width(), other.height()) != (map.width(), map.height()) => None,
+            Some(other) => Some(values(other)),
+            None => Some(vec![T::default(); map.width() * map.height()]),
+        };
+        let (images, references) = (counterpart(maps)?, counterpart(references)?);
+        let dense = map.dense();
+        for (texel, (image, reference)) in images.into_iter().zip(references).enumerate() {
+            let area_m2 = dense.chart.texel_area_m2(texel);
+            if area_m2 > 0.0 {
+                pairs.push((image, reference, area_m2));
+            }
+        }
     }
     Some(pairs)
 }
 
-/// Luminance of the caustic layer per texel [W/m²], row by row; zero where the layer was not baked.
-pub fn caustic_luminance(map: &IlluminationMap) -> Vec<f64> {
+/// The caustic layer per texel [W/m²], row by row; black where the layer was not baked.
+pub fn caustic_colours(map: &IlluminationMap) -> Vec<LinearSrgb> {
     match map.dense().layer(LayerKind::Caustic) {
         Some(layer) => layer
             .irradiance
             .iter()
-            .map(|rgb| LinearSrgb::from(rgb.map(f64::from)).luminance())
+            .map(|rgb| LinearSrgb::from(rgb.map(f64::from)))
             .collect(),
-        None => vec![0.0; map.width() * map.height()],
+        None => vec![LinearSrgb::BLACK; map.width() * map.height()],
     }
 }
 
-fn pair(
-    of: &IlluminationMap,
-    image: Option<&IlluminationMap>,
-    reference: Option<&IlluminationMap>,
-) -> Option<Vec<TexelPair>> {
-    let size = (of.width(), of.height());
-    let values = |map: Option<&IlluminationMap>| match map {
-        Some(map) if (map.width(), map.height()) != size => None,
-        Some(map) => Some(caustic_luminance(map)),
-        None => Some(vec![0.0; size.0 * size.1]),
-    };
-    let (image, reference) = (values(image)?, values(reference)?);
-    let of = of.dense();
-    let texels = image.into_iter().zip(reference).enumerate();
-    let covered = texels.filter_map(|(texel, (image, reference))| {
-        let area_m2 = of.chart.texel_area_m2(texel);
-        (area_m2 > 0.0).then_some(TexelPair {
-            image,
-            reference,
-            area_m2,
-        })
-    });
-    Some(covered.collect())
+/// Its luminance.
+pub fn caustic_luminance(map: &IlluminationMap) -> Vec<f64> {
+    caustic_colours(map)
+        .into_iter()
+        .map(LinearSrgb::luminance)
+        .collect()
 }
 
 #[cfg(test)]

@@ -111,6 +111,20 @@ impl Variant {
         }
     }
 
+    /// Its map goes into a sheet.
+    #[must_use]
+    pub fn in_sheet(self, file: impl Into<String>) -> Self {
+        let sheet = Some(file.into());
+        Self { sheet, ..self }
+    }
+
+    /// The scene in the bake's light is seen from a camera.
+    #[must_use]
+    pub fn seen(mut self, file: impl Into<String>, camera: &Camera) -> Self {
+        self.views.push((file.into(), camera.clone()));
+        self
+    }
+
     fn caption(&self) -> String {
         let words: Vec<String> = self.labels.iter().map(Cell::rounded).collect();
         words.join(", ")
@@ -168,7 +182,8 @@ pub fn share(value: Option<f64>) -> Cell {
     value.map_or(Cell::Empty, Cell::Share)
 }
 
-const fn column(name: &'static str, value: fn(&Measured) -> Cell) -> Column {
+/// A column with its name.
+pub const fn column(name: &'static str, value: fn(&Measured) -> Cell) -> Column {
     Column { name, value }
 }
 
