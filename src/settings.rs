@@ -8,31 +8,32 @@ use strum::{EnumMessage, IntoStaticStr, VariantArray};
 use crate::effect::EffectSwitches;
 use crate::error::{Error, Result};
 
-/// Which light a layer holds. The order is that of the files' channels.
-#[derive(
-    Clone,
-    Copy,
-    Debug,
-    PartialEq,
-    Eq,
-    PartialOrd,
-    Ord,
-    Hash,
-    Serialize,
-    Deserialize,
-    EnumMessage,
-    IntoStaticStr,
-    VariantArray,
-)]
-#[serde(rename_all = "lowercase")]
-#[strum(serialize_all = "lowercase")]
-pub enum LayerKind {
-    /// LS+D: light that met at least one specular surface.
-    Caustic,
-    /// LD: straight from the lights, stopped by every surface.
-    Direct,
-    /// LD+D: light that other diffuse surfaces send.
-    Indirect,
+/// Enumerations whose values have the names of its variants in files and on the command line, and their documentation
+/// as texts.
+macro_rules! choices {
+    ($($(#[$meta:meta])* pub enum $name:ident { $($variants:tt)* })*) => {
+        $(
+            $(#[$meta])*
+            #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+            #[derive(EnumMessage, IntoStaticStr, VariantArray)]
+            #[serde(rename_all = "lowercase")]
+            #[strum(serialize_all = "lowercase")]
+            pub enum $name { $($variants)* }
+        )*
+    };
+}
+
+choices! {
+    /// Which light a layer holds. The order is that of the files' channels.
+    #[derive(PartialOrd, Ord, Hash)]
+    pub enum LayerKind {
+        /// LS+D: light that met at least one specular surface.
+        Caustic,
+        /// LD: straight from the lights, stopped by every surface.
+        Direct,
+        /// LD+D: light that other diffuse surfaces send.
+        Indirect,
+    }
 }
 
 impl LayerKind {
@@ -45,120 +46,78 @@ impl LayerKind {
     }
 }
 
-/// How the light pass turns rays into irradiance.
-#[derive(
-    Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, EnumMessage, IntoStaticStr, VariantArray,
-)]
-#[serde(rename_all = "lowercase")]
-#[strum(serialize_all = "lowercase")]
-pub enum Estimator {
-    /// Photons for lights with a size, for light on rough surfaces, and without a target; else patches or, of a single
-    /// light, whichever a pilot of both measures to be cheaper for the target.
-    Auto,
-    /// Patches of the wavefront between neighbouring rays, spread exactly over the texels they cover.
-    Wavefront,
-    /// Photons: paths that go one way at every surface, each counted into the texel it hits.
-    Photon,
-    /// A kernel of flux per ray, scaled to the wavefront (Collins 1994).
-    Splat,
-}
+choices! {
+    /// How the light pass turns rays into irradiance.
+    pub enum Estimator {
+        /// Photons for lights with a size, for light on rough surfaces, and without a target; else patches or, of a single
+        /// light, whichever a pilot of both measures to be cheaper for the target.
+        Auto,
+        /// Patches of the wavefront between neighbouring rays, spread exactly over the texels they cover.
+        Wavefront,
+        /// Photons: paths that go one way at every surface, each counted into the texel it hits.
+        Photon,
+        /// A kernel of flux per ray, scaled to the wavefront (Collins 1994).
+        Splat,
+    }
 
-/// What a target for the error means.
-#[derive(
-    Clone,
-    Copy,
-    Debug,
-    Default,
-    PartialEq,
-    Eq,
-    Serialize,
-    Deserialize,
-    EnumMessage,
-    IntoStaticStr,
-    VariantArray,
-)]
-#[serde(rename_all = "lowercase")]
-#[strum(serialize_all = "lowercase")]
-pub enum ErrorMetric {
-    /// As an eye sees it: relative to how bright a place is, with what exposure makes of the dark.
-    #[default]
-    Visible,
-    /// Root mean square over all maps, over their mean: ruled by the brightest light.
-    Rmse,
-}
+    /// What a target for the error means.
+    #[derive(Default)]
+    pub enum ErrorMetric {
+        /// As an eye sees it: relative to how bright a place is, with what exposure makes of the dark.
+        #[default]
+        Visible,
+        /// Root mean square over all maps, over their mean: ruled by the brightest light.
+        Rmse,
+    }
 
-/// Shape of a splat. All have the same area at the same footprint: disc r = 1, box side √π, cone base √3 (footprint
-/// radii), gaussian exp(−r²/2σ).
-#[derive(
-    Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, EnumMessage, IntoStaticStr, VariantArray,
-)]
-#[serde(rename_all = "lowercase")]
-#[strum(serialize_all = "lowercase")]
-pub enum Kernel {
-    /// exp(−r²/2σ), cut at 4√σ (eq. 4.4).
-    Gaussian,
-    /// 1 − r/√3 up to r = √3.
-    Cone,
-    /// Constant up to r = 1.
-    Disc,
-    /// Constant over the square of the disc's area.
-    Box,
-}
+    /// Shape of a splat. All have the same area at the same footprint: disc r = 1, box side √π, cone base √3 (footprint
+    /// radii), gaussian exp(−r²/2σ).
+    pub enum Kernel {
+        /// exp(−r²/2σ), cut at 4√σ (eq. 4.4).
+        Gaussian,
+        /// 1 − r/√3 up to r = √3.
+        Cone,
+        /// Constant up to r = 1.
+        Disc,
+        /// Constant over the square of the disc's area.
+        Box,
+    }
 
-/// How a kernel is taken into texels.
-#[derive(
-    Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, EnumMessage, IntoStaticStr, VariantArray,
-)]
-#[serde(rename_all = "lowercase")]
-#[strum(serialize_all = "lowercase")]
-pub enum KernelSampling {
-    /// Its integral over each texel.
-    Integrated,
-    /// Its value at each texel's centre, as the paper does; for studies.
-    Point,
-}
+    /// How a kernel is taken into texels.
+    pub enum KernelSampling {
+        /// Its integral over each texel.
+        Integrated,
+        /// Its value at each texel's centre, as the paper does; for studies.
+        Point,
+    }
 
-/// What sets the size and shape of a splat.
-#[derive(
-    Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, EnumMessage, IntoStaticStr, VariantArray,
-)]
-#[serde(rename_all = "lowercase")]
-#[strum(serialize_all = "lowercase")]
-pub enum Footprint {
-    /// The ellipse that the neighbouring rays span.
-    Ellipse,
-    /// The disc of the area that the neighbouring rays span (section 3.2.1 of the paper).
-    Disc,
-    /// A disc that grows with the length of the path.
-    Distance,
-    /// The same disc for every ray of a light.
-    Fixed,
-}
+    /// What sets the size and shape of a splat.
+    pub enum Footprint {
+        /// The ellipse that the neighbouring rays span.
+        Ellipse,
+        /// The disc of the area that the neighbouring rays span (section 3.2.1 of the paper).
+        Disc,
+        /// A disc that grows with the length of the path.
+        Distance,
+        /// The same disc for every ray of a light.
+        Fixed,
+    }
 
-/// Where in its lattice cell a light ray starts.
-#[derive(
-    Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, EnumMessage, IntoStaticStr, VariantArray,
-)]
-#[serde(rename_all = "lowercase")]
-#[strum(serialize_all = "lowercase")]
-pub enum RayPlacement {
-    /// At the centre.
-    Lattice,
-    /// Anywhere, by the seed (section 3.1.2 of the paper).
-    Jittered,
-}
+    /// Where in its lattice cell a light ray starts.
+    pub enum RayPlacement {
+        /// At the centre.
+        Lattice,
+        /// Anywhere, by the seed (section 3.1.2 of the paper).
+        Jittered,
+    }
 
-/// How the sphere of directions around a light is divided.
-#[derive(
-    Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, EnumMessage, IntoStaticStr, VariantArray,
-)]
-#[serde(rename_all = "lowercase")]
-#[strum(serialize_all = "lowercase")]
-pub enum ItemBufferKind {
-    /// Cells of equal solid angle.
-    Equal,
-    /// The paper's cube: cells of equal area on the cube's faces.
-    Cube,
+    /// How the sphere of directions around a light is divided.
+    pub enum ItemBufferKind {
+        /// Cells of equal solid angle.
+        Equal,
+        /// The paper's cube: cells of equal area on the cube's faces.
+        Cube,
+    }
 }
 
 /// Spread of the gaussian in squared footprint radii (eq. 4.4). The wavefront estimator deposits exactly and smooths
@@ -201,43 +160,26 @@ pub enum Wavelengths {
     Fixed(u32),
 }
 
-/// How rays and wavelengths go together (section 4.1 of the paper).
-#[derive(
-    Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, EnumMessage, IntoStaticStr, VariantArray,
-)]
-#[serde(rename_all = "lowercase")]
-#[strum(serialize_all = "lowercase")]
-pub enum SpectralSampling {
-    /// Every ray is traced at every wavelength.
-    Split,
-    /// Every ray has one wavelength: rays are dealt out among the wavelengths evenly.
-    Stochastic,
-}
+choices! {
+    /// How rays and wavelengths go together (section 4.1 of the paper).
+    pub enum SpectralSampling {
+        /// Every ray is traced at every wavelength.
+        Split,
+        /// Every ray has one wavelength: rays are dealt out among the wavelengths evenly.
+        Stochastic,
+    }
 
-/// How carefully to bake, by name.
-#[derive(
-    Clone,
-    Copy,
-    Debug,
-    Default,
-    PartialEq,
-    Eq,
-    Serialize,
-    Deserialize,
-    EnumMessage,
-    IntoStaticStr,
-    VariantArray,
-)]
-#[serde(rename_all = "lowercase")]
-#[strum(serialize_all = "lowercase")]
-pub enum Preset {
-    /// 10 % of relative RMSE (splat: 12,500 rays per steradian).
-    Draft,
-    /// 3 % (splat: 100,000 rays per steradian).
-    #[default]
-    Preview,
-    /// 1 % (splat: 800,000 rays per steradian).
-    Final,
+    /// How carefully to bake, by name.
+    #[derive(Default)]
+    pub enum Preset {
+        /// 10 % of relative RMSE (splat: 12,500 rays per steradian).
+        Draft,
+        /// 3 % (splat: 100,000 rays per steradian).
+        #[default]
+        Preview,
+        /// 1 % (splat: 800,000 rays per steradian).
+        Final,
+    }
 }
 
 impl Preset {

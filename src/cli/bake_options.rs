@@ -18,13 +18,10 @@ fn arg(option: &'static OptionInfo) -> Arg {
         "" => String::new(),
         text => format!(" [{before}{text}]"),
     };
-    let range = if option.values.is_some() { "" } else { option.range };
-    let help = format!(
-        "{}{}{}",
-        option.what,
-        stated("", range),
-        stated("default: ", option.default)
-    );
+    // Names stand below.
+    let range = option.values.map_or(option.range(), |_| String::new());
+    let default = stated("default: ", option.default);
+    let help = format!("{}{}{default}", option.what, stated("", &range));
     let arg = Arg::new(option.name)
         .long(option.name)
         .help_heading("Bake options")

@@ -14,8 +14,8 @@ use nephroid::export::textures::{
 use nephroid::files;
 use nephroid::illumination::IlluminationMap;
 use nephroid::scene::{self, LoadOptions, Scene};
-use nephroid::settings::LayerKind;
 use nephroid::settings::options::share;
+use nephroid::settings::{LayerKind, MAX_MAP_SIDE};
 use serde::Serialize;
 
 use super::console::Console;
@@ -30,6 +30,9 @@ const DEFAULT_CUT: f64 = 0.005;
 
 /// Share of texels that are white in an unlit picture where no exposure was asked for.
 const WHITE_SHARE: f64 = 0.01;
+
+/// Below, gutters take most of an atlas [texels].
+const LEAST_ATLAS_SIDE: usize = 16;
 
 const FORMATS: &[Named<&str>] = &[
     ("glb", "glb", "The scene with its maps, binary glTF"),
@@ -165,7 +168,7 @@ pub struct ExportArguments {
     #[arg(long, value_parser = values::named(TRANSFERS))]
     transfer: Option<Transfer>,
     /// Of textures: many maps in one file, with sides of up to so many texels [default: one file for each; N: 4096]
-    #[arg(long, value_name = "N", num_args = 0..=1, default_missing_value = "4096", value_parser = values::atlas_side)]
+    #[arg(long, value_name = "N", num_args = 0..=1, default_missing_value = "4096", value_parser = values::within(LEAST_ATLAS_SIDE..=MAX_MAP_SIDE, "texels"))]
     atlas: Option<usize>,
     /// Of .ktx2: how texels are packed [default: rgb9e5]
     #[arg(long, value_parser = values::named(PACKINGS))]

@@ -9,6 +9,7 @@ use nephroid::error::{Error, Result};
 use nephroid::files;
 #[cfg(feature = "gpu")]
 use nephroid::scene::CameraPath;
+use nephroid::scene::camera_path::MAX_FRAMES;
 use nephroid::settings::{BakeSettings, LayerKind};
 use serde_json::json;
 
@@ -36,7 +37,7 @@ pub struct RenderArguments {
     #[arg(long, value_name = "FILE", conflicts_with = "camera")]
     path: Option<PathBuf>,
     /// Draw so many frames of a camera that goes once around the middle of the scene, beginning where --camera is
-    #[arg(long, value_name = "FRAMES", conflicts_with = "path", value_parser = values::frames)]
+    #[arg(long, value_name = "FRAMES", conflicts_with = "path", value_parser = values::within(1..=MAX_FRAMES, "frames"))]
     turntable: Option<usize>,
     /// With --path or --turntable: time every frame with and without what is seen in mirrors and through glass
     #[arg(long, requires = "motion")]

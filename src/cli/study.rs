@@ -1,6 +1,5 @@
 //! `study`: which there are, what they take, and one way to run them.
 
-use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -11,15 +10,13 @@ use nephroid::export::map_folder::MapFolder;
 use nephroid::files::{self, OutputFolder};
 use nephroid::scene::Scene;
 use nephroid::settings::{BakeSettings, Estimator, LayerKind, MapResolution, Wavelengths};
-use nephroid::study::brute_force::{brute_force, check_rays, relative_noise};
+use nephroid::study::brute_force::{RAYS, brute_force, relative_noise};
 use nephroid::study::one_scene::{self, CONVERGENCE, EFFECTS, SPECTRUM};
 use nephroid::study::references::Reference;
-use nephroid::study::studies;
-use nephroid::study::sweep::{Bench, Outcome, Sweep};
-use nephroid::study::table::Table;
+use nephroid::study::studies::STUDIES;
+use nephroid::study::sweep::{Bench, Sweep};
 use nephroid::transport::Tracer;
-use serde::Serialize;
-use serde_json::json;
+use serde_json::{Value, json};
 
 use super::bake_options::BakeOptions;
 use super::compare::read_luminance;
@@ -38,9 +35,8 @@ const ALL: (&str, &str) = ("pages", "all that follow, each in a folder of its na
 const SIDE: usize = 256;
 const SPECTRUM_SIDE: usize = 1024;
 
-/// Bakes of each kind where no number is asked for, and the most.
+/// Bakes of each kind where no number is asked for.
 const REPEATS: usize = 5;
-const MAX_REPEATS: usize = 1000;
 
 /// Densities of `convergence` [1/sr]; `--quick` leaves out the last.
 const DENSITIES: [f64; 9] = [1e2, 3e2, 1e3, 3e3, 1e4, 3e4, 1e5, 3e5, 1e6];
@@ -61,21 +57,23 @@ pub struct StudyArguments {
     run: RunOptions,
 }
 
-#[derive(Debug, Subcommand)]
-enum Study {
-    #[command(about = CONVERGENCE.1)]
-    Convergence(ConvergenceArguments),
-    #[command(about = REFERENCE.1)]
-    Reference(ReferenceArguments),
-    #[command(about = EFFECTS.1)]
-    Effects(EffectsArguments),
-    #[command(about = SPECTRUM.1)]
-    Spectrum(SpectrumArguments),
-    #[command(flatten)]
-    Built(BuiltStudy),
+/// A study that is named, with what every study takes.
+#[derive(Debug)]
+struct Study {
+    kind: Kind,
+    common: Common,
 }
 
-/// What every study takes.
+#[derive(Debug)]
+enum Kind {
+    Convergence(ConvergenceArguments),
+    Reference(ReferenceArguments),
+    Effects(EffectsArguments),
+    Spectrum(SpectrumArguments),
+    /// Of built-in scenes, by name.
+    Built(String),
+}
+
 #[derive(Debug, Args)]
 struct Common {
     /// Folder for what it finds: NAME.md, NAME.csv, plots (.svg) and pictures (.png)
@@ -91,45 +89,12 @@ struct Common {
     run: RunOptions,
 }
 
-/// Of a scene that is named.
-#[derive(Debug, Args)]
-struct BakesOptions {
-    /// Bakes of each kind, whose median CPU time counts [default: 5; 1 with --quick]
-    #[arg(long, value_name = "N", allow_negative_numbers = true)]
-    repeat: Option<usize>,
-    #[command(flatten)]
-    scene_options: SceneOptions,
-}
-
-#[derive(Debug, Args)]
-struct SizeOption {
-    /// Texels of every map: N by N, or W by H [default: 256, of spectrum 1024]
-    #[arg(long, value_name = "N|WxH", value_parser = fixed_map_resolution, allow_hyphen_values = true)]
-    map_resolution: Option<MapResolution>,
-}
-
-impl SizeOption {
-    fn or_square(&self, side: usize) -> MapResolution {
-        self.map_resolution.unwrap_or(MapResolution::Fixed {
-            width: side,
-            height: side,
-        })
-    }
-}
-
-/// Studies of built-in scenes, by name.
-#[derive(Debug)]
-struct BuiltStudy {
-    name: String,
-    common: Common,
-}
-
 #[derive(Debug, Args)]
 struct ConvergenceArguments {
     /// .glb, .gltf or builtin:NAME
     #[arg(default_value = "builtin:ring")]
     scene: String,
-    /// Estimators to measure [default: all]
+    /// Estimators to measure [default: wavefront,splat]
     #[arg(long, value_parser = values::one_of::<Estimator>(), value_delimiter = ',', value_name = "ESTIMATOR,...")]
     estimators: Option<Vec<Estimator>>,
     /// Ascending light rays per steradian [default: 1e2 to 1e6, two a decade]
@@ -149,9 +114,9 @@ struct ConvergenceArguments {
     #[command(flatten)]
     size: SizeOption,
     #[command(flatten)]
-    bakes: BakesOptions,
+    repeat: RepeatOption,
     #[command(flatten)]
-    common: Common,
+    scene_options: SceneOptions,
 }
 
 #[derive(Debug, Args)]
@@ -168,8 +133,6 @@ struct ReferenceArguments {
     seed: u64,
     #[command(flatten)]
     scene_options: SceneOptions,
-    #[command(flatten)]
-    common: Common,
 }
 
 #[derive(Debug, Args)]
@@ -177,11 +140,11 @@ struct EffectsArguments {
     /// .glb, .gltf or builtin:NAME
     scene: String,
     #[command(flatten)]
-    bakes: BakesOptions,
+    repeat: RepeatOption,
+    #[command(flatten)]
+    scene_options: SceneOptions,
     #[command(flatten)]
     bake: BakeOptions,
-    #[command(flatten)]
-    common: Common,
 }
 
 #[derive(Debug, Args)]
@@ -204,9 +167,32 @@ struct SpectrumArguments {
     #[command(flatten)]
     size: SizeOption,
     #[command(flatten)]
-    bakes: BakesOptions,
+    repeat: RepeatOption,
     #[command(flatten)]
-    common: Common,
+    scene_options: SceneOptions,
+}
+
+#[derive(Debug, Args)]
+struct SizeOption {
+    /// Texels of every map: N by N, or W by H [default: 256, of spectrum 1024]
+    #[arg(long, value_name = "N|WxH", value_parser = fixed_map_resolution, allow_hyphen_values = true)]
+    map_resolution: Option<MapResolution>,
+}
+
+#[derive(Debug, Args)]
+struct RepeatOption {
+    /// Bakes of each kind, whose median CPU time counts [default: 5; 1 with --quick]
+    #[arg(long, value_name = "N", value_parser = values::within(1..=1000, "bakes"), allow_negative_numbers = true)]
+    repeat: Option<usize>,
+}
+
+impl SizeOption {
+    fn or_square(&self, side: usize) -> MapResolution {
+        self.map_resolution.unwrap_or(MapResolution::Fixed {
+            width: side,
+            height: side,
+        })
+    }
 }
 
 /// `N` (square) or `WxH` [texels].
@@ -219,17 +205,30 @@ fn fixed_map_resolution(text: &str) -> std::result::Result<MapResolution, String
 
 /// A number of rays, `250000` or `2.5e5`.
 fn ray_count(text: &str) -> std::result::Result<u64, String> {
-    let rays = text.parse::<f64>().ok().filter(|rays| (1.0..1e18).contains(rays));
-    rays.map(|rays| rays as u64)
-        .ok_or_else(|| "give a number of rays, such as 1e8".to_string())
+    let rays = text.parse().ok().map(|rays: f64| rays as u64);
+    let (least, most) = (RAYS.start(), *RAYS.end() as f64);
+    rays.filter(|rays| RAYS.contains(rays))
+        .ok_or_else(|| format!("give a number of rays from {least} to {most:e}, such as 1e8"))
 }
 
-impl Subcommand for BuiltStudy {
+impl Subcommand for Study {
     fn augment_subcommands(command: clap::Command) -> clap::Command {
-        let names = studies::STUDIES.iter().map(|study| (study.name, study.what));
-        names.chain([ALL]).fold(command, |command, (name, what)| {
-            command.subcommand(Common::augment_args(clap::Command::new(name).about(what)))
-        })
+        type Augment = fn(clap::Command) -> clap::Command;
+        let own: [(_, Augment); 5] = [
+            (CONVERGENCE, ConvergenceArguments::augment_args),
+            (REFERENCE, ReferenceArguments::augment_args),
+            (EFFECTS, EffectsArguments::augment_args),
+            (SPECTRUM, SpectrumArguments::augment_args),
+            (ALL, |command| command),
+        ];
+        let built = STUDIES.iter().map(|study| ((study.name, study.what), own[4].1));
+        own.into_iter()
+            .chain(built)
+            .fold(command, |command, ((name, what), augment)| {
+                command.subcommand(Common::augment_args(augment(
+                    clap::Command::new(name).about(what),
+                )))
+            })
     }
 
     fn augment_subcommands_for_update(command: clap::Command) -> clap::Command {
@@ -237,16 +236,22 @@ impl Subcommand for BuiltStudy {
     }
 
     fn has_subcommand(name: &str) -> bool {
-        name == ALL.0 || studies::STUDIES.iter().any(|study| study.name == name)
+        all_studies().any(|(known, _)| known == name)
     }
 }
 
-impl FromArgMatches for BuiltStudy {
+impl FromArgMatches for Study {
     fn from_arg_matches(matches: &ArgMatches) -> std::result::Result<Self, clap::Error> {
         let missing = || clap::Error::new(clap::error::ErrorKind::MissingSubcommand);
         let (name, matches) = matches.subcommand().ok_or_else(missing)?;
         Ok(Self {
-            name: name.into(),
+            kind: match name {
+                _ if name == CONVERGENCE.0 => Kind::Convergence(FromArgMatches::from_arg_matches(matches)?),
+                _ if name == REFERENCE.0 => Kind::Reference(FromArgMatches::from_arg_matches(matches)?),
+                _ if name == EFFECTS.0 => Kind::Effects(FromArgMatches::from_arg_matches(matches)?),
+                _ if name == SPECTRUM.0 => Kind::Spectrum(FromArgMatches::from_arg_matches(matches)?),
+                _ => Kind::Built(name.into()),
+            },
             common: Common::from_arg_matches(matches)?,
         })
     }
@@ -257,16 +262,17 @@ impl FromArgMatches for BuiltStudy {
     }
 }
 
+/// Names, and what they find out.
+fn all_studies() -> impl Iterator<Item = (&'static str, &'static str)> {
+    let built = STUDIES.iter().map(|study| (study.name, study.what));
+    [CONVERGENCE, REFERENCE, EFFECTS, SPECTRUM, ALL]
+        .into_iter()
+        .chain(built)
+}
+
 impl StudyArguments {
     pub fn run_options(&self) -> &RunOptions {
-        match &self.study {
-            None => &self.run,
-            Some(Study::Convergence(study)) => &study.common.run,
-            Some(Study::Reference(study)) => &study.common.run,
-            Some(Study::Effects(study)) => &study.common.run,
-            Some(Study::Spectrum(study)) => &study.common.run,
-            Some(Study::Built(study)) => &study.common.run,
-        }
+        self.study.as_ref().map_or(&self.run, |study| &study.common.run)
     }
 
     /// Checks the arguments, measures, writes, and prints what was found.
@@ -275,77 +281,66 @@ impl StudyArguments {
     /// No study is named; a value outside its range; input, output or a bake that failed; stopped before the end, which
     /// writes nothing of the study that it was at.
     pub fn run(&self, console: &Console) -> Result<()> {
-        let desk = Desk { console };
-        match &self.study {
-            None if self.list => list(console),
-            None => Err(Error::usage(
-                "study",
-                "no study is named",
-                "name one, or use --list to see which there are",
-            )),
-            Some(Study::Convergence(study)) => desk.convergence(study),
-            Some(Study::Reference(study)) => desk.reference(study),
-            Some(Study::Effects(study)) => desk.effects(study),
-            Some(Study::Spectrum(study)) => desk.spectrum(study),
-            Some(Study::Built(study)) if study.name == ALL.0 => desk.all(&study.common),
-            Some(Study::Built(study)) => desk.built(study),
+        let Some(Study { kind, common }) = &self.study else {
+            return match self.list {
+                true => list(console),
+                false => Err(Error::usage(
+                    "study",
+                    "no study is named",
+                    "name one, or use --list to see which there are",
+                )),
+            };
+        };
+        let desk = Desk { common, console };
+        match kind {
+            Kind::Convergence(study) => desk.convergence(study),
+            Kind::Reference(study) => desk.reference(study),
+            Kind::Effects(study) => desk.effects(study),
+            Kind::Spectrum(study) => desk.spectrum(study),
+            Kind::Built(name) => desk.built(name),
         }
     }
 }
 
 fn list(console: &Console) -> Result<()> {
-    let own = [CONVERGENCE, REFERENCE, EFFECTS, SPECTRUM, ALL].into_iter();
-    let built = studies::STUDIES.iter().map(|study| (study.name, study.what));
-    let all: Vec<_> = own.chain(built).collect();
-    let text: String = all
-        .iter()
-        .map(|(name, what)| format!("{name:<12} {what}\n"))
+    let lines: Vec<String> = all_studies()
+        .map(|(name, what)| format!("{name:<12} {what}"))
         .collect();
-    let lines: Vec<_> = all
-        .iter()
+    let studies: Vec<Value> = all_studies()
         .map(|(name, what)| json!({"name": name, "what": what}))
         .collect();
-    console.print_result(&text, &lines)
+    console.print_result(&lines.join("\n"), &studies)
+}
+
+/// A study that is done: the result as text and as `--json` prints it, and the files.
+struct Done {
+    text: String,
+    report: Value,
+    files: Vec<String>,
 }
 
 /// Where studies are told of and stopped.
 #[derive(Clone, Copy)]
 struct Desk<'a> {
+    common: &'a Common,
     console: &'a Console,
-}
-
-/// The result of a study, as `--json` prints it.
-#[derive(Serialize)]
-struct Report {
-    study: &'static str,
-    folder: String,
-    files: Vec<String>,
-    table: Table,
-    costs: Table,
 }
 
 impl Desk<'_> {
     fn convergence(self, study: &ConvergenceArguments) -> Result<()> {
-        let settings = BakeSettings {
-            map_resolution: study.size.or_square(SIDE),
-            threads: study.common.run.threads()?,
-            ..BakeSettings::of(Estimator::Wavefront)
-        };
-        let few = if study.common.quick {
+        let settings = self.settings(&study.size, SIDE)?;
+        let few = if self.common.quick {
             QUICK_DENSITIES
         } else {
             DENSITIES.len()
         };
         let densities = study.densities.as_deref().unwrap_or(&DENSITIES[..few]);
         check_ladder(densities, &settings)?;
-        let mut estimators = study
-            .estimators
-            .clone()
-            .unwrap_or_else(|| vec![Estimator::Wavefront, Estimator::Splat]);
+        let usual = || vec![Estimator::Wavefront, Estimator::Splat];
+        let mut estimators = study.estimators.clone().unwrap_or_else(usual);
         estimators.dedup();
-        let repeats = repeats(study.bakes.repeat, &study.common)?;
-        let scene = self.load(&study.scene, &study.bakes.scene_options)?;
-        let make = || {
+        let scene = self.load(&study.scene, &study.scene_options)?;
+        self.one_scene(CONVERGENCE.0, &study.repeat, || {
             let reference = match &study.reference {
                 None => Reference::analytic(&scene)?,
                 Some(path) => {
@@ -359,16 +354,20 @@ impl Desk<'_> {
                     )?)
                 }
             };
-            let sweep = one_scene::convergence(&scene, &settings, &estimators, densities, reference);
-            Ok(Sweep { repeats, ..sweep })
-        };
-        self.tell(&self.study(CONVERGENCE.0, &study.common, &study.common.output, |_| make())?)
+            Ok(one_scene::convergence(
+                &scene,
+                &settings,
+                &estimators,
+                densities,
+                reference,
+            ))
+        })?;
+        Ok(())
     }
 
     fn effects(self, study: &EffectsArguments) -> Result<()> {
-        let settings = study
-            .bake
-            .settings(&[LayerKind::Caustic], study.common.run.threads()?)?;
+        let threads = self.common.run.threads()?;
+        let settings = study.bake.settings(&[LayerKind::Caustic], threads)?;
         if settings.max_time_s.is_some() {
             return Err(Error::usage(
                 "--max-time",
@@ -376,29 +375,22 @@ impl Desk<'_> {
                 "leave it out, or use --max-error or --density",
             ));
         }
-        let repeats = repeats(study.bakes.repeat, &study.common)?;
-        let scene = self.load(&study.scene, &study.bakes.scene_options)?;
-        let make = |_: &Bench| {
-            let sweep = one_scene::effects(&scene, &settings)?;
-            Ok(Sweep { repeats, ..sweep })
-        };
-        let told = self.study(EFFECTS.0, &study.common, &study.common.output, make)?;
+        let scene = self.load(&study.scene, &study.scene_options)?;
+        let written = self.one_scene(EFFECTS.0, &study.repeat, || one_scene::effects(&scene, &settings))?;
         for effect in Effect::ALL {
             let picture = format!("difference_{}.png", effect.name());
-            if !told.1.files.contains(&picture) {
+            if !written.contains(&picture) {
                 // An earlier study of this folder may have had the effect.
-                files::remove_file(&study.common.output.join(picture))?;
+                files::remove_file(&self.common.output.join(picture))?;
             }
         }
-        self.tell(&told)
+        Ok(())
     }
 
     fn spectrum(self, study: &SpectrumArguments) -> Result<()> {
         let settings = BakeSettings {
-            map_resolution: study.size.or_square(SPECTRUM_SIDE),
             density_per_sr: study.density.unwrap_or(BEAM_DENSITY_PER_SR),
-            threads: study.common.run.threads()?,
-            ..BakeSettings::of(Estimator::Wavefront)
+            ..self.settings(&study.size, SPECTRUM_SIDE)?
         };
         for &count in &study.wavelengths {
             let way = BakeSettings {
@@ -407,89 +399,90 @@ impl Desk<'_> {
             };
             way.validate()?;
         }
-        let repeats = repeats(study.bakes.repeat, &study.common)?;
-        let scene = self.load(&study.scene, &study.bakes.scene_options)?;
-        let make = |_: &Bench| {
-            let sweep = one_scene::spectrum(&scene, &settings, &study.wavelengths)?;
-            Ok(Sweep { repeats, ..sweep })
-        };
-        self.tell(&self.study(SPECTRUM.0, &study.common, &study.common.output, make)?)
+        let scene = self.load(&study.scene, &study.scene_options)?;
+        self.one_scene(SPECTRUM.0, &study.repeat, || {
+            one_scene::spectrum(&scene, &settings, &study.wavelengths)
+        })?;
+        Ok(())
     }
 
-    fn built(self, study: &BuiltStudy) -> Result<()> {
-        let found = studies::STUDIES.iter().find(|known| known.name == study.name);
-        let found = found.ok_or_else(|| Error::usage("study", "there is no such study", "use --list"))?;
-        let make = |bench: &Bench| found.sweep(bench);
-        self.tell(&self.study(found.name, &study.common, &study.common.output, make)?)
-    }
-
-    /// Each is told as soon as it is done, but for JSON, which is one document.
-    fn all(self, common: &Common) -> Result<()> {
+    /// One, or all: each is told as soon as it is done, but for JSON, which is one document.
+    fn built(self, name: &str) -> Result<()> {
+        let is_all = name == ALL.0;
         let mut reports = Vec::new();
-        for study in &studies::STUDIES {
-            let folder = common.output.join(study.name);
-            let told = self.study(study.name, common, &folder, |bench| study.sweep(bench))?;
-            if !self.console.json {
-                self.tell(&told)?;
+        for study in STUDIES.iter().filter(|study| is_all || study.name == name) {
+            let output = match is_all {
+                true => self.common.output.join(study.name),
+                false => self.common.output.clone(),
+            };
+            let done = self.study(study.name, &output, |bench| study.sweep(bench))?;
+            if !(is_all && self.console.json) {
+                self.console.print_result(&done.text, &done.report)?;
             }
-            reports.push(told.1);
+            reports.push(done.report);
         }
-        match self.console.json {
+        match is_all && self.console.json {
             true => self.console.print_result("", &reports),
             false => Ok(()),
         }
+    }
+
+    /// Runs it, writes and tells; the files that it wrote.
+    fn one_scene(
+        self,
+        name: &'static str,
+        repeat: &RepeatOption,
+        make: impl FnOnce() -> Result<Sweep>,
+    ) -> Result<Vec<String>> {
+        let usual = if self.common.quick { 1 } else { REPEATS };
+        let repeats = repeat.repeat.unwrap_or(usual);
+        let make = |_: &Bench| Ok(Sweep { repeats, ..make()? });
+        let study = self.study(name, &self.common.output, make)?;
+        self.console.print_result(&study.text, &study.report)?;
+        Ok(study.files)
     }
 
     /// Runs it and writes its files.
     fn study(
         self,
         name: &'static str,
-        common: &Common,
         output: &Path,
         make: impl FnOnce(&Bench) -> Result<Sweep>,
-    ) -> Result<(String, Report)> {
-        let folder = open_folder(output, common.force, &format!("{name}.csv"))?;
+    ) -> Result<Done> {
+        let folder = open_folder(output, self.common.force, &format!("{name}.csv"))?;
         let bar = self.console.bar();
         let bench = Bench {
-            quick: common.quick,
-            threads: common.run.threads()?,
+            quick: self.common.quick,
+            threads: self.common.run.threads()?,
             progress: &bar,
             control: self.console.control(),
         };
-        let outcome: Outcome = make(&bench)?.run(&bench)?;
+        let outcome = make(&bench)?.run(&bench)?;
         drop(bar);
-        let mut report = Report {
-            study: name,
-            folder: output.display().to_string(),
-            files: Vec::new(),
-            table: outcome.table.clone(),
-            costs: outcome.costs.clone(),
-        };
+        let mut files = Vec::new();
         for (file, bytes) in outcome.files()? {
             files::write_atomically(&folder.path().join(&file), |writer| writer.write_all(&bytes))?;
-            report.files.push(file);
+            files.push(file);
         }
-        let files = report.files.join(", ");
-        Ok((
-            format!("folder {}: {files}\n\n{}", report.folder, outcome.tables()),
-            report,
-        ))
-    }
-
-    fn tell(self, (text, report): &(String, Report)) -> Result<()> {
-        self.console.print_result(text, report)
+        let (folder, tables) = (output.display().to_string(), outcome.tables());
+        let text = format!("folder {folder}: {}\n\n{tables}", files.join(", "));
+        let report = json!({
+            "study": name,
+            "folder": folder,
+            "files": files,
+            "table": outcome.table,
+            "costs": outcome.costs,
+        });
+        Ok(Done { text, report, files })
     }
 
     /// Traces, writes the maps, and says how noisy they are.
     fn reference(self, study: &ReferenceArguments) -> Result<()> {
         let settings = BakeSettings {
-            map_resolution: study.size.or_square(SIDE),
             seed: study.seed,
-            threads: study.common.run.threads()?,
-            ..BakeSettings::default()
+            ..self.settings(&study.size, SIDE)?
         };
         settings.validate()?;
-        check_rays(study.rays)?;
         let scene = self.load(&study.scene, &study.scene_options)?;
         if (0..scene.objects.len()).any(|object| scene.material_of(object).is_dispersive()) {
             self.console.warn(&[Warning::new(
@@ -498,28 +491,28 @@ impl Desk<'_> {
                 "compare its maps with those of a bake with --effects dispersion=off",
             )]);
         }
-        let output = &study.common.output;
-        let folder = MapFolder::open(output, study.common.force)?;
+        let output = &self.common.output;
+        let folder = MapFolder::open(output, self.common.force)?;
         self.console.check(&scene.source)?;
         let tracer = Tracer::new(scene.clone());
         let (bar, control) = (self.console.bar(), self.console.control());
         let result = brute_force(&tracer, &settings, study.rays, &bar, control)?;
         drop(bar);
         let maps = folder.write(&scene, &settings, &result)?.maps;
-        let (rays, cpu_s, noise) = (
-            result.counts.rays,
-            result.cpu_s.total,
-            relative_noise(&result.maps),
-        );
-        let mut text = format!("folder {}\n", output.display());
-        for map in &maps {
+        let (rays, cpu_s) = (result.counts.rays, result.cpu_s.total);
+        let noise = relative_noise(&result.maps);
+        let lines = maps.iter().map(|map| {
             let noise = 100.0 * map.estimated_relative_rmse.unwrap_or(0.0);
-            let _ = writeln!(text, "map {} of {}, noise {noise:.3} %", map.file, map.surface);
-        }
+            format!("map {} of {}, noise {noise:.3} %\n", map.file, map.surface)
+        });
+        let lines: String = lines.collect();
         let told = noise.map_or("nothing arrived".into(), |noise| {
             format!("noise {:.3} % of the mean over all maps", 100.0 * noise)
         });
-        text += &format!("{rays} rays, {cpu_s:.2} s of CPU, {told}");
+        let text = format!(
+            "folder {}\n{lines}{rays} rays, {cpu_s:.2} s of CPU, {told}",
+            output.display()
+        );
         let report = json!({
             "method": "brute force: random rays, one per cell of two lattices; each arrival's flux into its texel",
             "rays": rays,
@@ -533,20 +526,16 @@ impl Desk<'_> {
         self.console.print_result(&text, &report)
     }
 
+    fn settings(self, size: &SizeOption, side: usize) -> Result<BakeSettings> {
+        Ok(BakeSettings {
+            map_resolution: size.or_square(side),
+            threads: self.common.run.threads()?,
+            ..BakeSettings::default()
+        })
+    }
+
     fn load(self, source: &str, options: &SceneOptions) -> Result<Arc<Scene>> {
         Ok(LoadedScene::load(source, &options.load_options(false), true, self.console)?.scene)
-    }
-}
-
-fn repeats(asked: Option<usize>, common: &Common) -> Result<usize> {
-    match asked {
-        None => Ok(if common.quick { 1 } else { REPEATS }),
-        Some(repeats) if (1..=MAX_REPEATS).contains(&repeats) => Ok(repeats),
-        Some(repeats) => Err(Error::usage(
-            "--repeat",
-            format!("{repeats} is outside 1 to {MAX_REPEATS}"),
-            "give a number in that range",
-        )),
     }
 }
 
@@ -572,9 +561,6 @@ fn check_ladder(densities: &[f64], settings: &BakeSettings) -> Result<()> {
 }
 
 /// A folder that is empty, holds the `table` of an earlier study, or is taken by force.
-///
-/// # Errors
-/// A place that cannot be written; other people's files in it.
 fn open_folder(path: &Path, force: bool, table: &str) -> Result<OutputFolder> {
     let folder = OutputFolder::open(path)?;
     if force || path.join(table).is_file() || folder.is_empty()? {

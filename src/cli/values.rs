@@ -1,28 +1,22 @@
 //! Values of options: how they are written.
 
+use std::ops::RangeInclusive;
+
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use nephroid::light_pass::share::Share;
-use nephroid::scene::camera_path::MAX_FRAMES;
-use nephroid::settings::{MAX_MAP_SIDE, options};
+use nephroid::settings::options;
 use strum::{EnumMessage, VariantArray};
 
-/// A number of frames.
-pub fn frames(text: &str) -> Result<usize, String> {
-    let frames = text.parse().ok();
-    frames
-        .filter(|frames| (1..=MAX_FRAMES).contains(frames))
-        .ok_or_else(|| format!("give 1 to {MAX_FRAMES} frames"))
+/// A whole number in a range.
+pub fn within(
+    range: RangeInclusive<usize>,
+    things: &'static str,
+) -> impl Fn(&str) -> Result<usize, String> + Clone + Send + Sync {
+    move |text| {
+        let number = text.parse().ok().filter(|number| range.contains(number));
+        number.ok_or_else(|| format!("give {} to {} {things}", range.start(), range.end()))
+    }
 }
-
-/// The longest side of an atlas [texels].
-pub fn atlas_side(text: &str) -> Result<usize, String> {
-    let side = text.parse().ok();
-    side.filter(|side| (LEAST_ATLAS_SIDE..=MAX_MAP_SIDE).contains(side))
-        .ok_or_else(|| format!("give {LEAST_ATLAS_SIDE} to {MAX_MAP_SIDE} texels"))
-}
-
-/// Below, gutters take most of an atlas [texels].
-const LEAST_ATLAS_SIDE: usize = 16;
 
 /// Most parts of a bake.
 const MOST_SHARDS: u32 = 100_000;

@@ -26,8 +26,8 @@ pub struct OptionInfo {
     pub is_list: bool,
     /// What it sets.
     pub what: &'static str,
-    /// Its values.
-    pub range: &'static str,
+    /// Its values; empty where they have names.
+    range: &'static str,
     /// What holds where it is not named.
     pub default: &'static str,
     /// What it does to accuracy.
@@ -49,54 +49,60 @@ type Read<T> = std::result::Result<T, String>;
 
 type Applies = std::result::Result<(), (&'static str, &'static str)>;
 
-/// What most rows have in common.
-const ROW: OptionInfo = OptionInfo {
-    name: "",
-    label: "",
-    value: "",
-    is_list: false,
-    what: "",
-    range: "",
-    default: "",
-    accuracy: "none",
-    cost: "none",
-    values: None,
-    limits: None,
-    applies: |_| Ok(()),
-    set: |_, _| Ok(()),
-};
+/// What most rows have in common: no limits but those of how a value is written.
+const fn row(name: &'static str, label: &'static str, value: &'static str) -> OptionInfo {
+    OptionInfo {
+        name,
+        label,
+        value,
+        is_list: false,
+        what: "",
+        range: "",
+        default: "",
+        accuracy: "none",
+        cost: "none",
+        values: None,
+        limits: None,
+        applies: |_| Ok(()),
+        set: |_, _| Ok(()),
+    }
+}
+
+/// One of the values of an enumeration.
+const fn choice<T>(name: &'static str, label: &'static str, value: &'static str) -> OptionInfo
+where
+    T: VariantArray + EnumMessage + Into<&'static str> + Copy,
+{
+    OptionInfo {
+        values: Some(names::<T>),
+        ..row(name, label, value)
+    }
+}
+
+/// On where it is named.
+const fn flag(name: &'static str) -> OptionInfo {
+    row(name, "", "")
+}
 
 /// All of them, in the order of the command line's help.
 pub const OPTIONS: &[OptionInfo] = &[
     OptionInfo {
-        name: "preset",
-        label: "Preset",
-        value: "PRESET",
         what: "How carefully to bake: the target error, or the density of splats, by name",
         range: "draft 10 %, preview 3 %, final 1 % of the error; splats 12,500, 100,000 and 800,000 rays/sr",
         default: "preview, unless density, error or time is given",
         accuracy: "as the name says, by the estimate",
         cost: "preview takes some ten times as long as a draft, final some ten times as long as a preview",
-        values: Some(names::<Preset>),
-        ..ROW
+        ..choice::<Preset>("preset", "Preset", "PRESET")
     },
     OptionInfo {
-        name: "estimator",
-        label: "Estimator",
-        value: "ESTIMATOR",
         what: "How light rays become irradiance",
-        range: "auto, wavefront, photon, splat",
         default: "auto",
         accuracy: "wavefront needs some hundred times fewer rays than splats for the same error",
         cost: "grows with the number of rays; a wavefront ray costs a few times more than a splat",
-        values: Some(names::<Estimator>),
         set: |s, text| named(text).map(|estimator| s.estimator = estimator),
-        ..ROW
+        ..choice::<Estimator>("estimator", "Estimator", "ESTIMATOR")
     },
     OptionInfo {
-        name: "density",
-        label: "Ray density [rays/sr]",
-        value: "RAYS_PER_SR",
         what: "Light rays per steradian around each lamp, and no refinement: just that many, grain and all; with a target error, \
                to begin with. For suns density/D² rays per m², D from the casters' centre to their farthest receiver",
         range: "1 to 1e12",
@@ -105,12 +111,9 @@ pub const OPTIONS: &[OptionInfo] = &[
         cost: "time grows in proportion to it; four times as many keep the rays of the step before",
         limits: Some((1.0, 1e12, |s| vec![s.density_per_sr])),
         set: |s, text| number(text).map(|density| s.density_per_sr = density),
-        ..ROW
+        ..row("density", "Ray density [rays/sr]", "RAYS_PER_SR")
     },
     OptionInfo {
-        name: "max-error",
-        label: "Max error [%]",
-        value: "SHARE",
         what: "Goes on until the estimated error of the maps is below this, such as 2% (not splat)",
         range: "0.01% to 100%",
         default: "that of the preset",
@@ -119,27 +122,19 @@ pub const OPTIONS: &[OptionInfo] = &[
         limits: Some((super::LEAST_MAX_ERROR, 1.0, |s| s.max_error.into_iter().collect())),
         applies: refining,
         set: |s, text| share(text).map(|error| s.max_error = Some(error)),
-        ..ROW
+        ..row("max-error", "Max error [%]", "SHARE")
     },
     OptionInfo {
-        name: "error-metric",
-        label: "Error is",
-        value: "METRIC",
         what: "What that error is: as an eye sees it, relative to how bright a place is, or the relative RMSE over all maps (not \
                splat)",
-        range: "visible, rmse",
         default: "visible",
         accuracy: "by the relative RMSE a focus outweighs a room; as an eye sees it, each place counts as exposure shows it",
         cost: "a small bright focus takes long by the relative RMSE, dim light by what is visible",
-        values: Some(names::<ErrorMetric>),
         applies: refining,
         set: |s, text| named(text).map(|metric| s.error_metric = metric),
-        ..ROW
+        ..choice::<ErrorMetric>("error-metric", "Error is", "METRIC")
     },
     OptionInfo {
-        name: "max-time",
-        label: "Max time [s]",
-        value: "TIME",
         what: "Ends the bake after so long, such as 10s, with the finest maps that are complete by then; without a target error, \
                refines as far as that goes (not splat)",
         range: "1ms to 1e7s",
@@ -148,26 +143,18 @@ pub const OPTIONS: &[OptionInfo] = &[
         cost: "so much time, unless the maps cannot become better",
         limits: Some((1e-3, 1e7, |s| s.max_time_s.into_iter().collect())),
         set: |s, text| seconds(text).map(|time_s| s.max_time_s = Some(time_s)),
-        ..ROW
+        ..row("max-time", "Max time [s]", "TIME")
     },
     OptionInfo {
-        name: "rays",
-        label: "Rays",
-        value: "PLACEMENT",
         what: "Where in its lattice cell a light ray starts (splat)",
-        range: "lattice, jittered",
         default: "lattice",
         accuracy: "a lattice converges faster, jittered rays turn regular patterns into noise",
         cost: "the same",
-        values: Some(names::<RayPlacement>),
         applies: splats,
         set: |s, text| named(text).map(|rays| s.rays = rays),
-        ..ROW
+        ..choice::<RayPlacement>("rays", "Rays", "PLACEMENT")
     },
     OptionInfo {
-        name: "sigma",
-        label: "Sigma [radii²]",
-        value: "S|adaptive",
         what: "Spread of a gaussian, weight exp(−r²/2σ), in squared radii of a ray's footprint at the density: of each splat, or \
                of the finished map; adaptive, of splats, by how each footprint compares with the mean",
         range: "0 to 1e4, splat above 0",
@@ -179,77 +166,53 @@ pub const OPTIONS: &[OptionInfo] = &[
             _ => Err(("only the gaussian kernel has a sigma", "--kernel gaussian")),
         },
         set: |s, text| text.parse().map(|sigma| s.sigma = sigma),
-        ..ROW
+        ..row("sigma", "Sigma [radii²]", "S|adaptive")
     },
     OptionInfo {
-        name: "kernel",
-        label: "Kernel",
-        value: "KERNEL",
         what: "Shape of a splat (splat)",
-        range: "gaussian, cone, disc, box",
         default: "gaussian",
         accuracy: "gaussian is smoothest; disc and box show their edges",
         cost: "gaussian touches the most texels",
-        values: Some(names::<Kernel>),
         applies: splats,
         set: |s, text| named(text).map(|kernel| s.kernel = kernel),
-        ..ROW
+        ..choice::<Kernel>("kernel", "Kernel", "KERNEL")
     },
     OptionInfo {
-        name: "kernel-sampling",
-        value: "SAMPLING",
         what: "How a kernel is taken into texels (splat)",
-        range: "integrated, point",
         default: "integrated",
         accuracy: "points miss kernels that are smaller than texels",
         cost: "nearly the same",
-        values: Some(names::<KernelSampling>),
         applies: splats,
         set: |s, text| named(text).map(|sampling| s.kernel_sampling = sampling),
-        ..ROW
+        ..choice::<KernelSampling>("kernel-sampling", "", "SAMPLING")
     },
     OptionInfo {
-        name: "footprint",
-        label: "Footprint",
-        value: "FOOTPRINT",
         what: "What sets the size and shape of a splat (splat)",
-        range: "ellipse, disc, distance, fixed",
         default: "ellipse",
         accuracy: "ellipse follows the wavefront best, fixed least",
         cost: "nearly the same for all",
-        values: Some(names::<Footprint>),
         applies: splats,
         set: |s, text| named(text).map(|footprint| s.footprint = footprint),
-        ..ROW
+        ..choice::<Footprint>("footprint", "Footprint", "FOOTPRINT")
     },
     OptionInfo {
-        name: "filter",
-        value: "on|off",
         what: "Whether the noise of photons is filtered where that lowers the error (auto, photon)",
         range: "on, off",
         default: "on with a target, off at a density",
         accuracy: "less noise, none of its grain",
         cost: "little: no ray is traced",
         set: |s, text| on_off(text).map(|filter| s.filter = Some(filter)),
-        ..ROW
+        ..row("filter", "", "on|off")
     },
     OptionInfo {
-        name: "item-buffer",
-        label: "Item buffer",
-        value: "DIVISION",
         what: "How the sphere of directions around a light is divided when looking for glass and mirrors",
-        range: "equal, cube",
         default: "equal",
         accuracy: "equal cells give each ray the same flux; the cube's differ by a factor of up to 5.2",
         cost: "nearly the same",
-        values: Some(names::<ItemBufferKind>),
         set: |s, text| named(text).map(|division| s.item_buffer = division),
-        ..ROW
+        ..choice::<ItemBufferKind>("item-buffer", "Item buffer", "DIVISION")
     },
     OptionInfo {
-        name: "map-resolution",
-        label: "Map size [texels]",
-        value: "auto|N|WxH",
         what: "Texels of every map: N by N, W by H, or as needed: maps of flat surfaces are finer where light is finer",
         range: "auto, 1 to 16384 a side",
         default: "auto",
@@ -260,12 +223,9 @@ pub const OPTIONS: &[OptionInfo] = &[
             MapResolution::Fixed { width, height } => vec![width as f64, height as f64],
         })),
         set: |s, text| text.parse().map(|size| s.map_resolution = size),
-        ..ROW
+        ..row("map-resolution", "Map size [texels]", "auto|N|WxH")
     },
     OptionInfo {
-        name: "max-depth",
-        label: "Max depth",
-        value: "N",
         what: "Largest number of glass, mirror and water surfaces on a light path",
         range: "1 to 100,000",
         default: "16 where all branches are followed, 256 by photons",
@@ -275,12 +235,9 @@ pub const OPTIONS: &[OptionInfo] = &[
             s.max_depth.map(f64::from).into_iter().collect()
         })),
         set: |s, text| number(text).map(|depth| s.max_depth = Some(depth)),
-        ..ROW
+        ..row("max-depth", "Max depth", "N")
     },
     OptionInfo {
-        name: "branch-threshold",
-        label: "Weakest branch",
-        value: "SHARE",
         what: "Where glass splits light, branches that carry less than this share of their light ray's flux are not followed",
         range: "0 to 0.5",
         default: "0.003 of the target error; 0.0001 without one",
@@ -288,13 +245,9 @@ pub const OPTIONS: &[OptionInfo] = &[
         cost: "a tenth of it follows about one more reflection inside each piece of glass",
         limits: Some((0.0, 0.5, |s| s.branch_threshold.into_iter().collect())),
         set: |s, text| number(text).map(|share| s.branch_threshold = Some(share)),
-        ..ROW
+        ..row("branch-threshold", "Weakest branch", "SHARE")
     },
     OptionInfo {
-        name: "layers",
-        label: "Layers",
-        value: "LAYER,...",
-        is_list: true,
         what: "Which light is baked. Caustic: light that met glass, mirrors or water. Direct: straight from the lights. Indirect: \
                what diffuse surfaces send each other of both, any number of times",
         range: "at least one",
@@ -302,28 +255,26 @@ pub const OPTIONS: &[OptionInfo] = &[
         accuracy: "a layer that is not baked is missing from the picture; indirect stops at the max error, 3 % without one",
         cost: "direct takes one shadow ray per texel and light; indirect 64 to 4,096 rays per texel of a coarser grid, and the other \
                two layers though they be hidden; they are kept while only lamps are dimmed",
-        values: Some(names::<LayerKind>),
         set: |s, text| {
             s.layers = text.split(',').map(named).collect::<Read<_>>()?;
             s.layers.sort_unstable();
             s.layers.dedup();
             Ok(())
         },
-        ..ROW
+        is_list: true,
+        values: Some(names::<LayerKind>),
+        ..row("layers", "Layers", "LAYER,...")
     },
     OptionInfo {
-        name: "per-light",
         what: "Adds each light's part of each layer to the files, so that lamps can be dimmed afterwards",
         cost: "files and memory grow with the number of lights",
         set: |s, _| {
             s.per_light = true;
             Ok(())
         },
-        ..ROW
+        ..flag("per-light")
     },
     OptionInfo {
-        name: "wavelengths",
-        value: "continuous|rainbow|N",
         what: "Wavelengths of light that meets dispersive glass: the whole spectrum, one for each colour of the rainbow, or so \
                many",
         range: "1 to 1000, rainbow or continuous",
@@ -335,34 +286,26 @@ pub const OPTIONS: &[OptionInfo] = &[
             _ => Vec::new(),
         })),
         set: |s, text| text.parse().map(|wavelengths| s.wavelengths = wavelengths),
-        ..ROW
+        ..row("wavelengths", "", "continuous|rainbow|N")
     },
     OptionInfo {
-        name: "spectral-sampling",
-        value: "SAMPLING",
         what: "Every ray at every wavelength, or each ray at one of them",
-        range: "split, stochastic",
         default: "split; stochastic for splats over the whole spectrum",
         accuracy: "stochastic rays are noisier",
         cost: "split rays are traced once for each wavelength",
-        values: Some(names::<SpectralSampling>),
         set: |s, text| named(text).map(|sampling| s.spectral_sampling = Some(sampling)),
-        ..ROW
+        ..choice::<SpectralSampling>("spectral-sampling", "", "SAMPLING")
     },
     OptionInfo {
-        name: "keep-spectrum",
         what: "Adds the light of each wavelength to the files [W/(m² nm)], with --wavelengths N",
         cost: "files and memory grow with the number of wavelengths",
         set: |s, _| {
             s.keep_spectrum = true;
             Ok(())
         },
-        ..ROW
+        ..flag("keep-spectrum")
     },
     OptionInfo {
-        name: "effects",
-        value: "NAME=auto|on|off",
-        is_list: true,
         what: "Forces effects on or off, such as refraction=off",
         default: "auto, on where the scene calls for it",
         accuracy: "light that an effect would bring is missing without it",
@@ -375,26 +318,23 @@ pub const OPTIONS: &[OptionInfo] = &[
             }
             Ok(())
         },
-        ..ROW
+        is_list: true,
+        ..row("effects", "", "NAME=auto|on|off")
     },
     OptionInfo {
-        name: "seed",
-        value: "N",
         what: "Seed of everything random",
         default: "0",
         set: |s, text| number(text).map(|seed| s.seed = seed),
-        ..ROW
+        ..row("seed", "", "N")
     },
     OptionInfo {
-        name: "memory",
-        value: "SIZE",
         what: "Largest memory for maps, such as 512M or 2G; where it is short, maps are made coarser, with a warning",
         range: "1M up",
         default: "4G",
         accuracy: "maps that are coarser average more",
         cost: "a quarter of it keeps traced light for the next bake",
         set: |s, text| memory(text).map(|bytes| s.memory_bytes = bytes),
-        ..ROW
+        ..row("memory", "", "SIZE")
     },
 ];
 
@@ -416,6 +356,15 @@ fn refining(settings: &BakeSettings) -> Applies {
 }
 
 impl OptionInfo {
+    /// Its values, by name where they have names.
+    pub fn range(&self) -> String {
+        let Some(values) = self.values else {
+            return self.range.into();
+        };
+        let names: Vec<&str> = values().into_iter().map(|(name, _)| name).collect();
+        names.join(", ")
+    }
+
     /// Sets it to a value as it is written.
     ///
     /// # Errors

@@ -50,7 +50,13 @@ pub fn brute_force(
     control: &Control,
 ) -> Result<BakeResult> {
     settings.validate()?;
-    check_rays(rays)?;
+    if !RAYS.contains(&rays) {
+        return Err(Error::usage(
+            "--rays",
+            format!("{rays} is outside {} to {:e}", RAYS.start(), *RAYS.end() as f64),
+            "give a number in that range",
+        ));
+    }
     let MapResolution::Fixed { width, height } = settings.map_resolution else {
         return Err(Error::usage(
             "--map-resolution",
@@ -63,21 +69,6 @@ pub fn brute_force(
         .build()
         .map_err(|error| Error::failure("--threads", error.to_string(), "ask for fewer threads"))?;
     pool.install(|| run(tracer, settings, rays, (width, height), progress, control))
-}
-
-/// Refuses a number of rays outside [`RAYS`].
-///
-/// # Errors
-/// Names the number and the range.
-pub fn check_rays(rays: u64) -> Result<()> {
-    if RAYS.contains(&rays) {
-        return Ok(());
-    }
-    Err(Error::usage(
-        "--rays",
-        format!("{rays} is outside {} to {:e}", RAYS.start(), *RAYS.end() as f64),
-        "give a number in that range",
-    ))
 }
 
 fn run(

@@ -49,7 +49,8 @@ impl From<&OptionInfo> for About {
     fn from(option: &OptionInfo) -> Self {
         Self {
             what: option.what,
-            range: option.range,
+            // Once for the whole run.
+            range: option.range().leak(),
             default: option.default,
             accuracy: option.accuracy,
             cost: option.cost,
