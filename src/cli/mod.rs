@@ -73,9 +73,11 @@ enum Command {
     Study(StudyArguments),
 }
 
+type Run<'a> = Box<dyn Fn(&Console) -> Result<()> + 'a>;
+
 impl Arguments {
     /// The options of the run, and the run.
-    fn command(&self) -> (&RunOptions, Box<dyn Fn(&Console) -> Result<()> + '_>) {
+    fn command(&self) -> (&RunOptions, Run<'_>) {
         match &self.command {
             None => (&self.view.run, Box::new(|console| self.view.run(console))),
             Some(Command::View(view)) => (&view.run, Box::new(|console| view.run(console))),

@@ -26,7 +26,7 @@ pub struct OptionInfo {
     pub is_list: bool,
     /// What it sets.
     pub what: &'static str,
-    /// Its values; empty where they have names.
+    /// Its values; empty where their names say all.
     range: &'static str,
     /// What holds where it is not named.
     pub default: &'static str,
@@ -35,9 +35,9 @@ pub struct OptionInfo {
     /// What it does to time and memory.
     pub cost: &'static str,
     /// Each value by name, and what it is; `None` of numbers and the like.
-    pub values: Option<fn() -> Vec<(&'static str, &'static str)>>,
+    pub values: Option<Names>,
     /// Least and most of numbers, and those that are set.
-    limits: Option<(f64, f64, fn(&BakeSettings) -> Vec<f64>)>,
+    limits: Option<Limits>,
     /// Whether it applies to the other settings; else why not, and what to do.
     applies: fn(&BakeSettings) -> Applies,
     /// Sets it to a value as it is written.
@@ -46,6 +46,11 @@ pub struct OptionInfo {
 
 /// What is wrong with a value where one cannot be read.
 type Read<T> = std::result::Result<T, String>;
+
+/// Names, and what they mean.
+type Names = fn() -> Vec<(&'static str, &'static str)>;
+
+type Limits = (f64, f64, fn(&BakeSettings) -> Vec<f64>);
 
 type Applies = std::result::Result<(), (&'static str, &'static str)>;
 
@@ -356,13 +361,15 @@ fn refining(settings: &BakeSettings) -> Applies {
 }
 
 impl OptionInfo {
-    /// Its values, by name where they have names.
+    /// Its values, by name where nothing else is said of them.
     pub fn range(&self) -> String {
-        let Some(values) = self.values else {
-            return self.range.into();
-        };
-        let names: Vec<&str> = values().into_iter().map(|(name, _)| name).collect();
-        names.join(", ")
+        match self.values {
+            Some(values) if self.range.is_empty() => {
+                let names: Vec<&str> = values().into_iter().map(|(name, _)| name).collect();
+                names.join(", ")
+            }
+            _ => self.range.into(),
+        }
     }
 
     /// Sets it to a value as it is written.

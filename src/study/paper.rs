@@ -224,7 +224,7 @@ const KERNELS: &[Column] = &[
     RELATIVE_RMSE,
     ARD,
     column("paper_rms", |m| {
-        let square = |pair: &super::agreement::TexelPair| (pair.image - pair.reference).powi(2);
+        let square = |pair: &crate::illumination::compare::TexelPair| (pair.image - pair.reference).powi(2);
         m.pairs.iter().map(square).sum::<f64>().sqrt().into()
     }),
     column("paper_ard", |m| {

@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 
-use super::agreement::{Agreement, TexelPair};
 use super::cost::{cost_of, slope};
 use super::picture::{self, Image, Picture};
 use super::plot::{Curve, Plot};
@@ -10,6 +9,7 @@ use super::references::{Reference, Truth, lit_side};
 use super::table::{Cell, Table};
 use crate::error::{Error, Result};
 use crate::export::picture::encode;
+use crate::illumination::compare::{Agreement, TexelPair};
 use crate::illumination::difference::{self, Difference};
 use crate::progress::{Control, Progress};
 use crate::scene::{Camera, Scene};
