@@ -1,6 +1,6 @@
 //! `view`: a window; without a display, files instead.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use clap::Args;
 use nephroid::error::{Error, Result};
@@ -33,7 +33,7 @@ pub struct ViewArguments {
     /// Write one JSON line per change of state of the window
     #[cfg(feature = "viewer")]
     #[arg(long, value_name = "FILE")]
-    event_log: Option<PathBuf>,
+    event_log: Option<std::path::PathBuf>,
     /// Read the scene again whenever its files are written
     #[cfg(feature = "viewer")]
     #[arg(long)]
