@@ -1,36 +1,39 @@
 //! Everything that a user can set about a bake.
 
+pub mod options;
+
 use serde::{Deserialize, Serialize};
 use strum::{EnumMessage, IntoStaticStr, VariantArray};
 
 use crate::effect::EffectSwitches;
 use crate::error::{Error, Result};
 
-/// Which light a layer holds. The order is that of the files' channels.
-#[derive(
-    Clone,
-    Copy,
-    Debug,
-    PartialEq,
-    Eq,
-    PartialOrd,
-    Ord,
-    Hash,
-    Serialize,
-    Deserialize,
-    EnumMessage,
-    IntoStaticStr,
-    VariantArray,
-)]
-#[serde(rename_all = "lowercase")]
-#[strum(serialize_all = "lowercase")]
-pub enum LayerKind {
-    /// LS+D: light that met at least one specular surface.
-    Caustic,
-    /// LD: straight from the lights, stopped by every surface.
-    Direct,
-    /// LD+D: light that other diffuse surfaces send.
-    Indirect,
+/// Enumerations whose values have the names of its variants in files and on the command line, and their documentation
+/// as texts.
+macro_rules! choices {
+    ($($(#[$meta:meta])* pub enum $name:ident { $($variants:tt)* })*) => {
+        $(
+            $(#[$meta])*
+            #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+            #[derive(EnumMessage, IntoStaticStr, VariantArray)]
+            #[serde(rename_all = "lowercase")]
+            #[strum(serialize_all = "lowercase")]
+            pub enum $name { $($variants)* }
+        )*
+    };
+}
+
+choices! {
+    /// Which light a layer holds. The order is that of the files' channels.
+    #[derive(PartialOrd, Ord, Hash)]
+    pub enum LayerKind {
+        /// LS+D: light that met at least one specular surface.
+        Caustic,
+        /// LD: straight from the lights, stopped by every surface.
+        Direct,
+        /// LD+D: light that other diffuse surfaces send.
+        Indirect,
+    }
 }
 
 impl LayerKind {
@@ -43,120 +46,78 @@ impl LayerKind {
     }
 }
 
-/// How the light pass turns rays into irradiance.
-#[derive(
-    Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, EnumMessage, IntoStaticStr, VariantArray,
-)]
-#[serde(rename_all = "lowercase")]
-#[strum(serialize_all = "lowercase")]
-pub enum Estimator {
-    /// Photons for lights with a size, for light on rough surfaces, and without a target; else patches or, of a single
-    /// light, whichever a pilot of both measures to be cheaper for the target.
-    Auto,
-    /// Patches of the wavefront between neighbouring rays, spread exactly over the texels they cover.
-    Wavefront,
-    /// Photons: paths that go one way at every surface, each counted into the texel it hits.
-    Photon,
-    /// A kernel of flux per ray, scaled to the wavefront (Collins 1994).
-    Splat,
-}
+choices! {
+    /// How the light pass turns rays into irradiance.
+    pub enum Estimator {
+        /// Photons for lights with a size, for light on rough surfaces, and without a target; else patches or, of a single
+        /// light, whichever a pilot of both measures to be cheaper for the target.
+        Auto,
+        /// Patches of the wavefront between neighbouring rays, spread exactly over the texels they cover.
+        Wavefront,
+        /// Photons: paths that go one way at every surface, each counted into the texel it hits.
+        Photon,
+        /// A kernel of flux per ray, scaled to the wavefront (Collins 1994).
+        Splat,
+    }
 
-/// What a target for the error means.
-#[derive(
-    Clone,
-    Copy,
-    Debug,
-    Default,
-    PartialEq,
-    Eq,
-    Serialize,
-    Deserialize,
-    EnumMessage,
-    IntoStaticStr,
-    VariantArray,
-)]
-#[serde(rename_all = "lowercase")]
-#[strum(serialize_all = "lowercase")]
-pub enum ErrorMetric {
-    /// As an eye sees it: relative to how bright a place is, with what exposure makes of the dark.
-    #[default]
-    Visible,
-    /// Root mean square over all maps, over their mean: ruled by the brightest light.
-    Rmse,
-}
+    /// What a target for the error means.
+    #[derive(Default)]
+    pub enum ErrorMetric {
+        /// As an eye sees it: relative to how bright a place is, with what exposure makes of the dark.
+        #[default]
+        Visible,
+        /// Root mean square over all maps, over their mean: ruled by the brightest light.
+        Rmse,
+    }
 
-/// Shape of a splat. All have the same area at the same footprint: disc r = 1, box side √π, cone base √3 (footprint
-/// radii), gaussian exp(−r²/2σ).
-#[derive(
-    Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, EnumMessage, IntoStaticStr, VariantArray,
-)]
-#[serde(rename_all = "lowercase")]
-#[strum(serialize_all = "lowercase")]
-pub enum Kernel {
-    /// exp(−r²/2σ), cut at 4√σ (eq. 4.4).
-    Gaussian,
-    /// 1 − r/√3 up to r = √3.
-    Cone,
-    /// Constant up to r = 1.
-    Disc,
-    /// Constant over the square of the disc's area.
-    Box,
-}
+    /// Shape of a splat. All have the same area at the same footprint: disc r = 1, box side √π, cone base √3 (footprint
+    /// radii), gaussian exp(−r²/2σ).
+    pub enum Kernel {
+        /// exp(−r²/2σ), cut at 4√σ (eq. 4.4).
+        Gaussian,
+        /// 1 − r/√3 up to r = √3.
+        Cone,
+        /// Constant up to r = 1.
+        Disc,
+        /// Constant over the square of the disc's area.
+        Box,
+    }
 
-/// How a kernel is taken into texels.
-#[derive(
-    Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, EnumMessage, IntoStaticStr, VariantArray,
-)]
-#[serde(rename_all = "lowercase")]
-#[strum(serialize_all = "lowercase")]
-pub enum KernelSampling {
-    /// Its integral over each texel.
-    Integrated,
-    /// Its value at each texel's centre, as the paper does; for studies.
-    Point,
-}
+    /// How a kernel is taken into texels.
+    pub enum KernelSampling {
+        /// Its integral over each texel.
+        Integrated,
+        /// Its value at each texel's centre, as the paper does; for studies.
+        Point,
+    }
 
-/// What sets the size and shape of a splat.
-#[derive(
-    Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, EnumMessage, IntoStaticStr, VariantArray,
-)]
-#[serde(rename_all = "lowercase")]
-#[strum(serialize_all = "lowercase")]
-pub enum Footprint {
-    /// The ellipse that the neighbouring rays span.
-    Ellipse,
-    /// The disc of the area that the neighbouring rays span (section 3.2.1 of the paper).
-    Disc,
-    /// A disc that grows with the length of the path.
-    Distance,
-    /// The same disc for every ray of a light.
-    Fixed,
-}
+    /// What sets the size and shape of a splat.
+    pub enum Footprint {
+        /// The ellipse that the neighbouring rays span.
+        Ellipse,
+        /// The disc of the area that the neighbouring rays span (section 3.2.1 of the paper).
+        Disc,
+        /// A disc that grows with the length of the path.
+        Distance,
+        /// The same disc for every ray of a light.
+        Fixed,
+    }
 
-/// Where in its lattice cell a light ray starts.
-#[derive(
-    Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, EnumMessage, IntoStaticStr, VariantArray,
-)]
-#[serde(rename_all = "lowercase")]
-#[strum(serialize_all = "lowercase")]
-pub enum RayPlacement {
-    /// At the centre.
-    Lattice,
-    /// Anywhere, by the seed (section 3.1.2 of the paper).
-    Jittered,
-}
+    /// Where in its lattice cell a light ray starts.
+    pub enum RayPlacement {
+        /// At the centre.
+        Lattice,
+        /// Anywhere, by the seed (section 3.1.2 of the paper).
+        Jittered,
+    }
 
-/// How the sphere of directions around a light is divided.
-#[derive(
-    Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, EnumMessage, IntoStaticStr, VariantArray,
-)]
-#[serde(rename_all = "lowercase")]
-#[strum(serialize_all = "lowercase")]
-pub enum ItemBufferKind {
-    /// Cells of equal solid angle.
-    Equal,
-    /// The paper's cube: cells of equal area on the cube's faces.
-    Cube,
+    /// How the sphere of directions around a light is divided.
+    pub enum ItemBufferKind {
+        /// Cells of equal solid angle.
+        Equal,
+        /// The paper's cube: cells of equal area on the cube's faces.
+        Cube,
+    }
 }
 
 /// Spread of the gaussian in squared footprint radii (eq. 4.4). The wavefront estimator deposits exactly and smooths
@@ -199,43 +160,26 @@ pub enum Wavelengths {
     Fixed(u32),
 }
 
-/// How rays and wavelengths go together (section 4.1 of the paper).
-#[derive(
-    Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, EnumMessage, IntoStaticStr, VariantArray,
-)]
-#[serde(rename_all = "lowercase")]
-#[strum(serialize_all = "lowercase")]
-pub enum SpectralSampling {
-    /// Every ray is traced at every wavelength.
-    Split,
-    /// Every ray has one wavelength: rays are dealt out among the wavelengths evenly.
-    Stochastic,
-}
+choices! {
+    /// How rays and wavelengths go together (section 4.1 of the paper).
+    pub enum SpectralSampling {
+        /// Every ray is traced at every wavelength.
+        Split,
+        /// Every ray has one wavelength: rays are dealt out among the wavelengths evenly.
+        Stochastic,
+    }
 
-/// How carefully to bake, by name.
-#[derive(
-    Clone,
-    Copy,
-    Debug,
-    Default,
-    PartialEq,
-    Eq,
-    Serialize,
-    Deserialize,
-    EnumMessage,
-    IntoStaticStr,
-    VariantArray,
-)]
-#[serde(rename_all = "lowercase")]
-#[strum(serialize_all = "lowercase")]
-pub enum Preset {
-    /// 10 % of relative RMSE (splat: 12,500 rays per steradian).
-    Draft,
-    /// 3 % (splat: 100,000 rays per steradian).
-    #[default]
-    Preview,
-    /// 1 % (splat: 800,000 rays per steradian).
-    Final,
+    /// How carefully to bake, by name.
+    #[derive(Default)]
+    pub enum Preset {
+        /// 10 % of relative RMSE (splat: 12,500 rays per steradian).
+        Draft,
+        /// 3 % (splat: 100,000 rays per steradian).
+        #[default]
+        Preview,
+        /// 1 % (splat: 800,000 rays per steradian).
+        Final,
+    }
 }
 
 impl Preset {
@@ -512,85 +456,44 @@ impl BakeSettings {
     /// # Errors
     /// A usage error that names the option, its value and its range.
     pub fn validate(&self) -> Result<()> {
-        let finite_in = |option: &str, value: f64, low: f64, high: f64| {
-            if value.is_finite() && value >= low && value <= high {
-                Ok(())
-            } else {
-                Err(Error::usage(
-                    option,
-                    format!("{value} is outside {low:e} to {high:e}"),
-                    "give a number in that range",
-                ))
-            }
-        };
-        finite_in("--density", self.density_per_sr, 1.0, 1e12)?;
-        if let Some(target) = self.max_error {
-            finite_in("--max-error", target, LEAST_MAX_ERROR, 1.0)?;
-        }
-        if let Some(limit_s) = self.max_time_s {
-            finite_in("--max-time", limit_s, 1e-3, 1e7)?;
-        }
-        match (self.estimator, self.sigma) {
-            (estimator, Sigma::Constant(sigma)) if estimator.refines() => {
-                finite_in("--sigma", sigma, 0.0, 1e4)?;
-            }
-            (_, Sigma::Constant(sigma)) => finite_in("--sigma", sigma, 1e-6, 1e4)?,
-            (Estimator::Splat, Sigma::Adaptive) => {}
-            (_, Sigma::Adaptive) => {
-                return Err(Error::usage(
-                    "--sigma",
-                    "only splats have footprints to adapt a sigma to",
-                    "give a number from 0, or use --estimator splat",
-                ));
-            }
-        }
-        if let Some(share) = self.branch_threshold {
-            finite_in("--branch-threshold", share, 0.0, 0.5)?;
-        }
-        if let MapResolution::Fixed { width, height } = self.map_resolution {
-            finite_in("--map-resolution", width as f64, 1.0, MAX_MAP_SIDE as f64)?;
-            finite_in("--map-resolution", height as f64, 1.0, MAX_MAP_SIDE as f64)?;
-        }
-        self.validate_wavelengths()?;
-        if let Some(depth) = self.max_depth {
-            finite_in("--max-depth", f64::from(depth), 1.0, 100_000.0)?;
-        }
-        finite_in("--threads", self.threads as f64, 0.0, 1024.0)?;
-        if self.layers.is_empty() {
-            return Err(Error::usage(
-                "--layers",
-                "no layer is named",
-                "name at least one of caustic, direct, indirect",
-            ));
-        }
-        Ok(())
-    }
-
-    fn validate_wavelengths(&self) -> Result<()> {
-        if let Wavelengths::Fixed(count) = self.wavelengths
-            && !(1..=MOST_WAVELENGTHS).contains(&count)
-        {
-            return Err(Error::usage(
-                "--wavelengths",
-                format!("{count} is outside 1 to {MOST_WAVELENGTHS}"),
-                "give a number in that range, rainbow or continuous",
-            ));
+        for option in options::OPTIONS {
+            option.check_limits(self)?;
         }
         let is_continuous = self.wavelengths == Wavelengths::Continuous;
-        if self.spectral_sampling.is_some() && is_continuous && self.estimator.refines() {
-            return Err(Error::usage(
+        let least_sigma = if self.estimator.refines() { 0.0 } else { 1e-6 };
+        let (option, what, remedy) = match self.sigma {
+            Sigma::Constant(sigma) if !(least_sigma..=1e4).contains(&sigma) => (
+                "--sigma",
+                &*format!("{sigma} is outside {least_sigma} to 1e4"),
+                "give a number in that range",
+            ),
+            Sigma::Adaptive if self.estimator.refines() => (
+                "--sigma",
+                "only splats have footprints to adapt a sigma to",
+                "give a number from 0, or use --estimator splat",
+            ),
+            _ if self.spectral_sampling.is_some() && is_continuous && self.estimator.refines() => (
                 "--spectral-sampling",
                 "only splats divide their rays between wavelengths of the whole spectrum",
                 "add --wavelengths N, or --estimator splat",
-            ));
-        }
-        if self.keep_spectrum && is_continuous {
-            return Err(Error::usage(
+            ),
+            _ if self.keep_spectrum && is_continuous => (
                 "--keep-spectrum",
                 "the whole spectrum has no bands to keep",
                 "add --wavelengths N, such as 7, or --wavelengths rainbow",
-            ));
-        }
-        Ok(())
+            ),
+            _ if self.threads > 1024 => (
+                "--threads",
+                &*format!("{} is outside 0 to 1024", self.threads),
+                "give a number in that range",
+            ),
+            _ if self.layers.is_empty() => (
+                "--layers",
+                "no layer is named",
+                "name at least one of caustic, direct, indirect",
+            ),
+            _ => return Ok(()),
+        };
+        Err(Error::usage(option, what, remedy))
     }
 }

@@ -1,120 +1,112 @@
-//! `bake`: maps and a manifest in a folder.
+//! `bake`: maps and a manifest in a folder, or one shard of them as raw sums.
 
-use std::borrow::Cow;
-use std::fmt::Write as _;
-use std::path::Path;
-use std::sync::Arc;
-use std::time::Instant;
+use std::path::PathBuf;
 
-use cpu_time::ProcessTime;
-
-use super::inspect::bytes;
-use super::job::BakeJob;
-use super::job::SceneInput;
-use super::terminal::Interrupt;
-use super::terminal::StageBar;
-use super::terminal::Terminal;
-use nephroid::error::{Result, Warning};
+use clap::Args;
+use nephroid::error::Result;
 use nephroid::export::manifest::{Manifest, MapEntry};
 use nephroid::export::map_folder::MapFolder;
-use nephroid::files;
+use nephroid::export::shards::{SceneOrigin, ShardFolder, ShardManifest};
 use nephroid::light_pass::ledger::CarriedFlux;
-use nephroid::scene::Scene;
+use nephroid::light_pass::share::Share;
+use nephroid::scene::LoadOptions;
 use nephroid::session::forecast::forecast;
-use nephroid::session::{BakeResult, BakeSession, Forecast, ForecastReport, StopReason};
-use nephroid::settings::{BakeSettings, Estimator};
+use nephroid::session::{self, BakeResult, Forecast, ForecastReport, StopReason};
+use nephroid::settings::{BakeSettings, Estimator, LayerKind};
+
+use super::bake_options::BakeOptions;
+use super::console::{Console, bytes, in_lines};
+use super::loaded::{LoadedScene, within_reach};
+use super::options::{RunOptions, SceneOptions};
+use super::values;
 
 /// Errors that people ask for [1].
 const ROUND_TARGETS: [f64; 9] = [0.2, 0.1, 0.05, 0.03, 0.02, 0.01, 0.005, 0.002, 0.001];
 
-/// Clocks from the start of the run on.
-pub struct Clock {
-    wall: Instant,
-    cpu: ProcessTime,
+#[derive(Debug, Args)]
+pub struct BakeArguments {
+    /// .glb, .gltf or builtin:NAME
+    scene: String,
+    /// Folder for the maps and manifest.json
+    #[arg(short, long, value_name = "DIR")]
+    output: PathBuf,
+    /// Write into the folder even if it holds other files
+    #[arg(long)]
+    force: bool,
+    /// Bake part I of N alone, as sums that `merge` adds up; with --density and a fixed --map-resolution
+    #[arg(long, value_name = "I/N", value_parser = values::share_of_bake, allow_hyphen_values = true)]
+    shard: Option<Share>,
+    #[command(flatten)]
+    scene_options: SceneOptions,
+    #[command(flatten)]
+    bake: BakeOptions,
+    #[command(flatten)]
+    pub run: RunOptions,
 }
 
-impl Clock {
-    /// Starts both.
-    pub fn start() -> Self {
-        Self {
-            wall: Instant::now(),
-            cpu: ProcessTime::now(),
+impl BakeArguments {
+    /// Loads, bakes, writes and sums up.
+    ///
+    /// # Errors
+    /// Bad usage; input, output or a bake that failed; a shard that was stopped.
+    pub fn run(&self, console: &Console) -> Result<()> {
+        let settings = self.bake.settings(&[LayerKind::Caustic], self.run.threads()?)?;
+        if self.shard.is_some() {
+            session::shards::check(&settings)?;
         }
+        let options = self.scene_options.load_options(false);
+        let loaded = LoadedScene::load(&self.scene, &options, true, console)?;
+        if let Some(share) = self.shard {
+            return self.bake_shard(share, &settings, &loaded, options, console);
+        }
+        let folder = MapFolder::open(&self.output, self.force)?;
+        let result = loaded.bake(&settings, console)?;
+        let manifest = folder.write(&loaded.scene, &settings, &result)?;
+        let text = summary(&manifest, &result, &self.output.display().to_string());
+        console.print_result(&text, &manifest)
     }
 
-    /// Wall-clock seconds since the start.
-    pub fn wall_s(&self) -> f64 {
-        self.wall.elapsed().as_secs_f64()
+    fn bake_shard(
+        &self,
+        share: Share,
+        settings: &BakeSettings,
+        loaded: &LoadedScene,
+        options: LoadOptions,
+        console: &Console,
+    ) -> Result<()> {
+        let folder = ShardFolder::open(&self.output, share, self.force)?;
+        let affordable = within_reach(settings, console);
+        let mut sums = loaded.session(console, |session, bar, control| {
+            session.bake_shard(&affordable, share, bar, control)
+        })?;
+        loaded.book(&mut sums.timings_s, &mut sums.cpu_s);
+        let origin = SceneOrigin {
+            source: self.scene.clone(),
+            default_light: options.default_light,
+            solid_glass: options.solid_glass,
+            environment: options.environment,
+        };
+        let manifest = ShardManifest::new(&loaded.scene, origin, settings, share, &sums);
+        folder.write(&manifest, &sums)?;
+        let size: usize = sums.passes.iter().map(Vec::len).sum();
+        let (wall_s, cpu_s) = (sums.timings_s.total, sums.cpu_s.total);
+        let text = in_lines(&[
+            ("folder", self.output.display().to_string()),
+            ("shard", format!("{} of {}", share.number(), share.count())),
+            (
+                "sums",
+                format!("{} of {} passes", bytes(size as u64), sums.passes.len()),
+            ),
+            ("seconds", format!("{wall_s:.2} ({cpu_s:.2} of CPU)")),
+        ]);
+        console.print_result(&text, &manifest)
     }
-
-    /// Wall-clock and CPU seconds since the start.
-    pub fn seconds(&self) -> (f64, f64) {
-        (self.wall_s(), self.cpu.elapsed().as_secs_f64())
-    }
-}
-
-/// A scene, with the wall-clock and CPU seconds that loading it took.
-pub struct LoadedScene {
-    pub scene: Arc<Scene>,
-    pub load_s: (f64, f64),
-}
-
-/// Loads a scene and prints its warnings.
-///
-/// # Errors
-/// A scene that cannot be read, or has no light where one is needed.
-pub fn load(input: &SceneInput, clock: &Clock, terminal: &Terminal) -> Result<LoadedScene> {
-    let scene = Arc::new(input.load()?);
-    terminal.print_warnings(&scene.warnings);
-    Ok(LoadedScene {
-        scene,
-        load_s: clock.seconds(),
-    })
-}
-
-/// Bakes with a progress bar, and prints the bake's warnings.
-///
-/// # Errors
-/// Those of [`BakeSession::bake`].
-pub fn bake(
-    loaded: &LoadedScene,
-    settings: &BakeSettings,
-    clock: &Clock,
-    terminal: &Terminal,
-    interrupt: &Interrupt,
-) -> Result<BakeResult> {
-    interrupt.check(&loaded.scene.source)?;
-    let settings = within_reach(settings, terminal);
-    let mut session = BakeSession::new(loaded.scene.clone())?;
-    let bar = StageBar::new(terminal);
-    let mut result = session.bake(&settings, &bar, interrupt.control())?;
-    drop(bar);
-    terminal.print_warnings(&result.warnings);
-    (result.timings_s.load, result.cpu_s.load) = loaded.load_s;
-    (result.timings_s.total, result.cpu_s.total) = clock.seconds();
-    Ok(result)
-}
-
-/// Loads, bakes, writes and sums up.
-///
-/// # Errors
-/// Input, output or a bake that failed.
-pub fn run(job: &BakeJob, terminal: &Terminal, interrupt: &Interrupt) -> Result<()> {
-    let clock = Clock::start();
-    let loaded = load(&job.scene, &clock, terminal)?;
-    let folder = MapFolder::open(&job.output, job.force)?;
-    let result = bake(&loaded, &job.settings, &clock, terminal, interrupt)?;
-    let manifest = folder.write(&loaded.scene, &job.settings, &result)?;
-    let text = summary(&manifest, &result, &job.output.display().to_string());
-    terminal.print_result(&text, &manifest)
 }
 
 /// What people want to know of a folder of maps.
 pub fn summary(manifest: &Manifest, result: &BakeResult, folder: &str) -> String {
-    let mut text = String::new();
-    let mut line = |name: &str, value: String| {
-        let _ = writeln!(text, "{name:<9} {value}");
-    };
+    let mut lines = Vec::new();
+    let mut line = |name, value| lines.push((name, value));
     line("folder", folder.to_string());
     for map in &manifest.maps {
         line(
@@ -184,7 +176,7 @@ pub fn summary(manifest: &Manifest, result: &BakeResult, folder: &str) -> String
     if manifest.partial {
         line("partial", "stopped before it was done".to_string());
     }
-    text
+    in_lines(&lines)
 }
 
 /// What was expected when the error was first known, and what it took.
@@ -211,92 +203,7 @@ fn why_nothing(result: &BakeResult) -> String {
     if result.stop_reason == StopReason::Cancelled {
         return "stopped before anything was deposited".into();
     }
-    let reasons: Vec<&str> = result
-        .plan
-        .effects
-        .iter()
-        .filter(|line| !line.on)
-        .map(|line| line.reason.as_str())
-        .take(1)
-        .collect();
-    reasons
-        .first()
-        .map_or("no surface received light", |reason| reason)
+    let off = result.plan.effects.iter().find(|line| !line.on);
+    off.map_or("no surface received light", |line| line.reason.as_str())
         .to_string()
-}
-
-/// More than the system says about a process [bytes].
-const MOST_BYTES: u64 = 1 << 16;
-
-/// Share of what is left that maps may take: as much again for rays, files and the system's own tables.
-const SHARE_OF_MAPS: u64 = 2;
-
-/// The settings with no more memory for maps than there is room for, with a warning where that is less than they ask.
-pub fn within_reach<'a>(settings: &'a BakeSettings, terminal: &Terminal) -> Cow<'a, BakeSettings> {
-    let most = left_bytes().map_or(u64::MAX, |left| left / SHARE_OF_MAPS);
-    if settings.memory_bytes <= most {
-        return Cow::Borrowed(settings);
-    }
-    terminal.print_warnings(&[Warning::new(
-        "--memory",
-        format!(
-            "the system grants this process so little address space that maps may take {} and not {}",
-            bytes(most),
-            bytes(settings.memory_bytes)
-        ),
-        "raise the limit (ulimit -v) for finer maps",
-    )]);
-    Cow::Owned(BakeSettings {
-        memory_bytes: most,
-        ..settings.clone()
-    })
-}
-
-/// Address space that is granted and not taken yet [bytes]; `None` where it is not limited or the system does not tell.
-fn left_bytes() -> Option<u64> {
-    let read = |name: &str| {
-        let bytes = files::read_file(&Path::new("/proc/self").join(name), MOST_BYTES).ok()?;
-        String::from_utf8(bytes).ok()
-    };
-    let limit = granted_bytes(&read("limits")?)?;
-    Some(limit.saturating_sub(taken_bytes(&read("status")?)?))
-}
-
-/// The limit in the text of `/proc/PID/limits`; `None` where there is none.
-fn granted_bytes(limits: &str) -> Option<u64> {
-    let line = limits
-        .lines()
-        .find_map(|line| line.strip_prefix("Max address space"))?;
-    line.split_whitespace().next()?.parse().ok()
-}
-
-/// What is taken by the text of `/proc/PID/status`, in which it stands in KiB.
-fn taken_bytes(status: &str) -> Option<u64> {
-    let line = status.lines().find_map(|line| line.strip_prefix("VmSize:"))?;
-    let kibibytes: u64 = line.split_whitespace().next()?.parse().ok()?;
-    Some(kibibytes << 10)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn limits_are_read_as_the_system_writes_them() {
-        let limits = |value: &str| {
-            format!(
-                "Limit                     Soft Limit           Hard Limit           Units     \n\
-                 Max open files            1024                 524288               files     \n\
-                 Max address space         {value}           unlimited            bytes     \n"
-            )
-        };
-        assert_eq!(granted_bytes(&limits("1536000000")), Some(1_536_000_000));
-        assert_eq!(granted_bytes(&limits("unlimited")), None);
-        assert_eq!(granted_bytes(""), None);
-        assert_eq!(
-            taken_bytes("Name:\tnephroid\nVmPeak:\t  300 kB\nVmSize:\t  200 kB\n"),
-            Some(204_800)
-        );
-        assert_eq!(taken_bytes("Name:\tnephroid\n"), None);
-    }
 }

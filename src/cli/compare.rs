@@ -1,178 +1,155 @@
 //! `compare`: a map against its reference.
 
-use std::fmt::Write as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use clap::ValueEnum;
+use clap::Args;
 use nephroid::error::{Error, Result};
 use nephroid::export::{FloatImage, picture};
 use nephroid::files;
-use nephroid::illumination::compare::{Comparison, Grid, at_common_size, compare};
-use serde::Serialize;
+use nephroid::illumination::compare::{Grid, at_common_size, compare};
+use serde_json::json;
 
-use super::args::CompareArguments;
-use super::terminal::Terminal;
+use super::console::Console;
+use super::options::RunOptions;
+use super::picture::holds_radiance;
+use super::values::{self, Named};
 
 /// Which channels of an EXR map are compared.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum LayerChoice {
-    /// Light through specular surfaces
-    Caustic,
-    /// Light straight from the lights
-    Direct,
-    /// All layers together
-    Sum,
+const LAYERS: &[Named<&str>] = &[
+    ("caustic", "caustic", "Light through specular surfaces"),
+    ("direct", "direct", "Light straight from the lights"),
+    ("sum", "sum", "All layers together"),
+];
+
+#[derive(Debug, Args)]
+pub struct CompareArguments {
+    /// Map to judge: .exr or .pfm
+    map: PathBuf,
+    /// What it should be: .exr or .pfm
+    reference: PathBuf,
+    /// Layer of EXR maps [default: caustic where there is one, else sum]
+    #[arg(long, value_parser = values::named(LAYERS))]
+    layer: Option<&'static str>,
+    /// Write a picture of the difference: red where the map is brighter, blue where it is darker
+    #[arg(long, value_name = "FILE.png")]
+    difference: Option<PathBuf>,
+    /// Fail (exit 1) if the relative RMSE is above this many percent
+    #[arg(long, value_name = "PERCENT", allow_negative_numbers = true)]
+    max_rmse: Option<f64>,
+    #[command(flatten)]
+    pub run: RunOptions,
 }
 
-impl LayerChoice {
-    /// What its channels' names start with.
-    fn prefix(self) -> &'static str {
-        match self {
-            Self::Caustic => "caustic",
-            Self::Direct => "direct",
-            Self::Sum => "",
-        }
-    }
-}
-
-/// The result, as `--json` prints it.
-#[derive(Debug, Serialize)]
-struct Report {
-    map: String,
-    reference: String,
-    layer: LayerChoice,
-    reference_layer: LayerChoice,
-    width: usize,
-    height: usize,
-    relative_rmse: f64,
-    average_relative_difference: Option<f64>,
-    peak: f64,
-    reference_peak: f64,
-    mean: f64,
-    reference_mean: f64,
-    flux_ratio: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    difference: Option<Difference>,
-}
-
-/// The picture of the difference.
-#[derive(Debug, Serialize)]
-struct Difference {
-    file: String,
-    /// Difference at which its colours are full, in units of the maps.
-    full_colour_at: f64,
-}
-
-/// Measures, prints, and fails where the limit is passed.
-///
-/// # Errors
-/// Files that cannot be read or compared; a relative RMSE above the limit.
-pub fn run(job: &CompareArguments, terminal: &Terminal) -> Result<()> {
-    if let Some(path) = &job.difference {
-        files::check_output_file(path)?;
-    }
-    let (map, layer) = read_luminance(&job.map, job.layer)?;
-    let (reference, reference_layer) = read_luminance(&job.reference, job.layer)?;
-    let (map, reference) = at_common_size(&map, &reference).ok_or_else(|| {
-        Error::failure(
-            job.map.display().to_string(),
-            format!(
+impl CompareArguments {
+    /// Measures, prints, and fails where the limit is passed.
+    ///
+    /// # Errors
+    /// Bad usage; files that cannot be read or compared; a relative RMSE above the limit.
+    pub fn run(&self, console: &Console) -> Result<()> {
+        self.validate()?;
+        let failed = |path: &Path, what: String, remedy: &str| {
+            Err(Error::failure(path.display().to_string(), what, remedy))
+        };
+        let (map, layer) = read_luminance(&self.map, self.layer)?;
+        let (reference, reference_layer) = read_luminance(&self.reference, self.layer)?;
+        let Some((map, reference)) = at_common_size(&map, &reference) else {
+            let what = format!(
                 "its size {}x{} and the reference's {}x{} are no whole multiples of one another",
                 map.width, map.height, reference.width, reference.height
-            ),
-            "bake at a multiple of the reference's size",
-        )
-    })?;
-    let measures = compare(&map, &reference);
-    let relative_rmse = measures.relative_rmse.ok_or_else(|| {
-        Error::failure(
-            job.reference.display().to_string(),
-            "the reference is dark, so that nothing can be measured against it",
-            "name a reference with light in it",
-        )
-    })?;
-    let difference = match &job.difference {
-        Some(path) => Some(write_difference(path, &map, &reference)?),
-        None => None,
-    };
-    let report = Report {
-        map: job.map.display().to_string(),
-        reference: job.reference.display().to_string(),
-        layer,
-        reference_layer,
-        width: map.width,
-        height: map.height,
-        relative_rmse,
-        average_relative_difference: measures.average_relative_difference,
-        peak: measures.peak,
-        reference_peak: measures.reference_peak,
-        mean: measures.mean,
-        reference_mean: measures.reference_mean,
-        flux_ratio: measures.flux_ratio,
-        difference,
-    };
-    terminal.print_result(&text(&report, &measures), &report)?;
-    hold_to_limit(job, relative_rmse)
-}
-
-fn hold_to_limit(job: &CompareArguments, relative_rmse: f64) -> Result<()> {
-    match job.max_rmse {
-        Some(limit) if relative_rmse > limit / 100.0 => Err(Error::failure(
-            job.map.display().to_string(),
-            format!(
-                "its relative RMSE of {:.4} % is above the limit of {} %",
-                100.0 * relative_rmse,
-                limit
-            ),
-            "bake at a higher density or raise --max-rmse",
-        )),
-        _ => Ok(()),
+            );
+            return failed(&self.map, what, "bake at a multiple of the reference's size");
+        };
+        let measures = compare(&map, &reference);
+        let Some(relative_rmse) = measures.relative_rmse else {
+            let what = "the reference is dark, so that nothing can be measured against it".into();
+            return failed(&self.reference, what, "name a reference with light in it");
+        };
+        let percent = |share: Option<f64>| {
+            share.map_or("undefined".to_string(), |share| format!("{:.4} %", 100.0 * share))
+        };
+        let pair = |map: f64, reference: f64| format!("{map:.6} (reference {reference:.6})");
+        let mut lines = vec![
+            ("size", format!("{} x {} texels", map.width, map.height)),
+            ("relative RMSE", percent(measures.relative_rmse)),
+            ("ARD", percent(measures.average_relative_difference)),
+            ("peak", pair(measures.peak, measures.reference_peak)),
+            ("mean", pair(measures.mean, measures.reference_mean)),
+            ("flux ratio", percent(measures.flux_ratio)),
+        ];
+        let mut report = json!({
+            "map": self.map.display().to_string(),
+            "reference": self.reference.display().to_string(),
+            "layer": layer,
+            "reference_layer": reference_layer,
+            "width": map.width,
+            "height": map.height,
+            "relative_rmse": relative_rmse,
+            "average_relative_difference": measures.average_relative_difference,
+            "peak": measures.peak,
+            "reference_peak": measures.reference_peak,
+            "mean": measures.mean,
+            "reference_mean": measures.reference_mean,
+            "flux_ratio": measures.flux_ratio,
+        });
+        if let Some(path) = &self.difference {
+            let full_colour_at = write_difference(path, &map, &reference)?;
+            let file = path.display().to_string();
+            lines.push((
+                "difference",
+                format!("{file} (full red and blue at {full_colour_at:.6})"),
+            ));
+            report["difference"] = json!({"file": file, "full_colour_at": full_colour_at});
+        }
+        let line = |(name, value): &(&str, String)| format!("{name:<15} {value}\n");
+        console.print_result(&lines.iter().map(line).collect::<String>(), &report)?;
+        match self.max_rmse {
+            Some(limit) if relative_rmse > limit / 100.0 => {
+                let what = format!(
+                    "its relative RMSE of {:.4} % is above the limit of {limit} %",
+                    100.0 * relative_rmse
+                );
+                failed(&self.map, what, "bake at a higher density or raise --max-rmse")
+            }
+            _ => Ok(()),
+        }
     }
-}
 
-fn text(report: &Report, measures: &Comparison) -> String {
-    let mut text = String::new();
-    let percent =
-        |share: Option<f64>| share.map_or("undefined".to_string(), |share| format!("{:.4} %", 100.0 * share));
-    let mut line = |name: &str, value: String| {
-        let _ = writeln!(text, "{name:<15} {value}");
-    };
-    line("size", format!("{} x {} texels", report.width, report.height));
-    line("relative RMSE", percent(measures.relative_rmse));
-    line("ARD", percent(measures.average_relative_difference));
-    line(
-        "peak",
-        format!("{:.6} (reference {:.6})", measures.peak, measures.reference_peak),
-    );
-    line(
-        "mean",
-        format!("{:.6} (reference {:.6})", measures.mean, measures.reference_mean),
-    );
-    line("flux ratio", percent(measures.flux_ratio));
-    if let Some(difference) = &report.difference {
-        line(
-            "difference",
-            format!(
-                "{} (full red and blue at {:.6})",
-                difference.file, difference.full_colour_at
-            ),
-        );
+    fn validate(&self) -> Result<()> {
+        if let Some(percent) = self.max_rmse
+            && !(percent.is_finite() && percent >= 0.0)
+        {
+            return Err(Error::usage(
+                "--max-rmse",
+                format!("{percent} is no limit"),
+                "give a percentage of 0 or more",
+            ));
+        }
+        let Some(path) = &self.difference else {
+            return Ok(());
+        };
+        if holds_radiance(path)? {
+            return Err(Error::usage(
+                "--difference",
+                format!("{} is no .png file", path.display()),
+                "name a file that ends in .png",
+            ));
+        }
+        files::check_output_file(path)
     }
-    text
 }
 
 /// The luminance of the wanted layer; without a wish the caustic layer where there is one, else the sum.
-pub fn read_luminance(path: &Path, wish: Option<LayerChoice>) -> Result<(Grid, LayerChoice)> {
+pub fn read_luminance(path: &Path, wish: Option<&'static str>) -> Result<(Grid, &'static str)> {
     let image = FloatImage::read(path)?;
     let has_layers = image.channels.iter().any(|channel| channel.name.contains('.'));
     let layer = match wish {
         // References hold one layer without a name: the one that is asked for.
         Some(wish) if has_layers => wish,
-        None if image.channel("caustic.R").is_some() => LayerChoice::Caustic,
-        _ => LayerChoice::Sum,
+        None if image.channel("caustic.R").is_some() => "caustic",
+        _ => "sum",
     };
-    let grid = image.luminance(layer.prefix()).ok_or_else(|| {
+    let prefix = if layer == "sum" { "" } else { layer };
+    let grid = image.luminance(prefix).ok_or_else(|| {
         let names: Vec<&str> = image
             .channels
             .iter()
@@ -201,8 +178,9 @@ pub fn read_luminance(path: &Path, wish: Option<LayerChoice>) -> Result<(Grid, L
 /// Standard deviations of the difference at which the picture's colours are full.
 const FULL_COLOUR_DEVIATIONS: f64 = 3.0;
 
-/// Red where the map is brighter than the reference, blue where it is darker, white where they agree.
-fn write_difference(path: &Path, map: &Grid, reference: &Grid) -> Result<Difference> {
+/// Red where the map is brighter than the reference, blue where it is darker, white where they agree; the difference at
+/// which its colours are full, in units of the maps.
+fn write_difference(path: &Path, map: &Grid, reference: &Grid) -> Result<f64> {
     let differences: Vec<f64> = map
         .values
         .iter()
@@ -231,8 +209,5 @@ fn write_difference(path: &Path, map: &Grid, reference: &Grid) -> Result<Differe
     // Sides are at most 16384.
     let bytes = picture::encode(map.width as u32, map.height as u32, rgba, &location)?;
     files::write_atomically(path, |writer| writer.write_all(&bytes))?;
-    Ok(Difference {
-        file: location,
-        full_colour_at,
-    })
+    Ok(full_colour_at)
 }

@@ -1,56 +1,74 @@
 //! `merge`: the maps of a bake from the sums of its shards.
 
+use std::path::PathBuf;
+
+use clap::Args;
 use nephroid::error::Result;
 use nephroid::export::map_folder::MapFolder;
 use nephroid::export::shards::ShardSet;
-use nephroid::session::BakeSession;
+use nephroid::scene::LoadOptions;
 use nephroid::settings::BakeSettings;
 
-use super::args::MergeArguments;
-use super::bake::{self, Clock};
-use super::job::{MissingLight, SceneInput};
-use super::terminal::Interrupt;
-use super::terminal::StageBar;
-use super::terminal::Terminal;
+use super::bake;
+use super::console::Console;
+use super::loaded::LoadedScene;
+use super::options::RunOptions;
 
-/// Reads, adds up and writes.
-///
-/// # Errors
-/// Shards that are torn, missing or of different bakes; another scene; output that cannot be written.
-pub fn run(job: &MergeArguments, threads: usize, terminal: &Terminal, interrupt: &Interrupt) -> Result<()> {
-    let clock = Clock::start();
-    let shards = ShardSet::open(&job.shards)?;
-    let (shards_wall_s, shards_cpu_s) = shards.seconds();
-    let manifest = shards.manifest()?.clone();
-    let input = SceneInput {
-        source: job.scene.clone().unwrap_or(manifest.scene.source),
-        missing_light: if manifest.scene.default_light {
-            MissingLight::Add
-        } else {
-            MissingLight::Fail
-        },
-        solid_glass: manifest.scene.solid_glass,
-        environment: job.environment.clone().or(manifest.scene.environment),
-    };
-    let loaded = bake::load(&input, &clock, terminal)?;
-    shards.check_scene(&loaded.scene)?;
-    let folder = MapFolder::open(&job.output, job.force)?;
-    let settings = BakeSettings {
-        threads,
-        ..manifest.settings
-    };
-    interrupt.check(&loaded.scene.source)?;
-    let mut session = BakeSession::new(loaded.scene.clone())?;
-    let bar = StageBar::new(terminal);
-    let mut result = session.merge(&settings, Box::new(shards), &bar, interrupt.control())?;
-    drop(bar);
-    terminal.print_warnings(&result.warnings);
-    (result.timings_s.load, result.cpu_s.load) = loaded.load_s;
-    let (wall_s, cpu_s) = clock.seconds();
-    // What the maps took: shards run side by side, then this.
-    result.timings_s.total = wall_s + shards_wall_s;
-    result.cpu_s.total = cpu_s + shards_cpu_s;
-    let manifest = folder.write(&loaded.scene, &settings, &result)?;
-    let text = bake::summary(&manifest, &result, &job.output.display().to_string());
-    terminal.print_result(&text, &manifest)
+#[derive(Debug, Args)]
+pub struct MergeArguments {
+    /// Folders that `bake --shard` wrote, of all shards of a bake
+    #[arg(required = true, value_name = "DIR")]
+    shards: Vec<PathBuf>,
+    /// Folder for the maps and manifest.json
+    #[arg(short, long, value_name = "DIR")]
+    output: PathBuf,
+    /// Write into the folder even if it holds other files
+    #[arg(long)]
+    force: bool,
+    /// Where the scene is now [default: where the first shard found it]
+    #[arg(long, value_name = "SCENE")]
+    scene: Option<String>,
+    /// Where the image around the scene is now [default: where the first shard found it]
+    #[arg(long, value_name = "FILE")]
+    environment: Option<PathBuf>,
+    #[command(flatten)]
+    pub run: RunOptions,
+}
+
+impl MergeArguments {
+    /// Reads, adds up and writes.
+    ///
+    /// # Errors
+    /// Shards that are torn, missing or of different bakes; another scene; output that cannot be written.
+    pub fn run(&self, console: &Console) -> Result<()> {
+        let threads = self.run.threads()?;
+        let shards = ShardSet::open(&self.shards)?;
+        let (shards_wall_s, shards_cpu_s) = shards.seconds();
+        let manifest = shards.manifest()?.clone();
+        let options = LoadOptions {
+            solid_glass: manifest.scene.solid_glass,
+            default_light: manifest.scene.default_light,
+            environment: self.environment.clone().or(manifest.scene.environment),
+            ..LoadOptions::default()
+        };
+        let source = self.scene.clone().unwrap_or(manifest.scene.source);
+        let loaded = LoadedScene::load(&source, &options, true, console)?;
+        shards.check_scene(&loaded.scene)?;
+        let folder = MapFolder::open(&self.output, self.force)?;
+        let settings = BakeSettings {
+            threads,
+            ..manifest.settings
+        };
+        let mut result = loaded.session(console, |session, bar, control| {
+            session.merge(&settings, Box::new(shards), bar, control)
+        })?;
+        console.warn(&result.warnings);
+        loaded.book(&mut result.timings_s, &mut result.cpu_s);
+        // What the maps took: shards run side by side, then this.
+        result.timings_s.total += shards_wall_s;
+        result.cpu_s.total += shards_cpu_s;
+        let manifest = folder.write(&loaded.scene, &settings, &result)?;
+        let text = bake::summary(&manifest, &result, &self.output.display().to_string());
+        console.print_result(&text, &manifest)
+    }
 }

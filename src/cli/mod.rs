@@ -1,32 +1,96 @@
-//! The command line: parse, a validated [`Job`] before any long work, run, exit code.
+//! The command line: a command is one struct that is parsed, checked before any long work, and run.
 
-mod args;
 mod bake;
 mod bake_options;
 mod compare;
+mod console;
 mod export;
-mod export_glb;
-mod export_textures;
 mod inspect;
-mod job;
+mod loaded;
 mod merge;
+mod options;
+mod picture;
 mod render;
 #[cfg(feature = "gpu")]
 mod render_path;
-mod shard;
 mod study;
-mod terminal;
 mod values;
 mod view;
 
 use std::process::ExitCode;
 
-use job::Job;
+use clap::error::ErrorKind as ClapErrorKind;
+use clap::{Parser, Subcommand};
 use nephroid::error::{Error, ErrorKind, Result};
 #[cfg(feature = "viewer")]
 use nephroid::viewer::is_orphaned as is_of_lost_window;
-use terminal::Interrupt;
-use terminal::Terminal;
+
+use bake::BakeArguments;
+use compare::CompareArguments;
+use console::Console;
+use export::ExportArguments;
+use inspect::InspectArguments;
+use merge::MergeArguments;
+use options::RunOptions;
+use render::RenderArguments;
+use study::StudyArguments;
+use view::ViewArguments;
+
+/// Bakes light through glass, mirrors and water into illumination maps, and lets you walk through the result.
+///
+/// A scene is a .glb or .gltf file, or builtin:NAME.
+#[derive(Debug, Parser)]
+#[command(
+    name = "nephroid",
+    version,
+    args_conflicts_with_subcommands = true,
+    max_term_width = 110
+)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Option<Command>,
+    #[command(flatten)]
+    view: ViewArguments,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Open a window on a scene and bake it; without a display, write maps and a picture instead (the default command)
+    View(ViewArguments),
+    /// Bake illumination maps and a manifest into a folder
+    Bake(BakeArguments),
+    /// Make one picture
+    Render(RenderArguments),
+    /// Say what is in a scene, which effects it calls for and why
+    Inspect(InspectArguments),
+    /// Measure a map against a reference: relative RMSE, ARD, peak, flux
+    Compare(CompareArguments),
+    /// Write baked maps for other programs
+    Export(ExportArguments),
+    /// Add up the shards of a bake
+    Merge(MergeArguments),
+    /// Study what accuracy costs
+    Study(StudyArguments),
+}
+
+type Run<'a> = Box<dyn Fn(&Console) -> Result<()> + 'a>;
+
+impl Arguments {
+    /// The options of the run, and the run.
+    fn command(&self) -> (&RunOptions, Run<'_>) {
+        match &self.command {
+            None => (&self.view.run, Box::new(|console| self.view.run(console))),
+            Some(Command::View(view)) => (&view.run, Box::new(|console| view.run(console))),
+            Some(Command::Bake(bake)) => (&bake.run, Box::new(|console| bake.run(console))),
+            Some(Command::Render(render)) => (&render.run, Box::new(|console| render.run(console))),
+            Some(Command::Inspect(inspect)) => (&inspect.run, Box::new(|console| inspect.run(console))),
+            Some(Command::Compare(compare)) => (&compare.run, Box::new(|console| compare.run(console))),
+            Some(Command::Export(export)) => (&export.run, Box::new(|console| export.run(console))),
+            Some(Command::Merge(merge)) => (&merge.run, Box::new(|console| merge.run(console))),
+            Some(Command::Study(study)) => (study.run_options(), Box::new(|console| study.run(console))),
+        }
+    }
+}
 
 /// Parses, runs, and says how it went: 0 done, 1 failed, 2 bad usage, 128 + signal when a signal stopped it.
 pub fn run() -> ExitCode {
@@ -37,15 +101,7 @@ pub fn run() -> ExitCode {
             usual(info);
         }
     }));
-    let (terminal, job) = match args::parse() {
-        Ok(args::Parsed::Run(terminal, job)) => (terminal, job),
-        Ok(args::Parsed::Printed) => return ExitCode::SUCCESS,
-        Err(error) => return report(&error),
-    };
-    match execute(&terminal, *job) {
-        Ok(code) => code,
-        Err(error) => report(&error),
-    }
+    parse_and_run().unwrap_or_else(|error| report(&error))
 }
 
 #[cfg(not(feature = "viewer"))]
@@ -53,24 +109,60 @@ fn is_of_lost_window(_: &std::panic::PanicHookInfo<'_>) -> bool {
     false
 }
 
-/// Runs a job; a signal decides the exit code even where what there was could still be written.
-fn execute(terminal: &Terminal, job: Job) -> Result<ExitCode> {
-    let interrupt = Interrupt::install()?;
-    let outcome = job.run(terminal, &interrupt);
-    match (interrupt.exit_code(), outcome) {
-        (Some(code), Ok(())) => Ok(code),
-        (Some(code), Err(error)) => {
-            report(&error);
+/// A signal decides the exit code even where what there was could still be written.
+fn parse_and_run() -> Result<ExitCode> {
+    let arguments = match Arguments::try_parse() {
+        Ok(arguments) => arguments,
+        Err(error)
+            if matches!(
+                error.kind(),
+                ClapErrorKind::DisplayHelp | ClapErrorKind::DisplayVersion
+            ) =>
+        {
+            console::print(error.render().to_string().trim_end())?;
+            return Ok(ExitCode::SUCCESS);
+        }
+        Err(error) => return Err(in_one_sentence(&error)),
+    };
+    let (options, command) = arguments.command();
+    env_logger::Builder::new().filter_level(options.log).init();
+    if !options.no_cache {
+        nephroid::files::cache::enable();
+    }
+    let console = Console::open(options.quiet, options.json)?;
+    let outcome = command(&console);
+    match console.exit_code() {
+        None => outcome.map(|()| ExitCode::SUCCESS),
+        Some(code) => {
+            if let Err(error) = outcome {
+                report(&error);
+            }
             Ok(code)
         }
-        (None, outcome) => outcome.map(|()| ExitCode::SUCCESS),
     }
 }
 
 fn report(error: &Error) -> ExitCode {
-    terminal::print_error(error);
+    console::print_error(error);
     match error.kind {
         ErrorKind::Usage => ExitCode::from(2),
         ErrorKind::Failure | ErrorKind::Cancelled => ExitCode::FAILURE,
     }
+}
+
+/// Clap's report without its usage block, tips joined.
+fn in_one_sentence(error: &clap::Error) -> Error {
+    let report = error.render().to_string();
+    let what: Vec<&str> = report
+        .lines()
+        .map(str::trim)
+        .take_while(|line| !line.starts_with("Usage:") && !line.starts_with("For more information"))
+        .filter(|line| !line.is_empty())
+        .collect();
+    let what = what.join(" ");
+    Error::usage(
+        "command line",
+        what.trim_start_matches("error: "),
+        "see nephroid --help",
+    )
 }

@@ -1,276 +1,182 @@
-//! `render`: one picture.
+//! `render`: one picture, or the frames of a camera that moves.
 
-use std::path::Path;
-use std::sync::Arc;
+use std::path::PathBuf;
 
-use serde::Serialize;
-
-use super::args::Backend;
-use super::bake::{self, Clock, LoadedScene};
-use super::job::{MapSource, PictureFormat, PictureRequest, RenderJob};
-use super::terminal::{Interrupt, StageBar, Terminal};
-use super::values::Exposure;
-use nephroid::effect::{Effect, EffectSwitches};
+use clap::Args;
+#[cfg(feature = "gpu")]
+use nephroid::effect::{Effect, EffectSwitch};
 use nephroid::error::{Error, Result};
-use nephroid::export::{map_reader, picture};
-use nephroid::eye_pass::reference::{self, ChainLimits, ReferenceSettings};
-use nephroid::eye_pass::{Picture, View, tone_mapping};
 use nephroid::files;
-use nephroid::illumination::IlluminationMap;
-use nephroid::optics::LinearSrgb;
-use nephroid::optics::spectrum::xyz::Matrix3;
-use nephroid::scene::{Camera, Scene};
-use nephroid::settings::BakeSettings;
-use nephroid::transport::Tracer;
+#[cfg(feature = "gpu")]
+use nephroid::scene::CameraPath;
+use nephroid::scene::camera_path::MAX_FRAMES;
+use nephroid::settings::{BakeSettings, LayerKind};
+use serde_json::json;
 
-/// The result, as `--json` prints it.
-#[derive(Debug, Serialize)]
-struct Report {
-    picture: String,
-    width: u32,
-    height: u32,
-    camera: String,
-    exposure_stops: f64,
-    made_by: String,
-    maps: usize,
-    seconds: f64,
+use super::bake_options::BakeOptions;
+use super::console::Console;
+use super::loaded::LoadedScene;
+use super::options::{MapsOption, PictureOptions, RunOptions, SceneOptions};
+#[cfg(feature = "gpu")]
+use super::picture::Backend;
+use super::picture::{self, EyeOptions};
+#[cfg(feature = "gpu")]
+use super::render_path::Film;
+use super::values;
+
+#[derive(Debug, Args)]
+#[command(group = clap::ArgGroup::new("motion").args(["path", "turntable"]))]
+pub struct RenderArguments {
+    /// .glb, .gltf or builtin:NAME
+    scene: String,
+    /// Picture: .png for display, .exr for radiance in W/(m² sr); with --path or --turntable a folder for the frames as
+    /// .png
+    #[arg(short, long, value_name = "FILE", required_unless_present_any = ["path", "turntable"])]
+    output: Option<PathBuf>,
+    /// Draw the frames of a camera's path, a JSON file, on the graphics card
+    #[arg(long, value_name = "FILE", conflicts_with = "camera")]
+    path: Option<PathBuf>,
+    /// Draw so many frames of a camera that goes once around the middle of the scene, beginning where --camera is
+    #[arg(long, value_name = "FRAMES", conflicts_with = "path", value_parser = values::within(1..=MAX_FRAMES, "frames"))]
+    turntable: Option<usize>,
+    /// With --path or --turntable: time every frame with and without what is seen in mirrors and through glass
+    #[arg(long, requires = "motion")]
+    stats: bool,
+    #[command(flatten)]
+    maps: MapsOption,
+    #[command(flatten)]
+    eye: EyeOptions,
+    #[command(flatten)]
+    picture: PictureOptions,
+    #[command(flatten)]
+    scene_options: SceneOptions,
+    #[command(flatten)]
+    bake: BakeOptions,
+    #[command(flatten)]
+    pub run: RunOptions,
 }
 
-/// Loads, bakes or reads maps, makes the picture and writes it.
-///
-/// # Errors
-/// Input, output, a bake or a picture that failed.
-pub fn run(job: &RenderJob, terminal: &Terminal, interrupt: &Interrupt) -> Result<()> {
-    let clock = Clock::start();
-    let loaded = bake::load(&job.scene, &clock, terminal)?;
-    files::check_output_file(&job.output)?;
-    let maps = maps(&job.maps, &loaded, &clock, terminal, interrupt)?;
-    let made = make(
-        &loaded.scene,
-        &maps,
-        job.maps.settings(),
-        &job.picture,
-        terminal,
-        interrupt,
-    )?;
-    let location = job.output.display().to_string();
-    let bytes = made.encode(job.format, &location)?;
-    files::write_atomically(&job.output, |writer| writer.write_all(&bytes))?;
-    let report = Report {
-        picture: location,
-        width: made.view.width,
-        height: made.view.height,
-        camera: made.view.camera.name.clone(),
-        exposure_stops: made.view.exposure_stops,
-        made_by: made.made_by,
-        maps: maps.len(),
-        seconds: clock.wall_s(),
-    };
-    let text = format!(
-        "picture   {} ({}x{}, camera {}, {} maps, exposure {:+.2} stops, by {})\nseconds   {:.2}",
-        report.picture,
-        report.width,
-        report.height,
-        report.camera,
-        report.maps,
-        report.exposure_stops,
-        report.made_by,
-        report.seconds
-    );
-    terminal.print_result(&text, &report)
-}
-
-/// Maps from where they are to come.
-///
-/// # Errors
-/// Those of a bake, or of [`read_maps`].
-pub fn maps(
-    source: &MapSource,
-    loaded: &LoadedScene,
-    clock: &Clock,
-    terminal: &Terminal,
-    interrupt: &Interrupt,
-) -> Result<Vec<IlluminationMap>> {
-    match source {
-        MapSource::Bake(settings) => bake_maps(loaded, settings, clock, terminal, interrupt),
-        MapSource::Folder(folder, _) => read_maps(folder, loaded, terminal),
-    }
-}
-
-/// Maps of a bake that ran to its end: half-lit pictures are not made.
-fn bake_maps(
-    loaded: &LoadedScene,
-    settings: &BakeSettings,
-    clock: &Clock,
-    terminal: &Terminal,
-    interrupt: &Interrupt,
-) -> Result<Vec<IlluminationMap>> {
-    let result = bake::bake(loaded, settings, clock, terminal, interrupt)?;
-    interrupt.check(&loaded.scene.source)?;
-    Ok(result.maps)
-}
-
-/// Maps that were baked before.
-///
-/// # Errors
-/// Those of [`map_reader::read`].
-pub fn read_maps(folder: &Path, loaded: &LoadedScene, terminal: &Terminal) -> Result<Vec<IlluminationMap>> {
-    let (maps, warnings) = map_reader::read(folder, &loaded.scene)?;
-    terminal.print_warnings(&warnings);
-    Ok(maps)
-}
-
-/// Samples across and down each pixel.
-const SAMPLES_PER_SIDE: u32 = 2;
-
-/// A picture, and how it was made.
-pub struct MadePicture {
-    pub picture: Picture,
-    /// With the exposure that was used.
-    pub view: View,
-    /// What radiance is multiplied by before tone mapping.
-    pub white_balance: Matrix3,
-    /// The graphics card's name, or `cpu`.
-    pub made_by: String,
-}
-
-impl MadePicture {
-    /// The bytes of a file; `location` is named in errors.
+impl RenderArguments {
+    /// Loads, bakes or reads maps, makes the picture or the frames and writes them.
     ///
     /// # Errors
-    /// A size that the format cannot hold.
-    pub fn encode(&self, format: PictureFormat, location: &str) -> Result<Vec<u8>> {
-        match format {
-            PictureFormat::Png => {
-                let view = &self.view;
-                let white = &self.white_balance;
-                picture::display_png(&self.picture, view.exposure_stops, view.tone_map, white, location)
-            }
-            PictureFormat::Exr => picture::radiance_exr(&self.picture, location),
+    /// Bad usage; input, output, a bake or a picture that failed.
+    pub fn run(&self, console: &Console) -> Result<()> {
+        let layers = [LayerKind::Caustic, LayerKind::Direct];
+        let settings = self.bake.settings(&layers, self.run.threads()?)?;
+        let options = self.scene_options.load_options(true);
+        let load = || LoadedScene::load(&self.scene, &options, false, console);
+        let Some(output) = self.output.as_ref().filter(|_| !self.moves()) else {
+            return self.film(&settings, load, console);
+        };
+        self.refuse_what_radiance_has_not(picture::holds_radiance(output)?)?;
+        let loaded = load()?;
+        files::check_output_file(output)?;
+        let maps = picture::maps(self.maps.maps.as_deref(), &settings, &loaded, console)?;
+        let look = (&self.picture, &self.eye);
+        let made = picture::make(&loaded.scene, &maps, &settings.effects, look, output, console)?;
+        let (view, made_by, seconds) = (&made.view, &made.made_by, loaded.seconds().0);
+        let text = format!(
+            "picture   {} ({}x{}, camera {}, {} maps, exposure {:+.2} stops, by {made_by})\nseconds   {seconds:.2}",
+            output.display(),
+            view.width,
+            view.height,
+            view.camera.name,
+            maps.len(),
+            view.exposure_stops,
+        );
+        let report = json!({
+            "picture": output.display().to_string(),
+            "width": view.width,
+            "height": view.height,
+            "camera": view.camera.name,
+            "exposure_stops": view.exposure_stops,
+            "made_by": made_by,
+            "maps": maps.len(),
+            "seconds": seconds,
+        });
+        console.print_result(&text, &report)
+    }
+
+    fn moves(&self) -> bool {
+        self.path.is_some() || self.turntable.is_some()
+    }
+
+    #[cfg(feature = "gpu")]
+    fn film(
+        &self,
+        settings: &BakeSettings,
+        load: impl FnOnce() -> Result<LoadedScene>,
+        console: &Console,
+    ) -> Result<()> {
+        let refused = |option: &str, what: &str, remedy: &str| Err(Error::usage(option, what, remedy));
+        if self.eye.backend == Some(Backend::Cpu) {
+            return refused(
+                "--backend cpu",
+                "frames of a path are drawn by the graphics card",
+                "leave it out, or render single pictures",
+            );
+        }
+        if !self.stats && self.output.is_none() {
+            return refused(
+                if self.path.is_some() {
+                    "--path"
+                } else {
+                    "--turntable"
+                },
+                "nothing is wanted of its frames",
+                "add --stats to time them, or -o DIR to keep them",
+            );
+        }
+        if self.stats && settings.effects.get(Effect::Chains) == EffectSwitch::Off {
+            return refused(
+                "--effects chains=off",
+                "--stats times frames with and without chains",
+                "leave one of the two out",
+            );
+        }
+        let film = Film {
+            // What cannot be read is told before anything is baked.
+            path: self.path.as_deref().map(CameraPath::read).transpose()?,
+            turntable: self.turntable.unwrap_or(1),
+            stats: self.stats,
+            output: self.output.as_deref(),
+            maps: self.maps.maps.as_deref(),
+            look: (&self.picture, &self.eye),
+        };
+        let name = self
+            .path
+            .as_ref()
+            .map_or("turntable".into(), |file| file.display().to_string());
+        film.draw(&name, settings, &load()?, console)
+    }
+
+    #[cfg(not(feature = "gpu"))]
+    fn film(&self, _: &BakeSettings, _: impl FnOnce() -> Result<LoadedScene>, _: &Console) -> Result<()> {
+        Err(Error::usage(
+            if self.path.is_some() {
+                "--path"
+            } else {
+                "--turntable"
+            },
+            "this program was built without the gpu feature, which draws the frames",
+            "render single pictures",
+        ))
+    }
+
+    fn refuse_what_radiance_has_not(&self, is_radiance: bool) -> Result<()> {
+        let given = [
+            ("--exposure", self.picture.exposure.is_some()),
+            ("--tone-map", self.eye.tone_map.is_some()),
+            ("--white-balance", self.eye.white_balance.is_some()),
+        ];
+        match given.iter().find(|(_, is_given)| is_radiance && *is_given) {
+            None => Ok(()),
+            Some((option, _)) => Err(Error::usage(
+                *option,
+                "an .exr picture holds radiance, which neither exposure nor white balance nor tone mapping changes",
+                "leave it out or write a .png",
+            )),
         }
     }
-}
-
-/// Makes the picture, by the card where there is one and no other wish; `settings` switch what the eye sees in mirrors and glass.
-///
-/// # Errors
-/// No such camera; a card that was asked for and is not there; a signal.
-pub fn make(
-    scene: &Arc<Scene>,
-    maps: &[IlluminationMap],
-    settings: &BakeSettings,
-    request: &PictureRequest,
-    terminal: &Terminal,
-    interrupt: &Interrupt,
-) -> Result<MadePicture> {
-    let (width, height) = request.size;
-    let mut view = View {
-        camera: choose_camera(scene, request)?,
-        width,
-        height,
-        exposure_stops: 0.0,
-        tone_map: request.tone_map,
-        background: LinearSrgb::BLACK,
-    };
-    let effects = &settings.effects;
-    interrupt.check("picture")?;
-    let (picture, made_by) = match request.backend {
-        Some(Backend::Cpu) => by_cpu(scene, maps, &view, effects, terminal, interrupt)?,
-        Some(Backend::Gpu) => by_gpu(scene, maps, &view, effects)?,
-        None => match by_gpu(scene, maps, &view, effects) {
-            Ok(made) => made,
-            Err(error) => {
-                terminal.print_note(&format!("{error}: the CPU makes the picture"));
-                by_cpu(scene, maps, &view, effects, terminal, interrupt)?
-            }
-        },
-    };
-    interrupt.check("picture")?;
-    view.exposure_stops = match request.exposure {
-        Exposure::Stops(stops) => stops,
-        Exposure::Auto => tone_mapping::auto_exposure_stops(&picture),
-    };
-    Ok(MadePicture {
-        picture,
-        view,
-        white_balance: request.white_balance.matrix(scene),
-        made_by,
-    })
-}
-
-fn by_cpu(
-    scene: &Arc<Scene>,
-    maps: &[IlluminationMap],
-    view: &View,
-    effects: &EffectSwitches,
-    terminal: &Terminal,
-    interrupt: &Interrupt,
-) -> Result<(Picture, String)> {
-    let tracer = Tracer::new(scene.clone());
-    let settings = ReferenceSettings {
-        samples_per_side: SAMPLES_PER_SIDE,
-        limits: ChainLimits {
-            switch: effects.get(Effect::Chains),
-            ..ChainLimits::default()
-        },
-        ..ReferenceSettings::switched(effects.get(Effect::Dispersion))
-    };
-    let bar = StageBar::new(terminal);
-    let picture = reference::render(&tracer, maps, view, &settings, &bar, interrupt.control())?;
-    Ok((picture, "cpu".into()))
-}
-
-#[cfg(feature = "gpu")]
-fn by_gpu(
-    scene: &Scene,
-    maps: &[IlluminationMap],
-    view: &View,
-    effects: &EffectSwitches,
-) -> Result<(Picture, String)> {
-    use nephroid::eye_pass::renderer::render_counted;
-
-    let gpu = nephroid::gpu::Gpu::headless()?;
-    let (picture, _) = render_counted(&gpu, scene, maps, view, SAMPLES_PER_SIDE, effects)?;
-    Ok((picture, gpu.adapter_name()))
-}
-
-#[cfg(not(feature = "gpu"))]
-fn by_gpu(_: &Scene, _: &[IlluminationMap], _: &View, _: &EffectSwitches) -> Result<(Picture, String)> {
-    Err(Error::failure(
-        "--backend gpu",
-        "this program was built without the gpu feature",
-        "use --backend cpu",
-    ))
-}
-
-/// The camera of that name or index; without a wish the first, or one that frames the scene.
-pub fn choose_camera(scene: &Scene, request: &PictureRequest) -> Result<Camera> {
-    let Some(wish) = &request.camera else {
-        return Ok(scene
-            .cameras
-            .first()
-            .cloned()
-            .unwrap_or_else(|| framing_camera(scene, request.size)));
-    };
-    let by_name = scene.cameras.iter().find(|camera| camera.name == *wish);
-    let by_index = || {
-        wish.parse()
-            .ok()
-            .and_then(|index: usize| scene.cameras.get(index))
-    };
-    by_name.or_else(by_index).cloned().ok_or_else(|| {
-        let names: Vec<&str> = scene.cameras.iter().map(|camera| camera.name.as_str()).collect();
-        let remedy = if names.is_empty() {
-            "the scene has no camera: leave --camera out to see all of it".to_string()
-        } else {
-            format!("choose one of {} or an index from 0", names.join(", "))
-        };
-        Error::failure("--camera", format!("there is no camera {wish}"), remedy)
-    })
-}
-
-fn framing_camera(scene: &Scene, (width, height): (u32, u32)) -> Camera {
-    // An empty scene has nothing to frame: any box will do.
-    let bounds = scene.bounds().unwrap_or((-glam::DVec3::ONE, glam::DVec3::ONE));
-    Camera::framing("all", bounds, f64::from(width) / f64::from(height))
 }

@@ -1,202 +1,152 @@
 //! `render --path` and `--turntable`: the frames of a camera that moves, kept as pictures or timed.
 
 use std::fmt::Write as _;
+use std::path::Path;
 
 use nephroid::effect::{Effect, EffectSwitch};
 use nephroid::error::Result;
 use nephroid::export::frame_folder::FrameFolder;
-use nephroid::eye_pass::frame_times::{self, Keep, MannerTimes, Ratio, SAMPLES, Spread, Walk};
-use nephroid::eye_pass::{ToneMap, View};
+use nephroid::eye_pass::frame_times::{self, Keep, MannerTimes, SAMPLES, Spread, Walk};
 use nephroid::gpu::Gpu;
-use nephroid::optics::LinearSrgb;
 use nephroid::scene::{CameraPath, turntable};
-use serde::Serialize;
+use nephroid::settings::BakeSettings;
+use serde_json::{Value, json};
 
-use super::bake::{self, Clock};
-use super::job::{Motion, PathJob};
-use super::render;
-use super::terminal::Interrupt;
-use super::terminal::StageBar;
-use super::terminal::Terminal;
+use super::console::Console;
+use super::loaded::LoadedScene;
+use super::options::PictureOptions;
+use super::picture::{self, EyeOptions};
 use super::values::Exposure;
 
-/// The result, as `--json` prints it.
-#[derive(Debug, Serialize)]
-struct Report {
-    /// The file, or `turntable`.
-    path: String,
-    scene: String,
-    adapter: String,
-    frames: usize,
-    width: u32,
-    height: u32,
-    samples_per_pixel: u32,
-    exposure_stops: f64,
-    tone_map: ToneMap,
-    maps: usize,
-    /// Where the frames were kept.
-    folder: Option<String>,
-    /// What is timed: nothing without --stats.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    stats: Option<Stats>,
+/// Frames that are wanted.
+pub struct Film<'a> {
+    /// How the camera moves; else it goes around the scene.
+    pub path: Option<CameraPath>,
+    /// Frames of that.
+    pub turntable: usize,
+    /// Whether frames are timed with and without chains.
+    pub stats: bool,
+    /// Folder for the frames.
+    pub output: Option<&'a Path>,
+    /// Folder of maps that were baked before.
+    pub maps: Option<&'a Path>,
+    /// Of every frame; its camera is where a turntable begins.
+    pub look: (&'a PictureOptions, &'a EyeOptions),
 }
 
-/// How the camera moves, read.
-enum Way {
-    Path(CameraPath),
-    Turntable(usize),
-}
-
-#[derive(Debug, Serialize)]
-struct Stats {
-    raster_alone: MannerTimes,
-    with_chains: MannerTimes,
-    /// Of the medians.
-    with_chains_over_raster_alone: Ratio,
-}
-
-/// Loads, bakes or reads maps, draws every frame, keeps and times them as asked.
-///
-/// # Errors
-/// Input, output, a bake or a frame that failed; no graphics card; a signal.
-pub fn run(job: &PathJob, terminal: &Terminal, interrupt: &Interrupt) -> Result<()> {
-    let clock = Clock::start();
-    // What cannot be read is told before anything is baked.
-    let way = match &job.motion {
-        Motion::Path(file) => Way::Path(CameraPath::read(file)?),
-        Motion::Turntable(frames) => Way::Turntable(*frames),
-    };
-    let loaded = bake::load(&job.scene, &clock, terminal)?;
-    let gpu = Gpu::headless()?;
-    let folder = job.output.as_deref().map(FrameFolder::open).transpose()?;
-    let maps = render::maps(&job.maps, &loaded, &clock, terminal, interrupt)?;
-    let cameras = match way {
-        Way::Path(path) => path.cameras(loaded.scene.origin_world),
-        Way::Turntable(frames) => {
-            let first = render::choose_camera(&loaded.scene, &job.picture)?;
-            turntable::around(&loaded.scene, &first, frames)
-        }
-    };
-    let (width, height) = job.picture.size;
-    let view = View {
-        camera: cameras[0].clone(),
-        width,
-        height,
-        exposure_stops: 0.0,
-        tone_map: job.picture.tone_map,
-        background: LinearSrgb::BLACK,
-    };
-    let mut walk = Walk {
-        scene: &loaded.scene,
-        maps: &maps,
-        view,
-        cameras: &cameras,
-        effects: &job.maps.settings().effects,
-        white_balance: job.picture.white_balance.matrix(&loaded.scene),
-    };
-    walk.view.exposure_stops = match job.picture.exposure {
-        Exposure::Stops(stops) => stops,
-        Exposure::Auto => frame_times::auto_exposure_stops(&gpu, &walk)?,
-    };
-    let mut report = Report {
-        path: match &job.motion {
-            Motion::Path(file) => file.display().to_string(),
-            Motion::Turntable(_) => "turntable".into(),
-        },
-        scene: loaded.scene.source.clone(),
-        adapter: gpu.adapter_name(),
-        frames: cameras.len(),
-        width,
-        height,
-        samples_per_pixel: SAMPLES,
-        exposure_stops: walk.view.exposure_stops,
-        tone_map: walk.view.tone_map,
-        maps: maps.len(),
-        folder: job.output.as_ref().map(|folder| folder.display().to_string()),
-        stats: None,
-    };
-    report.stats = draw(&gpu, &walk, job, folder.as_ref(), terminal, interrupt)?;
-    terminal.print_result(&report.text(), &report)
-}
-
-/// Draws, keeps and times what is asked for.
-fn draw(
-    gpu: &Gpu,
-    walk: &Walk<'_>,
-    job: &PathJob,
-    folder: Option<&FrameFolder>,
-    terminal: &Terminal,
-    interrupt: &Interrupt,
-) -> Result<Option<Stats>> {
-    let wanted = job.maps.settings().effects.get(Effect::Chains);
-    let both = [EffectSwitch::Off, wanted];
-    let switches = if job.stats { &both[..] } else { &both[1..] };
-    let mut write = |frame: usize, rgba: Vec<u8>| match folder {
-        Some(folder) => folder.write(frame, (walk.view.width, walk.view.height), rgba),
-        None => Ok(()),
-    };
-    let keep = folder.map(|_| &mut write as &mut Keep<'_>);
-    let bar = StageBar::new(terminal);
-    let times = frame_times::measure(gpu, walk, switches, keep, &bar, interrupt.control())?;
-    let [raster_alone, with_chains] = match <[MannerTimes; 2]>::try_from(times) {
-        Ok(both) => both,
-        Err(_) => return Ok(None),
-    };
-    let ratio = with_chains.over(&raster_alone);
-    Ok(Some(Stats {
-        raster_alone,
-        with_chains,
-        with_chains_over_raster_alone: ratio,
-    }))
-}
-
-impl Report {
-    fn text(&self) -> String {
+impl Film<'_> {
+    /// Bakes or reads maps, draws every frame, keeps and times them as asked; `name` is that of the path.
+    ///
+    /// # Errors
+    /// Input, output, a bake or a frame that failed; no graphics card; a signal.
+    pub fn draw(
+        self,
+        name: &str,
+        settings: &BakeSettings,
+        loaded: &LoadedScene,
+        console: &Console,
+    ) -> Result<()> {
+        let scene = &loaded.scene;
+        let gpu = Gpu::headless()?;
+        let folder = self.output.map(FrameFolder::open).transpose()?;
+        let maps = picture::maps(self.maps, settings, loaded, console)?;
+        let (options, eye) = self.look;
+        let (cameras, view) = match &self.path {
+            Some(path) => {
+                let cameras = path.cameras(scene.origin_world);
+                let view = picture::view_of(cameras[0].clone(), options, eye);
+                (cameras, view)
+            }
+            None => {
+                let view = picture::view(scene, options, eye)?;
+                (turntable::around(scene, &view.camera, self.turntable), view)
+            }
+        };
+        let mut walk = Walk {
+            scene,
+            maps: &maps,
+            view,
+            cameras: &cameras,
+            effects: &settings.effects,
+            white_balance: eye.white_balance.unwrap_or_default().matrix(scene),
+        };
+        walk.view.exposure_stops = match options.exposure {
+            Some(Exposure::Stops(stops)) => stops,
+            _ => frame_times::auto_exposure_stops(&gpu, &walk)?,
+        };
+        let (view, source, adapter) = (&walk.view, &scene.source, gpu.adapter_name());
+        let (width, height, stops) = (view.width, view.height, view.exposure_stops);
+        let (frames, maps) = (cameras.len(), maps.len());
         let mut text = format!(
-            "path      {} of {}: {} frames of {}x{}, {} samples a pixel, exposure {:+.2} stops, {} maps\n\
-             adapter   {}\n",
-            self.path,
-            self.scene,
-            self.frames,
-            self.width,
-            self.height,
-            self.samples_per_pixel,
-            self.exposure_stops,
-            self.maps,
-            self.adapter
+            "path      {name} of {source}: {frames} frames of {width}x{height}, {SAMPLES} samples a pixel, exposure \
+             {stops:+.2} stops, {maps} maps\nadapter   {adapter}\n"
         );
-        if let Some(folder) = &self.folder {
+        let kept = self.output.map(|folder| folder.display().to_string());
+        let mut report = json!({
+            "path": name,
+            "scene": source,
+            "adapter": adapter,
+            "frames": frames,
+            "width": width,
+            "height": height,
+            "samples_per_pixel": SAMPLES,
+            "exposure_stops": stops,
+            "tone_map": view.tone_map,
+            "maps": maps,
+            "folder": kept,
+        });
+        if let Some(folder) = kept {
             let _ = writeln!(text, "frames    {folder}");
         }
-        if let Some(stats) = &self.stats {
-            stats.add_to(&mut text);
+        let times = self.times(&gpu, &walk, folder.as_ref(), console)?;
+        if let [raster_alone, with_chains] = &times[..] {
+            report["stats"] = stats(raster_alone, with_chains, &mut text);
         }
-        text
+        console.print_result(&text, &report)
+    }
+
+    /// Draws and keeps every frame; its times, without chains first where that is asked for.
+    fn times(
+        &self,
+        gpu: &Gpu,
+        walk: &Walk<'_>,
+        folder: Option<&FrameFolder>,
+        console: &Console,
+    ) -> Result<Vec<MannerTimes>> {
+        let both = [EffectSwitch::Off, walk.effects.get(Effect::Chains)];
+        let switches = if self.stats { &both[..] } else { &both[1..] };
+        let mut write = |frame: usize, rgba: Vec<u8>| match folder {
+            Some(folder) => folder.write(frame, (walk.view.width, walk.view.height), rgba),
+            None => Ok(()),
+        };
+        let keep = folder.map(|_| &mut write as &mut Keep<'_>);
+        frame_times::measure(gpu, walk, switches, keep, &console.bar(), console.control())
     }
 }
 
-impl Stats {
-    fn add_to(&self, text: &mut String) {
-        let _ = writeln!(
-            text,
-            "\n{:<30} {:>10} {:>10} {:>10}",
-            "ms", "median", "95 %", "max"
-        );
-        for (name, times) in [
-            ("raster alone", &self.raster_alone),
-            ("with chains", &self.with_chains),
-        ] {
-            add_manner(text, name, times);
-        }
-        let times = |ratio: Option<f64>| ratio.map_or("-".into(), |ratio| format!("{ratio:.3}"));
-        let ratio = &self.with_chains_over_raster_alone;
-        let _ = writeln!(
-            text,
-            "with chains over raster alone, medians: device {}, wall {}",
-            times(ratio.device),
-            times(ratio.wall)
-        );
-    }
+/// The times of both manners as JSON and, added, as text.
+fn stats(raster_alone: &MannerTimes, with_chains: &MannerTimes, text: &mut String) -> Value {
+    let _ = writeln!(
+        text,
+        "\n{:<30} {:>10} {:>10} {:>10}",
+        "ms", "median", "95 %", "max"
+    );
+    add_manner(text, "raster alone", raster_alone);
+    add_manner(text, "with chains", with_chains);
+    let ratio = with_chains.over(raster_alone);
+    let times = |ratio: Option<f64>| ratio.map_or("-".into(), |ratio| format!("{ratio:.3}"));
+    let _ = writeln!(
+        text,
+        "with chains over raster alone, medians: device {}, wall {}",
+        times(ratio.device),
+        times(ratio.wall)
+    );
+    json!({
+        "raster_alone": raster_alone,
+        "with_chains": with_chains,
+        // Of the medians.
+        "with_chains_over_raster_alone": ratio,
+    })
 }
 
 fn add_manner(text: &mut String, name: &str, times: &MannerTimes) {

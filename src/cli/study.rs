@@ -1,35 +1,28 @@
 //! `study`: which there are, what they take, and one way to run them.
 
-use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use clap::{ArgMatches, Args, FromArgMatches, Subcommand};
 use nephroid::effect::Effect;
 use nephroid::error::{Error, Result, Warning};
-use nephroid::export::manifest::MapEntry;
 use nephroid::export::map_folder::MapFolder;
 use nephroid::files::{self, OutputFolder};
 use nephroid::scene::Scene;
 use nephroid::settings::{BakeSettings, Estimator, LayerKind, MapResolution, Wavelengths};
-use nephroid::study::brute_force::{brute_force, check_rays, relative_noise};
+use nephroid::study::brute_force::{RAYS, brute_force, relative_noise};
 use nephroid::study::one_scene::{self, CONVERGENCE, EFFECTS, SPECTRUM};
 use nephroid::study::references::Reference;
-use nephroid::study::studies;
-use nephroid::study::sweep::{Bench, Outcome, Sweep};
-use nephroid::study::table::Table;
+use nephroid::study::studies::STUDIES;
+use nephroid::study::sweep::{Bench, Sweep};
 use nephroid::transport::Tracer;
-use serde::Serialize;
+use serde_json::{Value, json};
 
-use super::args::{RunOptions, SceneOptions};
 use super::bake_options::BakeOptions;
 use super::compare::read_luminance;
-use super::job::MissingLight;
-use super::job::{scene_input, threads};
-use super::terminal::Interrupt;
-use super::terminal::StageBar;
-
-use super::terminal::Terminal;
+use super::console::Console;
+use super::loaded::LoadedScene;
+use super::options::{RunOptions, SceneOptions};
 use super::values;
 
 const REFERENCE: (&str, &str) = (
@@ -42,9 +35,8 @@ const ALL: (&str, &str) = ("pages", "all that follow, each in a folder of its na
 const SIDE: usize = 256;
 const SPECTRUM_SIDE: usize = 1024;
 
-/// Bakes of each kind where no number is asked for, and the most.
+/// Bakes of each kind where no number is asked for.
 const REPEATS: usize = 5;
-const MAX_REPEATS: usize = 1000;
 
 /// Densities of `convergence` [1/sr]; `--quick` leaves out the last.
 const DENSITIES: [f64; 9] = [1e2, 3e2, 1e3, 3e3, 1e4, 3e4, 1e5, 3e5, 1e6];
@@ -65,21 +57,23 @@ pub struct StudyArguments {
     run: RunOptions,
 }
 
-#[derive(Debug, Subcommand)]
-enum Study {
-    #[command(about = CONVERGENCE.1)]
-    Convergence(ConvergenceArguments),
-    #[command(about = REFERENCE.1)]
-    Reference(ReferenceArguments),
-    #[command(about = EFFECTS.1)]
-    Effects(EffectsArguments),
-    #[command(about = SPECTRUM.1)]
-    Spectrum(SpectrumArguments),
-    #[command(flatten)]
-    Built(BuiltStudy),
+/// A study that is named, with what every study takes.
+#[derive(Debug)]
+struct Study {
+    kind: Kind,
+    common: Common,
 }
 
-/// What every study takes.
+#[derive(Debug)]
+enum Kind {
+    Convergence(ConvergenceArguments),
+    Reference(ReferenceArguments),
+    Effects(EffectsArguments),
+    Spectrum(SpectrumArguments),
+    /// Of built-in scenes, by name.
+    Built(String),
+}
+
 #[derive(Debug, Args)]
 struct Common {
     /// Folder for what it finds: NAME.md, NAME.csv, plots (.svg) and pictures (.png)
@@ -95,19 +89,12 @@ struct Common {
     run: RunOptions,
 }
 
-/// Studies of built-in scenes, by name.
-#[derive(Debug)]
-struct BuiltStudy {
-    name: String,
-    common: Common,
-}
-
 #[derive(Debug, Args)]
 struct ConvergenceArguments {
     /// .glb, .gltf or builtin:NAME
     #[arg(default_value = "builtin:ring")]
     scene: String,
-    /// Estimators to measure [default: all]
+    /// Estimators to measure [default: wavefront,splat]
     #[arg(long, value_parser = values::one_of::<Estimator>(), value_delimiter = ',', value_name = "ESTIMATOR,...")]
     estimators: Option<Vec<Estimator>>,
     /// Ascending light rays per steradian [default: 1e2 to 1e6, two a decade]
@@ -124,16 +111,12 @@ struct ConvergenceArguments {
     /// Surface of the reference [default: floor, or the only one that takes light]
     #[arg(long, value_name = "NAME", requires = "reference")]
     surface: Option<String>,
-    /// Texels of every map: N by N, or W by H [default: 256]
-    #[arg(long, value_name = "N|WxH", value_parser = fixed_map_resolution, allow_hyphen_values = true)]
-    map_resolution: Option<MapResolution>,
-    /// Bakes of each kind, whose median CPU time counts [default: 5; 1 with --quick]
-    #[arg(long, value_name = "N", allow_negative_numbers = true)]
-    repeat: Option<usize>,
+    #[command(flatten)]
+    size: SizeOption,
+    #[command(flatten)]
+    repeat: RepeatOption,
     #[command(flatten)]
     scene_options: SceneOptions,
-    #[command(flatten)]
-    common: Common,
 }
 
 #[derive(Debug, Args)]
@@ -143,31 +126,25 @@ struct ReferenceArguments {
     /// Light rays, such as 1e8
     #[arg(long, value_name = "N", value_parser = ray_count, allow_hyphen_values = true)]
     rays: u64,
-    /// Texels of every map: N by N, or W by H [default: 256]
-    #[arg(long, value_name = "N|WxH", value_parser = fixed_map_resolution, allow_hyphen_values = true)]
-    map_resolution: Option<MapResolution>,
+    #[command(flatten)]
+    size: SizeOption,
     /// Seed of the rays
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
     #[command(flatten)]
     scene_options: SceneOptions,
-    #[command(flatten)]
-    common: Common,
 }
 
 #[derive(Debug, Args)]
 struct EffectsArguments {
     /// .glb, .gltf or builtin:NAME
     scene: String,
-    /// Bakes of each kind, whose median CPU time counts [default: 5; 1 with --quick]
-    #[arg(long, value_name = "N", allow_negative_numbers = true)]
-    repeat: Option<usize>,
+    #[command(flatten)]
+    repeat: RepeatOption,
     #[command(flatten)]
     scene_options: SceneOptions,
     #[command(flatten)]
     bake: BakeOptions,
-    #[command(flatten)]
-    common: Common,
 }
 
 #[derive(Debug, Args)]
@@ -187,21 +164,40 @@ struct SpectrumArguments {
     /// Light rays per steradian; beams are thin [default: 1e8]
     #[arg(long, value_name = "RAYS_PER_SR", allow_negative_numbers = true)]
     density: Option<f64>,
-    /// Texels of every map: N by N, or W by H [default: 1024]
-    #[arg(long, value_name = "N|WxH", value_parser = fixed_map_resolution, allow_hyphen_values = true)]
-    map_resolution: Option<MapResolution>,
-    /// Bakes of each kind, whose median CPU time counts [default: 5; 1 with --quick]
-    #[arg(long, value_name = "N", allow_negative_numbers = true)]
-    repeat: Option<usize>,
+    #[command(flatten)]
+    size: SizeOption,
+    #[command(flatten)]
+    repeat: RepeatOption,
     #[command(flatten)]
     scene_options: SceneOptions,
-    #[command(flatten)]
-    common: Common,
+}
+
+#[derive(Debug, Args)]
+struct SizeOption {
+    /// Texels of every map: N by N, or W by H [default: 256, of spectrum 1024]
+    #[arg(long, value_name = "N|WxH", value_parser = fixed_map_resolution, allow_hyphen_values = true)]
+    map_resolution: Option<MapResolution>,
+}
+
+#[derive(Debug, Args)]
+struct RepeatOption {
+    /// Bakes of each kind, whose median CPU time counts [default: 5; 1 with --quick]
+    #[arg(long, value_name = "N", value_parser = values::within(1..=1000, "bakes"), allow_negative_numbers = true)]
+    repeat: Option<usize>,
+}
+
+impl SizeOption {
+    fn or_square(&self, side: usize) -> MapResolution {
+        self.map_resolution.unwrap_or(MapResolution::Fixed {
+            width: side,
+            height: side,
+        })
+    }
 }
 
 /// `N` (square) or `WxH` [texels].
 fn fixed_map_resolution(text: &str) -> std::result::Result<MapResolution, String> {
-    match values::map_resolution(text) {
+    match text.parse() {
         Ok(fixed @ MapResolution::Fixed { .. }) => Ok(fixed),
         _ => Err("give N or WxH in texels, such as 512 or 512x256".to_string()),
     }
@@ -209,17 +205,30 @@ fn fixed_map_resolution(text: &str) -> std::result::Result<MapResolution, String
 
 /// A number of rays, `250000` or `2.5e5`.
 fn ray_count(text: &str) -> std::result::Result<u64, String> {
-    let rays = text.parse::<f64>().ok().filter(|rays| (1.0..1e18).contains(rays));
-    rays.map(|rays| rays as u64)
-        .ok_or_else(|| "give a number of rays, such as 1e8".to_string())
+    let rays = text.parse().ok().map(|rays: f64| rays as u64);
+    let (least, most) = (RAYS.start(), *RAYS.end() as f64);
+    rays.filter(|rays| RAYS.contains(rays))
+        .ok_or_else(|| format!("give a number of rays from {least} to {most:e}, such as 1e8"))
 }
 
-impl Subcommand for BuiltStudy {
+impl Subcommand for Study {
     fn augment_subcommands(command: clap::Command) -> clap::Command {
-        let names = studies::STUDIES.iter().map(|study| (study.name, study.what));
-        names.chain([ALL]).fold(command, |command, (name, what)| {
-            command.subcommand(Common::augment_args(clap::Command::new(name).about(what)))
-        })
+        type Augment = fn(clap::Command) -> clap::Command;
+        let own: [(_, Augment); 5] = [
+            (CONVERGENCE, ConvergenceArguments::augment_args),
+            (REFERENCE, ReferenceArguments::augment_args),
+            (EFFECTS, EffectsArguments::augment_args),
+            (SPECTRUM, SpectrumArguments::augment_args),
+            (ALL, |command| command),
+        ];
+        let built = STUDIES.iter().map(|study| ((study.name, study.what), own[4].1));
+        own.into_iter()
+            .chain(built)
+            .fold(command, |command, ((name, what), augment)| {
+                command.subcommand(Common::augment_args(augment(
+                    clap::Command::new(name).about(what),
+                )))
+            })
     }
 
     fn augment_subcommands_for_update(command: clap::Command) -> clap::Command {
@@ -227,16 +236,22 @@ impl Subcommand for BuiltStudy {
     }
 
     fn has_subcommand(name: &str) -> bool {
-        name == ALL.0 || studies::STUDIES.iter().any(|study| study.name == name)
+        all_studies().any(|(known, _)| known == name)
     }
 }
 
-impl FromArgMatches for BuiltStudy {
+impl FromArgMatches for Study {
     fn from_arg_matches(matches: &ArgMatches) -> std::result::Result<Self, clap::Error> {
         let missing = || clap::Error::new(clap::error::ErrorKind::MissingSubcommand);
         let (name, matches) = matches.subcommand().ok_or_else(missing)?;
         Ok(Self {
-            name: name.into(),
+            kind: match name {
+                _ if name == CONVERGENCE.0 => Kind::Convergence(FromArgMatches::from_arg_matches(matches)?),
+                _ if name == REFERENCE.0 => Kind::Reference(FromArgMatches::from_arg_matches(matches)?),
+                _ if name == EFFECTS.0 => Kind::Effects(FromArgMatches::from_arg_matches(matches)?),
+                _ if name == SPECTRUM.0 => Kind::Spectrum(FromArgMatches::from_arg_matches(matches)?),
+                _ => Kind::Built(name.into()),
+            },
             common: Common::from_arg_matches(matches)?,
         })
     }
@@ -247,97 +262,85 @@ impl FromArgMatches for BuiltStudy {
     }
 }
 
+/// Names, and what they find out.
+fn all_studies() -> impl Iterator<Item = (&'static str, &'static str)> {
+    let built = STUDIES.iter().map(|study| (study.name, study.what));
+    [CONVERGENCE, REFERENCE, EFFECTS, SPECTRUM, ALL]
+        .into_iter()
+        .chain(built)
+}
+
 impl StudyArguments {
     pub fn run_options(&self) -> &RunOptions {
-        match &self.study {
-            None => &self.run,
-            Some(Study::Convergence(study)) => &study.common.run,
-            Some(Study::Reference(study)) => &study.common.run,
-            Some(Study::Effects(study)) => &study.common.run,
-            Some(Study::Spectrum(study)) => &study.common.run,
-            Some(Study::Built(study)) => &study.common.run,
+        self.study.as_ref().map_or(&self.run, |study| &study.common.run)
+    }
+
+    /// Checks the arguments, measures, writes, and prints what was found.
+    ///
+    /// # Errors
+    /// No study is named; a value outside its range; input, output or a bake that failed; stopped before the end, which
+    /// writes nothing of the study that it was at.
+    pub fn run(&self, console: &Console) -> Result<()> {
+        let Some(Study { kind, common }) = &self.study else {
+            return match self.list {
+                true => list(console),
+                false => Err(Error::usage(
+                    "study",
+                    "no study is named",
+                    "name one, or use --list to see which there are",
+                )),
+            };
+        };
+        let desk = Desk { common, console };
+        match kind {
+            Kind::Convergence(study) => desk.convergence(study),
+            Kind::Reference(study) => desk.reference(study),
+            Kind::Effects(study) => desk.effects(study),
+            Kind::Spectrum(study) => desk.spectrum(study),
+            Kind::Built(name) => desk.built(name),
         }
     }
 }
 
-/// Checks the arguments, measures, writes, and prints what was found.
-///
-/// # Errors
-/// No study is named; a value outside its range; input, output or a bake that failed; stopped before the end, which
-/// writes nothing of the study that it was at.
-pub fn run(arguments: &StudyArguments, terminal: &Terminal, interrupt: &Interrupt) -> Result<()> {
-    let desk = Desk { terminal, interrupt };
-    match &arguments.study {
-        None if arguments.list => list(terminal),
-        None => Err(Error::usage(
-            "study",
-            "no study is named",
-            "name one, or use --list to see which there are",
-        )),
-        Some(Study::Convergence(study)) => desk.convergence(study),
-        Some(Study::Reference(study)) => desk.reference(study),
-        Some(Study::Effects(study)) => desk.effects(study),
-        Some(Study::Spectrum(study)) => desk.spectrum(study),
-        Some(Study::Built(study)) if study.name == ALL.0 => desk.all(&study.common),
-        Some(Study::Built(study)) => desk.built(study),
-    }
+fn list(console: &Console) -> Result<()> {
+    let lines: Vec<String> = all_studies()
+        .map(|(name, what)| format!("{name:<12} {what}"))
+        .collect();
+    let studies: Vec<Value> = all_studies()
+        .map(|(name, what)| json!({"name": name, "what": what}))
+        .collect();
+    console.print_result(&lines.join("\n"), &studies)
 }
 
-fn list(terminal: &Terminal) -> Result<()> {
-    #[derive(Serialize)]
-    struct Line {
-        name: &'static str,
-        what: &'static str,
-    }
-    let own = [CONVERGENCE, REFERENCE, EFFECTS, SPECTRUM, ALL].into_iter();
-    let built = studies::STUDIES.iter().map(|study| (study.name, study.what));
-    let lines: Vec<Line> = own.chain(built).map(|(name, what)| Line { name, what }).collect();
-    let text: Vec<String> = lines
-        .iter()
-        .map(|line| format!("{:<12} {}", line.name, line.what))
-        .collect();
-    terminal.print_result(&text.join("\n"), &lines)
+/// A study that is done: the result as text and as `--json` prints it, and the files.
+struct Done {
+    text: String,
+    report: Value,
+    files: Vec<String>,
 }
 
 /// Where studies are told of and stopped.
 #[derive(Clone, Copy)]
 struct Desk<'a> {
-    terminal: &'a Terminal,
-    interrupt: &'a Interrupt,
-}
-
-/// The result of a study, as `--json` prints it.
-#[derive(Serialize)]
-struct Report {
-    study: &'static str,
-    folder: String,
-    files: Vec<String>,
-    table: Table,
-    costs: Table,
+    common: &'a Common,
+    console: &'a Console,
 }
 
 impl Desk<'_> {
     fn convergence(self, study: &ConvergenceArguments) -> Result<()> {
-        let settings = BakeSettings {
-            map_resolution: study.map_resolution.unwrap_or(square(SIDE)),
-            threads: threads(&study.common.run)?,
-            ..BakeSettings::of(Estimator::Wavefront)
-        };
-        let few = if study.common.quick {
+        let settings = self.settings(&study.size, SIDE)?;
+        let few = if self.common.quick {
             QUICK_DENSITIES
         } else {
             DENSITIES.len()
         };
         let densities = study.densities.as_deref().unwrap_or(&DENSITIES[..few]);
         check_ladder(densities, &settings)?;
-        let mut estimators = study
-            .estimators
-            .clone()
-            .unwrap_or_else(|| vec![Estimator::Wavefront, Estimator::Splat]);
+        let usual = || vec![Estimator::Wavefront, Estimator::Splat];
+        let mut estimators = study.estimators.clone().unwrap_or_else(usual);
         estimators.dedup();
-        let repeats = repeats(study.repeat, &study.common)?;
         let scene = self.load(&study.scene, &study.scene_options)?;
-        let make = || {
+        self.one_scene(CONVERGENCE.0, &study.repeat, || {
             let reference = match &study.reference {
                 None => Reference::analytic(&scene)?,
                 Some(path) => {
@@ -351,16 +354,20 @@ impl Desk<'_> {
                     )?)
                 }
             };
-            let sweep = one_scene::convergence(&scene, &settings, &estimators, densities, reference);
-            Ok(Sweep { repeats, ..sweep })
-        };
-        self.tell(&self.study(CONVERGENCE.0, &study.common, &study.common.output, |_| make())?)
+            Ok(one_scene::convergence(
+                &scene,
+                &settings,
+                &estimators,
+                densities,
+                reference,
+            ))
+        })?;
+        Ok(())
     }
 
     fn effects(self, study: &EffectsArguments) -> Result<()> {
-        let settings = study
-            .bake
-            .settings(&[LayerKind::Caustic], threads(&study.common.run)?)?;
+        let threads = self.common.run.threads()?;
+        let settings = study.bake.settings(&[LayerKind::Caustic], threads)?;
         if settings.max_time_s.is_some() {
             return Err(Error::usage(
                 "--max-time",
@@ -368,29 +375,22 @@ impl Desk<'_> {
                 "leave it out, or use --max-error or --density",
             ));
         }
-        let repeats = repeats(study.repeat, &study.common)?;
         let scene = self.load(&study.scene, &study.scene_options)?;
-        let make = |_: &Bench| {
-            let sweep = one_scene::effects(&scene, &settings)?;
-            Ok(Sweep { repeats, ..sweep })
-        };
-        let told = self.study(EFFECTS.0, &study.common, &study.common.output, make)?;
+        let written = self.one_scene(EFFECTS.0, &study.repeat, || one_scene::effects(&scene, &settings))?;
         for effect in Effect::ALL {
             let picture = format!("difference_{}.png", effect.name());
-            if !told.1.files.contains(&picture) {
+            if !written.contains(&picture) {
                 // An earlier study of this folder may have had the effect.
-                files::remove_file(&study.common.output.join(picture))?;
+                files::remove_file(&self.common.output.join(picture))?;
             }
         }
-        self.tell(&told)
+        Ok(())
     }
 
     fn spectrum(self, study: &SpectrumArguments) -> Result<()> {
         let settings = BakeSettings {
-            map_resolution: study.map_resolution.unwrap_or(square(SPECTRUM_SIDE)),
             density_per_sr: study.density.unwrap_or(BEAM_DENSITY_PER_SR),
-            threads: threads(&study.common.run)?,
-            ..BakeSettings::of(Estimator::Wavefront)
+            ..self.settings(&study.size, SPECTRUM_SIDE)?
         };
         for &count in &study.wavelengths {
             let way = BakeSettings {
@@ -399,141 +399,143 @@ impl Desk<'_> {
             };
             way.validate()?;
         }
-        let repeats = repeats(study.repeat, &study.common)?;
         let scene = self.load(&study.scene, &study.scene_options)?;
-        let make = |_: &Bench| {
-            let sweep = one_scene::spectrum(&scene, &settings, &study.wavelengths)?;
-            Ok(Sweep { repeats, ..sweep })
-        };
-        self.tell(&self.study(SPECTRUM.0, &study.common, &study.common.output, make)?)
+        self.one_scene(SPECTRUM.0, &study.repeat, || {
+            one_scene::spectrum(&scene, &settings, &study.wavelengths)
+        })?;
+        Ok(())
     }
 
-    fn built(self, study: &BuiltStudy) -> Result<()> {
-        let found = studies::STUDIES.iter().find(|known| known.name == study.name);
-        let found = found.ok_or_else(|| Error::usage("study", "there is no such study", "use --list"))?;
-        let make = |bench: &Bench| found.sweep(bench);
-        self.tell(&self.study(found.name, &study.common, &study.common.output, make)?)
-    }
-
-    /// Each is told as soon as it is done, but for JSON, which is one document.
-    fn all(self, common: &Common) -> Result<()> {
+    /// One, or all: each is told as soon as it is done, but for JSON, which is one document.
+    fn built(self, name: &str) -> Result<()> {
+        let is_all = name == ALL.0;
         let mut reports = Vec::new();
-        for study in &studies::STUDIES {
-            let folder = common.output.join(study.name);
-            let told = self.study(study.name, common, &folder, |bench| study.sweep(bench))?;
-            if !self.terminal.json {
-                self.tell(&told)?;
+        for study in STUDIES.iter().filter(|study| is_all || study.name == name) {
+            let output = match is_all {
+                true => self.common.output.join(study.name),
+                false => self.common.output.clone(),
+            };
+            let done = self.study(study.name, &output, |bench| study.sweep(bench))?;
+            if !(is_all && self.console.json) {
+                self.console.print_result(&done.text, &done.report)?;
             }
-            reports.push(told.1);
+            reports.push(done.report);
         }
-        match self.terminal.json {
-            true => self.terminal.print_result("", &reports),
+        match is_all && self.console.json {
+            true => self.console.print_result("", &reports),
             false => Ok(()),
         }
+    }
+
+    /// Runs it, writes and tells; the files that it wrote.
+    fn one_scene(
+        self,
+        name: &'static str,
+        repeat: &RepeatOption,
+        make: impl FnOnce() -> Result<Sweep>,
+    ) -> Result<Vec<String>> {
+        let usual = if self.common.quick { 1 } else { REPEATS };
+        let repeats = repeat.repeat.unwrap_or(usual);
+        let make = |_: &Bench| Ok(Sweep { repeats, ..make()? });
+        let study = self.study(name, &self.common.output, make)?;
+        self.console.print_result(&study.text, &study.report)?;
+        Ok(study.files)
     }
 
     /// Runs it and writes its files.
     fn study(
         self,
         name: &'static str,
-        common: &Common,
         output: &Path,
         make: impl FnOnce(&Bench) -> Result<Sweep>,
-    ) -> Result<(String, Report)> {
-        let folder = open_folder(output, common.force, &format!("{name}.csv"))?;
-        let bar = StageBar::new(self.terminal);
+    ) -> Result<Done> {
+        let folder = open_folder(output, self.common.force, &format!("{name}.csv"))?;
+        let bar = self.console.bar();
         let bench = Bench {
-            quick: common.quick,
-            threads: threads(&common.run)?,
+            quick: self.common.quick,
+            threads: self.common.run.threads()?,
             progress: &bar,
-            control: self.interrupt.control(),
+            control: self.console.control(),
         };
-        let outcome: Outcome = make(&bench)?.run(&bench)?;
+        let outcome = make(&bench)?.run(&bench)?;
         drop(bar);
-        let mut report = Report {
-            study: name,
-            folder: output.display().to_string(),
-            files: Vec::new(),
-            table: outcome.table.clone(),
-            costs: outcome.costs.clone(),
-        };
+        let mut files = Vec::new();
         for (file, bytes) in outcome.files()? {
-            write(&folder, &file, &bytes)?;
-            report.files.push(file);
+            files::write_atomically(&folder.path().join(&file), |writer| writer.write_all(&bytes))?;
+            files.push(file);
         }
-        let files = report.files.join(", ");
-        Ok((
-            format!("folder {}: {files}\n\n{}", report.folder, outcome.tables()),
-            report,
-        ))
-    }
-
-    fn tell(self, (text, report): &(String, Report)) -> Result<()> {
-        self.terminal.print_result(text, report)
+        let (folder, tables) = (output.display().to_string(), outcome.tables());
+        let text = format!("folder {folder}: {}\n\n{tables}", files.join(", "));
+        let report = json!({
+            "study": name,
+            "folder": folder,
+            "files": files,
+            "table": outcome.table,
+            "costs": outcome.costs,
+        });
+        Ok(Done { text, report, files })
     }
 
     /// Traces, writes the maps, and says how noisy they are.
     fn reference(self, study: &ReferenceArguments) -> Result<()> {
         let settings = BakeSettings {
-            map_resolution: study.map_resolution.unwrap_or(square(SIDE)),
             seed: study.seed,
-            threads: threads(&study.common.run)?,
-            ..BakeSettings::default()
+            ..self.settings(&study.size, SIDE)?
         };
         settings.validate()?;
-        check_rays(study.rays)?;
         let scene = self.load(&study.scene, &study.scene_options)?;
         if (0..scene.objects.len()).any(|object| scene.material_of(object).is_dispersive()) {
-            self.terminal.print_warnings(&[Warning::new(
+            self.console.warn(&[Warning::new(
                 &scene.source,
                 "brute force bends light of all wavelengths alike, as at 587.56 nm",
                 "compare its maps with those of a bake with --effects dispersion=off",
             )]);
         }
-        let output = &study.common.output;
-        let folder = MapFolder::open(output, study.common.force)?;
-        self.interrupt.check(&scene.source)?;
+        let output = &self.common.output;
+        let folder = MapFolder::open(output, self.common.force)?;
+        self.console.check(&scene.source)?;
         let tracer = Tracer::new(scene.clone());
-        let bar = StageBar::new(self.terminal);
-        let result = brute_force(&tracer, &settings, study.rays, &bar, self.interrupt.control())?;
+        let (bar, control) = (self.console.bar(), self.console.control());
+        let result = brute_force(&tracer, &settings, study.rays, &bar, control)?;
         drop(bar);
-        let report = ReferenceReport {
-            method: "brute force: random rays, one per cell of two lattices; each arrival's flux into its texel",
-            rays: result.counts.rays,
-            noise: relative_noise(&result.maps),
-            cpu_s: result.cpu_s.total,
-            maps: folder.write(&scene, &settings, &result)?.maps,
-        };
+        let maps = folder.write(&scene, &settings, &result)?.maps;
+        let (rays, cpu_s) = (result.counts.rays, result.cpu_s.total);
+        let noise = relative_noise(&result.maps);
+        let lines = maps.iter().map(|map| {
+            let noise = 100.0 * map.estimated_relative_rmse.unwrap_or(0.0);
+            format!("map {} of {}, noise {noise:.3} %\n", map.file, map.surface)
+        });
+        let lines: String = lines.collect();
+        let told = noise.map_or("nothing arrived".into(), |noise| {
+            format!("noise {:.3} % of the mean over all maps", 100.0 * noise)
+        });
+        let text = format!(
+            "folder {}\n{lines}{rays} rays, {cpu_s:.2} s of CPU, {told}",
+            output.display()
+        );
+        let report = json!({
+            "method": "brute force: random rays, one per cell of two lattices; each arrival's flux into its texel",
+            "rays": rays,
+            "noise": noise,
+            "cpu_s": cpu_s,
+            "maps": maps,
+        });
         let path = output.join("reference.json");
         let json = files::to_json(&report, &path.display().to_string())?;
         files::write_atomically(&path, |writer| writer.write_all(&json))?;
-        self.terminal.print_result(&report.text(output), &report)
+        self.console.print_result(&text, &report)
     }
 
-    /// Loads a scene and prints its warnings.
+    fn settings(self, size: &SizeOption, side: usize) -> Result<BakeSettings> {
+        Ok(BakeSettings {
+            map_resolution: size.or_square(side),
+            threads: self.common.run.threads()?,
+            ..BakeSettings::default()
+        })
+    }
+
     fn load(self, source: &str, options: &SceneOptions) -> Result<Arc<Scene>> {
-        let scene = scene_input(source.into(), options, MissingLight::Fail).load()?;
-        self.terminal.print_warnings(&scene.warnings);
-        Ok(Arc::new(scene))
-    }
-}
-
-const fn square(side: usize) -> MapResolution {
-    MapResolution::Fixed {
-        width: side,
-        height: side,
-    }
-}
-
-fn repeats(asked: Option<usize>, common: &Common) -> Result<usize> {
-    match asked {
-        None => Ok(if common.quick { 1 } else { REPEATS }),
-        Some(repeats) if (1..=MAX_REPEATS).contains(&repeats) => Ok(repeats),
-        Some(repeats) => Err(Error::usage(
-            "--repeat",
-            format!("{repeats} is outside 1 to {MAX_REPEATS}"),
-            "give a number in that range",
-        )),
+        Ok(LoadedScene::load(source, &options.load_options(false), true, self.console)?.scene)
     }
 }
 
@@ -559,10 +561,7 @@ fn check_ladder(densities: &[f64], settings: &BakeSettings) -> Result<()> {
 }
 
 /// A folder that is empty, holds the `table` of an earlier study, or is taken by force.
-///
-/// # Errors
-/// A place that cannot be written; other people's files in it.
-pub fn open_folder(path: &Path, force: bool, table: &str) -> Result<OutputFolder> {
+fn open_folder(path: &Path, force: bool, table: &str) -> Result<OutputFolder> {
     let folder = OutputFolder::open(path)?;
     if force || path.join(table).is_file() || folder.is_empty()? {
         return Ok(folder);
@@ -572,58 +571,4 @@ pub fn open_folder(path: &Path, force: bool, table: &str) -> Result<OutputFolder
         "the folder holds files that are not from a study",
         "choose another folder or add --force",
     ))
-}
-
-/// Writes a file of that name in the folder.
-///
-/// # Errors
-/// A disk that is full, a place that cannot be written any more.
-pub fn write(folder: &OutputFolder, name: &str, bytes: &[u8]) -> Result<()> {
-    files::write_atomically(&folder.path().join(name), |writer| writer.write_all(bytes))
-}
-
-/// `reference.json`.
-#[derive(Serialize)]
-struct ReferenceReport {
-    method: &'static str,
-    rays: u64,
-    /// Standard error over the mean, over all maps.
-    noise: Option<f64>,
-    cpu_s: f64,
-    maps: Vec<MapEntry>,
-}
-
-impl ReferenceReport {
-    fn text(&self, folder: &Path) -> String {
-        let mut text = format!("folder {}\n", folder.display());
-        for map in &self.maps {
-            let noise = 100.0 * map.estimated_relative_rmse.unwrap_or(0.0);
-            let _ = writeln!(text, "map {} of {}, noise {noise:.3} %", map.file, map.surface);
-        }
-        let noise = self.noise.map_or("nothing arrived".into(), |noise| {
-            format!("noise {:.3} % of the mean over all maps", 100.0 * noise)
-        });
-        text + &format!("{} rays, {:.2} s of CPU, {noise}", self.rays, self.cpu_s)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn rays_may_be_written_as_powers_of_ten() {
-        assert_eq!(ray_count("1e8"), Ok(100_000_000));
-        assert_eq!(ray_count("2500"), Ok(2500));
-        for text in ["", "0", "-5", "nan", "1e30", "many"] {
-            assert!(ray_count(text).is_err(), "{text}");
-        }
-    }
-
-    #[test]
-    fn maps_of_studies_have_a_size() {
-        assert!(fixed_map_resolution("auto").is_err());
-        let fixed = MapResolution::Fixed { width: 8, height: 4 };
-        assert_eq!(fixed_map_resolution("8x4"), Ok(fixed));
-    }
 }

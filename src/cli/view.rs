@@ -2,15 +2,20 @@
 
 use std::path::Path;
 
-use nephroid::error::Result;
+use clap::Args;
+use nephroid::error::{Error, Result};
 use nephroid::export::map_folder::MapFolder;
 use nephroid::files;
+use nephroid::settings::{BakeSettings, LayerKind};
 
-use super::bake::{self, Clock, LoadedScene};
-use super::job::{MapSource, PictureFormat, ViewJob};
-use super::render;
-use super::terminal::Interrupt;
-use super::terminal::{self, Terminal};
+use super::bake_options::BakeOptions;
+use super::console::{self, Console};
+use super::loaded::LoadedScene;
+use super::options::{MapsOption, PictureOptions, RunOptions, SceneOptions};
+use super::picture::{self, EyeOptions};
+
+/// Scene where none is named.
+const DEFAULT_SCENE: &str = "builtin:gallery";
 
 /// Time of the light pass where neither quality nor time is asked for [s].
 const HURRIED_S: f64 = 5.0;
@@ -21,73 +26,148 @@ const HEADLESS_FOLDER: &str = "nephroid-out";
 /// The picture's name in it.
 const HEADLESS_PICTURE: &str = "picture.png";
 
-/// Opens the window on the scene; where there is no display, bakes and makes a picture instead.
-///
-/// # Errors
-/// Input that cannot be read; a window or files that failed.
-pub fn run(job: ViewJob, terminal: &Terminal, interrupt: &Interrupt) -> Result<()> {
-    let clock = Clock::start();
-    let loaded = bake::load(&job.scene, &clock, terminal)?;
-    let why = window(&job, &loaded, terminal, interrupt)?;
-    terminal.print_note(&format!(
-        "{why}: writing maps and a picture to ./{HEADLESS_FOLDER}/ instead of opening a window"
-    ));
-    headless(&job, &loaded, &clock, terminal, interrupt)
+#[derive(Debug, Args)]
+pub struct ViewArguments {
+    /// .glb, .gltf or builtin:NAME [default: builtin:gallery]
+    scene: Option<String>,
+    /// Write one JSON line per change of state of the window
+    #[cfg(feature = "viewer")]
+    #[arg(long, value_name = "FILE")]
+    event_log: Option<std::path::PathBuf>,
+    /// Read the scene again whenever its files are written
+    #[cfg(feature = "viewer")]
+    #[arg(long)]
+    watch: bool,
+    /// Leave camera, settings and edits of the last time alone
+    #[cfg(feature = "viewer")]
+    #[arg(long)]
+    fresh: bool,
+    /// Without a display: write into ./nephroid-out even if it holds other files
+    #[arg(long)]
+    force: bool,
+    #[command(flatten)]
+    maps: MapsOption,
+    #[command(flatten)]
+    picture: PictureOptions,
+    #[command(flatten)]
+    scene_options: SceneOptions,
+    #[command(flatten)]
+    bake: BakeOptions,
+    #[command(flatten)]
+    pub run: RunOptions,
 }
 
-/// Shows the window, and ends the process when that is closed; returns why it could not be opened.
-#[cfg(feature = "viewer")]
-fn window(
-    job: &ViewJob,
-    loaded: &LoadedScene,
-    terminal: &Terminal,
-    interrupt: &Interrupt,
-) -> Result<&'static str> {
-    use super::values::Exposure;
-    use nephroid::{gpu, viewer};
-
-    if !has_display() {
-        return Ok("no display");
+impl ViewArguments {
+    /// Opens the window on the scene; where there is no display, bakes and makes a picture instead.
+    ///
+    /// # Errors
+    /// Bad usage; input that cannot be read; a window or files that failed.
+    pub fn run(&self, console: &Console) -> Result<()> {
+        if console.json {
+            return Err(Error::usage(
+                "--json",
+                "a window has no result to print",
+                "use bake, render or inspect with --json",
+            ));
+        }
+        let bake = match &self.scene {
+            Some(_) => self.bake.clone(),
+            None => self.bake.clone().for_a_first_look(),
+        };
+        let layers = [LayerKind::Caustic, LayerKind::Direct];
+        let settings = bake.settings(&layers, self.run.threads()?)?;
+        let source = self.scene.as_deref().unwrap_or(DEFAULT_SCENE);
+        let loaded = LoadedScene::load(source, &self.scene_options.load_options(true), false, console)?;
+        let why = self.window(&settings, &loaded, console)?;
+        console.note(&format!(
+            "{why}: writing maps and a picture to ./{HEADLESS_FOLDER}/ instead of opening a window"
+        ));
+        self.headless(settings, &loaded, console)
     }
-    let maps = match &job.maps {
-        MapSource::Bake(_) => None,
-        MapSource::Folder(folder, _) => Some(render::read_maps(folder, loaded, terminal)?),
-    };
-    let camera = match &job.picture.camera {
-        Some(_) => Some(render::choose_camera(&loaded.scene, &job.picture)?.name),
-        None => None,
-    };
-    let options = viewer::ViewerOptions {
-        scene: loaded.scene.clone(),
-        settings: job.maps.settings().clone(),
-        maps,
-        size: job.picture.size,
-        camera,
-        exposure_stops: match job.picture.exposure {
-            Exposure::Auto => None,
-            Exposure::Stops(stops) => Some(stops),
-        },
-        stop: Some(interrupt.shared_control()),
-        event_log: job.event_log.clone(),
-        files: viewer::files::FilesOptions {
-            load: job.scene.load_options(),
-            watch: job.watch,
-            config: viewer::files::config::ConfigFolder::of_user(),
-            fresh: job.fresh,
-            settings_given: job.settings_given,
-        },
-    };
-    match viewer::run(options) {
-        Ok(()) => interrupt.leave(),
-        Err(error) if viewer::is_no_display(&error) => Ok("no display"),
-        Err(error) if gpu::is_no_adapter(&error) => Ok("no graphics adapter"),
-        Err(error) => Err(error),
-    }
-}
 
-#[cfg(not(feature = "viewer"))]
-fn window(_: &ViewJob, _: &LoadedScene, _: &Terminal, _: &Interrupt) -> Result<&'static str> {
-    Ok("no display: this program was built without the viewer feature")
+    /// Shows the window, and ends the process when that is closed; returns why it could not be opened.
+    #[cfg(feature = "viewer")]
+    fn window(
+        &self,
+        settings: &BakeSettings,
+        loaded: &LoadedScene,
+        console: &Console,
+    ) -> Result<&'static str> {
+        use super::values::Exposure;
+        use nephroid::{gpu, viewer};
+
+        if !has_display() {
+            return Ok("no display");
+        }
+        let read = |folder| picture::maps(Some(folder), settings, loaded, console);
+        let maps = self.maps.maps.as_deref().map(read).transpose()?;
+        let camera = match &self.picture.camera {
+            Some(_) => Some(picture::choose_camera(&loaded.scene, &self.picture)?.name),
+            None => None,
+        };
+        let options = viewer::ViewerOptions {
+            scene: loaded.scene.clone(),
+            settings: settings.clone(),
+            maps,
+            size: self.picture.size,
+            camera,
+            exposure_stops: match self.picture.exposure {
+                Some(Exposure::Stops(stops)) => Some(stops),
+                _ => None,
+            },
+            stop: Some(console.control().clone()),
+            event_log: self.event_log.clone(),
+            files: viewer::files::FilesOptions {
+                load: self.scene_options.load_options(true),
+                watch: self.watch,
+                config: viewer::files::config::ConfigFolder::of_user(),
+                fresh: self.fresh,
+                settings_given: self.bake.names_any() || self.run.threads.is_some(),
+            },
+        };
+        match viewer::run(options) {
+            Ok(()) => console.leave(),
+            Err(error) if viewer::is_no_display(&error) => Ok("no display"),
+            Err(error) if gpu::is_no_adapter(&error) => Ok("no graphics adapter"),
+            Err(error) => Err(error),
+        }
+    }
+
+    #[cfg(not(feature = "viewer"))]
+    fn window(&self, _: &BakeSettings, _: &LoadedScene, _: &Console) -> Result<&'static str> {
+        Ok("no display: this program was built without the viewer feature")
+    }
+
+    fn headless(&self, mut settings: BakeSettings, loaded: &LoadedScene, console: &Console) -> Result<()> {
+        let folder = Path::new(HEADLESS_FOLDER);
+        let make = |maps: &[_], effects| {
+            let look = (&self.picture, &EyeOptions::default());
+            picture::make(
+                &loaded.scene,
+                maps,
+                effects,
+                look,
+                &folder.join(HEADLESS_PICTURE),
+                console,
+            )
+        };
+        if let Some(baked) = &self.maps.maps {
+            let maps = picture::maps(Some(baked), &settings, loaded, console)?;
+            files::OutputFolder::open(folder)?;
+            make(&maps, &settings.effects)?;
+            return console::print(HEADLESS_FOLDER);
+        }
+        let folder = MapFolder::open(folder, self.force)?;
+        if !self.bake.names_quality() {
+            settings.max_time_s = Some(HURRIED_S);
+        }
+        let result = loaded.bake(&settings, console)?;
+        if !result.partial {
+            make(&result.maps, &settings.effects)?;
+        }
+        folder.write(&loaded.scene, &settings, &result)?;
+        console::print(&format!("./{HEADLESS_FOLDER}/"))
+    }
 }
 
 /// Whether the session has a screen to show windows on.
@@ -99,52 +179,4 @@ fn has_display() -> bool {
     ["DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET"]
         .iter()
         .any(|name| std::env::var_os(name).is_some_and(|value| !value.is_empty()))
-}
-
-fn headless(
-    job: &ViewJob,
-    loaded: &LoadedScene,
-    clock: &Clock,
-    terminal: &Terminal,
-    interrupt: &Interrupt,
-) -> Result<()> {
-    let path = Path::new(HEADLESS_FOLDER);
-    let picture_path = path.join(HEADLESS_PICTURE);
-    let location = picture_path.display().to_string();
-    if let MapSource::Folder(folder, _) = &job.maps {
-        let maps = render::read_maps(folder, loaded, terminal)?;
-        let made = render::make(
-            &loaded.scene,
-            &maps,
-            job.maps.settings(),
-            &job.picture,
-            terminal,
-            interrupt,
-        )?;
-        let folder = files::OutputFolder::open(path)?;
-        let bytes = made.encode(PictureFormat::Png, &location)?;
-        files::write_atomically(&picture_path, |writer| writer.write_all(&bytes))?;
-        return terminal::print(&folder.path().display().to_string());
-    }
-    let folder = MapFolder::open(path, job.force)?;
-    let mut settings = job.maps.settings().clone();
-    if job.hurries {
-        settings.max_time_s = Some(HURRIED_S);
-    }
-    let settings = &settings;
-    let result = bake::bake(loaded, settings, clock, terminal, interrupt)?;
-    if !result.partial {
-        let made = render::make(
-            &loaded.scene,
-            &result.maps,
-            settings,
-            &job.picture,
-            terminal,
-            interrupt,
-        )?;
-        let bytes = made.encode(PictureFormat::Png, &location)?;
-        files::write_atomically(&picture_path, |writer| writer.write_all(&bytes))?;
-    }
-    folder.write(&loaded.scene, settings, &result)?;
-    terminal::print(&format!("./{HEADLESS_FOLDER}/"))
 }

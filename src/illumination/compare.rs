@@ -1,7 +1,7 @@
 //! How far two maps are apart: measures over texels of equal area, on any quantity (irradiance luminance [W/m²] here).
 
-/// Share of the reference's mean from which on a texel counts in [`average_relative_difference`].
-pub const SIGNIFICANT_SHARE_OF_MEAN: f64 = 0.01;
+/// Share of the reference's mean from which on a texel counts in the average relative difference.
+const SIGNIFICANT_SHARE_OF_MEAN: f64 = 0.01;
 
 /// Values on a rectangle of texels, row by row.
 #[derive(Clone, Debug, PartialEq)]
@@ -33,51 +33,82 @@ pub struct Comparison {
     pub flux_ratio: Option<f64>,
 }
 
-/// sqrt(mean((I − R)²)) / mean(R); `None` where mean(R) is not above zero.
-///
-/// # Panics
-/// Slices of different lengths.
-pub fn relative_rmse(image: &[f64], reference: &[f64]) -> Option<f64> {
-    assert_eq!(image.len(), reference.len(), "maps of one size are compared");
-    let reference_mean = mean(reference);
-    let mean_square = mean_of(
-        image.iter().zip(reference).map(|(i, r)| (i - r) * (i - r)),
-        image.len(),
-    );
-    (reference_mean > 0.0).then(|| mean_square.sqrt() / reference_mean)
+/// One texel of a map beside its reference.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TexelPair {
+    /// E of the image [W/m²], luminance.
+    pub image: f64,
+    /// E of the reference [W/m²], luminance.
+    pub reference: f64,
+    /// Surface under the texel [m²]; any unit where all texels are alike.
+    pub area_m2: f64,
 }
 
-/// mean(|I − R| / R) over the texels with R > 1 % of mean(R); `None` where mean(R) is not above zero.
+/// Measures of an image against its reference, over all texels.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Agreement {
+    /// sqrt(mean((I − R)²)) / mean(R).
+    pub relative_rmse: f64,
+    /// mean(|I − R| / R) over texels with R > 1 % of mean(R).
+    pub average_relative_difference: f64,
+    /// Largest I over largest R.
+    pub peak_ratio: f64,
+    /// mean(I) / mean(R).
+    pub flux_ratio: f64,
+}
+
+impl Agreement {
+    /// Of all texels together; `None` where the reference is dark.
+    pub fn of(texels: &[TexelPair]) -> Option<Self> {
+        let sum = |value: &dyn Fn(&TexelPair) -> f64| -> f64 {
+            texels.iter().map(|texel| value(texel) * texel.area_m2).sum()
+        };
+        let area = sum(&|_| 1.0);
+        let mean = sum(&|texel| texel.reference) / area;
+        if !(mean.is_finite() && mean > 0.0) {
+            return None;
+        }
+        let mean_square = sum(&|texel| (texel.image - texel.reference).powi(2)) / area;
+        let significant = |texel: &TexelPair| texel.reference > SIGNIFICANT_SHARE_OF_MEAN * mean;
+        let share = |texel: &TexelPair, value: f64| if significant(texel) { value } else { 0.0 };
+        let differences = sum(&|texel| share(texel, (texel.image - texel.reference).abs() / texel.reference));
+        let peak = |value: fn(&TexelPair) -> f64| texels.iter().map(value).fold(0.0, f64::max);
+        Some(Self {
+            relative_rmse: mean_square.sqrt() / mean,
+            average_relative_difference: differences / sum(&|texel| share(texel, 1.0)),
+            peak_ratio: peak(|texel| texel.image) / peak(|texel| texel.reference),
+            flux_ratio: sum(&|texel| texel.image) / (mean * area),
+        })
+    }
+}
+
+/// The measures of texels of one area; `None` where mean(R) is not above zero.
 ///
 /// # Panics
 /// Slices of different lengths.
-pub fn average_relative_difference(image: &[f64], reference: &[f64]) -> Option<f64> {
+pub fn agreement(image: &[f64], reference: &[f64]) -> Option<Agreement> {
     assert_eq!(image.len(), reference.len(), "maps of one size are compared");
-    let reference_mean = mean(reference);
-    if reference_mean.is_nan() || reference_mean <= 0.0 {
-        return None;
-    }
-    let threshold = SIGNIFICANT_SHARE_OF_MEAN * reference_mean;
-    let significant: Vec<f64> = image
-        .iter()
-        .zip(reference)
-        .filter(|(_, r)| **r > threshold)
-        .map(|(i, r)| (i - r).abs() / r)
-        .collect();
-    Some(mean(&significant))
+    let pair = |(&image, &reference)| TexelPair {
+        image,
+        reference,
+        area_m2: 1.0,
+    };
+    Agreement::of(&image.iter().zip(reference).map(pair).collect::<Vec<_>>())
+}
+
+/// sqrt(mean((I − R)²)) / mean(R); as [`agreement`].
+pub fn relative_rmse(image: &[f64], reference: &[f64]) -> Option<f64> {
+    agreement(image, reference).map(|agreement| agreement.relative_rmse)
+}
+
+/// mean(|I − R| / R) over the texels with R > 1 % of mean(R); as [`agreement`].
+pub fn average_relative_difference(image: &[f64], reference: &[f64]) -> Option<f64> {
+    agreement(image, reference).map(|agreement| agreement.average_relative_difference)
 }
 
 /// Arithmetic mean; 0 of nothing.
 pub fn mean(values: &[f64]) -> f64 {
-    mean_of(values.iter().copied(), values.len())
-}
-
-fn mean_of(values: impl Iterator<Item = f64>, count: usize) -> f64 {
-    if count == 0 {
-        0.0
-    } else {
-        values.sum::<f64>() / count as f64
-    }
+    values.iter().sum::<f64>() / values.len().max(1) as f64
 }
 
 impl Grid {
@@ -140,21 +171,48 @@ pub fn compare(image: &Grid, reference: &Grid) -> Comparison {
         (reference.width, reference.height),
         "maps of one size are compared"
     );
-    let (image_mean, reference_mean) = (mean(&image.values), mean(&reference.values));
+    let measures = agreement(&image.values, &reference.values);
     Comparison {
-        relative_rmse: relative_rmse(&image.values, &reference.values),
-        average_relative_difference: average_relative_difference(&image.values, &reference.values),
+        relative_rmse: measures.map(|measures| measures.relative_rmse),
+        average_relative_difference: measures.map(|measures| measures.average_relative_difference),
         peak: image.peak(),
         reference_peak: reference.peak(),
-        mean: image_mean,
-        reference_mean,
-        flux_ratio: (reference_mean > 0.0).then(|| image_mean / reference_mean),
+        mean: mean(&image.values),
+        reference_mean: mean(&reference.values),
+        flux_ratio: measures.map(|_| mean(&image.values) / mean(&reference.values)),
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn texels(values: &[(f64, f64, f64)]) -> Vec<TexelPair> {
+        let texel = |&(image, reference, area_m2)| TexelPair {
+            image,
+            reference,
+            area_m2,
+        };
+        values.iter().map(texel).collect()
+    }
+
+    #[test]
+    fn large_texels_weigh_more() {
+        let agreement = Agreement::of(&texels(&[(2.0, 1.0, 3.0), (1.0, 1.0, 1.0)])).expect("lit");
+        assert!((agreement.relative_rmse - 0.75_f64.sqrt()).abs() < 1e-15);
+        assert!((agreement.average_relative_difference - 0.75).abs() < 1e-15);
+        assert!((agreement.flux_ratio - 1.75).abs() < 1e-15);
+        assert!((agreement.peak_ratio - 2.0).abs() < 1e-15);
+    }
+
+    #[test]
+    fn dark_texels_have_no_relative_difference() {
+        let agreement = Agreement::of(&texels(&[(1.0, 1.0, 1.0), (0.1, 0.0, 1.0)])).expect("lit");
+        assert!(agreement.average_relative_difference.abs() < 1e-15);
+        assert!(agreement.relative_rmse > 0.1);
+        assert_eq!(Agreement::of(&texels(&[(1.0, 0.0, 1.0)])), None);
+        assert_eq!(Agreement::of(&[]), None);
+    }
 
     #[test]
     fn measures_of_a_worked_example() {

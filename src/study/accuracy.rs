@@ -4,12 +4,12 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::paper::{SPLAT, WAVEFRONT, Way, error_against_rays, over_a_floor, scene, splat, wavefront};
+use super::paper::{SPLAT, WAVEFRONT, Way, over_a_floor, scene, splat, wavefront};
 use super::plot::Plot;
 use super::references::Reference;
 use super::sweep::{
     Against, Bench, CPU_S, Column, Group, MEMORY_MB, Measured, RAYS, REFERENCE, RELATIVE_RMSE, Sweep,
-    Variant, WALL_S, number, share,
+    Variant, WALL_S, column, number, share,
 };
 use super::table::Cell;
 use crate::error::Result;
@@ -43,35 +43,24 @@ const ACCURACY: &[Column] = &[
     CPU_S,
     WALL_S,
     MEMORY_MB,
-    Column {
-        name: "estimated_rmse",
-        value: |m| share(m.result.estimated_relative_rmse),
-    },
+    column("estimated_rmse", |m| share(m.result.estimated_relative_rmse)),
     RELATIVE_RMSE,
-    Column {
-        name: "stop",
-        value: |m| format!("{:?}", m.result.stop_reason).into(),
-    },
-    Column {
-        name: "predicted_at_rmse",
-        value: |m| share(predicted(m).map(|(made_at, _)| made_at.error)),
-    },
-    Column {
-        name: "predicted_rays",
-        value: |m| number(predicted(m).map(|(_, expected)| expected.rays as f64)),
-    },
-    Column {
-        name: "predicted_cpu_s",
-        value: |m| number(predicted(m).map(|(_, expected)| expected.cpu_s)),
-    },
-    Column {
-        name: "rays_ratio",
-        value: |m| predicted_over_actual(m, |f| f.rays as f64, |p| p.rays as f64),
-    },
-    Column {
-        name: "cpu_ratio",
-        value: |m| predicted_over_actual(m, |f| f.cpu_s, |p| p.cpu_s),
-    },
+    column("stop", |m| format!("{:?}", m.result.stop_reason).into()),
+    column("predicted_at_rmse", |m| {
+        share(predicted(m).map(|(made_at, _)| made_at.error))
+    }),
+    column("predicted_rays", |m| {
+        number(predicted(m).map(|(_, expected)| expected.rays as f64))
+    }),
+    column("predicted_cpu_s", |m| {
+        number(predicted(m).map(|(_, expected)| expected.cpu_s))
+    }),
+    column("rays_ratio", |m| {
+        predicted_over_actual(m, |f| f.rays as f64, |p| p.rays as f64)
+    }),
+    column("cpu_ratio", |m| {
+        predicted_over_actual(m, |f| f.cpu_s, |p| p.cpu_s)
+    }),
     REFERENCE,
 ];
 
@@ -79,17 +68,13 @@ pub(super) fn accuracy(bench: &Bench) -> Result<Sweep> {
     const TARGETS: [f64; 5] = [0.10, 0.05, 0.02, 0.01, 0.005];
     const DENSITIES: [f64; 4] = [1e4, 1e5, 1e6, 4e6];
     const PLOTS: &[Plot] = &[
-        by_scene("wavefront-cpu", "cpu_s", "wavefront"),
-        by_scene("wavefront-rays", "rays", "wavefront"),
-        by_scene("splat-cpu", "cpu_s", "splat"),
-        by_scene("splat-rays", "rays", "splat"),
+        by_scene("wavefront-cpu", "cpu_s").only("estimator", "wavefront"),
+        by_scene("wavefront-rays", "rays").only("estimator", "wavefront"),
+        by_scene("splat-cpu", "cpu_s").only("estimator", "splat"),
+        by_scene("splat-rays", "rays").only("estimator", "splat"),
     ];
-    const fn by_scene(file: &'static str, x: &'static str, estimator: &'static str) -> Plot {
-        Plot {
-            x,
-            only: Some(("estimator", estimator)),
-            ..error_against_rays(file, &["scene"])
-        }
+    const fn by_scene(file: &'static str, x: &'static str) -> Plot {
+        Plot::new(file, [x, "relative_rmse"], &["scene"])
     }
     let towards = |target: f64, limit_s: f64| BakeSettings {
         max_error: Some(target),
@@ -151,18 +136,13 @@ pub(super) fn accuracy(bench: &Bench) -> Result<Sweep> {
 
 const SCALING: &[Column] = &[
     RAYS,
-    Column {
-        name: "segments_per_ray",
-        value: |m| per_ray(m, m.result.counts.segments as f64),
-    },
-    Column {
-        name: "plan_cpu_s",
-        value: |m| m.result.cpu_s.plan.into(),
-    },
-    Column {
-        name: "us_per_ray",
-        value: |m| per_ray(m, 1e6 * (m.result.cpu_s.trace + m.result.cpu_s.deposit)),
-    },
+    column("segments_per_ray", |m| {
+        per_ray(m, m.result.counts.segments as f64)
+    }),
+    column("plan_cpu_s", |m| m.result.cpu_s.plan.into()),
+    column("us_per_ray", |m| {
+        per_ray(m, 1e6 * (m.result.cpu_s.trace + m.result.cpu_s.deposit))
+    }),
     WALL_S,
     MEMORY_MB,
 ];
@@ -176,19 +156,13 @@ pub(super) fn scaling(bench: &Bench) -> Result<Sweep> {
     const LEVELS: [u32; 5] = [2, 4, 6, 8, 9];
     const SIDES: [usize; 8] = [64, 128, 256, 512, 1024, 2048, 4096, 8192];
     const PLOTS: &[Plot] = &[
-        ladder("scaling-rays", "us_per_ray", "rays"),
-        ladder("scaling-memory", "memory_mb", "rays"),
-        ladder("scaling-triangles", "us_per_ray", "triangles"),
-        ladder("scaling-texels", "wall_s", "texels"),
+        ladder("scaling-rays", "us_per_ray").only("what", "rays"),
+        ladder("scaling-memory", "memory_mb").only("what", "rays"),
+        ladder("scaling-triangles", "us_per_ray").only("what", "triangles"),
+        ladder("scaling-texels", "wall_s").only("what", "texels"),
     ];
-    const fn ladder(file: &'static str, y: &'static str, what: &'static str) -> Plot {
-        Plot {
-            file,
-            x: "value",
-            y,
-            by: &["what"],
-            only: Some(("what", what)),
-        }
+    const fn ladder(file: &'static str, y: &'static str) -> Plot {
+        Plot::new(file, ["value", y], &["what"])
     }
     let ring = scene("ring")?;
     // So little that what was traced is not kept for later changes.

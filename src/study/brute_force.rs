@@ -50,7 +50,13 @@ pub fn brute_force(
     control: &Control,
 ) -> Result<BakeResult> {
     settings.validate()?;
-    check_rays(rays)?;
+    if !RAYS.contains(&rays) {
+        return Err(Error::usage(
+            "--rays",
+            format!("{rays} is outside {} to {:e}", RAYS.start(), *RAYS.end() as f64),
+            "give a number in that range",
+        ));
+    }
     let MapResolution::Fixed { width, height } = settings.map_resolution else {
         return Err(Error::usage(
             "--map-resolution",
@@ -63,21 +69,6 @@ pub fn brute_force(
         .build()
         .map_err(|error| Error::failure("--threads", error.to_string(), "ask for fewer threads"))?;
     pool.install(|| run(tracer, settings, rays, (width, height), progress, control))
-}
-
-/// Refuses a number of rays outside [`RAYS`].
-///
-/// # Errors
-/// Names the number and the range.
-pub fn check_rays(rays: u64) -> Result<()> {
-    if RAYS.contains(&rays) {
-        return Ok(());
-    }
-    Err(Error::usage(
-        "--rays",
-        format!("{rays} is outside {} to {:e}", RAYS.start(), *RAYS.end() as f64),
-        "give a number in that range",
-    ))
 }
 
 fn run(
@@ -115,16 +106,14 @@ fn run(
         targets: targets(scene, size),
         seed: settings.seed,
         rays_per_half: (rays as f64 / (2 * lights.len().max(1)) as f64).max(1.0),
+        progress,
+        control,
+        done: AtomicU64::new(0),
+        total: lights.len() as u64 * OF_A_LIGHT,
     };
     let mut result = empty_result(plan, lights.is_empty());
-    for (done, light) in lights.iter().enumerate() {
-        let heard = Heard {
-            progress,
-            control,
-            done: done as u64 * HALVES as u64,
-            total: (lights.len() * HALVES) as u64,
-        };
-        let tally = run.light(light, &heard);
+    for light in lights {
+        let tally = run.light(light);
         if control.is_cancelled() {
             return Err(Error::cancelled(&scene.source));
         }
@@ -166,27 +155,15 @@ struct Run<'a> {
     seed: u64,
     /// Of each light, about.
     rays_per_half: f64,
-}
-
-/// Who listens, with the half sets that are done and all.
-struct Heard<'a> {
     progress: &'a dyn Progress,
     control: &'a Control,
-    done: u64,
+    /// What is done of all lights, and all.
+    done: AtomicU64,
     total: u64,
 }
 
-impl<'a> Heard<'a> {
-    /// Nobody listens, but it may be stopped.
-    fn nobody(control: &'a Control) -> Self {
-        Self {
-            progress: &(),
-            control,
-            done: 0,
-            total: 1,
-        }
-    }
-}
+/// What one light is of the whole work, in units of progress.
+const OF_A_LIGHT: u64 = 1 << 30;
 
 /// Which rays of a light.
 #[derive(Clone, Copy, Debug)]
@@ -220,8 +197,15 @@ impl Tally {
 }
 
 impl Run<'_> {
+    /// Hears of a part of a light that is done: one of so many.
+    fn advance(&self, parts: usize) {
+        let part = OF_A_LIGHT / parts as u64;
+        let done = self.done.fetch_add(part, Ordering::Relaxed) + part;
+        self.progress.advance(Stage::Caustic, done, self.total);
+    }
+
     /// Both half sets of one light.
-    fn light(&self, light: &AimedLight, heard: &Heard) -> Tally {
+    fn light(&self, light: &AimedLight) -> Tally {
         let source = &self.tracer.scene().lights[light.light];
         if !(self.sizes && source.has_extent()) {
             let whole = Part {
@@ -229,10 +213,9 @@ impl Run<'_> {
                 share: 1.0 / HALVES as f64,
                 place: 0,
             };
-            return self.part(light, whole, heard);
+            return self.part(light, whole);
         }
         // Each half set has places of its own, drawn as its rays are.
-        let done = AtomicU64::new(0);
         let source = source.of_unit_strength();
         (0..HALVES * PLACES)
             .into_par_iter()
@@ -241,35 +224,30 @@ impl Run<'_> {
                 let mut random = self.generator(light.light, (half, 0, place), PLACE_STREAM);
                 // One in each cell of a lattice of places.
                 let side = (PLACES as f64).sqrt().floor() as usize;
+                let within = DVec2::new(random(), random());
                 let square = if place < side * side {
-                    (DVec2::new((place % side) as f64, (place / side) as f64)
-                        + DVec2::new(random(), random()))
-                        / side as f64
+                    (DVec2::new((place % side) as f64, (place / side) as f64) + within) / side as f64
                 } else {
-                    DVec2::new(random(), random())
+                    within
                 };
                 let emitter = Emitter::sample(&source, self.tracer.scene(), square);
                 let there = emitter
-                    .filter(|_| !heard.control.is_cancelled())
+                    .filter(|_| !self.control.is_cancelled())
                     .and_then(|emitter| light.from_place(self.tracer, self.aiming, &emitter));
                 let part = Part {
                     half: Some(half),
                     share: 1.0 / (HALVES * PLACES) as f64,
                     place: place as u64 + 1,
                 };
-                let tally = there.map(|there| self.part(&there, part, &Heard::nobody(heard.control)));
-                let places = done.fetch_add(1, Ordering::Relaxed) + 1;
-                let share = heard.done * PLACES as u64 + places;
-                heard
-                    .progress
-                    .advance(Stage::Caustic, share, heard.total * PLACES as u64);
+                let tally = there.map(|there| self.part(&there, part));
+                self.advance(HALVES * PLACES);
                 tally.unwrap_or_default()
             })
             .reduce(Tally::default, Tally::merged)
     }
 
     /// Rays from one place of a light, of both half sets or one.
-    fn part(&self, light: &AimedLight, part: Part, heard: &Heard) -> Tally {
+    fn part(&self, light: &AimedLight, part: Part) -> Tally {
         let measure = light.item_buffer.marked_measure(&light.launch);
         let halves = part.half.map_or(0..HALVES, |half| half..half + 1);
         let places = if part.half.is_some() { PLACES } else { 1 };
@@ -277,20 +255,18 @@ impl Run<'_> {
         let density = (self.rays_per_half / places as f64).max(1.0) / measure;
         let size = light.launch.lattice_size(density, 1.0);
         let faces = light.launch.face_count();
-        let rows_done = AtomicU64::new(0);
-        let rows = (faces * size.1 * HALVES) as u64;
         (halves.start * faces..halves.end * faces)
             .into_par_iter()
             .flat_map(|face| (0..size.1).into_par_iter().map(move |row| (face, row)))
             .map(|(half_face, row)| {
-                if heard.control.is_cancelled() {
+                if self.control.is_cancelled() {
                     return Tally::default();
                 }
                 let (half, face) = (half_face / faces, half_face % faces);
                 let tally = self.row(light, size, (half, face, row), &part);
-                let done = rows_done.fetch_add(1, Ordering::Relaxed) + 1;
-                let share = heard.done * rows + done * HALVES as u64;
-                heard.progress.advance(Stage::Caustic, share, heard.total * rows);
+                if part.half.is_none() {
+                    self.advance(faces * size.1 * HALVES);
+                }
                 tally
             })
             .reduce(Tally::default, Tally::merged)
@@ -384,14 +360,12 @@ impl Target {
     /// The mean of both half sets with its noise; `None` where nothing arrived.
     fn map(&self, unit: FluxUnit) -> Option<IlluminationMap> {
         let (mut irradiance, mut error) = (Vec::new(), Vec::new());
-        for (texel, (a, b)) in self.halves[0].iter().zip(&self.halves[1]).enumerate() {
+        for texel in 0..self.chart.texel_count() {
+            let [a, b] = [0, 1].map(|half| {
+                let sums = self.halves[half][texel].each_ref();
+                unit.flux_w(sums.map(|sum| sum.load(Ordering::Relaxed)))
+            });
             let texel_area_m2 = self.chart.texel_area_m2(texel);
-            let watts = |half: &[AtomicI64; 3]| {
-                unit.flux_w(std::array::from_fn(|channel| {
-                    half[channel].load(Ordering::Relaxed)
-                }))
-            };
-            let (a, b) = (watts(a), watts(b));
             let per_area = if texel_area_m2 > 0.0 {
                 1.0 / texel_area_m2
             } else {

@@ -2,16 +2,16 @@
 
 use std::sync::Arc;
 
+use super::agreement::{caustic_colours, pair_texels};
 use super::plot::Plot;
 use super::references::{Reference, Truth};
 use super::sweep::{
     ARD, Against, CELLS, CPU_S, Column, FLUX_RATIO, Group, Measured, PEAK_RATIO, RAYS, REFERENCE,
-    RELATIVE_RMSE, SPLATS, Sweep, Variant, number, share,
+    RELATIVE_RMSE, SPLATS, Sweep, Variant, column, number, share,
 };
 use super::table::Cell;
 use crate::effect::{Effect, EffectSwitch};
 use crate::error::{Error, Result};
-use crate::illumination::IlluminationMap;
 use crate::optics::LinearSrgb;
 use crate::scene::{Light, LightKind, Scene};
 use crate::session::BakeSession;
@@ -84,21 +84,11 @@ pub fn convergence(
         }],
         plots: const {
             &[
-                against("convergence-rays", "rays"),
-                against("convergence-cpu", "cpu_s"),
+                Plot::new("convergence-rays", ["rays", "relative_rmse"], &["estimator"]),
+                Plot::new("convergence-cpu", ["cpu_s", "relative_rmse"], &["estimator"]),
             ]
         },
         ..Sweep::default()
-    }
-}
-
-const fn against(file: &'static str, x: &'static str) -> Plot {
-    Plot {
-        file,
-        x,
-        y: "relative_rmse",
-        by: &["estimator"],
-        only: None,
     }
 }
 
@@ -140,18 +130,13 @@ pub fn effects(scene: &Arc<Scene>, settings: &BakeSettings) -> Result<Sweep> {
 }
 
 const EFFECT_COLUMNS: &[Column] = &[
-    Column {
-        name: "flux_w",
-        value: |m| number(m.difference().map(|found| found.without_w)),
-    },
-    Column {
-        name: "worth_w",
-        value: |m| number(m.difference().map(|found| found.difference_w())),
-    },
-    Column {
-        name: "relative_rmse",
-        value: |m| share(m.difference().and_then(|found| found.relative_rmse)),
-    },
+    column("flux_w", |m| number(m.difference().map(|found| found.without_w))),
+    column("worth_w", |m| {
+        number(m.difference().map(|found| found.difference_w()))
+    }),
+    column("relative_rmse", |m| {
+        share(m.difference().and_then(|found| found.relative_rmse))
+    }),
     RAYS,
     CPU_S,
 ];
@@ -189,14 +174,8 @@ pub fn spectrum(scene: &Scene, settings: &BakeSettings, wavelengths: &[u32]) -> 
     let mut variants = Vec::new();
     let mut add = |sampling: &str, wavelengths: String, settings: BakeSettings| {
         let name: &str = settings.estimator.into();
-        variants.push(Variant {
-            sheet: Some(SPECTRUM.0.into()),
-            ..Variant::new(
-                vec![name.into(), sampling.into(), wavelengths.into()],
-                &scene,
-                settings,
-            )
-        });
+        let labels = vec![name.into(), sampling.into(), wavelengths.into()];
+        variants.push(Variant::new(labels, &scene, settings).in_sheet(SPECTRUM.0));
     };
     for (estimator, all) in [
         (Estimator::Splat, "stochastic"),
@@ -255,14 +234,10 @@ const SPECTRUM_COLUMNS: &[Column] = &[
     RAYS,
     SPLATS,
     CPU_S,
-    Column {
-        name: "colour_error",
-        value: |m| norm_of_difference(m, LinearSrgb::to_array),
-    },
-    Column {
-        name: "luminance_error",
-        value: |m| norm_of_difference(m, |colour| [colour.luminance(), 0.0, 0.0]),
-    },
+    column("colour_error", |m| norm_of_difference(m, LinearSrgb::to_array)),
+    column("luminance_error", |m| {
+        norm_of_difference(m, |colour| [colour.luminance(), 0.0, 0.0])
+    }),
     FLUX_RATIO,
 ];
 
@@ -271,29 +246,14 @@ fn norm_of_difference(measured: &Measured, of: fn(LinearSrgb) -> [f64; 3]) -> Ce
     let Some(Truth::Maps(references)) = measured.reference.map(|reference| &reference.truth) else {
         return Cell::Empty;
     };
+    let Some(pairs) = pair_texels(&measured.result.maps, references, caustic_colours) else {
+        return Cell::Empty;
+    };
     let square = |rgb: LinearSrgb| of(rgb).iter().map(|channel| channel * channel).sum::<f64>();
-    let counterpart = |map: &IlluminationMap, among: &[IlluminationMap]| {
-        let found = among
-            .iter()
-            .find(|other| other.chart.receiver == map.chart.receiver);
-        found.map(|map| map.dense().total())
-    };
-    let texel = |values: &Option<Vec<[f32; 3]>>, texel: usize| match values {
-        Some(values) => LinearSrgb::from(values[texel].map(f64::from)),
-        None => LinearSrgb::BLACK,
-    };
-    let maps = &measured.result.maps;
-    let is_alone = |map: &&IlluminationMap| counterpart(map, maps).is_none();
     let (mut difference, mut whole) = (0.0, 0.0);
-    for map in maps.iter().chain(references.iter().filter(is_alone)) {
-        let (image, reference) = (counterpart(map, maps), counterpart(map, references));
-        let chart = map.dense().chart.clone();
-        for index in 0..chart.texel_count() {
-            let area_m2 = chart.texel_area_m2(index);
-            let truth = texel(&reference, index);
-            difference += area_m2 * square(texel(&image, index) - truth);
-            whole += area_m2 * square(truth);
-        }
+    for (image, reference, area_m2) in pairs {
+        difference += area_m2 * square(image - reference);
+        whole += area_m2 * square(reference);
     }
     Cell::Share((difference / whole).sqrt())
 }

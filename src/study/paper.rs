@@ -9,7 +9,7 @@ use super::plot::Plot;
 use super::references::Reference;
 use super::sweep::{
     ARD, Against, Bench, CPU_S, Column, EYE_PASS_CPU_S, FLUX_RATIO, Group, RAYS, RELATIVE_RMSE, Sweep,
-    Variant,
+    Variant, column,
 };
 use super::table::Cell;
 use crate::error::{Error, Result};
@@ -79,14 +79,8 @@ pub(super) fn scene_and_truth(name: &str) -> Result<(Arc<Scene>, Against)> {
     }
 }
 
-pub(super) const fn error_against_rays(file: &'static str, by: &'static [&'static str]) -> Plot {
-    Plot {
-        file,
-        x: "rays",
-        y: "relative_rmse",
-        by,
-        only: None,
-    }
+const fn error_against_rays(file: &'static str, by: &'static [&'static str]) -> Plot {
+    Plot::new(file, ["rays", "relative_rmse"], by)
 }
 
 /// Something of glass over a floor of that half width, below a lamp.
@@ -112,10 +106,8 @@ pub(super) fn table1(bench: &Bench) -> Result<Sweep> {
             let paper = [Cell::from(rays), light_pass_s.into(), eye_pass_s.into()];
             let labels = [density.into(), name.into()].into_iter().chain(paper).collect();
             let file = format!("table1-{}", variants.len() + 1);
-            variants.push(Variant {
-                views: vec![(file, scene.cameras[0].clone())],
-                ..Variant::new(labels, &scene, bench.at(settings(density), bench.side()))
-            });
+            let settings = bench.at(settings(density), bench.side());
+            variants.push(Variant::new(labels, &scene, settings).seen(file, &scene.cameras[0]));
         }
     }
     Ok(Sweep {
@@ -195,13 +187,7 @@ pub(super) fn sigma(bench: &Bench) -> Result<Sweep> {
         labels: &["kernel", "sigma", "sigma_half_sides"],
         columns: &[RELATIVE_RMSE, ARD],
         groups: vec![Group { against, variants }],
-        plots: &[Plot {
-            file: "sigma",
-            x: "sigma",
-            y: "relative_rmse",
-            by: &["kernel"],
-            only: None,
-        }],
+        plots: const { &[Plot::new("sigma", ["sigma", "relative_rmse"], &["kernel"])] },
         ..Sweep::default()
     })
 }
@@ -210,14 +196,11 @@ pub(super) fn resolution(bench: &Bench) -> Result<Sweep> {
     let scene = scene("ring")?;
     let finer = wavefront(if bench.quick { 8e3 } else { 4.0 * DENSITY_PER_SR });
     let groups = bench.some(&[30, 100, 300], 2).iter().map(|&side| {
-        let variants = [SPLAT, WAVEFRONT].map(|(name, settings)| Variant {
-            views: vec![(format!("plate6-{side}-{name}"), scene.cameras[0].clone())],
-            sheet: Some("plate6-maps".into()),
-            ..Variant::new(
-                vec![name.into(), (side as u64).into()],
-                &scene,
-                bench.at(settings(DENSITY_PER_SR), side),
-            )
+        let variants = [SPLAT, WAVEFRONT].map(|(name, settings)| {
+            let labels = vec![name.into(), (side as u64).into()];
+            Variant::new(labels, &scene, bench.at(settings(DENSITY_PER_SR), side))
+                .seen(format!("plate6-{side}-{name}"), &scene.cameras[0])
+                .in_sheet("plate6-maps")
         });
         Group {
             against: Against::Bake(Arc::clone(&scene), Box::new(bench.at(finer.clone(), side))),
@@ -240,23 +223,17 @@ pub(super) fn resolution(bench: &Bench) -> Result<Sweep> {
 const KERNELS: &[Column] = &[
     RELATIVE_RMSE,
     ARD,
-    Column {
-        name: "paper_rms",
-        value: |m| {
-            let square = |pair: &super::agreement::TexelPair| (pair.image - pair.reference).powi(2);
-            m.pairs.iter().map(square).sum::<f64>().sqrt().into()
-        },
-    },
-    Column {
-        name: "paper_ard",
-        value: |m| {
-            let lit = m.pairs.iter().filter(|pair| pair.reference > 0.0);
-            let sum: f64 = lit
-                .map(|pair| (pair.image - pair.reference).abs() / pair.reference)
-                .sum();
-            Cell::Share(sum / m.pairs.len() as f64)
-        },
-    },
+    column("paper_rms", |m| {
+        let square = |pair: &crate::illumination::compare::TexelPair| (pair.image - pair.reference).powi(2);
+        m.pairs.iter().map(square).sum::<f64>().sqrt().into()
+    }),
+    column("paper_ard", |m| {
+        let lit = m.pairs.iter().filter(|pair| pair.reference > 0.0);
+        let sum: f64 = lit
+            .map(|pair| (pair.image - pair.reference).abs() / pair.reference)
+            .sum();
+        Cell::Share(sum / m.pairs.len() as f64)
+    }),
 ];
 
 pub(super) fn kernels(bench: &Bench) -> Result<Sweep> {
@@ -288,14 +265,9 @@ pub(super) fn kernels(bench: &Bench) -> Result<Sweep> {
                     sigma,
                     ..bench.at(paper(DENSITY_PER_SR), bench.side())
                 };
-                variants.push(Variant {
-                    sheet: Some(format!("kernels-{placement}-{size}")),
-                    ..Variant::new(
-                        vec![placement.into(), shape.into(), size.into()],
-                        &scene,
-                        settings,
-                    )
-                });
+                let labels = vec![placement.into(), shape.into(), size.into()];
+                let variant = Variant::new(labels, &scene, settings);
+                variants.push(variant.in_sheet(format!("kernels-{placement}-{size}")));
             }
         }
     }
@@ -492,14 +464,10 @@ pub(super) fn complex(bench: &Bench) -> Result<Sweep> {
     for &mesh in bench.some(&MESHES, 2) {
         let triangles = 2 * u64::from(mesh.0) * u64::from(mesh.1);
         let scene = knot(mesh);
-        let views = match mesh == MESHES[1] {
-            true => vec![("plate9".to_string(), scene.cameras[0].clone())],
-            false => Vec::new(),
-        };
-        variants.push(Variant {
-            views,
-            sheet: Some("complex-maps".into()),
-            ..Variant::new(vec![triangles.into()], &scene, settings.clone())
+        let variant = Variant::new(vec![triangles.into()], &scene, settings.clone()).in_sheet("complex-maps");
+        variants.push(match mesh == MESHES[1] {
+            true => variant.seen("plate9", &scene.cameras[0]),
+            false => variant,
         });
     }
     let finest = knot(if bench.quick { MESHES[2] } else { (88, 360) });
@@ -511,13 +479,7 @@ pub(super) fn complex(bench: &Bench) -> Result<Sweep> {
             against: Against::Bake(finest, Box::new(settings)),
             variants,
         }],
-        plots: &[Plot {
-            file: "complex",
-            x: "triangles",
-            y: "relative_rmse",
-            by: &[],
-            only: None,
-        }],
+        plots: const { &[Plot::new("complex", ["triangles", "relative_rmse"], &[])] },
         sheet_columns: 4,
         ..Sweep::default()
     })

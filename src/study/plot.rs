@@ -44,6 +44,23 @@ pub struct Curve {
 }
 
 impl Plot {
+    /// All rows of two columns, a curve for each value of some others.
+    pub const fn new(file: &'static str, [x, y]: [&'static str; 2], by: &'static [&'static str]) -> Self {
+        Self {
+            file,
+            x,
+            y,
+            by,
+            only: None,
+        }
+    }
+
+    /// Of the rows with that value in a column.
+    pub const fn only(mut self, column: &'static str, value: &'static str) -> Self {
+        self.only = Some((column, value));
+        self
+    }
+
     /// Whether the ordinate is an error, which is shown in per cent.
     pub fn shows_error(&self) -> bool {
         self.y.ends_with("rmse")
@@ -196,18 +213,11 @@ mod tests {
                 row("a", 2.0, Cell::Empty),
             ],
         };
-        let plot = Plot {
-            file: "",
-            x: "rays",
-            y: "rmse",
-            by: &["name"],
-            only: None,
-        };
+        let plot = Plot::new("", ["rays", "rmse"], &["name"]);
         let curves = plot.curves(&table);
         assert_eq!(curves.len(), 2);
         assert_eq!(curves[0].points, [(1.0, 0.2), (2.0, 0.1)]);
         assert_eq!(curves[1].points, [(1.0, 0.3)]);
-        let only = Some(("name", "a"));
-        assert_eq!(Plot { only, ..plot }.curves(&table).len(), 1);
+        assert_eq!(plot.only("name", "a").curves(&table).len(), 1);
     }
 }

@@ -1,10 +1,10 @@
 //! What maps are measured against: a file, the analytic maps of the built-in scenes, or a finer bake.
 
-use super::agreement::{TexelPair, caustic_luminance, pair_maps};
+use super::agreement::{caustic_luminance, pair_maps};
 use crate::error::{Error, Result};
 use crate::export::pfm;
 use crate::illumination::IlluminationMap;
-use crate::illumination::compare::{Grid, at_common_size};
+use crate::illumination::compare::{Grid, TexelPair, at_common_size};
 use crate::scene::Scene;
 use crate::settings::LayerKind;
 

@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 
-use super::agreement::{Agreement, TexelPair};
 use super::cost::{cost_of, slope};
 use super::picture::{self, Image, Picture};
 use super::plot::{Curve, Plot};
@@ -10,6 +9,7 @@ use super::references::{Reference, Truth, lit_side};
 use super::table::{Cell, Table};
 use crate::error::{Error, Result};
 use crate::export::picture::encode;
+use crate::illumination::compare::{Agreement, TexelPair};
 use crate::illumination::difference::{self, Difference};
 use crate::progress::{Control, Progress};
 use crate::scene::{Camera, Scene};
@@ -111,6 +111,20 @@ impl Variant {
         }
     }
 
+    /// Its map goes into a sheet.
+    #[must_use]
+    pub fn in_sheet(self, file: impl Into<String>) -> Self {
+        let sheet = Some(file.into());
+        Self { sheet, ..self }
+    }
+
+    /// The scene in the bake's light is seen from a camera.
+    #[must_use]
+    pub fn seen(mut self, file: impl Into<String>, camera: &Camera) -> Self {
+        self.views.push((file.into(), camera.clone()));
+        self
+    }
+
     fn caption(&self) -> String {
         let words: Vec<String> = self.labels.iter().map(Cell::rounded).collect();
         words.join(", ")
@@ -168,7 +182,8 @@ pub fn share(value: Option<f64>) -> Cell {
     value.map_or(Cell::Empty, Cell::Share)
 }
 
-const fn column(name: &'static str, value: fn(&Measured) -> Cell) -> Column {
+/// A column with its name.
+pub const fn column(name: &'static str, value: fn(&Measured) -> Cell) -> Column {
     Column { name, value }
 }
 

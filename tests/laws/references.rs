@@ -6,14 +6,14 @@ use std::sync::Arc;
 
 use nephroid::export::manifest::SceneSummary;
 use nephroid::export::pfm;
-use nephroid::illumination::compare::relative_rmse;
+use nephroid::illumination::compare::{Agreement, relative_rmse};
 use nephroid::illumination::parametrisation::DEFAULT_NOMINAL_SIDE;
 use nephroid::illumination::{IlluminationMap, Layer, parametrise};
 use nephroid::progress::Control;
 use nephroid::scene::Scene;
 use nephroid::scene::builtin::parts;
 use nephroid::settings::{BakeSettings, ErrorMetric, LayerKind};
-use nephroid::study::agreement::{Agreement, caustic_luminance, pair_maps};
+use nephroid::study::agreement::{caustic_luminance, pair_maps};
 use nephroid::study::brute_force::{brute_force, relative_noise};
 use nephroid::transport::Tracer;
 use serde::{Deserialize, Serialize};

@@ -8,6 +8,8 @@ use egui::{Button, ComboBox, EventFilter, Grid, Key, Response, RichText, Ui, vec
 use serde::Deserialize;
 use strum::{EnumMessage, VariantArray};
 
+use crate::settings::options::{OPTIONS, OptionInfo};
+
 /// Width of the control beside its label [points].
 pub const CONTROL_WIDTH: f32 = 186.0;
 /// Width of the label in front of it [points].
@@ -43,7 +45,21 @@ impl About {
     }
 }
 
-/// All that is told, by the labels of rows and by the names of buttons.
+impl From<&OptionInfo> for About {
+    fn from(option: &OptionInfo) -> Self {
+        Self {
+            what: option.what,
+            // Once for the whole run.
+            range: option.range().leak(),
+            default: option.default,
+            accuracy: option.accuracy,
+            cost: option.cost,
+        }
+    }
+}
+
+/// All that is told, by the labels of rows and by the names of buttons; rows of a bake's options stand beside its
+/// settings.
 #[derive(Deserialize)]
 struct Texts {
     #[serde(borrow)]
@@ -54,12 +70,19 @@ struct Texts {
 
 static TEXTS: LazyLock<Texts> = LazyLock::new(|| {
     let texts = include_str!("about.json");
-    serde_json::from_str(texts).expect("the file is part of the program")
+    let mut texts: Texts = serde_json::from_str(texts).expect("the file is part of the program");
+    texts
+        .rows
+        .extend(OPTIONS.iter().map(|option| (option.label, About::from(option))));
+    texts
 });
 
 /// What is told about the control of a label.
 pub fn about(label: &str) -> &'static About {
-    TEXTS.rows.get(label).expect("about.json tells about every row")
+    TEXTS
+        .rows
+        .get(label)
+        .expect("about.json or OPTIONS tells about every row")
 }
 
 /// What is told about a button.

@@ -3,13 +3,13 @@
 use std::sync::Arc;
 
 use glam::{DMat2, DVec2, DVec3};
-use nephroid::illumination::compare::{Grid, relative_rmse};
+use nephroid::illumination::compare::{Agreement, Grid, TexelPair, relative_rmse};
 use nephroid::illumination::{IlluminationMap, Layer};
 use nephroid::light_pass::ledger::EnergyLedger;
 use nephroid::optics::LinearSrgb;
 use nephroid::scene::{Mesh, Scene};
 use nephroid::settings::LayerKind;
-use nephroid::study::agreement::{Agreement, TexelPair, pair_maps};
+use nephroid::study::agreement::pair_maps;
 
 use super::{Baked, Case, number};
 use crate::tools::bits;

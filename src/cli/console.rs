@@ -1,0 +1,236 @@
+//! What a command runs with: results on stdout, everything else on stderr, signals as they come.
+
+use std::io::{ErrorKind, IsTerminal, Write};
+use std::process::ExitCode;
+use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use serde::Serialize;
+#[cfg(unix)]
+use signal_hook::consts::SIGXFSZ;
+use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::iterator::Signals;
+
+use nephroid::error::{Error, Result, Warning};
+use nephroid::progress::{Control, Progress, Stage};
+
+/// Exit codes are 128 + signal, as shells have it.
+const SIGNAL_BASE: u8 = 128;
+
+/// The streams, and the signals for as long as the process runs.
+#[derive(Debug)]
+pub struct Console {
+    /// No progress on stderr; warnings and errors stay.
+    quiet: bool,
+    /// Results as one JSON document.
+    pub json: bool,
+    control: Arc<Control>,
+    exit_code: Arc<AtomicU8>,
+}
+
+impl Console {
+    /// Starts listening to signals.
+    ///
+    /// # Errors
+    /// A system that refuses the handlers.
+    pub fn open(quiet: bool, json: bool) -> Result<Self> {
+        let refused = |error: std::io::Error| {
+            Error::failure(
+                "signals",
+                format!("no handler could be installed ({error})"),
+                "start the program from an ordinary shell",
+            )
+        };
+        let console = Self {
+            quiet,
+            json,
+            control: Arc::default(),
+            exit_code: Arc::default(),
+        };
+        // Else the system ends the process in the middle of a file; so the write fails, with a sentence.
+        #[cfg(unix)]
+        signal_hook::flag::register(SIGXFSZ, Arc::new(AtomicBool::new(false))).map_err(refused)?;
+        let mut signals = Signals::new([SIGINT, SIGTERM]).map_err(refused)?;
+        let (control, exit_code) = (console.control.clone(), console.exit_code.clone());
+        std::thread::Builder::new()
+            .name("signals".into())
+            .spawn(move || {
+                for signal in signals.forever() {
+                    let code = SIGNAL_BASE + u8::try_from(signal).unwrap_or(0);
+                    if exit_code.swap(code, Ordering::SeqCst) != 0 {
+                        std::process::exit(i32::from(code));
+                    }
+                    control.cancel();
+                }
+            })
+            .map_err(refused)?;
+        Ok(console)
+    }
+
+    /// What the first signal cancels.
+    pub fn control(&self) -> &Arc<Control> {
+        &self.control
+    }
+
+    /// Between two pieces of work: an error where a signal came.
+    ///
+    /// # Errors
+    /// Cancelled; `location` says during what.
+    pub fn check(&self, location: &str) -> Result<()> {
+        if self.control.is_cancelled() {
+            return Err(Error::cancelled(location));
+        }
+        Ok(())
+    }
+
+    /// Ends the process, with the code that a signal calls for or 0. What libraries tidy up at an ordinary end is left:
+    /// threads of graphics drivers may be at work on it.
+    #[cfg(feature = "viewer")]
+    pub fn leave(&self) -> ! {
+        signal_hook::low_level::exit(self.exit_code.load(Ordering::SeqCst).into())
+    }
+
+    /// The exit code that a signal calls for, if one came.
+    pub fn exit_code(&self) -> Option<ExitCode> {
+        match self.exit_code.load(Ordering::SeqCst) {
+            0 => None,
+            code => Some(ExitCode::from(code)),
+        }
+    }
+
+    /// Prints the result of a command: text for people, or the JSON document when that was asked for.
+    ///
+    /// # Errors
+    /// A stdout that cannot be written. A reader that went away is no error.
+    pub fn print_result(&self, text: &str, document: &impl Serialize) -> Result<()> {
+        if self.json {
+            let json = serde_json::to_string_pretty(document).map_err(|error| {
+                Error::failure(
+                    "stdout",
+                    format!("the result is not valid JSON ({error})"),
+                    "leave --json out",
+                )
+            })?;
+            print(&json)
+        } else {
+            print(text.trim_end())
+        }
+    }
+
+    /// Prints warnings to stderr.
+    pub fn warn(&self, warnings: &[Warning]) {
+        for warning in warnings {
+            print_stderr(&format!("warning: {warning}"));
+        }
+    }
+
+    /// Prints a line that people should see, but that is no result, to stderr.
+    pub fn note(&self, note: &str) {
+        print_stderr(note);
+    }
+
+    /// Shows the stage and how far it is, where a bar is wanted and can be shown.
+    pub fn bar(&self) -> StageBar {
+        let is_shown = !self.quiet && std::io::stderr().is_terminal();
+        let target = if is_shown {
+            ProgressDrawTarget::stderr_with_hz(REFRESH_HZ)
+        } else {
+            ProgressDrawTarget::hidden()
+        };
+        let bar = ProgressBar::with_draw_target(Some(0), target);
+        let style = "{prefix:8} {wide_bar} {percent:>3} %  {elapsed} (left {eta}) {msg}";
+        bar.set_style(ProgressStyle::with_template(style).unwrap_or_else(|_| ProgressStyle::default_bar()));
+        if is_shown {
+            bar.enable_steady_tick(Duration::from_millis(250));
+        }
+        StageBar {
+            bar,
+            stage: Mutex::new(None),
+        }
+    }
+}
+
+/// Prints to stdout with a newline at the end.
+///
+/// # Errors
+/// A stdout that cannot be written. A reader that went away is no error.
+pub fn print(text: &str) -> Result<()> {
+    let mut stdout = std::io::stdout().lock();
+    let written = writeln!(stdout, "{text}").and_then(|()| stdout.flush());
+    match written {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(Error::failure(
+            "stdout",
+            format!("the result could not be written ({error})"),
+            "make room or send it elsewhere",
+        )),
+        _ => Ok(()),
+    }
+}
+
+/// Prints an error to stderr as one line.
+pub fn print_error(error: &Error) {
+    print_stderr(&format!("error: {error}"));
+}
+
+/// One line on stderr, whatever line breaks and control characters came in with names from files. Where stderr cannot
+/// be written there is nobody left to tell.
+fn print_stderr(line: &str) {
+    let line: String = line
+        .chars()
+        .map(|c| if c.is_control() { ' ' } else { c })
+        .collect();
+    let _ = writeln!(std::io::stderr().lock(), "{line}");
+}
+
+/// Named values, one a line.
+pub fn in_lines(lines: &[(&str, String)]) -> String {
+    lines
+        .iter()
+        .map(|(name, value)| format!("{name:<9} {value}\n"))
+        .collect()
+}
+
+/// A size with its unit.
+pub fn bytes(count: u64) -> String {
+    match count {
+        0..1_000 => format!("{count} B"),
+        1_000..1_000_000 => format!("{:.1} kB", count as f64 / 1e3),
+        1_000_000..1_000_000_000 => format!("{:.1} MB", count as f64 / 1e6),
+        _ => format!("{:.2} GB", count as f64 / 1e9),
+    }
+}
+
+/// Redraws per second.
+const REFRESH_HZ: u8 = 10;
+
+/// A progress bar, cleared when it is dropped.
+pub struct StageBar {
+    bar: ProgressBar,
+    stage: Mutex<Option<Stage>>,
+}
+
+impl Progress for StageBar {
+    fn advance(&self, stage: Stage, done: u64, total: u64) {
+        if let Ok(mut current) = self.stage.lock()
+            && *current != Some(stage)
+        {
+            *current = Some(stage);
+            self.bar.set_prefix(stage.name());
+            self.bar.reset_eta();
+        }
+        self.bar.set_length(total);
+        self.bar.set_position(done);
+    }
+
+    fn expect(&self, line: &str) {
+        self.bar.set_message(line.to_string());
+    }
+}
+
+impl Drop for StageBar {
+    fn drop(&mut self) {
+        self.bar.finish_and_clear();
+    }
+}

@@ -1,0 +1,143 @@
+//! A scene that was loaded, and sessions with it.
+
+use std::borrow::Cow;
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Instant;
+
+use cpu_time::ProcessTime;
+use nephroid::error::{Error, Result, Warning};
+use nephroid::files;
+use nephroid::progress::Control;
+use nephroid::scene::{self, LoadOptions, Scene};
+use nephroid::session::{BakeResult, BakeSession, Timings};
+use nephroid::settings::BakeSettings;
+
+use super::console::{Console, StageBar, bytes};
+
+/// A scene, with clocks from the start of the run on and what they showed when it was loaded.
+pub struct LoadedScene {
+    pub scene: Arc<Scene>,
+    started: (Instant, ProcessTime),
+    load_s: (f64, f64),
+}
+
+impl LoadedScene {
+    /// Loads a scene and prints its warnings.
+    ///
+    /// # Errors
+    /// A scene that cannot be read, or has no light where it needs one.
+    pub fn load(source: &str, options: &LoadOptions, needs_light: bool, console: &Console) -> Result<Self> {
+        let started = (Instant::now(), ProcessTime::now());
+        let scene = Arc::new(scene::load(source, options)?);
+        if needs_light && scene.lights.is_empty() {
+            return Err(Error::failure(
+                source,
+                "the scene has no light",
+                "add one to the file, a sun with --default-light or a sky with --environment",
+            ));
+        }
+        console.warn(&scene.warnings);
+        let mut loaded = Self {
+            scene,
+            started,
+            load_s: (0.0, 0.0),
+        };
+        loaded.load_s = loaded.seconds();
+        Ok(loaded)
+    }
+
+    /// Wall-clock and CPU seconds since the start.
+    pub fn seconds(&self) -> (f64, f64) {
+        (
+            self.started.0.elapsed().as_secs_f64(),
+            self.started.1.elapsed().as_secs_f64(),
+        )
+    }
+
+    /// Works with the scene and a progress bar.
+    ///
+    /// # Errors
+    /// Those of the work; stopped before.
+    pub fn session<T>(
+        &self,
+        console: &Console,
+        work: impl FnOnce(&mut BakeSession, &StageBar, &Control) -> Result<T>,
+    ) -> Result<T> {
+        console.check(&self.scene.source)?;
+        let mut session = BakeSession::new(self.scene.clone())?;
+        work(&mut session, &console.bar(), console.control())
+    }
+
+    /// Bakes with no more memory for maps than there is room for, and prints the bake's warnings.
+    ///
+    /// # Errors
+    /// Those of [`BakeSession::bake`].
+    pub fn bake(&self, settings: &BakeSettings, console: &Console) -> Result<BakeResult> {
+        let settings = within_reach(settings, console);
+        let mut result = self.session(console, |session, bar, control| {
+            session.bake(&settings, bar, control)
+        })?;
+        console.warn(&result.warnings);
+        self.book(&mut result.timings_s, &mut result.cpu_s);
+        Ok(result)
+    }
+
+    /// Loading and all until now, on the wall and of the CPU.
+    pub fn book(&self, wall: &mut Timings, cpu: &mut Timings) {
+        (wall.load, cpu.load) = self.load_s;
+        (wall.total, cpu.total) = self.seconds();
+    }
+}
+
+/// More than the system says about a process [bytes].
+const MOST_BYTES: u64 = 1 << 16;
+
+/// Share of what is left that maps may take: as much again for rays, files and the system's own tables.
+const SHARE_OF_MAPS: u64 = 2;
+
+/// The settings with no more memory for maps than there is room for, with a warning where that is less than they ask.
+pub fn within_reach<'a>(settings: &'a BakeSettings, console: &Console) -> Cow<'a, BakeSettings> {
+    let most = left_bytes().map_or(u64::MAX, |left| left / SHARE_OF_MAPS);
+    if settings.memory_bytes <= most {
+        return Cow::Borrowed(settings);
+    }
+    console.warn(&[Warning::new(
+        "--memory",
+        format!(
+            "the system grants this process so little address space that maps may take {} and not {}",
+            bytes(most),
+            bytes(settings.memory_bytes)
+        ),
+        "raise the limit (ulimit -v) for finer maps",
+    )]);
+    Cow::Owned(BakeSettings {
+        memory_bytes: most,
+        ..settings.clone()
+    })
+}
+
+/// Address space that is granted and not taken yet [bytes]; `None` where it is not limited or the system does not tell.
+fn left_bytes() -> Option<u64> {
+    let read = |name: &str| {
+        let bytes = files::read_file(&Path::new("/proc/self").join(name), MOST_BYTES).ok()?;
+        String::from_utf8(bytes).ok()
+    };
+    let limit = granted_bytes(&read("limits")?)?;
+    Some(limit.saturating_sub(taken_bytes(&read("status")?)?))
+}
+
+/// The limit in the text of `/proc/PID/limits`; `None` where there is none.
+fn granted_bytes(limits: &str) -> Option<u64> {
+    let line = limits
+        .lines()
+        .find_map(|line| line.strip_prefix("Max address space"))?;
+    line.split_whitespace().next()?.parse().ok()
+}
+
+/// What is taken by the text of `/proc/PID/status`, in which it stands in KiB.
+fn taken_bytes(status: &str) -> Option<u64> {
+    let line = status.lines().find_map(|line| line.strip_prefix("VmSize:"))?;
+    let kibibytes: u64 = line.split_whitespace().next()?.parse().ok()?;
+    Some(kibibytes << 10)
+}

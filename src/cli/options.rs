@@ -1,0 +1,99 @@
+//! Options that several commands share.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use nephroid::error::{Error, Result};
+use nephroid::scene::LoadOptions;
+
+use super::bake_options;
+use super::values::{self, Exposure};
+
+/// Most worker threads.
+const MAX_THREADS: usize = 1024;
+
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Scene options")]
+pub struct SceneOptions {
+    /// Add a sun to a scene without light
+    #[arg(long)]
+    default_light: bool,
+    /// Take transmissive materials without a volume for solid glass, where their meshes are closed
+    #[arg(long)]
+    solid_glass: bool,
+    /// Surround the scene with an image of radiance in W/(m² sr), equirectangular, .hdr or .exr, and light it by that
+    #[arg(long, value_name = "FILE")]
+    environment: Option<PathBuf>,
+}
+
+impl SceneOptions {
+    /// How the scene is read; a command may add a sun unasked.
+    pub fn load_options(&self, adds_light: bool) -> LoadOptions {
+        LoadOptions {
+            solid_glass: self.solid_glass,
+            default_light: self.default_light || adds_light,
+            environment: self.environment.clone(),
+            ..LoadOptions::default()
+        }
+    }
+}
+
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Run options")]
+pub struct RunOptions {
+    /// Worker threads [default: one per core]
+    #[arg(long, value_name = "N")]
+    pub threads: Option<usize>,
+    /// No progress bar
+    #[arg(long)]
+    pub quiet: bool,
+    /// Print the result as one JSON document
+    #[arg(long)]
+    pub json: bool,
+    /// Neither read nor keep unwrapped texture coordinates in the user's cache folder
+    #[arg(long)]
+    pub no_cache: bool,
+    /// Log messages of this level and above to stderr
+    #[arg(long, value_name = "LEVEL", default_value = "off", value_parser = values::log_level())]
+    pub log: log::LevelFilter,
+}
+
+impl RunOptions {
+    /// Threads asked for; 0 = one per core.
+    ///
+    /// # Errors
+    /// None, or too many.
+    pub fn threads(&self) -> Result<usize> {
+        match self.threads {
+            None => Ok(0),
+            Some(threads) if (1..=MAX_THREADS).contains(&threads) => Ok(threads),
+            Some(threads) => Err(Error::usage(
+                "--threads",
+                format!("{threads} is outside 1 to {MAX_THREADS}"),
+                "give a number in that range",
+            )),
+        }
+    }
+}
+
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Picture options")]
+pub struct PictureOptions {
+    /// Camera of the file, by name or index [default: the first, or one that frames the scene]
+    #[arg(long, value_name = "NAME|INDEX")]
+    pub camera: Option<String>,
+    /// Stops by which radiance is multiplied before tone mapping, or `auto` [default: auto]
+    #[arg(long, value_name = "auto|STOPS", value_parser = values::exposure, allow_hyphen_values = true)]
+    pub exposure: Option<Exposure>,
+    /// Size of the window or picture
+    #[arg(long, value_name = "WxH", value_parser = values::picture_size, default_value = "1280x720")]
+    pub size: (u32, u32),
+}
+
+/// Maps that were baked before, instead of baking.
+#[derive(Debug, Args)]
+pub struct MapsOption {
+    /// Use the maps of this folder instead of baking
+    #[arg(long, value_name = "DIR", conflicts_with = bake_options::GROUP)]
+    pub maps: Option<PathBuf>,
+}

@@ -1,0 +1,235 @@
+//! Pictures of a scene in the light of its maps: which camera, by what, and how they are shown.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use clap::Args;
+use nephroid::effect::{Effect, EffectSwitches};
+use nephroid::error::{Error, Result};
+use nephroid::export::{map_reader, picture};
+use nephroid::eye_pass::reference::{self, ChainLimits, ReferenceSettings};
+use nephroid::eye_pass::{Picture, ToneMap, View, WhiteBalance, tone_mapping};
+use nephroid::files;
+use nephroid::illumination::IlluminationMap;
+use nephroid::optics::LinearSrgb;
+use nephroid::scene::{Camera, Scene};
+use nephroid::settings::BakeSettings;
+use nephroid::transport::Tracer;
+
+use super::console::Console;
+use super::loaded::LoadedScene;
+use super::options::PictureOptions;
+use super::values::{self, Exposure};
+
+/// What makes a picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Backend {
+    Gpu,
+    Cpu,
+}
+
+const BACKENDS: &[values::Named<Backend>] = &[
+    ("gpu", Backend::Gpu, "Raster on the graphics card"),
+    ("cpu", Backend::Cpu, "Reference ray tracer"),
+];
+
+/// How it is made and shown.
+#[derive(Debug, Default, Args)]
+pub struct EyeOptions {
+    /// How radiance becomes display colour [default: soft]
+    #[arg(long, value_parser = values::one_of::<ToneMap>())]
+    pub tone_map: Option<ToneMap>,
+    /// Which light is shown as white: the display's, the lamps', or light of a temperature or chromaticity
+    /// [default: none]
+    #[arg(long, value_name = "none|lamps|KELVIN|X,Y", value_parser = str::parse::<WhiteBalance>)]
+    pub white_balance: Option<WhiteBalance>,
+    /// What makes the picture [default: gpu where there is one, else cpu]
+    #[arg(long, value_parser = values::named(BACKENDS))]
+    pub backend: Option<Backend>,
+}
+
+/// Whether a picture file holds radiance [W/(m² sr)]; else display colours.
+///
+/// # Errors
+/// A name that ends neither in .png nor in .exr.
+pub fn holds_radiance(path: &Path) -> Result<bool> {
+    let extension = path.extension().unwrap_or_default();
+    match extension.to_string_lossy().to_lowercase().as_str() {
+        "png" => Ok(false),
+        "exr" => Ok(true),
+        _ => Err(Error::usage(
+            path.display().to_string(),
+            "a picture's name has to say its format",
+            "name a file that ends in .png or .exr",
+        )),
+    }
+}
+
+/// Maps that were baked before, or those of a bake that ran to its end: half-lit pictures are not made.
+///
+/// # Errors
+/// Those of a bake, or of [`map_reader::read`].
+pub fn maps(
+    folder: Option<&Path>,
+    settings: &BakeSettings,
+    loaded: &LoadedScene,
+    console: &Console,
+) -> Result<Vec<IlluminationMap>> {
+    let Some(folder) = folder else {
+        let result = loaded.bake(settings, console)?;
+        console.check(&loaded.scene.source)?;
+        return Ok(result.maps);
+    };
+    let (maps, warnings) = map_reader::read(folder, &loaded.scene)?;
+    console.warn(&warnings);
+    Ok(maps)
+}
+
+/// Samples across and down each pixel.
+const SAMPLES_PER_SIDE: u32 = 2;
+
+/// A picture that is written, and how it was made.
+pub struct MadePicture {
+    /// With the exposure that was used.
+    pub view: View,
+    /// The graphics card's name, or `cpu`.
+    pub made_by: String,
+}
+
+/// What is seen by the camera that is asked for.
+///
+/// # Errors
+/// No such camera.
+pub fn view(scene: &Scene, options: &PictureOptions, eye: &EyeOptions) -> Result<View> {
+    Ok(view_of(choose_camera(scene, options)?, options, eye))
+}
+
+/// What is seen by a camera, at no exposure yet.
+pub fn view_of(camera: Camera, options: &PictureOptions, eye: &EyeOptions) -> View {
+    let (width, height) = options.size;
+    View {
+        camera,
+        width,
+        height,
+        exposure_stops: 0.0,
+        tone_map: eye.tone_map.unwrap_or_default(),
+        background: LinearSrgb::BLACK,
+    }
+}
+
+/// Makes the picture, by the card where there is one and no other wish, and writes it; `effects` switch what the eye
+/// sees in mirrors and glass.
+///
+/// # Errors
+/// No such camera; a card that was asked for and is not there; a place that cannot be written; a signal.
+pub fn make(
+    scene: &Arc<Scene>,
+    maps: &[IlluminationMap],
+    effects: &EffectSwitches,
+    (options, eye): (&PictureOptions, &EyeOptions),
+    path: &Path,
+    console: &Console,
+) -> Result<MadePicture> {
+    let mut view = view(scene, options, eye)?;
+    console.check("picture")?;
+    let (picture, made_by) = match eye.backend {
+        Some(Backend::Cpu) => by_cpu(scene, maps, &view, effects, console)?,
+        Some(Backend::Gpu) => by_gpu(scene, maps, &view, effects)?,
+        None => match by_gpu(scene, maps, &view, effects) {
+            Ok(made) => made,
+            Err(error) => {
+                console.note(&format!("{error}: the CPU makes the picture"));
+                by_cpu(scene, maps, &view, effects, console)?
+            }
+        },
+    };
+    console.check("picture")?;
+    view.exposure_stops = match options.exposure {
+        Some(Exposure::Stops(stops)) => stops,
+        _ => tone_mapping::auto_exposure_stops(&picture),
+    };
+    let location = path.display().to_string();
+    let bytes = if holds_radiance(path)? {
+        picture::radiance_exr(&picture, &location)?
+    } else {
+        let white = eye.white_balance.unwrap_or_default().matrix(scene);
+        picture::display_png(&picture, view.exposure_stops, view.tone_map, &white, &location)?
+    };
+    files::write_atomically(path, |writer| writer.write_all(&bytes))?;
+    Ok(MadePicture { view, made_by })
+}
+
+fn by_cpu(
+    scene: &Arc<Scene>,
+    maps: &[IlluminationMap],
+    view: &View,
+    effects: &EffectSwitches,
+    console: &Console,
+) -> Result<(Picture, String)> {
+    let tracer = Tracer::new(scene.clone());
+    let settings = ReferenceSettings {
+        samples_per_side: SAMPLES_PER_SIDE,
+        limits: ChainLimits {
+            switch: effects.get(Effect::Chains),
+            ..ChainLimits::default()
+        },
+        ..ReferenceSettings::switched(effects.get(Effect::Dispersion))
+    };
+    let picture = reference::render(&tracer, maps, view, &settings, &console.bar(), console.control())?;
+    Ok((picture, "cpu".into()))
+}
+
+#[cfg(feature = "gpu")]
+fn by_gpu(
+    scene: &Scene,
+    maps: &[IlluminationMap],
+    view: &View,
+    effects: &EffectSwitches,
+) -> Result<(Picture, String)> {
+    use nephroid::eye_pass::renderer::render_counted;
+
+    let gpu = nephroid::gpu::Gpu::headless()?;
+    let (picture, _) = render_counted(&gpu, scene, maps, view, SAMPLES_PER_SIDE, effects)?;
+    Ok((picture, gpu.adapter_name()))
+}
+
+#[cfg(not(feature = "gpu"))]
+fn by_gpu(_: &Scene, _: &[IlluminationMap], _: &View, _: &EffectSwitches) -> Result<(Picture, String)> {
+    Err(Error::failure(
+        "--backend gpu",
+        "this program was built without the gpu feature",
+        "use --backend cpu",
+    ))
+}
+
+/// The camera of that name or index; without a wish the first, or one that frames the scene.
+pub fn choose_camera(scene: &Scene, options: &PictureOptions) -> Result<Camera> {
+    let Some(wish) = &options.camera else {
+        return Ok(scene
+            .cameras
+            .first()
+            .cloned()
+            .unwrap_or_else(|| framing_camera(scene, options.size)));
+    };
+    let by_name = scene.cameras.iter().find(|camera| camera.name == *wish);
+    let by_index = || {
+        wish.parse()
+            .ok()
+            .and_then(|index: usize| scene.cameras.get(index))
+    };
+    by_name.or_else(by_index).cloned().ok_or_else(|| {
+        let names: Vec<&str> = scene.cameras.iter().map(|camera| camera.name.as_str()).collect();
+        let remedy = if names.is_empty() {
+            "the scene has no camera: leave --camera out to see all of it".to_string()
+        } else {
+            format!("choose one of {} or an index from 0", names.join(", "))
+        };
+        Error::failure("--camera", format!("there is no camera {wish}"), remedy)
+    })
+}
+
+fn framing_camera(scene: &Scene, (width, height): (u32, u32)) -> Camera {
+    // An empty scene has nothing to frame: any box will do.
+    let bounds = scene.bounds().unwrap_or((-glam::DVec3::ONE, glam::DVec3::ONE));
+    Camera::framing("all", bounds, f64::from(width) / f64::from(height))
+}

@@ -1,0 +1,602 @@
+//! The options of a bake, a row each: what the command line and the panel say of them, their limits, and how their
+//! values are written.
+
+use std::str::FromStr;
+
+use strum::{EnumMessage, VariantArray};
+
+use super::{
+    BakeSettings, ErrorMetric, Estimator, Footprint, ItemBufferKind, Kernel, KernelSampling, LayerKind,
+    MAX_MAP_SIDE, MOST_WAVELENGTHS, MapResolution, Preset, RayPlacement, Sigma, SpectralSampling,
+    Wavelengths,
+};
+use crate::effect::{Effect, EffectSwitch};
+use crate::error::{Error, Result};
+
+/// An option of a bake.
+#[derive(Debug)]
+pub struct OptionInfo {
+    /// On the command line, without dashes.
+    pub name: &'static str,
+    /// The panel's, with its unit; empty where it has no control there.
+    pub label: &'static str,
+    /// Stands for a value, with its unit; empty where being named is all.
+    pub value: &'static str,
+    /// Whether several values can be named, separated by commas.
+    pub is_list: bool,
+    /// What it sets.
+    pub what: &'static str,
+    /// Its values; empty where their names say all.
+    range: &'static str,
+    /// What holds where it is not named.
+    pub default: &'static str,
+    /// What it does to accuracy.
+    pub accuracy: &'static str,
+    /// What it does to time and memory.
+    pub cost: &'static str,
+    /// Each value by name, and what it is; `None` of numbers and the like.
+    pub values: Option<Names>,
+    /// Least and most of numbers, and those that are set.
+    limits: Option<Limits>,
+    /// Whether it applies to the other settings; else why not, and what to do.
+    applies: fn(&BakeSettings) -> Applies,
+    /// Sets it to a value as it is written.
+    set: fn(&mut BakeSettings, &str) -> Read<()>,
+}
+
+/// What is wrong with a value where one cannot be read.
+type Read<T> = std::result::Result<T, String>;
+
+/// Names, and what they mean.
+type Names = fn() -> Vec<(&'static str, &'static str)>;
+
+type Limits = (f64, f64, fn(&BakeSettings) -> Vec<f64>);
+
+type Applies = std::result::Result<(), (&'static str, &'static str)>;
+
+/// What most rows have in common: no limits but those of how a value is written.
+const fn row(name: &'static str, label: &'static str, value: &'static str) -> OptionInfo {
+    OptionInfo {
+        name,
+        label,
+        value,
+        is_list: false,
+        what: "",
+        range: "",
+        default: "",
+        accuracy: "none",
+        cost: "none",
+        values: None,
+        limits: None,
+        applies: |_| Ok(()),
+        set: |_, _| Ok(()),
+    }
+}
+
+/// One of the values of an enumeration.
+const fn choice<T>(name: &'static str, label: &'static str, value: &'static str) -> OptionInfo
+where
+    T: VariantArray + EnumMessage + Into<&'static str> + Copy,
+{
+    OptionInfo {
+        values: Some(names::<T>),
+        ..row(name, label, value)
+    }
+}
+
+/// On where it is named.
+const fn flag(name: &'static str) -> OptionInfo {
+    row(name, "", "")
+}
+
+/// All of them, in the order of the command line's help.
+pub const OPTIONS: &[OptionInfo] = &[
+    OptionInfo {
+        what: "How carefully to bake: the target error, or the density of splats, by name",
+        range: "draft 10 %, preview 3 %, final 1 % of the error; splats 12,500, 100,000 and 800,000 rays/sr",
+        default: "preview, unless density, error or time is given",
+        accuracy: "as the name says, by the estimate",
+        cost: "preview takes some ten times as long as a draft, final some ten times as long as a preview",
+        ..choice::<Preset>("preset", "Preset", "PRESET")
+    },
+    OptionInfo {
+        what: "How light rays become irradiance",
+        default: "auto",
+        accuracy: "wavefront needs some hundred times fewer rays than splats for the same error",
+        cost: "grows with the number of rays; a wavefront ray costs a few times more than a splat",
+        set: |s, text| named(text).map(|estimator| s.estimator = estimator),
+        ..choice::<Estimator>("estimator", "Estimator", "ESTIMATOR")
+    },
+    OptionInfo {
+        what: "Light rays per steradian around each lamp, and no refinement: just that many, grain and all; with a target error, \
+               to begin with. For suns density/D² rays per m², D from the casters' centre to their farthest receiver",
+        range: "1 to 1e12",
+        default: "25,000 (photon: 1,000,000, splat: 100,000); with a target error 40 over it, from 1,600 to 40,000",
+        accuracy: "finer caustics and less noise with more rays; sigma's radius falls with its root",
+        cost: "time grows in proportion to it; four times as many keep the rays of the step before",
+        limits: Some((1.0, 1e12, |s| vec![s.density_per_sr])),
+        set: |s, text| number(text).map(|density| s.density_per_sr = density),
+        ..row("density", "Ray density [rays/sr]", "RAYS_PER_SR")
+    },
+    OptionInfo {
+        what: "Goes on until the estimated error of the maps is below this, such as 2% (not splat)",
+        range: "0.01% to 100%",
+        default: "that of the preset",
+        accuracy: "kept by the estimate, not by a reference",
+        cost: "halving it takes about four times the rays",
+        limits: Some((super::LEAST_MAX_ERROR, 1.0, |s| s.max_error.into_iter().collect())),
+        applies: refining,
+        set: |s, text| share(text).map(|error| s.max_error = Some(error)),
+        ..row("max-error", "Max error [%]", "SHARE")
+    },
+    OptionInfo {
+        what: "What that error is: as an eye sees it, relative to how bright a place is, or the relative RMSE over all maps (not \
+               splat)",
+        default: "visible",
+        accuracy: "by the relative RMSE a focus outweighs a room; as an eye sees it, each place counts as exposure shows it",
+        cost: "a small bright focus takes long by the relative RMSE, dim light by what is visible",
+        applies: refining,
+        set: |s, text| named(text).map(|metric| s.error_metric = metric),
+        ..choice::<ErrorMetric>("error-metric", "Error is", "METRIC")
+    },
+    OptionInfo {
+        what: "Ends the bake after so long, such as 10s, with the finest maps that are complete by then; without a target error, \
+               refines as far as that goes (not splat)",
+        range: "1ms to 1e7s",
+        default: "as long as it takes",
+        accuracy: "the finest maps that were complete are shown; their error is estimated",
+        cost: "so much time, unless the maps cannot become better",
+        limits: Some((1e-3, 1e7, |s| s.max_time_s.into_iter().collect())),
+        set: |s, text| seconds(text).map(|time_s| s.max_time_s = Some(time_s)),
+        ..row("max-time", "Max time [s]", "TIME")
+    },
+    OptionInfo {
+        what: "Where in its lattice cell a light ray starts (splat)",
+        default: "lattice",
+        accuracy: "a lattice converges faster, jittered rays turn regular patterns into noise",
+        cost: "the same",
+        applies: splats,
+        set: |s, text| named(text).map(|rays| s.rays = rays),
+        ..choice::<RayPlacement>("rays", "Rays", "PLACEMENT")
+    },
+    OptionInfo {
+        what: "Spread of a gaussian, weight exp(−r²/2σ), in squared radii of a ray's footprint at the density: of each splat, or \
+               of the finished map; adaptive, of splats, by how each footprint compares with the mean",
+        range: "0 to 1e4, splat above 0",
+        default: "0, none; splat 1",
+        accuracy: "small shows single rays (photon, splat) or is exact (wavefront), large blurs the caustic",
+        cost: "splat: time per ray grows in proportion to it; others: nothing is traced",
+        applies: |s| match s.kernel {
+            Kernel::Gaussian => Ok(()),
+            _ => Err(("only the gaussian kernel has a sigma", "--kernel gaussian")),
+        },
+        set: |s, text| text.parse().map(|sigma| s.sigma = sigma),
+        ..row("sigma", "Sigma [radii²]", "S|adaptive")
+    },
+    OptionInfo {
+        what: "Shape of a splat (splat)",
+        default: "gaussian",
+        accuracy: "gaussian is smoothest; disc and box show their edges",
+        cost: "gaussian touches the most texels",
+        applies: splats,
+        set: |s, text| named(text).map(|kernel| s.kernel = kernel),
+        ..choice::<Kernel>("kernel", "Kernel", "KERNEL")
+    },
+    OptionInfo {
+        what: "How a kernel is taken into texels (splat)",
+        default: "integrated",
+        accuracy: "points miss kernels that are smaller than texels",
+        cost: "nearly the same",
+        applies: splats,
+        set: |s, text| named(text).map(|sampling| s.kernel_sampling = sampling),
+        ..choice::<KernelSampling>("kernel-sampling", "", "SAMPLING")
+    },
+    OptionInfo {
+        what: "What sets the size and shape of a splat (splat)",
+        default: "ellipse",
+        accuracy: "ellipse follows the wavefront best, fixed least",
+        cost: "nearly the same for all",
+        applies: splats,
+        set: |s, text| named(text).map(|footprint| s.footprint = footprint),
+        ..choice::<Footprint>("footprint", "Footprint", "FOOTPRINT")
+    },
+    OptionInfo {
+        what: "Whether the noise of photons is filtered where that lowers the error (auto, photon)",
+        range: "on, off",
+        default: "on with a target, off at a density",
+        accuracy: "less noise, none of its grain",
+        cost: "little: no ray is traced",
+        set: |s, text| on_off(text).map(|filter| s.filter = Some(filter)),
+        ..row("filter", "", "on|off")
+    },
+    OptionInfo {
+        what: "How the sphere of directions around a light is divided when looking for glass and mirrors",
+        default: "equal",
+        accuracy: "equal cells give each ray the same flux; the cube's differ by a factor of up to 5.2",
+        cost: "nearly the same",
+        set: |s, text| named(text).map(|division| s.item_buffer = division),
+        ..choice::<ItemBufferKind>("item-buffer", "Item buffer", "DIVISION")
+    },
+    OptionInfo {
+        what: "Texels of every map: N by N, W by H, or as needed: maps of flat surfaces are finer where light is finer",
+        range: "auto, 1 to 16384 a side",
+        default: "auto",
+        accuracy: "details finer than a texel are averaged",
+        cost: "memory and the direct layer's time grow with its square",
+        limits: Some((1.0, MAX_MAP_SIDE as f64, |s| match s.map_resolution {
+            MapResolution::Auto => Vec::new(),
+            MapResolution::Fixed { width, height } => vec![width as f64, height as f64],
+        })),
+        set: |s, text| text.parse().map(|size| s.map_resolution = size),
+        ..row("map-resolution", "Map size [texels]", "auto|N|WxH")
+    },
+    OptionInfo {
+        what: "Largest number of glass, mirror and water surfaces on a light path",
+        range: "1 to 100,000",
+        default: "16 where all branches are followed, 256 by photons",
+        accuracy: "light beyond it is missing from the maps and booked as truncated",
+        cost: "little where light leaves the glass soon; light caught in a ring of mirrors takes time in proportion",
+        limits: Some((1.0, 100_000.0, |s| {
+            s.max_depth.map(f64::from).into_iter().collect()
+        })),
+        set: |s, text| number(text).map(|depth| s.max_depth = Some(depth)),
+        ..row("max-depth", "Max depth", "N")
+    },
+    OptionInfo {
+        what: "Where glass splits light, branches that carry less than this share of their light ray's flux are not followed",
+        range: "0 to 0.5",
+        default: "0.003 of the target error; 0.0001 without one",
+        accuracy: "what is left out is missing from the maps and booked as truncated",
+        cost: "a tenth of it follows about one more reflection inside each piece of glass",
+        limits: Some((0.0, 0.5, |s| s.branch_threshold.into_iter().collect())),
+        set: |s, text| number(text).map(|share| s.branch_threshold = Some(share)),
+        ..row("branch-threshold", "Weakest branch", "SHARE")
+    },
+    OptionInfo {
+        what: "Which light is baked. Caustic: light that met glass, mirrors or water. Direct: straight from the lights. Indirect: \
+               what diffuse surfaces send each other of both, any number of times",
+        range: "at least one",
+        default: "caustic for bake, caustic,direct for pictures and the window",
+        accuracy: "a layer that is not baked is missing from the picture; indirect stops at the max error, 3 % without one",
+        cost: "direct takes one shadow ray per texel and light; indirect 64 to 4,096 rays per texel of a coarser grid, and the other \
+               two layers though they be hidden; they are kept while only lamps are dimmed",
+        set: |s, text| {
+            s.layers = text.split(',').map(named).collect::<Read<_>>()?;
+            s.layers.sort_unstable();
+            s.layers.dedup();
+            Ok(())
+        },
+        is_list: true,
+        values: Some(names::<LayerKind>),
+        ..row("layers", "Layers", "LAYER,...")
+    },
+    OptionInfo {
+        what: "Adds each light's part of each layer to the files, so that lamps can be dimmed afterwards",
+        cost: "files and memory grow with the number of lights",
+        set: |s, _| {
+            s.per_light = true;
+            Ok(())
+        },
+        ..flag("per-light")
+    },
+    OptionInfo {
+        what: "Wavelengths of light that meets dispersive glass: the whole spectrum, one for each colour of the rainbow, or so \
+               many",
+        range: "1 to 1000, rainbow or continuous",
+        default: "continuous",
+        accuracy: "few show as separate images of the lamp",
+        cost: "each is traced",
+        limits: Some((1.0, MOST_WAVELENGTHS as f64, |s| match s.wavelengths {
+            Wavelengths::Fixed(count) => vec![f64::from(count)],
+            _ => Vec::new(),
+        })),
+        set: |s, text| text.parse().map(|wavelengths| s.wavelengths = wavelengths),
+        ..row("wavelengths", "", "continuous|rainbow|N")
+    },
+    OptionInfo {
+        what: "Every ray at every wavelength, or each ray at one of them",
+        default: "split; stochastic for splats over the whole spectrum",
+        accuracy: "stochastic rays are noisier",
+        cost: "split rays are traced once for each wavelength",
+        set: |s, text| named(text).map(|sampling| s.spectral_sampling = Some(sampling)),
+        ..choice::<SpectralSampling>("spectral-sampling", "", "SAMPLING")
+    },
+    OptionInfo {
+        what: "Adds the light of each wavelength to the files [W/(m² nm)], with --wavelengths N",
+        cost: "files and memory grow with the number of wavelengths",
+        set: |s, _| {
+            s.keep_spectrum = true;
+            Ok(())
+        },
+        ..flag("keep-spectrum")
+    },
+    OptionInfo {
+        what: "Forces effects on or off, such as refraction=off",
+        default: "auto, on where the scene calls for it",
+        accuracy: "light that an effect would bring is missing without it",
+        cost: "see `study effects`",
+        set: |s, text| {
+            // The last one counts where an effect is named twice.
+            for one in text.split(',') {
+                let (effect, switch) = effect_switch(one)?;
+                s.effects.set(effect, switch);
+            }
+            Ok(())
+        },
+        is_list: true,
+        ..row("effects", "", "NAME=auto|on|off")
+    },
+    OptionInfo {
+        what: "Seed of everything random",
+        default: "0",
+        set: |s, text| number(text).map(|seed| s.seed = seed),
+        ..row("seed", "", "N")
+    },
+    OptionInfo {
+        what: "Largest memory for maps, such as 512M or 2G; where it is short, maps are made coarser, with a warning",
+        range: "1M up",
+        default: "4G",
+        accuracy: "maps that are coarser average more",
+        cost: "a quarter of it keeps traced light for the next bake",
+        set: |s, text| memory(text).map(|bytes| s.memory_bytes = bytes),
+        ..row("memory", "", "SIZE")
+    },
+];
+
+fn splats(settings: &BakeSettings) -> Applies {
+    match settings.estimator.refines() {
+        false => Ok(()),
+        true => Err(("only the splat estimator has it", "add --estimator splat")),
+    }
+}
+
+fn refining(settings: &BakeSettings) -> Applies {
+    match settings.estimator.refines() {
+        true => Ok(()),
+        false => Err((
+            "the splat estimator does not refine towards a target",
+            "use --estimator auto",
+        )),
+    }
+}
+
+impl OptionInfo {
+    /// Its values, by name where nothing else is said of them.
+    pub fn range(&self) -> String {
+        match self.values {
+            Some(values) if self.range.is_empty() => {
+                let names: Vec<&str> = values().into_iter().map(|(name, _)| name).collect();
+                names.join(", ")
+            }
+            _ => self.range.into(),
+        }
+    }
+
+    /// Sets it to a value as it is written.
+    ///
+    /// # Errors
+    /// What can be written instead.
+    pub fn set(&self, settings: &mut BakeSettings, text: &str) -> Read<()> {
+        (self.set)(settings, text)
+    }
+
+    /// Refuses an option that was named and does not apply to what the others say.
+    ///
+    /// # Errors
+    /// A usage error that says why not.
+    pub fn check_applies(&self, settings: &BakeSettings) -> Result<()> {
+        (self.applies)(settings).map_err(|(what, remedy)| {
+            let option = format!("--{}", self.name);
+            let remedy = format!("leave {option} out or {remedy}");
+            Error::usage(option, what, remedy)
+        })
+    }
+
+    /// Refuses numbers outside its limits.
+    ///
+    /// # Errors
+    /// A usage error that names the option, its value and its range.
+    pub(super) fn check_limits(&self, settings: &BakeSettings) -> Result<()> {
+        let Some((least, most, of)) = self.limits else {
+            return Ok(());
+        };
+        let outside = of(settings)
+            .into_iter()
+            .find(|value| !(least..=most).contains(value));
+        match outside {
+            None => Ok(()),
+            Some(value) => Err(Error::usage(
+                format!("--{}", self.name),
+                format!("{value} is outside {}", self.range),
+                "give a number in that range",
+            )),
+        }
+    }
+}
+
+/// Names of an enumeration with what their documentation says.
+fn names<T: VariantArray + EnumMessage + Into<&'static str> + Copy>() -> Vec<(&'static str, &'static str)> {
+    let told = |value: &T| ((*value).into(), value.get_documentation().unwrap_or_default());
+    T::VARIANTS.iter().map(told).collect()
+}
+
+/// The variant of a name.
+///
+/// # Errors
+/// All names.
+pub fn named<T: VariantArray + Copy + Into<&'static str>>(name: &str) -> Read<T> {
+    let variants = T::VARIANTS.iter().copied();
+    let found = variants.clone().find(|variant| (*variant).into() == name);
+    found.ok_or_else(|| {
+        let names: Vec<&str> = variants.map(Into::into).collect();
+        format!("there is no {name}; there are {}", names.join(", "))
+    })
+}
+
+fn number<T: FromStr>(text: &str) -> Read<T> {
+    text.parse().map_err(|_| "give a number".into())
+}
+
+fn on_off(text: &str) -> Read<bool> {
+    match text {
+        "on" => Ok(true),
+        "off" => Ok(false),
+        _ => Err("give on or off".into()),
+    }
+}
+
+/// A number with one of some units, in the last of them.
+fn with_unit(text: &str, units: &[(&str, f64)]) -> Option<f64> {
+    units.iter().find_map(|(unit, factor)| {
+        let number: f64 = text.strip_suffix(unit)?.trim().parse().ok()?;
+        Some(number * factor)
+    })
+}
+
+/// `2%` or `0.02`.
+///
+/// # Errors
+/// Neither.
+pub fn share(text: &str) -> Read<f64> {
+    let number = match text.strip_suffix('%') {
+        Some(percent) => percent.trim().parse::<f64>().map(|percent| percent / 100.0),
+        None => text.parse(),
+    };
+    number.map_err(|_| "give a share such as 2% or 0.02".into())
+}
+
+/// `10s`, `500ms`, `2min`, `1h`, or seconds without a unit.
+fn seconds(text: &str) -> Read<f64> {
+    let units = [
+        ("ms", 1e-3),
+        ("min", 60.0),
+        ("m", 60.0),
+        ("h", 3600.0),
+        ("s", 1.0),
+        ("", 1.0),
+    ];
+    with_unit(text, &units).ok_or_else(|| "give a time such as 10s, 500ms or 2min".into())
+}
+
+/// Bytes with a binary suffix: `512M`, `2G`, `1.5G`.
+fn memory(text: &str) -> Read<u64> {
+    let power = |exponent| 1024_f64.powi(exponent);
+    let units = [
+        ("K", power(1)),
+        ("M", power(2)),
+        ("G", power(3)),
+        ("T", power(4)),
+        ("", 1.0),
+    ];
+    with_unit(&text.to_ascii_uppercase(), &units)
+        .filter(|bytes| (power(2)..1e18).contains(bytes))
+        .map(|bytes| bytes as u64)
+        .ok_or_else(|| "give at least 1M, as bytes or with K, M, G or T, such as 512M or 2G".into())
+}
+
+/// `refraction=off`.
+fn effect_switch(text: &str) -> Read<(Effect, EffectSwitch)> {
+    let names = || Effect::ALL.map(Effect::name).join(", ");
+    let (name, switch) = text.split_once('=').ok_or_else(|| {
+        let names = names();
+        format!("{text} is not of the form NAME=auto|on|off; NAME is one of {names}")
+    })?;
+    let effect = named(name).map_err(|_| format!("there is no effect {name}; there are {}", names()))?;
+    let switch = named(switch).map_err(|_| format!("{switch} is no switch; use auto, on or off"))?;
+    Ok((effect, switch))
+}
+
+impl FromStr for Sigma {
+    type Err = String;
+
+    /// `1.5` or `adaptive`.
+    fn from_str(text: &str) -> Read<Self> {
+        match text {
+            "adaptive" => Ok(Self::Adaptive),
+            number => number
+                .parse()
+                .map(Self::Constant)
+                .map_err(|_| "give a number or `adaptive`".into()),
+        }
+    }
+}
+
+impl FromStr for Wavelengths {
+    type Err = String;
+
+    /// `continuous`, `rainbow` or a number.
+    fn from_str(text: &str) -> Read<Self> {
+        match text {
+            "continuous" => Ok(Self::Continuous),
+            "rainbow" => Ok(Self::Rainbow),
+            number => number
+                .parse()
+                .map(Self::Fixed)
+                .map_err(|_| "give a number, `rainbow` or `continuous`".into()),
+        }
+    }
+}
+
+impl FromStr for MapResolution {
+    type Err = String;
+
+    /// `auto`, `N` (square) or `WxH` [texels].
+    fn from_str(text: &str) -> Read<Self> {
+        if text == "auto" {
+            return Ok(Self::Auto);
+        }
+        let (width, height) = text.split_once('x').unwrap_or((text, text));
+        let sides = width.parse().ok().zip(height.parse().ok());
+        sides
+            .map(|(width, height)| Self::Fixed { width, height })
+            .ok_or_else(|| "give `auto`, N or WxH in texels, such as 512 or 512x256".into())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_are_read_as_they_are_written() {
+        let fixed = |width, height| Ok(MapResolution::Fixed { width, height });
+        assert_eq!("auto".parse(), Ok(MapResolution::Auto));
+        assert_eq!("64".parse(), fixed(64, 64));
+        assert_eq!("64x32".parse(), fixed(64, 32));
+        for text in ["", "x", "64x", "-3", "1.5", "64x32x1", "big"] {
+            assert!(text.parse::<MapResolution>().is_err(), "{text}");
+        }
+        assert_eq!(memory("2G"), Ok(2 << 30));
+        assert_eq!(memory("1.5g"), Ok(3 << 29));
+        assert_eq!(memory("1048576"), Ok(1 << 20));
+        for text in ["", "G", "0", "-2G", "1K", "nan", "infG", "1e300"] {
+            assert!(memory(text).is_err(), "{text}");
+        }
+        assert_eq!("adaptive".parse(), Ok(Sigma::Adaptive));
+        assert_eq!("0.5".parse(), Ok(Sigma::Constant(0.5)));
+        assert!("wide".parse::<Sigma>().is_err());
+        for (text, time_s) in [
+            ("90", 90.0),
+            ("500ms", 0.5),
+            ("2min", 120.0),
+            ("5m", 300.0),
+            ("1h", 3600.0),
+        ] {
+            assert_eq!(seconds(text), Ok(time_s), "{text}");
+        }
+        assert!(seconds("soon").is_err());
+    }
+
+    #[test]
+    fn layers_are_named_once_and_in_order() {
+        let mut settings = BakeSettings::default();
+        let layers = OPTIONS
+            .iter()
+            .find(|option| option.name == "layers")
+            .expect("a row");
+        layers
+            .set(&mut settings, "direct,caustic,direct")
+            .expect("layers");
+        assert_eq!(settings.layers, [LayerKind::Caustic, LayerKind::Direct]);
+    }
+}
