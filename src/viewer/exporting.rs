@@ -74,7 +74,8 @@ impl Progress for Told {
 /// The thread, while there is one. Dropping it stops what is filmed and waits until files are whole.
 #[derive(Debug)]
 pub struct Exporter {
-    state: ExportState,
+    /// How the last export got on, as of the last [`poll`](Self::poll).
+    pub state: ExportState,
     running: Option<(JoinHandle<()>, Receiver<ExportState>)>,
     control: Arc<Control>,
     wake: Wake,
@@ -89,11 +90,6 @@ impl Exporter {
             control: Arc::default(),
             wake: Wake(wake),
         }
-    }
-
-    /// How the last export got on, as of the last [`poll`](Self::poll).
-    pub fn state(&self) -> &ExportState {
-        &self.state
     }
 
     /// Writes maps into a working folder. Does nothing while anything is written.

@@ -5,6 +5,7 @@ mod app;
 mod background;
 pub mod beside;
 pub mod brightest;
+pub mod command;
 pub mod debounce;
 pub mod difference_view;
 pub mod edits;

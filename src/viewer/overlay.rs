@@ -2,9 +2,9 @@
 
 use egui::{Align2, Color32, FontId, Rect, Ui, pos2, vec2};
 
+use super::model::Model;
+use super::panel::Quantity;
 use super::panel::control::short;
-use super::panel::{Facts, Quantity};
-use super::views::ScaleChoice;
 use super::worker::BakeState;
 use super::{error_view, wavelength_view};
 use crate::effect::Effect;
@@ -16,17 +16,12 @@ const TEXT: Color32 = Color32::from_gray(230);
 const SIZE: f32 = 16.0;
 
 /// Shows the picture in the space that is left, with what is to be told over it; returns where it lies.
-pub fn show(
-    ui: &mut Ui,
-    picture: egui::TextureId,
-    facts: &Facts<'_>,
-    (quantity, choice): (Quantity, &ScaleChoice),
-    notice: Option<&str>,
-) -> Rect {
+pub fn show(ui: &mut Ui, picture: egui::TextureId, model: &Model, notice: Option<&str>) -> Rect {
+    let (quantity, choice) = (model.quantity(), &model.choices.display.scale);
     let rect = ui.available_rect_before_wrap();
     let whole = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
     ui.painter().image(picture, rect, whole, Color32::WHITE);
-    let text = notice.map(str::to_owned).or_else(|| caveat(facts));
+    let text = notice.map(str::to_owned).or_else(|| caveat(model));
     if let Some(text) = text {
         let width = rect.width() - 48.0;
         let galley = ui.painter().layout(text, FontId::proportional(SIZE), TEXT, width);
@@ -38,16 +33,16 @@ pub fn show(
         );
         ui.painter().galley(place.min, galley, TEXT);
     }
-    match (quantity, facts.worth) {
+    match (quantity, model.worth.as_ref()) {
         (Quantity::Error, _) => error_legend(ui, rect),
         (Quantity::Difference, Some(worth)) => difference_legend(ui, rect, worth.effect),
         (Quantity::Irradiance, _) => {
             let title = format!("Irradiance of the light shown [{}]", choice.unit.symbol());
-            let scale = facts.survey.scale(quantity, choice);
+            let scale = model.survey.scale(quantity, choice);
             scale_legend(ui, rect, &title, &scale, choice.unit.per_w_m2());
         }
         (Quantity::TexelDensity, _) => {
-            let scale = facts.survey.scale(quantity, choice);
+            let scale = model.survey.scale(quantity, choice);
             scale_legend(ui, rect, "Texels per metre", &scale, 1.0);
         }
         (Quantity::Wavelength, _) => wavelength_legend(ui, rect),
@@ -144,16 +139,16 @@ fn legend(ui: &Ui, picture: Rect, title: &str, colour: &dyn Fn(f64) -> [u8; 3], 
 }
 
 /// Says why the picture is dark or coarse.
-fn caveat(facts: &Facts<'_>) -> Option<String> {
-    let is_dark = facts.layers.is_empty();
-    match facts.state {
+fn caveat(model: &Model) -> Option<String> {
+    let is_dark = model.layers().is_empty();
+    match &model.state {
         BakeState::Baking { stage, fraction, .. } if is_dark => {
             Some(format!("First look: {} {:.0} %", stage.name(), 100.0 * fraction))
         }
         BakeState::Failed(sentence) if is_dark => Some(sentence.clone()),
         BakeState::Cancelled if is_dark => Some("No light is baked yet: press R to bake.".into()),
         BakeState::Done if is_dark => Some("No light reaches a surface that could show it.".into()),
-        BakeState::Cancelled if facts.last.is_some_and(|last| !last.is_final) => {
+        BakeState::Cancelled if model.last.as_deref().is_some_and(|last| !last.is_final) => {
             Some("Coarse maps of a bake that was stopped: press R to bake.".into())
         }
         _ => None,

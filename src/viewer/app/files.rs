@@ -92,7 +92,6 @@ impl App {
 
     /// The window shows another scene than before, or the same read again.
     fn begin_scene(&mut self, purpose: Purpose) {
-        self.must_set_maps = true;
         if purpose == Purpose::Open {
             self.notice = dark_notice(&self.model);
             self.exposure = AutoExposure::new(!self.model.keeps_exposure());

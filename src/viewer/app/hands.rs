@@ -8,11 +8,11 @@ use winit::window::CursorGrabMode;
 use super::{App, PIXELS_PER_NOTCH};
 use crate::geometry::Ray;
 use crate::scene::Camera;
+use crate::viewer::command::{Command, FilmCommand};
 use crate::viewer::gizmo::{self, Held};
 use crate::viewer::input::{self, Shortcut};
 use crate::viewer::lens::Lens;
 use crate::viewer::navigation::Travel;
-use crate::viewer::panel::FilmWish;
 use serde_json::json;
 
 /// A press that moves farther than this before it is let go is no click [pixels].
@@ -44,8 +44,8 @@ impl App {
             // Nothing flies or bakes by a chord.
             if event.state.is_pressed() {
                 let undoes = input::undoes(&event.logical_key, self.modifiers.shift_key());
-                self.pressed.undo |= undoes == Some(true);
-                self.pressed.redo |= undoes == Some(false);
+                let step = undoes.map(|is_back| if is_back { Command::Undo } else { Command::Redo });
+                self.pressed.extend(step);
                 if let Key::Character(digit) = &event.logical_key
                     && let Some(number) = input::bookmark(digit)
                 {
@@ -79,10 +79,10 @@ impl App {
                 }
                 Some(Shortcut::Look) if self.looking_from.is_some() => self.stop_looking(),
                 Some(Shortcut::Look) => self.start_looking(),
-                Some(Shortcut::Probe) => self.model.panel.probes = !self.model.panel.probes,
+                Some(Shortcut::Probe) => self.model.choices.probes ^= true,
                 Some(Shortcut::RecordKey) => {
-                    self.pressed.film = Some(FilmWish::Record(None));
-                    let number = self.model.panel.film.keys.len() + 1;
+                    self.pressed.push(Command::Film(FilmCommand::Record(None)));
+                    let number = self.model.choices.film.keys.len() + 1;
                     self.notice = Some(format!("Key {number} of the camera's path is set here."));
                 }
                 Some(Shortcut::Bookmark(number)) => {
@@ -95,12 +95,14 @@ impl App {
                         self.notice = Some(format!("No view is kept as {key}: Ctrl+{key} keeps this one."));
                     }
                 }
-                Some(Shortcut::Rebake) => self.pressed.rebake = true,
-                Some(Shortcut::SavePicture) => self.pressed.save_picture = true,
-                Some(Shortcut::Help) => self.model.panel.help_open = !self.model.panel.help_open,
+                Some(Shortcut::Rebake) => self.pressed.push(Command::Rebake),
+                Some(Shortcut::SavePicture) => self.pressed.push(Command::SavePicture),
+                Some(Shortcut::Help) => self.panel.help_open ^= true,
                 Some(Shortcut::LetGo) if self.looking_from.is_some() => self.stop_looking(),
-                Some(Shortcut::LetGo) if self.model.panel.held().is_some() => self.model.panel.hold(None),
-                Some(Shortcut::LetGo) => self.pressed.cancel = true,
+                Some(Shortcut::LetGo) if self.model.choices.selection.held().is_some() => {
+                    self.model.choices.selection.hold(None);
+                }
+                Some(Shortcut::LetGo) => self.pressed.push(Command::Cancel),
                 None => {}
             }
         }
@@ -127,9 +129,12 @@ impl App {
         if !self.is_over_picture() || self.gizmo.is_hot() {
             return;
         }
-        if self.model.panel.probes {
+        if self.model.choices.probes {
             self.model.probe(self.gaze());
-        } else if let Some(gaze) = self.gaze().filter(|_| self.model.panel.placed_light().is_some()) {
+        } else if let Some(gaze) = self
+            .gaze()
+            .filter(|_| self.model.choices.selection.placed().is_some())
+        {
             self.model.begin_placing(gaze);
         } else {
             self.clicks_at = Some(self.pointer);
@@ -150,7 +155,7 @@ impl App {
             picture: self.picture_rect,
         };
         // Lights are marked only beside handles.
-        let marks = self.model.panel.held().is_some();
+        let marks = self.model.choices.selection.held().is_some();
         let light = gizmo::light_at(&lens, self.model.scene(), place).filter(|_| marks);
         match light {
             Some(light) => self.model.hold(Held::Light(light)),

@@ -158,28 +158,10 @@ impl Files {
         }
     }
 
-    /// What the panel tells of them.
-    pub fn facts(&self) -> FileFacts<'_> {
-        FileFacts {
-            loading: self.loader.of().map(|(source, _)| source.as_str()),
-            recent: self.recent.paths(),
-            refusal: self.refusal.as_deref(),
-            warning: self.warning.as_deref(),
-        }
-    }
-}
-
-/// What the panel tells of files.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct FileFacts<'a> {
     /// The scene that is being read.
-    pub loading: Option<&'a str>,
-    /// Files that were opened before, the newest first.
-    pub recent: &'a [PathBuf],
-    /// Why the last scene could not be opened.
-    pub refusal: Option<&'a str>,
-    /// What of what was kept could not be taken over.
-    pub warning: Option<&'a str>,
+    pub fn loading(&self) -> Option<&str> {
+        self.loader.of().map(|(source, _)| source.as_str())
+    }
 }
 
 /// The path that somebody typed or pasted: without space or quotation marks around it, `~/` for the home folder.

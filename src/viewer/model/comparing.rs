@@ -10,19 +10,15 @@ use crate::illumination::IlluminationMap;
 use crate::illumination::difference::Difference;
 use crate::scene::Scene;
 use crate::viewer::beside::Reference;
+use crate::viewer::command::CompareCommand;
 use crate::viewer::event_log;
-use crate::viewer::panel::{CompareWish, Quantity};
+use crate::viewer::panel::Quantity;
 use crate::viewer::worker::{BakedLevel, Worth};
 
 impl Model {
     /// What an effect adds to the maps that are shown or takes from them, where that was found.
     pub(super) fn difference(&self) -> Option<&Difference> {
         self.worth.as_ref()?.difference.as_ref().ok()
-    }
-
-    /// What the present maps are held against.
-    pub fn reference(&self) -> Option<&Reference> {
-        self.reference.as_ref()
     }
 
     /// The reference's maps as they are to be shown.
@@ -32,12 +28,12 @@ impl Model {
     }
 
     /// Begins or ends a comparison.
-    pub(super) fn compare_with(&mut self, wish: &CompareWish) {
+    pub(super) fn compare_with(&mut self, wish: &CompareCommand) {
         let scene = self.edits.scene();
         let reference = match wish {
-            CompareWish::Keep => Reference::kept(scene, self.maps()).map(Some),
-            CompareWish::Load(folder) => Reference::of_folder(folder, scene).map(Some),
-            CompareWish::End => Ok(None),
+            CompareCommand::Keep => Reference::kept(scene, self.maps()).map(Some),
+            CompareCommand::Load(folder) => Reference::of_folder(folder, scene).map(Some),
+            CompareCommand::End => Ok(None),
         };
         match reference {
             Ok(reference) => {
@@ -68,7 +64,7 @@ impl Model {
         }
         self.log.write("compared", event_log::compared(&worth));
         if worth.difference.is_ok() {
-            self.panel.display.quantity = Quantity::Difference;
+            self.choices.display.quantity = Quantity::Difference;
         }
         self.worth = Some(worth);
         true

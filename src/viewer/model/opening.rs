@@ -17,15 +17,14 @@ use crate::viewer::files::Purpose;
 use crate::viewer::files::keeper::Stamps;
 use crate::viewer::filming::Film;
 use crate::viewer::navigation::Navigator;
+use crate::viewer::panel::Selection;
 use crate::viewer::worker::BakedLevel;
 use serde_json::json;
 
 impl Model {
     /// Takes over what was kept of the first scene; what the command line says goes first.
     pub(super) fn begin(&mut self, options: &ViewerOptions) {
-        if options.files.watch {
-            self.panel.watch(true);
-        }
+        self.choices.watches |= options.files.watch;
         let what = Restored {
             settings: options.maps.is_none() && !options.files.settings_given,
             camera: options.camera.is_none(),
@@ -35,7 +34,6 @@ impl Model {
         let source = self.edits.loaded().source.clone();
         self.files.opened(&source);
         self.exposure_is_kept = self.find_again((!options.files.fresh).then_some(what));
-        self.seen = self.wanted();
     }
 
     /// Reads a scene, which takes the place of the present one when it is there: a path as it was typed, or
@@ -118,13 +116,13 @@ impl Model {
         self.files.opened(&scene.source);
         self.files.watch = None;
         self.navigator = Navigator::new(&scene, None);
-        self.panel.forget_selection();
-        self.panel.film = Film::default();
+        self.choices.selection = Selection::default();
+        self.choices.film = Film::default();
         self.player = None;
         self.picking = None;
         self.placing = Placing::default();
         self.sought = Sought::default();
-        self.panel.watch(false);
+        self.choices.watches = false;
         self.edits = EditedScene::new(scene);
         self.exposure_is_kept = self.find_again(Some(Restored::ALL));
         self.forget_maps();
@@ -156,10 +154,10 @@ impl Model {
 
     /// Bakes a scene of which there are no maps that would do.
     fn bake_first(&mut self) {
+        self.maps_revision += 1;
         self.refusal = None;
         self.worth = None;
-        self.debounce.clear();
-        self.seen = self.wanted();
+        self.settle();
         self.asked = None;
         self.rebake();
         // Where a setting is out of its range nothing was asked for, and nothing of before is to come.
@@ -175,7 +173,7 @@ impl Model {
     /// Watches the scene's files, or no longer, as the panel says.
     pub(super) fn watch(&mut self) {
         let source = &self.edits.loaded().source;
-        let wanted = self.panel.watches() && !source.starts_with("builtin:");
+        let wanted = self.choices.watches && !source.starts_with("builtin:");
         if !wanted {
             self.files.watch = None;
         } else if self.files.watch.is_none() {

@@ -96,7 +96,7 @@ impl Model {
     /// Gives handles to a light or an object.
     pub fn hold(&mut self, held: Held) {
         self.picking = None;
-        self.panel.hold(Some(held));
+        self.choices.selection.hold(Some(held));
         let scene = self.edits.scene();
         let name = match held {
             Held::Light(light) => &scene.lights[light].name,
@@ -108,7 +108,7 @@ impl Model {
     /// Steps back or forth until what has handles fills a picture of that aspect (width/height), or else the scene.
     pub fn frame(&mut self, aspect: f64) {
         let whole_m = self.navigator.radius_m();
-        let ball = match self.panel.held() {
+        let ball = match self.choices.selection.held() {
             Some(Held::Object(object)) => {
                 let bounds = self.scene().objects.get(object);
                 let bounds = bounds.and_then(|object| object.mesh.bounds());
@@ -137,7 +137,7 @@ impl Model {
         self.picking = None;
         match surfaces.closest_place(&gaze) {
             Some(place) => self.hold(Held::Object(place.object as usize)),
-            None => self.panel.hold(None),
+            None => self.choices.selection.hold(None),
         }
     }
 
@@ -176,7 +176,7 @@ impl Model {
 
     /// Takes the panel's light in the hand: as far before surfaces as it is now before that at which a gaze ends.
     fn take_light(&mut self, gaze: &Ray) -> Option<Hand> {
-        let placed = self.panel.placed_light()?;
+        let placed = self.choices.selection.placed()?;
         let (Placed::At(light) | Placed::Towards(light)) = placed;
         let position = self.scene().lights.get(light)?.kind.position();
         let surfaces = self.surfaces()?;

@@ -4,23 +4,25 @@ use std::path::PathBuf;
 
 use egui::{TextEdit, Ui};
 
-use super::control::{about_button, button};
-use super::{CompareWish, Facts, Wishes};
+use super::control::{about_button, ask, button};
+use super::{Command, CompareCommand, Model};
 
 /// What the field is called by assistive technology.
 const FOLDER: &str = "Folder to compare with";
 
 /// Shows the controls.
-pub fn show(ui: &mut Ui, folder: &mut String, facts: &Facts<'_>, wishes: &mut Wishes) {
+pub fn show(ui: &mut Ui, folder: &mut String, model: &Model, commands: &mut Vec<Command>) {
     ui.horizontal(|ui| {
-        let none = facts.layers.is_empty().then_some("There are no maps yet.");
-        if button(ui, "Keep as before", none) {
-            wishes.compare = Some(CompareWish::Keep);
-        }
-        let none = facts.reference.is_none().then_some("Nothing is compared now.");
-        if button(ui, "End comparison", none) {
-            wishes.compare = Some(CompareWish::End);
-        }
+        let none = model.layers().is_empty().then_some("There are no maps yet.");
+        let keep = Command::Compare(CompareCommand::Keep);
+        ask(ui, "Keep as before", none, commands, keep);
+        let none = model
+            .reference
+            .as_ref()
+            .is_none()
+            .then_some("Nothing is compared now.");
+        let end = Command::Compare(CompareCommand::End);
+        ask(ui, "End comparison", none, commands, end);
     });
     ui.horizontal(|ui| {
         let field = TextEdit::singleline(folder)
@@ -34,10 +36,12 @@ pub fn show(ui: &mut Ui, folder: &mut String, facts: &Facts<'_>, wishes: &mut Wi
         let is_clicked = button(ui, "Compare", none);
         let is_entered = field.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter));
         if (is_clicked || is_entered) && none.is_none() {
-            wishes.compare = Some(CompareWish::Load(PathBuf::from(folder.trim())));
+            commands.push(Command::Compare(CompareCommand::Load(PathBuf::from(
+                folder.trim(),
+            ))));
         }
     });
-    if let Some(reference) = facts.reference {
+    if let Some(reference) = model.reference.as_ref() {
         ui.label(reference.told());
     }
 }

@@ -8,6 +8,8 @@ use egui::{Button, ComboBox, EventFilter, Grid, Key, Response, RichText, Ui, vec
 use serde::Deserialize;
 use strum::{EnumMessage, VariantArray};
 
+use super::Command;
+
 /// Width of the control beside its label [points].
 pub const CONTROL_WIDTH: f32 = 186.0;
 /// Width of the label in front of it [points].
@@ -76,6 +78,13 @@ pub fn button(ui: &mut Ui, name: &str, why_not: Option<&str>) -> bool {
         .on_hover_text(about_button(name))
         .on_disabled_hover_text(why_not.unwrap_or_default())
         .clicked()
+}
+
+/// A button that asks for something, greyed where there is a reason why not.
+pub fn ask(ui: &mut Ui, name: &str, why_not: Option<&str>, commands: &mut Vec<Command>, command: Command) {
+    if button(ui, name, why_not) {
+        commands.push(command);
+    }
 }
 
 /// A grid of label, control and what sets it back.

@@ -3,10 +3,11 @@
 use egui::{DragValue, Response, Slider, SliderClamping, Ui};
 
 use super::control::{CONTROL_WIDTH, about, choice, counted, pick, row, rows, setting, short};
-use super::{Display, Facts, LayerShown, Quantity, Wishes, bake};
+use super::{Command, Display, LayerShown, Model, Quantity, bake};
 use crate::eye_pass::{ToneMap, WhiteBalance};
 use crate::optics::spectrum::temperature::CAMERA_KELVIN;
 use crate::settings::LayerKind;
+use crate::viewer::error_view;
 use crate::viewer::views::{IrradianceUnit, ScaleChoice};
 
 const AUTO_EXPOSURE: &str = "Measures the present picture and sets the exposure once, so that brightness stays \
@@ -48,8 +49,8 @@ const LEAST_RATIO: f64 = 1.01;
 const DAYLIGHT_KELVIN: f64 = 6504.0;
 
 /// Shows the section.
-pub fn show(ui: &mut Ui, display: &mut Display, facts: &Facts<'_>, wishes: &mut Wishes) {
-    let baked = facts.layers;
+pub fn show(ui: &mut Ui, display: &mut Display, model: &Model, commands: &mut Vec<Command>) {
+    let baked = &model.layers()[..];
     rows(ui, "display", |ui| {
         row(ui, "Exposure [stops]", None, |ui| {
             ui.horizontal(|ui| {
@@ -57,7 +58,9 @@ pub fn show(ui: &mut Ui, display: &mut Display, facts: &Facts<'_>, wishes: &mut 
                 ui.spacing_mut().slider_width = 74.0;
                 let slider = exposure(ui, &mut display.exposure_stops);
                 let auto = ui.button("Auto").on_hover_text(AUTO_EXPOSURE);
-                wishes.measure_exposure |= auto.clicked();
+                if auto.clicked() {
+                    commands.push(Command::MeasureExposure);
+                }
                 slider
             })
             .inner
@@ -75,15 +78,15 @@ pub fn show(ui: &mut Ui, display: &mut Display, facts: &Facts<'_>, wishes: &mut 
             layer(ui, shown, baked)
         });
         let shown = (&mut display.quantity, &default.quantity);
-        setting(ui, "View", nothing, shown, |ui, shown| quantity(ui, shown, facts));
+        setting(ui, "View", nothing, shown, |ui, shown| quantity(ui, shown, model));
         if display.quantity == Quantity::Irradiance {
             let chosen = (&mut display.scale, &default.scale);
             setting(ui, "Scale", None, chosen, scale);
-            row(ui, "From, to", None, |ui| range(ui, &mut display.scale, facts));
+            row(ui, "From, to", None, |ui| range(ui, &mut display.scale, model));
         }
     });
-    if facts.survey.faults > 0 {
-        let told = counted(facts.survey.faults, "texel");
+    if model.survey.faults > 0 {
+        let told = counted(model.survey.faults, "texel");
         ui.colored_label(
             bake::ATTENTION,
             format!("{told} without a finite value, shown in magenta."),
@@ -174,10 +177,10 @@ const VIEWS: [(Quantity, &str); 10] = [
     ),
 ];
 
-fn quantity(ui: &mut Ui, shown: &mut Quantity, facts: &Facts<'_>) -> Response {
-    let has_difference = facts.worth.is_some_and(|worth| worth.difference.is_ok());
+fn quantity(ui: &mut Ui, shown: &mut Quantity, model: &Model) -> Response {
+    let has_difference = model.worth.as_ref().is_some_and(|worth| worth.difference.is_ok());
     let why_not = |kind: Quantity| match kind {
-        Quantity::Error if !facts.has_errors => Some(NO_ERRORS),
+        Quantity::Error if !error_view::is_available(model.maps()) => Some(NO_ERRORS),
         Quantity::Difference if !has_difference => Some(NO_DIFFERENCE),
         _ => None,
     };
@@ -203,14 +206,14 @@ fn scale(ui: &mut Ui, choice: &mut ScaleChoice) -> Response {
     .response
 }
 
-fn range(ui: &mut Ui, choice: &mut ScaleChoice, facts: &Facts<'_>) -> Response {
+fn range(ui: &mut Ui, choice: &mut ScaleChoice, model: &Model) -> Response {
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 5.0;
         ui.checkbox(&mut choice.is_automatic, "auto")
             .on_hover_text(about("From, to").range);
         let factor = choice.unit.per_w_m2();
         if choice.is_automatic {
-            let scale = facts.survey.scale(Quantity::Irradiance, choice);
+            let scale = model.survey.scale(Quantity::Irradiance, choice);
             let [low, high] = [scale.low, scale.high].map(|end| short(end * factor));
             ui.label(format!("{low} to {high} {}", choice.unit.symbol()));
         } else {

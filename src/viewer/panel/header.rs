@@ -2,28 +2,33 @@
 
 use egui::{Align, Button, Label, Layout, RichText, Ui};
 
-use super::{Facts, Panel, Wishes, bake, file};
+use super::{Choices, Command, Model, bake, file};
 
 /// Shows the header.
-pub fn show(ui: &mut Ui, panel: &mut Panel, facts: &Facts<'_>, wishes: &mut Wishes) {
+pub fn show(ui: &mut Ui, choices: &mut Choices, model: &Model, commands: &mut Vec<Command>) {
     ui.horizontal(|ui| {
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             ui.spacing_mut().item_spacing.x = 4.0;
-            wishes.redo |= step(ui, ("↷", "Redo (Ctrl+Y)"), ("Does again", facts.redo));
-            wishes.undo |= step(ui, ("↶", "Undo (Ctrl+Z)"), ("Takes back", facts.undo));
+            let history = model.edits().history();
+            if step(ui, ("↷", "Redo (Ctrl+Y)"), ("Does again", history.next_redo())) {
+                commands.push(Command::Redo);
+            }
+            if step(ui, ("↶", "Undo (Ctrl+Z)"), ("Takes back", history.next_undo())) {
+                commands.push(Command::Undo);
+            }
             ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
-                let name = Label::new(RichText::new(&facts.scene.name).heading()).truncate();
-                ui.add(name).on_hover_text(&facts.scene.source);
+                let name = Label::new(RichText::new(&model.scene().name).heading()).truncate();
+                ui.add(name).on_hover_text(&model.scene().source);
             });
         });
     });
-    bake::show(ui, panel, facts, wishes);
-    if facts.lost_device {
+    bake::show(ui, choices, model, commands);
+    if model.picture.lost_device {
         let told = "The graphics device was lost and came back; nothing else was.";
         ui.colored_label(bake::ATTENTION, told);
     }
-    file::show_state(ui, facts);
-    if let Some(refusal) = facts.refusal {
+    file::show_state(ui, model);
+    if let Some(refusal) = model.refusal.as_deref() {
         ui.colored_label(bake::FAILED, refusal);
     }
 }

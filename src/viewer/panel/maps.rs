@@ -9,7 +9,7 @@ use egui::{Button, ColorImage, Image, RichText, ScrollArea, TextureHandle, Textu
 use super::bake::two_digits;
 use super::control::{bytes, counted};
 use super::effects::COUNTER;
-use super::{Facts, Panel, Wishes, export};
+use super::{Command, Model, export};
 use crate::illumination::{IlluminationMap, Side};
 use crate::session::BYTES_PER_TEXEL;
 use crate::viewer::exporting::Export;
@@ -47,22 +47,22 @@ impl std::fmt::Debug for Browser {
 }
 
 /// Shows the section.
-pub fn show(ui: &mut Ui, panel: &mut Panel, facts: &Facts<'_>, wishes: &mut Wishes) {
-    let Panel {
-        maps: browser,
-        maps_folder,
-        ..
-    } = panel;
-    browser.keep_up(facts);
-    if facts.maps.is_empty() {
+pub fn show(
+    ui: &mut Ui,
+    (browser, maps_folder): (&mut Browser, &str),
+    model: &Model,
+    commands: &mut Vec<Command>,
+) {
+    browser.keep_up(model);
+    if model.maps().is_empty() {
         ui.label(RichText::new("There are no maps yet.").weak());
         return;
     }
     ui.horizontal(|ui| {
-        let texels: usize = facts.maps.iter().map(|map| map.chart.texel_count()).sum();
+        let texels: usize = model.maps().iter().map(|map| map.chart.texel_count()).sum();
         let memory = bytes(texels as u64 * BYTES_PER_TEXEL);
-        ui.label(format!("{} in {memory}", counted(facts.maps.len(), "map")));
-        export::all(ui, "Export all", maps_folder, facts, wishes);
+        ui.label(format!("{} in {memory}", counted(model.maps().len(), "map")));
+        export::all(ui, "Export all", maps_folder, model, commands);
     });
     let mut still_to_make = MOST_AT_ONCE;
     // What stands below is not to be far away.
@@ -71,9 +71,9 @@ pub fn show(ui: &mut Ui, panel: &mut Panel, facts: &Facts<'_>, wishes: &mut Wish
         .max_height(MOST_HEIGHT)
         .auto_shrink([false, true]);
     list.show(ui, |ui| {
-        for (index, map) in facts.maps.iter().enumerate() {
+        for (index, map) in model.maps().iter().enumerate() {
             ui.push_id(index, |ui| {
-                entry(ui, browser, (index, map), facts, wishes, &mut still_to_make)
+                entry(ui, browser, (index, map), model, commands, &mut still_to_make)
             });
         }
     });
@@ -83,21 +83,21 @@ pub fn show(ui: &mut Ui, panel: &mut Panel, facts: &Facts<'_>, wishes: &mut Wish
 }
 
 /// Shows the map that was chosen, in a window over the picture.
-pub fn show_large(ui: &Ui, browser: &mut Browser, facts: &Facts<'_>) {
-    browser.keep_up(facts);
+pub fn show_large(ui: &Ui, browser: &mut Browser, model: &Model) {
+    browser.keep_up(model);
     let Some(large) = &mut browser.large else {
         return;
     };
-    let map = facts.maps.get(large.map());
-    if !map.is_some_and(|map| large.show(ui, map, &name(map, facts))) {
+    let map = model.maps().get(large.map());
+    if !map.is_some_and(|map| large.show(ui, map, &name(map, model))) {
         browser.large = None;
     }
 }
 
 impl Browser {
     /// Forgets pictures of other maps than those that are shown.
-    fn keep_up(&mut self, facts: &Facts<'_>) {
-        let made_of = facts.last.map(|last| (last.serial, last.level));
+    fn keep_up(&mut self, model: &Model) {
+        let made_of = model.last.as_deref().map(|last| (last.serial, last.level));
         if made_of != self.made_of {
             self.made_of = made_of;
             self.thumbnails.clear();
@@ -112,11 +112,11 @@ fn entry(
     ui: &mut Ui,
     browser: &mut Browser,
     (index, map): (usize, &IlluminationMap),
-    facts: &Facts<'_>,
-    wishes: &mut Wishes,
+    model: &Model,
+    commands: &mut Vec<Command>,
     still_to_make: &mut usize,
 ) {
-    let name = name(map, facts);
+    let name = name(map, model);
     ui.horizontal(|ui| {
         let texture = thumbnail(ui, browser, (index, map), still_to_make);
         let size = vec2(THUMBNAIL, THUMBNAIL);
@@ -132,14 +132,14 @@ fn entry(
         ui.vertical(|ui| {
             ui.set_width(ui.available_width());
             ui.horizontal(|ui| {
-                let reason = export::unavailable(facts);
+                let reason = export::unavailable(model);
                 let one = ui.add_enabled(reason.is_none(), Button::new("Export").small());
                 let one = one.accessible_name(format!("Export map of {name}"));
                 let one = one
                     .on_hover_text(ONE)
                     .on_disabled_hover_text(reason.unwrap_or_default());
                 if one.clicked() {
-                    wishes.export = Some(Export::Map(index));
+                    commands.push(Command::Export(Export::Map(index)));
                 }
                 ui.add(egui::Label::new(RichText::new(&name).strong()).truncate());
             });
@@ -158,8 +158,8 @@ fn figures(map: &IlluminationMap) -> String {
 }
 
 /// The object's name, and which of its sides where that is the back.
-fn name(map: &IlluminationMap, facts: &Facts<'_>) -> String {
-    let object = facts.scene.objects.get(map.chart.object());
+fn name(map: &IlluminationMap, model: &Model) -> String {
+    let object = model.scene().objects.get(map.chart.object());
     let name = object.map_or("surface", |object| object.name.as_str());
     match map.chart.receiver.side() {
         Side::Front => name.to_owned(),

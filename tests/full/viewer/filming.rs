@@ -43,9 +43,9 @@ fn frames_are_written_and_can_be_stopped() {
         of_thread.fetch_add(1, Ordering::SeqCst);
     }));
     exporter.film(shooting(3), folder.path().to_owned());
-    assert_eq!(*exporter.state(), ExportState::Filming { done: 0, total: 3 });
+    assert_eq!(exporter.state, ExportState::Filming { done: 0, total: 3 });
     wait_for("the film", || exporter.poll());
-    let path = match exporter.state() {
+    let path = match &exporter.state {
         ExportState::Done(path) => path.clone(),
         ExportState::Failed(sentence) if sentence.contains("adapter") => {
             return support::skip("frames from the window", sentence);
@@ -73,8 +73,8 @@ fn frames_are_written_and_can_be_stopped() {
     exporter.stop();
     wait_for("the end", || exporter.poll());
     assert!(
-        matches!(exporter.state(), ExportState::Failed(_)),
+        matches!(exporter.state, ExportState::Failed(_)),
         "{:?}",
-        exporter.state()
+        exporter.state
     );
 }
