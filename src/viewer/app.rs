@@ -15,20 +15,21 @@ use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoopProxy};
 use winit::keyboard::ModifiersState;
 use winit::window::WindowId;
 
+use self::drawing::WarmUp;
+use super::background::Wake;
 use super::command::Command;
 use super::exposure::AutoExposure;
 use super::files::{Choice, Dialog};
-use super::frame_times::{FrameTimes, sum_ms};
 use super::gizmo::Gizmo;
 use super::graphics::{Graphics, RETRY_AFTER, Shown};
-use super::interface::Painting;
+use super::interface::{Painting, accessibility};
 use super::lens::Lens;
 use super::model::{MapsShown, Model};
 use super::overlay;
 use super::pace::Pace;
 use super::panel::Panel;
-use super::warm_up::WarmUp;
-use super::{ViewerOptions, accessibility, beside, probe, sketching};
+use super::timing::{FrameTimes, sum_ms};
+use super::{ViewerOptions, beside, probe, sketching};
 use crate::error::{Error, Result};
 use crate::eye_pass::renderer::MapStyle;
 use crate::illumination::IlluminationMap;
@@ -152,10 +153,11 @@ impl App {
             let _ = of_baker.send_event(News::Baker);
         };
         let model = Model::new(options, wake.clone())?;
+        let wake = &Wake::new(wake);
         Ok(Self {
             exposure: AutoExposure::new(options.exposure_stops.is_none() && !model.keeps_exposure()),
             exposed: Instant::now(),
-            warm_up: WarmUp::new(Arc::new(wake.clone())),
+            warm_up: WarmUp::new(wake),
             notice: files::dark_notice(&model),
             shown: model.maps_shown(),
             model,
@@ -184,7 +186,7 @@ impl App {
             rested_at: 0,
             reports_due: 0,
             modifiers: ModifiersState::empty(),
-            dialog: Dialog::new(Arc::new(wake)),
+            dialog: Dialog::new(wake),
             failure: None,
         })
     }

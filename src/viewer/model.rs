@@ -1,37 +1,34 @@
 //! Everything that the window shows and does, without the window.
 
-mod comparing;
 mod filming;
 mod keeping;
 mod opening;
 mod picking;
 mod seeking;
+mod showing;
 
-use std::borrow::Cow;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+pub use self::showing::MapsShown;
+use super::ViewerOptions;
+use super::background::Wake;
 use super::beside::Reference;
 use super::command::{Choices, Command};
-use super::debounce::Debounce;
 use super::edits::{EditedScene, Part};
 use super::event_log::{self, EventLog};
 use super::exporting::{Export, Exporter};
 use super::files::keeper::Keeper;
 use super::files::{Files, working_folder};
 use super::filming::Player;
-use super::frame_times::FrameTimes;
-use super::latency::Latencies;
 use super::navigation::{Navigator, Travel};
-use super::panel::{LayerShown, Quantity};
 use super::probe::{Probed, Prober};
 use super::sketching::Sketcher;
-use super::solid::{Solid, Surroundings};
+use super::timing::{FrameTimes, Latencies};
 use super::views::MapSurvey;
+use super::walking::{Solid, Surroundings};
 use super::worker::{BakeRequest, BakeState, BakedLevel, Worker, Worth};
-use super::{ViewerOptions, difference_view, error_view, wavelength_view};
 use crate::error::Result;
-use crate::eye_pass::renderer::MapStyle;
 use crate::geometry::Ray;
 use crate::illumination::IlluminationMap;
 use crate::light_pass::explain::Limits;
@@ -39,10 +36,12 @@ use crate::light_pass::sketch::{Sketch, SketchLimits};
 use crate::plan::EffectLine;
 use crate::scene::{Edit, Scene};
 use crate::session::BakeSession;
-use crate::settings::{BakeSettings, LayerKind};
+use crate::settings::BakeSettings;
 use crate::transport::Tracer;
 use serde_json::{Value, json};
 
+/// Quiet time after the last change before it is baked.
+pub const QUIET: Duration = Duration::from_millis(150);
 /// Rays that a probe may take for each place of a light.
 const MOST_PROBE_RAYS: u64 = 3_000_000;
 
@@ -74,7 +73,8 @@ pub struct Model {
     pub worth: Option<Worth>,
     /// Maps that were baked before the start; until the first bake.
     pub given: Vec<IlluminationMap>,
-    debounce: Debounce,
+    /// When a change is baked unless another one follows.
+    bake_due: Option<Instant>,
     /// Counts changes of what a bake depends on.
     revision: u64,
     /// The last one that was waited for, or asked for.
@@ -132,15 +132,6 @@ pub struct PictureReport {
     pub lost_device: bool,
 }
 
-/// Which maps the picture shows, and how.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct MapsShown {
-    revision: u64,
-    layer: LayerShown,
-    /// What of them.
-    pub quantity: Quantity,
-}
-
 impl Model {
     /// Starts the baking thread, and a bake unless there are maps. `wake` is called when the thread has news.
     ///
@@ -148,19 +139,18 @@ impl Model {
     /// The event log cannot be written; the system gives no thread.
     pub fn new(options: &ViewerOptions, wake: impl Fn() + Send + Sync + 'static) -> Result<Self> {
         let scene = Arc::clone(&options.scene);
-        let wake: Arc<dyn Fn() + Send + Sync> = Arc::new(wake);
-        let wake_too = Arc::clone(&wake);
-        let worker = Worker::spawn(BakeSession::new, move || wake_too())?;
+        let wake = &Wake::new(wake);
+        let worker = Worker::spawn(BakeSession::new, wake)?;
         let wanted = BakeRequest::new(Arc::clone(&scene), options.settings.clone());
         let mut model = Self {
             navigator: Navigator::new(&scene, options.camera.as_deref()),
             choices: Choices::new(options.settings.clone()),
             log: EventLog::open(options.event_log.as_deref())?,
             worker,
-            exporter: Exporter::new(Arc::clone(&wake)),
-            surroundings: Surroundings::new(Arc::clone(&wake)),
-            prober: Prober::new(Arc::clone(&wake)),
-            sketcher: Sketcher::new(Arc::clone(&wake)),
+            exporter: Exporter::new(wake),
+            surroundings: Surroundings::new(wake),
+            prober: Prober::new(wake),
+            sketcher: Sketcher::new(wake),
             reference: None,
             picking: None,
             placing: picking::Placing::default(),
@@ -173,7 +163,7 @@ impl Model {
             last: None,
             worth: None,
             given: options.maps.clone().unwrap_or_default(),
-            debounce: Debounce::default(),
+            bake_due: None,
             revision: 0,
             seen: 0,
             asked: options.maps.is_some().then_some((0, wanted)),
@@ -241,149 +231,13 @@ impl Model {
     /// When something is to be done though nothing happens.
     pub fn due(&self) -> Option<Instant> {
         let keeper = self.files.keeper.as_ref();
-        let dues = [self.debounce.due(), keeper.and_then(Keeper::due)];
+        let dues = [self.bake_due, keeper.and_then(Keeper::due)];
         dues.into_iter().flatten().min()
     }
 
     /// Maps with every layer that was baked; empty before the first bake.
     pub fn maps(&self) -> &[IlluminationMap] {
         self.last.as_ref().map_or(&self.given, |last| &last.result.maps)
-    }
-
-    /// Layers of the present maps.
-    pub fn layers(&self) -> Vec<LayerKind> {
-        let mut kinds: Vec<_> = self
-            .maps()
-            .iter()
-            .flat_map(|map| &map.layers)
-            .map(|layer| layer.kind)
-            .collect();
-        kinds.sort_unstable();
-        kinds.dedup();
-        kinds
-    }
-
-    /// What the picture shows: the light where the panel asks for what there is not.
-    pub fn quantity(&self) -> Quantity {
-        match self.choices.display.quantity {
-            Quantity::Error if error_view::is_available(self.maps()) => Quantity::Error,
-            Quantity::Difference if self.difference().is_some() => Quantity::Difference,
-            Quantity::Error | Quantity::Difference => Quantity::Light,
-            other => other,
-        }
-    }
-
-    /// Whether direct light is to be traced and not looked up: it is shown, and its layer is not baked yet, or a light or
-    /// an object was moved since.
-    pub fn traces_lights(&self) -> bool {
-        let shown = matches!(
-            self.choices.display.layer,
-            LayerShown::All | LayerShown::Only(LayerKind::Direct)
-        );
-        let Some(last) = self
-            .last
-            .as_ref()
-            .filter(|_| shown && self.quantity() == Quantity::Light)
-        else {
-            return false;
-        };
-        let is_asked_for = last.request.settings.layers.contains(&LayerKind::Direct);
-        if self.layers().contains(&LayerKind::Direct) {
-            is_other_light(&last.request.scene, self.scene())
-        } else {
-            is_asked_for && !last.is_final
-        }
-    }
-
-    /// The maps without their direct light.
-    pub fn maps_without_direct(&self) -> Vec<IlluminationMap> {
-        let mut maps = self.shown_maps().into_owned();
-        for map in &mut maps {
-            map.layers.retain(|layer| layer.kind != LayerKind::Direct);
-        }
-        maps.retain(|map| !map.layers.is_empty());
-        maps
-    }
-
-    /// The maps as the panel asks them to be shown: some layers, the errors, or what an effect is worth.
-    pub fn shown_maps(&self) -> Cow<'_, [IlluminationMap]> {
-        self.as_shown(self.maps())
-    }
-
-    /// Some maps of the scene as the panel asks them to be shown.
-    fn as_shown<'a>(&self, maps: &'a [IlluminationMap]) -> Cow<'a, [IlluminationMap]> {
-        self.with_quantity(maps, self.quantity())
-    }
-
-    /// Some maps of the scene, of the layer that the panel asks for, with a quantity in them.
-    fn with_quantity<'a>(
-        &self,
-        maps: &'a [IlluminationMap],
-        quantity: Quantity,
-    ) -> Cow<'a, [IlluminationMap]> {
-        // Until the next maps come, an edit may have made a receiver clear, or a mirror.
-        let receives = |map: &&IlluminationMap| {
-            let scene = self.scene();
-            let object = scene.objects.get(map.chart.object());
-            object.is_none_or(|object| scene.materials[object.material].surface.is_receiver())
-        };
-        let in_colours = match quantity {
-            Quantity::Wavelength => Some(wavelength_view::maps(&self.with_quantity(maps, Quantity::Light))),
-            Quantity::Error => Some(error_view::maps(maps)),
-            Quantity::Difference => self.difference().map(difference_view::maps),
-            _ => None,
-        };
-        if let Some(maps) = in_colours {
-            return Cow::Owned(maps.into_iter().filter(|map| receives(&map)).collect());
-        }
-        let LayerShown::Only(kind) = self.choices.display.layer else {
-            return if maps.iter().all(|map| receives(&map)) {
-                Cow::Borrowed(maps)
-            } else {
-                Cow::Owned(maps.iter().filter(receives).cloned().collect())
-            };
-        };
-        let with_kind = maps.iter().filter(receives).filter_map(|map| {
-            let irradiance = map.layer(kind)?.irradiance.clone();
-            Some(IlluminationMap::of_layer(
-                Arc::clone(&map.chart),
-                kind,
-                irradiance,
-            ))
-        });
-        Cow::Owned(with_kind.collect())
-    }
-
-    /// The maps' light, whatever the picture shows in its place.
-    fn lit_maps(&self) -> Cow<'_, [IlluminationMap]> {
-        self.with_quantity(self.maps(), Quantity::Light)
-    }
-
-    /// Maps as they are to be shown next, looked at as a whole, with what their values stand for.
-    pub fn maps_to_show(&mut self, without_direct: bool) -> (Vec<IlluminationMap>, MapStyle) {
-        let maps = if without_direct {
-            self.maps_without_direct()
-        } else {
-            self.shown_maps().into_owned()
-        };
-        self.survey = MapSurvey::of(&maps);
-        (maps, self.map_style())
-    }
-
-    /// What the values of the maps that are shown stand for.
-    pub fn map_style(&self) -> MapStyle {
-        let quantity = self.quantity();
-        let choice = &self.choices.display.scale;
-        quantity.map_style(self.survey.scale(quantity, choice))
-    }
-
-    /// Which maps the picture is to show, and how.
-    pub fn maps_shown(&self) -> MapsShown {
-        MapsShown {
-            revision: self.maps_revision,
-            layer: self.choices.display.layer,
-            quantity: self.quantity(),
-        }
     }
 
     /// Asks what lights the surface along a ray; forgets what was asked without one.
@@ -544,13 +398,14 @@ impl Model {
         let of_window = of_window.collect();
         self.watch();
         if std::mem::replace(&mut self.seen, self.revision) != self.revision {
-            self.debounce.change(now);
+            self.bake_due = Some(now + QUIET);
         }
         if !self.choices.automatic {
-            self.debounce.clear();
+            self.bake_due = None;
         }
-        let is_ripe = self.debounce.due().is_some() && self.has_answered();
-        if (self.debounce.is_due(now) || is_ripe) && self.is_changed() {
+        let is_ripe = self.bake_due.is_some() && self.has_answered();
+        let has_rested = self.bake_due.take_if(|due| now >= *due).is_some();
+        if (has_rested || is_ripe) && self.is_changed() {
             self.rebake();
         }
         self.keep(now);
@@ -695,15 +550,6 @@ impl Model {
     /// No change waits to be baked.
     fn settle(&mut self) {
         self.seen = self.revision;
-        self.debounce.clear();
+        self.bake_due = None;
     }
-}
-
-/// Whether a scene is lit otherwise than before: a lamp is another one, or an object elsewhere.
-fn is_other_light(before: &Arc<Scene>, now: &Arc<Scene>) -> bool {
-    let meshes = |scene: &Arc<Scene>| -> Vec<_> {
-        let objects = scene.objects.iter();
-        objects.map(|object| Arc::as_ptr(&object.mesh)).collect()
-    };
-    !Arc::ptr_eq(before, now) && (before.lights != now.lights || meshes(before) != meshes(now))
 }

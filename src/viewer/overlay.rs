@@ -2,11 +2,11 @@
 
 use egui::{Align2, Color32, FontId, Rect, Ui, pos2, vec2};
 
+use super::false_colours::{self, ERROR_RANGE, RANGE_NM};
 use super::model::Model;
 use super::panel::Quantity;
 use super::panel::control::short;
 use super::worker::BakeState;
-use super::{error_view, wavelength_view};
 use crate::effect::Effect;
 use crate::illumination::difference_colours;
 use crate::illumination::false_colours::{ColourScale, viridis};
@@ -52,14 +52,14 @@ pub fn show(ui: &mut Ui, picture: egui::TextureId, model: &Model, notice: Option
 }
 
 fn wavelength_legend(ui: &Ui, picture: Rect) {
-    let (low, high) = wavelength_view::RANGE_NM;
+    let (low, high) = RANGE_NM;
     let at = |share: f64| Nanometres(low + (high - low) * share);
     let marks = (0..=6).map(|mark| f64::from(mark) / 6.0);
     let marks: Vec<_> = marks
         .map(|share| (share, format!("{:.0}", at(share).0)))
         .collect();
     let colour = |share: f64| {
-        let linear = wavelength_view::colour(at(share)).to_array();
+        let linear = false_colours::wavelength_colour(at(share)).to_array();
         linear.map(|channel| (255.0 * LinearSrgb::encode_channel(channel)).round() as u8)
     };
     legend(
@@ -82,7 +82,7 @@ fn scale_legend(ui: &Ui, picture: Rect, title: &str, scale: &ColourScale, factor
 }
 
 fn error_legend(ui: &Ui, picture: Rect) {
-    let (low, high) = error_view::RANGE;
+    let (low, high) = ERROR_RANGE;
     let at = |share: f64| low * (high / low).powf(share);
     let marks = (0..=3).map(|mark| f64::from(mark) / 3.0);
     // Without what rounding leaves.
@@ -90,7 +90,13 @@ fn error_legend(ui: &Ui, picture: Rect) {
         .map(|share| (share, format!("{} %", (1e5 * at(share)).round() / 1e3)))
         .collect();
     let title = "Estimated error of each texel, in % of its map's mean irradiance";
-    legend(ui, picture, title, &|share| error_view::colour(at(share)), &marks);
+    legend(
+        ui,
+        picture,
+        title,
+        &|share| false_colours::error_colour(at(share)),
+        &marks,
+    );
 }
 
 fn difference_legend(ui: &Ui, picture: Rect, effect: Effect) {

@@ -6,13 +6,12 @@ use egui::{Color32, Painter, Stroke, pos2};
 use glam::DVec3;
 use serde_json::{Value, json};
 
-use super::background::Background;
+use super::background::{Background, Task, Wake};
 use super::lens::Lens;
 use crate::geometry::Ray;
 use crate::illumination::{IlluminationMap, Side};
 use crate::light_pass::explain::{Explanation, LightPath, Limits, Target, explain};
 use crate::optics::{LinearSrgb, luminance};
-use crate::progress::Control;
 use crate::settings::LayerKind;
 use crate::transport::{MediumStack, SurfaceHit, Tracer, media_at};
 use crate::units::LUMENS_PER_WATT;
@@ -218,8 +217,8 @@ pub struct Prober {
 }
 
 impl Prober {
-    /// Asks nothing yet; `wake` is called from another thread when there is something.
-    pub fn new(wake: Arc<dyn Fn() + Send + Sync>) -> Self {
+    /// Asks nothing yet; the window is woken when there is something.
+    pub fn new(wake: &Wake) -> Self {
         Self {
             gaze: None,
             is_due: false,
@@ -264,7 +263,7 @@ impl Prober {
         if let (Some(target), Some(texel)) = (target, &probed.texel) {
             let scale = scale_w_m2(maps, &target, texel);
             let tracer = Arc::clone(tracer);
-            let search = move |control: &Control| explain(&tracer, &target, limits, scale, control);
+            let search = move |task: &Task| explain(&tracer, &target, limits, scale, &task.control);
             if let Err(error) = self.coming.start((), search) {
                 log::warn!("{error}");
             }

@@ -3,19 +3,24 @@
 use std::sync::Arc;
 use std::time::Instant;
 
+use serde_json::json;
+
 use super::{App, BesideShown, MOST_REPORTS, MapsOnDevice};
 use crate::effect::{Effect, EffectSwitch};
 use crate::error::Result;
-use crate::eye_pass::renderer::{GpuMs, Uploaded};
+use crate::eye_pass::renderer::{EyeQuality, GpuMs, Renderer, Uploaded};
 use crate::eye_pass::{ToneMap, View, WhiteBalance};
+use crate::gpu::Gpu;
 use crate::optics::LinearSrgb;
 use crate::optics::spectrum::xyz::Matrix3;
 use crate::plan;
+use crate::scene::Scene;
 use crate::scene::load::was_dark;
-use crate::viewer::frame_times::Made;
+use crate::viewer::background::{Background, Wake};
+use crate::viewer::graphics::{FORMAT, Making, SAMPLES, texture};
 use crate::viewer::model::Model;
 use crate::viewer::panel::{Display, Quantity};
-use serde_json::json;
+use crate::viewer::timing::Made;
 
 /// What is seen behind scenes that came without light, before tone mapping [1]: their glass and metal would be as black as
 /// what they show. It lights nothing.
@@ -46,7 +51,6 @@ impl App {
         };
         let wanted = self.chains_switch();
         let chains = self.warm_up.switch(wanted);
-        let dispersion = self.model.choices.settings.effects.get(Effect::Dispersion);
         let white_balance = self.white_balance();
         let Some(graphics) = &mut self.graphics else {
             return Ok(());
@@ -101,9 +105,11 @@ impl App {
         }
         let is_compiling = wanted != EffectSwitch::Off && chains == EffectSwitch::Off;
         graphics.set_stand_in(is_compiling && !self.model.maps().is_empty());
-        graphics.set_chains(chains)?;
-        graphics.set_dispersion(dispersion);
-        graphics.set_white_balance(&white_balance);
+        graphics.set_making(Making {
+            chains,
+            dispersion: self.model.choices.settings.effects.get(Effect::Dispersion),
+            white_balance,
+        })?;
         // Measuring the exposure and drawing would take them in without a word.
         if let Some(ms) = graphics.take_times() {
             if let Some(quality) = graphics.counts().timed_quality {
@@ -270,4 +276,71 @@ impl App {
     pub(super) fn chains_switch(&self) -> EffectSwitch {
         self.model.choices.settings.effects.get(Effect::Chains)
     }
+}
+
+/// Pixels across of the picture that shaders are compiled for.
+const WARM_UP_WIDTH: u32 = 64;
+
+/// Whether mirrors and glass may be drawn: what they take is compiled beside the window, seconds where the driver has it in
+/// no cache. A device of its own draws the view once, small. Drivers compile at the latest then, and keep what they compiled
+/// for every device.
+#[derive(Debug)]
+pub struct WarmUp {
+    work: Background<(), Result<()>>,
+    is_lit: bool,
+    is_done: bool,
+}
+
+impl WarmUp {
+    /// Nothing is compiled; the window is woken when it is.
+    pub fn new(wake: &Wake) -> Self {
+        Self {
+            work: Background::new("shaders", wake),
+            is_lit: false,
+            is_done: false,
+        }
+    }
+
+    /// Begins with the second picture of light, so that the first one waits for nothing.
+    pub fn begin(&mut self, scene: &Arc<Scene>, view: &View, quality: EyeQuality) {
+        let was_lit = std::mem::replace(&mut self.is_lit, true);
+        if !was_lit || self.is_done || self.is_coming() {
+            return;
+        }
+        let scene = Arc::clone(scene);
+        let view = View {
+            width: WARM_UP_WIDTH,
+            height: (WARM_UP_WIDTH * view.height).div_ceil(view.width),
+            ..view.clone()
+        };
+        let started = self.work.start((), move |_| draw_once(&scene, &view, quality));
+        self.is_done = started.is_err();
+    }
+
+    /// Whether it is under way.
+    pub fn is_coming(&self) -> bool {
+        self.work.of().is_some()
+    }
+
+    /// How chains are switched in the window, where `wanted` is asked for.
+    pub fn switch(&mut self, wanted: EffectSwitch) -> EffectSwitch {
+        if let Some((_, outcome)) = self.work.take() {
+            self.is_done = true;
+            if let Some(Err(error)) = outcome {
+                log::warn!("shaders could not be compiled beside the window: {error}");
+            }
+        }
+        if self.is_done { wanted } else { EffectSwitch::Off }
+    }
+}
+
+fn draw_once(scene: &Scene, view: &View, quality: EyeQuality) -> Result<()> {
+    let gpu = Gpu::headless()?;
+    let mut renderer = Renderer::new(&gpu, scene, FORMAT, SAMPLES)?;
+    renderer.set_quality(quality);
+    let target = texture(&gpu.device, [view.width, view.height]);
+    let mut encoder = gpu.device.create_command_encoder(&Default::default());
+    renderer.draw(&gpu, &mut encoder, &target, view)?;
+    gpu.queue.submit([encoder.finish()]);
+    gpu.wait()
 }

@@ -1,8 +1,9 @@
 //! Keys and mouse.
 
+use serde_json::json;
 use winit::dpi::PhysicalPosition;
 use winit::event::{ElementState, KeyEvent, MouseButton, MouseScrollDelta};
-use winit::keyboard::{Key, NamedKey, PhysicalKey};
+use winit::keyboard::{Key, KeyCode, NamedKey, PhysicalKey};
 use winit::window::CursorGrabMode;
 
 use super::{App, PIXELS_PER_NOTCH};
@@ -10,10 +11,8 @@ use crate::geometry::Ray;
 use crate::scene::Camera;
 use crate::viewer::command::{Command, FilmCommand};
 use crate::viewer::gizmo::{self, Held};
-use crate::viewer::input::{self, Shortcut};
 use crate::viewer::lens::Lens;
-use crate::viewer::navigation::Travel;
-use serde_json::json;
+use crate::viewer::navigation::{BOOKMARKS, HeldKeys, Travel};
 
 /// A press that moves farther than this before it is let go is no click [pixels].
 const CLICK_PIXELS: f64 = 4.0;
@@ -43,11 +42,11 @@ impl App {
         if self.modifiers.control_key() || self.modifiers.super_key() {
             // Nothing flies or bakes by a chord.
             if event.state.is_pressed() {
-                let undoes = input::undoes(&event.logical_key, self.modifiers.shift_key());
+                let undoes = undoes(&event.logical_key, self.modifiers.shift_key());
                 let step = undoes.map(|is_back| if is_back { Command::Undo } else { Command::Redo });
                 self.pressed.extend(step);
                 if let Key::Character(digit) = &event.logical_key
-                    && let Some(number) = input::bookmark(digit)
+                    && let Some(number) = bookmark(digit)
                 {
                     self.model.navigator.set_bookmark(number);
                     self.model
@@ -63,13 +62,13 @@ impl App {
             }
         }
         if let PhysicalKey::Code(code) = event.physical_key
-            && input::hold(&mut self.model.navigator.keys, code, event.state)
+            && hold(&mut self.model.navigator.keys, code, event.state)
         {
             return;
         }
         if event.state.is_pressed() && !event.repeat {
             self.notice = None;
-            match input::shortcut(&event.logical_key) {
+            match shortcut(&event.logical_key) {
                 Some(Shortcut::NextCamera) => drop(self.model.navigator.next_camera().map(str::to_owned)),
                 Some(Shortcut::Frame) => self.model.frame(f64::from(self.picture_rect.aspect_ratio())),
                 Some(Shortcut::NextTravel) => {
@@ -146,20 +145,17 @@ impl App {
         if self.clicks_at.take().is_none() {
             return;
         }
-        let Some(place) = self.pointer_points() else {
-            return;
-        };
         let camera = self.camera();
-        let lens = Lens {
-            camera: &camera,
-            picture: self.picture_rect,
+        let Some((lens, place)) = self.pointed(&camera) else {
+            return;
         };
         // Lights are marked only beside handles.
         let marks = self.model.choices.selection.held().is_some();
         let light = gizmo::light_at(&lens, self.model.scene(), place).filter(|_| marks);
+        let gaze = lens.gaze(place);
         match light {
             Some(light) => self.model.hold(Held::Light(light)),
-            None => self.model.pick(lens.gaze(place)),
+            None => self.model.pick(gaze),
         }
         self.request_redraw();
     }
@@ -190,14 +186,16 @@ impl App {
         ))
     }
 
+    /// The picture, and where the pointer is in it.
+    fn pointed<'a>(&self, camera: &'a Camera) -> Option<(Lens<'a>, egui::Pos2)> {
+        let picture = self.picture_rect;
+        Some((Lens { camera, picture }, self.pointer_points()?))
+    }
+
     /// The ray from the eye through the pointer.
     fn gaze(&self) -> Option<Ray> {
         let camera = self.camera();
-        let lens = Lens {
-            camera: &camera,
-            picture: self.picture_rect,
-        };
-        self.pointer_points().map(|place| lens.gaze(place))
+        self.pointed(&camera).map(|(lens, place)| lens.gaze(place))
     }
 
     pub(super) fn on_wheel(&mut self, delta: MouseScrollDelta) {
@@ -211,15 +209,12 @@ impl App {
 
     /// Whether the pointer is on the picture and not on a list or text that lies over it.
     pub(super) fn is_over_picture(&mut self) -> bool {
-        let Some(graphics) = &mut self.graphics else {
+        let (Some(place), Some(graphics)) = (self.pointer_points(), &mut self.graphics) else {
             return false;
         };
-        let scale = graphics.window().scale_factor();
-        let pointer: PhysicalPosition<f64> = self.pointer;
-        let points = egui::pos2((pointer.x / scale) as f32, (pointer.y / scale) as f32);
         let is_background = |layer: egui::LayerId| layer.order == egui::Order::Background;
-        let layer = graphics.interface().context().layer_id_at(points);
-        self.picture_rect.contains(points) && layer.is_none_or(is_background)
+        let layer = graphics.interface().context().layer_id_at(place);
+        self.picture_rect.contains(place) && layer.is_none_or(is_background)
     }
 
     pub(super) fn start_looking(&mut self) {
@@ -244,5 +239,88 @@ impl App {
             let _ = window.set_cursor_grab(CursorGrabMode::None);
             window.set_cursor_visible(true);
         }
+    }
+}
+
+/// A key that does something once.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Shortcut {
+    /// C
+    NextCamera,
+    /// F
+    Frame,
+    /// R
+    Rebake,
+    /// H
+    Help,
+    /// V
+    NextTravel,
+    /// M
+    Look,
+    /// P
+    Probe,
+    /// K
+    RecordKey,
+    /// 1 to 9, from 0 on
+    Bookmark(usize),
+    /// F12
+    SavePicture,
+    /// Esc
+    LetGo,
+}
+
+/// Holds or releases a movement key, by its place on the keyboard, so that any layout flies with the same fingers;
+/// tells whether it is one.
+fn hold(keys: &mut HeldKeys, key: KeyCode, state: ElementState) -> bool {
+    let held = match key {
+        KeyCode::KeyW => &mut keys.forward,
+        KeyCode::KeyS => &mut keys.backward,
+        KeyCode::KeyA => &mut keys.left,
+        KeyCode::KeyD => &mut keys.right,
+        KeyCode::KeyE => &mut keys.up,
+        KeyCode::KeyQ => &mut keys.down,
+        KeyCode::ShiftLeft | KeyCode::ShiftRight => &mut keys.run,
+        KeyCode::ControlLeft | KeyCode::ControlRight => &mut keys.creep,
+        _ => return false,
+    };
+    *held = state.is_pressed();
+    true
+}
+
+/// What a key press does, if anything, by the letter on the key.
+fn shortcut(key: &Key) -> Option<Shortcut> {
+    match key {
+        Key::Named(NamedKey::Escape) => Some(Shortcut::LetGo),
+        Key::Named(NamedKey::F12) => Some(Shortcut::SavePicture),
+        Key::Character(letter) => match letter.to_lowercase().as_str() {
+            "c" => Some(Shortcut::NextCamera),
+            "f" => Some(Shortcut::Frame),
+            "r" => Some(Shortcut::Rebake),
+            "h" | "?" => Some(Shortcut::Help),
+            "v" => Some(Shortcut::NextTravel),
+            "m" => Some(Shortcut::Look),
+            "p" => Some(Shortcut::Probe),
+            "k" => Some(Shortcut::RecordKey),
+            digit => bookmark(digit).map(Shortcut::Bookmark),
+        },
+        _ => None,
+    }
+}
+
+/// Which kept view a key with a digit means, from 0 on.
+fn bookmark(digit: &str) -> Option<usize> {
+    let number: usize = digit.parse().ok()?;
+    (1..=BOOKMARKS).contains(&number).then(|| number - 1)
+}
+
+/// What a key does with Ctrl held: true takes the last change back, false does it again.
+fn undoes(key: &Key, shift: bool) -> Option<bool> {
+    let Key::Character(letter) = key else {
+        return None;
+    };
+    match letter.to_lowercase().as_str() {
+        "z" => Some(!shift),
+        "y" => Some(false),
+        _ => None,
     }
 }

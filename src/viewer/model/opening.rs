@@ -84,7 +84,7 @@ impl Model {
     /// Shows the scene that was being read once it is there; tells whether another scene is shown. One that cannot be
     /// read leaves everything as it was.
     pub fn poll_files(&mut self) -> Option<Purpose> {
-        if self.files.watch.as_ref().is_some_and(|watch| watch.take_change()) {
+        if self.files.have_changed() {
             let source = self.edits.loaded().source.clone();
             self.read(&source, Purpose::Reload);
         }
@@ -114,7 +114,7 @@ impl Model {
             keeper.settle();
         }
         self.files.opened(&scene.source);
-        self.files.watch = None;
+        self.files.stop_watch();
         self.navigator = Navigator::new(&scene, None);
         self.choices.selection = Selection::default();
         self.choices.film = Film::default();
@@ -175,8 +175,8 @@ impl Model {
         let source = &self.edits.loaded().source;
         let wanted = self.choices.watches && !source.starts_with("builtin:");
         if !wanted {
-            self.files.watch = None;
-        } else if self.files.watch.is_none() {
+            self.files.stop_watch();
+        } else if !self.files.is_watching() {
             let stamps = Stamps::of(load::files_of(source, &self.files.load));
             self.files.start_watch(stamps);
         }

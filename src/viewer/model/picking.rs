@@ -20,7 +20,7 @@ const AROUND_LIGHT: f64 = 0.25;
 const AT: f64 = 0.01;
 
 /// A light that the mouse drags over surfaces.
-#[derive(Default)]
+#[derive(Debug, Default)]
 pub(super) struct Placing {
     /// Whether the button is down.
     is_down: bool,
@@ -30,6 +30,7 @@ pub(super) struct Placing {
     hand: Option<Hand>,
 }
 
+#[derive(Debug)]
 struct Hand {
     /// As they were when the drag began: lights are no surfaces.
     surfaces: Arc<Tracer>,
@@ -37,7 +38,7 @@ struct Hand {
 }
 
 /// What becomes of a light.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 enum Deed {
     /// It is put so far before surfaces [m].
     Put(usize, f64),
@@ -67,14 +68,6 @@ impl Hand {
             }
             (Deed::Put(..) | Deed::Turn(..), None) => None,
         }
-    }
-}
-
-impl std::fmt::Debug for Placing {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Placing")
-            .field("is_down", &self.is_down)
-            .finish_non_exhaustive()
     }
 }
 

@@ -1,12 +1,12 @@
-//! Start, stop, progress, and what the last bake came to.
+//! Always at the top: the scene's name, undo and redo, start, stop and progress of the bake, and what the last one came to.
 
 use std::sync::Arc;
 use std::time::Instant;
 
-use egui::{Color32, Grid, ProgressBar, RichText, Ui};
+use egui::{Align, Button, Color32, Grid, Label, Layout, ProgressBar, RichText, Ui};
 
 use super::control::{ask, counted, grouped};
-use super::{Choices, Command, Model};
+use super::{Choices, Command, Model, file};
 use crate::illumination::IlluminationMap;
 use crate::light_pass::ledger::{CarriedFlux, EnergyLedger};
 use crate::session::{BYTES_PER_TEXEL, StopReason};
@@ -19,7 +19,7 @@ pub const FAILED: Color32 = Color32::from_rgb(255, 120, 110);
 pub const ATTENTION: Color32 = Color32::from_rgb(250, 190, 90);
 
 /// Shows the controls and the state.
-pub fn show(ui: &mut Ui, choices: &mut Choices, model: &Model, commands: &mut Vec<Command>) {
+fn show(ui: &mut Ui, choices: &mut Choices, model: &Model, commands: &mut Vec<Command>) {
     let refused = choices.settings.validate().err();
     ui.horizontal(|ui| {
         let invalid = refused.is_some().then_some("A setting is out of its range.");
@@ -229,4 +229,46 @@ fn ledger(ui: &mut Ui, total: &EnergyLedger) {
             .on_hover_text(hover);
             ui.end_row();
         });
+}
+
+/// Shows the header.
+pub fn header(ui: &mut Ui, choices: &mut Choices, model: &Model, commands: &mut Vec<Command>) {
+    ui.horizontal(|ui| {
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            ui.spacing_mut().item_spacing.x = 4.0;
+            let history = model.edits().history();
+            if step(ui, ("↷", "Redo (Ctrl+Y)"), ("Does again", history.next_redo())) {
+                commands.push(Command::Redo);
+            }
+            if step(ui, ("↶", "Undo (Ctrl+Z)"), ("Takes back", history.next_undo())) {
+                commands.push(Command::Undo);
+            }
+            ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
+                let name = Label::new(RichText::new(&model.scene().name).heading()).truncate();
+                ui.add(name).on_hover_text(&model.scene().source);
+            });
+        });
+    });
+    show(ui, choices, model, commands);
+    if model.picture.lost_device {
+        let told = "The graphics device was lost and came back; nothing else was.";
+        ui.colored_label(ATTENTION, told);
+    }
+    file::show_state(ui, model);
+    if let Some(refusal) = model.refusal.as_deref() {
+        ui.colored_label(FAILED, refusal);
+    }
+}
+
+/// A button that takes a change back or does one again; tells whether it was pressed.
+fn step(ui: &mut Ui, (sign, name): (&str, &str), (does, what): (&str, Option<&str>)) -> bool {
+    let button = ui.add_enabled(
+        what.is_some(),
+        Button::new(RichText::new(sign).monospace().size(15.0)),
+    );
+    button
+        .accessible_name(name)
+        .on_hover_text(format!("{does}: {}. {name}", what.unwrap_or_default()))
+        .on_disabled_hover_text(format!("Nothing. {name}"))
+        .clicked()
 }

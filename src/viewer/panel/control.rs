@@ -1,5 +1,6 @@
 //! One labelled control per row, each with a text that says what it does and what it costs.
 
+use std::any::type_name;
 use std::borrow::Cow;
 use std::collections::HashMap;
 use std::sync::LazyLock;
@@ -250,7 +251,7 @@ pub fn choice<T: PartialEq + Copy>(
 }
 
 /// A drop-down list of all values of a setting, by the names and texts that they have on the command line.
-pub fn listed<T>(ui: &mut Ui, name: &str, value: &mut T) -> Response
+pub fn listed<T>(ui: &mut Ui, value: &mut T) -> Response
 where
     T: VariantArray + EnumMessage + Into<&'static str> + PartialEq + Copy,
 {
@@ -262,7 +263,13 @@ where
             value.get_documentation().unwrap_or_default(),
         )
     });
-    choice(ui, name, value, "custom", &choices.collect::<Vec<_>>())
+    choice(
+        ui,
+        type_name::<T>(),
+        value,
+        "custom",
+        &choices.collect::<Vec<_>>(),
+    )
 }
 
 /// A number in four significant digits; very large and very small ones in powers of ten.

@@ -1,13 +1,14 @@
 //! Section *Display*: how the picture shows the maps. Nothing here changes a bake.
 
 use egui::{DragValue, Response, Slider, SliderClamping, Ui};
+use strum::{EnumMessage, VariantArray};
 
-use super::control::{CONTROL_WIDTH, about, choice, counted, pick, row, rows, setting, short};
+use super::control::{CONTROL_WIDTH, Entry, about, choice, counted, pick, row, rows, setting, short};
 use super::{Command, Display, LayerShown, Model, Quantity, bake};
 use crate::eye_pass::{ToneMap, WhiteBalance};
 use crate::optics::spectrum::temperature::CAMERA_KELVIN;
 use crate::settings::LayerKind;
-use crate::viewer::error_view;
+use crate::viewer::false_colours;
 use crate::viewer::views::{IrradianceUnit, ScaleChoice};
 
 const AUTO_EXPOSURE: &str = "Measures the present picture and sets the exposure once, so that brightness stays \
@@ -138,57 +139,23 @@ fn white_balance(ui: &mut Ui, white: &mut WhiteBalance) -> Response {
     .inner
 }
 
-const VIEWS: [(Quantity, &str); 10] = [
-    (Quantity::Light, "The lit scene."),
-    (
-        Quantity::Irradiance,
-        "Irradiance of the light shown, in false colours with a legend.",
-    ),
-    (
-        Quantity::Error,
-        "How far each texel may be off: its estimated error in false colours, relative to the map's mean irradiance.",
-    ),
-    (
-        Quantity::Difference,
-        "What an effect adds and takes away, in false colours, relative to the map's mean irradiance.",
-    ),
-    (Quantity::Texels, "The maps' texels as a checkerboard."),
-    (
-        Quantity::TexelDensity,
-        "Texels per metre, in false colours with a legend.",
-    ),
-    (
-        Quantity::Normals,
-        "Normals of the meshes: red, green, blue for x, y, z.",
-    ),
-    (
-        Quantity::Uv,
-        "Where the base colour's image is looked up, else the first set of coordinates: red for u, green for v.",
-    ),
-    (
-        Quantity::MapUv,
-        "Where the illumination map is looked up: red for u, green for v.",
-    ),
-    (
-        Quantity::Wavelength,
-        "The dominant wavelength [nm] of the light shown, against the white of D65: the single wavelength that, mixed with \
-         white, looks like it. White light is grey; purple, which no single wavelength looks like, is dim purple; texels \
-         below a thousandth of the brightest are black.",
-    ),
-];
-
 fn quantity(ui: &mut Ui, shown: &mut Quantity, model: &Model) -> Response {
     let has_difference = model.worth.as_ref().is_some_and(|worth| worth.difference.is_ok());
     let why_not = |kind: Quantity| match kind {
-        Quantity::Error if !error_view::is_available(model.maps()) => Some(NO_ERRORS),
+        Quantity::Error if !false_colours::has_errors(model.maps()) => Some(NO_ERRORS),
         Quantity::Difference if !has_difference => Some(NO_DIFFERENCE),
         _ => None,
     };
-    let entries = VIEWS.map(|(kind, hover)| (kind.name(), hover.into(), why_not(kind)));
-    let at = VIEWS.iter().position(|(kind, _)| kind == shown);
+    let views = Quantity::VARIANTS;
+    let hover = |kind: &Quantity| kind.get_documentation().unwrap_or_default();
+    let entries = views
+        .iter()
+        .map(|kind| (kind.name(), hover(kind).into(), why_not(*kind)));
+    let entries: Vec<Entry> = entries.collect();
+    let at = views.iter().position(|kind| kind == shown);
     let (response, picked) = pick(ui, ("view", CONTROL_WIDTH), (shown.name(), at), &entries);
     if let Some(index) = picked {
-        *shown = VIEWS[index].0;
+        *shown = views[index];
     }
     response
 }

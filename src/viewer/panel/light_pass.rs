@@ -43,9 +43,7 @@ pub fn show(ui: &mut Ui, settings: &mut BakeSettings) {
     rows(ui, "light pass", |ui| {
         let before = settings.estimator;
         let estimator = (&mut settings.estimator, &Estimator::Auto);
-        setting(ui, "Estimator", no_caustic, estimator, |ui, estimator| {
-            listed(ui, "estimator", estimator)
-        });
+        setting(ui, "Estimator", no_caustic, estimator, listed);
         if settings.estimator != before {
             change_estimator(settings, before);
         }
@@ -83,19 +81,13 @@ pub fn show_details(ui: &mut Ui, settings: &mut BakeSettings) {
     rows(ui, "rays and kernels", |ui| {
         adaptive(ui, &mut settings.sigma, no_splats.or(no_sigma));
         let value = (&mut settings.kernel, &default.kernel);
-        setting(ui, "Kernel", no_splats, value, |ui, kernel| {
-            listed(ui, "kernel", kernel)
-        });
+        setting(ui, "Kernel", no_splats, value, listed);
         let value = (&mut settings.footprint, &default.footprint);
-        setting(ui, "Footprint", no_splats, value, |ui, footprint| {
-            listed(ui, "footprint", footprint)
-        });
+        setting(ui, "Footprint", no_splats, value, listed);
         let value = (&mut settings.rays, &default.rays);
-        setting(ui, "Rays", no_splats, value, |ui, rays| listed(ui, "rays", rays));
+        setting(ui, "Rays", no_splats, value, listed);
         let value = (&mut settings.item_buffer, &default.item_buffer);
-        setting(ui, "Item buffer", no_caustic, value, |ui, item_buffer| {
-            listed(ui, "item buffer", item_buffer)
-        });
+        setting(ui, "Item buffer", no_caustic, value, listed);
     });
 }
 

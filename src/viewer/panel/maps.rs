@@ -1,15 +1,18 @@
-//! Section *Maps*: every receiver's map, to be looked at and written to files.
+//! Section *Maps*: every receiver's map, to be looked at and written to files; and section *Compare*: two maps side by side.
 
 mod large;
 
 use std::collections::HashMap;
+use std::path::PathBuf;
 
-use egui::{Button, ColorImage, Image, RichText, ScrollArea, TextureHandle, TextureOptions, Ui, vec2};
+use egui::{
+    Button, ColorImage, Image, RichText, ScrollArea, TextEdit, TextureHandle, TextureOptions, Ui, vec2,
+};
 
 use super::bake::two_digits;
-use super::control::{bytes, counted};
+use super::control::{about_button, ask, button, bytes, counted};
 use super::effects::COUNTER;
-use super::{Command, Model, export};
+use super::{Command, CompareCommand, Model, export};
 use crate::illumination::{IlluminationMap, Side};
 use crate::session::BYTES_PER_TEXEL;
 use crate::viewer::exporting::Export;
@@ -35,15 +38,6 @@ pub struct Browser {
     thumbnails: HashMap<usize, TextureHandle>,
     made_of: Made,
     large: Option<large::Large>,
-}
-
-impl std::fmt::Debug for Browser {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let made = self.thumbnails.len();
-        f.debug_struct("Browser")
-            .field("thumbnails", &made)
-            .finish_non_exhaustive()
-    }
 }
 
 /// Shows the section.
@@ -193,5 +187,44 @@ fn texture(ui: &Ui, name: &str, shown: &Shown, old: Option<TextureHandle>) -> Te
             texture
         }
         None => ui.ctx().load_texture(name, image, TextureOptions::NEAREST),
+    }
+}
+
+/// What the field is called by assistive technology.
+const FOLDER: &str = "Folder to compare with";
+
+/// Shows the controls.
+pub fn compare(ui: &mut Ui, folder: &mut String, model: &Model, commands: &mut Vec<Command>) {
+    ui.horizontal(|ui| {
+        let none = model.layers().is_empty().then_some("There are no maps yet.");
+        let keep = Command::Compare(CompareCommand::Keep);
+        ask(ui, "Keep as before", none, commands, keep);
+        let none = model
+            .reference
+            .as_ref()
+            .is_none()
+            .then_some("Nothing is compared now.");
+        let end = Command::Compare(CompareCommand::End);
+        ask(ui, "End comparison", none, commands, end);
+    });
+    ui.horizontal(|ui| {
+        let field = TextEdit::singleline(folder)
+            .hint_text("folder of maps")
+            .desired_width(190.0);
+        let field = ui
+            .add(field)
+            .on_hover_text(about_button("Compare"))
+            .accessible_name(FOLDER);
+        let none = folder.trim().is_empty().then_some("Type a folder first.");
+        let is_clicked = button(ui, "Compare", none);
+        let is_entered = field.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter));
+        if (is_clicked || is_entered) && none.is_none() {
+            commands.push(Command::Compare(CompareCommand::Load(PathBuf::from(
+                folder.trim(),
+            ))));
+        }
+    });
+    if let Some(reference) = model.reference.as_ref() {
+        ui.label(reference.told());
     }
 }

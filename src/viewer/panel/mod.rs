@@ -3,7 +3,6 @@
 
 pub mod accuracy;
 mod bake;
-mod compare;
 pub mod control;
 mod display;
 mod effects;
@@ -12,8 +11,6 @@ mod file;
 mod film;
 pub mod frame_graph;
 mod glass;
-mod header;
-mod help;
 mod light_colour;
 mod light_pass;
 mod light_size;
@@ -22,13 +19,14 @@ mod probe;
 mod scene;
 mod waves;
 
-use egui::{Align, CollapsingHeader, Color32, Frame, Margin, RichText, ScrollArea, Ui};
+use egui::{Align, CollapsingHeader, Color32, Frame, Grid, Margin, RichText, ScrollArea, Ui};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 pub use self::scene::{Placed, Selection};
 use super::command::{Choices, Command, CompareCommand, FilmCommand};
 use super::model::Model;
+use super::navigation::Travel;
 pub use super::views::Quantity;
 use super::views::ScaleChoice;
 use crate::error::Warning;
@@ -86,7 +84,7 @@ impl Display {
 }
 
 /// What the panel keeps between frames: what is typed, and what is open.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Default)]
 pub struct Panel {
     /// As the last frame had it.
     probed: bool,
@@ -136,7 +134,7 @@ impl Panel {
             .frame(frame)
             .show(ui, |ui| {
                 ui.spacing_mut().item_spacing.y = 3.0;
-                header::show(ui, &mut choices, model, &mut commands);
+                bake::header(ui, &mut choices, model, &mut commands);
                 ui.separator();
                 ScrollArea::vertical()
                     .auto_shrink(false)
@@ -197,7 +195,7 @@ impl Panel {
         });
         self.probe(ui, choices, model, commands);
         section(ui, "Compare", false, |ui| {
-            compare::show(ui, &mut self.compare_folder, model, commands)
+            maps::compare(ui, &mut self.compare_folder, model, commands)
         });
         self.help(ui, model);
     }
@@ -240,7 +238,7 @@ impl Panel {
         let help = CollapsingHeader::new(RichText::new("Help").strong())
             .open(Some(self.help_open))
             .show(ui, |ui| {
-                help::show(ui, model.navigator.travel(), model.navigator.speed_m_per_s())
+                keys(ui, model.navigator.travel(), model.navigator.speed_m_per_s())
             });
         if help.header_response.on_hover_text("The keys (H).").clicked() {
             self.help_open = !self.help_open;
@@ -284,4 +282,46 @@ fn titled(ui: &mut Ui, name: &str, title: RichText, open: bool, add: impl FnOnce
         .id_salt(id)
         .default_open(open)
         .show_unindented(ui, add);
+}
+
+/// Shows the keys for a way to get about at a speed [m/s].
+fn keys(ui: &mut Ui, travel: Travel, speed_m_per_s: f64) {
+    let (way, wheel) = match travel {
+        Travel::Fly | Travel::Walk => (
+            "hold to look around",
+            format!("speed ±5 % a notch, now {speed_m_per_s:.3} m/s"),
+        ),
+        Travel::Orbit => ("hold to turn around it", "nearer, farther".to_owned()),
+    };
+    let now = format!("fly, walk, orbit; now {}", travel.name());
+    let lines = [
+        ("V", now.as_str()),
+        ("W A S D", "forward, left, back, right"),
+        ("E  Q", "up, down, but on foot"),
+        ("Shift  Ctrl", "four times as fast, a quarter"),
+        ("Right mouse, M", way),
+        ("Wheel", wheel.as_str()),
+        ("1 … 9", "views kept with Ctrl+1 … Ctrl+9"),
+        ("C", "next camera of the file"),
+        ("F", "frame what has handles, or the whole scene"),
+        ("R", "re-bake"),
+        ("Ctrl+Z", "take the last change back"),
+        ("Ctrl+Y", "do it again; Ctrl+Shift+Z too"),
+        ("P", "probe: click on a surface to see what lights it"),
+        ("K", "add a key to the camera's path"),
+        ("F12", "save the picture as .png and .exr"),
+        ("Click", "on an object: handles to move and turn it"),
+        ("Esc", "let go of mouse and handles, cancel the bake"),
+        ("H  ?", "open or close this list"),
+    ];
+    Grid::new("keys")
+        .num_columns(2)
+        .spacing([12.0, 2.0])
+        .show(ui, |ui| {
+            for (key, meaning) in lines {
+                ui.label(RichText::new(key).strong());
+                ui.label(meaning);
+                ui.end_row();
+            }
+        });
 }

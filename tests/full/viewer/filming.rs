@@ -8,6 +8,7 @@ use nephroid::eye_pass::{ToneMap, View};
 use nephroid::optics::LinearSrgb;
 use nephroid::optics::spectrum::xyz::IDENTITY;
 use nephroid::scene::{Camera, turntable};
+use nephroid::viewer::background::Wake;
 use nephroid::viewer::exporting::{ExportState, Exporter};
 use nephroid::viewer::filming::Shooting;
 
@@ -39,7 +40,7 @@ fn frames_are_written_and_can_be_stopped() {
     let folder = folder();
     let news = Arc::new(AtomicUsize::new(0));
     let of_thread = Arc::clone(&news);
-    let mut exporter = Exporter::new(Arc::new(move || {
+    let mut exporter = Exporter::new(&Wake::new(move || {
         of_thread.fetch_add(1, Ordering::SeqCst);
     }));
     exporter.film(shooting(3), folder.path().to_owned());

@@ -1,7 +1,6 @@
 //! Opening scenes while the window is open.
 
-use nephroid::viewer::files::recent::{MOST, Recent};
-use nephroid::viewer::files::typed;
+use nephroid::viewer::files::{MOST_RECENT as MOST, Recent, typed};
 
 use super::*;
 

@@ -1,7 +1,7 @@
 //! The graph of what pictures took on the graphics device.
 
-use nephroid::viewer::frame_times::{FrameTimes, PICTURES};
 use nephroid::viewer::panel::frame_graph::{columns, scale_ms};
+use nephroid::viewer::timing::{FrameTimes, PICTURES};
 
 use super::*;
 

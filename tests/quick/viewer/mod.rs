@@ -2,7 +2,6 @@
 
 mod config;
 mod course_plot;
-mod debounce;
 mod effects;
 mod exporting;
 mod exposure;
@@ -54,11 +53,10 @@ use nephroid::session::StopReason;
 use nephroid::settings::{Estimator, LEAST_MAX_ERROR, Sigma};
 use nephroid::viewer::ViewerOptions;
 use nephroid::viewer::command::{Choices, Command, CompareCommand, FilmCommand};
-use nephroid::viewer::debounce::QUIET;
 use nephroid::viewer::edits::EditedScene;
 use nephroid::viewer::exporting::{Export, ExportState};
 use nephroid::viewer::gizmo::Held;
-use nephroid::viewer::model::Model;
+use nephroid::viewer::model::{Model, QUIET};
 use nephroid::viewer::navigation::Travel;
 use nephroid::viewer::new_light::NewLight;
 use nephroid::viewer::panel::{Display, LayerShown, Quantity};

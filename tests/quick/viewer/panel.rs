@@ -6,7 +6,7 @@ use egui::Pos2;
 use nephroid::eye_pass::WhiteBalance;
 use nephroid::light_pass::ledger::{CarriedFlux, EnergyLedger, LightLedger, Truncated};
 use nephroid::settings::{Footprint, ItemBufferKind, Kernel, Preset, RayPlacement};
-use nephroid::viewer::panel::accuracy::preset;
+use nephroid::viewer::panel::accuracy::target::preset_of;
 
 use super::headless::Gesture::{Check, Choose, Drag, Radio, Type};
 use super::headless::{Gesture, SCREEN, SECTIONS, edit_power};
@@ -175,21 +175,21 @@ fn presets_are_told_from_custom() {
     for of in [Preset::Draft, Preset::Final, Preset::Preview] {
         panel.choose("Preset", of.name());
         assert_eq!(panel.settings().max_error, Some(of.max_error()));
-        assert_eq!(preset::of(panel.settings()), Some(of));
+        assert_eq!(preset_of(panel.settings()), Some(of));
         shows(&panel, of.name());
     }
     panel.type_into("Max error [%]", "0.5");
     shows(&panel, "custom");
     panel.press("Reset Max error [%]");
-    assert_eq!(preset::of(panel.settings()), Some(Preset::Preview));
+    assert_eq!(preset_of(panel.settings()), Some(Preset::Preview));
     panel.choose("Map size [texels]", "256");
-    assert_eq!(preset::of(panel.settings()), None);
+    assert_eq!(preset_of(panel.settings()), None);
 
     let mut panel = Headless::new(splats());
     panel.choose("Preset", "final");
     let set = panel.settings();
     assert_eq!((set.density_per_sr, set.max_error), (800_000.0, None));
-    assert_eq!(preset::of(set), Some(Preset::Final));
+    assert_eq!(preset_of(set), Some(Preset::Final));
 }
 
 #[test]

@@ -7,7 +7,7 @@ use egui::{
 };
 
 use super::super::bake::two_digits;
-use super::target::{self, Picked};
+use super::target::{self, Target};
 use crate::session::forecast::forecast;
 use crate::session::{CostPoint, Forecast};
 use crate::settings::{BakeSettings, Preset};
@@ -98,18 +98,18 @@ impl Curve {
         let past: Vec<CostPoint> = last.result.course.iter().filter(is_shown).copied().collect();
         let reached = past.last()?.error;
         let expected = |target: f64| forecast(&past, target, estimator);
-        let picked = target::picked(settings);
+        let picked = Target::of(settings);
         let wanted = match picked {
-            Some(Picked::Error(error)) => error,
+            Target::Error(error) => error,
             _ => BEST_SHOWN,
         };
         let best = BEST_SHOWN.min(wanted).min(0.7 * reached);
         let at_step = |step: usize| reached * (best / reached).powf(step as f64 / STEPS as f64);
         let future: Vec<Forecast> = (0..=STEPS).filter_map(|step| expected(at_step(step))).collect();
         let target = match picked {
-            Some(Picked::Error(error)) => expected(error),
-            Some(Picked::Seconds(seconds)) => at_seconds(&past, &future, seconds),
-            None => None,
+            Target::Error(error) => expected(error),
+            Target::Time(seconds) => at_seconds(&past, &future, seconds),
+            Target::Density => None,
         };
         let presets = Preset::ALL.map(|preset| Some((preset, expected(preset.max_error())?)));
         Some(Self {
