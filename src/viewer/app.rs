@@ -148,14 +148,13 @@ impl App {
     /// As [`Model::new`].
     pub fn new(options: &ViewerOptions, proxy: EventLoopProxy<News>) -> Result<Self> {
         let of_baker = proxy.clone();
-        let wake = move || {
+        let wake = &Wake::new(move || {
             // Fails only when the window is gone, and then nobody waits for it.
             let _ = of_baker.send_event(News::Baker);
-        };
-        let model = Model::new(options, wake.clone())?;
-        let wake = &Wake::new(wake);
+        });
+        let model = Model::new(options, wake)?;
         Ok(Self {
-            exposure: AutoExposure::new(options.exposure_stops.is_none() && !model.keeps_exposure()),
+            exposure: AutoExposure::new(options.exposure_stops.is_none() && !model.exposure_is_kept),
             exposed: Instant::now(),
             warm_up: WarmUp::new(wake),
             notice: files::dark_notice(&model),
@@ -203,10 +202,8 @@ impl App {
                     graphics.interface().watch_controls();
                 }
                 let adapter = graphics.gpu().adapter_name();
-                let scene = Arc::clone(self.model.scene());
-                self.model
-                    .log
-                    .write("started", json!({"scene": scene.name, "adapter": adapter}));
+                let started = json!({"scene": self.model.scene().name, "adapter": adapter});
+                self.model.log.write("started", started);
                 let report = &mut self.model.picture;
                 report.adapter = adapter;
                 report.frame_times = graphics
@@ -238,12 +235,10 @@ impl App {
 
     fn closing(&mut self) {
         let Model { log, picture, .. } = &mut self.model;
+        let (while_baking, otherwise) = (picture.latencies.while_baking(), picture.latencies.otherwise());
         log.write(
             "latency",
-            json!({
-                "while_baking": picture.latencies.while_baking(),
-                "otherwise": picture.latencies.otherwise(),
-            }),
+            json!({"while_baking": while_baking, "otherwise": otherwise}),
         );
         self.model.log.write("closing", Value::Null);
     }
@@ -311,7 +306,7 @@ impl App {
         self.fly();
         self.poll_files();
         if self.model.poll() && self.is_software() {
-            self.model.look_away(LEVEL_OF_SOFTWARE);
+            self.model.worker.look_away(LEVEL_OF_SOFTWARE);
         }
         self.report_chains();
         let Some((mut painting, commands)) = self.run_interface() else {
@@ -406,14 +401,6 @@ impl App {
         Some((painting, commands))
     }
 
-    fn baking_frame(&self) -> Duration {
-        if self.is_software() {
-            BAKING_FRAME_OF_SOFTWARE
-        } else {
-            BAKING_FRAME
-        }
-    }
-
     fn is_software(&self) -> bool {
         let graphics = self.graphics.as_ref();
         graphics.is_some_and(|graphics| graphics.gpu().is_software())
@@ -423,7 +410,7 @@ impl App {
     fn schedule(&mut self, event_loop: &ActiveEventLoop, shown: Shown, repaint_after: Duration) {
         let now = Instant::now();
         if self.is_software() && (self.model.is_moving() || self.looking_from.is_some()) {
-            self.model.hold_bake(BAKE_WAITS);
+            self.model.worker.hold(BAKE_WAITS);
         }
         let wait = match shown {
             Shown::Broken => {
@@ -435,7 +422,10 @@ impl App {
             Shown::Yes if self.model.is_moving() || self.is_exposing() => Duration::ZERO,
             // The panel glides on while the picture waits for hands to rest.
             Shown::Yes if self.is_refining => self.pace.pause(now).min(repaint_after),
-            Shown::Yes if self.model.state.is_working() => repaint_after.min(self.baking_frame()),
+            Shown::Yes if self.model.state.is_working() && self.is_software() => {
+                repaint_after.min(BAKING_FRAME_OF_SOFTWARE)
+            }
+            Shown::Yes if self.model.state.is_working() => repaint_after.min(BAKING_FRAME),
             Shown::Yes => repaint_after,
         };
         let is_report_due = self.reports_due > 0 && shown == Shown::Yes;

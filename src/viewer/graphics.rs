@@ -150,8 +150,8 @@ impl Canvas {
             return self.draw(gpu, egui, view, quality).map(|_| ());
         }
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
-        let target = self.picture.target();
-        self.renderer.refine(gpu, &mut encoder, target, view)?;
+        self.renderer
+            .refine(gpu, &mut encoder, &self.picture.texture, view)?;
         gpu.queue.submit([encoder.finish()]);
         Ok(())
     }
@@ -197,8 +197,8 @@ impl Graphics {
             .map_err(|error| window_error(&error.to_string()))?;
         let gpu = Gpu::for_surface(instance, &surface)?;
         let screen = Screen::new(Arc::clone(&window), surface, &gpu.adapter, &gpu.device)?;
-        let mut interface = Interface::new(event_loop, &window, proxy, &gpu.device, screen.format());
-        let main = Canvas::new(&gpu, interface.renderer(), scene)?;
+        let mut interface = Interface::new(event_loop, &window, proxy, &gpu.device, screen.config.format);
+        let main = Canvas::new(&gpu, &mut interface.renderer, scene)?;
         window.set_visible(true);
         Ok(Self {
             interface,
@@ -211,7 +211,7 @@ impl Graphics {
 
     /// The window.
     pub fn window(&self) -> &Arc<Window> {
-        self.screen.window()
+        &self.screen.window
     }
 
     /// The device.
@@ -226,12 +226,12 @@ impl Graphics {
 
     /// The picture's name in egui.
     pub fn picture_id(&self) -> egui::TextureId {
-        self.main.picture.id()
+        self.main.picture.id
     }
 
     /// The name in egui of the picture's other part.
     pub fn beside_id(&self) -> Option<egui::TextureId> {
-        self.beside.as_ref().map(|beside| beside.picture.id())
+        self.beside.as_ref().map(|beside| beside.picture.id)
     }
 
     /// Shows other maps, of a scene, beside the picture from the next one on; nothing without.
@@ -239,11 +239,11 @@ impl Graphics {
     /// # Errors
     /// The device cannot hold them.
     pub fn set_beside(&mut self, shown: Option<(&Arc<Scene>, &[IlluminationMap], MapStyle)>) -> Result<()> {
-        let egui = self.interface.renderer();
+        let egui = &mut self.interface.renderer;
         let before = self.beside.take();
         let Some((scene, maps, style)) = shown else {
             if let Some(beside) = before {
-                egui.free_texture(&beside.picture.id());
+                egui.free_texture(&beside.picture.id);
             }
             return Ok(());
         };
@@ -377,7 +377,7 @@ impl Graphics {
     /// The device cannot hold a picture of that size.
     pub fn refine_picture(&mut self, view: &View, quality: EyeQuality) -> Result<()> {
         for canvas in [Some(&mut self.main), self.beside.as_mut()].into_iter().flatten() {
-            canvas.refine(&self.gpu, self.interface.renderer(), view, quality)?;
+            canvas.refine(&self.gpu, &mut self.interface.renderer, view, quality)?;
         }
         Ok(())
     }
@@ -387,7 +387,7 @@ impl Graphics {
     /// # Errors
     /// The device cannot hold a picture of that size.
     pub fn draw_picture(&mut self, view: &View, quality: EyeQuality) -> Result<bool> {
-        let egui = self.interface.renderer();
+        let egui = &mut self.interface.renderer;
         if let Some(beside) = &mut self.beside {
             beside.set_making(&self.gpu, self.main.making)?;
             beside.draw(&self.gpu, egui, view, quality)?;
@@ -430,7 +430,7 @@ impl Graphics {
             &gpu.queue,
             &mut encoder,
             &target,
-            screen.size(),
+            [screen.config.width, screen.config.height],
             painting,
         );
         gpu.queue.submit([encoder.finish()]);
@@ -452,7 +452,7 @@ fn window_error(what: &str) -> Error {
 
 /// A texture of the picture's size with what it shows.
 #[derive(Debug)]
-pub struct Picture {
+struct Picture {
     texture: wgpu::TextureView,
     id: egui::TextureId,
     size: [u32; 2],
@@ -461,8 +461,8 @@ pub struct Picture {
 }
 
 impl Picture {
-    /// A picture of one pixel, known to egui by its [`id`](Self::id).
-    pub fn new(device: &wgpu::Device, egui: &mut egui_wgpu::Renderer) -> Self {
+    /// A picture of one pixel, known to egui by its `id`.
+    fn new(device: &wgpu::Device, egui: &mut egui_wgpu::Renderer) -> Self {
         let size = [1, 1];
         let texture = texture(device, size);
         let id = egui.register_native_texture(device, &texture, wgpu::FilterMode::Nearest);
@@ -474,31 +474,21 @@ impl Picture {
         }
     }
 
-    /// Its name in egui.
-    pub fn id(&self) -> egui::TextureId {
-        self.id
-    }
-
     /// The scene or its maps changed: draw it next time whatever the view.
-    pub fn invalidate(&mut self) {
+    fn invalidate(&mut self) {
         self.shown = None;
     }
 
     /// Whether it shows a view.
-    pub fn shows(&self, view: &View) -> bool {
+    fn shows(&self, view: &View) -> bool {
         self.shown.as_ref() == Some(view)
-    }
-
-    /// What it is drawn into, of the size of the view that it shows.
-    pub fn target(&self) -> &wgpu::TextureView {
-        &self.texture
     }
 
     /// Draws `view` unless it is shown already; tells whether it drew.
     ///
     /// # Errors
     /// That of `draw`: the picture stays as it was.
-    pub fn update(
+    fn update(
         &mut self,
         device: &wgpu::Device,
         egui: &mut egui_wgpu::Renderer,
@@ -544,7 +534,7 @@ pub(super) fn texture(device: &wgpu::Device, [width, height]: [u32; 2]) -> wgpu:
 
 /// A window with a surface on it.
 #[derive(Debug)]
-pub struct Screen {
+struct Screen {
     /// Declared first: it has to go before its window.
     surface: wgpu::Surface<'static>,
     config: wgpu::SurfaceConfiguration,
@@ -555,7 +545,7 @@ pub struct Screen {
 
 /// What came of asking for the next frame.
 #[derive(Debug)]
-pub enum Acquired {
+enum Acquired {
     /// Draw on it and hand it to [`Screen::present`].
     Frame(wgpu::SurfaceTexture),
     /// Nothing to draw on for the time being; an event will tell when there is.
@@ -571,7 +561,7 @@ impl Screen {
     ///
     /// # Errors
     /// The adapter cannot draw on it.
-    pub fn new(
+    fn new(
         window: Arc<Window>,
         surface: wgpu::Surface<'static>,
         adapter: &wgpu::Adapter,
@@ -603,23 +593,8 @@ impl Screen {
         Ok(screen)
     }
 
-    /// The window.
-    pub fn window(&self) -> &Arc<Window> {
-        &self.window
-    }
-
-    /// Format of the frames.
-    pub fn format(&self) -> wgpu::TextureFormat {
-        self.config.format
-    }
-
-    /// Size of the frames [pixels].
-    pub fn size(&self) -> [u32; 2] {
-        [self.config.width, self.config.height]
-    }
-
     /// Takes over the window's present size.
-    pub fn resize(&mut self, device: &wgpu::Device) {
+    fn resize(&mut self, device: &wgpu::Device) {
         let size = self.window.inner_size();
         self.has_area = size.width > 0 && size.height > 0;
         if self.has_area {
@@ -631,7 +606,7 @@ impl Screen {
     }
 
     /// Asks for the next frame; mends the surface once where that helps.
-    pub fn acquire(&mut self, device: &wgpu::Device, instance: &wgpu::Instance) -> Acquired {
+    fn acquire(&mut self, device: &wgpu::Device, instance: &wgpu::Instance) -> Acquired {
         for _ in 0..2 {
             if !self.has_area {
                 return Acquired::Hidden;
@@ -661,7 +636,7 @@ impl Screen {
     }
 
     /// Shows a frame.
-    pub fn present(&self, queue: &wgpu::Queue, frame: wgpu::SurfaceTexture) {
+    fn present(&self, queue: &wgpu::Queue, frame: wgpu::SurfaceTexture) {
         self.window.pre_present_notify();
         queue.present(frame);
     }

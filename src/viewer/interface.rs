@@ -9,9 +9,11 @@ use winit::window::Window;
 
 /// egui's state for one window, and what paints it.
 pub struct Interface {
-    context: egui::Context,
+    /// egui's own state.
+    pub context: egui::Context,
     state: egui_winit::State,
-    renderer: egui_wgpu::Renderer,
+    /// Paints egui's triangles and knows its textures.
+    pub renderer: egui_wgpu::Renderer,
     /// Where controls were last; `None` where nobody asks.
     controls: Option<Vec<Control>>,
 }
@@ -60,16 +62,6 @@ impl Interface {
     pub fn watch_controls(&mut self) {
         self.context.enable_accesskit();
         self.controls = Some(Vec::new());
-    }
-
-    /// egui's own state.
-    pub fn context(&self) -> &egui::Context {
-        &self.context
-    }
-
-    /// Paints egui's triangles and knows its textures.
-    pub fn renderer(&mut self) -> &mut egui_wgpu::Renderer {
-        &mut self.renderer
     }
 
     /// Passes an event on; tells whether the window should be drawn again.

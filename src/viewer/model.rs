@@ -61,7 +61,8 @@ pub struct Model {
     pub navigator: Navigator,
     /// What happened.
     pub log: EventLog,
-    worker: Worker,
+    /// Bakes.
+    pub worker: Worker,
     /// Writes maps to files.
     pub exporter: Exporter,
     surroundings: Surroundings,
@@ -106,7 +107,7 @@ pub struct Model {
     /// The scene that was asked about.
     probed_scene: Option<Arc<Scene>>,
     /// Whether the exposure is that of an earlier time.
-    exposure_is_kept: bool,
+    pub exposure_is_kept: bool,
     /// What was kept of it and not taken over.
     left_alone: keeping::LeftAlone,
     /// The scene in the window by its full path.
@@ -133,13 +134,12 @@ pub struct PictureReport {
 }
 
 impl Model {
-    /// Starts the baking thread, and a bake unless there are maps. `wake` is called when the thread has news.
+    /// Starts the baking thread, and a bake unless there are maps. The window is woken when a thread has news.
     ///
     /// # Errors
     /// The event log cannot be written; the system gives no thread.
-    pub fn new(options: &ViewerOptions, wake: impl Fn() + Send + Sync + 'static) -> Result<Self> {
+    pub fn new(options: &ViewerOptions, wake: &Wake) -> Result<Self> {
         let scene = Arc::clone(&options.scene);
-        let wake = &Wake::new(wake);
         let worker = Worker::spawn(BakeSession::new, wake)?;
         let wanted = BakeRequest::new(Arc::clone(&scene), options.settings.clone());
         let mut model = Self {
@@ -529,16 +529,6 @@ impl Model {
         self.log.write("baking", json!({"settings": wanted.settings}));
         self.asked = Some((self.worker.request(wanted.clone()), wanted));
         self.state = self.worker.state();
-    }
-
-    /// Lets the bake wait for so long.
-    pub fn hold_bake(&self, time: Duration) {
-        self.worker.hold(time);
-    }
-
-    /// Lets the bake go on for so long without showing what it has.
-    pub fn look_away(&self, time: Duration) {
-        self.worker.look_away(time);
     }
 
     /// Stops the bake and keeps the maps that are shown.

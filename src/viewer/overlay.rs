@@ -154,7 +154,7 @@ fn caveat(model: &Model) -> Option<String> {
         BakeState::Failed(sentence) if is_dark => Some(sentence.clone()),
         BakeState::Cancelled if is_dark => Some("No light is baked yet: press R to bake.".into()),
         BakeState::Done if is_dark => Some("No light reaches a surface that could show it.".into()),
-        BakeState::Cancelled if model.last.as_deref().is_some_and(|last| !last.is_final) => {
+        BakeState::Cancelled if model.last.as_ref().is_some_and(|last| !last.is_final) => {
             Some("Coarse maps of a bake that was stopped: press R to bake.".into())
         }
         _ => None,

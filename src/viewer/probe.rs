@@ -7,11 +7,12 @@ use glam::DVec3;
 use serde_json::{Value, json};
 
 use super::background::{Background, Task, Wake};
+use super::flat_map::layers_at;
 use super::lens::Lens;
 use crate::geometry::Ray;
 use crate::illumination::{IlluminationMap, Side};
 use crate::light_pass::explain::{Explanation, LightPath, Limits, Target, explain};
-use crate::optics::{LinearSrgb, luminance};
+use crate::optics::LinearSrgb;
 use crate::settings::LayerKind;
 use crate::transport::{MediumStack, SurfaceHit, Tracer, media_at};
 use crate::units::LUMENS_PER_WATT;
@@ -182,13 +183,6 @@ pub fn read(tracer: &Tracer, maps: &[IlluminationMap], seen: &Seen) -> (Probed, 
         explanation: None,
     };
     (probed, found.map(|(_, target)| target))
-}
-
-fn layers_at(map: &IlluminationMap, texel: usize) -> Vec<(LayerKind, f64)> {
-    map.layers
-        .iter()
-        .map(|layer| (layer.kind, luminance(&layer.irradiance[texel])))
-        .collect()
 }
 
 /// About how bright a texel is: what its paths are to be looked for by [W/m²].

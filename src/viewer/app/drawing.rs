@@ -192,10 +192,8 @@ impl App {
         let graphics = self.graphics.as_ref()?;
         let scale = graphics.window().scale_factor() as f32;
         let pixels = |points: f32| (points * scale).round();
-        let (width, height) = (
-            pixels(self.picture_rect.width()),
-            pixels(self.picture_rect.height()),
-        );
+        let size = self.picture_rect.size();
+        let (width, height) = (pixels(size.x), pixels(size.y));
         let display = match self.model.quantity() {
             Quantity::Light => self.model.choices.display,
             // Colours of a legend are shown as they are.
@@ -229,11 +227,8 @@ impl App {
             self.tell_time(ms);
         }
         let aspect = f64::from(view.width) / f64::from(view.height);
-        self.model.picture.chains = Some(plan::chains(
-            self.model.scene(),
-            Some((&view.camera, aspect)),
-            switch,
-        ));
+        let chains = plan::chains(self.model.scene(), Some((&view.camera, aspect)), switch);
+        self.model.picture.chains = Some(chains);
         self.reports_due = if is_complete {
             0
         } else {

@@ -96,7 +96,7 @@ impl App {
     fn begin_scene(&mut self, purpose: Purpose) {
         if purpose == Purpose::Open {
             self.notice = dark_notice(&self.model);
-            self.exposure = AutoExposure::new(!self.model.keeps_exposure());
+            self.exposure = AutoExposure::new(!self.model.exposure_is_kept);
         }
         if let Some(graphics) = &self.graphics {
             let name = &self.model.scene().name;

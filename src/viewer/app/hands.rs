@@ -34,32 +34,15 @@ impl App {
         let is_typing = self
             .graphics
             .as_mut()
-            .is_some_and(|graphics| graphics.interface().context().text_edit_focused());
+            .is_some_and(|graphics| graphics.interface().context.text_edit_focused());
         if is_typing && event.state.is_pressed() {
             return;
         }
         self.fly();
-        if self.modifiers.control_key() || self.modifiers.super_key() {
+        let is_chord = self.modifiers.control_key() || self.modifiers.super_key();
+        if is_chord && event.state.is_pressed() {
             // Nothing flies or bakes by a chord.
-            if event.state.is_pressed() {
-                let undoes = undoes(&event.logical_key, self.modifiers.shift_key());
-                let step = undoes.map(|is_back| if is_back { Command::Undo } else { Command::Redo });
-                self.pressed.extend(step);
-                if let Key::Character(digit) = &event.logical_key
-                    && let Some(number) = bookmark(digit)
-                {
-                    self.model.navigator.set_bookmark(number);
-                    self.model
-                        .log
-                        .write("bookmark", json!({"number": number + 1, "kept": true}));
-                    self.notice = Some(format!("View kept as {}: press {0} to come back.", number + 1));
-                }
-                // What was held before goes on, more slowly.
-                if matches!(event.logical_key, Key::Named(NamedKey::Control)) {
-                    self.model.navigator.keys.creep = true;
-                }
-                return;
-            }
+            return self.on_chord(&event.logical_key);
         }
         if let PhysicalKey::Code(code) = event.physical_key
             && hold(&mut self.model.navigator.keys, code, event.state)
@@ -68,42 +51,76 @@ impl App {
         }
         if event.state.is_pressed() && !event.repeat {
             self.notice = None;
-            match shortcut(&event.logical_key) {
-                Some(Shortcut::NextCamera) => drop(self.model.navigator.next_camera().map(str::to_owned)),
-                Some(Shortcut::Frame) => self.model.frame(f64::from(self.picture_rect.aspect_ratio())),
-                Some(Shortcut::NextTravel) => {
-                    let next = self.model.navigator.travel().next();
-                    self.model.travel(next);
-                    self.notice = Some(travel_notice(next));
-                }
-                Some(Shortcut::Look) if self.looking_from.is_some() => self.stop_looking(),
-                Some(Shortcut::Look) => self.start_looking(),
-                Some(Shortcut::Probe) => self.model.choices.probes ^= true,
-                Some(Shortcut::RecordKey) => {
-                    self.pressed.push(Command::Film(FilmCommand::Record(None)));
-                    let number = self.model.choices.film.keys.len() + 1;
-                    self.notice = Some(format!("Key {number} of the camera's path is set here."));
-                }
-                Some(Shortcut::Bookmark(number)) => {
-                    if self.model.navigator.go_to_bookmark(number) {
-                        self.model
-                            .log
-                            .write("bookmark", json!({"number": number + 1, "kept": false}));
-                    } else {
-                        let key = number + 1;
-                        self.notice = Some(format!("No view is kept as {key}: Ctrl+{key} keeps this one."));
-                    }
-                }
-                Some(Shortcut::Rebake) => self.pressed.push(Command::Rebake),
-                Some(Shortcut::SavePicture) => self.pressed.push(Command::SavePicture),
-                Some(Shortcut::Help) => self.panel.help_open ^= true,
-                Some(Shortcut::LetGo) if self.looking_from.is_some() => self.stop_looking(),
-                Some(Shortcut::LetGo) if self.model.choices.selection.held().is_some() => {
-                    self.model.choices.selection.hold(None);
-                }
-                Some(Shortcut::LetGo) => self.pressed.push(Command::Cancel),
-                None => {}
+            match &event.logical_key {
+                Key::Named(NamedKey::Escape) => self.let_go(),
+                Key::Named(NamedKey::F12) => self.pressed.push(Command::SavePicture),
+                Key::Character(letter) => self.on_letter(&letter.to_lowercase()),
+                _ => {}
             }
+        }
+    }
+
+    /// Does what a key stands for while Ctrl is held.
+    fn on_chord(&mut self, key: &Key) {
+        match key {
+            // What was held before goes on, more slowly.
+            Key::Named(NamedKey::Control) => self.model.navigator.keys.creep = true,
+            Key::Character(letter) => match letter.to_lowercase().as_str() {
+                "z" if !self.modifiers.shift_key() => self.pressed.push(Command::Undo),
+                "z" | "y" => self.pressed.push(Command::Redo),
+                digit => {
+                    let Some(number) = bookmark(digit) else { return };
+                    self.model.navigator.set_bookmark(number);
+                    let more = json!({"number": number + 1, "kept": true});
+                    self.model.log.write("bookmark", more);
+                    self.notice = Some(format!("View kept as {}: press {0} to come back.", number + 1));
+                }
+            },
+            _ => {}
+        }
+    }
+
+    /// Does what the letter on a key stands for.
+    fn on_letter(&mut self, letter: &str) {
+        match letter {
+            "c" => drop(self.model.navigator.next_camera().map(str::to_owned)),
+            "f" => self.model.frame(f64::from(self.picture_rect.aspect_ratio())),
+            "r" => self.pressed.push(Command::Rebake),
+            "h" | "?" => self.panel.help_open ^= true,
+            "v" => {
+                let next = self.model.navigator.travel().next();
+                self.model.travel(next);
+                self.notice = Some(travel_notice(next));
+            }
+            "m" if self.looking_from.is_some() => self.stop_looking(),
+            "m" => self.start_looking(),
+            "p" => self.model.choices.probes ^= true,
+            "k" => {
+                self.pressed.push(Command::Film(FilmCommand::Record(None)));
+                let number = self.model.choices.film.keys.len() + 1;
+                self.notice = Some(format!("Key {number} of the camera's path is set here."));
+            }
+            digit => {
+                let Some(number) = bookmark(digit) else { return };
+                if self.model.navigator.go_to_bookmark(number) {
+                    let more = json!({"number": number + 1, "kept": false});
+                    self.model.log.write("bookmark", more);
+                } else {
+                    let key = number + 1;
+                    self.notice = Some(format!("No view is kept as {key}: Ctrl+{key} keeps this one."));
+                }
+            }
+        }
+    }
+
+    /// Lets go of the gaze, or of what has handles, or of the bake.
+    fn let_go(&mut self) {
+        if self.looking_from.is_some() {
+            self.stop_looking();
+        } else if self.model.choices.selection.held().is_some() {
+            self.model.choices.selection.hold(None);
+        } else {
+            self.pressed.push(Command::Cancel);
         }
     }
 
@@ -180,10 +197,8 @@ impl App {
 
     fn pointer_points(&self) -> Option<egui::Pos2> {
         let scale = self.graphics.as_ref()?.window().scale_factor();
-        Some(egui::pos2(
-            (self.pointer.x / scale) as f32,
-            (self.pointer.y / scale) as f32,
-        ))
+        let points = |pixels: f64| (pixels / scale) as f32;
+        Some(egui::pos2(points(self.pointer.x), points(self.pointer.y)))
     }
 
     /// The picture, and where the pointer is in it.
@@ -213,7 +228,7 @@ impl App {
             return false;
         };
         let is_background = |layer: egui::LayerId| layer.order == egui::Order::Background;
-        let layer = graphics.interface().context().layer_id_at(place);
+        let layer = graphics.interface().context.layer_id_at(place);
         self.picture_rect.contains(place) && layer.is_none_or(is_background)
     }
 
@@ -242,33 +257,6 @@ impl App {
     }
 }
 
-/// A key that does something once.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Shortcut {
-    /// C
-    NextCamera,
-    /// F
-    Frame,
-    /// R
-    Rebake,
-    /// H
-    Help,
-    /// V
-    NextTravel,
-    /// M
-    Look,
-    /// P
-    Probe,
-    /// K
-    RecordKey,
-    /// 1 to 9, from 0 on
-    Bookmark(usize),
-    /// F12
-    SavePicture,
-    /// Esc
-    LetGo,
-}
-
 /// Holds or releases a movement key, by its place on the keyboard, so that any layout flies with the same fingers;
 /// tells whether it is one.
 fn hold(keys: &mut HeldKeys, key: KeyCode, state: ElementState) -> bool {
@@ -287,40 +275,8 @@ fn hold(keys: &mut HeldKeys, key: KeyCode, state: ElementState) -> bool {
     true
 }
 
-/// What a key press does, if anything, by the letter on the key.
-fn shortcut(key: &Key) -> Option<Shortcut> {
-    match key {
-        Key::Named(NamedKey::Escape) => Some(Shortcut::LetGo),
-        Key::Named(NamedKey::F12) => Some(Shortcut::SavePicture),
-        Key::Character(letter) => match letter.to_lowercase().as_str() {
-            "c" => Some(Shortcut::NextCamera),
-            "f" => Some(Shortcut::Frame),
-            "r" => Some(Shortcut::Rebake),
-            "h" | "?" => Some(Shortcut::Help),
-            "v" => Some(Shortcut::NextTravel),
-            "m" => Some(Shortcut::Look),
-            "p" => Some(Shortcut::Probe),
-            "k" => Some(Shortcut::RecordKey),
-            digit => bookmark(digit).map(Shortcut::Bookmark),
-        },
-        _ => None,
-    }
-}
-
 /// Which kept view a key with a digit means, from 0 on.
 fn bookmark(digit: &str) -> Option<usize> {
     let number: usize = digit.parse().ok()?;
     (1..=BOOKMARKS).contains(&number).then(|| number - 1)
-}
-
-/// What a key does with Ctrl held: true takes the last change back, false does it again.
-fn undoes(key: &Key, shift: bool) -> Option<bool> {
-    let Key::Character(letter) = key else {
-        return None;
-    };
-    match letter.to_lowercase().as_str() {
-        "z" => Some(!shift),
-        "y" => Some(false),
-        _ => None,
-    }
 }

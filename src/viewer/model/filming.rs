@@ -57,9 +57,9 @@ impl Model {
     }
 
     /// Does what was asked for in section *Camera path*.
-    pub(super) fn film(&mut self, wish: &FilmCommand) {
+    pub(super) fn film(&mut self, command: &FilmCommand) {
         let before = self.choices.film.clone();
-        let outcome = self.filmed(wish);
+        let outcome = self.filmed(command);
         if before != self.choices.film {
             self.edits.note_film(&before, &self.choices.film);
             self.edits.release();
@@ -72,9 +72,9 @@ impl Model {
     }
 
     /// A sentence where there is something to be told.
-    fn filmed(&mut self, wish: &FilmCommand) -> Result<Option<String>> {
+    fn filmed(&mut self, command: &FilmCommand) -> Result<Option<String>> {
         let origin_world = self.scene().origin_world;
-        match wish {
+        match command {
             FilmCommand::Record(key) => {
                 let (camera, reach_m) = (self.navigator.camera(), self.navigator.radius_m());
                 self.choices.film.record(*key, &camera, origin_world, reach_m);

@@ -62,11 +62,6 @@ impl Model {
         level.serial == self.first_request
     }
 
-    /// Whether the exposure is that of an earlier time, and none to be measured.
-    pub fn keeps_exposure(&self) -> bool {
-        self.exposure_is_kept
-    }
-
     fn read(&mut self, source: &str, purpose: Purpose) {
         self.files.refusal = None;
         self.log.write("opening", json!({"source": source}));
@@ -96,10 +91,9 @@ impl Model {
                 return None;
             }
         };
-        self.log.write(
-            "opened",
-            json!({"scene": scene.name, "source": source, "again": purpose == Purpose::Reload}),
-        );
+        let again = purpose == Purpose::Reload;
+        let more = json!({"scene": scene.name, "source": source, "again": again});
+        self.log.write("opened", more);
         match purpose {
             Purpose::Open => self.show(scene),
             Purpose::Reload => self.show_again(scene),

@@ -127,11 +127,8 @@ impl Model {
         };
         let with_kind = maps.iter().filter(receives).filter_map(|map| {
             let irradiance = map.layer(kind)?.irradiance.clone();
-            Some(IlluminationMap::of_layer(
-                Arc::clone(&map.chart),
-                kind,
-                irradiance,
-            ))
+            let chart = Arc::clone(&map.chart);
+            Some(IlluminationMap::of_layer(chart, kind, irradiance))
         });
         Cow::Owned(with_kind.collect())
     }
@@ -180,9 +177,9 @@ impl Model {
     }
 
     /// Begins or ends a comparison.
-    pub(super) fn compare_with(&mut self, wish: &CompareCommand) {
+    pub(super) fn compare_with(&mut self, command: &CompareCommand) {
         let scene = self.edits.scene();
-        let reference = match wish {
+        let reference = match command {
             CompareCommand::Keep => Reference::kept(scene, self.maps()).map(Some),
             CompareCommand::Load(folder) => Reference::of_folder(folder, scene).map(Some),
             CompareCommand::End => Ok(None),

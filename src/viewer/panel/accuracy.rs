@@ -52,7 +52,7 @@ const NO_TARGET: &str = "No error is aimed at.";
 pub fn show_limits(ui: &mut Ui, settings: &mut BakeSettings) {
     let no_caustic = light_pass::no_caustic(settings);
     let default = BakeSettings::default();
-    let automatic = settings.path_threshold();
+    let usual_share = settings.path_threshold();
     let usual_depth = match settings.estimator {
         Estimator::Auto | Estimator::Photon => settings.photon_depth(),
         Estimator::Wavefront | Estimator::Splat => settings.depth(),
@@ -63,34 +63,29 @@ pub fn show_limits(ui: &mut Ui, settings: &mut BakeSettings) {
         setting(ui, "Error is", no_metric, metric, listed);
         let depth = (&mut settings.max_depth, &default.max_depth);
         setting(ui, "Max depth", no_caustic, depth, |ui, depth| {
-            automatic_depth(ui, depth, usual_depth)
+            automatic(ui, depth, usual_depth, |shown| Slider::new(shown, DEPTHS))
         });
         let share = (&mut settings.branch_threshold, &default.branch_threshold);
         setting(ui, "Weakest branch", no_caustic, share, |ui, share| {
-            threshold(ui, share, automatic)
+            automatic(ui, share, usual_share, |shown| {
+                Slider::new(shown, SHARES).custom_formatter(|value, _| significant(value))
+            })
         });
     });
 }
 
-/// The depth that counts; automatic until it is touched.
-fn automatic_depth(ui: &mut Ui, depth: &mut Option<u32>, automatic: u32) -> Response {
-    let mut shown = depth.unwrap_or(automatic);
-    let slider = Slider::new(&mut shown, DEPTHS).logarithmic(true);
+/// The value that counts; automatic until it is touched.
+fn automatic<T: Copy>(
+    ui: &mut Ui,
+    value: &mut Option<T>,
+    usual: T,
+    slider: impl FnOnce(&mut T) -> Slider<'_>,
+) -> Response {
+    let mut shown = value.unwrap_or(usual);
+    let slider = slider(&mut shown).logarithmic(true);
     let response = ui.add(slider.clamping(SliderClamping::Never));
     if response.changed() {
-        *depth = Some(shown);
-    }
-    response
-}
-
-/// The share that counts; automatic until it is touched.
-fn threshold(ui: &mut Ui, share: &mut Option<f64>, automatic: f64) -> Response {
-    let mut shown = share.unwrap_or(automatic);
-    let slider = Slider::new(&mut shown, SHARES).logarithmic(true);
-    let slider = slider.clamping(SliderClamping::Never);
-    let response = ui.add(slider.custom_formatter(|value, _| significant(value)));
-    if response.changed() {
-        *share = Some(shown);
+        *value = Some(shown);
     }
     response
 }

@@ -128,7 +128,6 @@ pub fn setting<T: PartialEq + Clone>(
 }
 
 /// A button that sets a value back; tells whether it was pressed.
-/// The same, for what is not in a row.
 pub fn reset_to(ui: &mut Ui, label: &str, default: &str) -> bool {
     let name = format!("Reset {label}");
     ui.add(

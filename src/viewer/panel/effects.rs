@@ -50,12 +50,7 @@ pub fn show(ui: &mut Ui, switches: &mut EffectSwitches, model: &Model, commands:
         }
         switches.set(effect, switch);
     }
-    for line in model
-        .last
-        .as_deref()
-        .iter()
-        .flat_map(|last| &last.result.plan.lights)
-    {
+    for line in model.last.iter().flat_map(|last| &last.result.plan.lights) {
         let name = format!("light {}", line.light);
         title(ui, &name, Some(line.on));
         detail(ui, &name, |ui| drop(ui.label(RichText::new(&line.reason).weak())));
@@ -63,8 +58,8 @@ pub fn show(ui: &mut Ui, switches: &mut EffectSwitches, model: &Model, commands:
 }
 
 /// The plan of the last level, the eye's chains as the picture has them. Dispersion is of both passes.
-fn known<'a>(effect: Effect, model: &'a Model) -> Option<Cow<'a, EffectLine>> {
-    let plan = model.last.as_deref().map(|last| &last.result.plan);
+fn known(effect: Effect, model: &Model) -> Option<Cow<'_, EffectLine>> {
+    let plan = model.last.as_ref().map(|last| &last.result.plan);
     let planned = || plan?.effects.iter().find(|line| line.effect == effect);
     let chains = model.picture.chains.as_ref();
     match effect {
@@ -102,11 +97,8 @@ fn entry(ui: &mut Ui, effect: Effect, switch: &mut EffectSwitch, model: &Model) 
             None => "Known after the first bake.",
         };
         ui.label(RichText::new(reason).weak());
-        if let Some(rays) = model
-            .last
-            .as_deref()
-            .and_then(|last| rays(effect, &last.result.counts))
-        {
+        let last = model.last.as_ref();
+        if let Some(rays) = last.and_then(|last| rays(effect, &last.result.counts)) {
             ui.label(RichText::new(rays).size(COUNTER))
                 .on_hover_text("Traced by this bake up to the maps that are shown; what was kept from before is not counted.");
         }
@@ -174,12 +166,12 @@ const LINE: &str = "Light on all maps and layers with the effect minus without i
                     root mean square of the difference over the mean with it.";
 
 /// A button that asks what an effect is worth, unless that is known or being found; tells whether it was pressed.
-pub fn button(ui: &mut Ui, effect: Effect, model: &Model) -> bool {
+fn button(ui: &mut Ui, effect: Effect, model: &Model) -> bool {
     if found(effect, model).is_some_and(|worth| worth.difference.is_ok()) || progress(effect, model).is_some()
     {
         return false;
     }
-    let is_ready = !model.state.is_working() && model.last.as_deref().is_some_and(|last| last.is_final);
+    let is_ready = !model.state.is_working() && model.last.as_ref().is_some_and(|last| last.is_final);
     let button = ui
         .add_enabled(is_ready, Button::new("worth?").small())
         .on_hover_text(BUTTON)
@@ -190,7 +182,7 @@ pub fn button(ui: &mut Ui, effect: Effect, model: &Model) -> bool {
 }
 
 /// What was found, or how far that is.
-pub fn line(ui: &mut Ui, effect: Effect, model: &Model) {
+fn line(ui: &mut Ui, effect: Effect, model: &Model) {
     if let Some(text) = progress(effect, model) {
         ui.label(RichText::new(text).size(COUNTER));
         return;
@@ -205,7 +197,7 @@ pub fn line(ui: &mut Ui, effect: Effect, model: &Model) {
     }
 }
 
-fn found<'a>(effect: Effect, model: &'a Model) -> Option<&'a Worth> {
+fn found(effect: Effect, model: &Model) -> Option<&Worth> {
     model.worth.as_ref().filter(|worth| worth.effect == effect)
 }
 

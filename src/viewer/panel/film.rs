@@ -31,13 +31,10 @@ pub fn show(ui: &mut Ui, film: &mut Film, file: &mut String, model: &Model, comm
     keys(ui, film, commands);
     let default = Film::default();
     rows(ui, "film", |ui| {
-        setting(
-            ui,
-            "Frames",
-            None,
-            (&mut film.frames, &default.frames),
-            |ui, frames| ui.add(DragValue::new(frames).range(1..=MAX_FRAMES)),
-        );
+        let frames = (&mut film.frames, &default.frames);
+        setting(ui, "Frames", None, frames, |ui, frames| {
+            ui.add(DragValue::new(frames).range(1..=MAX_FRAMES))
+        });
         setting(ui, "Frame size", None, (&mut film.size, &default.size), size);
     });
     ui.horizontal(|ui| {

@@ -47,13 +47,8 @@ pub fn show(ui: &mut Ui, settings: &mut BakeSettings) {
         if settings.estimator != before {
             change_estimator(settings, before);
         }
-        setting(
-            ui,
-            "Layers",
-            None,
-            (&mut settings.layers, &default.layers),
-            layers,
-        );
+        let value = (&mut settings.layers, &default.layers);
+        setting(ui, "Layers", None, value, layers);
         let default_density_per_sr = default_density_per_sr(settings);
         let density_per_sr = (&mut settings.density_per_sr, &default_density_per_sr);
         let before = *density_per_sr.0;
@@ -62,13 +57,10 @@ pub fn show(ui: &mut Ui, settings: &mut BakeSettings) {
             // What is asked for is seen: refinement would go on to the same picture from any density.
             target::aim_at_density(settings);
         }
-        setting(
-            ui,
-            "Sigma [radii²]",
-            no_sigma,
-            (&mut settings.sigma, &default.sigma),
-            |ui, value| sigma(ui, value, refines),
-        );
+        let value = (&mut settings.sigma, &default.sigma);
+        setting(ui, "Sigma [radii²]", no_sigma, value, |ui, value| {
+            sigma(ui, value, refines)
+        });
     });
 }
 

@@ -91,7 +91,7 @@ pub fn show_large(ui: &Ui, browser: &mut Browser, model: &Model) {
 impl Browser {
     /// Forgets pictures of other maps than those that are shown.
     fn keep_up(&mut self, model: &Model) {
-        let made_of = model.last.as_deref().map(|last| (last.serial, last.level));
+        let made_of = model.last.as_ref().map(|last| (last.serial, last.level));
         if made_of != self.made_of {
             self.made_of = made_of;
             self.thumbnails.clear();

@@ -26,7 +26,7 @@ use serde::{Deserialize, Serialize};
 pub use self::scene::{Placed, Selection};
 use super::command::{Choices, Command, CompareCommand, FilmCommand};
 use super::model::Model;
-use super::navigation::Travel;
+use super::navigation::{Navigator, Travel};
 pub use super::views::Quantity;
 use super::views::ScaleChoice;
 use crate::error::Warning;
@@ -152,40 +152,33 @@ impl Panel {
 
     fn sections(&mut self, ui: &mut Ui, choices: &mut Choices, model: &Model, commands: &mut Vec<Command>) {
         self.scene(ui, choices, model, commands);
+        let (settings, last) = (&mut choices.settings, model.last.as_deref());
         section(ui, "Light pass", true, |ui| {
-            light_pass::show(ui, &mut choices.settings);
+            light_pass::show(ui, settings);
             part(ui, "Rays and kernels", |ui| {
-                light_pass::show_details(ui, &mut choices.settings)
+                light_pass::show_details(ui, settings)
             });
-            part(ui, "Energy", |ui| bake::energy(ui, model.last.as_deref()));
+            part(ui, "Energy", |ui| bake::energy(ui, last));
         });
         section(ui, "Accuracy", true, |ui| {
-            accuracy::show(ui, &mut choices.settings);
-            part(
-                ui,
-                &accuracy::course::title(&choices.settings, model.last.as_deref()),
-                |ui| accuracy::course::show(ui, &mut choices.settings, model.last.as_deref()),
-            );
-            part(ui, "Limits", |ui| {
-                accuracy::show_limits(ui, &mut choices.settings)
-            });
+            accuracy::show(ui, settings);
+            let title = accuracy::course::title(settings, last);
+            part(ui, &title, |ui| accuracy::course::show(ui, settings, last));
+            part(ui, "Limits", |ui| accuracy::show_limits(ui, settings));
         });
         section(ui, "Effects", false, |ui| {
-            effects::show(ui, &mut choices.settings.effects, model, commands)
+            effects::show(ui, &mut settings.effects, model, commands)
         });
         section(ui, "Maps", false, |ui| {
             maps::show(ui, (&mut self.maps, &self.maps_folder), model, commands)
         });
         section(ui, "Display", true, |ui| {
             display::show(ui, &mut choices.display, model, commands);
-            part(
-                ui,
-                &frame_graph::title(model.picture.frame_times.as_ref()),
-                |ui| {
-                    frame_graph::show(ui, model.picture.frame_times.as_ref());
-                    frame_graph::waits(ui, &model.picture.latencies);
-                },
-            );
+            let times = model.picture.frame_times.as_ref();
+            part(ui, &frame_graph::title(times), |ui| {
+                frame_graph::show(ui, times);
+                frame_graph::waits(ui, &model.picture.latencies);
+            });
         });
         section(ui, "Export", true, |ui| {
             export::show(ui, &mut self.maps_folder, model, commands)
@@ -197,7 +190,7 @@ impl Panel {
         section(ui, "Compare", false, |ui| {
             maps::compare(ui, &mut self.compare_folder, model, commands)
         });
-        self.help(ui, model);
+        self.help(ui, &model.navigator);
     }
 
     /// Opens where something is picked in the picture.
@@ -234,12 +227,10 @@ impl Panel {
         }
     }
 
-    fn help(&mut self, ui: &mut Ui, model: &Model) {
+    fn help(&mut self, ui: &mut Ui, navigator: &Navigator) {
         let help = CollapsingHeader::new(RichText::new("Help").strong())
             .open(Some(self.help_open))
-            .show(ui, |ui| {
-                keys(ui, model.navigator.travel(), model.navigator.speed_m_per_s())
-            });
+            .show(ui, |ui| keys(ui, navigator.travel(), navigator.speed_m_per_s()));
         if help.header_response.on_hover_text("The keys (H).").clicked() {
             self.help_open = !self.help_open;
         }

@@ -9,7 +9,7 @@ use nephroid::settings::Estimator;
 use nephroid::viewer::ViewerOptions;
 use nephroid::viewer::files::FilesOptions;
 
-use super::fixtures::{act, bake, folder, model, options, read, set, until, wish};
+use super::fixtures::{act, bake, change, folder, model, options, read, set, until};
 use super::scene_file;
 
 #[test]
@@ -28,7 +28,7 @@ fn camera_settings_and_edits_stay() {
         material: 1,
         roughness: 0.25,
     };
-    act(&mut model, wish(rough));
+    act(&mut model, change(rough));
     model.navigator.look(DVec2::new(100.0, 30.0));
     set(&mut model, |it| {
         (it.settings.seed, it.settings.estimator) = (7, Estimator::Photon)

@@ -44,7 +44,7 @@ fn use_it(model: &mut Model) {
     model.travel(Travel::Orbit);
     model.choices.settings.seed = 7;
     model.choices.display.exposure_stops = 1.5;
-    act(model, wish(intensity(0, 5.0)));
+    act(model, change(intensity(0, 5.0)));
 }
 
 fn undoable(model: &Model) -> usize {
@@ -66,7 +66,7 @@ fn what_was_set_is_found_again() {
     let mut second = kept.model();
     assert_eq!(second.choices.settings, settings);
     near(second.choices.display.exposure_stops, 1.5, 1e-12, "exposure");
-    assert!(second.keeps_exposure());
+    assert!(second.exposure_is_kept);
     assert_eq!(second.navigator.travel(), Travel::Orbit);
     assert_eq!(second.scene().lights, scene.lights);
     for (number, bookmark) in views.bookmarks.iter().enumerate() {
@@ -79,7 +79,7 @@ fn what_was_set_is_found_again() {
 
     // Another scene has nothing of it.
     let slab = Arc::new(built_in("slab"));
-    assert!(!kept.other(|options| options.scene = slab).keeps_exposure());
+    assert!(!kept.other(|options| options.scene = slab).exposure_is_kept);
 }
 
 #[test]

@@ -10,7 +10,7 @@ fn model() -> (Model, tempfile::TempDir) {
         event_log: Some(folder.path().join("log")),
         ..options("ring")
     });
-    act(&mut model, wish(intensity(0, 77.0)));
+    act(&mut model, change(intensity(0, 77.0)));
     bake(&mut model);
     (model, folder)
 }

@@ -133,14 +133,14 @@ fn tours_lead_past_all_cameras_and_back() {
 fn buttons_record_play_and_film() {
     let mut panel = Headless::new(BakeSettings::splat());
     panel.open("Camera path");
-    let wish = |panel: &mut Headless, name: &str| {
+    let asked = |panel: &mut Headless, name: &str| {
         panel.press(name);
         panel.asked().pop()
     };
-    assert_eq!(wish(&mut panel, "Play"), None, "there is nothing to be played");
-    assert_eq!(wish(&mut panel, "Tour"), None, "nor is there a camera");
+    assert_eq!(asked(&mut panel, "Play"), None, "there is nothing to be played");
+    assert_eq!(asked(&mut panel, "Tour"), None, "nor is there a camera");
     assert_eq!(
-        wish(&mut panel, "Add key"),
+        asked(&mut panel, "Add key"),
         Some(Command::Film(FilmCommand::Record(None)))
     );
     panel.model.choices.film = film();
@@ -154,13 +154,13 @@ fn buttons_record_play_and_film() {
         ("Export frames", FilmCommand::Shoot { turns: false }),
         ("Export turntable", FilmCommand::Shoot { turns: true }),
     ] {
-        assert_eq!(wish(&mut panel, name), Some(Command::Film(expected)), "{name}");
+        assert_eq!(asked(&mut panel, name), Some(Command::Film(expected)), "{name}");
     }
     panel.tell(|model| model.exporter.state = ExportState::Filming { done: 3, total: 120 });
     panel.assert_says(&["3 of 120 frames"]);
-    assert_eq!(wish(&mut panel, "Stop"), Some(Command::Film(FilmCommand::Stop)));
-    assert_eq!(wish(&mut panel, "Export frames"), None, "one at a time");
+    assert_eq!(asked(&mut panel, "Stop"), Some(Command::Film(FilmCommand::Stop)));
+    assert_eq!(asked(&mut panel, "Export frames"), None, "one at a time");
     panel.press("Key 1: delete");
     assert_eq!(panel.model.choices.film.keys, film().keys[1..]);
-    assert_eq!(wish(&mut panel, "Save path"), None, "one key is no path");
+    assert_eq!(asked(&mut panel, "Save path"), None, "one key is no path");
 }

@@ -11,6 +11,7 @@ use nephroid::scene::{Edit, Light, LightKind, LoadOptions, Scene, load};
 use nephroid::settings::{BakeSettings, LayerKind, MapResolution};
 use nephroid::units::{Flux, Irradiance, RadiantIntensity};
 use nephroid::viewer::ViewerOptions;
+use nephroid::viewer::background::Wake;
 use nephroid::viewer::command::{Choices, Command};
 use nephroid::viewer::files::FilesOptions;
 use nephroid::viewer::model::Model;
@@ -98,7 +99,7 @@ pub fn folder() -> TempDir {
 }
 
 pub fn model(options: &ViewerOptions) -> Model {
-    Model::new(options, || ()).expect("threads are to be had")
+    Model::new(options, &Wake::new(|| ())).expect("threads are to be had")
 }
 
 /// One frame, with the mouse up.
@@ -142,7 +143,7 @@ pub fn bake(model: &mut Model) {
     });
 }
 
-pub fn wish(edit: Edit) -> Vec<Command> {
+pub fn change(edit: Edit) -> Vec<Command> {
     vec![Command::Edit(edit)]
 }
 

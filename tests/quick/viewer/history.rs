@@ -28,7 +28,7 @@ fn all_changes_are_undone_in_one_order() {
     let power = format!("power of `{}`", scene.lights[0].name);
     let order = ["sigma", &power, "tone map"];
     set(&mut model, |it| it.settings.sigma = Sigma::Constant(4.0));
-    act(&mut model, wish(intensity(0, 7.0)));
+    act(&mut model, change(intensity(0, 7.0)));
     let edited = Arc::clone(model.scene());
     set(&mut model, |it| it.display.tone_map = ToneMap::Aces);
     // A change of the window's own, which no undo takes back.

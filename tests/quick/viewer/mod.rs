@@ -64,6 +64,6 @@ use nephroid::viewer::placement::Placement;
 use nephroid::viewer::worker::{BakeState, BakedLevel};
 
 use crate::prelude::*;
-use fixtures::{act, bake, chart, edited, events, folder, intensity, options, set, until, wait_for, wish};
+use fixtures::{act, bake, change, chart, edited, events, folder, intensity, options, set, until, wait_for};
 use headless::{Headless, finished, splats};
 use support::scenes::map_of as caustic;

@@ -1,5 +1,7 @@
 //! The window's state, with real bakes and without a window.
 
+use nephroid::viewer::background::Wake;
+
 use super::fixtures::chosen;
 use super::*;
 
@@ -116,9 +118,8 @@ fn changes_that_need_no_bake_bake_nothing() {
 #[test]
 fn changes_wait_until_they_rest() {
     let (mut model, log) = baked();
-    model.choices.settings.density_per_sr = LONG;
     let now = Instant::now();
-    act_at(&mut model, now);
+    set_at(&mut model, now, |it| it.settings.density_per_sr = LONG);
     assert!(model.state.is_baking());
     // A change that is taken back bakes nothing.
     for seed in [5, 0] {
@@ -190,7 +191,7 @@ fn edits_are_baked_and_undone() {
     }
 
     let (material, ior) = (0, 0.5);
-    act(&mut model, wish(Edit::MaterialIor { material, ior }));
+    act(&mut model, change(Edit::MaterialIor { material, ior }));
     let refusal = model.refusal.as_ref().expect("it is refused");
     assert!(refusal.contains("0.5"), "{refusal}");
     assert!(!model.state.is_baking());
@@ -260,6 +261,6 @@ fn given_maps_are_shown_without_a_bake() {
 fn a_log_that_cannot_be_written_is_told() {
     let file = tempfile::NamedTempFile::new().expect("a file");
     let options = with(options("ring"), |it| it.event_log = Some(file.path().join("x")));
-    let error = Model::new(&options, || ()).expect_err("a file is no folder");
+    let error = Model::new(&options, &Wake::new(|| ())).expect_err("a file is no folder");
     says(error, "event log cannot be written");
 }

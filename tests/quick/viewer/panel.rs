@@ -275,16 +275,16 @@ fn buttons_tell_what_was_pressed() {
         model.refusal = Some("light `lamp`: no; yes".into());
     });
     panel.assert_says(&["caustic 25 %", "light `lamp`: no; yes"]);
-    panel.press("Cancel");
-    assert!(panel.asked() == [Command::Cancel] && panel.model.choices.automatic);
-    panel.make(Check("automatic"));
-    assert!(!panel.model.choices.automatic);
     panel.hover(Role::Button, "Undo (Ctrl+Z)");
     panel.assert_says(&["Takes back: power of `lamp`"]);
     panel.press("Undo (Ctrl+Z)");
     assert_eq!(panel.asked(), [Command::Undo]);
     panel.press("Redo (Ctrl+Y)");
     assert_eq!(panel.asked(), [Command::Redo]);
+    panel.press("Cancel");
+    assert!(panel.asked() == [Command::Cancel] && panel.model.choices.automatic);
+    panel.make(Check("automatic"));
+    assert!(!panel.model.choices.automatic);
 }
 
 #[test]

@@ -106,15 +106,15 @@ fn failures_spoil_nothing_and_bakes_come_first() {
 #[test]
 fn shown_until_other_maps_come() {
     let mut model = fixtures::model(&options("ring"));
-    let wish = || vec![Command::Worth(Effect::Reflection)];
-    act(&mut model, wish());
+    let asked = || vec![Command::Worth(Effect::Reflection)];
+    act(&mut model, asked());
     // Nothing is compared before there are maps.
     assert!(model.state.is_baking());
     bake(&mut model);
     let before = Arc::clone(model.last.as_ref().expect("there are maps"));
     assert_eq!(model.quantity(), Quantity::Light);
 
-    act(&mut model, wish());
+    act(&mut model, asked());
     until(&mut model, "the comparison", |model| model.worth.is_some());
     bake(&mut model);
     assert!(Arc::ptr_eq(&before, model.last.as_ref().expect("there are maps")));

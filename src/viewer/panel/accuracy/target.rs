@@ -134,24 +134,16 @@ pub fn show(ui: &mut Ui, settings: &mut BakeSettings, unavailable: Option<&str>)
         Target::Density => {}
         Target::Error(error) => {
             let default = Preset::default().max_error();
-            setting(
-                ui,
-                "Max error [%]",
-                unavailable,
-                (error, &default),
-                percent_slider,
-            );
+            let error = (error, &default);
+            setting(ui, "Max error [%]", unavailable, error, percent_slider);
         }
-        Target::Time(time_s) => setting(
-            ui,
-            "Max time [s]",
-            unavailable,
-            (time_s, &FIRST_TIME_S),
-            |ui, time_s| {
+        Target::Time(time_s) => {
+            let time_s = (time_s, &FIRST_TIME_S);
+            setting(ui, "Max time [s]", unavailable, time_s, |ui, time_s| {
                 let slider = Slider::new(time_s, TIMES_S).logarithmic(true).suffix(" s");
                 ui.add(slider.clamping(SliderClamping::Edits).max_decimals(3))
-            },
-        ),
+            });
+        }
     }
     if target != before {
         target.set(settings);
