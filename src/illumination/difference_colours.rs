@@ -1,6 +1,7 @@
 //! False colours of what an effect adds or takes away: warm is more, cool is less.
 
 use super::difference::SignedMap;
+use super::false_colours::mixed;
 
 /// Differences relative to the map's mean between the middle of the scale and its ends, logarithmic between them: 1 %
 /// and 1000 %, either way.
@@ -14,16 +15,7 @@ const TAKEN: [[u8; 3]; 4] = [[38, 38, 42], [24, 62, 128], [52, 140, 226], [190, 
 /// Display colour (sRGB) of a difference relative to the map's mean; both ends of the scale go on.
 pub fn colour(relative: f64) -> [u8; 3] {
     let stops = if relative < 0.0 { TAKEN } else { ADDED };
-    let place = place(relative.abs()) * (stops.len() - 1) as f64;
-    let index = (place as usize).min(stops.len() - 2);
-    let share = place - index as f64;
-    std::array::from_fn(|channel| {
-        let (a, b) = (
-            f64::from(stops[index][channel]),
-            f64::from(stops[index + 1][channel]),
-        );
-        (a + (b - a) * share).round() as u8
-    })
+    mixed(&stops, place(relative.abs()))
 }
 
 /// Where a size of a difference lies between the middle of the scale (0) and its ends (1).

@@ -23,6 +23,17 @@ pub fn viridis(place: f64) -> [f64; 3] {
     })
 }
 
+/// Display colour (sRGB) of a place in [0, 1] of a scale, between stops at even steps.
+pub fn mixed(stops: &[[u8; 3]], place: f64) -> [u8; 3] {
+    let place = place * (stops.len() - 1) as f64;
+    let index = (place as usize).min(stops.len() - 2);
+    let share = place - index as f64;
+    std::array::from_fn(|channel| {
+        let [a, b] = [0, 1].map(|step| f64::from(stops[index + step][channel]));
+        (a + (b - a) * share).round() as u8
+    })
+}
+
 /// Which quantities the two ends of the colours stand for.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ColourScale {

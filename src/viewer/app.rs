@@ -15,22 +15,24 @@ use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoopProxy};
 use winit::keyboard::ModifiersState;
 use winit::window::WindowId;
 
+use self::drawing::WarmUp;
+use super::background::Wake;
+use super::command::Command;
 use super::exposure::AutoExposure;
 use super::files::{Choice, Dialog};
-use super::frame_times::{FrameTimes, sum_ms};
 use super::gizmo::Gizmo;
 use super::graphics::{Graphics, RETRY_AFTER, Shown};
-use super::interface::Painting;
-use super::latency::Latencies;
+use super::interface::{Painting, accessibility};
 use super::lens::Lens;
-use super::model::Model;
+use super::model::{MapsShown, Model};
 use super::overlay;
 use super::pace::Pace;
-use super::panel::{Facts, Wishes};
-use super::warm_up::WarmUp;
-use super::{ViewerOptions, accessibility, beside, error_view, probe, sketching};
+use super::panel::Panel;
+use super::timing::{FrameTimes, sum_ms};
+use super::{ViewerOptions, beside, probe, sketching};
 use crate::error::{Error, Result};
-use crate::plan::EffectLine;
+use crate::eye_pass::renderer::MapStyle;
+use crate::illumination::IlluminationMap;
 use crate::progress::Control;
 use serde_json::{Value, json};
 
@@ -70,9 +72,21 @@ const LONGEST_STEP: Duration = Duration::from_millis(500);
 const MOST_LOSSES: usize = 3;
 const LOSSES_WITHIN: Duration = Duration::from_secs(60);
 
+/// The maps on the device.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct MapsOnDevice {
+    shown: MapsShown,
+    /// Whether direct light is traced, and not in them.
+    traces_lights: bool,
+}
+
+/// The maps beside the picture, and how they are shown.
+type BesideShown = (Arc<[IlluminationMap]>, MapStyle);
+
 /// The whole program behind one window.
 pub struct App {
     model: Model,
+    panel: Panel,
     graphics: Option<Graphics>,
     proxy: EventLoopProxy<News>,
     stop: Option<Arc<Control>>,
@@ -96,13 +110,16 @@ pub struct App {
     exposure: AutoExposure,
     /// When the exposure was last brought on its way.
     exposed: Instant,
-    must_set_maps: bool,
-    must_set_beside: bool,
+    /// As the model had them in the last frame.
+    shown: MapsShown,
+    /// As the device has them; `None` where it has to be given all.
+    on_device: Option<MapsOnDevice>,
+    /// What the picture's right part was told to show.
+    beside: Option<BesideShown>,
     /// Where the picture's two parts meet, as a share of its width.
     divider: f32,
-    /// Whether direct light is traced, and not in the maps on the device.
-    traces_lights: bool,
-    pressed: Wishes,
+    /// What keys asked for since the last frame.
+    pressed: Vec<Command>,
     losses: Vec<Instant>,
     /// Chooses how well pictures are made.
     pace: Pace,
@@ -114,13 +131,8 @@ pub struct App {
     frames: u64,
     /// Pictures at the last line of the log that told of rest.
     rested_at: u64,
-    /// The eye's chains in the picture that is shown.
-    chains: Option<EffectLine>,
-    frame_times: FrameTimes,
     /// Frames that may still come only to tell what the last picture took.
     reports_due: u32,
-    /// From events to frames.
-    latencies: Latencies,
     /// Told over the picture until the next key press.
     notice: Option<String>,
     /// Held now: Ctrl, Shift and the like.
@@ -136,17 +148,19 @@ impl App {
     /// As [`Model::new`].
     pub fn new(options: &ViewerOptions, proxy: EventLoopProxy<News>) -> Result<Self> {
         let of_baker = proxy.clone();
-        let wake = move || {
+        let wake = &Wake::new(move || {
             // Fails only when the window is gone, and then nobody waits for it.
             let _ = of_baker.send_event(News::Baker);
-        };
-        let model = Model::new(options, wake.clone())?;
+        });
+        let model = Model::new(options, wake)?;
         Ok(Self {
-            exposure: AutoExposure::new(options.exposure_stops.is_none() && !model.keeps_exposure()),
+            exposure: AutoExposure::new(options.exposure_stops.is_none() && !model.exposure_is_kept),
             exposed: Instant::now(),
-            warm_up: WarmUp::new(Arc::new(wake.clone())),
+            warm_up: WarmUp::new(wake),
             notice: files::dark_notice(&model),
+            shown: model.maps_shown(),
             model,
+            panel: Panel::default(),
             graphics: None,
             proxy,
             stop: options.stop.clone(),
@@ -158,11 +172,10 @@ impl App {
             clicks_at: None,
             moved_until: Instant::now(),
             wake_at: None,
-            must_set_maps: true,
-            must_set_beside: false,
+            on_device: None,
+            beside: None,
             divider: 0.5,
-            traces_lights: false,
-            pressed: Wishes::default(),
+            pressed: Vec::new(),
             losses: Vec::new(),
             pace: Pace::default(),
             is_refining: false,
@@ -170,12 +183,9 @@ impl App {
             pictures: 0,
             frames: 0,
             rested_at: 0,
-            chains: None,
-            frame_times: FrameTimes::default(),
             reports_due: 0,
-            latencies: Latencies::default(),
             modifiers: ModifiersState::empty(),
-            dialog: Dialog::new(Arc::new(wake)),
+            dialog: Dialog::new(wake),
             failure: None,
         })
     }
@@ -192,10 +202,13 @@ impl App {
                     graphics.interface().watch_controls();
                 }
                 let adapter = graphics.gpu().adapter_name();
-                let scene = Arc::clone(self.model.scene());
-                self.model
-                    .log
-                    .write("started", json!({"scene": scene.name, "adapter": adapter}));
+                let started = json!({"scene": self.model.scene().name, "adapter": adapter});
+                self.model.log.write("started", started);
+                let report = &mut self.model.picture;
+                report.adapter = adapter;
+                report.frame_times = graphics
+                    .tells_times()
+                    .then(|| report.frame_times.take().unwrap_or_default());
                 graphics.window().request_redraw();
                 self.pace = if graphics.gpu().is_software() {
                     Pace::of_software()
@@ -203,9 +216,7 @@ impl App {
                     Pace::default()
                 };
                 self.graphics = Some(graphics);
-                self.traces_lights = false;
-                self.must_set_maps = true;
-                self.must_set_beside = true;
+                (self.on_device, self.beside) = (None, None);
             }
             Err(error) => self.fail(event_loop, error),
         }
@@ -223,12 +234,11 @@ impl App {
     }
 
     fn closing(&mut self) {
-        self.model.log.write(
+        let Model { log, picture, .. } = &mut self.model;
+        let (while_baking, otherwise) = (picture.latencies.while_baking(), picture.latencies.otherwise());
+        log.write(
             "latency",
-            json!({
-                "while_baking": self.latencies.while_baking(),
-                "otherwise": self.latencies.otherwise(),
-            }),
+            json!({"while_baking": while_baking, "otherwise": otherwise}),
         );
         self.model.log.write("closing", Value::Null);
     }
@@ -294,32 +304,29 @@ impl App {
     /// One frame.
     fn redraw(&mut self, event_loop: &ActiveEventLoop) {
         self.fly();
-        let (quantity, style) = (self.model.quantity(), self.model.map_style());
         self.poll_files();
-        if self.model.poll() {
-            self.must_set_maps = true;
-            if self.is_software() {
-                self.model.look_away(LEVEL_OF_SOFTWARE);
-            }
+        if self.model.poll() && self.is_software() {
+            self.model.worker.look_away(LEVEL_OF_SOFTWARE);
         }
         self.report_chains();
-        let layer = self.model.panel.display.layer;
-        let mut wishes = std::mem::take(&mut self.pressed);
-        wishes.edit = self.model.placed();
-        let Some(mut painting) = self.run_interface(&mut wishes) else {
+        let Some((mut painting, commands)) = self.run_interface() else {
             return;
         };
-        self.model.act(&wishes, Instant::now());
-        self.must_set_beside |= wishes.compare.is_some() || self.model.map_style() != style;
-        self.must_set_maps |= layer != self.model.panel.display.layer;
-        if quantity != self.model.quantity() {
-            self.must_set_maps = true;
-            let what = self.model.quantity().name();
-            self.model.log.write("shows", json!({"what": what}));
-            // The legend comes with the next frame.
+        if commands
+            .iter()
+            .any(|command| matches!(command, Command::Choose(_)))
+        {
+            // Handles and legends come with the next frame.
             self.request_redraw();
         }
-        if wishes.measure_exposure {
+        let of_window = self.model.act(commands, Instant::now());
+        let before = std::mem::replace(&mut self.shown, self.model.maps_shown());
+        if before.quantity != self.shown.quantity {
+            let what = self.shown.quantity.name();
+            self.model.log.write("shows", json!({"what": what}));
+            self.request_redraw();
+        }
+        if of_window.contains(&Command::MeasureExposure) {
             self.exposure.ask();
         }
         if let Err(error) = self.draw_picture() {
@@ -336,14 +343,13 @@ impl App {
         {
             self.tell_fault(&error);
         }
-        if wishes.browse {
-            self.ask_for_file(Choice::Open);
-        }
-        if wishes.save_scene {
-            self.ask_for_file(Choice::SaveScene);
-        }
-        if wishes.save_picture {
-            self.save_picture();
+        for command in of_window {
+            match command {
+                Command::Browse => self.ask_for_file(Choice::Open),
+                Command::SaveScene => self.ask_for_file(Choice::SaveScene),
+                Command::SavePicture => self.save_picture(),
+                _ => {}
+            }
         }
         self.schedule(event_loop, shown, painting.repaint_after);
     }
@@ -355,122 +361,44 @@ impl App {
         self.notice = Some(sentence);
     }
 
-    /// Shows panel and picture to egui.
-    fn run_interface(&mut self, wishes: &mut Wishes) -> Option<Painting> {
-        let lost_device = self
-            .losses
-            .last()
-            .is_some_and(|loss| loss.elapsed() < LOSSES_WITHIN);
-        let Self {
-            model,
-            graphics,
-            picture_rect,
-            divider,
-            gizmo,
-            chains,
-            frame_times,
-            latencies,
-            notice,
-            ..
-        } = self;
-        let graphics = graphics.as_mut()?;
-        let (state, layers, adapter) = (
-            model.state().clone(),
-            model.layers(),
-            graphics.gpu().adapter_name(),
-        );
+    /// Shows panel and picture to egui; what the user asks for, in the order in which it is done.
+    fn run_interface(&mut self) -> Option<(Painting, Vec<Command>)> {
+        let lost = self.losses.last();
+        self.model.picture.lost_device = lost.is_some_and(|loss| loss.elapsed() < LOSSES_WITHIN);
+        let mut commands: Vec<Command> = self.model.placed().map(Command::Edit).into_iter().collect();
+        let graphics = self.graphics.as_mut()?;
         let (window, picture) = (Arc::clone(graphics.window()), graphics.picture_id());
         let beside = graphics.beside_id();
-        let tells_times = graphics.tells_times();
-        let (travel, speed_m_per_s) = (model.navigator.travel(), model.navigator.speed_m_per_s());
-        let edits = model.edits();
-        let (scene, loaded) = (Arc::clone(edits.scene()), Arc::clone(edits.loaded()));
-        let history = edits.history();
-        let (undo, redo) = (
-            history.next_undo().map(str::to_owned),
-            history.next_redo().map(str::to_owned),
-        );
-        let (has_errors, quantity) = (error_view::is_available(model.maps()), model.quantity());
-        let survey = *model.survey();
-        let probed = model.probed().cloned();
-        let sketch = model.sketch().cloned();
-        let (is_playing, film_told) = (model.is_playing(), model.film_told().map(str::to_owned));
-        let reference = model.reference().cloned();
-        let Model {
-            panel,
-            navigator,
-            last,
-            given,
-            exporter,
-            worth,
-            refusal,
-            files,
-            log,
-            ..
-        } = model;
-        let facts = Facts {
-            scene: &scene,
-            loaded: &loaded,
-            undo: undo.as_deref(),
-            redo: redo.as_deref(),
-            refusal: refusal.as_deref(),
-            state: &state,
-            last: last.as_deref(),
-            maps: last.as_ref().map_or(given, |last| &last.result.maps),
-            export: exporter.state(),
-            worth: worth.as_ref(),
-            layers: &layers,
-            survey: &survey,
-            reference: reference.as_ref(),
-            probed: probed.as_ref(),
-            sketch: sketch.as_deref(),
-            is_playing,
-            film_told: film_told.as_deref(),
-            has_errors,
-            chains: chains.as_ref(),
-            frame_times: tells_times.then_some(&*frame_times),
-            latencies,
-            travel,
-            speed_m_per_s,
-            lost_device,
-            files: files.facts(),
-            adapter: &adapter,
-        };
+        let model = &self.model;
         let painting = graphics.interface().run(&window, |ui| {
-            *wishes = std::mem::take(wishes).and(panel.show(ui, &facts));
-            let scale = panel.display.scale;
-            *picture_rect = overlay::show(ui, picture, &facts, (quantity, &scale), notice.as_deref());
-            if let Some((beside, reference)) = beside.zip(reference.as_ref()) {
-                beside::show(ui, *picture_rect, divider, (beside, reference));
+            commands.extend(self.panel.show(ui, model));
+            let rect = overlay::show(ui, picture, model, self.notice.as_deref());
+            self.picture_rect = rect;
+            if let Some((beside, reference)) = beside.zip(model.reference.as_ref()) {
+                beside::show(ui, rect, &mut self.divider, (beside, reference));
             }
-            let camera = navigator.camera_for(f64::from(picture_rect.aspect_ratio()));
+            let camera = model.navigator.camera_for(f64::from(rect.aspect_ratio()));
             let lens = Lens {
                 camera: &camera,
-                picture: *picture_rect,
+                picture: rect,
             };
-            if let Some(sketch) = &sketch {
-                sketching::draw(ui.painter(), &lens, sketch, panel.sketched);
+            if let Some(sketch) = model.sketch() {
+                sketching::draw(ui.painter(), &lens, sketch, model.choices.sketched);
             }
-            if let Some(probed) = &probed {
+            if let Some(probed) = model.probed() {
                 probe::draw(ui.painter(), &lens, probed);
             }
-            let pulled = gizmo.show(ui, &lens, panel.held(), (&scene, &loaded));
-            wishes.edit = pulled.or(wishes.edit.take());
+            let held = model.choices.selection.held();
+            let pulled = self.gizmo.show(ui, &lens, held, (model.scene(), model.loaded()));
+            commands.extend(pulled.map(Command::Edit));
         });
+        commands.append(&mut self.pressed);
         if let Some(controls) = &painting.moved_controls {
             let control = |c: &super::interface::Control| json!({"role": c.role, "name": c.name, "rect_pixels": c.rect});
             let controls: Vec<Value> = controls.iter().map(control).collect();
-            log.write("controls", json!({"controls": controls}));
+            self.model.log.write("controls", json!({"controls": controls}));
         }
-        Some(painting)
-    }
-
-    fn baking_frame(&self) -> Duration {
-        if self.is_software() {
-            BAKING_FRAME_OF_SOFTWARE
-        } else {
-            BAKING_FRAME
-        }
+        Some((painting, commands))
     }
 
     fn is_software(&self) -> bool {
@@ -482,7 +410,7 @@ impl App {
     fn schedule(&mut self, event_loop: &ActiveEventLoop, shown: Shown, repaint_after: Duration) {
         let now = Instant::now();
         if self.is_software() && (self.model.is_moving() || self.looking_from.is_some()) {
-            self.model.hold_bake(BAKE_WAITS);
+            self.model.worker.hold(BAKE_WAITS);
         }
         let wait = match shown {
             Shown::Broken => {
@@ -494,7 +422,10 @@ impl App {
             Shown::Yes if self.model.is_moving() || self.is_exposing() => Duration::ZERO,
             // The panel glides on while the picture waits for hands to rest.
             Shown::Yes if self.is_refining => self.pace.pause(now).min(repaint_after),
-            Shown::Yes if self.model.state().is_working() => repaint_after.min(self.baking_frame()),
+            Shown::Yes if self.model.state.is_working() && self.is_software() => {
+                repaint_after.min(BAKING_FRAME_OF_SOFTWARE)
+            }
+            Shown::Yes if self.model.state.is_working() => repaint_after.min(BAKING_FRAME),
             Shown::Yes => repaint_after,
         };
         let is_report_due = self.reports_due > 0 && shown == Shown::Yes;
@@ -505,7 +436,7 @@ impl App {
         };
         if shown == Shown::Yes {
             self.frames += 1;
-            self.latencies.show(now);
+            self.model.picture.latencies.show(now);
         }
         if wait.is_zero() {
             self.wake_at = None;
@@ -517,21 +448,27 @@ impl App {
             .flatten()
             .min();
         // A frame that could not be shown yet is no rest.
-        let is_working = self.model.state().is_working() || self.is_refining || is_report_due;
+        let is_working = self.model.state.is_working() || self.is_refining || is_report_due;
         let is_coming = self.is_exposing() || self.warm_up.is_coming();
         let is_working = is_working || shown == Shown::Later || self.model.is_moving() || is_coming;
         if self.rested_at != self.pictures && !is_working {
             self.rested_at = self.pictures;
             let (pictures, frames) = (self.pictures, self.frames);
             let position = self.model.navigator.camera().position.to_array();
+            let newest = self
+                .model
+                .picture
+                .frame_times
+                .as_ref()
+                .and_then(FrameTimes::newest);
             self.model.log.write(
                 "rest",
                 json!({
                     "pictures": pictures,
                     "frames": frames,
                     "position_m": position,
-                    "exposure_stops": self.model.panel.display.exposure_stops,
-                    "device_ms": self.frame_times.newest().copied().map(sum_ms),
+                    "exposure_stops": self.model.choices.display.exposure_stops,
+                    "device_ms": newest.copied().map(sum_ms),
                 }),
             );
         }
@@ -546,7 +483,7 @@ impl ApplicationHandler<News> for App {
     }
 
     fn new_events(&mut self, event_loop: &ActiveEventLoop, _: StartCause) {
-        self.latencies.begin_turn(Instant::now());
+        self.model.picture.latencies.begin_turn(Instant::now());
         if self.stop.as_ref().is_some_and(|stop| stop.is_cancelled()) {
             self.close(event_loop);
         } else if self.wake_at.is_some_and(|due| Instant::now() >= due) {
@@ -578,8 +515,8 @@ impl ApplicationHandler<News> for App {
         if graphics.interface().on_event(&window, &event) && event != WindowEvent::RedrawRequested {
             window.request_redraw();
             if is_by_hand {
-                let is_baking = self.model.state().is_baking();
-                self.latencies.meet(Instant::now(), is_baking);
+                let is_baking = self.model.state.is_baking();
+                self.model.picture.latencies.meet(Instant::now(), is_baking);
             }
         }
         match event {
@@ -615,8 +552,10 @@ impl ApplicationHandler<News> for App {
             && self.looking_from.is_some()
         {
             self.model.navigator.look(DVec2::new(x, y));
-            self.latencies
-                .meet(Instant::now(), self.model.state().is_baking());
+            self.model
+                .picture
+                .latencies
+                .meet(Instant::now(), self.model.state.is_baking());
             self.request_redraw();
         }
     }
@@ -625,7 +564,7 @@ impl ApplicationHandler<News> for App {
         let look = self.stop.as_ref().map(|_| Instant::now() + LOOK_FOR_STOP);
         let until = [self.wake_at, look].into_iter().flatten().min();
         event_loop.set_control_flow(until.map_or(ControlFlow::Wait, ControlFlow::WaitUntil));
-        self.latencies.end_turn(Instant::now());
+        self.model.picture.latencies.end_turn(Instant::now());
     }
 }
 

@@ -6,17 +6,11 @@ use std::sync::Arc;
 
 use egui::{Align2, Color32, CursorIcon, FontId, Rect, Sense, Stroke, Ui, WidgetInfo, pos2, vec2};
 
-use super::graphics::Picture;
 use super::panel::control::short;
-use crate::effect::EffectSwitch;
 use crate::error::{Error, Result};
 use crate::export::map_reader;
-use crate::eye_pass::View;
-use crate::eye_pass::renderer::{EyeQuality, MapStyle, Renderer};
-use crate::gpu::Gpu;
 use crate::illumination::IlluminationMap;
 use crate::illumination::difference::difference;
-use crate::optics::spectrum::xyz::Matrix3;
 use crate::scene::Scene;
 
 /// What the present maps are held against.
@@ -87,135 +81,6 @@ impl Reference {
                 .ok_or_else(|| format!("{} is dark", self.name)),
             Err(error) => Err(error.to_string()),
         };
-    }
-}
-
-/// How the picture is made: what both parts have in common.
-#[derive(Clone, Copy, Debug)]
-pub struct Making {
-    /// What is seen in mirrors and through glass.
-    pub chains: EffectSwitch,
-    /// What glass that parts wavelengths does.
-    pub dispersion: EffectSwitch,
-    /// What radiance is multiplied by before tone mapping.
-    pub white_balance: Matrix3,
-}
-
-/// The picture of the reference.
-pub struct Beside {
-    renderer: Renderer,
-    picture: Picture,
-    scene: Arc<Scene>,
-}
-
-impl Beside {
-    /// A renderer of its own for a scene.
-    ///
-    /// # Errors
-    /// The device cannot hold it twice.
-    pub fn new(gpu: &Gpu, egui: &mut egui_wgpu::Renderer, scene: &Arc<Scene>, samples: u32) -> Result<Self> {
-        Ok(Self {
-            picture: Picture::new(&gpu.device, egui),
-            renderer: Renderer::new(gpu, scene, Picture::FORMAT, samples)?,
-            scene: Arc::clone(scene),
-        })
-    }
-
-    /// Its picture's name in egui.
-    pub fn picture_id(&self) -> egui::TextureId {
-        self.picture.id()
-    }
-
-    /// Whether it shows a view.
-    pub fn shows(&self, view: &View) -> bool {
-        self.picture.shows(view)
-    }
-
-    /// Shows other maps, of a scene, from the next picture on.
-    ///
-    /// # Errors
-    /// The device cannot hold them.
-    pub fn set_maps(
-        &mut self,
-        gpu: &Gpu,
-        scene: &Arc<Scene>,
-        maps: &[IlluminationMap],
-        style: MapStyle,
-        making: &Making,
-    ) -> Result<()> {
-        self.picture.invalidate();
-        if !Arc::ptr_eq(&self.scene, scene) {
-            self.scene = Arc::clone(scene);
-            self.renderer.set_scene(gpu, scene)?;
-        }
-        self.renderer.set_map_style(style);
-        self.set_making(gpu, making)?;
-        self.renderer.set_maps(gpu, scene, maps)?;
-        Ok(())
-    }
-
-    /// Makes its picture otherwise from the next one on.
-    ///
-    /// # Errors
-    /// The device cannot hold what that takes.
-    pub fn set_making(&mut self, gpu: &Gpu, making: &Making) -> Result<()> {
-        self.picture.invalidate();
-        self.renderer.set_dispersion(making.dispersion);
-        self.renderer.set_white_balance(gpu, &making.white_balance);
-        self.renderer.set_chains(gpu, making.chains)
-    }
-
-    /// Draws a view that it does not show yet.
-    ///
-    /// # Errors
-    /// The device cannot hold a picture of that size.
-    pub fn draw(
-        &mut self,
-        gpu: &Gpu,
-        egui: &mut egui_wgpu::Renderer,
-        view: &View,
-        quality: EyeQuality,
-    ) -> Result<()> {
-        let Self {
-            renderer, picture, ..
-        } = self;
-        if renderer.quality() != quality {
-            picture.invalidate();
-            renderer.set_quality(quality);
-        }
-        picture.update(&gpu.device, egui, view, |target| {
-            let mut encoder = gpu.device.create_command_encoder(&Default::default());
-            renderer.draw(gpu, &mut encoder, target, view)?;
-            gpu.queue.submit([encoder.finish()]);
-            Ok(())
-        })?;
-        Ok(())
-    }
-
-    /// Makes the picture that it shows better by another sample.
-    ///
-    /// # Errors
-    /// The device cannot hold a picture of that size.
-    pub fn refine(
-        &mut self,
-        gpu: &Gpu,
-        egui: &mut egui_wgpu::Renderer,
-        view: &View,
-        quality: EyeQuality,
-    ) -> Result<()> {
-        if !self.shows(view) || self.renderer.quality() != quality {
-            return self.draw(gpu, egui, view, quality);
-        }
-        let mut encoder = gpu.device.create_command_encoder(&Default::default());
-        self.renderer
-            .refine(gpu, &mut encoder, self.picture.target(), view)?;
-        gpu.queue.submit([encoder.finish()]);
-        Ok(())
-    }
-
-    /// Gives its picture's name back.
-    pub fn release(self, egui: &mut egui_wgpu::Renderer) {
-        egui.free_texture(&self.picture.id());
     }
 }
 

@@ -1,18 +1,18 @@
-//! Maps and frames as files, written by a thread: the window goes on.
+//! Maps and frames as files, written by a thread: the window goes on; and the picture in the window, what is seen without
+//! the panel and the radiance behind it.
 
-use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
-use std::thread::JoinHandle;
-
-use super::background::Wake;
+use super::background::{Background, Task, Wake};
 use super::files::free_names;
 use super::filming::Shooting;
 use super::worker::BakedLevel;
 use crate::error::{Error, Result};
 use crate::export::map_folder::{self, MapFolder};
+use crate::export::picture::{display_png, radiance_exr};
+use crate::eye_pass::{Picture, View};
 use crate::files;
-use crate::progress::{Control, Progress, Stage};
+use crate::optics::spectrum::xyz::Matrix3;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// Which maps are to be written.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -51,118 +51,62 @@ impl ExportState {
     }
 }
 
-/// Where the thread tells how it gets on.
-struct Told {
-    states: Sender<ExportState>,
-    wake: Wake,
-}
-
-impl Told {
-    fn tell(&self, state: ExportState) {
-        // Nobody listens any more only where the window is gone.
-        let _ = self.states.send(state);
-        (self.wake.0)();
-    }
-}
-
-impl Progress for Told {
-    fn advance(&self, _: Stage, done: u64, total: u64) {
-        self.tell(ExportState::Filming { done, total });
-    }
-}
-
-/// The thread, while there is one. Dropping it stops what is filmed and waits until files are whole.
+/// Writes on a thread. Dropping it stops what is filmed and waits until files are whole.
 #[derive(Debug)]
 pub struct Exporter {
-    state: ExportState,
-    running: Option<(JoinHandle<()>, Receiver<ExportState>)>,
-    control: Arc<Control>,
-    wake: Wake,
+    /// How the last export got on, as of the last [`poll`](Self::poll).
+    pub state: ExportState,
+    work: Background<(), Result<PathBuf>>,
 }
 
 impl Exporter {
-    /// Nothing is written yet. `wake` is called from the thread when it is done.
-    pub fn new(wake: Arc<dyn Fn() + Send + Sync>) -> Self {
+    /// Nothing is written yet; the window is woken when something was.
+    pub fn new(wake: &Wake) -> Self {
         Self {
             state: ExportState::Idle,
-            running: None,
-            control: Arc::default(),
-            wake: Wake(wake),
+            work: Background::new("export", wake),
         }
-    }
-
-    /// How the last export got on, as of the last [`poll`](Self::poll).
-    pub fn state(&self) -> &ExportState {
-        &self.state
     }
 
     /// Writes maps into a working folder. Does nothing while anything is written.
     pub fn start(&mut self, export: Export, level: Arc<BakedLevel>, folder: PathBuf) {
-        self.run(ExportState::Writing, move |_, _| write(&export, &level, &folder));
+        self.run(ExportState::Writing, move |_| write(&export, &level, &folder));
     }
 
     /// Draws frames and writes them into a folder within a working folder. Does nothing while anything is written.
     pub fn film(&mut self, shooting: Shooting, folder: PathBuf) {
         let total = shooting.cameras.len() as u64;
         let begun = ExportState::Filming { done: 0, total };
-        self.run(begun, move |told, control| shooting.shoot(&folder, told, control));
+        self.run(begun, move |task| shooting.shoot(&folder, task, &task.control));
     }
 
     /// Stops what is being filmed after the present frame; those that are written stay.
     pub fn stop(&self) {
-        self.control.cancel();
+        self.work.cancel();
     }
 
-    fn run(
-        &mut self,
-        begun: ExportState,
-        write: impl FnOnce(&Told, &Control) -> Result<PathBuf> + Send + 'static,
-    ) {
-        if self.running.is_some() {
-            return;
-        }
-        let (sender, receiver) = channel();
-        self.control = Arc::default();
-        let control = Arc::clone(&self.control);
-        let told = Told {
-            states: sender,
-            wake: self.wake.clone(),
-        };
-        let work = move || {
-            told.tell(match write(&told, &control) {
-                Ok(path) => ExportState::Done(path),
+    fn run(&mut self, begun: ExportState, write: impl FnOnce(&Task) -> Result<PathBuf> + Send + 'static) {
+        if self.work.of().is_none() {
+            self.state = match self.work.start((), write) {
+                Ok(()) => begun,
                 Err(error) => ExportState::Failed(error.to_string()),
-            });
-        };
-        match std::thread::Builder::new().name("export".into()).spawn(work) {
-            Ok(thread) => {
-                self.running = Some((thread, receiver));
-                self.state = begun;
-            }
-            Err(error) => {
-                self.state = ExportState::Failed(format!("export: the system gives no thread: {error}"))
-            }
+            };
         }
     }
 
     /// Looks what the thread did; tells whether it ended since the last call.
     pub fn poll(&mut self) -> bool {
-        let Some((_, receiver)) = &self.running else {
+        if let (ExportState::Filming { .. }, Some((done, total))) = (&self.state, self.work.progress()) {
+            self.state = ExportState::Filming { done, total };
+        }
+        let Some(((), outcome)) = self.work.take() else {
             return false;
         };
-        loop {
-            match receiver.try_recv() {
-                Ok(state) => self.state = state,
-                Err(TryRecvError::Empty) if self.state.is_running() => return false,
-                // What it told last stays.
-                Err(_) if !self.state.is_running() => break,
-                Err(_) => {
-                    self.state = ExportState::Failed("export: it ended early; report this".into());
-                    break;
-                }
-            }
-        }
-        self.running = None;
+        self.state = match outcome {
+            Some(Ok(path)) => ExportState::Done(path),
+            Some(Err(error)) => ExportState::Failed(error.to_string()),
+            None => ExportState::Failed("export: it ended early; report this".into()),
+        };
         true
     }
 }
@@ -170,11 +114,7 @@ impl Exporter {
 impl Drop for Exporter {
     fn drop(&mut self) {
         self.stop();
-        if let Some((thread, _)) = self.running.take()
-            && thread.join().is_err()
-        {
-            log::error!("the exporting thread panicked");
-        }
+        self.work.wait();
     }
 }
 
@@ -205,4 +145,48 @@ fn write(export: &Export, level: &BakedLevel, folder: &Path) -> Result<PathBuf> 
 /// The folder that all maps of a scene go to unless another is named.
 pub fn folder_name(scene: &str) -> String {
     format!("nephroid-{}-maps", files::slug(scene, "scene"))
+}
+
+/// Writes `nephroid-SCENE-NNNN.png`, `picture` as `view` shows it in this white balance, and with `has_radiance` `.exr`, its radiance
+/// [W/(m² sr)]. The number is the first of which the folder holds neither. Returns what was written.
+///
+/// # Errors
+/// A place that cannot be written, a disk that is full, a folder without a free number: nothing is left there then.
+pub fn save_picture(
+    folder: &Path,
+    scene: &str,
+    picture: &Picture,
+    view: &View,
+    white_balance: &Matrix3,
+    has_radiance: bool,
+) -> Result<Vec<PathBuf>> {
+    let stem = format!("nephroid-{}", files::slug(scene, "scene"));
+    let names = |number: &str| ["png", "exr"].map(|extension| format!("{stem}-{number}.{extension}"));
+    let [png, exr] = free_names(folder, names)?;
+    let location = png.display().to_string();
+    let shown = display_png(
+        picture,
+        view.exposure_stops,
+        view.tone_map,
+        white_balance,
+        &location,
+    )?;
+    if !has_radiance {
+        files::write_atomically(&png, |writer| writer.write_all(&shown))?;
+        return Ok(vec![png]);
+    }
+    let radiance = radiance_exr(picture, &exr.display().to_string())?;
+    files::write_atomically(&exr, |writer| writer.write_all(&radiance))?;
+    if let Err(error) = files::write_atomically(&png, |writer| writer.write_all(&shown)) {
+        // Half a pair would take its number; the first error says more than one about tidying up.
+        let _ = files::remove_file(&exr);
+        return Err(error);
+    }
+    Ok(vec![png, exr])
+}
+
+/// What is told of files that were written.
+pub fn told(files: &[PathBuf]) -> String {
+    let names: Vec<_> = files.iter().map(|file| file.display().to_string()).collect();
+    format!("Saved {}.", names.join(" and "))
 }

@@ -93,14 +93,19 @@ pub fn show(map: &IlluminationMap, part: Part, size: [usize; 2], exposure_stops:
 pub fn read(map: &IlluminationMap, x: f64, y: f64) -> Option<Reading> {
     let (column, row) = inside(map, x, y)?;
     let texel = map.chart.texel_at(column, row);
-    let layers = map.layers.iter();
     Some(Reading {
         texel: [column, row],
-        layers_w_per_m2: layers
-            .map(|layer| (layer.kind, luminance(&layer.irradiance[texel])))
-            .collect(),
+        layers_w_per_m2: layers_at(map, texel),
         error_w_per_m2: map.error.as_ref().map(|error| f64::from(error[texel])),
     })
+}
+
+/// Luminance of the irradiance of each layer [W/m²] of a texel.
+pub fn layers_at(map: &IlluminationMap, texel: usize) -> Vec<(LayerKind, f64)> {
+    let layers = map.layers.iter();
+    layers
+        .map(|layer| (layer.kind, luminance(&layer.irradiance[texel])))
+        .collect()
 }
 
 fn inside(map: &IlluminationMap, x: f64, y: f64) -> Option<(usize, usize)> {

@@ -8,7 +8,6 @@ use winit::event_loop::{ActiveEventLoop, EventLoopProxy};
 use winit::window::{Window, WindowAttributes};
 
 use super::app::News;
-use super::beside::{Beside, Making};
 use super::interface::{Interface, Painting};
 use crate::effect::EffectSwitch;
 use crate::error::{Error, Result};
@@ -24,6 +23,9 @@ const SMALLEST: LogicalSize<u32> = LogicalSize::new(700, 400);
 /// Samples per pixel of the scene's edges.
 pub(super) const SAMPLES: u32 = 4;
 
+/// Format of pictures: holds encoded values, which egui blends and shows as they are.
+pub(super) const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
+
 /// Whether a frame reached the window.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Shown {
@@ -37,25 +39,130 @@ pub enum Shown {
     Broken,
 }
 
+/// How pictures are made.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Making {
+    /// What is seen in mirrors and through glass.
+    pub chains: EffectSwitch,
+    /// What glass that parts wavelengths does.
+    pub dispersion: EffectSwitch,
+    /// What radiance is multiplied by before tone mapping.
+    pub white_balance: Matrix3,
+}
+
+impl Default for Making {
+    fn default() -> Self {
+        Self {
+            chains: EffectSwitch::default(),
+            dispersion: EffectSwitch::default(),
+            white_balance: IDENTITY,
+        }
+    }
+}
+
+/// A picture in the window, with what draws it.
+struct Canvas {
+    picture: Picture,
+    renderer: Renderer,
+    /// As the renderer has it.
+    scene: Arc<Scene>,
+    style: MapStyle,
+    making: Making,
+}
+
+impl Canvas {
+    fn new(gpu: &Gpu, egui: &mut egui_wgpu::Renderer, scene: &Arc<Scene>) -> Result<Self> {
+        Ok(Self {
+            picture: Picture::new(&gpu.device, egui),
+            renderer: Renderer::new(gpu, scene, FORMAT, SAMPLES)?,
+            scene: Arc::clone(scene),
+            style: MapStyle::default(),
+            making: Making::default(),
+        })
+    }
+
+    fn set_scene(&mut self, gpu: &Gpu, scene: &Arc<Scene>) -> Result<Uploaded> {
+        if Arc::ptr_eq(&self.scene, scene) {
+            return Ok(Uploaded::default());
+        }
+        self.scene = Arc::clone(scene);
+        let uploaded = self.renderer.set_scene(gpu, scene)?;
+        if uploaded != Uploaded::default() {
+            self.picture.invalidate();
+        }
+        Ok(uploaded)
+    }
+
+    fn set_maps(&mut self, gpu: &Gpu, maps: &[IlluminationMap], style: MapStyle) -> Result<Uploaded> {
+        self.set_style(style);
+        self.picture.invalidate();
+        self.renderer.set_maps(gpu, &self.scene, maps)
+    }
+
+    fn set_style(&mut self, style: MapStyle) {
+        if self.style != style {
+            self.style = style;
+            self.picture.invalidate();
+            self.renderer.set_map_style(style);
+        }
+    }
+
+    fn set_making(&mut self, gpu: &Gpu, making: Making) -> Result<()> {
+        if self.making == making {
+            return Ok(());
+        }
+        self.making = making;
+        self.picture.invalidate();
+        self.renderer.set_dispersion(making.dispersion);
+        self.renderer.set_white_balance(gpu, &making.white_balance);
+        self.renderer.set_chains(gpu, making.chains)
+    }
+
+    /// Draws a view that it does not show yet in that quality; tells whether it drew.
+    fn draw(
+        &mut self,
+        gpu: &Gpu,
+        egui: &mut egui_wgpu::Renderer,
+        view: &View,
+        quality: EyeQuality,
+    ) -> Result<bool> {
+        if self.renderer.quality() != quality {
+            self.picture.invalidate();
+            self.renderer.set_quality(quality);
+        }
+        self.picture.update(&gpu.device, egui, view, |target| {
+            let mut encoder = gpu.device.create_command_encoder(&Default::default());
+            self.renderer.draw(gpu, &mut encoder, target, view)?;
+            gpu.queue.submit([encoder.finish()]);
+            Ok(())
+        })
+    }
+
+    /// Makes the picture that it shows better by another sample.
+    fn refine(
+        &mut self,
+        gpu: &Gpu,
+        egui: &mut egui_wgpu::Renderer,
+        view: &View,
+        quality: EyeQuality,
+    ) -> Result<()> {
+        if !self.picture.shows(view) || self.renderer.quality() != quality {
+            return self.draw(gpu, egui, view, quality).map(|_| ());
+        }
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        self.renderer
+            .refine(gpu, &mut encoder, &self.picture.texture, view)?;
+        gpu.queue.submit([encoder.finish()]);
+        Ok(())
+    }
+}
+
 /// A window and its device.
 pub struct Graphics {
     interface: Interface,
-    picture: Picture,
-    renderer: Renderer,
+    main: Canvas,
     /// The picture's other part, where there is one.
-    beside: Option<Beside>,
-    /// Whether that is still to be made as the picture is.
-    must_make_alike: bool,
-    /// As the renderer shows it.
-    scene: Arc<Scene>,
-    /// As the renderer has it.
-    map_style: MapStyle,
-    /// As the renderer has it.
-    chains: EffectSwitch,
-    /// As the renderer has it.
-    dispersion: EffectSwitch,
-    /// As the renderer has it.
-    white_balance: Matrix3,
+    beside: Option<Canvas>,
     screen: Screen,
     gpu: Gpu,
 }
@@ -90,21 +197,13 @@ impl Graphics {
             .map_err(|error| window_error(&error.to_string()))?;
         let gpu = Gpu::for_surface(instance, &surface)?;
         let screen = Screen::new(Arc::clone(&window), surface, &gpu.adapter, &gpu.device)?;
-        let mut interface = Interface::new(event_loop, &window, proxy, &gpu.device, screen.format());
-        let picture = Picture::new(&gpu.device, interface.renderer());
-        let renderer = Renderer::new(&gpu, scene, Picture::FORMAT, SAMPLES)?;
+        let mut interface = Interface::new(event_loop, &window, proxy, &gpu.device, screen.config.format);
+        let main = Canvas::new(&gpu, &mut interface.renderer, scene)?;
         window.set_visible(true);
         Ok(Self {
             interface,
-            picture,
-            renderer,
+            main,
             beside: None,
-            must_make_alike: false,
-            scene: Arc::clone(scene),
-            chains: EffectSwitch::default(),
-            map_style: MapStyle::default(),
-            dispersion: EffectSwitch::default(),
-            white_balance: IDENTITY,
             screen,
             gpu,
         })
@@ -112,7 +211,7 @@ impl Graphics {
 
     /// The window.
     pub fn window(&self) -> &Arc<Window> {
-        self.screen.window()
+        &self.screen.window
     }
 
     /// The device.
@@ -127,20 +226,12 @@ impl Graphics {
 
     /// The picture's name in egui.
     pub fn picture_id(&self) -> egui::TextureId {
-        self.picture.id()
+        self.main.picture.id
     }
 
     /// The name in egui of the picture's other part.
     pub fn beside_id(&self) -> Option<egui::TextureId> {
-        self.beside.as_ref().map(Beside::picture_id)
-    }
-
-    fn making(&self) -> Making {
-        Making {
-            chains: self.chains,
-            dispersion: self.dispersion,
-            white_balance: self.white_balance,
-        }
+        self.beside.as_ref().map(|beside| beside.picture.id)
     }
 
     /// Shows other maps, of a scene, beside the picture from the next one on; nothing without.
@@ -148,22 +239,23 @@ impl Graphics {
     /// # Errors
     /// The device cannot hold them.
     pub fn set_beside(&mut self, shown: Option<(&Arc<Scene>, &[IlluminationMap], MapStyle)>) -> Result<()> {
-        let making = self.making();
-        let egui = self.interface.renderer();
+        let egui = &mut self.interface.renderer;
         let before = self.beside.take();
         let Some((scene, maps, style)) = shown else {
             if let Some(beside) = before {
-                beside.release(egui);
+                egui.free_texture(&beside.picture.id);
             }
             return Ok(());
         };
         let mut beside = match before {
             Some(beside) => beside,
-            None => Beside::new(&self.gpu, egui, scene, SAMPLES)?,
+            None => Canvas::new(&self.gpu, egui, scene)?,
         };
-        beside.set_maps(&self.gpu, scene, maps, style, &making)?;
+        beside.set_scene(&self.gpu, scene)?;
+        beside.set_making(&self.gpu, self.main.making)?;
+        beside.set_maps(&self.gpu, maps, style)?;
         self.beside = Some(beside);
-        self.picture.invalidate();
+        self.main.picture.invalidate();
         Ok(())
     }
 
@@ -178,15 +270,7 @@ impl Graphics {
     /// # Errors
     /// The device cannot hold it.
     pub fn set_scene(&mut self, scene: &Arc<Scene>) -> Result<Uploaded> {
-        if Arc::ptr_eq(&self.scene, scene) {
-            return Ok(Uploaded::default());
-        }
-        self.scene = Arc::clone(scene);
-        let uploaded = self.renderer.set_scene(&self.gpu, scene)?;
-        if uploaded != Uploaded::default() {
-            self.picture.invalidate();
-        }
-        Ok(uploaded)
+        self.main.set_scene(&self.gpu, scene)
     }
 
     /// Shows other maps from the next picture on; tells what of them had changed.
@@ -194,69 +278,36 @@ impl Graphics {
     /// # Errors
     /// The device cannot hold them: what was shown stays.
     pub fn set_maps(&mut self, maps: &[IlluminationMap], style: MapStyle) -> Result<Uploaded> {
-        self.set_map_style(style);
-        self.picture.invalidate();
-        self.renderer.set_maps(&self.gpu, &self.scene, maps)
+        self.main.set_maps(&self.gpu, maps, style)
     }
 
     /// Shows the maps that there are by something else from the next picture on.
     pub fn set_map_style(&mut self, style: MapStyle) {
-        if self.map_style != style {
-            self.map_style = style;
-            self.picture.invalidate();
-            self.renderer.set_map_style(style);
-        }
+        self.main.set_style(style);
     }
 
     /// Whether direct light is traced from the next picture on; the maps are then to be set without it.
     pub fn set_traces_lights(&mut self, traces: bool) {
-        self.picture.invalidate();
-        self.renderer.set_traces_lights(traces);
+        self.main.picture.invalidate();
+        self.main.renderer.set_traces_lights(traces);
     }
 
-    /// Switches the eye's chains from the next picture on.
+    /// Makes pictures otherwise from the next one on.
     ///
     /// # Errors
-    /// The device cannot hold what they take.
-    pub fn set_chains(&mut self, switch: EffectSwitch) -> Result<()> {
-        if self.chains == switch {
-            return Ok(());
-        }
-        self.chains = switch;
-        self.picture.invalidate();
-        self.renderer.set_chains(&self.gpu, switch)?;
-        self.must_make_alike = true;
-        Ok(())
+    /// The device cannot hold what that takes.
+    pub fn set_making(&mut self, making: Making) -> Result<()> {
+        self.main.set_making(&self.gpu, making)
     }
 
     /// Whether mirrors are grey where chains are switched off, from the next picture on.
     pub fn set_stand_in(&mut self, has_stand_in: bool) {
-        self.renderer.set_stand_in(has_stand_in);
-    }
-
-    /// Switches what glass that parts wavelengths does to the picture, from the next one on.
-    pub fn set_dispersion(&mut self, switch: EffectSwitch) {
-        if self.dispersion != switch {
-            self.dispersion = switch;
-            self.picture.invalidate();
-            self.renderer.set_dispersion(switch);
-            self.must_make_alike = true;
-        }
-    }
-
-    /// What radiance is multiplied by before tone mapping, from the next picture on.
-    pub fn set_white_balance(&mut self, matrix: &Matrix3) {
-        if self.white_balance != *matrix {
-            self.white_balance = *matrix;
-            self.picture.invalidate();
-            self.renderer.set_white_balance(&self.gpu, matrix);
-            self.must_make_alike = true;
-        }
+        self.main.renderer.set_stand_in(has_stand_in);
     }
 
     /// What the picture takes.
     pub fn counts(&self) -> EyeCounts {
-        self.renderer.counts()
+        self.main.renderer.counts()
     }
 
     /// Whether the device can tell how long pictures take.
@@ -269,13 +320,13 @@ impl Graphics {
 
     /// How long the last picture took of which the device has told since this was asked.
     pub fn take_times(&mut self) -> Option<GpuMs> {
-        let is_new = self.renderer.collect_times(&self.gpu);
+        let is_new = self.main.renderer.collect_times(&self.gpu);
         self.counts().gpu_ms.filter(|_| is_new)
     }
 
     /// Whether the device has still to tell how long a picture took.
     pub fn awaits_times(&self) -> bool {
-        self.renderer.awaits_times()
+        self.main.renderer.awaits_times()
     }
 
     /// Exposure that suits the picture [stops].
@@ -289,7 +340,7 @@ impl Graphics {
             height: view.height.div_ceil(8),
             ..view.clone()
         };
-        let picture = self.renderer.glance(&self.gpu, &part)?;
+        let picture = self.main.renderer.glance(&self.gpu, &part)?;
         Ok(tone_mapping::auto_exposure_stops(&picture))
     }
 
@@ -298,22 +349,26 @@ impl Graphics {
     /// # Errors
     /// A picture without area or above the device's limit; the device was lost.
     pub fn radiance(&mut self, view: &View) -> Result<eye_pass::Picture> {
-        self.renderer.shown_radiance(&self.gpu, view)
+        self.main.renderer.shown_radiance(&self.gpu, view)
     }
 
     /// How well the picture is made.
     pub fn quality(&self) -> EyeQuality {
-        self.renderer.quality()
+        self.main.renderer.quality()
     }
 
     /// Why mirrors and glass are shown without what is seen in them, if that was called for.
     pub fn chain_refusal(&self) -> Option<&Error> {
-        self.renderer.chain_refusal()
+        self.main.renderer.chain_refusal()
     }
 
     /// Whether the picture shows a view.
     pub fn shows(&self, view: &View) -> bool {
-        self.picture.shows(view) && self.beside.as_ref().is_none_or(|beside| beside.shows(view))
+        self.main.picture.shows(view)
+            && self
+                .beside
+                .as_ref()
+                .is_none_or(|beside| beside.picture.shows(view))
     }
 
     /// Draws a view in another quality than it is shown in, or makes the picture that is shown better by another sample.
@@ -321,18 +376,10 @@ impl Graphics {
     /// # Errors
     /// The device cannot hold a picture of that size.
     pub fn refine_picture(&mut self, view: &View, quality: EyeQuality) -> Result<()> {
-        if self.renderer.quality() != quality {
-            self.picture.invalidate();
-            return self.draw_picture(view, quality).map(|_| ());
+        for canvas in [Some(&mut self.main), self.beside.as_mut()].into_iter().flatten() {
+            canvas.refine(&self.gpu, &mut self.interface.renderer, view, quality)?;
         }
-        let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
-        let target = self.picture.target();
-        self.renderer.refine(&self.gpu, &mut encoder, target, view)?;
-        self.gpu.queue.submit([encoder.finish()]);
-        match &mut self.beside {
-            Some(beside) => beside.refine(&self.gpu, self.interface.renderer(), view, quality),
-            None => Ok(()),
-        }
+        Ok(())
     }
 
     /// Draws the scene where the view changed since the last time; tells whether it drew.
@@ -340,36 +387,12 @@ impl Graphics {
     /// # Errors
     /// The device cannot hold a picture of that size.
     pub fn draw_picture(&mut self, view: &View, quality: EyeQuality) -> Result<bool> {
-        let making = self.making();
-        if let Some(beside) = &mut self.beside
-            && std::mem::take(&mut self.must_make_alike)
-        {
-            beside.set_making(&self.gpu, &making)?;
+        let egui = &mut self.interface.renderer;
+        if let Some(beside) = &mut self.beside {
+            beside.set_making(&self.gpu, self.main.making)?;
+            beside.draw(&self.gpu, egui, view, quality)?;
         }
-        let Self {
-            interface,
-            picture,
-            renderer,
-            gpu,
-            beside,
-            ..
-        } = self;
-        if let Some(beside) = beside {
-            beside.draw(gpu, interface.renderer(), view, quality)?;
-        }
-        picture.update(&gpu.device, interface.renderer(), view, |target| {
-            let mut encoder = gpu
-                .device
-                .create_command_encoder(&wgpu::CommandEncoderDescriptor {
-                    label: Some("picture"),
-                });
-            if renderer.quality() != quality {
-                renderer.set_quality(quality);
-            }
-            renderer.draw(gpu, &mut encoder, target, view)?;
-            gpu.queue.submit([encoder.finish()]);
-            Ok(())
-        })
+        self.main.draw(&self.gpu, egui, view, quality)
     }
 
     /// Shows a painting of the interface.
@@ -407,7 +430,7 @@ impl Graphics {
             &gpu.queue,
             &mut encoder,
             &target,
-            screen.size(),
+            [screen.config.width, screen.config.height],
             painting,
         );
         gpu.queue.submit([encoder.finish()]);
@@ -427,12 +450,9 @@ fn window_error(what: &str) -> Error {
     )
 }
 
-/// Holds encoded values, which egui blends and shows as they are.
-const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
-
 /// A texture of the picture's size with what it shows.
 #[derive(Debug)]
-pub struct Picture {
+struct Picture {
     texture: wgpu::TextureView,
     id: egui::TextureId,
     size: [u32; 2],
@@ -441,11 +461,8 @@ pub struct Picture {
 }
 
 impl Picture {
-    /// Format that the scene is drawn in.
-    pub const FORMAT: wgpu::TextureFormat = FORMAT;
-
-    /// A picture of one pixel, known to egui by its [`id`](Self::id).
-    pub fn new(device: &wgpu::Device, egui: &mut egui_wgpu::Renderer) -> Self {
+    /// A picture of one pixel, known to egui by its `id`.
+    fn new(device: &wgpu::Device, egui: &mut egui_wgpu::Renderer) -> Self {
         let size = [1, 1];
         let texture = texture(device, size);
         let id = egui.register_native_texture(device, &texture, wgpu::FilterMode::Nearest);
@@ -457,31 +474,21 @@ impl Picture {
         }
     }
 
-    /// Its name in egui.
-    pub fn id(&self) -> egui::TextureId {
-        self.id
-    }
-
     /// The scene or its maps changed: draw it next time whatever the view.
-    pub fn invalidate(&mut self) {
+    fn invalidate(&mut self) {
         self.shown = None;
     }
 
     /// Whether it shows a view.
-    pub fn shows(&self, view: &View) -> bool {
+    fn shows(&self, view: &View) -> bool {
         self.shown.as_ref() == Some(view)
-    }
-
-    /// What it is drawn into, of the size of the view that it shows.
-    pub fn target(&self) -> &wgpu::TextureView {
-        &self.texture
     }
 
     /// Draws `view` unless it is shown already; tells whether it drew.
     ///
     /// # Errors
     /// That of `draw`: the picture stays as it was.
-    pub fn update(
+    fn update(
         &mut self,
         device: &wgpu::Device,
         egui: &mut egui_wgpu::Renderer,
@@ -527,7 +534,7 @@ pub(super) fn texture(device: &wgpu::Device, [width, height]: [u32; 2]) -> wgpu:
 
 /// A window with a surface on it.
 #[derive(Debug)]
-pub struct Screen {
+struct Screen {
     /// Declared first: it has to go before its window.
     surface: wgpu::Surface<'static>,
     config: wgpu::SurfaceConfiguration,
@@ -538,7 +545,7 @@ pub struct Screen {
 
 /// What came of asking for the next frame.
 #[derive(Debug)]
-pub enum Acquired {
+enum Acquired {
     /// Draw on it and hand it to [`Screen::present`].
     Frame(wgpu::SurfaceTexture),
     /// Nothing to draw on for the time being; an event will tell when there is.
@@ -554,7 +561,7 @@ impl Screen {
     ///
     /// # Errors
     /// The adapter cannot draw on it.
-    pub fn new(
+    fn new(
         window: Arc<Window>,
         surface: wgpu::Surface<'static>,
         adapter: &wgpu::Adapter,
@@ -586,23 +593,8 @@ impl Screen {
         Ok(screen)
     }
 
-    /// The window.
-    pub fn window(&self) -> &Arc<Window> {
-        &self.window
-    }
-
-    /// Format of the frames.
-    pub fn format(&self) -> wgpu::TextureFormat {
-        self.config.format
-    }
-
-    /// Size of the frames [pixels].
-    pub fn size(&self) -> [u32; 2] {
-        [self.config.width, self.config.height]
-    }
-
     /// Takes over the window's present size.
-    pub fn resize(&mut self, device: &wgpu::Device) {
+    fn resize(&mut self, device: &wgpu::Device) {
         let size = self.window.inner_size();
         self.has_area = size.width > 0 && size.height > 0;
         if self.has_area {
@@ -614,7 +606,7 @@ impl Screen {
     }
 
     /// Asks for the next frame; mends the surface once where that helps.
-    pub fn acquire(&mut self, device: &wgpu::Device, instance: &wgpu::Instance) -> Acquired {
+    fn acquire(&mut self, device: &wgpu::Device, instance: &wgpu::Instance) -> Acquired {
         for _ in 0..2 {
             if !self.has_area {
                 return Acquired::Hidden;
@@ -644,7 +636,7 @@ impl Screen {
     }
 
     /// Shows a frame.
-    pub fn present(&self, queue: &wgpu::Queue, frame: wgpu::SurfaceTexture) {
+    fn present(&self, queue: &wgpu::Queue, frame: wgpu::SurfaceTexture) {
         self.window.pre_present_notify();
         queue.present(frame);
     }

@@ -1,50 +1,41 @@
 //! The window: fly through a scene, change a setting, see it baked anew.
 
-mod accessibility;
 mod app;
-mod background;
+pub mod background;
 pub mod beside;
 pub mod brightest;
-pub mod debounce;
-pub mod difference_view;
+pub mod command;
 pub mod edits;
-pub mod error_view;
 pub mod event_log;
 pub mod exporting;
 pub mod exposure;
+pub mod false_colours;
 pub mod files;
 pub mod filming;
 pub mod flat_map;
-pub mod frame_times;
 pub mod gizmo;
 mod graphics;
-mod input;
 mod interface;
-pub mod latency;
 pub mod lens;
 pub mod model;
 pub mod navigation;
 pub mod new_light;
-mod orphaned;
 mod overlay;
 pub mod pace;
 pub mod panel;
 pub mod placement;
 pub mod probe;
-pub mod screenshot;
 pub mod sketching;
-pub mod solid;
 pub mod time_left;
+pub mod timing;
 pub mod views;
 pub mod walking;
-mod warm_up;
-pub mod wavelength_view;
 pub mod worker;
 
-pub use orphaned::is_orphaned;
-
+use std::panic::{self, AssertUnwindSafe, PanicHookInfo};
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use winit::event_loop::EventLoop;
 
@@ -89,7 +80,7 @@ const DISPLAY: &str = "display";
 pub fn run(options: ViewerOptions) -> Result<()> {
     let event_loop = event_loop()?;
     let mut app = App::new(&options, event_loop.create_proxy())?;
-    match orphaned::run(|| event_loop.run_app(&mut app)) {
+    match unless_orphaned(|| event_loop.run_app(&mut app)) {
         Some(outcome) => outcome.map_err(|error| {
             Error::failure(
                 "window",
@@ -104,7 +95,7 @@ pub fn run(options: ViewerOptions) -> Result<()> {
 
 fn event_loop() -> Result<EventLoop<News>> {
     // Where a library of the window system is missing, winit panics instead of telling.
-    let built = std::panic::catch_unwind(|| EventLoop::<News>::with_user_event().build());
+    let built = panic::catch_unwind(|| EventLoop::<News>::with_user_event().build());
     let reason = match built {
         Ok(Ok(event_loop)) => return Ok(event_loop),
         Ok(Err(error)) => error.to_string(),
@@ -120,4 +111,27 @@ fn event_loop() -> Result<EventLoop<News>> {
 /// Whether [`run`] failed because there is no display to open a window on.
 pub fn is_no_display(error: &Error) -> bool {
     error.location == DISPLAY
+}
+
+/// Whether winit has panicked: where somebody else destroys its window, as `xdotool windowclose` does, it takes it that the X
+/// server still knows it.
+static IS_ORPHANED: AtomicBool = AtomicBool::new(false);
+
+/// Notes a panic of winit, and tells whether it is one: then the window has gone, and [`run`] ends as if it
+/// had been closed. For the program's panic hook, which need not report it; without that the panic goes on.
+pub fn is_orphaned(info: &PanicHookInfo<'_>) -> bool {
+    let is_of_winit = info
+        .location()
+        .is_some_and(|place| place.file().contains("/winit-") || place.file().contains("\\winit-"));
+    IS_ORPHANED.fetch_or(is_of_winit, Ordering::Relaxed);
+    is_of_winit
+}
+
+/// Runs the window; `None` where winit panicked.
+fn unless_orphaned<T>(window: impl FnOnce() -> T) -> Option<T> {
+    match panic::catch_unwind(AssertUnwindSafe(window)) {
+        Ok(outcome) => Some(outcome),
+        Err(_) if IS_ORPHANED.load(Ordering::Relaxed) => None,
+        Err(panic) => panic::resume_unwind(panic),
+    }
 }

@@ -1,18 +1,20 @@
 //! Everything that the window shows and does, without the window.
 
-mod comparing;
 mod filming;
 mod keeping;
 mod opening;
 mod picking;
 mod seeking;
+mod showing;
 
-use std::borrow::Cow;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+pub use self::showing::MapsShown;
+use super::ViewerOptions;
+use super::background::Wake;
 use super::beside::Reference;
-use super::debounce::Debounce;
+use super::command::{Choices, Command};
 use super::edits::{EditedScene, Part};
 use super::event_log::{self, EventLog};
 use super::exporting::{Export, Exporter};
@@ -20,25 +22,26 @@ use super::files::keeper::Keeper;
 use super::files::{Files, working_folder};
 use super::filming::Player;
 use super::navigation::{Navigator, Travel};
-use super::panel::{LayerShown, Panel, Quantity, Wishes};
 use super::probe::{Probed, Prober};
 use super::sketching::Sketcher;
-use super::solid::{Solid, Surroundings};
+use super::timing::{FrameTimes, Latencies};
 use super::views::MapSurvey;
+use super::walking::{Solid, Surroundings};
 use super::worker::{BakeRequest, BakeState, BakedLevel, Worker, Worth};
-use super::{ViewerOptions, difference_view, error_view, wavelength_view};
 use crate::error::Result;
-use crate::eye_pass::renderer::MapStyle;
 use crate::geometry::Ray;
 use crate::illumination::IlluminationMap;
 use crate::light_pass::explain::Limits;
 use crate::light_pass::sketch::{Sketch, SketchLimits};
-use crate::scene::Scene;
+use crate::plan::EffectLine;
+use crate::scene::{Edit, Scene};
 use crate::session::BakeSession;
-use crate::settings::LayerKind;
+use crate::settings::BakeSettings;
 use crate::transport::Tracer;
 use serde_json::{Value, json};
 
+/// Quiet time after the last change before it is baked.
+pub const QUIET: Duration = Duration::from_millis(150);
 /// Rays that a probe may take for each place of a light.
 const MOST_PROBE_RAYS: u64 = 3_000_000;
 
@@ -52,27 +55,31 @@ const SKETCHED_SHARE: f64 = 0.05;
 pub struct Model {
     /// What is shown, with its history.
     edits: EditedScene,
-    /// What the user can set.
-    pub panel: Panel,
+    /// What the user has set.
+    pub choices: Choices,
     /// From where it is seen.
     pub navigator: Navigator,
     /// What happened.
     pub log: EventLog,
-    worker: Worker,
+    /// Bakes.
+    pub worker: Worker,
     /// Writes maps to files.
     pub exporter: Exporter,
     surroundings: Surroundings,
-    state: BakeState,
+    /// Where the bake stood at the last [`poll`](Self::poll).
+    pub state: BakeState,
     /// The maps that the picture shows.
     pub last: Option<Arc<BakedLevel>>,
     /// What an effect is worth to these maps, where that was asked for.
     pub worth: Option<Worth>,
     /// Maps that were baked before the start; until the first bake.
     pub given: Vec<IlluminationMap>,
-    debounce: Debounce,
-    /// As they were at the last look.
-    seen: BakeRequest,
-    was_automatic: bool,
+    /// When a change is baked unless another one follows.
+    bake_due: Option<Instant>,
+    /// Counts changes of what a bake depends on.
+    revision: u64,
+    /// The last one that was waited for, or asked for.
+    seen: u64,
     /// The last request with its number; before the first one what the given maps are taken to be baked with.
     asked: Option<(u64, BakeRequest)>,
     /// The first request for the scene in the window; maps of those before are of another.
@@ -80,10 +87,13 @@ pub struct Model {
     /// Why the last edit was refused.
     pub refusal: Option<String>,
     /// What the maps that were shown last hold.
-    survey: MapSurvey,
+    pub survey: MapSurvey,
+    /// Counts the maps that were shown.
+    maps_revision: u64,
     prober: Prober,
     sketcher: Sketcher,
-    reference: Option<Reference>,
+    /// What the present maps are held against.
+    pub reference: Option<Reference>,
     /// What is to be picked once surfaces are known.
     picking: Option<Ray>,
     /// The light in the mouse's hand.
@@ -93,39 +103,54 @@ pub struct Model {
     /// The camera's path, while it is played.
     player: Option<Player>,
     /// What became of the last file of a path.
-    film_told: Option<String>,
+    pub film_told: Option<String>,
     /// The scene that was asked about.
     probed_scene: Option<Arc<Scene>>,
     /// Whether the exposure is that of an earlier time.
-    exposure_is_kept: bool,
+    pub exposure_is_kept: bool,
     /// What was kept of it and not taken over.
     left_alone: keeping::LeftAlone,
     /// The scene in the window by its full path.
     full_source: String,
     /// What is read from files, and from which.
     pub files: Files,
+    /// How pictures are made.
+    pub picture: PictureReport,
+}
+
+/// What the window tells of its pictures.
+#[derive(Clone, Debug, Default)]
+pub struct PictureReport {
+    /// What draws them.
+    pub adapter: String,
+    /// Whether the one that is shown has the eye's chains, and why.
+    pub chains: Option<EffectLine>,
+    /// How long the last ones took; `None` where the device cannot tell.
+    pub frame_times: Option<FrameTimes>,
+    /// From events to frames.
+    pub latencies: Latencies,
+    /// Whether the graphics device was lost a short while ago, and came back.
+    pub lost_device: bool,
 }
 
 impl Model {
-    /// Starts the baking thread, and a bake unless there are maps. `wake` is called when the thread has news.
+    /// Starts the baking thread, and a bake unless there are maps. The window is woken when a thread has news.
     ///
     /// # Errors
     /// The event log cannot be written; the system gives no thread.
-    pub fn new(options: &ViewerOptions, wake: impl Fn() + Send + Sync + 'static) -> Result<Self> {
+    pub fn new(options: &ViewerOptions, wake: &Wake) -> Result<Self> {
         let scene = Arc::clone(&options.scene);
-        let wake: Arc<dyn Fn() + Send + Sync> = Arc::new(wake);
-        let wake_too = Arc::clone(&wake);
-        let worker = Worker::spawn(BakeSession::new, move || wake_too())?;
+        let worker = Worker::spawn(BakeSession::new, wake)?;
         let wanted = BakeRequest::new(Arc::clone(&scene), options.settings.clone());
         let mut model = Self {
             navigator: Navigator::new(&scene, options.camera.as_deref()),
-            panel: Panel::new(options.settings.clone()),
+            choices: Choices::new(options.settings.clone()),
             log: EventLog::open(options.event_log.as_deref())?,
             worker,
-            exporter: Exporter::new(Arc::clone(&wake)),
-            surroundings: Surroundings::new(Arc::clone(&wake)),
-            prober: Prober::new(Arc::clone(&wake)),
-            sketcher: Sketcher::new(Arc::clone(&wake)),
+            exporter: Exporter::new(wake),
+            surroundings: Surroundings::new(wake),
+            prober: Prober::new(wake),
+            sketcher: Sketcher::new(wake),
             reference: None,
             picking: None,
             placing: picking::Placing::default(),
@@ -138,9 +163,9 @@ impl Model {
             last: None,
             worth: None,
             given: options.maps.clone().unwrap_or_default(),
-            debounce: Debounce::default(),
-            seen: wanted.clone(),
-            was_automatic: true,
+            bake_due: None,
+            revision: 0,
+            seen: 0,
             asked: options.maps.is_some().then_some((0, wanted)),
             first_request: 1,
             exposure_is_kept: false,
@@ -148,9 +173,11 @@ impl Model {
             full_source: String::new(),
             refusal: None,
             survey: MapSurvey::default(),
+            maps_revision: 0,
+            picture: PictureReport::default(),
             edits: EditedScene::new(scene),
         };
-        model.panel.display.exposure_stops = options.exposure_stops.unwrap_or(0.0);
+        model.choices.display.exposure_stops = options.exposure_stops.unwrap_or(0.0);
         model.begin(options);
         if options.maps.is_none() {
             model.rebake();
@@ -196,153 +223,21 @@ impl Model {
         &self.edits
     }
 
-    /// Where the bake stood at the last [`poll`](Self::poll).
-    pub fn state(&self) -> &BakeState {
-        &self.state
+    /// What was loaded.
+    pub fn loaded(&self) -> &Arc<Scene> {
+        self.edits.loaded()
     }
 
     /// When something is to be done though nothing happens.
     pub fn due(&self) -> Option<Instant> {
         let keeper = self.files.keeper.as_ref();
-        let dues = [self.debounce.due(), keeper.and_then(Keeper::due)];
+        let dues = [self.bake_due, keeper.and_then(Keeper::due)];
         dues.into_iter().flatten().min()
     }
 
     /// Maps with every layer that was baked; empty before the first bake.
     pub fn maps(&self) -> &[IlluminationMap] {
         self.last.as_ref().map_or(&self.given, |last| &last.result.maps)
-    }
-
-    /// Layers of the present maps.
-    pub fn layers(&self) -> Vec<LayerKind> {
-        let mut kinds: Vec<_> = self
-            .maps()
-            .iter()
-            .flat_map(|map| &map.layers)
-            .map(|layer| layer.kind)
-            .collect();
-        kinds.sort_unstable();
-        kinds.dedup();
-        kinds
-    }
-
-    /// What the picture shows: the light where the panel asks for what there is not.
-    pub fn quantity(&self) -> Quantity {
-        match self.panel.display.quantity {
-            Quantity::Error if error_view::is_available(self.maps()) => Quantity::Error,
-            Quantity::Difference if self.difference().is_some() => Quantity::Difference,
-            Quantity::Error | Quantity::Difference => Quantity::Light,
-            other => other,
-        }
-    }
-
-    /// Whether direct light is to be traced and not looked up: it is shown, and its layer is not baked yet, or a light or
-    /// an object was moved since.
-    pub fn traces_lights(&self) -> bool {
-        let shown = matches!(
-            self.panel.display.layer,
-            LayerShown::All | LayerShown::Only(LayerKind::Direct)
-        );
-        let Some(last) = self
-            .last
-            .as_ref()
-            .filter(|_| shown && self.quantity() == Quantity::Light)
-        else {
-            return false;
-        };
-        let is_asked_for = last.request.settings.layers.contains(&LayerKind::Direct);
-        if self.layers().contains(&LayerKind::Direct) {
-            is_other_light(&last.request.scene, self.scene())
-        } else {
-            is_asked_for && !last.is_final
-        }
-    }
-
-    /// The maps without their direct light.
-    pub fn maps_without_direct(&self) -> Vec<IlluminationMap> {
-        let mut maps = self.shown_maps().into_owned();
-        for map in &mut maps {
-            map.layers.retain(|layer| layer.kind != LayerKind::Direct);
-        }
-        maps.retain(|map| !map.layers.is_empty());
-        maps
-    }
-
-    /// The maps as the panel asks them to be shown: some layers, the errors, or what an effect is worth.
-    pub fn shown_maps(&self) -> Cow<'_, [IlluminationMap]> {
-        self.as_shown(self.maps())
-    }
-
-    /// Some maps of the scene as the panel asks them to be shown.
-    fn as_shown<'a>(&self, maps: &'a [IlluminationMap]) -> Cow<'a, [IlluminationMap]> {
-        self.with_quantity(maps, self.quantity())
-    }
-
-    /// Some maps of the scene, of the layer that the panel asks for, with a quantity in them.
-    fn with_quantity<'a>(
-        &self,
-        maps: &'a [IlluminationMap],
-        quantity: Quantity,
-    ) -> Cow<'a, [IlluminationMap]> {
-        // Until the next maps come, an edit may have made a receiver clear, or a mirror.
-        let receives = |map: &&IlluminationMap| {
-            let scene = self.scene();
-            let object = scene.objects.get(map.chart.object());
-            object.is_none_or(|object| scene.materials[object.material].surface.is_receiver())
-        };
-        let in_colours = match quantity {
-            Quantity::Wavelength => Some(wavelength_view::maps(&self.with_quantity(maps, Quantity::Light))),
-            Quantity::Error => Some(error_view::maps(maps)),
-            Quantity::Difference => self.difference().map(difference_view::maps),
-            _ => None,
-        };
-        if let Some(maps) = in_colours {
-            return Cow::Owned(maps.into_iter().filter(|map| receives(&map)).collect());
-        }
-        let LayerShown::Only(kind) = self.panel.display.layer else {
-            return if maps.iter().all(|map| receives(&map)) {
-                Cow::Borrowed(maps)
-            } else {
-                Cow::Owned(maps.iter().filter(receives).cloned().collect())
-            };
-        };
-        let with_kind = maps.iter().filter(receives).filter_map(|map| {
-            let irradiance = map.layer(kind)?.irradiance.clone();
-            Some(IlluminationMap::of_layer(
-                Arc::clone(&map.chart),
-                kind,
-                irradiance,
-            ))
-        });
-        Cow::Owned(with_kind.collect())
-    }
-
-    /// The maps' light, whatever the picture shows in its place.
-    fn lit_maps(&self) -> Cow<'_, [IlluminationMap]> {
-        self.with_quantity(self.maps(), Quantity::Light)
-    }
-
-    /// Maps as they are to be shown next, looked at as a whole, with what their values stand for.
-    pub fn maps_to_show(&mut self, without_direct: bool) -> (Vec<IlluminationMap>, MapStyle) {
-        let maps = if without_direct {
-            self.maps_without_direct()
-        } else {
-            self.shown_maps().into_owned()
-        };
-        self.survey = MapSurvey::of(&maps);
-        (maps, self.map_style())
-    }
-
-    /// What the values of the maps that are shown stand for.
-    pub fn map_style(&self) -> MapStyle {
-        let quantity = self.quantity();
-        let choice = &self.panel.display.scale;
-        quantity.map_style(self.survey.scale(quantity, choice))
-    }
-
-    /// What the maps that were shown last hold.
-    pub fn survey(&self) -> &MapSurvey {
-        &self.survey
     }
 
     /// Asks what lights the surface along a ray; forgets what was asked without one.
@@ -362,13 +257,13 @@ impl Model {
 
     /// Follows the light through the scene as it is now, while that is drawn.
     fn poll_sketch(&mut self) {
-        if !self.panel.sketched.is_any() {
+        if !self.choices.sketched.is_any() {
             return self.sketcher.forget();
         }
         let Some(tracer) = self.surroundings.of(self.edits.scene()) else {
             return;
         };
-        let settings = &self.panel.settings;
+        let settings = &self.choices.settings;
         let limits = SketchLimits {
             max_depth: settings.depth(),
             branch_threshold: settings.path_threshold().max(SKETCHED_SHARE),
@@ -394,7 +289,7 @@ impl Model {
         if self.prober.is_due()
             && let Some(tracer) = self.surroundings.of(self.edits.scene())
         {
-            let settings = &self.panel.settings;
+            let settings = &self.choices.settings;
             let limits = Limits {
                 max_depth: settings.depth(),
                 branch_threshold: settings.path_threshold(),
@@ -414,7 +309,7 @@ impl Model {
     /// Looks what the baking thread did; tells whether there are new maps to be shown.
     pub fn poll(&mut self) -> bool {
         if self.exporter.poll() {
-            self.log.write_export(self.exporter.state());
+            self.log.write_export(&self.exporter.state);
         }
         // The state first: maps that come in between are taken by the next call, which the thread wakes.
         let state = self.worker.state();
@@ -454,6 +349,7 @@ impl Model {
         self.poll_pick();
         self.poll_sought();
         if has_maps {
+            self.maps_revision += 1;
             self.compare_again();
         }
         has_maps
@@ -481,73 +377,81 @@ impl Model {
         }
     }
 
-    /// What the panel asks for now.
+    /// What the user asks for now.
     fn wanted(&self) -> BakeRequest {
-        BakeRequest::new(Arc::clone(self.edits.scene()), self.panel.settings.clone())
+        BakeRequest::new(Arc::clone(self.edits.scene()), self.choices.settings.clone())
     }
 
-    /// Does what was pressed, and bakes what was changed.
+    /// Does what was asked for, and bakes what was changed; returns what the window is to do.
     ///
     /// A change is baked at once where the request before it has shown something: while a slider is dragged, the
     /// picture follows at the pace of first levels, and no request is stopped before it had one. Where nothing was
     /// shown yet, the change waits for that, or until it has come to rest.
-    pub fn act(&mut self, wishes: &Wishes, now: Instant) {
-        self.edit(wishes);
-        if wishes.new_light.is_some() || wishes.brightest {
-            self.sought.light = wishes.new_light.or(self.sought.light);
-            self.sought.brightest |= wishes.brightest;
-            self.poll_sought();
-        }
-        if let Some(source) = &wishes.open {
-            self.open(source);
-        }
+    pub fn act(&mut self, mut commands: Vec<Command>, now: Instant) -> Vec<Command> {
+        // A slow frame may bring the end of a drag together with the wish to take it back.
+        commands.sort_by_key(|command| match command {
+            Command::Choose(_) => 0,
+            Command::Edit(_) => 1,
+            _ => 2,
+        });
+        let of_window = commands.into_iter().filter_map(|command| self.apply(command));
+        let of_window = of_window.collect();
         self.watch();
-        let wanted = self.wanted();
-        if wanted.settings != self.seen.settings {
-            self.log.write("settings", json!({"settings": wanted.settings}));
+        if std::mem::replace(&mut self.seen, self.revision) != self.revision {
+            self.bake_due = Some(now + QUIET);
         }
-        if !wanted.is_same(&self.seen) || (self.panel.automatic && !self.was_automatic) {
-            self.debounce.change(now);
+        if !self.choices.automatic {
+            self.bake_due = None;
         }
-        self.seen = wanted;
-        self.was_automatic = self.panel.automatic;
-        if !self.panel.automatic {
-            self.debounce.clear();
-        }
-        if wishes.cancel {
-            self.cancel();
-        }
-        if let Some(wish) = &wishes.film {
-            self.film(wish);
-        }
-        if let Some(export) = &wishes.export {
-            self.export(export);
-        }
-        let is_ripe = self.debounce.due().is_some() && self.has_answered();
-        let is_due = self.debounce.is_due(now) || is_ripe;
-        if wishes.rebake || (is_due && self.is_changed()) {
+        let is_ripe = self.bake_due.is_some() && self.has_answered();
+        let has_rested = self.bake_due.take_if(|due| now >= *due).is_some();
+        if (has_rested || is_ripe) && self.is_changed() {
             self.rebake();
-        } else if let Some(effect) = wishes.worth {
-            self.compare(effect);
         }
         self.keep(now);
+        of_window
+    }
+
+    /// Does one thing that was asked for, or returns it where the window is to do it.
+    pub fn apply(&mut self, command: Command) -> Option<Command> {
+        match command {
+            Command::Choose(choices) => self.choose(*choices),
+            Command::Edit(edit) => drop(self.edit(&edit)),
+            Command::Release => self.edits.release(),
+            Command::Undo => self.turn_back(true),
+            Command::Redo => self.turn_back(false),
+            Command::Rebake => self.rebake(),
+            Command::Cancel => self.cancel(),
+            Command::Worth(effect) => self.compare(effect),
+            Command::Compare(command) => self.compare_with(&command),
+            Command::Film(command) => self.film(&command),
+            Command::Export(export) => self.export(export),
+            Command::ClearProbe => self.probe(None),
+            Command::Brightest => self.seek(|sought| sought.brightest = true),
+            Command::AddLight(light) => self.seek(|sought| sought.light = Some(light)),
+            Command::Open(source) => self.open(&source),
+            Command::Browse | Command::SaveScene | Command::SavePicture | Command::MeasureExposure => {
+                return Some(command);
+            }
+        }
+        None
     }
 
     /// Has maps written that were baked here, into the working folder.
-    fn export(&mut self, export: &Export) {
+    fn export(&mut self, export: Export) {
         let Some(last) = &self.last else {
             return;
         };
         let last = Arc::clone(last);
-        self.exporter.start(export.clone(), last, working_folder());
-        self.log.write_export(self.exporter.state());
+        self.exporter.start(export, last, working_folder());
+        self.log.write_export(&self.exporter.state);
     }
 
     /// Whether something else is wanted than what was asked for last.
     fn is_changed(&self) -> bool {
         self.asked
             .as_ref()
-            .is_none_or(|(_, asked)| !asked.is_same(&self.seen))
+            .is_none_or(|(_, asked)| !asked.is_same(&self.wanted()))
     }
 
     /// Whether the last request has shown maps, or will not any more.
@@ -556,57 +460,63 @@ impl Model {
         !self.state.is_baking() || self.asked.as_ref().is_none_or(|(serial, _)| is_shown(*serial))
     }
 
-    /// Edits the scene, notes what the panel changed, or takes a change back.
-    fn edit(&mut self, wishes: &Wishes) {
-        if let Some(wish) = &wishes.compare {
-            self.compare_with(wish);
+    /// Takes over what the user has set.
+    fn choose(&mut self, choices: Choices) {
+        let before = std::mem::replace(&mut self.choices, choices);
+        let (edits, now) = (&mut self.edits, &self.choices);
+        edits.note_settings(&before.settings, &now.settings);
+        edits.note_display(before.display, now.display);
+        if before.film != now.film {
+            edits.note_film(&before.film, &now.film);
         }
-        if wishes.clear_probe {
-            self.probe(None);
+        if before.automatic != now.automatic {
+            edits.note_automatic(now.automatic);
+            self.revision += 1;
         }
-        if let Some((settings, display)) = wishes.changed.as_deref() {
-            self.edits.note_settings(settings, &self.panel.settings);
-            self.edits.note_display(*display, self.panel.display);
+        self.note_settings_since(before.settings);
+    }
+
+    /// Whether a bake depends on what is set otherwise than before.
+    fn note_settings_since(&mut self, before: BakeSettings) {
+        let wanted = self.wanted();
+        if wanted.settings != BakeRequest::new(Arc::clone(&wanted.scene), before).settings {
+            self.log.write("settings", json!({"settings": wanted.settings}));
+            self.revision += 1;
         }
-        if let Some(film) = &wishes.changed_film {
-            self.edits.note_film(film, &self.panel.film);
-        }
-        if wishes.changed_automatic {
-            self.edits.note_automatic(self.panel.automatic);
-        }
-        // A slow frame may bring both: the end of a drag, and the wish to take it back.
-        let mut outcome = Ok(());
-        if let Some(edit) = &wishes.edit {
-            self.log
-                .write("edit", json!({"target": format!("{:?}", edit.target())}));
-            outcome = self.edits.edit(edit);
-        }
-        if outcome.is_ok() && (wishes.undo || wishes.redo) {
-            self.turn_back(wishes.undo);
-        }
-        if wishes.edit.is_some() || wishes.undo || wishes.redo {
-            self.refusal = outcome.err().map(|error| error.to_string());
-        }
-        if !wishes.is_dragging {
-            self.edits.release();
-        }
+    }
+
+    /// Edits the scene; tells whether that was possible.
+    fn edit(&mut self, edit: &Edit) -> bool {
+        self.log
+            .write("edit", json!({"target": format!("{:?}", edit.target())}));
+        let outcome = self.edits.edit(edit);
+        self.revision += u64::from(outcome.is_ok());
+        self.refusal = outcome.err().map(|error| error.to_string());
+        self.refusal.is_none()
     }
 
     /// Takes the last change back, or does again what was taken back.
     fn turn_back(&mut self, is_back: bool) {
+        self.refusal = None;
         let Some((text, [from, to])) = self.edits.turn(is_back) else {
             return;
         };
-        match (from, to) {
-            (_, Part::Settings(settings)) => self.panel.settings = *settings,
-            (Part::Display(from), Part::Display(to)) => self.panel.display.restore(&from, &to),
-            (_, Part::Film(film)) => self.panel.film = *film,
-            (_, Part::Automatic(automatic)) => self.panel.automatic = automatic,
-            // The scene, which is changed already.
-            _ => {}
-        }
         let event = if is_back { "undone" } else { "redone" };
         self.log.write(event, json!({"what": text}));
+        match (from, to) {
+            (_, Part::Settings(settings)) => {
+                let before = std::mem::replace(&mut self.choices.settings, *settings);
+                self.note_settings_since(before);
+            }
+            (Part::Display(from), Part::Display(to)) => self.choices.display.restore(&from, &to),
+            (_, Part::Film(film)) => self.choices.film = *film,
+            (_, Part::Automatic(automatic)) => {
+                self.choices.automatic = automatic;
+                self.revision += 1;
+            }
+            // The scene, which is changed already.
+            _ => self.revision += 1,
+        }
     }
 
     /// Bakes with the panel's settings, unless one of them is out of its range: the panel tells so.
@@ -615,34 +525,21 @@ impl Model {
         if wanted.settings.validate().is_err() {
             return;
         }
-        self.debounce.clear();
+        self.settle();
         self.log.write("baking", json!({"settings": wanted.settings}));
         self.asked = Some((self.worker.request(wanted.clone()), wanted));
         self.state = self.worker.state();
     }
 
-    /// Lets the bake wait for so long.
-    pub fn hold_bake(&self, time: Duration) {
-        self.worker.hold(time);
-    }
-
-    /// Lets the bake go on for so long without showing what it has.
-    pub fn look_away(&self, time: Duration) {
-        self.worker.look_away(time);
-    }
-
     /// Stops the bake and keeps the maps that are shown.
     pub fn cancel(&mut self) {
-        self.debounce.clear();
+        self.settle();
         self.worker.cancel();
     }
-}
 
-/// Whether a scene is lit otherwise than before: a lamp is another one, or an object elsewhere.
-fn is_other_light(before: &Arc<Scene>, now: &Arc<Scene>) -> bool {
-    let meshes = |scene: &Arc<Scene>| -> Vec<_> {
-        let objects = scene.objects.iter();
-        objects.map(|object| Arc::as_ptr(&object.mesh)).collect()
-    };
-    !Arc::ptr_eq(before, now) && (before.lights != now.lights || meshes(before) != meshes(now))
+    /// No change waits to be baked.
+    fn settle(&mut self) {
+        self.seen = self.revision;
+        self.bake_due = None;
+    }
 }

@@ -4,10 +4,10 @@ use std::f64::consts::FRAC_PI_2;
 
 use glam::{DVec2, DVec3};
 use serde::{Deserialize, Serialize};
+use strum::{IntoStaticStr, VariantArray};
 
 use super::files::config::KeptViews;
-use super::solid::Solid;
-use super::walking::{self, Walker};
+use super::walking::{self, Solid, Walker};
 use crate::scene::{Camera, Scene};
 
 /// Time after which the velocity has closed 1 − 1/e of its gap to what the keys ask for [s].
@@ -42,8 +42,9 @@ const NEAR_OF_FRAMED: f64 = 0.01;
 pub const BOOKMARKS: usize = 9;
 
 /// How the camera gets about.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, IntoStaticStr, VariantArray)]
 #[serde(rename_all = "lowercase")]
+#[strum(serialize_all = "lowercase")]
 pub enum Travel {
     /// Anywhere, through walls.
     #[default]
@@ -55,26 +56,15 @@ pub enum Travel {
 }
 
 impl Travel {
-    /// All, in the order in which a key goes through them.
-    pub const ALL: [Self; 3] = [Self::Fly, Self::Walk, Self::Orbit];
-
     /// Its name in the panel and in the event log.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Fly => "fly",
-            Self::Walk => "walk",
-            Self::Orbit => "orbit",
-        }
+        self.into()
     }
 
     /// The one after it.
     #[must_use]
     pub fn next(self) -> Self {
-        match self {
-            Self::Fly => Self::Walk,
-            Self::Walk => Self::Orbit,
-            Self::Orbit => Self::Fly,
-        }
+        Self::VARIANTS[(self as usize + 1) % Self::VARIANTS.len()]
     }
 }
 

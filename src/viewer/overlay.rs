@@ -2,11 +2,11 @@
 
 use egui::{Align2, Color32, FontId, Rect, Ui, pos2, vec2};
 
+use super::false_colours::{self, ERROR_RANGE, RANGE_NM};
+use super::model::Model;
+use super::panel::Quantity;
 use super::panel::control::short;
-use super::panel::{Facts, Quantity};
-use super::views::ScaleChoice;
 use super::worker::BakeState;
-use super::{error_view, wavelength_view};
 use crate::effect::Effect;
 use crate::illumination::difference_colours;
 use crate::illumination::false_colours::{ColourScale, viridis};
@@ -16,17 +16,12 @@ const TEXT: Color32 = Color32::from_gray(230);
 const SIZE: f32 = 16.0;
 
 /// Shows the picture in the space that is left, with what is to be told over it; returns where it lies.
-pub fn show(
-    ui: &mut Ui,
-    picture: egui::TextureId,
-    facts: &Facts<'_>,
-    (quantity, choice): (Quantity, &ScaleChoice),
-    notice: Option<&str>,
-) -> Rect {
+pub fn show(ui: &mut Ui, picture: egui::TextureId, model: &Model, notice: Option<&str>) -> Rect {
+    let (quantity, choice) = (model.quantity(), &model.choices.display.scale);
     let rect = ui.available_rect_before_wrap();
     let whole = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
     ui.painter().image(picture, rect, whole, Color32::WHITE);
-    let text = notice.map(str::to_owned).or_else(|| caveat(facts));
+    let text = notice.map(str::to_owned).or_else(|| caveat(model));
     if let Some(text) = text {
         let width = rect.width() - 48.0;
         let galley = ui.painter().layout(text, FontId::proportional(SIZE), TEXT, width);
@@ -38,16 +33,16 @@ pub fn show(
         );
         ui.painter().galley(place.min, galley, TEXT);
     }
-    match (quantity, facts.worth) {
+    match (quantity, model.worth.as_ref()) {
         (Quantity::Error, _) => error_legend(ui, rect),
         (Quantity::Difference, Some(worth)) => difference_legend(ui, rect, worth.effect),
         (Quantity::Irradiance, _) => {
             let title = format!("Irradiance of the light shown [{}]", choice.unit.symbol());
-            let scale = facts.survey.scale(quantity, choice);
+            let scale = model.survey.scale(quantity, choice);
             scale_legend(ui, rect, &title, &scale, choice.unit.per_w_m2());
         }
         (Quantity::TexelDensity, _) => {
-            let scale = facts.survey.scale(quantity, choice);
+            let scale = model.survey.scale(quantity, choice);
             scale_legend(ui, rect, "Texels per metre", &scale, 1.0);
         }
         (Quantity::Wavelength, _) => wavelength_legend(ui, rect),
@@ -57,14 +52,14 @@ pub fn show(
 }
 
 fn wavelength_legend(ui: &Ui, picture: Rect) {
-    let (low, high) = wavelength_view::RANGE_NM;
+    let (low, high) = RANGE_NM;
     let at = |share: f64| Nanometres(low + (high - low) * share);
     let marks = (0..=6).map(|mark| f64::from(mark) / 6.0);
     let marks: Vec<_> = marks
         .map(|share| (share, format!("{:.0}", at(share).0)))
         .collect();
     let colour = |share: f64| {
-        let linear = wavelength_view::colour(at(share)).to_array();
+        let linear = false_colours::wavelength_colour(at(share)).to_array();
         linear.map(|channel| (255.0 * LinearSrgb::encode_channel(channel)).round() as u8)
     };
     legend(
@@ -87,7 +82,7 @@ fn scale_legend(ui: &Ui, picture: Rect, title: &str, scale: &ColourScale, factor
 }
 
 fn error_legend(ui: &Ui, picture: Rect) {
-    let (low, high) = error_view::RANGE;
+    let (low, high) = ERROR_RANGE;
     let at = |share: f64| low * (high / low).powf(share);
     let marks = (0..=3).map(|mark| f64::from(mark) / 3.0);
     // Without what rounding leaves.
@@ -95,7 +90,13 @@ fn error_legend(ui: &Ui, picture: Rect) {
         .map(|share| (share, format!("{} %", (1e5 * at(share)).round() / 1e3)))
         .collect();
     let title = "Estimated error of each texel, in % of its map's mean irradiance";
-    legend(ui, picture, title, &|share| error_view::colour(at(share)), &marks);
+    legend(
+        ui,
+        picture,
+        title,
+        &|share| false_colours::error_colour(at(share)),
+        &marks,
+    );
 }
 
 fn difference_legend(ui: &Ui, picture: Rect, effect: Effect) {
@@ -144,16 +145,16 @@ fn legend(ui: &Ui, picture: Rect, title: &str, colour: &dyn Fn(f64) -> [u8; 3], 
 }
 
 /// Says why the picture is dark or coarse.
-fn caveat(facts: &Facts<'_>) -> Option<String> {
-    let is_dark = facts.layers.is_empty();
-    match facts.state {
+fn caveat(model: &Model) -> Option<String> {
+    let is_dark = model.layers().is_empty();
+    match &model.state {
         BakeState::Baking { stage, fraction, .. } if is_dark => {
             Some(format!("First look: {} {:.0} %", stage.name(), 100.0 * fraction))
         }
         BakeState::Failed(sentence) if is_dark => Some(sentence.clone()),
         BakeState::Cancelled if is_dark => Some("No light is baked yet: press R to bake.".into()),
         BakeState::Done if is_dark => Some("No light reaches a surface that could show it.".into()),
-        BakeState::Cancelled if facts.last.is_some_and(|last| !last.is_final) => {
+        BakeState::Cancelled if model.last.as_ref().is_some_and(|last| !last.is_final) => {
             Some("Coarse maps of a bake that was stopped: press R to bake.".into())
         }
         _ => None,

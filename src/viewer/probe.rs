@@ -6,13 +6,13 @@ use egui::{Color32, Painter, Stroke, pos2};
 use glam::DVec3;
 use serde_json::{Value, json};
 
-use super::background::Background;
+use super::background::{Background, Task, Wake};
+use super::flat_map::layers_at;
 use super::lens::Lens;
 use crate::geometry::Ray;
 use crate::illumination::{IlluminationMap, Side};
 use crate::light_pass::explain::{Explanation, LightPath, Limits, Target, explain};
-use crate::optics::{LinearSrgb, luminance};
-use crate::progress::Control;
+use crate::optics::LinearSrgb;
 use crate::settings::LayerKind;
 use crate::transport::{MediumStack, SurfaceHit, Tracer, media_at};
 use crate::units::LUMENS_PER_WATT;
@@ -185,13 +185,6 @@ pub fn read(tracer: &Tracer, maps: &[IlluminationMap], seen: &Seen) -> (Probed, 
     (probed, found.map(|(_, target)| target))
 }
 
-fn layers_at(map: &IlluminationMap, texel: usize) -> Vec<(LayerKind, f64)> {
-    map.layers
-        .iter()
-        .map(|layer| (layer.kind, luminance(&layer.irradiance[texel])))
-        .collect()
-}
-
 /// About how bright a texel is: what its paths are to be looked for by [W/m²].
 fn scale_w_m2(maps: &[IlluminationMap], target: &Target, texel: &ProbedTexel) -> f64 {
     let map = maps.iter().find(|map| map.chart.receiver == target.receiver);
@@ -218,8 +211,8 @@ pub struct Prober {
 }
 
 impl Prober {
-    /// Asks nothing yet; `wake` is called from another thread when there is something.
-    pub fn new(wake: Arc<dyn Fn() + Send + Sync>) -> Self {
+    /// Asks nothing yet; the window is woken when there is something.
+    pub fn new(wake: &Wake) -> Self {
         Self {
             gaze: None,
             is_due: false,
@@ -264,7 +257,7 @@ impl Prober {
         if let (Some(target), Some(texel)) = (target, &probed.texel) {
             let scale = scale_w_m2(maps, &target, texel);
             let tracer = Arc::clone(tracer);
-            let search = move |control: &Control| explain(&tracer, &target, limits, scale, control);
+            let search = move |task: &Task| explain(&tracer, &target, limits, scale, &task.control);
             if let Err(error) = self.coming.start((), search) {
                 log::warn!("{error}");
             }

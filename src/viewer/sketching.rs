@@ -4,10 +4,9 @@ use std::sync::Arc;
 
 use egui::{Color32, Painter, Stroke};
 
-use super::background::Background;
+use super::background::{Background, Task, Wake};
 use super::lens::Lens;
 use crate::light_pass::sketch::{Sketch, SketchLimits, sketch};
-use crate::progress::Control;
 use crate::transport::Tracer;
 
 const HIT: Color32 = Color32::from_rgb(255, 214, 110);
@@ -40,8 +39,8 @@ pub struct Sketcher {
 }
 
 impl Sketcher {
-    /// Nothing yet; `wake` is called from another thread when there is something.
-    pub fn new(wake: Arc<dyn Fn() + Send + Sync>) -> Self {
+    /// Nothing yet; the window is woken when there is something.
+    pub fn new(wake: &Wake) -> Self {
         Self {
             shown: None,
             coming: Background::new("sketch", wake),
@@ -77,7 +76,7 @@ impl Sketcher {
 
     fn start(&mut self, tracer: &Arc<Tracer>, limits: SketchLimits) {
         let of = Arc::clone(tracer);
-        let search = move |control: &Control| sketch(&of, limits, control);
+        let search = move |task: &Task| sketch(&of, limits, &task.control);
         if let Err(error) = self.coming.start((Arc::clone(tracer), limits), search) {
             log::warn!("{error}");
         }

@@ -1,6 +1,7 @@
 //! What the picture can show in place of light, and on which scale.
 
 use serde::{Deserialize, Serialize};
+use strum::{EnumMessage, IntoStaticStr, VariantArray};
 
 use crate::eye_pass::renderer::{Inspected, MapStyle};
 use crate::illumination::IlluminationMap;
@@ -11,47 +12,52 @@ use crate::units::LUMENS_PER_WATT;
 /// Least of most on a logarithmic scale that follows the maps.
 const DECADES: f64 = 1e-4;
 
-/// What of the maps the picture shows.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+/// What of the maps the picture shows; the panel tells it of each.
+#[derive(
+    Clone,
+    Copy,
+    Debug,
+    Default,
+    PartialEq,
+    Eq,
+    Serialize,
+    Deserialize,
+    EnumMessage,
+    IntoStaticStr,
+    VariantArray,
+)]
+#[strum(serialize_all = "lowercase")]
 pub enum Quantity {
     /// The lit scene.
     #[default]
     Light,
-    /// Irradiance, in false colours.
+    /// Irradiance of the light shown, in false colours with a legend.
     Irradiance,
-    /// How far the light may be off, in false colours.
+    /// How far each texel may be off: its estimated error in false colours, relative to the map's mean irradiance.
     Error,
-    /// What an effect adds to the light or takes from it, in false colours.
+    /// What an effect adds and takes away, in false colours, relative to the map's mean irradiance.
     Difference,
-    /// Texels of the maps, as a checkerboard.
+    /// The maps' texels as a checkerboard.
     Texels,
-    /// Texels of the maps per metre, in false colours.
+    /// Texels per metre, in false colours with a legend.
+    #[strum(serialize = "texel density")]
     TexelDensity,
-    /// Normals of the meshes.
+    /// Normals of the meshes: red, green, blue for x, y, z.
     Normals,
-    /// Coordinates of the base colour's image, or of the first set.
+    /// Where the base colour's image is looked up, else the first set of coordinates: red for u, green for v.
+    #[strum(serialize = "texture uv")]
     Uv,
-    /// Coordinates in the illumination maps.
+    /// Where the illumination map is looked up: red for u, green for v.
+    #[strum(serialize = "map uv")]
     MapUv,
-    /// Which single wavelength the light looks like, in the colours of the spectrum.
+    /// The dominant wavelength [nm] of the light shown, against the white of D65: the single wavelength that, mixed with white, looks like it. White light is grey; purple, which no single wavelength looks like, is dim purple; texels below a thousandth of the brightest are black.
     Wavelength,
 }
 
 impl Quantity {
     /// Its name in the event log and in the panel's list.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Light => "light",
-            Self::Irradiance => "irradiance",
-            Self::Error => "error",
-            Self::Difference => "difference",
-            Self::Texels => "texels",
-            Self::TexelDensity => "texel density",
-            Self::Normals => "normals",
-            Self::Uv => "texture uv",
-            Self::MapUv => "map uv",
-            Self::Wavelength => "wavelength",
-        }
+        self.into()
     }
 
     /// By what surfaces are shown on the device, where that is not their light or colours.

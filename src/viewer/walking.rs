@@ -1,8 +1,14 @@
-//! A person on foot: eyes above the ground, stopped by walls, up and down steps. Pure: surfaces come by a trait.
+//! A person on foot: eyes above the ground, stopped by walls, up and down steps; and the surfaces of the scene, which are
+//! found on a thread of their own.
+
+use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::solid::Solid;
+use super::background::{Background, Task, Wake};
+use crate::geometry::Ray;
+use crate::scene::Scene;
+use crate::transport::Tracer;
 
 /// Height of the eyes above the ground [m].
 pub const EYE_M: f64 = 1.6;
@@ -158,4 +164,96 @@ fn beside_walls(eye: DVec3, wanted: DVec3, solid: &dyn Solid) -> Allowed {
     }
     // In a narrow corner: nowhere.
     Allowed::NOTHING
+}
+
+/// Surfaces that stop a person.
+pub trait Solid {
+    /// Distance [m] along a unit direction to the first surface that is nearer than `within_m`, and its unit normal on the
+    /// side it is met from.
+    fn meets(&self, from: DVec3, direction: DVec3, within_m: f64) -> Option<(f64, DVec3)>;
+}
+
+impl Solid for Tracer {
+    fn meets(&self, origin: DVec3, direction: DVec3, within_m: f64) -> Option<(f64, DVec3)> {
+        let place = self.closest_place(&Ray { origin, direction })?;
+        if place.distance_m >= within_m {
+            return None;
+        }
+        let normal = self.surface_at(&place).geometric_normal;
+        Some((place.distance_m, normal * -direction.dot(normal).signum()))
+    }
+}
+
+/// The surfaces of the scene in the window, once somebody asks for them.
+#[derive(Debug)]
+pub struct Surroundings {
+    found: Option<(Arc<Scene>, Arc<Tracer>)>,
+    coming: Background<Arc<Scene>, Tracer>,
+}
+
+impl Surroundings {
+    /// Nothing yet; the window is woken when there is something.
+    pub fn new(wake: &Wake) -> Self {
+        Self {
+            found: None,
+            coming: Background::new("surroundings", wake),
+        }
+    }
+
+    /// The surfaces of a scene; `None` until they are found, and where the system gives no thread to find them on.
+    pub fn of(&mut self, scene: &Arc<Scene>) -> Option<Arc<Tracer>> {
+        if let Some((of, Some(tracer))) = self.coming.take() {
+            self.found = Some((of, Arc::new(tracer)));
+        }
+        if let Some((of, tracer)) = &self.found
+            && Arc::ptr_eq(of, scene)
+        {
+            return Some(Arc::clone(tracer));
+        }
+        if self.coming.of().is_none() {
+            self.start(scene);
+        }
+        None
+    }
+
+    fn start(&mut self, scene: &Arc<Scene>) {
+        let before = self.found.as_ref().map(|(_, tracer)| Arc::clone(tracer));
+        let of = Arc::clone(scene);
+        let search = move |_: &Task| match before {
+            Some(before) => before.edited(of),
+            None => Tracer::new(of),
+        };
+        if let Err(error) = self.coming.start(Arc::clone(scene), search) {
+            log::warn!("{error}");
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::builtin;
+
+    #[test]
+    fn surfaces_are_found_once_and_again_for_another_scene() {
+        let scene = Arc::new(builtin::build("ring").expect("it is built in"));
+        let mut surroundings = Surroundings::new(&Wake::new(|| ()));
+        let mut wait = |scene: &Arc<Scene>| loop {
+            if let Some(tracer) = surroundings.of(scene) {
+                return tracer;
+            }
+            std::thread::sleep(std::time::Duration::from_millis(1));
+        };
+        let first = wait(&scene);
+        assert!(Arc::ptr_eq(&first, &wait(&scene)));
+        let down = first.meets(DVec3::new(0.9, 1.0, 0.9), DVec3::NEG_Y, 10.0);
+        let (distance_m, normal) = down.expect("the floor");
+        assert!(
+            (distance_m - 1.0).abs() < 1e-6 && normal == DVec3::Y,
+            "{distance_m}, {normal}"
+        );
+        assert_eq!(first.meets(DVec3::new(0.9, 1.0, 0.9), DVec3::NEG_Y, 0.5), None);
+        let other = Arc::new((*scene).clone());
+        assert!(!Arc::ptr_eq(&first, &wait(&other)));
+    }
 }

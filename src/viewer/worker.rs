@@ -1,12 +1,11 @@
 //! A thread around a bake: requests in, progress and maps of rising quality out; the window never waits for it.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use super::background::Wake;
+use super::background::{Wake, no_thread};
 use crate::effect::{Effect, EffectSwitch};
 use crate::error::Result;
 use crate::illumination::difference::{Difference, difference};
@@ -53,9 +52,10 @@ impl Baker for BakeSession {
 }
 
 /// Where the bake stands.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub enum BakeState {
     /// Nothing was asked for yet.
+    #[default]
     Idle,
     /// At work, or about to be.
     Baking {
@@ -179,26 +179,24 @@ pub struct Worker {
 
 impl Worker {
     /// Starts the thread. `make_baker` is called there with the scene of the first request, and again after a bake
-    /// that panicked. `wake` is called from any thread when there is news, but not for mere progress.
+    /// that panicked. The window is woken when there is news, but not for mere progress.
     ///
     /// # Errors
     /// The system gives no thread.
     pub fn spawn<B: Baker>(
         make_baker: impl Fn(Arc<Scene>) -> Result<B> + Send + 'static,
-        wake: impl Fn() + Send + Sync + 'static,
+        wake: &Wake,
     ) -> Result<Self> {
-        let shared = Arc::new(Shared::new(Wake(Arc::new(wake))));
+        let shared = Arc::new(Shared {
+            slot: Mutex::default(),
+            news: Condvar::new(),
+            wake: wake.clone(),
+        });
         let of_thread = Arc::clone(&shared);
         let thread = std::thread::Builder::new()
             .name("baker".into())
             .spawn(move || serve(&of_thread, &make_baker))
-            .map_err(|error| {
-                crate::error::Error::failure(
-                    "baker",
-                    format!("the system gives no thread: {error}"),
-                    "close other programs and start again",
-                )
-            })?;
+            .map_err(|error| no_thread("baker", &error))?;
         Ok(Self {
             shared,
             thread: Some(thread),
@@ -209,16 +207,9 @@ impl Worker {
     /// now on. Returns the request's number; later ones are higher.
     pub fn request(&self, asked: BakeRequest) -> u64 {
         let mut slot = self.shared.lock();
-        slot.cancel_running();
         slot.serial += 1;
-        slot.worth = None;
         let serial = slot.serial;
-        slot.request = Some(Request {
-            asked,
-            since: Instant::now(),
-            task: Task::Bake { serial },
-        });
-        self.shared.news.notify_all();
+        self.shared.put(&mut slot, asked, Purpose::Maps { serial });
         serial
     }
 
@@ -226,22 +217,16 @@ impl Worker {
     /// comparison, and gives way to every later request. Tells whether it is taken on: not while maps are baked.
     pub fn compare(&self, effect: Effect, with: Arc<BakedLevel>) -> bool {
         let mut slot = self.shared.lock();
-        let bakes = |task: Option<&Task>| task.is_some_and(|task| matches!(task, Task::Bake { .. }));
-        if bakes(slot.request.as_ref().map(|request| &request.task))
-            || bakes(slot.running.as_ref().map(|running| &running.task))
+        if [&slot.waiting, &slot.running]
+            .into_iter()
+            .flatten()
+            .any(|job| job.is_for_maps())
         {
             return false;
         }
-        slot.cancel_running();
-        slot.worth = None;
         let mut asked = with.request.clone();
         asked.settings.effects.set(effect, EffectSwitch::Off);
-        slot.request = Some(Request {
-            asked,
-            since: Instant::now(),
-            task: Task::Comparison { effect, with },
-        });
-        self.shared.news.notify_all();
+        self.shared.put(&mut slot, asked, Purpose::Worth { effect, with });
         true
     }
 
@@ -263,9 +248,8 @@ impl Worker {
     pub fn cancel(&self) {
         let mut slot = self.shared.lock();
         slot.cancel_running();
-        let waiting = slot.request.take();
-        let is_bake = waiting.is_some_and(|request| matches!(request.task, Task::Bake { .. }));
-        if is_bake && slot.running.is_none() {
+        let waiting = slot.waiting.take();
+        if waiting.is_some_and(|job| job.is_for_maps()) && slot.running.is_none() {
             slot.settled = BakeState::Cancelled;
         }
     }
@@ -273,11 +257,8 @@ impl Worker {
     /// Where the bake stands now.
     pub fn state(&self) -> BakeState {
         let slot = self.shared.lock();
-        match (&slot.request, &slot.running) {
-            (Some(request), _) => request.task.state((Stage::Build, 0.0), request.since),
-            (None, Some(running)) => running.task.state(running.meter.read(), running.since),
-            (None, None) => slot.settled.clone(),
-        }
+        let job = slot.waiting.as_ref().or(slot.running.as_ref());
+        job.map_or_else(|| slot.settled.clone(), |job| job.state())
     }
 
     /// What the last comparison found, unless that was taken or something else was asked for since.
@@ -295,7 +276,7 @@ impl Drop for Worker {
     fn drop(&mut self) {
         let mut slot = self.shared.lock();
         slot.quit = true;
-        slot.request = None;
+        slot.waiting = None;
         slot.cancel_running();
         drop(slot);
         self.shared.news.notify_all();
@@ -310,24 +291,40 @@ impl Drop for Worker {
     }
 }
 
-/// What is to be done with the maps.
-#[derive(Clone)]
-enum Task {
-    /// Handed out under this number.
-    Bake { serial: u64 },
-    /// Held against others.
-    Comparison { effect: Effect, with: Arc<BakedLevel> },
+/// What maps are baked for.
+#[derive(Debug)]
+enum Purpose {
+    /// They are handed out under this number.
+    Maps { serial: u64 },
+    /// They are held against others.
+    Worth { effect: Effect, with: Arc<BakedLevel> },
 }
 
-impl Task {
-    fn state(&self, (stage, fraction): (Stage, f64), since: Instant) -> BakeState {
-        match *self {
-            Self::Bake { .. } => BakeState::Baking {
+/// One bake, waiting or running.
+#[derive(Debug)]
+struct Job {
+    asked: BakeRequest,
+    since: Instant,
+    purpose: Purpose,
+    control: Control,
+    /// What it is doing, and how much of that is done.
+    progress: Mutex<(Stage, f64)>,
+}
+
+impl Job {
+    fn is_for_maps(&self) -> bool {
+        matches!(self.purpose, Purpose::Maps { .. })
+    }
+
+    fn state(&self) -> BakeState {
+        let (stage, fraction) = *self.progress.lock().unwrap_or_else(PoisonError::into_inner);
+        match self.purpose {
+            Purpose::Maps { .. } => BakeState::Baking {
                 stage,
                 fraction,
-                since,
+                since: self.since,
             },
-            Self::Comparison { effect, .. } => BakeState::Comparing {
+            Purpose::Worth { effect, .. } => BakeState::Comparing {
                 effect,
                 stage,
                 fraction,
@@ -336,25 +333,20 @@ impl Task {
     }
 }
 
-struct Request {
-    asked: BakeRequest,
-    since: Instant,
-    task: Task,
-}
-
-struct Running {
-    task: Task,
-    control: Arc<Control>,
-    meter: Arc<Meter>,
-    since: Instant,
+impl Progress for Job {
+    fn advance(&self, stage: Stage, done: u64, total: u64) {
+        let fraction = (done as f64 / total.max(1) as f64).clamp(0.0, 1.0);
+        *self.progress.lock().unwrap_or_else(PoisonError::into_inner) = (stage, fraction);
+    }
 }
 
 /// What both threads look at, under one lock.
+#[derive(Debug, Default)]
 struct Slot {
     /// Of the newest request for maps, waiting or not.
     serial: u64,
-    request: Option<Request>,
-    running: Option<Running>,
+    waiting: Option<Arc<Job>>,
+    running: Option<Arc<Job>>,
     /// The state while nothing is asked for or running.
     settled: BakeState,
     newest: Option<BakedLevel>,
@@ -370,158 +362,116 @@ impl Slot {
     }
 }
 
+#[derive(Debug)]
 struct Shared {
     slot: Mutex<Slot>,
     news: Condvar,
     wake: Wake,
 }
 
-impl std::fmt::Debug for Shared {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Shared").finish_non_exhaustive()
-    }
-}
-
 impl Shared {
-    fn new(wake: Wake) -> Self {
-        let slot = Slot {
-            serial: 0,
-            request: None,
-            running: None,
-            settled: BakeState::Idle,
-            newest: None,
-            worth: None,
-            quit: false,
-        };
-        Self {
-            slot: Mutex::new(slot),
-            news: Condvar::new(),
-            wake,
-        }
-    }
-
     /// No code that can panic runs under the lock, so a poisoned one still holds a valid slot.
     fn lock(&self) -> MutexGuard<'_, Slot> {
         self.slot.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Waits for a request and marks it as running; `None` when it is time to end.
-    fn next(&self) -> Option<(Request, Arc<Control>, Arc<Meter>)> {
+    /// Asks for a bake in the place of every other.
+    fn put(&self, slot: &mut Slot, asked: BakeRequest, purpose: Purpose) {
+        slot.cancel_running();
+        slot.worth = None;
+        slot.waiting = Some(Arc::new(Job {
+            asked,
+            since: Instant::now(),
+            purpose,
+            control: Control::default(),
+            progress: Mutex::new((Stage::Build, 0.0)),
+        }));
+        self.news.notify_all();
+    }
+
+    /// Waits for a job and marks it as running; `None` when it is time to end.
+    fn next(&self) -> Option<Arc<Job>> {
         let mut slot = self.lock();
-        loop {
-            if slot.quit {
-                return None;
-            }
-            if let Some(request) = slot.request.take() {
-                let control = Arc::new(Control::default());
-                let meter = Arc::new(Meter::default());
-                slot.running = Some(Running {
-                    task: request.task.clone(),
-                    control: Arc::clone(&control),
-                    meter: Arc::clone(&meter),
-                    since: request.since,
-                });
-                return Some((request, control, meter));
+        while !slot.quit {
+            if let Some(job) = slot.waiting.take() {
+                slot.running = Some(Arc::clone(&job));
+                return Some(job);
             }
             slot = self.news.wait(slot).unwrap_or_else(PoisonError::into_inner);
         }
+        None
     }
 
     /// Hands whole maps to the window, unless something else was asked for in between.
     fn hand_out(&self, level: BakedLevel) {
         let mut slot = self.lock();
-        if slot.serial != level.serial {
-            return;
+        if slot.serial == level.serial {
+            slot.newest = Some(level);
+            drop(slot);
+            self.wake.wake();
         }
-        slot.newest = Some(level);
-        drop(slot);
-        (self.wake.0)();
     }
 
-    /// Ends a comparison, and hands out what it found unless something else was asked for in between.
-    fn end_comparison(&self, worth: Option<Worth>, control: &Control) {
-        // May wait, which is not to be done under the lock.
-        let is_cancelled = control.is_cancelled();
+    /// Nothing is running any more.
+    fn end(&self, note: impl FnOnce(&mut Slot)) {
         let mut slot = self.lock();
         slot.running = None;
-        if !is_cancelled {
-            slot.worth = worth;
-        }
+        note(&mut slot);
         drop(slot);
-        (self.wake.0)();
-    }
-
-    fn settle(&self, serial: u64, state: BakeState) {
-        let mut slot = self.lock();
-        slot.running = None;
-        // A bake that was complete before it noticed that a newer request came, and was itself cancelled.
-        let outdated = state == BakeState::Done && serial != slot.serial;
-        slot.settled = if outdated { BakeState::Cancelled } else { state };
-        drop(slot);
-        (self.wake.0)();
+        self.wake.wake();
     }
 }
 
 /// The thread's life.
 fn serve<B: Baker>(shared: &Shared, make_baker: &impl Fn(Arc<Scene>) -> Result<B>) {
     let mut baker = None;
-    while let Some((request, control, meter)) = shared.next() {
-        (shared.wake.0)();
-        match &request.task {
-            Task::Bake { serial } => {
-                let state = serve_bake(
-                    shared, &mut baker, make_baker, &request, *serial, &*meter, &control,
-                );
-                shared.settle(*serial, state);
+    while let Some(job) = shared.next() {
+        shared.wake.wake();
+        match &job.purpose {
+            Purpose::Maps { serial } => {
+                let state = bake_in_levels(shared, &mut baker, make_baker, &job, *serial);
+                shared.end(|slot| {
+                    // Complete before it noticed that a newer request came, which was itself cancelled.
+                    let outdated = state == BakeState::Done && *serial != slot.serial;
+                    slot.settled = if outdated { BakeState::Cancelled } else { state };
+                });
             }
-            Task::Comparison { effect, with } => {
+            Purpose::Worth { effect, with } => {
                 // The session of the maps that are shown keeps all it has.
-                let mut own = None;
-                let ignore = &mut |_| ();
-                let outcome = bake(&mut own, make_baker, &request.asked, &*meter, &control, ignore);
-                drop(own);
-                let worth = worth(*effect, with, outcome);
-                shared.end_comparison(worth, &control);
+                let outcome = bake(&mut None, make_baker, &job, &mut |_| ());
+                // Asking may wait, which is not to be done under the lock.
+                let worth = worth(*effect, with, outcome).filter(|_| !job.control.is_cancelled());
+                shared.end(|slot| slot.worth = worth);
             }
         }
     }
 }
 
 /// Bakes, hands out every level, and tells how it ended.
-fn serve_bake<B: Baker>(
+fn bake_in_levels<B: Baker>(
     shared: &Shared,
     baker: &mut Option<B>,
     make_baker: &impl Fn(Arc<Scene>) -> Result<B>,
-    request: &Request,
+    job: &Job,
     serial: u64,
-    progress: &dyn Progress,
-    control: &Control,
 ) -> BakeState {
     let mut levels = 0;
     let mut hand_out = |result, is_final| {
         levels += 1;
         shared.hand_out(BakedLevel {
             serial,
-            request: request.asked.clone(),
+            request: job.asked.clone(),
             level: levels,
             is_final,
             result,
-            seconds: request.since.elapsed().as_secs_f64(),
+            seconds: job.since.elapsed().as_secs_f64(),
         });
     };
-    let mut on_the_way = |result| {
-        if !control.is_cancelled() {
+    let outcome = bake(baker, make_baker, job, &mut |result| {
+        if !job.control.is_cancelled() {
             hand_out(result, false);
         }
-    };
-    let outcome = bake(
-        baker,
-        make_baker,
-        &request.asked,
-        progress,
-        control,
-        &mut on_the_way,
-    );
+    });
     match outcome {
         Ok(result) => {
             hand_out(result, true);
@@ -553,11 +503,10 @@ fn worth(
 fn bake<B: Baker>(
     baker: &mut Option<B>,
     make_baker: &impl Fn(Arc<Scene>) -> Result<B>,
-    asked: &BakeRequest,
-    progress: &dyn Progress,
-    control: &Control,
+    job: &Job,
     level: &mut (dyn FnMut(BakeResult) + Send),
 ) -> std::result::Result<BakeResult, BakeState> {
+    let (asked, control) = (&job.asked, &job.control);
     let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
     let settings = BakeSettings {
         threads: baking_threads(asked.settings.threads, cores),
@@ -572,7 +521,7 @@ fn bake<B: Baker>(
             }
             None => baker.insert(make_baker(scene)?),
         };
-        baker.bake_levels(&settings, progress, control, level)
+        baker.bake_levels(&settings, job, control, level)
     }));
     match outcome {
         Ok(Ok(result)) if result.stop_reason != StopReason::Cancelled => Ok(result),
@@ -596,44 +545,4 @@ fn panic_sentence(panic: &(dyn std::any::Any + Send)) -> String {
     format!(
         "bake: it ended by a fault of the program ({text}); change a setting or bake again, and please report it"
     )
-}
-
-/// Stage and fraction in one word, so that they are read together: stage in the upper half, fraction × 2³¹ below.
-#[derive(Debug, Default)]
-pub(super) struct Meter {
-    packed: AtomicU64,
-}
-
-const STAGES: [Stage; 5] = [
-    Stage::Build,
-    Stage::Plan,
-    Stage::Caustic,
-    Stage::Direct,
-    Stage::Indirect,
-];
-const WHOLE: f64 = (1_u64 << 31) as f64;
-
-impl Meter {
-    fn write(&self, stage: Stage, fraction: f64) {
-        let index = STAGES
-            .iter()
-            .position(|candidate| *candidate == stage)
-            .unwrap_or(0) as u64;
-        let part = (fraction.clamp(0.0, 1.0) * WHOLE) as u64;
-        self.packed.store(index << 32 | part, Ordering::Relaxed);
-    }
-
-    pub(super) fn read(&self) -> (Stage, f64) {
-        let packed = self.packed.load(Ordering::Relaxed);
-        (
-            STAGES[(packed >> 32) as usize],
-            (packed & 0xffff_ffff) as f64 / WHOLE,
-        )
-    }
-}
-
-impl Progress for Meter {
-    fn advance(&self, stage: Stage, done: u64, total: u64) {
-        self.write(stage, done as f64 / total.max(1) as f64);
-    }
 }

@@ -1,20 +1,26 @@
 //! The picture beside the panel: what it shows, how well it is made, and what is told of that.
 
+use std::sync::Arc;
 use std::time::Instant;
 
-use super::{App, MOST_REPORTS};
+use serde_json::json;
+
+use super::{App, BesideShown, MOST_REPORTS, MapsOnDevice};
 use crate::effect::{Effect, EffectSwitch};
 use crate::error::Result;
-use crate::eye_pass::renderer::Uploaded;
+use crate::eye_pass::renderer::{EyeQuality, GpuMs, Renderer, Uploaded};
 use crate::eye_pass::{ToneMap, View, WhiteBalance};
+use crate::gpu::Gpu;
 use crate::optics::LinearSrgb;
 use crate::optics::spectrum::xyz::Matrix3;
 use crate::plan;
+use crate::scene::Scene;
 use crate::scene::load::was_dark;
-use crate::viewer::frame_times::Made;
+use crate::viewer::background::{Background, Wake};
+use crate::viewer::graphics::{FORMAT, Making, SAMPLES, texture};
 use crate::viewer::model::Model;
 use crate::viewer::panel::{Display, Quantity};
-use serde_json::json;
+use crate::viewer::timing::Made;
 
 /// What is seen behind scenes that came without light, before tone mapping [1]: their glass and metal would be as black as
 /// what they show. It lights nothing.
@@ -45,23 +51,26 @@ impl App {
         };
         let wanted = self.chains_switch();
         let chains = self.warm_up.switch(wanted);
-        let dispersion = self.model.panel.settings.effects.get(Effect::Dispersion);
         let white_balance = self.white_balance();
         let Some(graphics) = &mut self.graphics else {
             return Ok(());
         };
         // Played by the processor, shadow rays take longer than the next bake.
         let traces_lights = self.model.traces_lights() && !graphics.gpu().is_software();
-        if traces_lights != self.traces_lights {
-            self.traces_lights = traces_lights;
-            self.must_set_maps = true;
+        let wanted_maps = MapsOnDevice {
+            shown: self.shown,
+            traces_lights,
+        };
+        let before = self.on_device;
+        if before.is_some_and(|before| before.traces_lights) != traces_lights {
             graphics.set_traces_lights(traces_lights);
         }
         let start = Instant::now();
         let mut uploaded = graphics.set_scene(self.model.scene())?;
         let mut is_new = uploaded != Uploaded::default();
-        let has_new_maps = self.must_set_maps;
-        if std::mem::take(&mut self.must_set_maps) || is_new {
+        let has_new_maps = before != Some(wanted_maps);
+        self.on_device = Some(wanted_maps);
+        if has_new_maps || is_new {
             let (maps, style) = self.model.maps_to_show(traces_lights);
             uploaded += graphics.set_maps(&maps, style)?;
             is_new = true;
@@ -80,25 +89,33 @@ impl App {
                 }),
             );
         }
-        let (has_beside, has_reference) = (graphics.beside_id().is_some(), self.model.reference().is_some());
-        let must_set = std::mem::take(&mut self.must_set_beside) || has_beside != has_reference;
-        if must_set || (is_new && has_reference) {
-            let style = self.model.map_style();
+        let style = self.model.map_style();
+        let reference = self.model.reference.as_ref();
+        let beside = reference.map(|reference| (Arc::clone(&reference.maps), style));
+        let is_same = |a: &BesideShown, b: &BesideShown| Arc::ptr_eq(&a.0, &b.0) && a.1 == b.1;
+        let is_as_before = match (&self.beside, &beside) {
+            (Some(before), Some(now)) => is_same(before, now) && !is_new,
+            (before, now) => before.is_none() && now.is_none(),
+        };
+        self.beside = beside;
+        if !is_as_before {
             let shown = self.model.reference_to_show();
             let shown = shown.as_ref().map(|(scene, maps)| (*scene, &maps[..], style));
             graphics.set_beside(shown)?;
         }
         let is_compiling = wanted != EffectSwitch::Off && chains == EffectSwitch::Off;
         graphics.set_stand_in(is_compiling && !self.model.maps().is_empty());
-        graphics.set_chains(chains)?;
-        graphics.set_dispersion(dispersion);
-        graphics.set_white_balance(&white_balance);
+        graphics.set_making(Making {
+            chains,
+            dispersion: self.model.choices.settings.effects.get(Effect::Dispersion),
+            white_balance,
+        })?;
         // Measuring the exposure and drawing would take them in without a word.
         if let Some(ms) = graphics.take_times() {
             if let Some(quality) = graphics.counts().timed_quality {
                 self.pace.learn(ms, quality);
             }
-            self.frame_times.push(ms);
+            self.tell_time(ms);
         }
         self.expose(&mut view, has_new_maps)?;
         let Some(graphics) = &mut self.graphics else {
@@ -122,7 +139,7 @@ impl App {
 
     /// Makes the picture of a view at rest better, as long as nothing else is to be done.
     pub(super) fn refine_picture(&mut self, view: &View) -> Result<()> {
-        let is_busy = self.model.state().is_working() || self.model.navigator.is_moving();
+        let is_busy = self.model.state.is_working() || self.model.navigator.is_moving();
         let Some(graphics) = self.graphics.as_mut().filter(|_| !is_busy) else {
             self.is_refining = false;
             return Ok(());
@@ -161,13 +178,13 @@ impl App {
         }
         view.exposure_stops = self.exposure.next(shown, since);
         view.background = backdrop(model, view.exposure_stops);
-        model.panel.display.exposure_stops = view.exposure_stops;
+        model.choices.display.exposure_stops = view.exposure_stops;
         Ok(())
     }
 
     /// Whether the exposure is on its way.
     pub(super) fn is_exposing(&self) -> bool {
-        self.exposure.is_moving(self.model.panel.display.exposure_stops)
+        self.exposure.is_moving(self.model.choices.display.exposure_stops)
     }
 
     /// What the picture is to show; `None` while it has no area.
@@ -175,17 +192,15 @@ impl App {
         let graphics = self.graphics.as_ref()?;
         let scale = graphics.window().scale_factor() as f32;
         let pixels = |points: f32| (points * scale).round();
-        let (width, height) = (
-            pixels(self.picture_rect.width()),
-            pixels(self.picture_rect.height()),
-        );
+        let size = self.picture_rect.size();
+        let (width, height) = (pixels(size.x), pixels(size.y));
         let display = match self.model.quantity() {
-            Quantity::Light => self.model.panel.display,
+            Quantity::Light => self.model.choices.display,
             // Colours of a legend are shown as they are.
             _ => Display {
                 exposure_stops: 0.0,
                 tone_map: ToneMap::None,
-                ..self.model.panel.display
+                ..self.model.choices.display
             },
         };
         (width >= 1.0 && height >= 1.0).then(|| View {
@@ -206,16 +221,14 @@ impl App {
         let Some(graphics) = &mut self.graphics else {
             return;
         };
-        if let Some(ms) = graphics.take_times() {
-            self.frame_times.push(ms);
+        let times = graphics.take_times();
+        let is_complete = !graphics.awaits_times();
+        if let Some(ms) = times {
+            self.tell_time(ms);
         }
         let aspect = f64::from(view.width) / f64::from(view.height);
-        self.chains = Some(plan::chains(
-            self.model.scene(),
-            Some((&view.camera, aspect)),
-            switch,
-        ));
-        let is_complete = !graphics.awaits_times();
+        let chains = plan::chains(self.model.scene(), Some((&view.camera, aspect)), switch);
+        self.model.picture.chains = Some(chains);
         self.reports_due = if is_complete {
             0
         } else {
@@ -227,10 +240,12 @@ impl App {
     pub(super) fn report_making(&mut self) {
         let Some(graphics) = &self.graphics else { return };
         let (counts, quality) = (graphics.counts(), graphics.quality());
-        self.frame_times.set_made(Made {
-            traced_scale: (counts.drawn_specular > 0).then_some(quality.traced_scale),
-            samples: counts.samples,
-        });
+        if let Some(times) = &mut self.model.picture.frame_times {
+            times.set_made(Made {
+                traced_scale: (counts.drawn_specular > 0).then_some(quality.traced_scale),
+                samples: counts.samples,
+            });
+        }
         let refusal = graphics.chain_refusal().map(ToString::to_string);
         if refusal.is_some() && refusal != self.told_refusal {
             self.notice.clone_from(&refusal);
@@ -238,16 +253,89 @@ impl App {
         }
     }
 
+    fn tell_time(&mut self, ms: GpuMs) {
+        if let Some(times) = &mut self.model.picture.frame_times {
+            times.push(ms);
+        }
+    }
+
     /// What radiance is multiplied by before tone mapping; colours of a legend are shown as they are.
     pub(super) fn white_balance(&self) -> Matrix3 {
         let chosen = match self.model.quantity() {
-            Quantity::Light => self.model.panel.display.white_balance,
+            Quantity::Light => self.model.choices.display.white_balance,
             _ => WhiteBalance::None,
         };
         chosen.matrix(self.model.scene())
     }
 
     pub(super) fn chains_switch(&self) -> EffectSwitch {
-        self.model.panel.settings.effects.get(Effect::Chains)
+        self.model.choices.settings.effects.get(Effect::Chains)
     }
+}
+
+/// Pixels across of the picture that shaders are compiled for.
+const WARM_UP_WIDTH: u32 = 64;
+
+/// Whether mirrors and glass may be drawn: what they take is compiled beside the window, seconds where the driver has it in
+/// no cache. A device of its own draws the view once, small. Drivers compile at the latest then, and keep what they compiled
+/// for every device.
+#[derive(Debug)]
+pub struct WarmUp {
+    work: Background<(), Result<()>>,
+    is_lit: bool,
+    is_done: bool,
+}
+
+impl WarmUp {
+    /// Nothing is compiled; the window is woken when it is.
+    pub fn new(wake: &Wake) -> Self {
+        Self {
+            work: Background::new("shaders", wake),
+            is_lit: false,
+            is_done: false,
+        }
+    }
+
+    /// Begins with the second picture of light, so that the first one waits for nothing.
+    pub fn begin(&mut self, scene: &Arc<Scene>, view: &View, quality: EyeQuality) {
+        let was_lit = std::mem::replace(&mut self.is_lit, true);
+        if !was_lit || self.is_done || self.is_coming() {
+            return;
+        }
+        let scene = Arc::clone(scene);
+        let view = View {
+            width: WARM_UP_WIDTH,
+            height: (WARM_UP_WIDTH * view.height).div_ceil(view.width),
+            ..view.clone()
+        };
+        let started = self.work.start((), move |_| draw_once(&scene, &view, quality));
+        self.is_done = started.is_err();
+    }
+
+    /// Whether it is under way.
+    pub fn is_coming(&self) -> bool {
+        self.work.of().is_some()
+    }
+
+    /// How chains are switched in the window, where `wanted` is asked for.
+    pub fn switch(&mut self, wanted: EffectSwitch) -> EffectSwitch {
+        if let Some((_, outcome)) = self.work.take() {
+            self.is_done = true;
+            if let Some(Err(error)) = outcome {
+                log::warn!("shaders could not be compiled beside the window: {error}");
+            }
+        }
+        if self.is_done { wanted } else { EffectSwitch::Off }
+    }
+}
+
+fn draw_once(scene: &Scene, view: &View, quality: EyeQuality) -> Result<()> {
+    let gpu = Gpu::headless()?;
+    let mut renderer = Renderer::new(&gpu, scene, FORMAT, SAMPLES)?;
+    renderer.set_quality(quality);
+    let target = texture(&gpu.device, [view.width, view.height]);
+    let mut encoder = gpu.device.create_command_encoder(&Default::default());
+    renderer.draw(&gpu, &mut encoder, &target, view)?;
+    gpu.queue.submit([encoder.finish()]);
+    gpu.wait()
 }

@@ -8,11 +8,11 @@ use super::App;
 use super::drawing::without_backdrop;
 use crate::error::{Error, Result};
 use crate::scene::load::was_dark;
+use crate::viewer::exporting;
 use crate::viewer::exposure::AutoExposure;
-use crate::viewer::files::{Choice, Chosen, Purpose, free_names, working_folder};
+use crate::viewer::files::{Choice, NO_DIALOG, Purpose, free_names, working_folder};
 use crate::viewer::model::Model;
 use crate::viewer::panel::Quantity;
-use crate::viewer::screenshot;
 
 /// What who opens a file without light is told first.
 pub(super) fn dark_notice(model: &Model) -> Option<String> {
@@ -25,13 +25,11 @@ impl App {
     /// Shows what was chosen, read or written since the last frame.
     pub(super) fn poll_files(&mut self) {
         match self.dialog.take() {
-            Some(Chosen::File(Choice::Open, path)) => self.model.open(&path.display().to_string()),
-            Some(Chosen::File(Choice::SaveScene, path)) => self.save_scene_as(path),
-            Some(Chosen::NoDialog(Choice::Open, sentence)) => {
-                self.model.files.refusal = Some(sentence.to_owned());
-            }
+            Some((Choice::Open, Some(path))) => self.model.open(&path.display().to_string()),
+            Some((Choice::SaveScene, Some(path))) => self.save_scene_as(path),
+            Some((Choice::Open, None)) => self.model.files.refusal = Some(NO_DIALOG.to_owned()),
             // Beside the original it is found again, and the notice says where.
-            Some(Chosen::NoDialog(Choice::SaveScene, _)) => {
+            Some((Choice::SaveScene, None)) => {
                 let original = self.original();
                 let stem = original.file_stem().unwrap_or_default().to_string_lossy();
                 let folder = original.parent().unwrap_or(Path::new(""));
@@ -40,19 +38,13 @@ impl App {
                     Err(error) => self.tell_unsaved(&error.to_string()),
                 }
             }
-            Some(Chosen::Nothing) | None => {}
+            None => {}
         }
         if let Some(purpose) = self.model.poll_files() {
             self.begin_scene(purpose);
         }
-        match self.model.files.take_saved() {
-            Some(Ok(path)) => {
-                let files = [path];
-                self.model.log.write("saved", json!({"files": files}));
-                self.notice = Some(screenshot::told(&files));
-            }
-            Some(Err(error)) => self.tell_unsaved(&error.to_string()),
-            None => {}
+        if let Some(saved) = self.model.files.take_saved() {
+            self.tell_saved(saved.map(|path| vec![path]));
         }
     }
 
@@ -85,6 +77,16 @@ impl App {
         }
     }
 
+    fn tell_saved(&mut self, saved: Result<Vec<PathBuf>>) {
+        match saved {
+            Ok(files) => {
+                self.model.log.write("saved", json!({"files": files}));
+                self.notice = Some(exporting::told(&files));
+            }
+            Err(error) => self.tell_unsaved(&error.to_string()),
+        }
+    }
+
     fn tell_unsaved(&mut self, sentence: &str) {
         self.model.log.write("not_saved", json!({"sentence": sentence}));
         self.notice = Some(sentence.to_owned());
@@ -92,38 +94,24 @@ impl App {
 
     /// The window shows another scene than before, or the same read again.
     fn begin_scene(&mut self, purpose: Purpose) {
-        self.must_set_maps = true;
         if purpose == Purpose::Open {
             self.notice = dark_notice(&self.model);
-            self.exposure = AutoExposure::new(!self.model.keeps_exposure());
+            self.exposure = AutoExposure::new(!self.model.exposure_is_kept);
         }
         if let Some(graphics) = &self.graphics {
             let name = &self.model.scene().name;
             graphics.window().set_title(&format!("Nephroid – {name}"));
         }
     }
-}
 
-impl App {
     /// Writes the picture to files in the working folder, and tells where over the picture.
     pub(super) fn save_picture(&mut self) {
-        let outcome = self.written_picture();
-        let notice = match &outcome {
-            Ok(files) => {
-                self.model.log.write("saved", json!({"files": files}));
-                screenshot::told(files)
-            }
-            Err(error) => {
-                let sentence = error.to_string();
-                self.model.log.write("not_saved", json!({"sentence": sentence}));
-                sentence
-            }
-        };
-        self.notice = Some(notice);
+        let saved = self.written_picture();
+        self.tell_saved(saved);
         self.request_redraw();
     }
 
-    pub(super) fn written_picture(&mut self) -> Result<Vec<PathBuf>> {
+    fn written_picture(&mut self) -> Result<Vec<PathBuf>> {
         let white_balance = self.white_balance();
         let (Some(view), Some(graphics)) = (self.view(), &mut self.graphics) else {
             return Err(Error::failure(
@@ -138,6 +126,6 @@ impl App {
         // False colours are no radiance.
         let has_radiance = self.model.quantity() == Quantity::Light;
         let scene = &self.model.scene().name;
-        screenshot::save(&folder, scene, &picture, &view, &white_balance, has_radiance)
+        exporting::save_picture(&folder, scene, &picture, &view, &white_balance, has_radiance)
     }
 }

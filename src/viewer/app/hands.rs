@@ -1,19 +1,18 @@
 //! Keys and mouse.
 
+use serde_json::json;
 use winit::dpi::PhysicalPosition;
 use winit::event::{ElementState, KeyEvent, MouseButton, MouseScrollDelta};
-use winit::keyboard::{Key, NamedKey, PhysicalKey};
+use winit::keyboard::{Key, KeyCode, NamedKey, PhysicalKey};
 use winit::window::CursorGrabMode;
 
 use super::{App, PIXELS_PER_NOTCH};
 use crate::geometry::Ray;
 use crate::scene::Camera;
+use crate::viewer::command::{Command, FilmCommand};
 use crate::viewer::gizmo::{self, Held};
-use crate::viewer::input::{self, Shortcut};
 use crate::viewer::lens::Lens;
-use crate::viewer::navigation::Travel;
-use crate::viewer::panel::FilmWish;
-use serde_json::json;
+use crate::viewer::navigation::{BOOKMARKS, HeldKeys, Travel};
 
 /// A press that moves farther than this before it is let go is no click [pixels].
 const CLICK_PIXELS: f64 = 4.0;
@@ -35,74 +34,93 @@ impl App {
         let is_typing = self
             .graphics
             .as_mut()
-            .is_some_and(|graphics| graphics.interface().context().text_edit_focused());
+            .is_some_and(|graphics| graphics.interface().context.text_edit_focused());
         if is_typing && event.state.is_pressed() {
             return;
         }
         self.fly();
-        if self.modifiers.control_key() || self.modifiers.super_key() {
+        let is_chord = self.modifiers.control_key() || self.modifiers.super_key();
+        if is_chord && event.state.is_pressed() {
             // Nothing flies or bakes by a chord.
-            if event.state.is_pressed() {
-                let undoes = input::undoes(&event.logical_key, self.modifiers.shift_key());
-                self.pressed.undo |= undoes == Some(true);
-                self.pressed.redo |= undoes == Some(false);
-                if let Key::Character(digit) = &event.logical_key
-                    && let Some(number) = input::bookmark(digit)
-                {
-                    self.model.navigator.set_bookmark(number);
-                    self.model
-                        .log
-                        .write("bookmark", json!({"number": number + 1, "kept": true}));
-                    self.notice = Some(format!("View kept as {}: press {0} to come back.", number + 1));
-                }
-                // What was held before goes on, more slowly.
-                if matches!(event.logical_key, Key::Named(NamedKey::Control)) {
-                    self.model.navigator.keys.creep = true;
-                }
-                return;
-            }
+            return self.on_chord(&event.logical_key);
         }
         if let PhysicalKey::Code(code) = event.physical_key
-            && input::hold(&mut self.model.navigator.keys, code, event.state)
+            && hold(&mut self.model.navigator.keys, code, event.state)
         {
             return;
         }
         if event.state.is_pressed() && !event.repeat {
             self.notice = None;
-            match input::shortcut(&event.logical_key) {
-                Some(Shortcut::NextCamera) => drop(self.model.navigator.next_camera().map(str::to_owned)),
-                Some(Shortcut::Frame) => self.model.frame(f64::from(self.picture_rect.aspect_ratio())),
-                Some(Shortcut::NextTravel) => {
-                    let next = self.model.navigator.travel().next();
-                    self.model.travel(next);
-                    self.notice = Some(travel_notice(next));
-                }
-                Some(Shortcut::Look) if self.looking_from.is_some() => self.stop_looking(),
-                Some(Shortcut::Look) => self.start_looking(),
-                Some(Shortcut::Probe) => self.model.panel.probes = !self.model.panel.probes,
-                Some(Shortcut::RecordKey) => {
-                    self.pressed.film = Some(FilmWish::Record(None));
-                    let number = self.model.panel.film.keys.len() + 1;
-                    self.notice = Some(format!("Key {number} of the camera's path is set here."));
-                }
-                Some(Shortcut::Bookmark(number)) => {
-                    if self.model.navigator.go_to_bookmark(number) {
-                        self.model
-                            .log
-                            .write("bookmark", json!({"number": number + 1, "kept": false}));
-                    } else {
-                        let key = number + 1;
-                        self.notice = Some(format!("No view is kept as {key}: Ctrl+{key} keeps this one."));
-                    }
-                }
-                Some(Shortcut::Rebake) => self.pressed.rebake = true,
-                Some(Shortcut::SavePicture) => self.pressed.save_picture = true,
-                Some(Shortcut::Help) => self.model.panel.help_open = !self.model.panel.help_open,
-                Some(Shortcut::LetGo) if self.looking_from.is_some() => self.stop_looking(),
-                Some(Shortcut::LetGo) if self.model.panel.held().is_some() => self.model.panel.hold(None),
-                Some(Shortcut::LetGo) => self.pressed.cancel = true,
-                None => {}
+            match &event.logical_key {
+                Key::Named(NamedKey::Escape) => self.let_go(),
+                Key::Named(NamedKey::F12) => self.pressed.push(Command::SavePicture),
+                Key::Character(letter) => self.on_letter(&letter.to_lowercase()),
+                _ => {}
             }
+        }
+    }
+
+    /// Does what a key stands for while Ctrl is held.
+    fn on_chord(&mut self, key: &Key) {
+        match key {
+            // What was held before goes on, more slowly.
+            Key::Named(NamedKey::Control) => self.model.navigator.keys.creep = true,
+            Key::Character(letter) => match letter.to_lowercase().as_str() {
+                "z" if !self.modifiers.shift_key() => self.pressed.push(Command::Undo),
+                "z" | "y" => self.pressed.push(Command::Redo),
+                digit => {
+                    let Some(number) = bookmark(digit) else { return };
+                    self.model.navigator.set_bookmark(number);
+                    let more = json!({"number": number + 1, "kept": true});
+                    self.model.log.write("bookmark", more);
+                    self.notice = Some(format!("View kept as {}: press {0} to come back.", number + 1));
+                }
+            },
+            _ => {}
+        }
+    }
+
+    /// Does what the letter on a key stands for.
+    fn on_letter(&mut self, letter: &str) {
+        match letter {
+            "c" => drop(self.model.navigator.next_camera().map(str::to_owned)),
+            "f" => self.model.frame(f64::from(self.picture_rect.aspect_ratio())),
+            "r" => self.pressed.push(Command::Rebake),
+            "h" | "?" => self.panel.help_open ^= true,
+            "v" => {
+                let next = self.model.navigator.travel().next();
+                self.model.travel(next);
+                self.notice = Some(travel_notice(next));
+            }
+            "m" if self.looking_from.is_some() => self.stop_looking(),
+            "m" => self.start_looking(),
+            "p" => self.model.choices.probes ^= true,
+            "k" => {
+                self.pressed.push(Command::Film(FilmCommand::Record(None)));
+                let number = self.model.choices.film.keys.len() + 1;
+                self.notice = Some(format!("Key {number} of the camera's path is set here."));
+            }
+            digit => {
+                let Some(number) = bookmark(digit) else { return };
+                if self.model.navigator.go_to_bookmark(number) {
+                    let more = json!({"number": number + 1, "kept": false});
+                    self.model.log.write("bookmark", more);
+                } else {
+                    let key = number + 1;
+                    self.notice = Some(format!("No view is kept as {key}: Ctrl+{key} keeps this one."));
+                }
+            }
+        }
+    }
+
+    /// Lets go of the gaze, or of what has handles, or of the bake.
+    fn let_go(&mut self) {
+        if self.looking_from.is_some() {
+            self.stop_looking();
+        } else if self.model.choices.selection.held().is_some() {
+            self.model.choices.selection.hold(None);
+        } else {
+            self.pressed.push(Command::Cancel);
         }
     }
 
@@ -127,9 +145,12 @@ impl App {
         if !self.is_over_picture() || self.gizmo.is_hot() {
             return;
         }
-        if self.model.panel.probes {
+        if self.model.choices.probes {
             self.model.probe(self.gaze());
-        } else if let Some(gaze) = self.gaze().filter(|_| self.model.panel.placed_light().is_some()) {
+        } else if let Some(gaze) = self
+            .gaze()
+            .filter(|_| self.model.choices.selection.placed().is_some())
+        {
             self.model.begin_placing(gaze);
         } else {
             self.clicks_at = Some(self.pointer);
@@ -141,20 +162,17 @@ impl App {
         if self.clicks_at.take().is_none() {
             return;
         }
-        let Some(place) = self.pointer_points() else {
+        let camera = self.camera();
+        let Some((lens, place)) = self.pointed(&camera) else {
             return;
         };
-        let camera = self.camera();
-        let lens = Lens {
-            camera: &camera,
-            picture: self.picture_rect,
-        };
         // Lights are marked only beside handles.
-        let marks = self.model.panel.held().is_some();
+        let marks = self.model.choices.selection.held().is_some();
         let light = gizmo::light_at(&lens, self.model.scene(), place).filter(|_| marks);
+        let gaze = lens.gaze(place);
         match light {
             Some(light) => self.model.hold(Held::Light(light)),
-            None => self.model.pick(lens.gaze(place)),
+            None => self.model.pick(gaze),
         }
         self.request_redraw();
     }
@@ -179,20 +197,20 @@ impl App {
 
     fn pointer_points(&self) -> Option<egui::Pos2> {
         let scale = self.graphics.as_ref()?.window().scale_factor();
-        Some(egui::pos2(
-            (self.pointer.x / scale) as f32,
-            (self.pointer.y / scale) as f32,
-        ))
+        let points = |pixels: f64| (pixels / scale) as f32;
+        Some(egui::pos2(points(self.pointer.x), points(self.pointer.y)))
+    }
+
+    /// The picture, and where the pointer is in it.
+    fn pointed<'a>(&self, camera: &'a Camera) -> Option<(Lens<'a>, egui::Pos2)> {
+        let picture = self.picture_rect;
+        Some((Lens { camera, picture }, self.pointer_points()?))
     }
 
     /// The ray from the eye through the pointer.
     fn gaze(&self) -> Option<Ray> {
         let camera = self.camera();
-        let lens = Lens {
-            camera: &camera,
-            picture: self.picture_rect,
-        };
-        self.pointer_points().map(|place| lens.gaze(place))
+        self.pointed(&camera).map(|(lens, place)| lens.gaze(place))
     }
 
     pub(super) fn on_wheel(&mut self, delta: MouseScrollDelta) {
@@ -206,15 +224,12 @@ impl App {
 
     /// Whether the pointer is on the picture and not on a list or text that lies over it.
     pub(super) fn is_over_picture(&mut self) -> bool {
-        let Some(graphics) = &mut self.graphics else {
+        let (Some(place), Some(graphics)) = (self.pointer_points(), &mut self.graphics) else {
             return false;
         };
-        let scale = graphics.window().scale_factor();
-        let pointer: PhysicalPosition<f64> = self.pointer;
-        let points = egui::pos2((pointer.x / scale) as f32, (pointer.y / scale) as f32);
         let is_background = |layer: egui::LayerId| layer.order == egui::Order::Background;
-        let layer = graphics.interface().context().layer_id_at(points);
-        self.picture_rect.contains(points) && layer.is_none_or(is_background)
+        let layer = graphics.interface().context.layer_id_at(place);
+        self.picture_rect.contains(place) && layer.is_none_or(is_background)
     }
 
     pub(super) fn start_looking(&mut self) {
@@ -240,4 +255,28 @@ impl App {
             window.set_cursor_visible(true);
         }
     }
+}
+
+/// Holds or releases a movement key, by its place on the keyboard, so that any layout flies with the same fingers;
+/// tells whether it is one.
+fn hold(keys: &mut HeldKeys, key: KeyCode, state: ElementState) -> bool {
+    let held = match key {
+        KeyCode::KeyW => &mut keys.forward,
+        KeyCode::KeyS => &mut keys.backward,
+        KeyCode::KeyA => &mut keys.left,
+        KeyCode::KeyD => &mut keys.right,
+        KeyCode::KeyE => &mut keys.up,
+        KeyCode::KeyQ => &mut keys.down,
+        KeyCode::ShiftLeft | KeyCode::ShiftRight => &mut keys.run,
+        KeyCode::ControlLeft | KeyCode::ControlRight => &mut keys.creep,
+        _ => return false,
+    };
+    *held = state.is_pressed();
+    true
+}
+
+/// Which kept view a key with a digit means, from 0 on.
+fn bookmark(digit: &str) -> Option<usize> {
+    let number: usize = digit.parse().ok()?;
+    (1..=BOOKMARKS).contains(&number).then(|| number - 1)
 }

@@ -6,7 +6,7 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use super::recent::Recent;
+use super::Recent;
 use crate::error::{Error, Result};
 use crate::files::cache::ContentHash;
 use crate::files::{read_file, slug, to_json, write_atomically};

@@ -2,16 +2,14 @@
 
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::thread::{self, JoinHandle};
+use std::thread;
 use std::time::{Duration, Instant, SystemTime};
 
+use super::Recent;
 use super::config::{ConfigFolder, Kept};
-use super::recent::Recent;
-use crate::error::Result;
 use crate::scene::Scene;
 use crate::scene::changes::Changes;
-use crate::viewer::background::no_thread;
+use crate::viewer::background::{Background, Task, Wake};
 
 /// Longest that a change waits: a program that is killed loses no more than this.
 pub const SOON: Duration = Duration::from_secs(1);
@@ -44,8 +42,7 @@ pub struct Keeper {
     known: Option<Snapshot>,
     /// What is another one since some time.
     waiting: Option<(Instant, Snapshot)>,
-    /// What is being written.
-    writing: Option<JoinHandle<()>>,
+    writing: Background<(), ()>,
 }
 
 impl Keeper {
@@ -55,7 +52,7 @@ impl Keeper {
             folder,
             known: None,
             waiting: None,
-            writing: None,
+            writing: Background::new("keeper", &Wake::new(|| ())),
         }
     }
 
@@ -94,7 +91,7 @@ impl Keeper {
     /// Writes what waits, and comes back when it is on the disk: for who reads it back at once.
     pub fn settle(&mut self) {
         self.flush();
-        self.wait();
+        self.writing.wait();
     }
 
     /// Begins to write what waits.
@@ -108,18 +105,9 @@ impl Keeper {
 
     /// Writes on a thread, after what is being written.
     fn write(&mut self, work: impl FnOnce() + Send + 'static) {
-        self.wait();
-        match thread::Builder::new().name("keeper".into()).spawn(work) {
-            Ok(writing) => self.writing = Some(writing),
-            Err(error) => log::warn!("what is kept cannot be written: {error}"),
-        }
-    }
-
-    fn wait(&mut self) {
-        if let Some(writing) = self.writing.take()
-            && writing.join().is_err()
-        {
-            log::error!("the thread that keeps settings panicked");
+        self.writing.wait();
+        if let Err(error) = self.writing.start((), |_| work()) {
+            log::warn!("what is kept cannot be written: {error}");
         }
     }
 }
@@ -173,68 +161,16 @@ impl Stamps {
     }
 }
 
-/// What both threads look at.
-#[derive(Debug, Default)]
-struct Shared {
-    ends: AtomicBool,
-    has_changed: AtomicBool,
-}
-
-/// Watches files until it is dropped.
-#[derive(Debug)]
-pub struct Watch {
-    shared: Arc<Shared>,
-    thread: Option<JoinHandle<()>>,
-}
-
-impl Watch {
-    /// Watches files that were as `stamps` say; `wake` is called from another thread when they changed.
-    ///
-    /// # Errors
-    /// The system gives no thread.
-    pub fn start(stamps: Stamps, wake: Arc<dyn Fn() + Send + Sync>) -> Result<Self> {
-        let shared = Arc::new(Shared::default());
-        let of_thread = Arc::clone(&shared);
-        let thread = thread::Builder::new()
-            .name("watch".into())
-            .spawn(move || look(&of_thread, stamps, &*wake))
-            .map_err(|error| no_thread("watch", &error))?;
-        Ok(Self {
-            shared,
-            thread: Some(thread),
-        })
-    }
-
-    /// Whether they changed since it was asked last.
-    pub fn take_change(&self) -> bool {
-        self.shared.has_changed.swap(false, Ordering::AcqRel)
-    }
-}
-
-impl Drop for Watch {
-    fn drop(&mut self) {
-        self.shared.ends.store(true, Ordering::Release);
-        if let Some(thread) = self.thread.take() {
-            thread.thread().unpark();
-            // It can only have ended.
-            let _ = thread.join();
-        }
-    }
-}
-
-fn look(shared: &Shared, mut known: Stamps, wake: &dyn Fn()) {
+/// Waits until files that were as `known` says have changed; as they are then.
+pub(super) fn changed(known: Stamps, task: &Task) -> Stamps {
     let mut before = known.clone();
-    loop {
-        thread::park_timeout(BETWEEN_LOOKS);
-        if shared.ends.load(Ordering::Acquire) {
-            return;
-        }
+    while !task.control.is_cancelled() {
+        thread::sleep(BETWEEN_LOOKS);
         let now = known.again();
         if now == before && now != known {
-            known = now.clone();
-            shared.has_changed.store(true, Ordering::Release);
-            wake();
+            return now;
         }
         before = now;
     }
+    known
 }

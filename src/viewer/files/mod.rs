@@ -7,19 +7,14 @@ use std::time::{Duration, Instant};
 use rfd::FileDialog;
 use winit::window::Window;
 
-use self::config::Kept;
-use self::config::{ConfigFolder, ReadBack};
-use self::keeper::Keeper;
-use self::keeper::{Stamps, Watch};
-use self::recent::Recent;
+use self::config::{ConfigFolder, Kept, ReadBack};
+use self::keeper::{Keeper, Stamps, changed};
 use crate::error::{Error, Result};
-use crate::progress::Control;
 use crate::scene::{LoadOptions, Scene, load};
-use crate::viewer::background::{Background, Wake};
+use crate::viewer::background::{Background, Task, Wake};
 
 pub mod config;
 pub mod keeper;
-pub mod recent;
 
 /// What a scene is read for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -59,29 +54,27 @@ pub struct Files {
     /// What was found of what was kept, and could not be taken over.
     pub warning: Option<String>,
     /// Watches the files of the scene in the window.
-    pub watch: Option<Watch>,
+    watch: Background<(), Stamps>,
     /// Keeps what the user does.
     pub keeper: Option<Keeper>,
     config: Option<ConfigFolder>,
-    wake: Wake,
 }
 
 impl Files {
-    /// Nothing was opened yet; `wake` is called from other threads when there is news.
-    pub fn new(options: &FilesOptions, wake: Arc<dyn Fn() + Send + Sync>) -> Self {
+    /// Nothing was opened yet; the window is woken when there is news.
+    pub fn new(options: &FilesOptions, wake: &Wake) -> Self {
         let recent = options.config.as_ref().map(ConfigFolder::read_recent);
         let (recent, warning) = recent.unwrap_or_default();
         Self {
             load: options.load.clone(),
-            loader: Background::new("loader", Arc::clone(&wake)),
-            saver: Background::new("saver", Arc::clone(&wake)),
+            loader: Background::new("loader", wake),
+            saver: Background::new("saver", wake),
             recent: recent.unwrap_or_default(),
             refusal: None,
             warning,
-            watch: None,
+            watch: Background::new("watch", wake),
             keeper: options.config.clone().map(Keeper::new),
             config: options.config.clone(),
-            wake: Wake(wake),
         }
     }
 
@@ -106,14 +99,8 @@ impl Files {
     /// The scene that was read, once, with where it comes from and what it was read for.
     pub fn take_read(&mut self) -> Option<((String, Purpose), Result<Scene>)> {
         let (of, outcome) = self.loader.take()?;
-        let broken = || {
-            Err(Error::failure(
-                &of.0,
-                "reading it broke off",
-                "check the file and try again",
-            ))
-        };
-        let outcome = outcome.unwrap_or_else(broken);
+        let broken = || Error::failure(&of.0, "reading it broke off", "check the file and try again");
+        let outcome = outcome.unwrap_or_else(|| Err(broken()));
         Some((of, outcome))
     }
 
@@ -135,13 +122,13 @@ impl Files {
         let (target, outcome) = self.saver.take()?;
         let location = target.display().to_string();
         let broken = || {
-            Err(Error::failure(
+            Error::failure(
                 location,
                 "writing it broke off",
                 "try again, or choose another place",
-            ))
+            )
         };
-        Some(outcome.unwrap_or_else(broken).map(|()| target))
+        Some(outcome.unwrap_or_else(|| Err(broken())).map(|()| target))
     }
 
     /// What was kept of a scene by its full path, and a sentence where that cannot be understood.
@@ -150,36 +137,35 @@ impl Files {
         config.map_or((None, None), |config| config.read_scene(full_source))
     }
 
+    /// Whether files are watched.
+    pub fn is_watching(&self) -> bool {
+        self.watch.of().is_some()
+    }
+
     /// Watches files that were as `stamps` say.
     pub fn start_watch(&mut self, stamps: Stamps) {
-        match Watch::start(stamps, Arc::clone(&self.wake.0)) {
-            Ok(watch) => self.watch = Some(watch),
-            Err(error) => self.refusal = Some(error.to_string()),
+        if let Err(error) = self.watch.start((), |task| changed(stamps, task)) {
+            self.refusal = Some(error.to_string());
         }
     }
 
-    /// What the panel tells of them.
-    pub fn facts(&self) -> FileFacts<'_> {
-        FileFacts {
-            loading: self.loader.of().map(|(source, _)| source.as_str()),
-            recent: self.recent.paths(),
-            refusal: self.refusal.as_deref(),
-            warning: self.warning.as_deref(),
-        }
+    /// Watches them no longer.
+    pub fn stop_watch(&mut self) {
+        self.watch.stop();
     }
-}
 
-/// What the panel tells of files.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct FileFacts<'a> {
+    /// Whether they changed since this was called last.
+    pub fn have_changed(&mut self) -> bool {
+        let stamps = self.watch.take().and_then(|(_, stamps)| stamps);
+        let has_changed = stamps.is_some();
+        stamps.into_iter().for_each(|stamps| self.start_watch(stamps));
+        has_changed
+    }
+
     /// The scene that is being read.
-    pub loading: Option<&'a str>,
-    /// Files that were opened before, the newest first.
-    pub recent: &'a [PathBuf],
-    /// Why the last scene could not be opened.
-    pub refusal: Option<&'a str>,
-    /// What of what was kept could not be taken over.
-    pub warning: Option<&'a str>,
+    pub fn loading(&self) -> Option<&str> {
+        self.loader.of().map(|(source, _)| source.as_str())
+    }
 }
 
 /// The path that somebody typed or pasted: without space or quotation marks around it, `~/` for the home folder.
@@ -228,7 +214,7 @@ pub fn free_names<const N: usize>(
 const NO_DIALOG_WITHIN: Duration = Duration::from_millis(400);
 
 /// Told where no dialog can be had.
-const NONE: &str =
+pub const NO_DIALOG: &str =
     "This system offers no dialog to choose a file in: type its path, or drop the file on the window.";
 
 /// What a file is chosen for.
@@ -240,17 +226,6 @@ pub enum Choice {
     SaveScene,
 }
 
-/// What came of a dialog.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Chosen {
-    /// This file, for that.
-    File(Choice, PathBuf),
-    /// The user thought better of it.
-    Nothing,
-    /// There is no dialog to choose it in: one sentence.
-    NoDialog(Choice, &'static str),
-}
-
 /// A dialog, open or not.
 #[derive(Debug)]
 pub struct Dialog {
@@ -260,8 +235,8 @@ pub struct Dialog {
 }
 
 impl Dialog {
-    /// None is open; `wake` is called from another thread when a file was chosen.
-    pub fn new(wake: Arc<dyn Fn() + Send + Sync>) -> Self {
+    /// None is open; the window is woken when a file was chosen.
+    pub fn new(wake: &Wake) -> Self {
         Self {
             open: Background::new("dialog", wake),
             refused: None,
@@ -283,7 +258,7 @@ impl Dialog {
             let stem = present.file_stem().unwrap_or_default().to_string_lossy();
             dialog = dialog.set_file_name(format!("{stem}-edited.glb"));
         }
-        let ask = move |_: &Control| match choice {
+        let ask = move |_: &Task| match choice {
             Choice::Open => dialog.pick_file(),
             Choice::SaveScene => dialog.save_file(),
         };
@@ -291,16 +266,55 @@ impl Dialog {
         self.refused = is_refused.then_some(choice);
     }
 
-    /// What was chosen, once.
-    pub fn take(&mut self) -> Option<Chosen> {
+    /// What was chosen, once, and for what; `None` for the file where there is no dialog to choose it in.
+    pub fn take(&mut self) -> Option<(Choice, Option<PathBuf>)> {
         if let Some(choice) = self.refused.take() {
-            return Some(Chosen::NoDialog(choice, NONE));
+            return Some((choice, None));
         }
         let ((choice, since), answer) = self.open.take()?;
-        Some(match answer {
-            Some(Some(path)) => Chosen::File(choice, path),
-            Some(None) if since.elapsed() >= NO_DIALOG_WITHIN => Chosen::Nothing,
-            Some(None) | None => Chosen::NoDialog(choice, NONE),
-        })
+        let file = answer.flatten();
+        // The user thought better of it.
+        let is_closed = file.is_none() && since.elapsed() >= NO_DIALOG_WITHIN;
+        (!is_closed).then_some((choice, file))
+    }
+}
+
+/// Most that are remembered.
+pub const MOST_RECENT: usize = 10;
+
+/// Files that were opened, the newest first.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Recent {
+    paths: Vec<PathBuf>,
+}
+
+impl Recent {
+    /// Those of a list that are still there; each once, at most [`MOST_RECENT`].
+    pub fn of(paths: impl IntoIterator<Item = PathBuf>) -> Self {
+        let mut recent = Self::default();
+        for path in paths {
+            if recent.paths.len() < MOST_RECENT && path.is_file() && !recent.paths.contains(&path) {
+                recent.paths.push(path);
+            }
+        }
+        recent
+    }
+
+    /// The newest first.
+    pub fn paths(&self) -> &[PathBuf] {
+        &self.paths
+    }
+
+    /// A file was opened: it comes first, and what is gone is left out. Built-in scenes are no files.
+    pub fn opened(&mut self, source: &str) {
+        if source.starts_with("builtin:") {
+            return;
+        }
+        // Found again from whatever folder the program is started in.
+        let Ok(path) = Path::new(source).canonicalize() else {
+            return;
+        };
+        let before = std::mem::take(&mut self.paths);
+        *self = Self::of(std::iter::once(path).chain(before));
     }
 }

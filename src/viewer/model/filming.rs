@@ -5,9 +5,9 @@ use crate::error::Result;
 use crate::eye_pass::View;
 use crate::optics::LinearSrgb;
 use crate::scene::{PathPlan, turntable};
+use crate::viewer::command::FilmCommand;
 use crate::viewer::files::working_folder;
 use crate::viewer::filming::{Player, Shooting};
-use crate::viewer::panel::FilmWish;
 use serde_json::{Value, json};
 
 impl Model {
@@ -19,11 +19,6 @@ impl Model {
     /// Whether the camera's path is being played.
     pub fn is_playing(&self) -> bool {
         self.player.is_some()
-    }
-
-    /// What became of the last file of a path.
-    pub fn film_told(&self) -> Option<&str> {
-        self.film_told.as_deref()
     }
 
     /// Moves the camera along its path by some time [s]; tells whether it is played.
@@ -44,7 +39,7 @@ impl Model {
     }
 
     fn tell_keys(&mut self) {
-        let keys = self.panel.film.keys.len();
+        let keys = self.choices.film.keys.len();
         self.log.write("recorded", json!({"keys": keys}));
     }
 
@@ -55,18 +50,18 @@ impl Model {
     }
 
     fn play(&mut self) -> Result<()> {
-        let cameras = self.panel.film.path()?.cameras(self.scene().origin_world);
+        let cameras = self.choices.film.path()?.cameras(self.scene().origin_world);
         self.player = Player::new(cameras);
         self.log.write("plays", Value::Null);
         Ok(())
     }
 
     /// Does what was asked for in section *Camera path*.
-    pub(super) fn film(&mut self, wish: &FilmWish) {
-        let before = self.panel.film.clone();
-        let outcome = self.filmed(wish);
-        if before != self.panel.film {
-            self.edits.note_film(&before, &self.panel.film);
+    pub(super) fn film(&mut self, command: &FilmCommand) {
+        let before = self.choices.film.clone();
+        let outcome = self.filmed(command);
+        if before != self.choices.film {
+            self.edits.note_film(&before, &self.choices.film);
             self.edits.release();
         }
         match outcome {
@@ -77,41 +72,44 @@ impl Model {
     }
 
     /// A sentence where there is something to be told.
-    fn filmed(&mut self, wish: &FilmWish) -> Result<Option<String>> {
+    fn filmed(&mut self, command: &FilmCommand) -> Result<Option<String>> {
         let origin_world = self.scene().origin_world;
-        match wish {
-            FilmWish::Record(key) => {
+        match command {
+            FilmCommand::Record(key) => {
                 let (camera, reach_m) = (self.navigator.camera(), self.navigator.radius_m());
-                self.panel.film.record(*key, &camera, origin_world, reach_m);
+                self.choices.film.record(*key, &camera, origin_world, reach_m);
                 self.tell_keys();
             }
-            FilmWish::GoTo(index) => {
-                if let Some(camera) = self.panel.film.camera_at(*index, origin_world) {
+            FilmCommand::GoTo(index) => {
+                if let Some(camera) = self.choices.film.camera_at(*index, origin_world) {
                     self.navigator.stand_at(&camera);
                 }
             }
-            FilmWish::Play(true) => self.play()?,
-            FilmWish::Tour => {
+            FilmCommand::Play(true) => self.play()?,
+            FilmCommand::Tour => {
                 let reach_m = self.navigator.radius_m();
-                self.panel.film = self.panel.film.tour(&self.scene().cameras, origin_world, reach_m);
+                self.choices.film = self
+                    .choices
+                    .film
+                    .tour(&self.scene().cameras, origin_world, reach_m);
                 self.tell_keys();
                 self.play()?;
             }
-            FilmWish::Play(false) => self.end_play(),
-            FilmWish::Save => {
-                let path = self.panel.film.save(&working_folder(), &self.scene().name)?;
+            FilmCommand::Play(false) => self.end_play(),
+            FilmCommand::Save => {
+                let path = self.choices.film.save(&working_folder(), &self.scene().name)?;
                 let told = format!("Written: {}", path.display());
                 self.log.write("saved", json!({"files": [path]}));
                 return Ok(Some(told));
             }
-            FilmWish::Load(path) => {
+            FilmCommand::Load(path) => {
                 let plan = PathPlan::read(path)?;
                 plan.path(&path.display().to_string())?;
-                self.panel.film.take(plan);
+                self.choices.film.take(plan);
                 self.tell_keys();
             }
-            FilmWish::Shoot { turns } => self.shoot(*turns)?,
-            FilmWish::Stop => self.exporter.stop(),
+            FilmCommand::Shoot { turns } => self.shoot(*turns)?,
+            FilmCommand::Stop => self.exporter.stop(),
         }
         Ok(None)
     }
@@ -119,8 +117,8 @@ impl Model {
     /// Has frames drawn and written by the exporting thread.
     fn shoot(&mut self, turns: bool) -> Result<()> {
         let scene = self.scene().clone();
-        let display = self.panel.display;
-        let film = &self.panel.film;
+        let display = self.choices.display;
+        let film = &self.choices.film;
         let (width, height) = film.size;
         let camera = self.navigator.camera_for(f64::from(width) / f64::from(height));
         let (cameras, name) = if turns {
@@ -139,13 +137,13 @@ impl Model {
                 tone_map: display.tone_map,
                 background: LinearSrgb::BLACK,
             },
-            effects: self.panel.settings.effects.clone(),
+            effects: self.choices.settings.effects.clone(),
             white_balance: display.white_balance.matrix(&scene),
             scene,
             name,
         };
         self.exporter.film(shooting, working_folder());
-        self.log.write_export(self.exporter.state());
+        self.log.write_export(&self.exporter.state);
         Ok(())
     }
 }

@@ -52,10 +52,10 @@ impl Model {
                 source: self.full_source.clone(),
                 views: self.navigator.views(),
                 settings: self.settings_to_keep(),
-                display: self.panel.display,
-                film: self.panel.film.clone(),
-                automatic: Some(self.panel.automatic),
-                watch: self.panel.watches(),
+                display: self.choices.display,
+                film: self.choices.film.clone(),
+                automatic: Some(self.choices.automatic),
+                watch: self.choices.watches,
                 changes: self.left_alone.changes.clone(),
             },
             loaded: Arc::clone(self.edits.loaded()),
@@ -66,8 +66,8 @@ impl Model {
     /// Those of the panel, or what was kept before where the command line stood against it and nobody changed it since.
     fn settings_to_keep(&self) -> Value {
         match &self.left_alone.settings {
-            Some((given, kept)) if *given == self.panel.settings => kept.clone(),
-            _ => serde_json::to_value(&self.panel.settings).unwrap_or_default(),
+            Some((given, kept)) if *given == self.choices.settings => kept.clone(),
+            _ => serde_json::to_value(&self.choices.settings).unwrap_or_default(),
         }
     }
 
@@ -99,7 +99,7 @@ impl Model {
                 self.left_alone.changes.clone_from(&kept.changes);
             }
             if !what.settings {
-                self.left_alone.settings = Some((self.panel.settings.clone(), kept.settings.clone()));
+                self.left_alone.settings = Some((self.choices.settings.clone(), kept.settings.clone()));
             }
             self.log.write("found_again", json!({"source": self.full_source}));
         }
@@ -112,17 +112,16 @@ impl Model {
 
     fn restore(&mut self, kept: &Kept, what: Restored) {
         if what.settings {
-            self.panel.settings = kept.settings_or(&self.panel.settings);
-            self.panel.automatic = kept.automatic.unwrap_or(true);
-            self.was_automatic = self.panel.automatic;
+            self.choices.settings = kept.settings_or(&self.choices.settings);
+            self.choices.automatic = kept.automatic.unwrap_or(true);
         }
         self.navigator.restore(&kept.views, what.camera);
-        self.panel.watch(kept.watch || self.panel.watches());
-        let exposure_stops = self.panel.display.exposure_stops;
-        self.panel.display = kept.display;
-        self.panel.film = kept.film.clone();
+        self.choices.watches |= kept.watch;
+        let exposure_stops = self.choices.display.exposure_stops;
+        self.choices.display = kept.display;
+        self.choices.film = kept.film.clone();
         if !what.exposure {
-            self.panel.display.exposure_stops = exposure_stops;
+            self.choices.display.exposure_stops = exposure_stops;
         }
         if what.edits {
             self.edit_again(&kept.changes);

@@ -17,15 +17,14 @@ use crate::viewer::files::Purpose;
 use crate::viewer::files::keeper::Stamps;
 use crate::viewer::filming::Film;
 use crate::viewer::navigation::Navigator;
+use crate::viewer::panel::Selection;
 use crate::viewer::worker::BakedLevel;
 use serde_json::json;
 
 impl Model {
     /// Takes over what was kept of the first scene; what the command line says goes first.
     pub(super) fn begin(&mut self, options: &ViewerOptions) {
-        if options.files.watch {
-            self.panel.watch(true);
-        }
+        self.choices.watches |= options.files.watch;
         let what = Restored {
             settings: options.maps.is_none() && !options.files.settings_given,
             camera: options.camera.is_none(),
@@ -35,7 +34,6 @@ impl Model {
         let source = self.edits.loaded().source.clone();
         self.files.opened(&source);
         self.exposure_is_kept = self.find_again((!options.files.fresh).then_some(what));
-        self.seen = self.wanted();
     }
 
     /// Reads a scene, which takes the place of the present one when it is there: a path as it was typed, or
@@ -64,11 +62,6 @@ impl Model {
         level.serial == self.first_request
     }
 
-    /// Whether the exposure is that of an earlier time, and none to be measured.
-    pub fn keeps_exposure(&self) -> bool {
-        self.exposure_is_kept
-    }
-
     fn read(&mut self, source: &str, purpose: Purpose) {
         self.files.refusal = None;
         self.log.write("opening", json!({"source": source}));
@@ -86,7 +79,7 @@ impl Model {
     /// Shows the scene that was being read once it is there; tells whether another scene is shown. One that cannot be
     /// read leaves everything as it was.
     pub fn poll_files(&mut self) -> Option<Purpose> {
-        if self.files.watch.as_ref().is_some_and(|watch| watch.take_change()) {
+        if self.files.have_changed() {
             let source = self.edits.loaded().source.clone();
             self.read(&source, Purpose::Reload);
         }
@@ -98,10 +91,9 @@ impl Model {
                 return None;
             }
         };
-        self.log.write(
-            "opened",
-            json!({"scene": scene.name, "source": source, "again": purpose == Purpose::Reload}),
-        );
+        let again = purpose == Purpose::Reload;
+        let more = json!({"scene": scene.name, "source": source, "again": again});
+        self.log.write("opened", more);
         match purpose {
             Purpose::Open => self.show(scene),
             Purpose::Reload => self.show_again(scene),
@@ -116,15 +108,15 @@ impl Model {
             keeper.settle();
         }
         self.files.opened(&scene.source);
-        self.files.watch = None;
+        self.files.stop_watch();
         self.navigator = Navigator::new(&scene, None);
-        self.panel.forget_selection();
-        self.panel.film = Film::default();
+        self.choices.selection = Selection::default();
+        self.choices.film = Film::default();
         self.player = None;
         self.picking = None;
         self.placing = Placing::default();
         self.sought = Sought::default();
-        self.panel.watch(false);
+        self.choices.watches = false;
         self.edits = EditedScene::new(scene);
         self.exposure_is_kept = self.find_again(Some(Restored::ALL));
         self.forget_maps();
@@ -156,10 +148,10 @@ impl Model {
 
     /// Bakes a scene of which there are no maps that would do.
     fn bake_first(&mut self) {
+        self.maps_revision += 1;
         self.refusal = None;
         self.worth = None;
-        self.debounce.clear();
-        self.seen = self.wanted();
+        self.settle();
         self.asked = None;
         self.rebake();
         // Where a setting is out of its range nothing was asked for, and nothing of before is to come.
@@ -175,10 +167,10 @@ impl Model {
     /// Watches the scene's files, or no longer, as the panel says.
     pub(super) fn watch(&mut self) {
         let source = &self.edits.loaded().source;
-        let wanted = self.panel.watches() && !source.starts_with("builtin:");
+        let wanted = self.choices.watches && !source.starts_with("builtin:");
         if !wanted {
-            self.files.watch = None;
-        } else if self.files.watch.is_none() {
+            self.files.stop_watch();
+        } else if !self.files.is_watching() {
             let stamps = Stamps::of(load::files_of(source, &self.files.load));
             self.files.start_watch(stamps);
         }

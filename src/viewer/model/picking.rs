@@ -20,7 +20,7 @@ const AROUND_LIGHT: f64 = 0.25;
 const AT: f64 = 0.01;
 
 /// A light that the mouse drags over surfaces.
-#[derive(Default)]
+#[derive(Debug, Default)]
 pub(super) struct Placing {
     /// Whether the button is down.
     is_down: bool,
@@ -30,6 +30,7 @@ pub(super) struct Placing {
     hand: Option<Hand>,
 }
 
+#[derive(Debug)]
 struct Hand {
     /// As they were when the drag began: lights are no surfaces.
     surfaces: Arc<Tracer>,
@@ -37,7 +38,7 @@ struct Hand {
 }
 
 /// What becomes of a light.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 enum Deed {
     /// It is put so far before surfaces [m].
     Put(usize, f64),
@@ -70,14 +71,6 @@ impl Hand {
     }
 }
 
-impl std::fmt::Debug for Placing {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Placing")
-            .field("is_down", &self.is_down)
-            .finish_non_exhaustive()
-    }
-}
-
 /// Where a gaze ends, and the surface's unit normal towards the eye.
 fn met(surfaces: &Tracer, gaze: &Ray) -> Option<(DVec3, DVec3)> {
     let place = surfaces.closest_place(gaze)?;
@@ -96,7 +89,7 @@ impl Model {
     /// Gives handles to a light or an object.
     pub fn hold(&mut self, held: Held) {
         self.picking = None;
-        self.panel.hold(Some(held));
+        self.choices.selection.hold(Some(held));
         let scene = self.edits.scene();
         let name = match held {
             Held::Light(light) => &scene.lights[light].name,
@@ -108,7 +101,7 @@ impl Model {
     /// Steps back or forth until what has handles fills a picture of that aspect (width/height), or else the scene.
     pub fn frame(&mut self, aspect: f64) {
         let whole_m = self.navigator.radius_m();
-        let ball = match self.panel.held() {
+        let ball = match self.choices.selection.held() {
             Some(Held::Object(object)) => {
                 let bounds = self.scene().objects.get(object);
                 let bounds = bounds.and_then(|object| object.mesh.bounds());
@@ -137,7 +130,7 @@ impl Model {
         self.picking = None;
         match surfaces.closest_place(&gaze) {
             Some(place) => self.hold(Held::Object(place.object as usize)),
-            None => self.panel.hold(None),
+            None => self.choices.selection.hold(None),
         }
     }
 
@@ -176,7 +169,7 @@ impl Model {
 
     /// Takes the panel's light in the hand: as far before surfaces as it is now before that at which a gaze ends.
     fn take_light(&mut self, gaze: &Ray) -> Option<Hand> {
-        let placed = self.panel.placed_light()?;
+        let placed = self.choices.selection.placed()?;
         let (Placed::At(light) | Placed::Towards(light)) = placed;
         let position = self.scene().lights.get(light)?.kind.position();
         let surfaces = self.surfaces()?;

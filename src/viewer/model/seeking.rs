@@ -12,7 +12,6 @@ use crate::viewer::brightest::{self, Spot};
 use crate::viewer::gizmo::Held;
 use crate::viewer::new_light::{Aim, NewLight};
 use crate::viewer::probe;
-use serde_json::json;
 
 /// From how far the brightest spot is looked at, in scene radii.
 const DISTANCE: f64 = 0.6;
@@ -33,6 +32,12 @@ pub(super) struct Sought {
 }
 
 impl Model {
+    /// Does something as soon as the surfaces of the scene are known.
+    pub(super) fn seek(&mut self, what: impl FnOnce(&mut Sought)) {
+        what(&mut self.sought);
+        self.poll_sought();
+    }
+
     /// Does what waited, as soon as the surfaces of the scene are known.
     pub(super) fn poll_sought(&mut self) {
         if self.sought.light.is_none() && !self.sought.brightest {
@@ -58,19 +63,15 @@ impl Model {
         let scene = Arc::clone(self.edits.scene());
         let (low, high) = scene.bounds().unwrap_or((DVec3::ZERO, DVec3::ZERO));
         let aim = Aim::of(surfaces, &gaze, 0.5 * (low + high));
-        let stops = self.panel.display.exposure_stops;
+        let stops = self.choices.display.exposure_stops;
         let added = light.make((surfaces, radius_m), &aim, stops, &scene);
-        let edit = Edit::LightAdded {
+        let is_added = self.edit(&Edit::LightAdded {
             added: Arc::new(added),
-        };
-        self.log
-            .write("edit", json!({"target": format!("{:?}", edit.target())}));
-        let outcome = self.edits.edit(&edit);
+        });
         self.edits.release();
-        if outcome.is_ok() {
+        if is_added {
             self.hold(Held::Light(scene.lights.len()));
         }
-        self.refusal = outcome.err().map(|error| error.to_string());
     }
 
     /// Probes the texel with the most of the light that is shown, and goes where it is seen.

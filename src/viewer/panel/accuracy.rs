@@ -1,30 +1,23 @@
-//! Section *Accuracy*: how good the next bake is to be, and what that may take.
+//! Section *Accuracy*: how good the next bake is to be, what that may take, and where the light pass gives up.
 
 pub mod course;
-mod limits;
-pub mod preset;
 pub mod target;
 
-use egui::{Response, Ui};
+use egui::{Response, Slider, SliderClamping, Ui};
 
-use super::control::{choice, rows, setting};
+use super::control::{choice, listed, rows, setting, significant};
 use super::light_pass;
-use crate::settings::{BakeSettings, MapResolution};
+use crate::settings::{BakeSettings, Estimator, MapResolution};
 
 /// Shows the section; `settings` holds what the user chose.
 pub fn show(ui: &mut Ui, settings: &mut BakeSettings) {
     let no_caustic = light_pass::no_caustic(settings);
     rows(ui, "accuracy", |ui| {
-        preset::show(ui, settings);
+        target::show_presets(ui, settings);
         target::show(ui, settings, no_caustic);
         let value = (&mut settings.map_resolution, &MapResolution::Auto);
         setting(ui, "Map size [texels]", None, value, map_resolution);
     });
-}
-
-/// Shows what is seldom changed.
-pub fn show_limits(ui: &mut Ui, settings: &mut BakeSettings) {
-    limits::show(ui, settings);
 }
 
 fn map_resolution(ui: &mut Ui, resolution: &mut MapResolution) -> Response {
@@ -47,4 +40,52 @@ fn map_resolution(ui: &mut Ui, resolution: &mut MapResolution) -> Response {
         .chain(sides)
         .collect();
     choice(ui, "map size", resolution, &custom, &choices)
+}
+
+/// Ends of the slider; every share that settings may have can be typed.
+const SHARES: std::ops::RangeInclusive<f64> = 1e-6..=0.5;
+const DEPTHS: std::ops::RangeInclusive<u32> = 1..=1000;
+
+const NO_TARGET: &str = "No error is aimed at.";
+
+/// Shows the rows.
+pub fn show_limits(ui: &mut Ui, settings: &mut BakeSettings) {
+    let no_caustic = light_pass::no_caustic(settings);
+    let default = BakeSettings::default();
+    let usual_share = settings.path_threshold();
+    let usual_depth = match settings.estimator {
+        Estimator::Auto | Estimator::Photon => settings.photon_depth(),
+        Estimator::Wavefront | Estimator::Splat => settings.depth(),
+    };
+    let no_metric = no_caustic.or(settings.max_error.is_none().then_some(NO_TARGET));
+    rows(ui, "limits", |ui| {
+        let metric = (&mut settings.error_metric, &default.error_metric);
+        setting(ui, "Error is", no_metric, metric, listed);
+        let depth = (&mut settings.max_depth, &default.max_depth);
+        setting(ui, "Max depth", no_caustic, depth, |ui, depth| {
+            automatic(ui, depth, usual_depth, |shown| Slider::new(shown, DEPTHS))
+        });
+        let share = (&mut settings.branch_threshold, &default.branch_threshold);
+        setting(ui, "Weakest branch", no_caustic, share, |ui, share| {
+            automatic(ui, share, usual_share, |shown| {
+                Slider::new(shown, SHARES).custom_formatter(|value, _| significant(value))
+            })
+        });
+    });
+}
+
+/// The value that counts; automatic until it is touched.
+fn automatic<T: Copy>(
+    ui: &mut Ui,
+    value: &mut Option<T>,
+    usual: T,
+    slider: impl FnOnce(&mut T) -> Slider<'_>,
+) -> Response {
+    let mut shown = value.unwrap_or(usual);
+    let slider = slider(&mut shown).logarithmic(true);
+    let response = ui.add(slider.clamping(SliderClamping::Never));
+    if response.changed() {
+        *value = Some(shown);
+    }
+    response
 }

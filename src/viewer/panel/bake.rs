@@ -1,12 +1,12 @@
-//! Start, stop, progress, and what the last bake came to.
+//! Always at the top: the scene's name, undo and redo, start, stop and progress of the bake, and what the last one came to.
 
 use std::sync::Arc;
 use std::time::Instant;
 
-use egui::{Color32, Grid, ProgressBar, RichText, Ui};
+use egui::{Align, Button, Color32, Grid, Label, Layout, ProgressBar, RichText, Ui};
 
-use super::control::{button, counted, grouped};
-use super::{Facts, Panel, Wishes};
+use super::control::{ask, counted, grouped};
+use super::{Choices, Command, Model, file};
 use crate::illumination::IlluminationMap;
 use crate::light_pass::ledger::{CarriedFlux, EnergyLedger};
 use crate::session::{BYTES_PER_TEXEL, StopReason};
@@ -19,14 +19,14 @@ pub const FAILED: Color32 = Color32::from_rgb(255, 120, 110);
 pub const ATTENTION: Color32 = Color32::from_rgb(250, 190, 90);
 
 /// Shows the controls and the state.
-pub fn show(ui: &mut Ui, panel: &mut Panel, facts: &Facts<'_>, wishes: &mut Wishes) {
-    let refused = panel.settings.validate().err();
+fn show(ui: &mut Ui, choices: &mut Choices, model: &Model, commands: &mut Vec<Command>) {
+    let refused = choices.settings.validate().err();
     ui.horizontal(|ui| {
         let invalid = refused.is_some().then_some("A setting is out of its range.");
-        wishes.rebake |= button(ui, "Re-bake", invalid);
-        let idle = (!facts.state.is_working()).then_some("No bake is running.");
-        wishes.cancel |= button(ui, "Cancel", idle);
-        ui.checkbox(&mut panel.automatic, "automatic")
+        ask(ui, "Re-bake", invalid, commands, Command::Rebake);
+        let idle = (!model.state.is_working()).then_some("No bake is running.");
+        ask(ui, "Cancel", idle, commands, Command::Cancel);
+        ui.checkbox(&mut choices.automatic, "automatic")
             .on_hover_text(
                 "Bakes every change of a setting or of the scene, at the pace of first levels while it is dragged. \
                  Default: on.",
@@ -34,18 +34,21 @@ pub fn show(ui: &mut Ui, panel: &mut Panel, facts: &Facts<'_>, wishes: &mut Wish
     });
     match &refused {
         Some(error) => drop(ui.colored_label(FAILED, error.to_string())),
-        None => state_line(ui, panel, facts),
+        None => state_line(ui, choices, model),
     }
-    if let Some(last) = facts.last {
+    if let Some(last) = model.last.as_deref() {
         ui.add_space(2.0);
         last_bake(ui, last);
     }
 }
 
-fn state_line(ui: &mut Ui, panel: &Panel, facts: &Facts<'_>) {
-    let wanted = BakeRequest::new(Arc::clone(facts.scene), panel.settings.clone());
-    let is_stale = facts.last.is_some_and(|last| !last.request.is_same(&wanted));
-    match facts.state {
+fn state_line(ui: &mut Ui, choices: &Choices, model: &Model) {
+    let wanted = BakeRequest::new(Arc::clone(model.scene()), choices.settings.clone());
+    let is_stale = model
+        .last
+        .as_deref()
+        .is_some_and(|last| !last.request.is_same(&wanted));
+    match &model.state {
         BakeState::Baking {
             stage,
             fraction,
@@ -57,7 +60,7 @@ fn state_line(ui: &mut Ui, panel: &Panel, facts: &Facts<'_>) {
                 fraction * 100.0,
                 since.elapsed().as_secs_f64()
             );
-            let left_s = time_left_s(facts.state, &wanted, facts.last, Instant::now());
+            let left_s = time_left_s(&model.state, &wanted, model.last.as_deref(), Instant::now());
             if let Some(left_s) = left_s {
                 text = format!("{text}, {}", in_words(left_s));
             }
@@ -89,7 +92,7 @@ fn state_line(ui: &mut Ui, panel: &Panel, facts: &Facts<'_>) {
             ui.colored_label(ATTENTION, "Settings changed since the last bake.");
         }
         BakeState::Idle => drop(ui.label("Showing maps that were baked before.")),
-        BakeState::Done if has_converged(facts.last) => {
+        BakeState::Done if has_converged(model.last.as_deref()) => {
             drop(ui.label("Converged: the maps belong to these settings."))
         }
         BakeState::Done => drop(ui.label("Done: the maps belong to these settings.")),
@@ -156,7 +159,7 @@ const CARRIERS: &str = "What brought the deposited light to the maps. Patches of
     together, photons where it scatters. Bundles are laid down whole before photons, which carry the difference: less than \
     nothing where bundles brought too much.";
 
-/// "estimated error 2.1 %, 0.42 s: level 2, goes on": one line of the panel.
+/// "estimated error 2.1 %, 0.42 s: level 2, goes on": one line of the choices.
 fn level_line(last: &BakedLevel) -> String {
     let error = match last.result.estimated_error(last.request.settings.error_metric) {
         Some(error) => format!("estimated error {} %", two_digits(100.0 * error)),
@@ -226,4 +229,46 @@ fn ledger(ui: &mut Ui, total: &EnergyLedger) {
             .on_hover_text(hover);
             ui.end_row();
         });
+}
+
+/// Shows the header.
+pub fn header(ui: &mut Ui, choices: &mut Choices, model: &Model, commands: &mut Vec<Command>) {
+    ui.horizontal(|ui| {
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            ui.spacing_mut().item_spacing.x = 4.0;
+            let history = model.edits().history();
+            if step(ui, ("↷", "Redo (Ctrl+Y)"), ("Does again", history.next_redo())) {
+                commands.push(Command::Redo);
+            }
+            if step(ui, ("↶", "Undo (Ctrl+Z)"), ("Takes back", history.next_undo())) {
+                commands.push(Command::Undo);
+            }
+            ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
+                let name = Label::new(RichText::new(&model.scene().name).heading()).truncate();
+                ui.add(name).on_hover_text(&model.scene().source);
+            });
+        });
+    });
+    show(ui, choices, model, commands);
+    if model.picture.lost_device {
+        let told = "The graphics device was lost and came back; nothing else was.";
+        ui.colored_label(ATTENTION, told);
+    }
+    file::show_state(ui, model);
+    if let Some(refusal) = model.refusal.as_deref() {
+        ui.colored_label(FAILED, refusal);
+    }
+}
+
+/// A button that takes a change back or does one again; tells whether it was pressed.
+fn step(ui: &mut Ui, (sign, name): (&str, &str), (does, what): (&str, Option<&str>)) -> bool {
+    let button = ui.add_enabled(
+        what.is_some(),
+        Button::new(RichText::new(sign).monospace().size(15.0)),
+    );
+    button
+        .accessible_name(name)
+        .on_hover_text(format!("{does}: {}. {name}", what.unwrap_or_default()))
+        .on_disabled_hover_text(format!("Nothing. {name}"))
+        .clicked()
 }

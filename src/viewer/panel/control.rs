@@ -1,5 +1,6 @@
 //! One labelled control per row, each with a text that says what it does and what it costs.
 
+use std::any::type_name;
 use std::borrow::Cow;
 use std::collections::HashMap;
 use std::sync::LazyLock;
@@ -8,6 +9,7 @@ use egui::{Button, ComboBox, EventFilter, Grid, Key, Response, RichText, Ui, vec
 use serde::Deserialize;
 use strum::{EnumMessage, VariantArray};
 
+use super::Command;
 use crate::settings::options::{OPTIONS, OptionInfo};
 
 /// Width of the control beside its label [points].
@@ -101,6 +103,13 @@ pub fn button(ui: &mut Ui, name: &str, why_not: Option<&str>) -> bool {
         .clicked()
 }
 
+/// A button that asks for something, greyed where there is a reason why not.
+pub fn ask(ui: &mut Ui, name: &str, why_not: Option<&str>, commands: &mut Vec<Command>, command: Command) {
+    if button(ui, name, why_not) {
+        commands.push(command);
+    }
+}
+
 /// A grid of label, control and what sets it back.
 pub fn rows(ui: &mut Ui, name: &str, add: impl FnOnce(&mut Ui)) {
     Grid::new(name)
@@ -141,7 +150,6 @@ pub fn setting<T: PartialEq + Clone>(
 }
 
 /// A button that sets a value back; tells whether it was pressed.
-/// The same, for what is not in a row.
 pub fn reset_to(ui: &mut Ui, label: &str, default: &str) -> bool {
     let name = format!("Reset {label}");
     ui.add(
@@ -264,7 +272,7 @@ pub fn choice<T: PartialEq + Copy>(
 }
 
 /// A drop-down list of all values of a setting, by the names and texts that they have on the command line.
-pub fn listed<T>(ui: &mut Ui, name: &str, value: &mut T) -> Response
+pub fn listed<T>(ui: &mut Ui, value: &mut T) -> Response
 where
     T: VariantArray + EnumMessage + Into<&'static str> + PartialEq + Copy,
 {
@@ -276,7 +284,13 @@ where
             value.get_documentation().unwrap_or_default(),
         )
     });
-    choice(ui, name, value, "custom", &choices.collect::<Vec<_>>())
+    choice(
+        ui,
+        type_name::<T>(),
+        value,
+        "custom",
+        &choices.collect::<Vec<_>>(),
+    )
 }
 
 /// A number in four significant digits; very large and very small ones in powers of ten.

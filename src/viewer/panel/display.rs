@@ -1,12 +1,14 @@
 //! Section *Display*: how the picture shows the maps. Nothing here changes a bake.
 
 use egui::{DragValue, Response, Slider, SliderClamping, Ui};
+use strum::{EnumMessage, VariantArray};
 
-use super::control::{CONTROL_WIDTH, about, choice, counted, pick, row, rows, setting, short};
-use super::{Display, Facts, LayerShown, Quantity, Wishes, bake};
+use super::control::{CONTROL_WIDTH, Entry, about, choice, counted, pick, row, rows, setting, short};
+use super::{Command, Display, LayerShown, Model, Quantity, bake};
 use crate::eye_pass::{ToneMap, WhiteBalance};
 use crate::optics::spectrum::temperature::CAMERA_KELVIN;
 use crate::settings::LayerKind;
+use crate::viewer::false_colours;
 use crate::viewer::views::{IrradianceUnit, ScaleChoice};
 
 const AUTO_EXPOSURE: &str = "Measures the present picture and sets the exposure once, so that brightness stays \
@@ -48,8 +50,8 @@ const LEAST_RATIO: f64 = 1.01;
 const DAYLIGHT_KELVIN: f64 = 6504.0;
 
 /// Shows the section.
-pub fn show(ui: &mut Ui, display: &mut Display, facts: &Facts<'_>, wishes: &mut Wishes) {
-    let baked = facts.layers;
+pub fn show(ui: &mut Ui, display: &mut Display, model: &Model, commands: &mut Vec<Command>) {
+    let baked = &model.layers()[..];
     rows(ui, "display", |ui| {
         row(ui, "Exposure [stops]", None, |ui| {
             ui.horizontal(|ui| {
@@ -57,7 +59,9 @@ pub fn show(ui: &mut Ui, display: &mut Display, facts: &Facts<'_>, wishes: &mut 
                 ui.spacing_mut().slider_width = 74.0;
                 let slider = exposure(ui, &mut display.exposure_stops);
                 let auto = ui.button("Auto").on_hover_text(AUTO_EXPOSURE);
-                wishes.measure_exposure |= auto.clicked();
+                if auto.clicked() {
+                    commands.push(Command::MeasureExposure);
+                }
                 slider
             })
             .inner
@@ -75,15 +79,15 @@ pub fn show(ui: &mut Ui, display: &mut Display, facts: &Facts<'_>, wishes: &mut 
             layer(ui, shown, baked)
         });
         let shown = (&mut display.quantity, &default.quantity);
-        setting(ui, "View", nothing, shown, |ui, shown| quantity(ui, shown, facts));
+        setting(ui, "View", nothing, shown, |ui, shown| quantity(ui, shown, model));
         if display.quantity == Quantity::Irradiance {
             let chosen = (&mut display.scale, &default.scale);
             setting(ui, "Scale", None, chosen, scale);
-            row(ui, "From, to", None, |ui| range(ui, &mut display.scale, facts));
+            row(ui, "From, to", None, |ui| range(ui, &mut display.scale, model));
         }
     });
-    if facts.survey.faults > 0 {
-        let told = counted(facts.survey.faults, "texel");
+    if model.survey.faults > 0 {
+        let told = counted(model.survey.faults, "texel");
         ui.colored_label(
             bake::ATTENTION,
             format!("{told} without a finite value, shown in magenta."),
@@ -135,57 +139,23 @@ fn white_balance(ui: &mut Ui, white: &mut WhiteBalance) -> Response {
     .inner
 }
 
-const VIEWS: [(Quantity, &str); 10] = [
-    (Quantity::Light, "The lit scene."),
-    (
-        Quantity::Irradiance,
-        "Irradiance of the light shown, in false colours with a legend.",
-    ),
-    (
-        Quantity::Error,
-        "How far each texel may be off: its estimated error in false colours, relative to the map's mean irradiance.",
-    ),
-    (
-        Quantity::Difference,
-        "What an effect adds and takes away, in false colours, relative to the map's mean irradiance.",
-    ),
-    (Quantity::Texels, "The maps' texels as a checkerboard."),
-    (
-        Quantity::TexelDensity,
-        "Texels per metre, in false colours with a legend.",
-    ),
-    (
-        Quantity::Normals,
-        "Normals of the meshes: red, green, blue for x, y, z.",
-    ),
-    (
-        Quantity::Uv,
-        "Where the base colour's image is looked up, else the first set of coordinates: red for u, green for v.",
-    ),
-    (
-        Quantity::MapUv,
-        "Where the illumination map is looked up: red for u, green for v.",
-    ),
-    (
-        Quantity::Wavelength,
-        "The dominant wavelength [nm] of the light shown, against the white of D65: the single wavelength that, mixed with \
-         white, looks like it. White light is grey; purple, which no single wavelength looks like, is dim purple; texels \
-         below a thousandth of the brightest are black.",
-    ),
-];
-
-fn quantity(ui: &mut Ui, shown: &mut Quantity, facts: &Facts<'_>) -> Response {
-    let has_difference = facts.worth.is_some_and(|worth| worth.difference.is_ok());
+fn quantity(ui: &mut Ui, shown: &mut Quantity, model: &Model) -> Response {
+    let has_difference = model.worth.as_ref().is_some_and(|worth| worth.difference.is_ok());
     let why_not = |kind: Quantity| match kind {
-        Quantity::Error if !facts.has_errors => Some(NO_ERRORS),
+        Quantity::Error if !false_colours::has_errors(model.maps()) => Some(NO_ERRORS),
         Quantity::Difference if !has_difference => Some(NO_DIFFERENCE),
         _ => None,
     };
-    let entries = VIEWS.map(|(kind, hover)| (kind.name(), hover.into(), why_not(kind)));
-    let at = VIEWS.iter().position(|(kind, _)| kind == shown);
+    let views = Quantity::VARIANTS;
+    let hover = |kind: &Quantity| kind.get_documentation().unwrap_or_default();
+    let entries = views
+        .iter()
+        .map(|kind| (kind.name(), hover(kind).into(), why_not(*kind)));
+    let entries: Vec<Entry> = entries.collect();
+    let at = views.iter().position(|kind| kind == shown);
     let (response, picked) = pick(ui, ("view", CONTROL_WIDTH), (shown.name(), at), &entries);
     if let Some(index) = picked {
-        *shown = VIEWS[index].0;
+        *shown = views[index];
     }
     response
 }
@@ -203,14 +173,14 @@ fn scale(ui: &mut Ui, choice: &mut ScaleChoice) -> Response {
     .response
 }
 
-fn range(ui: &mut Ui, choice: &mut ScaleChoice, facts: &Facts<'_>) -> Response {
+fn range(ui: &mut Ui, choice: &mut ScaleChoice, model: &Model) -> Response {
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 5.0;
         ui.checkbox(&mut choice.is_automatic, "auto")
             .on_hover_text(about("From, to").range);
         let factor = choice.unit.per_w_m2();
         if choice.is_automatic {
-            let scale = facts.survey.scale(Quantity::Irradiance, choice);
+            let scale = model.survey.scale(Quantity::Irradiance, choice);
             let [low, high] = [scale.low, scale.high].map(|end| short(end * factor));
             ui.label(format!("{low} to {high} {}", choice.unit.symbol()));
         } else {

@@ -6,7 +6,7 @@ use egui::{Button, Frame, RichText, Role, Ui, WidgetInfo, vec2};
 
 use super::bake::{FAILED, two_digits};
 use super::control::{grouped, reset_to, significant};
-use super::{Facts, Wishes};
+use super::{Command, Model};
 use crate::effect::{Effect, EffectSwitch, EffectSwitches};
 use crate::illumination::difference::Difference;
 use crate::plan::{self, EffectLine};
@@ -42,15 +42,15 @@ const SWITCHES: [(EffectSwitch, &str, &str); 3] = [
 ];
 
 /// Shows every effect, then every light.
-pub fn show(ui: &mut Ui, switches: &mut EffectSwitches, facts: &Facts<'_>, wishes: &mut Wishes) {
+pub fn show(ui: &mut Ui, switches: &mut EffectSwitches, model: &Model, commands: &mut Vec<Command>) {
     for effect in Effect::ALL {
         let mut switch = switches.get(effect);
-        if entry(ui, effect, &mut switch, facts) {
-            wishes.worth = Some(effect);
+        if entry(ui, effect, &mut switch, model) {
+            commands.push(Command::Worth(effect));
         }
         switches.set(effect, switch);
     }
-    for line in facts.last.iter().flat_map(|last| &last.result.plan.lights) {
+    for line in model.last.iter().flat_map(|last| &last.result.plan.lights) {
         let name = format!("light {}", line.light);
         title(ui, &name, Some(line.on));
         detail(ui, &name, |ui| drop(ui.label(RichText::new(&line.reason).weak())));
@@ -58,14 +58,14 @@ pub fn show(ui: &mut Ui, switches: &mut EffectSwitches, facts: &Facts<'_>, wishe
 }
 
 /// The plan of the last level, the eye's chains as the picture has them. Dispersion is of both passes.
-fn known<'a>(effect: Effect, facts: &Facts<'a>) -> Option<Cow<'a, EffectLine>> {
-    let plan = facts.last.map(|last| &last.result.plan);
+fn known(effect: Effect, model: &Model) -> Option<Cow<'_, EffectLine>> {
+    let plan = model.last.as_ref().map(|last| &last.result.plan);
     let planned = || plan?.effects.iter().find(|line| line.effect == effect);
-    let chains = facts.chains;
+    let chains = model.picture.chains.as_ref();
     match effect {
         Effect::Chains => chains.map(Cow::Borrowed),
         Effect::Dispersion => planned().map(|line| match chains {
-            Some(chains) => Cow::Owned(plan::dispersion(line.clone(), facts.scene, None, chains)),
+            Some(chains) => Cow::Owned(plan::dispersion(line.clone(), model.scene(), None, chains)),
             None => Cow::Borrowed(line),
         }),
         _ => planned().map(Cow::Borrowed),
@@ -73,8 +73,8 @@ fn known<'a>(effect: Effect, facts: &Facts<'a>) -> Option<Cow<'a, EffectLine>> {
 }
 
 /// Shows one effect; tells whether it was asked what it is worth.
-fn entry(ui: &mut Ui, effect: Effect, switch: &mut EffectSwitch, facts: &Facts<'_>) -> bool {
-    let known = known(effect, facts);
+fn entry(ui: &mut Ui, effect: Effect, switch: &mut EffectSwitch, model: &Model) -> bool {
+    let known = known(effect, model);
     let is_on = known.as_ref().map(|line| line.on);
     let name = effect.name().replace('_', " ");
     let has_worth = is_on == Some(true) && effect != Effect::Chains;
@@ -82,7 +82,7 @@ fn entry(ui: &mut Ui, effect: Effect, switch: &mut EffectSwitch, facts: &Facts<'
     ui.horizontal(|ui| {
         title(ui, &name, is_on).on_hover_text(effect.description());
         if has_worth {
-            is_asked = button(ui, effect, facts);
+            is_asked = button(ui, effect, model);
         }
         ui.add_space((ui.available_width() - SWITCHES_WIDTH - RESET_WIDTH).max(0.0));
         segments(ui, &name, switch);
@@ -97,12 +97,13 @@ fn entry(ui: &mut Ui, effect: Effect, switch: &mut EffectSwitch, facts: &Facts<'
             None => "Known after the first bake.",
         };
         ui.label(RichText::new(reason).weak());
-        if let Some(rays) = facts.last.and_then(|last| rays(effect, &last.result.counts)) {
+        let last = model.last.as_ref();
+        if let Some(rays) = last.and_then(|last| rays(effect, &last.result.counts)) {
             ui.label(RichText::new(rays).size(COUNTER))
                 .on_hover_text("Traced by this bake up to the maps that are shown; what was kept from before is not counted.");
         }
         if has_worth {
-            line(ui, effect, facts);
+            line(ui, effect, model);
         }
     });
     is_asked
@@ -165,12 +166,12 @@ const LINE: &str = "Light on all maps and layers with the effect minus without i
                     root mean square of the difference over the mean with it.";
 
 /// A button that asks what an effect is worth, unless that is known or being found; tells whether it was pressed.
-pub fn button(ui: &mut Ui, effect: Effect, facts: &Facts<'_>) -> bool {
-    if found(effect, facts).is_some_and(|worth| worth.difference.is_ok()) || progress(effect, facts).is_some()
+fn button(ui: &mut Ui, effect: Effect, model: &Model) -> bool {
+    if found(effect, model).is_some_and(|worth| worth.difference.is_ok()) || progress(effect, model).is_some()
     {
         return false;
     }
-    let is_ready = !facts.state.is_working() && facts.last.is_some_and(|last| last.is_final);
+    let is_ready = !model.state.is_working() && model.last.as_ref().is_some_and(|last| last.is_final);
     let button = ui
         .add_enabled(is_ready, Button::new("worth?").small())
         .on_hover_text(BUTTON)
@@ -181,12 +182,12 @@ pub fn button(ui: &mut Ui, effect: Effect, facts: &Facts<'_>) -> bool {
 }
 
 /// What was found, or how far that is.
-pub fn line(ui: &mut Ui, effect: Effect, facts: &Facts<'_>) {
-    if let Some(text) = progress(effect, facts) {
+fn line(ui: &mut Ui, effect: Effect, model: &Model) {
+    if let Some(text) = progress(effect, model) {
         ui.label(RichText::new(text).size(COUNTER));
         return;
     }
-    match found(effect, facts).map(|worth| &worth.difference) {
+    match found(effect, model).map(|worth| &worth.difference) {
         Some(Ok(found)) => {
             let text = RichText::new(sentence(found)).size(COUNTER).strong();
             ui.label(text).on_hover_text(LINE);
@@ -196,12 +197,12 @@ pub fn line(ui: &mut Ui, effect: Effect, facts: &Facts<'_>) {
     }
 }
 
-fn found<'a>(effect: Effect, facts: &Facts<'a>) -> Option<&'a Worth> {
-    facts.worth.filter(|worth| worth.effect == effect)
+fn found(effect: Effect, model: &Model) -> Option<&Worth> {
+    model.worth.as_ref().filter(|worth| worth.effect == effect)
 }
 
-fn progress(effect: Effect, facts: &Facts<'_>) -> Option<String> {
-    match facts.state {
+fn progress(effect: Effect, model: &Model) -> Option<String> {
+    match &model.state {
         BakeState::Comparing {
             effect: left_out,
             stage,

@@ -5,7 +5,7 @@ use std::path::Path;
 use egui::{Checkbox, Key, TextEdit, Ui, vec2};
 
 use super::control::{CONTROL_WIDTH, row, rows};
-use super::{Facts, Wishes, bake};
+use super::{Command, Model, bake};
 use crate::scene::builtin;
 
 const WATCH: &str = "Reads the scene again whenever its file, or a buffer or an image that the file refers to, is written. \
@@ -17,62 +17,66 @@ pub struct FileRow {
     text: String,
     /// What was in the window when it was typed.
     of: String,
-    /// Whether the scene is read again when its files change.
-    pub watches: bool,
 }
 
 /// Says what is being read, and what could not be.
-pub fn show_state(ui: &mut Ui, facts: &Facts<'_>) {
-    if let Some(source) = facts.files.loading {
+pub fn show_state(ui: &mut Ui, model: &Model) {
+    if let Some(source) = model.files.loading() {
         let name = Path::new(source).file_name().map(|name| name.to_string_lossy());
         ui.label(format!("loading {} …", name.as_deref().unwrap_or(source)))
             .on_hover_text(source);
     }
-    if let Some(warning) = facts.files.warning {
+    if let Some(warning) = &model.files.warning {
         ui.colored_label(bake::ATTENTION, warning);
     }
-    if let Some(refusal) = facts.files.refusal {
+    if let Some(refusal) = &model.files.refusal {
         ui.colored_label(bake::FAILED, refusal);
     }
 }
 
-/// Shows the row; what is to be opened goes to `wishes`.
-pub fn show(ui: &mut Ui, file: &mut FileRow, facts: &Facts<'_>, wishes: &mut Wishes) {
-    if file.of != facts.scene.source {
-        file.of.clone_from(&facts.scene.source);
-        file.text.clone_from(&facts.scene.source);
+/// Shows the row; what is to be opened goes to `commands`.
+pub fn show(
+    ui: &mut Ui,
+    (file, watches): (&mut FileRow, &mut bool),
+    model: &Model,
+    commands: &mut Vec<Command>,
+) {
+    if file.of != model.scene().source {
+        file.of.clone_from(&model.scene().source);
+        file.text.clone_from(&model.scene().source);
     }
     rows(ui, "file", |ui| {
         row(ui, "File", None, |ui| {
             let size = vec2(CONTROL_WIDTH, ui.spacing().interact_size.y);
             let field = ui.add_sized(size, TextEdit::singleline(&mut file.text));
             if field.lost_focus() && ui.input(|input| input.key_pressed(Key::Enter)) {
-                wishes.open = Some(file.text.clone());
+                commands.push(Command::Open(file.text.clone()));
             }
             field
         });
     });
     ui.horizontal(|ui| {
-        buttons(ui, facts, wishes);
-        let is_file = !facts.scene.source.starts_with("builtin:");
-        ui.add_enabled(is_file, Checkbox::new(&mut file.watches, "watch"))
+        buttons(ui, model, commands);
+        let is_file = !model.scene().source.starts_with("builtin:");
+        ui.add_enabled(is_file, Checkbox::new(watches, "watch"))
             .on_hover_text(WATCH)
             .on_disabled_hover_text("A built-in scene has no file that could change.");
     });
 }
 
-fn buttons(ui: &mut Ui, facts: &Facts<'_>, wishes: &mut Wishes) {
+fn buttons(ui: &mut Ui, model: &Model, commands: &mut Vec<Command>) {
     let open = ui.button("Open…");
-    wishes.browse |= open
-        .on_hover_text("Chooses a .glb or .gltf file in the system's own dialog.")
-        .clicked();
-    ui.add_enabled_ui(!facts.files.recent.is_empty(), |ui| {
+    let open = open.on_hover_text("Chooses a .glb or .gltf file in the system's own dialog.");
+    if open.clicked() {
+        commands.push(Command::Browse);
+    }
+    ui.add_enabled_ui(!model.files.recent.paths().is_empty(), |ui| {
         ui.menu_button("Recent", |ui| {
-            for path in facts.files.recent {
+            for path in model.files.recent.paths() {
                 let name = path.file_name().unwrap_or_default().to_string_lossy();
                 let full = path.display().to_string();
                 if ui.button(name).on_hover_text(&full).clicked() {
-                    wishes.open = Some(full);
+                    commands.push(Command::Open(full));
                 }
             }
         })
@@ -83,7 +87,7 @@ fn buttons(ui: &mut Ui, facts: &Facts<'_>, wishes: &mut Wishes) {
     ui.menu_button("Built-in", |ui| {
         for name in builtin::NAMES {
             if ui.button(name).clicked() {
-                wishes.open = Some(format!("builtin:{name}"));
+                commands.push(Command::Open(format!("builtin:{name}")));
             }
         }
     })

@@ -2,8 +2,8 @@
 
 use egui::{DragValue, Response, RichText, TextEdit, Ui};
 
-use super::control::{about_button, button, counted, rows, setting};
-use super::{Facts, FilmWish, Wishes, export};
+use super::control::{self, about_button, counted, rows, setting};
+use super::{Command, FilmCommand, Model, export};
 use crate::scene::camera_path::MAX_FRAMES;
 use crate::viewer::filming::{FRAMES_PER_S, Film};
 
@@ -15,44 +15,30 @@ const FIELD: &str = "Path file";
 const SIDES: std::ops::RangeInclusive<u32> = 16..=8192;
 
 /// Shows the section; `file` is what is typed as the path's file.
-pub fn show(ui: &mut Ui, film: &mut Film, file: &mut String, facts: &Facts<'_>, wishes: &mut Wishes) {
+pub fn show(ui: &mut Ui, film: &mut Film, file: &mut String, model: &Model, commands: &mut Vec<Command>) {
     let too_few = (film.keys.len() < 2).then_some(TOO_FEW);
-    let mut wish = |asked: FilmWish| wishes.film = Some(asked);
     ui.horizontal(|ui| {
-        if button(ui, "Add key", None) {
-            wish(FilmWish::Record(None));
+        ask(ui, "Add key", None, commands, FilmCommand::Record(None));
+        if model.is_playing() {
+            ask(ui, "Stop playing", None, commands, FilmCommand::Play(false));
+        } else {
+            ask(ui, "Play", too_few, commands, FilmCommand::Play(true));
         }
-        if facts.is_playing {
-            if button(ui, "Stop playing", None) {
-                wish(FilmWish::Play(false));
-            }
-        } else if button(ui, "Play", too_few) {
-            wish(FilmWish::Play(true));
-        }
-        let few_cameras = (facts.scene.cameras.len() < 2).then_some(FEW_CAMERAS);
-        if button(ui, "Tour", few_cameras) {
-            wish(FilmWish::Tour);
-        }
+        let few_cameras = (model.scene().cameras.len() < 2).then_some(FEW_CAMERAS);
+        ask(ui, "Tour", few_cameras, commands, FilmCommand::Tour);
         ui.label(RichText::new(length(film)).weak());
     });
-    if let Some(asked) = keys(ui, film) {
-        wish(asked);
-    }
+    keys(ui, film, commands);
     let default = Film::default();
     rows(ui, "film", |ui| {
-        setting(
-            ui,
-            "Frames",
-            None,
-            (&mut film.frames, &default.frames),
-            |ui, frames| ui.add(DragValue::new(frames).range(1..=MAX_FRAMES)),
-        );
+        let frames = (&mut film.frames, &default.frames);
+        setting(ui, "Frames", None, frames, |ui, frames| {
+            ui.add(DragValue::new(frames).range(1..=MAX_FRAMES))
+        });
         setting(ui, "Frame size", None, (&mut film.size, &default.size), size);
     });
     ui.horizontal(|ui| {
-        if button(ui, "Save path", too_few) {
-            wish(FilmWish::Save);
-        }
+        ask(ui, "Save path", too_few, commands, FilmCommand::Save);
         let field = TextEdit::singleline(file)
             .hint_text("path.json")
             .desired_width(150.0);
@@ -60,31 +46,49 @@ pub fn show(ui: &mut Ui, film: &mut Film, file: &mut String, facts: &Facts<'_>, 
             .accessible_name(FIELD)
             .on_hover_text(about_button("Load path"));
         let none = file.trim().is_empty().then_some("Type a file first.");
-        if button(ui, "Load path", none) {
-            wish(FilmWish::Load(file.trim().into()));
-        }
+        ask(
+            ui,
+            "Load path",
+            none,
+            commands,
+            FilmCommand::Load(file.trim().into()),
+        );
     });
-    let no_light = facts.layers.is_empty().then_some("There are no maps yet.");
-    let busy = facts.export.is_running().then_some("Something is being written.");
+    let no_light = model.layers().is_empty().then_some("There are no maps yet.");
+    let busy = model
+        .exporter
+        .state
+        .is_running()
+        .then_some("Something is being written.");
     ui.horizontal(|ui| {
-        if button(ui, "Export frames", too_few.or(no_light).or(busy)) {
-            wish(FilmWish::Shoot { turns: false });
-        }
-        if button(ui, "Export turntable", no_light.or(busy)) {
-            wish(FilmWish::Shoot { turns: true });
-        }
-        let idle = (!facts.export.is_running()).then_some("Nothing is filmed now.");
-        if button(ui, "Stop", idle) {
-            wish(FilmWish::Stop);
-        }
+        ask(
+            ui,
+            "Export frames",
+            too_few.or(no_light).or(busy),
+            commands,
+            FilmCommand::Shoot { turns: false },
+        );
+        ask(
+            ui,
+            "Export turntable",
+            no_light.or(busy),
+            commands,
+            FilmCommand::Shoot { turns: true },
+        );
+        let idle = (!model.exporter.state.is_running()).then_some("Nothing is filmed now.");
+        ask(ui, "Stop", idle, commands, FilmCommand::Stop);
     });
-    if let Some(told) = facts.film_told {
+    if let Some(told) = &model.film_told {
         ui.label(RichText::new(told).small());
     }
-    export::outcome(ui, facts);
+    export::outcome(ui, model);
 }
 
-/// A button that says what it does, or why it cannot; tells whether it was pressed.
+fn ask(ui: &mut Ui, name: &str, why_not: Option<&str>, commands: &mut Vec<Command>, command: FilmCommand) {
+    control::ask(ui, name, why_not, commands, Command::Film(command));
+}
+
+/// "2 keys, 4.0 s".
 fn length(film: &Film) -> String {
     let keys = counted(film.keys.len(), "key");
     let seconds = film.frames as f64 / FRAMES_PER_S;
@@ -92,8 +96,7 @@ fn length(film: &Film) -> String {
 }
 
 /// A row for each key.
-fn keys(ui: &mut Ui, film: &mut Film) -> Option<FilmWish> {
-    let mut wish = None;
+fn keys(ui: &mut Ui, film: &mut Film, commands: &mut Vec<Command>) {
     let mut gone = None;
     for (index, key) in film.keys.iter().enumerate() {
         ui.horizontal(|ui| {
@@ -107,8 +110,8 @@ fn keys(ui: &mut Ui, film: &mut Film) -> Option<FilmWish> {
                 let button = ui.small_button(name).on_hover_text(what);
                 if button.accessible_name(format!("Key {number}: {name}")).clicked() {
                     match name {
-                        "go" => wish = Some(FilmWish::GoTo(index)),
-                        "set" => wish = Some(FilmWish::Record(Some(index))),
+                        "go" => commands.push(Command::Film(FilmCommand::GoTo(index))),
+                        "set" => commands.push(Command::Film(FilmCommand::Record(Some(index)))),
                         _ => gone = Some(index),
                     }
                 }
@@ -119,7 +122,6 @@ fn keys(ui: &mut Ui, film: &mut Film) -> Option<FilmWish> {
     if let Some(index) = gone {
         film.keys.remove(index);
     }
-    wish
 }
 
 fn size(ui: &mut Ui, (width, height): &mut (u32, u32)) -> Response {

@@ -4,8 +4,7 @@ use egui::{Align2, Color32, FontId, Rect, RichText, Role, Sense, Ui, WidgetInfo,
 
 use super::effects::COUNTER;
 use crate::eye_pass::renderer::GpuMs;
-use crate::viewer::frame_times::{FrameTimes, Made, PICTURES, sum_ms};
-use crate::viewer::latency::{Latencies, Percentiles};
+use crate::viewer::timing::{FrameTimes, Latencies, Made, PICTURES, Percentiles, sum_ms};
 
 /// Height of the graph [points].
 const HEIGHT: f32 = 64.0;

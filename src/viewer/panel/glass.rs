@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use egui::{Response, Slider, SliderClamping, Ui};
 
-use super::Wishes;
+use super::Command;
 use super::control::{CONTROL_WIDTH, Entry, pick, setting};
 use crate::optics::Glass;
 use crate::optics::glass::{Dispersion, catalogue};
@@ -14,13 +14,13 @@ const ONE_INDEX: &str = "one index";
 /// Said where only figures make it up.
 const BY_NUMBERS: &str = "by numbers";
 
-/// Shows the rows of a clear material with that of the file; what is changed goes to `wishes`.
+/// Shows the rows of a clear material with that of the file; what is changed goes to `commands`.
 pub fn show(
     ui: &mut Ui,
     material: usize,
     (shown, of_file): (&Material, &Material),
     why_not: Option<&str>,
-    wishes: &mut Wishes,
+    commands: &mut Vec<Command>,
 ) {
     let mut glass = shown.glass.clone();
     let value = (&mut glass, &of_file.glass);
@@ -46,13 +46,13 @@ pub fn show(
             Some(glass) => glass.dispersion.n_d(),
             None => shown.ior,
         };
-        wishes.edit = Some(Edit::MaterialSubstance {
+        commands.push(Command::Edit(Edit::MaterialSubstance {
             material,
             ior,
             glass,
             base_colour: shown.base_colour,
             metal: shown.metal,
-        });
+        }));
     }
 }
 

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use egui::{Response, Ui};
 
-use super::Wishes;
+use super::Command;
 use super::control::{CONTROL_WIDTH, Entry, pick, setting};
 use crate::optics::LinearSrgb;
 use crate::optics::spectrum::{Spectrum, illuminants};
@@ -22,8 +22,8 @@ const BY_NUMBER: [&str; 7] = [
     "line:633",
 ];
 
-/// Shows the rows of a light with that of the file; what is changed goes to `wishes`.
-pub fn show(ui: &mut Ui, index: usize, (light, of_file): (&Light, &Light), wishes: &mut Wishes) {
+/// Shows the rows of a light with that of the file; what is changed goes to `commands`.
+pub fn show(ui: &mut Ui, index: usize, (light, of_file): (&Light, &Light), commands: &mut Vec<Command>) {
     let mut colour = light.colour;
     setting(ui, "Colour", None, (&mut colour, &of_file.colour), button);
     let mut spectrum = light.spectrum.clone();
@@ -35,7 +35,7 @@ pub fn show(ui: &mut Ui, index: usize, (light, of_file): (&Light, &Light), wishe
         spectrum: of_file.spectrum.clone(),
     };
     if spectrum != light.spectrum {
-        wishes.edit = Some(match &spectrum {
+        commands.push(Command::Edit(match &spectrum {
             _ if spectrum == of_file.spectrum => as_in_file(),
             Some(spectrum) => Edit::LightSpectrum {
                 light: index,
@@ -46,13 +46,13 @@ pub fn show(ui: &mut Ui, index: usize, (light, of_file): (&Light, &Light), wishe
                 light: index,
                 colour: within_reach(light.colour),
             },
-        });
+        }));
     } else if colour != light.colour {
-        wishes.edit = Some(if colour == of_file.colour {
+        commands.push(Command::Edit(if colour == of_file.colour {
             as_in_file()
         } else {
             Edit::LightColour { light: index, colour }
-        });
+        }));
     }
 }
 

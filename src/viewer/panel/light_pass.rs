@@ -43,19 +43,12 @@ pub fn show(ui: &mut Ui, settings: &mut BakeSettings) {
     rows(ui, "light pass", |ui| {
         let before = settings.estimator;
         let estimator = (&mut settings.estimator, &Estimator::Auto);
-        setting(ui, "Estimator", no_caustic, estimator, |ui, estimator| {
-            listed(ui, "estimator", estimator)
-        });
+        setting(ui, "Estimator", no_caustic, estimator, listed);
         if settings.estimator != before {
             change_estimator(settings, before);
         }
-        setting(
-            ui,
-            "Layers",
-            None,
-            (&mut settings.layers, &default.layers),
-            layers,
-        );
+        let value = (&mut settings.layers, &default.layers);
+        setting(ui, "Layers", None, value, layers);
         let default_density_per_sr = default_density_per_sr(settings);
         let density_per_sr = (&mut settings.density_per_sr, &default_density_per_sr);
         let before = *density_per_sr.0;
@@ -64,13 +57,10 @@ pub fn show(ui: &mut Ui, settings: &mut BakeSettings) {
             // What is asked for is seen: refinement would go on to the same picture from any density.
             target::aim_at_density(settings);
         }
-        setting(
-            ui,
-            "Sigma [radii²]",
-            no_sigma,
-            (&mut settings.sigma, &default.sigma),
-            |ui, value| sigma(ui, value, refines),
-        );
+        let value = (&mut settings.sigma, &default.sigma);
+        setting(ui, "Sigma [radii²]", no_sigma, value, |ui, value| {
+            sigma(ui, value, refines)
+        });
     });
 }
 
@@ -83,19 +73,13 @@ pub fn show_details(ui: &mut Ui, settings: &mut BakeSettings) {
     rows(ui, "rays and kernels", |ui| {
         adaptive(ui, &mut settings.sigma, no_splats.or(no_sigma));
         let value = (&mut settings.kernel, &default.kernel);
-        setting(ui, "Kernel", no_splats, value, |ui, kernel| {
-            listed(ui, "kernel", kernel)
-        });
+        setting(ui, "Kernel", no_splats, value, listed);
         let value = (&mut settings.footprint, &default.footprint);
-        setting(ui, "Footprint", no_splats, value, |ui, footprint| {
-            listed(ui, "footprint", footprint)
-        });
+        setting(ui, "Footprint", no_splats, value, listed);
         let value = (&mut settings.rays, &default.rays);
-        setting(ui, "Rays", no_splats, value, |ui, rays| listed(ui, "rays", rays));
+        setting(ui, "Rays", no_splats, value, listed);
         let value = (&mut settings.item_buffer, &default.item_buffer);
-        setting(ui, "Item buffer", no_caustic, value, |ui, item_buffer| {
-            listed(ui, "item buffer", item_buffer)
-        });
+        setting(ui, "Item buffer", no_caustic, value, listed);
     });
 }
 

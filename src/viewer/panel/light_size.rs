@@ -2,7 +2,7 @@
 
 use egui::{DragValue, Response, Ui};
 
-use super::Wishes;
+use super::Command;
 use super::control::setting;
 use crate::scene::{Edit, Light, LightKind, LightSize};
 
@@ -11,8 +11,8 @@ const RADIUS_SPEED: f64 = 0.01;
 /// Drag of one point [°].
 const ANGLE_SPEED_DEG: f64 = 0.01;
 
-/// Shows the size of a light that can have one, with that of the file; what is changed goes to `wishes`.
-pub fn show(ui: &mut Ui, index: usize, (light, of_file): (&Light, &Light), wishes: &mut Wishes) {
+/// Shows the size of a light that can have one, with that of the file; what is changed goes to `commands`.
+pub fn show(ui: &mut Ui, index: usize, (light, of_file): (&Light, &Light), commands: &mut Vec<Command>) {
     let mut size = light.size;
     let value = (&mut size, &of_file.size);
     match light.kind {
@@ -21,7 +21,7 @@ pub fn show(ui: &mut Ui, index: usize, (light, of_file): (&Light, &Light), wishe
         LightKind::Panel { .. } | LightKind::Surface { .. } | LightKind::Environment { .. } => {}
     }
     if size != light.size {
-        wishes.edit = Some(Edit::LightSize { light: index, size });
+        commands.push(Command::Edit(Edit::LightSize { light: index, size }));
     }
 }
 

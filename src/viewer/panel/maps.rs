@@ -1,15 +1,18 @@
-//! Section *Maps*: every receiver's map, to be looked at and written to files.
+//! Section *Maps*: every receiver's map, to be looked at and written to files; and section *Compare*: two maps side by side.
 
 mod large;
 
 use std::collections::HashMap;
+use std::path::PathBuf;
 
-use egui::{Button, ColorImage, Image, RichText, ScrollArea, TextureHandle, TextureOptions, Ui, vec2};
+use egui::{
+    Button, ColorImage, Image, RichText, ScrollArea, TextEdit, TextureHandle, TextureOptions, Ui, vec2,
+};
 
 use super::bake::two_digits;
-use super::control::{bytes, counted};
+use super::control::{about_button, ask, button, bytes, counted};
 use super::effects::COUNTER;
-use super::{Facts, Panel, Wishes, export};
+use super::{Command, CompareCommand, Model, export};
 use crate::illumination::{IlluminationMap, Side};
 use crate::session::BYTES_PER_TEXEL;
 use crate::viewer::exporting::Export;
@@ -37,32 +40,23 @@ pub struct Browser {
     large: Option<large::Large>,
 }
 
-impl std::fmt::Debug for Browser {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let made = self.thumbnails.len();
-        f.debug_struct("Browser")
-            .field("thumbnails", &made)
-            .finish_non_exhaustive()
-    }
-}
-
 /// Shows the section.
-pub fn show(ui: &mut Ui, panel: &mut Panel, facts: &Facts<'_>, wishes: &mut Wishes) {
-    let Panel {
-        maps: browser,
-        maps_folder,
-        ..
-    } = panel;
-    browser.keep_up(facts);
-    if facts.maps.is_empty() {
+pub fn show(
+    ui: &mut Ui,
+    (browser, maps_folder): (&mut Browser, &str),
+    model: &Model,
+    commands: &mut Vec<Command>,
+) {
+    browser.keep_up(model);
+    if model.maps().is_empty() {
         ui.label(RichText::new("There are no maps yet.").weak());
         return;
     }
     ui.horizontal(|ui| {
-        let texels: usize = facts.maps.iter().map(|map| map.chart.texel_count()).sum();
+        let texels: usize = model.maps().iter().map(|map| map.chart.texel_count()).sum();
         let memory = bytes(texels as u64 * BYTES_PER_TEXEL);
-        ui.label(format!("{} in {memory}", counted(facts.maps.len(), "map")));
-        export::all(ui, "Export all", maps_folder, facts, wishes);
+        ui.label(format!("{} in {memory}", counted(model.maps().len(), "map")));
+        export::all(ui, "Export all", maps_folder, model, commands);
     });
     let mut still_to_make = MOST_AT_ONCE;
     // What stands below is not to be far away.
@@ -71,9 +65,9 @@ pub fn show(ui: &mut Ui, panel: &mut Panel, facts: &Facts<'_>, wishes: &mut Wish
         .max_height(MOST_HEIGHT)
         .auto_shrink([false, true]);
     list.show(ui, |ui| {
-        for (index, map) in facts.maps.iter().enumerate() {
+        for (index, map) in model.maps().iter().enumerate() {
             ui.push_id(index, |ui| {
-                entry(ui, browser, (index, map), facts, wishes, &mut still_to_make)
+                entry(ui, browser, (index, map), model, commands, &mut still_to_make)
             });
         }
     });
@@ -83,21 +77,21 @@ pub fn show(ui: &mut Ui, panel: &mut Panel, facts: &Facts<'_>, wishes: &mut Wish
 }
 
 /// Shows the map that was chosen, in a window over the picture.
-pub fn show_large(ui: &Ui, browser: &mut Browser, facts: &Facts<'_>) {
-    browser.keep_up(facts);
+pub fn show_large(ui: &Ui, browser: &mut Browser, model: &Model) {
+    browser.keep_up(model);
     let Some(large) = &mut browser.large else {
         return;
     };
-    let map = facts.maps.get(large.map());
-    if !map.is_some_and(|map| large.show(ui, map, &name(map, facts))) {
+    let map = model.maps().get(large.map());
+    if !map.is_some_and(|map| large.show(ui, map, &name(map, model))) {
         browser.large = None;
     }
 }
 
 impl Browser {
     /// Forgets pictures of other maps than those that are shown.
-    fn keep_up(&mut self, facts: &Facts<'_>) {
-        let made_of = facts.last.map(|last| (last.serial, last.level));
+    fn keep_up(&mut self, model: &Model) {
+        let made_of = model.last.as_ref().map(|last| (last.serial, last.level));
         if made_of != self.made_of {
             self.made_of = made_of;
             self.thumbnails.clear();
@@ -112,11 +106,11 @@ fn entry(
     ui: &mut Ui,
     browser: &mut Browser,
     (index, map): (usize, &IlluminationMap),
-    facts: &Facts<'_>,
-    wishes: &mut Wishes,
+    model: &Model,
+    commands: &mut Vec<Command>,
     still_to_make: &mut usize,
 ) {
-    let name = name(map, facts);
+    let name = name(map, model);
     ui.horizontal(|ui| {
         let texture = thumbnail(ui, browser, (index, map), still_to_make);
         let size = vec2(THUMBNAIL, THUMBNAIL);
@@ -132,14 +126,14 @@ fn entry(
         ui.vertical(|ui| {
             ui.set_width(ui.available_width());
             ui.horizontal(|ui| {
-                let reason = export::unavailable(facts);
+                let reason = export::unavailable(model);
                 let one = ui.add_enabled(reason.is_none(), Button::new("Export").small());
                 let one = one.accessible_name(format!("Export map of {name}"));
                 let one = one
                     .on_hover_text(ONE)
                     .on_disabled_hover_text(reason.unwrap_or_default());
                 if one.clicked() {
-                    wishes.export = Some(Export::Map(index));
+                    commands.push(Command::Export(Export::Map(index)));
                 }
                 ui.add(egui::Label::new(RichText::new(&name).strong()).truncate());
             });
@@ -158,8 +152,8 @@ fn figures(map: &IlluminationMap) -> String {
 }
 
 /// The object's name, and which of its sides where that is the back.
-fn name(map: &IlluminationMap, facts: &Facts<'_>) -> String {
-    let object = facts.scene.objects.get(map.chart.object());
+fn name(map: &IlluminationMap, model: &Model) -> String {
+    let object = model.scene().objects.get(map.chart.object());
     let name = object.map_or("surface", |object| object.name.as_str());
     match map.chart.receiver.side() {
         Side::Front => name.to_owned(),
@@ -193,5 +187,44 @@ fn texture(ui: &Ui, name: &str, shown: &Shown, old: Option<TextureHandle>) -> Te
             texture
         }
         None => ui.ctx().load_texture(name, image, TextureOptions::NEAREST),
+    }
+}
+
+/// What the field is called by assistive technology.
+const FOLDER: &str = "Folder to compare with";
+
+/// Shows the controls.
+pub fn compare(ui: &mut Ui, folder: &mut String, model: &Model, commands: &mut Vec<Command>) {
+    ui.horizontal(|ui| {
+        let none = model.layers().is_empty().then_some("There are no maps yet.");
+        let keep = Command::Compare(CompareCommand::Keep);
+        ask(ui, "Keep as before", none, commands, keep);
+        let none = model
+            .reference
+            .as_ref()
+            .is_none()
+            .then_some("Nothing is compared now.");
+        let end = Command::Compare(CompareCommand::End);
+        ask(ui, "End comparison", none, commands, end);
+    });
+    ui.horizontal(|ui| {
+        let field = TextEdit::singleline(folder)
+            .hint_text("folder of maps")
+            .desired_width(190.0);
+        let field = ui
+            .add(field)
+            .on_hover_text(about_button("Compare"))
+            .accessible_name(FOLDER);
+        let none = folder.trim().is_empty().then_some("Type a folder first.");
+        let is_clicked = button(ui, "Compare", none);
+        let is_entered = field.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter));
+        if (is_clicked || is_entered) && none.is_none() {
+            commands.push(Command::Compare(CompareCommand::Load(PathBuf::from(
+                folder.trim(),
+            ))));
+        }
+    });
+    if let Some(reference) = model.reference.as_ref() {
+        ui.label(reference.told());
     }
 }

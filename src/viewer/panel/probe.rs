@@ -2,8 +2,8 @@
 
 use egui::{Grid, Ui};
 
-use super::control::{button, counted, grouped, significant};
-use super::{Facts, Wishes};
+use super::control::{ask, counted, grouped, significant};
+use super::{Command, Model};
 use crate::light_pass::explain::LightPath;
 use crate::transport::Event;
 use crate::units::LUMENS_PER_WATT;
@@ -26,18 +26,18 @@ const MOST_LISTED: usize = 8;
 pub fn show(
     ui: &mut Ui,
     (is_on, sketched): (&mut bool, &mut Sketched),
-    facts: &Facts<'_>,
-    wishes: &mut Wishes,
+    model: &Model,
+    commands: &mut Vec<Command>,
 ) {
     ui.horizontal(|ui| {
         ui.toggle_value(is_on, "Probe").on_hover_text(TURN_ON);
-        let none = facts.probed.is_none().then_some("Nothing is probed yet.");
-        wishes.clear_probe |= button(ui, "Clear probe", none);
-        let dark = facts.maps.is_empty().then_some("No light is baked yet.");
-        wishes.brightest |= button(ui, "Brightest spot", dark);
+        let none = model.probed().is_none().then_some("Nothing is probed yet.");
+        ask(ui, "Clear probe", none, commands, Command::ClearProbe);
+        let dark = model.maps().is_empty().then_some("No light is baked yet.");
+        ask(ui, "Brightest spot", dark, commands, Command::Brightest);
     });
-    sketch(ui, sketched, facts);
-    let Some(probed) = facts.probed else {
+    sketch(ui, sketched, model);
+    let Some(probed) = model.probed() else {
         if *is_on {
             ui.weak("Click on a surface.");
         }
@@ -50,20 +50,20 @@ pub fn show(
         None => drop(ui.label("No light is baked onto it.")),
     }
     match &probed.explanation {
-        Some(_) => paths(ui, probed, facts),
+        Some(_) => paths(ui, probed, model),
         None if probed.texel.is_some() => drop(ui.weak("Looking for its light paths …")),
         None => {}
     }
 }
 
 /// What is drawn of the way that all light takes.
-fn sketch(ui: &mut Ui, sketched: &mut Sketched, facts: &Facts<'_>) {
+fn sketch(ui: &mut Ui, sketched: &mut Sketched, model: &Model) {
     ui.horizontal(|ui| {
         ui.label("Draw");
         ui.checkbox(&mut sketched.hits, "hits").on_hover_text(HITS);
         ui.checkbox(&mut sketched.patches, "patches")
             .on_hover_text(PATCHES);
-        if let Some(sketch) = facts.sketch.filter(|_| sketched.is_any()) {
+        if let Some(sketch) = model.sketch().filter(|_| sketched.is_any()) {
             let told = format!(
                 "{} rays, {} patches",
                 grouped(sketch.rays),
@@ -109,13 +109,13 @@ fn figures(ui: &mut Ui, texel: &ProbedTexel) {
         });
 }
 
-fn paths(ui: &mut Ui, probed: &Probed, facts: &Facts<'_>) {
+fn paths(ui: &mut Ui, probed: &Probed, model: &Model) {
     let Some(told) = &probed.explanation else { return };
     if told.paths.is_empty() {
         ui.label("No light path leads here.");
     }
     for path in told.paths.iter().take(MOST_LISTED) {
-        ui.label(format!("{}  {}", percent(probed.share(path)), chain(path, facts)));
+        ui.label(format!("{}  {}", percent(probed.share(path)), chain(path, model)));
     }
     if told.paths.len() > MOST_LISTED {
         let rest: f64 = told.paths[MOST_LISTED..]
@@ -140,8 +140,8 @@ fn percent(share: f64) -> String {
 }
 
 /// A path in words: lamp, through ball, through ball.
-fn chain(path: &LightPath, facts: &Facts<'_>) -> String {
-    let scene = facts.scene;
+fn chain(path: &LightPath, model: &Model) -> String {
+    let scene = model.scene();
     let light = scene.lights.get(path.light).map_or("light", |light| &light.name);
     let mut text = light.to_owned();
     for vertex in &path.vertices {

@@ -4,7 +4,7 @@ use egui::{DragValue, Response, RichText, Slider, SliderClamping, Ui};
 use glam::DVec3;
 
 use super::control::{CONTROL_WIDTH, Entry, about, counted, pick, row, rows, setting, significant};
-use super::{Facts, Wishes, bake, glass, light_colour, light_size, waves};
+use super::{Command, Model, bake, glass, light_colour, light_size, waves};
 use crate::optics::LinearSrgb;
 use crate::scene::{Edit, LightKind, Scene, SurfaceKind, why_light_stays};
 use crate::units::{Irradiance, RadiantIntensity};
@@ -29,13 +29,13 @@ const NO_HAND: &str = "Not for this light.";
 const NO_PLACE: &str = "This light has neither a place nor a direction that could be changed.";
 const NO_TURN: &str = "Its shape is another one than the file gives it.";
 /// What the section has in hand.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Selection {
     light: usize,
     object: usize,
     hand: Hand,
-    /// Whether the next frame opens the section: something was picked in the picture.
-    pub must_open: bool,
+    /// How often something was picked in the picture: each time the section opens.
+    pub picks: u32,
 }
 
 /// What clicks in the picture do to a light.
@@ -94,13 +94,13 @@ impl Selection {
                 Hand::Object
             }
         };
-        self.must_open = held.is_some();
+        self.picks += u32::from(held.is_some());
     }
 }
 
-/// Shows the section; what is changed goes to `wishes`.
-pub fn show(ui: &mut Ui, selection: &mut Selection, facts: &Facts<'_>, wishes: &mut Wishes) {
-    let scene = facts.scene;
+/// Shows the section; what is changed goes to `commands`.
+pub fn show(ui: &mut Ui, selection: &mut Selection, model: &Model, commands: &mut Vec<Command>) {
+    let scene = model.scene();
     let inventory = format!(
         "{}, {}, {}",
         counted(scene.objects.len(), "object"),
@@ -108,14 +108,14 @@ pub fn show(ui: &mut Ui, selection: &mut Selection, facts: &Facts<'_>, wishes: &
         counted(scene.lights.len(), "light")
     );
     ui.label(RichText::new(inventory).weak())
-        .on_hover_text(format!("{}, drawn by {}.", scene.source, facts.adapter));
+        .on_hover_text(format!("{}, drawn by {}.", scene.source, model.picture.adapter));
     rows(ui, "scene", |ui| {
         if scene.lights.is_empty() {
             ui.label("");
             ui.colored_label(bake::ATTENTION, "No light: add one.");
             ui.end_row();
         }
-        add_light(ui, wishes);
+        add_light(ui, commands);
         if !scene.lights.is_empty() {
             let names = scene.lights.iter().map(|light| light.name.as_str());
             row(ui, "Light", None, |ui| {
@@ -126,21 +126,21 @@ pub fn show(ui: &mut Ui, selection: &mut Selection, facts: &Facts<'_>, wishes: &
                         &mut selection.light,
                         names,
                     );
-                    remove_light(ui, selection, scene, wishes);
+                    remove_light(ui, selection, scene, commands);
                     list
                 })
                 .inner
             });
-            light(ui, selection.light, facts, wishes);
-            light_hand(ui, selection, facts);
+            light(ui, selection.light, model, commands);
+            light_hand(ui, selection, model);
         }
         if !scene.objects.is_empty() {
             let names = scene.objects.iter().map(|object| object.name.as_str());
             row(ui, "Object", None, |ui| {
                 one_of(ui, ("object", CONTROL_WIDTH), &mut selection.object, names)
             });
-            material(ui, selection.object, facts, wishes);
-            place_of_object(ui, selection.object, facts, wishes);
+            material(ui, selection.object, model, commands);
+            place_of_object(ui, selection.object, model, commands);
             row(ui, "Handles", None, |ui| {
                 ui.horizontal(|ui| {
                     hand(
@@ -158,7 +158,7 @@ pub fn show(ui: &mut Ui, selection: &mut Selection, facts: &Facts<'_>, wishes: &
 }
 
 /// Buttons for lights that are to be added.
-fn add_light(ui: &mut Ui, wishes: &mut Wishes) {
+fn add_light(ui: &mut Ui, commands: &mut Vec<Command>) {
     row(ui, "Add light", None, |ui| {
         ui.horizontal(|ui| {
             ui.spacing_mut().item_spacing.x = 3.0;
@@ -168,7 +168,7 @@ fn add_light(ui: &mut Ui, wishes: &mut Wishes) {
                     .accessible_name(format!("Add {}", light.name()))
                     .on_hover_text(format!("{} {}", what_of(light), about("Add light").what));
                 if button.clicked() {
-                    wishes.new_light = Some(light);
+                    commands.push(Command::AddLight(light));
                 }
             }
         })
@@ -185,7 +185,7 @@ fn what_of(light: NewLight) -> &'static str {
     }
 }
 
-fn remove_light(ui: &mut Ui, selection: &mut Selection, scene: &Scene, wishes: &mut Wishes) {
+fn remove_light(ui: &mut Ui, selection: &mut Selection, scene: &Scene, commands: &mut Vec<Command>) {
     let light = &scene.lights[selection.light];
     let why_not = why_light_stays(&light.kind);
     let remove = ui.add_enabled(why_not.is_none(), egui::Button::new("Remove"));
@@ -194,9 +194,9 @@ fn remove_light(ui: &mut Ui, selection: &mut Selection, scene: &Scene, wishes: &
         .on_hover_text("Takes the light out of the scene; undo brings it back.")
         .on_disabled_hover_text(format!("`{}` {}.", light.name, why_not.unwrap_or_default()));
     if remove.clicked() {
-        wishes.edit = Some(Edit::LightRemoved {
+        commands.push(Command::Edit(Edit::LightRemoved {
             light: selection.light,
-        });
+        }));
         selection.hold(None);
     }
 }
@@ -216,26 +216,26 @@ fn one_of<'a>(
     response
 }
 
-fn light(ui: &mut Ui, light: usize, facts: &Facts<'_>, wishes: &mut Wishes) {
-    let shown = &facts.scene.lights[light];
-    let of_file = facts.scene.light_at_first(light, facts.loaded);
+fn light(ui: &mut Ui, light: usize, model: &Model, commands: &mut Vec<Command>) {
+    let shown = &model.scene().lights[light];
+    let of_file = model.scene().light_at_first(light, model.loaded());
     let kind = shown.kind;
-    power(ui, light, (&kind, &of_file.kind), wishes);
-    light_size::show(ui, light, (shown, of_file), wishes);
+    power(ui, light, (&kind, &of_file.kind), commands);
+    light_size::show(ui, light, (shown, of_file), commands);
     if matches!(
         kind,
         LightKind::Point { .. } | LightKind::Spot { .. } | LightKind::Sun { .. }
     ) {
-        light_colour::show(ui, light, (shown, of_file), wishes);
+        light_colour::show(ui, light, (shown, of_file), commands);
     }
     if let (Some(position), Some(default)) = (kind.position(), of_file.kind.position()) {
         let mut moved = position;
         setting(ui, "Position [m]", None, (&mut moved, &default), |ui, moved| {
-            place(ui, "Position [m]", moved, facts.scene)
+            place(ui, "Position [m]", moved, model.scene())
         });
         if moved != position {
             let position = moved;
-            wishes.edit = Some(Edit::LightPosition { light, position });
+            commands.push(Command::Edit(Edit::LightPosition { light, position }));
         }
     }
     if let (Some(present), Some(default)) = (direction(&kind), direction(&of_file.kind)) {
@@ -243,7 +243,7 @@ fn light(ui: &mut Ui, light: usize, facts: &Facts<'_>, wishes: &mut Wishes) {
         setting(ui, "Direction [°]", None, (&mut turned, &default), angles);
         if turned != present {
             let direction = turned;
-            wishes.edit = Some(Edit::LightDirection { light, direction });
+            commands.push(Command::Edit(Edit::LightDirection { light, direction }));
         }
     }
 }
@@ -255,7 +255,7 @@ fn direction(kind: &LightKind) -> Option<DVec3> {
     }
 }
 
-fn power(ui: &mut Ui, light: usize, (kind, of_file): (&LightKind, &LightKind), wishes: &mut Wishes) {
+fn power(ui: &mut Ui, light: usize, (kind, of_file): (&LightKind, &LightKind), commands: &mut Vec<Command>) {
     let about = match kind {
         LightKind::Sun { .. } => "Irradiance [W/m²]",
         LightKind::Point { .. } | LightKind::Spot { .. } => "Intensity [W/sr]",
@@ -272,7 +272,7 @@ fn power(ui: &mut Ui, light: usize, (kind, of_file): (&LightKind, &LightKind), w
         )
     });
     if value != present {
-        wishes.edit = Some(strength(kind, light, value));
+        commands.push(Command::Edit(strength(kind, light, value)));
     }
 }
 
@@ -346,11 +346,11 @@ fn angles(ui: &mut Ui, direction: &mut DVec3) -> Response {
     response
 }
 
-fn material(ui: &mut Ui, object: usize, facts: &Facts<'_>, wishes: &mut Wishes) {
-    let material = facts.scene.objects[object].material;
+fn material(ui: &mut Ui, object: usize, model: &Model, commands: &mut Vec<Command>) {
+    let material = model.scene().objects[object].material;
     let (shown, of_file) = (
-        &facts.scene.materials[material],
-        &facts.loaded.materials[material],
+        &model.scene().materials[material],
+        &model.loaded().materials[material],
     );
     let no_ior = matches!(shown.surface, SurfaceKind::Diffuse | SurfaceKind::Mirror)
         .then_some("Only glass, water and polish have one; this surface is matte or a mirror.");
@@ -366,9 +366,9 @@ fn material(ui: &mut Ui, object: usize, facts: &Facts<'_>, wishes: &mut Wishes) 
         },
     );
     if ior != shown.ior {
-        wishes.edit = Some(Edit::MaterialIor { material, ior });
+        commands.push(Command::Edit(Edit::MaterialIor { material, ior }));
     }
-    glass::show(ui, material, (shown, of_file), no_ior, wishes);
+    glass::show(ui, material, (shown, of_file), no_ior, commands);
     let mut roughness = shown.roughness;
     let value = (&mut roughness, &of_file.roughness);
     setting(ui, "Roughness", None, value, |ui, roughness| {
@@ -376,10 +376,10 @@ fn material(ui: &mut Ui, object: usize, facts: &Facts<'_>, wishes: &mut Wishes) 
         ui.add(slider.fixed_decimals(2))
     });
     if roughness != shown.roughness {
-        wishes.edit = Some(Edit::MaterialRoughness { material, roughness });
+        commands.push(Command::Edit(Edit::MaterialRoughness { material, roughness }));
     }
     if let Some(waves) = shown.bending_waves() {
-        waves::show(ui, material, (waves, of_file.bending_waves()), wishes);
+        waves::show(ui, material, (waves, of_file.bending_waves()), commands);
     }
     let mut base_colour = shown.base_colour;
     let value = (&mut base_colour, &of_file.base_colour);
@@ -392,10 +392,10 @@ fn material(ui: &mut Ui, object: usize, facts: &Facts<'_>, wishes: &mut Wishes) 
         response
     });
     if base_colour != shown.base_colour {
-        wishes.edit = Some(Edit::MaterialTint {
+        commands.push(Command::Edit(Edit::MaterialTint {
             material,
             base_colour,
-        });
+        }));
     }
 }
 
@@ -411,8 +411,8 @@ fn hand(ui: &mut Ui, present: &mut Hand, own: Hand, (text, name): (&str, &str), 
     }
 }
 
-fn light_hand(ui: &mut Ui, selection: &mut Selection, facts: &Facts<'_>) {
-    let kind = &facts.scene.lights[selection.light].kind;
+fn light_hand(ui: &mut Ui, selection: &mut Selection, model: &Model) {
+    let kind = &model.scene().lights[selection.light].kind;
     let (has_place, has_direction) = (kind.position().is_some(), direction(kind).is_some());
     let why_not = (!has_place && !has_direction).then_some(NO_PLACE);
     row(ui, "By mouse", why_not, |ui| {
@@ -438,14 +438,14 @@ fn light_hand(ui: &mut Ui, selection: &mut Selection, facts: &Facts<'_>) {
 }
 
 /// Offset and turn of an object's node.
-fn place_of_object(ui: &mut Ui, object: usize, facts: &Facts<'_>, wishes: &mut Wishes) {
-    let found = Placement::of(object, facts.loaded, facts.scene);
+fn place_of_object(ui: &mut Ui, object: usize, model: &Model, commands: &mut Vec<Command>) {
+    let found = Placement::of(object, model.loaded(), model.scene());
     let why_not = found.is_none().then_some(NO_TURN);
     let present = found.unwrap_or_default();
     let mut wanted = present;
     let offset_m = (&mut wanted.offset_m, &DVec3::ZERO);
     setting(ui, "Offset [m]", why_not, offset_m, |ui, offset_m| {
-        place(ui, "Offset [m]", offset_m, facts.scene)
+        place(ui, "Offset [m]", offset_m, model.scene())
     });
     // To the digits that are shown: a look at the number changes nothing.
     let present_deg = (present.yaw_rad.to_degrees() * 1e2).round() / 1e2;
@@ -457,6 +457,6 @@ fn place_of_object(ui: &mut Ui, object: usize, facts: &Facts<'_>, wishes: &mut W
         wanted.yaw_rad = turn_deg.to_radians();
     }
     if wanted != present {
-        wishes.edit = Some(wanted.edit(object, facts.loaded));
+        commands.push(Command::Edit(wanted.edit(object, model.loaded())));
     }
 }

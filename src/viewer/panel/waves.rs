@@ -3,7 +3,7 @@
 use egui::{DragValue, Response, Slider, SliderClamping, Ui};
 use glam::DVec3;
 
-use super::Wishes;
+use super::Command;
 use super::bake::FAILED;
 use super::control::setting;
 use crate::scene::waves::STEEPEST_SLOPE;
@@ -14,8 +14,13 @@ const LEAST_HEIGHT_M: f64 = 1e-6;
 /// Slopes nearer than this are the same.
 const SAME_SLOPE: f64 = 1e-9;
 
-/// Shows the waves of a material, with those of the file; what is changed goes to `wishes`.
-pub fn show(ui: &mut Ui, material: usize, (waves, of_file): (&Waves, Option<&Waves>), wishes: &mut Wishes) {
+/// Shows the waves of a material, with those of the file; what is changed goes to `commands`.
+pub fn show(
+    ui: &mut Ui,
+    material: usize,
+    (waves, of_file): (&Waves, Option<&Waves>),
+    commands: &mut Vec<Command>,
+) {
     let mut list = waves.list().to_vec();
     let in_file = of_file.map_or(&[][..], Waves::list);
     slope(ui, &mut list, in_file);
@@ -28,10 +33,10 @@ pub fn show(ui: &mut Ui, material: usize, (waves, of_file): (&Waves, Option<&Wav
     }
     match Waves::new(list) {
         Ok(waves) => {
-            wishes.edit = Some(Edit::MaterialWaves {
+            commands.push(Command::Edit(Edit::MaterialWaves {
                 material,
                 waves: Some(waves),
-            });
+            }));
         }
         Err(why) => {
             ui.colored_label(FAILED, why);

@@ -8,6 +8,7 @@ use nephroid::eye_pass::{ToneMap, View};
 use nephroid::optics::LinearSrgb;
 use nephroid::optics::spectrum::xyz::IDENTITY;
 use nephroid::scene::{Camera, turntable};
+use nephroid::viewer::background::Wake;
 use nephroid::viewer::exporting::{ExportState, Exporter};
 use nephroid::viewer::filming::Shooting;
 
@@ -39,13 +40,13 @@ fn frames_are_written_and_can_be_stopped() {
     let folder = folder();
     let news = Arc::new(AtomicUsize::new(0));
     let of_thread = Arc::clone(&news);
-    let mut exporter = Exporter::new(Arc::new(move || {
+    let mut exporter = Exporter::new(&Wake::new(move || {
         of_thread.fetch_add(1, Ordering::SeqCst);
     }));
     exporter.film(shooting(3), folder.path().to_owned());
-    assert_eq!(*exporter.state(), ExportState::Filming { done: 0, total: 3 });
+    assert_eq!(exporter.state, ExportState::Filming { done: 0, total: 3 });
     wait_for("the film", || exporter.poll());
-    let path = match exporter.state() {
+    let path = match &exporter.state {
         ExportState::Done(path) => path.clone(),
         ExportState::Failed(sentence) if sentence.contains("adapter") => {
             return support::skip("frames from the window", sentence);
@@ -73,8 +74,8 @@ fn frames_are_written_and_can_be_stopped() {
     exporter.stop();
     wait_for("the end", || exporter.poll());
     assert!(
-        matches!(exporter.state(), ExportState::Failed(_)),
+        matches!(exporter.state, ExportState::Failed(_)),
         "{:?}",
-        exporter.state()
+        exporter.state
     );
 }

@@ -1,15 +1,13 @@
 //! The whole panel on small and on dense screens.
 
-use std::sync::Arc;
-
 use egui::accesskit::Role;
 use egui::pos2;
 use glam::DVec3;
 use nephroid::scene::Edit;
 use nephroid::settings::{BakeSettings, Sigma};
+use nephroid::viewer::command::Command;
 
-use super::fixtures::edited;
-use super::headless::{Headless, SCREEN, leak, splats};
+use super::headless::{Headless, SCREEN, splats};
 
 /// As the program opens it, the same on a dense screen, and the smallest.
 const SCREENS: [((f32, f32), f32); 3] = [SCREEN, (SCREEN.0, 2.0), ((700.0, 400.0), 2.0)];
@@ -50,9 +48,13 @@ fn nothing_is_cut_off_or_overlaps() {
                     light: 0,
                     position: DVec3::new(-10.75, -20.125, -30.25),
                 },
-                Edit::object_at(0, &panel.told.loaded.objects[0].mesh, DVec3::splat(-1.125)),
+                Edit::object_at(0, &panel.model.loaded().objects[0].mesh, DVec3::splat(-1.125)),
             ];
-            panel.tell(|told| told.scene = leak(Arc::new(edited(told.scene, &edits))));
+            panel.tell(|model| {
+                for edit in edits {
+                    model.apply(Command::Edit(edit));
+                }
+            });
             panel.choose("Tone map", "ACES");
             panel.click(Role::RadioButton, "caustic");
             panel.assert_layout();

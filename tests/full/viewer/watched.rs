@@ -9,7 +9,7 @@ use nephroid::settings::Estimator;
 use nephroid::viewer::ViewerOptions;
 use nephroid::viewer::files::FilesOptions;
 
-use super::fixtures::{act, bake, folder, model, options, read, until, wish};
+use super::fixtures::{act, bake, change, folder, model, options, read, set, until};
 use super::scene_file;
 
 #[test]
@@ -28,10 +28,11 @@ fn camera_settings_and_edits_stay() {
         material: 1,
         roughness: 0.25,
     };
-    act(&mut model, wish(rough));
+    act(&mut model, change(rough));
     model.navigator.look(DVec2::new(100.0, 30.0));
-    model.panel.settings.seed = 7;
-    model.panel.settings.estimator = Estimator::Photon;
+    set(&mut model, |it| {
+        (it.settings.seed, it.settings.estimator) = (7, Estimator::Photon)
+    });
     bake(&mut model);
     let (gaze, was) = (model.navigator.camera().forward, Arc::clone(model.scene()));
 
@@ -51,7 +52,7 @@ fn camera_settings_and_edits_stay() {
     let times = model.scene().lights[0].kind.strength() / was.lights[0].kind.strength();
     assert!((times - 10.0).abs() < 1e-9, "{times}");
     assert_eq!(model.scene().materials[1].roughness, 0.25, "the edit stays");
-    assert_eq!(model.panel.settings.seed, 7);
+    assert_eq!(model.choices.settings.seed, 7);
     assert!(model.navigator.camera().forward.distance(gaze) < 1e-12);
     let [mesh, before] = [model.scene(), &was].map(|scene| &scene.objects[0].mesh);
     assert!(Arc::ptr_eq(mesh, before), "what is the same is shared");

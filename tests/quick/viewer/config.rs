@@ -42,9 +42,9 @@ fn use_it(model: &mut Model) {
     model.navigator.look(dvec2(40.0, 0.0));
     assert!(model.navigator.set_bookmark(8));
     model.travel(Travel::Orbit);
-    model.panel.settings.seed = 7;
-    model.panel.display.exposure_stops = 1.5;
-    act(model, wish(intensity(0, 5.0)));
+    model.choices.settings.seed = 7;
+    model.choices.display.exposure_stops = 1.5;
+    act(model, change(intensity(0, 5.0)));
 }
 
 fn undoable(model: &Model) -> usize {
@@ -58,15 +58,15 @@ fn what_was_set_is_found_again() {
     use_it(&mut first);
     let Changes { changes, lost } = Changes::between(first.edits().loaded(), first.edits().scene());
     assert_eq!((changes.len(), lost.len()), (1, 0));
-    let (settings, scene) = (first.panel.settings.clone(), Arc::clone(first.scene()));
+    let (settings, scene) = (first.choices.settings.clone(), Arc::clone(first.scene()));
     let views = first.navigator.views();
     // At the end everything is written, however little time passed.
     drop(first);
 
     let mut second = kept.model();
-    assert_eq!(second.panel.settings, settings);
-    near(second.panel.display.exposure_stops, 1.5, 1e-12, "exposure");
-    assert!(second.keeps_exposure());
+    assert_eq!(second.choices.settings, settings);
+    near(second.choices.display.exposure_stops, 1.5, 1e-12, "exposure");
+    assert!(second.exposure_is_kept);
     assert_eq!(second.navigator.travel(), Travel::Orbit);
     assert_eq!(second.scene().lights, scene.lights);
     for (number, bookmark) in views.bookmarks.iter().enumerate() {
@@ -74,12 +74,12 @@ fn what_was_set_is_found_again() {
         assert_eq!(second.navigator.go_to_bookmark(number), bookmark.is_some());
     }
     assert_eq!(undoable(&second), 1);
-    act(&mut second, undo());
+    act(&mut second, vec![Command::Undo]);
     assert_eq!(second.scene().lights, second.edits().loaded().lights);
 
     // Another scene has nothing of it.
     let slab = Arc::new(built_in("slab"));
-    assert!(!kept.other(|options| options.scene = slab).keeps_exposure());
+    assert!(!kept.other(|options| options.scene = slab).exposure_is_kept);
 }
 
 #[test]
@@ -90,13 +90,13 @@ fn what_is_asked_for_comes_first() {
         options.exposure_stops = Some(-2.0);
         options.files.settings_given = true;
     });
-    assert_eq!(asked.panel.settings, kept.options.settings);
-    near(asked.panel.display.exposure_stops, -2.0, 1e-12, "exposure");
+    assert_eq!(asked.choices.settings, kept.options.settings);
+    near(asked.choices.display.exposure_stops, -2.0, 1e-12, "exposure");
     assert_eq!(undoable(&asked), 1, "edits were not asked away");
     // Who only looks around with other settings, or at other maps, takes none of what was kept away.
     let look = |model: &mut Model| {
         model.navigator.look(dvec2(5.0, 5.0));
-        act(model, Wishes::default());
+        act(model, Vec::new());
     };
     look(&mut asked);
     drop(asked);
@@ -105,7 +105,7 @@ fn what_is_asked_for_comes_first() {
     look(&mut looking);
     drop(looking);
     let again = kept.model();
-    assert_eq!((undoable(&again), again.panel.settings.seed), (1, 7));
+    assert_eq!((undoable(&again), again.choices.settings.seed), (1, 7));
     drop(again);
 
     let camera = |model: &Model| {
@@ -127,15 +127,15 @@ fn changes_are_written_within_a_second() {
     let kept = Kept::new();
     let (mut model, file) = (kept.model(), kept.file());
     let now = Instant::now();
-    model.act(&Wishes::default(), now);
+    model.act(Vec::new(), now);
     assert!(!file.exists(), "nothing changed");
-    model.panel.settings.seed = 1;
-    model.act(&Wishes::default(), now);
+    model.choices.settings.seed = 1;
+    model.act(Vec::new(), now);
     assert!(model.due().is_some_and(|due| due <= now + SOON));
     // Changing on does not put it off.
     for tenth in 1..=10 {
-        model.panel.settings.seed = 10 + tenth;
-        model.act(&Wishes::default(), now + SOON * tenth as u32 / 10);
+        model.choices.settings.seed = 10 + tenth;
+        model.act(Vec::new(), now + SOON * tenth as u32 / 10);
     }
     wait_for("the file", || file.exists());
     let text = fs::read_to_string(&file).expect("it is there");
@@ -178,8 +178,8 @@ fn settings_of_other_versions_are_taken() {
     fs::write(kept.file(), value.to_string()).expect("it is written");
     let model = kept.model();
     assert!(model.files.warning.is_none(), "{:?}", model.files.warning);
-    assert_eq!(model.panel.settings.seed, 7);
-    assert_eq!(model.panel.settings.max_depth, kept.options.settings.max_depth);
+    assert_eq!(model.choices.settings.seed, 7);
+    assert_eq!(model.choices.settings.max_depth, kept.options.settings.max_depth);
 }
 
 #[test]
@@ -192,7 +192,7 @@ fn a_scene_that_is_left_is_kept() {
         until(&mut model, "opened", |model| model.scene().name == name);
         assert_eq!(undoable(&model), edits);
         // A new scene is baked as the one before.
-        assert_eq!(model.panel.settings.seed, 7);
+        assert_eq!(model.choices.settings.seed, 7);
     }
     assert_eq!(model.navigator.travel(), Travel::Orbit);
     assert!(model.poll_files().is_none());

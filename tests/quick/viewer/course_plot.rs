@@ -38,7 +38,7 @@ fn plot(panel: &Headless) -> Rect {
 #[test]
 fn target_stands_where_the_forecast_has_it() {
     let panel = panel(towards(0.01));
-    let last = panel.told.last.expect("a level");
+    let last = panel.model.last.as_deref().expect("a level");
     let curve = Curve::new(panel.settings(), last).expect("errors are known");
     let expected = forecast(&last.result.course, 0.01, Estimator::Wavefront);
     assert!(expected.is_some() && curve.target == expected);

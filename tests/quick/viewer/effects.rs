@@ -44,7 +44,7 @@ fn plan_and_rays_are_listed() {
     panel.hover(Role::Label, "light pass: on");
     panel.assert_says(&[Effect::LightPass.description()]);
     let reason = "`ball` is in view of `camera`";
-    panel.tell(|told| told.chains = Some(leak(line(Effect::Chains, true, reason))));
+    panel.tell(|model| model.picture.chains = Some(line(Effect::Chains, true, reason)));
     panel.assert_says(&["chains: on", reason]);
 }
 

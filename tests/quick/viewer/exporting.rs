@@ -1,5 +1,6 @@
 //! Maps written by a thread of their own.
 
+use nephroid::viewer::background::Wake;
 use nephroid::viewer::exporting::{Exporter, folder_name};
 
 use super::fixtures::{map, scene};
@@ -8,16 +9,16 @@ use super::*;
 fn export(what: Export, folder: &Path) -> ExportState {
     let news = Arc::new(AtomicUsize::new(0));
     let of_thread = Arc::clone(&news);
-    let mut exporter = Exporter::new(Arc::new(move || {
+    let mut exporter = Exporter::new(&Wake::new(move || {
         of_thread.fetch_add(1, Ordering::SeqCst);
     }));
-    assert!(!exporter.poll() && *exporter.state() == ExportState::Idle);
+    assert!(!exporter.poll() && exporter.state == ExportState::Idle);
     let mut level = finished(&Arc::new(scene()), &BakeSettings::default());
     level.result.maps = vec![map()];
     exporter.start(what, Arc::new(level), folder.to_owned());
     wait_for("the export", || news.load(Ordering::SeqCst) == 1);
     assert!(exporter.poll() && !exporter.poll(), "it ends once");
-    exporter.state().clone()
+    exporter.state.clone()
 }
 
 /// Caustic and direct light of the last texel, its coordinates beside it.

@@ -3,7 +3,10 @@
 use nephroid::illumination::difference::SignedMap;
 use nephroid::illumination::difference_colours;
 use nephroid::optics::spectrum::{Hue, Xyz, dominant, xyz_bar};
-use nephroid::viewer::{difference_view, error_view, wavelength_view};
+use nephroid::viewer::false_colours::{
+    ERROR_RANGE, RANGE_NM, difference_maps, error_colour, error_maps, has_errors, wavelength_colour,
+    wavelength_maps,
+};
 
 use super::*;
 
@@ -18,20 +21,20 @@ fn errors_show_relative_to_the_mean() {
     // Texels of 4 and 2 W/m² over 1 and 3 m²: the mean is 2.5 W/m².
     let without = caustic(chart(0, 2, 1, vec![1.0, 3.0]), vec![[4.0; 3], [2.0; 3]]);
     let with = with(without.clone(), |it| it.error = Some(vec![0.25, 0.025]));
-    assert!(!error_view::is_available(std::slice::from_ref(&without)));
+    assert!(!has_errors(std::slice::from_ref(&without)));
     let maps = [without, with];
-    assert!(error_view::is_available(&maps));
-    let shown = error_view::maps(&maps);
+    assert!(has_errors(&maps));
+    let shown = error_maps(&maps);
     assert_eq!(shown.len(), 1, "a map without an error is left out");
     assert!(Arc::ptr_eq(&shown[0].chart, &maps[1].chart));
     for (texel, relative) in [(0, 0.1), (1, 0.01)] {
-        assert_shows(&shown[0], texel, error_view::colour(relative));
+        assert_shows(&shown[0], texel, error_colour(relative));
     }
 }
 
 #[test]
 fn error_colours_are_logarithmic_to_their_ends() {
-    let (colour, (low, high)) = (error_view::colour, error_view::RANGE);
+    let (colour, (low, high)) = (error_colour, ERROR_RANGE);
     assert_eq!(colour(0.0), colour(low));
     assert_eq!(colour(1e9), colour(high));
     assert_eq!(colour(f64::NAN), colour(high), "no number is no accuracy");
@@ -52,7 +55,7 @@ fn differences_show_relative_to_the_mean() {
             mean_w_m2,
         }];
         let (with_w, without_w, relative_rmse) = (6.0, 5.1, Some(0.3));
-        difference_view::maps(&Difference {
+        difference_maps(&Difference {
             maps,
             with_w,
             without_w,
@@ -98,15 +101,15 @@ fn texels_show_their_wavelength() {
     let pure = Xyz::from(xyz_bar(Nanometres(530.0))).to_linear_srgb();
     let [green, faint] = [1.0, 1e-5].map(|strength| (pure * strength).to_array().map(|c| c as f32));
     let texels = vec![green, faint, [0.5; 3], [f32::NAN; 3]];
-    let shown = wavelength_view::maps(&[caustic(chart(0, 4, 1, vec![1.0]), texels)])[0].total();
-    let expected = wavelength_view::colour(Nanometres(530.0)).to_array();
+    let shown = wavelength_maps(&[caustic(chart(0, 4, 1, vec![1.0]), texels)])[0].total();
+    let expected = wavelength_colour(Nanometres(530.0)).to_array();
     near(shown[0].map(f64::from), expected, 1e-3, "530 nm");
     assert_eq!(shown[1], [0.0; 3], "dark texels are black");
     assert!(shown[2][0] > 0.0 && shown[2] == [shown[2][0]; 3], "{shown:?}");
     assert!(shown[3][0].is_nan());
     // The legend's colours can be shown, and differ along it.
-    let (low, high) = wavelength_view::RANGE_NM;
-    let colour = |step| wavelength_view::colour(Nanometres(low + (high - low) * f64::from(step) / 12.0));
+    let (low, high) = RANGE_NM;
+    let colour = |step| wavelength_colour(Nanometres(low + (high - low) * f64::from(step) / 12.0));
     for step in 0..=12 {
         let is_shown = |channel: f64| (0.0..=1.0 + 1e-12).contains(&channel);
         assert!(colour(step).to_array().into_iter().all(is_shown));

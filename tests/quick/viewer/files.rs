@@ -1,7 +1,6 @@
 //! Opening scenes while the window is open.
 
-use nephroid::viewer::files::recent::{MOST, Recent};
-use nephroid::viewer::files::{FileFacts, typed};
+use nephroid::viewer::files::{MOST_RECENT as MOST, Recent, typed};
 
 use super::*;
 
@@ -11,7 +10,7 @@ fn model() -> (Model, tempfile::TempDir) {
         event_log: Some(folder.path().join("log")),
         ..options("ring")
     });
-    act(&mut model, wish(intensity(0, 77.0)));
+    act(&mut model, change(intensity(0, 77.0)));
     bake(&mut model);
     (model, folder)
 }
@@ -59,14 +58,14 @@ fn a_refused_file_leaves_all_as_it_was() {
         until(&mut model, "refused", |model| model.files.refusal.is_some());
         let sentence = model.files.refusal.clone().expect("it is refused");
         assert!(sentence.contains(source), "{sentence}");
-        assert!(model.files.facts().loading.is_none());
+        assert!(model.files.loading().is_none());
         assert!(Arc::ptr_eq(model.scene(), &scene));
         assert!(Arc::ptr_eq(model.last.as_ref().expect("it was baked"), &last));
         assert_eq!(model.edits().history().undoable(), 1);
     }
     assert_eq!(opened(&folder), [""; 0]);
     model.open("  ");
-    assert!(model.files.facts().loading.is_none(), "nothing was typed");
+    assert!(model.files.loading().is_none(), "nothing was typed");
 }
 
 #[test]
@@ -119,20 +118,17 @@ fn panel_opens_paths_and_builtin_scenes() {
     assert!(field.width() > 150.0, "a path has room there: {field:?}");
     panel.click_at(field.center());
     panel.type_text("x.glb");
-    assert_eq!(panel.wishes.open.take().as_deref(), Some("x.glb"));
+    assert_eq!(panel.asked(), [Command::Open("x.glb".into())]);
     panel.press("Built-in");
     panel.press("slab");
-    assert_eq!(panel.wishes.open.take().as_deref(), Some("builtin:slab"));
+    assert_eq!(panel.asked(), [Command::Open("builtin:slab".into())]);
     panel.press("Open…");
-    assert!(panel.wishes.browse && panel.wishes.open.is_none());
+    assert_eq!(panel.asked(), [Command::Browse]);
     assert!(!panel.says("The graphics device was lost"));
-    panel.tell(|told| {
-        told.lost_device = true;
-        told.files = FileFacts {
-            loading: Some("y.glb"),
-            refusal: Some("y.glb: is no scene"),
-            ..FileFacts::default()
-        };
+    panel.tell(|model| {
+        model.picture.lost_device = true;
+        model.open("y.glb");
+        model.files.refusal = Some("y.glb: is no scene".into());
     });
     panel.assert_says(&[
         "loading y.glb …",

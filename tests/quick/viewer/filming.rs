@@ -126,38 +126,41 @@ fn tours_lead_past_all_cameras_and_back() {
     let mut panel = Headless::with_scene(scene, BakeSettings::splat(), ((1280.0, 1800.0), 1.0));
     panel.open("Camera path");
     panel.press("Tour");
-    assert_eq!(panel.wishes.film.take(), Some(FilmWish::Tour));
+    assert_eq!(panel.asked(), [Command::Film(FilmCommand::Tour)]);
 }
 
 #[test]
 fn buttons_record_play_and_film() {
     let mut panel = Headless::new(BakeSettings::splat());
     panel.open("Camera path");
-    let wish = |panel: &mut Headless, name: &str| {
+    let asked = |panel: &mut Headless, name: &str| {
         panel.press(name);
-        panel.wishes.film.take()
+        panel.asked().pop()
     };
-    assert_eq!(wish(&mut panel, "Play"), None, "there is nothing to be played");
-    assert_eq!(wish(&mut panel, "Tour"), None, "nor is there a camera");
-    assert_eq!(wish(&mut panel, "Add key"), Some(FilmWish::Record(None)));
-    panel.panel.film = film();
+    assert_eq!(asked(&mut panel, "Play"), None, "there is nothing to be played");
+    assert_eq!(asked(&mut panel, "Tour"), None, "nor is there a camera");
+    assert_eq!(
+        asked(&mut panel, "Add key"),
+        Some(Command::Film(FilmCommand::Record(None)))
+    );
+    panel.model.choices.film = film();
     panel.settle();
     panel.assert_says(&["2 keys, 4.0 s"]);
     for (name, expected) in [
-        ("Play", FilmWish::Play(true)),
-        ("Key 1: go", FilmWish::GoTo(0)),
-        ("Key 2: set", FilmWish::Record(Some(1))),
-        ("Save path", FilmWish::Save),
-        ("Export frames", FilmWish::Shoot { turns: false }),
-        ("Export turntable", FilmWish::Shoot { turns: true }),
+        ("Play", FilmCommand::Play(true)),
+        ("Key 1: go", FilmCommand::GoTo(0)),
+        ("Key 2: set", FilmCommand::Record(Some(1))),
+        ("Save path", FilmCommand::Save),
+        ("Export frames", FilmCommand::Shoot { turns: false }),
+        ("Export turntable", FilmCommand::Shoot { turns: true }),
     ] {
-        assert_eq!(wish(&mut panel, name), Some(expected), "{name}");
+        assert_eq!(asked(&mut panel, name), Some(Command::Film(expected)), "{name}");
     }
-    panel.tell(|told| told.export = &ExportState::Filming { done: 3, total: 120 });
+    panel.tell(|model| model.exporter.state = ExportState::Filming { done: 3, total: 120 });
     panel.assert_says(&["3 of 120 frames"]);
-    assert_eq!(wish(&mut panel, "Stop"), Some(FilmWish::Stop));
-    assert_eq!(wish(&mut panel, "Export frames"), None, "one at a time");
+    assert_eq!(asked(&mut panel, "Stop"), Some(Command::Film(FilmCommand::Stop)));
+    assert_eq!(asked(&mut panel, "Export frames"), None, "one at a time");
     panel.press("Key 1: delete");
-    assert_eq!(panel.panel.film.keys, film().keys[1..]);
-    assert_eq!(wish(&mut panel, "Save path"), None, "one key is no path");
+    assert_eq!(panel.model.choices.film.keys, film().keys[1..]);
+    assert_eq!(asked(&mut panel, "Save path"), None, "one key is no path");
 }

@@ -11,9 +11,10 @@ use nephroid::scene::{Edit, Light, LightKind, LoadOptions, Scene, load};
 use nephroid::settings::{BakeSettings, LayerKind, MapResolution};
 use nephroid::units::{Flux, Irradiance, RadiantIntensity};
 use nephroid::viewer::ViewerOptions;
+use nephroid::viewer::background::Wake;
+use nephroid::viewer::command::{Choices, Command};
 use nephroid::viewer::files::FilesOptions;
 use nephroid::viewer::model::Model;
-use nephroid::viewer::panel::Wishes;
 use nephroid::viewer::worker::BakedLevel;
 use support::scenes::map_of;
 use tempfile::TempDir;
@@ -98,12 +99,25 @@ pub fn folder() -> TempDir {
 }
 
 pub fn model(options: &ViewerOptions) -> Model {
-    Model::new(options, || ()).expect("threads are to be had")
+    Model::new(options, &Wake::new(|| ())).expect("threads are to be had")
 }
 
-/// One frame.
-pub fn act(model: &mut Model, wishes: Wishes) {
-    model.act(&wishes, Instant::now());
+/// One frame, with the mouse up.
+pub fn act(model: &mut Model, mut commands: Vec<Command>) {
+    commands.push(Command::Release);
+    model.act(commands, Instant::now());
+}
+
+/// One frame in which something is set.
+pub fn set(model: &mut Model, set: impl FnOnce(&mut Choices)) {
+    let command = chosen(model, set);
+    act(model, vec![command]);
+}
+
+pub fn chosen(model: &Model, set: impl FnOnce(&mut Choices)) -> Command {
+    let mut choices = model.choices.clone();
+    set(&mut choices);
+    Command::Choose(Box::new(choices))
 }
 
 /// Frames until something is so.
@@ -113,7 +127,7 @@ pub fn until(model: &mut Model, what: &str, is_so: impl Fn(&Model) -> bool) {
     while !is_so(model) {
         model.poll_files();
         model.poll();
-        act(model, Wishes::default());
+        act(model, Vec::new());
         assert!(start.elapsed() < PATIENCE, "waited in vain: {what}");
         std::thread::sleep(Duration::from_millis(1));
     }
@@ -125,27 +139,12 @@ pub fn bake(model: &mut Model) {
     until(model, "the bake", |model| {
         let is_of_scene = |last: &BakedLevel| Arc::ptr_eq(&last.request.scene, model.scene());
         let last = model.last.as_deref().filter(|last| last.is_final);
-        !model.state().is_working() && last.is_some_and(is_of_scene)
+        !model.state.is_working() && last.is_some_and(is_of_scene)
     });
 }
 
-/// What a frame asks for.
-fn wishes(set: impl FnOnce(&mut Wishes)) -> Wishes {
-    let mut wishes = Wishes::default();
-    set(&mut wishes);
-    wishes
-}
-
-pub fn wish(edit: Edit) -> Wishes {
-    wishes(|wishes| wishes.edit = Some(edit))
-}
-
-pub fn undo() -> Wishes {
-    wishes(|wishes| wishes.undo = true)
-}
-
-pub fn redo() -> Wishes {
-    wishes(|wishes| wishes.redo = true)
+pub fn change(edit: Edit) -> Vec<Command> {
+    vec![Command::Edit(edit)]
 }
 
 pub fn intensity(light: usize, value: f64) -> Edit {

@@ -1,7 +1,7 @@
 //! The graph of what pictures took on the graphics device.
 
-use nephroid::viewer::frame_times::{FrameTimes, PICTURES};
 use nephroid::viewer::panel::frame_graph::{columns, scale_ms};
+use nephroid::viewer::timing::{FrameTimes, PICTURES};
 
 use super::*;
 
@@ -19,7 +19,7 @@ fn of<const N: usize>(pictures: [[f64; 3]; N]) -> FrameTimes {
 
 fn panel(times: Option<FrameTimes>) -> Headless {
     let mut panel = Headless::new(BakeSettings::default());
-    panel.tell(|told| told.frame_times = times.map(|times| leak(times) as &_));
+    panel.tell(|model| model.picture.frame_times = times);
     panel.open_part("Frame time");
     panel
 }
@@ -74,7 +74,7 @@ fn newest_time_is_told_in_numbers() {
     let rect = panel.named(Role::Image, graph).rect();
     assert!(Headless::is_inside(rect) && rect.width() > 250.0 && rect.height() > 40.0);
     // The section stays open though its title is another.
-    panel.tell(|told| told.frame_times = Some(leak(of([[0.5, 0.0, 0.25]]))));
+    panel.tell(|model| model.picture.frame_times = Some(of([[0.5, 0.0, 0.25]])));
     panel.assert_says(&["Frame time (0.75 ms)", "specular 0.00"]);
 }
 

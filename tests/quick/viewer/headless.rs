@@ -8,16 +8,15 @@ use egui::accesskit::Role;
 use egui::{Event, Key, Pos2, Rect, Vec2, vec2};
 use egui_kittest::kittest::NodeT as _;
 use egui_kittest::{Harness, Node};
+use nephroid::illumination::IlluminationMap;
 use nephroid::plan::EffectPlan;
 use nephroid::scene::{Edit, Scene};
 use nephroid::session::{BakeCounts, BakeResult, StopReason, Timings};
 use nephroid::settings::{BakeSettings, LayerKind};
-use nephroid::viewer::exporting::ExportState;
-use nephroid::viewer::files::FileFacts;
-use nephroid::viewer::latency::Latencies;
-use nephroid::viewer::navigation::Travel;
-use nephroid::viewer::panel::{Facts, Panel, WIDTH, Wishes, set_style};
-use nephroid::viewer::views::MapSurvey;
+use nephroid::viewer::ViewerOptions;
+use nephroid::viewer::command::Command;
+use nephroid::viewer::model::Model;
+use nephroid::viewer::panel::{Panel, WIDTH, set_style};
 use nephroid::viewer::worker::{BakeRequest, BakeState, BakedLevel};
 
 use super::fixtures;
@@ -27,59 +26,50 @@ pub const LEFT: f32 = 8.0;
 /// A window as the program opens it [points], and pixels per point.
 pub const SCREEN: ((f32, f32), f32) = ((1280.0, 720.0), 1.0);
 
-/// What the panel is told, and what was pressed since the start.
+/// The panel of a window that bakes nothing.
 pub struct Desk {
     pub panel: Panel,
-    pub told: Facts<'static>,
-    pub wishes: Wishes,
-}
-
-/// What a panel is told lives as long as the test.
-pub fn leak<T>(value: T) -> &'static T {
-    Box::leak(Box::new(value))
+    pub model: Model,
+    /// What was asked for, but for what is set at once.
+    asked: Vec<Command>,
 }
 
 impl Desk {
     fn new(scene: Scene, settings: BakeSettings) -> Self {
-        let scene = leak(Arc::new(scene));
-        let told = Facts {
-            scene,
-            loaded: scene,
-            undo: None,
-            redo: None,
-            refusal: None,
-            state: &BakeState::Idle,
-            last: None,
-            maps: &[],
-            export: &ExportState::Idle,
-            layers: &[LayerKind::Caustic, LayerKind::Direct],
-            survey: leak(MapSurvey::default()),
-            reference: None,
-            probed: None,
-            sketch: None,
-            is_playing: false,
-            film_told: None,
-            has_errors: false,
-            worth: None,
-            chains: None,
-            frame_times: None,
-            latencies: leak(Latencies::default()),
-            travel: Travel::Fly,
-            speed_m_per_s: 1.0,
-            lost_device: false,
-            files: FileFacts::default(),
-            adapter: "no adapter",
-        };
+        let model = fixtures::model(&ViewerOptions {
+            scene: Arc::new(scene),
+            settings,
+            maps: Some(vec![lit()]),
+            ..fixtures::options("ring")
+        });
         Self {
-            panel: Panel::new(settings),
-            told,
-            wishes: Wishes::default(),
+            panel: Panel::default(),
+            model,
+            asked: Vec::new(),
         }
     }
 
     fn show(&mut self, ui: &mut egui::Ui) {
-        let wishes = self.panel.show(ui, &self.told);
-        self.wishes = std::mem::take(&mut self.wishes).and(wishes);
+        for command in self.panel.show(ui, &self.model) {
+            match command {
+                Command::Choose(_) => drop(self.model.apply(command)),
+                Command::Release => {}
+                _ => self.asked.push(command),
+            }
+        }
+    }
+
+    /// What was asked for since this was called last.
+    pub fn asked(&mut self) -> Vec<Command> {
+        std::mem::take(&mut self.asked)
+    }
+}
+
+/// A map whose error nobody knows.
+fn lit() -> IlluminationMap {
+    IlluminationMap {
+        error: None,
+        ..fixtures::map()
     }
 }
 
@@ -177,36 +167,40 @@ impl Headless {
     }
 
     pub fn settings(&self) -> &BakeSettings {
-        &self.panel.settings
+        &self.model.choices.settings
     }
 
     /// The last edit that was asked for.
     pub fn edit(&mut self) -> Option<Edit> {
-        self.wishes.edit.take()
+        let edit = |command| match command {
+            Command::Edit(edit) => Some(edit),
+            _ => None,
+        };
+        self.asked().into_iter().rev().find_map(edit)
     }
 
     /// Makes that edit of the scene, as the window does.
-    pub fn apply(&mut self) -> &'static Scene {
+    pub fn apply(&mut self) -> Arc<Scene> {
         let edit = self.edit().expect("an edit was asked for");
-        let edited = edit.apply(self.told.scene).expect("the edit is possible").0;
-        self.tell(|told| told.scene = leak(Arc::new(edited)));
-        self.told.scene
+        self.tell(|model| drop(model.apply(Command::Edit(edit))));
+        assert_eq!(self.model.refusal, None);
+        Arc::clone(self.model.scene())
     }
 
-    /// Tells the panel something new.
-    pub fn tell(&mut self, set: impl FnOnce(&mut Facts<'static>)) {
-        set(&mut self.told);
+    /// Something is new.
+    pub fn tell(&mut self, set: impl FnOnce(&mut Model)) {
+        set(&mut self.model);
         self.settle();
     }
 
     /// A bake of the panel's settings has ended with this.
     pub fn tell_level(&mut self, set: impl FnOnce(&mut BakedLevel)) {
-        let mut last = finished(self.told.scene, self.settings());
+        let mut last = finished(self.model.scene(), self.settings());
+        last.result.maps = vec![lit()];
         set(&mut last);
-        self.tell(|told| {
-            let last = leak(last);
-            (told.last, told.maps) = (Some(last), &last.result.maps);
-            told.state = &BakeState::Done;
+        self.tell(|model| {
+            model.last = Some(Arc::new(last));
+            model.state = BakeState::Done;
         });
     }
 
@@ -393,6 +387,19 @@ pub const SECTIONS: [(&str, &[&str]); 10] = [
     ("Compare", &[]),
 ];
 
+/// Changes the power of the first light three times, and takes the last back: it is as it was, with something to undo and
+/// to redo.
+pub fn edit_power(model: &mut Model) {
+    let strength = model.scene().lights[0].kind.strength();
+    for times in [2.0, 1.0, 3.0] {
+        let edit = fixtures::intensity(0, times * strength);
+        for command in [Command::Edit(edit), Command::Release] {
+            model.apply(command);
+        }
+    }
+    model.apply(Command::Undo);
+}
+
 /// Settings of the splat estimator: they grey no control.
 pub fn splats() -> BakeSettings {
     BakeSettings {
@@ -405,11 +412,8 @@ impl Headless {
     /// After a bake of [`fixtures::scene`], with something to undo and to redo.
     pub fn baked(settings: BakeSettings, screen: ((f32, f32), f32)) -> Self {
         let mut panel = Self::with_scene(fixtures::scene(), settings, screen);
+        panel.tell(edit_power);
         panel.tell_level(|last| last.result.maps = vec![fixtures::map()]);
-        panel.tell(|told| {
-            (told.undo, told.redo) = (Some("sigma"), Some("power of `lamp`"));
-            (told.layers, told.has_errors) = (&LayerKind::ALL, true);
-        });
         panel
     }
 

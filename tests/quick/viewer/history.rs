@@ -1,8 +1,6 @@
 //! One history of settings, display, camera path and scene.
 
-use nephroid::viewer::panel::Panel;
-
-use super::fixtures::redo;
+use super::fixtures::chosen;
 use super::*;
 
 /// A window that bakes nothing by itself, with its event log.
@@ -14,22 +12,8 @@ fn model() -> (Model, tempfile::NamedTempFile) {
         event_log: Some(log.path().to_owned()),
         ..options("ring")
     });
-    model.panel.automatic = false;
+    model.choices.automatic = false;
     (model, log)
-}
-
-fn change(model: &mut Model, is_dragging: bool, change: impl FnOnce(&mut Panel)) {
-    let before = (model.panel.settings.clone(), model.panel.display);
-    change(&mut model.panel);
-    let changed = Some(Box::new(before));
-    act(
-        model,
-        Wishes {
-            changed,
-            is_dragging,
-            ..Wishes::default()
-        },
-    );
 }
 
 fn next(model: &Model) -> (Option<&str>, Option<&str>) {
@@ -40,36 +24,34 @@ fn next(model: &Model) -> (Option<&str>, Option<&str>) {
 #[test]
 fn all_changes_are_undone_in_one_order() {
     let (mut model, log) = model();
-    let (settings, scene) = (model.panel.settings.clone(), Arc::clone(model.scene()));
+    let (settings, scene) = (model.choices.settings.clone(), Arc::clone(model.scene()));
     let power = format!("power of `{}`", scene.lights[0].name);
     let order = ["sigma", &power, "tone map"];
-    change(&mut model, false, |panel| {
-        panel.settings.sigma = Sigma::Constant(4.0)
-    });
-    act(&mut model, wish(intensity(0, 7.0)));
+    set(&mut model, |it| it.settings.sigma = Sigma::Constant(4.0));
+    act(&mut model, change(intensity(0, 7.0)));
     let edited = Arc::clone(model.scene());
-    change(&mut model, false, |panel| panel.display.tone_map = ToneMap::Aces);
+    set(&mut model, |it| it.display.tone_map = ToneMap::Aces);
     // A change of the window's own, which no undo takes back.
-    model.panel.display.exposure_stops = 3.5;
+    model.choices.display.exposure_stops = 3.5;
 
     for (index, what) in order.iter().enumerate().rev() {
         assert_eq!(next(&model), (Some(*what), order.get(index + 1).copied()));
-        act(&mut model, undo());
+        act(&mut model, vec![Command::Undo]);
     }
     assert_eq!(next(&model), (None, Some("sigma")));
-    act(&mut model, undo());
-    assert_eq!(model.panel.display.tone_map, Display::default().tone_map);
-    assert_eq!(model.panel.display.exposure_stops, 3.5);
+    act(&mut model, vec![Command::Undo]);
+    assert_eq!(model.choices.display.tone_map, Display::default().tone_map);
+    assert_eq!(model.choices.display.exposure_stops, 3.5);
     assert_eq!(model.scene().lights, scene.lights);
-    assert_eq!(model.panel.settings, settings);
+    assert_eq!(model.choices.settings, settings);
 
     for what in order {
         assert_eq!(next(&model).1, Some(what));
-        act(&mut model, redo());
+        act(&mut model, vec![Command::Redo]);
     }
-    assert_eq!(model.panel.settings.sigma, Sigma::Constant(4.0));
+    assert_eq!(model.choices.settings.sigma, Sigma::Constant(4.0));
     assert_eq!(model.scene().lights, edited.lights);
-    assert_eq!(model.panel.display.tone_map, ToneMap::Aces);
+    assert_eq!(model.choices.display.tone_map, ToneMap::Aces);
     assert_eq!(next(&model), (Some("tone map"), None));
 
     let mut logged = events(log.path());
@@ -82,32 +64,27 @@ fn all_changes_are_undone_in_one_order() {
 fn camera_path_and_automatic_are_undone() {
     let (mut model, _log) = model();
     for _ in 0..2 {
-        let film = Some(FilmWish::Record(None));
-        act(&mut model, with(Wishes::default(), |it| it.film = film));
+        act(&mut model, vec![Command::Film(FilmCommand::Record(None))]);
     }
-    let before = model.panel.film.clone();
+    let before = model.choices.film.clone();
     assert_eq!(before.keys.len(), 2);
-    model.panel.film.keys.remove(0);
-    model.panel.automatic = true;
-    let changed = Wishes {
-        changed_film: Some(Box::new(before.clone())),
-        changed_automatic: true,
-        ..Wishes::default()
-    };
-    act(&mut model, changed);
+    set(&mut model, |it| {
+        it.film.keys.remove(0);
+        it.automatic = true;
+    });
     assert_eq!(next(&model), (Some("automatic"), None));
-    act(&mut model, undo());
-    assert!(!model.panel.automatic);
+    act(&mut model, vec![Command::Undo]);
+    assert!(!model.choices.automatic);
     for left in [2, 1, 0] {
-        act(&mut model, undo());
-        assert_eq!(model.panel.film.keys, before.keys[..left]);
+        act(&mut model, vec![Command::Undo]);
+        assert_eq!(model.choices.film.keys, before.keys[..left]);
     }
     assert_eq!(next(&model), (None, Some("keys of the camera's path")));
     for _ in 0..4 {
-        act(&mut model, redo());
+        act(&mut model, vec![Command::Redo]);
     }
-    assert_eq!(model.panel.film.keys, before.keys[1..]);
-    assert!(model.panel.automatic);
+    assert_eq!(model.choices.film.keys, before.keys[1..]);
+    assert!(model.choices.automatic);
 }
 
 #[test]
@@ -115,24 +92,23 @@ fn a_drag_is_one_step() {
     let (mut model, _log) = model();
     for drag in [&[2.0, 3.0, 4.0][..], &[5.0]] {
         for value in drag {
-            change(&mut model, true, |panel| {
-                panel.settings.sigma = Sigma::Constant(*value)
-            });
+            let command = chosen(&model, |it| it.settings.sigma = Sigma::Constant(*value));
+            model.act(vec![command], Instant::now());
         }
-        act(&mut model, Wishes::default());
+        act(&mut model, Vec::new());
     }
     assert_eq!(model.edits().history().undoable(), 2);
-    for (step, sigma) in [(undo(), 4.0), (undo(), 1.0), (redo(), 4.0)] {
-        act(&mut model, step);
-        assert_eq!(model.panel.settings.sigma, Sigma::Constant(sigma));
+    for (step, sigma) in [(Command::Undo, 4.0), (Command::Undo, 1.0), (Command::Redo, 4.0)] {
+        act(&mut model, vec![step]);
+        assert_eq!(model.choices.settings.sigma, Sigma::Constant(sigma));
     }
     // Another change forgets what was undone.
-    change(&mut model, false, |panel| {
-        panel.settings.effects.set(Effect::Refraction, EffectSwitch::Off)
+    set(&mut model, |it| {
+        it.settings.effects.set(Effect::Refraction, EffectSwitch::Off)
     });
     assert_eq!(next(&model), (Some("effects"), None));
-    act(&mut model, redo());
-    assert_eq!(model.panel.settings.sigma, Sigma::Constant(4.0));
+    act(&mut model, vec![Command::Redo]);
+    assert_eq!(model.choices.settings.sigma, Sigma::Constant(4.0));
 
     // A thousand steps are kept.
     let mut edits = EditedScene::new(options("ring").scene);

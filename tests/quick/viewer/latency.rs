@@ -1,6 +1,6 @@
 //! From events to frames: what is reported is never shorter than what a person waited.
 
-use nephroid::viewer::latency::{Latencies, Percentiles};
+use nephroid::viewer::timing::{Latencies, Percentiles};
 
 use super::*;
 

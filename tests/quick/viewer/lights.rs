@@ -224,15 +224,15 @@ fn brightest_texel_is_found_where_it_lies() {
 fn window_adds_a_light_and_tells_the_brightest() {
     let mut model = fixtures::model(&with(options("ring"), |it| it.exposure_stops = Some(0.0)));
     let before = model.scene().lights.len();
-    let wish = with(Wishes::default(), |it| it.new_light = Some(NewLight::Spot));
-    act(&mut model, wish);
+    let asked = vec![Command::AddLight(NewLight::Spot)];
+    act(&mut model, asked);
     until(&mut model, "the light", |model| {
         model.scene().lights.len() > before
     });
     assert_eq!(model.edits().history().next_undo(), Some("`spot`, a new light"));
     bake(&mut model);
-    let wish = with(Wishes::default(), |it| it.brightest = true);
-    act(&mut model, wish);
+    let asked = vec![Command::Brightest];
+    act(&mut model, asked);
     until(&mut model, "the answer", |model| {
         model.probed().is_some_and(|probed| probed.explanation.is_some())
     });

@@ -2,7 +2,6 @@
 
 mod config;
 mod course_plot;
-mod debounce;
 mod effects;
 mod exporting;
 mod exposure;
@@ -53,18 +52,18 @@ use nephroid::scene::load::save;
 use nephroid::session::StopReason;
 use nephroid::settings::{Estimator, LEAST_MAX_ERROR, Sigma};
 use nephroid::viewer::ViewerOptions;
-use nephroid::viewer::debounce::QUIET;
+use nephroid::viewer::command::{Choices, Command, CompareCommand, FilmCommand};
 use nephroid::viewer::edits::EditedScene;
 use nephroid::viewer::exporting::{Export, ExportState};
 use nephroid::viewer::gizmo::Held;
-use nephroid::viewer::model::Model;
+use nephroid::viewer::model::{Model, QUIET};
 use nephroid::viewer::navigation::Travel;
 use nephroid::viewer::new_light::NewLight;
-use nephroid::viewer::panel::{Display, FilmWish, LayerShown, Quantity, Wishes};
+use nephroid::viewer::panel::{Display, LayerShown, Quantity};
 use nephroid::viewer::placement::Placement;
 use nephroid::viewer::worker::{BakeState, BakedLevel};
 
 use crate::prelude::*;
-use fixtures::{act, bake, chart, edited, events, folder, intensity, options, undo, until, wait_for, wish};
-use headless::{Headless, finished, leak, splats};
+use fixtures::{act, bake, change, chart, edited, events, folder, intensity, options, set, until, wait_for};
+use headless::{Headless, finished, splats};
 use support::scenes::map_of as caustic;

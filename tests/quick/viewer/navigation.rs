@@ -1,8 +1,7 @@
 //! The camera: flying, on foot and in orbit, among boxes whose surfaces are known exactly.
 
 use nephroid::viewer::navigation::{BOOKMARKS, HeldKeys, Navigator};
-use nephroid::viewer::solid::Solid;
-use nephroid::viewer::walking::{EYE_M, SPEED_M_PER_S};
+use nephroid::viewer::walking::{EYE_M, SPEED_M_PER_S, Solid};
 
 use super::*;
 

@@ -6,10 +6,10 @@ use egui::Pos2;
 use nephroid::eye_pass::WhiteBalance;
 use nephroid::light_pass::ledger::{CarriedFlux, EnergyLedger, LightLedger, Truncated};
 use nephroid::settings::{Footprint, ItemBufferKind, Kernel, Preset, RayPlacement};
-use nephroid::viewer::panel::accuracy::preset;
+use nephroid::viewer::panel::accuracy::target::preset_of;
 
 use super::headless::Gesture::{Check, Choose, Drag, Radio, Type};
-use super::headless::{Gesture, SCREEN, SECTIONS};
+use super::headless::{Gesture, SCREEN, SECTIONS, edit_power};
 use super::*;
 
 /// The smallest window, on a dense screen.
@@ -56,8 +56,8 @@ fn controls_set_what_they_name() {
         set(&mut expected);
         assert_eq!(*panel.settings(), expected, "{gesture:?}");
     }
-    let (before, _) = *panel.wishes.changed.take().expect("it was changed");
-    assert_eq!(before.max_depth, None, "what was before is told");
+    panel.tell(|model| drop(model.apply(Command::Undo)));
+    assert_eq!(panel.settings().max_depth, None, "what was before is known");
 }
 
 #[test]
@@ -125,13 +125,13 @@ fn display_controls_set_the_display() {
     for (gesture, is_set) in rows {
         panel.make(gesture);
         assert!(
-            is_set(&panel.panel.display),
+            is_set(&panel.model.choices.display),
             "{gesture:?}: {:?}",
-            panel.panel.display
+            panel.model.choices.display
         );
     }
     panel.press("Auto");
-    assert!(panel.wishes.measure_exposure);
+    assert_eq!(panel.asked(), [Command::MeasureExposure]);
     assert_eq!(*panel.settings(), splats(), "no bake depends on it");
 }
 
@@ -175,21 +175,21 @@ fn presets_are_told_from_custom() {
     for of in [Preset::Draft, Preset::Final, Preset::Preview] {
         panel.choose("Preset", of.name());
         assert_eq!(panel.settings().max_error, Some(of.max_error()));
-        assert_eq!(preset::of(panel.settings()), Some(of));
+        assert_eq!(preset_of(panel.settings()), Some(of));
         shows(&panel, of.name());
     }
     panel.type_into("Max error [%]", "0.5");
     shows(&panel, "custom");
     panel.press("Reset Max error [%]");
-    assert_eq!(preset::of(panel.settings()), Some(Preset::Preview));
+    assert_eq!(preset_of(panel.settings()), Some(Preset::Preview));
     panel.choose("Map size [texels]", "256");
-    assert_eq!(preset::of(panel.settings()), None);
+    assert_eq!(preset_of(panel.settings()), None);
 
     let mut panel = Headless::new(splats());
     panel.choose("Preset", "final");
     let set = panel.settings();
     assert_eq!((set.density_per_sr, set.max_error), (800_000.0, None));
-    assert_eq!(preset::of(set), Some(Preset::Final));
+    assert_eq!(preset_of(set), Some(Preset::Final));
 }
 
 #[test]
@@ -206,7 +206,7 @@ fn looking_changes_nothing() {
         panel.move_to(pos2(250.0, y as f32));
     }
     assert_eq!(*panel.settings(), odd);
-    assert!(panel.says("300 × 7") && panel.wishes.changed.is_none());
+    assert!(panel.says("300 × 7") && panel.model.edits().history().undoable() == 0);
 }
 
 #[test]
@@ -235,16 +235,16 @@ fn what_means_nothing_cannot_be_set() {
     }
 
     // What was not baked or estimated cannot be shown.
-    panel.tell(|told| told.layers = &[LayerKind::Caustic]);
+    panel.tell(|model| model.given[0].layers.truncate(1));
     for (layer, shown) in [
         ("direct", LayerShown::All),
         ("caustic", LayerShown::Only(caustic)),
     ] {
         panel.make(Radio(layer));
-        assert_eq!(panel.panel.display.layer, shown);
+        assert_eq!(panel.model.choices.display.layer, shown);
     }
     panel.choose("View", "error");
-    assert_eq!(panel.panel.display.quantity, Quantity::Light);
+    assert_eq!(panel.model.choices.display.quantity, Quantity::Light);
     panel.click(Role::ComboBox, "View");
     panel.move_to(panel.named(Role::Button, "error").rect().center());
     panel.settle();
@@ -254,37 +254,37 @@ fn what_means_nothing_cannot_be_set() {
     let sentence = panel.settings().validate().expect_err("negative").to_string();
     panel.assert_says(&[&sentence]);
     panel.press("Re-bake");
-    assert!(!panel.wishes.rebake);
+    assert_eq!(panel.asked(), []);
 }
 
 #[test]
 fn buttons_tell_what_was_pressed() {
-    let mut panel = panel();
+    let mut panel = Headless::with_scene(fixtures::scene(), splats(), ((1280.0, 1800.0), 1.0));
     for name in ["Cancel", "Undo (Ctrl+Z)", "Redo (Ctrl+Y)"] {
         assert!(panel.is_disabled(Role::Button, name), "{name}");
     }
     panel.press("Re-bake");
-    assert!(panel.wishes.rebake && !panel.wishes.cancel && !panel.wishes.measure_exposure);
-    panel.tell(|told| {
-        told.state = leak(BakeState::Baking {
+    assert_eq!(panel.asked(), [Command::Rebake]);
+    panel.tell(|model| {
+        model.state = BakeState::Baking {
             stage: Stage::Caustic,
             fraction: 0.25,
             since: Instant::now(),
-        });
-        (told.undo, told.redo) = (Some("power of `lamp`"), Some("sigma"));
-        told.refusal = Some("light `lamp`: no; yes");
+        };
+        edit_power(model);
+        model.refusal = Some("light `lamp`: no; yes".into());
     });
     panel.assert_says(&["caustic 25 %", "light `lamp`: no; yes"]);
-    panel.press("Cancel");
-    assert!(panel.wishes.cancel && panel.panel.automatic);
-    panel.make(Check("automatic"));
-    assert!(!panel.panel.automatic);
     panel.hover(Role::Button, "Undo (Ctrl+Z)");
     panel.assert_says(&["Takes back: power of `lamp`"]);
     panel.press("Undo (Ctrl+Z)");
-    assert!(panel.wishes.undo && !panel.wishes.redo);
+    assert_eq!(panel.asked(), [Command::Undo]);
     panel.press("Redo (Ctrl+Y)");
-    assert!(panel.wishes.redo);
+    assert_eq!(panel.asked(), [Command::Redo]);
+    panel.press("Cancel");
+    assert!(panel.asked() == [Command::Cancel] && panel.model.choices.automatic);
+    panel.make(Check("automatic"));
+    assert!(!panel.model.choices.automatic);
 }
 
 #[test]
@@ -295,12 +295,12 @@ fn states_are_told_in_words() {
         (BakeState::Failed(failed.into()), failed),
         (BakeState::Cancelled, "Cancelled"),
     ] {
-        panel.tell(|told| told.state = leak(state));
+        panel.tell(|model| model.state = state);
         panel.assert_says(&[sentence]);
     }
     panel.tell_level(|_| {});
     panel.assert_says(&["the maps belong to these settings"]);
-    panel.panel.settings.seed = 7;
+    panel.model.choices.settings.seed = 7;
     panel.settle();
     panel.assert_says(&["Settings changed since the last bake"]);
     for (is_final, error, told) in [
@@ -363,10 +363,10 @@ fn maps_are_listed_read_and_exported() {
     panel.open("Maps");
     panel.assert_says(&["4 × 2 texels, 448 B, error 2.1 %"]);
     panel.press("Export map of floor");
-    assert_eq!(panel.wishes.export.take(), Some(Export::Map(0)));
+    assert_eq!(panel.asked(), [Command::Export(Export::Map(0))]);
     panel.press("Export all");
     let all = Export::All("nephroid-test-maps".into());
-    assert_eq!(panel.wishes.export.take(), Some(all));
+    assert_eq!(panel.asked(), [Command::Export(all)]);
 
     panel.press("Map of floor");
     let canvas = panel.named(Role::Image, "Map, large").rect();
@@ -397,16 +397,16 @@ fn exports_tell_how_they_got_on() {
     panel.click(Role::TextInput, "Maps folder");
     panel.type_text("elsewhere");
     panel.press("Export maps");
-    let wish = panel.wishes.export.take();
-    assert_eq!(wish, Some(Export::All("elsewhere".into())));
+    let all = Export::All("elsewhere".into());
+    assert_eq!(panel.asked(), [Command::Export(all)]);
     panel.press("Save picture");
-    assert!(panel.wishes.save_picture);
+    assert_eq!(panel.asked(), [Command::SavePicture]);
     let sentence = "elsewhere: the folder holds files; choose another";
-    panel.tell(|told| told.export = leak(ExportState::Failed(sentence.into())));
+    panel.tell(|model| model.exporter.state = ExportState::Failed(sentence.into()));
     panel.assert_says(&[sentence]);
-    panel.tell(|told| told.export = &ExportState::Writing);
+    panel.tell(|model| model.exporter.state = ExportState::Writing);
     panel.press("Export maps");
-    assert_eq!(panel.wishes.export, None, "one at a time");
+    assert_eq!(panel.asked(), [], "one at a time");
 }
 
 #[test]

@@ -78,7 +78,7 @@ fn sliders_ask_for_their_edit() {
         assert_eq!((what, index), kind, "{gesture:?}");
         assert!(range.contains(&value), "{gesture:?}: {value}");
     }
-    assert!(!panel.wishes.undo);
+    assert_eq!(panel.asked(), []);
 }
 
 #[test]
@@ -124,7 +124,7 @@ fn numbers_ask_for_their_edit() {
     assert!(direction.y < -0.999_999 && direction.z < 0.0, "{direction}");
     for light in NewLight::ALL {
         panel.press(&format!("Add {}", light.name()));
-        assert_eq!(panel.wishes.new_light.take(), Some(light));
+        assert_eq!(panel.asked(), [Command::AddLight(light)]);
     }
 }
 
@@ -151,11 +151,11 @@ fn rows_are_those_of_the_light() {
 fn objects_move_from_their_place_in_the_file() {
     let mut panel = panel();
     panel.choose("Object", "ball");
-    let loaded = Arc::clone(panel.told.scene);
+    let loaded = Arc::clone(panel.model.scene());
     let low = |scene: &Scene| scene.objects[1].mesh.bounds().expect("a ball").0;
     panel.type_into("Offset [m]: y", "0.25");
     let moved = panel.apply();
-    near(low(moved) - low(&loaded), DVec3::Y * 0.25, 1e-12, "offset");
+    near(low(&moved) - low(&loaded), DVec3::Y * 0.25, 1e-12, "offset");
     panel.assert_says(&["y: 0.25"]);
     panel.type_into("Offset [m]: y", "0");
     let back = panel.apply();
@@ -163,7 +163,7 @@ fn objects_move_from_their_place_in_the_file() {
     assert!(Arc::ptr_eq(back, loaded), "the file's place exactly");
     panel.type_into("Turn [°]", "90");
     let turned = panel.apply();
-    let found = Placement::of(1, panel.told.loaded, turned).expect("a turn");
+    let found = Placement::of(1, panel.model.loaded(), &turned).expect("a turn");
     near(found.yaw_rad, FRAC_PI_2, 1e-8, "turn");
 }
 
@@ -230,7 +230,7 @@ fn spectra_are_set_by_name() {
     assert!(colour.r > 1.0 && colour.b < 0.5, "{colour:?}");
     near(colour.luminance(), 1.0, 1e-3, "as bright");
     panel.press("Reset Spectrum");
-    assert_eq!(panel.apply().lights[0], panel.told.loaded.lights[0]);
+    assert_eq!(panel.apply().lights[0], panel.model.loaded().lights[0]);
 }
 
 #[test]
@@ -245,7 +245,7 @@ fn mouse_holds_one_thing_and_looking_edits_nothing() {
     }
     assert_eq!(panel.edit(), None);
     panel.choose("Object", "ball");
-    assert_eq!(panel.panel.held(), None);
+    assert_eq!(panel.model.choices.selection.held(), None);
     for (button, held, placed) in [
         ("Move object", Some(Held::Object(1)), None),
         ("Place light", Some(Held::Light(0)), Some(Placed::At(0))),
@@ -253,6 +253,12 @@ fn mouse_holds_one_thing_and_looking_edits_nothing() {
         ("Move light", None, None),
     ] {
         panel.press(button);
-        assert_eq!((panel.panel.held(), panel.panel.placed_light()), (held, placed));
+        assert_eq!(
+            (
+                panel.model.choices.selection.held(),
+                panel.model.choices.selection.placed()
+            ),
+            (held, placed)
+        );
     }
 }

@@ -2,7 +2,7 @@
 
 use nephroid::eye_pass::{Picture, View, tone_mapping};
 use nephroid::optics::spectrum::xyz::IDENTITY;
-use nephroid::viewer::screenshot;
+use nephroid::viewer::exporting::save_picture;
 
 use super::*;
 
@@ -27,7 +27,7 @@ fn save(folder: &Path, scene: &str, has_radiance: bool) -> Result<Vec<String>, S
         tone_map: ToneMap::AgX,
         background: LinearSrgb::BLACK,
     };
-    let saved = screenshot::save(folder, scene, &picture(), &view, &IDENTITY, has_radiance);
+    let saved = save_picture(folder, scene, &picture(), &view, &IDENTITY, has_radiance);
     let files = saved.map_err(|error| error.to_string())?;
     let name = |file: &std::path::PathBuf| {
         assert!(

@@ -3,6 +3,7 @@
 use std::collections::HashSet;
 
 use nephroid::light_pass::sketch::{Sketch, SketchLimits, sketch};
+use nephroid::viewer::background::Wake;
 use nephroid::viewer::sketching::Sketcher;
 
 use super::*;
@@ -84,7 +85,7 @@ fn finer_lattices_have_smaller_patches() {
 #[test]
 fn found_once_for_the_same_surfaces() {
     let surfaces = tracer("ring");
-    let mut sketcher = Sketcher::new(Arc::new(|| {}));
+    let mut sketcher = Sketcher::new(&Wake::new(|| ()));
     wait_for("the sketch", || sketcher.follow(&surfaces, LIMITS));
     let found = Arc::clone(sketcher.shown().expect("it was found"));
     assert!(!sketcher.follow(&surfaces, LIMITS) && !found.landings.is_empty());

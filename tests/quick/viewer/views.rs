@@ -1,7 +1,6 @@
 //! What the picture shows in place of light, on which scale, and what it is compared with.
 
 use nephroid::viewer::beside::Reference;
-use nephroid::viewer::panel::CompareWish;
 use nephroid::viewer::views::{IrradianceUnit, MapSurvey, ScaleChoice};
 
 use super::headless::Gesture::{Check, Choose, Radio};
@@ -58,18 +57,18 @@ fn scale_follows_the_maps_until_typed() {
 #[test]
 fn irradiance_has_a_unit_and_counts_faults() {
     let mut panel = panel();
-    panel.told.survey = leak(survey(2.0, 0));
+    panel.model.survey = survey(2.0, 0);
     assert!(!panel.says("From, to"), "it belongs to the irradiance");
     panel.make(Choose("View", "irradiance"));
-    assert_eq!(panel.panel.display.quantity, Quantity::Irradiance);
+    assert_eq!(panel.model.choices.display.quantity, Quantity::Irradiance);
     panel.assert_says(&[" to 2 W/m²"]);
     panel.make(Radio("lx"));
-    assert_eq!(panel.panel.display.scale.unit, IrradianceUnit::Lux);
+    assert_eq!(panel.model.choices.display.scale.unit, IrradianceUnit::Lux);
     // 683 times 2.
     panel.assert_says(&[" to 1366 lx"]);
     panel.make(Check("auto"));
-    assert!(!panel.panel.display.scale.is_automatic && !panel.says("magenta."));
-    panel.tell(|told| told.survey = leak(survey(0.0, 3)));
+    assert!(!panel.model.choices.display.scale.is_automatic && !panel.says("magenta."));
+    panel.tell(|model| model.survey = survey(0.0, 3));
     panel.assert_says(&["3 texels without a finite value"]);
 }
 
@@ -77,7 +76,7 @@ fn irradiance_has_a_unit_and_counts_faults() {
 fn reference_tells_its_relative_rmse() {
     let panel = panel();
     let before = [map(0, [[2.0; 3], [2.0; 3]])];
-    let mut reference = Reference::kept(panel.told.scene, &before).expect("there are maps");
+    let mut reference = Reference::kept(panel.model.scene(), &before).expect("there are maps");
     reference.compare(&before);
     assert_eq!(reference.relative_rmse, Ok(0.0));
     // Off by 1 W/m² on a quarter of the area: √(1/4) over a mean of 2.
@@ -89,7 +88,7 @@ fn reference_tells_its_relative_rmse() {
         "RMSE",
     );
     says(reference.told(), " 25 %");
-    assert!(Reference::kept(panel.told.scene, &[]).is_err());
+    assert!(Reference::kept(panel.model.scene(), &[]).is_err());
 }
 
 #[test]
@@ -97,13 +96,13 @@ fn comparison_begins_and_ends_by_buttons() {
     let mut panel = panel();
     panel.open("Compare");
     panel.press("Keep as before");
-    assert_eq!(panel.wishes.compare.take(), Some(CompareWish::Keep));
+    assert_eq!(panel.asked(), [Command::Compare(CompareCommand::Keep)]);
     assert!(panel.is_disabled(Role::Button, "End comparison"));
     let maps = [map(0, [[1.0; 3], [1.0; 3]])];
-    let mut reference = Reference::kept(panel.told.scene, &maps).expect("there are maps");
+    let mut reference = Reference::kept(panel.model.scene(), &maps).expect("there are maps");
     reference.compare(&maps);
-    panel.tell(|told| told.reference = Some(leak(reference)));
+    panel.tell(|model| model.reference = Some(reference));
     panel.assert_says(&["differs from before by 0 %"]);
     panel.press("End comparison");
-    assert_eq!(panel.wishes.compare, Some(CompareWish::End));
+    assert_eq!(panel.asked(), [Command::Compare(CompareCommand::End)]);
 }

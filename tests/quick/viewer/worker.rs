@@ -6,6 +6,7 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use nephroid::error::{Error, Result};
 use nephroid::progress::Progress;
 use nephroid::session::BakeResult;
+use nephroid::viewer::background::Wake;
 use nephroid::viewer::worker::{BakeRequest, Baker, Worker, baking_threads};
 
 use super::headless::nothing;
@@ -143,7 +144,7 @@ pub fn bench() -> Bench {
         of_wake.fetch_add(1, Ordering::SeqCst);
     };
     Bench {
-        worker: Worker::spawn(make, wake).expect("threads are to be had"),
+        worker: Worker::spawn(make, &Wake::new(wake)).expect("threads are to be had"),
         started,
         alive,
         made,

@@ -106,15 +106,15 @@ fn failures_spoil_nothing_and_bakes_come_first() {
 #[test]
 fn shown_until_other_maps_come() {
     let mut model = fixtures::model(&options("ring"));
-    let wish = || with(Wishes::default(), |it| it.worth = Some(Effect::Reflection));
-    act(&mut model, wish());
+    let asked = || vec![Command::Worth(Effect::Reflection)];
+    act(&mut model, asked());
     // Nothing is compared before there are maps.
-    assert!(model.state().is_baking());
+    assert!(model.state.is_baking());
     bake(&mut model);
     let before = Arc::clone(model.last.as_ref().expect("there are maps"));
     assert_eq!(model.quantity(), Quantity::Light);
 
-    act(&mut model, wish());
+    act(&mut model, asked());
     until(&mut model, "the comparison", |model| model.worth.is_some());
     bake(&mut model);
     assert!(Arc::ptr_eq(&before, model.last.as_ref().expect("there are maps")));
@@ -126,15 +126,14 @@ fn shown_until_other_maps_come() {
     let flux_w: f64 = layers.map(|layer| map.flux_w(layer.kind).luminance()).sum();
     near(found.with_w / flux_w, 1.0, 1e-6, "watts");
     assert_eq!(model.shown_maps().len(), found.maps.len());
-    let switch = model.panel.settings.effects.get(Effect::Reflection);
+    let switch = model.choices.settings.effects.get(Effect::Reflection);
     assert_eq!(switch, EffectSwitch::Auto, "the settings are those of the maps");
 
     for quantity in [Quantity::Light, Quantity::Difference] {
-        model.panel.display.quantity = quantity;
+        model.choices.display.quantity = quantity;
         assert_eq!(model.quantity(), quantity);
     }
-    model.panel.settings.density_per_sr *= 4.0;
-    act(&mut model, Wishes::default());
+    set(&mut model, |it| it.settings.density_per_sr *= 4.0);
     bake(&mut model);
     assert!(model.worth.is_none(), "it belonged to other maps");
     assert_eq!(model.quantity(), Quantity::Light);
@@ -152,22 +151,26 @@ fn asked_for_and_told_in_watts() {
         line(Effect::Absorption, false, "for a reason"),
     ]);
     panel.choose("View", "difference");
-    assert_eq!(panel.panel.display.quantity, Quantity::Light, "there is none");
+    assert_eq!(
+        panel.model.choices.display.quantity,
+        Quantity::Light,
+        "there is none"
+    );
     assert_eq!(offered(&panel), ["refraction: worth"]);
-    panel.tell(|told| {
-        told.state = leak(BakeState::Baking {
+    panel.tell(|model| {
+        model.state = BakeState::Baking {
             stage: Stage::Caustic,
             fraction: 0.5,
             since: Instant::now(),
-        });
+        };
     });
     assert!(panel.is_disabled(Role::Button, "refraction: worth"));
-    panel.tell(|told| told.state = &BakeState::Done);
+    panel.tell(|model| model.state = BakeState::Done);
     panel.press("refraction: worth");
-    assert_eq!(panel.wishes.worth, Some(Effect::Refraction));
+    assert_eq!(panel.asked(), [Command::Worth(Effect::Refraction)]);
 
-    panel.tell(|told| {
-        told.state = &BakeState::Comparing {
+    panel.tell(|model| {
+        model.state = BakeState::Comparing {
             effect: Effect::Refraction,
             stage: Stage::Caustic,
             fraction: 0.25,
@@ -176,7 +179,7 @@ fn asked_for_and_told_in_watts() {
     assert!(panel.says("25 %") && offered(&panel).is_empty());
     assert!(!panel.is_disabled(Role::Button, "Cancel"));
 
-    panel.tell(|told| told.state = &BakeState::Done);
+    panel.tell(|model| model.state = BakeState::Done);
     let found = |with_w, without_w, relative_rmse| {
         let maps = Vec::new();
         Ok(Difference {
@@ -198,14 +201,14 @@ fn asked_for_and_told_in_watts() {
         let has_maps = difference.is_ok();
         let worth = Worth {
             effect: Effect::Refraction,
-            with: Arc::new(finished(panel.told.scene, panel.settings())),
+            with: Arc::new(finished(panel.model.scene(), panel.settings())),
             difference,
         };
-        panel.tell(|told| told.worth = Some(leak(worth)));
+        panel.tell(|model| model.worth = Some(worth));
         panel.assert_says(&[sentence]);
         if has_maps {
             panel.choose("View", "difference");
-            assert_eq!(panel.panel.display.quantity, Quantity::Difference);
+            assert_eq!(panel.model.choices.display.quantity, Quantity::Difference);
         }
     }
 }

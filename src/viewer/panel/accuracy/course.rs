@@ -7,7 +7,7 @@ use egui::{
 };
 
 use super::super::bake::two_digits;
-use super::target::{self, Picked};
+use super::target::{self, Target};
 use crate::session::forecast::forecast;
 use crate::session::{CostPoint, Forecast};
 use crate::settings::{BakeSettings, Preset};
@@ -98,18 +98,18 @@ impl Curve {
         let past: Vec<CostPoint> = last.result.course.iter().filter(is_shown).copied().collect();
         let reached = past.last()?.error;
         let expected = |target: f64| forecast(&past, target, estimator);
-        let picked = target::picked(settings);
+        let picked = Target::of(settings);
         let wanted = match picked {
-            Some(Picked::Error(error)) => error,
+            Target::Error(error) => error,
             _ => BEST_SHOWN,
         };
         let best = BEST_SHOWN.min(wanted).min(0.7 * reached);
         let at_step = |step: usize| reached * (best / reached).powf(step as f64 / STEPS as f64);
         let future: Vec<Forecast> = (0..=STEPS).filter_map(|step| expected(at_step(step))).collect();
         let target = match picked {
-            Some(Picked::Error(error)) => expected(error),
-            Some(Picked::Seconds(seconds)) => at_seconds(&past, &future, seconds),
-            None => None,
+            Target::Error(error) => expected(error),
+            Target::Time(seconds) => at_seconds(&past, &future, seconds),
+            Target::Density => None,
         };
         let presets = Preset::ALL.map(|preset| Some((preset, expected(preset.max_error())?)));
         Some(Self {
@@ -230,30 +230,23 @@ fn decades(range: &RangeInclusive<f64>) -> impl Iterator<Item = f64> {
 fn draw(ui: &Ui, curve: &Curve, frame: &Frame) {
     let painter = ui.painter_at(frame.rect);
     painter.rect_filled(frame.rect, 2.0, ui.visuals().extreme_bg_color);
-    let font = FontId::proportional(SMALL);
+    let write = |at: Pos2, align: Align2, text: String| {
+        painter.text(at, align, text, FontId::proportional(SMALL), TEXT);
+    };
     for seconds in decades(&frame.seconds) {
         let foot = frame.place(seconds, *frame.errors.start());
         painter.line_segment([foot, pos2(foot.x, frame.rect.top())], Stroke::new(0.5, MARK));
-        let label = format!("{seconds} s");
-        painter.text(
+        write(
             foot - vec2(-2.0, 1.0),
             Align2::LEFT_BOTTOM,
-            label,
-            font.clone(),
-            TEXT,
+            format!("{seconds} s"),
         );
     }
     for (preset, expected) in &curve.presets {
         let right = frame.place(*frame.seconds.end(), expected.target);
         painter.line_segment([pos2(frame.rect.left(), right.y), right], Stroke::new(0.5, MARK));
         let label = format!("{} {} %", preset.name(), 100.0 * expected.target);
-        painter.text(
-            right - vec2(2.0, 0.0),
-            Align2::RIGHT_BOTTOM,
-            label,
-            font.clone(),
-            TEXT,
-        );
+        write(right - vec2(2.0, 0.0), Align2::RIGHT_BOTTOM, label);
     }
     for pair in curve.future.windows(2) {
         let edge = |point: &Forecast, times: f64| frame.place(point.wall_s * times, point.target);
@@ -265,17 +258,11 @@ fn draw(ui: &Ui, curve: &Curve, frame: &Frame) {
         ];
         painter.add(Shape::convex_polygon(corners.to_vec(), BAND, Stroke::NONE));
     }
-    let expected = curve
-        .future
-        .iter()
-        .map(|point| frame.place(point.wall_s, point.target));
-    let expected: Vec<Pos2> = expected.collect();
+    let expected = curve.future.iter();
+    let expected: Vec<Pos2> = expected.map(|to| frame.place(to.wall_s, to.target)).collect();
     painter.extend(Shape::dashed_line(&expected, Stroke::new(1.5, FUTURE), 4.0, 3.0));
-    let past = curve
-        .past
-        .iter()
-        .map(|point| frame.place(point.wall_s, point.error));
-    let past: Vec<Pos2> = past.collect();
+    let past = curve.past.iter();
+    let past: Vec<Pos2> = past.map(|level| frame.place(level.wall_s, level.error)).collect();
     for point in &past {
         painter.circle_filled(*point, 3.0, PAST);
     }

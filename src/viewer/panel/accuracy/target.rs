@@ -1,9 +1,10 @@
-//! What ends a bake: a density, an error or a time.
+//! What ends a bake: a density, an error or a time; and how carefully to bake, by name: the presets of the command line.
 
 use egui::{Response, Slider, SliderClamping, Ui};
+use strum::EnumMessage;
 
-use crate::settings::{BakeSettings, Estimator, LEAST_MAX_ERROR, Preset};
-use crate::viewer::panel::control::{self, CONTROL_WIDTH, setting};
+use crate::settings::{BakeSettings, Estimator, LEAST_MAX_ERROR, MapResolution, Preset};
+use crate::viewer::panel::control::{self, CONTROL_WIDTH, choice, setting};
 
 /// The first time that is offered [s].
 const FIRST_TIME_S: f64 = 10.0;
@@ -12,17 +13,20 @@ const PERCENTS: std::ops::RangeInclusive<f64> = 0.01..=100.0;
 const TIMES_S: std::ops::RangeInclusive<f64> = 1e-3..=1e4;
 const NO_ERRORS: &str = "Splats do not refine until an error is reached.";
 
-/// Which of the targets is chosen.
+/// What a bake aims at.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Target {
+pub enum Target {
+    /// Of rays, without refinement.
     Density,
+    /// Of all maps [1].
     Error(f64),
+    /// On the wall clock [s].
     Time(f64),
 }
 
 impl Target {
     /// An error that is no target stands beside a time: as far as that goes.
-    fn of(settings: &BakeSettings) -> Self {
+    pub fn of(settings: &BakeSettings) -> Self {
         match (settings.max_error, settings.max_time_s) {
             (Some(error), Some(time_s)) if error <= LEAST_MAX_ERROR => Self::Time(time_s),
             (Some(error), _) => Self::Error(error),
@@ -62,24 +66,6 @@ impl Target {
         } else {
             Self::Density
         }
-    }
-}
-
-/// A point on the curve of error against time.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Picked {
-    /// Of all maps [1].
-    Error(f64),
-    /// Wall-clock time [s].
-    Seconds(f64),
-}
-
-/// What the settings aim at; `None` where that is a density.
-pub fn picked(settings: &BakeSettings) -> Option<Picked> {
-    match Target::of(settings) {
-        Target::Error(error) => Some(Picked::Error(error)),
-        Target::Time(seconds) => Some(Picked::Seconds(seconds)),
-        Target::Density => None,
     }
 }
 
@@ -148,24 +134,16 @@ pub fn show(ui: &mut Ui, settings: &mut BakeSettings, unavailable: Option<&str>)
         Target::Density => {}
         Target::Error(error) => {
             let default = Preset::default().max_error();
-            setting(
-                ui,
-                "Max error [%]",
-                unavailable,
-                (error, &default),
-                percent_slider,
-            );
+            let error = (error, &default);
+            setting(ui, "Max error [%]", unavailable, error, percent_slider);
         }
-        Target::Time(time_s) => setting(
-            ui,
-            "Max time [s]",
-            unavailable,
-            (time_s, &FIRST_TIME_S),
-            |ui, time_s| {
+        Target::Time(time_s) => {
+            let time_s = (time_s, &FIRST_TIME_S);
+            setting(ui, "Max time [s]", unavailable, time_s, |ui, time_s| {
                 let slider = Slider::new(time_s, TIMES_S).logarithmic(true).suffix(" s");
                 ui.add(slider.clamping(SliderClamping::Edits).max_decimals(3))
-            },
-        ),
+            });
+        }
     }
     if target != before {
         target.set(settings);
@@ -202,4 +180,46 @@ fn percent_slider(ui: &mut Ui, error: &mut f64) -> Response {
         *error = shown / 100.0;
     }
     response
+}
+
+/// Sets all that a preset stands for; the estimator stays.
+fn apply(preset: Preset, settings: &mut BakeSettings) {
+    (settings.max_error, settings.density_per_sr) = if settings.estimator.refines() {
+        let target = preset.max_error();
+        (Some(target), BakeSettings::starting_density_per_sr(target))
+    } else {
+        (None, preset.splat_density_per_sr())
+    };
+    let default = BakeSettings::default();
+    settings.max_time_s = None;
+    settings.error_metric = default.error_metric;
+    settings.map_resolution = MapResolution::Auto;
+    settings.max_depth = default.max_depth;
+    settings.branch_threshold = default.branch_threshold;
+}
+
+/// The preset that settings are those of; `None` where one of its values differs.
+pub fn preset_of(settings: &BakeSettings) -> Option<Preset> {
+    Preset::ALL.into_iter().find(|preset| {
+        let mut set = settings.clone();
+        apply(*preset, &mut set);
+        set == *settings
+    })
+}
+
+/// A row with the presets.
+pub fn show_presets(ui: &mut Ui, settings: &mut BakeSettings) {
+    let before = preset_of(settings);
+    let mut preset = before;
+    let value = (&mut preset, &Some(Preset::Preview));
+    setting(ui, "Preset", None, value, |ui, preset| {
+        let choices = Preset::ALL.map(|preset| {
+            let hover = preset.get_documentation().unwrap_or_default();
+            (Some(preset), preset.name(), hover)
+        });
+        choice(ui, "preset", preset, "custom", &choices)
+    });
+    if let Some(preset) = preset.filter(|_| preset != before) {
+        apply(preset, settings);
+    }
 }

@@ -1,4 +1,5 @@
-//! How long after a key or the mouse was used the window shows what came of it.
+//! How long pictures took on the graphics device, and how long after a key or the mouse was used the window shows what came
+//! of it.
 //!
 //! A window that is busy meets events late, and nobody tells it when they came. Each is taken to have come at the
 //! earliest moment that it can have: what is said here is never too short, but for the way through the system.
@@ -8,8 +9,70 @@ use std::time::{Duration, Instant};
 
 use serde::Serialize;
 
+use crate::eye_pass::renderer::GpuMs;
+
+/// Pictures that are remembered.
+pub const PICTURES: usize = 120;
+
+/// Times of the last pictures that the device has told of, the oldest first. A picture whose times come back together
+/// with those of a later one is left out.
+#[derive(Clone, Debug, Default)]
+pub struct FrameTimes {
+    pictures: VecDeque<GpuMs>,
+    made: Option<Made>,
+}
+
+/// How the picture that is shown was made.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Made {
+    /// Traced pixels per pixel along a side; `None` where nothing specular is in view.
+    pub traced_scale: Option<f64>,
+    /// Pictures of which it is the mean.
+    pub samples: u32,
+}
+
+impl FrameTimes {
+    /// One more; the oldest goes where there are too many.
+    pub fn push(&mut self, ms: GpuMs) {
+        if self.pictures.len() == PICTURES {
+            self.pictures.pop_front();
+        }
+        self.pictures.push_back(ms);
+    }
+
+    /// Says how the picture that is shown was made.
+    pub fn set_made(&mut self, made: Made) {
+        self.made = Some(made);
+    }
+
+    /// How the picture that is shown was made.
+    pub fn made(&self) -> Option<Made> {
+        self.made
+    }
+
+    /// The oldest first.
+    pub fn iter(&self) -> impl ExactSizeIterator<Item = &GpuMs> {
+        self.pictures.iter()
+    }
+
+    /// The last one.
+    pub fn newest(&self) -> Option<&GpuMs> {
+        self.pictures.back()
+    }
+
+    /// The longest of all passes together [ms]; 0 where there is none.
+    pub fn longest_ms(&self) -> f64 {
+        self.iter().copied().map(sum_ms).fold(0.0, f64::max)
+    }
+}
+
+/// All passes of a picture [ms].
+pub fn sum_ms(ms: GpuMs) -> f64 {
+    ms.opaque + ms.specular + ms.tone_mapping
+}
+
 /// Waits that are remembered of each kind: the last ones.
-const MOST: usize = 10_000;
+const MOST_WAITS: usize = 10_000;
 /// Whoever asks the system for events and gets none at once has met all that came before.
 const WAITED: Duration = Duration::from_millis(1);
 
@@ -89,7 +152,7 @@ impl Latencies {
             } else {
                 &mut self.otherwise
             };
-            if waits.len() == MOST {
+            if waits.len() == MOST_WAITS {
                 waits.pop_front();
             }
             waits.push_back(now.duration_since(came));

@@ -1,0 +1,122 @@
+//! Maps in false colours with a legend: how far the light may be off, what an effect adds or takes away, and which
+//! wavelength it looks like.
+
+use std::sync::Arc;
+
+use crate::illumination::difference::Difference;
+use crate::illumination::false_colours::mixed;
+use crate::illumination::{Chart, IlluminationMap, difference_colours};
+use crate::optics::spectrum::xyz::to_display_gamut;
+use crate::optics::spectrum::{Hue, Xyz, dominant, xyz_bar};
+use crate::optics::{LinearSrgb, Nanometres};
+use crate::settings::LayerKind;
+
+/// A map of colours in linear light, to be shown as they are.
+fn coloured(chart: &Arc<Chart>, colours: impl Iterator<Item = [f32; 3]>) -> IlluminationMap {
+    IlluminationMap::of_layer(Arc::clone(chart), LayerKind::Caustic, colours.collect())
+}
+
+fn decoded(code: [u8; 3]) -> [f32; 3] {
+    code.map(|code| LinearSrgb::decode_channel(code) as f32)
+}
+
+/// Relative errors at the ends of the scale, logarithmic between them: 0.1 % and 100 % of the map's mean.
+pub const ERROR_RANGE: (f64, f64) = (1e-3, 1.0);
+
+/// Display colours (sRGB) at even steps of the scale: dark and cool where the light is exact, bright where it is not.
+const STOPS: [[u8; 3]; 5] = [
+    [16, 24, 64],
+    [40, 84, 140],
+    [48, 150, 110],
+    [230, 200, 60],
+    [250, 90, 50],
+];
+
+/// Display colour (sRGB) of an error relative to the map's mean, ≥ 0; both ends of the scale go on.
+pub fn error_colour(relative: f64) -> [u8; 3] {
+    let (low, high) = ERROR_RANGE;
+    let place = ((relative / low).log10() / (high / low).log10()).clamp(0.0, 1.0);
+    // NaN has no place on the scale, and is as wrong as can be.
+    mixed(&STOPS, if place.is_nan() { 1.0 } else { place })
+}
+
+/// Whether the maps tell how far they may be off.
+pub fn has_errors(maps: &[IlluminationMap]) -> bool {
+    maps.iter().any(|map| map.error.is_some())
+}
+
+/// The maps' errors as colours in linear light, to be shown as they are. Maps without an error are left out.
+pub fn error_maps(maps: &[IlluminationMap]) -> Vec<IlluminationMap> {
+    maps.iter()
+        .filter_map(|map| {
+            let error = map.error.as_ref()?;
+            let mean = mean_luminance(map);
+            let relative = |error: f64| if mean > 0.0 { error / mean } else { 0.0 };
+            let colours = error
+                .iter()
+                .map(|error| error_colour(relative(f64::from(*error))));
+            Some(coloured(&map.chart, colours.map(decoded)))
+        })
+        .collect()
+}
+
+/// Mean luminance of a map over its surface [W/m²]: flux by area.
+fn mean_luminance(map: &IlluminationMap) -> f64 {
+    let flux_w: f64 = map
+        .layers
+        .iter()
+        .map(|layer| map.flux_w(layer.kind).luminance())
+        .sum();
+    let texels = map.chart.texel_count();
+    let area_m2: f64 = (0..texels).map(|texel| map.chart.texel_area_m2(texel)).sum();
+    if area_m2 > 0.0 { flux_w / area_m2 } else { 0.0 }
+}
+
+/// The differences as colours in linear light, to be shown as they are.
+pub fn difference_maps(difference: &Difference) -> Vec<IlluminationMap> {
+    let maps = difference.maps.iter();
+    maps.map(|map| coloured(&map.chart, difference_colours::of_map(map).map(decoded)))
+        .collect()
+}
+
+/// Ends of the legend [nm]; what lies beyond has their colours.
+pub const RANGE_NM: (f64, f64) = (400.0, 700.0);
+/// Texels darker than this, of the brightest, are black.
+const DARK: f64 = 1e-3;
+/// Of white light.
+const GREY: LinearSrgb = LinearSrgb::new(0.25, 0.25, 0.25);
+/// Of light that no single wavelength looks like.
+const PURPLE: LinearSrgb = LinearSrgb::new(0.16, 0.02, 0.16);
+
+/// Colour of a wavelength in linear light, its strongest channel 1.
+pub fn wavelength_colour(wavelength: Nanometres) -> LinearSrgb {
+    let within = Nanometres(wavelength.0.clamp(RANGE_NM.0, RANGE_NM.1));
+    let seen = to_display_gamut(Xyz::from(xyz_bar(within)).to_linear_srgb());
+    seen * seen.max_channel().recip()
+}
+
+/// The maps' light as colours in linear light, to be shown as they are.
+pub fn wavelength_maps(maps: &[IlluminationMap]) -> Vec<IlluminationMap> {
+    let totals: Vec<Vec<[f32; 3]>> = maps.iter().map(IlluminationMap::total).collect();
+    let of = |texel: &[f32; 3]| LinearSrgb::from(texel.map(f64::from));
+    let luminances = totals.iter().flatten().map(|texel| of(texel).luminance());
+    let least = DARK * luminances.filter(|value| value.is_finite()).fold(0.0, f64::max);
+    let shown = |texel: &[f32; 3]| {
+        let light = of(texel);
+        if !light.is_finite() {
+            // To be shown as what it is.
+            return *texel;
+        }
+        let hue = dominant(light).filter(|_| light.luminance() >= least);
+        let colour = match hue {
+            None => LinearSrgb::BLACK,
+            Some(Hue::White) => GREY,
+            Some(Hue::Purple) => PURPLE,
+            Some(Hue::Spectral(wavelength)) => wavelength_colour(wavelength),
+        };
+        colour.to_array().map(|channel| channel as f32)
+    };
+    let maps = maps.iter().zip(&totals);
+    maps.map(|(map, total)| coloured(&map.chart, total.iter().map(shown)))
+        .collect()
+}

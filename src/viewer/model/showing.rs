@@ -1,0 +1,240 @@
+//! What of the maps the picture shows, and what they are held against: other maps, and those without an effect.
+
+use std::borrow::Cow;
+use std::sync::Arc;
+
+use serde_json::json;
+
+use super::Model;
+use crate::effect::Effect;
+use crate::eye_pass::renderer::MapStyle;
+use crate::illumination::IlluminationMap;
+use crate::illumination::difference::Difference;
+use crate::scene::Scene;
+use crate::settings::LayerKind;
+use crate::viewer::beside::Reference;
+use crate::viewer::command::CompareCommand;
+use crate::viewer::event_log;
+use crate::viewer::false_colours;
+use crate::viewer::panel::{LayerShown, Quantity};
+use crate::viewer::views::MapSurvey;
+use crate::viewer::worker::{BakedLevel, Worth};
+
+/// Which maps the picture shows, and how.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct MapsShown {
+    revision: u64,
+    layer: LayerShown,
+    /// What of them.
+    pub quantity: Quantity,
+}
+
+impl Model {
+    /// Layers of the present maps.
+    pub fn layers(&self) -> Vec<LayerKind> {
+        let mut kinds: Vec<_> = self
+            .maps()
+            .iter()
+            .flat_map(|map| &map.layers)
+            .map(|layer| layer.kind)
+            .collect();
+        kinds.sort_unstable();
+        kinds.dedup();
+        kinds
+    }
+
+    /// What the picture shows: the light where the panel asks for what there is not.
+    pub fn quantity(&self) -> Quantity {
+        match self.choices.display.quantity {
+            Quantity::Error if false_colours::has_errors(self.maps()) => Quantity::Error,
+            Quantity::Difference if self.difference().is_some() => Quantity::Difference,
+            Quantity::Error | Quantity::Difference => Quantity::Light,
+            other => other,
+        }
+    }
+
+    /// Whether direct light is to be traced and not looked up: it is shown, and its layer is not baked yet, or a light or
+    /// an object was moved since.
+    pub fn traces_lights(&self) -> bool {
+        let shown = matches!(
+            self.choices.display.layer,
+            LayerShown::All | LayerShown::Only(LayerKind::Direct)
+        );
+        let Some(last) = self
+            .last
+            .as_ref()
+            .filter(|_| shown && self.quantity() == Quantity::Light)
+        else {
+            return false;
+        };
+        let is_asked_for = last.request.settings.layers.contains(&LayerKind::Direct);
+        if self.layers().contains(&LayerKind::Direct) {
+            is_other_light(&last.request.scene, self.scene())
+        } else {
+            is_asked_for && !last.is_final
+        }
+    }
+
+    /// The maps without their direct light.
+    pub fn maps_without_direct(&self) -> Vec<IlluminationMap> {
+        let mut maps = self.shown_maps().into_owned();
+        for map in &mut maps {
+            map.layers.retain(|layer| layer.kind != LayerKind::Direct);
+        }
+        maps.retain(|map| !map.layers.is_empty());
+        maps
+    }
+
+    /// The maps as the panel asks them to be shown: some layers, the errors, or what an effect is worth.
+    pub fn shown_maps(&self) -> Cow<'_, [IlluminationMap]> {
+        self.as_shown(self.maps())
+    }
+
+    /// Some maps of the scene as the panel asks them to be shown.
+    fn as_shown<'a>(&self, maps: &'a [IlluminationMap]) -> Cow<'a, [IlluminationMap]> {
+        self.with_quantity(maps, self.quantity())
+    }
+
+    /// Some maps of the scene, of the layer that the panel asks for, with a quantity in them.
+    fn with_quantity<'a>(
+        &self,
+        maps: &'a [IlluminationMap],
+        quantity: Quantity,
+    ) -> Cow<'a, [IlluminationMap]> {
+        // Until the next maps come, an edit may have made a receiver clear, or a mirror.
+        let receives = |map: &&IlluminationMap| {
+            let scene = self.scene();
+            let object = scene.objects.get(map.chart.object());
+            object.is_none_or(|object| scene.materials[object.material].surface.is_receiver())
+        };
+        let in_colours = match quantity {
+            Quantity::Wavelength => Some(false_colours::wavelength_maps(
+                &self.with_quantity(maps, Quantity::Light),
+            )),
+            Quantity::Error => Some(false_colours::error_maps(maps)),
+            Quantity::Difference => self.difference().map(false_colours::difference_maps),
+            _ => None,
+        };
+        if let Some(maps) = in_colours {
+            return Cow::Owned(maps.into_iter().filter(|map| receives(&map)).collect());
+        }
+        let LayerShown::Only(kind) = self.choices.display.layer else {
+            return if maps.iter().all(|map| receives(&map)) {
+                Cow::Borrowed(maps)
+            } else {
+                Cow::Owned(maps.iter().filter(receives).cloned().collect())
+            };
+        };
+        let with_kind = maps.iter().filter(receives).filter_map(|map| {
+            let irradiance = map.layer(kind)?.irradiance.clone();
+            let chart = Arc::clone(&map.chart);
+            Some(IlluminationMap::of_layer(chart, kind, irradiance))
+        });
+        Cow::Owned(with_kind.collect())
+    }
+
+    /// The maps' light, whatever the picture shows in its place.
+    pub(super) fn lit_maps(&self) -> Cow<'_, [IlluminationMap]> {
+        self.with_quantity(self.maps(), Quantity::Light)
+    }
+
+    /// Maps as they are to be shown next, looked at as a whole, with what their values stand for.
+    pub fn maps_to_show(&mut self, without_direct: bool) -> (Vec<IlluminationMap>, MapStyle) {
+        let maps = if without_direct {
+            self.maps_without_direct()
+        } else {
+            self.shown_maps().into_owned()
+        };
+        self.survey = MapSurvey::of(&maps);
+        (maps, self.map_style())
+    }
+
+    /// What the values of the maps that are shown stand for.
+    pub fn map_style(&self) -> MapStyle {
+        let quantity = self.quantity();
+        let choice = &self.choices.display.scale;
+        quantity.map_style(self.survey.scale(quantity, choice))
+    }
+
+    /// Which maps the picture is to show, and how.
+    pub fn maps_shown(&self) -> MapsShown {
+        MapsShown {
+            revision: self.maps_revision,
+            layer: self.choices.display.layer,
+            quantity: self.quantity(),
+        }
+    }
+
+    /// What an effect adds to the maps that are shown or takes from them, where that was found.
+    pub(super) fn difference(&self) -> Option<&Difference> {
+        self.worth.as_ref()?.difference.as_ref().ok()
+    }
+
+    /// The reference's maps as they are to be shown.
+    pub fn reference_to_show(&self) -> Option<(&Arc<Scene>, Vec<IlluminationMap>)> {
+        let reference = self.reference.as_ref()?;
+        Some((&reference.scene, self.as_shown(&reference.maps).into_owned()))
+    }
+
+    /// Begins or ends a comparison.
+    pub(super) fn compare_with(&mut self, command: &CompareCommand) {
+        let scene = self.edits.scene();
+        let reference = match command {
+            CompareCommand::Keep => Reference::kept(scene, self.maps()).map(Some),
+            CompareCommand::Load(folder) => Reference::of_folder(folder, scene).map(Some),
+            CompareCommand::End => Ok(None),
+        };
+        match reference {
+            Ok(reference) => {
+                self.reference = reference;
+                self.refusal = None;
+                self.compare_again();
+            }
+            Err(error) => self.refusal = Some(error.to_string()),
+        }
+    }
+
+    /// Holds the maps that are shown now against the reference.
+    pub(super) fn compare_again(&mut self) {
+        let present = self.last.as_ref().map_or(&self.given, |last| &last.result.maps);
+        if let Some(reference) = &mut self.reference {
+            reference.compare(present);
+            let relative_rmse = reference.relative_rmse.as_ref().ok();
+            let more = json!({"name": reference.name, "relative_rmse": relative_rmse});
+            self.log.write("against", more);
+        }
+    }
+
+    /// Shows what an effect is worth; tells whether there is anything new to be shown.
+    pub(super) fn take_worth(&mut self, worth: Worth) -> bool {
+        let is_of_shown = |last: &Arc<BakedLevel>| Arc::ptr_eq(last, &worth.with);
+        if !self.last.as_ref().is_some_and(is_of_shown) {
+            return false;
+        }
+        self.log.write("compared", event_log::compared(&worth));
+        if worth.difference.is_ok() {
+            self.choices.display.quantity = Quantity::Difference;
+        }
+        self.worth = Some(worth);
+        true
+    }
+
+    /// Finds what an effect is worth to the maps that are shown, once these are done.
+    pub(super) fn compare(&mut self, effect: Effect) {
+        let Some(last) = self.last.as_ref().filter(|last| last.is_final) else {
+            return;
+        };
+        if self.worker.compare(effect, Arc::clone(last)) {
+            self.state = self.worker.state();
+        }
+    }
+}
+
+/// Whether a scene is lit otherwise than before: a lamp is another one, or an object elsewhere.
+fn is_other_light(before: &Arc<Scene>, now: &Arc<Scene>) -> bool {
+    let meshes = |scene: &Arc<Scene>| -> Vec<_> {
+        let objects = scene.objects.iter();
+        objects.map(|object| Arc::as_ptr(&object.mesh)).collect()
+    };
+    !Arc::ptr_eq(before, now) && (before.lights != now.lights || meshes(before) != meshes(now))
+}
