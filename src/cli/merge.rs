@@ -21,7 +21,7 @@ pub fn run(job: &MergeArguments, threads: usize, terminal: &Terminal, interrupt:
     let clock = Clock::start();
     let shards = ShardSet::open(&job.shards)?;
     let (shards_wall_s, shards_cpu_s) = shards.seconds();
-    let manifest = shards.manifest()?.clone();
+    let manifest = shards.manifest().clone();
     let input = SceneInput {
         source: job.scene.clone().unwrap_or(manifest.scene.source),
         missing_light: if manifest.scene.default_light {
