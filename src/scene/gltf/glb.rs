@@ -53,7 +53,9 @@ impl Glb {
             others: file.others.to_vec(),
         };
         // Chunks are padded.
-        if let Some(stated) = glb.json["buffers"][0]["byteLength"].as_u64() {
+        if glb.owns_first_buffer()
+            && let Some(stated) = glb.json["buffers"][0]["byteLength"].as_u64()
+        {
             glb.binary.truncate(usize::try_from(stated).unwrap_or(usize::MAX));
         }
         if !file.is_binary {
@@ -83,6 +85,11 @@ impl Glb {
             }
         }
         Ok(())
+    }
+
+    /// Whether the first buffer, if there is one, is the binary chunk and does not lie elsewhere.
+    pub(super) fn owns_first_buffer(&self) -> bool {
+        self.json["buffers"][0].get("uri").is_none()
     }
 
     /// The data so far.
@@ -243,7 +250,7 @@ impl Glb {
     /// More than the 4 GiB that such a file can hold.
     pub fn into_bytes(mut self) -> Result<Vec<u8>> {
         let mut chunks = Vec::new();
-        if !self.binary.is_empty() {
+        if !self.binary.is_empty() && self.owns_first_buffer() {
             let length = json!(self.binary.len());
             match self.json["buffers"].get_mut(0) {
                 Some(buffer) => buffer["byteLength"] = length,
@@ -316,6 +323,8 @@ fn patch(place: &mut Value, before: &Value, after: &Value) {
                 }
             }
         }
+        // Something else stands there, which is not ours to replace.
+        (_, Value::Object(_)) => {}
         (place, after) => *place = after.clone(),
     }
 }
@@ -378,6 +387,9 @@ mod tests {
             json!({ "same": 9, "colour": [8, 5, 8, 0.5], "own": 1, "extensions": { "NEW": { "a": 1 } } });
         assert_eq!(file.json["n"].to_string(), patched.to_string());
         assert_eq!(file.json["extensionsUsed"], json!(["NEW"]));
+        file.set("/n/extras", json!("a text"));
+        file.patch("/n", &json!({}), &json!({ "extras": { "a": 1 } }));
+        assert_eq!(file.json["n"]["extras"], "a text");
         file.patch("/n3", &before, &after);
         assert_eq!(file.json["n3"]["colour"], after["colour"]);
     }

@@ -227,7 +227,7 @@ pub fn open(scene: &Scene, most_bytes: u64) -> Result<Opened> {
         });
     }
     let file = File::read(Path::new(&scene.source), most_bytes)?;
-    if file.glb.json["buffers"][0].get("uri").is_some() {
+    if !file.glb.owns_first_buffer() {
         return Err(Error::failure(
             &scene.source,
             "has its first buffer within its text, where nothing can be added",

@@ -55,12 +55,15 @@ impl Edited<'_> {
             let entry = own_entry(origin, glb);
             glb.patch(&entry, &before, &after);
             for key in lights::EXTRAS {
+                let is_same = had.get(key) == has.get(key) && !(new_spectrum && key == spectrum::KEY);
                 let of_node = format!("/nodes/{}/extras/{key}", origin.node);
-                if let Some(stated) = has.get(key) {
-                    glb.set(&of_node, stated.clone());
-                } else if had.get(key).is_some() || new_spectrum && key == spectrum::KEY {
-                    glb.remove(&of_node);
-                    glb.remove(&format!("{entry}/extras/{key}"));
+                match has.get(key) {
+                    _ if is_same => {}
+                    Some(stated) => glb.set(&of_node, stated.clone()),
+                    None => {
+                        glb.remove(&of_node);
+                        glb.remove(&format!("{entry}/extras/{key}"));
+                    }
                 }
             }
         }
