@@ -160,7 +160,11 @@ pub fn summary(manifest: &Manifest, result: &BakeResult, folder: &str) -> String
         "watts",
         format!(
             "{:.6} emitted = {:.6} deposited + {:.6} absorbed + {:.6} escaped + {:.6} truncated",
-            energy.emitted, energy.deposited, energy.absorbed, energy.escaped, energy.truncated
+            energy.emitted,
+            energy.deposited,
+            energy.absorbed,
+            energy.escaped,
+            energy.truncated.total()
         ),
     );
     if let Some(parts) = CarriedFlux::sum(&result.ledgers).in_words(energy.deposited) {

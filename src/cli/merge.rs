@@ -44,7 +44,7 @@ impl MergeArguments {
         let threads = self.run.threads()?;
         let shards = ShardSet::open(&self.shards)?;
         let (shards_wall_s, shards_cpu_s) = shards.seconds();
-        let manifest = shards.manifest()?.clone();
+        let manifest = shards.manifest().clone();
         let options = LoadOptions {
             solid_glass: manifest.scene.solid_glass,
             default_light: manifest.scene.default_light,

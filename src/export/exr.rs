@@ -13,7 +13,6 @@ use half::f16;
 
 use super::float_image::{Channel, FloatImage, check_size, rgb_names};
 use crate::error::{Error, Result};
-use crate::eye_pass::Picture;
 use crate::illumination::{Chart, IlluminationMap};
 
 /// Most channels that a file is read with: a map has at most 13, and 9 for each light.
@@ -24,64 +23,58 @@ pub fn is_exr(bytes: &[u8]) -> bool {
     bytes.starts_with(&[0x76, 0x2f, 0x31, 0x01])
 }
 
-/// One channel of a map's file.
+/// One channel of a map's file: the chart's size, or a larger one where the map had to be made coarser.
 struct MapChannel<'a> {
-    rows: MapRows<'a>,
+    chart: &'a Chart,
+    /// Texels across and down the file.
+    size: (usize, usize),
     value: MapValue<'a>,
 }
 
 /// Gives the value of a texel of a map.
-type MapValue<'a> = Box<dyn Fn(usize) -> f32 + Sync + 'a>;
+pub type MapValue<'a> = Box<dyn Fn(usize) -> f32 + Sync + 'a>;
 
-/// A light's part of a layer: the names of its channels but for `.R`, `.G`, `.B`, and E per texel [W/m²].
-pub type LightChannel<'a> = (&'a str, &'a [[f32; 3]]);
-
-/// A band of the spectrum: the name of its channel, and E per texel [W/(m² nm)].
-pub type BandChannel<'a> = (&'a str, &'a [f32]);
+/// The channels `PREFIX.R/G/B` of a map's texels.
+pub fn rgb_values<'a>(
+    prefix: &str,
+    irradiance: &'a [[f32; 3]],
+) -> impl Iterator<Item = (String, MapValue<'a>)> + use<'a> {
+    let value = move |channel: usize| -> MapValue<'a> { Box::new(move |texel| irradiance[texel][channel]) };
+    let names = rgb_names(prefix).into_iter().enumerate();
+    names.map(move |(channel, name)| (name, value(channel)))
+}
 
 /// The bytes of a map's OpenEXR file: `LAYER.R/G/B` for each layer, `error.Y` where it was estimated, `R/G/B` = the sum of
-/// the layers [W/m²], and parts of lights and bands of the spectrum. Row by row: the dense map is never made. The same map always gives the same
-/// bytes; `comment` and `location` as for [`encode`].
+/// the layers [W/m²], and `others`. Row by row: the dense map is never made. The same map always gives the same bytes;
+/// `comment` and `location` as for [`encode`].
 ///
 /// # Errors
 /// An image that the format cannot hold.
 pub fn encode_map<'a>(
     map: &'a IlluminationMap,
     size: (usize, usize),
-    (parts, bands): (&[LightChannel<'a>], &[BandChannel<'a>]),
+    others: Vec<(String, MapValue<'a>)>,
     comment: &str,
     location: &str,
 ) -> Result<Vec<u8>> {
-    let rows = MapRows::new(&map.chart, size);
-    let mut channels = Vec::new();
-    let mut add = |name: String, value: MapValue<'a>| {
-        channels.push(oxr::AnyChannel::new(name.as_str(), MapChannel { rows, value }));
-    };
+    let mut channels = others;
     for layer in &map.layers {
-        for (channel, name) in rgb_names(layer.kind.name()).into_iter().enumerate() {
-            add(name, Box::new(move |texel| layer.irradiance[texel][channel]));
-        }
+        channels.extend(rgb_values(layer.kind.name(), &layer.irradiance));
     }
     if let Some(error) = &map.error {
-        add("error.Y".into(), Box::new(move |texel| error[texel]));
+        channels.push(("error.Y".into(), Box::new(|texel| error[texel])));
     }
     for (channel, name) in rgb_names("").into_iter().enumerate() {
         let sum = move |texel: usize| {
             let of_layers = map.layers.iter().map(|layer| layer.irradiance[texel][channel]);
             of_layers.fold(0.0, |sum, part| sum + part)
         };
-        add(name, Box::new(sum));
+        channels.push((name, Box::new(sum)));
     }
-    for &(prefix, irradiance) in parts {
-        for (channel, name) in rgb_names(prefix).into_iter().enumerate() {
-            add(name, Box::new(move |texel| irradiance[texel][channel]));
-        }
-    }
-    for &(name, irradiance) in bands {
-        add(name.into(), Box::new(move |texel| irradiance[texel]));
-    }
-    let channels = oxr::AnyChannels::sort(channels.into());
-    let image = oxr::Image::from_layer(oxr::Layer::new(size, attributes(comment), ENCODING, channels));
+    let chart: &Chart = &map.chart;
+    let channels = channels.into_iter();
+    let channels = channels.map(|(name, value)| (name, MapChannel { chart, size, value }));
+    let image = image_of(channels, size, comment);
     let mut bytes = Cursor::new(Vec::new());
     let written = image.write().to_buffered(&mut bytes);
     written.map_err(|error| does_not_fit(location, &error))?;
@@ -106,33 +99,12 @@ impl<'a, 'm: 'a> WritableSamples<'a> for MapChannel<'m> {
 
 impl SamplesWriter for &MapChannel<'_> {
     fn extract_line(&self, line: LineRefMut<'_>) {
-        let row = self.rows.row(line.location.position.y(), &self.value);
+        let row = self.row(line.location.position.y());
         let begin = line.location.position.x();
         let samples = &row[begin..begin + line.location.sample_count];
         // Into memory of the line's own length: this cannot fail.
         drop(line.write_samples_from_slice(samples));
     }
-}
-
-/// `R/G/B` of a picture [W/(m² sr)], row 0 at the top.
-pub fn image_of_picture(picture: &Picture) -> FloatImage {
-    FloatImage {
-        width: picture.width as usize,
-        height: picture.height as usize,
-        channels: rgb_channels("", &picture.radiance),
-    }
-}
-
-/// Channels `PREFIX.R/G/B` of values.
-pub(super) fn rgb_channels(prefix: &str, values: &[[f32; 3]]) -> Vec<Channel> {
-    rgb_names(prefix)
-        .into_iter()
-        .enumerate()
-        .map(|(channel, name)| Channel {
-            name,
-            values: values.iter().map(|rgb| rgb[channel]).collect(),
-        })
-        .collect()
 }
 
 /// The bytes of an OpenEXR file; the same image always gives the same bytes. `comment` states what the values are and
@@ -144,7 +116,7 @@ pub fn encode(image: FloatImage, comment: &str, location: &str) -> Result<Vec<u8
     let size = (image.width, image.height);
     let channels = image.channels.into_iter();
     let channels = channels.map(|channel| (channel.name, oxr::FlatSamples::F32(channel.values)));
-    encode_channels(channels, size, comment, location)
+    encode_samples(channels, size, comment, location)
 }
 
 /// The same of halves, as `R/G/B`.
@@ -161,44 +133,46 @@ pub fn encode_half(
         let values = values.iter().map(|rgb| rgb[channel]).collect();
         (name, oxr::FlatSamples::F16(values))
     });
-    encode_channels(channels, size, comment, location)
+    encode_samples(channels, size, comment, location)
 }
 
-fn encode_channels(
+fn encode_samples(
     channels: impl Iterator<Item = (String, oxr::FlatSamples)>,
     size: (usize, usize),
     comment: &str,
     location: &str,
 ) -> Result<Vec<u8>> {
-    let channels = channels.map(|(name, samples)| oxr::AnyChannel::new(name.as_str(), samples));
-    let channels = oxr::AnyChannels::sort(channels.collect());
-    let image = oxr::Image::from_layer(oxr::Layer::new(size, attributes(comment), ENCODING, channels));
+    let image = image_of(channels, size, comment);
     let mut bytes = Cursor::new(Vec::new());
     let written = image.write().to_buffered(&mut bytes);
     written.map_err(|error| does_not_fit(location, &error))?;
     Ok(bytes.into_inner())
 }
 
-const ENCODING: oxr::Encoding = oxr::Encoding {
-    compression: oxr::Compression::ZIP16,
-    blocks: oxr::Blocks::ScanLines,
-    line_order: oxr::LineOrder::Increasing,
-};
-
-fn attributes(comment: &str) -> oxr::LayerAttributes {
-    oxr::LayerAttributes {
+fn image_of<'s, S: WritableSamples<'s> + 's>(
+    channels: impl IntoIterator<Item = (String, S)>,
+    size: (usize, usize),
+    comment: &str,
+) -> oxr::Image<oxr::Layer<oxr::AnyChannels<S>>> {
+    let channels = channels.into_iter();
+    let channels = channels.map(|(name, samples)| oxr::AnyChannel::new(name.as_str(), samples));
+    let encoding = oxr::Encoding {
+        compression: oxr::Compression::ZIP16,
+        blocks: oxr::Blocks::ScanLines,
+        line_order: oxr::LineOrder::Increasing,
+    };
+    let attributes = oxr::LayerAttributes {
         comments: Some(comment.into()),
         software_name: Some(concat!("nephroid ", env!("CARGO_PKG_VERSION")).into()),
         ..Default::default()
-    }
+    };
+    let channels = oxr::AnyChannels::sort(channels.collect());
+    oxr::Image::from_layer(oxr::Layer::new(size, attributes, encoding, channels))
 }
 
 fn does_not_fit(location: &str, error: &exr::error::Error) -> Error {
-    Error::failure(
-        location,
-        format!("the image does not fit the format ({error})"),
-        "choose another size",
-    )
+    let what = format!("the image does not fit the format ({error})");
+    Error::failure(location, what, "choose another size")
 }
 
 /// Decodes the first part of an OpenEXR file; `location` is named in errors.
@@ -271,23 +245,11 @@ fn sample_bytes(header: &Header) -> u64 {
         .sum()
 }
 
-/// Gives the rows of a file of some size from the values of a chart's texels.
-#[derive(Clone, Copy, Debug)]
-pub struct MapRows<'a> {
-    chart: &'a Chart,
-    /// Texels across and down the file.
-    size: (usize, usize),
-}
-
-impl<'a> MapRows<'a> {
-    /// For a file of a chart's size, or a larger one where the map had to be made coarser.
-    pub fn new(chart: &'a Chart, size: (usize, usize)) -> Self {
-        Self { chart, size }
-    }
-
-    /// One row; `value` gives that of a texel of the chart. A texel of the file gets the mean over what it covers, so that
-    /// all of them together hold the flux of the map.
-    pub fn row(&self, row: usize, value: impl Fn(usize) -> f32) -> Vec<f32> {
+impl MapChannel<'_> {
+    /// One row. A texel of the file gets the mean over what it covers, so that all of them together hold the flux of the
+    /// map.
+    fn row(&self, row: usize) -> Vec<f32> {
+        let value = &self.value;
         let (width, height) = (self.chart.width, self.chart.height);
         if let Some(layout) = &self.chart.layout {
             return layout.row_texels(row).map(value).collect();

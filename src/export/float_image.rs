@@ -33,6 +33,22 @@ pub struct FloatImage {
 }
 
 impl FloatImage {
+    /// `R/G/B` of so many texels across and down.
+    pub fn of_rgb((width, height): (usize, usize), values: &[[f32; 3]]) -> Self {
+        let channels = rgb_names("")
+            .into_iter()
+            .enumerate()
+            .map(|(channel, name)| Channel {
+                name,
+                values: values.iter().map(|rgb| rgb[channel]).collect(),
+            });
+        Self {
+            width,
+            height,
+            channels: channels.collect(),
+        }
+    }
+
     /// Reads an OpenEXR or PFM file, told apart by their first bytes.
     ///
     /// # Errors

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::error::Warning;
 use crate::files::cache::ContentHash;
 use crate::illumination::{IlluminationMap, Side, UvSet};
-use crate::light_pass::ledger::{CarriedFlux, EnergyLedger, LightLedger, Truncated};
+use crate::light_pass::ledger::{EnergyLedger, LightLedger};
 use crate::plan::EffectLine;
 use crate::scene::Scene;
 use crate::session::{
@@ -52,7 +52,7 @@ pub struct Manifest {
     /// Where the bake stood after each level whose error was known.
     pub course: Vec<CostPoint>,
     /// Of the caustic layer, over all lights.
-    pub energy_w: EnergyAccounts,
+    pub energy_w: EnergyLedger,
     /// One per light and layer.
     pub ledgers: Vec<LedgerEntry>,
     /// How exact the whole bake is.
@@ -78,44 +78,14 @@ pub struct SceneSummary {
     pub geometry_hash: String,
 }
 
-/// Energy [W, luminous-equivalent].
-#[derive(Clone, Copy, Debug, Serialize)]
-pub struct EnergyAccounts {
-    /// Flux whose first hit is a specular surface.
-    pub emitted: f64,
-    /// Flux incident on diffuse surfaces, before their albedo.
-    pub deposited: f64,
-    /// Taken by metals, tints, volumes.
-    pub absorbed: f64,
-    /// Left the scene.
-    pub escaped: f64,
-    /// Given up, over all causes.
-    pub truncated: f64,
-    /// The same by cause.
-    pub truncated_by_cause: Truncated,
-    /// Conserved in expectation only, of either sign.
-    pub sampling: f64,
-}
-
 /// Energy of one light in one layer.
 #[derive(Clone, Debug, Serialize)]
 pub struct LedgerEntry {
-    /// The light's name.
-    pub light: String,
     /// Which layer.
     pub layer: LayerKind,
-    /// Its accounts.
-    pub energy_w: EnergyAccounts,
-    /// What was deposited, by what carried it.
-    pub carried_w: CarriedFlux,
-    /// Flux of launched rays whose first hit was not specular [W].
-    pub not_emitted_w: f64,
-    /// What was emitted, as radiant flux [W]; of light that is traced by wavelength.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub emitted_radiant_w: Option<f64>,
-    /// What was deposited, as radiant flux [W]; where the bands of the spectrum are kept.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub deposited_radiant_w: Option<f64>,
+    /// Its light's.
+    #[serde(flatten)]
+    pub ledger: LightLedger,
 }
 
 /// An estimate without a reference.
@@ -215,7 +185,10 @@ pub const UNITS: &str = "W/m^2";
 impl Manifest {
     /// The manifest of a bake whose maps are stored as `maps` say; `settings` are those it was run with.
     pub fn new(scene: &Scene, settings: &BakeSettings, result: &BakeResult, maps: Vec<MapEntry>) -> Self {
-        let energy: EnergyLedger = result.ledgers.iter().map(|ledger| &ledger.energy_w).sum();
+        let ledger = |ledger: &LightLedger| LedgerEntry {
+            layer: LayerKind::Caustic,
+            ledger: ledger.clone(),
+        };
         Self {
             schema: SCHEMA,
             program_version: env!("CARGO_PKG_VERSION"),
@@ -231,41 +204,13 @@ impl Manifest {
             item_buffers: result.item_buffers.clone(),
             forecast: result.forecast,
             course: result.course.clone(),
-            energy_w: energy.into(),
-            ledgers: result.ledgers.iter().map(LedgerEntry::from).collect(),
+            energy_w: result.ledgers.iter().map(|ledger| &ledger.energy_w).sum(),
+            ledgers: result.ledgers.iter().map(ledger).collect(),
             error: ErrorEstimate {
                 estimated_relative_rmse: result.estimated_relative_rmse,
                 estimated_visible: result.estimated_visible,
             },
             maps,
-        }
-    }
-}
-
-impl From<EnergyLedger> for EnergyAccounts {
-    fn from(ledger: EnergyLedger) -> Self {
-        Self {
-            emitted: ledger.emitted,
-            deposited: ledger.deposited,
-            absorbed: ledger.absorbed,
-            escaped: ledger.escaped,
-            truncated: ledger.truncated.total(),
-            truncated_by_cause: ledger.truncated,
-            sampling: ledger.sampling,
-        }
-    }
-}
-
-impl From<&LightLedger> for LedgerEntry {
-    fn from(ledger: &LightLedger) -> Self {
-        Self {
-            light: ledger.light.clone(),
-            layer: LayerKind::Caustic,
-            energy_w: ledger.energy_w.into(),
-            carried_w: ledger.carried_w,
-            not_emitted_w: ledger.not_emitted_w,
-            emitted_radiant_w: ledger.emitted_radiant_w,
-            deposited_radiant_w: ledger.deposited_radiant_w,
         }
     }
 }
@@ -285,6 +230,12 @@ impl SceneSummary {
 }
 
 impl MapEntry {
+    /// Its files, relative to the manifest.
+    pub fn files(&self) -> impl Iterator<Item = &str> {
+        let coordinates = self.uv_file.as_deref();
+        std::iter::once(self.file.as_str()).chain(coordinates)
+    }
+
     /// The entry of a map that is stored in `file`, of a size [texels].
     pub fn new(
         scene: &Scene,

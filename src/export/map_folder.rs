@@ -3,19 +3,16 @@
 use std::path::{Path, PathBuf};
 
 use super::manifest::{self, BandChannel, LightChannels, Manifest, MapEntry};
-use super::{exr, uv_file};
-use crate::error::{Error, Result};
+use super::{exr, map_reader, uv_file};
+use crate::error::Result;
 use crate::files::{self, OutputFolder};
 use crate::illumination::{IlluminationMap, Side, UvSet};
 use crate::scene::{Light, Scene};
-use crate::session::{BakeResult, BandLayer, LightLayer};
+use crate::session::BakeResult;
 use crate::settings::{BakeSettings, MapResolution};
 
 /// Folder of the map files within ours.
 const MAPS: &str = "maps";
-
-/// Largest manifest that is read [bytes].
-pub(super) const MAX_MANIFEST_BYTES: u64 = 64 << 20;
 
 /// A folder that a bake may write to.
 #[derive(Debug)]
@@ -34,15 +31,8 @@ impl MapFolder {
     /// # Errors
     /// A place that cannot be written; other people's files in it.
     pub fn open(path: &Path, force: bool) -> Result<Self> {
-        let root = OutputFolder::open(path)?;
-        let previous = files_of_ours(path);
-        if previous.is_none() && !force && !root.is_empty()? {
-            return Err(Error::failure(
-                path.display().to_string(),
-                "the folder holds files that are not from a bake",
-                "choose another folder or add --force",
-            ));
-        }
+        let previous = map_reader::files_of(path);
+        let root = OutputFolder::open_own(path, previous.is_some(), force, "a bake")?;
         let maps = OutputFolder::open(&path.join(MAPS))?;
         Ok(Self {
             maps,
@@ -69,7 +59,12 @@ impl MapFolder {
         let path = self.path().join(manifest::FILE_NAME);
         let json = files::to_json(&manifest, &path.display().to_string())?;
         files::write_atomically(&path, |writer| writer.write_all(&json))?;
-        for outdated in self.previous.iter().filter(|file| !manifest.names(file)) {
+        let written: Vec<&str> = manifest.maps.iter().flat_map(MapEntry::files).collect();
+        for outdated in self
+            .previous
+            .iter()
+            .filter(|file| !written.contains(&file.as_str()))
+        {
             files::remove_file(&self.path().join(outdated))?;
         }
         Ok(manifest)
@@ -139,31 +134,31 @@ pub fn write_map(
         let bytes = uv_file::encode(&map.chart.corner_uvs);
         files::write_atomically(uv_path, |writer| writer.write_all(&bytes))?;
     }
-    let mut lights = Vec::new();
-    let mut channels = Vec::new();
-    let is_of_map = |part: &&LightLayer| part.receiver == map.chart.receiver;
-    for part in result.light_layers.iter().filter(is_of_map) {
+    let (mut lights, mut bands, mut channels) = (Vec::new(), Vec::new(), Vec::new());
+    let receiver = map.chart.receiver;
+    for part in result
+        .light_layers
+        .iter()
+        .filter(|part| part.receiver == receiver)
+    {
+        let prefix = format!("{}.{}", part.kind.name(), light_slug(scene, part.light));
+        channels.extend(exr::rgb_values(&prefix, &part.irradiance));
         lights.push(LightChannels {
             light: scene.lights[part.light].name.clone(),
             layer: part.kind,
-            channels: format!("{}.{}", part.kind.name(), light_slug(scene, part.light)),
+            channels: prefix,
         });
-        channels.push(&part.irradiance[..]);
     }
-    let names = lights.iter().map(|light| light.channels.as_str());
-    let parts: Vec<exr::LightChannel> = names.zip(channels).collect();
-    let of_map = result.band_layers.iter();
-    let of_map: Vec<&BandLayer> = of_map
-        .filter(|layer| layer.receiver == map.chart.receiver)
-        .collect();
-    let bands: Vec<BandChannel> = of_map.iter().map(|layer| BandChannel::new(&layer.band)).collect();
-    let names = bands.iter().map(|band| band.channel.as_str());
-    let single = names.zip(of_map.iter().map(|layer| &layer.irradiance[..]));
-    let single: Vec<exr::BandChannel> = single.collect();
+    for part in result.band_layers.iter().filter(|part| part.receiver == receiver) {
+        let band = BandChannel::new(&part.band);
+        let value: exr::MapValue = Box::new(move |texel| part.irradiance[texel]);
+        channels.push((band.channel.clone(), value));
+        bands.push(band);
+    }
     let bytes = exr::encode_map(
         map,
         size(settings, map),
-        (&parts, &single),
+        channels,
         "irradiance in W/m^2 (lumens / 683 per m^2), linear sRGB; row 0 is v = 0",
         &path.display().to_string(),
     )?;
@@ -177,34 +172,6 @@ fn light_slug(scene: &Scene, light: usize) -> String {
     let own = slug_of(&scene.lights[light]);
     let is_alone = scene.lights.iter().filter(|other| slug_of(other) == own).count() == 1;
     if is_alone { own } else { format!("{own}-{light}") }
-}
-
-impl Manifest {
-    fn names(&self, file: &str) -> bool {
-        self.maps
-            .iter()
-            .any(|map| map.file == file || map.uv_file.as_deref() == Some(file))
-    }
-}
-
-/// Files of the bake that lies in a folder, relative to it; `None` where none of ours does.
-fn files_of_ours(path: &Path) -> Option<Vec<String>> {
-    let bytes = files::read_file(&path.join(manifest::FILE_NAME), MAX_MANIFEST_BYTES).ok()?;
-    let document: serde_json::Value = serde_json::from_slice(&bytes).ok()?;
-    if document.get("schema")?.as_u64()? != u64::from(manifest::SCHEMA) {
-        return None;
-    }
-    document.get("program_version")?;
-    let files = document
-        .get("maps")?
-        .as_array()?
-        .iter()
-        .flat_map(|map| [map.get("file"), map.get("uv_file")])
-        .filter_map(|file| file?.as_str())
-        .filter(|file| is_map_file(file))
-        .map(str::to_string)
-        .collect();
-    Some(files)
 }
 
 /// Whether a path in a manifest is one that a bake writes: `maps/NAME` with nothing that leads elsewhere.

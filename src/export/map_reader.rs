@@ -1,12 +1,12 @@
 //! A folder of maps, read back. Nothing in it is trusted: it may be damaged, edited or of another scene.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use serde::Deserialize;
 
 use super::manifest::{self, LightChannels, MapEntry, SceneSummary};
-use super::map_folder::{MAX_MANIFEST_BYTES, is_map_file};
+use super::map_folder::is_map_file;
 use super::{FloatImage, float_image, uv_file};
 use crate::error::{Error, Result, Warning};
 use crate::files;
@@ -37,13 +37,18 @@ impl StoredEnergy {
     /// Watts by which rounding may take a texel's light below 0. Sums count in steps of 2⁻⁶⁰ of the power at least, and
     /// colours outside of sRGB are rounded channel by channel: this is room for a million roundings.
     fn rounding_w(self) -> f64 {
-        let power_w = if self.emitted.is_finite() {
-            self.emitted.max(0.0)
+        let is_power = self.emitted.is_finite() && self.emitted > 0.0;
+        if is_power {
+            self.emitted * 2.0_f64.powi(-40)
         } else {
             0.0
-        };
-        power_w * 2.0_f64.powi(-40)
+        }
     }
+}
+
+/// What does not fit together.
+fn unusable(location: impl Into<String>, what: impl Into<String>) -> Error {
+    Error::failure(location, what, "bake the scene again")
 }
 
 /// A map as its folder has it.
@@ -127,36 +132,61 @@ impl<'a> MapReader<'a> {
     /// # Errors
     /// Files that are missing, damaged or do not fit the manifest.
     pub fn read(&self, entry: &MapEntry) -> Result<StoredMap> {
-        let (map, image) = self.read_map(entry)?;
-        let mut lights = Vec::new();
-        for channels in &entry.lights {
-            let irradiance = image.rgb(&channels.channels).ok_or_else(|| {
-                Error::failure(
-                    self.folder.join(&entry.file).display().to_string(),
-                    format!(
-                        "the channels {} that the manifest names are not in it",
-                        channels.channels
-                    ),
-                    "bake the scene again",
-                )
-            })?;
-            let location = self.folder.join(&entry.file).display().to_string();
-            let rounding_w = self.stored.energy_w.rounding_w();
-            check_light(
-                (&map.chart, &irradiance),
-                rounding_w,
-                &channels.channels,
-                &location,
-            )?;
-            lights.push(StoredLight {
-                channels: channels.clone(),
-                irradiance,
-            });
+        self.read_with(entry, &entry.lights)
+    }
+
+    /// The same with some lights alone.
+    fn read_with(&self, entry: &MapEntry, lights: &[LightChannels]) -> Result<StoredMap> {
+        let object = self.object_of(entry)?;
+        let path = self.inside(&entry.file)?;
+        let location = path.display().to_string();
+        let image = FloatImage::read(&path)?;
+        if (image.width, image.height) != (entry.width, entry.height) {
+            let what = format!(
+                "its size {}x{} is not the manifest's {}x{}",
+                image.width, image.height, entry.width, entry.height
+            );
+            return Err(unusable(location, what));
         }
+        let chart = self.chart(entry, object)?;
+        let rounding_w = self.stored.energy_w.rounding_w();
+        let light = |prefix: &str, what: &str| {
+            let irradiance = image.rgb(prefix).ok_or_else(|| {
+                let what = format!("the {what} that the manifest names are not in it");
+                unusable(&location, what)
+            })?;
+            let mut texels = irradiance.iter().enumerate();
+            if texels.all(|(texel, light)| is_light(light, rounding_w / chart.texel_area_m2(texel))) {
+                return Ok(irradiance);
+            }
+            let what = format!("its {prefix} layer holds values that are no irradiance");
+            Err(unusable(&location, what))
+        };
+        let mut kinds = entry.layers.clone();
+        kinds.sort_unstable();
+        kinds.dedup();
+        let layers = kinds.into_iter().map(|kind| {
+            let irradiance = light(kind.name(), &format!("channels of the {} layer", kind.name()))?;
+            Ok(Layer { kind, irradiance })
+        });
+        let layers = layers.collect::<Result<_>>()?;
+        let lights = lights.iter().map(|stated| {
+            let irradiance = light(&stated.channels, &format!("channels {}", stated.channels))?;
+            Ok(StoredLight {
+                channels: stated.clone(),
+                irradiance,
+            })
+        });
         Ok(StoredMap {
             entry: entry.clone(),
-            map,
-            lights,
+            lights: lights.collect::<Result<_>>()?,
+            map: IlluminationMap {
+                chart: Arc::new(chart),
+                layers,
+                error: image.channel("error.Y").map(<[f32]>::to_vec),
+                estimated_relative_rmse: entry.estimated_relative_rmse,
+                estimated_visible: entry.estimated_visible,
+            },
         })
     }
 
@@ -168,50 +198,49 @@ impl<'a> MapReader<'a> {
         let Some(file) = &entry.uv_file else {
             return Ok(None);
         };
-        let triangles = object_of(self.scene, entry, &self.location)?
-            .1
-            .mesh
-            .triangles
-            .len();
-        let path = inside(self.folder, file, &self.location)?;
-        files::read_file(&path, uv_file::size_bytes(triangles)).map(Some)
+        let triangles = self.object_of(entry)?.1.mesh.triangles.len();
+        files::read_file(&self.inside(file)?, uv_file::size_bytes(triangles)).map(Some)
     }
 
-    /// A map, and all that is in its file.
-    fn read_map(&self, entry: &MapEntry) -> Result<(IlluminationMap, FloatImage)> {
-        let object = object_of(self.scene, entry, &self.location)?;
-        let path = inside(self.folder, &entry.file, &self.location)?;
-        let location = path.display().to_string();
-        let image = FloatImage::read(&path)?;
-        if (image.width, image.height) != (entry.width, entry.height) {
-            return Err(Error::failure(
-                location,
-                format!(
-                    "its size {}x{} is not the manifest's {}x{}",
-                    image.width, image.height, entry.width, entry.height
-                ),
-                "bake the scene again",
-            ));
-        }
-        let layers = read_layers(&image, entry, &location)?;
-        let chart = read_chart(self.folder, entry, object, &self.location)?;
-        let rounding_w = self.stored.energy_w.rounding_w();
-        for layer in &layers {
-            check_light(
-                (&chart, &layer.irradiance),
-                rounding_w,
-                layer.kind.name(),
-                &location,
-            )?;
-        }
-        let map = IlluminationMap {
-            chart: Arc::new(chart),
-            layers,
-            error: image.channel("error.Y").map(<[f32]>::to_vec),
-            estimated_relative_rmse: entry.estimated_relative_rmse,
-            estimated_visible: entry.estimated_visible,
+    /// The object that a map is of, with its index.
+    fn object_of(&self, entry: &MapEntry) -> Result<(usize, &'a Object)> {
+        let mut objects = self.scene.objects.iter().enumerate();
+        let found =
+            objects.find(|(_, object)| object.node == entry.node && object.primitive == entry.primitive);
+        let missing = || format!("the scene has no surface {}", entry.surface);
+        found.ok_or_else(|| unusable(&self.location, missing()))
+    }
+
+    fn chart(&self, entry: &MapEntry, (index, object): (usize, &Object)) -> Result<Chart> {
+        float_image::check_size(entry.width, entry.height, &self.location)?;
+        let mesh = &object.mesh;
+        let parametrisation = match (entry.uv_set, &entry.uv_file) {
+            (UvSet::Generated, Some(file)) => {
+                let bytes = self.read_coordinates(entry)?.unwrap_or_default();
+                let corner_uvs = uv_file::decode(
+                    &bytes,
+                    mesh.triangles.len(),
+                    &self.inside(file)?.display().to_string(),
+                )?;
+                Some(Parametrisation::new(index, mesh, UvSet::Generated, corner_uvs))
+            }
+            (UvSet::Generated, None) => None,
+            // The file's own sets are taken up the same way as in the bake.
+            (set, _) => parametrise(index, mesh, DEFAULT_NOMINAL_SIDE).filter(|own| own.uv_set == set),
         };
-        Ok((map, image))
+        let missing = || format!("the texture coordinates of {} are not there", entry.surface);
+        let parametrisation = parametrisation.ok_or_else(|| unusable(&self.location, missing()))?;
+        let chart = parametrisation.chart(entry.width, entry.height);
+        Ok(chart.of_side(entry.side))
+    }
+
+    /// A file of the folder; names that lead out of it are refused.
+    fn inside(&self, file: &str) -> Result<PathBuf> {
+        if is_map_file(file) {
+            return Ok(self.folder.join(file));
+        }
+        let what = format!("it names the file {file:?}, which is none that a bake writes");
+        Err(unusable(&self.location, what))
     }
 }
 
@@ -223,16 +252,11 @@ pub fn read(folder: &Path, scene: &Scene) -> Result<(Vec<IlluminationMap>, Vec<W
     let reader = MapReader::open(folder, scene)?;
     let mut maps: Vec<IlluminationMap> = Vec::new();
     for entry in reader.entries() {
-        let (map, _) = reader.read_map(entry)?;
-        if maps
-            .iter()
-            .any(|other| other.chart.receiver == map.chart.receiver)
-        {
-            return Err(Error::failure(
-                &reader.location,
-                format!("it names two maps of one side of {}", entry.surface),
-                "bake the scene again",
-            ));
+        let map = reader.read_with(entry, &[])?.map;
+        let mut others = maps.iter();
+        if others.any(|other| other.chart.receiver == map.chart.receiver) {
+            let what = format!("it names two maps of one side of {}", entry.surface);
+            return Err(unusable(&reader.location, what));
         }
         maps.push(map);
     }
@@ -249,6 +273,21 @@ pub fn source_of(folder: &Path) -> Result<String> {
     read_manifest(folder).map(|(stored, _)| stored.scene.source)
 }
 
+/// Files of the maps in a folder, relative to it; `None` where none are.
+pub(super) fn files_of(folder: &Path) -> Option<Vec<String>> {
+    let (stored, _) = read_manifest(folder).ok()?;
+    let files = stored.maps.iter().flat_map(MapEntry::files);
+    Some(
+        files
+            .filter(|file| is_map_file(file))
+            .map(str::to_owned)
+            .collect(),
+    )
+}
+
+/// Largest manifest that is read [bytes].
+const MAX_MANIFEST_BYTES: u64 = 64 << 20;
+
 /// The manifest of a folder, and where it is for errors.
 fn read_manifest(folder: &Path) -> Result<(StoredMaps, String)> {
     let path = folder.join(manifest::FILE_NAME);
@@ -262,63 +301,10 @@ fn read_manifest(folder: &Path) -> Result<(StoredMaps, String)> {
         )
     })?;
     if stored.schema != manifest::SCHEMA {
-        return Err(Error::failure(
-            &location,
-            format!("its format is version {} of the manifest", stored.schema),
-            "bake the scene again",
-        ));
+        let what = format!("its format is version {} of the manifest", stored.schema);
+        return Err(unusable(location, what));
     }
     Ok((stored, location))
-}
-
-/// The object that a map is of, with its index.
-fn object_of<'a>(scene: &'a Scene, entry: &MapEntry, manifest: &str) -> Result<(usize, &'a Object)> {
-    let mut objects = scene.objects.iter().enumerate();
-    objects
-        .find(|(_, object)| object.node == entry.node && object.primitive == entry.primitive)
-        .ok_or_else(|| {
-            Error::failure(
-                manifest,
-                format!("the scene has no surface {}", entry.surface),
-                "bake the scene again",
-            )
-        })
-}
-
-fn read_layers(image: &FloatImage, entry: &MapEntry, location: &str) -> Result<Vec<Layer>> {
-    let mut kinds = entry.layers.clone();
-    kinds.sort_unstable();
-    kinds.dedup();
-    let mut layers = Vec::new();
-    for kind in kinds {
-        let irradiance = image.rgb(kind.name()).ok_or_else(|| {
-            Error::failure(
-                location,
-                format!("the {} layer that the manifest names is not in it", kind.name()),
-                "bake the scene again",
-            )
-        })?;
-        layers.push(Layer { kind, irradiance });
-    }
-    Ok(layers)
-}
-
-/// Refuses texels that hold no light.
-fn check_light(
-    (chart, irradiance): (&Chart, &[[f32; 3]]),
-    rounding_w: f64,
-    what: &str,
-    location: &str,
-) -> Result<()> {
-    let mut texels = irradiance.iter().enumerate();
-    if texels.all(|(texel, light)| is_light(light, rounding_w / chart.texel_area_m2(texel))) {
-        return Ok(());
-    }
-    Err(Error::failure(
-        location,
-        format!("its {what} layer holds values that are no irradiance"),
-        "bake the scene again",
-    ))
 }
 
 /// Whether a texel holds finite light of no negative luminance, but for rounding: of its numbers, and of the counts that
@@ -332,54 +318,6 @@ fn is_light(texel: &[f32; 3], rounding: f64) -> bool {
     let lost = f64::from(f32::EPSILON) * largest + rounding;
     // A texel without an area of its own has its neighbours' light, and no bound.
     largest.is_finite() && (lost.is_nan() || luminance >= -lost)
-}
-
-fn read_chart(
-    folder: &Path,
-    entry: &MapEntry,
-    (index, object): (usize, &Object),
-    manifest: &str,
-) -> Result<Chart> {
-    float_image::check_size(entry.width, entry.height, manifest)?;
-    let parametrisation = match (entry.uv_set, &entry.uv_file) {
-        (UvSet::Generated, Some(file)) => {
-            let path = inside(folder, file, manifest)?;
-            let triangles = object.mesh.triangles.len();
-            let bytes = files::read_file(&path, uv_file::size_bytes(triangles))?;
-            let corner_uvs = uv_file::decode(&bytes, triangles, &path.display().to_string())?;
-            Some(Parametrisation::new(
-                index,
-                &object.mesh,
-                UvSet::Generated,
-                corner_uvs,
-            ))
-        }
-        (UvSet::Generated, None) => None,
-        // The file's own sets are taken up the same way as in the bake.
-        (set, _) => parametrise(index, &object.mesh, DEFAULT_NOMINAL_SIDE).filter(|own| own.uv_set == set),
-    };
-    let parametrisation = parametrisation.ok_or_else(|| {
-        Error::failure(
-            manifest,
-            format!("the texture coordinates of {} are not there", entry.surface),
-            "bake the scene again",
-        )
-    })?;
-    Ok(parametrisation
-        .chart(entry.width, entry.height)
-        .of_side(entry.side))
-}
-
-/// A file of the folder; names that lead out of it are refused.
-fn inside(folder: &Path, file: &str, manifest: &str) -> Result<std::path::PathBuf> {
-    if is_map_file(file) {
-        return Ok(folder.join(file));
-    }
-    Err(Error::failure(
-        manifest,
-        format!("it names the file {file:?}, which is none that a bake writes"),
-        "bake the scene again",
-    ))
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! A picture as a file: what a display shows of it, or the radiance that it holds.
 
-use super::exr;
+use super::{FloatImage, exr};
 use crate::error::{Error, Result};
 use crate::eye_pass::{Picture, ToneMap, tone_mapping};
 use crate::files;
@@ -28,8 +28,9 @@ pub fn display_png(
 /// # Errors
 /// A size that the format cannot hold.
 pub fn radiance_exr(picture: &Picture, location: &str) -> Result<Vec<u8>> {
+    let size = (picture.width as usize, picture.height as usize);
     exr::encode(
-        exr::image_of_picture(picture),
+        FloatImage::of_rgb(size, &picture.radiance),
         "radiance in W/(m^2 sr) (cd/m^2 / 683), linear sRGB; row 0 is the top",
         location,
     )

@@ -44,6 +44,23 @@ impl OutputFolder {
         }
     }
 
+    /// The same of a folder whose files are to be replaced: one that is not empty and not ours is taken only with `force`.
+    /// `whose`: what its files should be from.
+    ///
+    /// # Errors
+    /// As [`Self::open`]; other people's files in it.
+    pub fn open_own(path: &Path, is_ours: bool, force: bool, whose: &str) -> Result<Self> {
+        let folder = Self::open(path)?;
+        if is_ours || force || folder.is_empty()? {
+            return Ok(folder);
+        }
+        Err(Error::failure(
+            path.display().to_string(),
+            format!("the folder holds files that are not from {whose}"),
+            "choose another folder or add --force",
+        ))
+    }
+
     /// Where it is.
     pub fn path(&self) -> &Path {
         &self.path

@@ -3,10 +3,10 @@
 use std::iter::Sum;
 use std::ops::AddAssign;
 
-use serde::{Deserialize, Serialize};
+use serde::{Serialize, Serializer};
 
 /// What was given up, by cause [W, luminous-equivalent].
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Truncated {
     /// Paths longer than the depth limit.
     pub depth: f64,
@@ -30,7 +30,7 @@ impl Truncated {
 }
 
 /// Accounts of the caustic layer [W, luminous-equivalent]; each is summed on its own, none is a remainder.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct EnergyLedger {
     /// Flux whose first hit is a specular surface.
     pub emitted: f64,
@@ -40,11 +40,24 @@ pub struct EnergyLedger {
     pub absorbed: f64,
     /// Left the scene.
     pub escaped: f64,
-    /// Given up by us.
+    /// Given up by us; also told as a sum.
+    #[serde(flatten, serialize_with = "with_total")]
     pub truncated: Truncated,
     /// What is conserved only in expectation, of either sign: photons that chance ended less what it gave to others.
-    #[serde(default)]
     pub sampling: f64,
+}
+
+fn with_total<S: Serializer>(by_cause: &Truncated, serializer: S) -> Result<S::Ok, S::Error> {
+    #[derive(Serialize)]
+    struct Told {
+        truncated: f64,
+        truncated_by_cause: Truncated,
+    }
+    let told = Told {
+        truncated: by_cause.total(),
+        truncated_by_cause: *by_cause,
+    };
+    told.serialize(serializer)
 }
 
 impl AddAssign for Truncated {
@@ -90,7 +103,7 @@ impl EnergyLedger {
 }
 
 /// What carried the light that diffuse surfaces got [W].
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct CarriedFlux {
     /// Patches of the wavefront.
     pub patches: f64,
@@ -131,7 +144,7 @@ impl CarriedFlux {
 }
 
 /// The ledger of one light.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct LightLedger {
     /// The light's name.
     pub light: String,
@@ -142,8 +155,10 @@ pub struct LightLedger {
     /// Flux of launched rays whose first hit was not specular [W].
     pub not_emitted_w: f64,
     /// What was emitted, as radiant flux [W]; `None` of light that is not traced by wavelength.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub emitted_radiant_w: Option<f64>,
     /// What was deposited, as radiant flux [W]; `None` where the bands of the spectrum are not kept.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub deposited_radiant_w: Option<f64>,
 }
 

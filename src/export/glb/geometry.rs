@@ -9,26 +9,18 @@ use crate::error::Warning;
 use crate::illumination::{Chart, UvSet};
 use crate::scene::{Glb, Mesh, Scene};
 
-/// Which set of texture coordinates a primitive's map follows.
-#[derive(Clone, Copy, Debug)]
-pub struct Coordinates {
-    /// n of TEXCOORD_n.
-    pub tex_coord: usize,
-}
-
 /// Gives the primitive of a chart's surface the coordinates of its map, where they are not its own. Vertices are doubled
-/// where charts part. `None` where the node's transform cannot be undone.
+/// where charts part. The n of their TEXCOORD_n; `None` where the node's transform cannot be undone.
 pub fn write(
     glb: &mut Glb,
     scene: &Scene,
     chart: &Chart,
     world_from_node: &DAffine3,
     warnings: &mut Vec<Warning>,
-) -> Option<Coordinates> {
-    let own = |tex_coord| Some(Coordinates { tex_coord });
+) -> Option<usize> {
     match chart.uv_set {
-        UvSet::TexCoord0 => return own(0),
-        UvSet::TexCoord1 => return own(1),
+        UvSet::TexCoord0 => return Some(0),
+        UvSet::TexCoord1 => return Some(1),
         UvSet::Generated => {}
     }
     let object = &scene.objects[chart.object()];
@@ -77,14 +69,14 @@ pub fn write(
     primitive["attributes"] = attributes;
     primitive["indices"] = json!(indices);
     if let Some(fields) = primitive.as_object_mut() {
-        fields.remove("mode");
-        fields.remove("targets");
+        fields.shift_remove("mode");
+        fields.shift_remove("targets");
         if let Some(extensions) = fields.get_mut("extensions").and_then(Value::as_object_mut) {
             // Its data is written out now.
-            extensions.remove("KHR_draco_mesh_compression");
+            extensions.shift_remove("KHR_draco_mesh_compression");
         }
     }
-    Some(Coordinates { tex_coord })
+    Some(tex_coord)
 }
 
 /// A mesh whose vertices have one map coordinate each.
@@ -230,8 +222,8 @@ fn gathered(glb: &mut Glb, accessor: usize, vertices: usize, parted: &Parted) ->
     copy["bufferView"] = json!(view);
     copy["count"] = json!(parted.vertices.len());
     let fields = copy.as_object_mut()?;
-    fields.remove("byteOffset");
-    Some(glb.push("accessors", copy))
+    fields.shift_remove("byteOffset");
+    Some(glb.push("/accessors", copy))
 }
 
 fn element_bytes(accessor: &Value) -> Option<usize> {

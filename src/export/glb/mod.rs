@@ -2,12 +2,11 @@
 //! the maps as images, for programs that know light maps (MOZ_lightmap), for those that know none (emissive), and for
 //! those that shall not light at all (unlit).
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use self::geometry::Coordinates;
 use super::Quantity;
 use crate::error::{Error, Result, Warning};
 use crate::illumination::{IlluminationMap, Side};
@@ -126,12 +125,13 @@ pub fn encode(
         maps: Vec::new(),
         warnings,
     };
-    glb.push_own_meshes(&nodes_with_maps(scene, maps));
+    let objects = maps.iter().map(|map| &scene.objects[map.chart.object()]);
+    glb.push_own_meshes(objects.map(|object| object.node).collect());
     for map in front_maps(maps, scene, &mut report.warnings) {
         let object = &scene.objects[map.chart.object()];
         let dense = map.dense();
         let world_from_node = world_from_node.get(&object.node);
-        let Some(coordinates) = world_from_node.and_then(|transform| {
+        let Some(tex_coord) = world_from_node.and_then(|transform| {
             geometry::write(&mut glb, scene, &dense.chart, transform, &mut report.warnings)
         }) else {
             report.warnings.push(Warning::new(
@@ -141,18 +141,19 @@ pub fn encode(
             ));
             continue;
         };
-        let exported = add_map(&mut glb, scene, &dense, &layers, coordinates, options)?;
+        let exported = add_map(&mut glb, scene, &dense, &layers, tex_coord, options)?;
         report.maps.push(exported);
     }
     if options.lights == SceneLights::Remove {
-        remove(&mut glb.json);
+        remove_lights(&mut glb);
     }
-    glb.json["asset"]["extras"]["nephroid"] = json!({
+    let about = json!({
         "unit": report.unit,
         "layers": report.layers,
         "carrier": options.carrier,
         "lights": options.lights,
     });
+    glb.set("/asset/extras/nephroid", about);
     Ok((glb.into_bytes()?, report))
 }
 
@@ -196,22 +197,12 @@ fn front_maps<'a>(
     front
 }
 
-fn nodes_with_maps(scene: &Scene, maps: &[IlluminationMap]) -> Vec<usize> {
-    let mut nodes: Vec<usize> = maps
-        .iter()
-        .map(|map| scene.objects[map.chart.object()].node)
-        .collect();
-    nodes.sort_unstable();
-    nodes.dedup();
-    nodes
-}
-
 fn add_map(
     glb: &mut Glb,
     scene: &Scene,
     map: &IlluminationMap,
     layers: &[LayerKind],
-    coordinates: Coordinates,
+    tex_coord: usize,
     options: GlbOptions,
 ) -> Result<ExportedMap> {
     let object = &scene.objects[map.chart.object()];
@@ -222,19 +213,20 @@ fn add_map(
         "samplers",
         json!({ "magFilter": 9729, "minFilter": 9729, "wrapS": 33071, "wrapT": 33071 }),
     );
-    let texture = glb.push("textures", json!({ "source": image_index, "sampler": sampler }));
-    let carried = Carried {
-        texture: json!({ "index": texture, "texCoord": coordinates.tex_coord }),
-        intensity: image.white,
+    let texture = glb.push("/textures", json!({ "source": image_index, "sampler": sampler }));
+    let texture = json!({ "index": texture, "texCoord": tex_coord });
+    give(
+        glb,
+        (object.node, object.primitive),
+        texture,
+        image.white,
         options,
-    };
-    let path = (object.node, object.primitive);
-    give(glb, path, &carried);
+    );
     Ok(ExportedMap {
         surface: object.name.clone(),
         node: object.node,
         primitive: object.primitive,
-        tex_coord: coordinates.tex_coord,
+        tex_coord,
         intensity: image.white,
         cut_texels: image.cut_texels,
         cut_share: image.cut_share,
@@ -244,14 +236,14 @@ fn add_map(
 
 impl Glb {
     /// Gives each of these nodes a mesh of its own where others share it: their light differs.
-    fn push_own_meshes(&mut self, nodes: &[usize]) {
+    fn push_own_meshes(&mut self, nodes: BTreeSet<usize>) {
         let mut users: BTreeMap<u64, usize> = BTreeMap::new();
         for node in self.json["nodes"].as_array().into_iter().flatten() {
             if let Some(mesh) = node["mesh"].as_u64() {
                 *users.entry(mesh).or_default() += 1;
             }
         }
-        for &node in nodes {
+        for node in nodes {
             let Some(mesh) = self.json["nodes"][node]["mesh"].as_u64() else {
                 continue;
             };
@@ -259,7 +251,7 @@ impl Glb {
             if *count > 1 {
                 *count -= 1;
                 let copy = self.json["meshes"][mesh as usize].clone();
-                let copy = self.push("meshes", copy);
+                let copy = self.push("/meshes", copy);
                 self.json["nodes"][node]["mesh"] = json!(copy);
             }
         }
@@ -275,34 +267,28 @@ impl Glb {
 const LISTS: [&str; 2] = ["KHR_lights_punctual", "EXT_lights_area"];
 
 /// Removes every light that stands at a node, and their lists. What glows stays: it is seen.
-pub fn remove(document: &mut Value) {
-    for node in document["nodes"].as_array_mut().into_iter().flatten() {
-        remove_extensions(node);
+fn remove_lights(glb: &mut Glb) {
+    let nodes = glb.json["nodes"].as_array().map_or(0, Vec::len);
+    let nodes = (0..nodes).map(|node| format!("/nodes/{node}/extensions"));
+    for extensions in nodes.chain(["/extensions".into()]) {
+        for list in LISTS {
+            glb.remove(&format!("{extensions}/{list}"));
+        }
+        remove_empty(glb, &extensions);
     }
-    remove_extensions(document);
-    for list in ["extensionsUsed", "extensionsRequired"] {
-        if let Some(names) = document[list].as_array_mut() {
+    for list in ["/extensionsUsed", "/extensionsRequired"] {
+        if let Some(Value::Array(names)) = glb.json.pointer_mut(list) {
             names.retain(|name| !LISTS.iter().any(|list| name == list));
         }
-        if document[list].as_array().is_none_or(Vec::is_empty)
-            && let Some(fields) = document.as_object_mut()
-        {
-            fields.remove(list);
-        }
+        remove_empty(glb, list);
     }
 }
 
-fn remove_extensions(owner: &mut Value) {
-    let Some(fields) = owner.as_object_mut() else {
-        return;
-    };
-    if let Some(extensions) = fields.get_mut("extensions").and_then(Value::as_object_mut) {
-        for list in LISTS {
-            extensions.remove(list);
-        }
-        if extensions.is_empty() {
-            fields.remove("extensions");
-        }
+/// glTF has no empty lists and objects.
+fn remove_empty(glb: &mut Glb, pointer: &str) {
+    let found = glb.json.pointer(pointer);
+    if found.is_some_and(|found| *found == json!({}) || *found == json!([])) {
+        glb.remove(pointer);
     }
 }
 
@@ -310,48 +296,36 @@ const LIGHT_MAP: &str = "MOZ_lightmap";
 const STRENGTH: &str = "KHR_materials_emissive_strength";
 const UNLIT: &str = "KHR_materials_unlit";
 
-/// What a material is given.
-pub struct Carried {
-    /// Reference to the texture of the light.
-    pub texture: Value,
-    /// The value of its white, in the export's unit.
-    pub intensity: f64,
-    /// How it is carried.
-    pub options: GlbOptions,
-}
-
-/// Gives a primitive a material of its own that carries a map. Colours and textures of the one that it had stay.
-pub fn give(glb: &mut Glb, place: (usize, usize), carried: &Carried) {
+/// Gives a primitive a material of its own that carries the light of a texture. Colours and textures of the one that it
+/// had stay. `intensity`: the value of the texture's white, in the export's unit.
+fn give(glb: &mut Glb, place: (usize, usize), mut texture: Value, intensity: f64, options: GlbOptions) {
     let index = glb.primitive(place)["material"].as_u64();
     let mut material = index.map_or(json!({}), |index| glb.json["materials"][index as usize].clone());
     if let Some(name) = material["name"].as_str() {
         material["name"] = json!(format!("{name}, lit"));
     }
-    match carried.options.carrier {
+    let black = json!([0.0, 0.0, 0.0, 1.0]);
+    match options.carrier {
         Carrier::LightMap => {
-            let mut light = carried.texture.clone();
-            light["intensity"] = json!(carried.intensity);
-            material["extensions"][LIGHT_MAP] = light;
-            glb.use_extension(LIGHT_MAP);
+            texture["intensity"] = json!(intensity);
+            material["extensions"][LIGHT_MAP] = texture;
         }
         Carrier::Emissive => {
-            material["emissiveTexture"] = carried.texture.clone();
+            material["emissiveTexture"] = texture;
             material["emissiveFactor"] = json!([1.0, 1.0, 1.0]);
-            material["extensions"][STRENGTH] = json!({ "emissiveStrength": carried.intensity });
-            glb.use_extension(STRENGTH);
-            if carried.options.lights == SceneLights::Remove {
+            material["extensions"][STRENGTH] = json!({ "emissiveStrength": intensity });
+            if options.lights == SceneLights::Remove {
                 // Any light that a program adds would be light twice.
-                material["pbrMetallicRoughness"] = json!({ "baseColorFactor": [0.0, 0.0, 0.0, 1.0],
-                    "metallicFactor": 0.0, "roughnessFactor": 1.0 });
+                material["pbrMetallicRoughness"] =
+                    json!({ "baseColorFactor": black, "metallicFactor": 0.0, "roughnessFactor": 1.0 });
             }
         }
         Carrier::Unlit => {
-            material["pbrMetallicRoughness"] = json!({ "baseColorTexture": carried.texture,
-                "metallicFactor": 0.0, "roughnessFactor": 1.0 });
+            material["pbrMetallicRoughness"] =
+                json!({ "baseColorTexture": texture, "metallicFactor": 0.0, "roughnessFactor": 1.0 });
             material["extensions"] = json!({ UNLIT: {} });
-            glb.use_extension(UNLIT);
         }
     }
-    let material = glb.push("materials", material);
+    let material = glb.push("/materials", material);
     glb.primitive(place)["material"] = json!(material);
 }

@@ -13,13 +13,13 @@ use crate::session::{ShardSums, Timings};
 use crate::settings::BakeSettings;
 
 /// Version of the format of both files.
-pub(super) const SCHEMA: u32 = 3;
+const SCHEMA: u32 = 4;
 
 /// Name of the file in its folder.
 pub(super) const FILE_NAME: &str = "shard.json";
 
 /// Largest one that is read [bytes].
-const MOST_BYTES: u64 = 1 << 20;
+const MOST_BYTES: u64 = 64 << 20;
 
 /// What the user named as the scene, and how it was read.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -43,6 +43,27 @@ pub struct ShardNumber {
     pub count: u32,
 }
 
+/// The sums of one pass in `sums.bin`.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct StoredPass {
+    /// Length [bytes].
+    pub bytes: u64,
+    /// Of these bytes.
+    pub hash: String,
+}
+
+impl StoredPass {
+    /// What is said of some sums.
+    pub(super) fn of(sums: &[u8]) -> Self {
+        let mut hash = ContentHash::default();
+        sums.iter().for_each(|&byte| hash.take(u64::from(byte)));
+        Self {
+            bytes: sums.len() as u64,
+            hash: format!("{:016x}", hash.value()),
+        }
+    }
+}
+
 /// Everything in `shard.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ShardManifest {
@@ -58,6 +79,8 @@ pub struct ShardManifest {
     pub scene: SceneOrigin,
     /// Of all that light meets there.
     pub scene_hash: String,
+    /// One after the other.
+    pub passes: Vec<StoredPass>,
     /// Wall-clock seconds.
     pub timings_s: Timings,
     /// Seconds of the process's CPU clock.
@@ -83,6 +106,7 @@ impl ShardManifest {
             settings: settings.clone(),
             scene: origin,
             scene_hash: hash_of(scene),
+            passes: sums.passes.iter().map(|pass| StoredPass::of(pass)).collect(),
             timings_s: sums.timings_s,
             cpu_s: sums.cpu_s,
         }
@@ -116,23 +140,6 @@ impl ShardManifest {
             None => return Err(refused("is no shard's manifest".into())),
         }
         serde_json::from_value(document).map_err(|error| refused(format!("is damaged ({error})")))
-    }
-
-    /// Which shard lies in a folder; `None` where none does.
-    pub(super) fn known_in(folder: &Path) -> Option<ShardNumber> {
-        Some(Self::read(folder).ok()?.shard)
-    }
-
-    /// One number for all that the shards of a bake have in common.
-    pub(super) fn fingerprint(&self) -> u64 {
-        let mut hash = ContentHash::default();
-        let settings = common_settings(&self.settings);
-        let text = format!(
-            "{}\n{}\n{}\n{settings}",
-            self.program_version, self.shard.count, self.scene_hash
-        );
-        text.bytes().for_each(|byte| hash.take(u64::from(byte)));
-        hash.value()
     }
 
     /// What tells this shard's bake from that of another one; `None` where they are of the same.

@@ -1,9 +1,9 @@
 //! All shards of a bake, read back. Nothing in them is trusted: they may be torn, of different bakes, or not all.
 
+use std::cmp::Ordering;
 use std::path::{Path, PathBuf};
 
-use super::manifest::{self, ShardManifest, ShardNumber, hash_of};
-use super::sums_file::{self, SumsIndex};
+use super::manifest::{self, ShardManifest, ShardNumber, StoredPass, hash_of};
 use crate::error::{Error, Result};
 use crate::files::{self, OutputFolder, StagedFolder};
 use crate::light_pass::share::Share;
@@ -19,22 +19,37 @@ pub struct ShardSet {
     shards: Vec<Shard>,
 }
 
+/// Name of the file of sums in its folder.
+const SUMS: &str = "sums.bin";
+
 #[derive(Debug)]
 struct Shard {
     folder: PathBuf,
     manifest: ShardManifest,
-    sums: SumsIndex,
 }
 
 impl Shard {
+    /// Nothing is taken on trust of the sums' lengths.
     fn open(folder: &Path) -> Result<Self> {
         let manifest = ShardManifest::read(folder)?;
-        let sums = SumsIndex::read(&folder.join(sums_file::FILE_NAME), &manifest)?;
-        Ok(Self {
-            folder: folder.to_path_buf(),
-            manifest,
-            sums,
-        })
+        let path = folder.join(SUMS);
+        let passes = manifest.passes.iter();
+        let stated = passes.fold(0_u64, |sum, pass| sum.saturating_add(pass.bytes));
+        let what = match stated.cmp(&files::file_bytes(&path)?) {
+            Ordering::Equal => {
+                return Ok(Self {
+                    folder: folder.to_path_buf(),
+                    manifest,
+                });
+            }
+            Ordering::Greater => "ends before it should",
+            Ordering::Less => "is longer than it should be",
+        };
+        Err(Error::failure(
+            path.display().to_string(),
+            what,
+            "bake this shard again",
+        ))
     }
 
     fn name(&self) -> String {
@@ -48,12 +63,19 @@ impl ShardSet {
     /// # Errors
     /// A folder without a shard, a torn one; shards of different bakes or program versions, one twice, one missing.
     pub fn open(folders: &[PathBuf]) -> Result<Self> {
-        let mut shards = Vec::new();
-        for folder in folders {
-            shards.push(Shard::open(folder)?);
+        let shards: Vec<Shard> = folders
+            .iter()
+            .map(|folder| Shard::open(folder))
+            .collect::<Result<_>>()?;
+        if shards.is_empty() {
+            return Err(Error::usage(
+                "merge",
+                "no shard is named",
+                "name the folders of all shards of a bake",
+            ));
         }
         let set = Self { shards };
-        let first = set.first()?;
+        let first = set.first();
         if first.manifest.program_version != env!("CARGO_PKG_VERSION") {
             return Err(Error::failure(
                 first.name(),
@@ -78,18 +100,13 @@ impl ShardSet {
         Ok(set)
     }
 
-    fn first(&self) -> Result<&Shard> {
-        self.shards.first().ok_or_else(|| {
-            Error::usage(
-                "merge",
-                "no shard is named",
-                "name the folders of all shards of a bake",
-            )
-        })
+    /// There is at least one.
+    fn first(&self) -> &Shard {
+        &self.shards[0]
     }
 
     fn refuse_gaps(&self) -> Result<()> {
-        let first = self.first()?;
+        let first = self.first();
         let mut by_number: Vec<&Shard> = self.shards.iter().collect();
         by_number.sort_by_key(|shard| shard.manifest.shard.number);
         let number = |shard: &Shard| shard.manifest.shard.number;
@@ -125,11 +142,8 @@ impl ShardSet {
     }
 
     /// What the shards have in common: that of the first one.
-    ///
-    /// # Errors
-    /// None: a set has at least one shard.
-    pub fn manifest(&self) -> Result<&ShardManifest> {
-        Ok(&self.first()?.manifest)
+    pub fn manifest(&self) -> &ShardManifest {
+        &self.first().manifest
     }
 
     /// Refuses a scene that the shards are not of.
@@ -137,7 +151,7 @@ impl ShardSet {
     /// # Errors
     /// Another scene.
     pub fn check_scene(&self, scene: &Scene) -> Result<()> {
-        let first = self.first()?;
+        let first = self.first();
         if first.manifest.scene_hash == hash_of(scene) {
             return Ok(());
         }
@@ -165,12 +179,22 @@ impl ShardSource for ShardSet {
     }
 
     fn pass_count(&self, shard: usize) -> usize {
-        self.shards[shard].sums.pass_count()
+        self.shards[shard].manifest.passes.len()
     }
 
     fn pass(&self, shard: usize, pass: usize) -> Result<Vec<u8>> {
-        let Shard { folder, sums, .. } = &self.shards[shard];
-        sums.pass(&folder.join(sums_file::FILE_NAME), pass)
+        let shard = &self.shards[shard];
+        let passes = &shard.manifest.passes;
+        let from = passes[..pass].iter().map(|pass| pass.bytes).sum();
+        let sums = files::read_part(&shard.folder.join(SUMS), from, passes[pass].bytes)?;
+        if StoredPass::of(&sums) == passes[pass] {
+            return Ok(sums);
+        }
+        Err(Error::failure(
+            shard.name(),
+            "its sums are damaged, or not those that its shard.json speaks of",
+            "bake this shard again",
+        ))
     }
 
     fn name(&self, shard: usize) -> String {
@@ -182,7 +206,6 @@ impl ShardSource for ShardSet {
 #[derive(Debug)]
 pub struct ShardFolder {
     root: OutputFolder,
-    path: PathBuf,
     force: bool,
     number: ShardNumber,
 }
@@ -194,36 +217,13 @@ impl ShardFolder {
     /// # Errors
     /// A place that cannot be written; other files or another shard in it.
     pub fn open(path: &Path, share: Share, force: bool) -> Result<Self> {
-        let folder = Self {
-            root: OutputFolder::open(path)?,
-            path: path.to_path_buf(),
-            force,
-            number: ShardNumber {
-                number: share.number(),
-                count: share.count(),
-            },
+        let number = ShardNumber {
+            number: share.number(),
+            count: share.count(),
         };
-        let is_known = folder.refuse_another()?;
-        if !is_known && !force && !folder.root.is_empty()? {
-            return Err(Error::failure(
-                path.display().to_string(),
-                "the folder holds files that are not from this shard",
-                "choose another folder or add --force",
-            ));
-        }
-        Ok(folder)
-    }
-
-    /// Whether this very shard lies there; an error where another one does.
-    fn refuse_another(&self) -> Result<bool> {
-        match ShardManifest::known_in(&self.path) {
-            Some(other) if other != self.number && !self.force => Err(Error::failure(
-                self.path.display().to_string(),
-                format!("the folder holds shard {} of {}", other.number, other.count),
-                "give each shard a folder of its own or add --force",
-            )),
-            found => Ok(found.is_some()),
-        }
+        let is_ours = holds(path, number, force)?;
+        let root = OutputFolder::open_own(path, is_ours, force, "this shard")?;
+        Ok(Self { root, force, number })
     }
 
     /// Writes both files, or neither.
@@ -231,11 +231,23 @@ impl ShardFolder {
     /// # Errors
     /// A disk that is full, a place that cannot be written any more; another shard that was written there meanwhile.
     pub fn write(self, manifest: &ShardManifest, sums: &ShardSums) -> Result<()> {
-        self.refuse_another()?;
-        let json = files::to_json(manifest, &self.path.display().to_string())?;
+        holds(self.root.path(), self.number, self.force)?;
+        let json = files::to_json(manifest, &self.root.path().display().to_string())?;
         let mut staged = StagedFolder::new(self.root)?;
-        staged.write(sums_file::FILE_NAME, &sums_file::encode(manifest, &sums.passes))?;
+        staged.write(SUMS, &sums.passes.concat())?;
         staged.write(manifest::FILE_NAME, &json)?;
         staged.commit()
+    }
+}
+
+/// Whether this very shard lies there; an error where another one does, unless by force.
+fn holds(path: &Path, number: ShardNumber, force: bool) -> Result<bool> {
+    match ShardManifest::read(path).map(|found| found.shard) {
+        Ok(other) if other != number && !force => Err(Error::failure(
+            path.display().to_string(),
+            format!("the folder holds shard {} of {}", other.number, other.count),
+            "give each shard a folder of its own or add --force",
+        )),
+        found => Ok(found.is_ok()),
     }
 }

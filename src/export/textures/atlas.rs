@@ -1,5 +1,7 @@
 //! Where many maps go in few textures.
 
+use crunch::{Item, PackedItem, Rect, Rotation};
+
 use super::index::Rectangle;
 use crate::error::{Error, Result};
 
@@ -47,20 +49,23 @@ pub fn pack(
             ));
         }
     }
-    // Tall ones first; those of one size in their order.
     let mut left: Vec<usize> = (0..sizes.len()).collect();
-    left.sort_by_key(|&map| std::cmp::Reverse((sizes[map].1, sizes[map].0)));
     let mut pages = Vec::new();
     while !left.is_empty() {
         let fill = |(width, height): (usize, usize)| {
-            let mut skyline = Skyline::new(width, height);
-            let place = |&map: &usize| {
+            let items = left.iter().map(|&map| {
                 let (width, height) = sizes[map];
-                let (x, y) = skyline.place(cell(width), cell(height))?;
-                let (x, y) = (x + options.gutter, y + options.gutter);
-                Some((map, Rectangle { x, y, width, height }))
+                Item::new(map, cell(width), cell(height), Rotation::None)
+            });
+            let packed = crunch::pack(Rect::of_size(width, height), items);
+            let place = |packed: PackedItem<usize>| {
+                let (width, height) = sizes[packed.data];
+                let [x, y] = [packed.rect.x, packed.rect.y].map(|at| at + options.gutter);
+                (packed.data, Rectangle { x, y, width, height })
             };
-            let places: Vec<(usize, Rectangle)> = left.iter().filter_map(place).collect();
+            let packed = packed.unwrap_or_else(|some| some).into_iter();
+            let mut places: Vec<(usize, Rectangle)> = packed.map(place).collect();
+            places.sort_unstable_by_key(|(map, _)| *map);
             Page {
                 width,
                 height,
@@ -86,65 +91,6 @@ fn shapes(most_side: usize) -> Vec<(usize, usize)> {
     sides
         .flat_map(|side: usize| [(side, side.div_ceil(2)), (side, side)])
         .collect()
-}
-
-/// What is free above what was placed: steps from left to right.
-struct Skyline {
-    height: usize,
-    steps: Vec<Step>,
-}
-
-#[derive(Clone, Copy)]
-struct Step {
-    x: usize,
-    y: usize,
-    width: usize,
-}
-
-impl Skyline {
-    fn new(width: usize, height: usize) -> Self {
-        let floor = Step { x: 0, y: 0, width };
-        Self {
-            height,
-            steps: vec![floor],
-        }
-    }
-
-    /// Takes the lowest room of a size, and of those the leftmost.
-    fn place(&mut self, width: usize, height: usize) -> Option<(usize, usize)> {
-        let rooms = (0..self.steps.len()).filter_map(|first| Some((self.level(first, width)?, first)));
-        let (y, first) = rooms.filter(|(y, _)| y + height <= self.height).min()?;
-        let x = self.steps[first].x;
-        let end = x + width;
-        let mut after: Vec<Step> = Vec::new();
-        for step in self.steps.drain(first..) {
-            let begin = step.x.max(end);
-            if begin < step.x + step.width {
-                after.push(Step {
-                    x: begin,
-                    y: step.y,
-                    width: step.x + step.width - begin,
-                });
-            }
-        }
-        let top = y + height;
-        self.steps.push(Step { x, y: top, width });
-        self.steps.extend(after);
-        Some((x, y))
-    }
-
-    /// How low a width comes that begins at a step.
-    fn level(&self, first: usize, width: usize) -> Option<usize> {
-        let (mut room, mut level) = (0, 0);
-        for step in &self.steps[first..] {
-            room += step.width;
-            level = level.max(step.y);
-            if room >= width {
-                return Some(level);
-            }
-        }
-        None
-    }
 }
 
 #[cfg(test)]

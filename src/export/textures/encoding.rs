@@ -5,10 +5,11 @@ use serde::Serialize;
 
 use super::atlas::AtlasOptions;
 use super::ktx2::{self, Packing};
+use super::shared_exponent::RGBE;
 use super::texels::Texels;
 use super::{png16, radiance};
 use crate::error::{Error, Result};
-use crate::export::{Quantity, exr};
+use crate::export::{FloatImage, Quantity, exr};
 
 /// How numbers between black and white are coded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -101,7 +102,7 @@ impl Encoding {
             Self::Half => f16::MAX.to_f32(),
             Self::Float => f32::MAX,
             Self::Png16 { .. } => 1.0,
-            Self::Radiance => radiance::MOST,
+            Self::Radiance => RGBE.most,
             Self::Ktx2 { packing, .. } => packing.most(),
         }
     }
@@ -160,7 +161,11 @@ impl Encoding {
                 })
             }
             Self::Float => Ok(Encoded {
-                bytes: exr::encode(texels.image(), &notes.comment(), notes.location)?,
+                bytes: exr::encode(
+                    FloatImage::of_rgb(texels.size(), texels.values()),
+                    &notes.comment(),
+                    notes.location,
+                )?,
                 stored: texels.values().to_vec(),
                 levels: 1,
             }),

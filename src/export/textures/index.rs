@@ -147,14 +147,13 @@ impl TextureIndex {
             textures,
         }
     }
+}
 
-    /// Names of all files that it speaks of.
+impl TextureEntry {
+    /// Names of its file and of those of its maps' coordinates.
     pub fn files(&self) -> impl Iterator<Item = &str> {
-        self.textures.iter().flat_map(|texture| {
-            let maps = texture.maps.iter();
-            let uvs = maps.filter_map(|map| map.uv_file.as_deref());
-            std::iter::once(texture.file.as_str()).chain(uvs)
-        })
+        let uvs = self.maps.iter().filter_map(|map| map.uv_file.as_deref());
+        std::iter::once(self.file.as_str()).chain(uvs)
     }
 }
 

@@ -18,12 +18,14 @@ use crate::files::{self, OutputFolder, StagedFolder};
 use crate::progress::Control;
 
 pub mod atlas;
+mod bc6h;
 mod content;
 mod encoding;
 pub mod index;
 mod ktx2;
 mod png16;
 mod radiance;
+mod shared_exponent;
 mod texels;
 
 pub use self::content::Content;
@@ -244,7 +246,7 @@ impl Writer<'_> {
     }
 
     fn put(&mut self, name: String, bytes: &[u8]) -> Result<String> {
-        self.folder.write(&name, bytes)?;
+        self.folder.staged.write(&name, bytes)?;
         self.bytes += bytes.len() as u64;
         Ok(name)
     }
@@ -288,15 +290,8 @@ impl TextureFolder {
     /// # Errors
     /// A place that cannot be written; other people's files in it.
     pub fn open(path: &Path, force: bool) -> Result<Self> {
-        let root = OutputFolder::open(path)?;
         let previous = files_of_ours(path);
-        if previous.is_none() && !force && !root.is_empty()? {
-            return Err(Error::failure(
-                path.display().to_string(),
-                "the folder holds files that are not from an export of textures",
-                "choose another folder or add --force",
-            ));
-        }
+        let root = OutputFolder::open_own(path, previous.is_some(), force, "an export of textures")?;
         Ok(Self {
             staged: StagedFolder::new(root)?,
             previous: previous.unwrap_or_default(),
@@ -308,14 +303,6 @@ impl TextureFolder {
         self.staged.path()
     }
 
-    /// Writes a file aside.
-    ///
-    /// # Errors
-    /// As [`StagedFolder::write`].
-    fn write(&mut self, name: &str, bytes: &[u8]) -> Result<()> {
-        self.staged.write(name, bytes)
-    }
-
     /// Gives all files their places and removes what the previous export had more.
     ///
     /// # Errors
@@ -323,10 +310,13 @@ impl TextureFolder {
     fn commit(self, index: &TextureIndex) -> Result<()> {
         let path = self.path().to_path_buf();
         self.staged.commit()?;
-        for outdated in &self.previous {
-            if !index.files().any(|file| file == outdated) {
-                files::remove_file(&path.join(outdated))?;
-            }
+        let written: Vec<&str> = index.textures.iter().flat_map(TextureEntry::files).collect();
+        for outdated in self
+            .previous
+            .iter()
+            .filter(|file| !written.contains(&file.as_str()))
+        {
+            files::remove_file(&path.join(outdated))?;
         }
         Ok(())
     }
@@ -346,12 +336,13 @@ fn files_of_ours(path: &Path) -> Option<Vec<String>> {
     if known.kind != index::KIND {
         return None;
     }
-    let of_texture = |texture: TextureEntry| {
-        let uvs = texture.maps.into_iter().filter_map(|map| map.uv_file);
-        std::iter::once(texture.file).chain(uvs)
-    };
-    let files = known.textures.into_iter().flat_map(of_texture);
-    Some(files.filter(|file| is_texture_file(file)).collect())
+    let files = known.textures.iter().flat_map(TextureEntry::files);
+    Some(
+        files
+            .filter(|file| is_texture_file(file))
+            .map(str::to_owned)
+            .collect(),
+    )
 }
 
 /// Whether a name in an index is one that an export writes, with nothing that leads elsewhere.

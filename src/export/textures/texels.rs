@@ -2,7 +2,6 @@
 
 use super::index::Rectangle;
 use crate::export::exr::shares;
-use crate::export::{FloatImage, exr};
 use crate::illumination::Chart;
 use crate::illumination::gutter::{GUTTER_REACH_TEXELS, neighbours};
 
@@ -60,15 +59,6 @@ impl Texels {
     /// Row by row.
     pub fn values(&self) -> &[[f32; 3]] {
         &self.values
-    }
-
-    /// As an image of channels `R/G/B`.
-    pub fn image(&self) -> FloatImage {
-        FloatImage {
-            width: self.width,
-            height: self.height,
-            channels: exr::rgb_channels("", &self.values),
-        }
     }
 
     /// Half the size, at least one texel a side: each the mean over what it covers.

@@ -8,11 +8,15 @@ use crate::error::{Error, Result};
 pub struct Container<'a> {
     /// The JSON text.
     pub json: &'a [u8],
+    /// Whether it is a `.glb`.
+    pub is_binary: bool,
     /// The binary chunk of a `.glb`.
     pub binary: Option<&'a [u8]>,
+    /// The chunks after these, with their headers.
+    pub others: &'a [u8],
 }
 
-const HEADER_BYTES: usize = 12;
+pub const HEADER_BYTES: usize = 12;
 const CHUNK_HEADER_BYTES: usize = 8;
 const JSON_CHUNK: [u8; 4] = *b"JSON";
 const BINARY_CHUNK: [u8; 4] = *b"BIN\0";
@@ -25,7 +29,9 @@ pub fn split<'a>(bytes: &'a [u8], report: &mut Report) -> Result<Container<'a>> 
     if !bytes.starts_with(b"glTF") {
         return Ok(Container {
             json: bytes,
+            is_binary: false,
             binary: None,
+            others: &[],
         });
     }
     let word = |at: usize| {
@@ -64,10 +70,11 @@ fn split_chunks<'a>(mut rest: &'a [u8], report: &mut Report) -> Result<Container
         return Err(broken("its first chunk is not JSON"));
     };
     let mut binary = None;
+    let mut others = rest;
     let mut index = 1;
     while let Some((kind, data)) = next_chunk(&mut rest)? {
         match kind {
-            BINARY_CHUNK if index == 1 => binary = Some(data),
+            BINARY_CHUNK if index == 1 => (binary, others) = (Some(data), rest),
             // The specification wants unknown chunks passed over, but these two have their one place.
             BINARY_CHUNK | JSON_CHUNK => report.warn(
                 format!("GLB chunk {index}"),
@@ -78,7 +85,12 @@ fn split_chunks<'a>(mut rest: &'a [u8], report: &mut Report) -> Result<Container
         }
         index += 1;
     }
-    Ok(Container { json, binary })
+    Ok(Container {
+        json,
+        is_binary: true,
+        binary,
+        others,
+    })
 }
 
 /// Kind and data of the chunk that `rest` begins with, which is taken off.

@@ -1,8 +1,12 @@
 //! A `.glb` in the making: its document, in which anything may be changed, and its binary chunk.
 
+use std::path::Path;
+
 use gltf::json::Value;
 use serde_json::json;
 
+use super::container::{Container, HEADER_BYTES};
+use super::uri;
 use crate::error::{Error, Result};
 
 const FLOAT: u32 = 5126;
@@ -11,9 +15,11 @@ const UNSIGNED_INT: u32 = 5125;
 /// Document and binary data of a file to be.
 #[derive(Clone, Debug)]
 pub struct Glb {
-    /// The document without its `buffers`' first entry's length, which [`into_bytes`](Self::into_bytes) states.
+    /// The document; [`into_bytes`](Self::into_bytes) states the length of its first buffer.
     pub json: Value,
     binary: Vec<u8>,
+    /// Chunks after the binary one, with their headers.
+    others: Vec<u8>,
 }
 
 impl Glb {
@@ -27,12 +33,63 @@ impl Glb {
                 "scenes": [{}],
             }),
             binary: Vec::new(),
+            others: Vec::new(),
         }
     }
 
-    /// A file that was there, with the data of its first buffer.
-    pub fn from_parts(json: Value, binary: Vec<u8>) -> Self {
-        Self { json, binary }
+    /// A file that was there. What lies beside a `.gltf` is taken in: its first buffer as the binary chunk, everything
+    /// else as data URIs.
+    ///
+    /// # Errors
+    /// Text that is no JSON; a buffer or an image that cannot be read.
+    pub(super) fn of(file: &Container, folder: &Path, most_bytes: u64) -> Result<Self> {
+        let json = serde_json::from_slice(file.json).map_err(|error| {
+            let what = format!("is damaged ({error})");
+            Error::failure("JSON", what, "export the file again")
+        })?;
+        let mut glb = Self {
+            json,
+            binary: file.binary.unwrap_or_default().to_vec(),
+            others: file.others.to_vec(),
+        };
+        // Chunks are padded.
+        if glb.owns_first_buffer()
+            && let Some(stated) = glb.json["buffers"][0]["byteLength"].as_u64()
+        {
+            glb.binary.truncate(usize::try_from(stated).unwrap_or(usize::MAX));
+        }
+        if !file.is_binary {
+            glb.gather(folder, most_bytes)?;
+        }
+        Ok(glb)
+    }
+
+    fn gather(&mut self, folder: &Path, most_bytes: u64) -> Result<()> {
+        for list in ["buffers", "images"] {
+            let items = self.json.get_mut(list).and_then(Value::as_array_mut);
+            for (index, item) in items.into_iter().flatten().enumerate() {
+                let Some(stated) = item.get("uri").and_then(Value::as_str) else {
+                    continue;
+                };
+                let is_first = list == "buffers" && index == 0;
+                if stated.starts_with("data:") && !is_first {
+                    continue;
+                }
+                let data = uri::read(stated, folder, most_bytes, &format!("{list} {index}"))?;
+                if is_first {
+                    remove(item, "/uri");
+                    self.binary = data;
+                } else {
+                    item["uri"] = json!(uri::data(kind(list, &data), &data));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether the first buffer, if there is one, is the binary chunk and does not lie elsewhere.
+    pub(super) fn owns_first_buffer(&self) -> bool {
+        self.json["buffers"][0].get("uri").is_none()
     }
 
     /// The data so far.
@@ -40,32 +97,93 @@ impl Glb {
         &self.binary
     }
 
-    /// Appends to a list of the document, which is made where it is missing, and returns the index.
-    pub fn push(&mut self, list: &str, item: Value) -> usize {
-        let Some(items) = self.json[list].as_array_mut() else {
-            self.json[list] = json!([item]);
-            return 0;
-        };
-        items.push(item);
-        items.len() - 1
+    /// The value at a JSON pointer, null where it is missing; objects on the way are made. `None` where something else
+    /// is in the way: a number is no object, and a list has no names.
+    fn at(&mut self, pointer: &str) -> Option<&mut Value> {
+        let mut place = &mut self.json;
+        for name in pointer.split('/').skip(1) {
+            if place.is_null() {
+                *place = json!({});
+            }
+            place = match place {
+                Value::Object(members) => members.entry(name).or_insert(Value::Null),
+                Value::Array(items) => items.get_mut(name.parse::<usize>().ok()?)?,
+                _ => return None,
+            };
+        }
+        Some(place)
     }
 
-    /// Lists a node in the first scene.
-    pub fn push_root(&mut self, node: usize) {
-        let scene = &mut self.json["scenes"][0];
-        match scene["nodes"].as_array_mut() {
-            Some(nodes) => nodes.push(json!(node)),
-            None => scene["nodes"] = json!([node]),
+    /// Sets the value at a JSON pointer, as far as the document lets it be there.
+    pub fn set(&mut self, pointer: &str, value: Value) {
+        if let Some(place) = self.at(pointer) {
+            *place = value;
         }
     }
 
+    /// Takes a member out of an object.
+    pub fn remove(&mut self, pointer: &str) {
+        remove(&mut self.json, pointer);
+    }
+
+    /// Gives what stands at a JSON pointer all that differs between two ways to state the same thing, and nothing else.
+    pub fn patch(&mut self, pointer: &str, before: &Value, after: &Value) {
+        if before != after
+            && let Some(place) = self.at(pointer)
+        {
+            patch(place, before, after);
+            let patched = place.clone();
+            self.name_extensions(&patched);
+        }
+    }
+
+    /// Appends to a list of the document, which is made where it is missing, and returns the index.
+    pub fn push(&mut self, list: &str, item: Value) -> usize {
+        self.name_extensions(&item);
+        match self.at(list) {
+            Some(Value::Array(items)) => {
+                items.push(item);
+                items.len() - 1
+            }
+            Some(list @ Value::Null) => {
+                *list = json!([item]);
+                0
+            }
+            // It is no list: whoever reads the file sees that the item is missing.
+            _ => 0,
+        }
+    }
+
+    /// Adds a node at the top of the scene that is shown and returns its index.
+    pub fn push_root(&mut self, node: Value) -> usize {
+        let node = self.push("/nodes", node);
+        let scene = self.json["scene"].as_u64().unwrap_or(0);
+        // Without scenes, nodes that are nobody's child are at the top.
+        if self.json.pointer(&format!("/scenes/{scene}")).is_some() {
+            self.push(&format!("/scenes/{scene}/nodes"), json!(node));
+        }
+        node
+    }
+
     /// Names an extension among those that the file uses.
-    pub fn use_extension(&mut self, name: &str) {
-        let is_named = self.json["extensionsUsed"]
-            .as_array()
-            .is_some_and(|used| used.iter().any(|used| used == name));
-        if !is_named {
-            self.push("extensionsUsed", json!(name));
+    pub fn name_extension(&mut self, name: &str) {
+        let named = self.json["extensionsUsed"].as_array();
+        if !named.is_some_and(|named| named.iter().any(|other| other == name)) {
+            self.push("/extensionsUsed", json!(name));
+        }
+    }
+
+    /// The same of those of an item.
+    fn name_extensions(&mut self, item: &Value) {
+        match item {
+            Value::Array(items) => items.iter().for_each(|item| self.name_extensions(item)),
+            Value::Object(members) => {
+                let used = item["extensions"].as_object().into_iter().flatten();
+                used.for_each(|(name, _)| self.name_extension(name));
+                let members = members.iter().filter(|(name, _)| *name != "extras");
+                members.for_each(|(_, member)| self.name_extensions(member));
+            }
+            _ => {}
         }
     }
 
@@ -75,7 +193,7 @@ impl Glb {
         let offset = self.binary.len();
         self.binary.extend(bytes);
         self.push(
-            "bufferViews",
+            "/bufferViews",
             json!({ "buffer": 0, "byteOffset": offset, "byteLength": bytes.len() }),
         )
     }
@@ -100,7 +218,7 @@ impl Glb {
         };
         let (low, high) = (bound(f32::min, f32::INFINITY), bound(f32::max, f32::NEG_INFINITY));
         self.push(
-            "accessors",
+            "/accessors",
             json!({ "bufferView": view, "componentType": FLOAT, "count": vectors.len(),
                 "type": format!("VEC{N}"), "min": low, "max": high }),
         )
@@ -111,7 +229,7 @@ impl Glb {
         let bytes: Vec<u8> = indices.into_iter().flat_map(u32::to_le_bytes).collect();
         let view = self.push_view(&bytes);
         self.push(
-            "accessors",
+            "/accessors",
             json!({ "bufferView": view, "componentType": UNSIGNED_INT, "count": bytes.len() / 4,
                 "type": "SCALAR" }),
         )
@@ -121,7 +239,7 @@ impl Glb {
     pub fn push_png(&mut self, name: &str, bytes: &[u8]) -> usize {
         let view = self.push_view(bytes);
         self.push(
-            "images",
+            "/images",
             json!({ "name": name, "bufferView": view, "mimeType": "image/png" }),
         )
     }
@@ -132,43 +250,147 @@ impl Glb {
     /// More than the 4 GiB that such a file can hold.
     pub fn into_bytes(mut self) -> Result<Vec<u8>> {
         let mut chunks = Vec::new();
-        if !self.binary.is_empty() {
+        if !self.binary.is_empty() && self.owns_first_buffer() {
             let length = json!(self.binary.len());
             match self.json["buffers"].get_mut(0) {
                 Some(buffer) => buffer["byteLength"] = length,
                 None => self.json["buffers"] = json!([{ "byteLength": length }]),
             }
-            chunks = chunk(*b"BIN\0", self.binary, 0);
         }
-        file_of(self.json.to_string(), &chunks)
+        push_chunk(&mut chunks, *b"JSON", self.json.to_string().as_bytes(), b' ');
+        if !self.binary.is_empty() {
+            push_chunk(&mut chunks, *b"BIN\0", &self.binary, 0);
+        }
+        chunks.extend(self.others);
+        let length = u32::try_from(chunks.len() + HEADER_BYTES).map_err(|_| {
+            Error::failure(
+                "GLB",
+                "would be larger than 4 GiB",
+                "use smaller maps or a smaller scene",
+            )
+        })?;
+        Ok([&b"glTF\x02\0\0\0"[..], &length.to_le_bytes(), &chunks].concat())
     }
 }
 
-/// Data with a header, padded to four bytes.
-pub fn chunk(kind: [u8; 4], mut data: Vec<u8>, padding: u8) -> Vec<u8> {
-    data.resize(data.len().next_multiple_of(4), padding);
-    let mut bytes = (data.len() as u32).to_le_bytes().to_vec();
-    bytes.extend(kind);
-    bytes.extend(data);
-    bytes
+/// Adds data with a header, padded to four bytes.
+fn push_chunk(chunks: &mut Vec<u8>, kind: [u8; 4], data: &[u8], padding: u8) {
+    chunks.extend((data.len().next_multiple_of(4) as u32).to_le_bytes());
+    chunks.extend(kind);
+    chunks.extend(data);
+    chunks.resize(chunks.len().next_multiple_of(4), padding);
 }
 
-/// A file of a document and the chunks after it.
-///
-/// # Errors
-/// More than the 4 GiB that such a file can hold.
-pub fn file_of(json: String, chunks: &[u8]) -> Result<Vec<u8>> {
-    let json = chunk(*b"JSON", json.into_bytes(), b' ');
-    let length = u32::try_from(json.len() + chunks.len() + 12).map_err(|_| {
-        Error::failure(
-            "GLB",
-            "would be larger than 4 GiB",
-            "use smaller maps or a smaller scene",
-        )
-    })?;
-    let mut bytes = b"glTF\x02\0\0\0".to_vec();
-    bytes.extend(length.to_le_bytes());
-    bytes.extend(json);
-    bytes.extend(chunks);
-    Ok(bytes)
+fn kind(list: &str, data: &[u8]) -> &'static str {
+    match data {
+        _ if list == "buffers" => "application/octet-stream",
+        [0x89, b'P', b'N', b'G', ..] => "image/png",
+        [b'R', b'I', b'F', b'F', ..] => "image/webp",
+        _ => "image/jpeg",
+    }
+}
+
+/// Takes a member out of an object within a value.
+pub fn remove(value: &mut Value, pointer: &str) {
+    if let Some((owner, name)) = pointer.rsplit_once('/')
+        && let Some(Value::Object(owner)) = value.pointer_mut(owner)
+    {
+        owner.shift_remove(name);
+    }
+}
+
+fn patch(place: &mut Value, before: &Value, after: &Value) {
+    if place.is_null() && after.is_object() {
+        *place = json!({});
+    }
+    match (place, after) {
+        (Value::Object(members), Value::Object(after)) => {
+            for (name, after) in after {
+                let before = &before[name];
+                if before != after {
+                    patch(members.entry(name).or_insert(Value::Null), before, after);
+                }
+            }
+            let lost = before.as_object().into_iter().flatten().map(|(name, _)| name);
+            lost.filter(|name| !after.contains_key(*name)).for_each(|name| {
+                members.shift_remove(name);
+            });
+        }
+        (Value::Array(items), Value::Array(after)) if items.len() == after.len() => {
+            for (index, (item, after)) in items.iter_mut().zip(after).enumerate() {
+                if before.get(index) != Some(after) {
+                    patch(item, &before[index], after);
+                }
+            }
+        }
+        // Something else stands there, which is not ours to replace.
+        (_, Value::Object(_)) => {}
+        (place, after) => *place = after.clone(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn file() -> Glb {
+        let json = json!({ "ab": [1.5, { "x": "}]" }], "n": {}, "l": [], "n2": { "k": 1.0 } });
+        Glb { json, ..Glb::empty() }
+    }
+
+    #[test]
+    fn values_are_replaced_in_place_and_missing_ones_added_last() {
+        let text = file().json.to_string();
+        for (pointer, before, after) in [
+            ("/ab/1/x", r#""}]""#, "7"),
+            ("/n/p/q", "{}", r#"{"p":{"q":7}}"#),
+            ("/n2/m", "1.0}", r#"1.0,"m":7}"#),
+            ("/l/5", "", ""),
+            ("/ab/0/x", "", ""),
+        ] {
+            let mut file = file();
+            file.set(pointer, json!(7));
+            assert_eq!(file.json.to_string(), text.replace(before, after), "{pointer}");
+        }
+        for (list, before, after) in [
+            ("/l", "[]", "[7]"),
+            ("/n/l", "{}", r#"{"l":[7]}"#),
+            ("/n2", "", ""),
+        ] {
+            let mut file = file();
+            assert_eq!(file.push(list, json!(7)), 0);
+            assert_eq!(file.json.to_string(), text.replace(before, after), "{list}");
+        }
+    }
+
+    #[test]
+    fn members_are_removed_and_the_others_keep_their_order() {
+        let text = file().json.to_string();
+        for (pointer, before) in [("/n", r#""n":{},"#), ("/n2/k", r#""k":1.0"#), ("/none", "")] {
+            let mut file = file();
+            file.remove(pointer);
+            assert_eq!(file.json.to_string(), text.replace(before, ""), "{pointer}");
+        }
+    }
+
+    #[test]
+    fn a_patch_changes_only_what_differs() {
+        let mut file = file();
+        let before = json!({ "colour": [1, 2, 3, 1], "gone": 1, "same": 2 });
+        let after = json!({ "colour": [1, 5, 3, 1], "same": 2, "extensions": { "NEW": { "a": 1 } } });
+        file.set(
+            "/n",
+            json!({ "gone": 4, "same": 9, "colour": [8, 8, 8, 0.5], "own": 1 }),
+        );
+        file.patch("/n", &before, &after);
+        let patched =
+            json!({ "same": 9, "colour": [8, 5, 8, 0.5], "own": 1, "extensions": { "NEW": { "a": 1 } } });
+        assert_eq!(file.json["n"].to_string(), patched.to_string());
+        assert_eq!(file.json["extensionsUsed"], json!(["NEW"]));
+        file.set("/n/extras", json!("a text"));
+        file.patch("/n", &json!({}), &json!({ "extras": { "a": 1 } }));
+        assert_eq!(file.json["n"]["extras"], "a text");
+        file.patch("/n3", &before, &after);
+        assert_eq!(file.json["n3"]["colour"], after["colour"]);
+    }
 }

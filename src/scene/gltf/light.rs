@@ -11,18 +11,29 @@ use super::document::Document;
 use super::nodes::Placed;
 use super::numbers::{widen, widen_all};
 use super::report::Report;
-use super::{sizes, spectrum};
+use super::{area_light, sizes, spectrum};
 use crate::error::Result;
 use crate::optics::LinearSrgb;
 use crate::scene::{Light, LightKind};
 use crate::units::{Irradiance, LUMENS_PER_WATT, RadiantIntensity};
 
-/// All lights of the placed nodes that have some power, node by node. A light that cannot be read is left out with a
-/// warning.
+/// All lamps of a file: those without a surface, then the flat ones. One that cannot be read is left out with a warning.
 ///
 /// # Errors
 /// As [`spectrum::apply`].
-pub fn read_all(
+pub fn all(
+    document: &Document,
+    placed: &[Placed],
+    folder: &Path,
+    report: &mut Report,
+) -> Result<Vec<(Light, Origin)>> {
+    let mut lights = punctual(document, placed, folder, report)?;
+    area_light::add_all(&mut lights, document, placed, folder, report)?;
+    Ok(lights)
+}
+
+/// The lights of the placed nodes that have some power, node by node.
+fn punctual(
     document: &Document,
     placed: &[Placed],
     folder: &Path,

@@ -11,7 +11,6 @@ use glam::DAffine3;
 use gltf::json::Value;
 use report::{Budget, Report};
 
-use self::save::Parts;
 use super::{LoadOptions, Scene};
 use crate::error::{Error, Result, Warning};
 use crate::files;
@@ -135,8 +134,7 @@ fn read_scene(bytes: &[u8], path: &Path, options: &LoadOptions) -> Result<Scene>
     )?;
     scene.materials = materials.into_all();
     scene.textures = images.into_textures().into_iter().map(Arc::new).collect();
-    let mut lights = light::read_all(&document, &placed, folder, &mut report)?;
-    area_light::add_all(&mut lights, &document, &placed, folder, &mut report)?;
+    let lights = light::all(&document, &placed, folder, &mut report)?;
     scene.lights = lights.into_iter().map(|(light, _)| light).collect();
     add_lights(&mut scene);
     scene.cameras = nodes::read_all(&document.root, &placed, &mut report);
@@ -228,32 +226,49 @@ pub fn open(scene: &Scene, most_bytes: u64) -> Result<Opened> {
             warnings,
         });
     }
-    let path = Path::new(&scene.source);
-    let bytes = files::read_file(path, most_bytes)?;
-    let mut report = Report::default();
-    let split = container::split(&bytes, &mut report)?;
-    let typed = document::parse(split.json, &mut report)?;
-    let placed = nodes::place(&typed, &mut report)?;
-    let folder = path.parent().unwrap_or(Path::new(""));
-    let parts = Parts::of(&bytes, split.json, folder, most_bytes)?;
-    let broken = |what: String| Error::failure(&scene.source, what, "export the file again");
-    let json: Value =
-        serde_json::from_str(&parts.json.into_text()).map_err(|error| broken(error.to_string()))?;
-    let has_elsewhere = json["buffers"][0].get("uri").is_some();
-    if has_elsewhere {
-        return Err(broken(
-            "has its first buffer within its text, where nothing can be added".into(),
+    let file = File::read(Path::new(&scene.source), most_bytes)?;
+    if !file.glb.owns_first_buffer() {
+        return Err(Error::failure(
+            &scene.source,
+            "has its first buffer within its text, where nothing can be added",
+            "export the file again",
         ));
     }
-    let binary = parts.chunks.get(8..).unwrap_or_default();
-    let stated = json["buffers"][0]["byteLength"].as_u64().unwrap_or(0);
-    let length = usize::try_from(stated).unwrap_or(usize::MAX).min(binary.len());
+    let placed = file.placed.into_iter();
     Ok(Opened {
-        glb: Glb::from_parts(json, binary[..length].to_vec()),
+        glb: file.glb,
         world_from_node: placed
-            .into_iter()
             .map(|placed| (placed.node, placed.world_from_node))
             .collect(),
         warnings: Vec::new(),
     })
+}
+
+/// A file that is to be changed: as it is, and as it is read.
+struct File {
+    bytes: Vec<u8>,
+    is_binary: bool,
+    folder: PathBuf,
+    glb: Glb,
+    document: document::Document,
+    placed: Vec<nodes::Placed>,
+}
+
+impl File {
+    fn read(path: &Path, most_bytes: u64) -> Result<Self> {
+        let bytes = files::read_file(path, most_bytes)?;
+        let mut report = Report::default();
+        let split = container::split(&bytes, &mut report)?;
+        let document = document::parse(split.json, &mut report)?;
+        let placed = nodes::place(&document, &mut report)?;
+        let folder = path.parent().unwrap_or(Path::new("")).to_path_buf();
+        Ok(Self {
+            glb: Glb::of(&split, &folder, most_bytes)?,
+            is_binary: split.is_binary,
+            bytes,
+            folder,
+            document,
+            placed,
+        })
+    }
 }

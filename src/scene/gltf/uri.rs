@@ -2,8 +2,25 @@
 
 use std::path::{Component, Path, PathBuf};
 
+use base64::Engine as _;
+use base64::alphabet::STANDARD;
+use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
+
 use crate::error::{Error, Result};
 use crate::files;
+
+/// Writers leave the padding out, or something in its bits.
+const BASE64: GeneralPurpose = GeneralPurpose::new(
+    &STANDARD,
+    GeneralPurposeConfig::new()
+        .with_decode_padding_mode(DecodePaddingMode::Indifferent)
+        .with_decode_allow_trailing_bits(true),
+);
+
+/// Bytes of a kind as a URI of their own.
+pub fn data(kind: &str, bytes: &[u8]) -> String {
+    format!("data:{kind};base64,{}", BASE64.encode(bytes))
+}
 
 /// The bytes behind a URI, at most `max_bytes`.
 ///
@@ -24,7 +41,8 @@ fn read_data(data: &str, owner: &str) -> Result<Vec<u8>> {
         return Err(refused("its data URI has no data"));
     };
     if kind.to_ascii_lowercase().ends_with(";base64") {
-        return decode(payload).ok_or_else(|| refused("its data URI is not valid base64"));
+        let bytes = BASE64.decode(payload);
+        return bytes.map_err(|_| refused("its data URI is not valid base64"));
     }
     percent_decode(payload).ok_or_else(|| refused("its data URI is not valid"))
 }
@@ -96,35 +114,4 @@ fn percent_decode(text: &str) -> Option<Vec<u8>> {
 fn strip_prefix_ignoring_case<'a>(text: &'a str, prefix: &str) -> Option<&'a str> {
     let (head, tail) = text.split_at_checked(prefix.len())?;
     head.eq_ignore_ascii_case(prefix).then_some(tail)
-}
-
-/// The bytes that the text stands for; `None` where it is no base64. Padding may be left out.
-pub fn decode(text: &str) -> Option<Vec<u8>> {
-    let digits = text.trim_end_matches('=').as_bytes();
-    if text.len() - digits.len() > 2 || digits.len() % 4 == 1 {
-        return None;
-    }
-    let mut bytes = Vec::with_capacity(digits.len() / 4 * 3 + 2);
-    for group in digits.chunks(4) {
-        let mut bits = 0_u32;
-        for &digit in group {
-            bits = bits << 6 | value(digit)?;
-        }
-        bits <<= 6 * (4 - group.len());
-        let [_, three @ ..] = bits.to_be_bytes();
-        bytes.extend(&three[..group.len() - 1]);
-    }
-    Some(bytes)
-}
-
-fn value(digit: u8) -> Option<u32> {
-    let value = match digit {
-        b'A'..=b'Z' => digit - b'A',
-        b'a'..=b'z' => digit - b'a' + 26,
-        b'0'..=b'9' => digit - b'0' + 52,
-        b'+' => 62,
-        b'/' => 63,
-        _ => return None,
-    };
-    Some(u32::from(value))
 }

@@ -162,7 +162,7 @@ impl Shards {
         let folders: Vec<PathBuf> = self.sums.iter().map(|(share, _)| self.folder(*share)).collect();
         let shards = ShardSet::open(&folders)?;
         shards.check_scene(&self.scene)?;
-        let settings = shards.manifest()?.settings.clone();
+        let settings = shards.manifest().settings.clone();
         let settings = set(settings, |s| s.memory_bytes = memory_bytes);
         let mut session = BakeSession::new(self.scene.clone())?;
         session.merge(&settings, Box::new(shards), &(), &Control::default())

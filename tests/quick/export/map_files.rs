@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use glam::DVec3;
-use nephroid::export::exr::{decode, encode_map};
+use nephroid::export::exr::{MapValue, decode, encode_map, rgb_values};
 use nephroid::illumination::parametrisation::DEFAULT_NOMINAL_SIDE;
 use nephroid::illumination::tiles::TileLayout;
 use nephroid::illumination::{Chart, IlluminationMap, Layer, Parametrisation, parametrise};
@@ -49,9 +49,9 @@ fn assert_file(map: &IlluminationMap, texel_at: impl Fn(usize, usize) -> usize) 
     let of_lamp = irradiance(2, texels);
     let band: Vec<f32> = (0..texels).map(|texel| value(2, texel, 1)).collect();
     let size = (map.width(), map.height());
-    let parts = [("caustic.lamp", &of_lamp[..])];
-    let bands = [("caustic.550nm", &band[..])];
-    let bytes = encode_map(map, size, (&parts, &bands), "", "a file").expect("it fits");
+    let band_value: MapValue = Box::new(|texel| band[texel]);
+    let others = rgb_values("caustic.lamp", &of_lamp).chain([("caustic.550nm".into(), band_value)]);
+    let bytes = encode_map(map, size, others.collect(), "", "a file").expect("it fits");
     let image = decode(&bytes, "a file").expect("an image");
     assert_eq!((image.width, image.height), size);
     let one = |name: &str, expected: &dyn Fn(usize) -> f32| {
@@ -100,7 +100,7 @@ fn tiles_hold_each_texel_where_it_reaches() {
 fn a_larger_file_holds_the_same_light() {
     let map = map(plane().chart(4, 3));
     let (width, height) = (10, 7);
-    let bytes = encode_map(&map, (width, height), (&[], &[]), "", "a file").expect("it fits");
+    let bytes = encode_map(&map, (width, height), Vec::new(), "", "a file").expect("it fits");
     let image = decode(&bytes, "a file").expect("an image");
     let values = image.channel("caustic.G").expect("there");
     let texels = || map.layers[0].irradiance.iter().map(|e| f64::from(e[1]));

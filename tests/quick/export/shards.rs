@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use nephroid::error::Result;
 use nephroid::export::shards::{SceneOrigin, ShardFolder, ShardManifest, ShardSet};
 use nephroid::light_pass::share::Share;
-use nephroid::session::BakeSession;
+use nephroid::session::{BakeSession, ShardSource as _};
 
 use crate::prelude::*;
 use support::program::read_json;
@@ -72,7 +72,7 @@ fn shards_of_different_bakes_are_refused() {
          two1 three2 => three2 | 3 shards and not 2 | two1
          two1 denser2 => denser2 | density per sr | 5000 | 1000 | two1
          two1 other2 => other2 | another scene | two1
-         two1 newer => newer | shard.json
+         two1 newer => newer | 99.0.0 | two1
          two1 nowhere => nowhere | no such file
          two1 . => holds no shard | --shard",
     ) {
@@ -99,12 +99,21 @@ fn torn_shards_are_refused_by_name() {
         (&whole[..3], "ends before it should"),
         (b"", "ends before it should"),
         (&[&whole[..], b"x"].concat(), "longer than it should be"),
-        (&[0; 100], "no sums of a shard"),
+        (&[0; 100], "ends before it should"),
     ] {
         std::fs::write(&sums, bytes).expect("writable");
         shards.refuse("s1 s2", &format!("s2 | {word} | again"));
     }
+    let others = std::fs::read(shards.path("s1/sums.bin")).expect("written");
+    let others = [&others[..], &whole[..]].concat();
+    std::fs::write(&sums, &others[..whole.len()]).expect("writable");
+    let set = shards.open("s1 s2").expect("its length is right");
+    says(
+        set.pass(1, 0).expect_err("another's"),
+        "s2 | damaged | shard.json | again",
+    );
     std::fs::write(&sums, &whole).expect("writable");
+    set.pass(1, 0).expect("they are its own again");
     let whole = std::fs::read(&json).expect("written");
     for bytes in [&whole[..whole.len() / 2], b"{}", b"[1]", b"", b"\xff"] {
         std::fs::write(&json, bytes).expect("writable");

@@ -4,17 +4,14 @@ use glam::{DAffine3, DQuat, DVec3};
 use gltf::json::Value;
 use serde_json::json;
 
-use super::JsonDocument;
 use super::placing::Placing;
 use crate::error::{Error, Result};
-use crate::optics::LinearSrgb;
-use crate::optics::spectrum::illuminant;
 use crate::scene::changes::direction;
-use crate::scene::gltf::document::Document;
+use crate::scene::gltf::glb::Glb;
 use crate::scene::gltf::light::Origin;
 use crate::scene::gltf::spectrum;
-use crate::scene::{Light, LightKind, LightSize, Scene};
-use crate::units::LUMENS_PER_WATT;
+use crate::scene::gltf::write::lights;
+use crate::scene::{Light, LightKind, Scene};
 
 /// A light before and after it was edited.
 pub struct Edited<'a> {
@@ -40,53 +37,37 @@ impl Edited<'_> {
     pub fn write(
         &self,
         origin: &Origin,
-        (document, shift): (&Document, DVec3),
+        shift: DVec3,
         placing: &mut Placing<'_>,
-        json: &mut JsonDocument,
+        glb: &mut Glb,
     ) -> Result<()> {
         let (was, is) = (self.was, self.is);
-        if was.kind.strength() != is.kind.strength() || was.colour != is.colour || was.spectrum != is.spectrum
-        {
-            let light = own_light(document, origin, json);
-            if was.kind.strength() != is.kind.strength() {
-                let candela = is.kind.strength() * LUMENS_PER_WATT;
-                json.set(&format!("{light}/intensity"), json!(candela));
-            }
-            if was.colour != is.colour || was.spectrum != is.spectrum {
-                self.write_colour(origin, &light, json)?;
-            }
+        let stated = |light| lights::stated(light).map_or(Value::Null, |(_, stated)| stated);
+        let (mut before, after) = (stated(was), stated(is));
+        let new_spectrum = was.spectrum != is.spectrum;
+        if new_spectrum {
+            check_spectrum(is)?;
+            // What is read of a file is not its colour then.
+            before["color"] = Value::Null;
         }
-        if was.size != is.size {
-            self.write_size(origin, json);
+        let [had, has] = [was, is].map(lights::extras);
+        if before != after || had != has || new_spectrum {
+            let entry = own_entry(origin, glb);
+            glb.patch(&entry, &before, &after);
+            for key in lights::EXTRAS {
+                let is_same = had.get(key) == has.get(key) && !(new_spectrum && key == spectrum::KEY);
+                let of_node = format!("/nodes/{}/extras/{key}", origin.node);
+                match has.get(key) {
+                    _ if is_same => {}
+                    Some(stated) => glb.set(&of_node, stated.clone()),
+                    None => {
+                        glb.remove(&of_node);
+                        glb.remove(&format!("{entry}/extras/{key}"));
+                    }
+                }
+            }
         }
         self.place(origin, shift, placing)
-    }
-
-    fn write_colour(&self, origin: &Origin, light: &str, json: &mut JsonDocument) -> Result<()> {
-        let of_node = format!("/nodes/{}/extras/{}", origin.node, spectrum::KEY);
-        let of_light = format!("{light}/extras/{}", spectrum::KEY);
-        let Some(spectrum) = &self.is.spectrum else {
-            json.remove(&of_node);
-            json.remove(&of_light);
-            json.set(&format!("{light}/color"), json!(self.is.colour.to_array()));
-            return Ok(());
-        };
-        let name = spectrum.name().filter(|name| illuminant(name).is_ok());
-        let name = name.ok_or_else(|| self.refused("has a spectrum without a name"))?;
-        json.set(&of_node, json!(name));
-        json.set(&format!("{light}/color"), json!(LinearSrgb::WHITE.to_array()));
-        Ok(())
-    }
-
-    fn write_size(&self, origin: &Origin, json: &mut JsonDocument) {
-        let extras = |name: &str| format!("/nodes/{}/extras/{name}", origin.node);
-        let (name, size) = match (self.is.size, &self.is.kind) {
-            (LightSize::Radius { radius_m }, _) => ("radius_m", radius_m),
-            (LightSize::Angle { diameter_rad }, _) => ("angular_diameter_deg", diameter_rad.to_degrees()),
-            (LightSize::None, LightKind::Sun { .. }) => ("angular_diameter_deg", 0.0),
-            (LightSize::None, _) => ("radius_m", 0.0),
-        };
-        json.set(&extras(name), json!(size));
     }
 
     /// Turns and moves its node, as little as the light itself was.
@@ -119,7 +100,7 @@ impl Edited<'_> {
     ///
     /// # Errors
     /// Another colour, or a material that glows elsewhere too and did not change there.
-    pub fn write_glow(&self, edited: &Scene, in_file: usize, json: &mut JsonDocument) -> Result<()> {
+    pub fn write_glow(&self, edited: &Scene, in_file: usize, glb: &mut Glb) -> Result<()> {
         let (was, is) = (self.was, self.is);
         if was.colour != is.colour || was.spectrum != is.spectrum {
             return Err(self.refused("glows in another colour"));
@@ -131,32 +112,50 @@ impl Edited<'_> {
         if material >= in_file {
             return Err(self.refused("glows by a material that the file only implies"));
         }
-        let path = format!("/materials/{material}/extensions/KHR_materials_emissive_strength");
-        let path = format!("{path}/emissiveStrength");
-        let before = json.get(&path).and_then(Value::as_f64);
+        let strength = format!("/materials/{material}/extensions/{STRENGTH}/emissiveStrength");
+        let before = glb.json.pointer(&strength).and_then(Value::as_f64);
         let times = is.kind.strength() / was.kind.strength();
-        json.set(&path, json!(before.unwrap_or(1.0) * times));
-        json.use_extension("KHR_materials_emissive_strength");
+        glb.set(&strength, json!(before.unwrap_or(1.0) * times));
+        glb.name_extension(STRENGTH);
         Ok(())
     }
 }
 
-/// The path of a light's entry in its list: one of its own where other nodes refer to the same.
-fn own_light(document: &Document, origin: &Origin, json: &mut JsonDocument) -> String {
+/// The extension that states how brightly a material glows.
+const STRENGTH: &str = "KHR_materials_emissive_strength";
+
+/// Refuses a spectrum that a file cannot hold.
+///
+/// # Errors
+/// One without a name.
+pub fn check_spectrum(light: &Light) -> Result<()> {
+    if light.spectrum.is_none() || lights::named_spectrum(light).is_some() {
+        return Ok(());
+    }
+    Err(Error::failure(
+        format!("light `{}`", light.name),
+        "has a spectrum without a name, which a file cannot hold",
+        "choose a colour or a named spectrum, and save again",
+    ))
+}
+
+/// A light's entry in its list: one of its own where other nodes refer to the same.
+fn own_entry(origin: &Origin, glb: &mut Glb) -> String {
     let list = origin.list;
     let lights = format!("/extensions/{list}/lights");
-    let of_node = |node: usize| format!("/nodes/{node}/extensions/{list}/light");
-    let refers = |node: &usize| {
-        let stated = json.get(&of_node(*node)).and_then(Value::as_u64);
+    let reference = format!("/extensions/{list}/light");
+    let refers = |node: &&Value| {
+        let stated = node.pointer(&reference).and_then(Value::as_u64);
         stated == Some(origin.index as u64)
     };
-    let sharing = (0..document.root.nodes.len()).filter(refers).count();
-    let path = format!("{lights}/{}", origin.index);
+    let nodes = glb.json["nodes"].as_array().into_iter().flatten();
+    let sharing = nodes.filter(refers).count();
+    let entry = format!("{lights}/{}", origin.index);
     if sharing <= 1 {
-        return path;
+        return entry;
     }
-    let copy = json.get(&path).cloned().unwrap_or_else(|| json!({}));
-    let next = json.append(&lights, copy);
-    json.set(&of_node(origin.node), json!(next));
+    let copy = glb.json.pointer(&entry).cloned().unwrap_or_default();
+    let next = glb.push(&lights, copy);
+    glb.set(&format!("/nodes/{}{reference}", origin.node), json!(next));
     format!("{lights}/{next}")
 }

@@ -6,9 +6,9 @@ use glam::{DAffine3, DMat4, DQuat, DVec3};
 use gltf::json::Root;
 use serde_json::json;
 
-use super::JsonDocument;
 use crate::error::{Error, Result};
 use crate::scene::gltf::document::Document;
+use crate::scene::gltf::glb::Glb;
 use crate::scene::gltf::nodes::Placed;
 
 /// Largest difference of two transforms that are the same, as a share of their size [1].
@@ -52,7 +52,7 @@ impl<'a> Placing<'a> {
     }
 
     /// Writes the transforms of all nodes that move, and of their children, which stay where they are.
-    pub fn write(&self, document: &Document, json: &mut JsonDocument) {
+    pub fn write(&self, document: &Document, glb: &mut Glb) {
         for placed in self.placed {
             let node = placed.node;
             let parent = parent_of(&document.root, node, self.placed);
@@ -62,7 +62,7 @@ impl<'a> Placing<'a> {
             }
             let world_from_parent = parent.map_or(DAffine3::IDENTITY, |parent| self.stands(parent));
             let parent_from_node = world_from_parent.inverse() * self.stands(node);
-            write_transform(document, node, &parent_from_node, json);
+            write_transform(document, node, &parent_from_node, glb);
         }
     }
 
@@ -95,24 +95,24 @@ fn parent_of(root: &Root, node: usize, placed: &[Placed]) -> Option<usize> {
 
 /// As translation, rotation and scale where the file has those and they can say it; only those that change. Otherwise as a
 /// matrix.
-fn write_transform(document: &Document, node: usize, transform: &DAffine3, json: &mut JsonDocument) {
+fn write_transform(document: &Document, node: usize, transform: &DAffine3, glb: &mut Glb) {
     let stated = &document.transforms[node];
     let path = |name: &str| format!("/nodes/{node}/{name}");
     let (scale, rotation, translation) = transform.to_scale_rotation_translation();
     let again = DAffine3::from_scale_rotation_translation(scale, rotation, translation);
     if stated.matrix.is_some() || !is_same(&again, transform) {
         for name in ["translation", "rotation", "scale"] {
-            json.remove(&path(name));
+            glb.remove(&path(name));
         }
-        json.set(&path("matrix"), json!(DMat4::from(*transform).to_cols_array()));
+        glb.set(&path("matrix"), json!(DMat4::from(*transform).to_cols_array()));
         return;
     }
     let was_scale = DVec3::from(stated.scale.unwrap_or([1.0; 3]));
     let was_rotation = DQuat::from_array(stated.rotation.unwrap_or([0.0, 0.0, 0.0, 1.0])).normalize();
     let keeps_turn = DAffine3::from_scale_rotation_translation(was_scale, was_rotation, translation);
-    json.set(&path("translation"), json!(translation.to_array()));
+    glb.set(&path("translation"), json!(translation.to_array()));
     if !is_same(&keeps_turn, transform) {
-        json.set(&path("rotation"), json!(rotation.to_array()));
-        json.set(&path("scale"), json!(scale.to_array()));
+        glb.set(&path("rotation"), json!(rotation.to_array()));
+        glb.set(&path("scale"), json!(scale.to_array()));
     }
 }

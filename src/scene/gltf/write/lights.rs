@@ -16,51 +16,39 @@ use crate::units::LUMENS_PER_WATT;
 /// Adds every light that is not the glow of an object, which its material states.
 pub fn add_all(scene: &Scene, glb: &mut Glb, warnings: &mut Vec<Warning>) {
     for source in &scene.lights {
-        let lost = |what: &str| {
-            let remedy = "name it when the file is opened (--environment)";
-            Warning::new(format!("light `{}`", source.name), what.to_owned(), remedy)
-        };
-        let Some((list, stated)) = stated(source) else {
-            if matches!(source.kind, LightKind::Environment { .. }) {
-                warnings.push(lost(
-                    "is an environment, which glTF has no place for; it was left out",
-                ));
+        let lost = match (&source.kind, &source.spectrum) {
+            (LightKind::Environment { .. }, _) => {
+                "is an environment, which glTF has no place for; it was left out"
             }
-            continue;
+            (_, Some(_)) if named_spectrum(source).is_none() && stated(source).is_some() => {
+                "has a spectrum without a name; its colour was written instead"
+            }
+            _ => "",
         };
-        let (extras, is_whole) = extras(source);
-        if !is_whole {
-            warnings.push(lost(
-                "has a spectrum without a name; its colour was written instead",
-            ));
+        if !lost.is_empty() {
+            let remedy = "name it when the file is opened (--environment)";
+            warnings.push(Warning::new(format!("light `{}`", source.name), lost, remedy));
         }
-        let mut node = node(source, scene.origin_world);
-        if extras != json!({}) {
-            node["extras"] = extras;
-        }
-        let index = add_to_list(list, stated, glb);
-        node["extensions"][list]["light"] = json!(index);
-        let node = glb.push("nodes", node);
-        glb.push_root(node);
+        add(source, scene.origin_world, glb);
     }
 }
 
-fn add_to_list(list: &str, stated: Value, glb: &mut Glb) -> usize {
-    glb.use_extension(list);
-    let lights = &mut glb.json["extensions"][list]["lights"];
-    match lights.as_array_mut() {
-        Some(lights) => {
-            lights.push(stated);
-            lights.len() - 1
-        }
-        None => {
-            *lights = json!([stated]);
-            0
-        }
+/// Adds a light at a node of its own, if glTF has a place for it.
+pub fn add(source: &Light, shift: DVec3, glb: &mut Glb) {
+    let Some((list, stated)) = stated(source) else {
+        return;
+    };
+    let mut node = node(source, shift);
+    let extras = extras(source);
+    if extras != json!({}) {
+        node["extras"] = extras;
     }
+    let index = glb.push(&format!("/extensions/{list}/lights"), stated);
+    node["extensions"][list]["light"] = json!(index);
+    glb.push_root(node);
 }
 
-/// The extension that lists a light, and its entry without the colour.
+/// The extension that lists a light, and its entry there.
 pub fn stated(source: &Light) -> Option<(&'static str, Value)> {
     let (list, mut stated) = by_kind(source)?;
     let colour = match named_spectrum(source) {
@@ -72,26 +60,27 @@ pub fn stated(source: &Light) -> Option<(&'static str, Value)> {
 }
 
 /// The name of a light's spectrum, by which it is found again.
-fn named_spectrum(source: &Light) -> Option<&str> {
+pub fn named_spectrum(source: &Light) -> Option<&str> {
     let name = source.spectrum.as_ref()?.name()?;
     illuminant(name).is_ok().then_some(name)
 }
 
-/// What glTF has no place for, and whether all of it could be stated: a spectrum without a name cannot.
-pub fn extras(source: &Light) -> (Value, bool) {
-    let mut extras = json!({});
-    let name = named_spectrum(source);
-    if let Some(name) = name {
-        extras[spectrum::KEY] = json!(name);
-    }
-    match source.size {
-        LightSize::None => {}
-        LightSize::Radius { radius_m } => extras["radius_m"] = json!(radius_m),
-        LightSize::Angle { diameter_rad } => {
-            extras["angular_diameter_deg"] = json!(diameter_rad.to_degrees());
-        }
-    }
-    (extras, name.is_some() == source.spectrum.is_some())
+/// What glTF has no place for, by where it stands in the extras of a light's node.
+pub const EXTRAS: [&str; 3] = [spectrum::KEY, "radius_m", "angular_diameter_deg"];
+
+/// What a light states of that.
+pub fn extras(source: &Light) -> Value {
+    let size = match source.size {
+        LightSize::None => [None; 2],
+        LightSize::Radius { radius_m } => [Some(radius_m), None],
+        LightSize::Angle { diameter_rad } => [None, Some(diameter_rad.to_degrees())],
+    };
+    let [radius, angle] = size.map(|size| size.map(Value::from));
+    let stated = [named_spectrum(source).map(Value::from), radius, angle];
+    let stated = EXTRAS.into_iter().zip(stated);
+    stated
+        .filter_map(|(key, value)| Some((key.to_owned(), value?)))
+        .collect()
 }
 
 fn by_kind(source: &Light) -> Option<(&'static str, Value)> {
@@ -125,7 +114,7 @@ fn by_kind(source: &Light) -> Option<(&'static str, Value)> {
 }
 
 /// A node whose −z is the way that the light goes.
-pub fn node(source: &Light, shift: DVec3) -> Value {
+fn node(source: &Light, shift: DVec3) -> Value {
     let position = source
         .kind
         .position()

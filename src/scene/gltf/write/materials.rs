@@ -4,15 +4,13 @@ use glam::DVec3;
 use gltf::json::Value;
 use serde_json::json;
 
-use super::super::glb::Glb;
 use super::super::{substance, waves};
 use crate::error::Warning;
 use crate::scene::{Material, TextureRef};
 use crate::units::LUMENS_PER_WATT;
 
-/// A material; extensions that it takes are named among those of the file. The world's origin lies at −`shift` of the
-/// scene [m].
-pub fn written(material: &Material, shift: DVec3, glb: &mut Glb, warnings: &mut Vec<Warning>) -> Value {
+/// A material. The world's origin lies at −`shift` of the scene [m].
+pub fn written(material: &Material, shift: DVec3, warnings: &mut Vec<Warning>) -> Value {
     let [red, green, blue] = material.base_colour.to_array();
     let alpha = material.alpha_mask.as_ref().map_or(1.0, |mask| mask.factor);
     let mut metallic_roughness = json!({
@@ -21,7 +19,7 @@ pub fn written(material: &Material, shift: DVec3, glb: &mut Glb, warnings: &mut 
         "roughnessFactor": material.roughness,
     });
     if let Some(texture) = &material.base_colour_texture {
-        metallic_roughness["baseColorTexture"] = reference(texture, glb);
+        metallic_roughness["baseColorTexture"] = reference(texture);
     }
     let mut written = json!({
         "name": material.name,
@@ -33,24 +31,19 @@ pub fn written(material: &Material, shift: DVec3, glb: &mut Glb, warnings: &mut 
         written["alphaCutoff"] = json!(mask.cutoff);
     }
     if let Some(map) = &material.normal_map {
-        written["normalTexture"] = reference(&map.image, glb);
+        written["normalTexture"] = reference(&map.image);
         written["normalTexture"]["scale"] = json!(map.scale);
     }
-    write_glow(material, &mut written, glb);
-    write_dielectric(material, &mut written, glb);
-    write_substance(material, &mut written, glb, warnings);
+    write_glow(material, &mut written);
+    write_dielectric(material, &mut written);
+    write_substance(material, &mut written, warnings);
     if let Some(waves) = &material.waves {
         written["extras"][waves::KEY] = waves::written(waves, shift);
     }
     written
 }
 
-fn extend(written: &mut Value, name: &str, value: Value, glb: &mut Glb) {
-    written["extensions"][name] = value;
-    glb.use_extension(name);
-}
-
-fn reference(texture: &TextureRef, glb: &mut Glb) -> Value {
+fn reference(texture: &TextureRef) -> Value {
     let mut reference = json!({ "index": texture.texture, "texCoord": texture.uv_set });
     let [x, y, z] = texture.uv_transform.to_cols_array_2d();
     if texture.uv_transform != glam::DMat3::IDENTITY {
@@ -59,29 +52,28 @@ fn reference(texture: &TextureRef, glb: &mut Glb) -> Value {
         let transform = json!({ "offset": [z[0], z[1]], "rotation": -x[1].atan2(x[0]),
             "scale": [scale_u, scale_v] });
         reference["extensions"]["KHR_texture_transform"] = transform;
-        glb.use_extension("KHR_texture_transform");
     }
     reference
 }
 
-fn write_glow(material: &Material, written: &mut Value, glb: &mut Glb) {
+fn write_glow(material: &Material, written: &mut Value) {
     let cd_per_m2 = material.emitted_radiance * LUMENS_PER_WATT;
     let most = cd_per_m2.max_channel();
     if most <= 0.0 {
         return;
     }
     written["emissiveFactor"] = json!((cd_per_m2 / most).to_array());
-    let strength = json!({ "emissiveStrength": most });
-    extend(written, "KHR_materials_emissive_strength", strength, glb);
+    written["extensions"]["KHR_materials_emissive_strength"] = json!({ "emissiveStrength": most });
 }
 
-fn write_dielectric(material: &Material, written: &mut Value, glb: &mut Glb) {
-    if material.metallic < 0.5 {
-        extend(written, "KHR_materials_ior", json!({ "ior": material.ior }), glb);
-    }
+fn write_dielectric(material: &Material, written: &mut Value) {
+    let mut extend = |name: &str, value| written["extensions"][name] = value;
+    extend("KHR_materials_ior", json!({ "ior": material.ior }));
     if material.transmission > 0.0 {
-        let transmission = json!({ "transmissionFactor": material.transmission });
-        extend(written, "KHR_materials_transmission", transmission, glb);
+        extend(
+            "KHR_materials_transmission",
+            json!({ "transmissionFactor": material.transmission }),
+        );
     }
     if let Some(volume) = &material.volume {
         let mut stated = json!({ "thicknessFactor": 1.0,
@@ -89,15 +81,17 @@ fn write_dielectric(material: &Material, written: &mut Value, glb: &mut Glb) {
         if volume.attenuation_distance_m.is_finite() {
             stated["attenuationDistance"] = json!(volume.attenuation_distance_m);
         }
-        extend(written, "KHR_materials_volume", stated, glb);
+        extend("KHR_materials_volume", stated);
     }
     if material.polish != 1.0 && material.metallic < 0.5 {
-        let specular = json!({ "specularFactor": material.polish });
-        extend(written, "KHR_materials_specular", specular, glb);
+        extend(
+            "KHR_materials_specular",
+            json!({ "specularFactor": material.polish }),
+        );
     }
 }
 
-fn write_substance(material: &Material, written: &mut Value, glb: &mut Glb, warnings: &mut Vec<Warning>) {
+fn write_substance(material: &Material, written: &mut Value, warnings: &mut Vec<Warning>) {
     if let Some(metal) = material.metal {
         written["extras"][substance::METAL_KEY] = json!(metal.name());
     }
@@ -107,14 +101,13 @@ fn write_substance(material: &Material, written: &mut Value, glb: &mut Glb, warn
     match substance::stated(glass) {
         Some(substance::Stated::Name(name)) => written["extras"][substance::GLASS_KEY] = json!(name),
         Some(substance::Stated::Dispersion(dispersion)) => {
-            let stated = json!({ "dispersion": dispersion });
-            extend(written, substance::NAME, stated, glb);
+            written["extensions"][substance::NAME] = json!({ "dispersion": dispersion });
         }
         Some(substance::Stated::Nothing) => {}
         None => warnings.push(Warning::new(
             format!("material `{}`", material.name),
             format!(
-                "is of glass `{}`, which a file cannot name; it was written as one without dispersion",
+                "is of glass `{}`, whose dispersion a file cannot state",
                 glass.name
             ),
             "choose a glass by its name",

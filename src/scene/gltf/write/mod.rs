@@ -1,7 +1,7 @@
 //! A scene of our own as glTF: every object a node, every light a node, every camera a node.
 
 pub(super) mod lights;
-mod materials;
+pub(super) mod materials;
 
 use glam::{DMat3, DQuat, DVec3};
 use gltf::json::Value;
@@ -32,8 +32,8 @@ pub fn document(scene: &Scene) -> Result<(Glb, Vec<Warning>)> {
     }
     let shift = scene.origin_world;
     for material in &scene.materials {
-        let written = materials::written(material, shift, &mut glb, &mut warnings);
-        glb.push("materials", written);
+        let written = materials::written(material, shift, &mut warnings);
+        glb.push("/materials", written);
     }
     for object in &scene.objects {
         add_object(object, shift, &mut glb);
@@ -54,8 +54,8 @@ fn add_texture(texture: &Texture, glb: &mut Glb) -> Result<()> {
         Wrap::MirroredRepeat => 33648,
         Wrap::ClampToEdge => 33071,
     });
-    let sampler = glb.push("samplers", json!({ "wrapS": across, "wrapT": down }));
-    glb.push("textures", json!({ "source": image, "sampler": sampler }));
+    let sampler = glb.push("/samplers", json!({ "wrapS": across, "wrapT": down }));
+    glb.push("/textures", json!({ "source": image, "sampler": sampler }));
     Ok(())
 }
 
@@ -90,20 +90,18 @@ fn add_object(object: &Object, shift: DVec3, glb: &mut Glb) {
     }
     let indices = glb.push_indices(triangles.iter().flatten().copied());
     let primitive = json!({ "attributes": attributes, "indices": indices, "material": object.material });
-    let mesh = glb.push("meshes", json!({ "primitives": [primitive] }));
-    let node = glb.push("nodes", json!({ "name": object.name, "mesh": mesh }));
-    glb.push_root(node);
+    let mesh = glb.push("/meshes", json!({ "primitives": [primitive] }));
+    glb.push_root(json!({ "name": object.name, "mesh": mesh }));
 }
 
 fn add_camera(camera: &Camera, shift: DVec3, glb: &mut Glb) {
     let lens = json!({ "type": "perspective",
         "perspective": { "yfov": camera.vertical_fov_rad, "znear": camera.near_m } });
-    let lens = glb.push("cameras", lens);
+    let lens = glb.push("/cameras", lens);
     let right = camera.forward.cross(camera.up);
     let axes = DMat3::from_cols(right, camera.up, -camera.forward);
     let mut node = placed(&camera.name, camera.position + shift, DQuat::from_mat3(&axes));
     node["camera"] = json!(lens);
-    let node = glb.push("nodes", node);
     glb.push_root(node);
 }
 

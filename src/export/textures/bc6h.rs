@@ -6,7 +6,7 @@ use block_compression::{BC6HSettings, CompressionVariant};
 use half::f16;
 use rayon::prelude::*;
 
-use super::super::texels::Texels;
+use super::texels::Texels;
 
 /// Texels along the side of a block, and its bytes.
 const SIDE: usize = 4;
