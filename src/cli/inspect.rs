@@ -143,8 +143,8 @@ fn object_report(scene: &Scene, index: usize) -> ObjectReport {
         name: object.name.clone(),
         node: object.node,
         primitive: object.primitive,
-        triangles: object.mesh.triangles.len(),
-        area_m2: object.mesh.area_m2(),
+        triangles: object.mesh_in_scene().triangles.len(),
+        area_m2: object.mesh_in_scene().area_m2(),
         material: material.name.clone(),
         surface: surface_name(material.surface),
     }
@@ -460,7 +460,7 @@ impl SurveyReport {
             surface: scene.objects[map.chart.object()].name.clone(),
             side: map.chart.receiver.side(),
             uv_set: map.chart.uv_set,
-            refused_uv_sets: refused_sets(&scene.objects[map.chart.object()].mesh)
+            refused_uv_sets: refused_sets(scene.objects[map.chart.object()].mesh_in_scene())
                 .into_iter()
                 .map(|(set, refusal)| format!("{set}: {refusal}"))
                 .collect(),

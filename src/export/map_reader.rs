@@ -170,7 +170,7 @@ impl<'a> MapReader<'a> {
         };
         let triangles = object_of(self.scene, entry, &self.location)?
             .1
-            .mesh
+            .mesh_in_scene()
             .triangles
             .len();
         let path = inside(self.folder, file, &self.location)?;
@@ -344,19 +344,21 @@ fn read_chart(
     let parametrisation = match (entry.uv_set, &entry.uv_file) {
         (UvSet::Generated, Some(file)) => {
             let path = inside(folder, file, manifest)?;
-            let triangles = object.mesh.triangles.len();
+            let triangles = object.mesh_in_scene().triangles.len();
             let bytes = files::read_file(&path, uv_file::size_bytes(triangles))?;
             let corner_uvs = uv_file::decode(&bytes, triangles, &path.display().to_string())?;
             Some(Parametrisation::new(
                 index,
-                &object.mesh,
+                object.mesh_in_scene(),
                 UvSet::Generated,
                 corner_uvs,
             ))
         }
         (UvSet::Generated, None) => None,
         // The file's own sets are taken up the same way as in the bake.
-        (set, _) => parametrise(index, &object.mesh, DEFAULT_NOMINAL_SIDE).filter(|own| own.uv_set == set),
+        (set, _) => {
+            parametrise(index, object.mesh_in_scene(), DEFAULT_NOMINAL_SIDE).filter(|own| own.uv_set == set)
+        }
     };
     let parametrisation = parametrisation.ok_or_else(|| {
         Error::failure(

@@ -47,7 +47,7 @@ impl Changes {
             found.extend(&now.name, of_material(index, before, now));
         }
         for (object, (before, now)) in loaded.objects.iter().zip(&edited.objects).enumerate() {
-            match Motion::between(&before.mesh, &now.mesh) {
+            match Motion::between(before.mesh_in_scene(), now.mesh_in_scene()) {
                 Some(None) => {}
                 Some(Some(motion)) => {
                     let Motion {

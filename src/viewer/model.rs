@@ -642,7 +642,9 @@ impl Model {
 fn is_other_light(before: &Arc<Scene>, now: &Arc<Scene>) -> bool {
     let meshes = |scene: &Arc<Scene>| -> Vec<_> {
         let objects = scene.objects.iter();
-        objects.map(|object| Arc::as_ptr(&object.mesh)).collect()
+        objects
+            .map(|object| Arc::as_ptr(object.mesh_in_scene()))
+            .collect()
     };
     !Arc::ptr_eq(before, now) && (before.lights != now.lights || meshes(before) != meshes(now))
 }

@@ -22,8 +22,8 @@ pub struct Placement {
 impl Placement {
     /// How an object's node stands; `None` where its shape is another one, or it was tilted.
     pub fn of(object: usize, loaded: &Scene, now: &Scene) -> Option<Self> {
-        let before = &loaded.objects.get(object)?.mesh;
-        let after = &now.objects.get(object)?.mesh;
+        let before = loaded.objects.get(object)?.mesh_in_scene();
+        let after = now.objects.get(object)?.mesh_in_scene();
         let Some(motion) = Motion::between(before, after)? else {
             return Some(Self::default());
         };
@@ -52,9 +52,9 @@ impl Placement {
         let edits: Vec<Edit> = parts
             .map(|(index, part)| {
                 if self.yaw_rad == 0.0 {
-                    Edit::object_at(index, &part.mesh, self.offset_m)
+                    Edit::object_at(index, part.mesh_in_scene(), self.offset_m)
                 } else {
-                    Edit::object_turned(index, &part.mesh, (turn, pivot), self.offset_m)
+                    Edit::object_turned(index, part.mesh_in_scene(), (turn, pivot), self.offset_m)
                 }
             })
             .collect();
@@ -75,7 +75,7 @@ fn middle(object: usize, loaded: &Scene) -> DVec3 {
     let node = loaded.objects[object].node;
     let parts = loaded.objects.iter().filter(|part| part.node == node);
     let bounds = parts
-        .filter_map(|part| part.mesh.bounds())
+        .filter_map(|part| part.mesh_in_scene().bounds())
         .reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
     bounds.map_or(DVec3::ZERO, |(low, high)| 0.5 * (low + high))
 }

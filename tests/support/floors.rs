@@ -23,21 +23,16 @@ const TRIANGLES: [[u32; 3]; 2] = [[0, 2, 1], [0, 3, 2]];
 
 /// A floor over x, z in [0, 1] at the given height, facing up, with uv = (x, z).
 pub fn floor(name: &str, material: usize, height_m: f64) -> Object {
-    Object {
-        name: name.into(),
-        node: 0,
-        primitive: 0,
-        material,
-        mesh: Arc::new(Mesh {
-            positions: CORNERS
-                .map(|corner| DVec3::new(corner.x, height_m, corner.y))
-                .to_vec(),
-            normals: vec![DVec3::Y; 4],
-            uv0: Some(CORNERS.to_vec()),
-            uv1: None,
-            triangles: TRIANGLES.to_vec(),
-        }),
-    }
+    let mesh = Mesh {
+        positions: CORNERS
+            .map(|corner| DVec3::new(corner.x, height_m, corner.y))
+            .to_vec(),
+        normals: vec![DVec3::Y; 4],
+        uv0: Some(CORNERS.to_vec()),
+        uv1: None,
+        triangles: TRIANGLES.to_vec(),
+    };
+    Object::new(name, (0, 0), material, mesh)
 }
 
 /// One floor of the given material.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::{DQuat, DVec3};
 use serde::{Deserialize, Serialize};
 
-use super::{Light, LightSize, Mesh, Scene, Waves};
+use super::{Light, LightSize, Mesh, Object, Scene, Waves};
 use crate::error::{Error, Result};
 use crate::optics::spectrum::Spectrum;
 use crate::optics::{Glass, LinearSrgb, Metal};
@@ -294,13 +294,14 @@ impl Edit {
                 translation,
             } => {
                 let found = existing(&mut scene.objects, *object, "object")?;
-                found.mesh = shape::moved(&found.mesh, *rotation, *translation, &found.name)?.into();
+                let moved = shape::moved(found.mesh_in_scene(), *rotation, *translation, &found.name)?;
+                *found.mesh_in_scene_mut() = moved;
                 Ok(())
             }
             Self::ObjectMesh { object, mesh } => {
                 let found = existing(&mut scene.objects, *object, "object")?;
                 shape::check_mesh(mesh, &found.name)?;
-                found.mesh = Arc::clone(mesh);
+                found.share(&Object::new("", (0, 0), 0, Arc::clone(mesh)));
                 Ok(())
             }
             Self::Several(edits) => edits.iter().try_for_each(|edit| edit.apply_to(scene)),

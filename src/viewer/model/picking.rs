@@ -111,7 +111,7 @@ impl Model {
         let ball = match self.panel.held() {
             Some(Held::Object(object)) => {
                 let bounds = self.scene().objects.get(object);
-                let bounds = bounds.and_then(|object| object.mesh.bounds());
+                let bounds = bounds.and_then(|object| object.mesh_in_scene().bounds());
                 bounds.map(|(low, high)| (0.5 * (low + high), 0.5 * (high - low).length()))
             }
             Some(Held::Light(light)) => {

@@ -161,7 +161,7 @@ fn edited_scene_shows_as_a_new_one() {
     };
     // All objects are written at once.
     let uniform = 80 * scene.objects.len() as u64;
-    let ball = 32 * scene.objects[1].mesh.positions.len() as u64;
+    let ball = 32 * scene.objects[1].mesh_in_scene().positions.len() as u64;
     let turned = moved(2, DQuat::from_rotation_y(0.3));
     for (edit, most_bytes) in [
         (ior, uniform),
@@ -199,7 +199,7 @@ fn glass_that_turns_matte_keeps_maps_in_place() {
     // Scenes of other objects are taken over whole.
     let alone = floor_scene(diffuse(LinearSrgb::new(0.3, 0.6, 0.9)));
     let mut other = alone.clone();
-    other.objects[0].mesh = Arc::new(shapes::floor([0.0, 0.5], [0.0, 1.0], 0.0));
+    *other.objects[0].mesh_in_scene_mut() = shapes::floor([0.0, 0.5], [0.0, 1.0], 0.0);
     for edited in [matte, again, alone, other] {
         rig.set_scene(&edited);
         rig.set_maps(&maps);

@@ -50,7 +50,11 @@ fn nothing_is_cut_off_or_overlaps() {
                     light: 0,
                     position: DVec3::new(-10.75, -20.125, -30.25),
                 },
-                Edit::object_at(0, &panel.told.loaded.objects[0].mesh, DVec3::splat(-1.125)),
+                Edit::object_at(
+                    0,
+                    panel.told.loaded.objects[0].mesh_in_scene(),
+                    DVec3::splat(-1.125),
+                ),
             ];
             panel.tell(|told| told.scene = leak(Arc::new(edited(told.scene, &edits))));
             panel.choose("Tone map", "ACES");

@@ -59,7 +59,11 @@ fn is_saved(source: &Path, target: &Path) -> bool {
     let extent_m = scene.bounds().map_or(1.0, |(low, high)| (high - low).length());
     let shift = read.origin_world - scene.origin_world;
     for (a, b) in read.objects.iter().zip(&scene.objects) {
-        let mut corners = a.mesh.positions.iter().zip(&b.mesh.positions);
+        let mut corners = a
+            .mesh_in_scene()
+            .positions
+            .iter()
+            .zip(&b.mesh_in_scene().positions);
         assert!(corners.all(|(a, b)| (*a + shift).distance(*b) < 1e-9 * extent_m));
     }
     assert_eq!(read.lights.len(), scene.lights.len());

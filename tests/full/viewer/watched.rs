@@ -53,7 +53,7 @@ fn camera_settings_and_edits_stay() {
     assert_eq!(model.scene().materials[1].roughness, 0.25, "the edit stays");
     assert_eq!(model.panel.settings.seed, 7);
     assert!(model.navigator.camera().forward.distance(gaze) < 1e-12);
-    let [mesh, before] = [model.scene(), &was].map(|scene| &scene.objects[0].mesh);
+    let [mesh, before] = [model.scene(), &was].map(|scene| scene.objects[0].mesh_in_scene());
     assert!(Arc::ptr_eq(mesh, before), "what is the same is shared");
     assert!(
         !model.maps().is_empty(),
@@ -69,7 +69,7 @@ fn camera_settings_and_edits_stay() {
     until(&mut model, "read again", |model| {
         !Arc::ptr_eq(model.scene(), &now)
     });
-    assert_eq!(model.scene().objects[0].mesh.positions[0].x, -2.0);
+    assert_eq!(model.scene().objects[0].mesh_in_scene().positions[0].x, -2.0);
     // A material that is gone takes its edits with it.
     let text = fs::read_to_string(&path).expect("it is there");
     fs::write(&path, text.replace("\"silver\"", "\"gold\"")).expect("it is written");

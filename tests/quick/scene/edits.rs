@@ -159,7 +159,7 @@ fn image(scene: &Scene) -> String {
 fn edits_undo_bit_for_bit_and_share_what_they_leave() {
     let scene = scene();
     let before = image(&scene);
-    let mesh = |scene: &Scene, object: usize| Arc::clone(&scene.objects[object].mesh);
+    let mesh = |scene: &Scene, object: usize| Arc::clone(scene.objects[object].mesh_in_scene());
     for edit in edits() {
         let (edited, inverse) = edit.apply(&scene).expect("it is in range");
         assert!(image(&scene) == before);
@@ -217,10 +217,10 @@ fn objects_turn_about_their_middle() {
     let turn = DQuat::from_rotation_z(std::f64::consts::FRAC_PI_2) * 3.0;
     let edit = moved(0, turn, dvec3(0.0, 0.25, 0.0));
     let (edited, _) = edit.apply(&scene()).expect("it is in range");
-    let (low, high) = edited.objects[0].mesh.bounds().expect("a floor");
+    let (low, high) = edited.objects[0].mesh_in_scene().bounds().expect("a floor");
     near(low, dvec3(0.0, -0.35, -0.6), 1e-12, "low");
     near(high, dvec3(0.0, 0.85, 0.6), 1e-12, "high");
-    for normal in &edited.objects[0].mesh.normals {
+    for normal in &edited.objects[0].mesh_in_scene().normals {
         near(*normal, DVec3::NEG_X, 1e-12, "normal");
     }
 }
@@ -241,7 +241,7 @@ fn edits_out_of_range_are_refused() {
     let nan = f64::NAN;
     let turned = |x, w| moved(0, DQuat::from_xyzw(x, 0.0, 0.0, w), DVec3::ZERO);
     let shifted = |object, x| moved(object, DQuat::IDENTITY, DVec3::X * x);
-    let mut mesh = (*scene.objects[0].mesh).clone();
+    let mut mesh = (*scene.objects[0].mesh_in_scene()).clone();
     mesh.triangles[0][0] = 4;
     let broken = Edit::ObjectMesh {
         object: 0,

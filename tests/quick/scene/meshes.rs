@@ -6,7 +6,7 @@ use crate::prelude::*;
 
 fn only_mesh(scene: &Scene) -> &Mesh {
     assert_eq!(scene.objects.len(), 1);
-    &scene.objects[0].mesh
+    scene.objects[0].mesh_in_scene()
 }
 
 pub fn volume_m3(mesh: &Mesh) -> f64 {
@@ -181,8 +181,8 @@ fn strips_and_fans_face_as_specified() {
     let scene = file.scene();
     assert_eq!(scene.objects.len(), 3);
     for object in &scene.objects[..2] {
-        assert_close(object.mesh.area_m2(), 1.0, 1e-15, "area");
-        assert!((0..2).all(|triangle| object.mesh.face_normal(triangle) == DVec3::Z));
+        assert_close(object.mesh_in_scene().area_m2(), 1.0, 1e-15, "area");
+        assert!((0..2).all(|triangle| object.mesh_in_scene().face_normal(triangle) == DVec3::Z));
     }
     warns(&scene, "mesh2 | points or lines");
     warns(&scene, "mesh3 | 1 vertices at its end make no triangle");

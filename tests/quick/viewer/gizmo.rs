@@ -72,12 +72,12 @@ fn nodes_move_and_come_back_bit_for_bit() {
     // Two parts of one node, of which none lies in the node's middle.
     let mut loaded = scene();
     let (ball, last) = (1, loaded.objects.len());
-    let beside = Edit::object_at(ball, &loaded.objects[ball].mesh, dvec3(2.0, 0.5, 0.0));
+    let beside = Edit::object_at(ball, loaded.objects[ball].mesh_in_scene(), dvec3(2.0, 0.5, 0.0));
     let Edit::ObjectMesh { mesh, .. } = beside else {
         panic!("it is a mesh")
     };
     loaded.objects.push(loaded.objects[ball].clone());
-    loaded.objects[last].mesh = mesh;
+    *loaded.objects[last].mesh_in_scene_mut() = Mesh::clone(&mesh);
     let there = Placement {
         yaw_rad: 0.7,
         offset_m: dvec3(0.25, -0.5, 1.0),
@@ -88,7 +88,7 @@ fn nodes_move_and_come_back_bit_for_bit() {
     assert!(pivot.distance(dvec3(1.0, 1.05, 0.0)) < 0.02);
     let turn = DQuat::from_rotation_y(there.yaw_rad);
     for part in [ball, last] {
-        let [was, is] = [&loaded, &moved].map(|scene| &scene.objects[part].mesh.positions);
+        let [was, is] = [&loaded, &moved].map(|scene| &scene.objects[part].mesh_in_scene().positions);
         for (was, is) in was.iter().zip(is) {
             near(*is, turn * (*was - pivot) + pivot + there.offset_m, 1e-12, part);
         }
@@ -96,11 +96,14 @@ fn nodes_move_and_come_back_bit_for_bit() {
         near(found.yaw_rad, there.yaw_rad, 1e-8, "turn");
         near(found.offset_m, there.offset_m, 1e-8, "offset");
     }
-    let [floor, same_floor] = [&loaded, &moved].map(|scene| &scene.objects[0].mesh);
+    let [floor, same_floor] = [&loaded, &moved].map(|scene| scene.objects[0].mesh_in_scene());
     assert!(Arc::ptr_eq(floor, same_floor), "nothing else moves");
     for back in [inverse, Placement::default().edit(ball, &loaded)] {
         let back = edited(&moved, &[back]);
-        assert_eq!(back.objects[last].mesh, loaded.objects[last].mesh);
+        assert_eq!(
+            back.objects[last].mesh_in_scene(),
+            loaded.objects[last].mesh_in_scene()
+        );
     }
     let tilt = Edit::ObjectMoved {
         object: ball,

@@ -46,7 +46,12 @@ fn assert_same(read: &Scene, saved: &Scene) {
     assert_eq!(read.objects.len(), saved.objects.len());
     for (a, b) in read.objects.iter().zip(&saved.objects) {
         assert_eq!(a.name, b.name);
-        for (a, b) in a.mesh.positions.iter().zip(&b.mesh.positions) {
+        for (a, b) in a
+            .mesh_in_scene()
+            .positions
+            .iter()
+            .zip(&b.mesh_in_scene().positions)
+        {
             near(*a, *b, 1e-9, "corner");
         }
     }
@@ -183,7 +188,7 @@ fn what_no_file_can_hold_is_refused() {
     let folder = folder();
     let source = scene_file::glb(folder.path(), "a", "300");
     let loaded = read(&source);
-    let mut mesh = (*loaded.objects[1].mesh).clone();
+    let mut mesh = (*loaded.objects[1].mesh_in_scene()).clone();
     mesh.positions.iter_mut().for_each(|corner| corner.y *= 0.5);
     let mesh = Arc::new(mesh);
     let squeezed = edited(&loaded, &[Edit::ObjectMesh { object: 1, mesh }]);

@@ -152,14 +152,14 @@ fn objects_move_from_their_place_in_the_file() {
     let mut panel = panel();
     panel.choose("Object", "ball");
     let loaded = Arc::clone(panel.told.scene);
-    let low = |scene: &Scene| scene.objects[1].mesh.bounds().expect("a ball").0;
+    let low = |scene: &Scene| scene.objects[1].mesh_in_scene().bounds().expect("a ball").0;
     panel.type_into("Offset [m]: y", "0.25");
     let moved = panel.apply();
     near(low(moved) - low(&loaded), DVec3::Y * 0.25, 1e-12, "offset");
     panel.assert_says(&["y: 0.25"]);
     panel.type_into("Offset [m]: y", "0");
     let back = panel.apply();
-    let (back, loaded) = (&back.objects[1].mesh, &loaded.objects[1].mesh);
+    let (back, loaded) = (back.objects[1].mesh_in_scene(), loaded.objects[1].mesh_in_scene());
     assert!(Arc::ptr_eq(back, loaded), "the file's place exactly");
     panel.type_into("Turn [°]", "90");
     let turned = panel.apply();

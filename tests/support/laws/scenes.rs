@@ -65,7 +65,7 @@ impl Build for Scene {
     }
 
     fn reshaped(mut self, object: usize, change: impl FnOnce(&mut Mesh)) -> Self {
-        change(Arc::make_mut(&mut self.objects[object].mesh));
+        change(self.objects[object].mesh_in_scene_mut());
         self
     }
 }

@@ -146,7 +146,7 @@ impl Patch<'_> {
     fn objects(&mut self) -> Result<()> {
         let pairs = self.loaded.objects.iter().zip(&self.edited.objects);
         for (was, is) in pairs {
-            let motion = Motion::between(&was.mesh, &is.mesh).ok_or_else(|| {
+            let motion = Motion::between(was.mesh_in_scene(), is.mesh_in_scene()).ok_or_else(|| {
                 Error::failure(
                     format!("object `{}`", is.name),
                     "has another shape than its file gives it, which cannot be saved",
@@ -156,13 +156,15 @@ impl Patch<'_> {
             let Some(stands) = self.placing.of(is.node) else {
                 continue;
             };
-            let centre = Motion::centre(&was.mesh) + self.edited.origin_world;
+            let centre = Motion::centre(was.mesh_in_scene()) + self.edited.origin_world;
             // Parts of one node that rest and parts that move are told apart too.
             let is_moved = motion.is_some();
             let moved = motion.map_or(stands, |motion| about(&motion, centre) * stands);
             let is_of_moved = || {
                 let mut parts = self.loaded.objects.iter().zip(&self.edited.objects);
-                parts.any(|(a, b)| b.node == is.node && !std::sync::Arc::ptr_eq(&a.mesh, &b.mesh))
+                parts.any(|(a, b)| {
+                    b.node == is.node && !std::sync::Arc::ptr_eq(a.mesh_in_scene(), b.mesh_in_scene())
+                })
             };
             if is_moved || is_of_moved() {
                 self.placing.put(is.node, moved, &is.name)?;
@@ -199,7 +201,11 @@ fn check(bytes: &[u8], original: &Path, edited: &Scene, options: &LoadOptions) -
     let shift = read.origin_world - edited.origin_world;
     let is_at = |a: DVec3, b: DVec3| (a + shift).distance(b) <= SAME * extent_m;
     for (read, is) in read.objects.iter().zip(&edited.objects) {
-        let mut corners = read.mesh.positions.iter().zip(&is.mesh.positions);
+        let mut corners = read
+            .mesh_in_scene()
+            .positions
+            .iter()
+            .zip(&is.mesh_in_scene().positions);
         if !corners.all(|(read, is)| is_at(*read, *is)) {
             return Err(differs(format!("object `{}`", is.name)));
         }
