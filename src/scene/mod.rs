@@ -34,7 +34,7 @@ pub mod waves;
 pub use adjacency::Adjacency;
 pub use camera::Camera;
 pub use camera_path::{CameraPath, PathPlan};
-pub use edit::{Edit, EditTarget, why_light_stays};
+pub use edit::{Edit, EditState, LightEdit, MaterialEdit, why_light_stays};
 pub use environment::Environment;
 pub use gltf::guard::is_guarded;
 pub use gltf::{Glb, Opened};
@@ -44,7 +44,7 @@ pub use material::AlphaMask;
 pub use material::{Material, SurfaceKind, Volume};
 pub use mesh::Mesh;
 pub use normal_map::NormalMap;
-pub use object::Object;
+pub use object::{Motion, Object};
 pub use texture::{Texture, TextureRef};
 pub use waves::{Wave, Waves};
 

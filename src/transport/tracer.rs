@@ -143,8 +143,8 @@ impl Tracer {
     #[must_use]
     pub fn edited(&self, scene: Arc<Scene>) -> Self {
         let is_same = |object: usize| {
-            let pair = [&self.scene, &scene].map(|scene| scene.objects[object].mesh_in_scene());
-            Arc::ptr_eq(pair[0], pair[1])
+            let [was, is] = [&self.scene, &scene].map(|scene| &scene.objects[object]);
+            was.stands_as(is)
         };
         let count = scene.objects.len();
         if count != self.scene.objects.len() {

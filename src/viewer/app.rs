@@ -454,7 +454,7 @@ impl App {
             if let Some(probed) = &probed {
                 probe::draw(ui.painter(), &lens, probed);
             }
-            let pulled = gizmo.show(ui, &lens, panel.held(), (&scene, &loaded));
+            let pulled = gizmo.show(ui, &lens, panel.held(), &scene);
             wishes.edit = pulled.or(wishes.edit.take());
         });
         if let Some(controls) = &painting.moved_controls {

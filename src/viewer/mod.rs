@@ -29,7 +29,6 @@ mod orphaned;
 mod overlay;
 pub mod pace;
 pub mod panel;
-pub mod placement;
 pub mod probe;
 pub mod screenshot;
 pub mod sketching;

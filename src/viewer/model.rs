@@ -577,8 +577,7 @@ impl Model {
         // A slow frame may bring both: the end of a drag, and the wish to take it back.
         let mut outcome = Ok(());
         if let Some(edit) = &wishes.edit {
-            self.log
-                .write("edit", json!({"target": format!("{:?}", edit.target())}));
+            self.log.write("edit", json!({"target": edit.target()}));
             outcome = self.edits.edit(edit);
         }
         if outcome.is_ok() && (wishes.undo || wishes.redo) {
@@ -640,11 +639,7 @@ impl Model {
 
 /// Whether a scene is lit otherwise than before: a lamp is another one, or an object elsewhere.
 fn is_other_light(before: &Arc<Scene>, now: &Arc<Scene>) -> bool {
-    let meshes = |scene: &Arc<Scene>| -> Vec<_> {
-        let objects = scene.objects.iter();
-        objects
-            .map(|object| Arc::as_ptr(object.mesh_in_scene()))
-            .collect()
-    };
-    !Arc::ptr_eq(before, now) && (before.lights != now.lights || meshes(before) != meshes(now))
+    let (was, is) = (&before.objects, &now.objects);
+    let stand_alike = || was.len() == is.len() && was.iter().zip(is).all(|(was, is)| was.stands_as(is));
+    !Arc::ptr_eq(before, now) && (before.lights != now.lights || !stand_alike())
 }

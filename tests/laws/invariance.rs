@@ -1,7 +1,5 @@
 //! What must not change a map or its ledgers, or must change them just so.
 
-use std::sync::Arc;
-
 use glam::{DMat3, DVec3};
 use nephroid::illumination::IlluminationMap;
 use nephroid::optics::LinearSrgb;

@@ -1,8 +1,6 @@
 //! Scenes small enough to know every pixel of.
 
 use std::f64::consts::PI;
-use std::sync::Arc;
-
 use glam::{DMat3, DVec2, DVec3};
 use nephroid::eye_pass::View;
 use nephroid::illumination::{Chart, IlluminationMap, Receiver, UvSet};

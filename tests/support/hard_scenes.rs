@@ -3,8 +3,6 @@
 //! `wall`, `blocker`, …
 
 use std::f64::consts::{PI, TAU};
-use std::sync::Arc;
-
 use glam::{DMat3, DVec3};
 use nephroid::optics::LinearSrgb;
 use nephroid::scene::builtin::{parts, shapes};

@@ -60,11 +60,8 @@ impl Model {
         let aim = Aim::of(surfaces, &gaze, 0.5 * (low + high));
         let stops = self.panel.display.exposure_stops;
         let added = light.make((surfaces, radius_m), &aim, stops, &scene);
-        let edit = Edit::LightAdded {
-            added: Arc::new(added),
-        };
-        self.log
-            .write("edit", json!({"target": format!("{:?}", edit.target())}));
+        let edit = Edit::AddLight(Arc::new(added));
+        self.log.write("edit", json!({"target": edit.target()}));
         let outcome = self.edits.edit(&edit);
         self.edits.release();
         if outcome.is_ok() {

@@ -4,7 +4,7 @@ use egui::{DragValue, Response, Ui};
 
 use super::Wishes;
 use super::control::setting;
-use crate::scene::{Edit, Light, LightKind, LightSize};
+use crate::scene::{Edit, Light, LightEdit, LightKind, LightSize};
 
 /// Drag of one point, as a share of the radius, or [m] where that is 0.
 const RADIUS_SPEED: f64 = 0.01;
@@ -21,7 +21,7 @@ pub fn show(ui: &mut Ui, index: usize, (light, of_file): (&Light, &Light), wishe
         LightKind::Panel { .. } | LightKind::Surface { .. } | LightKind::Environment { .. } => {}
     }
     if size != light.size {
-        wishes.edit = Some(Edit::LightSize { light: index, size });
+        wishes.edit = Some(Edit::Light(index, LightEdit::Size(size)));
     }
 }
 

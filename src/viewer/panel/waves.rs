@@ -7,7 +7,7 @@ use super::Wishes;
 use super::bake::FAILED;
 use super::control::setting;
 use crate::scene::waves::STEEPEST_SLOPE;
-use crate::scene::{Edit, Wave, Waves};
+use crate::scene::{Edit, MaterialEdit, Wave, Waves};
 
 /// Least height that a drag starts from [m].
 const LEAST_HEIGHT_M: f64 = 1e-6;
@@ -28,10 +28,7 @@ pub fn show(ui: &mut Ui, material: usize, (waves, of_file): (&Waves, Option<&Wav
     }
     match Waves::new(list) {
         Ok(waves) => {
-            wishes.edit = Some(Edit::MaterialWaves {
-                material,
-                waves: Some(waves),
-            });
+            wishes.edit = Some(Edit::Material(material, MaterialEdit::Waves(Some(waves))));
         }
         Err(why) => {
             ui.colored_label(FAILED, why);

@@ -1,7 +1,5 @@
 //! Light straight from the lamps by shadow rays, against the baked layer.
 
-use std::sync::Arc;
-
 use glam::DVec3;
 use nephroid::eye_pass::{Picture, View};
 use nephroid::optics::LinearSrgb;

@@ -1,7 +1,5 @@
 //! Illumination maps on the device: what is seen coarsely, and less detail where memory is short.
 
-use std::sync::Arc;
-
 use glam::{DVec2, DVec3};
 
 use nephroid::eye_pass::{Picture, View};

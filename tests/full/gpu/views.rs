@@ -1,7 +1,5 @@
 //! Surfaces shown by something else than their light, on floors of which every pixel is known.
 
-use std::sync::Arc;
-
 use glam::DVec3;
 use nephroid::eye_pass::renderer::{Inspected, MapStyle};
 use nephroid::illumination::IlluminationMap;

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use egui::accesskit::Role;
 use egui::pos2;
 use glam::DVec3;
-use nephroid::scene::Edit;
+use nephroid::scene::{Edit, LightEdit, Motion};
 use nephroid::settings::{BakeSettings, Sigma};
 
 use super::fixtures::edited;
@@ -46,15 +46,8 @@ fn nothing_is_cut_off_or_overlaps() {
             let mut panel = Headless::opened(settings, screen);
             // With what sets them back beside them.
             let edits = [
-                Edit::LightPosition {
-                    light: 0,
-                    position: DVec3::new(-10.75, -20.125, -30.25),
-                },
-                Edit::object_at(
-                    0,
-                    panel.told.loaded.objects[0].mesh_in_scene(),
-                    DVec3::splat(-1.125),
-                ),
+                Edit::Light(0, LightEdit::Position(DVec3::new(-10.75, -20.125, -30.25))),
+                Edit::Place(0, Motion::turned(0.0, DVec3::splat(-1.125))),
             ];
             panel.tell(|told| told.scene = leak(Arc::new(edited(told.scene, &edits))));
             panel.choose("Tone map", "ACES");

@@ -4,7 +4,7 @@ use std::fs;
 use std::sync::Arc;
 
 use glam::DVec2;
-use nephroid::scene::Edit;
+use nephroid::scene::{Edit, MaterialEdit};
 use nephroid::settings::Estimator;
 use nephroid::viewer::ViewerOptions;
 use nephroid::viewer::files::FilesOptions;
@@ -24,10 +24,7 @@ fn camera_settings_and_edits_stay() {
         },
         ..options("ring")
     });
-    let rough = Edit::MaterialRoughness {
-        material: 1,
-        roughness: 0.25,
-    };
+    let rough = Edit::Material(1, MaterialEdit::Roughness(0.25));
     act(&mut model, wish(rough));
     model.navigator.look(DVec2::new(100.0, 30.0));
     model.panel.settings.seed = 7;

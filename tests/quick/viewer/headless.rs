@@ -188,7 +188,7 @@ impl Headless {
     /// Makes that edit of the scene, as the window does.
     pub fn apply(&mut self) -> &'static Scene {
         let edit = self.edit().expect("an edit was asked for");
-        let edited = edit.apply(self.told.scene).expect("the edit is possible").0;
+        let edited = edit.apply(self.told.scene).expect("the edit is possible");
         self.tell(|told| told.scene = leak(Arc::new(edited)));
         self.told.scene
     }

@@ -48,7 +48,7 @@ use nephroid::eye_pass::renderer::GpuMs;
 use nephroid::illumination::IlluminationMap;
 use nephroid::illumination::difference::Difference;
 use nephroid::progress::Stage;
-use nephroid::scene::changes::Changes;
+use nephroid::scene::changes::Change;
 use nephroid::scene::load::save;
 use nephroid::session::StopReason;
 use nephroid::settings::{Estimator, LEAST_MAX_ERROR, Sigma};
@@ -61,7 +61,6 @@ use nephroid::viewer::model::Model;
 use nephroid::viewer::navigation::Travel;
 use nephroid::viewer::new_light::NewLight;
 use nephroid::viewer::panel::{Display, FilmWish, LayerShown, Quantity, Wishes};
-use nephroid::viewer::placement::Placement;
 use nephroid::viewer::worker::{BakeState, BakedLevel};
 
 use crate::prelude::*;
