@@ -30,6 +30,17 @@ pub enum LightEdit {
 const UNIT: f64 = 1e-12;
 
 impl LightEdit {
+    /// For the log, and for people.
+    pub(super) fn names(&self) -> [&'static str; 2] {
+        match self {
+            Self::Strength(_) => ["LightPower", "power"],
+            Self::Size(_) => ["LightSize", "size"],
+            Self::Position(_) => ["LightPosition", "position"],
+            Self::Direction(_) => ["LightDirection", "direction"],
+            Self::Colour(..) => ["LightColour", "colour"],
+        }
+    }
+
     /// Edits a light.
     pub(super) fn apply(&self, light: &mut Light) -> Result<()> {
         let owner = format!("light `{}`", light.name);

@@ -36,6 +36,17 @@ pub enum MaterialEdit {
 }
 
 impl MaterialEdit {
+    /// For the log, and for people.
+    pub(super) fn names(&self) -> [&'static str; 2] {
+        match self {
+            Self::Ior(_) => ["MaterialIor", "refractive index"],
+            Self::Substance { .. } => ["MaterialSubstance", "substance"],
+            Self::BaseColour(_) => ["MaterialTint", "base colour"],
+            Self::Roughness(_) => ["MaterialRoughness", "roughness"],
+            Self::Waves(_) => ["MaterialWaves", "waves"],
+        }
+    }
+
     /// Edits a material; its class follows where it did before.
     pub(super) fn apply(&self, material: &mut Material) -> Result<()> {
         let owner = format!("material `{}`", material.name);

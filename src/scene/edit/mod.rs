@@ -50,52 +50,21 @@ impl Edit {
 
     /// What it sets, by name and index: edits of the same target replace one another.
     pub fn target(&self) -> String {
-        let (target, index) = match self {
-            Self::Light(light, edit) => match edit {
-                LightEdit::Strength(_) => ("LightPower", light),
-                LightEdit::Size(_) => ("LightSize", light),
-                LightEdit::Position(_) => ("LightPosition", light),
-                LightEdit::Direction(_) => ("LightDirection", light),
-                LightEdit::Colour(..) => ("LightColour", light),
-            },
-            Self::AddLight(_) | Self::RemoveLight(_) => return "LightList".into(),
-            Self::Material(material, edit) => match edit {
-                MaterialEdit::Ior(_) => ("MaterialIor", material),
-                MaterialEdit::Substance { .. } => ("MaterialSubstance", material),
-                MaterialEdit::BaseColour(_) => ("MaterialTint", material),
-                MaterialEdit::Roughness(_) => ("MaterialRoughness", material),
-                MaterialEdit::Waves(_) => ("MaterialWaves", material),
-            },
-            Self::Place(object, _) => ("ObjectPlace", object),
-        };
-        format!("{target}({index})")
+        match self {
+            Self::Light(light, edit) => format!("{}({light})", edit.names()[0]),
+            Self::AddLight(_) | Self::RemoveLight(_) => "LightList".into(),
+            Self::Material(material, edit) => format!("{}({material})", edit.names()[0]),
+            Self::Place(object, _) => format!("ObjectPlace({object})"),
+        }
     }
 
     /// The same in words, for a scene that it is possible in: "power of `lamp`".
     pub fn in_words(&self, scene: &Scene) -> String {
         let (what, whose) = match self {
-            Self::Light(light, edit) => {
-                let what = match edit {
-                    LightEdit::Strength(_) => "power",
-                    LightEdit::Size(_) => "size",
-                    LightEdit::Position(_) => "position",
-                    LightEdit::Direction(_) => "direction",
-                    LightEdit::Colour(..) => "colour",
-                };
-                (what, &scene.lights[*light].name)
-            }
+            Self::Light(light, edit) => (edit.names()[1], &scene.lights[*light].name),
             Self::AddLight(light) => return format!("`{}`, a new light", light.name),
             Self::RemoveLight(light) => ("removal", &scene.lights[*light].name),
-            Self::Material(material, edit) => {
-                let what = match edit {
-                    MaterialEdit::Ior(_) => "refractive index",
-                    MaterialEdit::Substance { .. } => "substance",
-                    MaterialEdit::BaseColour(_) => "base colour",
-                    MaterialEdit::Roughness(_) => "roughness",
-                    MaterialEdit::Waves(_) => "waves",
-                };
-                (what, &scene.materials[*material].name)
-            }
+            Self::Material(material, edit) => (edit.names()[1], &scene.materials[*material].name),
             Self::Place(object, _) => ("place", &scene.objects[*object].name),
         };
         format!("{what} of `{whose}`")

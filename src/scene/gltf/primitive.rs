@@ -52,6 +52,22 @@ struct Variant {
     stands_at_origin: bool,
 }
 
+impl Variant {
+    /// The mesh of a primitive, without what would not be seen.
+    fn of(&self, source: &Mesh, has_normals: bool, owner: &str, report: &mut Report) -> Mesh {
+        let mut mesh = source.clone();
+        let mut has_area = self.has_area.iter();
+        mesh.triangles.retain(|_| has_area.next() == Some(&true));
+        if has_normals {
+            drop_unused_vertices(&mut mesh);
+            check_normals(&mut mesh, owner, report);
+        } else {
+            split_corners(&mut mesh, self.is_split_mirrored);
+        }
+        mesh
+    }
+}
+
 impl Primitives {
     /// The triangles of a primitive, in coordinates from which `world_from_node` brings them into the world; `None`, with a
     /// warning, where it has none there.
@@ -103,15 +119,7 @@ impl Primitives {
         if let Some((_, made)) = known.made.iter().find(|(made, _)| *made == variant) {
             return Ok(Some(Arc::clone(made)));
         }
-        let mut mesh = source.clone();
-        let mut has_area = variant.has_area.iter();
-        mesh.triangles.retain(|_| has_area.next() == Some(&true));
-        if *has_normals {
-            drop_unused_vertices(&mut mesh);
-            check_normals(&mut mesh, owner, report);
-        } else {
-            split_corners(&mut mesh, variant.is_split_mirrored);
-        }
+        let mut mesh = variant.of(source, *has_normals, owner, report);
         if variant.stands_at_origin {
             mesh = mesh.placed(world_from_node);
         }
