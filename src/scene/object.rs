@@ -47,8 +47,8 @@ pub struct Motion {
 
 /// A turn is about the vertical where its quaternion's other parts are smaller.
 const TILT: f64 = 1e-5;
-/// Angles are read off rotations to this [rad]: what was typed, and not what rounding made of it.
-const STEP_RAD: f64 = 1e-9;
+/// Angles are read off rotations in so many steps [1/rad]: what was typed, and not what rounding made of it.
+const STEPS: f64 = 1e9;
 
 impl Motion {
     /// A turn about the vertical, from z towards x [rad], and a way [m].
@@ -68,7 +68,7 @@ impl Motion {
         let turn = self.rotation;
         let half_turns = (2.0 * turn.y.atan2(turn.w)) / std::f64::consts::TAU;
         let yaw_rad = (half_turns - half_turns.round()) * std::f64::consts::TAU;
-        (turn.x.hypot(turn.z) <= TILT).then_some((yaw_rad / STEP_RAD).round() * STEP_RAD)
+        (turn.x.hypot(turn.z) <= TILT).then_some((yaw_rad * STEPS).round() / STEPS)
     }
 
     /// As a transform that turns about `pivot` [m].
