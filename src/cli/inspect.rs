@@ -161,7 +161,7 @@ fn told(scene: &Scene, survey: &Survey, plan: &EffectPlan) -> (Value, Lines) {
 
 fn object_report(scene: &Scene, index: usize, lines: &mut Lines) -> Value {
     let (object, material) = (&scene.objects[index], scene.material_of(index));
-    let (triangles, area_m2) = (object.mesh.triangles.len(), object.mesh.area_m2());
+    let (triangles, area_m2) = (object.mesh_in_scene().triangles.len(), object.mesh_in_scene().area_m2());
     let (name, surface) = (&object.name, surface_name(material.surface));
     lines.push((
         "object",
@@ -342,7 +342,7 @@ fn spectrum_report(spectrum: &Spectrum) -> (Value, String) {
 fn map_report(map: &IlluminationMap, scene: &Scene, lines: &mut Lines) -> Value {
     let object = &scene.objects[map.chart.object()];
     // Sets of the file that cannot serve, and why.
-    let refused = refused_sets(&object.mesh).into_iter();
+    let refused = refused_sets(object.mesh_in_scene()).into_iter();
     let refused: Vec<String> = refused
         .map(|(set, refusal)| format!("{set}: {refusal}"))
         .collect();

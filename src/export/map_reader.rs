@@ -198,7 +198,7 @@ impl<'a> MapReader<'a> {
         let Some(file) = &entry.uv_file else {
             return Ok(None);
         };
-        let triangles = self.object_of(entry)?.1.mesh.triangles.len();
+        let triangles = self.object_of(entry)?.1.mesh_in_scene().triangles.len();
         files::read_file(&self.inside(file)?, uv_file::size_bytes(triangles)).map(Some)
     }
 
@@ -213,7 +213,7 @@ impl<'a> MapReader<'a> {
 
     fn chart(&self, entry: &MapEntry, (index, object): (usize, &Object)) -> Result<Chart> {
         float_image::check_size(entry.width, entry.height, &self.location)?;
-        let mesh = &object.mesh;
+        let mesh = object.mesh_in_scene();
         let parametrisation = match (entry.uv_set, &entry.uv_file) {
             (UvSet::Generated, Some(file)) => {
                 let bytes = self.read_coordinates(entry)?.unwrap_or_default();

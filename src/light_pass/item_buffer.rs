@@ -72,7 +72,10 @@ impl ItemBuffer {
             .map(|face| lit::lit_cells(launch, face))
             .collect();
         let objects = &tracer.scene().objects;
-        let bounds: Vec<Option<Bounds>> = objects.par_iter().map(|object| object.mesh.bounds()).collect();
+        let bounds: Vec<Option<Bounds>> = objects
+            .par_iter()
+            .map(|object| object.mesh_in_scene().bounds())
+            .collect();
         let mut wanted = vec![false; objects.len()];
         casters.iter().for_each(|&object| wanted[object] = true);
         let boxes = |of_wanted: bool| {
@@ -136,7 +139,7 @@ impl ItemBuffer {
 
     /// Whether an object may bend light, or stand in its way to a caster.
     pub fn may_concern(&self, launch: &Launch, tracer: &Tracer, object: usize) -> bool {
-        let Some(bounds) = tracer.scene().objects[object].mesh.bounds() else {
+        let Some(bounds) = tracer.scene().objects[object].mesh_in_scene().bounds() else {
             return false;
         };
         if self.casters.contains(&object) {

@@ -291,7 +291,7 @@ fn sun_domain(direction: DVec3, scene: &Scene, casters: &[usize]) -> Option<Doma
     let mut low = DVec3::INFINITY;
     let mut high = DVec3::NEG_INFINITY;
     for &object in casters {
-        for position in &scene.objects[object].mesh.positions {
+        for position in &scene.objects[object].mesh_in_scene().positions {
             let local = frame_from_scene * *position;
             (low, high) = (low.min(local), high.max(local));
         }
@@ -300,7 +300,7 @@ fn sun_domain(direction: DVec3, scene: &Scene, casters: &[usize]) -> Option<Doma
     let before = scene
         .objects
         .iter()
-        .flat_map(|object| &object.mesh.positions)
+        .flat_map(|object| &object.mesh_in_scene().positions)
         .map(|position| (frame_from_scene * *position).z)
         .fold(f64::INFINITY, f64::min);
     let size = high - low;

@@ -25,7 +25,11 @@ pub(super) struct Compartments {
 
 impl Compartments {
     pub(super) fn of(scene: &Scene) -> Self {
-        let bounds: Vec<Option<Bounds>> = scene.objects.iter().map(|object| object.mesh.bounds()).collect();
+        let bounds: Vec<Option<Bounds>> = scene
+            .objects
+            .iter()
+            .map(|object| object.mesh_in_scene().bounds())
+            .collect();
         let mut compartments = Self {
             objects: vec![Some(Vec::new()); scene.objects.len()],
             lights: vec![Some(Vec::new()); scene.lights.len()],
@@ -49,7 +53,7 @@ impl Compartments {
                 .filter_map(|(light, source)| Some((light, extent(source, &bounds)?)))
                 .filter(|(_, place)| overlap(around, *place))
                 .collect();
-            let mesh = &object.mesh;
+            let mesh = object.mesh_in_scene();
             if (near.is_empty() && lamps.is_empty())
                 || mesh.triangles.len() > MOST_TRIANGLES
                 || !is_closed(&mesh.positions, &mesh.triangles)
@@ -59,7 +63,7 @@ impl Compartments {
             compartments.encloses[container] = true;
             for (other, bounds) in near {
                 // Boxes overlap easily where surfaces do not.
-                if enters(&scene.objects[other].mesh, around) {
+                if enters(scene.objects[other].mesh_in_scene(), around) {
                     book(
                         &mut compartments.objects[other],
                         container,

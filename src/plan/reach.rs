@@ -43,7 +43,11 @@ impl<'a> Reach<'a> {
         let mut reach = Self {
             scene,
             compartments: Compartments::of(scene),
-            bounds: scene.objects.iter().map(|object| object.mesh.bounds()).collect(),
+            bounds: scene
+                .objects
+                .iter()
+                .map(|object| object.mesh_in_scene().bounds())
+                .collect(),
             specular: of_kind(SurfaceKind::is_specular),
             receivers: of_kind(SurfaceKind::is_receiver),
             tolerance_m: TOLERANCE * size_m,
@@ -140,7 +144,7 @@ impl<'a> Reach<'a> {
 
     fn sends_to_any(&self, from: usize, lit_by: Option<&Light>, to: &[usize]) -> bool {
         let tests = self.scene.objects[from]
-            .mesh
+            .mesh_in_scene()
             .triangles
             .len()
             .saturating_mul(to.len());
@@ -164,7 +168,7 @@ impl<'a> Reach<'a> {
             SurfaceKind::Dielectric | SurfaceKind::ThinWall => true,
             SurfaceKind::Diffuse => false,
             SurfaceKind::Mirror | SurfaceKind::Mixed => {
-                let mesh = &self.scene.objects[from].mesh;
+                let mesh = self.scene.objects[from].mesh_in_scene();
                 self.specular.len() > MOST_RELAYS || self.reflects_into(mesh, lit_by, bounds)
             }
         }

@@ -84,7 +84,7 @@ fn planes(scene: &Scene) -> BTreeMap<Plane, Vec<Face>> {
     };
     let size_m = low.abs().max(high.abs()).max_element();
     for object in bodies {
-        let mesh = &scene.objects[object].mesh;
+        let mesh = scene.objects[object].mesh_in_scene();
         for triangle in 0..mesh.triangles.len() {
             let [a, b, c] = mesh.corners(triangle);
             let normal = mesh.face_normal(triangle);

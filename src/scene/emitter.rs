@@ -305,7 +305,7 @@ struct Glowing<'a> {
 impl<'a> Glowing<'a> {
     /// `None` where it has no area.
     fn new(scene: &'a Scene, object: usize) -> Option<Self> {
-        let mesh = &scene.objects.get(object)?.mesh;
+        let mesh = scene.objects.get(object)?.mesh_in_scene();
         let mut sum_m2 = 0.0;
         let upto_m2: Vec<f64> = (0..mesh.triangles.len())
             .map(|triangle| {

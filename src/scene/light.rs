@@ -147,18 +147,7 @@ impl Light {
     #[must_use]
     pub fn of_unit_strength(&self) -> Self {
         let mut kind = self.kind;
-        match &mut kind {
-            LightKind::Point { intensity, .. } | LightKind::Spot { intensity, .. } => {
-                *intensity = RadiantIntensity(1.0);
-            }
-            LightKind::Sun {
-                normal_irradiance, ..
-            } => *normal_irradiance = Irradiance(1.0),
-            LightKind::Panel { radiance, .. } | LightKind::Surface { radiance, .. } => {
-                *radiance = Radiance(1.0);
-            }
-            LightKind::Environment { scale } => *scale = 1.0,
-        }
+        kind.set_strength(1.0);
         Self {
             colour: LinearSrgb::WHITE,
             kind,
@@ -188,6 +177,28 @@ impl LightKind {
             } => normal_irradiance.0,
             Self::Panel { radiance, .. } | Self::Surface { radiance, .. } => radiance.0,
             Self::Environment { scale } => scale,
+        }
+    }
+
+    /// Sets [`strength`](Self::strength).
+    pub fn set_strength(&mut self, strength: f64) {
+        match self {
+            Self::Point { intensity, .. } | Self::Spot { intensity, .. } => {
+                *intensity = RadiantIntensity(strength);
+            }
+            Self::Sun {
+                normal_irradiance, ..
+            } => *normal_irradiance = Irradiance(strength),
+            Self::Panel { radiance, .. } | Self::Surface { radiance, .. } => *radiance = Radiance(strength),
+            Self::Environment { scale } => *scale = strength,
+        }
+    }
+
+    /// The way a spot's or a sun's light travels.
+    pub fn direction(&self) -> Option<DVec3> {
+        match *self {
+            Self::Spot { direction, .. } | Self::Sun { direction, .. } => Some(direction),
+            _ => None,
         }
     }
 

@@ -1,14 +1,18 @@
 //! Triangle meshes with vertex normals.
 
-use glam::{DVec2, DVec3};
+use glam::{DAffine3, DMat3, DVec2, DVec3};
 
-/// Indexed triangles in scene coordinates. Counter-clockwise corners face outwards; vertex normals are unit and kept
-/// as the file has them, since smooth normals carry the shape between the vertices.
+/// A normal of a length that differs from 1 by no more is unit, squared [1].
+const UNIT: f64 = 4.0 * f64::EPSILON;
+
+/// Indexed triangles. Counter-clockwise corners face outwards; vertex normals are kept as the file has them, since
+/// smooth normals carry the shape between the vertices.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Mesh {
     /// Vertex positions [m].
     pub positions: Vec<DVec3>,
-    /// Unit vertex normals, one per position. Flat-shaded meshes have their corners split.
+    /// Vertex normals, one per position: unit in scene coordinates. In those of a file's mesh they have any length, or 0
+    /// where the triangles around the vertex give them. Flat-shaded meshes have their corners split.
     pub normals: Vec<DVec3>,
     /// TEXCOORD_0, one per position (v downwards, as glTF has it).
     pub uv0: Option<Vec<DVec2>>,
@@ -63,5 +67,61 @@ impl Mesh {
                 0.5 * (b - a).cross(c - a).length()
             })
             .sum()
+    }
+
+    /// The same mesh where a transform puts it, with unit normals. A mirroring transform turns the triangles, so that
+    /// they stay wound counter-clockwise about the outside.
+    #[must_use]
+    pub fn placed(&self, world_from_object: &DAffine3) -> Self {
+        let linear = world_from_object.matrix3;
+        let is_mirrored = linear.determinant() < 0.0;
+        let turn = |&[a, b, c]: &[u32; 3]| if is_mirrored { [a, c, b] } else { [a, b, c] };
+        let place = |position: &DVec3| world_from_object.transform_point3(*position);
+        let mut placed = Self {
+            positions: self.positions.iter().map(place).collect(),
+            normals: Vec::new(),
+            uv0: self.uv0.clone(),
+            uv1: self.uv1.clone(),
+            triangles: self.triangles.iter().map(turn).collect(),
+        };
+        // The cofactors are the inverse transpose without its division, so that flattened objects have normals too.
+        let cofactors = DMat3::from_cols(
+            linear.y_axis.cross(linear.z_axis),
+            linear.z_axis.cross(linear.x_axis),
+            linear.x_axis.cross(linear.y_axis),
+        );
+        let sign = if is_mirrored { -1.0 } else { 1.0 };
+        let is_shifted = linear == DMat3::IDENTITY;
+        let mut around: Option<Vec<DVec3>> = None;
+        let normal = |(vertex, normal): (usize, &DVec3)| {
+            let normal = cofactors * *normal * sign;
+            if is_shifted && (normal.length_squared() - 1.0).abs() <= UNIT {
+                return normal;
+            }
+            normal
+                .try_normalize()
+                .unwrap_or_else(|| around.get_or_insert_with(|| placed.normals_around())[vertex])
+        };
+        placed.normals = self.normals.iter().enumerate().map(normal).collect();
+        placed
+    }
+
+    /// Normals of the triangles around each vertex, weighted by area; every vertex is part of a triangle with an area.
+    fn normals_around(&self) -> Vec<DVec3> {
+        // Added to anything, −0 leaves its sign.
+        let mut sums = vec![DVec3::splat(-0.0); self.positions.len()];
+        let mut any = sums.clone();
+        for triangle in 0..self.triangles.len() {
+            let [a, b, c] = self.corners(triangle);
+            for vertex in self.triangles[triangle] {
+                sums[vertex as usize] += (b - a).cross(c - a);
+                any[vertex as usize] = self.face_normal(triangle);
+            }
+        }
+        // Triangles back to back cancel: then any one of them is as good.
+        sums.iter()
+            .zip(any)
+            .map(|(sum, any)| sum.try_normalize().unwrap_or(any))
+            .collect()
     }
 }

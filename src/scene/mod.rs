@@ -26,6 +26,7 @@ pub mod load;
 pub mod material;
 pub mod mesh;
 pub mod normal_map;
+pub mod object;
 pub mod texture;
 pub mod turntable;
 pub mod waves;
@@ -33,7 +34,7 @@ pub mod waves;
 pub use adjacency::Adjacency;
 pub use camera::Camera;
 pub use camera_path::{CameraPath, PathPlan};
-pub use edit::{Edit, EditTarget, why_light_stays};
+pub use edit::{Edit, EditState, LightEdit, MaterialEdit, why_light_stays};
 pub use environment::Environment;
 pub use gltf::guard::is_guarded;
 pub use gltf::{Glb, Opened};
@@ -43,23 +44,9 @@ pub use material::AlphaMask;
 pub use material::{Material, SurfaceKind, Volume};
 pub use mesh::Mesh;
 pub use normal_map::NormalMap;
+pub use object::{Motion, Object};
 pub use texture::{Texture, TextureRef};
 pub use waves::{Wave, Waves};
-
-/// One mesh primitive of one node: the unit that has a material and, when light reaches it, an illumination map.
-#[derive(Clone, Debug)]
-pub struct Object {
-    /// The node's name in the file; `nodeN` when it has none.
-    pub name: String,
-    /// glTF index of the node.
-    pub node: usize,
-    /// Index of the primitive within the node's mesh.
-    pub primitive: usize,
-    /// Index into [`Scene::materials`].
-    pub material: usize,
-    /// Geometry in scene coordinates; shared between a scene and its edited copies.
-    pub mesh: Arc<Mesh>,
-}
 
 /// A whole scene, sanitised: every number in it is finite and every index valid.
 #[derive(Clone, Debug, Default)]
@@ -137,7 +124,7 @@ impl Scene {
     pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
         self.objects
             .iter()
-            .filter_map(|object| object.mesh.bounds())
+            .filter_map(|object| object.mesh_in_scene().bounds())
             .reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
     }
 
@@ -145,7 +132,7 @@ impl Scene {
     pub fn triangle_count(&self) -> usize {
         self.objects
             .iter()
-            .map(|object| object.mesh.triangles.len())
+            .map(|object| object.mesh_in_scene().triangles.len())
             .sum()
     }
 }
@@ -192,9 +179,20 @@ impl Scene {
         } = self;
         let mut text = Text::default();
         // Text takes whatever it is given.
+        for object in objects {
+            let Object {
+                name,
+                node,
+                primitive,
+                material,
+                ..
+            } = object;
+            let mesh = object.mesh_in_scene();
+            let _ = writeln!(text, "{name:?} {node} {primitive} {material} {mesh:?}");
+        }
         let _ = write!(
             text,
-            "{origin_world:?}\n{objects:?}\n{materials:?}\n{textures:?}\n{lights:?}\n{environment:?}"
+            "{origin_world:?}\n{materials:?}\n{textures:?}\n{lights:?}\n{environment:?}"
         );
         let rest = &text.word[..text.filled];
         rest.iter().for_each(|&byte| text.hash.take(u64::from(byte)));
@@ -204,8 +202,6 @@ impl Scene {
 
 #[cfg(test)]
 mod tests {
-    use std::sync::Arc;
-
     use crate::scene::{LoadOptions, Scene, load};
 
     #[test]
@@ -220,7 +216,7 @@ mod tests {
         type Change = fn(&mut Scene);
         let changes: [Change; 5] = [
             |scene| {
-                let x = &mut Arc::make_mut(&mut scene.objects[0].mesh).positions[0].x;
+                let x = &mut scene.objects[0].mesh_in_scene_mut().positions[0].x;
                 *x = x.next_up();
             },
             |scene| scene.materials[0].ior += 1e-9,

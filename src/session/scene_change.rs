@@ -35,7 +35,7 @@ impl SceneChange {
         let objects = 0..new.objects.len();
         let shapes: Vec<usize> = objects
             .clone()
-            .filter(|&object| !Arc::ptr_eq(&old.objects[object].mesh, &new.objects[object].mesh))
+            .filter(|&object| !old.objects[object].stands_as(&new.objects[object]))
             .collect();
         let is_moved_with =
             |light: &Light| glowing_object(light).is_some_and(|object| shapes.contains(&object));

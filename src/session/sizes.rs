@@ -151,7 +151,7 @@ impl MapSizes {
     pub fn parametrisation(&self, object: usize) -> Option<&Arc<Parametrisation>> {
         self.parametrisations[object]
             .get_or_init(|| {
-                let mesh = &self.scene.objects[object].mesh;
+                let mesh = self.scene.objects[object].mesh_in_scene();
                 parametrise(object, mesh, DEFAULT_NOMINAL_SIDE).map(Arc::new)
             })
             .as_ref()
@@ -170,7 +170,11 @@ impl MapSizes {
         if let Some(known) = known().get(&(object, side)) {
             return Some(Arc::clone(known));
         }
-        let made = Arc::new(parametrise(object, &self.scene.objects[object].mesh, side)?);
+        let made = Arc::new(parametrise(
+            object,
+            self.scene.objects[object].mesh_in_scene(),
+            side,
+        )?);
         if is_for_all(&made) {
             return usual.get_or_init(|| Some(made)).clone();
         }
@@ -190,17 +194,17 @@ impl MapSizes {
     }
 
     fn is_closed(&self, object: usize) -> bool {
-        *self.closed[object].get_or_init(|| is_closed(&self.scene.objects[object].mesh))
+        *self.closed[object].get_or_init(|| is_closed(self.scene.objects[object].mesh_in_scene()))
     }
 
     fn may_enclose_a_light(&self, object: usize) -> bool {
-        let Some((low, high)) = self.scene.objects[object].mesh.bounds() else {
+        let Some((low, high)) = self.scene.objects[object].mesh_in_scene().bounds() else {
             return false;
         };
         let overlaps = |(a, b): (DVec3, DVec3)| a.cmple(high).all() && b.cmpge(low).all();
         self.scene.lights.iter().any(|light| {
             let mesh_bounds = match light.kind {
-                LightKind::Surface { object, .. } => self.scene.objects[object].mesh.bounds(),
+                LightKind::Surface { object, .. } => self.scene.objects[object].mesh_in_scene().bounds(),
                 _ => None,
             };
             let place = light.kind.position().map(|position| (position, position));

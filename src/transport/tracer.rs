@@ -60,8 +60,8 @@ impl Hierarchy {
         let mut corners = Vec::with_capacity(scene.triangle_count());
         let mut triangles = Vec::with_capacity(scene.triangle_count());
         for (object, item) in scene.objects.iter().enumerate() {
-            for triangle in 0..item.mesh.triangles.len() {
-                corners.push(item.mesh.corners(triangle));
+            for triangle in 0..item.mesh_in_scene().triangles.len() {
+                corners.push(item.mesh_in_scene().corners(triangle));
                 triangles.push((object as u32, triangle as u32));
             }
         }
@@ -143,8 +143,8 @@ impl Tracer {
     #[must_use]
     pub fn edited(&self, scene: Arc<Scene>) -> Self {
         let is_same = |object: usize| {
-            let pair = [&self.scene, &scene].map(|scene| &scene.objects[object].mesh);
-            Arc::ptr_eq(pair[0], pair[1])
+            let [was, is] = [&self.scene, &scene].map(|scene| &scene.objects[object]);
+            was.stands_as(is)
         };
         let count = scene.objects.len();
         if count != self.scene.objects.len() {
@@ -243,7 +243,7 @@ impl Tracer {
     }
 
     fn specular_shape(scene: &Scene, object: usize) -> Option<Arc<SpecularShape>> {
-        let mesh = &scene.objects[object].mesh;
+        let mesh = scene.objects[object].mesh_in_scene();
         let bending_map = scene.material_of(object).bending_map();
         scene.material_of(object).surface.is_specular().then(|| {
             Arc::new(SpecularShape {
@@ -267,7 +267,7 @@ impl Tracer {
 
     /// Sharp edges of an object, both ends of each [m]; none where there are very many.
     pub fn sharp_edges(&self, object: usize) -> &[[DVec3; 2]] {
-        self.hierarchy.edges[object].get_or_init(|| sharp_edges(&self.scene.objects[object].mesh))
+        self.hierarchy.edges[object].get_or_init(|| sharp_edges(self.scene.objects[object].mesh_in_scene()))
     }
 
     /// Smoothing group of a triangle within its object; 0 where the object is not specular.
@@ -280,7 +280,8 @@ impl Tracer {
 
     /// How the triangles of an object hang together.
     pub fn adjacency(&self, object: usize) -> &Adjacency {
-        self.hierarchy.adjacencies[object].get_or_init(|| Adjacency::of(&self.scene.objects[object].mesh))
+        self.hierarchy.adjacencies[object]
+            .get_or_init(|| Adjacency::of(self.scene.objects[object].mesh_in_scene()))
     }
 
     /// The scene.
@@ -327,13 +328,13 @@ impl Tracer {
 
     /// The surface at a place that a ray met.
     pub fn surface_at(&self, hit: &HitPlace) -> SurfaceHit {
-        let mesh = &self.scene.objects[hit.object as usize].mesh;
+        let mesh = self.scene.objects[hit.object as usize].mesh_in_scene();
         self.surface_with(hit, &mesh.corners(hit.triangle as usize))
     }
 
     fn surface_with(&self, hit: &HitPlace, corners: &[DVec3; 3]) -> SurfaceHit {
         let (object, triangle) = (hit.object as usize, hit.triangle as usize);
-        let mesh = &self.scene.objects[object].mesh;
+        let mesh = self.scene.objects[object].mesh_in_scene();
         let (point, point_error) = ray::point_with_error(corners, hit.barycentric);
         let [a, b, c] = *corners;
         let geometric_normal = (b - a).cross(c - a).normalize_or_zero();
@@ -380,7 +381,7 @@ impl Tracer {
 
     fn texture_bump(&self, hit: &SurfaceHit) -> Option<TextureBump> {
         let map = self.scene.material_of(hit.object).bending_map()?;
-        let mesh = &self.scene.objects[hit.object].mesh;
+        let mesh = self.scene.objects[hit.object].mesh_in_scene();
         let place = (hit.triangle, hit.barycentric);
         TextureBump::at((&self.scene, mesh), map, place, hit.interpolated_normal)
     }
@@ -421,7 +422,7 @@ impl Tracer {
             return true;
         };
         let placed = material.base_colour_texture.as_ref().and_then(|reference| {
-            let uv = texture_uv(&object.mesh, reference, triangle as usize, barycentric)?;
+            let uv = texture_uv(object.mesh_in_scene(), reference, triangle as usize, barycentric)?;
             Some((&*self.scene.textures[reference.texture], uv))
         });
         mask.is_there(placed)
@@ -438,7 +439,7 @@ impl Tracer {
         let Some(reference) = &self.scene.materials[object.material].base_colour_texture else {
             return LinearSrgb::WHITE;
         };
-        match texture_uv(&object.mesh, reference, hit.triangle, hit.barycentric) {
+        match texture_uv(object.mesh_in_scene(), reference, hit.triangle, hit.barycentric) {
             Some(uv) => self.scene.textures[reference.texture].sample(uv),
             None => LinearSrgb::WHITE,
         }

@@ -389,7 +389,7 @@ impl App {
                 probe::draw(ui.painter(), &lens, probed);
             }
             let held = model.choices.selection.held();
-            let pulled = self.gizmo.show(ui, &lens, held, (model.scene(), model.loaded()));
+            let pulled = self.gizmo.show(ui, &lens, held, model.scene());
             commands.extend(pulled.map(Command::Edit));
         });
         commands.append(&mut self.pressed);

@@ -40,7 +40,7 @@ pub fn find(scene: &Scene, maps: &[IlluminationMap]) -> Option<Spot> {
 /// The point of the surface at a texel's middle, or the nearest to it where the surface does not reach that.
 fn place(scene: &Scene, chart: &Chart, texel: usize) -> Option<(DVec3, DVec3)> {
     let uv = middle(chart, texel)?;
-    let mesh = &scene.objects.get(chart.object())?.mesh;
+    let mesh = scene.objects.get(chart.object())?.mesh_in_scene();
     let within = |(triangle, corners): (usize, &[DVec2; 3])| {
         let shares = barycentric(corners, uv)?;
         let least = shares.into_iter().fold(f64::INFINITY, f64::min);

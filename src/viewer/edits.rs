@@ -9,10 +9,10 @@ use serde::Serialize;
 use super::filming::Film;
 use super::panel::Display;
 use crate::error::Result;
-use crate::scene::{Edit, EditTarget, Scene};
+use crate::scene::{Edit, EditState, Scene};
 use crate::settings::BakeSettings;
 
-/// Steps that can be taken back. Scenes share the meshes that no step between them changed.
+/// Steps that can be taken back.
 const MOST_STEPS: usize = 1000;
 
 /// A scene with its history, and that of the settings it is baked and shown with.
@@ -20,6 +20,8 @@ const MOST_STEPS: usize = 1000;
 pub struct EditedScene {
     loaded: Arc<Scene>,
     scene: Arc<Scene>,
+    /// Of the loaded scene, and of the edited one.
+    states: [Arc<EditState>; 2],
     history: History,
 }
 
@@ -27,7 +29,7 @@ pub struct EditedScene {
 #[derive(Clone, Debug)]
 pub enum Part {
     /// The scene.
-    Scene(Arc<Scene>),
+    Scene(Arc<EditState>),
     /// The settings of a bake.
     Settings(Box<BakeSettings>),
     /// The camera's path.
@@ -43,7 +45,7 @@ struct Step {
     /// What was changed, in the panel's words.
     text: String,
     /// What of the scene.
-    target: Option<EditTarget>,
+    target: Option<String>,
     before: Part,
     after: Part,
 }
@@ -54,7 +56,7 @@ impl Step {
         let is_of_same = discriminant(&self.after) == discriminant(&next.after)
             && self.text == next.text
             && self.target == next.target;
-        is_of_same && !matches!(self.after, Part::Automatic(_)) && self.target != Some(EditTarget::LightList)
+        is_of_same && !matches!(self.after, Part::Automatic(_)) && self.target.as_deref() != Some("LightList")
     }
 }
 
@@ -102,9 +104,11 @@ impl History {
 impl EditedScene {
     /// Nothing is edited yet.
     pub fn new(scene: Arc<Scene>) -> Self {
+        let state = Arc::new(EditState::of(&scene));
         Self {
             loaded: Arc::clone(&scene),
             scene,
+            states: [Arc::clone(&state), state],
             history: History::default(),
         }
     }
@@ -129,20 +133,16 @@ impl EditedScene {
     /// # Errors
     /// What the edit is refused for; nothing is changed then.
     pub fn edit(&mut self, edit: &Edit) -> Result<()> {
-        let (scene, _) = edit.apply(&self.scene)?;
-        let before = std::mem::replace(&mut self.scene, Arc::new(scene));
-        let target = edit.target();
-        let text = match edit {
-            Edit::LightAdded { added } => format!("`{}`, a new light", added.name),
-            Edit::LightRemoved { light } => format!("removal of `{}`", before.lights[*light].name),
-            _ => name_of(&target, &self.scene),
-        };
+        let scene = edit.apply(&self.scene)?;
+        let after = Arc::new(EditState::of(&scene));
+        let before = std::mem::replace(&mut self.states[1], Arc::clone(&after));
         self.history.record(Step {
-            text,
-            target: Some(target),
+            text: edit.in_words(&self.scene),
+            target: Some(edit.target()),
             before: Part::Scene(before),
-            after: Part::Scene(Arc::clone(&self.scene)),
+            after: Part::Scene(after),
         });
+        self.scene = Arc::new(scene);
         Ok(())
     }
 
@@ -210,39 +210,17 @@ impl EditedScene {
         if is_back {
             parts.reverse();
         }
-        if let Part::Scene(scene) = &parts[1] {
-            self.scene = Arc::clone(scene);
+        if let Part::Scene(state) = &parts[1] {
+            self.scene = match Arc::ptr_eq(state, &self.states[0]) {
+                true => Arc::clone(&self.loaded),
+                false => Arc::new(state.set(&self.scene)),
+            };
+            self.states[1] = Arc::clone(state);
         }
         let text = step.text.clone();
         to.push(step);
         Some((text, parts))
     }
-}
-
-/// "power of `lamp`".
-fn name_of(target: &EditTarget, scene: &Scene) -> String {
-    let light = |index: &usize| scene.lights[*index].name.as_str();
-    let material = |index: &usize| scene.materials[*index].name.as_str();
-    let object = |index: &usize| scene.objects[*index].name.as_str();
-    let (what, whose) = match target {
-        EditTarget::LightPower(index) => ("power", light(index)),
-        EditTarget::LightSize(index) => ("size", light(index)),
-        EditTarget::LightPosition(index) => ("position", light(index)),
-        EditTarget::LightDirection(index) => ("direction", light(index)),
-        EditTarget::LightColour(index) => ("colour", light(index)),
-        EditTarget::MaterialIor(index) => ("refractive index", material(index)),
-        EditTarget::MaterialTint(index) => ("base colour", material(index)),
-        EditTarget::MaterialSubstance(index) => ("substance", material(index)),
-        EditTarget::MaterialRoughness(index) => ("roughness", material(index)),
-        EditTarget::MaterialWaves(index) => ("waves", material(index)),
-        EditTarget::ObjectPlace(index) => ("place", object(index)),
-        EditTarget::LightList | EditTarget::Whole => return "scene".into(),
-        EditTarget::Several(targets) => {
-            let first = targets.first();
-            return first.map_or("nothing".into(), |first| name_of(first, scene));
-        }
-    };
-    format!("{what} of `{whose}`")
 }
 
 /// The names of fields that differ, without their units.

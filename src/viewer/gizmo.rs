@@ -4,9 +4,8 @@ use egui::{Color32, Pos2, Rect, Sense, Stroke, Ui, WidgetInfo, vec2};
 use glam::DVec3;
 
 use super::lens::Lens;
-use super::placement::Placement;
 use crate::geometry::Ray;
-use crate::scene::{Edit, Scene};
+use crate::scene::{Edit, LightEdit, Motion, Scene};
 
 /// Length of the axes [points].
 const LENGTH: f64 = 90.0;
@@ -95,46 +94,59 @@ impl Handle {
 #[derive(Clone, Copy, Debug)]
 enum Pose {
     Light(usize, DVec3),
-    Object(usize, Placement),
+    Object {
+        object: usize,
+        yaw_rad: f64,
+        offset_m: DVec3,
+        /// Where its middle was in the file [m].
+        rest: DVec3,
+    },
 }
 
 impl Pose {
-    fn of(held: Held, scene: &Scene, loaded: &Scene) -> Option<Self> {
+    /// `None` for what has no place, or is tilted.
+    fn of(held: Held, scene: &Scene) -> Option<Self> {
         match held {
             Held::Light(light) => Some(Self::Light(light, scene.lights.get(light)?.kind.position()?)),
-            Held::Object(object) => Some(Self::Object(object, Placement::of(object, loaded, scene)?)),
+            Held::Object(object) => {
+                let motion = scene.objects.get(object)?.motion();
+                Some(Self::Object {
+                    object,
+                    yaw_rad: motion.yaw_rad()?,
+                    offset_m: motion.translation,
+                    rest: scene.pivot(object),
+                })
+            }
         }
     }
 
-    fn middle_m(&self, loaded: &Scene) -> DVec3 {
-        match self {
-            Self::Light(_, position) => *position,
-            Self::Object(object, placement) => placement.middle_m(*object, loaded),
+    fn middle_m(&self) -> DVec3 {
+        match *self {
+            Self::Light(_, position) => position,
+            Self::Object { rest, offset_m, .. } => rest + offset_m,
         }
     }
 
     fn handles(&self) -> &'static [Handle] {
         match self {
             Self::Light(..) => &[Handle::X, Handle::Y, Handle::Z],
-            Self::Object(..) => &[Handle::X, Handle::Y, Handle::Z, Handle::Turn],
+            Self::Object { .. } => &[Handle::X, Handle::Y, Handle::Z, Handle::Turn],
         }
     }
 
     /// The edit that pulls it so far [m, rad].
-    fn pulled(&self, handle: Handle, by: f64, loaded: &Scene) -> Edit {
+    fn pulled(&self, handle: Handle, by: f64) -> Edit {
         let step = handle.axis().map_or(DVec3::ZERO, |axis| axis * by);
         match *self {
-            Self::Light(light, position) => Edit::LightPosition {
-                light,
-                position: position + step,
-            },
-            Self::Object(object, placement) => {
+            Self::Light(light, position) => Edit::Light(light, LightEdit::Position(position + step)),
+            Self::Object {
+                object,
+                yaw_rad,
+                offset_m,
+                ..
+            } => {
                 let turn = if handle == Handle::Turn { by } else { 0.0 };
-                let there = Placement {
-                    yaw_rad: placement.yaw_rad + turn,
-                    offset_m: placement.offset_m + step,
-                };
-                there.edit(object, loaded)
+                Edit::Place(object, Motion::turned(yaw_rad + turn, offset_m + step))
             }
         }
     }
@@ -163,21 +175,15 @@ impl Gizmo {
     }
 
     /// Shows the handles of what is held over the picture; the edit that a pull asks for.
-    pub fn show(
-        &mut self,
-        ui: &Ui,
-        lens: &Lens<'_>,
-        held: Option<Held>,
-        (scene, loaded): (&Scene, &Scene),
-    ) -> Option<Edit> {
+    pub fn show(&mut self, ui: &Ui, lens: &Lens<'_>, held: Option<Held>, scene: &Scene) -> Option<Edit> {
         self.is_hot = false;
-        let pose = held.and_then(|held| Pose::of(held, scene, loaded));
-        let Some(pose) = pose.filter(|pose| lens.is_before(pose.middle_m(loaded))) else {
+        let pose = held.and_then(|held| Pose::of(held, scene));
+        let Some(pose) = pose.filter(|pose| lens.is_before(pose.middle_m())) else {
             self.grip = None;
             return None;
         };
         lamps(ui, lens, scene);
-        let origin = pose.middle_m(loaded);
+        let origin = pose.middle_m();
         let length_m = LENGTH * lens.m_per_point(origin);
         let mut edit = None;
         for handle in pose.handles() {
@@ -185,23 +191,14 @@ impl Gizmo {
             if !lens.is_before(tip) {
                 continue;
             }
-            edit = self
-                .pull(ui, lens, (*handle, &pose), lens.place(tip), loaded)
-                .or(edit);
+            edit = self.pull(ui, lens, (*handle, &pose), lens.place(tip)).or(edit);
             draw(ui, lens, *handle, (origin, tip), length_m);
         }
         edit
     }
 
     /// Lets a handle be dragged.
-    fn pull(
-        &mut self,
-        ui: &Ui,
-        lens: &Lens<'_>,
-        (handle, pose): (Handle, &Pose),
-        at: Pos2,
-        loaded: &Scene,
-    ) -> Option<Edit> {
+    fn pull(&mut self, ui: &Ui, lens: &Lens<'_>, (handle, pose): (Handle, &Pose), at: Pos2) -> Option<Edit> {
         let rect = Rect::from_center_size(at, vec2(2.0 * REACH, 2.0 * REACH));
         if !lens.picture.contains_rect(rect) && self.grip.is_none() {
             return None;
@@ -213,7 +210,7 @@ impl Gizmo {
         if response.drag_started() {
             let pressed = ui.input(|input| input.pointer.press_origin());
             let gaze = lens.gaze(pressed.unwrap_or(pointer));
-            let begun = handle.reach(pose.middle_m(loaded), &gaze)?;
+            let begun = handle.reach(pose.middle_m(), &gaze)?;
             self.grip = Some(Grip {
                 handle,
                 from: *pose,
@@ -227,8 +224,8 @@ impl Gizmo {
         if response.drag_delta() == egui::Vec2::ZERO {
             return None;
         }
-        let reached = handle.reach(grip.from.middle_m(loaded), &lens.gaze(pointer))?;
-        Some(grip.from.pulled(handle, reached - grip.begun, loaded))
+        let reached = handle.reach(grip.from.middle_m(), &lens.gaze(pointer))?;
+        Some(grip.from.pulled(handle, reached - grip.begun))
     }
 }
 
@@ -236,9 +233,9 @@ impl Gizmo {
 fn tip(handle: Handle, pose: &Pose, origin: DVec3, length_m: f64) -> DVec3 {
     match (handle.axis(), pose) {
         (Some(axis), _) => origin + axis * length_m,
-        (None, Pose::Object(_, placement)) => {
+        (None, Pose::Object { yaw_rad, .. }) => {
             // Between two axes, where it hides none.
-            origin + on_ring(placement.yaw_rad + std::f64::consts::FRAC_PI_4, length_m)
+            origin + on_ring(yaw_rad + std::f64::consts::FRAC_PI_4, length_m)
         }
         (None, Pose::Light(..)) => origin,
     }

@@ -23,7 +23,6 @@ pub mod new_light;
 mod overlay;
 pub mod pace;
 pub mod panel;
-pub mod placement;
 pub mod probe;
 pub mod sketching;
 pub mod time_left;

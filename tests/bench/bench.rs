@@ -14,12 +14,12 @@ use nephroid::light_pass::wavefront::coverage::{FluxTriangle, deposit_triangles}
 use nephroid::optics::LinearSrgb;
 use nephroid::progress::Control;
 use nephroid::scene::builtin::{self, parts, shapes};
-use nephroid::scene::edit::Edit;
+use nephroid::scene::edit::{Edit, LightEdit};
 use nephroid::scene::{LightKind, Scene};
 use nephroid::session::{BakeResult, BakeSession};
 use nephroid::settings::{BakeSettings, Estimator, MapResolution, Sigma};
 use nephroid::transport::{MediumStack, Tracer};
-use nephroid::units::{Flux, RadiantIntensity};
+use nephroid::units::Flux;
 use rayon::prelude::*;
 
 fn main() {
@@ -111,7 +111,7 @@ fn drags(name: &str) {
         run(&mut session, &with_sigma(&base, 0.1 * (step + 1.0)))
     });
     let mut edited = |edit: Edit| {
-        let (scene, _) = edit.apply(session.scene()).unwrap();
+        let scene = edit.apply(session.scene()).unwrap();
         session.set_scene(Arc::new(scene)).unwrap();
         run(&mut session, &base)
     };
@@ -120,12 +120,12 @@ fn drags(name: &str) {
         panic!("{name} is lit by a point light");
     };
     edits(&format!("{name}: light dimmed"), |step| {
-        let intensity = RadiantIntensity(intensity.0 * (1.0 - 0.01 * step));
-        edited(Edit::LightIntensity { light: 0, intensity })
+        let strength = intensity.0 * (1.0 - 0.01 * step);
+        edited(Edit::Light(0, LightEdit::Strength(strength)))
     });
     edits(&format!("{name}: light moved"), |step| {
         let position = position + DVec3::X * 0.002 * step;
-        edited(Edit::LightPosition { light: 0, position })
+        edited(Edit::Light(0, LightEdit::Position(position)))
     });
     edits(&format!("{name}: map size, 500² to 540²"), |step| {
         run(&mut session, &at(base.clone(), 25_000.0, 500 + step as usize))

@@ -1,7 +1,5 @@
 //! What must not change a map or its ledgers, or must change them just so.
 
-use std::sync::Arc;
-
 use glam::{DMat3, DVec3};
 use nephroid::illumination::IlluminationMap;
 use nephroid::optics::LinearSrgb;
@@ -83,7 +81,7 @@ fn symmetries(t: &mut Table, name: &str, scene: &Scene) {
     let (mut reversed, mut triangles) = (scene.clone(), scene.clone());
     reversed.objects.reverse();
     for object in &mut triangles.objects {
-        Arc::make_mut(&mut object.mesh).triangles.reverse();
+        object.mesh_in_scene_mut().triangles.reverse();
     }
     t.case(format!("order-of-objects-{name}"))
         .bake(scene.clone(), 1e3, 32)
@@ -325,7 +323,7 @@ fn both_estimators(t: &mut Table) {
     }
     // Within tinted glass, light is taken before its first hit.
     let mut within = ball.clone();
-    let (low, high) = within.objects[1].mesh.bounds().expect("a ball");
+    let (low, high) = within.objects[1].mesh_in_scene().bounds().expect("a ball");
     let lamp = within.lights[0].kind.position().expect("a point light");
     within.lights[0].kind = within.lights[0].kind.moved(0.5 * (low + high) - lamp);
     for (name, scene, density_per_sr) in [

@@ -175,7 +175,7 @@ fn no_second_hit() {
         .iter()
         .find(|object| object.name == "ball")
         .expect("the ball");
-    let mesh = Arc::clone(&ball.mesh);
+    let mesh = Arc::clone(ball.mesh_in_scene());
     let tracer = Tracer::new(Arc::new(scene));
     for triangle in (0..mesh.triangles.len()).step_by(97) {
         let [a, b, c] = mesh.corners(triangle);

@@ -322,7 +322,12 @@ fn read_map(scene: &Scene, surface: &str, file: &str) -> IlluminationMap {
     let object = names
         .position(|name| name == surface)
         .expect("a surface of the scene");
-    let chart = parametrise(object, &scene.objects[object].mesh, DEFAULT_NOMINAL_SIDE).expect("an area");
+    let chart = parametrise(
+        object,
+        scene.objects[object].mesh_in_scene(),
+        DEFAULT_NOMINAL_SIDE,
+    )
+    .expect("an area");
     IlluminationMap {
         chart: Arc::new(chart.chart(grid.width, grid.height)),
         layers: vec![Layer {

@@ -11,8 +11,8 @@ pub use nephroid::progress::Control;
 pub use nephroid::scene::builtin::{self, parts, shapes};
 pub use nephroid::scene::texture::Wrap;
 pub use nephroid::scene::{
-    Camera, Edit, Light, LightKind, LightSize, LoadOptions, Material, Mesh, Scene, SurfaceKind, Texture,
-    Wave, Waves,
+    Camera, Edit, EditState, Light, LightEdit, LightKind, LightSize, LoadOptions, Material, MaterialEdit,
+    Mesh, Motion, Scene, SurfaceKind, Texture, Wave, Waves,
 };
 pub use nephroid::settings::{BakeSettings, LayerKind, MapResolution};
 pub use nephroid::transport::{MediumStack, Tracer};

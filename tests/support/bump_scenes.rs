@@ -42,7 +42,7 @@ pub fn by_image(mirrored: bool) -> Scene {
     let mut scene = by_waves();
     let waves = scene.materials[1].waves.take().expect("they are there");
     let flip = if mirrored { -1.0 } else { 1.0 };
-    let mesh = Arc::make_mut(&mut scene.objects[1].mesh);
+    let mesh = scene.objects[1].mesh_in_scene_mut();
     let uv = |place: &DVec3| DVec2::new(flip * place.x, place.z) / WIDTH_M + 0.5;
     mesh.uv0 = Some(mesh.positions.iter().map(uv).collect());
     let texel = |index: u32| {

@@ -1,8 +1,6 @@
 //! Scenes small enough to know every pixel of.
 
 use std::f64::consts::PI;
-use std::sync::Arc;
-
 use glam::{DMat3, DVec2, DVec3};
 use nephroid::eye_pass::View;
 use nephroid::illumination::{Chart, IlluminationMap, Receiver, UvSet};
@@ -23,21 +21,16 @@ const TRIANGLES: [[u32; 3]; 2] = [[0, 2, 1], [0, 3, 2]];
 
 /// A floor over x, z in [0, 1] at the given height, facing up, with uv = (x, z).
 pub fn floor(name: &str, material: usize, height_m: f64) -> Object {
-    Object {
-        name: name.into(),
-        node: 0,
-        primitive: 0,
-        material,
-        mesh: Arc::new(Mesh {
-            positions: CORNERS
-                .map(|corner| DVec3::new(corner.x, height_m, corner.y))
-                .to_vec(),
-            normals: vec![DVec3::Y; 4],
-            uv0: Some(CORNERS.to_vec()),
-            uv1: None,
-            triangles: TRIANGLES.to_vec(),
-        }),
-    }
+    let mesh = Mesh {
+        positions: CORNERS
+            .map(|corner| DVec3::new(corner.x, height_m, corner.y))
+            .to_vec(),
+        normals: vec![DVec3::Y; 4],
+        uv0: Some(CORNERS.to_vec()),
+        uv1: None,
+        triangles: TRIANGLES.to_vec(),
+    };
+    Object::new(name, (0, 0), material, mesh)
 }
 
 /// One floor of the given material.

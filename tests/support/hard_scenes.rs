@@ -3,8 +3,6 @@
 //! `wall`, `blocker`, …
 
 use std::f64::consts::{PI, TAU};
-use std::sync::Arc;
-
 use glam::{DMat3, DVec3};
 use nephroid::optics::LinearSrgb;
 use nephroid::scene::builtin::{parts, shapes};
@@ -216,7 +214,7 @@ pub fn ball_in_a_room() -> Scene {
 pub fn with_tilted_floor(mut scene: Scene) -> Scene {
     let tilt = DMat3::from_axis_angle(DVec3::new(0.6, 0.0, 0.8), PI / 6.0);
     for object in scene.objects.iter_mut().filter(|object| object.name == "floor") {
-        let mesh = Arc::make_mut(&mut object.mesh);
+        let mesh = object.mesh_in_scene_mut();
         mesh.positions.iter_mut().for_each(|p| *p = tilt * *p);
         mesh.normals.iter_mut().for_each(|n| *n = tilt * *n);
     }
@@ -231,9 +229,9 @@ pub fn with_cut_floor(mut scene: Scene) -> Scene {
         .iter()
         .position(|object| object.name == "floor")
         .expect("a floor");
-    let half = scene.objects[floor].mesh.positions[2].x.abs();
+    let half = scene.objects[floor].mesh_in_scene().positions[2].x.abs();
     let (cut, z) = (0.07 * half, [-half, half]);
-    scene.objects[floor].mesh = Arc::new(shapes::floor([-half, cut], z, 0.0));
+    *scene.objects[floor].mesh_in_scene_mut() = shapes::floor([-half, cut], z, 0.0);
     let material = scene.objects[floor].material;
     parts::add_with(
         &mut scene,

@@ -23,13 +23,9 @@ pub fn scene(parts: Vec<(Mesh, Material)>, lights: Vec<Light>) -> Scene {
         ..Scene::default()
     };
     for (index, (mesh, material)) in parts.into_iter().enumerate() {
-        scene.objects.push(Object {
-            name: format!("object {index}"),
-            node: index,
-            primitive: 0,
-            material: index,
-            mesh: mesh.into(),
-        });
+        scene
+            .objects
+            .push(Object::new(format!("object {index}"), (index, 0), index, mesh));
         scene.materials.push(material);
     }
     scene
@@ -82,7 +78,7 @@ pub fn sun(direction: DVec3, normal_irradiance: f64) -> Light {
 
 /// The chart of an object of a tracer's scene.
 pub fn chart(tracer: &Tracer, object: usize, width: usize, height: usize) -> Chart {
-    parametrise(object, &tracer.scene().objects[object].mesh, DEFAULT_NOMINAL_SIDE)
+    parametrise(object, tracer.scene().objects[object].mesh_in_scene(), DEFAULT_NOMINAL_SIDE)
         .expect("the object has area")
         .chart(width, height)
 }

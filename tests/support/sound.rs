@@ -26,7 +26,7 @@ pub fn scene_fault(scene: &Scene) -> Option<String> {
 }
 
 fn of_object(scene: &Scene, object: &Object) -> [Promise; 7] {
-    let mesh = &object.mesh;
+    let mesh = object.mesh_in_scene();
     let count = mesh.positions.len();
     let has_uvs = |uvs: &Vec<glam::DVec2>| uvs.len() == count && uvs.iter().all(|uv| uv.is_finite());
     let is_there = |vertex: &u32| (*vertex as usize) < count;

@@ -111,7 +111,7 @@ pub fn transformed(mut scene: Scene, rotation: DMat3, scale: f64, offset: DVec3)
     let turned = |direction: DVec3| (rotation * direction).normalize();
     let is_mirrored = rotation.determinant() < 0.0;
     for object in &mut scene.objects {
-        let mesh = Arc::make_mut(&mut object.mesh);
+        let mesh = object.mesh_in_scene_mut();
         mesh.positions.iter_mut().for_each(|p| *p = place(*p));
         mesh.normals.iter_mut().for_each(|n| *n = turned(*n));
         if is_mirrored {

@@ -30,14 +30,14 @@ pub fn write(
     if determinant == 0.0 || !node_from_world.is_finite() {
         return None;
     }
-    let parted = Parted::new(&object.mesh, chart, determinant < 0.0);
+    let parted = Parted::new(object.mesh_in_scene(), chart, determinant < 0.0);
     let normal_from_world = world_from_node.matrix3.transpose();
     let position = |vertex: usize| {
-        let world = object.mesh.positions[vertex] + scene.origin_world;
+        let world = object.mesh_in_scene().positions[vertex] + scene.origin_world;
         node_from_world.transform_point3(world).as_vec3().to_array()
     };
     let normal = |vertex: usize| {
-        let normal = (normal_from_world * object.mesh.normals[vertex]).normalize_or(DVec3::Y);
+        let normal = (normal_from_world * object.mesh_in_scene().normals[vertex]).normalize_or(DVec3::Y);
         normal.as_vec3().to_array()
     };
     let of_vertices = |value: &dyn Fn(usize) -> [f32; 3]| -> Vec<[f32; 3]> {
@@ -54,11 +54,18 @@ pub fn write(
         .map(|(_, uv)| uv.as_vec2().to_array())
         .collect();
     let generated = glb.push_vectors(&uvs);
-    let tex_coord = add_sets(glb, &object.mesh, &parted, &was, generated, &mut attributes);
+    let tex_coord = add_sets(
+        glb,
+        object.mesh_in_scene(),
+        &parted,
+        &was,
+        generated,
+        &mut attributes,
+    );
     keep_others(
         glb,
         &object.name,
-        &object.mesh,
+        object.mesh_in_scene(),
         &parted,
         &was,
         &mut attributes,

@@ -68,7 +68,7 @@ fn albedo(scene: &Scene, chart: &Chart) -> Vec<LinearSrgb> {
     let Some(reference) = &material.base_colour_texture else {
         return plain;
     };
-    let sets = [&object.mesh.uv0, &object.mesh.uv1];
+    let sets = [&object.mesh_in_scene().uv0, &object.mesh_in_scene().uv1];
     let Some(uvs) = sets.get(reference.uv_set).and_then(|set| set.as_deref()) else {
         return plain;
     };
@@ -76,7 +76,7 @@ fn albedo(scene: &Scene, chart: &Chart) -> Vec<LinearSrgb> {
     let look = |reference: &TextureRef, uv: DVec2| texture.sample(reference.transform(uv));
     // How far outside its nearest triangle each texel's centre lies [texels], with what that one has there.
     let mut nearest: Vec<(f64, DVec2)> = vec![(f64::INFINITY, DVec2::ZERO); chart.texel_count()];
-    for (corners, triangle) in chart.corner_uvs.iter().zip(&object.mesh.triangles) {
+    for (corners, triangle) in chart.corner_uvs.iter().zip(&object.mesh_in_scene().triangles) {
         let of_image = triangle.map(|vertex| uvs[vertex as usize]);
         spread(chart, *corners, of_image, &mut nearest);
     }

@@ -147,12 +147,13 @@ impl Geometry {
     }
 
     fn is_changed(&self, scene: &Scene, index: usize) -> bool {
-        !Arc::ptr_eq(&self.meshes[index], &scene.objects[index].mesh) || !self.can_hold(scene, index)
+        !Arc::ptr_eq(&self.meshes[index], scene.objects[index].mesh_in_scene())
+            || !self.can_hold(scene, index)
     }
 
     /// Whether an object's corners have the places that it needs: maps may cut a receiver anywhere.
     fn can_hold(&self, scene: &Scene, index: usize) -> bool {
-        let (old, new) = (&self.meshes[index], &scene.objects[index].mesh);
+        let (old, new) = (&self.meshes[index], scene.objects[index].mesh_in_scene());
         let has_same_shape = Arc::ptr_eq(old, new)
             || (old.positions.len() == new.positions.len() && old.triangles == new.triangles);
         let is_shared = self.segments[index].iter().any(|segment| segment.shares_corners);
@@ -164,7 +165,7 @@ impl Geometry {
         let image = scene.material_of(index).coordinates();
         let mut bytes = 0;
         for segment in &self.segments[index] {
-            let corners = segment.corners(&object.mesh, image);
+            let corners = segment.corners(object.mesh_in_scene(), image);
             let offset = (segment.first_corner * size_of::<Corner>()) as u64;
             let page = &self.pages[segment.page];
             gpu.queue
@@ -204,7 +205,7 @@ fn meshes(scene: &Scene) -> Vec<Arc<Mesh>> {
     scene
         .objects
         .iter()
-        .map(|object| Arc::clone(&object.mesh))
+        .map(|object| Arc::clone(object.mesh_in_scene()))
         .collect()
 }
 
@@ -236,7 +237,7 @@ impl Packing<'_> {
     fn add(&mut self, scene: &Scene, object: &Object) -> Vec<Segment> {
         let material = &scene.materials[object.material];
         let image = material.coordinates();
-        let mesh = &object.mesh;
+        let mesh = object.mesh_in_scene();
         let largest = mesh.positions.len().max(3 * mesh.triangles.len());
         if !material.surface.is_receiver() && largest <= self.page_corners {
             let segment = self.segment(largest, 0..mesh.triangles.len(), true);

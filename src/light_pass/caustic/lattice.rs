@@ -89,7 +89,7 @@ impl<'a> Points<'a> {
         let [a, b, c] = match self.last {
             Some((o, t, corners)) if o == object && t == triangle => corners,
             _ => {
-                let mesh = &self.scene.objects[object].mesh;
+                let mesh = self.scene.objects[object].mesh_in_scene();
                 let corners = mesh.corners(triangle as usize);
                 self.last = Some((object, triangle, corners));
                 corners

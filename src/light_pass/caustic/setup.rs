@@ -385,7 +385,7 @@ impl Looker<'_> {
 fn bounds_of(scene: &Scene, objects: &[usize]) -> Option<(DVec3, DVec3)> {
     objects
         .iter()
-        .filter_map(|&object| scene.objects[object].mesh.bounds())
+        .filter_map(|&object| scene.objects[object].mesh_in_scene().bounds())
         .reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
 }
 
@@ -398,7 +398,7 @@ fn reach_m(scene: &Scene, casters: &[usize]) -> f64 {
     let own = (high - centre).length();
     let farthest = (0..scene.objects.len())
         .filter(|&object| scene.material_of(object).surface.is_receiver())
-        .flat_map(|object| &scene.objects[object].mesh.positions)
+        .flat_map(|object| &scene.objects[object].mesh_in_scene().positions)
         .map(|position| position.distance(centre))
         .fold(own, f64::max);
     if farthest > 0.0 { farthest } else { 1.0 }

@@ -25,7 +25,9 @@ impl<'a> Surface<'a> {
     fn new(scene: &Scene, maps: &'a ReceiverMaps, arrival: &Arrival) -> Option<Self> {
         let triangle = arrival.triangle as usize;
         let map = maps.get(arrival.receiver)?;
-        let corners = scene.objects[arrival.receiver.object()].mesh.corners(triangle);
+        let corners = scene.objects[arrival.receiver.object()]
+            .mesh_in_scene()
+            .corners(triangle);
         let texel_from_world = map.chart.texel_from_world(triangle, corners)?;
         Some(Self {
             map,

@@ -433,7 +433,7 @@ impl<'a> Baker<'a> {
     }
 
     fn facet(&self, triangle: u32) -> Option<Facet> {
-        let mesh = &self.tracer.scene().objects[self.chart.object()].mesh;
+        let mesh = self.tracer.scene().objects[self.chart.object()].mesh_in_scene();
         Facet::new(mesh, self.chart, triangle)
     }
 }

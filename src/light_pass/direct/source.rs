@@ -189,7 +189,7 @@ fn shape(light: &Light, scene: &Scene) -> Option<Shape> {
             vec![Polygon::new(corners.collect(), normal, false)]
         }
         LightKind::Surface { object, .. } => {
-            let mesh = &scene.objects.get(object)?.mesh;
+            let mesh = scene.objects.get(object)?.mesh_in_scene();
             if mesh.triangles.len() > MOST_POLYGONS {
                 return None;
             }

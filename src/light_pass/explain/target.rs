@@ -40,7 +40,9 @@ impl Target {
     /// The texel under a point that was seen along a direction; `None` where the chart has none there.
     pub fn new(tracer: &Tracer, chart: &Arc<Chart>, hit: &SurfaceHit, direction: DVec3) -> Option<Self> {
         let receiver = Receiver::new(hit.object, Side::met(direction, hit.geometric_normal));
-        let corners = tracer.scene().objects[hit.object].mesh.corners(hit.triangle);
+        let corners = tracer.scene().objects[hit.object]
+            .mesh_in_scene()
+            .corners(hit.triangle);
         let uv = chart.uv(hit.triangle, hit.barycentric);
         let size = DVec2::new(chart.width as f64, chart.height as f64);
         let at = uv * size;

@@ -29,7 +29,7 @@ pub struct Grid {
 impl Grid {
     /// Of a receiver by a chart of the grid's size; `first`: elements of the grids before it.
     pub fn new(scene: &Scene, chart: &Arc<Chart>, first: usize) -> Self {
-        let mesh = &scene.objects[chart.object()].mesh;
+        let mesh = scene.objects[chart.object()].mesh_in_scene();
         let pieces = smooth_pieces(mesh, chart);
         let elements = Elements::new(mesh, chart, &pieces);
         let texels = elements.all().chunk_by(|a, b| a.texel == b.texel).count();

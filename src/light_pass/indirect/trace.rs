@@ -151,7 +151,7 @@ impl Pass<'_> {
     fn element(&self, number: usize, has_bodies: bool, part: &mut Batch) {
         let grid = &self.grids[self.grids.partition_point(|grid| grid.first <= number) - 1];
         let element = number - grid.first;
-        let mesh = &self.tracer().scene().objects[grid.chart.object()].mesh;
+        let mesh = self.tracer().scene().objects[grid.chart.object()].mesh_in_scene();
         let media = if has_bodies {
             self.media(grid, mesh, element)
         } else {

@@ -41,7 +41,7 @@ impl Builder<'_> {
     pub(super) fn sees(&self, object: usize, bounds: Bounds, visible: &[CellBits]) -> bool {
         let wanted = |triangle: u32| self.owners.of(triangle) == object;
         let bounds = [bounds];
-        let mesh = &self.tracer.scene().objects[object].mesh;
+        let mesh = self.tracer.scene().objects[object].mesh_in_scene();
         visible.iter().enumerate().any(|(face, visible)| {
             let search = Search::new(self.launch, face, &bounds, &[], &wanted);
             let first = 0..mesh.triangles.len().min(TRIED_FIRST);
@@ -62,7 +62,7 @@ impl Builder<'_> {
             let search = Search::new(self.launch, face, &self.boxes, others, &wanted);
             let objects = self.tracer.scene().objects.iter().zip(self.wanted);
             for (object, _) in objects.filter(|(_, wanted)| **wanted) {
-                search.close_some(&object.mesh, &mut open);
+                search.close_some(object.mesh_in_scene(), &mut open);
             }
             if let Some(root) = self.root() {
                 search.close(root, &mut open);
@@ -84,7 +84,9 @@ impl Builder<'_> {
             let mut cells = HiddenCells::new(self.launch);
             let mut tests = 0;
             let facet = |&(object, triangle): &(usize, usize)| {
-                let corners = self.tracer.scene().objects[object].mesh.corners(triangle);
+                let corners = self.tracer.scene().objects[object]
+                    .mesh_in_scene()
+                    .corners(triangle);
                 (object, Facet::new(self.launch, face, &corners))
             };
             for (object, facet) in hiders.iter().filter(|_| marked.count() > 0).map(facet) {
@@ -119,9 +121,12 @@ impl Builder<'_> {
             if !scene.material_of(object).is_opaque() || self.is_the_only_caster(object) {
                 continue;
             }
-            for triangle in 0..item.mesh.triangles.len() {
+            for triangle in 0..item.mesh_in_scene().triangles.len() {
                 tests += 1;
-                let (corner, normal) = (item.mesh.corners(triangle)[0], item.mesh.face_normal(triangle));
+                let (corner, normal) = (
+                    item.mesh_in_scene().corners(triangle)[0],
+                    item.mesh_in_scene().face_normal(triangle),
+                );
                 let side = self.launch.side_of_light(corner, normal);
                 let has_behind = self.boxes.iter().any(|(low, high)| {
                     let height = ((*low + *high) * 0.5 - corner).dot(normal);
@@ -138,7 +143,7 @@ impl Builder<'_> {
             return Vec::new();
         }
         hiders.sort_by_cached_key(|&(object, triangle)| {
-            let [a, b, c] = scene.objects[object].mesh.corners(triangle);
+            let [a, b, c] = scene.objects[object].mesh_in_scene().corners(triangle);
             // Bits of positive numbers are ordered as the numbers are.
             let area = (b - a).cross(c - a).length().to_bits();
             (self.wanted[object], Reverse(area))
@@ -162,7 +167,7 @@ impl Owners {
     pub(super) fn new(tracer: &Tracer) -> Self {
         let mut end = 0;
         let count = |object: &crate::scene::Object| {
-            end += object.mesh.triangles.len() as u32;
+            end += object.mesh_in_scene().triangles.len() as u32;
             end
         };
         Self {

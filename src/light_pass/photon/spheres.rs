@@ -271,7 +271,7 @@ fn spheres(scene: &Scene, objects: &[usize], most: usize) -> Vec<Sphere> {
     let mut bounded: Vec<(usize, DVec3)> = objects
         .iter()
         .filter_map(|&object| {
-            let (low, high) = scene.objects[object].mesh.bounds()?;
+            let (low, high) = scene.objects[object].mesh_in_scene().bounds()?;
             Some((object, low * 0.5 + high * 0.5))
         })
         .collect();
@@ -302,7 +302,7 @@ fn around(scene: &Scene, objects: &[(usize, DVec3)]) -> Option<Sphere> {
     let vertices = || {
         objects
             .iter()
-            .flat_map(|(object, _)| &scene.objects[*object].mesh.positions)
+            .flat_map(|(object, _)| &scene.objects[*object].mesh_in_scene().positions)
     };
     let low = vertices().fold(DVec3::INFINITY, |low, position| low.min(*position));
     let high = vertices().fold(DVec3::NEG_INFINITY, |high, position| high.max(*position));

@@ -153,7 +153,7 @@ impl<'a> Receivers<'a> {
             bounds: scene
                 .objects
                 .iter()
-                .map(|object| object.mesh.bounds().unwrap_or(empty))
+                .map(|object| object.mesh_in_scene().bounds().unwrap_or(empty))
                 .collect(),
             scene_bounds: scene.bounds().unwrap_or(empty),
         }
@@ -171,7 +171,7 @@ impl<'a> Receivers<'a> {
         let surface = self.get(receiver).filter(|surface| surface.plane.is_none())?;
         Some(Facets {
             surface,
-            mesh: &self.tracer.scene().objects[receiver.object()].mesh,
+            mesh: self.tracer.scene().objects[receiver.object()].mesh_in_scene(),
             adjacency: self.tracer.adjacency(receiver.object()),
         })
     }
@@ -180,7 +180,7 @@ impl<'a> Receivers<'a> {
         let scene = self.tracer.scene();
         let object = receiver.object();
         let chart = (self.chart_for)(receiver)?;
-        let mesh = &scene.objects[object].mesh;
+        let mesh = scene.objects[object].mesh_in_scene();
         Some(ReceiverSurface {
             islands: Islands::find(&chart),
             plane: PlaneChart::of(mesh, &chart),

@@ -146,13 +146,8 @@ pub fn add(scene: &mut Scene, name: &str, mesh: Mesh, material: Material) {
 
 /// Adds an object that shares the material of that index.
 pub fn add_with(scene: &mut Scene, name: &str, mesh: Mesh, material: usize) {
-    scene.objects.push(Object {
-        name: name.into(),
-        node: scene.objects.len(),
-        primitive: 0,
-        material,
-        mesh: mesh.into(),
-    });
+    let node = (scene.objects.len(), 0);
+    scene.objects.push(Object::new(name, node, material, mesh));
 }
 
 /// A scene of the reference set: a square grey `floor` of the given half width [m] around the origin at y = 0, and a

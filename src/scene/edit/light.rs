@@ -3,104 +3,102 @@
 use std::sync::Arc;
 
 use glam::DVec3;
+use serde::{Deserialize, Serialize};
 
-use super::{Edit, check_place, existing, out_of_range};
+use super::{check_place, existing, out_of_range};
 use crate::error::{Error, Result};
 use crate::optics::LinearSrgb;
+use crate::optics::spectrum::Spectrum;
 use crate::scene::{Light, LightKind, LightSize, Scene};
-use crate::units::{Irradiance, RadiantIntensity};
+
+/// One property of a light.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum LightEdit {
+    /// [`LightKind::strength`]; > 0 and finite.
+    Strength(f64),
+    /// How large a point light, spot or sun is: a radius for the first two, an angle for suns; positive and finite.
+    Size(LightSize),
+    /// Place of a point or spot light, or of a flat lamp's middle, in scene coordinates [m].
+    Position(DVec3),
+    /// Where a spot points, or a sun's light travels. Of any length but 0; made unit.
+    Direction(DVec3),
+    /// Colour, and the spectrum that it is of. Its luminance is above 0; without a spectrum each channel is at least 0.
+    Colour(LinearSrgb, Option<Arc<Spectrum>>),
+}
 
 /// A direction whose squared length is this near to 1 is unit already and stays bit for bit.
 const UNIT: f64 = 1e-12;
 
-/// Edits a light.
-pub(super) fn apply(edit: &Edit, light: &mut Light) -> Result<()> {
-    let owner = format!("light `{}`", light.name);
-    let lacks = |what: &str, remedy: &str| Error::usage(&owner, format!("has no {what}"), remedy);
-    let kind = &mut light.kind;
-    match edit {
-        Edit::LightIntensity { intensity: new, .. } => {
-            let instead = "set its normal irradiance";
-            let old = intensity(kind).ok_or_else(|| lacks("radiant intensity, as it is a sun", instead))?;
-            check_power(new.0, "W/sr", &owner)?;
-            *old = *new;
+impl LightEdit {
+    /// For the log, and for people.
+    pub(super) fn names(&self) -> [&'static str; 2] {
+        match self {
+            Self::Strength(_) => ["LightPower", "power"],
+            Self::Size(_) => ["LightSize", "size"],
+            Self::Position(_) => ["LightPosition", "position"],
+            Self::Direction(_) => ["LightDirection", "direction"],
+            Self::Colour(..) => ["LightColour", "colour"],
         }
-        Edit::LightNormalIrradiance {
-            normal_irradiance: new,
-            ..
-        } => {
-            let instead = "set its radiant intensity";
-            let old = normal_irradiance(kind)
-                .ok_or_else(|| lacks("normal irradiance, as it is no sun", instead))?;
-            check_power(new.0, "W/m²", &owner)?;
-            *old = *new;
-        }
-        Edit::LightPosition { position: new, .. } => {
-            let old = position(kind).ok_or_else(|| lacks("position, as it is a sun", "set its direction"))?;
-            check_place(*new, &owner)?;
-            *old = *new;
-        }
-        Edit::LightDirection { direction: new, .. } => {
-            let why = "direction, as it shines everywhere alike";
-            let old = direction(kind).ok_or_else(|| lacks(why, "set its position"))?;
-            *old = unit(*new, &owner)?;
-        }
-        Edit::LightBrightness { brightness: new, .. } => {
-            let why = "brightness of its own, since it is a point or a direction";
-            let old = brightness(&mut light.kind).ok_or_else(|| lacks(why, "set its intensity"))?;
-            check_power(*new, "W/(m² sr)", &owner)?;
-            *old = *new;
-        }
-        Edit::LightSize { size: new, .. } => {
-            check_size(&light.kind, *new, &owner)?;
-            light.size = *new;
-        }
-        Edit::LightColour { colour: new, .. } => {
-            check_colour(*new, &owner)?;
-            (light.colour, light.spectrum) = (*new, None);
-        }
-        Edit::LightSpectrum {
-            colour,
-            spectrum: new,
-            ..
-        } => {
-            if !(colour.is_finite() && colour.luminance() > 0.0) {
-                let value = format!("{:?}", colour.to_array());
-                return Err(out_of_range(
-                    &owner,
-                    "colour",
-                    value,
-                    "what has a luminance above 0",
-                ));
+    }
+
+    /// Edits a light.
+    pub(super) fn apply(&self, light: &mut Light) -> Result<()> {
+        let owner = format!("light `{}`", light.name);
+        let lacks = |what: &str, remedy: &str| Error::usage(&owner, format!("has no {what}"), remedy);
+        match self {
+            Self::Strength(strength) => {
+                if !(*strength > 0.0 && strength.is_finite()) {
+                    let range = "what is above 0 and finite";
+                    return Err(out_of_range(&owner, "strength", strength, range));
+                }
+                light.kind.set_strength(*strength);
             }
-            (light.colour, light.spectrum) = (*colour, new.clone());
+            Self::Size(size) => {
+                check_size(&light.kind, *size, &owner)?;
+                light.size = *size;
+            }
+            Self::Position(new) => {
+                let why = "position, as it is a sun";
+                let old = position(&mut light.kind).ok_or_else(|| lacks(why, "set its direction"))?;
+                check_place(*new, &owner)?;
+                *old = *new;
+            }
+            Self::Direction(new) => {
+                let why = "direction, as it shines everywhere alike";
+                let old = direction(&mut light.kind).ok_or_else(|| lacks(why, "set its position"))?;
+                *old = unit(*new, &owner)?;
+            }
+            Self::Colour(colour, spectrum) => {
+                check_colour(*colour, spectrum.is_some(), &owner)?;
+                (light.colour, light.spectrum) = (*colour, spectrum.clone());
+            }
         }
-        _ => return Err(lacks("such property", "edit what it has")),
+        Ok(())
     }
-    Ok(())
-}
 
-fn intensity(kind: &mut LightKind) -> Option<&mut RadiantIntensity> {
-    match kind {
-        LightKind::Point { intensity, .. } | LightKind::Spot { intensity, .. } => Some(intensity),
-        _ => None,
-    }
-}
-
-fn normal_irradiance(kind: &mut LightKind) -> Option<&mut Irradiance> {
-    match kind {
-        LightKind::Sun {
-            normal_irradiance, ..
-        } => Some(normal_irradiance),
-        _ => None,
-    }
-}
-
-fn brightness(kind: &mut LightKind) -> Option<&mut f64> {
-    match kind {
-        LightKind::Panel { radiance, .. } | LightKind::Surface { radiance, .. } => Some(&mut radiance.0),
-        LightKind::Environment { scale } => Some(scale),
-        _ => None,
+    /// Edits that make `was` what `is` is.
+    pub(in crate::scene) fn between(was: &Light, is: &Light) -> Vec<Self> {
+        let mut edits = Vec::new();
+        if was.kind.strength() != is.kind.strength() {
+            edits.push(Self::Strength(is.kind.strength()));
+        }
+        let moved = is
+            .kind
+            .position()
+            .filter(|position| was.kind.position() != Some(*position));
+        edits.extend(moved.map(Self::Position));
+        let turned = is
+            .kind
+            .direction()
+            .filter(|direction| was.kind.direction() != Some(*direction));
+        edits.extend(turned.map(Self::Direction));
+        if was.size != is.size {
+            edits.push(Self::Size(is.size));
+        }
+        if was.spectrum != is.spectrum || was.colour != is.colour {
+            edits.push(Self::Colour(is.colour, is.spectrum.clone()));
+        }
+        edits
     }
 }
 
@@ -137,18 +135,10 @@ fn direction(kind: &mut LightKind) -> Option<&mut DVec3> {
     }
 }
 
-fn check_power(value: f64, unit: &str, owner: &str) -> Result<()> {
-    if value > 0.0 && value.is_finite() {
-        return Ok(());
-    }
-    let range = "what is above 0 and finite";
-    Err(out_of_range(owner, "strength", format!("{value} {unit}"), range))
-}
-
-fn check_colour(colour: LinearSrgb, owner: &str) -> Result<()> {
+fn check_colour(colour: LinearSrgb, has_spectrum: bool, owner: &str) -> Result<()> {
     let channels = colour.to_array();
-    let is_light = channels.iter().all(|channel| *channel >= 0.0) && colour.luminance() > 0.0;
-    if is_light && colour.is_finite() {
+    let is_colour = has_spectrum || channels.iter().all(|channel| *channel >= 0.0);
+    if is_colour && colour.luminance() > 0.0 && colour.is_finite() {
         return Ok(());
     }
     let range = "0 up, not all 0";

@@ -2,58 +2,117 @@
 
 use std::sync::Arc;
 
-use super::Edit;
-use super::out_of_range;
-use crate::error::{Error, Result};
-use crate::optics::LinearSrgb;
-use crate::optics::glass::{Dispersion, Glass};
-use crate::scene::Material;
+use serde::{Deserialize, Serialize};
 
-/// Edits a material; its class follows where it did before.
-pub(super) fn apply(edit: &Edit, material: &mut Material) -> Result<()> {
-    let owner = format!("material `{}`", material.name);
-    // A class that a file sets otherwise (unlit) is not ours to change.
-    let follows = material.surface == material.classified();
-    match edit {
-        Edit::MaterialIor { ior, .. } => {
-            check_index(*ior, &owner)?;
-            let glass = material
-                .glass
-                .as_deref()
-                .map(|glass| Arc::new(of_index(glass, *ior)));
-            (material.ior, material.glass) = (*ior, glass);
+use super::out_of_range;
+use crate::error::Result;
+use crate::optics::glass::{Dispersion, Glass};
+use crate::optics::{LinearSrgb, Metal};
+use crate::scene::{Material, Waves};
+
+/// One property of a material; its class follows as it does on loading.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum MaterialEdit {
+    /// Refractive index, at least 1; a glass keeps its Abbe number.
+    Ior(f64),
+    /// What it is made of.
+    Substance {
+        /// At least 1: the glass's at 587.56 nm.
+        ior: f64,
+        /// `None` for one index at every wavelength.
+        glass: Option<Arc<Glass>>,
+        /// Each channel in [0, 1].
+        base_colour: LinearSrgb,
+        /// `None` for no metal of a table.
+        #[serde(serialize_with = "Metal::write_name", deserialize_with = "Metal::read_name")]
+        metal: Option<&'static Metal>,
+    },
+    /// The tint of glass, the albedo of what is matte, each channel in [0, 1]; it takes the place of a metal's table.
+    BaseColour(LinearSrgb),
+    /// [0, 1].
+    Roughness(f64),
+    /// Waves that bend its normals; `None` for none.
+    Waves(Option<Waves>),
+}
+
+impl MaterialEdit {
+    /// For the log, and for people.
+    pub(super) fn names(&self) -> [&'static str; 2] {
+        match self {
+            Self::Ior(_) => ["MaterialIor", "refractive index"],
+            Self::Substance { .. } => ["MaterialSubstance", "substance"],
+            Self::BaseColour(_) => ["MaterialTint", "base colour"],
+            Self::Roughness(_) => ["MaterialRoughness", "roughness"],
+            Self::Waves(_) => ["MaterialWaves", "waves"],
         }
-        Edit::MaterialTint { base_colour, .. } => {
-            check_colour(*base_colour, &owner)?;
-            (material.base_colour, material.metal) = (*base_colour, None);
-        }
-        Edit::MaterialSubstance {
-            ior,
-            glass,
-            base_colour,
-            metal,
-            ..
-        } => {
-            check_index(*ior, &owner)?;
-            check_colour(*base_colour, &owner)?;
-            (material.ior, material.glass) = (*ior, glass.clone());
-            (material.base_colour, material.metal) = (*base_colour, *metal);
-        }
-        Edit::MaterialRoughness { roughness, .. } => {
-            if !(0.0..=1.0).contains(roughness) {
-                return Err(out_of_range(&owner, "roughness", roughness, "0 to 1"));
+    }
+
+    /// Edits a material; its class follows where it did before.
+    pub(super) fn apply(&self, material: &mut Material) -> Result<()> {
+        let owner = format!("material `{}`", material.name);
+        // A class that a file sets otherwise (unlit) is not ours to change.
+        let follows = material.surface == material.classified();
+        match self {
+            Self::Ior(ior) => {
+                check_index(*ior, &owner)?;
+                let glass = material
+                    .glass
+                    .as_deref()
+                    .map(|glass| Arc::new(of_index(glass, *ior)));
+                (material.ior, material.glass) = (*ior, glass);
             }
-            material.roughness = *roughness;
+            Self::BaseColour(base_colour) => {
+                check_colour(*base_colour, &owner)?;
+                (material.base_colour, material.metal) = (*base_colour, None);
+            }
+            Self::Substance {
+                ior,
+                glass,
+                base_colour,
+                metal,
+            } => {
+                check_index(*ior, &owner)?;
+                check_colour(*base_colour, &owner)?;
+                (material.ior, material.glass) = (*ior, glass.clone());
+                (material.base_colour, material.metal) = (*base_colour, *metal);
+            }
+            Self::Roughness(roughness) => {
+                if !(0.0..=1.0).contains(roughness) {
+                    return Err(out_of_range(&owner, "roughness", roughness, "0 to 1"));
+                }
+                material.roughness = *roughness;
+            }
+            Self::Waves(waves) => material.waves.clone_from(waves),
         }
-        Edit::MaterialWaves { waves, .. } => material.waves.clone_from(waves),
-        _ => {
-            return Err(Error::usage(owner, "has no such property", "edit what it has"));
+        if follows {
+            material.surface = material.classified();
         }
+        Ok(())
     }
-    if follows {
-        material.surface = material.classified();
+
+    /// Edits that make `was` what `is` is.
+    pub(in crate::scene) fn between(was: &Material, is: &Material) -> Vec<Self> {
+        let mut edits = Vec::new();
+        let is_same_substance = was.ior == is.ior
+            && was.glass.as_deref() == is.glass.as_deref()
+            && was.base_colour == is.base_colour
+            && was.metal == is.metal;
+        if !is_same_substance {
+            edits.push(Self::Substance {
+                ior: is.ior,
+                glass: is.glass.clone(),
+                base_colour: is.base_colour,
+                metal: is.metal,
+            });
+        }
+        if was.roughness != is.roughness {
+            edits.push(Self::Roughness(is.roughness));
+        }
+        if was.waves != is.waves {
+            edits.push(Self::Waves(is.waves.clone()));
+        }
+        edits
     }
-    Ok(())
 }
 
 /// A glass of another index at 587.56 nm and the same Abbe number.

@@ -157,12 +157,8 @@ pub fn rebase(scene: &mut Scene) {
         return;
     }
     scene.origin_world = centre;
-    for position in scene
-        .objects
-        .iter_mut()
-        .flat_map(|object| &mut Arc::make_mut(&mut object.mesh).positions)
-    {
-        *position -= centre;
+    for object in &mut scene.objects {
+        object.place(DAffine3::from_translation(-centre) * *object.world_from_object());
     }
     for light in &mut scene.lights {
         light.kind = light.kind.moved(-centre);
@@ -184,7 +180,7 @@ pub fn add_lights(scene: &mut Scene) {
         let emitted = material.emitted_radiance;
         let spectrum = material.emission_spectrum.clone();
         let luminance = emitted.luminance();
-        if luminance > 0.0 && part.mesh.area_m2() > 0.0 {
+        if luminance > 0.0 && part.mesh_in_scene().area_m2() > 0.0 {
             scene.lights.push(Light {
                 name: part.name.clone(),
                 colour: emitted / luminance,

@@ -1,6 +1,10 @@
-//! One primitive of a mesh, as triangles in world coordinates.
+//! The primitives of meshes, as triangles.
 
-use glam::{DAffine3, DMat3, DVec2, DVec3};
+use std::collections::HashMap;
+use std::collections::hash_map::Entry;
+use std::sync::Arc;
+
+use glam::{DAffine3, DVec2, DVec3};
 use gltf::json::mesh::{Mode, Primitive, Semantic};
 use gltf::json::validation::Checked;
 
@@ -20,45 +24,114 @@ const LARGEST_ROUNDING: f64 = 1e-5;
 const VERTEX_BYTES: u64 = 2 * 80;
 const TRIANGLE_BYTES: u64 = 2 * 12;
 
-/// The triangles of a primitive placed by `world_from_node`; `None`, with a warning, where it has none. Adds the
-/// number of triangles without area to `degenerate`.
-///
-/// # Errors
-/// Positions that are not finite or too far, indices of vertices that do not exist, broken accessors.
-pub fn read(
-    reader: Reader,
-    primitive: &Primitive,
-    world_from_node: &DAffine3,
-    owner: &str,
-    budget: &mut Budget,
-    report: &mut Report,
-    degenerate: &mut usize,
-) -> Result<Option<Mesh>> {
-    let Some((mut mesh, has_normals)) = read_local(reader, primitive, owner, budget, report)? else {
-        return Ok(None);
-    };
-    warn_of_rounding(&mesh, world_from_node, owner, report);
-    let lengths: Vec<f64> = mesh.normals.iter().map(|normal| normal.length()).collect();
-    place(&mut mesh, world_from_node, owner)?;
-    let before = mesh.triangles.len();
-    drop_degenerate(&mut mesh);
-    *degenerate += before - mesh.triangles.len();
-    if mesh.triangles.is_empty() {
-        report.warn(
-            owner,
-            "has no triangle with an area and was skipped",
-            "remove it from the scene",
-        );
-        return Ok(None);
+/// The primitives that were read: nodes with the same mesh share them.
+#[derive(Debug, Default)]
+pub struct Primitives {
+    /// By the indices of mesh and primitive.
+    known: HashMap<(usize, usize), Known>,
+    /// Triangles without an area.
+    pub degenerate: usize,
+}
+
+/// A primitive of the file.
+#[derive(Debug)]
+struct Known {
+    /// As the file has it, and whether it has normals; `None` where it has no triangles.
+    source: Option<(Mesh, bool)>,
+    /// What objects were made of it. Which triangles have an area depends on the transform by what it rounds.
+    made: Vec<(Variant, Arc<Mesh>)>,
+}
+
+/// What two meshes of one primitive differ in.
+#[derive(Debug, PartialEq)]
+struct Variant {
+    has_area: Vec<bool>,
+    /// Corners are split in the order of the scene's triangles.
+    is_split_mirrored: bool,
+    /// Normals are unit already, so that mesh and mesh in the scene are one.
+    stands_at_origin: bool,
+}
+
+impl Variant {
+    /// The mesh of a primitive, without what would not be seen.
+    fn of(&self, source: &Mesh, has_normals: bool, owner: &str, report: &mut Report) -> Mesh {
+        let mut mesh = source.clone();
+        let mut has_area = self.has_area.iter();
+        mesh.triangles.retain(|_| has_area.next() == Some(&true));
+        if has_normals {
+            drop_unused_vertices(&mut mesh);
+            check_normals(&mut mesh, owner, report);
+        } else {
+            split_corners(&mut mesh, self.is_split_mirrored);
+        }
+        mesh
     }
-    if has_normals {
-        let kept = drop_unused_vertices(&mut mesh);
-        let lengths = kept.iter().map(|vertex| lengths[*vertex]);
-        repair(&mut mesh, lengths, owner, report);
-    } else {
-        shade_flat(&mut mesh);
+}
+
+impl Primitives {
+    /// The triangles of a primitive, in coordinates from which `world_from_node` brings them into the world; `None`, with a
+    /// warning, where it has none there.
+    ///
+    /// # Errors
+    /// Positions that are not finite or too far, indices of vertices that do not exist, broken accessors.
+    pub fn read(
+        &mut self,
+        reader: Reader,
+        (mesh, index, primitive): (usize, usize, &Primitive),
+        world_from_node: &DAffine3,
+        owner: &str,
+        budget: &mut Budget,
+        report: &mut Report,
+    ) -> Result<Option<Arc<Mesh>>> {
+        let known = match self.known.entry((mesh, index)) {
+            Entry::Occupied(known) => {
+                let known = known.into_mut();
+                if let Some((mesh, _)) = &known.source {
+                    budget.take(mesh.positions.len() as u64 * VERTEX_BYTES, owner)?;
+                    budget.take(3 * mesh.triangles.len() as u64 * TRIANGLE_BYTES, owner)?;
+                }
+                known
+            }
+            Entry::Vacant(place) => place.insert(Known {
+                source: read_local(reader, primitive, owner, budget, report)?,
+                made: Vec::new(),
+            }),
+        };
+        let Some((source, has_normals)) = &known.source else {
+            return Ok(None);
+        };
+        warn_of_rounding(source, world_from_node, owner, report);
+        let has_area = have_area(source, world_from_node, owner)?;
+        self.degenerate += has_area.iter().filter(|has_area| !**has_area).count();
+        if !has_area.contains(&true) {
+            report.warn(
+                owner,
+                "has no triangle with an area and was skipped",
+                "remove it from the scene",
+            );
+            return Ok(None);
+        }
+        let variant = Variant {
+            is_split_mirrored: !has_normals && world_from_node.matrix3.determinant() < 0.0,
+            stands_at_origin: *world_from_node == DAffine3::IDENTITY,
+            has_area,
+        };
+        if let Some((_, made)) = known.made.iter().find(|(made, _)| *made == variant) {
+            return Ok(Some(Arc::clone(made)));
+        }
+        let mut mesh = variant.of(source, *has_normals, owner, report);
+        if variant.stands_at_origin {
+            mesh = mesh.placed(world_from_node);
+        }
+        let mesh = Arc::new(mesh);
+        known.made.push((variant, Arc::clone(&mesh)));
+        Ok(Some(mesh))
     }
-    Ok(Some(mesh))
+
+    /// Forgets a mesh that no other node has.
+    pub fn forget(&mut self, mesh: usize) {
+        self.known.retain(|(known, _), _| *known != mesh);
+    }
 }
 
 /// The primitive in its node's coordinates, and whether the file has normals for it.
@@ -231,10 +304,13 @@ fn warn_of_rounding(mesh: &Mesh, world_from_node: &DAffine3, owner: &str, report
     );
 }
 
-/// Brings positions and normals into the world; a mirroring transform turns the triangles, so that they stay wound
-/// counter-clockwise about the outside.
-fn place(mesh: &mut Mesh, world_from_node: &DAffine3, owner: &str) -> Result<()> {
-    for (vertex, position) in mesh.positions.iter_mut().enumerate() {
+/// Which triangles have an area in the world.
+///
+/// # Errors
+/// A vertex that is not finite, or too far away.
+fn have_area(mesh: &Mesh, world_from_node: &DAffine3, owner: &str) -> Result<Vec<bool>> {
+    let mut placed = Vec::with_capacity(mesh.positions.len());
+    for (vertex, position) in mesh.positions.iter().enumerate() {
         if !position.is_finite() {
             return Err(Error::failure(
                 owner,
@@ -242,7 +318,7 @@ fn place(mesh: &mut Mesh, world_from_node: &DAffine3, owner: &str) -> Result<()>
                 "repair the mesh or export the file again",
             ));
         }
-        *position = world_from_node.transform_point3(*position);
+        let position = world_from_node.transform_point3(*position);
         if !position.is_finite() || position.abs().max_element() > FARTHEST_M {
             return Err(Error::failure(
                 owner,
@@ -250,44 +326,24 @@ fn place(mesh: &mut Mesh, world_from_node: &DAffine3, owner: &str) -> Result<()>
                 "use metres, or move the scene closer to the origin",
             ));
         }
+        placed.push(position);
     }
-    let linear = world_from_node.matrix3;
-    let mirrored = linear.determinant() < 0.0;
-    // The cofactors are the inverse transpose without its division, so that flattened nodes have normals too.
-    let cofactors = DMat3::from_cols(
-        linear.y_axis.cross(linear.z_axis),
-        linear.z_axis.cross(linear.x_axis),
-        linear.x_axis.cross(linear.y_axis),
-    );
-    let sign = if mirrored { -1.0 } else { 1.0 };
-    for normal in &mut mesh.normals {
-        *normal = cofactors * *normal * sign;
-    }
-    if mirrored {
-        for triangle in &mut mesh.triangles {
-            triangle.swap(1, 2);
-        }
-    }
-    Ok(())
+    let has_area = |triangle: &[u32; 3]| {
+        let [a, b, c] = triangle.map(|vertex| placed[vertex as usize]);
+        (b - a).cross(c - a).normalize_or_zero() != DVec3::ZERO
+    };
+    Ok(mesh.triangles.iter().map(has_area).collect())
 }
 
-fn drop_degenerate(mesh: &mut Mesh) {
-    let has_area: Vec<bool> = (0..mesh.triangles.len())
-        .map(|triangle| mesh.face_normal(triangle) != DVec3::ZERO)
-        .collect();
-    let mut has_area = has_area.into_iter();
-    mesh.triangles.retain(|_| has_area.next().unwrap_or(false));
-}
-
-/// Leaves only the vertices of triangles, since others would widen the bounds; returns which ones were kept.
-fn drop_unused_vertices(mesh: &mut Mesh) -> Vec<usize> {
+/// Leaves only the vertices of triangles, since others would widen the bounds.
+fn drop_unused_vertices(mesh: &mut Mesh) {
     let mut used = vec![false; mesh.positions.len()];
     for vertex in mesh.triangles.iter().flatten() {
         used[*vertex as usize] = true;
     }
     let kept: Vec<usize> = (0..used.len()).filter(|vertex| used[*vertex]).collect();
     if kept.len() == used.len() {
-        return kept;
+        return;
     }
     let mut renamed = vec![0_u32; used.len()];
     for (new, old) in kept.iter().enumerate() {
@@ -301,17 +357,18 @@ fn drop_unused_vertices(mesh: &mut Mesh) -> Vec<usize> {
     for vertex in mesh.triangles.iter_mut().flatten() {
         *vertex = renamed[*vertex as usize];
     }
-    kept
 }
 
 /// How far from 1 [relative] the length of a normal may be before it is worth a word; 8-bit normals stay within it.
 const UNIT_TOLERANCE: f64 = 0.02;
 
-/// Splits all corners and gives each triangle its own normal, as glTF wants where normals are missing.
-pub fn shade_flat(mesh: &mut Mesh) {
-    let order: Vec<u32> = mesh.triangles.iter().flatten().copied().collect();
-    let normals: Vec<DVec3> = (0..mesh.triangles.len())
-        .map(|triangle| mesh.face_normal(triangle))
+/// Splits all corners, so that each triangle has its own normal, as glTF wants where normals are missing.
+fn split_corners(mesh: &mut Mesh, is_mirrored: bool) {
+    let [second, third] = if is_mirrored { [2, 1] } else { [1, 2] };
+    let order: Vec<u32> = mesh
+        .triangles
+        .iter()
+        .flat_map(|corners| [corners[0], corners[second], corners[third]])
         .collect();
     let split = |values: &Option<Vec<_>>| {
         let values = values.as_ref()?;
@@ -322,30 +379,26 @@ pub fn shade_flat(mesh: &mut Mesh) {
             .iter()
             .map(|vertex| mesh.positions[*vertex as usize])
             .collect(),
-        normals: normals.iter().flat_map(|normal| [*normal; 3]).collect(),
+        normals: vec![DVec3::ZERO; order.len()],
         uv0: split(&mesh.uv0),
         uv1: split(&mesh.uv1),
         triangles: (0..mesh.triangles.len() as u32)
-            .map(|t| [3 * t, 3 * t + 1, 3 * t + 2])
+            .map(|t| [3 * t, 3 * t + second as u32, 3 * t + third as u32])
             .collect(),
     };
 }
 
-/// Brings all normals to length 1. Those that are zero or not finite are taken from the triangles around the vertex,
-/// weighted by area. Every vertex is part of a triangle that has an area.
-pub fn repair(mesh: &mut Mesh, lengths_in_file: impl Iterator<Item = f64>, owner: &str, report: &mut Report) {
+/// Tells of normals that are not unit, and makes those 0 that are nothing.
+fn check_normals(mesh: &mut Mesh, owner: &str, report: &mut Report) {
     let (mut replaced, mut rescaled) = (0, 0);
-    let mut around: Option<Vec<DVec3>> = None;
-    for (vertex, length) in lengths_in_file.enumerate() {
-        let unit = mesh.normals[vertex]
-            .try_normalize()
-            .filter(|_| length > 0.0 && length.is_finite());
-        rescaled += usize::from(unit.is_some() && (length - 1.0).abs() > UNIT_TOLERANCE);
-        mesh.normals[vertex] = unit.unwrap_or_else(|| {
+    for normal in &mut mesh.normals {
+        let length = normal.length();
+        if length > 0.0 && length.is_finite() {
+            rescaled += usize::from((length - 1.0).abs() > UNIT_TOLERANCE);
+        } else {
             replaced += 1;
-            let around = around.get_or_insert_with(|| face_normals_around(mesh));
-            around[vertex]
-        });
+            *normal = DVec3::ZERO;
+        }
     }
     if replaced > 0 {
         report.warn(
@@ -361,21 +414,4 @@ pub fn repair(mesh: &mut Mesh, lengths_in_file: impl Iterator<Item = f64>, owner
             "export the normals again",
         );
     }
-}
-
-fn face_normals_around(mesh: &Mesh) -> Vec<DVec3> {
-    let mut sums = vec![DVec3::ZERO; mesh.positions.len()];
-    let mut any = sums.clone();
-    for triangle in 0..mesh.triangles.len() {
-        let [a, b, c] = mesh.corners(triangle);
-        for vertex in mesh.triangles[triangle] {
-            sums[vertex as usize] += (b - a).cross(c - a);
-            any[vertex as usize] = mesh.face_normal(triangle);
-        }
-    }
-    // Triangles back to back cancel: then any one of them is as good.
-    sums.iter()
-        .zip(any)
-        .map(|(sum, any)| sum.try_normalize().unwrap_or(any))
-        .collect()
 }

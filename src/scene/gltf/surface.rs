@@ -5,8 +5,9 @@ use gltf::json::{Root, mesh};
 use super::accessor::Reader;
 use super::buffers::Buffers;
 use super::nodes::Placed;
+use super::primitive::Primitives;
 use super::report::{Budget, Report};
-use super::{material, names, primitive};
+use super::{material, names};
 use crate::error::{Error, Result};
 use crate::scene::closed::is_closed;
 use crate::scene::{Material, Mesh, Object, Scene, SurfaceKind};
@@ -27,7 +28,7 @@ pub struct Source<'a> {
 /// Adds all objects, and to `materials` (in file order so far) those that the file only implies.
 ///
 /// # Errors
-/// A mesh that does not exist, or as [`primitive::read`].
+/// A mesh that does not exist, or as [`Primitives::read`].
 pub fn add_objects(
     scene: &mut Scene,
     source: Source,
@@ -39,7 +40,17 @@ pub fn add_objects(
         root: source.root,
         buffers: source.buffers,
     };
-    let mut degenerate = 0;
+    let mut primitives = Primitives::default();
+    let mut uses = vec![0; source.root.meshes.len()];
+    let meshes = source
+        .placed
+        .iter()
+        .filter_map(|placed| source.root.nodes[placed.node].mesh);
+    for mesh in meshes {
+        if let Some(uses) = uses.get_mut(mesh.value()) {
+            *uses += 1;
+        }
+    }
     for placed in source.placed {
         let Some(mesh_index) = source.root.nodes[placed.node].mesh else {
             continue;
@@ -53,34 +64,36 @@ pub fn add_objects(
         };
         for (index, part) in mesh.primitives.iter().enumerate() {
             let owner = owner(mesh, mesh_index.value(), index);
-            let read = primitive::read(
+            let read = primitives.read(
                 reader,
-                part,
+                (mesh_index.value(), index, part),
                 &placed.world_from_node,
                 &owner,
                 budget,
                 report,
-                &mut degenerate,
             )?;
             let Some(mesh) = read else {
                 continue;
             };
+            let mut object = Object::new(placed.name.as_str(), (placed.node, index), 0, mesh);
+            object.place(placed.world_from_node);
+            let mesh = object.mesh_in_scene();
             let material = materials.of_primitive(part, &owner, report);
             let material = if source.solid_glass {
-                materials.as_solid(material, &mesh, &placed.name, report)
+                materials.as_solid(material, mesh, &placed.name, report)
             } else {
                 material
             };
-            materials.check_coordinates(material, &mesh, &placed.name, report);
-            scene.objects.push(Object {
-                name: placed.name.clone(),
-                node: placed.node,
-                primitive: index,
-                material,
-                mesh: mesh.into(),
-            });
+            materials.check_coordinates(material, mesh, &placed.name, report);
+            object.material = material;
+            scene.objects.push(object);
+        }
+        uses[mesh_index.value()] -= 1;
+        if uses[mesh_index.value()] == 0 {
+            primitives.forget(mesh_index.value());
         }
     }
+    let degenerate = primitives.degenerate;
     if degenerate > 0 {
         report.warn(
             "meshes",

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use serde::de::DeserializeOwned;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 use serde_json::Value;
 
 use super::Recent;
@@ -178,8 +178,17 @@ pub struct Kept {
     pub automatic: Option<bool>,
     /// Whether the scene is read again when its files change.
     pub watch: bool,
-    /// Edits of what was loaded.
+    /// Edits of what was loaded; those that this version does not know are left out.
+    #[serde(deserialize_with = "known")]
     pub changes: Vec<Change>,
+}
+
+fn known<'a, D: Deserializer<'a>>(source: D) -> std::result::Result<Vec<Change>, D::Error> {
+    let changes = Vec::<Value>::deserialize(source)?;
+    Ok(changes
+        .into_iter()
+        .filter_map(|change| serde_json::from_value(change).ok())
+        .collect())
 }
 
 impl Kept {

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant, SystemTime};
 use super::Recent;
 use super::config::{ConfigFolder, Kept};
 use crate::scene::Scene;
-use crate::scene::changes::Changes;
+use crate::scene::changes::Change;
 use crate::viewer::background::{Background, Task, Wake};
 
 /// Longest that a change waits: a program that is killed loses no more than this.
@@ -126,11 +126,7 @@ fn write(folder: &ConfigFolder, snapshot: Snapshot) {
     } = snapshot;
     // Without an edit, what was kept of edits before is kept on.
     if !Arc::ptr_eq(&loaded, &edited) {
-        let changes = Changes::between(&loaded, &edited);
-        for lost in changes.lost {
-            log::warn!("{lost}, which is not kept");
-        }
-        kept.changes = changes.changes;
+        kept.changes = Change::between(&loaded, &edited);
     }
     if let Err(error) = folder.write_scene(&kept) {
         log::warn!("{error}");

@@ -8,7 +8,7 @@ use super::keeping::Restored;
 use super::picking::Placing;
 use super::seeking::Sought;
 use crate::error::Result;
-use crate::scene::changes::Changes;
+use crate::scene::changes::Change;
 use crate::scene::{Scene, load};
 use crate::viewer::ViewerOptions;
 use crate::viewer::edits::EditedScene;
@@ -126,11 +126,11 @@ impl Model {
     /// Puts a scene that was read again in its own place: camera, settings and edits stay.
     fn show_again(&mut self, mut scene: Scene) {
         let loaded = Arc::clone(self.edits.loaded());
-        let changes = Changes::between(&loaded, self.edits.scene());
+        let changes = Change::between(&loaded, self.edits.scene());
         let is_same_shape = load::share(&loaded, &mut scene);
         self.edits = EditedScene::new(Arc::new(scene));
         self.files.warning = None;
-        self.edit_again(&changes.changes);
+        self.edit_again(&changes);
         self.navigator.stay_in(self.edits.scene());
         if !is_same_shape {
             self.forget_maps();

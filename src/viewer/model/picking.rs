@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use super::Model;
 use crate::geometry::Ray;
-use crate::scene::Edit;
+use crate::scene::{Edit, LightEdit};
 use crate::transport::Tracer;
 use crate::viewer::gizmo::Held;
 use crate::viewer::panel::Placed;
@@ -53,18 +53,18 @@ impl Hand {
     fn edit(&self, gaze: &Ray) -> Option<Edit> {
         let met = met(&self.surfaces, gaze);
         match (self.does, met) {
-            (Deed::Put(light, distance_m), Some((point, normal))) => Some(Edit::LightPosition {
-                light,
-                position: point + normal * distance_m,
-            }),
+            (Deed::Put(light, distance_m), Some((point, normal))) => {
+                let position = point + normal * distance_m;
+                Some(Edit::Light(light, LightEdit::Position(position)))
+            }
             (Deed::Turn(light, from), Some((point, _))) => {
                 let direction = (point - from).try_normalize()?;
-                Some(Edit::LightDirection { light, direction })
+                Some(Edit::Light(light, LightEdit::Direction(direction)))
             }
             (Deed::TurnSun(light), met) => {
                 let seen = met.map_or(gaze.direction, |(_, normal)| gaze.direction.reflect(normal));
                 let direction = -seen.try_normalize()?;
-                Some(Edit::LightDirection { light, direction })
+                Some(Edit::Light(light, LightEdit::Direction(direction)))
             }
             (Deed::Put(..) | Deed::Turn(..), None) => None,
         }
@@ -104,7 +104,7 @@ impl Model {
         let ball = match self.choices.selection.held() {
             Some(Held::Object(object)) => {
                 let bounds = self.scene().objects.get(object);
-                let bounds = bounds.and_then(|object| object.mesh.bounds());
+                let bounds = bounds.and_then(|object| object.mesh_in_scene().bounds());
                 bounds.map(|(low, high)| (0.5 * (low + high), 0.5 * (high - low).length()))
             }
             Some(Held::Light(light)) => {

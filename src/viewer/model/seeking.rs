@@ -65,9 +65,7 @@ impl Model {
         let aim = Aim::of(surfaces, &gaze, 0.5 * (low + high));
         let stops = self.choices.display.exposure_stops;
         let added = light.make((surfaces, radius_m), &aim, stops, &scene);
-        let is_added = self.edit(&Edit::LightAdded {
-            added: Arc::new(added),
-        });
+        let is_added = self.edit(&Edit::AddLight(Arc::new(added)));
         self.edits.release();
         if is_added {
             self.hold(Held::Light(scene.lights.len()));

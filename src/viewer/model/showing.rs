@@ -232,9 +232,7 @@ impl Model {
 
 /// Whether a scene is lit otherwise than before: a lamp is another one, or an object elsewhere.
 fn is_other_light(before: &Arc<Scene>, now: &Arc<Scene>) -> bool {
-    let meshes = |scene: &Arc<Scene>| -> Vec<_> {
-        let objects = scene.objects.iter();
-        objects.map(|object| Arc::as_ptr(&object.mesh)).collect()
-    };
-    !Arc::ptr_eq(before, now) && (before.lights != now.lights || meshes(before) != meshes(now))
+    let (was, is) = (&before.objects, &now.objects);
+    let stand_alike = || was.len() == is.len() && was.iter().zip(is).all(|(was, is)| was.stands_as(is));
+    !Arc::ptr_eq(before, now) && (before.lights != now.lights || !stand_alike())
 }

@@ -8,7 +8,7 @@ use super::Command;
 use super::control::{CONTROL_WIDTH, Entry, pick, setting};
 use crate::optics::Glass;
 use crate::optics::glass::{Dispersion, catalogue};
-use crate::scene::{Edit, Material};
+use crate::scene::{Edit, Material, MaterialEdit};
 
 const ONE_INDEX: &str = "one index";
 /// Said where only figures make it up.
@@ -46,13 +46,13 @@ pub fn show(
             Some(glass) => glass.dispersion.n_d(),
             None => shown.ior,
         };
-        commands.push(Command::Edit(Edit::MaterialSubstance {
-            material,
+        let substance = MaterialEdit::Substance {
             ior,
             glass,
             base_colour: shown.base_colour,
             metal: shown.metal,
-        }));
+        };
+        commands.push(Command::Edit(Edit::Material(material, substance)));
     }
 }
 

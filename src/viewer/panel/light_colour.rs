@@ -8,7 +8,7 @@ use super::Command;
 use super::control::{CONTROL_WIDTH, Entry, pick, setting};
 use crate::optics::LinearSrgb;
 use crate::optics::spectrum::{Spectrum, illuminants};
-use crate::scene::{Edit, Light};
+use crate::scene::{Edit, Light, LightEdit};
 
 const COLOUR_ALONE: &str = "a colour alone";
 /// Of those that are called by a number.
@@ -29,31 +29,23 @@ pub fn show(ui: &mut Ui, index: usize, (light, of_file): (&Light, &Light), comma
     let mut spectrum = light.spectrum.clone();
     let value = (&mut spectrum, &of_file.spectrum);
     setting(ui, "Spectrum", None, value, by_name);
-    let as_in_file = || Edit::LightSpectrum {
-        light: index,
-        colour: of_file.colour,
-        spectrum: of_file.spectrum.clone(),
+    let wanted = if spectrum != light.spectrum {
+        match &spectrum {
+            _ if spectrum == of_file.spectrum => (of_file.colour, spectrum),
+            Some(found) => (found.xyz().to_linear_srgb(), spectrum),
+            None => (within_reach(light.colour), None),
+        }
+    } else if colour == light.colour {
+        return;
+    } else if colour == of_file.colour {
+        (colour, of_file.spectrum.clone())
+    } else {
+        (colour, None)
     };
-    if spectrum != light.spectrum {
-        commands.push(Command::Edit(match &spectrum {
-            _ if spectrum == of_file.spectrum => as_in_file(),
-            Some(spectrum) => Edit::LightSpectrum {
-                light: index,
-                colour: spectrum.xyz().to_linear_srgb(),
-                spectrum: Some(Arc::clone(spectrum)),
-            },
-            None => Edit::LightColour {
-                light: index,
-                colour: within_reach(light.colour),
-            },
-        }));
-    } else if colour != light.colour {
-        commands.push(Command::Edit(if colour == of_file.colour {
-            as_in_file()
-        } else {
-            Edit::LightColour { light: index, colour }
-        }));
-    }
+    commands.push(Command::Edit(Edit::Light(
+        index,
+        LightEdit::Colour(wanted.0, wanted.1),
+    )));
 }
 
 /// The nearest colour without a negative channel.

@@ -4,7 +4,7 @@ use egui::{DragValue, Response, Ui};
 
 use super::Command;
 use super::control::setting;
-use crate::scene::{Edit, Light, LightKind, LightSize};
+use crate::scene::{Edit, Light, LightEdit, LightKind, LightSize};
 
 /// Drag of one point, as a share of the radius, or [m] where that is 0.
 const RADIUS_SPEED: f64 = 0.01;
@@ -21,7 +21,7 @@ pub fn show(ui: &mut Ui, index: usize, (light, of_file): (&Light, &Light), comma
         LightKind::Panel { .. } | LightKind::Surface { .. } | LightKind::Environment { .. } => {}
     }
     if size != light.size {
-        commands.push(Command::Edit(Edit::LightSize { light: index, size }));
+        commands.push(Command::Edit(Edit::Light(index, LightEdit::Size(size))));
     }
 }
 

@@ -6,11 +6,9 @@ use glam::DVec3;
 use super::control::{CONTROL_WIDTH, Entry, about, counted, pick, row, rows, setting, significant};
 use super::{Command, Model, bake, glass, light_colour, light_size, waves};
 use crate::optics::LinearSrgb;
-use crate::scene::{Edit, LightKind, Scene, SurfaceKind, why_light_stays};
-use crate::units::{Irradiance, RadiantIntensity};
+use crate::scene::{Edit, LightEdit, LightKind, MaterialEdit, Motion, Scene, SurfaceKind, why_light_stays};
 use crate::viewer::gizmo::Held;
 use crate::viewer::new_light::NewLight;
-use crate::viewer::placement::Placement;
 
 /// The slider's ends, as factors of the strength in the file.
 const POWER_FACTORS: (f64, f64) = (1e-2, 1e2);
@@ -27,7 +25,7 @@ const AIM: &str = "A click or drag in the picture turns the light: a spot to the
                    in the sky, or would be seen if the surface there were a mirror.";
 const NO_HAND: &str = "Not for this light.";
 const NO_PLACE: &str = "This light has neither a place nor a direction that could be changed.";
-const NO_TURN: &str = "Its shape is another one than the file gives it.";
+const NO_TURN: &str = "It is tilted.";
 /// What the section has in hand.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Selection {
@@ -194,9 +192,7 @@ fn remove_light(ui: &mut Ui, selection: &mut Selection, scene: &Scene, commands:
         .on_hover_text("Takes the light out of the scene; undo brings it back.")
         .on_disabled_hover_text(format!("`{}` {}.", light.name, why_not.unwrap_or_default()));
     if remove.clicked() {
-        commands.push(Command::Edit(Edit::LightRemoved {
-            light: selection.light,
-        }));
+        commands.push(Command::Edit(Edit::RemoveLight(selection.light)));
         selection.hold(None);
     }
 }
@@ -234,24 +230,15 @@ fn light(ui: &mut Ui, light: usize, model: &Model, commands: &mut Vec<Command>) 
             place(ui, "Position [m]", moved, model.scene())
         });
         if moved != position {
-            let position = moved;
-            commands.push(Command::Edit(Edit::LightPosition { light, position }));
+            commands.push(Command::Edit(Edit::Light(light, LightEdit::Position(moved))));
         }
     }
-    if let (Some(present), Some(default)) = (direction(&kind), direction(&of_file.kind)) {
+    if let (Some(present), Some(default)) = (kind.direction(), of_file.kind.direction()) {
         let mut turned = present;
         setting(ui, "Direction [°]", None, (&mut turned, &default), angles);
         if turned != present {
-            let direction = turned;
-            commands.push(Command::Edit(Edit::LightDirection { light, direction }));
+            commands.push(Command::Edit(Edit::Light(light, LightEdit::Direction(turned))));
         }
-    }
-}
-
-fn direction(kind: &LightKind) -> Option<DVec3> {
-    match *kind {
-        LightKind::Spot { direction, .. } | LightKind::Sun { direction, .. } => Some(direction),
-        _ => None,
     }
 }
 
@@ -272,26 +259,7 @@ fn power(ui: &mut Ui, light: usize, (kind, of_file): (&LightKind, &LightKind), c
         )
     });
     if value != present {
-        commands.push(Command::Edit(strength(kind, light, value)));
-    }
-}
-
-fn strength(kind: &LightKind, light: usize, value: f64) -> Edit {
-    match kind {
-        LightKind::Sun { .. } => Edit::LightNormalIrradiance {
-            light,
-            normal_irradiance: Irradiance(value),
-        },
-        LightKind::Point { .. } | LightKind::Spot { .. } => Edit::LightIntensity {
-            light,
-            intensity: RadiantIntensity(value),
-        },
-        LightKind::Panel { .. } | LightKind::Surface { .. } | LightKind::Environment { .. } => {
-            Edit::LightBrightness {
-                light,
-                brightness: value,
-            }
-        }
+        commands.push(Command::Edit(Edit::Light(light, LightEdit::Strength(value))));
     }
 }
 
@@ -366,7 +334,7 @@ fn material(ui: &mut Ui, object: usize, model: &Model, commands: &mut Vec<Comman
         },
     );
     if ior != shown.ior {
-        commands.push(Command::Edit(Edit::MaterialIor { material, ior }));
+        commands.push(Command::Edit(Edit::Material(material, MaterialEdit::Ior(ior))));
     }
     glass::show(ui, material, (shown, of_file), no_ior, commands);
     let mut roughness = shown.roughness;
@@ -376,7 +344,10 @@ fn material(ui: &mut Ui, object: usize, model: &Model, commands: &mut Vec<Comman
         ui.add(slider.fixed_decimals(2))
     });
     if roughness != shown.roughness {
-        commands.push(Command::Edit(Edit::MaterialRoughness { material, roughness }));
+        commands.push(Command::Edit(Edit::Material(
+            material,
+            MaterialEdit::Roughness(roughness),
+        )));
     }
     if let Some(waves) = shown.bending_waves() {
         waves::show(ui, material, (waves, of_file.bending_waves()), commands);
@@ -392,10 +363,10 @@ fn material(ui: &mut Ui, object: usize, model: &Model, commands: &mut Vec<Comman
         response
     });
     if base_colour != shown.base_colour {
-        commands.push(Command::Edit(Edit::MaterialTint {
+        commands.push(Command::Edit(Edit::Material(
             material,
-            base_colour,
-        }));
+            MaterialEdit::BaseColour(base_colour),
+        )));
     }
 }
 
@@ -413,7 +384,7 @@ fn hand(ui: &mut Ui, present: &mut Hand, own: Hand, (text, name): (&str, &str), 
 
 fn light_hand(ui: &mut Ui, selection: &mut Selection, model: &Model) {
     let kind = &model.scene().lights[selection.light].kind;
-    let (has_place, has_direction) = (kind.position().is_some(), direction(kind).is_some());
+    let (has_place, has_direction) = (kind.position().is_some(), kind.direction().is_some());
     let why_not = (!has_place && !has_direction).then_some(NO_PLACE);
     row(ui, "By mouse", why_not, |ui| {
         ui.horizontal(|ui| {
@@ -439,24 +410,27 @@ fn light_hand(ui: &mut Ui, selection: &mut Selection, model: &Model) {
 
 /// Offset and turn of an object's node.
 fn place_of_object(ui: &mut Ui, object: usize, model: &Model, commands: &mut Vec<Command>) {
-    let found = Placement::of(object, model.loaded(), model.scene());
-    let why_not = found.is_none().then_some(NO_TURN);
-    let present = found.unwrap_or_default();
-    let mut wanted = present;
-    let offset_m = (&mut wanted.offset_m, &DVec3::ZERO);
-    setting(ui, "Offset [m]", why_not, offset_m, |ui, offset_m| {
-        place(ui, "Offset [m]", offset_m, model.scene())
-    });
+    let motion = model.scene().objects[object].motion();
+    let why_not = motion.yaw_rad().is_none().then_some(NO_TURN);
+    let present = (motion.yaw_rad().unwrap_or_default(), motion.translation);
+    let (mut yaw_rad, mut moved) = present;
+    setting(
+        ui,
+        "Offset [m]",
+        why_not,
+        (&mut moved, &DVec3::ZERO),
+        |ui, moved| place(ui, "Offset [m]", moved, model.scene()),
+    );
     // To the digits that are shown: a look at the number changes nothing.
-    let present_deg = (present.yaw_rad.to_degrees() * 1e2).round() / 1e2;
+    let present_deg = (yaw_rad.to_degrees() * 1e2).round() / 1e2;
     let mut turn_deg = present_deg;
     setting(ui, "Turn [°]", why_not, (&mut turn_deg, &0.0), |ui, turn_deg| {
         ui.add(DragValue::new(turn_deg).speed(0.5).max_decimals(2))
     });
     if turn_deg != present_deg {
-        wanted.yaw_rad = turn_deg.to_radians();
+        yaw_rad = turn_deg.to_radians();
     }
-    if wanted != present {
-        commands.push(Command::Edit(wanted.edit(object, model.loaded())));
+    if (yaw_rad, moved) != present {
+        commands.push(Command::Edit(Edit::Place(object, Motion::turned(yaw_rad, moved))));
     }
 }

@@ -7,7 +7,7 @@ use super::Command;
 use super::bake::FAILED;
 use super::control::setting;
 use crate::scene::waves::STEEPEST_SLOPE;
-use crate::scene::{Edit, Wave, Waves};
+use crate::scene::{Edit, MaterialEdit, Wave, Waves};
 
 /// Least height that a drag starts from [m].
 const LEAST_HEIGHT_M: f64 = 1e-6;
@@ -33,10 +33,10 @@ pub fn show(
     }
     match Waves::new(list) {
         Ok(waves) => {
-            commands.push(Command::Edit(Edit::MaterialWaves {
+            commands.push(Command::Edit(Edit::Material(
                 material,
-                waves: Some(waves),
-            }));
+                MaterialEdit::Waves(Some(waves)),
+            )));
         }
         Err(why) => {
             ui.colored_label(FAILED, why);

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::DVec3;
 use nephroid::effect::{Effect, EffectSwitch, EffectSwitches};
 use nephroid::scene::builtin::pool::{AMPLITUDE_M, bumped, displaced};
-use nephroid::scene::{Edit, LightKind, Scene, Wave, Waves};
+use nephroid::scene::{Edit, LightKind, MaterialEdit, Scene, Wave, Waves};
 use nephroid::settings::BakeSettings;
 
 use crate::bake::common::{self, all_bits, edit, rmse, run, session};
@@ -136,7 +136,7 @@ fn edited_waves_bake_as_if_from_the_start() {
         let mut session = session(&first);
         let before = all_bits(&run(&mut session, &settings));
         let waves = second.materials[1].waves.clone();
-        edit(&mut session, &Edit::MaterialWaves { material: 1, waves });
+        edit(&mut session, &Edit::Material(1, MaterialEdit::Waves(waves)));
         let after = all_bits(&run(&mut session, &settings));
         assert!(after == all_bits(&bake(second.clone(), &settings)));
         session

@@ -24,7 +24,7 @@ pub fn run(session: &mut BakeSession, settings: &BakeSettings) -> BakeResult {
 
 /// Applies an edit to a session's scene.
 pub fn edit(session: &mut BakeSession, edit: &Edit) {
-    let (scene, _) = edit.apply(session.scene()).expect("a sound edit");
+    let scene = edit.apply(session.scene()).expect("a sound edit");
     session.set_scene(Arc::new(scene)).expect("a sound scene");
 }
 

@@ -3,17 +3,18 @@
 
 use std::sync::Arc;
 
-use glam::{DQuat, DVec3};
+use glam::DVec3;
 use nephroid::optics::LinearSrgb;
 use nephroid::progress::Control;
+use nephroid::scene::Motion;
 use nephroid::scene::builtin::{parts, shapes};
-use nephroid::scene::edit::Edit;
+use nephroid::scene::edit::{Edit, LightEdit, MaterialEdit};
 use nephroid::scene::{LightKind, LightSize, Scene};
 use nephroid::session::{BakeResult, BakeSession, StopReason};
 use nephroid::settings::{
     BakeSettings, Footprint, ItemBufferKind, Kernel, KernelSampling, LayerKind, RayPlacement, Sigma,
 };
-use nephroid::units::{Flux, Radiance, RadiantIntensity};
+use nephroid::units::{Flux, Radiance};
 use rand_pcg::Pcg64Mcg;
 use rand_pcg::rand_core::{Rng, SeedableRng};
 
@@ -32,11 +33,7 @@ fn assert_fresh(session: &mut BakeSession, settings: &BakeSettings, what: &str) 
 }
 
 fn moved(object: usize, translation: DVec3) -> Edit {
-    Edit::ObjectMoved {
-        object,
-        rotation: DQuat::IDENTITY,
-        translation,
-    }
+    Edit::Place(object, Motion::turned(0.0, translation))
 }
 
 fn material_of(scene: &Scene, object: &str) -> usize {
@@ -178,12 +175,9 @@ fn dimming_and_smoothing_take_no_work() {
     let LightKind::Point { intensity, .. } = scene.lights[0].kind else {
         panic!("the ring has a point light")
     };
-    let dimmer = Edit::LightIntensity {
-        light: 0,
-        intensity: RadiantIntensity(0.37 * intensity.0),
-    };
+    let dimmer = Edit::Light(0, LightEdit::Strength(0.37 * intensity.0));
     let colour = LinearSrgb::new(1.0, 0.6, 0.2);
-    let warmer = Edit::LightColour { light: 0, colour };
+    let warmer = Edit::Light(0, LightEdit::Colour(colour, None));
     for (sigma, change) in [(0.0, Some(dimmer)), (0.0, Some(warmer)), (2.5, None)] {
         if let Some(change) = &change {
             edit(&mut session, change);
@@ -249,20 +243,14 @@ fn an_edit_traces_only_what_it_touches() {
     let edits = [
         // Half of the light goes to either ball.
         (moved(2, DVec3::new(0.1, 0.05, 0.0)), 0.3..0.62),
-        (Edit::MaterialIor { material, ior: 1.7 }, 0.1..0.67),
+        (Edit::Material(material, MaterialEdit::Ior(1.7)), 0.1..0.67),
         // Only branches that another tint lifts over the threshold are new.
         (
-            Edit::MaterialTint {
-                material,
-                base_colour: tint,
-            },
+            Edit::Material(material, MaterialEdit::BaseColour(tint)),
             0.0..0.05,
         ),
         (
-            Edit::LightPosition {
-                light: 1,
-                position: DVec3::new(0.1, 2.6, 0.5),
-            },
+            Edit::Light(1, LightEdit::Position(DVec3::new(0.1, 2.6, 0.5))),
             0.3..0.7,
         ),
     ];
@@ -293,7 +281,10 @@ fn a_resized_lamp_and_a_moved_glow_are_seen() {
     let mut session = session(&scene);
     let mut before = run(&mut session, &settings);
     let size = LightSize::Radius { radius_m: 0.3 };
-    for change in [Edit::LightSize { light: 0, size }, moved(object, DVec3::X * 0.3)] {
+    for change in [
+        Edit::Light(0, LightEdit::Size(size)),
+        moved(object, DVec3::X * 0.3),
+    ] {
         edit(&mut session, &change);
         let (after, _) = assert_fresh(&mut session, &settings, &format!("{change:?}"));
         assert!(
@@ -333,23 +324,19 @@ impl Storm {
             }
             3 => self.settings.max_depth = Some(2 + self.below(5) as u32),
             4 => {
-                let intensity = RadiantIntensity(0.1 + self.unit());
-                return Some(Edit::LightIntensity { light, intensity });
+                return Some(Edit::Light(light, LightEdit::Strength(0.1 + self.unit())));
             }
             5 => {
                 let position = scene.lights[light].kind.position()? + spread;
-                return Some(Edit::LightPosition { light, position });
+                return Some(Edit::Light(light, LightEdit::Position(position)));
             }
             6 => {
                 let (material, ior) = (scene.objects[object].material, 1.2 + 0.6 * self.unit());
-                return Some(Edit::MaterialIor { material, ior });
+                return Some(Edit::Material(material, MaterialEdit::Ior(ior)));
             }
             _ => {
-                return Some(Edit::ObjectMoved {
-                    object,
-                    rotation: DQuat::from_rotation_y(self.unit()),
-                    translation: spread * 0.3,
-                });
+                let motion = Motion::turned(self.unit(), spread * 0.3);
+                return Some(Edit::Place(object, motion));
             }
         }
         None
@@ -397,10 +384,7 @@ fn edits_while_baking_leave_nothing_behind() {
 fn hard_edits_and_back_lose_no_watt() {
     let scene = two_casters();
     let material = material_of(&scene, "left");
-    let lamp = |x, y, z| Edit::LightPosition {
-        light: 0,
-        position: DVec3::new(x, y, z),
-    };
+    let lamp = |x, y, z| Edit::Light(0, LightEdit::Position(DVec3::new(x, y, z)));
     let hard = [
         ("a lamp within glass", lamp(-0.8, 0.5, 0.0)),
         ("a lamp in the floor", lamp(0.3, 0.0, 0.2)),
@@ -411,21 +395,18 @@ fn hard_edits_and_back_lose_no_watt() {
         ),
         ("a ball beyond all light", moved(1, DVec3::new(0.0, 0.0, 1e6))),
         ("the floor above the lamp", moved(0, DVec3::new(0.0, 5.0, 0.0))),
-        ("glass like air", Edit::MaterialIor { material, ior: 1.0 }),
-        ("glass of index 40", Edit::MaterialIor { material, ior: 40.0 }),
+        ("glass like air", Edit::Material(material, MaterialEdit::Ior(1.0))),
+        (
+            "glass of index 40",
+            Edit::Material(material, MaterialEdit::Ior(40.0)),
+        ),
         (
             "black glass",
-            Edit::MaterialTint {
-                material,
-                base_colour: LinearSrgb::BLACK,
-            },
+            Edit::Material(material, MaterialEdit::BaseColour(LinearSrgb::BLACK)),
         ),
         (
             "rough glass",
-            Edit::MaterialRoughness {
-                material,
-                roughness: 1.0,
-            },
+            Edit::Material(material, MaterialEdit::Roughness(1.0)),
         ),
     ];
     let settings = at(1e3, 48);

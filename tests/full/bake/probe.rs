@@ -167,7 +167,7 @@ fn paths_through_a_glass_ball() {
     let scene = builtin_scene("ball");
     let mut objects = scene.objects.iter();
     let ball = objects.find(|object| object.name != "floor").expect("a ball");
-    let (low, high) = ball.mesh.bounds().expect("it has a size");
+    let (low, high) = ball.mesh_in_scene().bounds().expect("it has a size");
     // Light that grazes a facet is turned at the facet itself, half of one away from the ball's own normal.
     check_normals(&found, |point| point - (low + high) * 0.5, 2e-5);
 }

@@ -288,7 +288,7 @@ fn cut_uv(piece: usize, place: DVec2) -> DVec2 {
 fn with_floor_in_pieces(mut scene: Scene) -> Scene {
     let mut objects = scene.objects.iter_mut();
     let floor = objects.find(|object| object.name == "floor").expect("a floor");
-    let (low, high) = floor.mesh.bounds().expect("corners");
+    let (low, high) = floor.mesh_in_scene().bounds().expect("corners");
     let (mut mesh, mut uvs) = (Mesh::default(), Vec::new());
     for piece in 0..PIECES[0] * PIECES[1] {
         let corner = DVec2::new((piece % PIECES[0]) as f64, (piece / PIECES[0]) as f64);
@@ -304,7 +304,7 @@ fn with_floor_in_pieces(mut scene: Scene) -> Scene {
         mesh.triangles.push([first, first + 2, first + 1]);
     }
     mesh.uv0 = Some(uvs);
-    floor.mesh = Arc::new(mesh);
+    *floor.mesh_in_scene_mut() = mesh;
     scene
 }
 

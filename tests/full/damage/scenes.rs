@@ -185,7 +185,7 @@ fn broken_promises_of_a_scene_are_noticed() {
     let sound = builtin_scene("showroom");
     assert_eq!(scene_fault(&sound), None);
     fn mesh(scene: &mut Scene) -> &mut nephroid::scene::Mesh {
-        Arc::make_mut(&mut scene.objects[0].mesh)
+        scene.objects[0].mesh_in_scene_mut()
     }
     type Break = fn(&mut Scene);
     let breaks: [(&str, Break); 12] = [

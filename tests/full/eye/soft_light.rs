@@ -273,7 +273,7 @@ fn surfaces_glow_on_the_sides_they_have() {
         let sheet = quad(DVec3::new(-0.5, 0.7, -0.5), DVec3::Z, DVec3::X);
         let others = vec![(sheet, sided(double_sided)), ceiling()];
         let tracer = under(glowing(1, 2.0), 1.0, others);
-        let normal = |object: usize| tracer.scene().objects[object].mesh.face_normal(0);
+        let normal = |object: usize| tracer.scene().objects[object].mesh_in_scene().face_normal(0);
         let faces_up = normal(1).y > 0.0;
         for (object, is_lit) in [(0, double_sided || !faces_up), (2, double_sided || faces_up)] {
             let travels = if object == 0 { DVec3::NEG_Y } else { DVec3::Y };
@@ -294,7 +294,7 @@ fn surfaces_glow_on_the_sides_they_have() {
     let ceiling = quad(DVec3::new(-1.0, 1.4, -1.0), DVec3::Z * 2.0, DVec3::X * 2.0);
     let others = vec![(sheet, sided(false)), matte(ceiling)];
     let tracer = under(glowing(1, 2.0), 1.0, others);
-    assert!(tracer.scene().objects[1].mesh.face_normal(0).y > 0.0);
+    assert!(tracer.scene().objects[1].mesh_in_scene().face_normal(0).y > 0.0);
     for (object, is_lit) in [(0, false), (2, true)] {
         let chart = chart(&tracer, object, 8, 8);
         let e_w = flux_w(&chart, &direct(&tracer, &chart));

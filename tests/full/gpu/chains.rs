@@ -199,7 +199,7 @@ fn normal_images_bend_chains_as_on_the_cpu() {
     let normal_map = scene.materials[1].normal_map.clone();
     let floor = &mut scene.materials[0];
     (floor.surface, floor.roughness, floor.normal_map) = (SurfaceKind::Mixed, 0.0, normal_map);
-    let mesh = Arc::make_mut(&mut scene.objects[0].mesh);
+    let mesh = scene.objects[0].mesh_in_scene_mut();
     let uv = |place: &DVec3| DVec2::new(place.x, place.z);
     mesh.uv0 = Some(mesh.positions.iter().map(uv).collect());
     compare(scene);

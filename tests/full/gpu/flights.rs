@@ -35,7 +35,7 @@ fn cameras(scene: &Scene) -> Vec<Camera> {
     };
     let is_specular = |object: &usize| scene.material_of(*object).surface != SurfaceKind::Diffuse;
     let specular = (0..scene.objects.len()).filter(is_specular);
-    let bounds = specular.filter_map(|object| scene.objects[object].mesh.bounds());
+    let bounds = specular.filter_map(|object| scene.objects[object].mesh_in_scene().bounds());
     let middles: Vec<DVec3> = bounds.map(|(low, high)| 0.5 * (low + high)).collect();
     let camera = |place: usize| {
         let eye = match place {

@@ -96,7 +96,7 @@ impl Judge {
         let (mut firsts, mut corners) = (Vec::new(), Vec::new());
         for object in &scene.objects {
             firsts.push(corners.len());
-            let mesh = &object.mesh;
+            let mesh = object.mesh_in_scene();
             let local = |triangle| mesh.corners(triangle).map(|corner| (corner - centre) * scale);
             corners.extend((0..mesh.triangles.len()).map(local));
         }

@@ -1,7 +1,5 @@
 //! Light straight from the lamps by shadow rays, against the baked layer.
 
-use std::sync::Arc;
-
 use glam::DVec3;
 use nephroid::eye_pass::{Picture, View};
 use nephroid::optics::LinearSrgb;
@@ -126,7 +124,7 @@ fn moved_object_takes_its_shadow_along() {
     let mut scene = scene(lamps().to_vec());
     let mut rig = or_skip!(tracing(&scene));
     let before = rig.picture(&ahead());
-    let mesh = Arc::make_mut(&mut scene.objects[1].mesh);
+    let mesh = scene.objects[1].mesh_in_scene_mut();
     mesh.positions.iter_mut().for_each(|corner| corner.x -= 0.2);
     rig.set_scene(&scene);
     assert!(unlike(&before, &assert_traced(&mut rig)) > 0.02);

@@ -1,7 +1,5 @@
 //! Illumination maps on the device: what is seen coarsely, and less detail where memory is short.
 
-use std::sync::Arc;
-
 use glam::{DVec2, DVec3};
 
 use nephroid::eye_pass::{Picture, View};
@@ -42,8 +40,9 @@ fn white_floor() -> Scene {
 /// bright, the right half, which lies 3 m farther, black.
 fn two_halves(size: usize) -> (Scene, IlluminationMap) {
     let mut scene = white_floor();
-    let right = floor("right", 0, 0.0).mesh;
-    let mesh = Arc::make_mut(&mut scene.objects[0].mesh);
+    let right = floor("right", 0, 0.0);
+    let right = right.mesh_in_scene();
+    let mesh = scene.objects[0].mesh_in_scene_mut();
     let far = right.positions.iter().map(|corner| *corner + DVec3::X * 3.0);
     mesh.positions.extend(far);
     mesh.normals.extend([DVec3::Y; 4]);
@@ -142,7 +141,7 @@ fn roughness_blurs_what_is_reflected() {
 fn maps_beyond_the_budget_lose_what_is_needed_least() {
     let mut scene = white_floor();
     let mut far = floor("far", 0, 0.0);
-    let mesh = Arc::make_mut(&mut far.mesh);
+    let mesh = far.mesh_in_scene_mut();
     mesh.positions.iter_mut().for_each(|corner| corner.x += 40.0);
     scene.objects.push(far);
     let ramp = |texel: usize| [1.0 + (texel % 256) as f32 / 256.0; 3];

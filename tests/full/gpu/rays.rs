@@ -52,7 +52,7 @@ impl Numbers {
 
     /// From within a ball, every `nth` one at an edge or a corner.
     fn rays(&mut self, scene: &Scene, (centre, radius): (DVec3, f64), nth: usize, count: usize) -> Vec<Ray> {
-        let meshes = scene.objects.iter().map(|object| &object.mesh);
+        let meshes = scene.objects.iter().map(|object| object.mesh_in_scene());
         let corners = |mesh: &Arc<Mesh>| {
             (0..mesh.triangles.len())
                 .map(|at| mesh.corners(at))
@@ -124,7 +124,7 @@ fn awkward() -> Scene {
     ]);
     let turn = DMat3::from_axis_angle(DVec3::new(0.6, 0.0, 0.8), 0.7);
     for object in &mut scene.objects {
-        for position in &mut Arc::make_mut(&mut object.mesh).positions {
+        for position in &mut object.mesh_in_scene_mut().positions {
             *position = turn * *position + DVec3::new(3e5, -1e5, 7e5);
         }
     }

@@ -3,13 +3,13 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use glam::{DQuat, DVec3};
+use glam::DVec3;
 use nephroid::eye_pass::renderer::{MapStyle, Uploaded};
 use nephroid::eye_pass::{Picture, View};
 use nephroid::illumination::IlluminationMap;
 use nephroid::optics::LinearSrgb;
 use nephroid::scene::builtin::{parts, shapes};
-use nephroid::scene::{Edit, Environment, LightKind, Scene};
+use nephroid::scene::{Edit, EditState, Environment, LightKind, MaterialEdit, Motion, Scene};
 
 use crate::gpu::rig::{Rig, or_skip};
 use support::floors::{diffuse, floor_map, floor_scene, from_above, lambert};
@@ -146,30 +146,21 @@ fn room() -> (Scene, Vec<IlluminationMap>) {
 fn edited_scene_shows_as_a_new_one() {
     let (mut scene, maps) = room();
     let mut rig = or_skip!(Rig::new(&scene, &maps));
-    let moved = |object, rotation| Edit::ObjectMoved {
-        object,
-        rotation,
-        translation: DVec3::new(-0.1, 0.05, 0.02),
-    };
-    let ior = Edit::MaterialIor {
-        material: 1,
-        ior: 1.2,
-    };
-    let tint = Edit::MaterialTint {
-        material: 1,
-        base_colour: LinearSrgb::new(1.0, 0.5, 0.2),
-    };
+    let way = DVec3::new(-0.1, 0.05, 0.02);
+    let moved = |object, yaw_rad| Edit::Place(object, Motion::turned(yaw_rad, way));
+    let ior = Edit::Material(1, MaterialEdit::Ior(1.2));
+    let tint = Edit::Material(1, MaterialEdit::BaseColour(LinearSrgb::new(1.0, 0.5, 0.2)));
     // All objects are written at once.
     let uniform = 80 * scene.objects.len() as u64;
-    let ball = 32 * scene.objects[1].mesh.positions.len() as u64;
-    let turned = moved(2, DQuat::from_rotation_y(0.3));
+    let ball = 32 * scene.objects[1].mesh_in_scene().positions.len() as u64;
+    let turned = moved(2, 0.3);
     for (edit, most_bytes) in [
         (ior, uniform),
         (tint, uniform),
-        (moved(1, DQuat::IDENTITY), ball),
+        (moved(1, 0.0), ball),
         (turned, 36 * 32),
     ] {
-        scene = edit.apply(&scene).expect("it is in range").0;
+        scene = edit.apply(&scene).expect("it is in range");
         let mut uploaded = rig.set_scene(&scene);
         let bytes = uploaded.other_bytes;
         assert!(bytes > 0 && bytes <= most_bytes, "{edit:?} {bytes} {most_bytes}");
@@ -190,16 +181,13 @@ fn edited_scene_shows_as_a_new_one() {
 fn glass_that_turns_matte_keeps_maps_in_place() {
     let (scene, maps) = room();
     let mut rig = or_skip!(Rig::new(&scene, &maps));
-    let rough = Edit::MaterialRoughness {
-        material: 1,
-        roughness: 0.9,
-    };
-    let (matte, smooth) = rough.apply(&scene).expect("it is in range");
-    let (again, _) = smooth.apply(&matte).expect("it is in range");
+    let rough = Edit::Material(1, MaterialEdit::Roughness(0.9));
+    let matte = rough.apply(&scene).expect("it is in range");
+    let again = EditState::of(&scene).set(&matte);
     // Scenes of other objects are taken over whole.
     let alone = floor_scene(diffuse(LinearSrgb::new(0.3, 0.6, 0.9)));
     let mut other = alone.clone();
-    other.objects[0].mesh = Arc::new(shapes::floor([0.0, 0.5], [0.0, 1.0], 0.0));
+    *other.objects[0].mesh_in_scene_mut() = shapes::floor([0.0, 0.5], [0.0, 1.0], 0.0);
     for edited in [matte, again, alone, other] {
         rig.set_scene(&edited);
         rig.set_maps(&maps);

@@ -1,7 +1,5 @@
 //! Surfaces shown by something else than their light, on floors of which every pixel is known.
 
-use std::sync::Arc;
-
 use glam::DVec3;
 use nephroid::eye_pass::renderer::{Inspected, MapStyle};
 use nephroid::illumination::IlluminationMap;
@@ -82,7 +80,7 @@ fn irradiance_has_the_colour_of_the_scale() {
 fn normals_are_those_of_the_mesh() {
     for normal in [DVec3::Y, DVec3::new(0.6, 0.8, 0.0), DVec3::new(-0.48, 0.6, -0.64)] {
         let mut scene = grey_floor();
-        Arc::make_mut(&mut scene.objects[0].mesh).normals = vec![normal; 4];
+        scene.objects[0].mesh_in_scene_mut().normals = vec![normal; 4];
         // Surfaces have them with and without maps.
         let found = or_skip!(shown(&scene, &[], inspected(Inspected::Normals), SIDE));
         assert_near(&found, std::iter::repeat((0.5 * normal + 0.5).to_array()));

@@ -3,7 +3,7 @@
 use egui::accesskit::Role;
 use egui::pos2;
 use glam::DVec3;
-use nephroid::scene::Edit;
+use nephroid::scene::{Edit, LightEdit, Motion};
 use nephroid::settings::{BakeSettings, Sigma};
 use nephroid::viewer::command::Command;
 
@@ -44,11 +44,8 @@ fn nothing_is_cut_off_or_overlaps() {
             let mut panel = Headless::opened(settings, screen);
             // With what sets them back beside them.
             let edits = [
-                Edit::LightPosition {
-                    light: 0,
-                    position: DVec3::new(-10.75, -20.125, -30.25),
-                },
-                Edit::object_at(0, &panel.model.loaded().objects[0].mesh, DVec3::splat(-1.125)),
+                Edit::Light(0, LightEdit::Position(DVec3::new(-10.75, -20.125, -30.25))),
+                Edit::Place(0, Motion::turned(0.0, DVec3::splat(-1.125))),
             ];
             panel.tell(|model| {
                 for edit in edits {

@@ -3,9 +3,9 @@
 use std::fs;
 use std::path::Path;
 
-use glam::{DQuat, DVec3};
+use glam::DVec3;
 use nephroid::scene::load::save;
-use nephroid::scene::{Edit, LoadOptions};
+use nephroid::scene::{Edit, LoadOptions, MaterialEdit, Motion};
 use serde_json::Value;
 
 use super::fixtures::{edited, folder, intensity, read};
@@ -32,20 +32,11 @@ fn real_files_are_saved_with_edits() {
 /// Edits the first of everything, saves and reads back.
 fn is_saved(source: &Path, target: &Path) -> bool {
     let loaded = read(source);
-    let (material, roughness, ior) = (0, 0.375, 1.75);
     let mut edits = vec![
-        Edit::MaterialRoughness { material, roughness },
-        Edit::MaterialIor { material, ior },
+        Edit::Material(0, MaterialEdit::Roughness(0.375)),
+        Edit::Material(0, MaterialEdit::Ior(1.75)),
+        Edit::Place(0, Motion::turned(0.0, DVec3::new(0.125, 0.25, -0.5))),
     ];
-    // All parts of the first object's node.
-    let node = loaded.objects[0].node;
-    let parts = (0..loaded.objects.len()).filter(|object| loaded.objects[*object].node == node);
-    edits.extend(parts.map(|object| Edit::ObjectMoved {
-        object,
-        rotation: DQuat::IDENTITY,
-        translation: DVec3::new(0.125, 0.25, -0.5),
-    }));
-    // A sun or a lamp with a surface has no intensity.
     let double = loaded
         .lights
         .first()
@@ -59,7 +50,11 @@ fn is_saved(source: &Path, target: &Path) -> bool {
     let extent_m = scene.bounds().map_or(1.0, |(low, high)| (high - low).length());
     let shift = read.origin_world - scene.origin_world;
     for (a, b) in read.objects.iter().zip(&scene.objects) {
-        let mut corners = a.mesh.positions.iter().zip(&b.mesh.positions);
+        let mut corners = a
+            .mesh_in_scene()
+            .positions
+            .iter()
+            .zip(&b.mesh_in_scene().positions);
         assert!(corners.all(|(a, b)| (*a + shift).distance(*b) < 1e-9 * extent_m));
     }
     assert_eq!(read.lights.len(), scene.lights.len());

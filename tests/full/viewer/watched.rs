@@ -4,7 +4,7 @@ use std::fs;
 use std::sync::Arc;
 
 use glam::DVec2;
-use nephroid::scene::Edit;
+use nephroid::scene::{Edit, MaterialEdit};
 use nephroid::settings::Estimator;
 use nephroid::viewer::ViewerOptions;
 use nephroid::viewer::files::FilesOptions;
@@ -24,10 +24,7 @@ fn camera_settings_and_edits_stay() {
         },
         ..options("ring")
     });
-    let rough = Edit::MaterialRoughness {
-        material: 1,
-        roughness: 0.25,
-    };
+    let rough = Edit::Material(1, MaterialEdit::Roughness(0.25));
     act(&mut model, change(rough));
     model.navigator.look(DVec2::new(100.0, 30.0));
     set(&mut model, |it| {
@@ -54,7 +51,7 @@ fn camera_settings_and_edits_stay() {
     assert_eq!(model.scene().materials[1].roughness, 0.25, "the edit stays");
     assert_eq!(model.choices.settings.seed, 7);
     assert!(model.navigator.camera().forward.distance(gaze) < 1e-12);
-    let [mesh, before] = [model.scene(), &was].map(|scene| &scene.objects[0].mesh);
+    let [mesh, before] = [model.scene(), &was].map(|scene| scene.objects[0].mesh_in_scene());
     assert!(Arc::ptr_eq(mesh, before), "what is the same is shared");
     assert!(
         !model.maps().is_empty(),
@@ -70,7 +67,7 @@ fn camera_settings_and_edits_stay() {
     until(&mut model, "read again", |model| {
         !Arc::ptr_eq(model.scene(), &now)
     });
-    assert_eq!(model.scene().objects[0].mesh.positions[0].x, -2.0);
+    assert_eq!(model.scene().objects[0].mesh_in_scene().positions[0].x, -2.0);
     // A material that is gone takes its edits with it.
     let text = fs::read_to_string(&path).expect("it is there");
     fs::write(&path, text.replace("\"silver\"", "\"gold\"")).expect("it is written");

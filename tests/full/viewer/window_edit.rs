@@ -179,7 +179,7 @@ fn glass_ball_is_probed_and_bends_otherwise() {
     let scene = builtin::build("ball").expect("it is built in");
     let glass = scene.objects.iter().find(|object| object.name == "ball");
     let (low, high) = glass
-        .and_then(|glass| glass.mesh.bounds())
+        .and_then(|glass| glass.mesh_in_scene().bounds())
         .expect("it has corners");
     viewer.click_at(pixel_of("ball", 0.5 * (low + high)));
     viewer.wait_for("picked", |event| event["name"] == "ball");

@@ -57,7 +57,7 @@ fn with_room_around_the_floor() -> Scene {
     let mut scene = builtin_scene("mirror");
     let mut objects = scene.objects.iter_mut();
     let floor = objects.find(|object| object.name == "floor").expect("a floor");
-    let mesh = Arc::make_mut(&mut floor.mesh);
+    let mesh = floor.mesh_in_scene_mut();
     for uv in mesh.uv0.as_mut().expect("coordinates") {
         *uv = *uv * 0.5 + 0.25;
     }

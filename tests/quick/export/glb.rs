@@ -196,7 +196,7 @@ fn emission_and_pictures_hold_light_sent_on() {
 
 fn mesh_at(scene: &Scene, node: usize) -> &Mesh {
     let found = scene.objects.iter().find(|object| object.node == node);
-    &found.expect("it is there").mesh
+    found.expect("it is there").mesh_in_scene()
 }
 
 #[test]

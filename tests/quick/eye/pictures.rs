@@ -340,7 +340,7 @@ fn maps_are_read_bilinearly_by_their_chart() {
     }
     // u runs against x.
     let mut turned = white();
-    let mesh = Arc::make_mut(&mut turned.objects[0].mesh);
+    let mesh = turned.objects[0].mesh_in_scene_mut();
     mesh.uv0.iter_mut().flatten().for_each(|uv| uv.x = 1.0 - uv.x);
     let lit = Lit::with_map(turned, 2, texels(&[1.0, 2.0]));
     lit.assert_point_sends([-0.5, 0.0], sent(2.0));

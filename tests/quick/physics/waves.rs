@@ -39,7 +39,7 @@ fn gradients_are_derivatives_of_the_height() {
 fn bent_normals_are_of_the_displaced_surface() {
     let (displaced, bumped) = (built_in("pool"), built_in("pool-bump"));
     let waves = bumped.materials[1].waves.as_ref().expect("it has waves");
-    let mesh = &displaced.objects[1].mesh;
+    let mesh = displaced.objects[1].mesh_in_scene();
     for (position, normal) in mesh.positions.iter().zip(&mesh.normals).step_by(97) {
         near(waves.height_m(*position), position.y - 1.0, 1e-12, position);
         near(

@@ -49,7 +49,8 @@ fn every_scene_is_whole_and_its_meshes_sound() {
         let mut kinds = (0..scene.objects.len()).map(|object| scene.material_of(object).surface);
         assert!(kinds.any(SurfaceKind::is_specular), "{name}");
         warns_not(&scene);
-        for Object { name: part, mesh, .. } in &scene.objects {
+        for object in &scene.objects {
+            let (part, mesh) = (&object.name, object.mesh_in_scene());
             let at = format!("{name}/{part}");
             assert_eq!(mesh.positions.len(), mesh.normals.len(), "{at}");
             assert!(mesh.positions.iter().all(|p| p.is_finite()), "{at}");
@@ -87,7 +88,7 @@ fn floors_have_map_coordinates() {
         let material = &scene.materials[floor.material];
         assert_eq!(material.surface, SurfaceKind::Diffuse);
         assert_eq!(material.base_colour.to_array(), [0.5; 3]);
-        let mesh = &floor.mesh;
+        let mesh = floor.mesh_in_scene();
         assert_close(mesh.area_m2(), 4.0 * half * half, 1e-15, name);
         assert!(mesh.normals.iter().all(|n| *n == DVec3::Y));
         let uvs = mesh.uv0.as_ref().expect("floor has TEXCOORD_0");
@@ -114,17 +115,17 @@ fn solids_are_closed() {
         ("bowl", "bowl", bowl_m3, 0.5),
     ] {
         let scene = built_in(name);
-        let mesh = &object(&scene, part).mesh;
+        let mesh = object(&scene, part).mesh_in_scene();
         assert_eq!(open_edges(mesh), 0, "{name}/{part}");
         assert_close(volume_m3(mesh), expected_m3, tolerance, name);
     }
     let gallery = built_in("gallery");
     for solid in ["wine glass", "wine", "tumbler", "prism", "block"] {
-        let mesh = &object(&gallery, solid).mesh;
+        let mesh = object(&gallery, solid).mesh_in_scene();
         assert_eq!(open_edges(mesh), 0, "{solid}");
         assert!(volume_m3(mesh) > 5e-5, "{solid}");
     }
-    let mut cut = object(&built_in("ball"), "ball").mesh.as_ref().clone();
+    let mut cut = object(&built_in("ball"), "ball").mesh_in_scene().as_ref().clone();
     cut.triangles[17].swap(0, 1);
     assert_ne!(open_edges(&cut), 0, "a turned triangle is seen");
     cut.triangles.remove(17);
@@ -136,7 +137,7 @@ fn solids_are_closed() {
 fn shapes_are_those_of_the_references() {
     for name in ["ring", "nephroid"] {
         let scene = built_in(name);
-        let ring = &object(&scene, "ring").mesh;
+        let ring = object(&scene, "ring").mesh_in_scene();
         for (position, normal) in ring.positions.iter().zip(&ring.normals) {
             near(*normal, -position.with_y(0.0), 1e-15, position);
         }
@@ -147,7 +148,7 @@ fn shapes_are_those_of_the_references() {
 #[test]
 fn pool_has_its_waves() {
     let scene = built_in("pool");
-    let water = &object(&scene, "water").mesh;
+    let water = object(&scene, "water").mesh_in_scene();
     let height = |x: f64, z: f64| {
         1.0 + 0.02 * ((9.0 * x + 1.0).cos() + (7.0 * z + 2.0).cos() + (6.0 * x + 5.0 * z).cos())
     };
@@ -160,7 +161,7 @@ fn pool_has_its_waves() {
         assert!(normal.distance(expected) < 1e-9, "{normal} instead of {expected}");
     }
     let scene = built_in("paraboloid");
-    let dish = &object(&scene, "paraboloid").mesh;
+    let dish = object(&scene, "paraboloid").mesh_in_scene();
     let LightKind::Sun { direction, .. } = scene.lights[0].kind else {
         panic!("paraboloid is lit by a sun");
     };
@@ -182,7 +183,8 @@ fn pool_has_its_waves() {
 fn showroom_has_its_own_coordinates() {
     let scene = built_in("showroom");
     assert!(scene.triangle_count() < 300_000, "{}", scene.triangle_count());
-    for (index, Object { name, mesh, .. }) in scene.objects.iter().enumerate() {
+    for (index, object) in scene.objects.iter().enumerate() {
+        let (name, mesh) = (&object.name, object.mesh_in_scene());
         if scene.material_of(index).surface != SurfaceKind::Diffuse {
             continue;
         }
@@ -282,7 +284,7 @@ fn spectra_fall_on_the_wall_in_view() {
     let scene = built_in("spectrum");
     let (prism, ball) = (object(&scene, "prism"), object(&scene, "ball"));
     let glass = &scene.materials[prism.material];
-    let (low, high) = ball.mesh.bounds().expect("has vertices");
+    let (low, high) = ball.mesh_in_scene().bounds().expect("has vertices");
     let centre = 0.5 * (low + high);
     let beam = |index: usize| match scene.lights[index].kind {
         LightKind::Spot {
@@ -293,8 +295,8 @@ fn spectra_fall_on_the_wall_in_view() {
     let hits = |nm: f64| {
         let n = glass.index_at(Nanometres(nm));
         let (origin, direction) = beam(0);
-        let (entry, inside) = through_face(&prism.mesh, origin, direction, n);
-        let (exit, out) = through_face(&prism.mesh, entry, inside, 1.0 / n);
+        let (entry, inside) = through_face(prism.mesh_in_scene(), origin, direction, n);
+        let (exit, out) = through_face(prism.mesh_in_scene(), entry, inside, 1.0 / n);
         let (origin, direction) = beam(1);
         let (last, back) = through_ball(centre, 0.06, origin, direction, n);
         [at_wall(exit, out), at_wall(last, back)]
@@ -329,9 +331,9 @@ fn bowl_stands_in_daylight() {
     let scene = built_in("bowl");
     let bowl = object(&scene, "bowl");
     // Between the half of an ellipsoid that is missing and the cone frustums around: rather thick.
-    let filled_m3 = volume_m3(&bowl.mesh) + 2.0 / 3.0 * PI * 0.128 * 0.128 * 0.084;
+    let filled_m3 = volume_m3(bowl.mesh_in_scene()) + 2.0 / 3.0 * PI * 0.128 * 0.128 * 0.084;
     assert!((0.0033..0.0040).contains(&filled_m3), "{filled_m3} m³");
-    let (low, _) = bowl.mesh.bounds().expect("has vertices");
+    let (low, _) = bowl.mesh_in_scene().bounds().expect("has vertices");
     assert!(low.y > 0.0, "it does not stand in the table");
     let glass = &scene.materials[bowl.material];
     assert!(glass.is_dispersive());
@@ -373,8 +375,9 @@ fn casters_are_those_of_the_references() {
         ("mirror", "mirror", SurfaceKind::Mirror, None, 0, 0.6 * 0.5, 1e-14),
     ] {
         let scene = built_in(name);
-        let Object { material, mesh, .. } = object(&scene, part);
-        let material = &scene.materials[*material];
+        let object = object(&scene, part);
+        let mesh = object.mesh_in_scene();
+        let material = &scene.materials[object.material];
         assert_eq!(material.surface, surface, "{name}");
         assert!(ior.is_none_or(|ior| material.ior == ior), "{name}");
         assert!(triangles == 0 || mesh.triangles.len() == triangles, "{name}");
@@ -390,7 +393,12 @@ fn casters_are_those_of_the_references() {
             "{name}"
         );
     }
-    let bounds = |name: &str, part: &str| object(&built_in(name), part).mesh.bounds().expect("has vertices");
+    let bounds = |name: &str, part: &str| {
+        object(&built_in(name), part)
+            .mesh_in_scene()
+            .bounds()
+            .expect("has vertices")
+    };
     let (low, high) = bounds("ring", "ring");
     assert_eq!((low.y, high.y), (0.0, 0.5));
     let (low, high) = bounds("pool", "water");
@@ -402,7 +410,7 @@ fn casters_are_those_of_the_references() {
     assert_close(low.y, 0.2, 1e-14, "lower edge");
     assert_close(high.y, 0.7, 1e-14, "upper edge");
     let ball = built_in("ball");
-    let mesh = &object(&ball, "ball").mesh;
+    let mesh = object(&ball, "ball").mesh_in_scene();
     for (position, normal) in mesh.positions.iter().zip(&mesh.normals) {
         let from_centre = *position - DVec3::new(0.0, 0.8, 0.0);
         assert_close(from_centre.length(), 0.5, 2e-5, "radius");

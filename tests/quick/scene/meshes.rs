@@ -6,7 +6,7 @@ use crate::prelude::*;
 
 fn only_mesh(scene: &Scene) -> &Mesh {
     assert_eq!(scene.objects.len(), 1);
-    &scene.objects[0].mesh
+    scene.objects[0].mesh_in_scene()
 }
 
 pub fn volume_m3(mesh: &Mesh) -> f64 {
@@ -181,8 +181,8 @@ fn strips_and_fans_face_as_specified() {
     let scene = file.scene();
     assert_eq!(scene.objects.len(), 3);
     for object in &scene.objects[..2] {
-        assert_close(object.mesh.area_m2(), 1.0, 1e-15, "area");
-        assert!((0..2).all(|triangle| object.mesh.face_normal(triangle) == DVec3::Z));
+        assert_close(object.mesh_in_scene().area_m2(), 1.0, 1e-15, "area");
+        assert!((0..2).all(|triangle| object.mesh_in_scene().face_normal(triangle) == DVec3::Z));
     }
     warns(&scene, "mesh2 | points or lines");
     warns(&scene, "mesh3 | 1 vertices at its end make no triangle");
@@ -254,6 +254,50 @@ fn loops_shared_nodes_and_deep_chains_end() {
         only_mesh(&scene).positions[0] + scene.origin_world,
         DVec3::X * 1e5
     );
+}
+
+#[test]
+fn nodes_share_their_mesh_and_stand_as_if_alone() {
+    let placed = [
+        json!({}),
+        json!({ "translation": [1.0, 0.5, 0.25] }),
+        json!({ "rotation": [0.0, FRAC_1_SQRT_2, 0.0, FRAC_1_SQRT_2], "scale": [1.0, 2.0, 3.0] }),
+        json!({ "scale": [-1.0, 1.0, 1.0] }),
+        json!({ "scale": [1.0, 1.0, -2.0] }),
+    ];
+    let mut flat = Glb::tetrahedron();
+    attributes(&mut flat)
+        .as_object_mut()
+        .expect("is an object")
+        .remove("NORMAL");
+    for (of, shared) in [
+        // Corners are split in the order of the scene's triangles.
+        (flat, vec![(1, 2), (3, 4)]),
+        (Glb::tetrahedron(), vec![(1, 2), (2, 3), (3, 4)]),
+    ] {
+        let with = |nodes: &[Value]| {
+            let mut file = of.clone();
+            file.json["scenes"][0]["nodes"] = json!([]);
+            for node in nodes {
+                let mut node = node.clone();
+                node["mesh"] = json!(0);
+                file.push_root(node);
+            }
+            file.scene()
+        };
+        let scene = with(&placed);
+        for (object, node) in scene.objects.iter().zip(&placed) {
+            let alone = with(std::slice::from_ref(node));
+            assert_eq!(**object.mesh_in_scene(), *only_mesh(&alone), "{node}");
+            assert!(volume_m3(object.mesh_in_scene()) > 0.0, "{node}");
+        }
+        for (a, b) in shared {
+            let [a, b] = [a, b].map(|index: usize| scene.objects[index].mesh());
+            assert!(Arc::ptr_eq(a, b));
+        }
+        let first = &scene.objects[0];
+        assert!(Arc::ptr_eq(first.mesh(), first.mesh_in_scene()));
+    }
 }
 
 #[test]

@@ -16,7 +16,7 @@ const PAIRS: [(&str, &str); 7] = [
 
 fn floor(scene: &Scene) -> &Mesh {
     let floor = scene.objects.iter().find(|object| object.name == "floor");
-    &floor.expect("there is a floor").mesh
+    floor.expect("there is a floor").mesh_in_scene()
 }
 
 fn caster(scene: &Scene) -> usize {
@@ -95,7 +95,7 @@ fn files_and_built_in_scenes_agree() {
             1e-12,
             "refractive index",
         );
-        let (a, b) = (&scene.objects[a].mesh, &ours.objects[b].mesh);
+        let (a, b) = (scene.objects[a].mesh_in_scene(), ours.objects[b].mesh_in_scene());
         assert_close(a.area_m2(), b.area_m2(), 1e-5, file);
         assert!(
             b.triangles.len() >= a.triangles.len(),
@@ -153,8 +153,18 @@ fn prism_is_that_of_its_file() {
     assert_same_light(&scene, &ours);
     assert_eq!(scene.objects.len(), ours.objects.len());
     for (index, (theirs, own)) in scene.objects.iter().zip(&ours.objects).enumerate() {
-        assert_eq!(corners(&theirs.mesh), corners(&own.mesh), "{}", own.name);
-        assert_close(theirs.mesh.area_m2(), own.mesh.area_m2(), 1e-4, &own.name);
+        assert_eq!(
+            corners(theirs.mesh_in_scene()),
+            corners(own.mesh_in_scene()),
+            "{}",
+            own.name
+        );
+        assert_close(
+            theirs.mesh_in_scene().area_m2(),
+            own.mesh_in_scene().area_m2(),
+            1e-4,
+            &own.name,
+        );
         let (theirs, own) = (scene.material_of(index), ours.material_of(index));
         assert_eq!(theirs.surface, own.surface);
         assert_eq!(theirs.base_colour, own.base_colour);
@@ -163,7 +173,7 @@ fn prism_is_that_of_its_file() {
             assert_close(a, b, 1e-12, "refractive index");
         }
     }
-    let [wall, own] = [&scene, &ours].map(|scene| &scene.objects[0].mesh);
+    let [wall, own] = [&scene, &ours].map(|scene| scene.objects[0].mesh_in_scene());
     let [uvs, own_uvs] = [wall, own].map(|mesh| mesh.uv0.as_ref().expect("it has TEXCOORD_0"));
     assert_eq!(wall.positions.len(), 4);
     for (position, uv) in wall.positions.iter().zip(uvs) {

@@ -137,6 +137,6 @@ fn data_uris_are_decoded() {
         format!("data:,{percent}"),
     ] {
         let scene = with_uri(&uri, &[]).unwrap_or_else(|error| panic!("{error}"));
-        assert_eq!(scene.objects[0].mesh.area_m2(), 0.5);
+        assert_eq!(scene.objects[0].mesh_in_scene().area_m2(), 0.5);
     }
 }

@@ -56,8 +56,8 @@ fn what_was_set_is_found_again() {
     let kept = Kept::new();
     let mut first = kept.model();
     use_it(&mut first);
-    let Changes { changes, lost } = Changes::between(first.edits().loaded(), first.edits().scene());
-    assert_eq!((changes.len(), lost.len()), (1, 0));
+    let changes = Change::between(first.edits().loaded(), first.edits().scene());
+    assert_eq!(changes.len(), 1);
     let (settings, scene) = (first.choices.settings.clone(), Arc::clone(first.scene()));
     let views = first.navigator.views();
     // At the end everything is written, however little time passed.

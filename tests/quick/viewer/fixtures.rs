@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use glam::{DVec2, DVec3};
 use nephroid::illumination::{Chart, IlluminationMap, Layer, Receiver, UvSet};
 use nephroid::scene::builtin::{self, parts, shapes};
-use nephroid::scene::{Edit, Light, LightKind, LoadOptions, Scene, load};
+use nephroid::scene::{Edit, Light, LightEdit, LightKind, LoadOptions, Scene, load};
 use nephroid::settings::{BakeSettings, LayerKind, MapResolution};
 use nephroid::units::{Flux, Irradiance, RadiantIntensity};
 use nephroid::viewer::ViewerOptions;
@@ -148,15 +148,12 @@ pub fn change(edit: Edit) -> Vec<Command> {
 }
 
 pub fn intensity(light: usize, value: f64) -> Edit {
-    let intensity = RadiantIntensity(value);
-    Edit::LightIntensity { light, intensity }
+    Edit::Light(light, LightEdit::Strength(value))
 }
 
 /// A light that somebody adds.
 pub fn added(light: Light) -> Edit {
-    Edit::LightAdded {
-        added: Arc::new(light),
-    }
+    Edit::AddLight(Arc::new(light))
 }
 
 /// The lines of an event log.
@@ -173,7 +170,7 @@ pub fn read(path: &Path) -> Scene {
 /// A scene after some edits.
 pub fn edited(scene: &Scene, edits: &[Edit]) -> Scene {
     edits.iter().fold(scene.clone(), |scene, edit| {
-        edit.apply(&scene).expect("the edit is possible").0
+        edit.apply(&scene).expect("the edit is possible")
     })
 }
 

@@ -72,53 +72,51 @@ fn nodes_move_and_come_back_bit_for_bit() {
     // Two parts of one node, of which none lies in the node's middle.
     let mut loaded = scene();
     let (ball, last) = (1, loaded.objects.len());
-    let beside = Edit::object_at(ball, &loaded.objects[ball].mesh, dvec3(2.0, 0.5, 0.0));
-    let Edit::ObjectMesh { mesh, .. } = beside else {
-        panic!("it is a mesh")
-    };
     loaded.objects.push(loaded.objects[ball].clone());
-    loaded.objects[last].mesh = mesh;
-    let there = Placement {
-        yaw_rad: 0.7,
-        offset_m: dvec3(0.25, -0.5, 1.0),
-    };
-    let (moved, inverse) = there.edit(ball, &loaded).apply(&loaded).expect("it can be moved");
+    let beside = loaded.objects[last].mesh_in_scene_mut();
+    beside
+        .positions
+        .iter_mut()
+        .for_each(|corner| *corner += dvec3(2.0, 0.5, 0.0));
+    let (yaw_rad, offset_m) = (0.7, dvec3(0.25, -0.5, 1.0));
+    let there = Motion::turned(yaw_rad, offset_m);
+    let moved = edited(&loaded, &[Edit::Place(ball, there)]);
     // Balls of 0.5 m around 0.8 m, and 2 m and 0.5 m further: their box is from −0.5 to 2.5 and from 0.3 to 1.8.
-    let pivot = there.middle_m(ball, &loaded) - there.offset_m;
+    let pivot = loaded.pivot(ball);
     assert!(pivot.distance(dvec3(1.0, 1.05, 0.0)) < 0.02);
-    let turn = DQuat::from_rotation_y(there.yaw_rad);
+    assert_eq!(moved.pivot(last), pivot);
+    let turn = DQuat::from_rotation_y(yaw_rad);
     for part in [ball, last] {
-        let [was, is] = [&loaded, &moved].map(|scene| &scene.objects[part].mesh.positions);
+        let [was, is] = [&loaded, &moved].map(|scene| &scene.objects[part].mesh_in_scene().positions);
         for (was, is) in was.iter().zip(is) {
-            near(*is, turn * (*was - pivot) + pivot + there.offset_m, 1e-12, part);
+            near(*is, turn * (*was - pivot) + pivot + offset_m, 1e-12, part);
         }
-        let found = Placement::of(part, &loaded, &moved).expect("it is a turn and a way");
-        near(found.yaw_rad, there.yaw_rad, 1e-8, "turn");
-        near(found.offset_m, there.offset_m, 1e-8, "offset");
+        let found = moved.objects[part].motion();
+        assert_eq!((found.yaw_rad(), found.translation), (Some(yaw_rad), offset_m));
     }
-    let [floor, same_floor] = [&loaded, &moved].map(|scene| &scene.objects[0].mesh);
+    let [floor, same_floor] = [&loaded, &moved].map(|scene| scene.objects[0].mesh_in_scene());
     assert!(Arc::ptr_eq(floor, same_floor), "nothing else moves");
-    for back in [inverse, Placement::default().edit(ball, &loaded)] {
-        let back = edited(&moved, &[back]);
-        assert_eq!(back.objects[last].mesh, loaded.objects[last].mesh);
+    let undone = EditState::of(&loaded).set(&moved);
+    for back in [undone, edited(&moved, &[Edit::Place(ball, Motion::default())])] {
+        assert!(back.objects[last].stands_as(&loaded.objects[last]));
+        assert_eq!(
+            back.objects[last].mesh_in_scene(),
+            loaded.objects[last].mesh_in_scene()
+        );
     }
-    let tilt = Edit::ObjectMoved {
-        object: ball,
+    let tilt = Motion {
         rotation: DQuat::from_rotation_x(0.5),
         translation: DVec3::ZERO,
     };
-    let tilted = edited(&loaded, &[tilt]);
-    // No turn about the vertical.
-    assert_eq!(Placement::of(ball, &loaded, &tilted), None);
+    assert_eq!(tilt.yaw_rad(), None, "no turn about the vertical");
 }
 
 /// Pulls a handle by some points of the picture; the scene after each edit that asks for.
 fn pull(held: Held, handle: &str, by: egui::Vec2) -> Vec<Scene> {
-    let loaded = scene();
     let mut harness = Harness::builder().with_size(SIZE).build_ui_state(
         |ui, (gizmo, scenes): &mut (Gizmo, Vec<Scene>)| {
             let (camera, now) = (camera(), scenes[scenes.len() - 1].clone());
-            let edit = gizmo.show(ui, &lens(&camera), Some(held), (&now, &loaded));
+            let edit = gizmo.show(ui, &lens(&camera), Some(held), &now);
             scenes.extend(edit.map(|edit| edited(&now, &[edit])));
         },
         (Gizmo::default(), vec![scene()]),
@@ -165,12 +163,18 @@ fn lights_follow_one_axis() {
 fn objects_turn_about_their_vertical() {
     let placed = |handle: &str, by: egui::Vec2| {
         let scenes = pull(Held::Object(1), handle, by);
-        Placement::of(1, &scenes[0], &scenes[scenes.len() - 1]).expect("a turn or a way")
+        *scenes[scenes.len() - 1].objects[1].motion()
     };
     let turned = placed("Turn", vec2(-50.0, 10.0));
-    assert!(turned.yaw_rad.abs() > 0.1, "{turned:?}");
-    assert_eq!(turned.offset_m, DVec3::ZERO);
+    assert!(
+        turned.yaw_rad().is_some_and(|yaw_rad| yaw_rad.abs() > 0.1),
+        "{turned:?}"
+    );
+    assert_eq!(turned.translation, DVec3::ZERO);
     let moved = placed("Move z", vec2(-20.0, 30.0));
-    assert!(moved.offset_m.z > 0.05 && moved.yaw_rad == 0.0, "{moved:?}");
-    assert_eq!(moved.offset_m.with_z(0.0), DVec3::ZERO);
+    assert!(
+        moved.translation.z > 0.05 && moved.rotation == DQuat::IDENTITY,
+        "{moved:?}"
+    );
+    assert_eq!(moved.translation.with_z(0.0), DVec3::ZERO);
 }

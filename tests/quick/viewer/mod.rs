@@ -47,7 +47,7 @@ use nephroid::eye_pass::renderer::GpuMs;
 use nephroid::illumination::IlluminationMap;
 use nephroid::illumination::difference::Difference;
 use nephroid::progress::Stage;
-use nephroid::scene::changes::Changes;
+use nephroid::scene::changes::Change;
 use nephroid::scene::load::save;
 use nephroid::session::StopReason;
 use nephroid::settings::{Estimator, LEAST_MAX_ERROR, Sigma};
@@ -60,7 +60,6 @@ use nephroid::viewer::model::{Model, QUIET};
 use nephroid::viewer::navigation::Travel;
 use nephroid::viewer::new_light::NewLight;
 use nephroid::viewer::panel::{Display, LayerShown, Quantity};
-use nephroid::viewer::placement::Placement;
 use nephroid::viewer::worker::{BakeState, BakedLevel};
 
 use crate::prelude::*;

@@ -190,8 +190,7 @@ fn edits_are_baked_and_undone() {
         assert_eq!(flux(&model), before);
     }
 
-    let (material, ior) = (0, 0.5);
-    act(&mut model, change(Edit::MaterialIor { material, ior }));
+    act(&mut model, change(Edit::Material(0, MaterialEdit::Ior(0.5))));
     let refusal = model.refusal.as_ref().expect("it is refused");
     assert!(refusal.contains("0.5"), "{refusal}");
     assert!(!model.state.is_baking());

@@ -15,27 +15,17 @@ fn edits() -> Vec<Edit> {
         direction: DVec3::X,
         phase_rad: 0.5,
     };
-    let moved = |object, yaw_rad, translation| Edit::ObjectMoved {
-        object,
-        rotation: DQuat::from_rotation_y(yaw_rad),
-        translation,
-    };
-    let (light, material) = (0, 1);
-    let (position, colour) = (dvec3(0.25, 2.0, 0.5), rgb(1.0, 0.5, 0.25));
-    let size = LightSize::Radius { radius_m: 0.05 };
-    let (base_colour, roughness) = (rgb(0.1, 0.2, 0.3), 0.25);
+    let moved = |object, yaw_rad, way| Edit::Place(object, Motion::turned(yaw_rad, way));
+    let light = |edit| Edit::Light(0, edit);
     let waves = Some(Waves::new(vec![wave]).expect("it is one"));
     vec![
-        intensity(light, 2.5),
-        Edit::LightPosition { light, position },
-        Edit::LightColour { light, colour },
-        Edit::LightSize { light, size },
-        Edit::MaterialTint {
-            material: 0,
-            base_colour,
-        },
-        Edit::MaterialRoughness { material, roughness },
-        Edit::MaterialWaves { material, waves },
+        light(LightEdit::Strength(2.5)),
+        light(LightEdit::Position(dvec3(0.25, 2.0, 0.5))),
+        light(LightEdit::Colour(rgb(1.0, 0.5, 0.25), None)),
+        light(LightEdit::Size(LightSize::Radius { radius_m: 0.05 })),
+        Edit::Material(0, MaterialEdit::BaseColour(rgb(0.1, 0.2, 0.3))),
+        Edit::Material(1, MaterialEdit::Roughness(0.25)),
+        Edit::Material(1, MaterialEdit::Waves(waves)),
         moved(1, 0.3, dvec3(0.1, 0.2, -0.3)),
         moved(0, 0.0, dvec3(0.0, -0.125, 0.0)),
     ]
@@ -46,7 +36,12 @@ fn assert_same(read: &Scene, saved: &Scene) {
     assert_eq!(read.objects.len(), saved.objects.len());
     for (a, b) in read.objects.iter().zip(&saved.objects) {
         assert_eq!(a.name, b.name);
-        for (a, b) in a.mesh.positions.iter().zip(&b.mesh.positions) {
+        for (a, b) in a
+            .mesh_in_scene()
+            .positions
+            .iter()
+            .zip(&b.mesh_in_scene().positions)
+        {
             near(*a, *b, 1e-9, "corner");
         }
     }
@@ -140,20 +135,17 @@ fn glass_spectra_and_directions_are_saved() {
         Glass::parse("N-BK7").expect("it is known"),
         Glass::with_abbe_number(1.7, 30.0),
     ] {
+        let substance = MaterialEdit::Substance {
+            ior: glass.dispersion.index(D_LINE),
+            glass: Some(Arc::new(glass.clone())),
+            base_colour: loaded.materials[1].base_colour,
+            metal: None,
+        };
+        let colour = lamp.xyz().to_linear_srgb();
         let edits = [
-            Edit::MaterialSubstance {
-                material: 1,
-                ior: glass.dispersion.index(D_LINE),
-                glass: Some(Arc::new(glass.clone())),
-                base_colour: loaded.materials[1].base_colour,
-                metal: None,
-            },
-            Edit::LightSpectrum {
-                light: 0,
-                colour: lamp.xyz().to_linear_srgb(),
-                spectrum: Some(Arc::clone(&lamp)),
-            },
-            Edit::LightDirection { light: 0, direction },
+            Edit::Material(1, substance),
+            Edit::Light(0, LightEdit::Colour(colour, Some(Arc::clone(&lamp)))),
+            Edit::Light(0, LightEdit::Direction(direction)),
         ];
         let (read, _) = saved(&loaded, &edited(&loaded, &edits));
         let found = read.materials[1].glass.as_ref().expect("it is of glass");
@@ -183,10 +175,9 @@ fn what_no_file_can_hold_is_refused() {
     let folder = folder();
     let source = scene_file::glb(folder.path(), "a", "300");
     let loaded = read(&source);
-    let mut mesh = (*loaded.objects[1].mesh).clone();
+    let mut squeezed = loaded.clone();
+    let mesh = squeezed.objects[1].mesh_in_scene_mut();
     mesh.positions.iter_mut().for_each(|corner| corner.y *= 0.5);
-    let mesh = Arc::new(mesh);
-    let squeezed = edited(&loaded, &[Edit::ObjectMesh { object: 1, mesh }]);
     let ring = built_in("ring");
     let target = folder.path().join("saved.glb");
     let refusal = |loaded: &Scene, scene: &Scene| {

@@ -42,14 +42,9 @@ fn panel() -> Headless {
 /// What a slider's edit is of, by kind and index, and the value.
 fn slid(edit: Edit) -> (&'static str, usize, f64) {
     match edit {
-        Edit::LightIntensity { light, intensity } => ("intensity", light, intensity.0),
-        Edit::LightNormalIrradiance {
-            light,
-            normal_irradiance,
-        } => ("irradiance", light, normal_irradiance.0),
-        Edit::LightBrightness { light, brightness } => ("brightness", light, brightness),
-        Edit::MaterialIor { material, ior } => ("ior", material, ior),
-        Edit::MaterialRoughness { material, roughness } => ("roughness", material, roughness),
+        Edit::Light(light, LightEdit::Strength(strength)) => ("strength", light, strength),
+        Edit::Material(material, MaterialEdit::Ior(ior)) => ("ior", material, ior),
+        Edit::Material(material, MaterialEdit::Roughness(roughness)) => ("roughness", material, roughness),
         other => panic!("{other:?}"),
     }
 }
@@ -64,10 +59,10 @@ fn sliders_ask_for_their_edit() {
     let (brighter, darker) = (Drag("Brightness", 0.5, 0.75), Drag("Brightness", 0.5, 0.25));
     let (bent, rough) = (Drag("Refractive index", 0.25, 0.5), Drag("Roughness", 0.0, 0.5));
     for (list, name, gesture, kind, range) in [
-        ("Light", "lamp", power, ("intensity", 0), 5.0 * lamp..20.0 * lamp),
-        ("Light", "sun", beam, ("irradiance", 1), 0.1..0.4),
-        ("Light", "panel", brighter, ("brightness", 3), 15.0..60.0),
-        ("Light", "sky", darker, ("brightness", 4), 0.05..0.2),
+        ("Light", "lamp", power, ("strength", 0), 5.0 * lamp..20.0 * lamp),
+        ("Light", "sun", beam, ("strength", 1), 0.1..0.4),
+        ("Light", "panel", brighter, ("strength", 3), 15.0..60.0),
+        ("Light", "sky", darker, ("strength", 4), 0.05..0.2),
         ("Object", "ball", bent, ("ior", 1), 1.7..2.3),
         ("Object", "ball", rough, ("roughness", 1), 0.3..0.7),
     ] {
@@ -84,15 +79,15 @@ fn sliders_ask_for_their_edit() {
 #[test]
 fn numbers_ask_for_their_edit() {
     let mut panel = panel();
-    let at = |light, position| Edit::LightPosition { light, position };
+    let at = |light, position| Edit::Light(light, LightEdit::Position(position));
     let ball = |light, radius_m| {
         let size = LightSize::Radius { radius_m };
-        Edit::LightSize { light, size }
+        Edit::Light(light, LightEdit::Size(size))
     };
     let disc = |degrees: f64| {
         let diameter_rad = degrees.to_radians();
         let size = LightSize::Angle { diameter_rad };
-        Edit::LightSize { light: 1, size }
+        Edit::Light(1, LightEdit::Size(size))
     };
     let (y, z) = (Type("Position [m]: y", "2.5"), Type("Position [m]: z", "2.5"));
     for (light, gesture, expected) in [
@@ -104,7 +99,7 @@ fn numbers_ask_for_their_edit() {
         ("sun", Type("Diameter [°]", "0.53"), disc(0.53)),
         // No disc is wider.
         ("sun", Type("Diameter [°]", "500"), disc(180.0)),
-        ("sun", Press("Remove light"), Edit::LightRemoved { light: 1 }),
+        ("sun", Press("Remove light"), Edit::RemoveLight(1)),
     ] {
         panel.choose("Light", light);
         panel.make(gesture);
@@ -115,10 +110,10 @@ fn numbers_ask_for_their_edit() {
     panel.apply();
     panel.type_into("Diameter [°]", "0");
     let size = LightSize::None;
-    assert_eq!(panel.edit(), Some(Edit::LightSize { light: 1, size }));
+    assert_eq!(panel.edit(), Some(Edit::Light(1, LightEdit::Size(size))));
     // From 45° above the horizon to straight down, with the azimuth kept.
     panel.type_into("Direction [°]: elevation", "-90");
-    let Some(Edit::LightDirection { light: 1, direction }) = panel.edit() else {
+    let Some(Edit::Light(1, LightEdit::Direction(direction))) = panel.edit() else {
         panic!("no direction")
     };
     assert!(direction.y < -0.999_999 && direction.z < 0.0, "{direction}");
@@ -152,19 +147,19 @@ fn objects_move_from_their_place_in_the_file() {
     let mut panel = panel();
     panel.choose("Object", "ball");
     let loaded = Arc::clone(panel.model.scene());
-    let low = |scene: &Scene| scene.objects[1].mesh.bounds().expect("a ball").0;
+    let low = |scene: &Scene| scene.objects[1].mesh_in_scene().bounds().expect("a ball").0;
     panel.type_into("Offset [m]: y", "0.25");
     let moved = panel.apply();
     near(low(&moved) - low(&loaded), DVec3::Y * 0.25, 1e-12, "offset");
     panel.assert_says(&["y: 0.25"]);
     panel.type_into("Offset [m]: y", "0");
     let back = panel.apply();
-    let (back, loaded) = (&back.objects[1].mesh, &loaded.objects[1].mesh);
+    let (back, loaded) = (back.objects[1].mesh_in_scene(), loaded.objects[1].mesh_in_scene());
     assert!(Arc::ptr_eq(back, loaded), "the file's place exactly");
     panel.type_into("Turn [°]", "90");
     let turned = panel.apply();
-    let found = Placement::of(1, panel.model.loaded(), &turned).expect("a turn");
-    near(found.yaw_rad, FRAC_PI_2, 1e-8, "turn");
+    let yaw_rad = turned.objects[1].motion().yaw_rad().expect("a turn");
+    near(yaw_rad, FRAC_PI_2, 1e-8, "turn");
 }
 
 #[test]
@@ -176,10 +171,7 @@ fn waves_keep_their_proportions() {
     panel.choose("Object", "water");
     assert_eq!(panel.edit(), None);
     let asked = |panel: &mut Headless| match panel.edit() {
-        Some(Edit::MaterialWaves {
-            material: 1,
-            waves: Some(waves),
-        }) => waves,
+        Some(Edit::Material(1, MaterialEdit::Waves(Some(waves)))) => waves,
         other => panic!("{other:?}"),
     };
     panel.drag("Waves' slope", 0.48, 0.24);

@@ -33,7 +33,7 @@ fn flat_mirrors_send_light_as_from_an_image() {
     let mirror = (0..scene.objects.len())
         .find(is_mirror)
         .expect("there is a mirror");
-    let mirror = &scene.objects[mirror].mesh;
+    let mirror = scene.objects[mirror].mesh_in_scene();
     let [a, b, c] = mirror.corners(0);
     let normal = (b - a).cross(c - a).normalize();
     let (low, high) = mirror.bounds().expect("it has corners");

@@ -278,7 +278,7 @@ fn against_theory(bake: &Baked, theory: impl Fn(DVec3) -> f64) -> f64 {
 /// Where coordinates of a map lie on a flat surface.
 fn place(scene: &Scene, map: &IlluminationMap, uv: DVec2) -> DVec3 {
     let [a, b, c] = map.chart.corner_uvs[0];
-    let [pa, pb, pc] = scene.objects[map.chart.object()].mesh.corners(0);
+    let [pa, pb, pc] = scene.objects[map.chart.object()].mesh_in_scene().corners(0);
     let weights = DMat2::from_cols(b - a, c - a).inverse() * (uv - a);
     pa + (pb - pa) * weights.x + (pc - pa) * weights.y + scene.origin_world
 }

@@ -1,8 +1,6 @@
 //! Scenes in one expression. Metres, watts, y up; the receiver whose E is known is the object `floor`.
 
 use std::f64::consts::PI;
-use std::sync::Arc;
-
 use glam::DVec3;
 use nephroid::optics::LinearSrgb;
 use nephroid::scene::builtin::{parts, shapes};
@@ -65,7 +63,7 @@ impl Build for Scene {
     }
 
     fn reshaped(mut self, object: usize, change: impl FnOnce(&mut Mesh)) -> Self {
-        change(Arc::make_mut(&mut self.objects[object].mesh));
+        change(self.objects[object].mesh_in_scene_mut());
         self
     }
 }

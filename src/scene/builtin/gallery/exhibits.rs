@@ -81,7 +81,8 @@ fn add_basin(scene: &mut Scene, stone: usize) {
     let first = scene.objects.len();
     basin.add(scene, mosaic, stone);
     for object in &mut scene.objects[first..] {
-        object.mesh = room::in_metres(object.mesh.as_ref().clone()).into();
+        let mesh = object.mesh_in_scene_mut();
+        *mesh = room::in_metres(std::mem::take(mesh));
     }
 }
 

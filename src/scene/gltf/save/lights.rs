@@ -6,7 +6,6 @@ use serde_json::json;
 
 use super::placing::Placing;
 use crate::error::{Error, Result};
-use crate::scene::changes::direction;
 use crate::scene::gltf::glb::Glb;
 use crate::scene::gltf::light::Origin;
 use crate::scene::gltf::spectrum;
@@ -73,7 +72,7 @@ impl Edited<'_> {
     /// Turns and moves its node, as little as the light itself was.
     fn place(&self, origin: &Origin, shift: DVec3, placing: &mut Placing<'_>) -> Result<()> {
         let (was, is) = (&self.was.kind, &self.is.kind);
-        let turn = match (direction(was), direction(is)) {
+        let turn = match (was.direction(), is.direction()) {
             (Some(was), Some(is)) if was != is => DQuat::from_rotation_arc(was.normalize(), is.normalize()),
             _ => DQuat::IDENTITY,
         };

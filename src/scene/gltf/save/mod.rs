@@ -4,7 +4,7 @@
 use std::mem::discriminant;
 use std::path::Path;
 
-use glam::{DAffine3, DVec3};
+use glam::DVec3;
 
 use self::lights::Edited;
 use self::placing::Placing;
@@ -16,8 +16,7 @@ use super::report::Report;
 use super::{File, substance, write};
 use crate::error::{Error, Result, Warning};
 use crate::files;
-use crate::scene::changes::Motion;
-use crate::scene::{Light, LightKind, LoadOptions, Scene};
+use crate::scene::{Light, LightKind, LoadOptions, Motion, Scene};
 
 mod lights;
 mod placing;
@@ -158,28 +157,14 @@ impl Patch<'_> {
     }
 
     fn objects(&mut self) -> Result<()> {
-        let pairs = self.loaded.objects.iter().zip(&self.edited.objects);
-        for (was, is) in pairs {
-            let motion = Motion::between(&was.mesh, &is.mesh).ok_or_else(|| {
-                Error::failure(
-                    format!("object `{}`", is.name),
-                    "has another shape than its file gives it, which cannot be saved",
-                    "take that edit back and save again",
-                )
-            })?;
-            let Some(stands) = self.placing.of(is.node) else {
-                continue;
-            };
-            let centre = Motion::centre(&was.mesh) + self.edited.origin_world;
-            // Parts of one node that rest and parts that move are told apart too.
-            let is_moved = motion.is_some();
-            let moved = motion.map_or(stands, |motion| about(&motion, centre) * stands);
-            let is_of_moved = || {
-                let mut parts = self.loaded.objects.iter().zip(&self.edited.objects);
-                parts.any(|(a, b)| b.node == is.node && !std::sync::Arc::ptr_eq(&a.mesh, &b.mesh))
-            };
-            if is_moved || is_of_moved() {
-                self.placing.put(is.node, moved, &is.name)?;
+        for (index, object) in self.edited.objects.iter().enumerate() {
+            let motion = object.motion();
+            if *motion != Motion::default()
+                && let Some(stands) = self.placing.of(object.node)
+            {
+                let pivot = self.edited.pivot(index) + self.edited.origin_world;
+                self.placing
+                    .put(object.node, motion.about(pivot) * stands, &object.name)?;
             }
         }
         Ok(())
@@ -191,12 +176,6 @@ impl Patch<'_> {
 fn is_to_be_written(light: usize, loaded: &Scene, edited: &Scene) -> bool {
     let was = edited.light_when_loaded(light).map(|place| &loaded.lights[place]);
     was != Some(&edited.lights[light]) || !edited.light_list.added.is_empty()
-}
-
-/// A motion about a point, in the world's coordinates [m].
-fn about(motion: &Motion, centre: DVec3) -> DAffine3 {
-    let turn = DAffine3::from_quat(motion.rotation);
-    DAffine3::from_translation(centre + motion.translation) * turn * DAffine3::from_translation(-centre)
 }
 
 /// Reads what is to be written as anybody would, and refuses it where that is not the edited scene.
@@ -213,7 +192,11 @@ fn check(bytes: &[u8], original: &Path, edited: &Scene, options: &LoadOptions) -
     let shift = read.origin_world - edited.origin_world;
     let is_at = |a: DVec3, b: DVec3| (a + shift).distance(b) <= SAME * extent_m;
     for (read, is) in read.objects.iter().zip(&edited.objects) {
-        let mut corners = read.mesh.positions.iter().zip(&is.mesh.positions);
+        let mut corners = read
+            .mesh_in_scene()
+            .positions
+            .iter()
+            .zip(&is.mesh_in_scene().positions);
         if !corners.all(|(read, is)| is_at(*read, *is)) {
             return Err(differs(format!("object `{}`", is.name)));
         }

@@ -73,7 +73,7 @@ fn add_object(object: &Object, shift: DVec3, glb: &mut Glb) {
         uv0,
         uv1,
         triangles,
-    } = &*object.mesh;
+    } = &**object.mesh_in_scene();
     let vectors = |list: &[DVec3], shift: DVec3| -> Vec<[f32; 3]> {
         let shifted = list.iter().map(|vector| (*vector + shift).as_vec3().to_array());
         shifted.collect()
@@ -137,9 +137,9 @@ mod tests {
         for (wanted, found) in scene.objects.iter().zip(&read.objects) {
             assert_eq!(wanted.name, found.name);
             assert_eq!((wanted.node, wanted.primitive), (found.node, found.primitive));
-            let area_m2 = wanted.mesh.area_m2();
+            let area_m2 = wanted.mesh_in_scene().area_m2();
             assert!(
-                (found.mesh.area_m2() - area_m2).abs() < 1e-4 * area_m2,
+                (found.mesh_in_scene().area_m2() - area_m2).abs() < 1e-4 * area_m2,
                 "{name}: {}",
                 wanted.name
             );
