@@ -12,7 +12,7 @@ use nephroid::illumination::{IlluminationMap, Layer, parametrise};
 use nephroid::progress::Control;
 use nephroid::scene::Scene;
 use nephroid::scene::builtin::parts;
-use nephroid::settings::{BakeSettings, ErrorMetric, LayerKind};
+use nephroid::settings::{BakeSettings, Estimator, LayerKind};
 use nephroid::study::agreement::{caustic_luminance, pair_maps};
 use nephroid::study::brute_force::{brute_force, relative_noise};
 use nephroid::transport::Tracer;
@@ -23,7 +23,7 @@ use support::hard_scenes::{self, Shading, TinyBall};
 use support::laws::law::deposited_w;
 use support::laws::{Baked, Table};
 use support::project_file;
-use support::tools::{bake, builtin_scene, energy_fault, map_of, settings};
+use support::tools::{at, bake, builtin_scene, energy_fault, map_of, settings};
 
 /// Texels of all maps across and down.
 const SIDE: usize = 64;
@@ -154,8 +154,8 @@ fn from_reference(bake: &Baked) -> f64 {
 fn auto_comes_close(scene: &Scene) {
     let settings = BakeSettings {
         max_error: Some(AIM),
-        error_metric: ErrorMetric::Rmse,
-        ..settings(BakeSettings::starting_density_per_sr(AIM), SIDE)
+        estimator: Estimator::Auto,
+        ..at(BakeSettings::starting_density_per_sr(AIM), SIDE)
     };
     let result = bake(scene.clone(), &settings);
     let (maps, noise) = stored(scene);
