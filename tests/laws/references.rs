@@ -142,9 +142,13 @@ pub fn fill(t: &mut Table) {
 
 /// Relative RMSE over all maps and by area, without the reference's noise.
 fn from_reference(bake: &Baked) -> f64 {
-    let (maps, noise) = stored(&bake.scene);
+    distance(&bake.scene, &bake.result.maps)
+}
+
+fn distance(scene: &Scene, baked: &[IlluminationMap]) -> f64 {
+    let (maps, noise) = stored(scene);
     assert!(noise <= LARGEST_NOISE, "{noise}");
-    let pairs = pair_maps(&bake.result.maps, &maps).expect("maps of one size");
+    let pairs = pair_maps(baked, &maps).expect("maps of one size");
     let rmse = Agreement::of(&pairs)
         .expect("a reference with light")
         .relative_rmse;
@@ -158,10 +162,7 @@ fn auto_comes_close(scene: &Scene) {
         ..at(BakeSettings::starting_density_per_sr(AIM), SIDE)
     };
     let result = bake(scene.clone(), &settings);
-    let (maps, noise) = stored(scene);
-    let pairs = pair_maps(&result.maps, &maps).expect("maps of one size");
-    let rmse = Agreement::of(&pairs).expect("light").relative_rmse;
-    let error = (rmse * rmse - noise * noise).max(0.0).sqrt();
+    let error = distance(scene, &result.maps);
     let estimate = result.estimated_relative_rmse.expect("an estimate");
     assert!(error <= AIM, "{}: {error}", scene.name);
     assert!(
