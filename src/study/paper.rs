@@ -33,6 +33,7 @@ pub(super) type Way = (&'static str, fn(f64) -> BakeSettings);
 const AS_PAPER: Way = ("splat, as the paper", paper);
 pub(super) const SPLAT: Way = ("splat", splat);
 pub(super) const WAVEFRONT: Way = ("wavefront", wavefront);
+pub(super) const AUTO: Way = ("auto", auto);
 
 /// What "as the paper" means.
 const AS_PAPER_NOTE: &str = "As the paper: jittered rays, a cube around the light, discs of the wavefront's area, point samples \
@@ -61,6 +62,14 @@ pub(super) fn wavefront(density_per_sr: f64) -> BakeSettings {
     BakeSettings {
         density_per_sr,
         ..BakeSettings::of(Estimator::Wavefront)
+    }
+}
+
+/// The estimator that is used unless another is asked for.
+pub(super) fn auto(density_per_sr: f64) -> BakeSettings {
+    BakeSettings {
+        density_per_sr,
+        ..BakeSettings::of(Estimator::Auto)
     }
 }
 

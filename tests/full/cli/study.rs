@@ -151,7 +151,7 @@ fn built_in_studies_keep_their_laws() {
     for law in LAWS.lines().skip(1) {
         check_law(&tables, law);
     }
-    let reached = tables["accuracy"].of("estimator", "wavefront");
+    let reached = tables["accuracy"].of("estimator", "auto");
     let targets = reached.numbers("target").into_iter();
     assert!(
         reached
