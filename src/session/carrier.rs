@@ -1,6 +1,6 @@
 //! What carries a light: patches of its wavefront, or photons.
 //!
-//! Light of many places, of a continuous spectrum that a surface parts, and on rough surfaces is for photons. Of any other light `auto` makes a few photons first; they
+//! Light of many places and on rough surfaces is for photons. Of any other light `auto` makes a few photons first; they
 //! tell what the target would cost by photons, and patches go on while they cost less than that. Costs are counted
 //! operations, so that the choice does not depend on the machine.
 
@@ -117,14 +117,8 @@ impl CausticLayer<'_> {
     pub(super) fn carrier(&self, light: &AimedLight) -> Carrier {
         match self.settings.estimator {
             Estimator::Photon => Carrier::Photons,
-            Estimator::Auto => {
-                let is_for_photons = self.is_soft(light) || self.spectra.is_interpolated(light.light);
-                if is_for_photons || self.settings.max_error.is_none() {
-                    Carrier::Photons
-                } else {
-                    Carrier::Undecided
-                }
-            }
+            Estimator::Auto if self.settings.max_error.is_none() || self.is_soft(light) => Carrier::Photons,
+            Estimator::Auto => Carrier::Undecided,
             Estimator::Wavefront => Carrier::Patches,
             Estimator::Splat => Carrier::Splats,
         }

@@ -167,18 +167,6 @@ impl Spectra {
         self.of_lights.get(&light)?.photons.as_ref()
     }
 
-    /// Whether patches would interpolate a light between a few of its wavelengths, with an error that no level tells.
-    pub(super) fn is_interpolated(&self, light: usize) -> bool {
-        let spectral = self.of_lights.get(&light);
-        spectral.is_some_and(|light| {
-            matches!(light.traced, Traced::Whole(_))
-                && light
-                    .photons
-                    .as_ref()
-                    .is_some_and(|photons| photons.tracers().is_some())
-        })
-    }
-
     /// Where in its cell a ray of a band starts, [0, 1)²: bands that share rays out start between each other's, evenly
     /// (M. Roberts' R₂ sequence).
     pub(super) fn ray_place(&self, light: usize, band: Option<usize>) -> DVec2 {
