@@ -73,6 +73,8 @@ pub struct LightError {
     pub relative_rmse: f64,
     /// How many times smaller the error became with the last level.
     pub ratio: f64,
+    /// Whether an audit found more than differences between levels show.
+    pub is_raised: bool,
 }
 
 impl LightError {
@@ -82,6 +84,7 @@ impl LightError {
         if !(factor > 1.0 && factor.is_finite()) {
             return;
         }
+        self.is_raised = true;
         self.relative_rmse *= factor;
         for map in self.maps.values_mut() {
             map.texels.iter_mut().for_each(|error| *error *= factor);

@@ -13,7 +13,7 @@ use crate::illumination::accumulator::FluxUnit;
 use crate::light_pass::accuracy::{self, Images, LightError};
 use crate::light_pass::caustic::pass::Listener;
 use crate::light_pass::caustic::setup::AimedLight;
-use crate::light_pass::ledger_sum::LedgerSum;
+use crate::light_pass::ledger_sum::{Account, LedgerSum};
 use crate::light_pass::photon::filter;
 use crate::light_pass::photon::launch::PhotonLaunch;
 use crate::light_pass::photon::pass::{HALVES, PhotonPass};
@@ -307,12 +307,14 @@ impl CausticLayer<'_> {
         let is_signed = self.spectra.has(light.light);
         let mut maps = first.clone().into_owned();
         maps.add(&second);
+        let mut left = [0; 3];
         if self.settings.filters() {
-            noise.extend(filter::filter(&mut maps, [&first, &second], unit, is_signed));
+            let of_filter = filter::filter(&mut maps, [&first, &second], (unit, is_signed), &mut left);
+            noise.extend(of_filter);
         }
-        if !is_signed {
-            filter::without_negative(&mut maps);
-        }
+        filter::without_negative(&mut maps, is_signed, &mut left);
+        ledger.book_sum(Account::Sampling, left);
+        ledger.book_sum(Account::Deposited, left.map(|count| -count));
         drop((first, second));
         let mut bands = raw.halves[0].bands().to_vec();
         for (band, more) in bands.iter_mut().zip(raw.halves[1].bands()) {

@@ -167,6 +167,12 @@ impl Spectra {
         self.of_lights.get(&light)?.photons.as_ref()
     }
 
+    /// Whether patches interpolate a light between a few of its wavelengths, with an error that is alike at every level.
+    pub(super) fn is_interpolated(&self, light: usize) -> bool {
+        let spectral = self.of_lights.get(&light);
+        spectral.is_some_and(|light| matches!(light.traced, Traced::Whole(_)))
+    }
+
     /// Where in its cell a ray of a band starts, [0, 1)²: bands that share rays out start between each other's, evenly
     /// (M. Roberts' R₂ sequence).
     pub(super) fn ray_place(&self, light: usize, band: Option<usize>) -> DVec2 {

@@ -24,7 +24,11 @@ use crate::settings::{BakeSettings, ErrorMetric};
 fn predicted(measured: &Measured) -> Option<(CostPoint, Forecast)> {
     let (result, target) = (measured.result, measured.variant.settings.max_error?);
     let made = stood_at(&result.course, 5.0 * target)?;
-    let expected = forecast(&result.course[..=made], target, measured.variant.settings.estimator)?;
+    let expected = forecast(
+        &result.course[..=made],
+        target,
+        measured.variant.settings.estimator,
+    )?;
     (result.stop_reason == StopReason::MaxError).then_some((result.course[made], expected))
 }
 
@@ -80,10 +84,7 @@ pub(super) fn accuracy(bench: &Bench) -> Result<Sweep> {
         max_error: Some(target),
         error_metric: ErrorMetric::Rmse,
         max_time_s: Some(limit_s),
-        ..bench.at(
-            auto(BakeSettings::starting_density_per_sr(target)),
-            bench.side(),
-        )
+        ..bench.at(auto(BakeSettings::starting_density_per_sr(target)), bench.side())
     };
     let names = if bench.quick {
         &["mirror", "pool"][..]
