@@ -25,7 +25,7 @@
 //!
 //! A [`session::BakeSession`] that is kept bakes again only what a change of scene or settings affects.
 //!
-//! The [guide](guide): [the window](guide::window), [scenes](guide::scenes), [glass and lights](guide::glass_and_lamps),
+//! The [guide]: [the window](guide::window), [scenes](guide::scenes), [glass and lights](guide::glass_and_lamps),
 //! [surfaces and maps](guide::surfaces), [files and units](guide::formats), [other programs](guide::engines),
 //! [many machines](guide::many_machines), [accuracy](guide::accuracy), [hard cases](guide::hard_cases),
 //! [how it works](guide::how_it_works), [contributing](guide::contributing), [changes](guide::changes).
