@@ -5,26 +5,13 @@ use glam::DVec3;
 use nephroid::effect::{Effect, EffectSwitch, EffectSwitches};
 use nephroid::optics::LinearSrgb;
 use nephroid::progress::Control;
+use nephroid::scene::Scene;
 use nephroid::scene::builtin::{parts, shapes};
-use nephroid::scene::{LightKind, LightSize, PanelShape, Scene};
 use nephroid::settings::{BakeSettings, Estimator};
-use nephroid::units::Radiance;
 
 use crate::bake::common::{floor, off_brute_force, rmse, session, towards};
+use support::hard_scenes::{roughened, under_square_lamp, under_the_suns_disc};
 use support::tools::{at, bake, builtin_scene, energy_fault, photons, set, settings};
-
-/// The ring with a square lamp of a side [m] that shines downwards, with the same intensity on its axis whatever its side.
-fn ring_under_square_lamp(side_m: f64) -> Scene {
-    let mut scene = builtin_scene("ring");
-    scene.lights[0].kind = LightKind::Panel {
-        centre: scene.lights[0].kind.position().expect("a point light"),
-        across: DVec3::X * (0.5 * side_m),
-        down: DVec3::Z * (0.5 * side_m),
-        shape: PanelShape::Rectangle,
-        radiance: Radiance(8.0 / (side_m * side_m)),
-    };
-    scene
-}
 
 /// Photons until a target is reached, with maps of `side` texels each way.
 fn soft(target: f64, side: usize) -> BakeSettings {
@@ -34,7 +21,7 @@ fn soft(target: f64, side: usize) -> BakeSettings {
 #[test]
 fn a_square_lamp_tends_to_a_point() {
     let map_at = |side_m: f64| {
-        let scene = ring_under_square_lamp(side_m);
+        let scene = under_square_lamp("ring", side_m);
         let result = bake(scene.clone(), &soft(0.02, 32));
         assert_eq!(energy_fault(&result), None);
         floor(&result, &scene)
@@ -44,16 +31,6 @@ fn a_square_lamp_tends_to_a_point() {
     // The blur is as wide as the lamp: caustics of about a texel's width change by at least its 0.7th power.
     assert!(off[0] > 0.15, "{off:?}");
     assert!(off.windows(2).all(|pair| pair[1] < 0.65 * pair[0]), "{off:?}");
-}
-
-/// A scene whose specular materials have a roughness.
-fn roughened(name: &str, roughness: f64) -> Scene {
-    let mut scene = builtin_scene(name);
-    let specular = |material: &&mut nephroid::scene::Material| material.surface.is_specular();
-    for material in scene.materials.iter_mut().filter(specular) {
-        material.roughness = roughness;
-    }
-    scene
 }
 
 /// A plate of frosted glass over the floor.
@@ -70,13 +47,9 @@ fn frosted_plate() -> Scene {
 /// What is off brute force may be twice the estimate, as everywhere; rough surfaces are within 3 %.
 #[test]
 fn soft_light_is_as_brute_force_has_it() {
-    let mut sun = builtin_scene("nephroid");
-    sun.lights[0].size = LightSize::Angle {
-        diameter_rad: 0.53_f64.to_radians(),
-    };
     let cases = [
-        ("square lamp", ring_under_square_lamp(0.3), 0.02, false),
-        ("sun of 0.53°", sun, 0.02, false),
+        ("square lamp", under_square_lamp("ring", 0.3), 0.02, false),
+        ("sun of 0.53°", under_the_suns_disc(), 0.02, false),
         ("roughness 0.05", roughened("mirror", 0.05), 0.025, true),
         ("roughness 0.2", roughened("mirror", 0.2), 0.025, true),
         ("roughness 0.5", roughened("mirror", 0.5), 0.025, true),
@@ -118,7 +91,7 @@ fn a_rough_white_mirror_loses_nothing() {
 fn soft_light_is_refused_by_what_cannot_carry_it() {
     for (scene, cause) in [
         (roughened("mirror", 0.2), "is rough"),
-        (ring_under_square_lamp(0.2), "has a size"),
+        (under_square_lamp("ring", 0.2), "has a size"),
     ] {
         for settings in [at(2_000.0, 16), settings(2_000.0, 16)] {
             let refused = session(&scene).bake(&settings, &(), &Control::default());

@@ -57,15 +57,6 @@ fn estimate(result: &BakeResult) -> f64 {
 }
 
 #[test]
-fn a_ball_takes_a_tenth_of_a_dense_map() {
-    let result = bake(builtin_scene("ball"), &auto(2.5e4));
-    let (taken, dense) = memory(&result);
-    assert!(taken * 10 <= dense, "{taken} of {dense} bytes");
-    assert_eq!(result.warnings, []);
-    assert_eq!(energy_fault(&result), None);
-}
-
-#[test]
 fn a_small_caustic_looks_the_same_in_tiles() {
     let scene = torus_over_a_wide_floor();
     assert!(scene.triangle_count() >= 4_000);

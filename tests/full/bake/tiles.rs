@@ -150,20 +150,6 @@ fn triangles_within_leave_nothing_outside() {
 }
 
 #[test]
-fn light_off_the_map_or_nowhere_is_booked() {
-    let mut triangles = triangles(8);
-    for triangle in &mut triangles {
-        triangle.corners = triangle.corners.map(|corner| corner + DVec2::new(1e4, 0.0));
-    }
-    triangles[0].corners[1].x = f64::NAN;
-    let (_, report) = deposited(Some(mixed()), &triangles);
-    assert_eq!(report.deposited, [0; 3]);
-    assert_eq!(report.non_finite, triangles[0].flux.map(i128::from));
-    let rest = triangles[1..].iter().map(|triangle| triangle.flux);
-    assert_eq!(report.outside, sum(rest));
-}
-
-#[test]
 fn balanced_tiles_differ_by_one_level() {
     let columns = 9;
     let mut levels = vec![tiles::COARSEST; columns * 9];

@@ -3,7 +3,7 @@
 use serde_json::{Value, json};
 
 use nephroid::scene::builtin;
-use support::program::{Run, Sandbox};
+use support::program::{Run, Sandbox, number};
 use support::skip;
 
 const QUICK: &str = "--density 1e4 --map-resolution 64 --size 48x32";
@@ -17,10 +17,6 @@ fn run(sandbox: &Sandbox, test: &str, line: &str) -> Option<Run> {
     }
     assert_eq!(run.code, 0, "{line}: {}", run.stderr);
     Some(run)
-}
-
-fn number(value: &Value) -> f64 {
-    value.as_f64().unwrap_or_else(|| panic!("no number: {value}"))
 }
 
 /// Median, 95 % and largest, in order.

@@ -2,11 +2,7 @@
 
 use crate::prelude::*;
 use support::files;
-use support::program::Sandbox;
-
-fn number(value: &Value) -> f64 {
-    value.as_f64().unwrap_or_else(|| panic!("{value} is no number"))
-}
+use support::program::{Sandbox, number};
 
 #[track_caller]
 fn assert_tells(sandbox: &Sandbox, line: &str, words: &str) {

@@ -3,13 +3,9 @@
 use super::without_card;
 use crate::prelude::*;
 use support::files;
-use support::program::{Run, Sandbox};
+use support::program::{Run, Sandbox, number};
 
 const QUICK: &str = "--density 1e3 --map-resolution 32";
-
-fn number(value: &Value) -> f64 {
-    value.as_f64().unwrap_or_else(|| panic!("{value} is no number"))
-}
 
 #[track_caller]
 fn assert_keys(object: &Value, expected: &str) {

@@ -6,11 +6,8 @@ use nephroid::settings::Wavelengths;
 
 use super::Baked;
 use crate::prelude::*;
+use support::program::number;
 use support::tools::{at, energy_fault};
-
-fn number(value: &Value) -> f64 {
-    value.as_f64().unwrap_or_else(|| panic!("{value} is no number"))
-}
 
 #[test]
 fn files_hold_the_watts_of_their_ledgers() {
