@@ -14,7 +14,9 @@ use nephroid::viewer::panel::WIDTH;
 use serde_json::Value;
 use x11rb::connection::Connection as _;
 use x11rb::protocol::Event;
-use x11rb::protocol::xproto::{ChangeWindowAttributesAux, ClientMessageEvent, ConnectionExt as _, EventMask};
+use x11rb::protocol::xproto::{
+    ChangeWindowAttributesAux, ClientMessageEvent, ConnectionExt as _, EventMask,
+};
 use x11rb::rust_connection::RustConnection;
 
 use crate::evidence::keep_bytes;
@@ -131,9 +133,7 @@ impl Manager {
 
     fn say(&self, window: u32, [what, a, b]: [u32; 3]) {
         let message = ClientMessageEvent::new(32, window, self.atom("WM_PROTOCOLS"), [what, a, b, 0, 0]);
-        let sent = self
-            .server
-            .send_event(false, window, EventMask::NO_EVENT, message);
+        let sent = self.server.send_event(false, window, EventMask::NO_EVENT, message);
         sent.expect("it is sent").check().expect("the window is there");
     }
 
@@ -339,11 +339,7 @@ impl<'a> Viewer<'a> {
         all.flatten()
             .map(|control| {
                 let side = |side: usize| control["rect_pixels"][side].as_f64().expect("a number");
-                (
-                    text(&control["role"]),
-                    text(&control["name"]),
-                    [0, 1, 2, 3].map(side),
-                )
+                (text(&control["role"]), text(&control["name"]), [0, 1, 2, 3].map(side))
             })
             .collect()
     }
@@ -433,9 +429,7 @@ impl<'a> Viewer<'a> {
         let controls = self.controls();
         let is_below = |[left, its_top, ..]: [f64; 4]| left < f64::from(WIDTH) && its_top > top + 1.0;
         let mut below = controls.iter().filter(|(.., rect)| is_below(*rect));
-        below
-            .next()
-            .is_some_and(|(role, ..)| role != "DisclosureTriangle")
+        below.next().is_some_and(|(role, ..)| role != "DisclosureTriangle")
     }
 
     /// Chooses what the picture shows, and waits until the log tells so.

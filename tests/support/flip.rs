@@ -180,11 +180,7 @@ fn derivatives() -> (Vec<f64>, Vec<f64>, Vec<f64>) {
     let second = |x: f64| (x * x / (deviation * deviation) - 1.0) * gauss(x);
     let smooth: Vec<f64> = offsets().map(gauss).collect();
     let first = offsets().map(|x| -x * gauss(x)).collect();
-    (
-        normalised(&smooth),
-        balanced(first),
-        balanced(offsets().map(second).collect()),
-    )
+    (normalised(&smooth), balanced(first), balanced(offsets().map(second).collect()))
 }
 
 /// One filter along rows, then one along columns; the outermost pixels go on beyond the picture.
@@ -199,12 +195,7 @@ fn filtered(values: &[f64], width: usize, across: &[f64], down: &[f64]) -> Vec<f
             let row = shifted(pixel / width, offset * steps.1 as isize, height);
             values[row * width + column]
         };
-        let sum = |pixel: usize| {
-            (-radius..)
-                .zip(filter)
-                .map(|(offset, weight)| weight * at(pixel, offset))
-                .sum()
-        };
+        let sum = |pixel: usize| (-radius..).zip(filter).map(|(offset, weight)| weight * at(pixel, offset)).sum();
         (0..values.len()).map(sum).collect()
     };
     along(&along(values, across, (1, 0)), down, (0, 1))

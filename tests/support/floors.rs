@@ -1,12 +1,12 @@
 //! Scenes small enough to know every pixel of.
 
+use std::f64::consts::PI;
 use glam::{DMat3, DVec2, DVec3};
 use nephroid::eye_pass::View;
 use nephroid::illumination::{Chart, IlluminationMap, Receiver, UvSet};
 use nephroid::optics::LinearSrgb;
 use nephroid::scene::texture::Wrap;
 use nephroid::scene::{Camera, Material, Mesh, Object, Scene, Texture, TextureRef};
-use std::f64::consts::PI;
 
 use crate::scenes::{map_of, view_of};
 
@@ -48,9 +48,7 @@ pub fn floor_map(object: usize, width: usize, height: usize, irradiance: Vec<[f3
     let chart = Chart {
         receiver: Receiver::front(object),
         uv_set: UvSet::TexCoord0,
-        corner_uvs: TRIANGLES
-            .map(|triangle| triangle.map(|corner| CORNERS[corner as usize]))
-            .to_vec(),
+        corner_uvs: TRIANGLES.map(|triangle| triangle.map(|corner| CORNERS[corner as usize])).to_vec(),
         width,
         height,
         texel_areas_m2: vec![1.0 / (width * height) as f64],

@@ -2,12 +2,13 @@
 //! light, small casters, several receivers. Metres, watts, y up; each has one light, and receivers named `floor`,
 //! `wall`, `blocker`, …
 
+use std::f64::consts::{PI, TAU};
+
 use glam::{DMat3, DVec3};
 use nephroid::optics::LinearSrgb;
 use nephroid::scene::builtin::{parts, shapes};
 use nephroid::scene::{LightKind, LightSize, Material, Mesh, PanelShape, Scene};
 use nephroid::units::{Flux, Irradiance, Radiance};
-use std::f64::consts::{PI, TAU};
 
 use crate::tools::builtin_scene;
 

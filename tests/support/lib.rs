@@ -32,19 +32,13 @@ pub use skip::skip;
 /// The project's folder.
 fn root() -> &'static Path {
     let support = Path::new(env!("CARGO_MANIFEST_DIR"));
-    support
-        .ancestors()
-        .nth(2)
-        .expect("tests/support lies in the project")
+    support.ancestors().nth(2).expect("tests/support lies in the project")
 }
 
 /// The folder of this build's programs; test binaries lie in its `deps`.
 fn build_folder() -> PathBuf {
     let test = std::env::current_exe().expect("the path of this test binary");
-    test.ancestors()
-        .nth(2)
-        .expect("it lies in the build folder")
-        .to_owned()
+    test.ancestors().nth(2).expect("it lies in the build folder").to_owned()
 }
 
 /// A file or folder of the project; fails where it is missing.

@@ -68,17 +68,19 @@ pub fn references() -> [Reference; 7] {
             mean_difference: 0.05,
             ..ball
         },
-        Reference {
-            has_sun: true,
-            ..pool
-        },
+        Reference { has_sun: true, ..pool },
         reference(
             ("mirror", "S5"),
             (1e5, 0.01),
             Some((1e6, 0.03)),
             (1.286_660, Some(0.016_970)),
         ),
-        reference(("slab", "S6"), (5e3, 0.01), Some((2e5, 0.03)), (6.490_964, None)),
+        reference(
+            ("slab", "S6"),
+            (5e3, 0.01),
+            Some((2e5, 0.03)),
+            (6.490_964, None),
+        ),
         reference(("paraboloid", "S7"), (3e4, 0.01), None, (0.502_656, None)),
         Reference {
             has_sun: true,

@@ -78,26 +78,16 @@ pub fn sun(direction: DVec3, normal_irradiance: f64) -> Light {
 
 /// The chart of an object of a tracer's scene.
 pub fn chart(tracer: &Tracer, object: usize, width: usize, height: usize) -> Chart {
-    parametrise(
-        object,
-        tracer.scene().objects[object].mesh_in_scene(),
-        DEFAULT_NOMINAL_SIDE,
-    )
-    .expect("the object has area")
-    .chart(width, height)
+    parametrise(object, tracer.scene().objects[object].mesh_in_scene(), DEFAULT_NOMINAL_SIDE)
+        .expect("the object has area")
+        .chart(width, height)
 }
 
 /// The direct layer of an object.
 pub fn direct(tracer: &Tracer, chart: &Chart) -> DirectLayer {
-    let layer = bake_direct(
-        tracer,
-        &tracer.scene().lights,
-        &[(chart, None)],
-        &(),
-        &Control::default(),
-    )
-    .pop()
-    .expect("one layer per chart");
+    let layer = bake_direct(tracer, &tracer.scene().lights, &[(chart, None)], &(), &Control::default())
+        .pop()
+        .expect("one layer per chart");
     assert!(layer.complete);
     assert_eq!(layer.irradiance.len(), chart.width * chart.height);
     layer

@@ -34,22 +34,10 @@ fn of_object(scene: &Scene, object: &Object) -> [Promise; 7] {
         (object.material < scene.materials.len(), "no material"),
         (!mesh.triangles.is_empty(), "no triangle"),
         (mesh.normals.len() == count, "not one normal per vertex"),
-        (
-            mesh.positions.iter().all(|p| p.is_finite()),
-            "no numbers as positions",
-        ),
-        (
-            mesh.normals.iter().all(|n| is_unit(*n)),
-            "a normal that is not unit",
-        ),
-        (
-            mesh.triangles.as_flattened().iter().all(is_there),
-            "a vertex that is not there",
-        ),
-        (
-            [&mesh.uv0, &mesh.uv1].into_iter().flatten().all(has_uvs),
-            "no numbers as coordinates, or not one per vertex",
-        ),
+        (mesh.positions.iter().all(|p| p.is_finite()), "no numbers as positions"),
+        (mesh.normals.iter().all(|n| is_unit(*n)), "a normal that is not unit"),
+        (mesh.triangles.as_flattened().iter().all(is_there), "a vertex that is not there"),
+        ([&mesh.uv0, &mesh.uv1].into_iter().flatten().all(has_uvs), "no numbers as coordinates, or not one per vertex"),
     ]
 }
 
@@ -61,24 +49,12 @@ fn of_material(scene: &Scene, material: &Material) -> [Promise; 6] {
     let texture = material.base_colour_texture.as_ref();
     let shares = [metallic, roughness, material.transmission];
     [
-        (
-            material.ior >= 1.0 && material.ior.is_finite(),
-            "an index below 1",
-        ),
-        (
-            material.emitted_radiance.is_finite(),
-            "a radiance that is no number",
-        ),
+        (material.ior >= 1.0 && material.ior.is_finite(), "an index below 1"),
+        (material.emitted_radiance.is_finite(), "a radiance that is no number"),
         (colour.all(is_share), "a colour outside 0 to 1"),
         (shares.into_iter().all(is_share), "a share outside 0 to 1"),
-        (
-            volume.is_none_or(|volume| volume.attenuation_distance_m > 0.0),
-            "no attenuation distance",
-        ),
-        (
-            texture.is_none_or(|texture| texture.texture < scene.textures.len()),
-            "a texture that is not there",
-        ),
+        (volume.is_none_or(|volume| volume.attenuation_distance_m > 0.0), "no attenuation distance"),
+        (texture.is_none_or(|texture| texture.texture < scene.textures.len()), "a texture that is not there"),
     ]
 }
 
@@ -99,15 +75,9 @@ fn of_light(scene: &Scene, light: &Light) -> [Promise; 4] {
     };
     [
         (light.strength().is_finite(), "a strength that is no number"),
-        (
-            place.is_none_or(|place| place.is_finite()),
-            "a place that is none",
-        ),
+        (place.is_none_or(|place| place.is_finite()), "a place that is none"),
         (direction.is_none_or(is_unit), "a direction that is not unit"),
-        (
-            object.is_none_or(|object| object < scene.objects.len()),
-            "an object that is not there",
-        ),
+        (object.is_none_or(|object| object < scene.objects.len()), "an object that is not there"),
     ]
 }
 

@@ -130,11 +130,7 @@ pub fn transformed(mut scene: Scene, rotation: DMat3, scale: f64, offset: DVec3)
                 centre, across, down, ..
             } => {
                 let side = if is_mirrored { -scale } else { scale };
-                (*centre, *across, *down) = (
-                    place(*centre),
-                    rotation * *across * scale,
-                    rotation * *down * side,
-                );
+                (*centre, *across, *down) = (place(*centre), rotation * *across * scale, rotation * *down * side);
             }
             LightKind::Surface { .. } | LightKind::Environment { .. } => {}
         }

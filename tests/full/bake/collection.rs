@@ -5,6 +5,7 @@ use nephroid::illumination::IlluminationMap;
 use nephroid::optics::LinearSrgb;
 use nephroid::scene::{LoadOptions, load};
 
+use support::sound::scene_fault;
 use support::tools::{bake, energy_fault, photons};
 
 /// The first texel that holds no light there can be: not finite, or negative. Light of one wavelength lies outside sRGB, so
@@ -43,6 +44,8 @@ fn real_files_bake() {
     for file in files {
         let scene = load(file.to_str().expect("a readable path"), &options).expect("a valid file");
         let name = scene.name.clone();
+        assert_eq!(scene_fault(&scene), None, "{name}");
+        assert!(scene.triangle_count() > 0, "{name}");
         let result = bake(scene, &photons(3e4, 64));
         assert_eq!(energy_fault(&result), None, "{name}");
         let parts = result.plan.is_on(Effect::Dispersion);

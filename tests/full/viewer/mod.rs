@@ -1,8 +1,6 @@
 //! The window under Xvfb, and what takes longer of its parts without a display.
 
 mod filming;
-#[cfg(target_os = "linux")]
-mod first_light;
 #[path = "../../quick/viewer/fixtures.rs"]
 #[allow(dead_code, reason = "quick tests use the rest")]
 mod fixtures;

@@ -5,7 +5,6 @@ mod errors;
 mod inspect;
 mod render;
 mod smoke;
-mod study;
 mod usage;
 
 use std::process::Command;

@@ -3,7 +3,6 @@
 //! An adapter is required, a software one will do: with CI=true its absence is a failure, else a skip that says so.
 
 mod device;
-mod flip;
 mod picture;
 #[allow(dead_code, reason = "full tests use the rest")]
 mod rig;

@@ -10,11 +10,9 @@ mod files;
 mod filming;
 mod fixtures;
 mod flat_map;
-mod frame_times;
 mod gizmo;
 mod headless;
 mod history;
-mod latency;
 mod lights;
 mod model;
 mod navigation;
@@ -24,7 +22,6 @@ mod save_scene;
 mod scene_edits;
 #[allow(dead_code, reason = "full tests use the rest")]
 mod scene_file;
-mod screenshot;
 mod sketching;
 mod views;
 #[cfg(target_os = "linux")]

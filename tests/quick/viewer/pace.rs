@@ -1,7 +1,9 @@
-//! How well pictures are made, by how long those before took.
+//! How well pictures are made by how long those before took, how long events wait, and the graph of device times.
 
 use nephroid::eye_pass::renderer::EyeQuality;
 use nephroid::viewer::pace::Pace;
+use nephroid::viewer::panel::frame_graph::columns;
+use nephroid::viewer::timing::{FrameTimes, Latencies, PICTURES, Percentiles};
 
 use super::*;
 
@@ -81,4 +83,134 @@ fn hands_do_not_wait_for_a_picture() {
     let early = start + Duration::from_millis(100);
     assert!(pace.pause(early) > Duration::ZERO);
     assert_eq!(pace.pause(early + pace.pause(early)), Duration::ZERO);
+}
+
+const MS: Duration = Duration::from_millis(1);
+
+#[test]
+fn percentiles_are_of_the_waits_by_nearest_rank() {
+    let waits = (1..=200).rev().map(|index| index * MS);
+    let told = Percentiles::of(waits).expect("there are some");
+    let found = [told.p50_ms, told.p95_ms, told.p99_ms, told.max_ms].map(f64::round);
+    assert_eq!((found, told.count), ([100.0, 190.0, 198.0, 200.0], 200));
+    let one = Percentiles::of([7 * MS]).expect("one is enough");
+    assert_eq!([one.p50_ms, one.max_ms].map(f64::round), [7.0, 7.0]);
+    assert_eq!(Percentiles::of([]), None);
+}
+
+/// What comes while a frame is made is met after it: it has waited since some moment of the frame, at worst its first.
+#[test]
+fn events_of_a_busy_window_count_from_when_they_can_have_come() {
+    let start = Instant::now();
+    let at = |ms: u32| start + ms * MS;
+    let mut latencies = Latencies::default();
+    latencies.begin_turn(at(0));
+    latencies.end_turn(at(1));
+    // It waited: the event has just come.
+    latencies.begin_turn(at(50));
+    latencies.meet(at(50), false);
+    latencies.show(at(90));
+    latencies.end_turn(at(90));
+    assert_eq!(latencies.otherwise().map(|told| told.max_ms.round()), Some(40.0));
+    assert_eq!(latencies.while_baking(), None);
+
+    // There at once: it may have come right after the last turn began.
+    latencies.begin_turn(at(90));
+    latencies.meet(at(91), true);
+    latencies.end_turn(at(92));
+    latencies.begin_turn(at(95));
+    latencies.show(at(100));
+    assert_eq!(
+        latencies.while_baking().map(|told| told.max_ms.round()),
+        Some(50.0)
+    );
+    // Shown once, counted once.
+    latencies.show(at(200));
+    assert_eq!(latencies.while_baking().map(|told| told.count), Some(1));
+}
+
+#[test]
+fn only_the_last_waits_are_remembered() {
+    let mut latencies = Latencies::default();
+    let now = Instant::now();
+    for index in 0..10_100_u32 {
+        latencies.begin_turn(now);
+        latencies.meet(now, true);
+        latencies.show(now + if index < 100 { 500 * MS } else { MS });
+    }
+    let told = latencies.while_baking().expect("many");
+    assert_eq!((told.count, told.max_ms.round()), (10_000, 1.0));
+}
+
+fn of<const N: usize>(pictures: [[f64; 3]; N]) -> FrameTimes {
+    let mut times = FrameTimes::default();
+    for [opaque, specular, tone_mapping] in pictures {
+        times.push(GpuMs {
+            opaque,
+            specular,
+            tone_mapping,
+        });
+    }
+    times
+}
+
+fn panel(times: Option<FrameTimes>) -> Headless {
+    let mut panel = Headless::new(BakeSettings::default());
+    panel.tell(|model| model.picture.frame_times = times);
+    panel.open_part("Frame time");
+    panel
+}
+
+#[test]
+fn oldest_pictures_are_forgotten() {
+    let mut ramp = [[0.0; 3]; PICTURES + 30];
+    for (index, picture) in ramp.iter_mut().enumerate() {
+        picture[0] = index as f64;
+    }
+    let times = of(ramp);
+    assert_eq!(times.iter().len(), PICTURES);
+    let ends = [times.iter().next(), times.newest()].map(|ms| ms.map(|ms| ms.opaque));
+    assert_eq!(ends, [Some(30.0), Some(149.0)]);
+    assert_eq!(of([[1.0, 2.0, 3.0], [4.0, 0.0, 0.5]]).longest_ms(), 6.0);
+    assert_eq!(FrameTimes::default().longest_ms(), 0.0);
+}
+
+#[test]
+fn passes_are_stacked_newest_at_the_right() {
+    let rect = Rect::from_min_max(pos2(10.0, 100.0), pos2(10.0 + PICTURES as f32, 180.0));
+    let columns = columns(&of([[2.0, 4.0, 1.0], [1.0, 0.0, 30.0]]), 8.0, rect);
+    // Eight milliseconds are eighty points; what is beyond the scale ends at the top.
+    let expected = [
+        (128.0, [(160.0, 180.0), (120.0, 160.0), (110.0, 120.0)]),
+        (129.0, [(170.0, 180.0), (170.0, 170.0), (100.0, 170.0)]),
+    ];
+    let expected = expected.map(|(left, bars)| {
+        bars.map(|(top, bottom)| Rect::from_min_max(pos2(left, top), pos2(left + 1.0, bottom)))
+    });
+    assert_eq!(columns, expected);
+    assert_eq!(columns[1][0].right(), rect.right());
+}
+
+#[test]
+fn newest_time_is_told_in_numbers() {
+    let mut panel = panel(Some(of([[9.0, 9.0, 9.0], [1.25, 3.5, 0.25]])));
+    let passes = ["opaque 1.25", "specular 3.50", "tone mapping 0.25"];
+    panel.assert_says(&passes);
+    panel.assert_says(&["Frame time (5.00 ms)"]);
+    let graph = "Device times of 2 pictures, at most 27.00 ms";
+    panel.hover(Role::Image, graph);
+    panel.assert_says(&["the newest at the right"]);
+    let rect = panel.named(Role::Image, graph).rect();
+    assert!(Headless::is_inside(rect) && rect.width() > 250.0 && rect.height() > 40.0);
+    // The section stays open though its title is another.
+    panel.tell(|model| model.picture.frame_times = Some(of([[0.5, 0.0, 0.25]])));
+    panel.assert_says(&["Frame time (0.75 ms)", "specular 0.00"]);
+}
+
+#[test]
+fn untimed_devices_are_not_shown_as_fast() {
+    panel(None).assert_says(&["does not tell how long it takes"]);
+    let panel = panel(Some(FrameTimes::default()));
+    panel.assert_says(&["Known with the first picture."]);
+    assert!(!panel.says("0.00 ms"));
 }

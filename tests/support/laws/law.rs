@@ -22,15 +22,8 @@ fn chance(bake: &Baked) -> f64 {
 
 impl Case {
     /// A figure of the last bake.
-    pub fn measure(
-        &mut self,
-        says: &str,
-        bound: f64,
-        of: impl Fn(&Baked) -> f64 + Send + 'static,
-    ) -> &mut Self {
-        self.law(says, bound, move |bakes| {
-            of(bakes.last().expect("a bake before its law"))
-        })
+    pub fn measure(&mut self, says: &str, bound: f64, of: impl Fn(&Baked) -> f64 + Send + 'static) -> &mut Self {
+        self.law(says, bound, move |bakes| of(bakes.last().expect("a bake before its law")))
     }
 
     /// Something that must be so of the last bake: 0 or 1 of 0.
@@ -39,35 +32,18 @@ impl Case {
     }
 
     /// A figure of the first lamp's energy in the last bake.
-    pub fn ledger(
-        &mut self,
-        says: &str,
-        bound: f64,
-        of: impl Fn(&EnergyLedger) -> f64 + Send + 'static,
-    ) -> &mut Self {
+    pub fn ledger(&mut self, says: &str, bound: f64, of: impl Fn(&EnergyLedger) -> f64 + Send + 'static) -> &mut Self {
         self.measure(says, bound, move |bake| of(&bake.result.ledgers[0].energy_w))
     }
 
     /// An account of the first lamp in the last bake, of what it emitted.
-    pub fn share(
-        &mut self,
-        says: &str,
-        bound: f64,
-        of: impl Fn(&EnergyLedger) -> f64 + Send + 'static,
-    ) -> &mut Self {
+    pub fn share(&mut self, says: &str, bound: f64, of: impl Fn(&EnergyLedger) -> f64 + Send + 'static) -> &mut Self {
         self.ledger(says, bound, move |energy| of(energy) / energy.emitted)
     }
 
     /// A comparison of the last bake with the first.
-    pub fn compare(
-        &mut self,
-        says: &str,
-        bound: f64,
-        of: impl Fn(&Baked, &Baked) -> f64 + Send + 'static,
-    ) -> &mut Self {
-        self.law(says, bound, move |bakes| {
-            of(bakes.last().expect("a bake before its law"), &bakes[0])
-        })
+    pub fn compare(&mut self, says: &str, bound: f64, of: impl Fn(&Baked, &Baked) -> f64 + Send + 'static) -> &mut Self {
+        self.law(says, bound, move |bakes| of(bakes.last().expect("a bake before its law"), &bakes[0]))
     }
 
     /// What needs no bake: how far it is off.
@@ -87,18 +63,14 @@ impl Case {
     pub fn watts(&mut self, expected_w: f64, bound: f64) -> &mut Self {
         let says = format!("{} W arrive", number(expected_w));
         self.measure(&says, bound, move |bake| off(deposited_w(bake), expected_w))
-            .carried(&says, move |bake| {
-                off(deposited_w(bake), expected_w) / (bound + chance(bake))
-            })
+            .carried(&says, move |bake| off(deposited_w(bake), expected_w) / (bound + chance(bake)))
     }
 
     /// What lamps send to mirrors and glass [W].
     pub fn sent(&mut self, expected_w: f64, bound: f64) -> &mut Self {
         let says = format!("{} W are sent", number(expected_w));
         self.measure(&says, bound, move |bake| off(emitted_w(bake), expected_w))
-            .carried(&says, move |bake| {
-                off(emitted_w(bake), expected_w) / (bound + chance(bake))
-            })
+            .carried(&says, move |bake| off(emitted_w(bake), expected_w) / (bound + chance(bake)))
     }
 
     /// No light is made: at most a share of what was sent arrives.
@@ -115,12 +87,7 @@ impl Case {
     }
 
     /// E of the floor, or of another flat `floor`, point by point [W/m²]: relative RMSE.
-    pub fn e(
-        &mut self,
-        says: &str,
-        bound: f64,
-        theory: impl Fn(DVec3) -> f64 + Send + Sync + 'static,
-    ) -> &mut Self {
+    pub fn e(&mut self, says: &str, bound: f64, theory: impl Fn(DVec3) -> f64 + Send + Sync + 'static) -> &mut Self {
         let (says, theory) = (format!("E is {says}"), Arc::new(theory));
         let same = Arc::clone(&theory);
         self.measure(&says, bound, move |bake| against_theory(bake, &*theory))
@@ -138,41 +105,30 @@ impl Case {
     /// The scene was read with a warning that has the word.
     pub fn warned(&mut self, word: &'static str) -> &mut Self {
         self.must(&format!("a warning names the {word}"), move |bake| {
-            bake.scene
-                .warnings
-                .iter()
-                .any(|warning| warning.what.contains(word))
+            bake.scene.warnings.iter().any(|warning| warning.what.contains(word))
         })
     }
 
     /// Maps as those of the first bake times a factor: relative RMSE.
     pub fn as_first(&mut self, says: &str, bound: f64, factor: f64) -> &mut Self {
-        self.compare(says, bound, move |bake, first| {
-            maps_apart(&bake.result.maps, &first.result.maps, factor)
-        })
+        self.compare(says, bound, move |bake, first| maps_apart(&bake.result.maps, &first.result.maps, factor))
     }
 
     /// Maps as those of the first bake, over the errors that both estimate.
     pub fn as_first_within_errors(&mut self) -> &mut Self {
-        self.compare(
-            "maps as of the first bake, over both estimated errors",
-            1.0,
-            |bake, first| maps_apart(&bake.result.maps, &first.result.maps, 1.0) / estimates(bake, first),
-        )
+        self.compare("maps as of the first bake, over both estimated errors", 1.0, |bake, first| {
+            maps_apart(&bake.result.maps, &first.result.maps, 1.0) / estimates(bake, first)
+        })
     }
 
     /// The watts of the first bake.
     pub fn watts_as_first(&mut self, says: &str, bound: f64) -> &mut Self {
-        self.compare(says, bound, |bake, first| {
-            off(deposited_w(bake), deposited_w(first))
-        })
+        self.compare(says, bound, |bake, first| off(deposited_w(bake), deposited_w(first)))
     }
 
     /// The maps of the first bake, bit for bit.
     pub fn bits_as_first(&mut self, says: &str) -> &mut Self {
-        self.compare(says, 0.0, |bake, first| {
-            no(same_bits(&bake.result.maps, &first.result.maps))
-        })
+        self.compare(says, 0.0, |bake, first| no(same_bits(&bake.result.maps, &first.result.maps)))
     }
 
     /// The floor's map with its texels averaged in fours: the first bake has twice the texels each way.
@@ -201,20 +157,12 @@ pub fn no(is_so: bool) -> f64 {
 
 /// Deposited on all surfaces, over all lights [W].
 pub fn deposited_w(bake: &Baked) -> f64 {
-    bake.result
-        .ledgers
-        .iter()
-        .map(|ledger| ledger.energy_w.deposited)
-        .sum()
+    bake.result.ledgers.iter().map(|ledger| ledger.energy_w.deposited).sum()
 }
 
 /// Emitted towards mirrors and glass, over all lights [W].
 pub fn emitted_w(bake: &Baked) -> f64 {
-    bake.result
-        .ledgers
-        .iter()
-        .map(|ledger| ledger.energy_w.emitted)
-        .sum()
+    bake.result.ledgers.iter().map(|ledger| ledger.energy_w.emitted).sum()
 }
 
 /// |actual − expected| over the expected.
@@ -248,10 +196,7 @@ pub fn maps_apart(maps: &[IlluminationMap], references: &[IlluminationMap], fact
     for pair in &mut pairs {
         pair.reference *= factor;
     }
-    if pairs
-        .iter()
-        .all(|pair| pair.image == 0.0 && pair.reference == 0.0)
-    {
+    if pairs.iter().all(|pair| pair.image == 0.0 && pair.reference == 0.0) {
         return 0.0;
     }
     Agreement::of(&pairs).map_or(f64::INFINITY, |agreement| agreement.relative_rmse)
@@ -315,14 +260,9 @@ fn against_theory(bake: &Baked, theory: impl Fn(DVec3) -> f64) -> f64 {
     let (width, height) = (map.width(), map.height());
     let pair = |(texel, image): (usize, f64)| {
         let mean = (0..POINTS * POINTS).map(|point| {
-            let within =
-                DVec2::new((point % POINTS) as f64 + 0.5, (point / POINTS) as f64 + 0.5) / POINTS as f64;
+            let within = DVec2::new((point % POINTS) as f64 + 0.5, (point / POINTS) as f64 + 0.5) / POINTS as f64;
             let texel = DVec2::new((texel % width) as f64, (texel / width) as f64);
-            theory(place(
-                &bake.scene,
-                map,
-                (texel + within) / DVec2::new(width as f64, height as f64),
-            ))
+            theory(place(&bake.scene, map, (texel + within) / DVec2::new(width as f64, height as f64)))
         });
         TexelPair {
             image,

@@ -137,11 +137,7 @@ impl Case {
                 scene: scene.into(),
                 law,
                 // What is no number is worse than anything.
-                measured: if measured.is_nan() {
-                    f64::INFINITY
-                } else {
-                    measured
-                },
+                measured: if measured.is_nan() { f64::INFINITY } else { measured },
                 bound,
             });
         };
@@ -156,11 +152,7 @@ impl Case {
                         first = described(&scene);
                     }
                     open = Some(books_open(&result).max(open.unwrap_or(0.0)));
-                    carried = if is_carried {
-                        by_carriers(&scene, &settings)
-                    } else {
-                        Vec::new()
-                    };
+                    carried = if is_carried { by_carriers(&scene, &settings) } else { Vec::new() };
                     for (_, baked) in carried.iter().filter(|_| !self.is_without_books) {
                         open = Some(books_open(&baked.result).max(open.unwrap_or(0.0)));
                     }
@@ -169,12 +161,7 @@ impl Case {
                 Step::Law(says, bound, of) => note(says, of(&bakes), bound, &first),
                 Step::Carried(says, of) => {
                     for (carrier, baked) in &carried {
-                        note(
-                            format!("by {carrier}, over what chance allows: {says}"),
-                            of(baked),
-                            1.0,
-                            &first,
-                        );
+                        note(format!("by {carrier}, over what chance allows: {says}"), of(baked), 1.0, &first);
                     }
                 }
                 Step::Forget(after) => {
@@ -187,12 +174,7 @@ impl Case {
             }
         }
         if let Some(open) = open.filter(|_| !self.is_without_books) {
-            note(
-                "ledgers and maps hold every watt".into(),
-                open,
-                BOOKS_BOUND,
-                &first,
-            );
+            note("ledgers and maps hold every watt".into(), open, BOOKS_BOUND, &first);
         }
         rows
     }
@@ -221,10 +203,7 @@ fn described(scene: &Scene) -> String {
 /// What ledgers leave open at worst, of what was emitted, or maps of what was deposited; infinite where a value is not
 /// finite, or below zero though no light is traced by wavelength, which knows colours beyond sRGB.
 pub fn books_open(result: &BakeResult) -> f64 {
-    let is_spectral = result
-        .ledgers
-        .iter()
-        .any(|ledger| ledger.emitted_radiant_w.is_some());
+    let is_spectral = result.ledgers.iter().any(|ledger| ledger.emitted_radiant_w.is_some());
     let is_value = |e: f32| e.is_finite() && (e >= 0.0 || is_spectral);
     let mut is_sound = result.maps.iter().flat_map(values).all(is_value);
     let mut worst: f64 = 0.0;
@@ -287,10 +266,7 @@ fn by_carriers(scene: &Scene, settings: &BakeSettings) -> Vec<(&'static str, Bak
 
 /// All values of a map, its errors included.
 pub fn values(map: &IlluminationMap) -> impl Iterator<Item = f32> {
-    let layers = map
-        .layers
-        .iter()
-        .flat_map(|layer| layer.irradiance.iter().flatten());
+    let layers = map.layers.iter().flat_map(|layer| layer.irradiance.iter().flatten());
     layers.chain(map.error.iter().flatten()).copied()
 }
 
@@ -318,10 +294,7 @@ impl Row {
 
 /// Rows of one case and one law are one: the worst.
 fn worst(mut rows: Vec<Row>, row: Row) -> Vec<Row> {
-    match rows
-        .iter_mut()
-        .find(|known| known.case == row.case && known.law == row.law)
-    {
+    match rows.iter_mut().find(|known| known.case == row.case && known.law == row.law) {
         Some(known) if known.measured < row.measured => *known = row,
         Some(_) => {}
         None => rows.push(row),
@@ -356,10 +329,7 @@ pub fn hold_some(fill: fn(&mut Table), names: &[&str]) {
 #[track_caller]
 fn check(rows: &[Row]) {
     let faults: String = rows.iter().filter(|row| !row.holds()).map(Row::line).collect();
-    assert!(
-        !rows.is_empty() && faults.is_empty(),
-        "laws that do not hold:\n{faults}"
-    );
+    assert!(!rows.is_empty() && faults.is_empty(), "laws that do not hold:\n{faults}");
 }
 
 /// Runs cases side by side.
@@ -370,31 +340,22 @@ fn run(table: Table) -> Vec<Row> {
     let work = || {
         let indices = std::iter::from_fn(|| Some(next.fetch_add(1, Ordering::Relaxed)));
         let cases = indices.map_while(|index| Some((index, take(index)?)));
-        cases
-            .map(|(index, case)| (index, case.rows()))
-            .collect::<Vec<_>>()
+        cases.map(|(index, case)| (index, case.rows())).collect::<Vec<_>>()
     };
     let mut found: Vec<(usize, Vec<Row>)> = std::thread::scope(|scope| {
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
         let workers: Vec<_> = (0..cores).map(|_| scope.spawn(work)).collect();
-        let done = workers
-            .into_iter()
-            .map(|worker| worker.join().expect("panics are caught"));
+        let done = workers.into_iter().map(|worker| worker.join().expect("panics are caught"));
         done.flatten().collect()
     });
     found.sort_by_key(|(index, _)| *index);
-    found
-        .into_iter()
-        .flat_map(|(_, rows)| rows)
-        .fold(Vec::new(), worst)
+    found.into_iter().flat_map(|(_, rows)| rows).fold(Vec::new(), worst)
 }
 
 /// Prints a group's table and writes those of all groups so far to `laws/laws.md` in the build folder.
 #[allow(clippy::print_stdout, reason = "the README quotes it")]
 fn publish(group: &'static str, rows: &[Row]) {
-    let mut table = format!(
-        "\n## {group}\n\n| case | scene | law | measured | bound | verdict |\n|---|---|---|---|---|---|\n"
-    );
+    let mut table = format!("\n## {group}\n\n| case | scene | law | measured | bound | verdict |\n|---|---|---|---|---|---|\n");
     table.extend(rows.iter().map(Row::line));
     println!("{table}");
     let mut done = DONE.lock().expect("no panic holds it");

@@ -1,12 +1,12 @@
 //! Scenes in one expression. Metres, watts, y up; the receiver whose E is known is the object `floor`.
 
+use std::f64::consts::PI;
 use glam::DVec3;
 use nephroid::optics::LinearSrgb;
 use nephroid::scene::builtin::{parts, shapes};
 use nephroid::scene::{Light, LightKind, LightSize, Material, Mesh, Scene};
 use nephroid::settings::BakeSettings;
 use nephroid::units::{Flux, Irradiance};
-use std::f64::consts::PI;
 
 /// Parts of a scene, one after the other.
 pub trait Build: Sized {
@@ -86,9 +86,7 @@ pub fn floor(half_m: f64) -> Scene {
 
 /// A box of diffuse walls around the origin, called the floor.
 pub fn room(half_m: f64) -> Scene {
-    floor(half_m).reshaped(0, |mesh| {
-        *mesh = shapes::cuboid(DVec3::splat(-half_m), DVec3::splat(half_m))
-    })
+    floor(half_m).reshaped(0, |mesh| *mesh = shapes::cuboid(DVec3::splat(-half_m), DVec3::splat(half_m)))
 }
 
 /// A horizontal slab that reaches 3 m to all sides.
