@@ -3,7 +3,6 @@
 use nephroid::viewer::flat_map::{Part, Shown, read, show, thumbnail};
 
 use super::fixtures::map;
-use super::*;
 
 /// Brightness [0, 255] and opacity of a pixel.
 fn pixel(shown: &Shown, x: usize, y: usize) -> (u8, u8) {
