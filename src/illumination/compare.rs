@@ -215,6 +215,23 @@ mod tests {
     }
 
     #[test]
+    fn measures_of_a_worked_example() {
+        // R = 1, 3, 0, 4 has mean 2; differences 1, 0, 5, 0 have mean square 6.5. The third texel (R = 0) is left out
+        // of the ARD: (1/1 + 0/3 + 0/4) / 3.
+        let (image, reference) = ([2.0, 3.0, 5.0, 4.0], [1.0, 3.0, 0.0, 4.0]);
+        let rmse = relative_rmse(&image, &reference).expect("lit");
+        assert!((rmse - 6.5_f64.sqrt() / 2.0).abs() < 1e-15, "{rmse}");
+        let ard = average_relative_difference(&image, &reference).expect("lit");
+        assert!((ard - 1.0 / 3.0).abs() < 1e-15, "{ard}");
+    }
+
+    #[test]
+    fn dark_references_have_no_relative_measure() {
+        assert_eq!(relative_rmse(&[1.0], &[0.0]), None);
+        assert_eq!(average_relative_difference(&[1.0], &[0.0]), None);
+    }
+
+    #[test]
     fn box_average_keeps_the_mean_and_the_place() {
         let grid = Grid {
             width: 6,
@@ -227,5 +244,20 @@ mod tests {
         assert_eq!(small.values, [4.0, 7.0, 16.0, 19.0]);
         assert!((mean(&small.values) - mean(&grid.values)).abs() < 1e-12);
         assert_eq!(grid.box_averaged(4, 2), None);
+    }
+
+    #[test]
+    fn sizes_meet_at_the_smaller_or_not_at_all() {
+        let grid = |width: usize, height: usize| Grid {
+            width,
+            height,
+            values: vec![1.0; width * height],
+        };
+        let (a, b) = at_common_size(&grid(8, 4), &grid(4, 4)).expect("multiple");
+        assert_eq!((a.width, b.width), (4, 4));
+        let (a, b) = at_common_size(&grid(2, 2), &grid(6, 4)).expect("multiple");
+        assert_eq!((a.width, b.height), (2, 2));
+        assert!(at_common_size(&grid(8, 2), &grid(4, 4)).is_none());
+        assert!(at_common_size(&grid(9, 4), &grid(4, 4)).is_none());
     }
 }

@@ -1,8 +1,10 @@
 //! Glass and water: every angle, every index, bodies in bodies, and what they absorb.
 
 use glam::DVec3;
-use nephroid::optics::LinearSrgb;
 use nephroid::optics::fresnel::dielectric_reflectance;
+use nephroid::optics::refraction::{cos_transmitted, refract};
+use nephroid::optics::wavelength::VISIBLE;
+use nephroid::optics::{Glass, LinearSrgb, Nanometres, glass};
 use nephroid::scene::builtin::{parts, shapes};
 use nephroid::scene::{Material, Mesh, Scene, Volume, contact};
 use nephroid::settings::{BakeSettings, LayerKind};
@@ -61,6 +63,15 @@ fn slabs_and_angles(t: &mut Table) {
             .bake(under_slab(ior).lamp(place), 2e3, 32)
             .e_of_lamp("that of the lamp alone", 1e-3, place);
     }
+    t.case("every-angle")
+        // Next to the critical angle of a weak interface a rounding of cosines moves R by its root, over the cosine.
+        .fact("R is the same from both sides", 1e-4, || over_angles(other_side))
+        .fact("directions are unit", 1e-14, || {
+            over_angles(|_, _, [_, out]| (out.length() - 1.0).abs())
+        })
+        .fact("Snell: sines by their indices", 1e-8, || {
+            over_angles(|eta, _, [incident, out]| (out.x * eta - incident.x).abs())
+        });
     for (elevation_deg, density_per_sr) in [(10.0_f64, 1e4), (1.0, 1e5)] {
         let (sine, cosine) = elevation_deg.to_radians().sin_cos();
         let water = shapes::floor([-3.0, 3.0], [-3.0, 3.0], 0.5);
@@ -82,6 +93,10 @@ fn slabs_and_angles(t: &mut Table) {
     t.case("above-the-critical-angle")
         .bake(out_of_glass(critical_rad + 1e-7), 1e6, 32)
         .arrives(0.0);
+    t.case("dispersion-beyond-its-formula")
+        .check("indices are sound far beyond visible light", ends_of_formulas);
+    t.case("wavelength-at-a-resonance")
+        .check("refused in visible light, finite beside it", resonances);
 }
 
 fn bodies(t: &mut Table) {
@@ -220,6 +235,33 @@ fn turned(mesh: &mut Mesh) {
     mesh.triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
 }
 
+/// The worst over interfaces and angles, crowded at 0, at 90 degrees and at the critical one, of a function of the
+/// relative index, R, and the directions of incidence and refraction.
+fn over_angles(of: impl Fn(f64, f64, [DVec3; 2]) -> f64) -> f64 {
+    let quarter = std::f64::consts::FRAC_PI_2;
+    let mut worst: f64 = 0.0;
+    for eta in [1.0, 1.0 + 1e-6, 1.0 - 1e-6, 0.7, 1.0 / 1.5, 1.333, 1.5, 3.0, 10.0] {
+        let critical = if eta < 1.0 { f64::asin(eta) } else { 1.0 };
+        let near = (0..16).map(|digit| 10.0_f64.powi(-digit));
+        let near = near.flat_map(|step| [step, quarter - step, critical - step, critical + step]);
+        let angles = near.chain((0..1000).map(|step| quarter * f64::from(step) / 1000.0));
+        for angle in angles.filter(|angle| (0.0..quarter).contains(angle)) {
+            let incident = DVec3::new(angle.sin(), -angle.cos(), 0.0);
+            let there = dielectric_reflectance(angle.cos(), eta);
+            assert!((0.0..=1.0).contains(&there), "R is {there} at {angle} for {eta}");
+            if let Some(refracted) = refract(incident, DVec3::Y, eta) {
+                worst = worst.max(of(eta, there, [incident, refracted]));
+            }
+        }
+    }
+    worst
+}
+
+fn other_side(eta: f64, there: f64, [incident, _]: [DVec3; 2]) -> f64 {
+    let beyond = cos_transmitted(-incident.y, eta).expect("it is refracted");
+    (there - dielectric_reflectance(beyond, 1.0 / eta)).abs()
+}
+
 /// Seen from below, an open sheet with its normals up is the surface of the glass that the sun comes through.
 fn out_of_glass(angle_rad: f64) -> Scene {
     let ceiling = shapes::floor([-50.0, 50.0], [-0.5, 0.5], 0.01);
@@ -275,6 +317,46 @@ fn tinted(ior: f64, colour: LinearSrgb, distance_m: f64) -> Material {
             attenuation_colour: colour,
         }),
         ..parts::dielectric("tinted", ior)
+    }
+}
+
+/// Every glass of the catalogue beyond both ends of what its formula was made for.
+fn ends_of_formulas() {
+    let (first, last) = (VISIBLE.start().0, VISIBLE.end().0);
+    for glass in glass::catalogue::all() {
+        for step in 0..=100 {
+            let nm = 0.25 * first + (4.0 * last - 0.25 * first) * f64::from(step) / 100.0;
+            let index = glass.dispersion.index(Nanometres(nm));
+            assert!(index.is_finite() && index >= 1.0, "{index} at {nm} nm");
+            assert!(
+                glass.dispersion.slope_per_nm(Nanometres(nm)).is_finite(),
+                "slope at {nm} nm"
+            );
+            assert!(
+                index <= 10.0 || !(first..=last).contains(&nm),
+                "{index} at {nm} nm"
+            );
+        }
+        let [blue, red] = [VISIBLE.start(), VISIBLE.end()].map(|nm| glass.dispersion.index(*nm));
+        assert!(blue >= red, "blue is bent more than red");
+    }
+}
+
+/// A glass that resonates with visible light is refused; one that does just beyond is finite within.
+fn resonances() {
+    let glass =
+        |strength: &str, um: f64| Glass::parse(&format!("sellmeier:{strength},0,{},0.01,100", um * um));
+    for um in [0.4, 0.55, 0.7] {
+        assert!(glass("1.0,0", um).is_err(), "{um} µm");
+    }
+    let (first, last) = (VISIBLE.start().0, VISIBLE.end().0);
+    for um in [1e-3 * (first - 1e-6), 1e-3 * (last + 1e-6)] {
+        let Ok(glass) = glass("0.5,1.0", um) else { continue };
+        let nm = |step: u32| Nanometres(first + (last - first) * f64::from(step) / 100.0);
+        assert!(
+            (0..=100).all(|step| glass.dispersion.index(nm(step)).is_finite()),
+            "{um} µm"
+        );
     }
 }
 

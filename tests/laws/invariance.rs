@@ -3,18 +3,18 @@
 use glam::{DMat3, DVec3};
 use nephroid::illumination::IlluminationMap;
 use nephroid::optics::LinearSrgb;
-use nephroid::scene::builtin::{self, shapes};
+use nephroid::scene::builtin::{self, parts, shapes};
 use nephroid::scene::{LightKind, LightSize, PanelShape, Scene, Volume};
 use nephroid::session::BakeResult;
 use nephroid::settings::{
     BakeSettings, Footprint, Kernel, KernelSampling, LayerKind, MapResolution, RayPlacement, Sigma,
 };
-use nephroid::units::Radiance;
+use nephroid::units::{Flux, Radiance};
 
 use support::laws::law::*;
 use support::laws::scenes::*;
-use support::laws::{Baked, Table, is_long};
-use support::tools::{at, builtin_scene, photons, set, settings, transformed};
+use support::laws::{Baked, Table, books_open, is_long};
+use support::tools::{at, bake, builtin_scene, photons, set, settings, transformed};
 
 pub fn fill(t: &mut Table) {
     for (name, scene) in [
@@ -229,6 +229,15 @@ fn seeds(t: &mut Table) {
             .bits_as_first("the same seed gives the same map");
     }
     // Lamps below the floor, where the mirror is not.
+    let mut cellar = builtin_scene("mirror");
+    for lamp in 0..3 {
+        let place = DVec3::new(0.1 * f64::from(lamp), -1.0, 0.0);
+        cellar = cellar.lit(parts::beam("cellar", place, DVec3::NEG_Y, 0.5, Flux(50.0)));
+    }
+    t.case("lamps-that-see-nothing-specular")
+        .splat(builtin_scene("mirror"), 1e4, 64)
+        .splat(cellar, 1e4, 64)
+        .bits_as_first("map as without them, bit for bit");
 }
 
 fn ledgers(t: &mut Table) {
@@ -241,6 +250,10 @@ fn ledgers(t: &mut Table) {
             .bake_with(builtin_scene(name), by(density_per_sr, 64))
             .must("something arrives", |bake| deposited_w(bake) > 0.0);
     }
+    t.case("ledger-with-a-fault").check(
+        "a lost watt and a value that is no number are noticed",
+        faults_are_noticed,
+    );
     // The same rays: not a bit of the accounts may depend on how they are drawn.
     let base = || settings(3e3, 48);
     let kernels = [Kernel::Gaussian, Kernel::Cone, Kernel::Disc, Kernel::Box];
@@ -272,6 +285,19 @@ fn ledgers(t: &mut Table) {
                 }
             }
         }
+    }
+}
+
+fn faults_are_noticed() {
+    let sound = bake(builtin_scene("ring"), &at(500.0, 16));
+    assert!(books_open(&sound) <= 1e-6);
+    let mut lost = sound.clone();
+    lost.ledgers[0].energy_w.deposited *= 1.0 + 1e-5;
+    assert!(books_open(&lost) > 1e-6);
+    for bad in [f32::NAN, f32::INFINITY, -1e-3] {
+        let mut broken = sound.clone();
+        broken.maps[0].layers[0].irradiance[7][2] = bad;
+        assert!(books_open(&broken).is_infinite(), "{bad}");
     }
 }
 

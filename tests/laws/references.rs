@@ -92,6 +92,8 @@ pub fn fill(t: &mut Table) {
     if std::env::var_os("NEPHROID_WRITE_REFERENCES").is_some() {
         write_references();
     }
+    t.case("shadow-two-texels-off")
+        .check("is noticed", moved_shadow_is_noticed);
     t.case("brute-force")
         .check("noise falls faster than that of random rays", noise_falls)
         .check(
@@ -193,6 +195,14 @@ fn displaced_on_floor(bake: &Baked) -> f64 {
     let [image, reference] = [&bake.result.maps, &maps]
         .map(|maps| caustic_luminance(maps.iter().find(is_floor).expect("a lit floor")));
     displaced_texels(&image, &reference) as f64
+}
+
+fn moved_shadow_is_noticed() {
+    let image = caustic_luminance(&stored(&hard_scenes::ring_with_blocker()).0[0]);
+    assert_eq!(displaced_texels(&image, &image), 0);
+    let mut moved = image.clone();
+    moved.rotate_right(2);
+    assert!(displaced_texels(&moved, &image) > 20);
 }
 
 fn few_rays_agree(scene: &Scene) {

@@ -10,6 +10,7 @@ use support::laws::hold_some;
 fn glass_keeps_its_laws() {
     let names = [
         "normal-incidence",
+        "every-angle",
         "grazing-sun",
         "below-the-critical-angle",
         "above-the-critical-angle",

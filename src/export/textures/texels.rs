@@ -182,4 +182,34 @@ mod tests {
             }
         }
     }
+
+    #[test]
+    fn a_placed_map_goes_on_around_itself() {
+        let mut texels = Texels::black((8, 8));
+        let map = Texels {
+            width: 2,
+            height: 2,
+            values: vec![[1.0; 3], [2.0; 3], [3.0; 3], [4.0; 3]],
+        };
+        let place = Rectangle {
+            x: 3,
+            y: 1,
+            width: 2,
+            height: 2,
+        };
+        texels.place(&map, place, 2);
+        let rows: Vec<String> = texels
+            .values
+            .chunks(8)
+            .map(|row| row.iter().map(|value| value[0].to_string()).collect())
+            .collect();
+        let top = "01112220";
+        let bottom = "03334440";
+        assert_eq!(
+            rows,
+            [
+                top, top, bottom, bottom, bottom, "00000000", "00000000", "00000000"
+            ]
+        );
+    }
 }

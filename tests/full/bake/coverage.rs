@@ -241,6 +241,18 @@ proptest! {
         let across = grey([[0.0, b[0]], [a[1], 8.0], inside]);
         deposit((8, 8), &[grey(corners), grey([a, b, inside]), across, grey([a, inside, inside])]);
     }
+
+    #[test]
+    fn order_of_corners_changes_next_to_nothing(corners in prop::array::uniform3(point(-2.0, 10.0))) {
+        let [a, b, c] = corners;
+        let (one, _) = deposit((8, 8), &[grey([a, b, c])]);
+        for corners in [[a, c, b], [b, a, c], [b, c, a], [c, a, b], [c, b, a]] {
+            let (other, _) = deposit((8, 8), &[grey(corners)]);
+            for (x, y) in one.texels().iter().zip(other.texels()) {
+                prop_assert!((x[0] - y[0]).abs() <= 2, "{x:?} {y:?}");
+            }
+        }
+    }
 }
 
 #[test]
@@ -299,10 +311,28 @@ fn beside_the_map_and_nowhere_is_booked() {
         assert_eq!(report.outside, all);
         let in_tiles = tiles::chart(Some(tiles::mixed()));
         let far = corners.map(|[x, y]| [x + 1e4 * dx, y + 1e4 * dy]);
-        let (_, report) = deposit_on(&in_tiles, &[grey(far)], 1);
-        assert_eq!(report.outside, all, "in tiles");
-        let (_, report) = deposit_on(&in_tiles, &[grey([[1.0, f64::NAN], far[1], far[2]])], 1);
-        assert_eq!(report.non_finite, all, "in tiles");
+        let nowhere = grey([[1.0, f64::NAN], far[1], far[2]]);
+        let (_, report) = deposit_on(&in_tiles, &[grey(far), nowhere, grey(far)], 3);
+        let twice = all.map(|count| 2 * count);
+        assert_eq!((report.outside, report.non_finite), (twice, all), "in tiles");
+    }
+}
+
+#[test]
+fn one_triangle_over_everything_is_flat() {
+    let flux = 1 << 60;
+    let over = |far: f64| {
+        let corners = [[-far, -far], [far, -far], [0.0, far]];
+        deposit((64, 64), &[triangle(corners, [flux; 3])])
+    };
+    // 4096 texels of 2·10²⁴: nothing of 2⁶⁰ counts.
+    let (_, report) = over(1e12);
+    assert!(report.deposited[0] <= 1 << 20, "{report:?}");
+    let (map, _) = over(1e4);
+    let expected = flux as f64 / 2e8;
+    for texel in map.texels() {
+        let off = (texel[0] as f64 / expected - 1.0).abs();
+        assert!(off < 1e-6, "{texel:?} {expected}");
     }
 }
 
@@ -312,6 +342,52 @@ fn hash(index: u64) -> f64 {
     x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
     (x >> 11) as f64 / (1_u64 << 53) as f64
+}
+
+/// A crooked triangulation of the rectangle of `size`, `cells` each way, with a flux of `density` counts per texel of area.
+fn tiling(size: (usize, usize), cells: (usize, usize), density: f64) -> Vec<FluxTriangle> {
+    let shift = |along: usize, count: usize, seed: usize| {
+        let is_inside = along > 0 && along < count;
+        f64::from(u8::from(is_inside)) * 0.3 * (hash(seed as u64) - 0.5)
+    };
+    let corner = |i: usize, j: usize| {
+        let seed = 2 * (j * (cells.0 + 1) + i);
+        DVec2::new(
+            (i as f64 + shift(i, cells.0, seed)) * size.0 as f64 / cells.0 as f64,
+            (j as f64 + shift(j, cells.1, seed + 1)) * size.1 as f64 / cells.1 as f64,
+        )
+    };
+    let in_cell = |cell: usize| {
+        let (i, j) = (cell % cells.0, cell / cells.0);
+        let [a, b, c, d] = [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)].map(|(i, j)| corner(i, j));
+        [[a, b, c], [a, c, d]]
+    };
+    let triangles = (0..cells.0 * cells.1).flat_map(in_cell);
+    let with_flux = |corners: [DVec2; 3]| FluxTriangle {
+        corners,
+        flux: [(density * area(&corners)).round() as i64; 3],
+        island: 0,
+    };
+    triangles.map(with_flux).collect()
+}
+
+#[test]
+fn a_tiling_with_even_flux_is_flat() {
+    for cells in [(3, 2), (20, 17), (90, 110)] {
+        let size = (48, 56);
+        let density = 1e10;
+        let triangles = tiling(size, cells, density);
+        let (flux, report) = deposit(size, &triangles);
+        assert_eq!(report.outside, [0; 3]);
+        // Rounded fluxes, and two roundings per triangle and texel.
+        let per_texel = 4.0 + triangles.len() as f64 / (size.0 * size.1) as f64;
+        for texel in flux.texels() {
+            assert!(
+                (texel[0] as f64 - density).abs() < 12.0 * per_texel,
+                "{texel:?} in {cells:?}"
+            );
+        }
+    }
 }
 
 /// Triangles of many sizes, on and beside a map.

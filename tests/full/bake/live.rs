@@ -155,6 +155,17 @@ fn light_beyond_its_memory_is_not_kept() {
 }
 
 #[test]
+fn a_cancelled_bake_leaves_nothing_behind() {
+    let settings = settings(2e4, 32);
+    let mut session = session(&builtin_scene("ring"));
+    let control = Control::default();
+    control.cancel();
+    assert!(session.bake(&settings, &(), &control).expect("a part").partial);
+    let (whole, _) = assert_fresh(&mut session, &settings, "after a cancelled one");
+    assert!(whole.counts.rays > 0);
+}
+
+#[test]
 fn dimming_and_smoothing_take_no_work() {
     let scene = builtin_scene("ring");
     let base = with_layers(&CAUSTIC_AND_DIRECT, at(5e3, 96));

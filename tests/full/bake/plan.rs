@@ -135,6 +135,20 @@ fn check_item_buffers(alone: &BakeResult, among: &BakeResult) {
 }
 
 #[test]
+fn forced_on_everything_is_looked_for() {
+    let mut settings = at(4_000.0, 64);
+    let auto = bake(crowded(), &settings);
+    settings.effects = EffectSwitches::default().with(Effect::LightPass, EffectSwitch::On);
+    let forced = bake(crowded(), &settings);
+    assert!(forced.counts.rays > auto.counts.rays);
+    assert!(forced.counts.segments > auto.counts.segments);
+    assert!(
+        all_bits(&auto) == all_bits(&forced),
+        "what is looked for in vain changes nothing"
+    );
+}
+
+#[test]
 fn nothing_to_do_takes_nothing() {
     let ring = builtin_scene("ring");
     let mut dark = ring.clone();

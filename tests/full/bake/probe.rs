@@ -191,3 +191,25 @@ fn a_plane_mirror_has_one_path() {
     assert_eq!(*dark, 0.0, "no light comes there from the mirror");
     assert_eq!((told.caustic().luminance(), reflected(told)), (0.0, 0));
 }
+
+/// Against the maps of the independent solver, which knows neither meshes nor this program.
+#[test]
+fn shares_add_up_to_the_solvers_texels() {
+    for (name, file, tolerance) in [("ring", "S1", 0.02), ("ball", "S2", 0.03), ("pool", "S3", 0.04)] {
+        let scene = Arc::new(builtin_scene(name));
+        let result = bake(Scene::clone(&scene), &at(1e3, 256));
+        let map = map_of(&result, &scene, "floor");
+        let expected = support::reference_map(file);
+        let tracer = Tracer::new(scene.clone());
+        let mut order: Vec<usize> = (0..expected.len()).collect();
+        order.sort_by(|a, b| expected[*a].total_cmp(&expected[*b]));
+        // Not the very brightest: those are the meshes' own.
+        for share in [0.99, 0.95, 0.8, 0.6] {
+            let texel = order[(share * order.len() as f64) as usize];
+            let target = target(&tracer, map, texel);
+            let told = explain(&tracer, &target, LIMITS, expected[texel], &Control::default());
+            let sum = told.caustic().luminance();
+            support::assert_close(sum, expected[texel], tolerance, &format!("{name} {texel}"));
+        }
+    }
+}

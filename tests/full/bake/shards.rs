@@ -7,7 +7,7 @@ use nephroid::optics::LinearSrgb;
 use nephroid::progress::Control;
 use nephroid::scene::Scene;
 use nephroid::session::{BakeResult, ShardSource, ShardSums};
-use nephroid::settings::{BakeSettings, LayerKind, Sigma, Wavelengths};
+use nephroid::settings::{BakeSettings, LayerKind, MapResolution, Sigma, Wavelengths};
 
 use crate::bake::common::{assert_same, session, with_layers};
 use support::hard_scenes::under_square_lamp;
@@ -112,4 +112,64 @@ fn wavelengths_add_up() {
 #[test]
 fn soft_light_adds_up() {
     assert_adds_up(&under_square_lamp("ball", 0.1), &photons(1e6, 24), &[3]);
+}
+
+#[test]
+fn what_the_light_decides_is_refused() {
+    let scene = builtin_scene("ring");
+    type Change = fn(&mut BakeSettings);
+    let cases: [(&str, Change); 5] = [
+        ("--max-error", |settings| settings.max_error = Some(0.02)),
+        ("--max-time", |settings| settings.max_time_s = Some(1.0)),
+        ("--map-resolution", |settings| {
+            settings.map_resolution = MapResolution::Auto
+        }),
+        ("--layers", |settings| settings.layers = vec![LayerKind::Direct]),
+        ("--memory", |settings| settings.memory_bytes = 1 << 20),
+    ];
+    for (option, change) in cases {
+        let mut settings = at(1000.0, 512);
+        change(&mut settings);
+        let share = Share::new(1, 2).expect("a share");
+        let refused = session(&scene).bake_shard(&settings, share, &(), &Control::default());
+        assert_eq!(refused.expect_err(option).location, option);
+        let refused = merge(&scene, &settings, Vec::new()).expect_err(option);
+        assert_eq!(refused.location, option);
+    }
+}
+
+#[test]
+fn what_is_not_all_of_a_bake_is_refused() {
+    let (scene, settings) = (builtin_scene("ring"), at(2000.0, 16));
+    let all = shards(&scene, &settings, 3);
+    let damaged = |change: fn(&mut Vec<Vec<u8>>)| {
+        let mut shards = all.clone();
+        change(&mut shards[1].passes);
+        shards
+    };
+    let cases = [
+        (all[..2].to_vec(), "in no shard, or in two"),
+        ([&all[..], &all[..1]].concat(), "in no shard, or in two"),
+        (damaged(|passes| passes.truncate(1)), "does not hold the passes"),
+        (
+            damaged(|passes| passes.push(Vec::new())),
+            "does not hold the passes",
+        ),
+        (damaged(|passes| passes.reverse()), ""),
+        (damaged(|passes| passes[0].truncate(30)), "damaged"),
+        (damaged(|passes| passes[0].clear()), "damaged"),
+        (
+            damaged(|passes| {
+                let half = passes[1].len() / 2;
+                passes[1][half] ^= 1;
+            }),
+            "damaged",
+        ),
+    ];
+    for (shards, word) in cases {
+        let error = merge(&scene, &settings, shards).expect_err(word);
+        assert!(error.what.contains(word), "{error}");
+    }
+    let other = merge(&scene, &at(2000.0, 17), all).expect_err("maps of another size");
+    assert!(other.what.contains("damaged"), "{other}");
 }

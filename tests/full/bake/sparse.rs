@@ -1,8 +1,11 @@
-//! Maps in tiles: how much memory they save and what that costs; their sizes, and levels on the way.
+//! Maps in tiles: how much memory they save and what that costs; their sizes, levels on the way, and layers light by
+//! light.
 
 use std::sync::Arc;
 
 use glam::{DQuat, DVec3};
+use nephroid::export::exr::decode;
+use nephroid::export::map_folder::MapFolder;
 use nephroid::illumination::IlluminationMap;
 use nephroid::optics::LinearSrgb;
 use nephroid::progress::Control;
@@ -55,6 +58,15 @@ fn floor_size(scene: &Scene, result: &BakeResult) -> (usize, usize) {
 
 fn estimate(result: &BakeResult) -> f64 {
     result.estimated_relative_rmse.expect("an estimate")
+}
+
+#[test]
+fn a_ball_takes_a_tenth_of_a_dense_map() {
+    let result = bake(builtin_scene("ball"), &auto(2.5e4));
+    let (taken, dense) = memory(&result);
+    assert!(taken * 10 <= dense, "{taken} of {dense} bytes");
+    assert_eq!(result.warnings, []);
+    assert_eq!(energy_fault(&result), None);
 }
 
 #[test]
@@ -263,4 +275,52 @@ fn whole_pictures_come_before_the_last() {
         "all but the first have an estimate"
     );
     assert!(errors.windows(2).all(|pair| pair[1] < pair[0]), "{errors:?}");
+}
+
+#[test]
+fn each_light_has_its_part_of_each_layer() {
+    let mut scene = builtin_scene("mirror");
+    let second = parts::point_light("second lamp", DVec3::new(0.1, 1.0, -0.2), Flux(30.0));
+    scene.lights.push(second);
+    let settings = set(with_layers(&CAUSTIC_AND_DIRECT, at(5_000.0, 32)), |s| {
+        s.per_light = true
+    });
+    let result = bake(scene.clone(), &settings);
+    let map = map_of(&result, &scene, "floor");
+    let part = |light: usize, kind: LayerKind| {
+        let mut parts = result.light_layers.iter();
+        let found =
+            parts.find(|part| (part.light, part.receiver, part.kind) == (light, map.chart.receiver, kind));
+        &found.expect("a part").irradiance
+    };
+    for layer in &map.layers {
+        let [first, second] = [0, 1].map(|light| part(light, layer.kind));
+        for (texel, whole) in layer.irradiance.iter().enumerate() {
+            let sum = first[texel][1] + second[texel][1];
+            let off = (sum - whole[1]).abs();
+            assert!(off <= 1e-5 * whole[1].max(1e-3), "{:?} {texel}", layer.kind);
+        }
+    }
+    assert!(bake(scene.clone(), &at(5_000.0, 32)).light_layers.is_empty());
+
+    let folder = tempfile::tempdir().expect("a folder");
+    let target = MapFolder::open(folder.path(), false).expect("a place");
+    let manifest = target.write(&scene, &settings, &result).expect("written");
+    let mut entries = manifest.maps.iter();
+    let entry = entries.find(|entry| entry.surface == "floor").expect("the floor");
+    let names: Vec<&str> = entry.lights.iter().map(|part| part.channels.as_str()).collect();
+    let expected = [
+        "caustic.light",
+        "caustic.second-lamp",
+        "direct.light",
+        "direct.second-lamp",
+    ];
+    assert_eq!(names, expected);
+    let bytes = std::fs::read(folder.path().join(&entry.file)).expect("a file");
+    let image = decode(&bytes, "map").expect("an image");
+    let green: Vec<f32> = part(1, LayerKind::Caustic).iter().map(|rgb| rgb[1]).collect();
+    assert_eq!(
+        image.channel("caustic.second-lamp.G").expect("its channel"),
+        &green[..]
+    );
 }

@@ -186,6 +186,22 @@ fn ball() -> Mesh {
     })
 }
 
+fn cylinder() -> Mesh {
+    let (axis, x) = (
+        DVec3::new(1.0, 0.4, 0.2).normalize(),
+        DVec3::new(-0.4, 1.0, 0.0).normalize(),
+    );
+    let y = axis.cross(x).normalize();
+    let x = y.cross(axis);
+    // The seam lies below, in the light.
+    let (x, y) = (-x, -y);
+    stretched(192, 48, |u, v| {
+        let around = DVec2::from_angle(TAU * u);
+        let normal = x * around.x + y * around.y;
+        (MIDDLE + normal * 0.2 + axis * (0.7 * (v - 0.5)), normal)
+    })
+}
+
 fn torus() -> Mesh {
     stretched(192, 96, |u, v| {
         let around = DVec2::from_angle(TAU * u);
@@ -230,6 +246,11 @@ fn check_bent(mesh: Mesh) {
 #[test]
 fn a_ball_takes_a_virtual_lamps_light() {
     check_bent(ball());
+}
+
+#[test]
+fn a_cylinder_takes_a_virtual_lamps_light() {
+    check_bent(cylinder());
 }
 
 #[test]

@@ -1,11 +1,14 @@
 //! The wavefront estimator against an independent solver, and by its counters.
 
+use glam::{DMat3, DVec3};
+use nephroid::scene::{LoadOptions, load};
 use nephroid::session::BakeResult;
 
 use crate::bake::common::{floor, rmse, towards};
-use support::reference_map;
+use support::hard_scenes;
 use support::references::references;
-use support::tools::{at, bake, builtin_scene, energy_fault, set, settings};
+use support::tools::{at, bake, builtin_scene, energy_fault, map_of, set, settings, transformed};
+use support::{assert_close, project_file, reference_map, shared_or_skip};
 
 /// The others are in the quick tests.
 #[test]
@@ -19,6 +22,84 @@ fn few_rays_agree_with_the_solver() {
         let scene = builtin_scene(reference.builtin);
         let result = bake(scene.clone(), &at(reference.by_wavefronts.0, 256));
         reference.check_wavefronts(&result, &scene);
+        if reference.builtin == "ball" {
+            let texel_m = map_of(&result, &scene, "floor").chart.texel_area_m2(0).sqrt();
+            check_far_field(&floor(&result, &scene), texel_m);
+        }
+    }
+}
+
+/// As a lamp's irradiance falls with the square of the size, and a sun's does not.
+#[test]
+fn splats_of_moved_scenes_agree() {
+    let rotation = DMat3::from_axis_angle(DVec3::new(0.3, -0.8, 0.52).normalize(), 1.234);
+    let size = 3.7;
+    let references = references();
+    let plain = ["mirror", "slab", "nephroid"];
+    for reference in references.iter().filter(|it| plain.contains(&it.builtin)) {
+        let scene = transformed(builtin_scene(reference.builtin), rotation, size, DVec3::ZERO);
+        let (density, most) = reference.by_splats.expect("held to it");
+        let result = bake(scene.clone(), &settings(density, 256));
+        reference.check(&result, &scene, size, (most, 0.005));
+    }
+}
+
+#[test]
+fn the_solvers_files_agree_with_its_maps() {
+    for reference in references()
+        .iter()
+        .filter(|reference| reference.by_splats.is_some())
+    {
+        let Some(path) = shared_or_skip(&format!("oracle/{}.glb", reference.file)) else {
+            continue;
+        };
+        let path = path.to_str().expect("a readable path");
+        let scene = load(path, &LoadOptions::default()).expect("a valid file");
+        let (density, most) = reference.by_wavefronts;
+        reference.check(
+            &bake(scene.clone(), &at(density, 256)),
+            &scene,
+            1.0,
+            (most, 0.005),
+        );
+    }
+}
+
+/// Rings around the ball's axis that lie wholly on its map, against the solver's profile.
+fn check_far_field(image: &[f64], texel_m: f64) {
+    let profile = std::fs::read_to_string(project_file("assets/reference/S2_profile.csv"));
+    let profile = profile.expect("a readable profile");
+    let numbers = |line: &str| -> Vec<f64> {
+        let numbers = line.split(',').map(|x| x.parse().expect("a number"));
+        numbers.collect()
+    };
+    let rows: Vec<Vec<f64>> = profile.lines().skip(1).map(numbers).collect();
+    for ring in 0..12 {
+        let (inner, outer) = (0.05 * f64::from(ring), 0.05 * f64::from(ring + 1));
+        let (mut flux, mut area) = (0.0, 0.0);
+        const SUB: usize = 8;
+        for (texel, e) in image.iter().enumerate() {
+            for sub in 0..SUB * SUB {
+                let place = |index: usize, part: usize| {
+                    (index as f64 + (part as f64 + 0.5) / SUB as f64 - 128.0) * texel_m
+                };
+                let r = place(texel % 256, sub % SUB).hypot(place(texel / 256, sub / SUB));
+                if (inner..outer).contains(&r) {
+                    flux += e;
+                    area += 1.0;
+                }
+            }
+        }
+        let (mut expected, mut whole) = (0.0, 0.0);
+        for row in &rows {
+            let (low, high) = (row[0].max(inner), row[1].min(outer));
+            if high > low {
+                expected += row[2] * (high * high - low * low);
+                whole += high * high - low * low;
+            }
+        }
+        let what = format!("ring {inner:.2} to {outer:.2} m");
+        assert_close(flux / area, expected / whole, 0.05, &what);
     }
 }
 
@@ -93,4 +174,17 @@ fn a_named_threshold_is_taken_as_it_is() {
     let named = set(towards(0.01, 64), |s| s.branch_threshold = Some(0.02));
     assert_eq!(named.path_threshold().to_bits(), 0.02_f64.to_bits());
     assert!(towards(0.1, 64).path_threshold() > towards(0.01, 64).path_threshold());
+}
+
+#[test]
+fn a_floor_of_two_objects_takes_the_same_light() {
+    for name in ["ring", "pool"] {
+        let whole = builtin_scene(name);
+        let cut = hard_scenes::with_cut_floor(whole.clone());
+        let [whole, cut] = [whole, cut].map(|scene| bake(scene, &at(1e4, 128)));
+        assert_eq!(energy_fault(&cut), None, "{name}");
+        assert_eq!(cut.maps.len(), 2, "{name}");
+        let deposited = |result: &BakeResult| result.ledgers[0].energy_w.deposited;
+        assert_close(deposited(&cut), deposited(&whole), 5e-4, name);
+    }
 }

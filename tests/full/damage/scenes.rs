@@ -5,11 +5,13 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use glam::DVec3;
 use nephroid::error::Result;
 use nephroid::progress::Control;
-use nephroid::scene::{LoadOptions, Scene};
+use nephroid::scene::{LightKind, LoadOptions, Scene};
 use nephroid::session::{BakeResult, BakeSession};
 use nephroid::settings::{BakeSettings, LayerKind};
+use nephroid::units::RadiantIntensity;
 use serde_json::json;
 
 use super::mutate::{Damage, effort};
@@ -17,7 +19,7 @@ use super::watch::{Tally, Way, alone, attack};
 use support::glb::{Glb, load_bytes, load_path};
 use support::shared_or_skip;
 use support::sound::scene_fault;
-use support::tools::{at, energy_fault, photons};
+use support::tools::{at, builtin_scene, energy_fault, photons};
 
 /// Most memory that loading may take by itself [bytes].
 const LIMIT_BYTES: u64 = 64 << 20;
@@ -174,6 +176,76 @@ fn a_small_scene() {
         let subject = ("small.glb", whole, Damage::scene as Way);
         attack(&tally, bounds, &[subject], read, |scene| scene_fault(&scene));
         tally.expect(90, 90);
+    });
+}
+
+/// What the tests above rest on.
+#[test]
+fn broken_promises_of_a_scene_are_noticed() {
+    let sound = builtin_scene("showroom");
+    assert_eq!(scene_fault(&sound), None);
+    fn mesh(scene: &mut Scene) -> &mut nephroid::scene::Mesh {
+        scene.objects[0].mesh_in_scene_mut()
+    }
+    type Break = fn(&mut Scene);
+    let breaks: [(&str, Break); 12] = [
+        ("position", |s| mesh(s).positions[0].x = f64::NAN),
+        ("normal", |s| mesh(s).normals[0] *= 1.001),
+        ("normals", |s| mesh(s).normals.truncate(1)),
+        ("vertex", |s| mesh(s).triangles[0][1] = u32::MAX),
+        ("triangle", |s| mesh(s).triangles.clear()),
+        ("material", |s| s.objects[0].material = 9999),
+        ("index", |s| s.materials[0].ior = 0.5),
+        ("share", |s| s.materials[0].roughness = f64::NAN),
+        ("colour", |s| s.materials[0].base_colour.g = 1.5),
+        ("strength", |s| s.lights[0].colour.r = f64::INFINITY),
+        ("place", |s| {
+            s.lights[0].kind = LightKind::Point {
+                position: DVec3::splat(f64::INFINITY),
+                intensity: RadiantIntensity(1.0),
+            }
+        }),
+        ("camera", |s| s.cameras[0].forward = DVec3::ZERO),
+    ];
+    for (what, damage) in breaks {
+        let mut scene = sound.clone();
+        damage(&mut scene);
+        assert!(scene_fault(&scene).is_some(), "a wrong {what} passes");
+    }
+}
+
+/// Counts that a file only states are worth nothing: a kilobyte must not take a gigabyte.
+#[test]
+fn stated_counts_take_no_memory() {
+    alone(|| {
+        let tally = Tally::default();
+        for count in [1_u64 << 20, 1 << 31, u64::from(u32::MAX), 1 << 53] {
+            let sparse = json!({ "count": count, "indices": { "bufferView": 0, "componentType": 5125 },
+                "values": { "bufferView": 0 } });
+            for (what, claim) in [
+                (
+                    "accessors",
+                    json!({ "componentType": 5126, "count": count, "type": "VEC3", "bufferView": null }),
+                ),
+                ("accessors", json!({ "count": count })),
+                ("accessors", json!({ "sparse": sparse })),
+                ("bufferViews", json!({ "byteLength": count })),
+                ("bufferViews", json!({ "byteStride": count })),
+            ] {
+                let mut file = Glb::tetrahedron();
+                let stated = file.json[what][0].as_object_mut().expect("it is there");
+                stated.extend(claim.as_object().cloned().unwrap_or_default());
+                stated.retain(|_, value| !value.is_null());
+                let bytes = file.bytes();
+                let load = || load_bytes(&bytes, &options());
+                tally.watch(
+                    (&format!("{count}-{what}.glb"), &bytes),
+                    most_bytes(bytes.len()),
+                    load,
+                );
+            }
+        }
+        assert!(tally.refused.get() >= 12, "{tally:?}");
     });
 }
 

@@ -141,3 +141,27 @@ fn sentence_fault(error: &Error) -> Option<String> {
     let is_fair = !caught && is_one && error.kind != ErrorKind::Cancelled;
     (!is_fair).then(|| format!("it is refused with {sentence:?}"))
 }
+
+/// The one test of these tests: all of them rest on this.
+#[test]
+fn what_goes_wrong_is_noticed() {
+    alone(|| {
+        let fault = |outcome: std::result::Result<Result<usize>, String>| outcome.err().unwrap_or_default();
+        let refused = |what: &str| watched(1 << 20, || Err(Error::failure("a.glb", what, "export it again")));
+        assert_eq!(fault(watched(1 << 20, || Ok(0))), "");
+        assert_eq!(fault(refused("is broken")), "");
+        assert!(fault(refused(" ")).contains("refused with"));
+        assert!(fault(refused("its contents cannot be understood")).contains("refused with"));
+        let cancelled = || Err(Error::cancelled("bake"));
+        assert!(fault(watched(1 << 20, cancelled)).contains("refused with"));
+        let greedy = || {
+            Ok(
+                std::thread::spawn(|| std::hint::black_box(vec![1_u8; 2 << 20]).len())
+                    .join()
+                    .unwrap_or(0),
+            )
+        };
+        assert!(fault(watched(1 << 20, greedy)).contains("bytes of memory"));
+        assert!(fault(watched(1 << 20, || panic!("as it should"))).contains("panicked"));
+    });
+}

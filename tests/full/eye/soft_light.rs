@@ -5,6 +5,9 @@ use std::sync::Arc;
 
 use glam::DVec3;
 use nephroid::illumination::Side;
+use nephroid::light_pass::direct::bake_direct;
+use nephroid::optics::LinearSrgb;
+use nephroid::progress::Control;
 use nephroid::scene::{Environment, Light, LightKind, LightSize, Material, Mesh, PanelShape};
 use nephroid::transport::Tracer;
 use nephroid::units::Radiance;
@@ -320,4 +323,42 @@ fn lamps_do_not_shadow_themselves() {
         let body = lit(&beside(0.1, body), 0, 8);
         assert_lit(&body, 0.1, [2e-3, 2e-3], |place| 5.0 * square_sr(place, 0.2, 0.5));
     }
+}
+
+/// On, at and just above its receiver a lamp sends no more than πL, and no number that is none.
+#[test]
+fn lamp_on_its_receiver_stays_finite() {
+    for (height, double_sided) in [(0.0, false), (0.0, true), (1e-12, true), (1e-6, true)] {
+        let flat = quad(DVec3::new(-0.5, height, -0.5), DVec3::X, DVec3::Z);
+        let ball = sphere(DVec3::Y * height, 0.5, 24, 12);
+        for (lamp, most) in [(flat, PI), (ball, 2.0 * PI)] {
+            let tracer = under(glowing(1, 1e30), 1.0, vec![(lamp, sided(double_sided))]);
+            for e in lit(&tracer, 0, 20) {
+                let share = f64::from(e[0]) / 1e30;
+                assert!((0.0..1.01 * most).contains(&share), "{height}: {share}");
+            }
+        }
+    }
+}
+
+#[test]
+fn same_bytes_for_any_number_of_threads() {
+    let sky = Environment::new(2, 2, vec![[1.0, 0.5, 0.2], [0.3; 3], [0.0; 3], [0.1; 3]]);
+    let ball = sphere(DVec3::new(0.0, 0.4, 0.0), 0.3, 24, 12);
+    let lamps = vec![panel(0.2, 1.5, 1.0, PanelShape::Disc), sky_light(1.0)];
+    let mut scene = scene(vec![matte(floor(1.0, 0.0)), matte(ball)], lamps);
+    scene.environment = sky.map(Arc::new);
+    scene.lights[0].colour = LinearSrgb::new(1.0, 0.5, 0.25);
+    let tracer = Tracer::new(Arc::new(scene));
+    let charts = [chart(&tracer, 0, 24, 24), chart(&tracer, 1, 32, 32)];
+    let [one, three] = [1, 3].map(|threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+        let charts: Vec<_> = charts.iter().map(|chart| (chart, None)).collect();
+        let bake = || bake_direct(&tracer, &tracer.scene().lights, &charts, &(), &Control::default());
+        let layers = pool.expect("threads").install(bake).into_iter();
+        layers
+            .map(|layer| (layer.irradiance, layer.shadow_rays))
+            .collect::<Vec<_>>()
+    });
+    assert_eq!(one, three);
 }

@@ -182,3 +182,16 @@ fn small_surfaces_are_traced_as_their_middles() {
     let found = tracing(&glowing).expect("there is a device").picture(&ahead());
     assert!(unlike(&expected, &found) < 0.02, "{}", unlike(&expected, &found));
 }
+
+#[test]
+fn lamps_cost_nothing_where_not_traced() {
+    let mut scene = scene(lamps().to_vec());
+    scene.objects.truncate(2);
+    let mut rig = or_skip!(Rig::at(AS_CPU, &scene, &[]));
+    rig.picture(&ahead());
+    let counts = rig.renderer.counts();
+    assert_eq!((counts.pipelines, counts.chain_bytes), (1, 0));
+    rig.renderer.set_traces_lights(true);
+    rig.picture(&ahead());
+    assert!(rig.renderer.counts().chain_bytes > 0);
+}

@@ -1,6 +1,6 @@
 //! Metals where light meets them: by wavelength where it has one, by colour where it has three channels.
 
-use nephroid::optics::fresnel::metal_reflectance;
+use nephroid::optics::fresnel::{dielectric_reflectance, metal_reflectance};
 use nephroid::optics::spectrum::{Spectrum, WavelengthSampler, Xyz, illuminant, xyz_bar};
 use nephroid::optics::wavelength::VISIBLE;
 use nephroid::optics::{ColourBasis, Metal};
@@ -183,4 +183,58 @@ fn textures_dim_a_metal_at_a_wavelength() {
             nm,
         );
     }
+}
+
+#[test]
+fn light_comes_back_from_gold_behind_glass() {
+    let mut scene = plate("gold");
+    let pane = shapes::cuboid(dvec3(-1.0, 0.1, -1.0), dvec3(1.0, 0.3, 1.0));
+    parts::add(&mut scene, "pane", pane, parts::glass("N-SF11"));
+    let index = scene.materials[1].glass.clone().expect("a glass");
+    let tracer = Tracer::new(Arc::new(scene));
+    let incident = dvec2(0.6, -0.8);
+    let follow = |wavelength: Nanometres| -> (f64, Ray) {
+        let at = tracer.at_wavelength(wavelength);
+        let mut ray = Ray {
+            origin: dvec3(-0.5, 0.6, 0.02),
+            direction: incident.extend(0.0),
+        };
+        let (mut media, mut flux) = (MediumStack::default(), LinearSrgb::WHITE);
+        // Through the pane, off the gold, through the pane.
+        for step in 0..5 {
+            let hit = at.closest_hit(&ray).expect("pane and plate");
+            let met = at.interact(&hit, ray.direction, &media);
+            let branch = if step == 2 {
+                met.reflection
+            } else {
+                met.transmission
+            };
+            let branch = branch.expect("light goes on");
+            (ray, media, flux) = (branch.ray, branch.media, flux * branch.share);
+        }
+        assert!(at.closest_hit(&ray).is_none(), "it is out");
+        assert_eq!([flux.g, flux.b], [flux.r; 2], "one wavelength, one channel");
+        (flux.r, ray)
+    };
+    let expected = |wavelength: Nanometres| {
+        let glass = dielectric_reflectance(0.8, index.dispersion.index(wavelength));
+        (1.0 - glass).powi(4) * metal("gold").reflectance(0.8, wavelength)
+    };
+    let mut places = Vec::new();
+    for nm in [420.0, 500.0, 580.0, 680.0].map(Nanometres) {
+        let (flux, ray) = follow(nm);
+        near(flux, expected(nm), 1e-9, nm);
+        // A pane and a plate turn all light alike.
+        near(ray.direction, dvec3(incident.x, -incident.y, 0.0), 1e-9, nm);
+        // The pane shifts blue more: along the plate it is 0.2 m deep, twice.
+        let n = index.dispersion.index(nm);
+        let tan_within = incident.x / (n * n - incident.x * incident.x).sqrt();
+        let at_top = ray.origin.x + (0.3 - ray.origin.y) * 0.75;
+        near(at_top, -0.5 + (0.3 + 0.2) * 0.75 + 0.4 * tan_within, 1e-9, nm);
+        places.push(at_top);
+    }
+    assert!(places.is_sorted(), "blue light is bent most: {places:?}");
+    let lamp = illuminant("FL2").expect("a lamp");
+    let found = followed(&lamp, |wavelength| follow(wavelength).0);
+    near(found, integrated(&lamp, expected), 1e-4, "under FL2");
 }

@@ -1,4 +1,5 @@
-//! What becomes of light at a floor: interfaces within other bodies, polish, micro-facets; and the fall-off of lamps.
+//! What becomes of light at a floor: interfaces within other bodies, polish, micro-facets; how lamps fall off, and how
+//! units multiply.
 
 use std::f64::consts::TAU;
 
@@ -6,6 +7,7 @@ use nephroid::light_pass::emitter::EmitterKind;
 use nephroid::optics::fresnel::{dielectric_reflectance, thin_wall_reflectance};
 use nephroid::transport::microfacets::Facet;
 use nephroid::transport::{EffectSet, Event, Interaction, SurfaceHit};
+use nephroid::units::{Area, Irradiance, RadiantIntensity, SolidAngle};
 
 use crate::prelude::*;
 use support::scenes::middles;
@@ -223,6 +225,20 @@ fn lights_have_their_falloff() {
     // Half-way in the cosine a quarter is left: the square of 1/2.
     let cosine = 0.5 * (0.3f64.cos() + 0.5f64.cos());
     near(soft.falloff(off_axis(cosine.acos())), 0.25, 1e-12, "half-way");
+}
+
+#[test]
+fn units_multiply_lawfully() {
+    let flux = RadiantIntensity(2.0) * SolidAngle(4.0 * PI);
+    near(flux.0, 8.0 * PI, 1e-12, "into the whole sphere");
+    // On a sphere of 3 m around it that is I/r².
+    near((flux / Area(4.0 * PI * 9.0)).0, 2.0 / 9.0, 1e-15, "on a sphere");
+    near(
+        Irradiance(PI).diffuse_radiance(1.0).0,
+        1.0,
+        1e-15,
+        "a white Lambert surface",
+    );
 }
 
 proptest! {

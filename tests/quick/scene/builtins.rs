@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use nephroid::optics::refraction::refract;
+use nephroid::optics::refraction::{reflect, refract};
 use nephroid::optics::wavelength::D_LINE;
 use nephroid::scene::Object;
 use nephroid::scene::builtin::{NAMES, build};
@@ -72,6 +72,34 @@ fn every_scene_is_whole_and_its_meshes_sound() {
     assert!(build("Ring").is_none() && build("").is_none());
 }
 
+#[test]
+fn floors_have_map_coordinates() {
+    for (name, half) in [
+        ("ring", 1.0),
+        ("ball", 0.6),
+        ("pool", 1.0),
+        ("mirror", 1.0),
+        ("slab", 1.0),
+        ("paraboloid", 0.5),
+        ("nephroid", 1.0),
+    ] {
+        let scene = built_in(name);
+        let floor = object(&scene, "floor");
+        let material = &scene.materials[floor.material];
+        assert_eq!(material.surface, SurfaceKind::Diffuse);
+        assert_eq!(material.base_colour.to_array(), [0.5; 3]);
+        let mesh = floor.mesh_in_scene();
+        assert_close(mesh.area_m2(), 4.0 * half * half, 1e-15, name);
+        assert!(mesh.normals.iter().all(|n| *n == DVec3::Y));
+        let uvs = mesh.uv0.as_ref().expect("floor has TEXCOORD_0");
+        for (position, uv) in mesh.positions.iter().zip(uvs) {
+            assert_eq!(position.y, 0.0);
+            assert_close(position.x, half * (2.0 * uv.x - 1.0), 1e-15, "u runs along x");
+            assert_close(position.z, half * (2.0 * uv.y - 1.0), 1e-15, "v runs along z");
+        }
+    }
+}
+
 /// Solids are closed and have their volume [m³]. That their light lands where it should is held by the references.
 #[test]
 fn solids_are_closed() {
@@ -102,6 +130,52 @@ fn solids_are_closed() {
     assert_ne!(open_edges(&cut), 0, "a turned triangle is seen");
     cut.triangles.remove(17);
     assert_eq!(open_edges(&cut), 3, "a missing one too");
+}
+
+/// A ring faces inwards; the pool has its waves; a paraboloid sends a sun's light to its focus.
+#[test]
+fn shapes_are_those_of_the_references() {
+    for name in ["ring", "nephroid"] {
+        let scene = built_in(name);
+        let ring = object(&scene, "ring").mesh_in_scene();
+        for (position, normal) in ring.positions.iter().zip(&ring.normals) {
+            near(*normal, -position.with_y(0.0), 1e-15, position);
+        }
+        assert_eq!(open_edges(ring), 2 * 1024, "both rims, no seam along the wall");
+    }
+}
+
+#[test]
+fn pool_has_its_waves() {
+    let scene = built_in("pool");
+    let water = object(&scene, "water").mesh_in_scene();
+    let height = |x: f64, z: f64| {
+        1.0 + 0.02 * ((9.0 * x + 1.0).cos() + (7.0 * z + 2.0).cos() + (6.0 * x + 5.0 * z).cos())
+    };
+    let step = 1e-5;
+    for (p, normal) in water.positions.iter().zip(&water.normals).step_by(97) {
+        assert_close(p.y, height(p.x, p.z), 1e-14, "height");
+        let slope_x = (height(p.x + step, p.z) - height(p.x - step, p.z)) / (2.0 * step);
+        let slope_z = (height(p.x, p.z + step) - height(p.x, p.z - step)) / (2.0 * step);
+        let expected = DVec3::new(-slope_x, 1.0, -slope_z).normalize();
+        assert!(normal.distance(expected) < 1e-9, "{normal} instead of {expected}");
+    }
+    let scene = built_in("paraboloid");
+    let dish = object(&scene, "paraboloid").mesh_in_scene();
+    let LightKind::Sun { direction, .. } = scene.lights[0].kind else {
+        panic!("paraboloid is lit by a sun");
+    };
+    for (position, normal) in dish.positions.iter().zip(&dish.normals) {
+        let (reflected, to_focus) = (reflect(direction, *normal), DVec3::Y * -0.5 - *position);
+        near(to_focus.cross(reflected), DVec3::ZERO, 1e-14, position);
+        assert!(reflected.dot(to_focus) > 0.0);
+    }
+    let across = |triangle: usize| {
+        let [a, b, c] = dish.corners(triangle);
+        0.5 * (b - a).cross(c - a).dot(-direction)
+    };
+    let opening_m2: f64 = (0..dish.triangles.len()).map(across).sum();
+    assert_close(opening_m2, PI * 0.16, 1e-4, "opening across the beam");
 }
 
 /// A plane surface's TEXCOORD_0 fills the unit square without overlap: area in uv of 1.
@@ -172,7 +246,11 @@ fn behind(tracer: &Tracer, mut ray: Ray, reflections: usize) -> Ray {
 
 /// Whether a point is in the picture of the scene's first camera, 3 wide and 2 high.
 fn is_in_view(scene: &Scene, point: DVec3) -> bool {
-    scene.cameras[0].frustum(1.5).may_see((point, point))
+    let camera = &scene.cameras[0];
+    let to = point - camera.position;
+    let (depth, half) = (to.dot(camera.forward), (0.5 * camera.vertical_fov_rad).tan());
+    let (x, y) = (to.dot(camera.right()) / depth, to.dot(camera.up) / depth);
+    depth > 0.0 && y.abs() < half && x.abs() < 1.5 * half
 }
 
 #[test]
@@ -233,4 +311,123 @@ fn bowl_stands_in_daylight() {
             .iter()
             .all(|x| is_in_view(&scene, DVec3::new(*x, 0.1, 0.0)))
     );
+}
+
+/// What the references were computed with, to more digits than their maps can show.
+#[test]
+fn casters_are_those_of_the_references() {
+    for (name, part, surface, ior, triangles, area_m2, tolerance) in [
+        ("ring", "ring", SurfaceKind::Mirror, None, 2048, PI, 1e-5),
+        ("nephroid", "ring", SurfaceKind::Mirror, None, 2048, PI, 1e-5),
+        ("ball", "ball", SurfaceKind::Dielectric, Some(1.5), 0, PI, 3e-5),
+        (
+            "slab",
+            "slab",
+            SurfaceKind::Dielectric,
+            Some(1.5),
+            0,
+            2.0 * (64.0 + 2.0 * 2.4),
+            1e-14,
+        ),
+        (
+            "pool",
+            "water",
+            SurfaceKind::Dielectric,
+            Some(1.333),
+            2 * 512 * 512,
+            0.0,
+            0.0,
+        ),
+        ("mirror", "mirror", SurfaceKind::Mirror, None, 0, 0.6 * 0.5, 1e-14),
+    ] {
+        let scene = built_in(name);
+        let object = object(&scene, part);
+        let mesh = object.mesh_in_scene();
+        let material = &scene.materials[object.material];
+        assert_eq!(material.surface, surface, "{name}");
+        assert!(ior.is_none_or(|ior| material.ior == ior), "{name}");
+        assert!(triangles == 0 || mesh.triangles.len() == triangles, "{name}");
+        assert!(
+            area_m2 == 0.0 || (mesh.area_m2() / area_m2 - 1.0).abs() < tolerance,
+            "{name}: area"
+        );
+    }
+    for name in ["ball", "slab"] {
+        let scene = built_in(name);
+        assert!(
+            scene.materials[object(&scene, name).material].volume.is_some(),
+            "{name}"
+        );
+    }
+    let bounds = |name: &str, part: &str| {
+        object(&built_in(name), part)
+            .mesh_in_scene()
+            .bounds()
+            .expect("has vertices")
+    };
+    let (low, high) = bounds("ring", "ring");
+    assert_eq!((low.y, high.y), (0.0, 0.5));
+    let (low, high) = bounds("pool", "water");
+    assert_eq!((low.x, low.z, high.x, high.z), (-1.5, -1.5, 1.5, 1.5));
+    let (low, high) = bounds("mirror", "mirror");
+    // Turned by fifteen degrees.
+    assert_close(0.5 * (high.x - low.x), 0.077_645_7, 1e-6, "half width in x");
+    assert_close(0.5 * (high.z - low.z), 0.289_777_7, 1e-6, "half width in z");
+    assert_close(low.y, 0.2, 1e-14, "lower edge");
+    assert_close(high.y, 0.7, 1e-14, "upper edge");
+    let ball = built_in("ball");
+    let mesh = object(&ball, "ball").mesh_in_scene();
+    for (position, normal) in mesh.positions.iter().zip(&mesh.normals) {
+        let from_centre = *position - DVec3::new(0.0, 0.8, 0.0);
+        assert_close(from_centre.length(), 0.5, 2e-5, "radius");
+        assert!((from_centre.normalize() - *normal).length() < 1e-14);
+    }
+}
+
+#[test]
+fn lights_have_the_references_power() {
+    for (name, position) in [
+        ("ring", [-0.7, 1.2, 0.0]),
+        ("ball", [0.0, 3.0, 0.0]),
+        ("mirror", [-0.1, 1.2, 0.1]),
+        ("slab", [0.1, 2.0, -0.05]),
+    ] {
+        let light = built_in(name).lights[0].clone();
+        let LightKind::Point {
+            position: at,
+            intensity,
+        } = light.kind
+        else {
+            panic!("{name} is lit by a point light");
+        };
+        assert_eq!(at.to_array(), position);
+        assert_close(
+            intensity.0 * 4.0 * PI * light.colour.luminance(),
+            100.0,
+            1e-12,
+            name,
+        );
+    }
+    for (name, along) in [
+        ("pool", DVec3::new(0.3, -1.0, 0.2)),
+        ("paraboloid", DVec3::new(0.8, -0.6, 0.0)),
+        (
+            "nephroid",
+            DVec3::new(0.939_692_620_785_908_4, -0.342_020_143_325_668_7, 0.0),
+        ),
+    ] {
+        let light = built_in(name).lights[0].clone();
+        let LightKind::Sun {
+            direction,
+            normal_irradiance,
+        } = light.kind
+        else {
+            panic!("{name} is lit by a sun");
+        };
+        assert!(
+            (direction - along.normalize()).length() < 1e-15,
+            "{name}: {direction}"
+        );
+        assert_close(normal_irradiance.0 * light.colour.luminance(), 1.0, 1e-12, name);
+    }
 }

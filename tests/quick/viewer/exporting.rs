@@ -1,6 +1,6 @@
 //! Maps written by a thread of their own, and the picture of the window as files.
 
-use nephroid::eye_pass::{Picture, View};
+use nephroid::eye_pass::{Picture, View, tone_mapping};
 use nephroid::optics::spectrum::xyz::IDENTITY;
 use nephroid::viewer::background::Wake;
 use nephroid::viewer::exporting::{Exporter, folder_name, save_picture};
@@ -108,6 +108,21 @@ fn save(folder: &Path, scene: &str, has_radiance: bool) -> Result<Vec<String>, S
         file.file_name().expect("a name").to_string_lossy().into_owned()
     };
     Ok(files.iter().map(name).collect())
+}
+
+#[test]
+fn files_hold_the_picture_and_its_radiance() {
+    let folder = folder();
+    let names = save(folder.path(), "ring", true).expect("it is saved");
+    assert_eq!(names, ["nephroid-ring-0001.png", "nephroid-ring-0001.exr"]);
+    let radiance = FloatImage::read(&folder.path().join(&names[1])).expect("a picture");
+    assert_eq!(radiance.rgb("").expect("R, G, B"), picture().radiance);
+    let shown = image::open(folder.path().join(&names[0]))
+        .expect("a PNG")
+        .to_rgba8();
+    assert_eq!(shown.dimensions(), (3, 2));
+    let expected = tone_mapping::display_rgba8(&picture(), -1.5, ToneMap::AgX);
+    assert_eq!(shown.into_raw(), expected);
 }
 
 #[test]

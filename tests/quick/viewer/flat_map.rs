@@ -3,6 +3,7 @@
 use nephroid::viewer::flat_map::{Part, Shown, read, show, thumbnail};
 
 use super::fixtures::map;
+use super::*;
 
 /// Brightness [0, 255] and opacity of a pixel.
 fn pixel(shown: &Shown, x: usize, y: usize) -> (u8, u8) {
@@ -66,4 +67,15 @@ fn a_pixel_of_many_texels_is_their_mean() {
         assert!(found.abs_diff(expected) <= 1, "{found} instead of {expected}");
     }
     assert!(pixel(&coarse, 1, 0).0 > pixel(&coarse, 0, 0).0);
+}
+
+#[test]
+fn reading_tells_layers_and_error() {
+    let reading = read(&map(), 3.5, 1.2).expect("it is on the map");
+    assert_eq!((reading.texel, reading.error_w_per_m2), ([3, 1], Some(0.25)));
+    let [(LayerKind::Caustic, caustic), (LayerKind::Direct, direct)] = reading.layers_w_per_m2[..] else {
+        panic!("{reading:?}")
+    };
+    // Grey light is its own luminance.
+    near([caustic, direct], [6.0, 3.0], 1e-9, "layers");
 }

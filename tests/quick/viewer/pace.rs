@@ -2,7 +2,7 @@
 
 use nephroid::eye_pass::renderer::EyeQuality;
 use nephroid::viewer::pace::Pace;
-use nephroid::viewer::panel::frame_graph::columns;
+use nephroid::viewer::panel::frame_graph::{columns, scale_ms};
 use nephroid::viewer::timing::{FrameTimes, Latencies, PICTURES, Percentiles};
 
 use super::*;
@@ -173,6 +173,14 @@ fn oldest_pictures_are_forgotten() {
     assert_eq!(ends, [Some(30.0), Some(149.0)]);
     assert_eq!(of([[1.0, 2.0, 3.0], [4.0, 0.0, 0.5]]).longest_ms(), 6.0);
     assert_eq!(FrameTimes::default().longest_ms(), 0.0);
+}
+
+#[test]
+fn scale_holds_the_longest_picture() {
+    let longest = [0.0, 0.1, 0.11, 3.0, 16.7, 51.0, 1e9];
+    for (longest, scale) in longest.into_iter().zip([0.1, 0.1, 0.2, 5.0, 20.0, 100.0, 1e5]) {
+        near(scale_ms(longest) / scale, 1.0, 1e-12, longest);
+    }
 }
 
 #[test]
