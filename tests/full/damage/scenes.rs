@@ -14,8 +14,7 @@ use nephroid::settings::{BakeSettings, LayerKind};
 use nephroid::units::RadiantIntensity;
 use serde_json::json;
 
-use super::mutate::{Damage, effort};
-use super::watch::{Tally, Way, alone, attack};
+use super::mutate::{Damage, Tally, Way, alone, attack, effort};
 use support::glb::{Glb, load_bytes, load_path};
 use support::shared_or_skip;
 use support::sound::scene_fault;

@@ -7,9 +7,8 @@ use nephroid::scene::builtin::{parts, shapes};
 use nephroid::session::BakeResult;
 use nephroid::settings::{BakeSettings, Estimator, LayerKind, MapResolution};
 
-use support::brute_force::brute;
 use support::hard_scenes::{cut_glass, roughened, under_square_lamp, under_the_suns_disc};
-use support::tools::{bake, bits, builtin_scene, caustic, energy_fault, map_of, photons};
+use support::tools::{bake, bits, brute, builtin_scene, caustic, energy_fault, map_of, photons};
 
 const SIDE: usize = 64;
 const BLOCK: usize = 8;

@@ -1,9 +1,6 @@
 //! The program as a user runs it: options, streams, exit codes, files.
 
-mod compare;
-mod errors;
 mod inspect;
-mod render;
 mod smoke;
 mod usage;
 

@@ -1,11 +1,7 @@
 //! Files for other programs, read back by readers that are not ours.
 
-mod folders;
 mod glb;
-mod ktx2;
-mod map_files;
 mod maps;
-mod shards;
 mod textures;
 
 use std::path::PathBuf;
