@@ -76,6 +76,17 @@ pub fn skip(test: &str, reason: &str) {
     let _ = writeln!(std::io::stderr(), "skipped: {test}: {reason}");
 }
 
+/// What it holds, or the end of a test whose skip was counted.
+#[macro_export]
+macro_rules! or_skip {
+    ($option:expr) => {
+        match $option {
+            Some(found) => found,
+            None => return,
+        }
+    };
+}
+
 /// How a law is tried: many cases, the same ones in every run, so that a failure can be looked at.
 pub fn law(cases: u32) -> proptest::test_runner::Config {
     proptest::test_runner::Config {

@@ -11,7 +11,7 @@ use nephroid::session::BakeResult;
 use crate::bake::common::{floor, rmse, towards};
 use support::references::references;
 use support::tools::{at, bake, builtin_scene, energy_fault, map_of, photons, set, settings, transformed};
-use support::{assert_close, hard_scenes, project_file, reference_map, shared_or_skip};
+use support::{assert_close, hard_scenes, or_skip, project_file, reference_map, shared_or_skip};
 
 /// The others are in the quick tests.
 #[test]
@@ -211,9 +211,7 @@ fn impossible_texel(map: &IlluminationMap, wavelengths_part: bool) -> Option<[f3
 
 #[test]
 fn real_files_bake() {
-    let Some(folder) = shared_or_skip("scenes") else {
-        return;
-    };
+    let folder = or_skip!(shared_or_skip("scenes"));
     let entries = std::fs::read_dir(folder).expect("a readable folder");
     let files = entries.map(|entry| entry.expect("an entry").path());
     let is_glb = |path: &std::path::PathBuf| path.extension().is_some_and(|extension| extension == "glb");

@@ -16,7 +16,7 @@ use nephroid::transport::Tracer;
 use nephroid::units::{Irradiance, Radiance, RadiantIntensity};
 use rayon::prelude::*;
 
-use crate::gpu::rig::{AS_CPU, Rig, gpu, or_skip};
+use crate::gpu::rig::{AS_CPU, Rig, gpu, or_skip, unlike};
 use support::floors::{diffuse, floor_scene};
 use support::scenes::{light, view};
 use support::tools::{at, bake, builtin_scene, set};
@@ -457,16 +457,6 @@ fn tracing(scene: &Scene) -> Option<Rig<'static>> {
     let mut rig = Rig::at(AS_CPU, scene, &[])?;
     rig.renderer.set_traces_lights(true);
     Some(rig)
-}
-
-/// Share of the channels that differ by more than 1 % of the brightest or themselves: borders of shadows, which a map
-/// softens over a texel.
-fn unlike(a: &Picture, b: &Picture) -> f64 {
-    let channels = || a.radiance.iter().flatten().zip(b.radiance.iter().flatten());
-    let peak = channels().fold(0.0_f32, |peak, (a, _)| peak.max(*a));
-    assert!(peak > 0.0, "it is not dark");
-    let far = channels().filter(|(a, b)| (*a - *b).abs() > 0.01 * a.max(0.1 * peak));
-    far.count() as f64 / (3 * a.radiance.len()) as f64
 }
 
 /// Fails unless shadow rays show what the baked layer shows, which is returned.

@@ -286,9 +286,7 @@ const TOUCHED: [&str; 5] = ["nodes", "materials", "extensions", "extensionsUsed"
 
 #[test]
 fn real_files_are_saved_with_edits() {
-    let Some(sources) = support::shared_or_skip("scenes") else {
-        return;
-    };
+    let sources = support::or_skip!(support::shared_or_skip("scenes"));
     let folder = folder();
     let target = folder.path().join("saved.glb");
     let sources = fs::read_dir(sources).expect("a readable folder");

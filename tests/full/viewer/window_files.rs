@@ -19,6 +19,7 @@ use super::scene_file;
 use crate::damage::mutate::{Damage, effort};
 use support::desktop::{ALIKE, SIZE, Screen, Viewer, difference, picture, position, wait_until};
 use support::file_drop::drop_file;
+use support::or_skip;
 use support::tools::{at, bake, builtin_scene, set};
 
 /// Coarse enough to be baked in a second.
@@ -35,9 +36,7 @@ fn wait_for_scene(viewer: &mut Viewer<'_>, name: &str) {
 
 #[test]
 fn scenes_take_each_others_place() {
-    let Some(screen) = Screen::start() else {
-        return;
-    };
+    let screen = or_skip!(Screen::start());
     let mut viewer = Viewer::open(&screen, &format!("builtin:slab {COARSE}"));
     viewer.wait_for_bake();
     let slab = viewer.screenshot();
@@ -92,9 +91,7 @@ fn scenes_take_each_others_place() {
 /// of one is not.
 #[test]
 fn killed_window_comes_back_and_watches() {
-    let Some(screen) = Screen::start() else {
-        return;
-    };
+    let screen = or_skip!(Screen::start());
     let folder = tempfile::tempdir().expect("a folder");
     let config = folder.path().join("config");
     let path = scene_file::glb(folder.path(), "kept", "30");
@@ -153,9 +150,7 @@ fn killed_window_comes_back_and_watches() {
 
 #[test]
 fn path_is_recorded_played_and_filmed() {
-    let Some(screen) = Screen::start() else {
-        return;
-    };
+    let screen = or_skip!(Screen::start());
     let mut viewer = Viewer::open(&screen, "builtin:ring --density 1000 --map-resolution 64");
     let start = position(&viewer.wait_for_bake().1);
     viewer.hands("mousemove 900 300 key k");
@@ -254,9 +249,7 @@ fn deed(random: &mut Damage, window: &str) -> String {
 
 #[test]
 fn random_input_breaks_nothing() {
-    let Some(screen) = Screen::start() else {
-        return;
-    };
+    let screen = or_skip!(Screen::start());
     let mut viewer = Viewer::open(&screen, "builtin:ring --map-resolution 128 --max-error 0.05%");
     let mut random = Damage::to("hands", 0);
     let start = Instant::now();
@@ -295,9 +288,7 @@ fn tell_waits(log: &[Value]) {
 /// Both bakes would take minutes: whoever waited for one would see it done.
 #[test]
 fn long_bake_leaves_room_for_input_and_ends() {
-    let Some(screen) = Screen::start() else {
-        return;
-    };
+    let screen = or_skip!(Screen::start());
     let long = "builtin:ring --density 3e7";
     let mut viewer = Viewer::open(&screen, &format!("{long} --estimator splat --layers caustic"));
     for step in 0..40 {

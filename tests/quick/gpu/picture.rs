@@ -5,7 +5,7 @@ use nephroid::eye_pass::tone_mapping::display_rgba8;
 use nephroid::illumination::IlluminationMap;
 use nephroid::scene::Environment;
 
-use crate::gpu::rig::{AS_CPU, Rig, or_skip};
+use crate::gpu::rig::{AS_CPU, Rig, or_skip, unlike};
 use crate::prelude::*;
 use support::flip::mean_flip;
 use support::floors::{diffuse, floor_map, floor_scene, four_colours, lambert, texture_reference};
@@ -43,14 +43,6 @@ fn exhibit() -> (Scene, Vec<IlluminationMap>) {
         texels[corner] = [3.0, 2.0, 1.0];
     }
     (scene, vec![floor_map(0, 8, 8, texels)])
-}
-
-/// Share of the channels that differ by more than 1 % of the brightest or themselves.
-fn unlike(a: &Picture, b: &Picture) -> f64 {
-    let channels = || a.radiance.iter().flatten().zip(b.radiance.iter().flatten());
-    let peak = channels().fold(0.0_f32, |peak, (a, _)| peak.max(*a));
-    let far = channels().filter(|(a, b)| (*a - *b).abs() > 0.01 * a.max(0.2 * peak));
-    far.count() as f64 / (3 * a.radiance.len()) as f64
 }
 
 #[test]
