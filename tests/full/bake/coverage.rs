@@ -310,11 +310,14 @@ fn beside_the_map_and_nowhere_is_booked() {
         let (_, report) = deposit((6, 6), &[grey(corners)]);
         assert_eq!(report.outside, all);
         let in_tiles = tiles::chart(Some(tiles::mixed()));
-        let far = corners.map(|[x, y]| [x + 1e4 * dx, y + 1e4 * dy]);
-        let nowhere = grey([[1.0, f64::NAN], far[1], far[2]]);
-        let (_, report) = deposit_on(&in_tiles, &[grey(far), nowhere, grey(far)], 3);
-        let twice = all.map(|count| 2 * count);
-        assert_eq!((report.outside, report.non_finite), (twice, all), "in tiles");
+        let flux = [FLUX, FLUX / 3, 7];
+        let far = triangle(corners.map(|[x, y]| [x + 1e4 * dx, y + 1e4 * dy]), flux);
+        let mut nowhere = far;
+        nowhere.corners[1].x = f64::NAN;
+        let (_, report) = deposit_on(&in_tiles, &[far, nowhere, far], 3);
+        let once = flux.map(i128::from);
+        let twice = once.map(|count| 2 * count);
+        assert_eq!((report.outside, report.non_finite), (twice, once), "in tiles");
     }
 }
 
