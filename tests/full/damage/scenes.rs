@@ -14,12 +14,11 @@ use nephroid::settings::{BakeSettings, LayerKind};
 use nephroid::units::RadiantIntensity;
 use serde_json::json;
 
-use super::mutate::{Damage, effort};
-use super::watch::{Tally, Way, alone, attack};
+use super::mutate::{Damage, Tally, Way, alone, attack, effort};
 use support::glb::{Glb, load_bytes, load_path};
-use support::shared_or_skip;
 use support::sound::scene_fault;
 use support::tools::{at, builtin_scene, energy_fault, photons};
+use support::{or_skip, shared_or_skip};
 
 /// Most memory that loading may take by itself [bytes].
 const LIMIT_BYTES: u64 = 64 << 20;
@@ -138,9 +137,7 @@ fn attack_scene(path: &Path, tally: &Tally, bakes: &Tally) {
 
 #[test]
 fn files_of_the_validator() {
-    let Some(folder) = shared_or_skip("validator") else {
-        return;
-    };
+    let folder = or_skip!(shared_or_skip("validator"));
     alone(|| {
         let (tally, bakes) = (Tally::default(), Tally::default());
         let is_scene = |path: &PathBuf| {

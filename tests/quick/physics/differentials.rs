@@ -8,7 +8,7 @@ use nephroid::settings::ItemBufferKind;
 use nephroid::transport::EffectSet;
 
 use crate::prelude::*;
-use support::bump_scenes::by_image;
+use support::effect_scenes::by_image;
 
 /// Compares derivatives of the strand that carries most, at places over the domain, with central differences over a
 /// step of the unit square; returns the root mean square of the relative difference and how many places there were.

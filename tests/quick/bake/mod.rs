@@ -1,5 +1,0 @@
-//! Bakes of reference scenes: against an independent solver, against the law of energy, against themselves.
-
-mod effects;
-mod photon;
-mod reference;
