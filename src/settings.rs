@@ -172,7 +172,7 @@ choices! {
     /// How carefully to bake, by name.
     #[derive(Default)]
     pub enum Preset {
-        /// 10 % of relative RMSE (splat: 12,500 rays per steradian).
+        /// An error of 10 % (splat: 12,500 rays per steradian).
         Draft,
         /// 3 % (splat: 100,000 rays per steradian).
         #[default]
@@ -191,7 +191,7 @@ impl Preset {
         self.into()
     }
 
-    /// Relative RMSE that it aims at [1].
+    /// Error that it aims at [1].
     pub fn max_error(self) -> f64 {
         match self {
             Self::Draft => 0.10,

@@ -242,6 +242,13 @@ fn layers_and_lights_come_apart_and_add_up() {
         assert_eq!(entry.layers, [LayerKind::Direct]);
         assert_eq!(read("one", &entry), read("layers", &entry));
     }
+    // The back of the mirror has no caustic.
+    let mirror = Baked::quick(built_in("mirror"), &[LayerKind::Caustic, LayerKind::Direct]);
+    assert_eq!(export(&mirror, Content::Sum, None, "sum").len(), 2);
+    assert_eq!(
+        export(&mirror, Content::Layer(LayerKind::Caustic), None, "one").len(),
+        1
+    );
     let indirect = Content::Layer(LayerKind::Indirect);
     for (baked, content, words) in [
         (&baked, indirect, "indirect | --layers"),

@@ -353,7 +353,7 @@ fn run(table: Table) -> Vec<Row> {
 }
 
 /// Prints a group's table and writes those of all groups so far to `laws/laws.md` in the build folder.
-#[allow(clippy::print_stdout, reason = "the README quotes it")]
+#[allow(clippy::print_stdout, reason = "the guide quotes it")]
 fn publish(group: &'static str, rows: &[Row]) {
     let mut table = format!("\n## {group}\n\n| case | scene | law | measured | bound | verdict |\n|---|---|---|---|---|---|\n");
     table.extend(rows.iter().map(Row::line));
