@@ -1,6 +1,7 @@
 //! Binary data of a file: buffers, and views into them.
 
 use std::borrow::Cow;
+use std::collections::HashSet;
 use std::path::Path;
 
 use gltf::json::{Index, Value, buffer};
@@ -44,15 +45,16 @@ impl<'a> Buffers<'a> {
     ) -> Result<Self> {
         let mut data = Vec::with_capacity(all.len());
         let compressed: Vec<_> = views.iter().map(compression).collect();
+        // Where compressed views would lie for readers that cannot unpack them.
+        let spare: HashSet<usize> = views
+            .iter()
+            .zip(&compressed)
+            .filter_map(|(view, compressed)| compressed.as_ref().map(|_| view.buffer.value()))
+            .collect();
         for (index, buffer) in all.iter().enumerate() {
             let owner = format!("buffer {index}");
-            // Where compressed views would lie for readers that cannot unpack them.
-            let is_spare = views
-                .iter()
-                .zip(&compressed)
-                .any(|(view, compressed)| view.buffer.value() == index && compressed.is_some());
             let is_binary = index == 0 && binary.is_some();
-            if is_spare && !is_binary && is_fallback(buffer) {
+            if spare.contains(&index) && !is_binary && is_fallback(buffer) {
                 data.push(None);
                 continue;
             }

@@ -7,7 +7,7 @@ use serde_json::Map;
 use super::extras::Extras;
 use super::pose::Poses;
 use super::report::Report;
-use super::{extensions, faults, names};
+use super::{extensions, faults, glossiness, names};
 use crate::error::{Error, Result};
 
 /// The typed JSON, with node transforms in double precision beside it.
@@ -50,7 +50,7 @@ pub fn parse(json: &[u8], report: &mut Report) -> Result<Document> {
     let required = strings(file, "extensionsRequired")?;
     extensions::check(&required, &strings(file, "extensionsUsed")?, report)?;
     let poses = Poses::of(file);
-    leave_out_what_is_not_read(file, report);
+    prepare(file, report);
     let extras = Extras::of(&value);
     remove_extras(&mut value);
 
@@ -131,13 +131,18 @@ fn strings(file: &Map<String, Value>, key: &str) -> Result<Vec<String>> {
     }
 }
 
-/// Takes out animations, skins and morph targets, so that faults in them cannot stop a scene at rest, and fills in
-/// what the typed reader wants although glTF does not.
-fn leave_out_what_is_not_read(file: &mut Map<String, Value>, report: &mut Report) {
+/// Takes out animations, skins and morph targets, so that faults in them cannot stop a scene at rest, brings old materials
+/// up to date, and fills in what the typed reader wants although glTF does not.
+fn prepare(file: &mut Map<String, Value>, report: &mut Report) {
+    for (index, material) in objects(file.get_mut("materials")).enumerate() {
+        let name = material.get("name").and_then(Value::as_str).map(str::to_owned);
+        let owner = format!("material `{}`", names::name(name.as_ref(), "material", index));
+        glossiness::convert(material, &owner, report);
+    }
     let has_animations = file.remove("animations").is_some();
     let mut is_bent = file.remove("skins").is_some();
     for node in objects(file.get_mut("nodes")) {
-        node.remove("skin");
+        is_bent |= node.remove("skin").is_some();
         node.remove("weights");
     }
     for mesh in objects(file.get_mut("meshes")) {
@@ -156,30 +161,7 @@ fn leave_out_what_is_not_read(file: &mut Map<String, Value>, report: &mut Report
             "pose the scene where it was made",
         );
     }
-    let names = file
-        .get("extensions")
-        .and_then(|extensions| extensions.get(extensions::VARIANTS));
-    let names = names
-        .and_then(|stated| stated.get("variants"))
-        .and_then(Value::as_array);
-    let names: Vec<String> = names
-        .into_iter()
-        .flatten()
-        .map(|variant| {
-            variant
-                .get("name")
-                .and_then(Value::as_str)
-                .unwrap_or("without a name")
-        })
-        .map(|name| names::name(Some(&name.to_owned()), "variant", 0))
-        .collect();
-    if !names.is_empty() {
-        report.warn(
-            "variants",
-            format!("of materials are left out ({})", names.join(", ")),
-            "the scene has the materials that it begins with",
-        );
-    }
+    name_variants(file, report);
     for scene in objects(file.get_mut("scenes")) {
         scene.entry("nodes").or_insert_with(|| Value::Array(Vec::new()));
     }
@@ -189,6 +171,25 @@ fn leave_out_what_is_not_read(file: &mut Map<String, Value>, report: &mut Report
         .and_then(|punctual| punctual.get_mut("lights"));
     for light in objects(lights) {
         light.remove("extensions");
+    }
+}
+
+fn name_variants(file: &Map<String, Value>, report: &mut Report) {
+    let extensions = file.get("extensions");
+    let stated = extensions.and_then(|all| all.get(extensions::VARIANTS)?.get("variants")?.as_array());
+    let name = |variant: &Value| variant.get("name")?.as_str().map(str::to_owned);
+    let names: Vec<String> = stated
+        .into_iter()
+        .flatten()
+        .enumerate()
+        .map(|(index, variant)| names::name(name(variant).as_ref(), "variant", index))
+        .collect();
+    if !names.is_empty() {
+        report.warn(
+            "materials",
+            format!("have variants, which are left out ({})", names.join(", ")),
+            "the scene has the materials that it begins with",
+        );
     }
 }
 

@@ -1,14 +1,14 @@
 //! Which glTF extensions are read, which are passed over, which stop the loading.
 
 use super::report::Report;
-use super::{draco, instancing, meshopt};
+use super::{draco, glossiness, instancing, meshopt, nodes};
 use crate::error::{Error, Result};
 
 /// Name of an extension that gives a scene several sets of materials.
 pub const VARIANTS: &str = "KHR_materials_variants";
 
 /// Read in full, or in the parts that say so in a warning.
-const READ: [&str; 19] = [
+const READ: [&str; 21] = [
     "EXT_lights_area",
     instancing::NAME,
     meshopt::NAMES[0],
@@ -19,6 +19,7 @@ const READ: [&str; 19] = [
     "KHR_materials_dispersion",
     "KHR_materials_emissive_strength",
     "KHR_materials_ior",
+    glossiness::NAME,
     "KHR_materials_specular",
     "KHR_materials_transmission",
     "KHR_materials_unlit",
@@ -26,6 +27,7 @@ const READ: [&str; 19] = [
     "KHR_materials_volume",
     "KHR_mesh_quantization",
     meshopt::NAMES[1],
+    nodes::VISIBILITY,
     "KHR_texture_basisu",
     "KHR_texture_transform",
 ];
@@ -89,7 +91,6 @@ fn is_named_by_materials(extension: &str) -> bool {
 fn remedy(extension: &str) -> &'static str {
     match extension {
         "EXT_texture_avif" => "export it with PNG or JPEG images",
-        "KHR_materials_pbrSpecularGlossiness" => "convert it with `gltf-transform metalrough`",
         _ => "export it without this extension",
     }
 }

@@ -121,7 +121,7 @@ fn attributes(data: &[u8], count: usize, stride: usize) -> Option<Vec<u8>> {
     let mut last = baseline.as_chunks::<4>().0.to_vec();
 
     let mut unpacked = vec![0; count * stride];
-    let most = (8192 / stride & !(GROUP - 1)).min(BLOCK);
+    let most = ((8192 / stride) & !(GROUP - 1)).min(BLOCK);
     for block in unpacked.chunks_mut(most * stride) {
         let elements = block.len() / stride;
         let controls = take(&mut data, modes)?;

@@ -27,6 +27,7 @@ mod extensions;
 mod extras;
 mod faults;
 mod glb;
+mod glossiness;
 pub(super) mod guard;
 mod images;
 mod instancing;
@@ -132,6 +133,11 @@ fn read_scene(bytes: &[u8], path: &Path, options: &LoadOptions) -> Result<Scene>
     let mut materials = surface::Materials::new(materials);
     let placed = nodes::place(&document, &mut report)?;
 
+    let stands = placed
+        .iter()
+        .map(|placed| (placed.node, placed.world_from_node))
+        .collect();
+
     let mut scene = Scene::default();
     surface::add_objects(
         &mut scene,
@@ -141,8 +147,9 @@ fn read_scene(bytes: &[u8], path: &Path, options: &LoadOptions) -> Result<Scene>
                 buffers: &buffers,
             },
             poses: &document.poses,
-            placed: &placed,
+            stands: &stands,
         },
+        &placed,
         options.solid_glass,
         &mut materials,
         &mut budget,

@@ -8,7 +8,6 @@ use serde::Deserialize;
 use serde_json::Map;
 
 use super::accessor::{Formats, Reader};
-use super::nodes::Placed;
 use super::report::Budget;
 use crate::error::{Error, Result};
 use crate::scene::Mesh;
@@ -144,86 +143,73 @@ impl Poses {
         Ok(())
     }
 
-    /// Puts the vertices of a mesh with a skin where its joints have them in the world.
+    /// What brings vertices that hang on the joints of a node's skin into the world.
     ///
     /// # Errors
-    /// A skin that does not exist or does not fit the mesh.
-    pub fn skin(
+    /// A skin that does not exist, or whose joints do not stand in the scene.
+    pub fn joints(
         &self,
-        place: Place,
-        mesh: &mut Mesh,
-        influences: &[Influences],
-        placed: &[Placed],
-        reader: Reader,
-        owner: &str,
-        budget: &mut Budget,
-    ) -> Result<()> {
-        let skin = self
-            .node(place.node)
-            .and_then(|node| self.skins.get(node.skin?)?.get());
-        let matrices = skin.map(|skin| skin.matrices(placed, reader, owner, budget));
-        let matrices = matrices.transpose()?.ok_or_else(|| unlike(owner))?;
-        let mut sums = vec![DMat4::ZERO; mesh.positions.len()];
-        for (joints, weights) in influences {
-            if joints.len() != sums.len() || weights.len() != sums.len() {
-                return Err(unlike(owner));
-            }
-            for ((sum, joints), weights) in sums.iter_mut().zip(joints).zip(weights) {
-                for (joint, weight) in joints.iter().zip(weights).filter(|(_, weight)| **weight > 0.0) {
-                    let matrix = matrices.get(*joint as usize).ok_or_else(|| unlike(owner))?;
-                    *sum += *matrix * *weight;
-                }
-            }
-        }
-        for (vertex, sum) in sums.into_iter().enumerate() {
-            // Weights need not add up to exactly 1, nor matrices be affine.
-            let matrix = DAffine3::from_mat4(sum * sum.w_axis.w.recip());
-            if !matrix.is_finite() {
-                return Err(unlike(owner));
-            }
-            let [x, y, z] = [
-                matrix.matrix3.x_axis,
-                matrix.matrix3.y_axis,
-                matrix.matrix3.z_axis,
-            ];
-            let cofactors = DMat3::from_cols(y.cross(z), z.cross(x), x.cross(y));
-            mesh.positions[vertex] = matrix.transform_point3(mesh.positions[vertex]);
-            mesh.normals[vertex] = (cofactors * mesh.normals[vertex]).normalize_or_zero();
-        }
-        Ok(())
-    }
-}
-
-impl Skin {
-    /// What brings vertices into the world, by joint.
-    fn matrices(
-        &self,
-        placed: &[Placed],
+        node: usize,
+        stands: &HashMap<usize, DAffine3>,
         reader: Reader,
         owner: &str,
         budget: &mut Budget,
     ) -> Result<Vec<DMat4>> {
-        let stands: HashMap<usize, &DAffine3> = placed
-            .iter()
-            .map(|placed| (placed.node, &placed.world_from_node))
-            .collect();
-        let inverse = match self.inverse_bind_matrices {
-            None => vec![DMat4::IDENTITY; self.joints.len()],
+        let skin = self.node(node).and_then(|node| self.skins.get(node.skin?)?.get());
+        let skin = skin.ok_or_else(|| unlike(owner))?;
+        budget.take((skin.joints.len() * size_of::<DMat4>()) as u64, owner)?;
+        let inverse = match skin.inverse_bind_matrices {
+            None => vec![DMat4::IDENTITY; skin.joints.len()],
             Some(index) => {
                 let read = reader.vectors::<16>(Index::new(index), Formats::Float, owner, budget)?;
                 read.iter().map(DMat4::from_cols_array).collect()
             }
         };
-        if inverse.len() < self.joints.len() {
+        if inverse.len() < skin.joints.len() {
             return Err(unlike(owner));
         }
-        let pairs = self.joints.iter().zip(inverse);
-        let matrix = |(joint, inverse)| Some(DMat4::from(**stands.get(joint)?) * inverse);
+        let pairs = skin.joints.iter().zip(inverse);
+        let matrix = |(joint, inverse)| Some(DMat4::from(*stands.get(joint)?) * inverse);
         pairs
             .map(matrix)
             .collect::<Option<_>>()
             .ok_or_else(|| unlike(owner))
     }
+}
+
+/// Puts the vertices of a mesh where the joints that they hang on have them in the world.
+///
+/// # Errors
+/// Vertices that hang on joints which do not exist, or on nothing.
+pub fn hang(mesh: &mut Mesh, joints: &[DMat4], influences: &[Influences], owner: &str) -> Result<()> {
+    let mut sums = vec![DMat4::ZERO; mesh.positions.len()];
+    for (indices, weights) in influences {
+        if indices.len() != sums.len() || weights.len() != sums.len() {
+            return Err(unlike(owner));
+        }
+        for ((sum, indices), weights) in sums.iter_mut().zip(indices).zip(weights) {
+            for (index, weight) in indices.iter().zip(weights).filter(|(_, weight)| **weight > 0.0) {
+                let joint = joints.get(*index as usize).ok_or_else(|| unlike(owner))?;
+                *sum += *joint * *weight;
+            }
+        }
+    }
+    for (vertex, sum) in sums.into_iter().enumerate() {
+        // Weights need not add up to exactly 1.
+        let matrix = DAffine3::from_mat4(sum * sum.w_axis.w.recip());
+        if !matrix.is_finite() {
+            return Err(unlike(owner));
+        }
+        let [x, y, z] = [
+            matrix.matrix3.x_axis,
+            matrix.matrix3.y_axis,
+            matrix.matrix3.z_axis,
+        ];
+        let cofactors = DMat3::from_cols(y.cross(z), z.cross(x), x.cross(y));
+        mesh.positions[vertex] = matrix.transform_point3(mesh.positions[vertex]);
+        mesh.normals[vertex] = (cofactors * mesh.normals[vertex]).normalize_or_zero();
+    }
+    Ok(())
 }
 
 fn unlike(owner: &str) -> Error {

@@ -11,10 +11,9 @@ use gltf::json::mesh::{Mode, Primitive, Semantic};
 use gltf::json::validation::Checked;
 
 use super::accessor::{Formats, Reader};
-use super::nodes::Placed;
 use super::pose::{Place, Poses};
 use super::report::{Budget, Report};
-use super::{draco, triangles};
+use super::{draco, pose, triangles};
 use crate::error::{Error, Result};
 use crate::optics::LinearSrgb;
 use crate::scene::Mesh;
@@ -65,8 +64,8 @@ pub struct Source<'a> {
     pub reader: Reader<'a>,
     /// What bends meshes.
     pub poses: &'a Poses,
-    /// The scene's nodes.
-    pub placed: &'a [Placed],
+    /// Where nodes stand, by their glTF index.
+    pub stands: &'a HashMap<usize, DAffine3>,
 }
 
 /// What two meshes of one primitive differ in.
@@ -222,7 +221,7 @@ impl Vertices<'_> {
         let Source {
             reader,
             poses,
-            placed,
+            stands,
         } = source;
         let mut bent = mesh.clone();
         poses.morph(place, &mut bent, reader, self.owner, budget)?;
@@ -236,7 +235,8 @@ impl Vertices<'_> {
                 };
                 influences.push(both);
             }
-            poses.skin(place, &mut bent, &influences, placed, reader, self.owner, budget)?;
+            let joints = poses.joints(place.node, stands, reader, self.owner, budget)?;
+            pose::hang(&mut bent, &joints, &influences, self.owner)?;
         }
         Ok(bent)
     }
@@ -263,7 +263,7 @@ impl Vertices<'_> {
         }
     }
 
-    /// Mean of the colours over the area of the triangles; without an area, of all.
+    /// Mean of the colours over the area of the triangles.
     fn colour(&self, mesh: &Mesh, budget: &mut Budget, report: &mut Report) -> Result<Option<LinearSrgb>> {
         let Some(index) = self.index(Semantic::Colors(0)) else {
             return Ok(None);
@@ -293,10 +293,13 @@ impl Vertices<'_> {
             sum += of_triangle / 3.0 * weight;
             area += weight;
         }
-        let mean = (sum / area).clamp(DVec3::ZERO, DVec3::ONE);
+        let mean = sum / area;
         if !mean.is_finite() {
             return Ok(None);
         }
+        let mean = mean.clamp(DVec3::ZERO, DVec3::ONE);
+        // One colour is the same wherever it is averaged, and white is white.
+        let mean = (mean / COLOUR_STEP).round() * COLOUR_STEP;
         if colours.iter().any(|colour| colour.distance(mean) > SAME_COLOUR) {
             report.warn(
                 self.owner,
@@ -310,6 +313,9 @@ impl Vertices<'_> {
 
 /// Colours of vertices differ by no more where they are one colour.
 const SAME_COLOUR: f64 = 1e-3;
+
+/// Mean colours are rounded to multiples of this, a power of 2.
+const COLOUR_STEP: f64 = 1.0 / 1_048_576.0;
 
 /// The primitive in its node's coordinates.
 fn read_local(
@@ -373,7 +379,14 @@ fn read_local(
         uv1,
         triangles,
     };
-    let colour = vertices.colour(&mesh, budget, report)?;
+    let colour = vertices.colour(&mesh, budget, report).unwrap_or_else(|error| {
+        report.warn(
+            error.location,
+            format!("{}; its colours were left out", error.what),
+            error.remedy,
+        );
+        None
+    });
     if source.poses.bend(place) {
         match vertices.bent(source, place, &mesh, budget) {
             Ok(bent) => mesh = bent,

@@ -3,6 +3,7 @@
 use glam::DAffine3;
 use gltf::json::mesh;
 
+use super::nodes::Placed;
 use super::pose::Place;
 use super::primitive::{self, Primitives};
 use super::report::{Budget, Report};
@@ -20,6 +21,7 @@ use crate::scene::{Material, Mesh, Object, Scene, SurfaceKind};
 pub fn add_objects(
     scene: &mut Scene,
     source: primitive::Source,
+    placed: &[Placed],
     solid_glass: bool,
     materials: &mut Materials,
     budget: &mut Budget,
@@ -28,16 +30,13 @@ pub fn add_objects(
     let root = source.reader.root;
     let mut primitives = Primitives::default();
     let mut uses = vec![0; root.meshes.len()];
-    let meshes = source
-        .placed
-        .iter()
-        .filter_map(|placed| root.nodes[placed.node].mesh);
+    let meshes = placed.iter().filter_map(|placed| root.nodes[placed.node].mesh);
     for mesh in meshes {
         if let Some(uses) = uses.get_mut(mesh.value()) {
             *uses += 1;
         }
     }
-    for placed in source.placed {
+    for placed in placed {
         let Some(mesh_index) = root.nodes[placed.node].mesh else {
             continue;
         };

@@ -327,3 +327,66 @@ fn skins_stand_where_their_joints_do() {
     file.json["skins"] = json!([{ "joints": [low] }]);
     warns(&file.scene(), "do not fit its vertices; it was left as it is");
 }
+
+#[test]
+fn materials_of_old_are_converted() {
+    for (stated, base, metallic, roughness) in [
+        (
+            json!({ "diffuseFactor": [0.5, 0.25, 0.0, 1.0], "specularFactor": [0.04, 0.04, 0.04], "glossinessFactor": 0.8 }),
+            [0.5, 0.25, 0.0],
+            0.0,
+            0.2,
+        ),
+        (
+            json!({ "diffuseFactor": [0.0, 0.0, 0.0, 1.0], "specularFactor": [0.9, 0.7, 0.3] }),
+            [0.9, 0.7, 0.3],
+            1.0,
+            0.0,
+        ),
+        (
+            json!({ "diffuseFactor": [0.5, 0.5, 0.5, 1.0], "specularGlossinessTexture": { "index": 0 }, "glossinessFactor": 0.5 }),
+            [0.5; 3],
+            0.0,
+            0.5,
+        ),
+    ] {
+        let name = "KHR_materials_pbrSpecularGlossiness";
+        let mut file = Glb::triangle().with_material(json!({ "extensions": { name: stated } }));
+        file.json["extensionsUsed"] = json!([name]);
+        file.json["extensionsRequired"] = json!([name]);
+        let scene = file.scene();
+        warns(&scene, "its specular-glossiness was read as metallic");
+        let material = scene.material_of(0);
+        near(material.base_colour.to_array(), base, 1e-6, "base colour");
+        near(
+            [material.metallic, material.roughness],
+            [metallic, roughness],
+            1e-6,
+            "metallic and roughness",
+        );
+    }
+}
+
+#[test]
+fn hidden_nodes_are_left_out_with_all_below() {
+    let mut file = Glb::triangle();
+    let below = file.push("nodes", json!({ "mesh": 0 }));
+    let hidden = json!({ "children": [below], "mesh": 0, "extensions": { "KHR_node_visibility": { "visible": false } } });
+    file.push_root(hidden);
+    file.json["extensionsUsed"] = json!(["KHR_node_visibility"]);
+    let scene = file.scene();
+    warns_not(&scene);
+    assert_eq!(scene.objects.len(), 1);
+}
+
+#[test]
+fn variants_are_named() {
+    let mut file = Glb::triangle();
+    let variants = json!({ "variants": [{ "name": "red" }, { "name": "blue" }] });
+    file.json["extensions"] = json!({ "KHR_materials_variants": variants });
+    file.json["extensionsUsed"] = json!(["KHR_materials_variants"]);
+    warns(
+        &file.scene(),
+        "materials | have variants, which are left out (red, blue)",
+    );
+}
