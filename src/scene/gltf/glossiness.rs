@@ -34,8 +34,12 @@ impl Default for Stated {
     }
 }
 
-/// Gives a material that is stated in that way its metallic-roughness model, whatever it has of it.
+/// Gives a material that is stated in that way alone its metallic-roughness model.
 pub fn convert(material: &mut Map<String, Value>, owner: &str, report: &mut Report) {
+    let own = material.get("pbrMetallicRoughness").and_then(Value::as_object);
+    if own.is_some_and(|own| !own.is_empty()) {
+        return;
+    }
     let extensions = material.get_mut("extensions").and_then(Value::as_object_mut);
     let Some(stated) = extensions.and_then(|extensions| extensions.remove(NAME)) else {
         return;
