@@ -1,89 +1,76 @@
 //! The objects of a scene: every primitive of every placed node.
 
-use gltf::json::{Root, mesh};
+use glam::DAffine3;
+use gltf::json::mesh;
 
-use super::accessor::Reader;
-use super::buffers::Buffers;
 use super::nodes::Placed;
-use super::primitive::Primitives;
+use super::pose::Place;
+use super::primitive::{self, Primitives};
 use super::report::{Budget, Report};
 use super::{material, names};
 use crate::error::{Error, Result};
+use crate::optics::LinearSrgb;
 use crate::scene::closed::is_closed;
 use crate::scene::{Material, Mesh, Object, Scene, SurfaceKind};
 
-/// What objects are read from.
-#[derive(Clone, Copy, Debug)]
-pub struct Source<'a> {
-    /// The typed JSON.
-    pub root: &'a Root,
-    /// Its binary data.
-    pub buffers: &'a Buffers<'a>,
-    /// The scene's nodes.
-    pub placed: &'a [Placed],
-    /// Reads thin walls as solid glass where their mesh is closed.
-    pub solid_glass: bool,
-}
-
-/// Adds all objects, and to `materials` (in file order so far) those that the file only implies.
+/// Adds all objects, and to `materials` (in file order so far) those that the file only implies. `solid_glass` reads thin
+/// walls as solid glass where their mesh is closed.
 ///
 /// # Errors
 /// A mesh that does not exist, or as [`Primitives::read`].
 pub fn add_objects(
     scene: &mut Scene,
-    source: Source,
+    source: primitive::Source,
+    placed: &[Placed],
+    solid_glass: bool,
     materials: &mut Materials,
     budget: &mut Budget,
     report: &mut Report,
 ) -> Result<()> {
-    let reader = Reader {
-        root: source.root,
-        buffers: source.buffers,
-    };
+    let root = source.reader.root;
     let mut primitives = Primitives::default();
-    let mut uses = vec![0; source.root.meshes.len()];
-    let meshes = source
-        .placed
-        .iter()
-        .filter_map(|placed| source.root.nodes[placed.node].mesh);
+    let mut uses = vec![0; root.meshes.len()];
+    let meshes = placed.iter().filter_map(|placed| root.nodes[placed.node].mesh);
     for mesh in meshes {
         if let Some(uses) = uses.get_mut(mesh.value()) {
             *uses += 1;
         }
     }
-    for placed in source.placed {
-        let Some(mesh_index) = source.root.nodes[placed.node].mesh else {
+    for placed in placed {
+        let Some(mesh_index) = root.nodes[placed.node].mesh else {
             continue;
         };
-        let Some(mesh) = source.root.meshes.get(mesh_index.value()) else {
+        let Some(mesh) = root.meshes.get(mesh_index.value()) else {
             return Err(Error::failure(
                 format!("node `{}`", placed.name),
                 format!("has mesh {}, which does not exist", mesh_index.value()),
                 "export the file again",
             ));
         };
+        // Joints place what they bend, wherever its node stands.
+        let world_from_node = match source.poses.has_skin(placed.node) {
+            true => DAffine3::IDENTITY,
+            false => placed.world_from_node,
+        };
         for (index, part) in mesh.primitives.iter().enumerate() {
             let owner = owner(mesh, mesh_index.value(), index);
-            let read = primitives.read(
-                reader,
-                (mesh_index.value(), index, part),
-                &placed.world_from_node,
-                &owner,
-                budget,
-                report,
-            )?;
-            let Some(mesh) = read else {
+            let place = Place {
+                node: placed.node,
+                mesh: mesh_index.value(),
+                primitive: index,
+            };
+            let read = primitives.read(source, (place, part), &world_from_node, &owner, budget, report)?;
+            let Some((mesh, colour)) = read else {
                 continue;
             };
             let mut object = Object::new(placed.name.as_str(), (placed.node, index), 0, mesh);
-            object.place(placed.world_from_node);
+            object.place(world_from_node);
             let mesh = object.mesh_in_scene();
-            let material = materials.of_primitive(part, &owner, report);
-            let material = if source.solid_glass {
-                materials.as_solid(material, mesh, &placed.name, report)
-            } else {
-                material
-            };
+            let mut material = materials.of_primitive(part, &owner, report);
+            if solid_glass {
+                material = materials.as_solid(material, mesh, &placed.name, report);
+            }
+            material = materials.tinted(material, colour);
             materials.check_coordinates(material, mesh, &placed.name, report);
             object.material = material;
             scene.objects.push(object);
@@ -119,6 +106,8 @@ pub struct Materials {
     default: Option<usize>,
     /// The solid twin of each of the file's materials.
     solid: Vec<Option<usize>>,
+    /// The twins in other colours: of which material, by what it is multiplied, and which it is.
+    tinted: Vec<(usize, LinearSrgb, usize)>,
 }
 
 impl Materials {
@@ -128,6 +117,7 @@ impl Materials {
             in_file: in_file.len(),
             default: None,
             solid: vec![None; in_file.len()],
+            tinted: Vec::new(),
             all: in_file,
         }
     }
@@ -175,6 +165,26 @@ impl Materials {
         let solid = self.all.len() - 1;
         self.solid[material] = Some(solid);
         solid
+    }
+
+    /// The material with its base colour multiplied, where that changes it.
+    fn tinted(&mut self, material: usize, colour: Option<LinearSrgb>) -> usize {
+        let Some(colour) = colour.filter(|colour| *colour != LinearSrgb::WHITE) else {
+            return material;
+        };
+        let same = |known: &&(usize, LinearSrgb, usize)| (known.0, known.1) == (material, colour);
+        if let Some((.., twin)) = self.tinted.iter().find(same) {
+            return *twin;
+        }
+        let twin = self.all.len();
+        let own = &self.all[material];
+        self.all.push(Material {
+            name: format!("{} (tinted)", own.name),
+            base_colour: own.base_colour * colour,
+            ..own.clone()
+        });
+        self.tinted.push((material, colour, twin));
+        twin
     }
 
     fn check_coordinates(&self, material: usize, mesh: &Mesh, name: &str, report: &mut Report) {

@@ -232,6 +232,21 @@ impl Damage {
     }
 }
 
+impl Damage {
+    /// Damages the binary part of a scene's file.
+    pub fn binary(&mut self, file: &[u8]) -> Vec<u8> {
+        match parts_of(file) {
+            Some((document, Some(binary))) => {
+                // What is longer or shorter is refused before it is looked at.
+                let mut damaged = self.bytes(&binary);
+                damaged.resize(binary.len(), 0);
+                assembled(&document, damaged)
+            }
+            _ => self.bytes(file),
+        }
+    }
+}
+
 /// The document of a scene's file, and its binary part where it has one.
 fn parts_of(file: &[u8]) -> Option<(Value, Option<Vec<u8>>)> {
     if !file.starts_with(b"glTF") {

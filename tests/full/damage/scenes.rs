@@ -176,6 +176,45 @@ fn a_small_scene() {
     });
 }
 
+/// Compressed data is unpacked by what it says of itself.
+#[test]
+fn compressed_scenes() {
+    let golden = |name: &str| {
+        let path = format!("{}/tests/goldens/gltf/{name}", env!("CARGO_MANIFEST_DIR"));
+        std::fs::read(path).expect("the file is part of the project")
+    };
+    let with_image = |name: &str| {
+        let mut file = Glb::triangle();
+        let view = file.push_view(&golden(name));
+        file.push("images", json!({ "bufferView": view }));
+        file.push(
+            "textures",
+            json!({ "extensions": { "KHR_texture_basisu": { "source": 0 } } }),
+        );
+        let texture = json!({ "pbrMetallicRoughness": { "baseColorTexture": { "index": 0 } } });
+        file.with_material(texture).bytes()
+    };
+    alone(|| {
+        for (name, whole) in [
+            ("draco.glb", golden("draco.glb")),
+            ("draco_sequential.glb", golden("draco_sequential.glb")),
+            ("meshopt.glb", golden("meshopt.glb")),
+            ("etc1s.glb", with_image("etc1s.ktx2")),
+            ("uastc.glb", with_image("uastc.ktx2")),
+        ] {
+            assert!(load_bytes(&whole, &options()).is_ok(), "{name}");
+            let (tally, bounds) = (Tally::default(), (1_000, most_bytes(whole.len() + 10_000)));
+            let read = |bytes: &[u8]| load_bytes(bytes, &options());
+            let subjects = [
+                (name, whole.clone(), Damage::scene as Way),
+                (name, whole, Damage::binary as Way),
+            ];
+            attack(&tally, bounds, &subjects, read, |scene| scene_fault(&scene));
+            tally.expect(90, 90);
+        }
+    });
+}
+
 /// What the tests above rest on.
 #[test]
 fn broken_promises_of_a_scene_are_noticed() {
