@@ -194,6 +194,9 @@ fn material_report(material: &Material, objects: usize, lines: &mut Lines) -> Va
         ior.map(|ior| format!(", ior {ior:.4}")),
         glass.as_ref().map(|(_, line)| format!(", {line}")),
         metal.map(|metal| format!(", {metal} by wavelength")),
+        material
+            .is_solid_by_shape
+            .then(|| ", solid as its mesh is closed".into()),
     ];
     let made_of: String = made_of.into_iter().flatten().collect();
     lines.push(("material", format!("{name}: {surface}{made_of}")));

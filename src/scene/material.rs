@@ -88,6 +88,8 @@ pub struct Material {
     pub metal: Option<&'static Metal>,
     /// Set where the surface bounds a solid body.
     pub volume: Option<Volume>,
+    /// Whether it has one because its mesh encloses space, and not because the file says so.
+    pub is_solid_by_shape: bool,
     /// Emitted radiance [W/(m² sr)], luminous-equivalent: glTF's cd/m² divided by 683 lm/W.
     pub emitted_radiance: LinearSrgb,
     /// That light by wavelength, scaled to one luminous-equivalent watt, of which `emitted_radiance` has the colour;
@@ -207,6 +209,7 @@ impl Default for Material {
             glass: None,
             metal: None,
             volume: None,
+            is_solid_by_shape: false,
             emitted_radiance: LinearSrgb::BLACK,
             emission_spectrum: None,
             polish: 1.0,

@@ -33,13 +33,28 @@ pub fn default() -> Material {
     }
 }
 
+/// Makes a thin wall clear solid glass.
+pub fn make_solid(thin: &mut Material) {
+    (thin.surface, thin.volume) = (SurfaceKind::Dielectric, Some(CLEAR));
+    thin.is_solid_by_shape = true;
+}
+
 /// A thin wall as clear solid glass.
 pub fn solid_twin(thin: &Material) -> Material {
+    let mut solid = thin.clone();
+    solid.name += " (solid)";
+    make_solid(&mut solid);
+    solid
+}
+
+/// The thin wall of which clear solid glass was made.
+pub fn thin_twin(solid: &Material) -> Material {
     Material {
-        name: format!("{} (solid)", thin.name),
-        surface: SurfaceKind::Dielectric,
-        volume: Some(CLEAR),
-        ..thin.clone()
+        name: format!("{} (thin)", solid.name),
+        surface: SurfaceKind::ThinWall,
+        volume: None,
+        is_solid_by_shape: false,
+        ..solid.clone()
     }
 }
 
@@ -125,6 +140,7 @@ impl Reading<'_, '_> {
             glass: None,
             metal: None,
             volume: self.volume(extensions),
+            is_solid_by_shape: false,
             emitted_radiance: self.emission(extensions)?,
             emission_spectrum: None,
             polish: 1.0,
@@ -380,10 +396,6 @@ impl Reading<'_, '_> {
             SurfaceKind::Diffuse if !is_metal && material.transmission >= 0.5 => self.warn(
                 format!("transmits light at a roughness of {roughness:.2}, treated as matte"),
                 as_matte,
-            ),
-            SurfaceKind::ThinWall => self.warn(
-                "transmits light but has no thickness, so that it is a thin pane that does not refract",
-                "give it a volume, or read closed meshes as solid with --solid-glass",
             ),
             SurfaceKind::Mirror | SurfaceKind::Diffuse | SurfaceKind::Mixed if material.glass.is_some() => {
                 self.warn(

@@ -132,6 +132,7 @@ fn read_scene(bytes: &[u8], path: &Path, options: &LoadOptions) -> Result<Scene>
         &mut budget,
         &mut report,
     )?;
+    materials.warn_of_thin_walls(options.solid_glass, &mut report);
     scene.materials = materials.into_all();
     scene.textures = images.into_textures().into_iter().map(Arc::new).collect();
     let lights = light::all(&document, &placed, folder, &mut report)?;

@@ -1,5 +1,7 @@
 //! The objects of a scene: every primitive of every placed node.
 
+use std::collections::HashMap;
+
 use gltf::json::{Root, mesh};
 
 use super::accessor::Reader;
@@ -9,7 +11,7 @@ use super::primitive::Primitives;
 use super::report::{Budget, Report};
 use super::{material, names};
 use crate::error::{Error, Result};
-use crate::scene::closed::is_closed;
+use crate::scene::closed::is_solid;
 use crate::scene::{Material, Mesh, Object, Scene, SurfaceKind};
 
 /// What objects are read from.
@@ -21,7 +23,7 @@ pub struct Source<'a> {
     pub buffers: &'a Buffers<'a>,
     /// The scene's nodes.
     pub placed: &'a [Placed],
-    /// Reads thin walls as solid glass where their mesh is closed.
+    /// Reads thin walls as solid glass where their mesh encloses space.
     pub solid_glass: bool,
 }
 
@@ -79,11 +81,7 @@ pub fn add_objects(
             object.place(placed.world_from_node);
             let mesh = object.mesh_in_scene();
             let material = materials.of_primitive(part, &owner, report);
-            let material = if source.solid_glass {
-                materials.as_solid(material, mesh, &placed.name, report)
-            } else {
-                material
-            };
+            let material = materials.thin_or_solid(material, || source.solid_glass && is_solid(mesh));
             materials.check_coordinates(material, mesh, &placed.name, report);
             object.material = material;
             scene.objects.push(object);
@@ -117,8 +115,8 @@ pub struct Materials {
     all: Vec<Material>,
     in_file: usize,
     default: Option<usize>,
-    /// The solid twin of each of the file's materials.
-    solid: Vec<Option<usize>>,
+    /// What became of each thin wall among the file's materials: as which it is used, and its twin of the other kind.
+    thin: HashMap<usize, (bool, Option<usize>)>,
 }
 
 impl Materials {
@@ -127,7 +125,7 @@ impl Materials {
         Self {
             in_file: in_file.len(),
             default: None,
-            solid: vec![None; in_file.len()],
+            thin: HashMap::new(),
             all: in_file,
         }
     }
@@ -155,26 +153,47 @@ impl Materials {
         })
     }
 
-    /// The material that a thin wall has as a solid, where its mesh is closed; any other stays.
-    fn as_solid(&mut self, material: usize, mesh: &Mesh, name: &str, report: &mut Report) -> usize {
-        if self.all[material].surface != SurfaceKind::ThinWall {
+    /// The material of a thin wall for a mesh that is solid or not; any other stays. The first mesh decides what the
+    /// material itself becomes, and meshes of the other kind have a twin of it.
+    fn thin_or_solid(&mut self, material: usize, is_solid: impl FnOnce() -> bool) -> usize {
+        let is_known = self.thin.contains_key(&material);
+        if !is_known && self.all[material].surface != SurfaceKind::ThinWall {
             return material;
         }
-        if !is_closed(mesh) {
+        let is_solid = is_solid();
+        let (own, twin) = self.thin.entry(material).or_insert((is_solid, None));
+        if *own == is_solid {
+            if !is_known && is_solid {
+                material::make_solid(&mut self.all[material]);
+            }
+            return material;
+        }
+        *twin.get_or_insert_with(|| {
+            let own = &self.all[material];
+            let made = if is_solid {
+                material::solid_twin(own)
+            } else {
+                material::thin_twin(own)
+            };
+            self.all.push(made);
+            self.all.len() - 1
+        })
+    }
+
+    /// Warns of the thin walls that are left.
+    pub fn warn_of_thin_walls(&self, solid_glass: bool, report: &mut Report) {
+        let is_thin = |material: &&Material| material.surface == SurfaceKind::ThinWall;
+        for material in self.all.iter().filter(is_thin) {
             report.warn(
-                format!("node `{name}`"),
-                "is not closed, so that it stays a pane without thickness",
-                "close its mesh to make it solid glass",
+                format!("material `{}`", material.name),
+                "transmits light but has no thickness, so that it is a thin pane that does not refract",
+                if solid_glass {
+                    "give it a volume, or close its mesh, to make it solid glass"
+                } else {
+                    "give it a volume, or leave --solid-glass on"
+                },
             );
-            return material;
         }
-        if let Some(solid) = self.solid[material] {
-            return solid;
-        }
-        self.all.push(material::solid_twin(&self.all[material]));
-        let solid = self.all.len() - 1;
-        self.solid[material] = Some(solid);
-        solid
     }
 
     fn check_coordinates(&self, material: usize, mesh: &Mesh, name: &str, report: &mut Report) {

@@ -114,25 +114,41 @@ fn values_out_of_range_are_brought_back() {
 }
 
 #[test]
-fn solid_glass_fills_closed_thin_walls() {
+fn closed_meshes_of_glass_are_solid_unless_asked_otherwise() {
     let glass = json!({
         "name": "glass",
         "pbrMetallicRoughness": factors(0.0, 0.0),
         "extensions": { "KHR_materials_transmission": { "transmissionFactor": 1.0 } },
     });
-    let filling = options(|options| options.solid_glass = true);
-    let kind = |scene: &Scene| scene.material_of(0).surface;
+    let thin = options(|options| options.solid_glass = false);
     let closed = Glb::tetrahedron().with_material(glass.clone());
-    assert_eq!(kind(&closed.scene()), SurfaceKind::ThinWall);
-    let solid = closed.load_with(&filling).expect("loads");
-    assert_eq!(kind(&solid), SurfaceKind::Dielectric);
-    assert!(solid.material_of(0).volume.is_some());
-    let open = Glb::triangle()
-        .with_material(glass)
-        .load_with(&filling)
-        .expect("loads");
-    assert_eq!(kind(&open), SurfaceKind::ThinWall);
-    warns(&open, "node `tri` | is not closed");
+    for (file, options, expected) in [
+        (&closed, &LoadOptions::default(), SurfaceKind::Dielectric),
+        (&closed, &thin, SurfaceKind::ThinWall),
+        (&Glb::triangle().with_material(glass), &LoadOptions::default(), SurfaceKind::ThinWall),
+    ] {
+        let scene = file.load_with(options).expect("loads");
+        let read = scene.material_of(0);
+        let is_solid = expected == SurfaceKind::Dielectric;
+        assert_eq!((read.surface, read.name.as_str()), (expected, "glass"));
+        assert_eq!((read.volume.is_some(), read.is_solid_by_shape), (is_solid, is_solid));
+        if is_solid {
+            warns_not(&scene);
+        } else {
+            warns(&scene, "material `glass` | thin pane");
+        }
+    }
+    // One material on both: the first mesh has it, the other a twin.
+    let mut both = closed;
+    let opened = both.json["meshes"][0].clone();
+    let mesh = both.push("meshes", opened);
+    let three = both.push_indices(&[0, 1, 2]);
+    both.json["meshes"][mesh]["primitives"][0]["indices"] = json!(three);
+    both.push_root(json!({ "mesh": mesh }));
+    let scene = both.scene();
+    let kinds = [0, 1].map(|object| scene.material_of(object).surface);
+    assert_eq!(kinds, [SurfaceKind::Dielectric, SurfaceKind::ThinWall]);
+    assert_eq!(scene.material_of(1).name, "glass (thin)");
 }
 
 fn png(pixels: &[[u8; 4]], width: u32) -> Vec<u8> {
