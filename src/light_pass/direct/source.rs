@@ -19,7 +19,7 @@ use crate::geometry::sampling::even_point;
 use crate::optics::LinearSrgb;
 use crate::scene::emitter::{Emitter, Places};
 use crate::scene::{Environment, Light, LightKind, LightSize, Material, PanelShape, Scene};
-use crate::transport::Tracer;
+use crate::transport::{Taking, Tracer};
 
 /// Places of a light that are ready: a power of 2.
 const READY: usize = 1 << 13;
@@ -230,7 +230,7 @@ impl Soft {
         &self,
         tracer: &Tracer,
         point: &SurfacePoint,
-        material: &Material,
+        (material, taking): (&Material, &Taking),
         within: &Surroundings,
         run: Range<usize>,
     ) -> Gathered {
@@ -239,7 +239,7 @@ impl Soft {
         for index in run.clone() {
             let arriving = self
                 .beam(index, &run, point, material)
-                .and_then(|beam| Arriving::from_beam(&beam, point, material, within));
+                .and_then(|beam| Arriving::from_beam(&beam, point, taking, within));
             let Some(arriving) = arriving else { continue };
             sum.shadow_rays += 1;
             sum.open += arriving.open;

@@ -6,7 +6,7 @@ use serde_json::Map;
 
 use super::extras::Extras;
 use super::report::Report;
-use super::{extensions, faults};
+use super::{extensions, faults, names};
 use crate::error::{Error, Result};
 
 /// The typed JSON, with node transforms in double precision beside it.
@@ -47,6 +47,7 @@ pub fn parse(json: &[u8], report: &mut Report) -> Result<Document> {
     let required = strings(file, "extensionsRequired")?;
     extensions::check(&required, &strings(file, "extensionsUsed")?, report)?;
     leave_out_what_is_not_read(file, report);
+    make_glass_clear(file, report);
     let extras = Extras::of(&value);
     remove_extras(&mut value);
 
@@ -163,6 +164,34 @@ fn leave_out_what_is_not_read(file: &mut Map<String, Value>, report: &mut Report
         .and_then(|punctual| punctual.get_mut("lights"));
     for light in objects(lights) {
         light.remove("extensions");
+    }
+}
+
+/// A material that transmits light is no metal unless it says so: what glTF assumes would let nothing through.
+fn make_glass_clear(file: &mut Map<String, Value>, report: &mut Report) {
+    for (index, material) in objects(file.get_mut("materials")).enumerate() {
+        let extensions = material.get("extensions");
+        let transmission = extensions.and_then(|all| all.get("KHR_materials_transmission"));
+        let factor = transmission.and_then(|stated| stated.get("transmissionFactor"));
+        let states = |pbr: &Map<String, Value>| {
+            pbr.contains_key("metallicFactor") || pbr.contains_key("metallicRoughnessTexture")
+        };
+        let pbr = material.get("pbrMetallicRoughness").and_then(Value::as_object);
+        if factor.and_then(Value::as_f64).is_none_or(|factor| factor <= 0.0) || pbr.is_some_and(states) {
+            continue;
+        }
+        let name = material.get("name").and_then(Value::as_str).map(str::to_owned);
+        let pbr = material
+            .entry("pbrMetallicRoughness")
+            .or_insert_with(|| Value::Object(Map::new()));
+        if let Some(pbr) = pbr.as_object_mut() {
+            pbr.insert("metallicFactor".into(), Value::from(0.0));
+            report.warn(
+                format!("material `{}`", names::name(name.as_ref(), "material", index)),
+                "transmits light but does not say that it is no metal; it was read as glass",
+                "state a metallic factor of 0",
+            );
+        }
     }
 }
 

@@ -24,6 +24,7 @@ mod container;
 mod document;
 mod extensions;
 mod extras;
+mod factors;
 mod faults;
 mod glb;
 pub(super) mod guard;

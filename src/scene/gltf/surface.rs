@@ -12,7 +12,7 @@ use super::report::{Budget, Report};
 use super::{material, names};
 use crate::error::{Error, Result};
 use crate::scene::closed::is_solid;
-use crate::scene::{Material, Mesh, Object, Scene, SurfaceKind};
+use crate::scene::{Material, Mesh, Object, Scene};
 
 /// What objects are read from.
 #[derive(Clone, Copy, Debug)]
@@ -157,7 +157,7 @@ impl Materials {
     /// material itself becomes, and meshes of the other kind have a twin of it.
     fn thin_or_solid(&mut self, material: usize, is_solid: impl FnOnce() -> bool) -> usize {
         let is_known = self.thin.contains_key(&material);
-        if !is_known && self.all[material].surface != SurfaceKind::ThinWall {
+        if !is_known && !material::is_thin(&self.all[material]) {
             return material;
         }
         let is_solid = is_solid();
@@ -182,8 +182,7 @@ impl Materials {
 
     /// Warns of the thin walls that are left.
     pub fn warn_of_thin_walls(&self, solid_glass: bool, report: &mut Report) {
-        let is_thin = |material: &&Material| material.surface == SurfaceKind::ThinWall;
-        for material in self.all.iter().filter(is_thin) {
+        for material in self.all.iter().filter(|material| material::is_thin(material)) {
             report.warn(
                 format!("material `{}`", material.name),
                 "transmits light but has no thickness, so that it is a thin pane that does not refract",
@@ -197,7 +196,7 @@ impl Materials {
     }
 
     fn check_coordinates(&self, material: usize, mesh: &Mesh, name: &str, report: &mut Report) {
-        let Some(texture) = &self.all[material].base_colour_texture else {
+        let Some(texture) = self.all[material].coordinates() else {
             return;
         };
         let uvs = if texture.uv_set == 0 { &mesh.uv0 } else { &mesh.uv1 };
