@@ -171,7 +171,13 @@ fn chain_radiance(first: Gaze) -> vec3f {
             part(&walk, point.object);
             walk.gaze.weight *= medium_transmittance(walk.gaze.media, seen.distance * start.unit_m);
             walk.gaze.width += walk.gaze.spread * seen.distance;
-            walk.radiance += shown(walk.gaze.weight * object.emitted_radiance, walk.gaze.wavelength);
+            var emitted = object.emitted_radiance;
+            if object.glow != NO_IMAGE {
+                let cos_view = abs(dot(point.geometric_normal, walk.gaze.direction));
+                let level = footprint_level(object.glow, point.uv_density, walk.gaze.width, cos_view);
+                emitted *= texture_colour(object.glow, point.uv, level);
+            }
+            walk.radiance += shown(walk.gaze.weight * emitted, walk.gaze.wavelength);
             if has_map(object.surface) {
                 arrives = true;
                 break;

@@ -25,9 +25,10 @@ struct ObjectRecord {
     coverage: f32,
     // Whether it bounds a body.
     solid: u32,
+    // Image of what it emits.
+    glow: u32,
     padding0: u32,
     padding1: u32,
-    padding2: u32,
 }
 
 const SURFACE_DIFFUSE: u32 = 0u;

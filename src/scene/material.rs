@@ -104,6 +104,8 @@ pub struct Material {
     pub is_solid_by_shape: bool,
     /// Emitted radiance [W/(m² sr)], luminous-equivalent: glTF's cd/m² divided by 683 lm/W.
     pub emitted_radiance: LinearSrgb,
+    /// sRGB-encoded image that multiplies `emitted_radiance`.
+    pub emission_texture: Option<TextureRef>,
     /// That light by wavelength, scaled to one luminous-equivalent watt, of which `emitted_radiance` has the colour;
     /// `None` where that is all that is known.
     pub emission_spectrum: Option<Arc<Spectrum>>,
@@ -132,7 +134,8 @@ impl Material {
     pub fn coordinates(&self) -> Option<&TextureRef> {
         let normals = self.bending_map().map(|map| &map.image);
         let variation = self.variation.as_ref().map(|variation| &variation.image);
-        self.base_colour_texture.as_ref().or(variation).or(normals)
+        let surface = self.base_colour_texture.as_ref().or(variation);
+        surface.or(self.emission_texture.as_ref()).or(normals)
     }
 
     /// Whether anything bends its normals.
@@ -256,6 +259,7 @@ impl Default for Material {
             volume: None,
             is_solid_by_shape: false,
             emitted_radiance: LinearSrgb::BLACK,
+            emission_texture: None,
             emission_spectrum: None,
             polish: 1.0,
             waves: None,

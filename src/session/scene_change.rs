@@ -75,6 +75,7 @@ fn leave_alike(a: &Material, b: &Material) -> bool {
         && a.alpha_mask == b.alpha_mask
         && a.coverage == b.coverage
         && a.variation == b.variation
+        && a.emission_texture == b.emission_texture
         && (!has_alpha || a.base_colour_texture == b.base_colour_texture)
 }
 

@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, OnceLock};
 
-use glam::{DVec2, DVec3};
+use glam::DVec3;
 use rayon::prelude::*;
 
 use super::bend;
@@ -14,7 +14,7 @@ use super::smoothing::smoothing_groups;
 use crate::geometry::{Ray, TriangleBvh, TriangleHit, ray};
 use crate::optics::spectrum::Spectrum;
 use crate::optics::{LinearSrgb, Nanometres};
-use crate::scene::{Adjacency, AlphaMask, Material, Mesh, Mixture, Scene, SurfaceKind, TextureRef, Waves};
+use crate::scene::{Adjacency, AlphaMask, Material, Mixture, Scene, SurfaceKind, TextureRef, Waves};
 
 /// A scene with its hierarchy. What edits of the scene leave as it is, edited copies share.
 #[derive(Debug)]
@@ -423,7 +423,7 @@ impl Tracer {
             return true;
         };
         let placed = material.base_colour_texture.as_ref().and_then(|reference| {
-            let uv = texture_uv(object.mesh_in_scene(), reference, triangle as usize, barycentric)?;
+            let uv = reference.place(object.mesh_in_scene(), triangle as usize, barycentric)?;
             Some((&*self.scene.textures[reference.texture], uv))
         });
         mask.is_there(placed)
@@ -439,7 +439,7 @@ impl Tracer {
         let material = self.scene.material_of(object);
         let mesh = self.scene.objects[object].mesh_in_scene();
         let placed = |reference: &TextureRef| {
-            let uv = texture_uv(mesh, reference, triangle, barycentric)?;
+            let uv = reference.place(mesh, triangle, barycentric)?;
             Some((&self.scene.textures[reference.texture], uv))
         };
         let variation = material.variation.as_ref().filter(|_| textures);
@@ -481,26 +481,11 @@ impl Tracer {
         let Some(reference) = &self.scene.materials[object.material].base_colour_texture else {
             return LinearSrgb::WHITE;
         };
-        match texture_uv(object.mesh_in_scene(), reference, hit.triangle, hit.barycentric) {
+        match reference.place(object.mesh_in_scene(), hit.triangle, hit.barycentric) {
             Some(uv) => self.scene.textures[reference.texture].sample(uv),
             None => LinearSrgb::WHITE,
         }
     }
-}
-
-/// Where a texture is looked up at a place of a triangle; `None` where the mesh lacks its coordinates.
-fn texture_uv(mesh: &Mesh, reference: &TextureRef, triangle: usize, barycentric: [f64; 3]) -> Option<DVec2> {
-    let uvs = if reference.uv_set == 0 {
-        &mesh.uv0
-    } else {
-        &mesh.uv1
-    }
-    .as_ref()?;
-    let corners = mesh.triangles[triangle].iter().zip(barycentric);
-    let uv = corners.fold(DVec2::ZERO, |sum, (&vertex, weight)| {
-        sum + uvs[vertex as usize] * weight
-    });
-    Some(reference.transform(uv))
 }
 
 fn has_masks(scene: &Scene) -> bool {

@@ -207,7 +207,8 @@ impl<'a> LitScene<'a> {
 
     /// What a surface sends by itself: emission, and the share of its map that its polish lets out, L = ρE/π.
     fn own_radiance(&self, hit: &SurfaceHit, side: Side, share: LinearSrgb) -> LinearSrgb {
-        let emitted = self.emitted[hit.object];
+        let scene = self.tracer.scene();
+        let emitted = self.emitted[hit.object] * scene.glow_at(hit.object, hit.triangle, hit.barycentric);
         let Some(map) = self.maps[Receiver::new(hit.object, side).index()]
             .as_ref()
             .filter(|_| share != LinearSrgb::BLACK)

@@ -28,6 +28,7 @@ pub(super) struct Look {
     record: ObjectRecord,
     base_colour_texture: Option<usize>,
     variation: Option<usize>,
+    emission_texture: Option<usize>,
 }
 
 /// Glasses that can part wavelengths in one scene; as many as the shader's uniform has room for.
@@ -178,6 +179,9 @@ impl Objects {
                 variation: look
                     .variation
                     .map_or(NO_IMAGE, |texture| self.images.texture_record(texture)),
+                glow: look
+                    .emission_texture
+                    .map_or(NO_IMAGE, |texture| self.images.texture_record(texture)),
                 bumps: self.images.bump_record(index),
                 ..look.record
             })
@@ -195,6 +199,11 @@ impl Look {
     fn of(scene: &Scene, index: usize) -> Self {
         let object = &scene.objects[index];
         let material = &scene.materials[object.material];
+        let emitted = match scene.glows.get(&index) {
+            // The shader multiplies by its image.
+            Some(glow) => scene.emitted_radiance(index) * glow.per_colour(),
+            None => scene.emitted_radiance(index),
+        };
         Self {
             surface: material.surface,
             double_sided: material.has_back(),
@@ -203,7 +212,7 @@ impl Look {
             record: ObjectRecord {
                 base_colour: rgb(material.base_colour),
                 ior: material.ior as f32,
-                emitted_radiance: rgb(scene.emitted_radiance(index)),
+                emitted_radiance: rgb(emitted),
                 surface: surface_code(material.surface),
                 absorption_per_m: absorption_per_m(material),
                 double_sided: u32::from(material.has_back()),
@@ -220,15 +229,16 @@ impl Look {
                 transmission: material.transmission as f32,
                 coverage: material.coverage.map_or(-1.0, |factor| factor as f32),
                 solid: u32::from(material.is_solid()),
+                glow: NO_IMAGE,
                 padding0: 0,
                 padding1: 0,
-                padding2: 0,
             },
             base_colour_texture: material.base_colour_texture.as_ref().map(|image| image.texture),
             variation: material
                 .variation
                 .as_ref()
                 .map(|variation| variation.image.texture),
+            emission_texture: material.emission_texture.as_ref().map(|image| image.texture),
         }
     }
 

@@ -129,9 +129,10 @@ shader_struct! {
         coverage: f32,
         /// Whether it bounds a body.
         solid: u32,
+        /// Record of the image of what it emits.
+        glow: u32,
         padding0: u32,
         padding1: u32,
-        padding2: u32,
     }
 }
 

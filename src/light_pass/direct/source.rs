@@ -190,7 +190,7 @@ fn shape(light: &Light, scene: &Scene) -> Option<Shape> {
         }
         LightKind::Surface { object, .. } => {
             let mesh = scene.objects.get(object)?.mesh_in_scene();
-            if mesh.triangles.len() > MOST_POLYGONS {
+            if mesh.triangles.len() > MOST_POLYGONS || scene.glows.contains_key(&object) {
                 return None;
             }
             let both_sides = scene.material_of(object).double_sided;

@@ -162,7 +162,8 @@ impl Reading<'_, '_> {
             metal: None,
             volume: self.volume(extensions),
             is_solid_by_shape: false,
-            emitted_radiance: self.emission(extensions)?,
+            emitted_radiance: self.emission(extensions),
+            emission_texture: None,
             emission_spectrum: None,
             polish: 1.0,
             normal_map: None,
@@ -173,6 +174,7 @@ impl Reading<'_, '_> {
         };
         self.vary(&mut material, transmission)?;
         self.blend(&mut material);
+        self.glow(&mut material)?;
         self.emission_spectrum(&mut material)?;
         self.substance(&mut material, extensions)?;
         material.surface = if extensions.unlit.is_none() {
@@ -187,10 +189,10 @@ impl Reading<'_, '_> {
         if !material.transmits() {
             material.volume = None;
         }
-        if let (SurfaceKind::Mixed, Some(specular)) = (material.surface, &extensions.specular) {
+        let is_polish = matches!(material.surface, SurfaceKind::Mixed | SurfaceKind::Varied);
+        if let (true, Some(specular)) = (is_polish, &extensions.specular) {
             material.polish = self.share(specular.specular_factor.0, "specular factor");
         }
-        let is_polish = material.surface == SurfaceKind::Mixed;
         self.coat(&mut material, extensions);
         material.normal_map = self.normal_map(&material)?;
         self.name_what_is_ignored(extensions, &material, is_polish);
@@ -280,7 +282,7 @@ impl Reading<'_, '_> {
     }
 
     /// glTF's cd/m² as luminous-equivalent W/(m² sr).
-    fn emission(&mut self, extensions: &extension::Material) -> Result<LinearSrgb> {
+    fn emission(&mut self, extensions: &extension::Material) -> LinearSrgb {
         let mut strength = extensions
             .emissive_strength
             .as_ref()
@@ -292,24 +294,49 @@ impl Reading<'_, '_> {
             );
             strength = 0.0;
         }
-        let mut factor = self.colour(self.source.emissive_factor.0, "emissive factor");
-        if let Some(texture) = self
-            .source
-            .emissive_texture
-            .as_ref()
-            .filter(|_| factor.max_channel() > 0.0)
-        {
-            let linear = |[r, g, b, _]: [u8; 4]| [r, g, b].map(LinearSrgb::decode_channel).into();
-            let mean = self
-                .images
-                .mean(texture.index, linear, &self.owner, self.budget, self.report)?;
-            factor = factor * mean.unwrap_or(LinearSrgb::WHITE);
-            self.warn(
-                "its emissive texture was read as its mean",
-                "split the mesh where it glows",
-            );
+        let factor = self.colour(self.source.emissive_factor.0, "emissive factor");
+        factor * (strength / LUMENS_PER_WATT)
+    }
+
+    /// The image of what it emits, or its mean where the graphics card could not place it.
+    fn glow(&mut self, material: &mut Material) -> Result<()> {
+        let source = self.source;
+        let Some(info) = source.emissive_texture.as_ref() else {
+            return Ok(());
+        };
+        if material.emitted_radiance == LinearSrgb::BLACK {
+            return Ok(());
         }
-        Ok(factor * (strength / LUMENS_PER_WATT))
+        let transform = info
+            .extensions
+            .as_ref()
+            .and_then(|extensions| extensions.texture_transform.as_ref());
+        let place = self.placed("emissive texture", info.tex_coord, transform);
+        let others = material.coordinates();
+        let is_coloured = self.spectrum.is_none();
+        let fits =
+            is_coloured && others.is_none_or(|other| place == Some((other.uv_set, other.uv_transform)));
+        if let Some((uv_set, uv_transform)) = place.filter(|_| fits) {
+            let found = self
+                .images
+                .texture(info.index, &self.owner, self.budget, self.report)?;
+            material.emission_texture = found.map(|texture| TextureRef {
+                texture,
+                uv_set,
+                uv_transform,
+            });
+            return Ok(());
+        }
+        let linear = |[r, g, b, _]: [u8; 4]| [r, g, b].map(LinearSrgb::decode_channel).into();
+        let mean = self
+            .images
+            .mean(info.index, linear, &self.owner, self.budget, self.report)?;
+        material.emitted_radiance = material.emitted_radiance * mean.unwrap_or(LinearSrgb::WHITE);
+        self.warn(
+            "its emissive texture was read as its mean, since it has other coordinates than its others or a spectrum",
+            "give all of its textures the same set and transform",
+        );
+        Ok(())
     }
 
     /// Gives what it emits the spectrum that is stated for it, if any, in place of its colour.

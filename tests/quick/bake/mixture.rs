@@ -1,8 +1,10 @@
 //! Surfaces that change from place to place are the sum of their parts.
 
-use nephroid::scene::Variation;
+use nephroid::scene::{Glow, Variation};
+use nephroid::units::Radiance;
 use support::floors::texture_reference;
 use support::meshes::{floor, quad};
+use support::scenes::{chart, direct, flux_w, light, scene};
 use support::tools::{bake, bits, caustic, energy_fault, photons};
 
 use crate::prelude::*;
@@ -147,4 +149,47 @@ fn boards_do_not_depend_on_threads() {
         result.maps.iter().map(bits).collect::<Vec<_>>()
     };
     assert!(baked(1) == baked(3));
+}
+
+/// Flux on a floor under a lamp of radiance 10 W/(m² sr) where its image is white [W].
+fn shone_by(image: Option<Texture>) -> f64 {
+    let lamp = Material {
+        emitted_radiance: LinearSrgb::grey(10.0),
+        emission_texture: image.is_some().then(texture_reference),
+        double_sided: false,
+        ..Material::default()
+    };
+    let hanging = quad(dvec3(-0.5, 1.0, -0.5), DVec3::Z, DVec3::X);
+    let mut scene = scene(
+        vec![(floor(2.0, 0.0), Material::default()), (hanging, lamp)],
+        vec![],
+    );
+    if let Some(image) = image {
+        let glow = Glow::new(scene.objects[1].mesh_in_scene(), &texture_reference(), &image);
+        scene.glows.insert(1, Arc::new(glow.expect("it glows")));
+        scene.textures.push(Arc::new(image));
+    }
+    let radiance = Radiance(scene.emitted_radiance(1).luminance());
+    scene
+        .lights
+        .push(light(LightKind::Surface { object: 1, radiance }));
+    let tracer = Tracer::new(Arc::new(scene));
+    let chart = chart(&tracer, 0, 16, 16);
+    flux_w(&chart, &direct(&tracer, &chart))
+}
+
+#[test]
+fn glowing_boards_are_half_of_each_kind() {
+    let (light, dark) = ([255; 4], [99, 99, 99, 255]);
+    let mixed_w = shone_by(Some(board(|is_light| if is_light { light } else { dark })));
+    let [bright_w, dim_w] = [light, dark].map(|all| shone_by(Some(board(|_| all))));
+    println!("{mixed_w} of {bright_w} and {dim_w}, evenly {}", shone_by(None));
+    near(bright_w, shone_by(None), 0.01 * bright_w, "a white image is none");
+    near(
+        dim_w / bright_w,
+        LinearSrgb::decode_channel(99),
+        1e-3,
+        "as bright as its image",
+    );
+    near(mixed_w, 0.5 * (bright_w + dim_w), 0.02 * mixed_w, "half of each");
 }
