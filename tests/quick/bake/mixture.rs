@@ -184,7 +184,8 @@ fn glowing_boards_are_half_of_each_kind() {
     let mixed_w = shone_by(Some(board(|is_light| if is_light { light } else { dark })));
     let [bright_w, dim_w] = [light, dark].map(|all| shone_by(Some(board(|_| all))));
     println!("{mixed_w} of {bright_w} and {dim_w}, evenly {}", shone_by(None));
-    near(bright_w, shone_by(None), 0.01 * bright_w, "a white image is none");
+    // Without an image it is exact; each place of one with an image stands for a patch as wide as all of them leave it.
+    near(bright_w, shone_by(None), 0.05 * bright_w, "a white image is none");
     near(
         dim_w / bright_w,
         LinearSrgb::decode_channel(99),

@@ -98,6 +98,7 @@ fn photons_are_unbiased() {
         ("square lamp", ring_under_square_lamp(), 1e5),
         ("disc of the sun", nephroid_under_the_sun(), 2e6),
         ("frosted ball", frosted_ball(0.3), 1e6),
+        ("ball as rough as can be", frosted_ball(1.0), 1e6),
         ("lamp in green glass", lamp_in_green_glass(), 3e4),
     ] {
         let result = bake(scene.clone(), &photons(density_per_sr, SIDE));
