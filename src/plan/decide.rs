@@ -35,8 +35,7 @@ pub fn decide(scene: &Scene, settings: &BakeSettings, sights: &[Sight]) -> Effec
     let lets_through = |material: &Material| !material.surface.is_opaque();
     let absorbs = |material: &Material| {
         let volume = material.volume.as_ref();
-        material.surface == SurfaceKind::Dielectric
-            && volume.is_some_and(|volume| volume.attenuation_distance_m.is_finite())
+        material.is_solid() && volume.is_some_and(|volume| volume.attenuation_distance_m.is_finite())
     };
     let effects = vec![
         on_paths(
@@ -57,7 +56,11 @@ pub fn decide(scene: &Scene, settings: &BakeSettings, sights: &[Sight]) -> Effec
         ),
         on_paths(
             Effect::Textures,
-            &|material| material.surface != SurfaceKind::Mixed && material.base_colour_texture.is_some(),
+            &|material| {
+                let has_tint =
+                    material.surface != SurfaceKind::Mixed && material.base_colour_texture.is_some();
+                has_tint || material.variation.is_some()
+            },
             "no lit mirror or glass has a texture",
         ),
         on_paths(

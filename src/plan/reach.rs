@@ -165,7 +165,7 @@ impl<'a> Reach<'a> {
             return false;
         }
         match self.scene.material_of(from).surface {
-            SurfaceKind::Dielectric | SurfaceKind::ThinWall => true,
+            SurfaceKind::Dielectric | SurfaceKind::ThinWall | SurfaceKind::Varied => true,
             SurfaceKind::Diffuse => false,
             SurfaceKind::Mirror | SurfaceKind::Mixed => {
                 let mesh = self.scene.objects[from].mesh_in_scene();

@@ -6,6 +6,21 @@ use glam::DVec3;
 
 use crate::scene::Mesh;
 
+/// Least volume of a solid over that of a cube of its area: what is flatter is a sheet with two sides.
+const LEAST_FILLED: f64 = 1e-6;
+
+/// Whether a mesh encloses space, with its triangles wound so that they face outwards.
+pub fn is_solid(mesh: &Mesh) -> bool {
+    let middle = mesh.positions.first().copied().unwrap_or_default();
+    let volume_m3: f64 = (0..mesh.triangles.len())
+        .map(|triangle| {
+            let [a, b, c] = mesh.corners(triangle).map(|corner| corner - middle);
+            a.dot(b.cross(c)) / 6.0
+        })
+        .sum();
+    volume_m3 > LEAST_FILLED * (mesh.area_m2() / 6.0).powf(1.5) && is_closed(mesh)
+}
+
 /// Whether every edge is passed as often in one direction as in the other; vertices are one where their positions are
 /// equal bit by bit, since normals and texture coordinates split them.
 pub fn is_closed(mesh: &Mesh) -> bool {

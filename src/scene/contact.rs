@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use glam::DVec3;
 
-use super::{Scene, SurfaceKind};
+use super::Scene;
 use crate::error::Warning;
 
 /// How finely planes are told apart: parts of a unit normal, and of the largest coordinate.
@@ -76,7 +76,7 @@ pub fn warnings(scene: &Scene) -> Vec<Warning> {
 
 /// Triangles of all solid dielectrics by their planes; nothing where there is only one such body.
 fn planes(scene: &Scene) -> BTreeMap<Plane, Vec<Face>> {
-    let is_solid = |object: &usize| scene.material_of(*object).surface == SurfaceKind::Dielectric;
+    let is_solid = |object: &usize| scene.material_of(*object).is_solid();
     let bodies: Vec<usize> = (0..scene.objects.len()).filter(is_solid).collect();
     let mut planes: BTreeMap<Plane, Vec<Face>> = BTreeMap::new();
     let Some((low, high)) = scene.bounds().filter(|_| bodies.len() > 1) else {

@@ -2,6 +2,7 @@
 
 use glam::{DMat3, DVec2};
 
+use super::Mesh;
 use crate::optics::LinearSrgb;
 
 /// How a coordinate outside [0, 1] is brought back.
@@ -81,6 +82,16 @@ impl Texture {
 }
 
 impl TextureRef {
+    /// Where it is looked up at a place of a triangle; `None` where the mesh lacks its coordinates.
+    pub fn place(&self, mesh: &Mesh, triangle: usize, barycentric: [f64; 3]) -> Option<DVec2> {
+        let uvs = if self.uv_set == 0 { &mesh.uv0 } else { &mesh.uv1 }.as_ref()?;
+        let corners = mesh.triangles[triangle].iter().zip(barycentric);
+        let uv = corners.fold(DVec2::ZERO, |sum, (&vertex, weight)| {
+            sum + uvs[vertex as usize] * weight
+        });
+        Some(self.transform(uv))
+    }
+
     /// The texture coordinate after KHR_texture_transform.
     pub fn transform(&self, uv: DVec2) -> DVec2 {
         self.uv_transform.transform_point2(uv)

@@ -69,7 +69,7 @@ impl CausticLayer<'_> {
         self.plan.is_on(Effect::AreaLights) && self.tracer.scene().lights[light.light].has_extent()
     }
 
-    /// A rough surface that light meets.
+    /// A rough surface that light meets, or one that changes from place to place.
     pub(super) fn rough_object(&self, light: &AimedLight) -> Option<usize> {
         let scene = self.tracer.scene();
         let reached = self.aim.sights[light.light].reached.iter();
@@ -97,7 +97,10 @@ impl CausticLayer<'_> {
                 (String::from("has a size"), Effect::AreaLights)
             } else if let Some(object) = self.rough_object(light) {
                 let name = &scene.objects[object].name;
-                (format!("shines on `{name}`, which is rough"), Effect::Roughness)
+                (
+                    format!("shines on `{name}`, which is rough or changes from place to place"),
+                    Effect::Roughness,
+                )
             } else {
                 continue;
             };

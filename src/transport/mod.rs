@@ -15,7 +15,7 @@ pub mod tracer;
 
 pub use differential::{RayDerivative, RayDifferential, SurfaceDetail, SurfaceScale};
 pub use effects::EffectSet;
-pub use interaction::{Branch, Event, Interaction, Meeting, TurnedBy};
+pub use interaction::{Branch, Event, Interaction, Meeting, Taking, TurnedBy};
 pub use medium::MediumStack;
 pub use microfacets::Microfacets;
 pub use surroundings::media_at;

@@ -4,7 +4,6 @@ use glam::DVec3;
 
 use super::{MediumStack, Tracer};
 use crate::geometry::Ray;
-use crate::scene::SurfaceKind;
 
 /// Surfaces that are looked at above the point before it is taken to be outside of all others.
 const MOST_CROSSINGS: usize = 100_000;
@@ -23,7 +22,7 @@ pub fn media_at(tracer: &Tracer, point: DVec3) -> MediumStack {
         let Some(hit) = tracer.closest_hit(&ray) else {
             break;
         };
-        if scene.material_of(hit.object).surface == SurfaceKind::Dielectric {
+        if scene.material_of(hit.object).is_solid() {
             if hit.geometric_normal.dot(ray.direction) < 0.0 {
                 entered[hit.object] += 1;
             } else if entered[hit.object] > 0 {

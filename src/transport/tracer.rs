@@ -2,18 +2,19 @@
 
 use std::sync::{Arc, OnceLock};
 
-use glam::{DVec2, DVec3};
+use glam::DVec3;
 use rayon::prelude::*;
 
 use super::bend;
 use super::corners::{sharp_corners, sharp_edges};
 use super::curvature::NormalField;
+use super::interaction::Taking;
 use super::normal_texture::{TextureBump, texel_m};
 use super::smoothing::smoothing_groups;
 use crate::geometry::{Ray, TriangleBvh, TriangleHit, ray};
 use crate::optics::spectrum::Spectrum;
 use crate::optics::{LinearSrgb, Nanometres};
-use crate::scene::{Adjacency, AlphaMask, Material, Mesh, Scene, TextureRef, Waves};
+use crate::scene::{Adjacency, AlphaMask, Material, Mixture, Scene, SurfaceKind, TextureRef, Waves};
 
 /// A scene with its hierarchy. What edits of the scene leave as it is, edited copies share.
 #[derive(Debug)]
@@ -191,7 +192,7 @@ impl Tracer {
     #[must_use]
     pub fn without_clear_bodies(&self) -> Self {
         let mut scene = Scene::clone(&self.scene);
-        let is_clear = |material: &&mut Material| !material.surface.is_opaque();
+        let is_clear = |material: &&mut Material| material.surface.is_clear();
         for material in scene.materials.iter_mut().filter(is_clear) {
             material.alpha_mask = Some(AlphaMask::NOWHERE);
         }
@@ -422,10 +423,51 @@ impl Tracer {
             return true;
         };
         let placed = material.base_colour_texture.as_ref().and_then(|reference| {
-            let uv = texture_uv(object.mesh_in_scene(), reference, triangle as usize, barycentric)?;
+            let uv = reference.place(object.mesh_in_scene(), triangle as usize, barycentric)?;
             Some((&*self.scene.textures[reference.texture], uv))
         });
         mask.is_there(placed)
+    }
+
+    /// What the surface is made of at a place of a triangle; by the material's factors alone without `textures`.
+    pub(super) fn mixture(
+        &self,
+        object: usize,
+        (triangle, barycentric): (usize, [f64; 3]),
+        textures: bool,
+    ) -> Mixture {
+        let material = self.scene.material_of(object);
+        let mesh = self.scene.objects[object].mesh_in_scene();
+        let placed = |reference: &TextureRef| {
+            let uv = reference.place(mesh, triangle, barycentric)?;
+            Some((&self.scene.textures[reference.texture], uv))
+        };
+        let variation = material.variation.as_ref().filter(|_| textures);
+        let factors = variation.and_then(|variation| placed(&variation.image));
+        let colour = material.base_colour_texture.as_ref();
+        let alpha = colour.filter(|_| material.coverage.is_some()).and_then(placed);
+        material.mixture(
+            factors.map_or(LinearSrgb::WHITE, |(texture, uv)| texture.sample(uv)),
+            alpha.map_or(1.0, |(texture, uv)| texture.alpha(uv)),
+        )
+    }
+
+    /// What the diffuse body of a surface takes at a place of a triangle.
+    pub fn taking(&self, object: usize, triangle: usize, barycentric: [f64; 3]) -> Taking {
+        let material = self.scene.material_of(object);
+        let (share, polish) = match material.surface {
+            SurfaceKind::Mixed => (1.0, material.polish),
+            SurfaceKind::Varied => {
+                let mixture = self.mixture(object, (triangle, barycentric), true);
+                (mixture.body, mixture.polish)
+            }
+            _ => (1.0, 0.0),
+        };
+        Taking {
+            share,
+            polish,
+            ior: material.ior,
+        }
     }
 
     /// Base colour of the surface at a hit, its texture included.
@@ -439,26 +481,11 @@ impl Tracer {
         let Some(reference) = &self.scene.materials[object.material].base_colour_texture else {
             return LinearSrgb::WHITE;
         };
-        match texture_uv(object.mesh_in_scene(), reference, hit.triangle, hit.barycentric) {
+        match reference.place(object.mesh_in_scene(), hit.triangle, hit.barycentric) {
             Some(uv) => self.scene.textures[reference.texture].sample(uv),
             None => LinearSrgb::WHITE,
         }
     }
-}
-
-/// Where a texture is looked up at a place of a triangle; `None` where the mesh lacks its coordinates.
-fn texture_uv(mesh: &Mesh, reference: &TextureRef, triangle: usize, barycentric: [f64; 3]) -> Option<DVec2> {
-    let uvs = if reference.uv_set == 0 {
-        &mesh.uv0
-    } else {
-        &mesh.uv1
-    }
-    .as_ref()?;
-    let corners = mesh.triangles[triangle].iter().zip(barycentric);
-    let uv = corners.fold(DVec2::ZERO, |sum, (&vertex, weight)| {
-        sum + uvs[vertex as usize] * weight
-    });
-    Some(reference.transform(uv))
 }
 
 fn has_masks(scene: &Scene) -> bool {

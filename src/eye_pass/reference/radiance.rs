@@ -176,7 +176,7 @@ impl<'a> LitScene<'a> {
         let tracer = gaze.at.map_or(self.tracer, |at| &at.tracer);
         let interaction = tracer.interact(hit, incident, &gaze.media);
         let side = Side::met(incident, hit.geometric_normal);
-        let seen = gaze.brings(self.own_radiance(hit, side, interaction.deposit));
+        let seen = gaze.brings(self.own_radiance(hit, side, interaction.leaving));
         if !CHAINS {
             return seen;
         }
@@ -207,7 +207,8 @@ impl<'a> LitScene<'a> {
 
     /// What a surface sends by itself: emission, and the share of its map that its polish lets out, L = ρE/π.
     fn own_radiance(&self, hit: &SurfaceHit, side: Side, share: LinearSrgb) -> LinearSrgb {
-        let emitted = self.emitted[hit.object];
+        let scene = self.tracer.scene();
+        let emitted = self.emitted[hit.object] * scene.glow_at(hit.object, hit.triangle, hit.barycentric);
         let Some(map) = self.maps[Receiver::new(hit.object, side).index()]
             .as_ref()
             .filter(|_| share != LinearSrgb::BLACK)
@@ -249,13 +250,12 @@ fn nearest<const CHAINS: bool>(tracer: &Tracer, mut ray: Ray) -> Option<(Surface
     loop {
         let hit = tracer.closest_hit(&ray)?;
         let material = tracer.scene().material_of(hit.object);
-        let clear = matches!(material.surface, SurfaceKind::Dielectric | SurfaceKind::ThinWall);
         let back = hit.geometric_normal.dot(ray.direction) > 0.0;
         passed_m += hit.distance_m;
-        let is_drawn = if clear {
+        let is_drawn = if material.surface.is_clear() {
             CHAINS
         } else {
-            !back || material.double_sided
+            !back || material.has_back()
         };
         if is_drawn {
             return Some((hit, passed_m));
@@ -306,7 +306,9 @@ impl SpectralScene {
         let scene = tracer.scene();
         let is_dispersive = |object: usize| scene.material_of(object).is_dispersive();
         let goes_by_index = match scene.material_of(hit.object).surface {
-            SurfaceKind::Dielectric | SurfaceKind::ThinWall | SurfaceKind::Mixed => true,
+            SurfaceKind::Dielectric | SurfaceKind::ThinWall | SurfaceKind::Mixed | SurfaceKind::Varied => {
+                true
+            }
             SurfaceKind::Diffuse | SurfaceKind::Mirror => false,
         };
         !self.wavelengths.is_empty()

@@ -28,7 +28,7 @@ macro_rules! chains {
         program! { $name:
             "shared/srgb" "shared/refraction" "shared/fresnel" "shared/traversal" "eye_pass/frame"
             "eye_pass/objects" "eye_pass/images" "eye_pass/bumps" "eye_pass/place" "eye_pass/mask" "eye_pass/start"
-            "eye_pass/lights" "eye_pass/corners" $indices "eye_pass/medium" "eye_pass/interaction"
+            "eye_pass/mixture" "eye_pass/lights" "eye_pass/corners" $indices "eye_pass/medium" "eye_pass/interaction"
             $background "eye_pass/chain" "eye_pass/traced"
         }
     };
@@ -69,7 +69,7 @@ pub(super) const SKY: Program = program! { "sky":
 pub(super) const UNDER_LIGHTS: Program = program! { "under_lights":
     "shared/srgb" "shared/refraction" "shared/fresnel" "shared/traversal" "eye_pass/frame"
     "eye_pass/objects" "eye_pass/images" "eye_pass/bumps" "eye_pass/place" "eye_pass/mask" "eye_pass/start"
-    "eye_pass/lights" "eye_pass/surface" "eye_pass/own_under_lights"
+    "eye_pass/mixture" "eye_pass/lights" "eye_pass/surface" "eye_pass/own_under_lights"
 };
 
 /// What was traced, in the picture.
@@ -149,12 +149,13 @@ pub struct Specialisation {
 
 /// Every specialisation that pipelines can ask for, for the tests; some of them more than once.
 pub fn specialisations() -> Vec<Specialisation> {
-    const KINDS: [SurfaceKind; 5] = [
+    const KINDS: [SurfaceKind; 6] = [
         SurfaceKind::Diffuse,
         SurfaceKind::Mirror,
         SurfaceKind::Dielectric,
         SurfaceKind::ThinWall,
         SurfaceKind::Mixed,
+        SurfaceKind::Varied,
     ];
     let alone = |program: Program, entry_point| Specialisation {
         program: program.name,

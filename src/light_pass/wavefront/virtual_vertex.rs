@@ -211,7 +211,9 @@ impl<'a> VirtualRays<'a> {
         let kind = tracer.scene().material_of(hit.object).surface;
         let deposit = match kind {
             SurfaceKind::Diffuse => 1.0,
-            SurfaceKind::Mixed => tracer.interact(&hit, direction, &self.media).deposit.luminance(),
+            SurfaceKind::Mixed | SurfaceKind::Varied => {
+                tracer.interact(&hit, direction, &self.media).deposit.luminance()
+            }
             _ => 0.0,
         };
         let place = if kind.is_receiver() {

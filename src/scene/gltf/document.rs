@@ -51,6 +51,7 @@ pub fn parse(json: &[u8], report: &mut Report) -> Result<Document> {
     extensions::check(&required, &strings(file, "extensionsUsed")?, report)?;
     let poses = Poses::of(file);
     prepare(file, report);
+    make_glass_clear(file, report);
     let extras = Extras::of(&value);
     remove_extras(&mut value);
 
@@ -190,6 +191,34 @@ fn name_variants(file: &Map<String, Value>, report: &mut Report) {
             format!("have variants, which are left out ({})", names.join(", ")),
             "the scene has the materials that it begins with",
         );
+    }
+}
+
+/// A material that transmits light is no metal unless it says so: what glTF assumes would let nothing through.
+fn make_glass_clear(file: &mut Map<String, Value>, report: &mut Report) {
+    for (index, material) in objects(file.get_mut("materials")).enumerate() {
+        let extensions = material.get("extensions");
+        let transmission = extensions.and_then(|all| all.get("KHR_materials_transmission"));
+        let factor = transmission.and_then(|stated| stated.get("transmissionFactor"));
+        let states = |pbr: &Map<String, Value>| {
+            pbr.contains_key("metallicFactor") || pbr.contains_key("metallicRoughnessTexture")
+        };
+        let pbr = material.get("pbrMetallicRoughness").and_then(Value::as_object);
+        if factor.and_then(Value::as_f64).is_none_or(|factor| factor <= 0.0) || pbr.is_some_and(states) {
+            continue;
+        }
+        let name = material.get("name").and_then(Value::as_str).map(str::to_owned);
+        let pbr = material
+            .entry("pbrMetallicRoughness")
+            .or_insert_with(|| Value::Object(Map::new()));
+        if let Some(pbr) = pbr.as_object_mut() {
+            pbr.insert("metallicFactor".into(), Value::from(0.0));
+            report.warn(
+                format!("material `{}`", names::name(name.as_ref(), "material", index)),
+                "transmits light but does not say that it is no metal; it was read as glass",
+                "state a metallic factor of 0",
+            );
+        }
     }
 }
 

@@ -86,6 +86,34 @@ impl<'a> Images<'a> {
         Ok(Some(self.textures.len() - 1))
     }
 
+    /// The texels of a glTF texture, and how it repeats; `None` where it has no image.
+    ///
+    /// # Errors
+    /// More memory than the budget has.
+    pub fn pixels(
+        &mut self,
+        texture: Index<gltf::json::Texture>,
+        owner: &str,
+        budget: &mut Budget,
+        report: &mut Report,
+    ) -> Result<Option<(Rc<RgbaImage>, [Wrap; 2])>> {
+        let Some(image) = self.image_index(texture, owner, report) else {
+            return Ok(None);
+        };
+        let pixels = self.decode(image, budget, report)?;
+        Ok(Some((pixels, self.wrap(texture))))
+    }
+
+    /// Adds a texture that is no image of the file; gives its index among the scene's textures.
+    ///
+    /// # Errors
+    /// More memory than the budget has.
+    pub fn add(&mut self, texture: Texture, budget: &mut Budget) -> Result<usize> {
+        budget.take(size_of_val(&texture.rgba[..]) as u64, &texture.name)?;
+        self.textures.push(texture);
+        Ok(self.textures.len() - 1)
+    }
+
     /// A texture by its index among the scene's textures.
     pub fn get(&self, texture: usize) -> &Texture {
         &self.textures[texture]

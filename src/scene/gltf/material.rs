@@ -1,5 +1,6 @@
 //! Materials: glTF's factors and extensions, checked, and the class that transport treats each as.
 
+use std::ops::RangeInclusive;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -7,11 +8,13 @@ use glam::{DMat3, DVec2};
 use gltf::json::extensions::material as extension;
 use gltf::json::extensions::texture::TextureTransform;
 use gltf::json::material::{AlphaMode, Material as Source};
+use gltf::json::texture::Info;
 use gltf::json::validation::Checked;
 use gltf::json::{Index, Value};
 use serde::Deserialize;
 
 use super::document::Document;
+use super::factors::{FactorImage, Factors};
 use super::images::Images;
 use super::numbers::widen;
 use super::report::{Budget, Report};
@@ -20,7 +23,7 @@ use super::{extras, names, spectrum, waves};
 use crate::error::Result;
 use crate::optics::LinearSrgb;
 use crate::scene::material::SPECULAR_ROUGHNESS_LIMIT;
-use crate::scene::{AlphaMask, Material, NormalMap, SurfaceKind, TextureRef, Volume};
+use crate::scene::{AlphaMask, Material, NormalMap, SurfaceKind, TextureRef, Variation, Volume};
 use crate::units::LUMENS_PER_WATT;
 
 /// What a primitive without a material has: glTF's default material is a rough metal, which is taken for matte.
@@ -33,14 +36,36 @@ pub fn default() -> Material {
     }
 }
 
+/// Whether it lets light through without being the surface of a body.
+pub fn is_thin(material: &Material) -> bool {
+    material.transmits() && material.volume.is_none()
+}
+
+/// Makes a thin wall clear solid glass.
+pub fn make_solid(thin: &mut Material) {
+    thin.volume = Some(CLEAR);
+    thin.surface = thin.classified();
+    thin.is_solid_by_shape = true;
+}
+
 /// A thin wall as clear solid glass.
 pub fn solid_twin(thin: &Material) -> Material {
-    Material {
-        name: format!("{} (solid)", thin.name),
-        surface: SurfaceKind::Dielectric,
-        volume: Some(CLEAR),
-        ..thin.clone()
-    }
+    let mut solid = thin.clone();
+    solid.name += " (solid)";
+    make_solid(&mut solid);
+    solid
+}
+
+/// The thin wall of which clear solid glass was made.
+pub fn thin_twin(solid: &Material) -> Material {
+    let mut thin = Material {
+        name: format!("{} (thin)", solid.name),
+        volume: None,
+        is_solid_by_shape: false,
+        ..solid.clone()
+    };
+    thin.surface = thin.classified();
+    thin
 }
 
 const CLEAR: Volume = Volume {
@@ -53,6 +78,15 @@ const DEFAULT_IOR: f64 = 1.5;
 
 /// The least that an attenuation colour lets through: black would need an infinite absorption.
 const DARKEST_ATTENUATION: f64 = 1e-6;
+
+/// Alphas that are neither there nor not [codes].
+const BETWEEN: RangeInclusive<u8> = 26..=229;
+
+/// A texture whose alpha is between in no more than this part of it cuts out.
+const MOST_BETWEEN: f64 = 0.02;
+
+/// Alpha from which on nothing is seen through a surface [codes].
+const OPAQUE: u8 = 254;
 
 /// All materials, in file order.
 ///
@@ -115,6 +149,8 @@ impl Reading<'_, '_> {
             base_colour: self.colour([red, green, blue], "base colour"),
             base_colour_texture: self.base_colour_texture()?,
             alpha_mask: self.alpha_mask(),
+            coverage: None,
+            variation: None,
             metallic: self.share(pbr.metallic_factor.0, "metallic factor"),
             roughness: self.share(pbr.roughness_factor.0, "roughness factor"),
             transmission: self.share(
@@ -125,7 +161,9 @@ impl Reading<'_, '_> {
             glass: None,
             metal: None,
             volume: self.volume(extensions),
-            emitted_radiance: self.emission(extensions)?,
+            is_solid_by_shape: false,
+            emitted_radiance: self.emission(extensions),
+            emission_texture: None,
             emission_spectrum: None,
             polish: 1.0,
             normal_map: None,
@@ -134,21 +172,27 @@ impl Reading<'_, '_> {
                 .and_then(|waves| waves::read(waves, &self.owner, self.report)),
             double_sided: self.source.double_sided,
         };
-        self.take_means(&mut material, transmission)?;
+        self.vary(&mut material, transmission)?;
+        self.blend(&mut material);
+        self.glow(&mut material)?;
         self.emission_spectrum(&mut material)?;
         self.substance(&mut material, extensions)?;
-        material.surface = if extensions.unlit.is_some() {
-            SurfaceKind::Diffuse
-        } else {
+        material.surface = if extensions.unlit.is_none() {
             self.classify(&material)
+        } else if material.coverage.is_some() {
+            (material.metallic, material.roughness, material.transmission) = (0.0, 1.0, 0.0);
+            material.variation = None;
+            SurfaceKind::Varied
+        } else {
+            SurfaceKind::Diffuse
         };
-        if material.surface != SurfaceKind::Dielectric {
+        if !material.transmits() {
             material.volume = None;
         }
-        if let (SurfaceKind::Mixed, Some(specular)) = (material.surface, &extensions.specular) {
+        let is_polish = matches!(material.surface, SurfaceKind::Mixed | SurfaceKind::Varied);
+        if let (true, Some(specular)) = (is_polish, &extensions.specular) {
             material.polish = self.share(specular.specular_factor.0, "specular factor");
         }
-        let is_polish = material.surface == SurfaceKind::Mixed;
         self.coat(&mut material, extensions);
         material.normal_map = self.normal_map(&material)?;
         self.name_what_is_ignored(extensions, &material, is_polish);
@@ -238,7 +282,7 @@ impl Reading<'_, '_> {
     }
 
     /// glTF's cd/m² as luminous-equivalent W/(m² sr).
-    fn emission(&mut self, extensions: &extension::Material) -> Result<LinearSrgb> {
+    fn emission(&mut self, extensions: &extension::Material) -> LinearSrgb {
         let mut strength = extensions
             .emissive_strength
             .as_ref()
@@ -250,24 +294,49 @@ impl Reading<'_, '_> {
             );
             strength = 0.0;
         }
-        let mut factor = self.colour(self.source.emissive_factor.0, "emissive factor");
-        if let Some(texture) = self
-            .source
-            .emissive_texture
-            .as_ref()
-            .filter(|_| factor.max_channel() > 0.0)
-        {
-            let linear = |[r, g, b, _]: [u8; 4]| [r, g, b].map(LinearSrgb::decode_channel).into();
-            let mean = self
-                .images
-                .mean(texture.index, linear, &self.owner, self.budget, self.report)?;
-            factor = factor * mean.unwrap_or(LinearSrgb::WHITE);
-            self.warn(
-                "its emissive texture was read as its mean",
-                "split the mesh where it glows",
-            );
+        let factor = self.colour(self.source.emissive_factor.0, "emissive factor");
+        factor * (strength / LUMENS_PER_WATT)
+    }
+
+    /// The image of what it emits, or its mean where the graphics card could not place it.
+    fn glow(&mut self, material: &mut Material) -> Result<()> {
+        let source = self.source;
+        let Some(info) = source.emissive_texture.as_ref() else {
+            return Ok(());
+        };
+        if material.emitted_radiance == LinearSrgb::BLACK {
+            return Ok(());
         }
-        Ok(factor * (strength / LUMENS_PER_WATT))
+        let transform = info
+            .extensions
+            .as_ref()
+            .and_then(|extensions| extensions.texture_transform.as_ref());
+        let place = self.placed("emissive texture", info.tex_coord, transform);
+        let others = material.coordinates();
+        let is_coloured = self.spectrum.is_none();
+        let fits =
+            is_coloured && others.is_none_or(|other| place == Some((other.uv_set, other.uv_transform)));
+        if let Some((uv_set, uv_transform)) = place.filter(|_| fits) {
+            let found = self
+                .images
+                .texture(info.index, &self.owner, self.budget, self.report)?;
+            material.emission_texture = found.map(|texture| TextureRef {
+                texture,
+                uv_set,
+                uv_transform,
+            });
+            return Ok(());
+        }
+        let linear = |[r, g, b, _]: [u8; 4]| [r, g, b].map(LinearSrgb::decode_channel).into();
+        let mean = self
+            .images
+            .mean(info.index, linear, &self.owner, self.budget, self.report)?;
+        material.emitted_radiance = material.emitted_radiance * mean.unwrap_or(LinearSrgb::WHITE);
+        self.warn(
+            "its emissive texture was read as its mean, since it has other coordinates than its others or a spectrum",
+            "give all of its textures the same set and transform",
+        );
+        Ok(())
     }
 
     /// Gives what it emits the spectrum that is stated for it, if any, in place of its colour.
@@ -297,46 +366,112 @@ impl Reading<'_, '_> {
         Ok(())
     }
 
-    /// Multiplies factors by the means of their textures.
-    fn take_means(
+    /// The image of a texture of factors.
+    fn factor_image(&mut self, what: &str, stated: Option<&Info>) -> Result<Option<FactorImage>> {
+        let Some(info) = stated else {
+            return Ok(None);
+        };
+        let found = self
+            .images
+            .pixels(info.index, &self.owner, self.budget, self.report)?;
+        let Some((pixels, wrap)) = found else {
+            return Ok(None);
+        };
+        let extensions = info.extensions.as_ref();
+        let transform = extensions.and_then(|extensions| extensions.texture_transform.as_ref());
+        Ok(Some(FactorImage {
+            pixels,
+            wrap,
+            place: self.placed(what, info.tex_coord, transform),
+        }))
+    }
+
+    /// Takes over the textures of factors: as an image where that changes what the surface does, else as their means.
+    fn vary(
         &mut self,
         material: &mut Material,
         transmission: Option<&extension::Transmission>,
     ) -> Result<()> {
-        let share = |code: u8| f64::from(code) / 255.0;
-        let channels = |[r, g, b, _]: [u8; 4]| LinearSrgb::new(share(r), share(g), share(b));
-        let pbr = &self.source.pbr_metallic_roughness;
-        if let Some(texture) = &pbr.metallic_roughness_texture {
-            let mean = self
-                .images
-                .mean(texture.index, channels, &self.owner, self.budget, self.report)?;
-            let mean = mean.unwrap_or(LinearSrgb::WHITE);
-            material.roughness *= mean.g;
-            material.metallic *= mean.b;
-            self.warn(
-                format!(
-                    "its metallic-roughness texture was read as its mean, metallic {:.2} and roughness {:.2}",
-                    material.metallic, material.roughness
-                ),
-                "split the mesh where the material changes",
-            );
+        let source = self.source;
+        let stated = source.pbr_metallic_roughness.metallic_roughness_texture.as_ref();
+        let metallic_roughness = self.factor_image("metallic-roughness texture", stated)?;
+        let stated = transmission.and_then(|transmission| transmission.transmission_texture.as_ref());
+        let stated = stated.filter(|_| material.transmission > 0.0);
+        let transmission = self.factor_image("transmission texture", stated)?;
+        let factors = Factors {
+            transmission: transmission.as_ref(),
+            metallic_roughness: metallic_roughness.as_ref(),
+        };
+        if transmission.is_none() && metallic_roughness.is_none() {
+            return Ok(());
         }
-        if let Some(texture) =
-            transmission.and_then(|transmission| transmission.transmission_texture.as_ref())
+        let mean = factors.mean();
+        let class = factors.class(material);
+        let colour = material.base_colour_texture.as_ref();
+        let place = factors.place(colour.map(|colour| (colour.uv_set, colour.uv_transform)));
+        if let (Some(surface), Some((uv_set, uv_transform))) = (class, place)
+            && surface != SurfaceKind::Diffuse
         {
-            let mean = self
-                .images
-                .mean(texture.index, channels, &self.owner, self.budget, self.report)?;
-            material.transmission *= mean.unwrap_or(LinearSrgb::WHITE).r;
+            let texture = factors.texture(format!("factors of {}", self.owner));
+            let texture = self.images.add(texture, self.budget)?;
+            let image = TextureRef {
+                texture,
+                uv_set,
+                uv_transform,
+            };
+            material.variation = Some(Variation { image, surface });
+            if surface != SurfaceKind::Varied {
+                (material.transmission, material.metallic) =
+                    (material.transmission * mean.r, material.metallic * mean.b);
+            }
+            return Ok(());
+        }
+        (material.transmission, material.roughness, material.metallic) = (
+            material.transmission * mean.r,
+            material.roughness * mean.g,
+            material.metallic * mean.b,
+        );
+        if class == Some(SurfaceKind::Diffuse) && material.classified() != SurfaceKind::Diffuse {
+            // Matte metal and matte body may have a shining mean.
+            material.roughness = 1.0;
+        } else if class.is_some_and(|class| class != SurfaceKind::Diffuse) {
             self.warn(
                 format!(
-                    "its transmission texture was read as its mean, {:.2}",
-                    material.transmission
+                    "its textures of factors follow different coordinates and were read as their means, metallic {:.2}, \
+                     roughness {:.2} and transmission {:.2}",
+                    material.metallic, material.roughness, material.transmission
                 ),
-                "split the mesh where it is clear",
+                "give all of its textures the same set and transform",
             );
         }
         Ok(())
+    }
+
+    /// Alpha that blends: what part of the surface is there.
+    fn blend(&mut self, material: &mut Material) {
+        if !matches!(self.source.alpha_mode, Checked::Valid(AlphaMode::Blend)) {
+            return;
+        }
+        let factor = self.share(self.source.pbr_metallic_roughness.base_color_factor.0[3], "alpha");
+        let image = material.base_colour_texture.as_ref();
+        let texels = image.map_or(&[][..], |image| &self.images.get(image.texture).rgba);
+        let least = texels.iter().map(|texel| texel[3]).min().unwrap_or(u8::MAX);
+        let between = texels.iter().filter(|texel| BETWEEN.contains(&texel[3])).count();
+        if factor * f64::from(least) >= f64::from(OPAQUE) {
+            return;
+        }
+        if material.transmission > 0.0 {
+            let kept = LinearSrgb::WHITE - material.base_colour;
+            material.base_colour = LinearSrgb::WHITE - kept * factor;
+            self.warn(
+                "its alpha was read as a lighter tint, since light goes through it already",
+                "leave its alpha mode OPAQUE",
+            );
+        } else if factor == 1.0 && (between as f64) < MOST_BETWEEN * texels.len() as f64 {
+            material.alpha_mask = Some(AlphaMask { cutoff: 0.5, factor });
+        } else {
+            material.coverage = Some(factor);
+        }
     }
 
     /// What it is made of: as its extras say, else by KHR_materials_dispersion.
@@ -369,21 +504,12 @@ impl Reading<'_, '_> {
     fn classify(&mut self, material: &Material) -> SurfaceKind {
         let surface = material.classified();
         let roughness = material.roughness;
-        let as_matte = "make it smoother to have it reflect or transmit light";
         let is_metal = material.metallic >= 0.5;
         match surface {
             // Metallic 1 with roughness 1 is what glTF assumes where a file says nothing.
             SurfaceKind::Diffuse if is_metal && (roughness < 1.0 || material.metal.is_some()) => self.warn(
                 format!("is a metal of roughness {roughness:.2}, treated as matte"),
-                as_matte,
-            ),
-            SurfaceKind::Diffuse if !is_metal && material.transmission >= 0.5 => self.warn(
-                format!("transmits light at a roughness of {roughness:.2}, treated as matte"),
-                as_matte,
-            ),
-            SurfaceKind::ThinWall => self.warn(
-                "transmits light but has no thickness, so that it is a thin pane that does not refract",
-                "give it a volume, or read closed meshes as solid with --solid-glass",
+                "make it smoother to have it reflect light",
             ),
             SurfaceKind::Mirror | SurfaceKind::Diffuse | SurfaceKind::Mixed if material.glass.is_some() => {
                 self.warn(
@@ -391,6 +517,10 @@ impl Reading<'_, '_> {
                     "give it transmission and a volume",
                 )
             }
+            SurfaceKind::Varied if material.glass.is_some() => self.warn(
+                "changes from place to place, so that its glass disperses nothing",
+                "split the mesh where the material changes",
+            ),
             _ => {}
         }
         surface
@@ -468,7 +598,7 @@ impl Reading<'_, '_> {
             return Ok(None);
         };
         let scale = widen(stated.scale);
-        let colour = material.base_colour_texture.as_ref();
+        let colour = material.coordinates();
         // The graphics card has one set of coordinates for each surface.
         if colour.is_some_and(|colour| (colour.uv_set, colour.uv_transform) != (uv_set, uv_transform)) {
             self.warn(
@@ -549,13 +679,7 @@ impl Reading<'_, '_> {
     ) {
         let is_matte = !material.surface.is_specular();
         match self.source.alpha_mode {
-            Checked::Valid(AlphaMode::Opaque | AlphaMode::Mask) => {}
-            Checked::Valid(AlphaMode::Blend) => {
-                self.warn(
-                    "its alpha mode BLEND was read as opaque",
-                    "use transmission for glass, or MASK to cut it out",
-                );
-            }
+            Checked::Valid(_) => {}
             Checked::Invalid => self.warn(
                 "its alpha mode is unknown and was read as opaque",
                 "export the file again",
@@ -668,5 +792,6 @@ pub fn put_on(material: &mut Material, factor: f64, roughness: f64) -> std::resu
         SurfaceKind::Dielectric | SurfaceKind::ThinWall => {
             Err("its clearcoat was left out, as light goes through it".into())
         }
+        SurfaceKind::Varied => Err("its clearcoat was left out, as what it covers varies".into()),
     }
 }

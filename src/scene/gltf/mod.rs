@@ -14,7 +14,7 @@ use report::{Budget, Report};
 use super::{LoadOptions, Scene};
 use crate::error::{Error, Result, Warning};
 use crate::files;
-use crate::scene::{Light, LightKind, LightSize};
+use crate::scene::{Glow, Light, LightKind, LightSize};
 use crate::units::Radiance;
 
 mod accessor;
@@ -25,6 +25,7 @@ mod document;
 mod draco;
 mod extensions;
 mod extras;
+mod factors;
 mod faults;
 mod glb;
 mod glossiness;
@@ -155,6 +156,7 @@ fn read_scene(bytes: &[u8], path: &Path, options: &LoadOptions) -> Result<Scene>
         &mut budget,
         &mut report,
     )?;
+    materials.warn_of_thin_walls(options.solid_glass, &mut report);
     scene.materials = materials.into_all();
     scene.textures = images.into_textures().into_iter().map(Arc::new).collect();
     let lights = light::all(&document, &placed, folder, &mut report)?;
@@ -198,16 +200,19 @@ pub fn rebase(scene: &mut Scene) {
 /// emitted, its colour has a luminance of 1, and its
 /// spectrum is the material's.
 pub fn add_lights(scene: &mut Scene) {
-    for (object, part) in scene.objects.iter().enumerate() {
-        let material = scene.material_of(object);
-        let emitted = material.emitted_radiance;
-        let spectrum = material.emission_spectrum.clone();
+    for object in 0..scene.objects.len() {
+        let mesh = scene.objects[object].mesh_in_scene();
+        let image = scene.material_of(object).emission_texture.as_ref();
+        let glow = image.and_then(|image| Glow::new(mesh, image, &scene.textures[image.texture]));
+        scene.glows.extend(glow.map(|glow| (object, Arc::new(glow))));
+        let emitted = scene.emitted_radiance(object);
         let luminance = emitted.luminance();
+        let part = &scene.objects[object];
         if luminance > 0.0 && part.mesh_in_scene().area_m2() > 0.0 {
             scene.lights.push(Light {
                 name: part.name.clone(),
                 colour: emitted / luminance,
-                spectrum,
+                spectrum: scene.material_of(object).emission_spectrum.clone(),
                 kind: LightKind::Surface {
                     object,
                     radiance: Radiance(luminance),

@@ -1,5 +1,7 @@
 //! The objects of a scene: every primitive of every placed node.
 
+use std::collections::HashMap;
+
 use glam::DAffine3;
 use gltf::json::mesh;
 
@@ -10,11 +12,11 @@ use super::report::{Budget, Report};
 use super::{material, names};
 use crate::error::{Error, Result};
 use crate::optics::LinearSrgb;
-use crate::scene::closed::is_closed;
-use crate::scene::{Material, Mesh, Object, Scene, SurfaceKind};
+use crate::scene::closed::is_solid;
+use crate::scene::{Material, Mesh, Object, Scene};
 
 /// Adds all objects, and to `materials` (in file order so far) those that the file only implies. `solid_glass` reads thin
-/// walls as solid glass where their mesh is closed.
+/// walls as solid glass where their mesh encloses space.
 ///
 /// # Errors
 /// A mesh that does not exist, or as [`Primitives::read`].
@@ -66,11 +68,9 @@ pub fn add_objects(
             let mut object = Object::new(placed.name.as_str(), (placed.node, index), 0, mesh);
             object.place(world_from_node);
             let mesh = object.mesh_in_scene();
-            let mut material = materials.of_primitive(part, &owner, report);
-            if solid_glass {
-                material = materials.as_solid(material, mesh, &placed.name, report);
-            }
-            material = materials.tinted(material, colour);
+            let material = materials.of_primitive(part, &owner, report);
+            let material = materials.thin_or_solid(material, || solid_glass && is_solid(mesh));
+            let material = materials.tinted(material, colour);
             materials.check_coordinates(material, mesh, &placed.name, report);
             object.material = material;
             scene.objects.push(object);
@@ -104,8 +104,8 @@ pub struct Materials {
     all: Vec<Material>,
     in_file: usize,
     default: Option<usize>,
-    /// The solid twin of each of the file's materials.
-    solid: Vec<Option<usize>>,
+    /// What became of each thin wall among the file's materials: as which it is used, and its twin of the other kind.
+    thin: HashMap<usize, (bool, Option<usize>)>,
     /// The twins in other colours: of which material, by what it is multiplied, and which it is.
     tinted: Vec<(usize, LinearSrgb, usize)>,
 }
@@ -116,7 +116,7 @@ impl Materials {
         Self {
             in_file: in_file.len(),
             default: None,
-            solid: vec![None; in_file.len()],
+            thin: HashMap::new(),
             tinted: Vec::new(),
             all: in_file,
         }
@@ -145,26 +145,46 @@ impl Materials {
         })
     }
 
-    /// The material that a thin wall has as a solid, where its mesh is closed; any other stays.
-    fn as_solid(&mut self, material: usize, mesh: &Mesh, name: &str, report: &mut Report) -> usize {
-        if self.all[material].surface != SurfaceKind::ThinWall {
+    /// The material of a thin wall for a mesh that is solid or not; any other stays. The first mesh decides what the
+    /// material itself becomes, and meshes of the other kind have a twin of it.
+    fn thin_or_solid(&mut self, material: usize, is_solid: impl FnOnce() -> bool) -> usize {
+        let is_known = self.thin.contains_key(&material);
+        if !is_known && !material::is_thin(&self.all[material]) {
             return material;
         }
-        if !is_closed(mesh) {
+        let is_solid = is_solid();
+        let (own, twin) = self.thin.entry(material).or_insert((is_solid, None));
+        if *own == is_solid {
+            if !is_known && is_solid {
+                material::make_solid(&mut self.all[material]);
+            }
+            return material;
+        }
+        *twin.get_or_insert_with(|| {
+            let own = &self.all[material];
+            let made = if is_solid {
+                material::solid_twin(own)
+            } else {
+                material::thin_twin(own)
+            };
+            self.all.push(made);
+            self.all.len() - 1
+        })
+    }
+
+    /// Warns of the thin walls that are left.
+    pub fn warn_of_thin_walls(&self, solid_glass: bool, report: &mut Report) {
+        for material in self.all.iter().filter(|material| material::is_thin(material)) {
             report.warn(
-                format!("node `{name}`"),
-                "is not closed, so that it stays a pane without thickness",
-                "close its mesh to make it solid glass",
+                format!("material `{}`", material.name),
+                "transmits light but has no thickness, so that it is a thin pane that does not refract",
+                if solid_glass {
+                    "give it a volume, or close its mesh, to make it solid glass"
+                } else {
+                    "give it a volume, or leave --solid-glass on"
+                },
             );
-            return material;
         }
-        if let Some(solid) = self.solid[material] {
-            return solid;
-        }
-        self.all.push(material::solid_twin(&self.all[material]));
-        let solid = self.all.len() - 1;
-        self.solid[material] = Some(solid);
-        solid
     }
 
     /// The material with its base colour multiplied, where that changes it.
@@ -188,7 +208,7 @@ impl Materials {
     }
 
     fn check_coordinates(&self, material: usize, mesh: &Mesh, name: &str, report: &mut Report) {
-        let Some(texture) = &self.all[material].base_colour_texture else {
+        let Some(texture) = self.all[material].coordinates() else {
             return;
         };
         let uvs = if texture.uv_set == 0 { &mesh.uv0 } else { &mesh.uv1 };

@@ -66,6 +66,7 @@ fn photons_are_unbiased() {
         ("square lamp", under_square_lamp("ring", 0.3), 1e5),
         ("disc of the sun", under_the_suns_disc(), 2e6),
         ("frosted ball", roughened("ball", 0.3), 1e6),
+        ("ball as rough as can be", roughened("ball", 1.0), 1e6),
         ("lamp in green glass", lamp_in_green_glass(), 3e4),
     ] {
         let result = bake(scene.clone(), &photons(density_per_sr, SIDE));

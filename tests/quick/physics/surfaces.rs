@@ -82,6 +82,59 @@ fn polish_reflects_where_it_covers() {
     }
 }
 
+/// A mixture shares light out as its classes do, by their shares of the surface.
+#[test]
+fn mixtures_are_the_sum_of_their_classes() {
+    let direction = dvec3(0.7, -1.0, 0.2).normalize();
+    let of = |surface: SurfaceKind, metallic: f64, transmission: f64, coverage: Option<f64>| {
+        let material = Material {
+            metallic,
+            transmission,
+            coverage,
+            ..smooth(surface, 1.0)
+        };
+        let met = met(material, direction, &MediumStack::default());
+        let share = |branch: Option<nephroid::transport::Branch>| {
+            branch.map_or(LinearSrgb::BLACK, |branch| branch.share)
+        };
+        [
+            share(met.reflection),
+            share(met.transmission),
+            met.deposit,
+            met.absorbed,
+        ]
+    };
+    let alone = |surface| of(surface, 0.0, 0.0, None);
+    let [metal, clear, body] = [SurfaceKind::Mirror, SurfaceKind::ThinWall, SurfaceKind::Mixed].map(alone);
+    let passed = [
+        LinearSrgb::BLACK,
+        LinearSrgb::WHITE,
+        LinearSrgb::BLACK,
+        LinearSrgb::BLACK,
+    ];
+    for (metallic, transmission, coverage) in [
+        (0.25, 0.5, None),
+        (1.0, 0.5, None),
+        (0.0, 0.0, Some(0.3)),
+        (0.5, 0.0, Some(0.8)),
+    ] {
+        let mixed = of(SurfaceKind::Varied, metallic, transmission, coverage);
+        let there = coverage.unwrap_or(1.0);
+        let through = there * (1.0 - metallic) * transmission;
+        let rest = there * (1.0 - metallic) * (1.0 - transmission);
+        let mut sum = LinearSrgb::BLACK;
+        for part in 0..4 {
+            let expected = metal[part] * (there * metallic)
+                + clear[part] * through
+                + body[part] * rest
+                + passed[part] * (1.0 - there);
+            near(mixed[part], expected, 1e-12, (metallic, transmission, part));
+            sum += mixed[part];
+        }
+        near(sum, LinearSrgb::WHITE, 1e-12, "all of the light");
+    }
+}
+
 /// An open sheet met from behind: light leaves it as it leaves glass, though it never entered any.
 #[test]
 fn a_body_never_entered_is_left() {
