@@ -6,7 +6,7 @@ use crate::settings::{BakeSettings, LayerKind};
 
 /// What a light sees of the specular objects in the scene.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Sight {
+pub struct LightReach {
     /// Specular objects that nothing opaque and closed seals from the light.
     pub unsealed: usize,
     /// Those whose light may go on to a diffuse surface.
@@ -21,7 +21,7 @@ pub struct Sight {
 }
 
 /// Decides every effect. `sights` in the order of `Scene::lights`.
-pub fn decide(scene: &Scene, settings: &BakeSettings, sights: &[Sight]) -> EffectPlan {
+pub fn decide(scene: &Scene, settings: &BakeSettings, sights: &[LightReach]) -> EffectPlan {
     let decision = Decision {
         scene,
         settings,
@@ -121,7 +121,7 @@ const FORCED_ON: &str = "switched on by the user, though nothing calls for it";
 struct Decision<'a> {
     scene: &'a Scene,
     settings: &'a BakeSettings,
-    sights: &'a [Sight],
+    sights: &'a [LightReach],
     /// Whether the caustic layer is wanted.
     caustic: bool,
 }
@@ -312,7 +312,7 @@ impl Decision<'_> {
             .collect()
     }
 
-    fn light_reason(&self, shines: bool, sight: Option<&Sight>) -> String {
+    fn light_reason(&self, shines: bool, sight: Option<&LightReach>) -> String {
         let Some(sight) = sight.filter(|_| self.caustic) else {
             return "the caustic layer is not asked for".into();
         };

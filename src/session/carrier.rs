@@ -4,12 +4,12 @@
 //! tell what the target would cost by photons, and patches go on while they cost less than that. Costs are counted
 //! operations, so that the choice does not depend on the machine.
 
-use super::caustic::{CausticLayer, Climb, Course};
+use super::caustic::{CausticLayer, Course, LightProgress};
 use super::light_level::{LightLevel, LightState};
 use super::map_size::Sizes;
 use super::photon_level::GROWTH;
 use crate::error::{Error, Result};
-use crate::light_pass::caustic::setup::AimedLight;
+use crate::light_pass::caustic::setup::VisibleLight;
 use crate::light_pass::photon::pass::HALVES;
 use crate::plan::Effect;
 use crate::settings::Estimator;
@@ -52,7 +52,7 @@ pub(super) enum Carrier {
     Splats,
 }
 
-impl Climb {
+impl LightProgress {
     /// Goes on from the first photons.
     pub(super) fn turn_to_photons(&mut self) {
         self.carrier = Carrier::Photons;
@@ -65,12 +65,12 @@ impl Climb {
 
 impl CausticLayer<'_> {
     /// Whether its light comes from many places.
-    pub(super) fn has_places(&self, light: &AimedLight) -> bool {
+    pub(super) fn has_places(&self, light: &VisibleLight) -> bool {
         self.plan.is_on(Effect::AreaLights) && self.tracer.scene().lights[light.light].has_extent()
     }
 
     /// A rough surface that light meets, or one that changes from place to place.
-    pub(super) fn rough_object(&self, light: &AimedLight) -> Option<usize> {
+    pub(super) fn rough_object(&self, light: &VisibleLight) -> Option<usize> {
         let scene = self.tracer.scene();
         let reached = self.aim.sights[light.light].reached.iter();
         let mut objects = reached.map(|&(object, _)| object);
@@ -79,13 +79,13 @@ impl CausticLayer<'_> {
     }
 
     /// Whether only photons can carry a light.
-    pub(super) fn is_soft(&self, light: &AimedLight) -> bool {
+    pub(super) fn is_soft(&self, light: &VisibleLight) -> bool {
         self.has_places(light) || self.rough_object(light).is_some()
     }
 
     /// # Errors
     /// A light of many places or on rough surfaces, for an estimator that has neither.
-    pub(super) fn refuse_soft_light(&self, lights: &[&AimedLight]) -> Result<()> {
+    pub(super) fn refuse_soft_light(&self, lights: &[&VisibleLight]) -> Result<()> {
         let estimator = self.settings.estimator;
         if matches!(estimator, Estimator::Auto | Estimator::Photon) {
             return Ok(());
@@ -121,7 +121,7 @@ impl CausticLayer<'_> {
     }
 
     /// What carries a light to begin with.
-    pub(super) fn carrier(&self, light: &AimedLight) -> Carrier {
+    pub(super) fn carrier(&self, light: &VisibleLight) -> Carrier {
         match self.settings.estimator {
             Estimator::Photon => Carrier::Photons,
             Estimator::Auto if self.settings.max_error.is_none() || self.is_soft(light) => Carrier::Photons,
@@ -135,10 +135,10 @@ impl CausticLayer<'_> {
     /// the first patches would; then decides whether another level of patches is worth it. True where it made photons.
     pub(super) fn decide_carrier(
         &self,
-        light: &AimedLight,
+        light: &VisibleLight,
         sizes: &Sizes,
         state: &mut LightState,
-        climb: &mut Climb,
+        climb: &mut LightProgress,
         course: &mut Course,
     ) -> Result<bool> {
         let Some(target) = self.settings.max_error else {
@@ -186,7 +186,7 @@ impl CausticLayer<'_> {
 
     /// Whether patches may have a bias that the first photons are too few to see, and more of them take less than the
     /// patches did.
-    fn lacks_auditors(&self, light: &AimedLight, climb: &Climb) -> bool {
+    fn lacks_auditors(&self, light: &VisibleLight, climb: &LightProgress) -> bool {
         let Some(rival) = climb
             .rival
             .as_ref()
@@ -206,7 +206,7 @@ impl CausticLayer<'_> {
     }
 
     /// Whether another level of photons takes less than the first one of patches.
-    fn are_photons_sooner(&self, light: &AimedLight, climb: &Climb) -> bool {
+    fn are_photons_sooner(&self, light: &VisibleLight, climb: &LightProgress) -> bool {
         let known = climb.rival.as_ref().and_then(photon_segments);
         let (Some((segments, per_photon)), true) = (known, climb.levels.is_empty()) else {
             return false;
@@ -232,14 +232,14 @@ fn cost(level: &LightLevel, per_photon: f64) -> f64 {
 }
 
 /// Whether audits found more than the last two levels of patches show of themselves: finer ones will not mend that.
-fn is_biased(climb: &Climb) -> bool {
+fn is_biased(climb: &LightProgress) -> bool {
     let mut last = climb.levels.iter().rev().take(2);
     climb.levels.len() > 1
         && last.all(|level| level.error.as_ref().is_some_and(|error| error.estimate.is_raised))
 }
 
 /// Whether there is no time left for another level of patches, but for photons that are better than the last one.
-fn are_photons_in_time(climb: &Climb, state: &LightState, course: &Course) -> bool {
+fn are_photons_in_time(climb: &LightProgress, state: &LightState, course: &Course) -> bool {
     let (Some(left_s), Some(photon_s)) = (course.limited.time_left_s(), state.photon_s) else {
         return false;
     };
@@ -257,7 +257,7 @@ fn are_photons_in_time(climb: &Climb, state: &LightState, course: &Course) -> bo
 }
 
 /// What patches are expected to take for a share of the whole error, by their last two levels whose own share is known.
-fn promised(climb: &Climb, cost: impl Fn(&LightLevel) -> f64, most_share: f64) -> Option<f64> {
+fn promised(climb: &LightProgress, cost: impl Fn(&LightLevel) -> f64, most_share: f64) -> Option<f64> {
     let cost_of = |levels: usize| -> f64 { climb.levels.iter().take(levels).map(&cost).sum() };
     let has_error = |levels: usize| {
         let last = levels.checked_sub(1).and_then(|last| climb.levels.get(last));

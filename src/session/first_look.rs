@@ -5,7 +5,7 @@
 
 use super::direct_cache::DirectCache;
 use super::direct_work::DirectWork;
-use super::finish::{Finish, Levels};
+use super::finish::{Levels, MapAssembler};
 use super::indirect_cache::IndirectCache;
 use super::indirect_work::IndirectWork;
 use super::result::LightLayer;
@@ -31,12 +31,12 @@ impl FirstLook {
     /// All maps: caustics of the levels, with both layers where they are asked for.
     pub(super) fn maps(
         &mut self,
-        finish: &Finish,
+        finish: &MapAssembler,
         tracer: &Tracer,
         levels: &Levels,
         on_whom: (&dyn Progress, &Control),
     ) -> (Vec<IlluminationMap>, Vec<LightLayer>) {
-        let finish = &Finish {
+        let finish = &MapAssembler {
             coarsening: HALVINGS,
             ..*finish
         };
@@ -60,7 +60,7 @@ impl FirstLook {
     /// What surfaces send each other, traced where it was not yet.
     pub(super) fn traced(
         &mut self,
-        finish: &Finish,
+        finish: &MapAssembler,
         tracer: &Tracer,
         on_whom: (&dyn Progress, &Control),
     ) -> &IndirectCache {

@@ -4,7 +4,7 @@ use super::caustic::CausticOutcome;
 use super::clock::Clock;
 use super::indirect_cache::{IndirectCache, link_bytes, most_texels};
 use super::result::LightLayer;
-use super::sizes::MapSizes;
+use super::sizes::ChartCache;
 use crate::error::Warning;
 use crate::illumination::{IlluminationMap, Layer, Receiver};
 use crate::light_pass::caustic::pass::{Seconds, Stopwatch};
@@ -45,7 +45,7 @@ pub(super) struct IndirectWork {
 /// What the gathering needs of a bake.
 pub(super) struct Gathering<'a> {
     pub(super) tracer: &'a Tracer,
-    pub(super) sizes: &'a MapSizes,
+    pub(super) sizes: &'a ChartCache,
     pub(super) settings: &'a BakeSettings,
     pub(super) progress: &'a dyn Progress,
     /// What the user asks.

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use glam::DVec2;
 
-use super::caustic::{CausticLayer, Climb, Course, ESTIMATED_LEVELS};
+use super::caustic::{CausticLayer, Course, ESTIMATED_LEVELS, LightProgress};
 use super::light_level::{LevelKey, LightStates, TraceKey};
 use super::map_size::Sizes;
 use super::splat_level::LEVEL_STRIDES;
@@ -12,7 +12,7 @@ use crate::error::{Error, Result};
 use crate::illumination::accumulator::FluxUnit;
 use crate::light_pass::caustic::lattice::Lattice;
 use crate::light_pass::caustic::path::PathLimits;
-use crate::light_pass::caustic::setup::AimedLight;
+use crate::light_pass::caustic::setup::VisibleLight;
 use crate::light_pass::caustic::statistics::FootprintStatistics;
 use crate::light_pass::wavefront::refine::Round;
 use crate::settings::{BakeSettings, Estimator, Footprint, Kernel, MapResolution, Sigma};
@@ -47,7 +47,7 @@ const USUAL_ERROR: f64 = 0.012;
 
 impl CausticLayer<'_> {
     /// Cells across and down each face, from the coarsest lattice to that of the settings. Splats have strides instead.
-    pub(super) fn lattices(&self, light: &AimedLight) -> Vec<(usize, usize)> {
+    pub(super) fn lattices(&self, light: &VisibleLight) -> Vec<(usize, usize)> {
         let finest = self.lattice_size(light);
         if self.settings.estimator == Estimator::Splat {
             return vec![finest; LEVEL_STRIDES.len()];
@@ -63,7 +63,7 @@ impl CausticLayer<'_> {
         lattices
     }
 
-    fn lattice_size(&self, light: &AimedLight) -> (usize, usize) {
+    fn lattice_size(&self, light: &VisibleLight) -> (usize, usize) {
         light
             .launch
             .lattice_size(self.density_per_sr(light), light.reach_m)
@@ -71,7 +71,7 @@ impl CausticLayer<'_> {
 
     /// Density of a light's lattice [rays/sr]: as it is set or, with a target, so much that a small caster has its share
     /// of cells.
-    fn density_per_sr(&self, light: &AimedLight) -> f64 {
+    fn density_per_sr(&self, light: &VisibleLight) -> f64 {
         let set = self.settings.density_per_sr;
         let Some(target) = self.settings.max_error else {
             return set;
@@ -86,7 +86,13 @@ impl CausticLayer<'_> {
     }
 
     /// All that a level depends on.
-    pub(super) fn key(&self, light: &AimedLight, step: usize, climb: &Climb, sizes: &Sizes) -> LevelKey {
+    pub(super) fn key(
+        &self,
+        light: &VisibleLight,
+        step: usize,
+        climb: &LightProgress,
+        sizes: &Sizes,
+    ) -> LevelKey {
         let lattices = self.lattices(light);
         let size = lattices[step.min(lattices.len() - 1)];
         // Coarse lattices are deposited as coarsely, so that their difference shows both kinds of error.
@@ -111,7 +117,7 @@ impl CausticLayer<'_> {
     /// For a lattice of a size, so many lattices before the usual finest.
     pub(super) fn trace_key(
         &self,
-        light: &AimedLight,
+        light: &VisibleLight,
         size: (usize, usize),
         coarser: i32,
         rounds: &[Round],
@@ -164,7 +170,7 @@ impl CausticLayer<'_> {
     }
 
     /// The unit of a light's sums: by its own launch, so that other lights do not change a bit.
-    pub(super) fn unit(&self, light: &AimedLight) -> Result<FluxUnit> {
+    pub(super) fn unit(&self, light: &VisibleLight) -> Result<FluxUnit> {
         self.unit_for(light, light.launch.power_bound_w(), 1.0)
     }
 
@@ -172,7 +178,7 @@ impl CausticLayer<'_> {
     ///
     /// # Errors
     /// A power that is no number, or none at all.
-    pub(super) fn unit_for(&self, light: &AimedLight, power_w: f64, sums: f64) -> Result<FluxUnit> {
+    pub(super) fn unit_for(&self, light: &VisibleLight, power_w: f64, sums: f64) -> Result<FluxUnit> {
         let source = &self.tracer.scene().lights[light.light];
         let real_w = power_w * source.strength().max_channel();
         if power_w.is_finite() && power_w > 0.0 && real_w.is_finite() {
@@ -187,7 +193,7 @@ impl CausticLayer<'_> {
     }
 
     /// The lattice of rays, as splats have it.
-    pub(super) fn lattice<'a>(&'a self, light: &'a AimedLight, unit: FluxUnit) -> Lattice<'a> {
+    pub(super) fn lattice<'a>(&'a self, light: &'a VisibleLight, unit: FluxUnit) -> Lattice<'a> {
         Lattice {
             tracer: self.tracer,
             band: None,
@@ -228,7 +234,7 @@ impl CausticLayer<'_> {
     pub(super) fn sizes_of_maps(
         &self,
         states: &mut LightStates,
-        lights: &[&AimedLight],
+        lights: &[&VisibleLight],
         course: &mut Course,
     ) -> Result<Sizes> {
         if self.wants_statistics() {
@@ -266,7 +272,7 @@ impl CausticLayer<'_> {
     }
 
     /// The lattice that mean footprints are taken from: one of the light's lattices.
-    pub(super) fn statistics_size(&self, light: &AimedLight) -> (usize, usize) {
+    pub(super) fn statistics_size(&self, light: &VisibleLight) -> (usize, usize) {
         let lattices = self.lattices(light);
         let coarse = lattices.len().saturating_sub(ESTIMATED_LEVELS);
         let fine_enough = |size: &&(usize, usize)| size.0.max(size.1) >= LEAST_STATISTICS_SIDE;

@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use glam::DVec3;
 
-use super::map_size::{self, Borders, MapSize, TileNeed, Wish};
+use super::map_size::{self, Borders, MapSize, SizeRequest, TileDemand};
 use crate::illumination::parametrisation::{DEFAULT_NOMINAL_SIDE, Parametrisation, parametrise};
 use crate::illumination::tiles::tile_counts;
 use crate::illumination::{Chart, Receiver, Side, UvSet};
@@ -76,7 +76,7 @@ impl MapMemory {
 
 /// Parametrisations of a scene's surfaces, made on first use.
 #[derive(Debug)]
-pub struct MapSizes {
+pub struct ChartCache {
     scene: Arc<Scene>,
     parametrisations: Vec<OnceLock<Option<Arc<Parametrisation>>>>,
     /// Generated ones for maps of other sides than usual, by object and side.
@@ -108,7 +108,7 @@ const LEAST_CHARTS: usize = 256;
 /// Charts in tiles that are kept.
 const MOST_TILED_CHARTS: usize = 64;
 
-impl MapSizes {
+impl ChartCache {
     /// Nothing made yet.
     pub fn new(scene: Arc<Scene>) -> Self {
         let parametrisations = scene.objects.iter().map(|_| OnceLock::new()).collect();
@@ -318,21 +318,21 @@ impl MapSizes {
 
     /// A map of direct and indirect light only: texels of a 400th of the scene's diagonal, or what is asked; in tiles where
     /// light ends within little.
-    pub fn direct_wish(&self, receiver: Receiver, settings: &BakeSettings) -> Option<Wish> {
+    pub fn direct_wish(&self, receiver: Receiver, settings: &BakeSettings) -> Option<SizeRequest> {
         let size = self.direct_size(receiver.object(), settings)?;
         let doublings = self.border_doublings(receiver, settings);
         let Some(borders) = self.borders(receiver).filter(|_| doublings > 0) else {
-            return Some(Wish::dense(size));
+            return Some(SizeRequest::dense(size));
         };
         let finest = (size.0 << doublings, size.1 << doublings);
         let (columns, rows) = tile_counts(finest.0, finest.1);
-        let mut tiles = vec![TileNeed::NOTHING; columns * rows];
+        let mut tiles = vec![TileDemand::NOTHING; columns * rows];
         borders.refine(finest, 0, &mut tiles);
-        Some(Wish {
+        Some(SizeRequest {
             is_even: false,
             tiles: Some(tiles),
             coarsest: doublings as u8,
-            ..Wish::dense(finest)
+            ..SizeRequest::dense(finest)
         })
     }
 

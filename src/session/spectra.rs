@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::band_layers::LevelBand;
 use crate::error::Result;
-use crate::light_pass::caustic::setup::{Aim, AimedLight};
+use crate::light_pass::caustic::setup::{Aim, VisibleLight};
 use crate::light_pass::ledger_sum::LedgerSum;
 use crate::light_pass::photon::spectrum::PhotonSpectrum;
 use crate::light_pass::receiver_maps::ReceiverMaps;
@@ -252,7 +252,7 @@ impl Spectra {
     }
 
     /// Whether a light's rays are not those of its lattice as it is.
-    pub(super) fn has_bands(&self, light: &AimedLight) -> bool {
+    pub(super) fn has_bands(&self, light: &VisibleLight) -> bool {
         let light = self.of_lights.get(&light.light);
         light.is_some_and(|light| matches!(light.traced, Traced::Bands(_)))
     }

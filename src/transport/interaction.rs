@@ -48,12 +48,12 @@ pub struct Branch {
     /// Unit normal of the surface on the side of the incoming ray that gave the direction.
     pub normal: DVec3,
     /// How it did.
-    pub by: TurnedBy,
+    pub by: NormalSource,
 }
 
 /// What light turns about.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum TurnedBy {
+pub enum NormalSource {
     /// The triangle's normal, where the shading normal would send light through the facet.
     Geometric,
     /// The shading normal.
@@ -101,7 +101,7 @@ pub struct Interaction {
 }
 
 /// Orientation of a hit: normals on the side of the incoming ray.
-struct Facing {
+struct HitFrame {
     /// Whether the outside was met.
     front: bool,
     geometric: DVec3,
@@ -117,10 +117,10 @@ struct Facing {
 struct Turned {
     direction: DVec3,
     normal: DVec3,
-    by: TurnedBy,
+    by: NormalSource,
 }
 
-impl Facing {
+impl HitFrame {
     fn new(hit: &SurfaceHit, incident: DVec3, micro: Option<Facet>) -> Self {
         let front = incident.dot(hit.geometric_normal) < 0.0;
         let side = if front { 1.0 } else { -1.0 };
@@ -156,7 +156,7 @@ impl Facing {
         Some(Turned {
             direction: microfacets::out_of(direction, self.geometric, side),
             normal: self.shading,
-            by: TurnedBy::Micro(facet),
+            by: NormalSource::Micro(facet),
         })
     }
 
@@ -175,7 +175,7 @@ impl Facing {
             Turned {
                 direction: refraction::reflect(incident, self.geometric),
                 normal: self.geometric,
-                by: TurnedBy::Geometric,
+                by: NormalSource::Geometric,
             }
         }
     }
@@ -192,7 +192,7 @@ impl Facing {
             Some(Turned {
                 direction: refraction::refract(incident, self.geometric, eta)?,
                 normal: self.geometric,
-                by: TurnedBy::Geometric,
+                by: NormalSource::Geometric,
             })
         }
     }
@@ -211,9 +211,9 @@ impl Facing {
             direction,
             normal: self.shading,
             by: if self.is_smooth {
-                TurnedBy::Shading
+                NormalSource::Shading
             } else {
-                TurnedBy::Geometric
+                NormalSource::Geometric
             },
         }
     }
@@ -224,7 +224,7 @@ pub struct Meeting<'a> {
     hit: &'a SurfaceHit,
     incident: DVec3,
     media: &'a MediumStack,
-    facing: Facing,
+    facing: HitFrame,
     /// Goes back, where something does.
     pub reflected: Option<LinearSrgb>,
     /// Goes through, where something does.
@@ -395,7 +395,7 @@ impl Tracer {
             hit,
             incident,
             media,
-            facing: Facing::new(hit, incident, micro),
+            facing: HitFrame::new(hit, incident, micro),
             reflected: None,
             transmitted: None,
             deposit: LinearSrgb::BLACK,

@@ -15,8 +15,8 @@ pub mod tracer;
 
 pub use differential::{RayDerivative, RayDifferential, SurfaceDetail, SurfaceScale};
 pub use effects::EffectSet;
-pub use interaction::{Branch, Event, Interaction, Meeting, Taking, TurnedBy};
+pub use interaction::{Branch, Event, Interaction, Meeting, NormalSource, Taking};
 pub use medium::MediumStack;
 pub use microfacets::Microfacets;
 pub use surroundings::media_at;
-pub use tracer::{HitPlace, SurfaceHit, Tracer};
+pub use tracer::{RayHit, SurfaceHit, Tracer};

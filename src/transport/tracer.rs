@@ -77,7 +77,7 @@ impl Hierarchy {
 
 /// The place where a ray met a surface, and nothing that follows from it: what is worth keeping of a hit.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct HitPlace {
+pub struct RayHit {
     /// Index into `Scene::objects`.
     pub object: u32,
     /// Index into the object's triangles.
@@ -304,7 +304,7 @@ impl Tracer {
     }
 
     /// Where the nearest surface in front of the ray's origin is met.
-    pub fn closest_place(&self, ray: &Ray) -> Option<HitPlace> {
+    pub fn closest_place(&self, ray: &Ray) -> Option<RayHit> {
         Some(self.place_of(&self.closest_triangle(ray)?))
     }
 
@@ -317,9 +317,9 @@ impl Tracer {
         }
     }
 
-    fn place_of(&self, hit: &TriangleHit) -> HitPlace {
+    fn place_of(&self, hit: &TriangleHit) -> RayHit {
         let (object, triangle) = self.hierarchy.triangles[hit.triangle as usize];
-        HitPlace {
+        RayHit {
             object,
             triangle,
             barycentric: hit.barycentric,
@@ -328,12 +328,12 @@ impl Tracer {
     }
 
     /// The surface at a place that a ray met.
-    pub fn surface_at(&self, hit: &HitPlace) -> SurfaceHit {
+    pub fn surface_at(&self, hit: &RayHit) -> SurfaceHit {
         let mesh = self.scene.objects[hit.object as usize].mesh_in_scene();
         self.surface_with(hit, &mesh.corners(hit.triangle as usize))
     }
 
-    fn surface_with(&self, hit: &HitPlace, corners: &[DVec3; 3]) -> SurfaceHit {
+    fn surface_with(&self, hit: &RayHit, corners: &[DVec3; 3]) -> SurfaceHit {
         let (object, triangle) = (hit.object as usize, hit.triangle as usize);
         let mesh = self.scene.objects[object].mesh_in_scene();
         let (point, point_error) = ray::point_with_error(corners, hit.barycentric);

@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 
 use super::background::{Background, Task, Wake};
 use super::flat_map::layers_at;
-use super::lens::Lens;
+use super::lens::Viewport;
 use crate::geometry::Ray;
 use crate::illumination::{IlluminationMap, Side};
 use crate::light_pass::explain::{Explanation, LightPath, Limits, Target, explain};
@@ -285,7 +285,7 @@ const DIRECT: Color32 = Color32::from_rgb(120, 190, 255);
 const POINT: Color32 = Color32::from_rgb(255, 80, 80);
 
 /// Draws the paths over a picture as the camera sees them: the wider, the larger their share.
-pub fn draw(painter: &Painter, lens: &Lens<'_>, probed: &Probed) {
+pub fn draw(painter: &Painter, lens: &Viewport<'_>, probed: &Probed) {
     let painter = painter.with_clip_rect(lens.picture);
     let paths = probed.explanation.iter().flat_map(|told| &told.paths);
     for path in paths.take(MOST_PATHS) {

@@ -2,7 +2,7 @@
 
 use super::MapStyle;
 use super::objects::{Look, Objects};
-use super::pipelines::{DrawnHow, Faces, PipelineKey, Writes};
+use super::pipelines::{Faces, PipelineFlags, PipelineKey, Writes};
 use crate::eye_pass::View;
 
 /// An object drawn once.
@@ -72,7 +72,7 @@ impl Manner {
         } else {
             Faces::Front
         };
-        let how = DrawnHow {
+        let how = PipelineFlags {
             has_texture: match writes {
                 Writes::Traced => self.has_tinted_glass,
                 _ => look.has_texture(),

@@ -1,7 +1,7 @@
 //! The eye pass's shader modules and what they share with Rust.
 
 use super::geometry::{CORNER_LAYOUT, MAP_UV_LAYOUT};
-use super::pipelines::{DrawnHow, Faces, PipelineKey, Writes};
+use super::pipelines::{Faces, PipelineFlags, PipelineKey, Writes};
 use super::tone_mapping;
 use super::uniforms::{
     Accumulation, ChainStart, DisplayWhite, Frame, LightRecord, Node, ObjectRecord, ProbeHit, ProbeRay,
@@ -166,7 +166,7 @@ pub fn specialisations() -> Vec<Specialisation> {
     for writes in Writes::all() {
         for kind in KINDS {
             for flags in 0..64 {
-                let manner = DrawnHow {
+                let manner = PipelineFlags {
                     has_texture: flags & 1 > 0,
                     is_scaled: flags & 1 > 0,
                     traces_lights: flags & 2 > 0,

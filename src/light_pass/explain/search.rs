@@ -119,7 +119,7 @@ enum Verdict {
 }
 
 /// A search for one wavefront.
-pub(super) struct Searcher<'a> {
+pub(super) struct TexelSearch<'a> {
     pub(super) walker: Walker<'a>,
     pub(super) item_buffer: &'a ItemBuffer,
     /// Flux on the texel that does not matter [W].
@@ -128,7 +128,7 @@ pub(super) struct Searcher<'a> {
     pub(super) control: &'a Control,
 }
 
-impl Searcher<'_> {
+impl TexelSearch<'_> {
     pub(super) fn search(&self) -> Found {
         let mut found = Found::default();
         let mut known: HashMap<Point, Vec<Arrival>> = HashMap::new();

@@ -5,8 +5,8 @@ use std::collections::HashMap;
 
 use glam::{DVec2, DVec3};
 
-use super::closeness::Closeness;
-use super::openings::{Opening, narrow_openings};
+use super::closeness::EdgeSearch;
+use super::openings::{Slit, narrow_openings};
 use crate::geometry::Ray;
 use crate::geometry::enclosure::Bounds;
 use crate::light_pass::item_buffer::{self, CELLS_PER_SIDE, ItemBuffer};
@@ -41,7 +41,7 @@ struct Body {
 
 impl Body {
     /// With so many cells across the opening.
-    fn of(opening: &Opening, across: f64) -> Self {
+    fn of(opening: &Slit, across: f64) -> Self {
         Self {
             ends: opening.ends,
             radius_m: opening.width_m,
@@ -91,7 +91,7 @@ impl SmallBodies {
         launch: &Launch,
         visible: &ItemBuffer,
         cell: DVec2,
-        closeness: Closeness,
+        closeness: EdgeSearch,
     ) -> Self {
         let scene = tracer.scene();
         let mut corners = Bins::default();

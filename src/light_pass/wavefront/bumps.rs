@@ -3,7 +3,7 @@
 
 use glam::DVec2;
 
-use super::strand::LightSample;
+use super::strand::LatticeRay;
 use crate::transport::RayDifferential;
 
 /// Cells for each wave in the finest lattice: a cubic patch then follows a sine to about 2 %.
@@ -65,8 +65,8 @@ impl BumpCells {
 
     /// Whether a cell or an edge with the given step in the unit square, divided `level` times for detail, has to be
     /// divided again.
-    pub fn ask_for_finer(&self, samples: &[&LightSample], step: DVec2, level: u32) -> bool {
-        let is_coarse = |sample: &&LightSample| (sample.bump_cells * step.abs()).max_element() > 1.0;
+    pub fn ask_for_finer(&self, samples: &[&LatticeRay], step: DVec2, level: u32) -> bool {
+        let is_coarse = |sample: &&LatticeRay| (sample.bump_cells * step.abs()).max_element() > 1.0;
         let is_rough = samples.iter().any(|sample| sample.is_rough);
         !is_rough && level < self.deepest && samples.iter().any(is_coarse)
     }

@@ -4,12 +4,12 @@ use rayon::prelude::*;
 
 use super::cell::Patch;
 use super::coverage::{FluxTriangle, deposit_triangles};
-use super::kept_rays::KeptRays;
+use super::kept_rays::RayCache;
 use super::lattice::{TracedBand, WavefrontLattice};
 use super::receivers::Receivers;
 use super::spread::{SpreadOutput, Spreader};
 use crate::illumination::Receiver;
-use crate::light_pass::caustic::pass::{Listener, PassReport, Stopwatch};
+use crate::light_pass::caustic::pass::{PassReport, ProgressScope, Stopwatch};
 use crate::light_pass::ledger_sum::Account;
 use crate::light_pass::receiver_maps::{ChartFor, ReceiverMaps};
 use crate::light_pass::share::Share;
@@ -76,9 +76,9 @@ impl WavefrontDepositor<'_> {
     pub fn run(
         &self,
         share: Option<Share>,
-        rays: &mut KeptRays,
+        rays: &mut RayCache,
         maps: Option<&mut ReceiverMaps>,
-        listener: &Listener,
+        listener: &ProgressScope,
         room: Room,
     ) -> (PassReport, Option<TracedLight>) {
         let mut report = PassReport::default();
@@ -123,7 +123,7 @@ impl WavefrontDepositor<'_> {
         &self,
         traced: &TracedLight,
         maps: &mut ReceiverMaps,
-        listener: &Listener,
+        listener: &ProgressScope,
     ) -> PassReport {
         let mut report = PassReport::default();
         for band in &traced.bands {

@@ -6,7 +6,7 @@ use super::facets::FacetPlace;
 use super::patch::PatchShape;
 use super::receivers::{ReceiverSurface, Receivers};
 use super::spread::Spreader;
-use super::strand::{Landing, Strand};
+use super::strand::{Landing, PathSegment};
 use crate::geometry::Ray;
 use crate::illumination::{Receiver, Side};
 use crate::optics::{ColourMatrix, LinearSrgb};
@@ -114,7 +114,7 @@ impl<'a> VirtualRays<'a> {
     pub fn new(
         spreader: &Spreader<'a>,
         shape: &'a PatchShape,
-        strands: &[&Strand],
+        strands: &[&PathSegment],
         plane: Option<Receiver>,
         factors: ColourMatrix,
     ) -> Self {

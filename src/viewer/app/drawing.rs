@@ -17,7 +17,7 @@ use crate::plan;
 use crate::scene::Scene;
 use crate::scene::load::was_dark;
 use crate::viewer::background::{Background, Wake};
-use crate::viewer::graphics::{FORMAT, Making, SAMPLES, texture};
+use crate::viewer::graphics::{FORMAT, RenderOptions, SAMPLES, texture};
 use crate::viewer::model::Model;
 use crate::viewer::panel::{Display, Quantity};
 use crate::viewer::timing::Made;
@@ -105,7 +105,7 @@ impl App {
         }
         let is_compiling = wanted != EffectSwitch::Off && chains == EffectSwitch::Off;
         graphics.set_stand_in(is_compiling && !self.model.maps().is_empty());
-        graphics.set_making(Making {
+        graphics.set_making(RenderOptions {
             chains,
             dispersion: self.model.choices.settings.effects.get(Effect::Dispersion),
             white_balance,

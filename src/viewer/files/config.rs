@@ -14,7 +14,7 @@ use crate::scene::Camera;
 use crate::scene::changes::Change;
 use crate::settings::BakeSettings;
 use crate::viewer::filming::Film;
-use crate::viewer::navigation::{BOOKMARKS, Travel};
+use crate::viewer::navigation::{BOOKMARKS, NavigationMode};
 use crate::viewer::panel::Display;
 
 /// Most that is read of one file [bytes]: far more than anything here takes.
@@ -155,7 +155,7 @@ pub struct KeptViews {
     /// `None` for the file's first.
     pub camera: Option<Camera>,
     /// How it gets about.
-    pub travel: Travel,
+    pub travel: NavigationMode,
     /// Views under the numbers from 1 on.
     pub bookmarks: [Option<Camera>; BOOKMARKS],
 }

@@ -8,7 +8,7 @@ use rfd::FileDialog;
 use winit::window::Window;
 
 use self::config::{ConfigFolder, Kept, ReadBack};
-use self::keeper::{Keeper, Stamps, changed};
+use self::keeper::{Autosaver, Stamps, changed};
 use crate::error::{Error, Result};
 use crate::scene::{LoadOptions, Scene, load};
 use crate::viewer::background::{Background, Task, Wake};
@@ -56,7 +56,7 @@ pub struct Files {
     /// Watches the files of the scene in the window.
     watch: Background<(), Stamps>,
     /// Keeps what the user does.
-    pub keeper: Option<Keeper>,
+    pub keeper: Option<Autosaver>,
     config: Option<ConfigFolder>,
 }
 
@@ -73,7 +73,7 @@ impl Files {
             refusal: None,
             warning,
             watch: Background::new("watch", wake),
-            keeper: options.config.clone().map(Keeper::new),
+            keeper: options.config.clone().map(Autosaver::new),
             config: options.config.clone(),
         }
     }

@@ -8,7 +8,7 @@ use crate::light_pass::explain::LightPath;
 use crate::transport::Event;
 use crate::units::LUMENS_PER_WATT;
 use crate::viewer::probe::{Probed, ProbedTexel};
-use crate::viewer::sketching::Sketched;
+use crate::viewer::sketching::PreviewFlags;
 
 const TURN_ON: &str = "Click on a surface to see what lights it (P): irradiance and its error, and the light paths that \
                        come there, drawn through every glass surface. Looks through glass and over mirrors to what is \
@@ -25,7 +25,7 @@ const MOST_LISTED: usize = 8;
 /// Shows the section.
 pub fn show(
     ui: &mut Ui,
-    (is_on, sketched): (&mut bool, &mut Sketched),
+    (is_on, sketched): (&mut bool, &mut PreviewFlags),
     model: &Model,
     commands: &mut Vec<Command>,
 ) {
@@ -57,7 +57,7 @@ pub fn show(
 }
 
 /// What is drawn of the way that all light takes.
-fn sketch(ui: &mut Ui, sketched: &mut Sketched, model: &Model) {
+fn sketch(ui: &mut Ui, sketched: &mut PreviewFlags, model: &Model) {
     ui.horizontal(|ui| {
         ui.label("Draw");
         ui.checkbox(&mut sketched.hits, "hits").on_hover_text(HITS);

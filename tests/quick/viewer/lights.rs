@@ -4,14 +4,14 @@
 use std::collections::HashSet;
 
 use nephroid::illumination::{Chart, Receiver};
-use nephroid::light_pass::sketch::{Sketch, SketchLimits, sketch};
+use nephroid::light_pass::sketch::{PathPreview, SketchLimits, sketch};
 use nephroid::scene::load;
 use nephroid::scene::load::save;
 use nephroid::units::Flux;
 use nephroid::viewer::background::Wake;
 use nephroid::viewer::brightest;
 use nephroid::viewer::new_light::Aim;
-use nephroid::viewer::sketching::Sketcher;
+use nephroid::viewer::sketching::PreviewTask;
 
 use super::fixtures::added;
 use super::*;
@@ -304,7 +304,7 @@ fn finer_lattices_have_smaller_patches() {
             "{patch:?}"
         );
     }
-    let middling = |sketch: &Sketch| {
+    let middling = |sketch: &PathPreview| {
         let sides = sketch.patches.iter();
         let mut sides: Vec<f64> = sides
             .map(|patch| patch.corners[0].distance(patch.corners[1]))
@@ -322,7 +322,7 @@ fn finer_lattices_have_smaller_patches() {
 #[test]
 fn found_once_for_the_same_surfaces() {
     let surfaces = tracer("ring");
-    let mut sketcher = Sketcher::new(&Wake::new(|| ()));
+    let mut sketcher = PreviewTask::new(&Wake::new(|| ()));
     wait_for("the sketch", || sketcher.follow(&surfaces, LIMITS));
     let found = Arc::clone(sketcher.shown().expect("it was found"));
     assert!(!sketcher.follow(&surfaces, LIMITS) && !found.landings.is_empty());

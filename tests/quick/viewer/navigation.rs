@@ -4,7 +4,7 @@
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable as _;
 use nephroid::viewer::gizmo::{Gizmo, Handle, light_at};
-use nephroid::viewer::lens::Lens;
+use nephroid::viewer::lens::Viewport;
 use nephroid::viewer::navigation::{BOOKMARKS, HeldKeys, Navigator};
 use nephroid::viewer::walking::{EYE_M, SPEED_M_PER_S, Solid};
 
@@ -268,7 +268,7 @@ const WALL: [f64; 5] = [-10.0, -3.2, 10.0, -3.0, 3.0];
 
 fn walker(position: DVec3, forward: DVec3, solid: &Boxes, held: &str) -> Navigator {
     let mut navigator = at(position, forward);
-    navigator.set_travel(Travel::Walk, Some(solid));
+    navigator.set_travel(NavigationMode::Walk, Some(solid));
     navigator.keys = keys(held);
     navigator
 }
@@ -317,7 +317,7 @@ fn a_wall_stops_the_walk_and_lets_it_slide() {
             let z = eye(&navigator).z;
             assert!((-2.76..-2.7).contains(&z), "{frames} frames, {held}: {z}");
             // Flying goes through.
-            navigator.set_travel(Travel::Fly, None);
+            navigator.set_travel(NavigationMode::Fly, None);
             pass(&mut navigator, &room, 4.0, frames);
             assert!(eye(&navigator).z < -3.2);
         }
@@ -381,7 +381,7 @@ fn an_orbit_keeps_its_distance_and_pivot() {
     // The pivot is the origin.
     let start = dvec3(0.0, 2.0, 4.0);
     let mut navigator = at(start, -start);
-    navigator.set_travel(Travel::Orbit, Some(&ground));
+    navigator.set_travel(NavigationMode::Orbit, Some(&ground));
     let assert_at = |navigator: &Navigator, distance_m: f64| {
         let camera = navigator.camera();
         near(camera.position.length(), distance_m, 1e-9, "distance");
@@ -422,8 +422,8 @@ fn camera() -> Camera {
     Camera::look_at("eye", dvec3(2.0, 3.0, 6.0), dvec3(0.1, 0.8, -0.2), 0.9)
 }
 
-fn lens(camera: &Camera) -> Lens<'_> {
-    Lens {
+fn lens(camera: &Camera) -> Viewport<'_> {
+    Viewport {
         camera,
         picture: Rect::from_min_size(pos2(0.0, 0.0), SIZE.into()),
     }
@@ -520,7 +520,7 @@ fn nodes_move_and_come_back_bit_for_bit() {
 }
 
 /// Pulls a handle by some points of the picture; the scene after each edit that asks for.
-fn pull(held: Held, handle: &str, by: egui::Vec2) -> Vec<Scene> {
+fn pull(held: GizmoTarget, handle: &str, by: egui::Vec2) -> Vec<Scene> {
     let mut harness = Harness::builder().with_size(SIZE).build_ui_state(
         |ui, (gizmo, scenes): &mut (Gizmo, Vec<Scene>)| {
             let (camera, now) = (camera(), scenes[scenes.len() - 1].clone());
@@ -553,7 +553,7 @@ fn pull(held: Held, handle: &str, by: egui::Vec2) -> Vec<Scene> {
 #[test]
 fn lights_follow_one_axis() {
     let position = |light: usize, scene: &Scene| scene.lights[light].kind.position().expect("a place");
-    let scenes = pull(Held::Light(0), "Move x", vec2(60.0, 0.0));
+    let scenes = pull(GizmoTarget::Light(0), "Move x", vec2(60.0, 0.0));
     let (before, after) = (position(0, &scenes[0]), position(0, &scenes[scenes.len() - 1]));
     assert!(after.x > before.x && after.with_x(before.x) == before, "{after}");
     // As far as the mouse went along the axis in the picture.
@@ -563,14 +563,14 @@ fn lights_follow_one_axis() {
     let along = (place(after) - place(before)).dot(axis);
     assert!((along - vec2(60.0, 0.0).dot(axis)).abs() < 8.0, "{along} points");
     // Another, whose upper handle is within the picture.
-    let scenes = pull(Held::Light(2), "Move y", vec2(0.0, -40.0));
+    let scenes = pull(GizmoTarget::Light(2), "Move y", vec2(0.0, -40.0));
     assert!(position(2, &scenes[scenes.len() - 1]).y > position(2, &scenes[0]).y);
 }
 
 #[test]
 fn objects_turn_about_their_vertical() {
     let placed = |handle: &str, by: egui::Vec2| {
-        let scenes = pull(Held::Object(1), handle, by);
+        let scenes = pull(GizmoTarget::Object(1), handle, by);
         *scenes[scenes.len() - 1].objects[1].motion()
     };
     let turned = placed("Turn", vec2(-50.0, 10.0));

@@ -239,9 +239,9 @@ fn mouse_holds_one_thing_and_looking_edits_nothing() {
     panel.choose("Object", "ball");
     assert_eq!(panel.model.choices.selection.held(), None);
     for (button, held, placed) in [
-        ("Move object", Some(Held::Object(1)), None),
-        ("Place light", Some(Held::Light(0)), Some(Placed::At(0))),
-        ("Move light", Some(Held::Light(0)), None),
+        ("Move object", Some(GizmoTarget::Object(1)), None),
+        ("Place light", Some(GizmoTarget::Light(0)), Some(Placed::At(0))),
+        ("Move light", Some(GizmoTarget::Light(0)), None),
         ("Move light", None, None),
     ] {
         panel.press(button);

@@ -9,7 +9,7 @@ use crate::light_pass::receiver_maps::ChartFor;
 use crate::light_pass::share::Share;
 
 /// Who does the work.
-pub(in crate::session) enum Labour {
+pub(in crate::session) enum ShardRole {
     /// This bake alone.
     Alone,
     /// This bake, its share.
@@ -25,7 +25,7 @@ pub(in crate::session) struct Merging {
     next: usize,
 }
 
-impl Labour {
+impl ShardRole {
     pub(super) fn shard(share: Share) -> Self {
         Self::Shard {
             share,
