@@ -407,14 +407,14 @@ fn hard_edits_and_back_lose_no_watt() {
             "black glass",
             Edit::Material(material, MaterialEdit::BaseColour(LinearSrgb::BLACK)),
         ),
-        (
-            "rough glass",
-            Edit::Material(material, MaterialEdit::Roughness(1.0)),
-        ),
     ];
-    let settings = at(1e3, 48);
-    let untouched = bake(scene.clone(), &settings);
-    for (what, change) in hard {
+    let rough = Edit::Material(material, MaterialEdit::Roughness(1.0));
+    let by_patches = hard.map(|(what, change)| (what, change, at(1e3, 48)));
+    let all = by_patches
+        .into_iter()
+        .chain([("rough glass", rough, photons(1e3, 48))]);
+    for (what, change, settings) in all {
+        let untouched = bake(scene.clone(), &settings);
         let mut session = session(&scene);
         run(&mut session, &settings);
         edit(&mut session, &change);

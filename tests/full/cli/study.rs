@@ -86,11 +86,11 @@ fn rows(sandbox: &Sandbox, report: &Value) -> Rows {
 /// Study, which of its rows, what of them, and the least and most that it may be: `y ~ x` is the slope of logarithms,
 /// `spread y` the largest over the smallest, `y` every value that there is.
 const LAWS: &str = "
-accuracy | estimator=wavefront | memory_mb | 1e-9 1e9
-accuracy | scene=mirror; estimator=wavefront | rays_ratio | 0.3 3
-accuracy | scene=pool; estimator=wavefront | rays_ratio | 0.3 3
-accuracy | scene=mirror; estimator=wavefront | rays ~ target | -9 -1e-9
-accuracy | scene=pool; estimator=wavefront | rays ~ target | -9 -1e-9
+accuracy | estimator=auto | memory_mb | 1e-9 1e9
+accuracy | scene=mirror; estimator=auto | rays_ratio | 0.3 3
+accuracy | scene=pool; estimator=auto | rays_ratio | 0.3 3
+accuracy | scene=mirror; estimator=auto | rays ~ target | -9 -1e-9
+accuracy | scene=pool; estimator=auto | rays ~ target | -9 -1e-9
 accuracy | scene=mirror; estimator=splat | relative_rmse ~ rays | -1.5 -0.1
 accuracy | scene=pool; estimator=splat | relative_rmse ~ rays | -1.5 -0.1
 scaling | what=rays | spread segments_per_ray | 1 1.5
