@@ -7,9 +7,9 @@ override HAS_TINTED_GLASS: bool;
 override TRACES_LIGHTS: bool;
 
 // Surfaces at which both ways on can be followed.
-const MOST_BRANCHING: u32 = 4u;
+const MAX_BRANCHING: u32 = 4u;
 // Holes and backs of single-sided surfaces that a gaze passes before it is taken to have left the scene.
-const MOST_BACKS: u32 = 64u;
+const MAX_BACKS: u32 = 64u;
 
 struct Gaze {
     origin: vec3f,
@@ -45,7 +45,7 @@ fn is_hole(hit: Hit, object: ObjectRecord) -> bool {
 fn nearest(gaze: Gaze) -> Seen {
     var origin = gaze.origin;
     var passed = 0.0;
-    for (var backs = 0u; backs < MOST_BACKS; backs += 1u) {
+    for (var backs = 0u; backs < MAX_BACKS; backs += 1u) {
         let hit = closest_hit(origin, gaze.direction, FAR_AWAY);
         if hit.triangle == NO_TRIANGLE {
             return Seen(hit, 0.0);
@@ -103,7 +103,7 @@ struct Walk {
     count: u32,
 }
 
-var<private> waiting: array<Gaze, MOST_WAITING>;
+var<private> waiting: array<Gaze, MAX_WAITING>;
 
 // Goes on from a surface, both ways at the first ones and then the stronger; false where the gaze ends here.
 fn go_on(walk: ptr<function, Walk>, point: SurfacePoint, next: Interaction) -> bool {
@@ -113,7 +113,7 @@ fn go_on(walk: ptr<function, Walk>, point: SurfacePoint, next: Interaction) -> b
     let is_back = is_followed(reflected);
     let is_through = is_followed(transmitted);
     let is_stronger = largest(transmitted.weight) >= largest(reflected.weight);
-    if is_back && is_through && gaze.depth < start.branching_depth && (*walk).count < MOST_WAITING {
+    if is_back && is_through && gaze.depth < start.branching_depth && (*walk).count < MAX_WAITING {
         waiting[(*walk).count] = reflected;
         (*walk).count += 1u;
         (*walk).gaze = transmitted;

@@ -6,7 +6,7 @@ use crate::geometry::enclosure::{Bounds, is_closed, triangle_meets_box, winding_
 use crate::scene::{Light, LightKind, LightSize, Mesh, Scene};
 
 /// Larger meshes are not looked at: they seal nothing.
-const MOST_TRIANGLES: usize = 200_000;
+const MAX_TRIANGLES: usize = 200_000;
 
 /// A winding number this close to a whole one is taken for it.
 const WINDING_TOLERANCE: f64 = 1e-6;
@@ -55,7 +55,7 @@ impl Compartments {
                 .collect();
             let mesh = object.mesh_in_scene();
             if (near.is_empty() && lamps.is_empty())
-                || mesh.triangles.len() > MOST_TRIANGLES
+                || mesh.triangles.len() > MAX_TRIANGLES
                 || !is_closed(&mesh.positions, &mesh.triangles)
             {
                 continue;
@@ -128,7 +128,7 @@ fn overlap((low, high): Bounds, (from, to): Bounds) -> bool {
 
 /// Whether any part of a mesh lies in a box.
 fn enters(mesh: &Mesh, bounds: Bounds) -> bool {
-    mesh.triangles.len() > MOST_TRIANGLES
+    mesh.triangles.len() > MAX_TRIANGLES
         || (0..mesh.triangles.len()).any(|triangle| triangle_meets_box(mesh.corners(triangle), bounds))
 }
 

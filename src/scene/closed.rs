@@ -7,7 +7,7 @@ use glam::DVec3;
 use crate::scene::Mesh;
 
 /// Least volume of a solid over that of a cube of its area: what is flatter is a sheet with two sides.
-const LEAST_FILLED: f64 = 1e-6;
+const MIN_FILLED: f64 = 1e-6;
 
 /// Whether a mesh encloses space, with its triangles wound so that they face outwards.
 pub fn is_solid(mesh: &Mesh) -> bool {
@@ -18,7 +18,7 @@ pub fn is_solid(mesh: &Mesh) -> bool {
             a.dot(b.cross(c)) / 6.0
         })
         .sum();
-    volume_m3 > LEAST_FILLED * (mesh.area_m2() / 6.0).powf(1.5) && is_closed(mesh)
+    volume_m3 > MIN_FILLED * (mesh.area_m2() / 6.0).powf(1.5) && is_closed(mesh)
 }
 
 /// Whether every edge is passed as often in one direction as in the other; vertices are one where their positions are

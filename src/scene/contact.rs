@@ -11,10 +11,10 @@ use crate::error::Warning;
 const STEPS: f64 = 1e9;
 
 /// Pairs that a scene is told of.
-const MOST_WARNINGS: usize = 8;
+const MAX_WARNINGS: usize = 8;
 
 /// Comparisons of triangles that are worth making; what is beyond is not looked at.
-const MOST_TESTS: usize = 1 << 22;
+const MAX_TESTS: usize = 1 << 22;
 
 /// A plane in steps, the same from both sides.
 type Plane = [i64; 4];
@@ -40,7 +40,7 @@ pub fn touching(scene: &Scene) -> BTreeMap<(usize, usize), usize> {
             let next = faces[index..].partition_point(|other| other.object == face.object);
             let others = &faces[index + next..];
             tests += others.len() + 1;
-            if tests > MOST_TESTS {
+            if tests > MAX_TESTS {
                 return pairs;
             }
             let touched = others
@@ -69,7 +69,7 @@ pub fn warnings(scene: &Scene) -> Vec<Warning> {
     };
     touching(scene)
         .into_iter()
-        .take(MOST_WARNINGS)
+        .take(MAX_WARNINGS)
         .map(warning)
         .collect()
 }

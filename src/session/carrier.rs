@@ -25,7 +25,7 @@ const RECEIVER_QUERY: f64 = 0.4;
 const LEVEL_GROWTH: f64 = 4.0;
 
 /// Light whose photons have more segments than this goes more ways than patches should follow.
-const MOST_WAYS: f64 = 4.0;
+const MAX_WAYS: f64 = 4.0;
 
 /// Patches have to promise the target for this part of what photons take: they may promise too much, and what they took is
 /// lost with the change.
@@ -168,7 +168,7 @@ impl CausticLayer<'_> {
         let so_far: f64 = climb.levels.iter().map(cost).sum();
         let next = climb.levels.last().map_or(0.0, cost) * LEVEL_GROWTH;
         let promised = promised(climb, cost, most_share).unwrap_or(0.0);
-        let goes_many_ways = climb.levels.is_empty() && per_photon > MOST_WAYS;
+        let goes_many_ways = climb.levels.is_empty() && per_photon > MAX_WAYS;
         let is_late = are_photons_in_time(climb, state, course);
         let is_biased = is_biased(climb) && climb.shares.last().is_some_and(|(_, share)| *share > most_share);
         if goes_many_ways

@@ -40,10 +40,10 @@ const GOAL: f64 = 0.85;
 const ROUND_GAIN: f64 = 0.4;
 
 /// Rounds of refinement at most: cells are then a 2¹⁶th of the first ones.
-const MOST_ROUNDS: usize = 8;
+const MAX_ROUNDS: usize = 8;
 
 /// Patches with more of their light where a part of the spectrum is held in one place look finer than they are.
-const MOST_IN_ONE_PLACE: f64 = 0.3;
+const MAX_IN_ONE_PLACE: f64 = 0.3;
 
 /// Part of the time that there is when light between surfaces is still to be gathered.
 const PART_BEFORE_INDIRECT: f64 = 0.85;
@@ -458,7 +458,7 @@ impl CausticLayer<'_> {
             }
             return Ok(());
         };
-        if climb.carrier == Carrier::Undecided && level.in_one_place > MOST_IN_ONE_PLACE {
+        if climb.carrier == Carrier::Undecided && level.in_one_place > MAX_IN_ONE_PLACE {
             climb.turn_to_photons();
             climb.rival = None;
             return Ok(());
@@ -595,7 +595,7 @@ impl CausticLayer<'_> {
         }
         // No round can do much more, and a bake that has its time shows what came of it.
         let goal = (GOAL * target).max(ROUND_GAIN * error.relative_rmse);
-        if self.settings.estimator == Estimator::Splat || climb.rounds.len() >= MOST_ROUNDS {
+        if self.settings.estimator == Estimator::Splat || climb.rounds.len() >= MAX_ROUNDS {
             return false;
         }
         let Some(level) = climb.levels.last() else {

@@ -10,7 +10,7 @@ use super::indirect_cache::IndirectCache;
 use super::indirect_work::IndirectWork;
 use super::result::LightLayer;
 use crate::illumination::IlluminationMap;
-use crate::light_pass::indirect::{LEAST_PASSES, Network};
+use crate::light_pass::indirect::{MIN_PASSES, Network};
 use crate::plan::{Effect, wants_caustics};
 use crate::progress::{Control, Progress};
 use crate::transport::Tracer;
@@ -66,7 +66,7 @@ impl FirstLook {
     ) -> &IndirectCache {
         let indirect = &mut self.indirect;
         indirect.prepare(tracer, finish.sizes, finish.settings, ELEMENTS);
-        let passes = vec![LEAST_PASSES; indirect.network().map_or(0, Network::element_count)];
+        let passes = vec![MIN_PASSES; indirect.network().map_or(0, Network::element_count)];
         if indirect.passes != passes && indirect.trace(tracer, &passes, on_whom) {
             indirect.passes = passes;
         }

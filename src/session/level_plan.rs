@@ -28,19 +28,19 @@ const CELLS_FOR_AN_ERROR: f64 = 30.0;
 const STARTING_TARGET: f64 = 0.005;
 
 /// Cells to begin with, at least.
-const LEAST_CELLS: f64 = 500.0;
+const MIN_CELLS: f64 = 500.0;
 
 /// A small caster makes the lattice so many times denser at most.
-const MOST_DENSER: f64 = 64.0;
+const MAX_DENSER: f64 = 64.0;
 
 /// Density at which cells are counted: high enough that no side is rounded by much [rays/sr].
 const UNIT_DENSITY_PER_SR: f64 = 1e5;
 
 /// Least side of the lattice that mean footprints are taken from [cells].
-const LEAST_STATISTICS_SIDE: usize = 32;
+const MIN_STATISTICS_SIDE: usize = 32;
 
 /// How much coarser than the last one a coarse lattice is deposited at most.
-const MOST_COARSE: f64 = 16.0;
+const MAX_COARSE: f64 = 16.0;
 
 /// How coarse triangles may be for a target, relative to those of a bake without one: over this relative RMSE.
 const USUAL_ERROR: f64 = 0.012;
@@ -76,13 +76,13 @@ impl CausticLayer<'_> {
         let Some(target) = self.settings.max_error else {
             return set;
         };
-        let wanted = (CELLS_FOR_AN_ERROR / target.max(STARTING_TARGET)).max(LEAST_CELLS);
+        let wanted = (CELLS_FOR_AN_ERROR / target.max(STARTING_TARGET)).max(MIN_CELLS);
         // A lattice of 1 ray/sr has as many cells on casters as this; suns scale it by their reach.
         let (columns, rows) = light.launch.lattice_size(UNIT_DENSITY_PER_SR, light.reach_m);
         let whole = (columns * rows * light.launch.face_count()) as f64;
         let share = light.visible().marked_share(&light.launch);
         set.max(UNIT_DENSITY_PER_SR * wanted / (whole * share))
-            .min(set * MOST_DENSER)
+            .min(set * MAX_DENSER)
     }
 
     /// All that a level depends on.
@@ -105,7 +105,7 @@ impl CausticLayer<'_> {
             photons: None,
             sizes: sizes.clone(),
             coarseness: coarseness(self.settings.max_error, climb.goal)
-                * (before_last as f64).exp2().min(MOST_COARSE),
+                * (before_last as f64).exp2().min(MAX_COARSE),
             kernels: self.kernels(),
             stride: match self.settings.estimator {
                 estimator if estimator.refines() => 1,
@@ -275,7 +275,7 @@ impl CausticLayer<'_> {
     pub(super) fn statistics_size(&self, light: &VisibleLight) -> (usize, usize) {
         let lattices = self.lattices(light);
         let coarse = lattices.len().saturating_sub(ESTIMATED_LEVELS);
-        let fine_enough = |size: &&(usize, usize)| size.0.max(size.1) >= LEAST_STATISTICS_SIDE;
+        let fine_enough = |size: &&(usize, usize)| size.0.max(size.1) >= MIN_STATISTICS_SIDE;
         let last = lattices[lattices.len() - 1];
         lattices[coarse..]
             .iter()

@@ -51,7 +51,7 @@ pub(super) fn halved((width, height): (usize, usize), times: u32) -> (usize, usi
 }
 
 /// Maps with fewer tiles than this are not worth them.
-const LEAST_TILES: usize = 32;
+const MIN_TILES: usize = 32;
 
 /// Tiles are worth their trouble where they take less than this share of a dense map.
 const WORTH: f64 = 0.75;
@@ -72,7 +72,7 @@ pub(super) struct TileDemand {
 impl TileDemand {
     /// Where no light was seen.
     pub(super) const NOTHING: Self = Self {
-        fineness: MOST_LEVELS,
+        fineness: MAX_LEVELS,
         dimness: 0.0,
     };
 
@@ -88,7 +88,7 @@ impl TileDemand {
 
     /// The level at which nothing is missed.
     fn wished(&self) -> f64 {
-        self.fineness + self.dimness.clamp(0.0, MOST_DIM)
+        self.fineness + self.dimness.clamp(0.0, MAX_DIM)
     }
 
     /// The level at which as much is missed everywhere, but for a number of levels.
@@ -98,7 +98,7 @@ impl TileDemand {
 }
 
 /// Dim light has texels that are larger than its footprints by so many levels at most.
-const MOST_DIM: f64 = 1.0;
+const MAX_DIM: f64 = 1.0;
 
 /// Where light ends within little on a map, or beside a place of it.
 #[derive(Clone, Debug)]
@@ -232,14 +232,14 @@ impl SizeRequest {
 /// Whether a map of a size may be in tiles.
 pub(super) fn is_divisible((width, height): (usize, usize)) -> bool {
     let (columns, rows) = tiles::tile_counts(width, height);
-    columns * rows >= LEAST_TILES
+    columns * rows >= MIN_TILES
 }
 
 /// Steps in which texels grow where memory is short [levels].
 const SPARING_STEP: f64 = 0.125;
 
 /// Most that texels of whole maps are finer, or coarser, than their light.
-const MOST_LEVELS: f64 = 20.0;
+const MAX_LEVELS: f64 = 20.0;
 
 /// Sizes of all maps as they are wished for.
 pub(super) fn wished(wishes: &BTreeMap<Receiver, SizeRequest>) -> Sizes {
@@ -261,8 +261,8 @@ pub(super) fn fit(wishes: &BTreeMap<Receiver, SizeRequest>, (limit, memory): (u6
         return wished;
     }
     // Tiles with far more texels than light needs come first; then every other.
-    let steps = (2.0 * MOST_LEVELS / SPARING_STEP) as i32;
-    let sparing = |step: i32| MemoryReduction::Levels(f64::from(step) * SPARING_STEP - MOST_LEVELS);
+    let steps = (2.0 * MAX_LEVELS / SPARING_STEP) as i32;
+    let sparing = |step: i32| MemoryReduction::Levels(f64::from(step) * SPARING_STEP - MAX_LEVELS);
     let (mut low, mut high) = (0, steps);
     while low < high {
         let middle = low + (high - low) / 2;
@@ -276,7 +276,7 @@ pub(super) fn fit(wishes: &BTreeMap<Receiver, SizeRequest>, (limit, memory): (u6
 }
 
 /// Cells across and down that light is sorted into, at most.
-const MOST_CELLS: usize = 64;
+const MAX_CELLS: usize = 64;
 
 /// Powers of two that shares of a map are told apart by: from the whole map on.
 const BINS: usize = 36;
@@ -284,7 +284,7 @@ const BINS: usize = 36;
 /// What each tile of a map asks for, row by row.
 pub(super) fn needs<'a>(size: (usize, usize), spots: impl Iterator<Item = &'a Spot>) -> Vec<TileDemand> {
     let (columns, rows) = tiles::tile_counts(size.0, size.1);
-    let (across, down) = (columns.min(MOST_CELLS), rows.min(MOST_CELLS));
+    let (across, down) = (columns.min(MAX_CELLS), rows.min(MAX_CELLS));
     let mut cells = vec![[0.0_f64; BINS]; across * down];
     for spot in spots {
         let bin = (-spot.map_share.log2()).clamp(0.0, (BINS - 1) as f64) as usize;

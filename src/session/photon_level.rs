@@ -41,7 +41,7 @@ const POWER_WITH_BUNDLES: f64 = 0.8;
 const MARGIN: f64 = 1.1;
 
 /// Noise that is this part of the error aimed at is little enough, whatever else the error holds.
-const LEAST_NOISE: f64 = 0.7;
+const MIN_NOISE: f64 = 0.7;
 
 /// The mean flux of all photons may be so many times that of the first ones.
 const MEAN_MARGIN: f64 = 4.0;
@@ -53,7 +53,7 @@ const PART_OF_TIME: f64 = 0.85;
 const PART_OF_TIME_WITH_BUNDLES: f64 = 0.5;
 
 /// Fewer photons than so many times those before are not worth a level.
-const LEAST_GROWTH: f64 = 1.2;
+const MIN_GROWTH: f64 = 1.2;
 
 /// Photons of a level after one with fewer, or as many as there is part of the time for: a level that is cut off leaves
 /// nothing.
@@ -63,7 +63,7 @@ fn in_time(photons: u32, before: u32, part: f64, state: &LightState, course: &Co
     };
     let own_s = part * left_s / course.open_lights as f64;
     let affordable = f64::from(before) + own_s / photon_s;
-    let least = LEAST_GROWTH * f64::from(before);
+    let least = MIN_GROWTH * f64::from(before);
     (affordable.max(least) as u32).min(photons)
 }
 
@@ -98,7 +98,7 @@ impl CausticLayer<'_> {
             Some((error, given_up)) => {
                 // More photons do not bring back what was given up.
                 let noise2 = error * error - given_up * given_up;
-                let wanted2 = (goal * goal - given_up * given_up).max((LEAST_NOISE * goal).powi(2));
+                let wanted2 = (goal * goal - given_up * given_up).max((MIN_NOISE * goal).powi(2));
                 if noise2 <= wanted2 {
                     return None;
                 }

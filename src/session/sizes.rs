@@ -103,10 +103,10 @@ type KeptChart = (Arc<Chart>, u64);
 const CHARTS_PER_RECEIVER: usize = 4;
 
 /// Charts that are kept however few receivers there are.
-const LEAST_CHARTS: usize = 256;
+const MIN_CHARTS: usize = 256;
 
 /// Charts in tiles that are kept.
-const MOST_TILED_CHARTS: usize = 64;
+const MAX_TILED_CHARTS: usize = 64;
 
 impl ChartCache {
     /// Nothing made yet.
@@ -227,7 +227,7 @@ impl ChartCache {
             .chart(width, height);
         let chart = Arc::new(chart.of_side(receiver.side()));
         let mut charts = charts();
-        if charts.len() >= LEAST_CHARTS.max(CHARTS_PER_RECEIVER * 2 * self.scene.objects.len()) {
+        if charts.len() >= MIN_CHARTS.max(CHARTS_PER_RECEIVER * 2 * self.scene.objects.len()) {
             let oldest = charts.iter().min_by_key(|(_, (_, last))| *last);
             if let Some(oldest) = oldest.map(|(key, _)| *key) {
                 charts.remove(&oldest);
@@ -253,7 +253,7 @@ impl ChartCache {
         }
         let chart = self.parametrisation(receiver.object())?.tiled_chart(layout)?;
         let chart = Arc::new(chart.of_side(receiver.side()));
-        if tiled.len() >= MOST_TILED_CHARTS {
+        if tiled.len() >= MAX_TILED_CHARTS {
             tiled.remove(0);
         }
         tiled.push(Arc::clone(&chart));
@@ -434,7 +434,7 @@ impl ChartCache {
         };
         let halved = |times: u32| -> Vec<(Receiver, (usize, usize))> {
             let side = |side: usize, most: usize| {
-                let least = (LEAST_GRID_SIDE >> (times - 1)).max(1);
+                let least = (MIN_GRID_SIDE >> (times - 1)).max(1);
                 (side >> times).max(least).min(most)
             };
             let size = |&(receiver, (width, height)): &(Receiver, (usize, usize))| {
@@ -463,7 +463,7 @@ fn border_doublings(settings: &BakeSettings) -> u32 {
 }
 
 /// Least side of a grid of indirect light, where there is room for it [texels].
-const LEAST_GRID_SIDE: usize = 8;
+const MIN_GRID_SIDE: usize = 8;
 
 /// A map of about FIRST_SIDE² texels whose sides have a power of two between them, at most 8:1.
 pub fn first_size(aspect: f64) -> (usize, usize) {

@@ -23,7 +23,7 @@ use crate::settings::{BakeSettings, Footprint, Sigma};
 const COARSENING: usize = 8;
 
 /// Least side of that lattice.
-const LEAST_COARSE_SIDE: usize = 64;
+const MIN_COARSE_SIDE: usize = 64;
 
 /// Stride of the lattice that the blur of splats is estimated from.
 const ERROR_STRIDE: usize = 2;
@@ -270,7 +270,7 @@ fn source_of<'a>(state: &'a LightState, key: &TraceKey) -> Source<'a> {
 
 /// The lattice for mean footprints: every so many-th of the same rays, so that kept ones will do.
 fn thinned(lattice: Lattice) -> Lattice {
-    let stride = |side: usize| (side / LEAST_COARSE_SIDE).clamp(1, COARSENING);
+    let stride = |side: usize| (side / MIN_COARSE_SIDE).clamp(1, COARSENING);
     Lattice {
         strides: (stride(lattice.size.0), stride(lattice.size.1)),
         ..lattice

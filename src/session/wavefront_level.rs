@@ -32,7 +32,7 @@ use crate::settings::Estimator;
 const USUAL_MAP_ERROR: f64 = 0.03;
 
 /// Light that is less than this share of its ray's says nothing of the sizes of maps.
-const LEAST_SIZED_SHARE: f64 = 0.01;
+const MIN_SIZED_SHARE: f64 = 0.01;
 
 impl CausticLayer<'_> {
     /// Traces and deposits a level, or deposits again what was traced for other maps; `None` where it was stopped.
@@ -170,7 +170,7 @@ impl CausticLayer<'_> {
         let rays = if is_for_patches { &mut state.rays } else { &mut own };
         if !is_for_patches {
             let threshold = &mut lattice.tracer.limits.branch_threshold;
-            *threshold = threshold.max(LEAST_SIZED_SHARE);
+            *threshold = threshold.max(MIN_SIZED_SHARE);
         }
         let depositor = WavefrontDepositor {
             receivers: &receivers,

@@ -65,11 +65,11 @@ const LEVEL_OF_SOFTWARE: Duration = Duration::from_secs(3);
 /// Time between a picture and the frame that tells what it took.
 const REPORT_AFTER: Duration = Duration::from_millis(40);
 /// A device that has not told in so many frames how long a picture took is not asked again until the next one.
-const MOST_REPORTS: u32 = 25;
+const MAX_REPORTS: u32 = 25;
 /// Longest time that one frame flies: after a stall the camera is not thrown through the scene.
 const LONGEST_STEP: Duration = Duration::from_millis(500);
 /// A device that was lost this often within [`LOSSES_WITHIN`] is given up.
-const MOST_LOSSES: usize = 3;
+const MAX_LOSSES: usize = 3;
 const LOSSES_WITHIN: Duration = Duration::from_secs(60);
 
 /// The maps on the device.
@@ -276,7 +276,7 @@ impl App {
         self.losses
             .retain(|loss| now.duration_since(*loss) < LOSSES_WITHIN);
         self.losses.push(now);
-        if self.losses.len() > MOST_LOSSES {
+        if self.losses.len() > MAX_LOSSES {
             self.fail(event_loop, reason);
             return;
         }

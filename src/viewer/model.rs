@@ -43,7 +43,7 @@ use serde_json::{Value, json};
 /// Quiet time after the last change before it is baked.
 pub const QUIET: Duration = Duration::from_millis(150);
 /// Rays that a probe may take for each place of a light.
-const MOST_PROBE_RAYS: u64 = 3_000_000;
+const MAX_PROBE_RAYS: u64 = 3_000_000;
 
 /// Cells of the lattice of rays that is drawn, for each light.
 const SKETCHED_CELLS: usize = 3000;
@@ -293,7 +293,7 @@ impl Model {
             let limits = Limits {
                 max_depth: settings.depth(),
                 branch_threshold: settings.path_threshold(),
-                most_rays: MOST_PROBE_RAYS,
+                most_rays: MAX_PROBE_RAYS,
             };
             let maps = self.last.as_ref().map_or(&self.given, |last| &last.result.maps);
             self.prober.look(&tracer, maps, limits);

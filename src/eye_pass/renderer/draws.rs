@@ -186,7 +186,7 @@ impl EyeQuality {
         };
         Self {
             traced_scale,
-            branching_depth: self.branching_depth.min(super::chains::MOST_BRANCHING),
+            branching_depth: self.branching_depth.min(super::chains::MAX_BRANCHING),
             ..self
         }
     }

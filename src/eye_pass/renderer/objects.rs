@@ -32,7 +32,7 @@ pub(super) struct Look {
 }
 
 /// Glasses that can part wavelengths in one scene; as many as the shader's uniform has room for.
-const MOST_GLASSES: usize = 128;
+const MAX_GLASSES: usize = 128;
 
 /// All objects with the images they share.
 #[derive(Debug)]
@@ -84,9 +84,9 @@ impl Objects {
             };
             let known = self.glasses.iter().position(|known| *known == glass.dispersion);
             let place = known.unwrap_or(self.glasses.len());
-            if place == MOST_GLASSES {
+            if place == MAX_GLASSES {
                 log::warn!(
-                    "`{}` is one glass more than the {MOST_GLASSES} seen by wavelength",
+                    "`{}` is one glass more than the {MAX_GLASSES} seen by wavelength",
                     glass.name
                 );
                 continue;

@@ -21,8 +21,8 @@ use crate::progress::{Control, Progress, Stage};
 const RAYS_PER_BAND: usize = 1 << 14;
 
 /// Rows of a band, however few or many rays they hold.
-const LEAST_ROWS: usize = 4;
-const MOST_ROWS: usize = 4096;
+const MIN_ROWS: usize = 4;
+const MAX_ROWS: usize = 4096;
 
 /// What the pass of one light did.
 #[derive(Clone, Debug, Default)]
@@ -273,9 +273,9 @@ impl Recorder {
 
 /// The row after a band's last.
 fn band_end(lattice: &Lattice, face: usize, first_row: usize) -> usize {
-    let rows = lattice.traced_size().1.min(first_row + MOST_ROWS);
+    let rows = lattice.traced_size().1.min(first_row + MAX_ROWS);
     let (mut end, mut rays) = (first_row, 0);
-    while end < rows && (rays < RAYS_PER_BAND || end < first_row + LEAST_ROWS) {
+    while end < rows && (rays < RAYS_PER_BAND || end < first_row + MIN_ROWS) {
         rays += lattice.row_ray_count(face, end);
         end += 1;
     }

@@ -165,7 +165,7 @@ impl Aim {
 const PLACES: u32 = 16;
 
 /// So many more are tried where those see nothing.
-const MOST_PLACES: u32 = 256;
+const MAX_PLACES: u32 = 256;
 
 /// Which places those are.
 const PLACES_SEED: u64 = 0;
@@ -371,7 +371,7 @@ impl ItemBufferBuilder<'_> {
         let scene = self.aimer.tracer.scene();
         let source = scene.lights[light].of_unit_strength();
         let many = self.sizes && source.has_extent();
-        (0..if many { MOST_PLACES } else { 1 }).filter_map(move |place| {
+        (0..if many { MAX_PLACES } else { 1 }).filter_map(move |place| {
             let emitter = if many {
                 Emitter::sample(&source, scene, even_point(place, 0, PLACES_SEED))
             } else {

@@ -28,7 +28,7 @@ const READY_OF_SKY: usize = 1 << 14;
 /// Angle of a sun [rad] whose places shine on a surface alike.
 const NARROW_RAD: f64 = 0.03;
 /// Surfaces of more triangles are looked at by samples alone.
-const MOST_POLYGONS: usize = 16;
+const MAX_POLYGONS: usize = 16;
 /// Corners that stand for the edge of a disc.
 const DISC_CORNERS: usize = 64;
 /// Share of its way that a shadow ray stops before a lamp, so as not to meet the lamp's own surface.
@@ -190,7 +190,7 @@ fn shape(light: &Light, scene: &Scene) -> Option<Shape> {
         }
         LightKind::Surface { object, .. } => {
             let mesh = scene.objects.get(object)?.mesh_in_scene();
-            if mesh.triangles.len() > MOST_POLYGONS || scene.glows.contains_key(&object) {
+            if mesh.triangles.len() > MAX_POLYGONS || scene.glows.contains_key(&object) {
                 return None;
             }
             let both_sides = scene.material_of(object).double_sided;

@@ -36,7 +36,7 @@ const PLACES_SEED: u64 = 0;
 const NEGLIGIBLE: f64 = 1e-5;
 /// A path is to meet the point that was asked about this nearly [m], and is looked for in so many steps.
 const MEETS_M: f64 = 1e-9;
-const MOST_STEPS: u32 = 40;
+const MAX_STEPS: u32 = 40;
 
 /// A specular surface on the way.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -258,7 +258,7 @@ fn meeting(walker: &Walker<'_>, piece: &Piece) -> Option<Way> {
     let mut square = piece.ray;
     let mut best = way(square)?;
     let mut step = 1e-4 * side;
-    for _ in 0..MOST_STEPS {
+    for _ in 0..MAX_STEPS {
         let miss = goal - best.place;
         if miss.length() * texel_m < MEETS_M {
             break;

@@ -9,7 +9,7 @@ use crate::scene::SurfaceKind;
 use crate::transport::{Branch, EffectSet, Interaction, MediumStack, SurfaceHit, Tracer};
 
 /// Rays that carry less than this share of what they could are given up, and counted.
-const LEAST_WEIGHT: f64 = 1e-4;
+const MIN_WEIGHT: f64 = 1e-4;
 
 /// How far rays are followed.
 #[derive(Clone, Copy, Debug)]
@@ -82,7 +82,7 @@ impl Follower<'_> {
             };
             weight = weight * share * (branch.ior_ratio * branch.ior_ratio);
             (ray, media) = (branch.ray, branch.media);
-            if weight.max_channel() < LEAST_WEIGHT {
+            if weight.max_channel() < MIN_WEIGHT {
                 break;
             }
         }

@@ -82,7 +82,7 @@ impl std::ops::AddAssign for TraceCounts {
 const CHUNK: usize = 32;
 
 /// An element far smaller than is usual on its grid takes up to so many times fewer rays.
-const MOST_HALVINGS: u32 = 3;
+const MAX_HALVINGS: u32 = 3;
 
 /// All that tracing needs.
 pub struct Pass<'a> {
@@ -161,7 +161,7 @@ impl Pass<'_> {
         let halvings = (grid.usual_m2 / grid.elements.all()[element].area_m2)
             .log2()
             .floor();
-        let halvings = halvings.clamp(0.0, f64::from(MOST_HALVINGS)) as u32;
+        let halvings = halvings.clamp(0.0, f64::from(MAX_HALVINGS)) as u32;
         let first_link = part.links.len();
         let mut ends = Vec::new();
         for index in self.rays.0 >> halvings..self.rays.1 >> halvings {

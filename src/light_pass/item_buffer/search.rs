@@ -178,7 +178,7 @@ impl<'a> Search<'a> {
     /// closes cells faster than the search does.
     pub(super) fn close_some(&self, mesh: &Mesh, open: &mut CellBits) {
         const BATCH: u64 = 1024;
-        const LEAST_CLOSED: u64 = BATCH / 12;
+        const MIN_CLOSED: u64 = BATCH / 12;
         let count = mesh.triangles.len() as u64;
         for batch in 0..count / BATCH {
             let before = open.count();
@@ -189,7 +189,7 @@ impl<'a> Search<'a> {
                 let vertex = mesh.triangles[triangle as usize][0];
                 self.close_at(mesh.positions[vertex as usize], open);
             }
-            if before - open.count() < LEAST_CLOSED {
+            if before - open.count() < MIN_CLOSED {
                 return;
             }
         }

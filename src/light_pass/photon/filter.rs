@@ -24,7 +24,7 @@ const CHANCE_PAIRS: f32 = 2.0;
 const ERROR_BY_LIGHT: f32 = 1.5;
 
 /// Details take no more of the light of a cell than leaves this part of it, where channels may be negative.
-const LEAST_LEFT: f32 = 1e-5;
+const MIN_LEFT: f32 = 1e-5;
 
 /// Light is told from none down to this part of the map's mean.
 const DARKEST: f32 = 1e-4;
@@ -243,7 +243,7 @@ impl Details {
             return with(1.0).map(|value| value.max(0.0));
         }
         let [before, after] = [0.0, 1.0].map(|part| luminance(&with(part)) as f32);
-        let least = LEAST_LEFT * before.max(0.0);
+        let least = MIN_LEFT * before.max(0.0);
         let lit = if after >= least {
             with(1.0)
         } else {

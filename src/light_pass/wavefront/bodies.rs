@@ -23,7 +23,7 @@ const CELLS_ACROSS_OTHERS: f64 = 8.0;
 const DEEPEST_BODY_LEVEL: u32 = 18;
 
 /// Cells across each of very many casters: enough for their flux.
-const LEAST_ACROSS_CASTERS: f64 = 12.0;
+const MIN_ACROSS_CASTERS: f64 = 12.0;
 
 /// Small casters from which on each is looked at less closely.
 const MANY_CASTERS: usize = 8;
@@ -141,7 +141,7 @@ impl SmallBodies {
         let mut bodies = Bins::default();
         for (body, bounds) in &mut small {
             if body.cells_across > CELLS_ACROSS_OTHERS {
-                let least = LEAST_ACROSS_CASTERS.min(body.cells_across);
+                let least = MIN_ACROSS_CASTERS.min(body.cells_across);
                 body.cells_across = (body.cells_across / crowd).max(least);
             }
             book(launch, *bounds, *body, &mut bodies);

@@ -10,7 +10,7 @@ use crate::transport::RayDifferential;
 const CELLS_PER_WAVE: f64 = 4.0;
 
 /// Cells of a whole lattice at most, once they are divided for detail.
-const MOST_CELLS: f64 = 2_097_152.0;
+const MAX_CELLS: f64 = 2_097_152.0;
 
 /// Divisions at most.
 const DEEPEST_LEVEL: u32 = 12;
@@ -31,7 +31,7 @@ impl BumpCells {
     pub fn for_lattice(cells: u64, coarser: i32) -> Self {
         let longer = f64::from(coarser).exp2();
         let finest = (cells as f64 * longer * longer).max(1.0);
-        let divisions = 0.5 * (MOST_CELLS / finest).log2();
+        let divisions = 0.5 * (MAX_CELLS / finest).log2();
         Self {
             per_wave: CELLS_PER_WAVE / longer,
             deepest: (divisions.max(0.0) as u32).min(DEEPEST_LEVEL),

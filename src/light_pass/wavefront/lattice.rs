@@ -20,7 +20,7 @@ use crate::light_pass::ledger_sum::{Account, LedgerSum};
 const CELLS_PER_BAND: f64 = 4096.0;
 
 /// Cells of a row from which on it is traced in parts.
-const MOST_CELLS_OF_ROW: f64 = 4.0 * CELLS_PER_BAND;
+const MAX_CELLS_OF_ROW: f64 = 4.0 * CELLS_PER_BAND;
 
 /// What is traced together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -122,7 +122,7 @@ impl WavefrontLattice<'_> {
         let (mut start, mut cells) = (0, 0.0);
         for row in 0..self.size.1 {
             let of_row = self.expected_cells(face, row);
-            if of_row.iter().sum::<f64>() > MOST_CELLS_OF_ROW {
+            if of_row.iter().sum::<f64>() > MAX_CELLS_OF_ROW {
                 if cells > 0.0 {
                     bands.push(self.whole_rows((start, row)));
                 }

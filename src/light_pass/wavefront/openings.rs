@@ -19,10 +19,10 @@ const NARROWEST_CELLS: f64 = 1e-4;
 const WIDTH_BITS: u32 = 4;
 
 /// Samples along an edge lie half a cell apart, but an edge has these at least.
-const LEAST_SAMPLES: usize = 3;
+const MIN_SAMPLES: usize = 3;
 
 /// Samples of one light's edges at most: beyond, they lie farther apart.
-const MOST_SAMPLES: f64 = 8_192.0;
+const MAX_SAMPLES: f64 = 8_192.0;
 
 /// Least and most cells across an opening: of the least, corners lie in it; of the most, its own corners are resolved.
 const CELLS_ACROSS: (f64, f64) = (4.0, 32.0);
@@ -77,7 +77,7 @@ pub fn narrow_openings(
     };
     let edges = search.edges();
     let wanted: f64 = edges.iter().map(|edge| search.samples_wanted(edge)).sum();
-    let thinning = (wanted / MOST_SAMPLES).max(1.0);
+    let thinning = (wanted / MAX_SAMPLES).max(1.0);
     let beside = |edge: &[DVec3; 2]| search.beside(edge, thinning);
     let openings = edges.par_iter().map(beside).collect::<Vec<_>>().concat();
     if openings.is_empty() {
@@ -171,7 +171,7 @@ impl Search<'_> {
     }
 
     fn beside(&self, edge: &[DVec3; 2], thinning: f64) -> Vec<Slit> {
-        let samples = ((self.samples_wanted(edge) / thinning).ceil() as usize).max(LEAST_SAMPLES);
+        let samples = ((self.samples_wanted(edge) / thinning).ceil() as usize).max(MIN_SAMPLES);
         let place = |share: f64| edge[0].lerp(edge[1], share);
         let along = (edge[1] - edge[0]).normalize_or_zero();
         let of_sample = |sample: usize| {

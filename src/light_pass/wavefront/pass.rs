@@ -25,7 +25,7 @@ const TASKS_AT_ONCE: usize = 64;
 const FIRST_AT_ONCE: usize = 4;
 
 /// Triangles that wait together, about: 72 bytes each.
-const MOST_TRIANGLES: usize = 1 << 21;
+const MAX_TRIANGLES: usize = 1 << 21;
 
 /// Triangles that are deposited between two looks at whether to stop.
 const TRIANGLES_AT_ONCE: usize = 1 << 13;
@@ -169,7 +169,7 @@ impl WavefrontDepositor<'_> {
             }
             let triangles: usize = parts.iter().map(SpreadOutput::triangle_count).sum();
             // Neighbouring patches are divided alike.
-            at_once = (MOST_TRIANGLES * tasks.len() / triangles.max(1)).clamp(1, TASKS_AT_ONCE);
+            at_once = (MAX_TRIANGLES * tasks.len() / triangles.max(1)).clamp(1, TASKS_AT_ONCE);
             if let Some(maps) = maps.as_deref_mut() {
                 let lists = parts.iter().flat_map(|part| &part.triangles);
                 let pieces = lists.flat_map(|(receiver, triangles)| {

@@ -17,7 +17,7 @@ use crate::light_pass::caustic::path::PathSignature;
 pub const TILE_SIDE: usize = 16;
 
 /// Light below this share of a cell's brightest does not divide it.
-const LEAST_SHARE: f64 = 0.02;
+const MIN_SHARE: f64 = 0.02;
 
 /// Tiles of one map.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -201,7 +201,7 @@ fn bright_signatures(samples: &[&LatticeRay]) -> Vec<PathSignature> {
         .iter()
         .map(|sample| sample.brightest_w)
         .fold(0.0, f64::max);
-    let is_bright = |strand: &&PathSegment| strand.flux_w.luminance() >= LEAST_SHARE * brightest_w;
+    let is_bright = |strand: &&PathSegment| strand.flux_w.luminance() >= MIN_SHARE * brightest_w;
     let strands = samples
         .iter()
         .flat_map(|sample| &sample.strands)

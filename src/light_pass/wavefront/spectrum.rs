@@ -17,7 +17,7 @@ use crate::transport::{RayDerivative, Tracer};
 pub const NODES: usize = 3;
 
 /// Most slices of a spectrum, as a power of two.
-const MOST_SLICES_LOG2: u32 = 9;
+const MAX_SLICES_LOG2: u32 = 9;
 
 /// Share of a lamp's colour, at either end, beyond the outermost nodes: Chebyshev's places over the rest.
 const TAIL: f64 = 0.002;
@@ -172,7 +172,7 @@ fn band(lamp: &Spectrum, (low, high): (f64, f64), index: usize, count: usize) ->
 
 /// The narrowest slices.
 fn finest(lamp: &Spectrum, ends: (f64, f64), nodes: [f64; NODES]) -> Vec<Slice> {
-    let count = 1 << MOST_SLICES_LOG2;
+    let count = 1 << MAX_SLICES_LOG2;
     let slice = |index: usize| {
         let range = band(lamp, ends, index, count);
         let within = |weight: &dyn Fn(f64) -> f64| {

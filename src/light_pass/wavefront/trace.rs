@@ -19,7 +19,7 @@ use crate::transport::{
 };
 
 /// Strands that one light ray may have waiting: a closed mirror box with glass in it doubles them without end.
-const MOST_BRANCHES: usize = 512;
+const MAX_BRANCHES: usize = 512;
 
 /// Rays start this far within the border of the domain's unit square.
 const DOMAIN_MARGIN: f64 = 1e-9;
@@ -284,7 +284,7 @@ impl<'a> StrandTracer<'a> {
                 node.depth += flux_w;
             } else if flux_w.luminance() < floor_w {
                 node.threshold += flux_w;
-            } else if sample.strands.len() >= MOST_BRANCHES {
+            } else if sample.strands.len() >= MAX_BRANCHES {
                 node.unresolved += flux_w;
             } else {
                 let surface = if is_too_fine {

@@ -83,7 +83,7 @@ const DARKEST_ATTENUATION: f64 = 1e-6;
 const BETWEEN: RangeInclusive<u8> = 26..=229;
 
 /// A texture whose alpha is between in no more than this part of it cuts out.
-const MOST_BETWEEN: f64 = 0.02;
+const MAX_BETWEEN: f64 = 0.02;
 
 /// Alpha from which on nothing is seen through a surface [codes].
 const OPAQUE: u8 = 254;
@@ -467,7 +467,7 @@ impl Reading<'_, '_> {
                 "its alpha was read as a lighter tint, since light goes through it already",
                 "leave its alpha mode OPAQUE",
             );
-        } else if factor == 1.0 && (between as f64) < MOST_BETWEEN * texels.len() as f64 {
+        } else if factor == 1.0 && (between as f64) < MAX_BETWEEN * texels.len() as f64 {
             material.alpha_mask = Some(AlphaMask { cutoff: 0.5, factor });
         } else {
             material.coverage = Some(factor);

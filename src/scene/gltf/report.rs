@@ -17,10 +17,10 @@ struct CheckResult {
 }
 
 /// More would bury the ones that matter.
-const MOST_FINDINGS: usize = 60;
+const MAX_FINDINGS: usize = 60;
 
 /// Places that a warning names before it only counts them.
-const MOST_LOCATIONS: usize = 4;
+const MAX_LOCATIONS: usize = 4;
 
 impl Report {
     /// Notes something repaired or ignored.
@@ -31,7 +31,7 @@ impl Report {
             if !known.locations.contains(&location) {
                 known.locations.push(location);
             }
-        } else if self.found.len() < MOST_FINDINGS {
+        } else if self.found.len() < MAX_FINDINGS {
             self.found.push(CheckResult {
                 what,
                 remedy,
@@ -58,7 +58,7 @@ impl Report {
 
 impl CheckResult {
     fn into_warning(self) -> Warning {
-        let named = self.locations.len().min(MOST_LOCATIONS);
+        let named = self.locations.len().min(MAX_LOCATIONS);
         let mut location = self.locations[..named].join(", ");
         if self.locations.len() > named {
             location += &format!(" and {} more", self.locations.len() - named);

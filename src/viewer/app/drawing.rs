@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use serde_json::json;
 
-use super::{App, BesideShown, MOST_REPORTS, MapsOnDevice};
+use super::{App, BesideShown, MAX_REPORTS, MapsOnDevice};
 use crate::effect::{Effect, EffectSwitch};
 use crate::error::Result;
 use crate::eye_pass::renderer::{EyeQuality, GpuMs, Renderer, Uploaded};
@@ -132,7 +132,7 @@ impl App {
         self.is_refining = true;
         if graphics.draw_picture(&view, self.pace.walking())? {
             self.pictures += 1;
-            self.reports_due = MOST_REPORTS;
+            self.reports_due = MAX_REPORTS;
         }
         Ok(())
     }

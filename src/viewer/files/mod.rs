@@ -280,7 +280,7 @@ impl Dialog {
 }
 
 /// Most that are remembered.
-pub const MOST_RECENT: usize = 10;
+pub const MAX_RECENT: usize = 10;
 
 /// Files that were opened, the newest first.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -289,11 +289,11 @@ pub struct Recent {
 }
 
 impl Recent {
-    /// Those of a list that are still there; each once, at most [`MOST_RECENT`].
+    /// Those of a list that are still there; each once, at most [`MAX_RECENT`].
     pub fn of(paths: impl IntoIterator<Item = PathBuf>) -> Self {
         let mut recent = Self::default();
         for path in paths {
-            if recent.paths.len() < MOST_RECENT && path.is_file() && !recent.paths.contains(&path) {
+            if recent.paths.len() < MAX_RECENT && path.is_file() && !recent.paths.contains(&path) {
                 recent.paths.push(path);
             }
         }

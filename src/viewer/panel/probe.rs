@@ -20,7 +20,7 @@ const PATCHES: &str = "Outlines what lies between four neighbouring light rays t
                        bright, folded ones are where the wavefront overlaps. Far thinner than the bake's patches; changes \
                        nothing in a bake.";
 /// Paths that are listed: the strongest.
-const MOST_LISTED: usize = 8;
+const MAX_LISTED: usize = 8;
 
 /// Shows the section.
 pub fn show(
@@ -114,15 +114,15 @@ fn paths(ui: &mut Ui, probed: &Probed, model: &Model) {
     if told.paths.is_empty() {
         ui.label("No light path leads here.");
     }
-    for path in told.paths.iter().take(MOST_LISTED) {
+    for path in told.paths.iter().take(MAX_LISTED) {
         ui.label(format!("{}  {}", percent(probed.share(path)), chain(path, model)));
     }
-    if told.paths.len() > MOST_LISTED {
-        let rest: f64 = told.paths[MOST_LISTED..]
+    if told.paths.len() > MAX_LISTED {
+        let rest: f64 = told.paths[MAX_LISTED..]
             .iter()
             .map(|path| probed.share(path))
             .sum();
-        let more = counted(told.paths.len() - MOST_LISTED, "path");
+        let more = counted(told.paths.len() - MAX_LISTED, "path");
         ui.label(format!("{}  {more} more", percent(rest)));
     }
     if !told.is_complete {

@@ -230,7 +230,7 @@ fn stated_sizes_take_no_memory() {
 }
 
 /// Memory that reading or merging so little may take [bytes].
-const MOST_BYTES: usize = 32 << 20;
+const MAX_BYTES: usize = 32 << 20;
 
 /// Damages one file of a folder after the other, so often each, and reads the folder.
 fn attack_files<T>(
@@ -255,7 +255,7 @@ fn attack_files<T>(
             read()
         };
         let subjects = [(name.as_str(), whole.clone(), damage)];
-        attack(tally, (times(file), MOST_BYTES), &subjects, read, &fault);
+        attack(tally, (times(file), MAX_BYTES), &subjects, read, &fault);
         std::fs::write(file, whole).expect("can be written");
     }
 }
@@ -416,7 +416,7 @@ fn sums_behind_right_checksums() {
         for (pass, packed) in passes.iter().enumerate() {
             let unpacked = zstd::stream::decode_all(&packed[..]).expect("whole");
             let sums = [("sums", unpacked, Damage::head as Way)];
-            let bounds = (60_usize.div_ceil(passes.len()), MOST_BYTES);
+            let bounds = (60_usize.div_ceil(passes.len()), MAX_BYTES);
             let read = |bytes: &[u8]| shards.read_with(pass, bytes, 1 << 30);
             attack(&tally, bounds, &sums, read, |result| result_fault(&result));
         }
@@ -431,7 +431,7 @@ fn small_file_that_unpacks_to_a_large_one() {
         let tally = Tally::default();
         for byte in [0, 0x01, 0x7f] {
             let read = || shards.read_with(0, std::io::repeat(byte).take(1 << 28), 8 << 20);
-            tally.watch((&format!("{byte}-bomb"), &[]), MOST_BYTES, read);
+            tally.watch((&format!("{byte}-bomb"), &[]), MAX_BYTES, read);
         }
         assert_eq!(tally.refused.get(), 3, "{tally:?}");
     });

@@ -24,7 +24,7 @@ use support::{or_skip, shared_or_skip};
 const LIMIT_BYTES: u64 = 64 << 20;
 
 /// Memory that a small bake may take [bytes].
-const MOST_BYTES_OF_BAKE: usize = 512 << 20;
+const MAX_BYTES_OF_BAKE: usize = 512 << 20;
 
 /// Memory that a file of so many bytes may take: the limit twice, since data is copied on its way, and what its text
 /// takes as a document.
@@ -128,7 +128,7 @@ fn attack_scene(path: &Path, tally: &Tally, bakes: &Tally) {
                 return fault;
             }
             let bytes = std::fs::read(copy_of(file)).expect("it was written");
-            let result = bakes.watch((&name, &bytes), MOST_BYTES_OF_BAKE, || bake(scene));
+            let result = bakes.watch((&name, &bytes), MAX_BYTES_OF_BAKE, || bake(scene));
             result.and_then(|result| bake_fault(&result))
         });
         std::fs::write(copy_of(file), whole).expect("can be written");

@@ -198,7 +198,7 @@ fn path_is_recorded_played_and_filmed() {
 
 /// Of one part; there are at most three.
 const PART: Duration = Duration::from_secs(20);
-const MOST_PARTS: usize = 3;
+const MAX_PARTS: usize = 3;
 /// Deeds between two looks at the clock.
 const DEEDS: usize = 12;
 
@@ -253,7 +253,7 @@ fn random_input_breaks_nothing() {
     let mut viewer = Viewer::open(&screen, "builtin:ring --map-resolution 128 --max-error 0.05%");
     let mut random = Damage::to("hands", 0);
     let start = Instant::now();
-    while start.elapsed() < PART * effort().clamp(1, MOST_PARTS) as u32 {
+    while start.elapsed() < PART * effort().clamp(1, MAX_PARTS) as u32 {
         let deeds: String = (0..DEEDS).map(|_| deed(&mut random, viewer.place().1)).collect();
         viewer.hasty_hands(&deeds);
         assert!(viewer.runs(), "it ended: {}", viewer.stderr());

@@ -4,7 +4,7 @@
 use nephroid::optics::Glass;
 use nephroid::optics::spectrum::illuminant;
 use nephroid::optics::wavelength::D_LINE;
-use nephroid::viewer::files::{MOST_RECENT as MOST, Recent, typed};
+use nephroid::viewer::files::{MAX_RECENT as MOST, Recent, typed};
 
 use super::fixtures::read;
 use super::*;

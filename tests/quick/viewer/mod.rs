@@ -37,7 +37,7 @@ use nephroid::progress::Stage;
 use nephroid::scene::changes::Change;
 use nephroid::scene::load::save;
 use nephroid::session::StopReason;
-use nephroid::settings::{Estimator, LEAST_MAX_ERROR, Sigma};
+use nephroid::settings::{Estimator, MIN_MAX_ERROR, Sigma};
 use nephroid::viewer::ViewerOptions;
 use nephroid::viewer::command::{Choices, Command, CompareCommand, FilmCommand};
 use nephroid::viewer::edits::EditedScene;

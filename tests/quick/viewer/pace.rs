@@ -305,7 +305,7 @@ fn drag_along_the_curve_sets_the_target() {
 
 #[test]
 fn a_time_stays_a_time() {
-    let mut panel = panel(with(towards(LEAST_MAX_ERROR), |it| it.max_time_s = Some(1.0)));
+    let mut panel = panel(with(towards(MIN_MAX_ERROR), |it| it.max_time_s = Some(1.0)));
     let rect = plot(&panel);
     panel.click_at(rect.right_center() - vec2(0.1 * rect.width(), 0.0));
     let limit_s = panel.settings().max_time_s.expect("still a time");
