@@ -322,9 +322,8 @@ impl<'a> Glowing<'a> {
         let mut sum_m2 = 0.0;
         let upto_m2: Vec<f64> = (0..mesh.triangles.len())
             .map(|triangle| {
-                let [a, b, c] = mesh.corners(triangle);
                 let bright = glow.map_or(1.0, |glow| weight(glow, triangle));
-                sum_m2 += 0.5 * (b - a).cross(c - a).length() * bright;
+                sum_m2 += mesh.triangle_area_m2(triangle) * bright;
                 sum_m2
             })
             .collect();

@@ -25,8 +25,7 @@ impl Glow {
         let mut luminances = Vec::with_capacity(mesh.triangles.len());
         for triangle in 0..mesh.triangles.len() {
             let mean = triangle_mean(mesh, image, texture, triangle)?;
-            let [a, b, c] = mesh.corners(triangle);
-            let triangle_m2 = 0.5 * (b - a).cross(c - a).length();
+            let triangle_m2 = mesh.triangle_area_m2(triangle);
             sum += mean * triangle_m2;
             area_m2 += triangle_m2;
             luminances.push(mean.luminance());
@@ -37,6 +36,11 @@ impl Glow {
             mean,
             by_triangle: luminances.into_iter().map(|of| of / luminance).collect(),
         })
+    }
+
+    /// Radiance over that of the whole for a white texel of the image.
+    pub fn per_colour(&self) -> LinearSrgb {
+        self.mean.map(|mean| if mean > 0.0 { mean.recip() } else { 0.0 })
     }
 }
 
@@ -66,17 +70,9 @@ impl Scene {
             return LinearSrgb::WHITE;
         };
         let image = self.material_of(object).emission_texture.as_ref();
-        let placed = image.and_then(|image| {
-            let uv = image.place(self.objects[object].mesh_in_scene(), triangle, barycentric)?;
-            Some(self.textures[image.texture].sample(uv))
-        });
-        placed.map_or(LinearSrgb::WHITE, |colour| colour * glow.per_colour())
-    }
-}
-
-impl Glow {
-    /// Radiance over that of the whole for a white texel of the image.
-    pub fn per_colour(&self) -> LinearSrgb {
-        self.mean.map(|mean| if mean > 0.0 { mean.recip() } else { 0.0 })
+        let placed = image.and_then(|image| self.placed_texture(image, (object, triangle), barycentric));
+        placed.map_or(LinearSrgb::WHITE, |(texture, uv)| {
+            texture.sample(uv) * glow.per_colour()
+        })
     }
 }

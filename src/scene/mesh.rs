@@ -59,13 +59,16 @@ impl Mesh {
         )
     }
 
+    /// Area of a triangle [m²].
+    pub fn triangle_area_m2(&self, triangle: usize) -> f64 {
+        let [a, b, c] = self.corners(triangle);
+        0.5 * (b - a).cross(c - a).length()
+    }
+
     /// Total area [m²].
     pub fn area_m2(&self) -> f64 {
         (0..self.triangles.len())
-            .map(|triangle| {
-                let [a, b, c] = self.corners(triangle);
-                0.5 * (b - a).cross(c - a).length()
-            })
+            .map(|triangle| self.triangle_area_m2(triangle))
             .sum()
     }
 
@@ -84,12 +87,7 @@ impl Mesh {
             uv1: self.uv1.clone(),
             triangles: self.triangles.iter().map(turn).collect(),
         };
-        // The cofactors are the inverse transpose without its division, so that flattened objects have normals too.
-        let cofactors = DMat3::from_cols(
-            linear.y_axis.cross(linear.z_axis),
-            linear.z_axis.cross(linear.x_axis),
-            linear.x_axis.cross(linear.y_axis),
-        );
+        let cofactors = cofactors(linear);
         let sign = if is_mirrored { -1.0 } else { 1.0 };
         let is_shifted = linear == DMat3::IDENTITY;
         let mut around: Option<Vec<DVec3>> = None;
@@ -124,4 +122,11 @@ impl Mesh {
             .map(|(sum, any)| sum.try_normalize().unwrap_or(any))
             .collect()
     }
+}
+
+/// What turns normals as a linear map turns the surface: its inverse transpose without the division, so that flattened
+/// objects have normals too.
+pub fn cofactors(linear: DMat3) -> DMat3 {
+    let [x, y, z] = [linear.x_axis, linear.y_axis, linear.z_axis];
+    DMat3::from_cols(y.cross(z), z.cross(x), x.cross(y))
 }

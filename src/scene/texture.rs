@@ -2,7 +2,7 @@
 
 use glam::{DMat3, DVec2};
 
-use super::Mesh;
+use super::{Mesh, Scene};
 use crate::optics::LinearSrgb;
 
 /// How a coordinate outside [0, 1] is brought back.
@@ -95,6 +95,20 @@ impl TextureRef {
     /// The texture coordinate after KHR_texture_transform.
     pub fn transform(&self, uv: DVec2) -> DVec2 {
         self.uv_transform.transform_point2(uv)
+    }
+}
+
+impl Scene {
+    /// A texture, and where it is looked up at a place of a triangle of an object; `None` where its mesh lacks the
+    /// coordinates.
+    pub fn placed_texture(
+        &self,
+        reference: &TextureRef,
+        (object, triangle): (usize, usize),
+        barycentric: [f64; 3],
+    ) -> Option<(&Texture, DVec2)> {
+        let uv = reference.place(self.objects[object].mesh_in_scene(), triangle, barycentric)?;
+        Some((&self.textures[reference.texture], uv))
     }
 }
 

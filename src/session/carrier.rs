@@ -165,7 +165,7 @@ impl CausticLayer<'_> {
             _ => f64::INFINITY,
         };
         let cost = |level: &LightLevel| cost(level, per_photon);
-        let so_far: f64 = climb.levels.iter().map(cost).sum();
+        let so_far = cost_of(&climb.levels, per_photon);
         let next = climb.levels.last().map_or(0.0, cost) * LEVEL_GROWTH;
         let promised = promised(climb, cost, most_share).unwrap_or(0.0);
         let goes_many_ways = climb.levels.is_empty() && per_photon > MAX_WAYS;
@@ -199,10 +199,7 @@ impl CausticLayer<'_> {
             .as_ref()
             .is_some_and(|error| error.estimate.relative_rmse > AUDITORS);
         let known = photon_segments(rival).filter(|_| is_coarse);
-        known.is_some_and(|(segments, per_photon)| {
-            let by_patches: f64 = climb.levels.iter().map(|level| cost(level, per_photon)).sum();
-            GROWTH.1 * segments < by_patches
-        })
+        known.is_some_and(|(segments, per_photon)| GROWTH.1 * segments < cost_of(&climb.levels, per_photon))
     }
 
     /// Whether another level of photons takes less than the first one of patches.
@@ -229,6 +226,11 @@ impl CausticLayer<'_> {
 fn cost(level: &LightLevel, per_photon: f64) -> f64 {
     let (cells, queries) = level.work;
     CELL * per_photon.powi(3) * cells as f64 + RECEIVER_QUERY * queries as f64
+}
+
+/// Of all levels.
+fn cost_of(levels: &[LightLevel], per_photon: f64) -> f64 {
+    levels.iter().map(|level| cost(level, per_photon)).sum()
 }
 
 /// Whether audits found more than the last two levels of patches show of themselves: finer ones will not mend that.

@@ -51,25 +51,23 @@ pub(super) fn paper(density_per_sr: f64) -> BakeSettings {
 }
 
 pub(super) fn splat(density_per_sr: f64) -> BakeSettings {
-    BakeSettings {
-        density_per_sr,
-        ..BakeSettings::splat()
-    }
+    at_density(Estimator::Splat, density_per_sr)
 }
 
 /// Exactly one lattice.
 pub(super) fn wavefront(density_per_sr: f64) -> BakeSettings {
-    BakeSettings {
-        density_per_sr,
-        ..BakeSettings::of(Estimator::Wavefront)
-    }
+    at_density(Estimator::Wavefront, density_per_sr)
 }
 
 /// The estimator that is used unless another is asked for.
 pub(super) fn auto(density_per_sr: f64) -> BakeSettings {
+    at_density(Estimator::Auto, density_per_sr)
+}
+
+fn at_density(estimator: Estimator, density_per_sr: f64) -> BakeSettings {
     BakeSettings {
         density_per_sr,
-        ..BakeSettings::of(Estimator::Auto)
+        ..BakeSettings::of(estimator)
     }
 }
 

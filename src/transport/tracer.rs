@@ -417,16 +417,13 @@ impl Tracer {
     /// Whether a surface is there at a place of the hierarchy's triangle, or cut out.
     fn is_there(&self, triangle: u32, barycentric: [f64; 3]) -> bool {
         let (object, triangle) = self.hierarchy.triangles[triangle as usize];
-        let object = &self.scene.objects[object as usize];
-        let material = &self.scene.materials[object.material];
+        let place = (object as usize, triangle as usize);
+        let material = self.scene.material_of(place.0);
         let Some(mask) = &material.alpha_mask else {
             return true;
         };
-        let placed = material.base_colour_texture.as_ref().and_then(|reference| {
-            let uv = reference.place(object.mesh_in_scene(), triangle as usize, barycentric)?;
-            Some((&*self.scene.textures[reference.texture], uv))
-        });
-        mask.is_there(placed)
+        let image = material.base_colour_texture.as_ref();
+        mask.is_there(image.and_then(|image| self.scene.placed_texture(image, place, barycentric)))
     }
 
     /// What the surface is made of at a place of a triangle; by the material's factors alone without `textures`.
@@ -437,11 +434,7 @@ impl Tracer {
         textures: bool,
     ) -> Mixture {
         let material = self.scene.material_of(object);
-        let mesh = self.scene.objects[object].mesh_in_scene();
-        let placed = |reference: &TextureRef| {
-            let uv = reference.place(mesh, triangle, barycentric)?;
-            Some((&self.scene.textures[reference.texture], uv))
-        };
+        let placed = |image: &TextureRef| self.scene.placed_texture(image, (object, triangle), barycentric);
         let variation = material.variation.as_ref().filter(|_| textures);
         let factors = variation.and_then(|variation| placed(&variation.image));
         let colour = material.base_colour_texture.as_ref();
@@ -477,14 +470,10 @@ impl Tracer {
 
     /// What the texture at a hit multiplies the base colour by: white where there is none.
     pub(super) fn texture_colour(&self, hit: &SurfaceHit) -> LinearSrgb {
-        let object = &self.scene.objects[hit.object];
-        let Some(reference) = &self.scene.materials[object.material].base_colour_texture else {
-            return LinearSrgb::WHITE;
-        };
-        match reference.place(object.mesh_in_scene(), hit.triangle, hit.barycentric) {
-            Some(uv) => self.scene.textures[reference.texture].sample(uv),
-            None => LinearSrgb::WHITE,
-        }
+        let image = self.scene.material_of(hit.object).base_colour_texture.as_ref();
+        let place = (hit.object, hit.triangle);
+        let placed = image.and_then(|image| self.scene.placed_texture(image, place, hit.barycentric));
+        placed.map_or(LinearSrgb::WHITE, |(texture, uv)| texture.sample(uv))
     }
 }
 

@@ -51,8 +51,7 @@ pub fn light_map_set(mesh: &Mesh, uvs: &[DVec2]) -> Result<Vec<[DVec2; 3]>, Refu
     }
     let surface_m2 = mesh.area_m2();
     let dense = |triangle: usize| {
-        let [a, b, c] = mesh.corners(triangle);
-        let share_of_surface = 0.5 * (b - a).cross(c - a).length() / surface_m2;
+        let share_of_surface = mesh.triangle_area_m2(triangle) / surface_m2;
         let share_of_map = 0.5 * twice_signed_area(corners[triangle]).abs() / covered;
         share_of_surface == 0.0 || share_of_map > MIN_DENSITY * share_of_surface
     };

@@ -1,29 +1,22 @@
 //! Materials: glTF's factors and extensions, checked, and the class that transport treats each as.
 
-use std::ops::RangeInclusive;
 use std::path::Path;
 use std::sync::Arc;
 
-use glam::{DMat3, DVec2};
+use gltf::json::Value;
 use gltf::json::extensions::material as extension;
-use gltf::json::extensions::texture::TextureTransform;
-use gltf::json::material::{AlphaMode, Material as Source};
-use gltf::json::texture::Info;
+use gltf::json::material::Material as Source;
 use gltf::json::validation::Checked;
-use gltf::json::{Index, Value};
-use serde::Deserialize;
 
 use super::document::Document;
-use super::factors::{FactorImage, Factors};
 use super::images::Images;
 use super::numbers::widen;
 use super::report::{Budget, Report};
 use super::substance::{self, Substance};
-use super::{extras, names, spectrum, waves};
+use super::{coat, extras, names, spectrum, waves};
 use crate::error::Result;
 use crate::optics::LinearSrgb;
-use crate::scene::material::SPECULAR_ROUGHNESS_LIMIT;
-use crate::scene::{AlphaMask, Material, NormalMap, SurfaceKind, TextureRef, Variation, Volume};
+use crate::scene::{Material, SurfaceKind, Volume};
 use crate::units::LUMENS_PER_WATT;
 
 /// What a primitive without a material has: glTF's default material is a rough metal, which is taken for matte.
@@ -79,15 +72,6 @@ const DEFAULT_IOR: f64 = 1.5;
 /// The least that an attenuation colour lets through: black would need an infinite absorption.
 const DARKEST_ATTENUATION: f64 = 1e-6;
 
-/// Alphas that are neither there nor not [codes].
-const BETWEEN: RangeInclusive<u8> = 26..=229;
-
-/// A texture whose alpha is between in no more than this part of it cuts out.
-const MAX_BETWEEN: f64 = 0.02;
-
-/// Alpha from which on nothing is seen through a surface [codes].
-const OPAQUE: u8 = 254;
-
 /// All materials, in file order.
 ///
 /// # Errors
@@ -121,19 +105,20 @@ pub fn read_all(
         .collect()
 }
 
-struct Reading<'a, 'b> {
-    owner: String,
-    source: &'a Source,
+/// A material while it is read.
+pub struct Reading<'a, 'b> {
+    pub owner: String,
+    pub source: &'a Source,
     /// As its extras state them.
-    waves: Option<&'a Value>,
-    glass: Option<&'a Value>,
-    metal: Option<&'a Value>,
-    spectrum: Option<&'a Value>,
+    pub waves: Option<&'a Value>,
+    pub glass: Option<&'a Value>,
+    pub metal: Option<&'a Value>,
+    pub spectrum: Option<&'a Value>,
     /// Where the file is.
-    folder: &'a Path,
-    images: &'a mut Images<'b>,
-    budget: &'a mut Budget,
-    report: &'a mut Report,
+    pub folder: &'a Path,
+    pub images: &'a mut Images<'b>,
+    pub budget: &'a mut Budget,
+    pub report: &'a mut Report,
 }
 
 impl Reading<'_, '_> {
@@ -199,12 +184,12 @@ impl Reading<'_, '_> {
         Ok(material)
     }
 
-    fn warn(&mut self, what: impl Into<String>, remedy: &str) {
+    pub(super) fn warn(&mut self, what: impl Into<String>, remedy: &str) {
         self.report.warn(self.owner.clone(), what, remedy);
     }
 
     /// A factor brought into [0, 1]; what is no number counts as 0.
-    fn share(&mut self, value: f32, what: &str) -> f64 {
+    pub(super) fn share(&mut self, value: f32, what: &str) -> f64 {
         let read = if value.is_nan() {
             0.0
         } else {
@@ -298,47 +283,6 @@ impl Reading<'_, '_> {
         factor * (strength / LUMENS_PER_WATT)
     }
 
-    /// The image of what it emits, or its mean where the graphics card could not place it.
-    fn glow(&mut self, material: &mut Material) -> Result<()> {
-        let source = self.source;
-        let Some(info) = source.emissive_texture.as_ref() else {
-            return Ok(());
-        };
-        if material.emitted_radiance == LinearSrgb::BLACK {
-            return Ok(());
-        }
-        let transform = info
-            .extensions
-            .as_ref()
-            .and_then(|extensions| extensions.texture_transform.as_ref());
-        let place = self.placed("emissive texture", info.tex_coord, transform);
-        let others = material.coordinates();
-        let is_coloured = self.spectrum.is_none();
-        let fits =
-            is_coloured && others.is_none_or(|other| place == Some((other.uv_set, other.uv_transform)));
-        if let Some((uv_set, uv_transform)) = place.filter(|_| fits) {
-            let found = self
-                .images
-                .texture(info.index, &self.owner, self.budget, self.report)?;
-            material.emission_texture = found.map(|texture| TextureRef {
-                texture,
-                uv_set,
-                uv_transform,
-            });
-            return Ok(());
-        }
-        let linear = |[r, g, b, _]: [u8; 4]| [r, g, b].map(LinearSrgb::decode_channel).into();
-        let mean = self
-            .images
-            .mean(info.index, linear, &self.owner, self.budget, self.report)?;
-        material.emitted_radiance = material.emitted_radiance * mean.unwrap_or(LinearSrgb::WHITE);
-        self.warn(
-            "its emissive texture was read as its mean, since it has other coordinates than its others or a spectrum",
-            "give all of its textures the same set and transform",
-        );
-        Ok(())
-    }
-
     /// Gives what it emits the spectrum that is stated for it, if any, in place of its colour.
     fn emission_spectrum(&mut self, material: &mut Material) -> Result<()> {
         let Some(stated) = self.spectrum else {
@@ -364,114 +308,6 @@ impl Reading<'_, '_> {
         material.emitted_radiance = spectrum.xyz().to_linear_srgb() * luminance;
         material.emission_spectrum = Some(spectrum);
         Ok(())
-    }
-
-    /// The image of a texture of factors.
-    fn factor_image(&mut self, what: &str, stated: Option<&Info>) -> Result<Option<FactorImage>> {
-        let Some(info) = stated else {
-            return Ok(None);
-        };
-        let found = self
-            .images
-            .pixels(info.index, &self.owner, self.budget, self.report)?;
-        let Some((pixels, wrap)) = found else {
-            return Ok(None);
-        };
-        let extensions = info.extensions.as_ref();
-        let transform = extensions.and_then(|extensions| extensions.texture_transform.as_ref());
-        Ok(Some(FactorImage {
-            pixels,
-            wrap,
-            place: self.placed(what, info.tex_coord, transform),
-        }))
-    }
-
-    /// Takes over the textures of factors: as an image where that changes what the surface does, else as their means.
-    fn vary(
-        &mut self,
-        material: &mut Material,
-        transmission: Option<&extension::Transmission>,
-    ) -> Result<()> {
-        let source = self.source;
-        let stated = source.pbr_metallic_roughness.metallic_roughness_texture.as_ref();
-        let metallic_roughness = self.factor_image("metallic-roughness texture", stated)?;
-        let stated = transmission.and_then(|transmission| transmission.transmission_texture.as_ref());
-        let stated = stated.filter(|_| material.transmission > 0.0);
-        let transmission = self.factor_image("transmission texture", stated)?;
-        let factors = Factors {
-            transmission: transmission.as_ref(),
-            metallic_roughness: metallic_roughness.as_ref(),
-        };
-        if transmission.is_none() && metallic_roughness.is_none() {
-            return Ok(());
-        }
-        let mean = factors.mean();
-        let class = factors.class(material);
-        let colour = material.base_colour_texture.as_ref();
-        let place = factors.place(colour.map(|colour| (colour.uv_set, colour.uv_transform)));
-        if let (Some(surface), Some((uv_set, uv_transform))) = (class, place)
-            && surface != SurfaceKind::Diffuse
-        {
-            let texture = factors.texture(format!("factors of {}", self.owner));
-            let texture = self.images.add(texture, self.budget)?;
-            let image = TextureRef {
-                texture,
-                uv_set,
-                uv_transform,
-            };
-            material.variation = Some(Variation { image, surface });
-            if surface != SurfaceKind::Varied {
-                (material.transmission, material.metallic) =
-                    (material.transmission * mean.r, material.metallic * mean.b);
-            }
-            return Ok(());
-        }
-        (material.transmission, material.roughness, material.metallic) = (
-            material.transmission * mean.r,
-            material.roughness * mean.g,
-            material.metallic * mean.b,
-        );
-        if class == Some(SurfaceKind::Diffuse) && material.classified() != SurfaceKind::Diffuse {
-            // Matte metal and matte body may have a shining mean.
-            material.roughness = 1.0;
-        } else if class.is_some_and(|class| class != SurfaceKind::Diffuse) {
-            self.warn(
-                format!(
-                    "its textures of factors follow different coordinates and were read as their means, metallic {:.2}, \
-                     roughness {:.2} and transmission {:.2}",
-                    material.metallic, material.roughness, material.transmission
-                ),
-                "give all of its textures the same set and transform",
-            );
-        }
-        Ok(())
-    }
-
-    /// Alpha that blends: what part of the surface is there.
-    fn blend(&mut self, material: &mut Material) {
-        if !matches!(self.source.alpha_mode, Checked::Valid(AlphaMode::Blend)) {
-            return;
-        }
-        let factor = self.share(self.source.pbr_metallic_roughness.base_color_factor.0[3], "alpha");
-        let image = material.base_colour_texture.as_ref();
-        let texels = image.map_or(&[][..], |image| &self.images.get(image.texture).rgba);
-        let least = texels.iter().map(|texel| texel[3]).min().unwrap_or(u8::MAX);
-        let between = texels.iter().filter(|texel| BETWEEN.contains(&texel[3])).count();
-        if factor * f64::from(least) >= f64::from(OPAQUE) {
-            return;
-        }
-        if material.transmission > 0.0 {
-            let kept = LinearSrgb::WHITE - material.base_colour;
-            material.base_colour = LinearSrgb::WHITE - kept * factor;
-            self.warn(
-                "its alpha was read as a lighter tint, since light goes through it already",
-                "leave its alpha mode OPAQUE",
-            );
-        } else if factor == 1.0 && (between as f64) < MAX_BETWEEN * texels.len() as f64 {
-            material.alpha_mask = Some(AlphaMask { cutoff: 0.5, factor });
-        } else {
-            material.coverage = Some(factor);
-        }
     }
 
     /// What it is made of: as its extras say, else by KHR_materials_dispersion.
@@ -526,151 +362,6 @@ impl Reading<'_, '_> {
         surface
     }
 
-    /// Set and transform of a texture's coordinates; `None`, with a warning, for a set that is not read.
-    fn placed(
-        &mut self,
-        what: &str,
-        tex_coord: u32,
-        transform: Option<&TextureTransform>,
-    ) -> Option<(usize, DMat3)> {
-        let (uv_set, uv_transform) = coordinates(tex_coord, transform);
-        if uv_set > 1 {
-            self.warn(
-                format!("its {what} follows TEXCOORD_{uv_set} and was left out"),
-                "use TEXCOORD_0 or TEXCOORD_1",
-            );
-            return None;
-        }
-        if uv_transform.is_finite() {
-            return Some((uv_set, uv_transform));
-        }
-        self.warn(
-            "its texture transform is not finite and was ignored",
-            "export the file again",
-        );
-        Some((uv_set, DMat3::IDENTITY))
-    }
-
-    /// A lacquer over the surface, where the file has one.
-    fn coat(&mut self, material: &mut Material, extensions: &extension::Material) {
-        let Some(stated) = extensions.others.get(CLEARCOAT) else {
-            return;
-        };
-        let Ok(stated) = Coat::deserialize(stated) else {
-            return self.warn(
-                "its clearcoat cannot be read and was left out",
-                "export the file again",
-            );
-        };
-        let factor = self.share(stated.clearcoat_factor, "clearcoat factor");
-        let roughness = self.share(stated.clearcoat_roughness_factor, "clearcoat roughness");
-        if factor == 0.0 || extensions.unlit.is_some() {
-            return;
-        }
-        if stated.has_texture() {
-            self.warn(
-                "its clearcoat is read by its factors alone, without textures",
-                "split the mesh where the lacquer changes",
-            );
-        }
-        if let Err(why) = put_on(material, factor, roughness) {
-            self.warn(why, "expect it to look and bake as if it were not there");
-        }
-    }
-
-    /// What bends the normals of a specular surface.
-    fn normal_map(&mut self, material: &Material) -> Result<Option<NormalMap>> {
-        let source = self.source;
-        let Some(stated) = source
-            .normal_texture
-            .as_ref()
-            .filter(|_| material.surface.is_specular())
-        else {
-            return Ok(None);
-        };
-        let others = stated.extensions.as_ref().map(|extensions| &extensions.others);
-        let transform = others
-            .and_then(|others| others.get("KHR_texture_transform"))
-            .and_then(|transform| TextureTransform::deserialize(transform).ok());
-        let Some((uv_set, uv_transform)) =
-            self.placed("normal texture", stated.tex_coord, transform.as_ref())
-        else {
-            return Ok(None);
-        };
-        let scale = widen(stated.scale);
-        let colour = material.coordinates();
-        // The graphics card has one set of coordinates for each surface.
-        if colour.is_some_and(|colour| (colour.uv_set, colour.uv_transform) != (uv_set, uv_transform)) {
-            self.warn(
-                "its normal texture follows other coordinates than its base colour and was left out",
-                "give both the same set and transform",
-            );
-            return Ok(None);
-        }
-        if !scale.is_finite() {
-            self.warn(
-                "its normal texture has a scale that is not finite and was left out",
-                "export the file again",
-            );
-            return Ok(None);
-        }
-        let index = Index::new(stated.index.value() as u32);
-        let texture = self
-            .images
-            .texture(index, &self.owner, self.budget, self.report)?;
-        let Some(texture) = texture else {
-            return Ok(None);
-        };
-        let image = TextureRef {
-            texture,
-            uv_set,
-            uv_transform,
-        };
-        let map = NormalMap::new(image, scale, self.images.get(texture));
-        // Also what stands in for an image that could not be read.
-        if map.detail_texels == f64::INFINITY {
-            self.warn(
-                "its normal texture is the same everywhere and was left out",
-                "give it some relief, or none",
-            );
-            return Ok(None);
-        }
-        Ok(Some(map))
-    }
-
-    fn base_colour_texture(&mut self) -> Result<Option<TextureRef>> {
-        let source = self.source;
-        let Some(info) = &source.pbr_metallic_roughness.base_color_texture else {
-            return Ok(None);
-        };
-        let transform = info
-            .extensions
-            .as_ref()
-            .and_then(|extensions| extensions.texture_transform.as_ref());
-        let Some((uv_set, uv_transform)) = self.placed("base colour texture", info.tex_coord, transform)
-        else {
-            return Ok(None);
-        };
-        let texture = Index::new(info.index.value() as u32);
-        let texture = self
-            .images
-            .texture(texture, &self.owner, self.budget, self.report)?;
-        Ok(texture.map(|texture| TextureRef {
-            texture,
-            uv_set,
-            uv_transform,
-        }))
-    }
-
-    /// Where the surface is cut out, if it is.
-    fn alpha_mask(&mut self) -> Option<AlphaMask> {
-        let is_mask = matches!(self.source.alpha_mode, Checked::Valid(AlphaMode::Mask));
-        is_mask.then(|| AlphaMask {
-            cutoff: self.source.alpha_cutoff.map_or(0.5, |cutoff| f64::from(cutoff.0)),
-            factor: self.share(self.source.pbr_metallic_roughness.base_color_factor.0[3], "alpha"),
-        })
-    }
-
     fn name_what_is_ignored(
         &mut self,
         extensions: &extension::Material,
@@ -702,7 +393,7 @@ impl Reading<'_, '_> {
             extensions
                 .others
                 .keys()
-                .filter(|key| ![CLEARCOAT, substance::NAME].contains(&key.as_str()))
+                .filter(|key| ![coat::NAME, substance::NAME].contains(&key.as_str()))
                 .map(|key| names::name(Some(key), "extension", 0)),
         );
         if !ignored.is_empty() {
@@ -711,87 +402,5 @@ impl Reading<'_, '_> {
                 "expect it to look and bake as if it were not there",
             );
         }
-    }
-}
-
-/// Set and transform of a texture's coordinates.
-fn coordinates(tex_coord: u32, transform: Option<&TextureTransform>) -> (usize, DMat3) {
-    let Some(transform) = transform else {
-        return (tex_coord as usize, DMat3::IDENTITY);
-    };
-    let vector = |[x, y]: [f32; 2]| DVec2::new(widen(x), widen(y));
-    // v runs downwards, so that the extension's counter-clockwise turn is a negative one in (u, v).
-    let matrix = DMat3::from_scale_angle_translation(
-        vector(transform.scale.0),
-        -widen(transform.rotation.0),
-        vector(transform.offset.0),
-    );
-    (transform.tex_coord.unwrap_or(tex_coord) as usize, matrix)
-}
-
-/// Name of the extension.
-const CLEARCOAT: &str = "KHR_materials_clearcoat";
-
-/// n of the lacquer, as the extension fixes it.
-const IOR: f64 = 1.5;
-
-/// Reflectance of the lacquer at normal incidence: ((n − 1)/(n + 1))².
-const F0: f64 = 0.04;
-
-/// The lacquer as the file states it; textures are named and not read.
-#[derive(Debug, Default, Deserialize)]
-#[serde(default, rename_all = "camelCase")]
-pub struct Coat {
-    /// Part of the surface that it covers.
-    pub clearcoat_factor: f32,
-    /// Of its surface.
-    pub clearcoat_roughness_factor: f32,
-    clearcoat_texture: Option<Value>,
-    clearcoat_roughness_texture: Option<Value>,
-    clearcoat_normal_texture: Option<Value>,
-}
-
-impl Coat {
-    /// Whether an image changes it from place to place.
-    pub fn has_texture(&self) -> bool {
-        let textures = [
-            &self.clearcoat_texture,
-            &self.clearcoat_roughness_texture,
-            &self.clearcoat_normal_texture,
-        ];
-        textures.iter().any(|texture| texture.is_some())
-    }
-}
-
-/// Puts a lacquer of a factor and a roughness, both in [0, 1], over a material whose class is known.
-///
-/// # Errors
-/// Why it has to be left out, to go after the name of the material.
-pub fn put_on(material: &mut Material, factor: f64, roughness: f64) -> std::result::Result<(), String> {
-    match material.surface {
-        SurfaceKind::Diffuse if roughness > SPECULAR_ROUGHNESS_LIMIT => Err(format!(
-            "its clearcoat of roughness {roughness:.2} was left out, as it hardly shines"
-        )),
-        SurfaceKind::Diffuse => {
-            // What is below is matte, whatever it was.
-            (material.metallic, material.transmission, material.volume) = (0.0, 0.0, None);
-            (material.roughness, material.ior, material.polish) = (roughness, IOR, factor);
-            material.surface = SurfaceKind::Mixed;
-            Ok(())
-        }
-        SurfaceKind::Mirror => {
-            // 1 − R = (1 − coat)(1 − metal) at normal incidence; towards grazing angles both tend to 1.
-            let left = 1.0 - factor * F0;
-            material.base_colour = LinearSrgb::WHITE - (LinearSrgb::WHITE - material.base_colour) * left;
-            Ok(())
-        }
-        SurfaceKind::Mixed => {
-            material.polish = factor + (1.0 - factor) * material.polish;
-            Ok(())
-        }
-        SurfaceKind::Dielectric | SurfaceKind::ThinWall => {
-            Err("its clearcoat was left out, as light goes through it".into())
-        }
-        SurfaceKind::Varied => Err("its clearcoat was left out, as what it covers varies".into()),
     }
 }

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use glam::{DAffine3, DMat3, DMat4, DVec3};
+use glam::{DAffine3, DMat4, DVec3};
 use gltf::json::{Index, Value};
 use serde::Deserialize;
 use serde_json::Map;
@@ -11,6 +11,7 @@ use super::accessor::{Formats, Reader};
 use super::report::Budget;
 use crate::error::{Error, Result};
 use crate::scene::Mesh;
+use crate::scene::mesh::cofactors;
 
 /// What bends meshes, as the file states it. Faults in it cost the pose and not the scene, so it is read by itself.
 #[derive(Clone, Debug, Default, Deserialize)]
@@ -200,14 +201,8 @@ pub fn hang(mesh: &mut Mesh, joints: &[DMat4], influences: &[Influences], owner:
         if !matrix.is_finite() {
             return Err(unlike(owner));
         }
-        let [x, y, z] = [
-            matrix.matrix3.x_axis,
-            matrix.matrix3.y_axis,
-            matrix.matrix3.z_axis,
-        ];
-        let cofactors = DMat3::from_cols(y.cross(z), z.cross(x), x.cross(y));
         mesh.positions[vertex] = matrix.transform_point3(mesh.positions[vertex]);
-        mesh.normals[vertex] = (cofactors * mesh.normals[vertex]).normalize_or_zero();
+        mesh.normals[vertex] = (cofactors(matrix.matrix3) * mesh.normals[vertex]).normalize_or_zero();
     }
     Ok(())
 }

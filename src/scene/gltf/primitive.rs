@@ -284,8 +284,7 @@ impl Vertices<'_> {
         };
         let (mut sum, mut area) = (DVec3::ZERO, 0.0);
         for (triangle, corners) in mesh.triangles.iter().enumerate() {
-            let [a, b, c] = mesh.corners(triangle);
-            let weight = (b - a).cross(c - a).length();
+            let weight = mesh.triangle_area_m2(triangle);
             let of_triangle = corners
                 .iter()
                 .map(|vertex| colours[*vertex as usize])
