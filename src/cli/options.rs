@@ -91,7 +91,7 @@ impl RunOptions {
     }
 }
 
-#[derive(Debug, Args)]
+#[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Picture options")]
 pub struct PictureOptions {
     /// Camera of the file, by name or index [default: the first, or one that frames the scene]

@@ -36,6 +36,13 @@ struct Shape {
     in_scene: Option<Arc<Mesh>>,
 }
 
+impl Shape {
+    fn settle(&mut self) {
+        let is_moved = self.world_from_object != DAffine3::IDENTITY;
+        self.in_scene = is_moved.then(|| Arc::new(self.mesh.placed(&self.world_from_object)));
+    }
+}
+
 /// How a node was moved since it was loaded: turned about the middle of its box, and then moved.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Motion {
@@ -152,8 +159,19 @@ impl Object {
             return;
         }
         shape.world_from_object = world_from_object;
-        let is_moved = world_from_object != DAffine3::IDENTITY;
-        shape.in_scene = is_moved.then(|| Arc::new(shape.mesh.placed(&world_from_object)));
+        shape.settle();
+    }
+
+    /// Moves it on from where it is now.
+    pub(super) fn carry(&mut self, carrying: &DAffine3) {
+        self.shape.world_from_object = *carrying * self.shape.world_from_object;
+        self.shape.settle();
+    }
+
+    /// Gives it another mesh at the same place.
+    pub(super) fn reshape(&mut self, mesh: Arc<Mesh>) {
+        self.shape.mesh = mesh;
+        self.shape.settle();
     }
 
     /// Takes over mesh and place of an object that looks the same, so that who knows that one does nothing anew.

@@ -170,6 +170,7 @@ fn wavy_mirror() -> Material {
         wavelength_m: 0.2,
         direction: DVec3::Y,
         phase_rad: 0.5,
+        period_s: 0.0,
     };
     Material {
         waves: Waves::new(vec![wave]).ok(),
@@ -214,6 +215,7 @@ pub fn fitting_waves() -> Waves {
         wavelength_m,
         direction,
         phase_rad,
+        period_s: 0.0,
     };
     Waves::new(vec![
         wave(DVec3::X, WIDTH_M / 4.0, 1.0),
