@@ -1,6 +1,6 @@
 //! The sky and the ground of a clear day, for scenes without light.
 
-use std::f64::consts::{FRAC_1_PI, FRAC_PI_2, TAU};
+use std::f64::consts::{FRAC_1_PI, FRAC_PI_2, PI, TAU};
 
 use glam::DVec3;
 
@@ -22,7 +22,7 @@ const ALBEDO: f64 = 0.2;
 pub fn clear_sky(to_sun: DVec3, sun_w_per_m2: f64, sky_w_per_m2: f64) -> Option<Environment> {
     let [width, height] = SIZE;
     let place = |pixel: usize| {
-        let polar = ((pixel / width) as f64 + 0.5) / height as f64 * (2.0 * FRAC_PI_2);
+        let polar = ((pixel / width) as f64 + 0.5) / height as f64 * PI;
         let azimuth = ((pixel % width) as f64 + 0.5) / width as f64 * TAU;
         let sine = polar.sin();
         DVec3::new(sine * azimuth.sin(), polar.cos(), -sine * azimuth.cos())
@@ -30,7 +30,7 @@ pub fn clear_sky(to_sun: DVec3, sun_w_per_m2: f64, sky_w_per_m2: f64) -> Option<
     let above: Vec<LinearSrgb> = (0..width * height / 2)
         .map(|pixel| radiance(place(pixel), to_sun))
         .collect();
-    let pixel_sr = TAU / width as f64 * (2.0 * FRAC_PI_2) / height as f64;
+    let pixel_sr = TAU / width as f64 * PI / height as f64;
     let received = above.iter().enumerate().map(|(pixel, radiance)| {
         let cosine = place(pixel).y;
         radiance.luminance() * cosine * (1.0 - cosine * cosine).sqrt() * pixel_sr

@@ -20,7 +20,7 @@ fn exhibit() -> (Scene, Vec<IlluminationMap>) {
     let glow = TextureRef {
         texture: 1,
         uv_set: 1,
-        uv_transform: DMat3::from_scale_angle_translation(dvec2(2.0, 1.5), 0.0, dvec2(0.0, -0.25)),
+        uv_transform: DMat3::from_scale_angle_translation(dvec2(1.5, 1.5), 0.0, dvec2(0.0, -0.6)),
     };
     let mut scene = floor_scene(Material {
         base_colour_texture: Some(texture_reference()),
@@ -33,7 +33,7 @@ fn exhibit() -> (Scene, Vec<IlluminationMap>) {
     mesh.uv1 = mesh.uv0.as_ref().map(|uvs| uvs.iter().map(swapped).collect());
     let of_floor = Glow::new(mesh, &glow, &pattern).expect("it glows");
     scene.glows.insert(0, of_floor.into());
-    scene.textures.extend([four_colours().into(), pattern.into()]);
+    scene.textures.extend([four_colours(), pattern].map(Arc::new));
     let mirror = with(parts::mirror(), |it| it.base_colour = rgb(0.9, 0.7, 0.5));
     let mut glass = parts::dielectric("glass", 1.5);
     glass.base_colour = rgb(1.0, 0.8, 0.6);
