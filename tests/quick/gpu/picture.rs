@@ -11,7 +11,8 @@ use support::flip::mean_flip;
 use support::floors::{diffuse, floor_map, floor_scene, four_colours, lambert, texture_reference};
 use support::scenes::{light, seen, view};
 
-/// A textured floor with a lit corner of known radiance, which glows elsewhere by an image of other coordinates, a glowing wall with colours at its corners, a mirror ball and a glass ball under a sky;
+/// A textured floor with a lit corner of known radiance, which glows elsewhere by an image of other coordinates, a
+/// glowing wall with colours at its corners, a mirror ball and a glass ball under a sky;
 /// whatever has a colour has three distinct channels.
 fn exhibit() -> (Scene, Vec<IlluminationMap>) {
     let mut pattern = four_colours();
