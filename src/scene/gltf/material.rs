@@ -224,7 +224,7 @@ impl Reading<'_, '_> {
                 "expect highlights of the light's own colour, the same everywhere",
             );
         }
-        let brightness = tint.luminance();
+        let brightness = if is_grey { tint.r } else { tint.luminance() };
         let brightness = if brightness.is_nan() { 1.0 } else { brightness };
         Ok((factor * mean * brightness).clamp(0.0, 1.0))
     }

@@ -72,7 +72,10 @@ fn fault(scene: &Scene, target: &Target, path: &LightPath) -> Option<String> {
             _ => [1.0, 1.0],
         };
         let off_ratio = ratios.map(|ratio| (vertex.ior_ratio - ratio).abs());
-        let passes = matches!(vertex.event, Event::Refraction | Event::ThinTransmission | Event::Passage);
+        let passes = matches!(
+            vertex.event,
+            Event::Refraction | Event::ThinTransmission | Event::Passage
+        );
         let is_on_side = normal.dot(way_in) < 0.0 && passes == (way_out.dot(normal) < 0.0);
         let lengths = (way_out.length() - 1.0).abs() + (normal.length() - 1.0).abs();
         laws.extend([

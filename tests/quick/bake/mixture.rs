@@ -2,6 +2,7 @@
 
 use nephroid::optics::Glass;
 use nephroid::scene::{Glow, Variation};
+use nephroid::settings::Estimator;
 use nephroid::units::Radiance;
 use support::floors::texture_reference;
 use support::meshes::{floor, quad};
@@ -224,6 +225,28 @@ fn shone_by(image: Option<Texture>) -> f64 {
     let tracer = Tracer::new(Arc::new(scene));
     let chart = chart(&tracer, 0, 16, 16);
     flux_w(&chart, &direct(&tracer, &chart))
+}
+
+/// Over a mirror, most places of which are black.
+#[test]
+fn lamps_that_are_mostly_black_shine() {
+    let mut image = board(|_| [0, 0, 0, 255]);
+    image.rgba[..4 * TEXELS].fill([255; 4]);
+    let mut scene = lit(parts::mirror(), image.clone());
+    let lamp = &mut scene.materials[2];
+    lamp.emitted_radiance = LinearSrgb::grey(10.0);
+    lamp.emission_texture = Some(texture_reference());
+    let glow = Glow::new(scene.objects[2].mesh_in_scene(), &texture_reference(), &image);
+    scene.glows.insert(2, Arc::new(glow.expect("it glows")));
+    let radiance = Radiance(scene.emitted_radiance(2).luminance());
+    scene.lights = vec![light(LightKind::Surface { object: 2, radiance })];
+    let settings = BakeSettings {
+        estimator: Estimator::Wavefront,
+        ..photons(1e3, 16)
+    };
+    let result = bake(scene, &settings);
+    assert_eq!(energy_fault(&result), None);
+    assert!(result.ledgers[0].energy_w.emitted > 0.0);
 }
 
 #[test]
