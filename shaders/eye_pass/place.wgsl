@@ -3,8 +3,10 @@
 struct Corner {
     @location(0) position: vec3f,
     @location(1) normal: vec3f,
-    @location(2) uv: vec2f,
+    // Both sets of texture coordinates.
+    @location(2) uvs: vec4f,
     @location(3) map_uv: vec2f,
+    @location(7) colour: vec4f,
 }
 
 struct Fragment {
@@ -12,9 +14,10 @@ struct Fragment {
     @builtin(position) @invariant clip: vec4f,
     @location(0) from_camera: vec3f,
     @location(1) normal: vec3f,
-    @location(2) uv: vec2f,
+    @location(2) uvs: vec4f,
     @location(3) map_uv: vec2f,
     @location(4) @interpolate(flat) object: u32,
+    @location(5) colour: vec3f,
 }
 
 @vertex
@@ -24,5 +27,5 @@ fn place(corner: Corner, @builtin(instance_index) object: u32) -> Fragment {
     var clip = frame.clip_from_camera * vec4f(from_camera, 1.0);
     clip.x -= frame.jitter.x * clip.w;
     clip.y -= frame.jitter.y * clip.w;
-    return Fragment(clip, from_camera, corner.normal, corner.uv, corner.map_uv, object);
+    return Fragment(clip, from_camera, corner.normal, corner.uvs, corner.map_uv, object, corner.colour.rgb);
 }

@@ -1,5 +1,6 @@
 //! Finds the next surface of a scene.
 
+use std::cell::Cell;
 use std::sync::{Arc, OnceLock};
 
 use glam::DVec3;
@@ -27,6 +28,8 @@ pub struct Tracer {
     has_bumps: bool,
     /// Whether anything is cut out of a surface.
     has_masks: bool,
+    /// Whether any surface is there in part.
+    has_partial: bool,
     /// The wavelength of all light, where it has but one.
     wavelength: Option<Nanometres>,
 }
@@ -130,7 +133,8 @@ impl Tracer {
             .map(|object| Self::specular_shape(&scene, object))
             .collect();
         Self {
-            has_masks: has_masks(&scene),
+            has_masks: is_any(&scene, |material| material.alpha_mask.is_some()),
+            has_partial: is_any(&scene, |material| material.coverage.is_some()),
             scene,
             hierarchy,
             specular,
@@ -166,7 +170,8 @@ impl Tracer {
             })
             .collect();
         Self {
-            has_masks: has_masks(&scene),
+            has_masks: is_any(&scene, |material| material.alpha_mask.is_some()),
+            has_partial: is_any(&scene, |material| material.coverage.is_some()),
             scene,
             hierarchy,
             specular,
@@ -184,6 +189,7 @@ impl Tracer {
             specular: self.specular.clone(),
             has_bumps: false,
             has_masks: self.has_masks,
+            has_partial: self.has_partial,
             wavelength: self.wavelength,
         }
     }
@@ -414,6 +420,28 @@ impl Tracer {
         }
     }
 
+    /// Share of the light along a ray that no surface before `distance_m` stops: where one is there in part, the rest goes
+    /// straight on.
+    pub fn passing_share(&self, ray: &Ray, distance_m: f64) -> f64 {
+        if !self.has_partial {
+            return f64::from(u8::from(!self.is_blocked(ray, distance_m)));
+        }
+        let left = Cell::new(1.0);
+        let is_blocked = self.hierarchy.bvh.is_blocked_where(ray, distance_m, |index, at| {
+            if !self.is_there(index, at) {
+                return false;
+            }
+            let (object, triangle) = self.hierarchy.triangles[index as usize];
+            let object = object as usize;
+            if self.scene.material_of(object).coverage.is_none() {
+                return true;
+            }
+            left.set(left.get() * self.mixture(object, (triangle as usize, at), true).hole);
+            left.get() == 0.0
+        });
+        if is_blocked { 0.0 } else { left.get() }
+    }
+
     /// Whether a surface is there at a place of the hierarchy's triangle, or cut out.
     fn is_there(&self, triangle: u32, barycentric: [f64; 3]) -> bool {
         let (object, triangle) = self.hierarchy.triangles[triangle as usize];
@@ -468,16 +496,17 @@ impl Tracer {
         self.scene.material_of(hit.object).base_colour * self.texture_colour(hit)
     }
 
-    /// What the texture at a hit multiplies the base colour by: white where there is none.
+    /// What texture and vertices at a hit multiply the base colour by: white where there is nothing.
     pub(super) fn texture_colour(&self, hit: &SurfaceHit) -> LinearSrgb {
         let image = self.scene.material_of(hit.object).base_colour_texture.as_ref();
         let place = (hit.object, hit.triangle);
         let placed = image.and_then(|image| self.scene.placed_texture(image, place, hit.barycentric));
-        placed.map_or(LinearSrgb::WHITE, |(texture, uv)| texture.sample(uv))
+        let mesh = self.scene.objects[hit.object].mesh_in_scene();
+        let of_vertices = mesh.colour(hit.triangle, hit.barycentric);
+        placed.map_or(of_vertices, |(texture, uv)| of_vertices * texture.sample(uv))
     }
 }
 
-fn has_masks(scene: &Scene) -> bool {
-    let mut objects = 0..scene.objects.len();
-    objects.any(|object| scene.material_of(object).alpha_mask.is_some())
+fn is_any(scene: &Scene, is: impl Fn(&Material) -> bool) -> bool {
+    (0..scene.objects.len()).any(|object| is(scene.material_of(object)))
 }

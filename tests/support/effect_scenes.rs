@@ -198,6 +198,7 @@ fn stripes() -> Texture {
         height: 8,
         rgba: rgba.collect(),
         wrap: [Wrap::Repeat; 2],
+        is_nearest: false,
     }
 }
 
@@ -255,6 +256,7 @@ pub fn by_image(mirrored: bool) -> Scene {
         height: SIDE,
         rgba: (0..SIDE * SIDE).map(texel).collect(),
         wrap: [Wrap::Repeat; 2],
+        is_nearest: false,
     };
     let image = TextureRef {
         texture: 0,

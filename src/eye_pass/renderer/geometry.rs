@@ -9,7 +9,7 @@ use glam::DVec2;
 use super::paging::Uploaded;
 use crate::gpu::Gpu;
 use crate::illumination::Chart;
-use crate::scene::{Mesh, Object, Scene, TextureRef};
+use crate::scene::{Mesh, Object, Scene};
 
 /// A corner of a triangle. Surfaces with a map share none between triangles, since maps may cut them anywhere.
 #[repr(C)]
@@ -19,8 +19,10 @@ pub(super) struct Corner {
     position: [f32; 3],
     /// Unit.
     normal: [f32; 3],
-    /// Of the material's images, KHR_texture_transform applied.
-    uv: [f32; 2],
+    /// TEXCOORD_0 and TEXCOORD_1, 0 where the mesh has none.
+    uvs: [[f32; 2]; 2],
+    /// What the base colour is multiplied by, in steps of 1/65535; the last number is not used.
+    colour: [u16; 4],
 }
 
 /// Map coordinates of a corner: they change with the maps.
@@ -41,7 +43,16 @@ pub(super) const CORNER_LAYOUT: wgpu::VertexBufferLayout<'static> = wgpu::Vertex
             std::mem::offset_of!(Corner, normal),
             wgpu::VertexFormat::Float32x3,
         ),
-        attribute(2, std::mem::offset_of!(Corner, uv), wgpu::VertexFormat::Float32x2),
+        attribute(
+            2,
+            std::mem::offset_of!(Corner, uvs),
+            wgpu::VertexFormat::Float32x4,
+        ),
+        attribute(
+            7,
+            std::mem::offset_of!(Corner, colour),
+            wgpu::VertexFormat::Unorm16x4,
+        ),
     ],
 };
 pub(super) const MAP_UV_LAYOUT: wgpu::VertexBufferLayout<'static> = wgpu::VertexBufferLayout {
@@ -162,10 +173,9 @@ impl Geometry {
 
     fn write_corners(&self, gpu: &Gpu, scene: &Scene, index: usize) -> usize {
         let object = &scene.objects[index];
-        let image = scene.material_of(index).coordinates();
         let mut bytes = 0;
         for segment in &self.segments[index] {
-            let corners = segment.corners(object.mesh_in_scene(), image);
+            let corners = segment.corners(object.mesh_in_scene());
             let offset = (segment.first_corner * size_of::<Corner>()) as u64;
             let page = &self.pages[segment.page];
             gpu.queue
@@ -210,16 +220,14 @@ fn meshes(scene: &Scene) -> Vec<Arc<Mesh>> {
 }
 
 impl Segment {
-    fn corners(&self, mesh: &Mesh, image: Option<&TextureRef>) -> Vec<Corner> {
+    fn corners(&self, mesh: &Mesh) -> Vec<Corner> {
         if self.shares_corners {
             return (0..mesh.positions.len())
-                .map(|vertex| corner(mesh, image, vertex))
+                .map(|vertex| corner(mesh, vertex))
                 .collect();
         }
         let vertices = mesh.triangles[self.triangles.clone()].iter().flatten();
-        vertices
-            .map(|vertex| corner(mesh, image, *vertex as usize))
-            .collect()
+        vertices.map(|vertex| corner(mesh, *vertex as usize)).collect()
     }
 }
 
@@ -236,13 +244,12 @@ impl Packing<'_> {
     /// Where an object ended up. Surfaces without maps share the corners of neighbouring triangles.
     fn add(&mut self, scene: &Scene, object: &Object) -> Vec<Segment> {
         let material = &scene.materials[object.material];
-        let image = material.coordinates();
         let mesh = object.mesh_in_scene();
         let largest = mesh.positions.len().max(3 * mesh.triangles.len());
         if !material.surface.is_receiver() && largest <= self.page_corners {
             let segment = self.segment(largest, 0..mesh.triangles.len(), true);
             let first = self.corners.len() as u32;
-            self.corners.extend(segment.corners(mesh, image));
+            self.corners.extend(segment.corners(mesh));
             self.indices
                 .extend(mesh.triangles.iter().flatten().map(|vertex| first + vertex));
             return vec![segment];
@@ -256,7 +263,7 @@ impl Packing<'_> {
             triangle = triangles.end;
             let segment = self.segment(3 * triangles.len(), triangles, false);
             let first = self.corners.len() as u32;
-            self.corners.extend(segment.corners(mesh, image));
+            self.corners.extend(segment.corners(mesh));
             self.indices.extend(first..self.corners.len() as u32);
             segments.push(segment);
         }
@@ -312,18 +319,14 @@ fn single(uv: DVec2) -> [f32; 2] {
     uv.as_vec2().to_array()
 }
 
-fn corner(mesh: &Mesh, image: Option<&TextureRef>, vertex: usize) -> Corner {
-    // Without an image they are looked at, but nothing is looked up by them.
-    let uv = match image {
-        Some(image) => {
-            let set = if image.uv_set == 0 { &mesh.uv0 } else { &mesh.uv1 };
-            set.as_ref().map(|uvs| image.transform(uvs[vertex]))
-        }
-        None => mesh.uv0.as_ref().map(|uvs| uvs[vertex]),
-    };
+fn corner(mesh: &Mesh, vertex: usize) -> Corner {
+    let uv = |set: &Option<Vec<DVec2>>| single(set.as_ref().map_or(DVec2::ZERO, |uvs| uvs[vertex]));
+    let colour = mesh.colours.as_ref().map_or([1.0; 3], |colours| colours[vertex]);
+    let [red, green, blue] = colour.map(|channel| (channel * f32::from(u16::MAX)).round() as u16);
     Corner {
         position: mesh.positions[vertex].as_vec3().to_array(),
         normal: mesh.normals[vertex].as_vec3().to_array(),
-        uv: single(uv.unwrap_or_default()),
+        uvs: [uv(&mesh.uv0), uv(&mesh.uv1)],
+        colour: [red, green, blue, u16::MAX],
     }
 }

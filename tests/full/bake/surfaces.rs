@@ -376,6 +376,7 @@ fn scene_under_a(sheet: Sheet) -> Scene {
         height: 1,
         rgba: vec![[255, 255, 255, 0], [255; 4]],
         wrap: [Wrap::ClampToEdge; 2],
+        is_nearest: false,
     }));
     let material = Material {
         base_colour_texture: Some(TextureRef {

@@ -3,7 +3,7 @@
 use nephroid::eye_pass::Picture;
 use nephroid::eye_pass::tone_mapping::display_rgba8;
 use nephroid::illumination::IlluminationMap;
-use nephroid::scene::Environment;
+use nephroid::scene::{Environment, Glow, TextureRef};
 
 use crate::gpu::rig::{AS_CPU, Rig, or_skip, unlike};
 use crate::prelude::*;
@@ -11,23 +11,40 @@ use support::flip::mean_flip;
 use support::floors::{diffuse, floor_map, floor_scene, four_colours, lambert, texture_reference};
 use support::scenes::{light, seen, view};
 
-/// A textured floor with a lit corner of known radiance, a glowing wall, a mirror ball and a glass ball under a sky;
+/// A textured floor with a lit corner of known radiance, which glows elsewhere by an image of other coordinates, a
+/// glowing wall with colours at its corners, a mirror ball and a glass ball under a sky;
 /// whatever has a colour has three distinct channels.
 fn exhibit() -> (Scene, Vec<IlluminationMap>) {
+    let mut pattern = four_colours();
+    (pattern.wrap, pattern.is_nearest) = ([Wrap::MirroredRepeat, Wrap::Repeat], true);
+    pattern.rgba.reverse();
+    let glow = TextureRef {
+        texture: 1,
+        uv_set: 1,
+        uv_transform: DMat3::from_scale_angle_translation(dvec2(1.5, 1.5), 0.0, dvec2(0.0, -0.6)),
+    };
     let mut scene = floor_scene(Material {
         base_colour_texture: Some(texture_reference()),
+        emitted_radiance: rgb(0.0, 0.4, 0.2),
+        emission_texture: Some(glow.clone()),
         ..diffuse(rgb(0.8, 0.6, 0.3))
     });
-    scene.textures.push(four_colours().into());
+    let mesh = scene.objects[0].mesh_in_scene_mut();
+    let swapped = |uv: &DVec2| dvec2(uv.y, uv.x);
+    mesh.uv1 = mesh.uv0.as_ref().map(|uvs| uvs.iter().map(swapped).collect());
+    let of_floor = Glow::new(mesh, &glow, &pattern).expect("it glows");
+    scene.glows.insert(0, of_floor.into());
+    scene.textures.extend([four_colours(), pattern].map(Arc::new));
     let mirror = with(parts::mirror(), |it| it.base_colour = rgb(0.9, 0.7, 0.5));
     let mut glass = parts::dielectric("glass", 1.5);
     glass.base_colour = rgb(1.0, 0.8, 0.6);
     let glowing = Material {
         emitted_radiance: rgb(0.3, 0.9, 0.6),
-        ..diffuse(LinearSrgb::BLACK)
+        ..diffuse(LinearSrgb::WHITE)
     };
     let ball = |x: f64| shapes::sphere(dvec3(x, 0.2, 0.35), 0.18, 4);
-    let wall = shapes::rectangle(dvec3(0.5, 0.3, -0.1), DVec3::X * 0.4, DVec3::Y * 0.2);
+    let mut wall = shapes::rectangle(dvec3(0.5, 0.3, -0.1), DVec3::X * 0.4, DVec3::Y * 0.2);
+    wall.colours = Some(vec![[1.0, 0.0, 0.3], [0.2, 1.0, 0.1], [0.0, 0.4, 1.0], [0.6; 3]]);
     parts::add(&mut scene, "mirror", ball(0.25), mirror);
     parts::add(&mut scene, "glass", ball(0.75), glass);
     parts::add(&mut scene, "wall", wall, glowing);
@@ -42,7 +59,8 @@ fn exhibit() -> (Scene, Vec<IlluminationMap>) {
     for corner in [54, 55, 62, 63] {
         texels[corner] = [3.0, 2.0, 1.0];
     }
-    (scene, vec![floor_map(0, 8, 8, texels)])
+    let of_wall = floor_map(3, 1, 1, vec![[2.0, 3.0, 4.0]]);
+    (scene, vec![floor_map(0, 8, 8, texels), of_wall])
 }
 
 #[test]
