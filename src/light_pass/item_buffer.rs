@@ -86,6 +86,7 @@ impl ItemBuffer {
             launch,
             tracer,
             owners: Owners::new(tracer),
+            bounds: &bounds,
             boxes: boxes(true),
             wanted: &wanted,
             tests: AtomicU64::new(0),

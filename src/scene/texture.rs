@@ -121,6 +121,8 @@ impl Scene {
 fn wrap_index(coordinate: f64, size: u32, wrap: Wrap) -> usize {
     let size_f = f64::from(size);
     let index = match wrap {
+        // As each of them has it, without a division.
+        _ if (0.0..size_f).contains(&coordinate) => coordinate,
         Wrap::ClampToEdge => coordinate.clamp(0.0, size_f - 1.0),
         Wrap::Repeat => coordinate.rem_euclid(size_f),
         Wrap::MirroredRepeat => {
