@@ -9,6 +9,7 @@
 //! | [`formats`] | the folder of a bake, exported files, units |
 //! | [`engines`] | maps in three.js, Blender, Godot, Unity, Bevy and Unreal |
 //! | [`many_machines`] | one bake on many machines |
+//! | [`options`] | every option of a bake: values, default, accuracy, cost |
 //! | [`accuracy`] | estimators, error targets, energy accounts, studies, comparisons |
 //! | [`hard_cases`] | what is tested, and the limits that remain |
 //! | [`how_it_works`] | the algorithm, a glossary, and two walks through the code |
@@ -41,6 +42,9 @@ pub mod how_it_works {}
 
 #[doc = include_str!("many_machines.md")]
 pub mod many_machines {}
+
+#[doc = include_str!("options.md")]
+pub mod options {}
 
 #[doc = include_str!("scenes.md")]
 pub mod scenes {}
