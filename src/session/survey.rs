@@ -1,4 +1,4 @@
-//! What a bake would take, before it: a short pilot bake of each preset, and what its course says.
+//! Predicts the cost of a bake: a short pilot bake for each preset, and its forecast.
 
 use std::time::Instant;
 

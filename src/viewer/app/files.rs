@@ -1,4 +1,4 @@
-//! Scenes that are chosen, dropped, read or saved while the window is open.
+//! Scenes that are opened, dropped, reloaded or saved while the window is open.
 
 use std::path::{Path, PathBuf};
 
@@ -14,7 +14,7 @@ use crate::viewer::files::{Choice, NO_DIALOG, Purpose, free_names, working_folde
 use crate::viewer::model::Model;
 use crate::viewer::panel::Quantity;
 
-/// What who opens a file without light is told first.
+/// Shown first for a file without light.
 pub(super) fn dark_notice(model: &Model) -> Option<String> {
     was_dark(model.edits().loaded()).then(|| {
         "The scene has no light: a sun of 4 W/m² was added. Section Scene adds lamps, and removes or turns it.".to_owned()
