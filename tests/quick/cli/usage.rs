@@ -281,7 +281,7 @@ fn refused(sandbox: &Sandbox, line: &str, words: &str) {
 fn scenes_and_skies_that_cannot_be_read() {
     let sandbox = Sandbox::new();
     sandbox.write("text.glb", "this is no scene");
-    std::fs::create_dir(sandbox.path("folder.glb")).expect("writable");
+    fs::create_dir(sandbox.path("folder.glb")).expect("writable");
     sandbox.write("text.hdr", "this is no sky");
     for (input, words) in rows(
         "missing.glb => missing.glb
@@ -304,7 +304,7 @@ fn scenes_and_skies_that_cannot_be_read() {
 fn unwritable_outputs_are_found_at_once() {
     let sandbox = Sandbox::new();
     sandbox.write("file", "kept");
-    std::fs::create_dir(sandbox.path("folder.png")).expect("writable");
+    fs::create_dir(sandbox.path("folder.png")).expect("writable");
     // At this density the bake itself would take hours.
     let long = "builtin:ring --density 1e12 --map-resolution 64";
     for (line, words) in rows(
@@ -321,7 +321,7 @@ fn unwritable_outputs_are_found_at_once() {
     ) {
         refused(&sandbox, &line.replace("LONG", long), words);
     }
-    assert_eq!(std::fs::read(sandbox.path("file")).expect("there"), b"kept");
+    assert_eq!(fs::read(sandbox.path("file")).expect("there"), b"kept");
     assert_eq!(sandbox.files("."), ["file", "folder.png"]);
 }
 
@@ -330,12 +330,12 @@ fn an_export_does_not_replace_its_scene() {
     let sandbox = Sandbox::new();
     sandbox.write("matte.gltf", files::lit_matte_triangle());
     sandbox.succeed("bake matte.gltf -o out --layers direct --density 1e3 --map-resolution 16");
-    std::fs::create_dir(sandbox.path("sub")).expect("it can be made");
+    fs::create_dir(sandbox.path("sub")).expect("it can be made");
     let itself = sandbox.run("export out -o sub/../matte.gltf");
     itself.failed_in_one_sentence(2, &["scene itself"]);
     refused(&sandbox, "export out -o missing/a.glb", "missing");
     refused(&sandbox, "export out --scene builtin:ring", "geometry");
-    let scene = std::fs::read_to_string(sandbox.path("matte.gltf")).expect("it is there");
+    let scene = fs::read_to_string(sandbox.path("matte.gltf")).expect("it is there");
     assert_eq!(scene, files::lit_matte_triangle());
 }
 
