@@ -65,7 +65,12 @@ fn options_page() -> String {
     page += "\n| option | value | meaning |\n|---|---|---|\n";
     for option in OPTIONS {
         for (name, meaning) in option.values.map_or(Vec::new(), |values| values()) {
-            page += &format!("| `--{}` | `{name}` | {} |\n", option.name, escaped(meaning));
+            let meaning: Vec<&str> = meaning.split_whitespace().collect();
+            page += &format!(
+                "| `--{}` | `{name}` | {} |\n",
+                option.name,
+                escaped(&meaning.join(" "))
+            );
         }
     }
     page
