@@ -33,10 +33,10 @@ pub struct BakeArguments {
     /// Folder for the maps and manifest.json
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
-    /// Write into the folder even if it holds other files
-    #[arg(long)]
+    /// Write into a folder that holds other files
+    #[arg(long, hide_short_help = true)]
     force: bool,
-    /// Bake part I of N alone, as sums that `merge` adds up; with --density and a fixed --map-resolution
+    /// Bake part I of N for `merge` (with --density and --map-resolution N)
     #[arg(long, value_name = "I/N", value_parser = values::share_of_bake, allow_hyphen_values = true)]
     shard: Option<Share>,
     #[command(flatten)]

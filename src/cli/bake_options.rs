@@ -1,6 +1,6 @@
 //! Bake options: from flags to validated settings.
 
-use clap::builder::{PossibleValue, PossibleValuesParser, ValueParser};
+use clap::builder::{PossibleValuesParser, ValueParser};
 use clap::{Arg, ArgAction, ArgGroup, ArgMatches, Args, Command, FromArgMatches, Id};
 use nephroid::error::{Error, Result};
 use nephroid::settings::options::{OPTIONS, OptionInfo, named};
@@ -13,31 +13,32 @@ pub struct BakeOptions(Vec<(&'static OptionInfo, String)>);
 /// All of them, in what conflicts with them.
 pub const GROUP: &str = "BakeOptions";
 
+/// Their title in `--help`.
+pub const HEADING: &str = "Bake options";
+
+/// Those in `-h`, and in `--help` of commands other than `bake`.
+pub const COMMON: [&str; 8] = [
+    "preset",
+    "estimator",
+    "density",
+    "max-error",
+    "max-time",
+    "map-resolution",
+    "layers",
+    "effects",
+];
+
 fn arg(option: &'static OptionInfo) -> Arg {
-    let stated = |before: &str, text: &str| match text {
-        "" => String::new(),
-        text => format!(" [{before}{text}]"),
-    };
-    // Names stand below.
-    let range = option.values.map_or(option.range(), |_| String::new());
-    let default = stated("default: ", option.default);
-    let help = format!("{}{}{default}", option.what, stated("", &range));
     let arg = Arg::new(option.name)
         .long(option.name)
-        .help_heading("Bake options")
-        .long_help(format!(
-            "{help}\nAccuracy: {}. Cost: {}",
-            option.accuracy, option.cost
-        ))
-        .help(help);
+        .help_heading(HEADING)
+        .help(option.brief)
+        .hide_short_help(!COMMON.contains(&option.name));
     if option.value.is_empty() {
         return arg.action(ArgAction::SetTrue);
     }
     let parser = match option.values {
-        Some(values) => {
-            let values = values().into_iter();
-            PossibleValuesParser::new(values.map(|(name, what)| PossibleValue::new(name).help(what))).into()
-        }
+        Some(values) => PossibleValuesParser::new(values().into_iter().map(|(name, _)| name)).into(),
         None => ValueParser::from(|text: &str| {
             option.set(&mut BakeSettings::default(), text)?;
             Ok::<_, String>(text.to_string())
@@ -138,7 +139,7 @@ impl BakeOptions {
         given.map(|(_, text)| text.as_str())
     }
 
-    /// Of the scene that nobody asked for: all its light, as a draft, where nothing else is asked.
+    /// For the scene that opens by default: all layers, as a draft, unless the options say otherwise.
     pub fn for_a_first_look(mut self) -> Self {
         let is_draft = !self.names_quality() && self.value("estimator") != Some("splat");
         let added = [

@@ -15,11 +15,7 @@ use super::picture::holds_radiance;
 use super::values::{self, Named};
 
 /// Which channels of an EXR map are compared.
-const LAYERS: &[Named<&str>] = &[
-    ("caustic", "caustic", "Light through specular surfaces"),
-    ("direct", "direct", "Light straight from the lights"),
-    ("sum", "sum", "All layers together"),
-];
+const LAYERS: &[Named<&str>] = &[("caustic", "caustic"), ("direct", "direct"), ("sum", "sum")];
 
 #[derive(Debug, Args)]
 pub struct CompareArguments {
@@ -27,13 +23,13 @@ pub struct CompareArguments {
     map: PathBuf,
     /// What it should be: .exr or .pfm
     reference: PathBuf,
-    /// Layer of EXR maps [default: caustic where there is one, else sum]
+    /// caustic, direct or sum [default: caustic where there is one]
     #[arg(long, value_parser = values::named(LAYERS))]
     layer: Option<&'static str>,
-    /// Write a picture of the difference: red where the map is brighter, blue where it is darker
+    /// Picture: red where the map is brighter, blue where darker
     #[arg(long, value_name = "FILE.png")]
     difference: Option<PathBuf>,
-    /// Fail (exit 1) if the relative RMSE is above this many percent
+    /// Exit with 1 if the relative RMSE is above this
     #[arg(long, value_name = "PERCENT", allow_negative_numbers = true)]
     max_rmse: Option<f64>,
     #[command(flatten)]
@@ -54,7 +50,7 @@ impl CompareArguments {
         let (reference, reference_layer) = read_luminance(&self.reference, self.layer)?;
         let Some((map, reference)) = at_common_size(&map, &reference) else {
             let what = format!(
-                "its size {}x{} and the reference's {}x{} are no whole multiples of one another",
+                "its size {}x{} and the reference's {}x{} are not whole multiples of each other",
                 map.width, map.height, reference.width, reference.height
             );
             return failed(&self.map, what, "bake at a multiple of the reference's size");
@@ -120,7 +116,7 @@ impl CompareArguments {
         {
             return Err(Error::usage(
                 "--max-rmse",
-                format!("{percent} is no limit"),
+                format!("{percent} is not a limit"),
                 "give a percentage of 0 or more",
             ));
         }
@@ -130,7 +126,7 @@ impl CompareArguments {
         if holds_radiance(path)? {
             return Err(Error::usage(
                 "--difference",
-                format!("{} is no .png file", path.display()),
+                format!("{} is not a .png file", path.display()),
                 "name a file that ends in .png",
             ));
         }

@@ -1,4 +1,4 @@
-//! What a command runs with: results on stdout, everything else on stderr, signals as they come.
+//! The terminal: results on stdout, everything else on stderr, and signals.
 
 use std::io::{ErrorKind, IsTerminal, Write};
 use std::process::ExitCode;

@@ -1,4 +1,4 @@
-//! `export`: baked maps for other programs, with their scene or as textures.
+//! `export`: baked maps for other programs, as a glTF scene or as textures.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -35,154 +35,96 @@ const WHITE_SHARE: f64 = 0.01;
 const MIN_ATLAS_SIDE: usize = 16;
 
 const FORMATS: &[Named<&str>] = &[
-    ("glb", "glb", "The scene with its maps, binary glTF"),
-    ("exr", "exr", "Textures, OpenEXR: half floats or floats"),
-    ("png", "png", "Textures, PNG of 16 bits a channel"),
-    (
-        "hdr",
-        "hdr",
-        "Textures, Radiance: 8 bits a channel with an exponent in common",
-    ),
-    (
-        "ktx2",
-        "ktx2",
-        "Textures, KTX 2.0 with zstd: what graphics cards sample",
-    ),
+    ("glb", "glb"),
+    ("exr", "exr"),
+    ("png", "png"),
+    ("hdr", "hdr"),
+    ("ktx2", "ktx2"),
 ];
 
 const CARRIERS: &[Named<Carrier>] = &[
-    (
-        "lightmap",
-        Carrier::LightMap,
-        "MOZ_lightmap, light-map coordinates in TEXCOORD_1",
-    ),
-    ("emissive", Carrier::Emissive, "Emission of the lit surfaces"),
-    (
-        "unlit",
-        Carrier::Unlit,
-        "A picture of the light on materials that are not lit",
-    ),
+    ("lightmap", Carrier::LightMap),
+    ("emissive", Carrier::Emissive),
+    ("unlit", Carrier::Unlit),
 ];
 
 const UNITS: &[Named<Quantity>] = &[
-    ("E", Quantity::Irradiance, "Irradiance in W/m²"),
-    ("E/pi", Quantity::IrradianceByPi, "Irradiance by π"),
-    ("lux", Quantity::Illuminance, "Illuminance in lx"),
-    ("lux/pi", Quantity::IlluminanceByPi, "Illuminance by π"),
+    ("E", Quantity::Irradiance),
+    ("E/pi", Quantity::IrradianceByPi),
+    ("lux", Quantity::Illuminance),
+    ("lux/pi", Quantity::IlluminanceByPi),
 ];
 
-const LIGHTS: &[Named<SceneLights>] = &[
-    (
-        "keep",
-        SceneLights::Keep,
-        "They stay, and maps hold the caustic layer",
-    ),
-    (
-        "remove",
-        SceneLights::Remove,
-        "They go, and maps hold every layer",
-    ),
-];
+const LIGHTS: &[Named<SceneLights>] = &[("keep", SceneLights::Keep), ("remove", SceneLights::Remove)];
 
-const BITS: &[Named<u32>] = &[
-    ("8", 8, "What browsers read; errors are diffused"),
-    ("16", 16, "For programs that read all of them; half floats"),
-    ("32", 32, "Floats"),
-];
+const BITS: &[Named<u32>] = &[("8", 8), ("16", 16), ("32", 32)];
 
 const CONTENTS: &[Named<Content>] = &[
-    ("sum", Content::Sum, "All layers summed"),
-    (
-        "caustic",
-        Content::Layer(LayerKind::Caustic),
-        "Light through specular surfaces",
-    ),
-    (
-        "direct",
-        Content::Layer(LayerKind::Direct),
-        "Light straight from the lights",
-    ),
-    (
-        "indirect",
-        Content::Layer(LayerKind::Indirect),
-        "Light from other surfaces",
-    ),
-    ("each", Content::EachLayer, "Each layer in a texture of its own"),
-    (
-        "lights",
-        Content::EachLight,
-        "Each light in a texture of its own, of maps baked with --per-light",
-    ),
+    ("sum", Content::Sum),
+    ("caustic", Content::Layer(LayerKind::Caustic)),
+    ("direct", Content::Layer(LayerKind::Direct)),
+    ("indirect", Content::Layer(LayerKind::Indirect)),
+    ("each", Content::EachLayer),
+    ("lights", Content::EachLight),
 ];
 
-const PACKINGS: &[Named<Packing>] = &[
-    (
-        "rgb9e5",
-        Packing::Rgb9e5,
-        "Nine bits a channel and an exponent in common, 32 bits a texel",
-    ),
-    ("bc6h", Packing::Bc6h, "Blocks of 4 by 4 texels, 8 bits a texel"),
-];
+const PACKINGS: &[Named<Packing>] = &[("rgb9e5", Packing::Rgb9e5), ("bc6h", Packing::Bc6h)];
 
-const TRANSFERS: &[Named<Transfer>] = &[
-    ("srgb", Transfer::Srgb, "Finer steps where it is dark"),
-    ("linear", Transfer::Linear, "Proportional to light"),
-];
+const TRANSFERS: &[Named<Transfer>] = &[("srgb", Transfer::Srgb), ("linear", Transfer::Linear)];
 
 #[derive(Debug, Args)]
 pub struct ExportArguments {
     /// Folder that `bake` wrote
     maps: PathBuf,
-    /// Kind of file: the scene with its maps, or its maps as textures with an index
+    /// glb (scene with maps) or textures: exr, png, hdr, ktx2
     #[arg(long, value_parser = values::named(FORMATS), default_value = "glb")]
     format: &'static str,
-    /// File to write, or folder for the textures [default: the scene's or the format's name in the folder of the maps]
+    /// File, or folder for textures [default: in the folder of the maps]
     #[arg(short, long, value_name = "FILE|FOLDER")]
     output: Option<PathBuf>,
-    /// Of textures: write into the folder even if it holds other files
-    #[arg(long)]
+    /// Textures: write into a folder that holds other files
+    #[arg(long, hide_short_help = true)]
     force: bool,
-    /// Scene of the maps [default: the one that the folder names]
+    /// Scene of the maps, if it has moved
     #[arg(long, value_name = "SCENE")]
     scene: Option<String>,
-    /// What numbers mean: E and E/pi in W/m^2 (Blender), lux and lux/pi beside lights in candela (three.js)
-    /// [default: lux for a .glb, E for textures]
+    /// E, E/pi (W/m²), lux or lux/pi [default: lux; E for textures]
     #[arg(long, value_parser = values::named(UNITS))]
     units: Option<Quantity>,
-    /// Of a .glb: how materials carry the light: for programs that know light maps, that know none, or that shall not
-    /// light at all [default: lightmap]
+    /// glb: light as lightmap, emissive or unlit [default: lightmap]
     #[arg(long = "as", value_parser = values::named(CARRIERS))]
     carrier: Option<Carrier>,
-    /// Of a .glb: keep the scene's lights and write the caustic layer, or remove them and write every layer
-    /// [default: remove where the direct layer was baked]
+    /// glb: keep lights, write caustics; or remove, write all layers
     #[arg(long, value_parser = values::named(LIGHTS))]
     lights: Option<SceneLights>,
-    /// Of textures: which light they hold [default: sum]
+    /// Textures: sum, caustic, direct, indirect, each or lights
     #[arg(long, value_parser = values::named(CONTENTS))]
     layer: Option<Content>,
-    /// Bits a channel: 8 or 16 of the images of a .glb, 16 of .png, 16 or 32 of .exr [default: 16, but 8 for a .glb with
-    /// light maps or unlit, which is what browsers read]
-    #[arg(long, value_parser = values::named(BITS))]
+    /// Bits a channel: glb 8 or 16, exr 16 or 32
+    #[arg(long, value_parser = values::named(BITS), hide_short_help = true)]
     bits: Option<u32>,
-    /// Of .png: how numbers between black and white are coded [default: srgb]
-    #[arg(long, value_parser = values::named(TRANSFERS))]
+    /// png: srgb or linear [default: srgb]
+    #[arg(long, value_parser = values::named(TRANSFERS), hide_short_help = true)]
     transfer: Option<Transfer>,
-    /// Of textures: many maps in one file, with sides of up to so many texels [default: one file for each; N: 4096]
-    #[arg(long, value_name = "N", num_args = 0..=1, default_missing_value = "4096", value_parser = values::within(MIN_ATLAS_SIDE..=MAX_MAP_SIDE, "texels"))]
+    /// Textures: pack many maps into files of up to N texels a side
+    #[arg(long, value_name = "N", hide_short_help = true, num_args = 0..=1, default_missing_value = "4096", value_parser = values::within(MIN_ATLAS_SIDE..=MAX_MAP_SIDE, "texels"))]
     atlas: Option<usize>,
-    /// Of .ktx2: how texels are packed [default: rgb9e5]
-    #[arg(long, value_parser = values::named(PACKINGS))]
+    /// ktx2: rgb9e5 or bc6h [default: rgb9e5]
+    #[arg(long, value_parser = values::named(PACKINGS), hide_short_help = true)]
     packing: Option<Packing>,
-    /// Of .ktx2: all sizes down to one texel; else the image alone
-    #[arg(long)]
+    /// ktx2: add the mip levels
+    #[arg(long, hide_short_help = true)]
     mips: bool,
-    /// Of a .glb or .png: share of a map's light that its brightest texels may lose so that dim ones have finer steps
-    /// [default: 0.5%]
-    #[arg(long, value_name = "PERCENT", value_parser = share, allow_hyphen_values = true)]
+    /// glb, png: light that may clip for finer steps [default: 0.5%]
+    #[arg(long, value_name = "PERCENT", hide_short_help = true, value_parser = share, allow_hyphen_values = true)]
     cut: Option<f64>,
-    /// Stops by which light is multiplied: of a .glb with --as unlit [default: the brightest hundredth is white], of
-    /// textures [default: 0; of .png as --cut allows]
-    #[arg(long, value_name = "STOPS", allow_negative_numbers = true)]
+    /// Multiply light by 2^STOPS (textures, and --as unlit)
+    #[arg(
+        long,
+        value_name = "STOPS",
+        hide_short_help = true,
+        allow_negative_numbers = true
+    )]
     exposure: Option<f64>,
     #[command(flatten)]
     pub run: RunOptions,
@@ -233,7 +175,7 @@ impl ExportArguments {
         {
             return Err(Error::usage(
                 "--cut",
-                format!("{cut} is no share from 0 % to below 100 %"),
+                format!("{cut} is outside 0 % to below 100 %"),
                 "give a share such as 0.5%",
             ));
         }
@@ -245,7 +187,7 @@ impl ExportArguments {
             _ => &[],
         };
         let (option, what, remedy) = if self.bits.is_some_and(|asked| !bits.contains(&asked)) {
-            let what = "so many bits are none that the format has";
+            let what = "the format does not have this number of bits";
             ("--bits", what, "see nephroid export --help")
         } else if self.carrier == Some(Carrier::Unlit) && self.lights == Some(SceneLights::Keep) {
             let what = "cannot go with --as unlit, whose materials no light reaches";

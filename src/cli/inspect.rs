@@ -1,4 +1,4 @@
-//! `inspect`: what is in a scene, which effects it calls for, and what a bake would take.
+//! `inspect`: contents of a scene, the effects that it needs and why, and the expected cost of a bake.
 
 use clap::Args;
 use nephroid::effect::Effect;
@@ -33,7 +33,7 @@ pub struct InspectArguments {
     pub run: RunOptions,
 }
 
-/// Width over height of the picture that eye-pass effects are told for.
+/// Aspect ratio of the picture for which eye-pass effects are listed.
 const PICTURE_ASPECT: f64 = 16.0 / 9.0;
 
 /// Name and value of each line of the text.
@@ -306,7 +306,7 @@ fn surface_name(surface: SurfaceKind) -> &'static str {
 /// A glass, and as text: "N-SF11 (V_d 25.8, measured from 370 to 2500 nm)".
 fn glass_report(glass: &Glass) -> (Value, String) {
     let abbe_number = Some(glass.dispersion.abbe_number()).filter(|number| number.is_finite());
-    // What its formula was fitted to, where somebody said.
+    // The range that its formula was fitted to, where known.
     let range_nm = glass.range.as_ref().map(|range| [range.start().0, range.end().0]);
     let covers_the_visible = glass.is_within(*VISIBLE.start()) && glass.is_within(*VISIBLE.end());
     let dispersion = abbe_number.map_or("no dispersion".into(), |number| format!("V_d {number:.1}"));

@@ -1,4 +1,4 @@
-//! A scene that was loaded, and sessions with it.
+//! A loaded scene, and bakes of it.
 
 use std::borrow::Cow;
 use std::path::Path;
@@ -122,7 +122,7 @@ pub fn within_reach<'a>(settings: &'a BakeSettings, console: &Console) -> Cow<'a
     console.warn(&[Warning::new(
         "--memory",
         format!(
-            "the system grants this process so little address space that maps may take {} and not {}",
+            "the address space of this process is limited: maps may take {} instead of {}",
             bytes(most),
             bytes(settings.memory_bytes)
         ),

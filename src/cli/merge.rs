@@ -16,19 +16,19 @@ use super::options::RunOptions;
 
 #[derive(Debug, Args)]
 pub struct MergeArguments {
-    /// Folders that `bake --shard` wrote, of all shards of a bake
+    /// The folders of all shards of a bake
     #[arg(required = true, value_name = "DIR")]
     shards: Vec<PathBuf>,
     /// Folder for the maps and manifest.json
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
-    /// Write into the folder even if it holds other files
-    #[arg(long)]
+    /// Write into a folder that holds other files
+    #[arg(long, hide_short_help = true)]
     force: bool,
-    /// Where the scene is now [default: where the first shard found it]
+    /// The scene, if it has moved since the shards were baked
     #[arg(long, value_name = "SCENE")]
     scene: Option<String>,
-    /// Where the image around the scene is now [default: where the first shard found it]
+    /// The environment image, if it has moved
     #[arg(long, value_name = "FILE")]
     environment: Option<PathBuf>,
     #[command(flatten)]

@@ -5,6 +5,7 @@ mod bake_options;
 mod compare;
 mod console;
 mod export;
+mod help;
 mod inspect;
 mod loaded;
 mod merge;
@@ -37,15 +38,13 @@ use render::RenderArguments;
 use study::StudyArguments;
 use view::ViewArguments;
 
-/// Bakes light through glass, mirrors and water into illumination maps, and lets you walk through the result.
-///
-/// A scene is a .glb or .gltf file, or builtin:NAME.
+/// Bakes light through glass, mirrors and water into maps, and lets you walk through the result.
 #[derive(Debug, Parser)]
 #[command(
     name = "nephroid",
     version,
     args_conflicts_with_subcommands = true,
-    max_term_width = 110
+    max_term_width = 100
 )]
 struct Arguments {
     #[command(subcommand)]
@@ -56,21 +55,21 @@ struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Open a window on a scene and bake it; without a display, write maps and a picture instead (the default command)
+    /// Open a window on a scene and bake it (the default command)
     View(ViewArguments),
     /// Bake illumination maps and a manifest into a folder
     Bake(BakeArguments),
-    /// Make one picture
+    /// Render a picture or a film
     Render(RenderArguments),
-    /// Say what is in a scene, which effects it calls for and why
+    /// List contents, effects, warnings and expected cost of a scene
     Inspect(InspectArguments),
-    /// Measure a map against a reference: relative RMSE, ARD, peak, flux
+    /// Measure a map against a reference
     Compare(CompareArguments),
-    /// Write baked maps for other programs
+    /// Write baked maps as glTF or textures for other programs
     Export(ExportArguments),
-    /// Add up the shards of a bake
+    /// Combine the shards of a bake into maps
     Merge(MergeArguments),
-    /// Study what accuracy costs
+    /// Measure accuracy against cost: tables, plots, pictures
     Study(StudyArguments),
 }
 
@@ -120,7 +119,11 @@ fn parse_and_run() -> Result<ExitCode> {
                 ClapErrorKind::DisplayHelp | ClapErrorKind::DisplayVersion
             ) =>
         {
-            console::print(error.render().to_string().trim_end())?;
+            let text = match error.kind() {
+                ClapErrorKind::DisplayHelp => help::text(std::env::args().skip(1)),
+                _ => error.render().to_string(),
+            };
+            console::print(text.trim_end())?;
             return Ok(ExitCode::SUCCESS);
         }
         Err(error) => return Err(in_one_sentence(&error)),

@@ -20,14 +20,14 @@ enum Switch {
 }
 
 #[derive(Debug, Args)]
-#[command(next_help_heading = "Scene options")]
 pub struct SceneOptions {
     /// Add a sun and a clear sky to a scene without light
-    #[arg(long)]
+    #[arg(long, hide_short_help = true)]
     default_light: bool,
-    /// Whether closed meshes of a transmissive material without a volume are solid glass, or panes without thickness
+    /// Closed transmissive meshes are solid glass
     #[arg(
         long,
+        hide_short_help = true,
         value_name = "on|off",
         value_enum,
         num_args = 0..=1,
@@ -36,8 +36,8 @@ pub struct SceneOptions {
         default_missing_value = "on"
     )]
     solid_glass: Switch,
-    /// Surround the scene with an image of radiance in W/(m² sr), equirectangular, .hdr or .exr, and light it by that
-    #[arg(long, value_name = "FILE")]
+    /// Light the scene by an equirectangular .hdr or .exr [W/(m² sr)]
+    #[arg(long, value_name = "FILE", hide_short_help = true)]
     environment: Option<PathBuf>,
 }
 
@@ -54,22 +54,21 @@ impl SceneOptions {
 }
 
 #[derive(Debug, Args)]
-#[command(next_help_heading = "Run options")]
 pub struct RunOptions {
     /// Worker threads [default: one per core]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", hide_short_help = true)]
     pub threads: Option<usize>,
     /// No progress bar
-    #[arg(long)]
+    #[arg(long, hide_short_help = true)]
     pub quiet: bool,
     /// Print the result as one JSON document
     #[arg(long)]
     pub json: bool,
-    /// Neither read nor keep unwrapped texture coordinates in the user's cache folder
-    #[arg(long)]
+    /// Do not cache unwrapped texture coordinates
+    #[arg(long, hide_short_help = true)]
     pub no_cache: bool,
-    /// Log messages of this level and above to stderr
-    #[arg(long, value_name = "LEVEL", default_value = "off", value_parser = values::log_level())]
+    /// Log to stderr: error, warn, info, debug or trace
+    #[arg(long, value_name = "LEVEL", default_value = "off", value_parser = values::log_level(), hide_short_help = true)]
     pub log: log::LevelFilter,
 }
 
@@ -92,12 +91,11 @@ impl RunOptions {
 }
 
 #[derive(Clone, Debug, Args)]
-#[command(next_help_heading = "Picture options")]
 pub struct PictureOptions {
-    /// Camera of the file, by name or index [default: the first, or one that frames the scene]
+    /// Camera of the file [default: the first, or a view of all]
     #[arg(long, value_name = "NAME|INDEX")]
     pub camera: Option<String>,
-    /// Stops by which radiance is multiplied before tone mapping, or `auto` [default: auto]
+    /// Exposure in stops [default: auto]
     #[arg(long, value_name = "auto|STOPS", value_parser = values::exposure, allow_hyphen_values = true)]
     pub exposure: Option<Exposure>,
     /// Size of the window or picture

@@ -1,4 +1,4 @@
-//! Pictures of a scene in the light of its maps: which camera, by what, and how they are shown.
+//! Options of pictures: camera, backend, tone map; and how a picture is made.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -24,26 +24,24 @@ use super::values::{self, Exposure};
 /// What makes a picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Backend {
+    /// Raster on the graphics card.
     Gpu,
+    /// The reference ray tracer.
     Cpu,
 }
 
-const BACKENDS: &[values::Named<Backend>] = &[
-    ("gpu", Backend::Gpu, "Raster on the graphics card"),
-    ("cpu", Backend::Cpu, "Reference ray tracer"),
-];
+const BACKENDS: &[values::Named<Backend>] = &[("gpu", Backend::Gpu), ("cpu", Backend::Cpu)];
 
 /// How it is made and shown.
 #[derive(Debug, Default, Args)]
 pub struct EyeOptions {
-    /// How radiance becomes display colour [default: soft]
-    #[arg(long, value_parser = values::one_of::<ToneMap>())]
+    /// none, neutral, agx, aces or soft [default: soft]
+    #[arg(long, value_parser = values::one_of::<ToneMap>(), hide_short_help = true)]
     pub tone_map: Option<ToneMap>,
-    /// Which light is shown as white: the display's, the lamps', or light of a temperature or chromaticity
-    /// [default: none]
-    #[arg(long, value_name = "none|lamps|KELVIN|X,Y", value_parser = str::parse::<WhiteBalance>)]
+    /// What appears white: none, lamps, KELVIN or X,Y [default: none]
+    #[arg(long, value_name = "LIGHT", value_parser = str::parse::<WhiteBalance>, hide_short_help = true)]
     pub white_balance: Option<WhiteBalance>,
-    /// What makes the picture [default: gpu where there is one, else cpu]
+    /// gpu or cpu [default: gpu where there is one]
     #[arg(long, value_parser = values::named(BACKENDS))]
     pub backend: Option<Backend>,
 }
@@ -59,7 +57,7 @@ pub fn holds_radiance(path: &Path) -> Result<bool> {
         "exr" => Ok(true),
         _ => Err(Error::usage(
             path.display().to_string(),
-            "a picture's name has to say its format",
+            "the name does not say the picture's format",
             "name a file that ends in .png or .exr",
         )),
     }

@@ -1,4 +1,4 @@
-//! `render`: one picture, or the frames of a camera that moves.
+//! `render`: a picture, or the frames of a film.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -34,18 +34,17 @@ use super::values::{self, Exposure};
 pub struct RenderArguments {
     /// .glb, .gltf or builtin:NAME
     scene: String,
-    /// Picture: .png for display, .exr for radiance in W/(m² sr); with --path, --turntable or --frames a folder for the
-    /// frames as .png
+    /// .png, or .exr of radiance; a folder for the frames of a film
     #[arg(short, long, value_name = "FILE", required_unless_present_any = ["path", "turntable"])]
     output: Option<PathBuf>,
-    /// Draw the frames of a camera's path, a JSON file, on the graphics card
+    /// Draw a film along the camera path of a JSON file
     #[arg(long, value_name = "FILE", conflicts_with = "camera")]
     path: Option<PathBuf>,
-    /// Draw so many frames of a camera that goes once around the middle of the scene, beginning where --camera is
+    /// Draw a film once around the scene, starting at --camera
     #[arg(long, value_name = "FRAMES", conflicts_with = "path", value_parser = values::within(1..=MAX_FRAMES, "frames"))]
     turntable: Option<usize>,
-    /// With --path or --turntable: time every frame with and without what is seen in mirrors and through glass
-    #[arg(long, requires = "camera_motion")]
+    /// Time every frame of a film, with and without mirrors and glass
+    #[arg(long, requires = "camera_motion", hide_short_help = true)]
     stats: bool,
     #[command(flatten)]
     moment: MomentOptions,
@@ -182,7 +181,7 @@ impl RenderArguments {
                 } else {
                     "--turntable"
                 },
-                "nothing is wanted of its frames",
+                "its frames would go nowhere",
                 "add --stats to time them, or -o DIR to keep them",
             );
         }
@@ -194,7 +193,7 @@ impl RenderArguments {
             );
         }
         let film = Film {
-            // What cannot be read is told before anything is baked.
+            // Read before the bake, so that a damaged file costs nothing.
             path: self.path.as_deref().map(CameraPath::read).transpose()?,
             turntable: self.turntable.unwrap_or(1),
             stats: self.stats,

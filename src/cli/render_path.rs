@@ -1,4 +1,4 @@
-//! `render --path` and `--turntable`: the frames of a camera that moves, kept as pictures or timed.
+//! `render --path` and `--turntable`: the frames of a film, written or timed.
 
 use std::fmt::Write as _;
 use std::path::Path;

@@ -1,4 +1,4 @@
-//! `study`: which there are, what they take, and one way to run them.
+//! `study`: lists and runs the studies.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -76,13 +76,13 @@ enum Kind {
 
 #[derive(Debug, Args)]
 struct Common {
-    /// Folder for what it finds: NAME.md, NAME.csv, plots (.svg) and pictures (.png)
+    /// Folder for the page (.md), table (.csv), plots and pictures
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
-    /// Write into the folder even if it holds other files
-    #[arg(long)]
+    /// Write into a folder that holds other files
+    #[arg(long, hide_short_help = true)]
     force: bool,
-    /// Small maps and few of everything, to see that it works
+    /// A coarse run with small maps
     #[arg(long)]
     quick: bool,
     #[command(flatten)]
@@ -97,7 +97,7 @@ struct ConvergenceArguments {
     /// Estimators to measure [default: wavefront,splat]
     #[arg(long, value_parser = values::one_of::<Estimator>(), value_delimiter = ',', value_name = "ESTIMATOR,...")]
     estimators: Option<Vec<Estimator>>,
-    /// Ascending light rays per steradian [default: 1e2 to 1e6, two a decade]
+    /// Ray densities, ascending [default: 1e2 to 1e6]
     #[arg(
         long,
         value_delimiter = ',',
@@ -105,10 +105,10 @@ struct ConvergenceArguments {
         allow_negative_numbers = true
     )]
     densities: Option<Vec<f64>>,
-    /// Map to measure against, .exr or .pfm [default: the shipped one of a built-in scene, else a much denser bake]
+    /// Map to measure against [default: shipped, or a denser bake]
     #[arg(long, value_name = "FILE")]
     reference: Option<PathBuf>,
-    /// Surface of the reference [default: floor, or the only one that takes light]
+    /// Surface of the reference [default: floor]
     #[arg(long, value_name = "NAME", requires = "reference")]
     surface: Option<String>,
     #[command(flatten)]
@@ -149,7 +149,7 @@ struct EffectsArguments {
 
 #[derive(Debug, Args)]
 struct SpectrumArguments {
-    /// .glb, .gltf or builtin:NAME; of a scene with thin beams, those alone shine
+    /// .glb, .gltf or builtin:NAME; thin beams shine alone
     #[arg(default_value = "builtin:spectrum")]
     scene: String,
     /// Numbers of wavelengths
@@ -161,7 +161,7 @@ struct SpectrumArguments {
         allow_negative_numbers = true
     )]
     wavelengths: Vec<u32>,
-    /// Light rays per steradian; beams are thin [default: 1e8]
+    /// Rays per steradian [default: 1e8]
     #[arg(long, value_name = "RAYS_PER_SR", allow_negative_numbers = true)]
     density: Option<f64>,
     #[command(flatten)]
@@ -174,14 +174,14 @@ struct SpectrumArguments {
 
 #[derive(Debug, Args)]
 struct SizeOption {
-    /// Texels of every map: N by N, or W by H [default: 256, of spectrum 1024]
+    /// Texels of each map [default: 256; spectrum 1024]
     #[arg(long, value_name = "N|WxH", value_parser = fixed_map_resolution, allow_hyphen_values = true)]
     map_resolution: Option<MapResolution>,
 }
 
 #[derive(Debug, Args)]
 struct RepeatOption {
-    /// Bakes of each kind, whose median CPU time counts [default: 5; 1 with --quick]
+    /// Bakes for each median of CPU time [default: 5; quick 1]
     #[arg(long, value_name = "N", value_parser = values::within(1..=1000, "bakes"), allow_negative_numbers = true)]
     repeat: Option<usize>,
 }
@@ -319,7 +319,7 @@ struct Done {
     files: Vec<String>,
 }
 
-/// Where studies are told of and stopped.
+/// Options and console of a study.
 #[derive(Clone, Copy)]
 struct Desk<'a> {
     common: &'a Common,
@@ -371,7 +371,7 @@ impl Desk<'_> {
         if settings.max_time_s.is_some() {
             return Err(Error::usage(
                 "--max-time",
-                "bakes that a clock ends do not differ by their effects alone",
+                "bakes that end by time differ by more than their effects",
                 "leave it out, or use --max-error or --density",
             ));
         }
@@ -406,7 +406,7 @@ impl Desk<'_> {
         Ok(())
     }
 
-    /// One, or all: each is told as soon as it is done, but for JSON, which is one document.
+    /// One, or all: each is printed as soon as it is done; JSON is one document at the end.
     fn built(self, name: &str) -> Result<()> {
         let is_all = name == ALL.0;
         let mut reports = Vec::new();
@@ -487,7 +487,7 @@ impl Desk<'_> {
         if (0..scene.objects.len()).any(|object| scene.material_of(object).is_dispersive()) {
             self.console.warn(&[Warning::new(
                 &scene.source,
-                "brute force bends light of all wavelengths alike, as at 587.56 nm",
+                "brute force refracts all wavelengths as at 587.56 nm",
                 "compare its maps with those of a bake with --effects dispersion=off",
             )]);
         }
@@ -543,7 +543,7 @@ fn check_ladder(densities: &[f64], settings: &BakeSettings) -> Result<()> {
     if densities.is_empty() || !densities.is_sorted_by(|a, b| a < b) {
         return Err(Error::usage(
             "--densities",
-            "they have to be in ascending order, each once",
+            "they are not in ascending order, each once",
             "give numbers such as 1e3,1e4,1e5",
         ));
     }

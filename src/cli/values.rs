@@ -1,11 +1,11 @@
-//! Values of options: how they are written.
+//! Parsers of option values.
 
 use std::ops::RangeInclusive;
 
-use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use nephroid::light_pass::share::Share;
 use nephroid::settings::options;
-use strum::{EnumMessage, VariantArray};
+use strum::VariantArray;
 
 /// A whole number in a range.
 pub fn within(
@@ -48,31 +48,26 @@ pub fn log_level() -> impl TypedValueParser<Value = log::LevelFilter> {
     PossibleValuesParser::new(names).try_map(|name| name.parse::<log::LevelFilter>())
 }
 
-/// A name, what it stands for, and what is told about it.
-pub type Named<T> = (&'static str, T, &'static str);
+/// A name and its value.
+pub type Named<T> = (&'static str, T);
 
 /// Reads one of the names of a table.
 pub fn named<T: Copy + Send + Sync + 'static>(
     table: &'static [Named<T>],
 ) -> impl TypedValueParser<Value = T> {
-    let possible = table
-        .iter()
-        .map(|(name, _, help)| PossibleValue::new(*name).help(*help));
-    PossibleValuesParser::new(possible).try_map(|name| {
+    PossibleValuesParser::new(table.iter().map(|(name, _)| *name)).try_map(|name| {
         let found = table.iter().find(|known| known.0 == name);
         found.map(|known| known.1).ok_or("an unknown name")
     })
 }
 
-/// Reads one of the names of an enumeration; its documentation becomes the help of each.
+/// Reads one of the names of an enumeration.
 pub fn one_of<T>() -> impl TypedValueParser<Value = T>
 where
-    T: VariantArray + EnumMessage + Into<&'static str> + Copy + Send + Sync,
+    T: VariantArray + Into<&'static str> + Copy + Send + Sync,
 {
-    let possible = T::VARIANTS
-        .iter()
-        .map(|variant| PossibleValue::new((*variant).into()).help(variant.get_documentation()));
-    PossibleValuesParser::new(possible).try_map(|name| options::named(&name))
+    let names = T::VARIANTS.iter().map(|variant| (*variant).into());
+    PossibleValuesParser::new(names.collect::<Vec<&'static str>>()).try_map(|name| options::named(&name))
 }
 
 /// Latest moment of a scene that moves [s]: a day.

@@ -30,20 +30,20 @@ const HEADLESS_PICTURE: &str = "picture.png";
 pub struct ViewArguments {
     /// .glb, .gltf or builtin:NAME [default: builtin:gallery]
     scene: Option<String>,
-    /// Write one JSON line per change of state of the window
+    /// Write a JSON line for each change of state of the window
     #[cfg(feature = "viewer")]
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", hide_short_help = true)]
     event_log: Option<std::path::PathBuf>,
-    /// Read the scene again whenever its files are written
+    /// Read the scene again whenever its files change
     #[cfg(feature = "viewer")]
     #[arg(long)]
     watch: bool,
-    /// Leave camera, settings and edits of the last time alone
+    /// Ignore the camera, settings and edits kept from last time
     #[cfg(feature = "viewer")]
     #[arg(long)]
     fresh: bool,
-    /// Without a display: write into ./nephroid-out even if it holds other files
-    #[arg(long)]
+    /// Without a display: write into a folder that holds other files
+    #[arg(long, hide_short_help = true)]
     force: bool,
     #[command(flatten)]
     maps: MapsOption,

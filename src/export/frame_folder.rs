@@ -1,4 +1,4 @@
-//! Frames of a camera's way as pictures in a folder.
+//! Frames of a film as pictures in a folder.
 
 use std::path::{Path, PathBuf};
 

@@ -1,4 +1,4 @@
-//! `manifest.json`: how a folder of maps came about, and where in it each map is.
+//! `manifest.json`: how a folder of maps was made, and where each map is.
 
 use serde::{Deserialize, Serialize};
 

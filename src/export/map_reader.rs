@@ -170,7 +170,7 @@ impl<'a> MapReader<'a> {
         let partial = self.stored.partial.then(|| {
             Warning::new(
                 &self.location,
-                "its bake was stopped before it was done",
+                "its bake was interrupted",
                 "bake the scene again for all of its light",
             )
         });
@@ -209,7 +209,7 @@ impl<'a> MapReader<'a> {
             if texels.all(|(texel, light)| is_light(light, rounding_w / chart.texel_area_m2(texel))) {
                 return Ok(irradiance);
             }
-            let what = format!("its {prefix} layer holds values that are no irradiance");
+            let what = format!("its {prefix} layer holds values that are not irradiance");
             Err(unusable(&location, what))
         };
         let mut kinds = entry.layers.clone();
@@ -371,7 +371,7 @@ fn read_manifest(folder: &Path) -> Result<(StoredMaps, String)> {
     let stored: StoredMaps = serde_json::from_slice(&bytes).map_err(|error| {
         Error::failure(
             &location,
-            format!("this is no manifest of maps ({error})"),
+            format!("this is not a manifest of maps ({error})"),
             "name a folder that `bake` wrote",
         )
     })?;

@@ -1,4 +1,4 @@
-//! Files that others read: maps with their manifest, pictures; and how they are read back.
+//! Files for other programs: maps with their manifest, pictures, glTF, textures; and how maps are read back.
 
 pub mod exr;
 pub mod float_image;

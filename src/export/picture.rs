@@ -1,4 +1,4 @@
-//! A picture as a file: what a display shows of it, or the radiance that it holds.
+//! Writes pictures: display colours as PNG, radiance as EXR.
 
 use super::{FloatImage, exr};
 use crate::error::{Error, Result};

@@ -36,7 +36,7 @@ pub fn decode(bytes: &[u8], triangles: usize, location: &str) -> Result<Vec<[DVe
     let (header, body) = bytes
         .split_at_checked(HEADER_BYTES)
         .filter(|(header, _)| header.starts_with(MAGIC))
-        .ok_or_else(|| unusable("this is no file of texture coordinates"))?;
+        .ok_or_else(|| unusable("this is not a file of texture coordinates"))?;
     if header[MAGIC.len()..] != (triangles as u64).to_le_bytes() || body.len() != triangles * TRIANGLE_BYTES {
         return Err(unusable(
             "its texture coordinates belong to a surface with other triangles",

@@ -117,7 +117,7 @@ pub fn check_output_file(path: &Path) -> Result<()> {
     {
         return Err(Error::failure(
             location,
-            "something that is no file has this name",
+            "something that is not a file has this name",
             "choose another name",
         ));
     }

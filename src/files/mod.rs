@@ -1,4 +1,4 @@
-//! Reading and writing files: bounded reads, whole or not at all writes. The only place that opens files.
+//! Reading and writing files: reads are bounded, writes are atomic. No other module opens files.
 
 use std::fs::File;
 use std::io::{self, BufWriter, Cursor, Read, Seek, SeekFrom, Write};
@@ -42,8 +42,8 @@ pub fn read_part(path: &Path, from: u64, bytes: u64) -> Result<Vec<u8>> {
     if from.checked_add(bytes).is_none_or(|end| end > length) {
         return Err(Error::failure(
             path.display().to_string(),
-            "ends before it should",
-            "make it again",
+            "ends too early",
+            "write it again",
         ));
     }
     let read = || {

@@ -1,4 +1,4 @@
-//! A hierarchy in single precision, as devices traverse it.
+//! The triangle hierarchy in single precision, for the device.
 
 use glam::DVec3;
 

@@ -1,4 +1,4 @@
-//! Rays, and starting points that do not meet the surface they leave.
+//! Rays, and robust starting points that do not meet the surface they leave.
 
 use glam::DVec3;
 

@@ -10,6 +10,7 @@
 //! | [`formats`] | the folder of a bake, exported files, units |
 //! | [`engines`] | maps in three.js, Blender, Godot, Unity, Bevy and Unreal |
 //! | [`many_machines`] | one bake on many machines |
+//! | [`options`] | every option of a bake: values, default, accuracy, cost |
 //! | [`accuracy`] | estimators, error targets, energy accounts, studies, comparisons |
 //! | [`hard_cases`] | what is tested, and the limits that remain |
 //! | [`how_it_works`] | the algorithm, a glossary, and two walks through the code |
@@ -45,6 +46,8 @@ pub mod many_machines {}
 
 #[doc = include_str!("moving_scenes.md")]
 pub mod moving_scenes {}
+#[doc = include_str!("options.md")]
+pub mod options {}
 
 #[doc = include_str!("scenes.md")]
 pub mod scenes {}

@@ -1,5 +1,5 @@
-//! How a surface lies in its map: the contract between the light pass (which deposits), the eye pass (which looks up)
-//! and the exporters.
+//! Where a surface lies in its map: the contract between the light pass (deposits), the eye pass (looks up) and the
+//! exporters.
 
 use std::sync::Arc;
 

@@ -1,5 +1,5 @@
-//! Texels beside a surface take the value of their nearest neighbours on it, so that a bilinear look-up at a border
-//! does not mix in nothing.
+//! Fills the texels beside a surface with their nearest neighbour on it, so that a bilinear look-up at a border does not
+//! darken.
 
 use super::Chart;
 use super::lookup::bilinear;

@@ -1,4 +1,4 @@
-//! Illumination maps: where a surface's light is kept, texel by texel.
+//! Illumination maps: the irradiance of a surface, texel by texel.
 
 pub mod accumulator;
 pub mod chart;

@@ -1,4 +1,4 @@
-//! What larger texels than were asked for leave out: how light varies within them, from how it varies between them.
+//! The error of texels that are larger than requested: the variation within them, extrapolated from that between them.
 
 use super::Chart;
 

@@ -1,5 +1,5 @@
-//! The two sides of a surface. Light that falls on one side of a thin sheet is not seen on the other: each side is a
-//! receiver with a map of its own, and both lie in the same coordinates.
+//! The two sides of a surface. Light on one side of a thin sheet is not seen on the other, so each side is a receiver
+//! with a map of its own. Both use the same coordinates.
 
 use glam::DVec3;
 use serde::{Deserialize, Serialize};

@@ -1,4 +1,4 @@
-//! How good maps are, without a reference: from the differences between maps of nested lattices.
+//! Error estimates without a reference, from the differences between maps of nested lattices.
 //!
 //! Let I be the map of a lattice, I₂ that of the lattice with steps of twice the length, I₄ the next. The errors of
 //! neighbouring levels turn out to be independent (they come from where cuts and cells happen to lie), so that

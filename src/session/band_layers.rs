@@ -1,4 +1,4 @@
-//! What each band of the spectrum gives to the maps, where that is to be kept: the paper's n-band illumination map.
+//! Maps of each band of the spectrum, for `--keep-spectrum`: the paper's n-band illumination map.
 
 use rayon::prelude::*;
 

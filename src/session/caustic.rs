@@ -1,4 +1,4 @@
-//! The caustic layer of all lights, level by level: a coarse whole picture first, then finer ones, each with its error.
+//! The caustic layer of all lights, level by level: complete coarse maps first, then finer ones, each with its error.
 
 use std::time::Instant;
 
@@ -145,7 +145,7 @@ impl LightProgress {
     }
 }
 
-/// Who watches a bake.
+/// Observer of a bake.
 pub(super) trait Onlooker {
     /// Takes a picture that is not the last: levels, where the bake stands, and the clock.
     ///
@@ -169,7 +169,7 @@ pub(super) trait Onlooker {
     }
 }
 
-/// Nobody.
+/// No observer.
 impl Onlooker for () {}
 
 /// The pictures of all lights so far.
@@ -180,12 +180,12 @@ pub(super) fn shown<'a>(lights: &[&VisibleLight], climbs: &'a [LightProgress]) -
         .collect()
 }
 
-/// Works on a bake in its course.
+/// Mutable state of a running bake.
 pub(super) struct Course<'a> {
     pub(super) control: &'a Control,
     pub(super) clock: &'a mut Clock,
     pub(super) outcome: &'a mut CausticOutcome,
-    /// Who traces and deposits.
+    /// Where passes are traced and deposited.
     pub(super) role: &'a mut ShardRole,
     /// Mean footprints, where they are wanted.
     pub(super) statistics: Option<FootprintStatistics>,
@@ -234,8 +234,7 @@ impl CausticLayer<'_> {
             return Err(Error::failure(
                 "--memory",
                 format!(
-                    "shards need maps of a fixed size, and those asked for may take more than {} MiB and would be \
-                     made coarser where the light falls",
+                    "shards need maps of a fixed size, but these may take more than {} MiB and would be made coarser",
                     self.settings.map_memory_bytes() >> 20
                 ),
                 "allow more --memory or ask for a smaller --map-resolution",

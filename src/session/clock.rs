@@ -1,4 +1,4 @@
-//! How long a bake takes, stage by stage.
+//! Wall and CPU time of a bake, stage by stage.
 
 use super::result::Timings;
 use crate::light_pass::caustic::pass::{Seconds, Stopwatch};

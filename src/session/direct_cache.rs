@@ -1,4 +1,4 @@
-//! Direct light that was baked before: what edits and settings do not touch is not traced again.
+//! Cache of the direct layer: what edits and settings do not affect is not traced again.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};

@@ -1,4 +1,4 @@
-//! Direct light in the course of a bake: beside the levels of the caustic layer, and counted apart.
+//! Direct light during a bake: beside the levels of the caustic layer, and timed apart.
 
 use super::caustic::CausticOutcome;
 use super::clock::Clock;

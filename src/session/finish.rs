@@ -1,4 +1,4 @@
-//! From levels of lights of unit strength to finished maps.
+//! Assembles finished maps from the lights' levels, which are of unit strength.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -379,7 +379,7 @@ fn beyond_single(maps: &[IlluminationMap]) -> Option<Warning> {
         Warning::new(
             "maps",
             format!(
-                "{texels} texels are brighter than {:.1e} W/m², the most that a map holds; they hold that",
+                "{texels} texels are brighter than {:.1e} W/m², the most that a map holds; they were clipped to it",
                 f32::MAX
             ),
             "make the lights weaker",

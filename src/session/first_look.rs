@@ -1,4 +1,4 @@
-//! Direct light and what surfaces send each other of it, coarsely: what is shown until both are as fine as asked for.
+//! A coarse first picture: direct light, and what surfaces send each other of it, until both are finished.
 //!
 //! Before there are caustics, light goes straight through clear bodies: where it comes to lie is wrong, but not how much
 //! of it there is.

@@ -1,5 +1,5 @@
-//! What each light aims at, by what it can still gain: light adds up on the maps, and so do the squares of its errors.
-//! Lights whose error hardly shows beside the others' stay coarse.
+//! The error target of each light, by what it can still gain: light adds up on the maps, and so do the squares of its
+//! errors. Lights whose error hardly shows beside the others' stay coarse.
 
 use std::collections::BTreeMap;
 

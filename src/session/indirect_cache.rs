@@ -1,4 +1,4 @@
-//! Rays between diffuse surfaces that were traced before: lamps may change without a new one.
+//! Cache of the rays between diffuse surfaces: lights may change without a new one.
 
 use std::sync::Arc;
 

@@ -1,4 +1,4 @@
-//! Light between diffuse surfaces in the course of a bake: after the layers that it is gathered from.
+//! Indirect light during a bake: after the layers that it is gathered from.
 
 use super::caustic::CausticOutcome;
 use super::clock::Clock;
@@ -233,7 +233,7 @@ impl IndirectWork {
             warnings.push(Warning::new(
                 "indirect layer",
                 format!(
-                    "after {MAX_BOUNCES} bounces light is still to come: surfaces give back nearly all of it"
+                    "after {MAX_BOUNCES} bounces it has not converged: surfaces reflect nearly all light"
                 ),
                 "use albedos below 1",
             ));
@@ -248,7 +248,7 @@ impl IndirectWork {
             warnings.push(Warning::new(
                 "indirect layer",
                 format!(
-                    "its estimated error is {}, above the {} that are aimed at, with up to {rays} rays per texel of its grid",
+                    "its estimated error is {}, above the target of {}, with up to {rays} rays per texel of its grid",
                     percent(solution.relative_noise),
                     percent(self.target)
                 ),

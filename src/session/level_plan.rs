@@ -1,4 +1,4 @@
-//! Which lattices and map sizes a bake goes through.
+//! The lattices and map sizes that a bake goes through.
 
 use std::collections::BTreeMap;
 

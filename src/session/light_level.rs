@@ -1,4 +1,4 @@
-//! What a session keeps of one light: rays, and the maps of the levels of the last bake.
+//! What a session caches of one light: rays, and the maps of the last bake's levels.
 
 use std::collections::BTreeMap;
 

@@ -1,4 +1,4 @@
-//! Which map each surface gets, from the light that a thin lattice saw on it.
+//! Chooses each surface's map from the light that a coarse lattice found on it.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -213,7 +213,7 @@ pub(super) fn scarce(wished: &Sizes, granted: &Sizes, (limit, memory): (u64, Map
     Warning::new(
         MEMORY,
         format!(
-            "the maps need {:.1} MiB, the limit is {:.1} MiB: they are coarser than they should be and take {:.1} MiB",
+            "the maps need {:.1} MiB, the limit is {:.1} MiB: they were made coarser and take {:.1} MiB",
             taken(wished),
             mebibytes(limit),
             taken(granted),

@@ -1,4 +1,4 @@
-//! How large and how fine each map is: as its light asks for, and no larger than memory allows.
+//! How large and how fine each map is: as its light needs, within the memory limit.
 //!
 //! A tile's texels are to be no larger than the footprints that fall on it (section 3.1.1 of the paper). Where memory is
 //! short, all texels grow alike beside their footprints: those that are far finer than their light are spared first.
@@ -253,7 +253,7 @@ fn granted(wishes: &BTreeMap<Receiver, SizeRequest>, sparing: MemoryReduction) -
         .collect()
 }
 
-/// Sizes of all maps in so much memory [bytes]: as they are wished for, or as little coarser as can be.
+/// Sizes of all maps within a memory limit [bytes]: as requested, or as little coarser as possible.
 pub(super) fn fit(wishes: &BTreeMap<Receiver, SizeRequest>, (limit, memory): (u64, MapMemory)) -> Sizes {
     let fits = |sizes: &Sizes| memory.bytes(sizes.values().map(MapSize::texels)) <= limit;
     let wished = wished(wishes);

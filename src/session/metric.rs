@@ -1,4 +1,4 @@
-//! What errors of texels count for in the error that a bake aims at.
+//! How errors of texels add up to the error that a bake refines towards.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;

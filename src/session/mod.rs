@@ -275,7 +275,7 @@ impl BakeSession {
 
     fn aim(&mut self, settings: &BakeSettings) -> Arc<Aim> {
         if !plan::wants_caustics(settings) {
-            // Nobody looks for what nobody wants to see.
+            // No caustic layer requested: skip the item buffers.
             return Arc::default();
         }
         let wanted = aim_key(settings);

@@ -1,4 +1,4 @@
-//! Maps of one light while they are made: all of it on one set, or band by band of its spectrum.
+//! Maps of one light during a bake: one set for all of it, or one for each band of its spectrum.
 
 use std::borrow::Cow;
 

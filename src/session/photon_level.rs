@@ -1,4 +1,4 @@
-//! One level of one light by photons: twice as many as before or more, those of earlier levels included.
+//! One level of one light by photons: at least twice as many as before, earlier ones included.
 
 use std::borrow::Cow;
 use std::time::Instant;

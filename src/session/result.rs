@@ -1,4 +1,4 @@
-//! What a bake gives.
+//! The result of a bake.
 
 use super::band_layers::BandLayer;
 use serde::{Deserialize, Serialize};

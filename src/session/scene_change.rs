@@ -1,4 +1,4 @@
-//! What an edit changed of a scene, as far as baked light depends on it.
+//! What an edit changed in a scene, as far as baked light depends on it.
 
 use std::sync::Arc;
 

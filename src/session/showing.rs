@@ -1,4 +1,4 @@
-//! Pictures on the way, and the light of other layers that the caustics are seen beside.
+//! Intermediate maps: each level of the caustics, with the other layers as far as they are known.
 
 use std::sync::Arc;
 
@@ -25,7 +25,7 @@ use crate::transport::Tracer;
 /// Takes pictures.
 pub(super) type TakeLevel<'a> = dyn FnMut(BakeResult) + Send + 'a;
 
-/// Shows a bake to whoever takes its levels.
+/// Hands the levels of a bake to a callback.
 pub(super) struct Showing<'a, 'level> {
     pub(super) finish: &'a MapAssembler<'a>,
     pub(super) tracer: &'a Tracer,
@@ -44,7 +44,7 @@ pub(super) struct Showing<'a, 'level> {
     pub(super) is_first: bool,
     /// What stands in for layers that are not baked yet, where nothing was shown before the bake.
     pub(super) first_look: Option<FirstLook>,
-    /// What stands in for indirect light that is not baked yet, where nobody watches.
+    /// No stand-in for indirect light: there is no callback.
     pub(super) glance: Option<FirstLook>,
 }
 

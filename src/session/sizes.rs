@@ -1,4 +1,4 @@
-//! How large each surface's map is.
+//! The size of each surface's map, and its chart.
 
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicU64, Ordering};

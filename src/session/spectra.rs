@@ -1,5 +1,5 @@
-//! Which lights are traced wavelength by wavelength, and at which: those whose light meets glass that parts it, or all
-//! where their spectrum is to be kept.
+//! Which lights are traced by wavelength, and at which wavelengths: those that reach dispersive glass, or all with
+//! `--keep-spectrum`.
 
 use std::collections::BTreeMap;
 use std::ops::RangeInclusive;

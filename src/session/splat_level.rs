@@ -1,4 +1,4 @@
-//! One light by splats: the whole lattice at once, and thinner ones for its error.
+//! One light by splats: the full lattice at once, and sparser ones to estimate the error.
 
 use super::caustic::{CausticLayer, Course};
 use super::light_level::{LevelKey, LightLevel, LightState, TraceKey};
@@ -28,7 +28,7 @@ const MIN_COARSE_SIDE: usize = 64;
 /// Stride of the lattice that the blur of splats is estimated from.
 const ERROR_STRIDE: usize = 2;
 
-/// Who makes splats, of what.
+/// Input of a splat pass.
 #[derive(Clone, Copy, Debug)]
 struct Worker<'a> {
     /// Its share of the lattice, of rays that are not kept; `None` for all of it.

@@ -1,4 +1,4 @@
-//! What a bake would take, before it: the first moments of one, and what its course says.
+//! Predicts the cost of a bake: the first moments of one, and what its course says.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;

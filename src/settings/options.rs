@@ -23,6 +23,8 @@ pub struct OptionInfo {
     pub value: &'static str,
     /// Whether several values can be named, separated by commas.
     pub is_list: bool,
+    /// What it sets, in one line of help.
+    pub brief: &'static str,
     /// What it sets.
     pub what: &'static str,
     /// Its values; empty where their names say all.
@@ -60,6 +62,7 @@ const fn row(name: &'static str, label: &'static str, value: &'static str) -> Op
         label,
         value,
         is_list: false,
+        brief: "",
         what: "",
         range: "",
         default: "",
@@ -91,14 +94,16 @@ const fn flag(name: &'static str) -> OptionInfo {
 /// All of them, in the order of the command line's help.
 pub const OPTIONS: &[OptionInfo] = &[
     OptionInfo {
-        what: "How carefully to bake: the target error, or the density of splats, by name",
+        brief: "Target error by name: draft 10 %, preview 3 %, final 1 %",
+        what: "Target error by name; for splats their density",
         range: "draft 10 %, preview 3 %, final 1 % of the error; splats 12,500, 100,000 and 800,000 rays/sr",
         default: "preview, unless density, error or time is given",
-        accuracy: "as the name says, by the estimate",
-        cost: "preview takes some ten times as long as a draft, final some ten times as long as a preview",
+        accuracy: "as named, by the estimate",
+        cost: "preview takes about ten times as long as draft, final ten times as long as preview",
         ..choice::<Preset>("preset", "Preset", "PRESET")
     },
     OptionInfo {
+        brief: "auto, wavefront, photon or splat [default: auto]",
         what: "How light rays become irradiance",
         default: "auto",
         accuracy: "wavefront needs some hundred times fewer rays than splats for the same error",
@@ -107,21 +112,24 @@ pub const OPTIONS: &[OptionInfo] = &[
         ..choice::<Estimator>("estimator", "Estimator", "ESTIMATOR")
     },
     OptionInfo {
-        what: "Light rays per steradian around each lamp, and no refinement: just that many, grain and all; with a target error, \
-               to begin with. For suns density/D² rays per m², D from the casters' centre to their farthest receiver",
+        brief: "Trace exactly this many rays per steradian, unrefined",
+        what: "Light rays per steradian around each light: exactly that many, without refinement; with a target error, the \
+                density to start with. Suns: density/D² rays per m², with D from the casters' centre to their \
+                farthest receiver",
         range: "1 to 1e12",
-        default: "25,000 (photon: 1,000,000, splat: 100,000); with a target error 40 over it, from 1,600 to 40,000",
-        accuracy: "finer caustics and less noise with more rays; sigma's radius falls with its root",
-        cost: "time grows in proportion to it; four times as many keep the rays of the step before",
+        default: "25,000 (photon: 1,000,000, splat: 100,000); with a target error 40 divided by it, from 1,600 to 40,000",
+        accuracy: "more rays give finer caustics and less noise; sigma's radius shrinks with their root",
+        cost: "time grows in proportion; four times as many rays reuse those of the step before",
         limits: Some((1.0, 1e12, |s| vec![s.density_per_sr])),
         set: |s, text| number(text).map(|density| s.density_per_sr = density),
         ..row("density", "Ray density [rays/sr]", "RAYS_PER_SR")
     },
     OptionInfo {
-        what: "Goes on until the estimated error of the maps is below this, such as 2% (not splat)",
+        brief: "Refine until the estimated error is below this, e.g. 2%",
+        what: "Refines until the estimated error of the maps is below this, such as 2% (not splat)",
         range: "0.01% to 100%",
         default: "that of the preset",
-        accuracy: "kept by the estimate, not by a reference",
+        accuracy: "the estimate meets it; no reference is needed",
         cost: "halving it takes about four times the rays",
         limits: Some((super::MIN_MAX_ERROR, 1.0, |s| s.max_error.into_iter().collect())),
         applies: refining,
@@ -129,42 +137,47 @@ pub const OPTIONS: &[OptionInfo] = &[
         ..row("max-error", "Max error [%]", "SHARE")
     },
     OptionInfo {
-        what: "What that error is: as an eye sees it, relative to how bright a place is, or the relative RMSE over all maps (not \
-               splat)",
+        brief: "visible or rmse [default: visible]",
+        what: "What the error means: relative to the brightness of each place as the eye sees it, or the relative RMSE over \
+                all maps (not splat)",
         default: "visible",
-        accuracy: "by the relative RMSE a focus outweighs a room; as an eye sees it, each place counts as exposure shows it",
-        cost: "a small bright focus takes long by the relative RMSE, dim light by what is visible",
+        accuracy: "with rmse a bright focus outweighs a room; with visible each place counts as exposure shows it",
+        cost: "rmse takes long on a small bright focus, visible on dim light",
         applies: refining,
         set: |s, text| named(text).map(|metric| s.error_metric = metric),
         ..choice::<ErrorMetric>("error-metric", "Error is", "METRIC")
     },
     OptionInfo {
-        what: "Ends the bake after so long, such as 10s, with the finest maps that are complete by then; without a target error, \
-               refines as far as that goes (not splat)",
+        brief: "Stop after this long, e.g. 10s, with the best maps so far",
+        what: "Ends the bake after this long, such as 10s, with the finest complete maps; without a target error, refines \
+                as far as the time allows (not splat)",
         range: "1ms to 1e7s",
         default: "as long as it takes",
-        accuracy: "the finest maps that were complete are shown; their error is estimated",
-        cost: "so much time, unless the maps cannot become better",
+        accuracy: "the finest complete maps are kept, with their estimated error",
+        cost: "that time, unless the maps cannot improve",
         limits: Some((1e-3, 1e7, |s| s.max_time_s.into_iter().collect())),
         set: |s, text| seconds(text).map(|time_s| s.max_time_s = Some(time_s)),
         ..row("max-time", "Max time [s]", "TIME")
     },
     OptionInfo {
-        what: "Where in its lattice cell a light ray starts (splat)",
+        brief: "lattice or jittered [default: lattice]",
+        what: "Where in its lattice cell a ray starts (splat)",
         default: "lattice",
-        accuracy: "a lattice converges faster, jittered rays turn regular patterns into noise",
+        accuracy: "a lattice converges faster; jittered rays turn regular patterns into noise",
         cost: "the same",
         applies: splats,
         set: |s, text| named(text).map(|rays| s.rays = rays),
         ..choice::<RayPlacement>("rays", "Rays", "PLACEMENT")
     },
     OptionInfo {
-        what: "Spread of a gaussian, weight exp(−r²/2σ), in squared radii of a ray's footprint at the density: of each splat, or \
-               of the finished map; adaptive, of splats, by how each footprint compares with the mean",
+        brief: "Smooth by a Gaussian of this variance [default: 0]",
+        what: "Variance σ of a Gaussian, weight exp(−r²/2σ), in squared radii of a ray's footprint: the kernel of each \
+                splat, or a blur of the finished map; adaptive (splat) scales it by each footprint's size relative \
+                to the mean",
         range: "0 to 1e4, splat above 0",
         default: "0, none; splat 1",
-        accuracy: "small shows single rays (photon, splat) or is exact (wavefront), large blurs the caustic",
-        cost: "splat: time per ray grows in proportion to it; others: nothing is traced",
+        accuracy: "small values show single rays (photon, splat) or are exact (wavefront), large ones blur the caustic",
+        cost: "splat: time per ray grows in proportion; others: no ray is traced",
         applies: |s| match s.kernel {
             Kernel::Gaussian => Ok(()),
             _ => Err(("only the gaussian kernel has a sigma", "--kernel gaussian")),
@@ -173,6 +186,7 @@ pub const OPTIONS: &[OptionInfo] = &[
         ..row("sigma", "Sigma [radii²]", "S|adaptive")
     },
     OptionInfo {
+        brief: "gaussian, cone, disc or box [default: gaussian]",
         what: "Shape of a splat (splat)",
         default: "gaussian",
         accuracy: "gaussian is smoothest; disc and box show their edges",
@@ -182,15 +196,17 @@ pub const OPTIONS: &[OptionInfo] = &[
         ..choice::<Kernel>("kernel", "Kernel", "KERNEL")
     },
     OptionInfo {
-        what: "How a kernel is taken into texels (splat)",
+        brief: "integrated or point [default: integrated]",
+        what: "How a kernel is sampled on texels (splat)",
         default: "integrated",
-        accuracy: "points miss kernels that are smaller than texels",
+        accuracy: "points miss kernels smaller than a texel",
         cost: "nearly the same",
         applies: splats,
         set: |s, text| named(text).map(|sampling| s.kernel_sampling = sampling),
         ..choice::<KernelSampling>("kernel-sampling", "", "SAMPLING")
     },
     OptionInfo {
+        brief: "ellipse, disc, distance or fixed [default: ellipse]",
         what: "What sets the size and shape of a splat (splat)",
         default: "ellipse",
         accuracy: "ellipse follows the wavefront best, fixed least",
@@ -200,16 +216,18 @@ pub const OPTIONS: &[OptionInfo] = &[
         ..choice::<Footprint>("footprint", "Footprint", "FOOTPRINT")
     },
     OptionInfo {
-        what: "Whether the noise of photons is filtered where that lowers the error (auto, photon)",
+        brief: "Denoise photons [default: on with a target error]",
+        what: "Filters the noise of photons where that lowers the error (auto, photon)",
         range: "on, off",
         default: "on with a target, off at a density",
-        accuracy: "less noise, none of its grain",
+        accuracy: "less noise and no grain",
         cost: "little: no ray is traced",
         set: |s, text| on_off(text).map(|filter| s.filter = Some(filter)),
         ..row("filter", "", "on|off")
     },
     OptionInfo {
-        what: "How the sphere of directions around a light is divided when looking for glass and mirrors",
+        brief: "equal or cube [default: equal]",
+        what: "How directions around a light are divided to find glass and mirrors",
         default: "equal",
         accuracy: "equal cells give each ray the same flux; the cube's differ by a factor of up to 5.2",
         cost: "nearly the same",
@@ -217,7 +235,8 @@ pub const OPTIONS: &[OptionInfo] = &[
         ..choice::<ItemBufferKind>("item-buffer", "Item buffer", "DIVISION")
     },
     OptionInfo {
-        what: "Texels of every map: N by N, W by H, or as needed: maps of flat surfaces are finer where light is finer",
+        brief: "Texels of each map, up to 16384 a side [default: auto]",
+        what: "Texels of every map: N by N, W by H, or as fine as the light on each surface",
         range: "auto, 1 to 16384 a side",
         default: "auto",
         accuracy: "details finer than a texel are averaged",
@@ -230,11 +249,12 @@ pub const OPTIONS: &[OptionInfo] = &[
         ..row("map-resolution", "Map size [texels]", "auto|N|WxH")
     },
     OptionInfo {
+        brief: "Specular surfaces on a path [default: 16; photons 256]",
         what: "Largest number of glass, mirror and water surfaces on a light path",
         range: "1 to 100,000",
-        default: "16 where all branches are followed, 256 by photons",
+        default: "16 where all branches are followed, 256 for photons",
         accuracy: "light beyond it is missing from the maps and booked as truncated",
-        cost: "little where light leaves the glass soon; light caught in a ring of mirrors takes time in proportion",
+        cost: "little where light soon leaves the glass; light trapped between mirrors takes time in proportion",
         limits: Some((1.0, 100_000.0, |s| {
             s.max_depth.map(f64::from).into_iter().collect()
         })),
@@ -242,23 +262,26 @@ pub const OPTIONS: &[OptionInfo] = &[
         ..row("max-depth", "Max depth", "N")
     },
     OptionInfo {
-        what: "Where glass splits light, branches that carry less than this share of their light ray's flux are not followed",
+        brief: "Drop branches below this share of their ray's flux",
+        what: "Drops branches that carry less than this share of their ray's flux where glass splits light",
         range: "0 to 0.5",
         default: "0.003 of the target error; 0.0001 without one",
-        accuracy: "what is left out is missing from the maps and booked as truncated",
-        cost: "a tenth of it follows about one more reflection inside each piece of glass",
+        accuracy: "what is dropped is missing from the maps and booked as truncated",
+        cost: "a tenth of it follows about one more internal reflection",
         limits: Some((0.0, 0.5, |s| s.branch_threshold.into_iter().collect())),
         set: |s, text| number(text).map(|share| s.branch_threshold = Some(share)),
         ..row("branch-threshold", "Weakest branch", "SHARE")
     },
     OptionInfo {
-        what: "Which light is baked. Caustic: light that met glass, mirrors or water. Direct: straight from the lights. Indirect: \
-               what diffuse surfaces send each other of both, any number of times",
+        brief: "caustic, direct, indirect; commas between several",
+        what: "Which light is baked. Caustic: light that met glass, mirrors or water. Direct: straight from the lights. \
+                Indirect: light that diffuse surfaces send each other, any number of bounces",
         range: "at least one",
         default: "caustic for bake, caustic,direct for pictures and the window",
-        accuracy: "a layer that is not baked is missing from the picture; indirect stops at the max error, 3 % without one",
-        cost: "direct takes one shadow ray per texel and light; indirect 64 to 4,096 rays per texel of a coarser grid, and the other \
-               two layers though they be hidden; they are kept while only lamps are dimmed",
+        accuracy: "a layer that is not baked is missing from the picture; indirect stops at the max error, 3 % without \
+                one",
+        cost: "direct: a shadow ray per texel and light; indirect: 64 to 4,096 rays per texel of a coarser grid, and the \
+                other two layers, shown or not; kept while only powers of lights change",
         set: |s, text| {
             s.layers = text.split(',').map(named).collect::<Read<_>>()?;
             s.layers.sort_unstable();
@@ -270,7 +293,8 @@ pub const OPTIONS: &[OptionInfo] = &[
         ..row("layers", "Layers", "LAYER,...")
     },
     OptionInfo {
-        what: "Adds each light's part of each layer to the files, so that lamps can be dimmed afterwards",
+        brief: "Also write the contribution of each light",
+        what: "Also writes each light's share of each layer, so that lights can be dimmed afterwards",
         cost: "files and memory grow with the number of lights",
         set: |s, _| {
             s.per_light = true;
@@ -279,11 +303,12 @@ pub const OPTIONS: &[OptionInfo] = &[
         ..flag("per-light")
     },
     OptionInfo {
-        what: "Wavelengths of light that meets dispersive glass: the whole spectrum, one for each colour of the rainbow, or so \
-               many",
+        brief: "Where glass disperses light [default: continuous]",
+        what: "Wavelengths of light that meets dispersive glass: the whole spectrum, seven for the colours of the rainbow, \
+                or N",
         range: "1 to 1000, rainbow or continuous",
         default: "continuous",
-        accuracy: "few show as separate images of the lamp",
+        accuracy: "few show as separate images of the light",
         cost: "each is traced",
         limits: Some((1.0, MAX_WAVELENGTHS as f64, |s| match s.wavelengths {
             Wavelengths::Fixed(count) => vec![f64::from(count)],
@@ -293,7 +318,8 @@ pub const OPTIONS: &[OptionInfo] = &[
         ..row("wavelengths", "", "continuous|rainbow|N")
     },
     OptionInfo {
-        what: "Every ray at every wavelength, or each ray at one of them",
+        brief: "split (a ray at every wavelength) or stochastic (at one)",
+        what: "Traces every ray at every wavelength, or at one",
         default: "split; stochastic for splats over the whole spectrum",
         accuracy: "stochastic rays are noisier",
         cost: "split rays are traced once for each wavelength",
@@ -301,7 +327,8 @@ pub const OPTIONS: &[OptionInfo] = &[
         ..choice::<SpectralSampling>("spectral-sampling", "", "SAMPLING")
     },
     OptionInfo {
-        what: "Adds the light of each wavelength to the files [W/(m² nm)], with --wavelengths N",
+        brief: "Also write each wavelength (with --wavelengths N)",
+        what: "Also writes the light of each wavelength [W/(m² nm)]; needs --wavelengths N",
         cost: "files and memory grow with the number of wavelengths",
         set: |s, _| {
             s.keep_spectrum = true;
@@ -310,9 +337,10 @@ pub const OPTIONS: &[OptionInfo] = &[
         ..flag("keep-spectrum")
     },
     OptionInfo {
+        brief: "Force effects, e.g. dispersion=off [default: auto]",
         what: "Forces effects on or off, such as refraction=off",
-        default: "auto, on where the scene calls for it",
-        accuracy: "light that an effect would bring is missing without it",
+        default: "auto: on where the scene needs it",
+        accuracy: "light of an effect that is off is missing",
         cost: "see `study effects`",
         set: |s, text| {
             // The last one counts where an effect is named twice.
@@ -326,16 +354,18 @@ pub const OPTIONS: &[OptionInfo] = &[
         ..row("effects", "", "NAME=auto|on|off")
     },
     OptionInfo {
-        what: "Seed of everything random",
+        brief: "Seed of the random numbers [default: 0]",
+        what: "Seed of the random numbers",
         default: "0",
         set: |s, text| number(text).map(|seed| s.seed = seed),
         ..row("seed", "", "N")
     },
     OptionInfo {
-        what: "Largest memory for maps, such as 512M or 2G; where it is short, maps are made coarser, with a warning",
+        brief: "Memory for maps, e.g. 512M or 2G [default: 4G]",
+        what: "Memory limit for maps, such as 512M or 2G; if it is short, maps get coarser, with a warning",
         range: "1M up",
         default: "4G",
-        accuracy: "maps that are coarser average more",
+        accuracy: "coarser maps average more",
         cost: "a quarter of it keeps traced light for the next bake",
         set: |s, text| memory(text).map(|bytes| s.memory_bytes = bytes),
         ..row("memory", "", "SIZE")
@@ -501,7 +531,7 @@ fn effect_switch(text: &str) -> Read<(Effect, EffectSwitch)> {
         format!("{text} is not of the form NAME=auto|on|off; NAME is one of {names}")
     })?;
     let effect = named(name).map_err(|_| format!("there is no effect {name}; there are {}", names()))?;
-    let switch = named(switch).map_err(|_| format!("{switch} is no switch; use auto, on or off"))?;
+    let switch = named(switch).map_err(|_| format!("{switch} is not a switch; use auto, on or off"))?;
     Ok((effect, switch))
 }
 

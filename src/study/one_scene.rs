@@ -207,7 +207,7 @@ pub fn spectrum(scene: &Scene, settings: &BakeSettings, wavelengths: &[u32]) -> 
     {
         return Err(Error::failure(
             &scene.source,
-            "no light comes to a diffuse surface by way of glass that parts it",
+            "no light reaches a diffuse surface through dispersive glass",
             "name a scene with a lit prism, such as builtin:spectrum",
         ));
     }

@@ -434,7 +434,7 @@ fn pairs(reference: Option<&Reference>, result: &BakeResult) -> Result<Vec<Texel
         (Some(pairs), _) => Ok(pairs),
         (None, Truth::Maps(_)) => Ok(Vec::new()),
         (None, Truth::Surface { .. }) => failed(
-            "its size and that of the maps are no whole multiples of one another",
+            "its size and that of the maps are not whole multiples of each other",
             "choose another --map-resolution",
         ),
     }

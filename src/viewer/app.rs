@@ -1,4 +1,4 @@
-//! The window's life: events in, frames out, and rest while nothing changes.
+//! The event loop of the window: events in, frames out, idle while nothing changes.
 
 mod drawing;
 mod files;
@@ -129,7 +129,7 @@ pub struct App {
     told_refusal: Option<String>,
     pictures: u64,
     frames: u64,
-    /// Pictures at the last line of the log that told of rest.
+    /// Number of pictures when the log last reported an idle window.
     rested_at: u64,
     /// Frames that may still come only to tell what the last picture took.
     reports_due: u32,
@@ -149,7 +149,7 @@ impl App {
     pub fn new(options: &ViewerOptions, proxy: EventLoopProxy<UserEvent>) -> Result<Self> {
         let of_baker = proxy.clone();
         let wake = &Wake::new(move || {
-            // Fails only when the window is gone, and then nobody waits for it.
+            // Fails only once the window is gone.
             let _ = of_baker.send_event(UserEvent::Baker);
         });
         let model = Model::new(options, wake)?;
@@ -337,7 +337,7 @@ impl App {
             return;
         };
         let shown = graphics.show(&mut painting);
-        // What breaks the window is told when it is mended.
+        // A broken window is reported once it is restored.
         if shown != Shown::Broken
             && let Some(error) = graphics.gpu().take_error()
         {

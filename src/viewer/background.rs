@@ -1,4 +1,4 @@
-//! Work beside the window, on threads of its own.
+//! Background work on threads of its own.
 
 use std::fmt;
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
@@ -32,7 +32,7 @@ impl fmt::Debug for Wake {
 /// What a piece of work is stopped by, and tells its progress to.
 #[derive(Debug)]
 pub struct Task {
-    /// Cancelled once nobody waits for the work any more.
+    /// Cancelled once the result is not needed any more.
     pub control: Control,
     done: Mutex<Option<(u64, u64)>>,
     wake: Wake,
@@ -120,7 +120,7 @@ impl<K, T: Send + 'static> Background<K, T> {
         });
         let of_work = Arc::clone(&task);
         let work = move || {
-            // Nobody waits any more where something else was asked for, or the window was closed.
+            // The receiver is gone if a newer task replaced this one or the window was closed.
             let _ = give.send(work(&of_work));
             of_work.wake.wake();
         };
@@ -157,7 +157,7 @@ impl<K, T> Drop for Background<K, T> {
 pub(super) fn no_thread(location: &str, error: &std::io::Error) -> Error {
     Error::failure(
         location,
-        format!("the system gives no thread for it ({error})"),
+        format!("the system refuses a thread for it ({error})"),
         "close other programs and try again",
     )
 }

@@ -1,5 +1,5 @@
-//! Maps to hold the present ones against: as they were when somebody kept them, or of a folder. The picture's right part
-//! shows them, from the same place and by the same colours.
+//! Maps to compare with: earlier ones that the user kept, or those of a folder. The right part of the picture shows them
+//! from the same camera and with the same colours.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -13,7 +13,7 @@ use crate::illumination::IlluminationMap;
 use crate::illumination::difference::difference;
 use crate::scene::Scene;
 
-/// What the present maps are held against.
+/// The maps to compare with.
 #[derive(Clone, Debug)]
 pub struct Reference {
     /// What it is called in the window.
@@ -35,7 +35,7 @@ impl Reference {
         if maps.is_empty() {
             return Err(Error::usage(
                 "compare",
-                "there are no maps to be kept yet",
+                "there are no maps to keep yet",
                 "bake first",
             ));
         }

@@ -1,5 +1,4 @@
-//! What the user sets and asks for. The panel, keys and handles in the picture push commands; the model and the window do
-//! what they say.
+//! What the user chooses and requests. Panel, keys and handles push commands; the model and the window carry them out.
 
 use std::path::PathBuf;
 

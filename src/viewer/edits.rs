@@ -1,5 +1,4 @@
-//! What the user changes, step by step, in the order in which it is taken back: the scene, and the settings that it is
-//! baked and shown with.
+//! Undo and redo: the user's changes of the scene and of the settings, step by step.
 
 use std::mem::discriminant;
 use std::sync::Arc;

@@ -1,4 +1,4 @@
-//! What the window did, one JSON object per line: for support, and for tests that cannot look inside.
+//! Changes of the window's state as JSON lines, for support and for tests.
 
 use std::fs::File;
 use std::io::Write;
@@ -69,7 +69,7 @@ impl EventLog {
         })
     }
 
-    /// Whether anything that is told is kept.
+    /// Whether events are written.
     pub fn is_kept(&self) -> bool {
         self.file.is_some()
     }

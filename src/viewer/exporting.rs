@@ -1,5 +1,4 @@
-//! Maps and frames as files, written by a thread: the window goes on; and the picture in the window, what is seen without
-//! the panel and the radiance behind it.
+//! Exports maps, frames and pictures on a thread of its own, while the window goes on.
 
 use super::background::{Background, Task, Wake};
 use super::files::free_names;
@@ -185,7 +184,7 @@ pub fn save_picture(
     Ok(vec![png, exr])
 }
 
-/// What is told of files that were written.
+/// The message about written files.
 pub fn told(files: &[PathBuf]) -> String {
     let names: Vec<_> = files.iter().map(|file| file.display().to_string()).collect();
     format!("Saved {}.", names.join(" and "))

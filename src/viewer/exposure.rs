@@ -1,4 +1,4 @@
-//! The exposure that the window chooses by itself: measured when there is light, then steady.
+//! Automatic exposure of the window: measured once there is light, then constant.
 
 use std::time::Duration;
 
@@ -23,7 +23,7 @@ pub struct AutoExposure {
     first: Option<f64>,
     /// Where it goes [stops].
     goal: f64,
-    /// As it was set last [stops]: another value is somebody else's.
+    /// The value set last [stops]; any other value was set by the user.
     set: f64,
 }
 

@@ -1,5 +1,4 @@
-//! Maps in false colours with a legend: how far the light may be off, what an effect adds or takes away, and which
-//! wavelength it looks like.
+//! False colours with a legend: estimated error, contribution of an effect, dominant wavelength.
 
 use std::sync::Arc;
 

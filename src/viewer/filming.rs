@@ -1,4 +1,4 @@
-//! A way for the camera through the scene: recorded key by key, played, kept in a file, and filmed.
+//! Camera paths: recorded key by key, played, saved and filmed.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;

@@ -1,4 +1,4 @@
-//! A map as a flat picture: its thumbnail, what a window shows of it, and what lies under the pointer.
+//! A map as a flat picture: thumbnails, crops, and the value under the pointer.
 
 use std::f64::consts::PI;
 

@@ -1,4 +1,4 @@
-//! Handles at what is held, over the picture: three that move it along an axis, and one that turns it about the vertical.
+//! Handles on the selection: three move it along an axis, one turns it about the vertical.
 
 use egui::{Color32, Pos2, Rect, Sense, Stroke, Ui, WidgetInfo, vec2};
 use glam::DVec3;

@@ -1,4 +1,4 @@
-//! The window with everything that draws in it; thrown away whole and made anew when its device is lost.
+//! The window with everything that draws in it. It is dropped and created anew when the device is lost.
 
 use std::sync::Arc;
 use std::time::Duration;

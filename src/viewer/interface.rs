@@ -14,7 +14,7 @@ pub struct Interface {
     state: egui_winit::State,
     /// Paints egui's triangles and knows its textures.
     pub renderer: egui_wgpu::Renderer,
-    /// Where controls were last; `None` where nobody asks.
+    /// Last rectangles of the controls; `None` unless requested.
     controls: Option<Vec<Control>>,
 }
 
@@ -25,7 +25,7 @@ pub struct Painting {
     pixels_per_point: f32,
     /// When egui wants to be shown again; zero at once.
     pub repaint_after: Duration,
-    /// Where controls are, where somebody asks and they moved.
+    /// Rectangles of the controls, if requested and changed.
     pub moved_controls: Option<Vec<Control>>,
 }
 

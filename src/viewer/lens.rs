@@ -1,4 +1,4 @@
-//! From points of the scene to points of the picture, and back to gazes.
+//! Maps points of the scene to points of the picture, and back to view rays.
 
 use egui::{Pos2, Rect, vec2};
 use glam::DVec3;

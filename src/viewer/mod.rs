@@ -1,4 +1,4 @@
-//! The window: fly through a scene, change a setting, see it baked anew.
+//! The window: fly through a scene, change a setting, watch it bake again.
 
 mod app;
 pub mod background;

@@ -1,4 +1,4 @@
-//! Everything that the window shows and does, without the window.
+//! The state of the window and everything that it does, apart from the window itself.
 
 mod filming;
 mod keeping;
@@ -95,7 +95,7 @@ pub struct Model {
     maps_revision: u64,
     prober: Prober,
     sketcher: PreviewTask,
-    /// What the present maps are held against.
+    /// The maps to compare with.
     pub reference: Option<Reference>,
     /// What is to be picked once surfaces are known.
     picking: Option<Ray>,
@@ -189,7 +189,7 @@ impl Model {
         Ok(model)
     }
 
-    /// The surfaces of what is shown, for whoever walks; `None` until they are found.
+    /// The collision surfaces of the shown scene; `None` until they are built.
     pub fn surfaces(&mut self) -> Option<Arc<Tracer>> {
         self.surroundings.of(self.edits.scene())
     }

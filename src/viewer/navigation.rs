@@ -1,4 +1,4 @@
-//! A camera that flies, walks or orbits, and moves the same at every frame rate: pure, without a window.
+//! A camera that flies, walks or orbits, equally at every frame rate. Needs no window.
 
 use std::f64::consts::FRAC_PI_2;
 

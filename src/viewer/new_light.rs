@@ -1,4 +1,4 @@
-//! Lights that are added in the window: where there is room before what is looked at, and as bright as suits the picture.
+//! New lights: placed where there is room in front of the camera, and as bright as suits the picture.
 
 use glam::DVec3;
 

@@ -1,4 +1,4 @@
-//! What stands over the picture: how the first bake gets on, what went wrong, and what false colours mean.
+//! Text over the picture: progress of the first bake, errors, and legends of false colours.
 
 use egui::{Align2, Color32, FontId, Rect, Ui, pos2, vec2};
 
@@ -15,7 +15,7 @@ use crate::optics::{LinearSrgb, Nanometres};
 const TEXT: Color32 = Color32::from_gray(230);
 const SIZE: f32 = 16.0;
 
-/// Shows the picture in the space that is left, with what is to be told over it; returns where it lies.
+/// Shows the picture in the remaining space, with messages over it; returns its rectangle.
 pub fn show(ui: &mut Ui, picture: egui::TextureId, model: &Model, notice: Option<&str>) -> Rect {
     let (quantity, choice) = (model.quantity(), &model.choices.display.scale);
     let rect = ui.available_rect_before_wrap();

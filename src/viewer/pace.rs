@@ -1,5 +1,5 @@
-//! How well pictures are made so that none is waited for: what is seen in mirrors and through glass is traced more
-//! coarsely while the camera moves and frames run late, and the picture at rest becomes a mean of many.
+//! Picture quality against frame rate: mirrors and glass are traced more coarsely while the camera moves and frames are
+//! late, and at rest the picture averages many samples.
 
 use std::time::{Duration, Instant};
 

@@ -1,4 +1,4 @@
-//! What a point of a surface is lit by: read off the maps at once, and explained on a thread of its own.
+//! What lights a point of a surface: map values at once, light paths from a thread of its own.
 
 use std::sync::Arc;
 

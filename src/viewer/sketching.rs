@@ -1,4 +1,4 @@
-//! How light runs through the scene, over the picture: found on a thread of its own, and drawn.
+//! Light paths drawn over the picture, traced on a thread of its own.
 
 use std::sync::Arc;
 

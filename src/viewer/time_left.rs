@@ -1,4 +1,4 @@
-//! How long a bake is going to take, from what is known of it so far.
+//! Remaining time of a bake, from its levels so far.
 
 use std::time::{Duration, Instant};
 

@@ -1,5 +1,4 @@
-//! How long pictures took on the graphics device, and how long after a key or the mouse was used the window shows what came
-//! of it.
+//! GPU times of pictures, and the latency from an input event to the picture that shows its effect.
 //!
 //! A window that is busy meets events late, and nobody tells it when they came. Each is taken to have come at the
 //! earliest moment that it can have: what is said here is never too short, but for the way through the system.

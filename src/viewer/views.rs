@@ -1,4 +1,4 @@
-//! What the picture can show in place of light, and on which scale.
+//! What the picture shows in place of light, and on which scale.
 
 use serde::{Deserialize, Serialize};
 use strum::{EnumMessage, IntoStaticStr, VariantArray};
@@ -83,7 +83,7 @@ impl Quantity {
     }
 }
 
-/// In which unit irradiance is told.
+/// Unit of irradiance.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum IrradianceUnit {
     /// W/m², luminous-equivalent.

@@ -1,5 +1,4 @@
-//! A person on foot: eyes above the ground, stopped by walls, up and down steps; and the surfaces of the scene, which are
-//! found on a thread of their own.
+//! Walk mode: eye height, gravity, walls and steps; and the surfaces to collide with, built on a thread of its own.
 
 use std::sync::Arc;
 
@@ -26,14 +25,14 @@ const FASTEST_FALL_M_PER_S: f64 = 50.0;
 const CLIMBING_S: f64 = 0.08;
 /// Longest time between two looks around [s].
 pub(super) const LOOK_S: f64 = 1.0 / 120.0;
-/// Ground farther down than this is none [m]: nobody falls out of the world.
+/// Ground farther below than this is ignored [m]: you cannot fall out of the scene.
 const DEEPEST_M: f64 = 1e4;
 /// Feet this near to the ground stand on it [m].
 const STANDING_M: f64 = 1e-4;
-/// Most that a wall pushes somebody back who is too near to it already [m per look].
+/// Largest push away from a wall that is too near [m per step].
 const PUSH_M: f64 = 0.01;
 
-/// How someone on foot moves; where is told and kept by others.
+/// Motion in walk mode; the position is kept by the caller.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Walker {
     fall_m_per_s: f64,
@@ -41,7 +40,7 @@ pub struct Walker {
 }
 
 impl Walker {
-    /// Whether the next step would move the eyes though nobody walks: they fall, or climb.
+    /// Whether the eyes still move without input: falling, or climbing a step.
     pub fn is_moving(&self) -> bool {
         !self.stands
     }
@@ -99,7 +98,7 @@ impl Walker {
 struct Allowed {
     /// Of what was wanted.
     along: DVec3,
-    /// How far they push away whoever is too near.
+    /// Push away from walls that are too near.
     away: DVec3,
 }
 
@@ -184,7 +183,7 @@ impl Solid for Tracer {
     }
 }
 
-/// The surfaces of the scene in the window, once somebody asks for them.
+/// The collision surfaces of the scene, built on first use.
 #[derive(Debug)]
 pub struct Surroundings {
     found: Option<(Arc<Scene>, Arc<Tracer>)>,

@@ -1,4 +1,4 @@
-//! A thread around a bake: requests in, progress and maps of rising quality out; the window never waits for it.
+//! The baking thread: requests in, progress and maps of rising quality out. The window never waits for it.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
@@ -130,7 +130,7 @@ impl BakeRequest {
     }
 }
 
-/// Whole maps on the way to what was asked for, or those themselves.
+/// Complete maps of a level of the requested bake.
 #[derive(Clone, Debug)]
 pub struct BakedLevel {
     /// Number of the request that it answers, as [`Worker::request`] gave it.
@@ -237,7 +237,7 @@ impl Worker {
         }
     }
 
-    /// Tells what is running that nobody looks at its levels for so long.
+    /// Tells the running bake to hand out no level for this long.
     pub fn look_away(&self, time: Duration) {
         if let Some(running) = &self.shared.lock().running {
             running.control.look_away(time);
@@ -266,7 +266,7 @@ impl Worker {
         self.shared.lock().worth.take()
     }
 
-    /// The newest whole maps that were not taken yet. Older ones that nobody took are gone.
+    /// The newest complete maps not taken yet; older ones are dropped.
     pub fn take_level(&self) -> Option<BakedLevel> {
         self.shared.lock().newest.take()
     }
@@ -296,7 +296,7 @@ impl Drop for Worker {
 enum Purpose {
     /// They are handed out under this number.
     Maps { serial: u64 },
-    /// They are held against others.
+    /// For a comparison.
     Worth { effect: Effect, with: Arc<BakedLevel> },
 }
 

@@ -1,4 +1,4 @@
-//! The coordinates that a surface looks its map up by.
+//! The light-map coordinates of a surface in the exported file.
 
 use std::collections::HashMap;
 
@@ -208,7 +208,7 @@ fn keep_others(
     }
 }
 
-/// The elements of an accessor in the order of the new vertices, as another accessor; `None` where they cannot be told.
+/// An accessor with its elements in the order of the new vertices; `None` if it cannot be read.
 fn gathered(glb: &mut Glb, accessor: usize, vertices: usize, parted: &Parted) -> Option<usize> {
     let stated = glb.json["accessors"].get(accessor)?.clone();
     if stated.get("sparse").is_some() || stated["count"].as_u64()? != vertices as u64 {

@@ -137,7 +137,7 @@ impl ShardManifest {
                     "is of format {schema}, and this program reads format {SCHEMA}"
                 )));
             }
-            None => return Err(refused("is no shard's manifest".into())),
+            None => return Err(refused("is not a shard's manifest".into())),
         }
         serde_json::from_value(document).map_err(|error| refused(format!("is damaged ({error})")))
     }

@@ -134,7 +134,7 @@ impl ShardSet {
         Err(Error::failure(
             first.name(),
             format!(
-                "of the {count} shards of its bake these are missing: {}{more}",
+                "these of the {count} shards of its bake are missing: {}{more}",
                 named.join(", ")
             ),
             "bake them and name their folders too",
@@ -192,7 +192,7 @@ impl ShardSource for ShardSet {
         }
         Err(Error::failure(
             shard.name(),
-            "its sums are damaged, or not those that its shard.json speaks of",
+            "its sums are damaged, or do not match its shard.json",
             "bake this shard again",
         ))
     }

@@ -1,4 +1,4 @@
-//! Where many maps go in few textures.
+//! Packs many maps into few textures.
 
 use crunch::{Item, PackedItem, Rect, Rotation};
 

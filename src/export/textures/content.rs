@@ -1,4 +1,4 @@
-//! Which light of a map is in its textures.
+//! Which light of a map its textures hold.
 
 use crate::error::{Error, Result, Warning};
 use crate::export::map_reader::{MapReader, StoredLight, StoredMap};
@@ -138,7 +138,7 @@ fn lacking(stored: &StoredMap, what: impl Into<String>, remedy: &str) -> Error {
 fn parts_of_lights(stored: &StoredMap) -> Vec<Part> {
     let mut parts: Vec<Part> = Vec::new();
     for StoredLight { channels, irradiance } in &stored.lights {
-        // Lights of one name are told apart by their channels.
+        // Lights of the same name differ by their channels.
         let own = channels.channels.split_once('.').map_or("", |(_, own)| own);
         let key = files::slug(own, "light");
         let known = parts.iter().position(|part| part.key == key);

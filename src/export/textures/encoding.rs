@@ -1,4 +1,4 @@
-//! The kinds of files that textures are written as.
+//! File formats of textures.
 
 use half::f16;
 use serde::Serialize;

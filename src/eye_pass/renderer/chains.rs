@@ -246,33 +246,33 @@ fn check(gpu: &Gpu, scene: &Scene, geometry: &Geometry, packed: &PackedBvh) -> R
     let refused = |what: String| {
         Err(Error::failure(
             format!("mirrors and glass of {}", scene.name),
-            format!("{what}: they are drawn without what is seen in them"),
+            format!("{what}: they are drawn without reflections and refractions"),
             "use a larger graphics device, or `render --backend cpu`",
         ))
     };
     if limits.max_storage_buffers_per_shader_stage < BUFFERS {
         return refused(format!(
-            "the device lets a shader read {} buffers, and chains take {BUFFERS}",
+            "the device allows a shader {} buffers, and {BUFFERS} are needed",
             limits.max_storage_buffers_per_shader_stage
         ));
     }
     let readable = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
     if geometry.pages.len() > 1 || largest as u64 > readable {
         return refused(format!(
-            "a shader of the device reads {} KiB at a time, and {} triangles take more",
+            "a buffer of the device holds at most {} KiB, and {} triangles take more",
             readable >> 10,
             packed.corners.len()
         ));
     }
     if scene.objects.len() > MAX_OBJECTS {
         return refused(format!(
-            "{} objects are more than the {MAX_OBJECTS} that chains tell apart",
+            "{} objects are more than the {MAX_OBJECTS} that it can tell apart",
             scene.objects.len()
         ));
     }
     if packed.depth >= STACK {
         return refused(format!(
-            "the hierarchy of its triangles is {} levels deep, and chains go through {STACK}",
+            "the hierarchy of its triangles is {} levels deep, and at most {STACK} can be traversed",
             packed.depth
         ));
     }

@@ -1,4 +1,4 @@
-//! Objects on the device: what they look like, in one buffer for all.
+//! Appearance of objects on the device, in one buffer for all.
 
 use glam::DVec3;
 

@@ -1,4 +1,4 @@
-//! The environment on the device: drawn behind all surfaces, and seen at the ends of chains. Exists only for scenes that
+//! The environment on the device: drawn behind all surfaces, and met at the ends of chains. Exists only for scenes that
 //! have one.
 
 use std::sync::Arc;

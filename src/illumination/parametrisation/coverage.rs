@@ -1,4 +1,4 @@
-//! Which part of a triangle lies under which texel: exact, by clipping.
+//! The part of a triangle under each texel: exact, by clipping.
 
 use glam::DVec2;
 

@@ -1,4 +1,4 @@
-//! Whether texture coordinates of the file can serve as map coordinates.
+//! Whether a file's texture coordinates can serve as map coordinates.
 
 use glam::{DVec2, DVec3};
 

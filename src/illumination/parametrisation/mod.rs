@@ -1,4 +1,4 @@
-//! Gives every point of a surface its place in a map, at any map size.
+//! Gives every point of a surface a place in its map, at any map size.
 
 pub mod coverage;
 mod given;

@@ -1,4 +1,4 @@
-//! Planes, and the rectangle in which a set of points fits best.
+//! Planes, and the smallest rectangle around a set of points.
 
 use glam::{DVec2, DVec3};
 

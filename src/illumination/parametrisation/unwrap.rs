@@ -1,4 +1,4 @@
-//! Gives every point of a bent surface its place in a map: charts by uvunwrap, laid side by side with gutters.
+//! Unwraps a curved surface: charts by uvunwrap, packed with gutters.
 
 use std::collections::HashMap;
 

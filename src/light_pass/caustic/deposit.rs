@@ -1,4 +1,4 @@
-//! Takes traced rows to the maps: footprints from the neighbouring rows, then kernels of flux.
+//! Deposits traced rows: footprints from the neighbouring rows, then kernels of flux.
 
 use rayon::prelude::*;
 use std::collections::BTreeMap;

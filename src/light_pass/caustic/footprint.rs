@@ -1,4 +1,4 @@
-//! The area that one ray lights, from where its neighbours went (section 3.2.1 of the paper).
+//! The footprint of a ray: the area that it lights, from where its neighbours landed (section 3.2.1 of the paper).
 
 use glam::{DVec2, DVec3};
 

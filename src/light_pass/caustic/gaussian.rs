@@ -1,5 +1,5 @@
-//! Integrals of an elliptical gaussian over the texels of a window, fast: small ones exactly, from the distribution
-//! function at the texels' corners; wide ones from their values at the texels' centres.
+//! Integrals of an elliptical Gaussian over the texels of a window: narrow ones exactly, from the distribution function
+//! at the texels' corners; wide ones from their values at the texels' centres.
 
 use glam::DVec2;
 

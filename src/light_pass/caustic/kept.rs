@@ -1,4 +1,4 @@
-//! What arrived from one light, packed to be kept: other kernels and maps are deposited from it without a light ray.
+//! Cached arrivals of one light: other kernels and maps are deposited from them without a new ray.
 
 use glam::DVec2;
 use rayon::prelude::*;

@@ -1,4 +1,4 @@
-//! Where the rays around each ray of a row arrived.
+//! Where the neighbours of each ray of a row landed.
 
 use super::deposit::RowContext;
 use super::footprint::Neighbours;

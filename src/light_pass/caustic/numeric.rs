@@ -1,4 +1,4 @@
-//! Elementary functions without a call into the mathematics library, for inner loops.
+//! Elementary functions for inner loops, without a call into the mathematics library.
 
 /// The greatest whole number not above `x`, without a call into the mathematics library.
 pub(super) fn floor(x: f64) -> i64 {

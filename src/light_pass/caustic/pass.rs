@@ -99,7 +99,7 @@ impl Seconds {
     }
 }
 
-/// Who listens to a pass, and how it is stopped.
+/// Progress callback and cancel token of a pass.
 #[derive(Clone, Copy)]
 pub struct ProgressScope<'a> {
     /// Hears how far it is.
@@ -190,7 +190,7 @@ pub fn run(
 
 /// Traces and deposits the bands of a share.
 ///
-/// A band borrows its neighbours' rows: they are traced for it alone, and booked by nobody else than their own band.
+/// A band needs its neighbours' rows: they are traced again for it, and booked by their own band only.
 pub fn run_share(
     depositor: &Depositor,
     share: Share,

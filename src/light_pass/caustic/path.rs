@@ -1,4 +1,4 @@
-//! Follows one light ray through specular surfaces, on every branch that matters, and books what becomes of its flux.
+//! Traces one light ray through specular surfaces, along every branch above the threshold, and books its flux.
 
 use glam::{DVec2, DVec3};
 

@@ -1,4 +1,4 @@
-//! Looks around from every light, before any ray is traced.
+//! Finds what each light sees, before any ray is traced.
 
 use std::sync::{Arc, OnceLock};
 

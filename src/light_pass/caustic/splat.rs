@@ -1,4 +1,4 @@
-//! One kernel of flux, taken into the texels of a map.
+//! Deposits one kernel of flux into the texels of a map.
 
 use glam::{DVec2, Vec2Swizzles};
 

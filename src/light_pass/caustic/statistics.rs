@@ -1,4 +1,4 @@
-//! Mean sizes of footprints per receiver: they set automatic map sizes, the fixed footprint and the adaptive sigma.
+//! Mean footprint sizes of each receiver: they set automatic map sizes, the fixed footprint and the adaptive sigma.
 
 use crate::illumination::Receiver;
 use std::collections::BTreeMap;

@@ -1,5 +1,4 @@
-//! Which light paths light a texel, and how much each of them brings: found from the scene alone, without what was
-//! baked.
+//! The light paths that reach a texel, with the flux of each: found by tracing the scene, without the baked maps.
 //!
 //! The part of a light's domain that lights the texel is found by halving the domain's cells; its flux is what comes to
 //! the texel. Cells that hang together and go the same way are one path, shown by the ray among them that meets the

@@ -1,5 +1,5 @@
-//! Which part of a light's domain lights one texel: cells of the domain are halved until what they light is smaller than
-//! the texel, or nothing.
+//! Finds the part of a light's domain that lights one texel: cells of the domain are halved until what they light is
+//! smaller than the texel, or nothing.
 
 use std::collections::HashMap;
 

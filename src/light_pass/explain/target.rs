@@ -1,4 +1,4 @@
-//! The texel that is asked about.
+//! The texel that is probed.
 
 use std::sync::Arc;
 

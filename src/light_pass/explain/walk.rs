@@ -1,4 +1,4 @@
-//! Follows one light ray to a receiver, and remembers what it met.
+//! Follows one light ray to a receiver and records its surfaces.
 
 use glam::{DVec2, DVec3};
 

@@ -1,4 +1,4 @@
-//! How far the light of each element may be off.
+//! The estimated error of each element.
 
 use super::grid::Grid;
 use super::network::Network;

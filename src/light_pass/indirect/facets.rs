@@ -1,4 +1,4 @@
-//! Which triangles of a map go on smoothly into each other: light is not interpolated over a crease or a cut.
+//! Which triangles of a map continue each other smoothly: light is not interpolated across a crease or a cut.
 
 use std::collections::HashMap;
 

@@ -1,4 +1,4 @@
-//! A ray on its way from a diffuse surface to those that send light along it.
+//! A ray from a diffuse surface to those that light it.
 
 use glam::DVec2;
 

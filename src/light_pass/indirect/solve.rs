@@ -1,4 +1,4 @@
-//! Light that goes to and fro until it stands.
+//! Iterates the light between surfaces until it converges.
 
 use rayon::prelude::*;
 

@@ -1,4 +1,4 @@
-//! Rays from every element, and what they found, as rows of a sparse matrix.
+//! Rays from every element, and where they ended, as rows of a sparse matrix.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -44,7 +44,7 @@ pub struct Batch {
     pub counts: TraceCounts,
 }
 
-/// Which of an element's points are looked from: a surface may go on within a solid, where nobody sees it.
+/// Which of an element's points send rays: parts of a surface inside a solid do not.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Stance {
     /// Nothing was looked at yet.

@@ -26,7 +26,7 @@ const ERROR_BY_LIGHT: f32 = 1.5;
 /// Details take no more of the light of a cell than leaves this part of it, where channels may be negative.
 const MIN_LEFT: f32 = 1e-5;
 
-/// Light is told from none down to this part of the map's mean.
+/// Light below this fraction of the map's mean counts as none.
 const DARKEST: f32 = 1e-4;
 
 /// Whether a map can be filtered: charts of several islands without tiles stay as they are, and keep their noise.

@@ -1,4 +1,4 @@
-//! Edges of cells: where along one the way of the light changes, found by bisection with light rays.
+//! Edges of cells: bisection with light rays finds where along an edge the light path changes.
 
 use glam::{DVec2, DVec3};
 

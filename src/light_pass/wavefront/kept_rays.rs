@@ -130,7 +130,7 @@ impl RayCache {
         }
     }
 
-    /// Begins an edit: what is told until the next one belongs to it.
+    /// Begins an edit; calls until the next one belong to it.
     pub fn begin_edit(&mut self) {
         self.edit += 1;
     }

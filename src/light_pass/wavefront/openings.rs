@@ -1,5 +1,5 @@
-//! Slits and pinholes that are narrower than the cells of a lattice: rays beside the sharp edges of what stands before
-//! casters find them. The cells' corners alone would meet only what is around them.
+//! Slits and pinholes narrower than a lattice cell: rays beside the sharp edges in front of casters find them, since the
+//! cell's corners meet only what surrounds them.
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;

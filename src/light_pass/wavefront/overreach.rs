@@ -1,5 +1,5 @@
-//! Patches that light places which none of their traced rays reaches: near silhouettes and foci a smooth patch may swing
-//! far out. Who refines those places has to divide these patches' cells.
+//! Patches that land where none of their traced rays did: near silhouettes and foci a smooth patch may overshoot.
+//! Refinement of those places divides the cells of these patches.
 
 use crate::illumination::Receiver;
 use glam::DVec2;

@@ -56,7 +56,7 @@ pub struct Room {
 /// How patches go to maps.
 #[derive(Clone, Copy)]
 pub struct WavefrontDepositor<'a> {
-    /// Who is lit.
+    /// Receivers.
     pub receivers: &'a Receivers<'a>,
     /// Gives the charts of maps that receive light.
     pub chart_for: &'a ChartFor<'a>,

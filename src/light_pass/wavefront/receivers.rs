@@ -1,4 +1,4 @@
-//! Surfaces that take light into maps, as the wavefront meets them: planes by one equation, others by the hierarchy.
+//! Receivers as the wavefront meets them: planes by one equation, others by the hierarchy.
 
 use std::sync::{Arc, OnceLock};
 

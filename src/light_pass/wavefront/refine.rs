@@ -116,7 +116,7 @@ impl Round {
 /// Rounds of refinement so far.
 #[derive(Clone, Copy, Debug)]
 pub struct Refinement<'a> {
-    /// Who is lit.
+    /// Receivers.
     pub receivers: &'a Receivers<'a>,
     /// What each round refines.
     pub rounds: &'a [Round],

@@ -1,4 +1,4 @@
-//! Regions of a cell that one way of light fills: its corners, the samples along its edges, and the cuts between.
+//! Regions of a cell with one light path: its corners, the samples along its edges, and the cuts between.
 
 use glam::DVec2;
 

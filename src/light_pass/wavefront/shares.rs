@@ -1,4 +1,4 @@
-//! Counts of flux in parts: no count is lost to rounding.
+//! Divides counts of flux without losing one to rounding.
 
 use crate::illumination::accumulator::FluxCount;
 use crate::optics::LinearSrgb;

@@ -30,7 +30,7 @@ const FAR_TEXELS: f64 = 32.0;
 /// Spreads patches.
 #[derive(Clone, Copy, Debug)]
 pub struct Spreader<'a> {
-    /// Who is lit.
+    /// Receivers.
     pub receivers: &'a Receivers<'a>,
     /// Of the launch domain.
     pub face: u32,

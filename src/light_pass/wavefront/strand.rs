@@ -1,4 +1,4 @@
-//! What one light ray says: the rays that leave specular surfaces along its tree of paths, with their derivatives.
+//! What one light ray found: the segments that leave specular surfaces along its tree of paths, with their derivatives.
 
 use glam::{DVec2, DVec3};
 

@@ -1,4 +1,4 @@
-//! Rays between the traced ones, and where they land.
+//! Interpolated rays between the traced ones, and where they land.
 
 use glam::{DVec2, DVec3};
 

@@ -14,7 +14,7 @@ pub enum GlassError {
         nearest: String,
     },
     /// Digits that are no glass number.
-    #[error("`{number}` is no glass number of six digits")]
+    #[error("`{number}` is not a glass number of six digits")]
     NotANumber {
         /// What was asked for.
         number: String,
@@ -26,7 +26,7 @@ pub enum GlassError {
         formula: String,
     },
     /// Too few, too many, or something that is no number.
-    #[error("`{constants}` are no constants for {formula}, which takes {takes}")]
+    #[error("`{constants}` are not constants for {formula}, which takes {takes}")]
     Constants {
         /// The formula.
         formula: &'static str,

@@ -1,4 +1,4 @@
-//! Glasses: how fast light of each wavelength goes in them, by number, name or formula.
+//! Glasses: refractive index by wavelength, from a catalogue name, a glass number or a formula.
 
 use std::ops::RangeInclusive;
 
@@ -62,13 +62,16 @@ impl Glass {
                      {last:.0} nm",
                     self.name
                 ),
-                "choose a lamp or a glass of other wavelengths if its ends matter",
+                "choose another lamp or glass if the ends of the spectrum matter",
             )
         });
         let below = self.dispersion.falls_below_one(light).then(|| {
             Warning::new(
                 location,
-                format!("the index of {} falls below 1, and 1 is taken there", self.name),
+                format!(
+                    "the index of {} falls below 1 and was raised to 1 there",
+                    self.name
+                ),
                 "check the constants of its formula",
             )
         });

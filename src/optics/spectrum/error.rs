@@ -6,7 +6,7 @@ use crate::error::Error;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SpectrumError {
     /// A row of a file is no pair of numbers.
-    #[error("line {line}: `{text}` is no wavelength and value")]
+    #[error("line {line}: `{text}` is not a wavelength and a value")]
     NotARow {
         /// Line of the file, from 1.
         line: usize,
@@ -65,7 +65,7 @@ pub enum SpectrumError {
         nearest: String,
     },
     /// A temperature or wavelength in a name that is no number or lies outside of its range.
-    #[error("`{text}` is no number from {least} to {most} {unit}")]
+    #[error("`{text}` is not a number from {least} to {most} {unit}")]
     OutOfRange {
         /// What was asked for.
         text: String,

@@ -45,11 +45,11 @@ pub fn read(path: &Path, memory_limit_bytes: u64) -> Result<Environment> {
         .any(|value| value.is_finite() && *value > BRIGHTEST)
     {
         return Err(refused(format!(
-            "holds values above {BRIGHTEST:e} W/(m² sr), of which sums are no number in a map"
+            "holds values above {BRIGHTEST:e} W/(m² sr), whose sums a map cannot hold"
         )));
     }
     Environment::new(width, height, radiance).ok_or_else(|| {
-        refused("holds values that are no radiance: negative, infinite or not a number".into())
+        refused("holds values that are not radiance: negative, infinite or not a number".into())
     })
 }
 

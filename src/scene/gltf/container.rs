@@ -105,7 +105,7 @@ fn next_chunk<'a>(rest: &mut &'a [u8]) -> Result<Option<([u8; 4], &'a [u8])>> {
     let length = u32::from_le_bytes([l0, l1, l2, l3]) as usize;
     if !length.is_multiple_of(4) {
         return Err(broken(format!(
-            "a chunk's length of {length} bytes is no multiple of 4"
+            "a chunk's length of {length} bytes is not a multiple of 4"
         )));
     }
     let Some((data, after)) = body.split_at_checked(length) else {

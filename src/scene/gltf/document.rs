@@ -84,7 +84,7 @@ fn broken_json(json: &[u8], error: &serde_json::Error) -> Error {
     } else {
         Error::failure(
             "JSON",
-            format!("this is no glTF file ({error})"),
+            format!("this is not a glTF file ({error})"),
             "name a .glb or .gltf file",
         )
     }
@@ -132,7 +132,7 @@ fn strings(file: &Map<String, Value>, key: &str) -> Result<Vec<String>> {
     match file.get(key) {
         None => Ok(Vec::new()),
         Some(list) => {
-            Vec::deserialize(list).map_err(|_| unlike_gltf(&format!("`{key}` is no list of names")))
+            Vec::deserialize(list).map_err(|_| unlike_gltf(&format!("`{key}` is not a list of names")))
         }
     }
 }
@@ -159,7 +159,7 @@ fn prepare(file: &mut Map<String, Value>, report: &mut Report) {
     if is_bent {
         report.warn(
             "skins and morph targets",
-            "are read as they are at rest",
+            "are read at rest",
             "pose the scene where it was made",
         );
     }
@@ -190,7 +190,7 @@ fn name_variants(file: &Map<String, Value>, report: &mut Report) {
         report.warn(
             "materials",
             format!("have variants, which are left out ({})", names.join(", ")),
-            "the scene has the materials that it begins with",
+            "the default materials were read",
         );
     }
 }
@@ -216,7 +216,7 @@ fn make_glass_clear(file: &mut Map<String, Value>, report: &mut Report) {
             pbr.insert("metallicFactor".into(), Value::from(0.0));
             report.warn(
                 format!("material `{}`", names::name(name.as_ref(), "material", index)),
-                "transmits light but does not say that it is no metal; it was read as glass",
+                "transmits light and states no metallic factor; it was read as glass",
                 "state a metallic factor of 0",
             );
         }

@@ -45,7 +45,7 @@ pub fn text<'a>(stated: &'a Value, key: &str, owner: &str) -> Result<&'a str> {
     let wrong = || {
         Error::failure(
             owner,
-            format!("its `{key}` is no text"),
+            format!("its `{key}` is not text"),
             "put it into quotation marks",
         )
     };

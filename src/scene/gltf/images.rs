@@ -276,5 +276,5 @@ fn decode_basis(bytes: &[u8], most_bytes: u64) -> std::result::Result<RgbaImage,
     }
     let texels = image.transcode(0, TargetFormat::Rgba32, DecodeFlags::NONE);
     let texels = texels.map_err(|error| damaged(format!("{error:?}")))?;
-    RgbaImage::from_raw(width, height, texels).ok_or_else(|| "has another size than it states".into())
+    RgbaImage::from_raw(width, height, texels).ok_or_else(|| "differs from the size that it states".into())
 }

@@ -82,7 +82,7 @@ pub fn read(root: &Root, buffers: &Buffers, budget: &mut Budget) -> Result<Vec<I
         let count = counts.into_iter().flatten().max().unwrap_or(0);
         if counts.into_iter().flatten().any(|other| other != count) {
             return Err(broken(
-                "its instances have unlike numbers of places, turns and sizes".into(),
+                "its instances have different numbers of translations, rotations and scales".into(),
             ));
         }
         budget.take(count as u64 * NODE_BYTES, &owner)?;

@@ -384,12 +384,12 @@ impl Reading<'_, '_> {
         match surface {
             // Metallic 1 with roughness 1 is what glTF assumes where a file says nothing.
             SurfaceKind::Diffuse if is_metal && (roughness < 1.0 || material.metal.is_some()) => self.warn(
-                format!("is a metal of roughness {roughness:.2}, treated as matte"),
-                "make it smoother to have it reflect light",
+                format!("is a metal of roughness {roughness:.2}, treated as diffuse"),
+                "lower its roughness for a mirror",
             ),
             SurfaceKind::Mirror | SurfaceKind::Diffuse | SurfaceKind::Mixed if material.glass.is_some() => {
                 self.warn(
-                    "is of a glass but lets no light through, so that none is dispersed",
+                    "names a glass but transmits no light, so nothing is dispersed",
                     "give it transmission and a volume",
                 )
             }
@@ -428,7 +428,7 @@ impl Reading<'_, '_> {
             ignored.push("thickness texture, as its mesh says how thick it is,".to_owned());
         }
         if is_matte && self.source.normal_texture.is_some() {
-            ignored.push("normal texture, as it is matte,".to_owned());
+            ignored.push("normal texture, as it is diffuse,".to_owned());
         }
         ignored.extend(
             extensions

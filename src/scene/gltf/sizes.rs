@@ -37,7 +37,11 @@ pub fn read(extras: [Option<&Value>; 2], kind: &LightKind, owner: &str, report: 
         } else {
             ("radius_m", "use metres from 0 up")
         };
-        report.warn(owner, format!("its {what} was ignored, as it is no size"), range);
+        report.warn(
+            owner,
+            format!("its {what} was ignored, as it is not a size"),
+            range,
+        );
         LightSize::None
     })
 }

@@ -76,7 +76,13 @@ fn by_name_or_file(stated: &str, folder: &Path, owner: &str) -> Result<Spectrum>
         return illuminant(stated).map_err(|error| of_file(error.at(owner)));
     }
     let bytes = uri::read(stated, folder, MAX_CSV_BYTES, owner)?;
-    let no_text = |_| Error::failure(owner, format!("its `{KEY}` is no text file"), "save it as UTF-8");
+    let no_text = |_| {
+        Error::failure(
+            owner,
+            format!("its `{KEY}` is not a text file"),
+            "save it as UTF-8",
+        )
+    };
     let table = String::from_utf8(bytes).map_err(no_text)?;
     read_lamp(&table)
         .and_then(|lamp| lamp.named(stated).to_luminous_equivalent(1.0))

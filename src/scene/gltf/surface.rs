@@ -136,7 +136,7 @@ impl Materials {
             }
             report.warn(
                 owner,
-                format!("has material {material}, which does not exist; it was made matte white"),
+                format!("has material {material}, which does not exist; it was made diffuse white"),
                 "give it a material",
             );
         }
@@ -184,7 +184,7 @@ impl Materials {
         for material in self.all.iter().filter(|material| material::is_thin(material)) {
             report.warn(
                 format!("material `{}`", material.name),
-                "transmits light but has no thickness, so that it is a thin pane that does not refract",
+                "transmits light but has no thickness, so it is a thin pane and does not refract",
                 if solid_glass {
                     "give it a volume, or close its mesh, to make it solid glass"
                 } else {

@@ -79,9 +79,7 @@ fn path_within(folder: &Path, uri: &str, owner: &str) -> Result<PathBuf> {
                 .all(|c| c.is_ascii_alphanumeric() || "+-.".contains(c))
     });
     if has_scheme {
-        return Err(refused(
-            "its URI has a scheme, and nothing is read from elsewhere",
-        ));
+        return Err(refused("its URI does not name a local file"));
     }
     let decoded = percent_decode(uri).and_then(|bytes| String::from_utf8(bytes).ok());
     let Some(relative) = decoded.filter(|path| !path.is_empty() && !path.contains('\0')) else {
@@ -91,7 +89,9 @@ fn path_within(folder: &Path, uri: &str, owner: &str) -> Result<PathBuf> {
     let mut components = Path::new(&relative).components();
     let stays = components.all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
     if !stays || relative.contains('\\') || relative.contains(':') {
-        return Err(refused("its URI is no relative path within the scene's folder"));
+        return Err(refused(
+            "its URI is not a relative path within the scene's folder",
+        ));
     }
     Ok(folder.join(relative))
 }

@@ -61,7 +61,7 @@ pub fn check(settings: &BakeSettings) -> Result<()> {
         return Err(Error::usage(
             "--max-error",
             format!(
-                "shards need a fixed density, and an error of {:.3} % is a target that only the whole bake can see",
+                "shards need a fixed density; only the whole bake knows whether its error is below {:.3} %",
                 100.0 * target
             ),
             "give --density RAYS_PER_SR instead of --max-error, --max-time and --preset",
@@ -70,21 +70,21 @@ pub fn check(settings: &BakeSettings) -> Result<()> {
     if settings.max_time_s.is_some() {
         return Err(Error::usage(
             "--max-time",
-            "shards need a fixed density, and a time ends each of them somewhere else",
+            "shards need a fixed density; a time limit ends each of them elsewhere",
             "give --density RAYS_PER_SR alone",
         ));
     }
     if settings.map_resolution == MapResolution::Auto {
         return Err(Error::usage(
             "--map-resolution",
-            "shards need maps of a fixed size, and auto chooses it by where the light falls",
+            "shards need maps of a fixed size; auto depends on where light falls",
             "give --map-resolution N or WxH",
         ));
     }
     if !plan::wants_caustics(settings) {
         return Err(Error::usage(
             "--layers",
-            "a shard is a part of the caustic layer, which is not to be baked here",
+            "a shard is a part of the caustic layer, which --layers leaves out",
             "add caustic to --layers or bake without shards",
         ));
     }

@@ -70,7 +70,7 @@ impl PassSums {
         if whole(&mut reader)? != number as u64 {
             return Err(damaged("it is another pass"));
         }
-        let small = |value: u64| u32::try_from(value).map_err(|_| damaged("there are no so many shards"));
+        let small = |value: u64| u32::try_from(value).map_err(|_| damaged("there are not so many shards"));
         let share = (small(whole(&mut reader)?)?, small(whole(&mut reader)?)?);
         read_report(&mut reader, &mut self.report)?;
         for set in self.maps.iter_mut().flat_map(PartMaps::sets_mut) {

@@ -1,4 +1,4 @@
-//! Who does the work of a pass: the bake itself, one shard of it, or shards that have done it before.
+//! Whether a pass is traced here, restricted to one shard, or summed from shard files.
 
 use std::io;
 
@@ -8,7 +8,7 @@ use crate::error::{Error, Result};
 use crate::light_pass::receiver_maps::ChartFor;
 use crate::light_pass::share::Share;
 
-/// Who does the work.
+/// Where a pass is computed.
 pub(in crate::session) enum ShardRole {
     /// This bake alone.
     Alone,
@@ -47,7 +47,7 @@ impl ShardRole {
         matches!(self, Self::Shard { .. })
     }
 
-    /// The share of the next pass; `None` where nobody shares.
+    /// The shard of the next pass; `None` if it is not divided.
     pub(in crate::session) fn share(&self) -> Option<Share> {
         match self {
             Self::Shard { share, passes } => Some(share.shifted(passes.len() as u64)),

@@ -1,4 +1,4 @@
-//! The picture beside the panel: what it shows, how well it is made, and what is told of that.
+//! The picture beside the panel: what it shows, at which quality, and the status text about it.
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -135,7 +135,7 @@ impl App {
         Ok(())
     }
 
-    /// Chooses the exposure of a view of light. The maps of the first bake may move it, until somebody else does.
+    /// Chooses the exposure. The maps of the first bake may change it, until the user does.
     fn expose(&mut self, view: &mut View, has_new_maps: bool) -> Result<()> {
         let (model, mut shown) = (&mut self.model, view.exposure_stops);
         let since = std::mem::replace(&mut self.exposed, Instant::now()).elapsed();

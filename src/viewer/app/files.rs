@@ -1,4 +1,4 @@
-//! Scenes that are chosen, dropped, read or saved while the window is open.
+//! Scenes that are opened, dropped, reloaded or saved while the window is open.
 
 use std::path::{Path, PathBuf};
 
@@ -13,7 +13,7 @@ use crate::viewer::files::{Choice, NO_DIALOG, Purpose, free_names, working_folde
 use crate::viewer::model::Model;
 use crate::viewer::panel::Quantity;
 
-/// What who opens a file without light is told first.
+/// Shown first for a file without light.
 pub(super) fn dark_notice(model: &Model) -> Option<String> {
     let loaded = model.edits().loaded();
     was_dark(loaded).then(|| {

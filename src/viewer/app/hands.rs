@@ -1,4 +1,4 @@
-//! Keys and mouse.
+//! Keyboard and mouse input.
 
 use serde_json::json;
 use winit::dpi::PhysicalPosition;

@@ -1,4 +1,4 @@
-//! The user's configuration folder: one file for each scene, and a list of the last ones.
+//! The user's configuration folder: one file for each scene, and a list of recent ones.
 
 use std::path::{Path, PathBuf};
 

@@ -1,4 +1,4 @@
-//! Writes what is kept on a thread of its own, soon after it changed and at the end.
+//! Saves the state of a scene on a thread of its own, shortly after it changed and at the end.
 
 use std::path::PathBuf;
 use std::sync::Arc;

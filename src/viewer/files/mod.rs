@@ -1,4 +1,4 @@
-//! Scenes that are opened while the window is open.
+//! Files of the window: scenes to open, and the state that is saved with them.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -99,7 +99,13 @@ impl Files {
     /// The scene that was read, once, with where it comes from and what it was read for.
     pub fn take_read(&mut self) -> Option<((String, Purpose), Result<Scene>)> {
         let (of, outcome) = self.loader.take()?;
-        let broken = || Error::failure(&of.0, "reading it broke off", "check the file and try again");
+        let broken = || {
+            Error::failure(
+                &of.0,
+                "it could not be read to the end",
+                "check the file and try again",
+            )
+        };
         let outcome = outcome.unwrap_or_else(|| Err(broken()));
         Some((of, outcome))
     }
@@ -124,7 +130,7 @@ impl Files {
         let broken = || {
             Error::failure(
                 location,
-                "writing it broke off",
+                "it could not be written to the end",
                 "try again, or choose another place",
             )
         };
@@ -168,7 +174,7 @@ impl Files {
     }
 }
 
-/// The path that somebody typed or pasted: without space or quotation marks around it, `~/` for the home folder.
+/// A typed or pasted path, without surrounding space or quotation marks, `~/` expanded.
 pub fn typed(text: &str) -> String {
     let bare = text.trim();
     let quoted = ['"', '\''].iter().find_map(|mark| {
@@ -210,7 +216,7 @@ pub fn free_names<const N: usize>(
     })
 }
 
-/// Nobody sees a dialog and closes it in so short a time: there was none.
+/// A dialog that closes sooner than this was never shown.
 const NO_DIALOG_WITHIN: Duration = Duration::from_millis(400);
 
 /// Told where no dialog can be had.

@@ -1,4 +1,4 @@
-//! The camera's path: recorded, played, kept and filmed.
+//! The camera path: recorded, played, saved and filmed.
 
 use super::Model;
 use crate::error::Result;
@@ -71,7 +71,7 @@ impl Model {
         }
     }
 
-    /// A sentence where there is something to be told.
+    /// A message, if any.
     fn filmed(&mut self, command: &FilmCommand) -> Result<Option<String>> {
         let origin_world = self.scene().origin_world;
         match command {

@@ -1,4 +1,4 @@
-//! What is kept of the scene in the window, and found again.
+//! What is saved of a scene's camera, settings and edits, and how it is restored.
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -63,7 +63,7 @@ impl Model {
         }
     }
 
-    /// Those of the panel, or what was kept before where the command line stood against it and nobody changed it since.
+    /// The panel's settings; where the command line overrode a saved one and it has not changed since, the saved one.
     fn settings_to_keep(&self) -> Value {
         match &self.left_alone.settings {
             Some((given, kept)) if *given == self.choices.settings => kept.clone(),

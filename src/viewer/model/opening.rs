@@ -1,4 +1,4 @@
-//! Another scene in the same window, or the same one read again.
+//! Opening another scene in the same window, or reading the same one again.
 
 use std::path::PathBuf;
 use std::sync::Arc;

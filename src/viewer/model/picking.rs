@@ -1,4 +1,4 @@
-//! What is picked in the picture, and lights that are put before what is pointed at.
+//! Picking in the picture: objects, and lights that the mouse drags over surfaces.
 
 use std::sync::Arc;
 

@@ -1,4 +1,4 @@
-//! What waits for the surfaces of the scene: lights that are to be added, and a look at the brightest spot.
+//! Tasks that wait for the scene's surfaces: lights to add, and the search for the brightest spot.
 
 use std::sync::Arc;
 

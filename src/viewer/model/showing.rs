@@ -1,4 +1,4 @@
-//! What of the maps the picture shows, and what they are held against: other maps, and those without an effect.
+//! Which maps the picture shows, and what it compares them with: other maps, or a bake without an effect.
 
 use std::borrow::Cow;
 use std::sync::Arc;

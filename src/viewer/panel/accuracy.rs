@@ -1,4 +1,4 @@
-//! Section *Accuracy*: how good the next bake is to be, what that may take, and where the light pass gives up.
+//! Section *Accuracy*: the target of the next bake, its limits, and where the light pass truncates light.
 
 pub mod course;
 pub mod target;

@@ -1,4 +1,4 @@
-//! Always at the top: the scene's name, undo and redo, start, stop and progress of the bake, and what the last one came to.
+//! The head of the panel: name of the scene, undo and redo, start, stop and progress of the bake, and its result.
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -98,7 +98,7 @@ fn state_line(ui: &mut Ui, choices: &Choices, model: &Model) {
     }
 }
 
-/// What takes longer is told how it ends sooner [s].
+/// A bake that takes longer shows how to end it sooner [s].
 const LONG_S: f64 = 600.0;
 const SOONER: &str =
     "Section Accuracy: map size, max error, or bake until a max time. Cancel keeps the maps that are shown.";

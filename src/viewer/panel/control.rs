@@ -1,4 +1,4 @@
-//! One labelled control per row, each with a text that says what it does and what it costs.
+//! One labelled control per row, each with a tooltip about what it does and what it costs.
 
 use std::any::type_name;
 use std::borrow::Cow;
@@ -79,7 +79,7 @@ static TEXTS: LazyLock<Texts> = LazyLock::new(|| {
     texts
 });
 
-/// What is told about the control of a label.
+/// The help of a label's control.
 pub fn about(label: &str) -> &'static About {
     TEXTS
         .rows
@@ -87,7 +87,7 @@ pub fn about(label: &str) -> &'static About {
         .expect("about.json or OPTIONS tells about every row")
 }
 
-/// What is told about a button.
+/// The help of a button.
 pub fn about_button(name: &str) -> &'static str {
     TEXTS
         .buttons

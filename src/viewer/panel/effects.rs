@@ -1,4 +1,4 @@
-//! Section *Effects*: what can be simulated or left out, how it is switched, why it is on or off, and what it is worth.
+//! Section *Effects*: each effect with its switch, the reason for its state, and its contribution.
 
 use std::borrow::Cow;
 

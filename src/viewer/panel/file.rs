@@ -1,4 +1,4 @@
-//! Row *File*: which scene is in the window.
+//! Row *File*: opens scenes.
 
 use std::path::Path;
 

@@ -1,4 +1,4 @@
-//! Section *Frame time*: what each pass of the last pictures took on the graphics device, stacked.
+//! Section *Frame time*: GPU time of each pass of the last pictures, stacked.
 
 use egui::{Align2, Color32, FontId, Rect, RichText, Role, Sense, Ui, WidgetInfo, pos2, vec2};
 

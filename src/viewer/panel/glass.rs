@@ -1,4 +1,4 @@
-//! Rows of the section *Scene* for what a clear material is made of: glass by name, and how it parts wavelengths.
+//! Rows of section *Scene* for a glass: its name, index and dispersion.
 
 use std::sync::Arc;
 

@@ -1,4 +1,4 @@
-//! Rows of the section *Scene* for the colour and the spectrum of a light.
+//! Rows of section *Scene* for the colour and the spectrum of a light.
 
 use std::sync::Arc;
 

@@ -1,4 +1,4 @@
-//! Section *Light pass*: how the next bake is made.
+//! Section *Light pass*: estimator, layers and ray density of the next bake.
 
 use egui::{Response, Slider, SliderClamping, Ui};
 

@@ -1,4 +1,4 @@
-//! The row of the section *Scene* for how large a lamp is.
+//! The row of section *Scene* for the size of a light.
 
 use egui::{DragValue, Response, Ui};
 

@@ -1,4 +1,4 @@
-//! Section *Maps*: every receiver's map, to be looked at and written to files; and section *Compare*: two maps side by side.
+//! Section *Maps*: each receiver's map with its size and error; and section *Compare*: two maps side by side.
 
 mod large;
 

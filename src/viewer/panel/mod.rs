@@ -1,5 +1,4 @@
-//! The side panel: edits of the scene, settings of the bake, its state, and how the picture shows it. Knows egui, but
-//! no window.
+//! The side panel: the scene, settings of the bake, its state, and display options. Knows egui, but no window.
 
 pub mod accuracy;
 mod bake;
@@ -286,28 +285,28 @@ fn keys(ui: &mut Ui, travel: NavigationMode, speed_m_per_s: f64) {
             "hold to look around",
             format!("speed ±5 % a notch, now {speed_m_per_s:.3} m/s"),
         ),
-        NavigationMode::Orbit => ("hold to turn around it", "nearer, farther".to_owned()),
+        NavigationMode::Orbit => ("hold to orbit", "move nearer, farther".to_owned()),
     };
     let now = format!("fly, walk, orbit; now {}", travel.name());
     let lines = [
         ("V", now.as_str()),
         ("W A S D", "forward, left, back, right"),
-        ("E  Q", "up, down, but on foot"),
-        ("Shift  Ctrl", "four times as fast, a quarter"),
+        ("E  Q", "up, down (not when walking)"),
+        ("Shift  Ctrl", "four times as fast, a quarter as fast"),
         ("Right mouse, M", way),
         ("Wheel", wheel.as_str()),
         ("1 … 9", "views kept with Ctrl+1 … Ctrl+9"),
         ("C", "next camera of the file"),
-        ("F", "frame what has handles, or the whole scene"),
-        ("R", "re-bake"),
-        ("T", "let water and objects move, or stand still"),
-        ("Ctrl+Z", "take the last change back"),
-        ("Ctrl+Y", "do it again; Ctrl+Shift+Z too"),
+        ("F", "frame the selection, or the whole scene"),
+        ("R", "bake again"),
+        ("T", "let water and objects move, or stop them"),
+        ("Ctrl+Z", "undo"),
+        ("Ctrl+Y", "redo; also Ctrl+Shift+Z"),
         ("P", "probe: click on a surface to see what lights it"),
-        ("K", "add a key to the camera's path"),
+        ("K", "add a key to the camera path"),
         ("F12", "save the picture as .png and .exr"),
-        ("Click", "on an object: handles to move and turn it"),
-        ("Esc", "let go of mouse and handles, cancel the bake"),
+        ("Click", "select an object: handles move and turn it"),
+        ("Esc", "release mouse and selection, cancel the bake"),
         ("H  ?", "open or close this list"),
     ];
     Grid::new("keys")

@@ -1,4 +1,4 @@
-//! Section *Probe*: why it is bright where the user points.
+//! Section *Probe*: the light paths that reach the point which the user clicked.
 
 use egui::{Grid, Ui};
 
@@ -130,7 +130,7 @@ fn paths(ui: &mut Ui, probed: &Probed, model: &Model) {
     }
 }
 
-/// A share; one too small to be told is not none.
+/// A share as text; a tiny one is not shown as none.
 fn percent(share: f64) -> String {
     let percent = 100.0 * share;
     if percent > 0.0 && percent < 0.05 {

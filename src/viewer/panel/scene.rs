@@ -1,4 +1,4 @@
-//! Section *Scene*: lights, materials and places, changed while they are looked at.
+//! Section *Scene*: lights, materials, positions and rotations.
 
 use egui::{DragValue, Response, RichText, Slider, SliderClamping, Ui};
 use glam::DVec3;

@@ -1,4 +1,4 @@
-//! Rows of the section *Scene* for the waves of a material.
+//! Rows of section *Scene* for the waves of a material.
 
 use egui::{DragValue, Response, Slider, SliderClamping, Ui};
 use glam::DVec3;

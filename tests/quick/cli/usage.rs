@@ -1,28 +1,92 @@
 //! Help, options, what is refused before any work, and bad input: one sentence with what, where and what to do, exit 1,
 //! nothing half-written.
 
+use std::fs;
+use std::path::Path;
+
 use crate::prelude::*;
+use nephroid::settings::options::OPTIONS;
 use support::files;
 use support::program::Sandbox;
 
 #[test]
-fn help_names_what_there_is() {
+fn help_fits_a_screen_and_begins_with_examples() {
     let sandbox = Sandbox::new();
-    let help = sandbox.succeed("--help");
-    assert_eq!(help.stderr, "");
-    for command in "view bake render inspect compare export merge study".split(' ') {
-        assert!(help.stdout.contains(command), "{command}");
-        let own = sandbox.succeed(&format!("{command} --help"));
-        assert!(own.stdout.contains("--json"), "{}", own.stdout);
+    let studies = sandbox.succeed("study --list").stdout;
+    let studies = studies.lines().filter_map(|line| line.split_whitespace().next());
+    let studies = studies.map(|study| format!("study {study}"));
+    let commands = "view bake render inspect compare export merge study".split(' ');
+    let root = sandbox.succeed("--help");
+    assert_eq!(root.stderr, "");
+    for command in commands.clone() {
+        assert!(root.stdout.contains(command), "{command}");
     }
-    let render = sandbox.succeed("render -h").stdout;
-    let words: Vec<&str> = render.split_whitespace().collect();
-    assert!(
-        words.join(" ").contains("none, neutral, agx, aces, soft]"),
-        "{render}"
-    );
+    for command in commands.map(str::to_string).chain(studies).chain([String::new()]) {
+        let [long, short] = ["--help", "-h"].map(|flag| sandbox.succeed(&format!("{command} {flag}")).stdout);
+        let lines = |text: &str| text.lines().count();
+        let widest = long.lines().map(|line| line.chars().count()).max();
+        assert!(lines(&long) <= 50 && widest <= Some(100), "{widest:?} {long}");
+        assert!(lines(&short) <= lines(&long) && lines(&short) <= 40, "{short}");
+        assert!(long.contains("Usage: nephroid"), "{long}");
+        if !command.starts_with("study ") {
+            assert!(long.find("Examples:") < long.find("Usage:"), "{long}");
+            assert!(long.contains("Examples:\n  nephroid"), "{long}");
+        }
+    }
+    let render = sandbox.succeed("render --help").stdout;
+    assert!(render.contains("none, neutral, agx, aces or soft"), "{render}");
     let version = sandbox.succeed("--version").stdout;
     assert_eq!(version, format!("nephroid {}\n", env!("CARGO_PKG_VERSION")));
+}
+
+/// The guide's page of options, from their table.
+fn options_page() -> String {
+    let escaped = |text: &str| text.replace('|', "\\|");
+    let mut page = String::from(
+        "# Options of a bake\n\n`nephroid bake --help` has them in short. `render`, `view`, `inspect` and `study effects` take \
+         them too. An option that does\nnot apply to the others is refused with the reason.\n\n\
+         | option | sets | values | default | accuracy | cost |\n|---|---|---|---|---|---|\n",
+    );
+    for option in OPTIONS {
+        let name = format!("--{} {}", option.name, option.value);
+        let cells = [
+            option.what,
+            &option.range(),
+            option.default,
+            option.accuracy,
+            option.cost,
+        ];
+        page += &format!(
+            "| `{}` | {} |\n",
+            escaped(name.trim_end()),
+            escaped(&cells.join(" ¦ ")).replace('¦', "|")
+        );
+    }
+    page += "\n| option | value | meaning |\n|---|---|---|\n";
+    for option in OPTIONS {
+        for (name, meaning) in option.values.map_or(Vec::new(), |values| values()) {
+            let meaning: Vec<&str> = meaning.split_whitespace().collect();
+            page += &format!(
+                "| `--{}` | `{name}` | {} |\n",
+                option.name,
+                escaped(&meaning.join(" "))
+            );
+        }
+    }
+    page
+}
+
+#[test]
+fn the_guide_lists_the_options() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/guide/options.md");
+    let page = options_page();
+    if fs::read_to_string(&path).ok().as_ref() != Some(&page) {
+        fs::write(&path, &page).expect("a page to write");
+        panic!(
+            "{} was out of date and is written anew: look at it and keep it",
+            path.display()
+        );
+    }
 }
 
 /// Runs each line in an empty folder and expects that exit code, one sentence with the words (separated by ` | `), and
@@ -222,7 +286,7 @@ fn refused(sandbox: &Sandbox, line: &str, words: &str) {
 fn scenes_and_skies_that_cannot_be_read() {
     let sandbox = Sandbox::new();
     sandbox.write("text.glb", "this is no scene");
-    std::fs::create_dir(sandbox.path("folder.glb")).expect("writable");
+    fs::create_dir(sandbox.path("folder.glb")).expect("writable");
     sandbox.write("text.hdr", "this is no sky");
     for (input, words) in rows(
         "missing.glb => missing.glb
@@ -245,7 +309,7 @@ fn scenes_and_skies_that_cannot_be_read() {
 fn unwritable_outputs_are_found_at_once() {
     let sandbox = Sandbox::new();
     sandbox.write("file", "kept");
-    std::fs::create_dir(sandbox.path("folder.png")).expect("writable");
+    fs::create_dir(sandbox.path("folder.png")).expect("writable");
     // At this density the bake itself would take hours.
     let long = "builtin:ring --density 1e12 --map-resolution 64";
     for (line, words) in rows(
@@ -262,7 +326,7 @@ fn unwritable_outputs_are_found_at_once() {
     ) {
         refused(&sandbox, &line.replace("LONG", long), words);
     }
-    assert_eq!(std::fs::read(sandbox.path("file")).expect("there"), b"kept");
+    assert_eq!(fs::read(sandbox.path("file")).expect("there"), b"kept");
     assert_eq!(sandbox.files("."), ["file", "folder.png"]);
 }
 
@@ -271,12 +335,12 @@ fn an_export_does_not_replace_its_scene() {
     let sandbox = Sandbox::new();
     sandbox.write("matte.gltf", files::lit_matte_triangle());
     sandbox.succeed("bake matte.gltf -o out --layers direct --density 1e3 --map-resolution 16");
-    std::fs::create_dir(sandbox.path("sub")).expect("it can be made");
+    fs::create_dir(sandbox.path("sub")).expect("it can be made");
     let itself = sandbox.run("export out -o sub/../matte.gltf");
     itself.failed_in_one_sentence(2, &["scene itself"]);
     refused(&sandbox, "export out -o missing/a.glb", "missing");
     refused(&sandbox, "export out --scene builtin:ring", "geometry");
-    let scene = std::fs::read_to_string(sandbox.path("matte.gltf")).expect("it is there");
+    let scene = fs::read_to_string(sandbox.path("matte.gltf")).expect("it is there");
     assert_eq!(scene, files::lit_matte_triangle());
 }
 

@@ -107,7 +107,7 @@ fn assert_refused(small: &Gpu, (scene, maps): &(Scene, Vec<IlluminationMap>), wo
     assert_eq!(rig.picture(view).radiance, without.radiance);
     let refusal = rig.renderer.chain_refusal().expect("it is too small");
     says(refusal, words);
-    says(refusal, "they are drawn without what is seen in them");
+    says(refusal, "they are drawn without reflections and refractions");
     let counts = rig.renderer.counts();
     assert_eq!((counts.chain_bytes, counts.specular_pipelines), (0, 0));
     // Forced on it is the same, and no fault.
@@ -119,7 +119,7 @@ fn assert_refused(small: &Gpu, (scene, maps): &(Scene, Vec<IlluminationMap>), wo
 fn too_few_buffers_leave_out_chains_or_are_refused() {
     for buffers in [2, 4, 6] {
         let small = or_skip!(with_buffers(buffers));
-        let words = format!("lets a shader read {buffers} buffers, and chains take");
+        let words = format!("allows a shader {buffers} buffers, and");
         assert_refused(&small, &scene(3), &words, &ahead());
     }
     for buffers in [0, 1] {
@@ -139,7 +139,7 @@ fn large_scenes_lose_chains_small_ones_do_not() {
     let limit = |limits: &mut wgpu::Limits| limits.max_storage_buffer_binding_size = 1 << 18;
     let small = or_skip!(own_gpu(limit));
     let (large, fitting) = (scene(5), scene(3));
-    let words = "reads 256 KiB at a time, and 20484 triangles take more";
+    let words = "holds at most 256 KiB, and 20484 triangles take more";
     assert_refused(&small, &large, words, &ahead());
     let mut rig = Rig::on(&small, &large.0, &large.1);
     rig.picture(&ahead());
@@ -170,7 +170,7 @@ fn meshes_beyond_a_buffer_are_drawn_whole() {
     let chart = parametrise(0, &sheet(0.0), 8).expect("it has area").chart(8, 8);
     let texels = (0..64).map(|index| [index as f32; 3]).collect();
     let lit = (scene, vec![map_of(Arc::new(chart), texels)]);
-    let words = "reads 64 KiB at a time, and 16384 triangles take more";
+    let words = "holds at most 64 KiB, and 16384 triangles take more";
     assert_refused(&small, &lit, words, &from_above(48));
     let mut whole = Rig::new(&lit.0, &lit.1).expect("there is a device");
     let whole = whole.picture(&from_above(48));

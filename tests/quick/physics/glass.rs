@@ -279,14 +279,14 @@ fn faults_say_what_is_wrong() {
         ("sellmayer:1", "no formula is named `sellmayer`"),
         (
             "cauchy:1.5",
-            "`1.5` are no constants for cauchy, which takes A, B and perhaps C",
+            "`1.5` are not constants for cauchy, which takes A, B and perhaps C",
         ),
-        ("cauchy:1.5,x", "`1.5,x` are no constants for cauchy"),
+        ("cauchy:1.5,x", "`1.5,x` are not constants for cauchy"),
         (
             "sellmeier:1,2,3",
-            "`1,2,3` are no constants for sellmeier, which takes B1, B2, B3",
+            "`1,2,3` are not constants for sellmeier, which takes B1, B2, B3",
         ),
-        ("herzberger:", "`` are no constants for herzberger"),
+        ("herzberger:", "`` are not constants for herzberger"),
         ("abbe:1.5,0", "0 cannot be a constant of abbe"),
         ("abbe:1.5,-3", "-3 cannot be a constant of abbe"),
         ("abbe:NaN,50", "NaN cannot be a constant of abbe"),
@@ -294,7 +294,7 @@ fn faults_say_what_is_wrong() {
         ("cauchy:1.5,4000", "the index at 587.56 nm is 11588"),
         ("cauchy:0.5,0.001", "the index at 587.56 nm is 0.50"),
         ("sellmeier:1,0,0,0.36,0,0", "the index is infinite at 600.0 nm"),
-        ("12345", "`12345` is no glass number of six digits"),
+        ("12345", "`12345` is not a glass number of six digits"),
     ] {
         let error = Glass::parse(text).expect_err(text);
         assert!(error.to_string().starts_with(expected), "{text}: {error}");

@@ -371,11 +371,11 @@ fn csv_faults_name_their_line() {
     for (text, expected) in [
         (
             "400,1\nfive hundred,2\n",
-            "line 2: `five hundred,2` is no wavelength and value",
+            "line 2: `five hundred,2` is not a wavelength and a value",
         ),
         (
             "nm,W\nnm,W\n400,1\n500,1\n",
-            "line 2: `nm,W` is no wavelength and value",
+            "line 2: `nm,W` is not a wavelength and a value",
         ),
         ("# mine\n400,1\n500,NaN\n", "line 3: NaN is not a finite number"),
         ("400,1\n500,inf\n", "line 2: inf is not a finite number"),

@@ -279,7 +279,9 @@ fn instances_are_objects_and_can_be_written() {
         }
     }
     file.json["accessors"][sizes]["count"] = json!(2);
-    file.assert_refused("node `solid`: its instances have unlike numbers of places, turns and sizes");
+    file.assert_refused(
+        "node `solid`: its instances have different numbers of translations, rotations and scales",
+    );
 }
 
 #[test]

@@ -193,7 +193,7 @@ fn sizes_come_from_extras_of_node_or_light() {
     for (light, name) in suns.chain(points.map(|radius| (point(radius.clone()), "radius_m"))) {
         let (size, scene) = size_of(light, json!({}));
         assert_eq!(size, LightSize::None);
-        warns(&scene, &format!("light `lamp` | {name} | no size"));
+        warns(&scene, &format!("light `lamp` | {name} | not a size"));
     }
     let (size, scene) = size_of(json!({ "type": "directional" }), json!({ "radius_m": 1.0 }));
     assert_eq!(size, LightSize::None);
@@ -303,10 +303,10 @@ fn environments_that_are_none_get_one_sentence() {
         ("cut.hdr", cut_hdr, "cannot be decoded"),
         ("none.hdr", hdr(0, 0, "", [0; 4]), "has no pixels"),
         ("wide.hdr", many, "cannot be decoded"),
-        ("negative.exr", red(-1.0), "are no radiance"),
-        ("nan.exr", red(f32::NAN), "are no radiance"),
+        ("negative.exr", red(-1.0), "are not radiance"),
+        ("nan.exr", red(f32::NAN), "are not radiance"),
         ("blinding.exr", red(2e36), "holds values above 1e36"),
-        ("infinite.exr", red(f32::INFINITY), "are no radiance"),
+        ("infinite.exr", red(f32::INFINITY), "are not radiance"),
     ] {
         let error = under(name, &bytes).expect_err(name);
         assert_eq!(error.kind, ErrorKind::Failure);

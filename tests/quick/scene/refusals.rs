@@ -26,8 +26,8 @@ fn sources_that_are_no_scene() {
     let path = folder.path().join("letter.glb");
     for (text, words) in rows(
         r#"
-        Dear scene, => this is no glTF file
-        => this is no glTF file
+        Dear scene, => this is not a glTF file
+        => this is not a glTF file
         { "asset": => is broken
         [1, 2] => not an object
         {} => states no version
@@ -108,10 +108,10 @@ fn buffers_come_from_the_scenes_folder_alone() {
     }
     for (uri, words) in rows(
         r"
-        ../scene/a b.bin => no relative path within the scene's folder
-        %2e%2e/scene/a b.bin => no relative path within the scene's folder
-        /etc/passwd => no relative path within the scene's folder
-        ..\a b.bin => no relative path within the scene's folder
+        ../scene/a b.bin => not a relative path within the scene's folder
+        %2e%2e/scene/a b.bin => not a relative path within the scene's folder
+        /etc/passwd => not a relative path within the scene's folder
+        ..\a b.bin => not a relative path within the scene's folder
         http://example.com/a.bin => has a scheme
         file:///etc/passwd => has a scheme
         a%2 => its URI is not valid

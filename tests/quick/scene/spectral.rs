@@ -78,7 +78,7 @@ fn dispersion_needs_a_clear_solid() {
     let polished = of(dispersion(1.0)).scene();
     assert_eq!(material(&polished).surface, SurfaceKind::Mixed);
     assert!(!material(&polished).is_dispersive());
-    warns(&polished, "material `lacquer` | lets no light through");
+    warns(&polished, "material `lacquer` | transmits no light");
     let mut pane = dispersion(1.0);
     pane["KHR_materials_transmission"] = json!({ "transmissionFactor": 1.0 });
     let pane = of(pane);
@@ -150,7 +150,7 @@ fn metal_in_extras_is_a_mirror_of_its_colour() {
     // glTF's roughness is 1 where a file is silent.
     let silver = json!({ "extras": { "metal": "silver" } });
     let scene = Glb::triangle().with_material(silver).scene();
-    warns(&scene, "metal of roughness 1.00, treated as matte");
+    warns(&scene, "metal of roughness 1.00, treated as diffuse");
 }
 
 #[test]
@@ -160,9 +160,9 @@ fn unknown_glass_and_metal_are_refused() {
         {"glass": "N-BK8"} => N-BK8 | N-BK7
         {"glass": "52358"} => 52358 | six digits
         {"glass": "cauchy:1.5"} => cauchy | A, B
-        {"glass": 1.5} => `glass` is no text | quotation marks
+        {"glass": 1.5} => `glass` is not text | quotation marks
         {"metal": "tin"} => tin | choose one
-        {"metal": null} => `metal` is no text | quotation marks
+        {"metal": null} => `metal` is not text | quotation marks
         {"metal": "gold", "glass": "BK7"} => both | name one
         "#,
     ) {
@@ -308,7 +308,7 @@ fn lamps_may_be_measured_in_a_table() {
         says(beside(stated, "lamp.csv", table).expect_err("no spectrum"), parts);
     }
     let refusal = lamp(json!({ "spectrum": 6500 }), Value::Null).refusal();
-    says(refusal, "light `lamp`: its `spectrum` is no text");
+    says(refusal, "light `lamp`: its `spectrum` is not text");
 }
 
 #[test]

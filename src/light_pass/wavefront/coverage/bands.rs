@@ -1,4 +1,4 @@
-//! Triangles are divided among tasks that own bands of rows.
+//! Divides triangles among tasks, each of which owns a band of rows.
 
 use std::ops::Range;
 

@@ -25,7 +25,7 @@ impl Edited<'_> {
         Error::failure(
             format!("light `{}`", self.is.name),
             format!("{what}, which a file cannot hold"),
-            "take that edit back and save again",
+            "undo that edit and save again",
         )
     }
 

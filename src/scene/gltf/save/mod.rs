@@ -84,7 +84,7 @@ impl Patch<'_> {
         }
         Err(Error::failure(
             path.display().to_string(),
-            "is not the file any more that the scene was loaded from",
+            "has changed since the scene was loaded",
             "open it again and repeat the edits",
         ))
     }
@@ -184,8 +184,8 @@ fn check(bytes: &[u8], original: &Path, edited: &Scene, options: &LoadOptions) -
     let differs = |what: String| {
         Error::failure(
             what,
-            "cannot be saved as it is: the file has something that stands against it",
-            "take its last edit back and save again",
+            "cannot be saved: the file has something that prevents it",
+            "undo its last edit and save again",
         )
     };
     let extent_m = edited.bounds().map_or(1.0, |(low, high)| (high - low).length());

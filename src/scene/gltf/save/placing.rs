@@ -44,7 +44,7 @@ impl<'a> Placing<'a> {
         match self.wanted.insert(node, world_from_node) {
             Some(other) if !is_same(&other, &world_from_node) => Err(Error::failure(
                 format!("`{name}`"),
-                "shares its node with what was moved elsewhere, which a file cannot hold",
+                "shares its node with an object that was moved elsewhere, which a file cannot state",
                 "move both alike, or give them nodes of their own",
             )),
             _ => Ok(()),

@@ -21,7 +21,7 @@ pub fn document(scene: &Scene) -> Result<(Glb, Vec<Warning>)> {
     if scene.objects.is_empty() {
         return Err(Error::failure(
             &scene.source,
-            "has no surfaces that a file could hold",
+            "has no surfaces to write",
             "name another scene",
         ));
     }

@@ -1,4 +1,4 @@
-//! Error against time: the bake so far, what better maps are expected to take, and the target on that curve.
+//! Error against time: the bake so far, the forecast, and the target on that curve.
 
 use std::ops::RangeInclusive;
 

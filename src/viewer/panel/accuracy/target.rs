@@ -1,4 +1,4 @@
-//! What ends a bake: a density, an error or a time; and how carefully to bake, by name: the presets of the command line.
+//! What ends a bake: a density, an error, a time, or a preset of the command line.
 
 use egui::{Response, Slider, SliderClamping, Ui};
 use strum::EnumMessage;

@@ -1,4 +1,4 @@
-//! One map in a window over the picture: zoomed, moved about, with the values under the pointer.
+//! One map in a window over the picture: zoom, pan, values under the pointer.
 
 use egui::{Color32, EventFilter, Key, Rect, Response, RichText, Sense, TextureHandle, Ui, pos2, vec2};
 
