@@ -210,7 +210,7 @@ fn add_map(
     let image = images::encode(&light, (map.width(), map.height()), options, &object.name)?;
     let image_index = glb.push_png(&format!("{} light", object.name), &image.png);
     let sampler = glb.push(
-        "samplers",
+        "/samplers",
         json!({ "magFilter": 9729, "minFilter": 9729, "wrapS": 33071, "wrapT": 33071 }),
     );
     let texture = glb.push("/textures", json!({ "source": image_index, "sampler": sampler }));

@@ -90,7 +90,9 @@ impl Exported {
 
     /// The texels of an image that a texture names [0, 1]; codes of eight bits are 257 times smaller.
     fn image(&self, texture: &Value) -> Vec<[f64; 3]> {
-        let image = self.item("images", &self.item("textures", &texture["index"])["source"]);
+        let texture = self.item("textures", &texture["index"]);
+        assert_eq!(self.item("samplers", &texture["sampler"])["wrapS"], 33071, "clamped");
+        let image = self.item("images", &texture["source"]);
         let png = image::load_from_memory(self.view(&image["bufferView"])).expect("it is a PNG");
         let pixels = png.to_rgb16();
         pixels.pixels().map(|pixel| pixel.0.map(linear_of_srgb)).collect()
