@@ -9,7 +9,7 @@ use cpu_time::ProcessTime;
 use nephroid::error::{Error, Result, Warning};
 use nephroid::files;
 use nephroid::progress::Control;
-use nephroid::scene::{self, LoadOptions, Scene};
+use nephroid::scene::{LoadOptions, Scene};
 use nephroid::session::{BakeResult, BakeSession, Timings};
 use nephroid::settings::BakeSettings;
 
@@ -29,7 +29,7 @@ impl LoadedScene {
     /// A scene that cannot be read, or has no light where it needs one.
     pub fn load(source: &str, options: &LoadOptions, needs_light: bool, console: &Console) -> Result<Self> {
         let started = (Instant::now(), ProcessTime::now());
-        let scene = Arc::new(scene::load(source, options)?);
+        let scene = Arc::new(Scene::load(source, options)?);
         if needs_light && scene.lights.is_empty() {
             return Err(Error::failure(
                 source,

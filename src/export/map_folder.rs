@@ -30,7 +30,8 @@ impl MapFolder {
     ///
     /// # Errors
     /// A place that cannot be written; other people's files in it.
-    pub fn open(path: &Path, force: bool) -> Result<Self> {
+    pub fn open(path: impl AsRef<Path>, force: bool) -> Result<Self> {
+        let path = path.as_ref();
         let previous = map_reader::files_of(path);
         let root = OutputFolder::open_own(path, previous.is_some(), force, "a bake")?;
         let maps = OutputFolder::open(&path.join(MAPS))?;

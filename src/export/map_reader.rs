@@ -74,7 +74,7 @@ pub struct StoredLight {
 /// A folder of maps beside their scene; maps are read one at a time.
 #[derive(Debug)]
 pub struct MapReader<'a> {
-    folder: &'a Path,
+    folder: PathBuf,
     scene: &'a Scene,
     stored: StoredMaps,
     location: String,
@@ -85,8 +85,9 @@ impl<'a> MapReader<'a> {
     ///
     /// # Errors
     /// No manifest, one of another format or scene.
-    pub fn open(folder: &'a Path, scene: &'a Scene) -> Result<Self> {
-        let (stored, location) = read_manifest(folder)?;
+    pub fn open(folder: impl Into<PathBuf>, scene: &'a Scene) -> Result<Self> {
+        let folder = folder.into();
+        let (stored, location) = read_manifest(&folder)?;
         if stored.scene.geometry_hash != SceneSummary::of(scene).geometry_hash {
             return Err(Error::failure(
                 &location,
@@ -107,7 +108,7 @@ impl<'a> MapReader<'a> {
 
     /// The folder that the maps lie in.
     pub fn folder(&self) -> &Path {
-        self.folder
+        &self.folder
     }
 
     /// What there is.
@@ -130,6 +131,33 @@ impl<'a> MapReader<'a> {
             )
         });
         partial.into_iter().collect()
+    }
+
+    /// What the user named as the scene of the maps in a folder: a path as given, or `builtin:NAME`.
+    ///
+    /// # Errors
+    /// No manifest, or one of another format.
+    pub fn source_of(folder: &Path) -> Result<String> {
+        read_manifest(folder).map(|(stored, _)| stored.scene.source)
+    }
+
+    /// Reads all maps, without each light's part of them.
+    ///
+    /// # Errors
+    /// As [`Self::read`]; two maps of one side of a surface.
+    pub fn read_all(&self) -> Result<Vec<IlluminationMap>> {
+        let mut maps: Vec<IlluminationMap> = Vec::new();
+        for entry in self.entries() {
+            let map = self.read_with(entry, &[])?.map;
+            let mut others = maps.iter();
+            if others.any(|other| other.chart.receiver == map.chart.receiver) {
+                let what = format!("it names two maps of one side of {}", entry.surface);
+                return Err(unusable(&self.location, what));
+            }
+            maps.push(map);
+        }
+        maps.sort_by_key(|map| map.chart.receiver);
+        Ok(maps)
     }
 
     /// Reads one of the maps.
@@ -247,35 +275,6 @@ impl<'a> MapReader<'a> {
         let what = format!("it names the file {file:?}, which is none that a bake writes");
         Err(unusable(&self.location, what))
     }
-}
-
-/// Maps of a scene from a folder, with warnings about their state.
-///
-/// # Errors
-/// No manifest, one of another format or scene, files that are missing, damaged or do not fit the manifest.
-pub fn read(folder: &Path, scene: &Scene) -> Result<(Vec<IlluminationMap>, Vec<Warning>)> {
-    let reader = MapReader::open(folder, scene)?;
-    let mut maps: Vec<IlluminationMap> = Vec::new();
-    for entry in reader.entries() {
-        let map = reader.read_with(entry, &[])?.map;
-        let mut others = maps.iter();
-        if others.any(|other| other.chart.receiver == map.chart.receiver) {
-            let what = format!("it names two maps of one side of {}", entry.surface);
-            return Err(unusable(&reader.location, what));
-        }
-        maps.push(map);
-    }
-    maps.sort_by_key(|map| map.chart.receiver);
-    let warnings = reader.warnings();
-    Ok((maps, warnings))
-}
-
-/// What the user named as the scene of the maps in a folder: a path as given, or `builtin:NAME`.
-///
-/// # Errors
-/// No manifest, or one of another format.
-pub fn source_of(folder: &Path) -> Result<String> {
-    read_manifest(folder).map(|(stored, _)| stored.scene.source)
 }
 
 /// Files of the maps in a folder, relative to it; `None` where none are.

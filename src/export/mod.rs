@@ -15,4 +15,4 @@ pub mod textures;
 pub mod uv_file;
 
 pub use float_image::FloatImage;
-pub use quantity::Quantity;
+pub use quantity::{DEFAULT_CUT, Quantity};

@@ -109,7 +109,8 @@ impl BakeSession {
     ///
     /// # Errors
     /// More triangles than the hierarchy can count.
-    pub fn new(scene: Arc<Scene>) -> Result<Self> {
+    pub fn new(scene: impl Into<Arc<Scene>>) -> Result<Self> {
+        let scene = scene.into();
         if u32::try_from(scene.triangle_count()).is_err() {
             return Err(Error::failure(
                 &scene.source,

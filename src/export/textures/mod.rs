@@ -58,6 +58,19 @@ pub struct TextureOptions {
     pub atlas_side: Option<usize>,
 }
 
+impl Default for TextureOptions {
+    /// OpenEXR files of half floats, one for each map: all light, in W/m².
+    fn default() -> Self {
+        Self {
+            encoding: Encoding::Half,
+            quantity: Quantity::Irradiance,
+            content: Content::Sum,
+            exposure: Exposure::Stops(0.0),
+            atlas_side: None,
+        }
+    }
+}
+
 /// What was written.
 #[derive(Clone, Debug, Serialize)]
 pub struct TextureReport {

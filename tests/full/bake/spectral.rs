@@ -11,7 +11,7 @@ use nephroid::optics::spectrum::{Spectrum, Xyz, illuminant, xyz_bar};
 use nephroid::optics::wavelength::VISIBLE;
 use nephroid::optics::{LinearSrgb, Metal, Nanometres};
 use nephroid::scene::builtin::{parts, shapes};
-use nephroid::scene::{LoadOptions, Scene, load};
+use nephroid::scene::{LoadOptions, Scene};
 use nephroid::session::BakeResult;
 use nephroid::settings::{BakeSettings, Estimator, LayerKind, Wavelengths};
 use nephroid::transport::{MediumStack, Tracer};
@@ -186,7 +186,7 @@ fn prism_table(path: &std::path::Path) -> Vec<[f64; 6]> {
 
 fn shared_prism() -> Option<(Scene, Vec<[f64; 6]>)> {
     let path = support::shared_or_skip("oracle/S4.glb")?;
-    let scene = load(&path.to_string_lossy(), &LoadOptions::default()).expect("a scene");
+    let scene = Scene::load(&path.to_string_lossy(), &LoadOptions::default()).expect("a scene");
     Some((scene, prism_table(&path.with_file_name("S4_table.csv"))))
 }
 

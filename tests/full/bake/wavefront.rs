@@ -5,7 +5,7 @@ use glam::{DMat3, DVec3};
 use nephroid::effect::Effect;
 use nephroid::illumination::IlluminationMap;
 use nephroid::optics::LinearSrgb;
-use nephroid::scene::{LoadOptions, load};
+use nephroid::scene::{LoadOptions, Scene};
 use nephroid::session::BakeResult;
 
 use crate::bake::common::{floor, rmse, towards};
@@ -57,7 +57,7 @@ fn the_solvers_files_agree_with_its_maps() {
             continue;
         };
         let path = path.to_str().expect("a readable path");
-        let scene = load(path, &LoadOptions::default()).expect("a valid file");
+        let scene = Scene::load(path, &LoadOptions::default()).expect("a valid file");
         let (density, most) = reference.by_wavefronts;
         reference.check(
             &bake(scene.clone(), &at(density, 256)),
@@ -224,7 +224,7 @@ fn real_files_bake() {
     };
     let mut lit = 0;
     for file in files {
-        let scene = load(file.to_str().expect("a readable path"), &options).expect("a valid file");
+        let scene = Scene::load(file.to_str().expect("a readable path"), &options).expect("a valid file");
         let name = scene.name.clone();
         let result = bake(scene, &photons(3e4, 64));
         assert_eq!(energy_fault(&result), None, "{name}");

@@ -11,7 +11,7 @@ use image::ImageFormat;
 use nephroid::error::Result;
 use nephroid::export::float_image::{Channel, FloatImage};
 use nephroid::export::map_folder::MapFolder;
-use nephroid::export::map_reader;
+use nephroid::export::map_reader::MapReader;
 use nephroid::export::shards::{SceneOrigin, ShardFolder, ShardManifest, ShardSet};
 use nephroid::illumination::IlluminationMap;
 use nephroid::light_pass::share::Share;
@@ -300,7 +300,7 @@ fn maps() {
                     20_usize.div_ceil(count)
                 }
             };
-            let read = || map_reader::read(folder.path(), &scene).map(|(maps, _)| maps);
+            let read = || MapReader::open(folder.path(), &scene)?.read_all();
             assert!(read().is_ok_and(|maps| !maps.is_empty()));
             attack_files((name, &files), times, &tally, read, |maps| {
                 maps.iter().find_map(|map| map_fault(map, &scene))
