@@ -3,14 +3,14 @@
 //! nor a graphics card.
 //!
 //! ```
-//! use nephroid::{BakeSession, BakeSettings, Control, LoadOptions, MapFolder, Scene, View, render};
+//! use nephroid::{Baker, BakeSettings, Control, LoadOptions, MapFolder, Scene, View, render};
 //!
 //! # let folder = tempfile::tempdir().expect("a temporary folder");
 //! # std::env::set_current_dir(&folder).expect("it is there");
 //! let scene = std::sync::Arc::new(Scene::load("builtin:ring", &LoadOptions::default())?); // or a .glb
 //! let settings = BakeSettings { max_error: Some(0.1), ..BakeSettings::default() };
 //! let control = Control::default(); // any thread may call control.cancel()
-//! let bake = BakeSession::new(scene.clone())?.bake(&settings, &(), &control)?;
+//! let bake = Baker::new(scene.clone())?.bake(&settings, &(), &control)?;
 //! println!("{} maps, visible error {:?}", bake.maps.len(), bake.estimated_visible);
 //! MapFolder::open("maps", false)?.write(&scene, &settings, &bake)?; // OpenEXR files and manifest.json
 //! let mut view = View::new(scene.cameras[0].clone(), [64, 36]);
@@ -21,7 +21,7 @@
 //! # Ok::<(), nephroid::Error>(())
 //! ```
 //!
-//! A [`BakeSession`] that is kept bakes again only what a change of scene or settings affects. [`MapReader`] reads maps back,
+//! A [`Baker`] that is kept bakes again only what a change of scene or settings affects. [`MapSet`] reads maps back,
 //! for [`write_glb`] and [`write_textures`]. [`settings`] has what [`BakeSettings`] are made of.
 //!
 //! The [guide]: [the window](guide::window), [scenes](guide::scenes), [glass and lights](guide::glass_and_lamps),
@@ -35,13 +35,13 @@
 pub use error::{Error, ErrorKind, Result, Warning};
 pub use export::glb::{Carrier, GlbOptions, write as write_glb};
 pub use export::map_folder::MapFolder;
-pub use export::map_reader::MapReader;
+pub use export::map_set::MapSet;
 pub use export::textures::{Encoding, TextureFolder, TextureOptions, write as write_textures};
 pub use eye_pass::{Picture, ToneMap, View, render};
 pub use illumination::IlluminationMap;
 pub use progress::{Control, Progress, Stage};
 pub use scene::{Camera, LoadOptions, Scene};
-pub use session::{BakeResult, BakeSession, StopReason};
+pub use session::{Bake, Baker, StopReason};
 pub use settings::{BakeSettings, Estimator, LayerKind, MapResolution};
 
 pub mod guide;

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use nephroid::error::{Error, Result};
 use nephroid::export::glb::{self, Bits, Carrier, GlbOptions, GlbReport, SceneLights};
-use nephroid::export::map_reader::MapReader;
+use nephroid::export::map_set::MapSet;
 use nephroid::export::textures::{
     self, Content, Encoding, Exposure, Packing, TextureFolder, TextureOptions, TextureReport, Transfer,
 };
@@ -296,7 +296,7 @@ impl ExportArguments {
         let options = LoadOptions::default();
         match &self.scene {
             Some(scene) => Scene::load(scene, &options),
-            None => Scene::load(&MapReader::source_of(&self.maps)?, &options),
+            None => Scene::load(&MapSet::source_of(&self.maps)?, &options),
         }
     }
 
@@ -307,7 +307,7 @@ impl ExportArguments {
             self.maps.join(format!("{name}.glb"))
         });
         check_target(&output, &scene)?;
-        let set = MapReader::open(&self.maps, &scene)?;
+        let set = MapSet::open(&self.maps, &scene)?;
         let maps = set.read_all()?;
         let report = glb::write(&scene, &maps, self.glb_options(&scene, &maps), &output)?;
         console.warn(&set.warnings());
@@ -343,7 +343,7 @@ impl ExportArguments {
 
     fn write_textures(&self, console: &Console) -> Result<()> {
         let scene = self.load()?;
-        let reader = MapReader::open(&self.maps, &scene)?;
+        let reader = MapSet::open(&self.maps, &scene)?;
         let output = self.output.clone().unwrap_or_else(|| self.maps.join(self.format));
         let folder = TextureFolder::open(&output, self.force)?;
         let report = textures::write(&reader, self.texture_options(), folder, console.control())?;

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use clap::Args;
 use nephroid::effect::{Effect, EffectSwitches};
 use nephroid::error::{Error, Result};
-use nephroid::export::map_reader::MapReader;
+use nephroid::export::map_set::MapSet;
 use nephroid::export::picture::holds_radiance;
 use nephroid::eye_pass::reference::{self, ChainLimits, ReferenceSettings};
 use nephroid::eye_pass::{Picture, ToneMap, View, WhiteBalance};
@@ -51,7 +51,7 @@ pub struct EyeOptions {
 /// Maps that were baked before, or those of a bake that ran to its end: half-lit pictures are not made.
 ///
 /// # Errors
-/// Those of a bake, or of [`MapReader::read_all`].
+/// Those of a bake, or of [`MapSet::read_all`].
 pub fn maps(
     folder: Option<&Path>,
     settings: &BakeSettings,
@@ -63,7 +63,7 @@ pub fn maps(
         console.check(&loaded.scene.source)?;
         return Ok(result.maps);
     };
-    let set = MapReader::open(folder, &loaded.scene)?;
+    let set = MapSet::open(folder, &loaded.scene)?;
     let maps = set.read_all()?;
     console.warn(&set.warnings());
     Ok(maps)

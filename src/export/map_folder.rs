@@ -3,12 +3,12 @@
 use std::path::{Path, PathBuf};
 
 use super::manifest::{self, BandChannel, LightChannels, Manifest, MapEntry};
-use super::{exr, map_reader, uv_file};
+use super::{exr, map_set, uv_file};
 use crate::error::Result;
 use crate::files::{self, OutputFolder};
 use crate::illumination::{IlluminationMap, Side, UvSet};
 use crate::scene::{Light, Scene};
-use crate::session::BakeResult;
+use crate::session::Bake;
 use crate::settings::{BakeSettings, MapResolution};
 
 /// Folder of the map files within ours.
@@ -32,7 +32,7 @@ impl MapFolder {
     /// A place that cannot be written; other people's files in it.
     pub fn open(path: impl AsRef<Path>, force: bool) -> Result<Self> {
         let path = path.as_ref();
-        let previous = map_reader::files_of(path);
+        let previous = map_set::files_of(path);
         let root = OutputFolder::open_own(path, previous.is_some(), force, "a bake")?;
         let maps = OutputFolder::open(&path.join(MAPS))?;
         Ok(Self {
@@ -51,7 +51,7 @@ impl MapFolder {
     ///
     /// # Errors
     /// A disk that is full, a place that cannot be written any more.
-    pub fn write(self, scene: &Scene, settings: &BakeSettings, result: &BakeResult) -> Result<Manifest> {
+    pub fn write(self, scene: &Scene, settings: &BakeSettings, result: &Bake) -> Result<Manifest> {
         let mut entries = Vec::new();
         for map in &result.maps {
             entries.push(self.write_map(scene, settings, map, result)?);
@@ -76,7 +76,7 @@ impl MapFolder {
         scene: &Scene,
         settings: &BakeSettings,
         map: &IlluminationMap,
-        result: &BakeResult,
+        result: &Bake,
     ) -> Result<MapEntry> {
         let name = format!("{}.exr", stem(scene, map));
         let path = self.maps.path().join(&name);
@@ -128,7 +128,7 @@ pub fn write_map(
     scene: &Scene,
     settings: &BakeSettings,
     map: &IlluminationMap,
-    result: &BakeResult,
+    result: &Bake,
 ) -> Result<(Parts, Option<PathBuf>)> {
     let uv_path = (map.chart.uv_set == UvSet::Generated).then(|| path.with_extension("uv"));
     if let Some(uv_path) = &uv_path {

@@ -6,7 +6,7 @@ pub mod frame_folder;
 pub mod glb;
 pub mod manifest;
 pub mod map_folder;
-pub mod map_reader;
+pub mod map_set;
 pub mod pfm;
 pub mod picture;
 mod quantity;

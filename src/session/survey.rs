@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use super::forecast::{Forecast, forecast};
-use super::{BakeEstimate, BakeResult, BakeSession, StopReason, Timings};
+use super::{Bake, BakeEstimate, Baker, StopReason, Timings};
 use crate::error::Result;
 use crate::plan::Effect;
 use crate::progress::Control;
@@ -34,14 +34,14 @@ pub struct Survey {
     /// The plan, and bounds.
     pub estimate: BakeEstimate,
     /// The pilot bake of the default preset: which maps there are, and what it took.
-    pub pilot: BakeResult,
+    pub pilot: Bake,
     /// All presets.
     pub presets: Vec<PresetForecast>,
     /// Wall-clock seconds that the survey took.
     pub seconds: f64,
 }
 
-impl BakeSession {
+impl Baker {
     /// Finds out what a bake would take: draft, preview and final in turn, everything else as the settings say.
     ///
     /// # Errors
@@ -80,7 +80,7 @@ impl BakeSession {
     }
 
     /// The first moments of a bake: until something is known of its error, or the last limit is reached.
-    fn pilot(&mut self, settings: &BakeSettings, control: &Control) -> Result<BakeResult> {
+    fn pilot(&mut self, settings: &BakeSettings, control: &Control) -> Result<Bake> {
         let within = |limit_s| BakeSettings {
             max_time_s: Some(limit_s),
             ..settings.clone()
@@ -97,7 +97,7 @@ impl BakeSession {
 }
 
 /// A bake that went on where another ended, with what that one took.
-fn added(first: BakeResult, mut second: BakeResult) -> BakeResult {
+fn added(first: Bake, mut second: Bake) -> Bake {
     let sum_s = |times: &Timings| times.plan + times.trace + times.deposit;
     for point in &mut second.course {
         point.rays += first.counts.rays;
@@ -137,7 +137,7 @@ fn nothing(preset: Preset) -> Forecast {
 }
 
 /// Rays and time grow with the density.
-fn splat_forecast(pilot: &BakeResult, preset: Preset) -> Option<Forecast> {
+fn splat_forecast(pilot: &Bake, preset: Preset) -> Option<Forecast> {
     let last = pilot.course.last()?;
     let gain = preset.splat_density_per_sr() / PILOT_DENSITY_PER_SR;
     Some(Forecast {

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{Encoding, TextureOptions};
 use crate::export::manifest::{MapEntry, SceneSummary};
-use crate::export::map_reader::MapReader;
+use crate::export::map_set::MapSet;
 use crate::illumination::{Side, UvSet};
 use crate::optics::luminance;
 use crate::settings::LayerKind;
@@ -128,7 +128,7 @@ impl PlacedMap {
 impl TextureIndex {
     /// Of textures that were made of a folder of maps.
     pub(super) fn new(
-        reader: &MapReader<'_>,
+        reader: &MapSet<'_>,
         options: TextureOptions,
         exposure_stops: f64,
         textures: Vec<TextureEntry>,

@@ -11,7 +11,7 @@ use self::index::{PlacedMap, Rectangle, TextureEntry, TextureIndex};
 use self::texels::Texels;
 use super::Quantity;
 use super::manifest::MapEntry;
-use super::map_reader::{MapReader, StoredMap};
+use super::map_set::{MapSet, StoredMap};
 use super::quantity::white;
 use crate::error::{Error, Result, Warning};
 use crate::files::{self, OutputFolder, StagedFolder};
@@ -90,7 +90,7 @@ pub struct TextureReport {
 /// Maps that cannot be read or lack the light that was asked for; light that the format cannot hold; a place that cannot
 /// be written; [`Error::cancelled`].
 pub fn write(
-    reader: &MapReader<'_>,
+    reader: &MapSet<'_>,
     options: TextureOptions,
     mut folder: TextureFolder,
     control: &Control,
@@ -132,7 +132,7 @@ struct Writer<'a> {
 }
 
 impl Writer<'_> {
-    fn choose_exposure(&self, reader: &MapReader<'_>) -> Result<f64> {
+    fn choose_exposure(&self, reader: &MapSet<'_>) -> Result<f64> {
         let cut = match self.options.exposure {
             Exposure::Stops(stops) => return Ok(stops),
             Exposure::Cut(cut) => cut,
@@ -155,7 +155,7 @@ impl Writer<'_> {
     }
 
     /// One file for each map.
-    fn write_each(&mut self, reader: &MapReader<'_>) -> Result<Vec<TextureEntry>> {
+    fn write_each(&mut self, reader: &MapSet<'_>) -> Result<Vec<TextureEntry>> {
         let mut textures = Vec::new();
         for entry in reader.entries() {
             let stored = reader.read(entry)?;
@@ -171,7 +171,7 @@ impl Writer<'_> {
     }
 
     /// As few files as hold all maps.
-    fn write_atlas(&mut self, reader: &MapReader<'_>, most_side: usize) -> Result<Vec<TextureEntry>> {
+    fn write_atlas(&mut self, reader: &MapSet<'_>, most_side: usize) -> Result<Vec<TextureEntry>> {
         let entries = reader.entries();
         let sizes: Vec<(usize, usize)> = entries.iter().map(|entry| (entry.width, entry.height)).collect();
         let options = self.options.encoding.atlas_options(most_side);
@@ -208,7 +208,7 @@ impl Writer<'_> {
     }
 
     /// Copies the coordinates that were made for a map; `None` where it follows the scene's own.
-    fn put_coordinates(&mut self, reader: &MapReader<'_>, entry: &MapEntry) -> Result<Option<String>> {
+    fn put_coordinates(&mut self, reader: &MapSet<'_>, entry: &MapEntry) -> Result<Option<String>> {
         let bytes = reader.read_coordinates(entry)?;
         bytes
             .map(|bytes| self.put(format!("{}.uv", stem(entry)), &bytes))

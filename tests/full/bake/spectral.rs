@@ -12,7 +12,7 @@ use nephroid::optics::wavelength::VISIBLE;
 use nephroid::optics::{LinearSrgb, Metal, Nanometres};
 use nephroid::scene::builtin::{parts, shapes};
 use nephroid::scene::{LoadOptions, Scene};
-use nephroid::session::BakeResult;
+use nephroid::session::Bake;
 use nephroid::settings::{BakeSettings, Estimator, LayerKind, Wavelengths};
 use nephroid::transport::{MediumStack, Tracer};
 use nephroid::units::{Flux, Irradiance};
@@ -46,7 +46,7 @@ fn glass(text: &str) -> Arc<Glass> {
 }
 
 /// Caustic light on the upper side of the object of a name, row by row.
-fn caustic(result: &BakeResult, scene: &Scene, name: &str) -> Vec<[f32; 3]> {
+fn caustic(result: &Bake, scene: &Scene, name: &str) -> Vec<[f32; 3]> {
     let is_wanted = |map: &&nephroid::illumination::IlluminationMap| {
         scene.objects[map.chart.object()].name == name && map.chart.receiver.side() == Side::Front
     };

@@ -4,7 +4,7 @@ use std::f64::consts::FRAC_1_PI;
 
 use nephroid::error::Result;
 use nephroid::export::glb::{self, Bits, Carrier, GlbOptions, GlbReport, SceneLights};
-use nephroid::export::map_reader::MapReader;
+use nephroid::export::map_set::MapSet;
 use nephroid::export::{Quantity, uv_file};
 use nephroid::scene::open_document;
 
@@ -26,7 +26,7 @@ const WHOLE: GlbOptions = GlbOptions {
 
 fn encode(baked: &Baked, options: GlbOptions) -> Result<(Vec<u8>, GlbReport)> {
     let scene = &baked.scene;
-    let maps = MapReader::open(baked.path("out"), scene)?.read_all()?;
+    let maps = MapSet::open(baked.path("out"), scene)?.read_all()?;
     let opened = open_document(scene, &LoadOptions::default())?;
     glb::encode(scene, opened, &maps, options)
 }

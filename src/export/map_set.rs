@@ -73,14 +73,14 @@ pub struct StoredLight {
 
 /// A folder of maps beside their scene; maps are read one at a time.
 #[derive(Debug)]
-pub struct MapReader<'a> {
+pub struct MapSet<'a> {
     folder: PathBuf,
     scene: &'a Scene,
     stored: StoredMaps,
     location: String,
 }
 
-impl<'a> MapReader<'a> {
+impl<'a> MapSet<'a> {
     /// Reads the manifest.
     ///
     /// # Errors
