@@ -160,7 +160,6 @@ pub struct BandChannel {
     /// The wavelengths.
     #[serde(flatten)]
     pub band: SpectralBand,
-    /// Its channel.
     pub channel: String,
     /// Of its values: radiant, and by nanometre.
     pub units: String,

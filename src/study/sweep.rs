@@ -70,7 +70,6 @@ pub struct Group {
 /// What bakes are measured against.
 #[derive(Clone, Debug)]
 pub enum Against {
-    /// Nothing.
     Nothing,
     /// A map that is known.
     Known(Reference),
@@ -182,7 +181,6 @@ pub fn share(value: Option<f64>) -> Cell {
     value.map_or(Cell::Empty, Cell::Share)
 }
 
-/// A column with its name.
 pub const fn column(name: &'static str, value: fn(&Measured) -> Cell) -> Column {
     Column { name, value }
 }

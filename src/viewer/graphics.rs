@@ -209,7 +209,6 @@ impl Graphics {
         })
     }
 
-    /// The window.
     pub fn window(&self) -> &Arc<Window> {
         &self.screen.window
     }

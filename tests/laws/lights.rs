@@ -4,8 +4,8 @@ use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
 use glam::DVec3;
+use nephroid::eye_pass::View;
 use nephroid::eye_pass::reference::{ReferenceSettings, render};
-use nephroid::eye_pass::{ToneMap, View};
 use nephroid::illumination::Side;
 use nephroid::optics::LinearSrgb;
 use nephroid::scene::builtin::{parts, shapes};

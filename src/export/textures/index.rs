@@ -62,7 +62,6 @@ pub struct TextureEntry {
     pub light: Option<String>,
     /// What the file does not hold.
     pub lost: Loss,
-    /// The maps in it.
     pub maps: Vec<PlacedMap>,
 }
 

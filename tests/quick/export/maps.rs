@@ -126,7 +126,7 @@ fn files_are_as_large_as_asked_for() {
 fn stored_maps_are_not_trusted() {
     let baked = Baked::quick(built_in("mirror"), &[LayerKind::Caustic]);
     let out = baked.path("out");
-    let read = |folder, scene| MapSet::open(folder, scene)?.read_all();
+    let read = |folder: &Path, scene: &Scene| MapSet::open(folder, scene)?.read_all();
     let refuse = |scene: &Scene, words: &str| says(read(&out, scene).expect_err(words), words);
     refuse(&built_in("ring"), "builtin:mirror | builtin:ring | geometry");
     let missing = read(&baked.path("nowhere"), &baked.scene).expect_err("nowhere");

@@ -31,7 +31,7 @@ impl Baked {
             result,
             around,
         };
-        let folder = MapFolder::open(&baked.path("out"), false).expect("it can be written");
+        let folder = MapFolder::open(baked.path("out"), false).expect("it can be written");
         let written = folder.write(&baked.scene, settings, &baked.result);
         written.expect("it can be written");
         baked
