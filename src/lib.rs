@@ -3,72 +3,87 @@
 //! nor a graphics card.
 //!
 //! ```
-//! use std::sync::Arc;
-//! use nephroid::export::map_folder::MapFolder;
-//! use nephroid::progress::Control;
-//! use nephroid::scene::{self, LoadOptions};
-//! use nephroid::session::BakeSession;
-//! use nephroid::settings::{BakeSettings, MapResolution};
+//! use nephroid::{Baker, BakeSettings, Control, LoadOptions, MapFolder, Scene, View, render};
 //!
 //! # let folder = tempfile::tempdir().expect("a temporary folder");
-//! # let folder = folder.path();
-//! let scene = Arc::new(scene::load("builtin:ring", &LoadOptions::default())?); // or a .glb
-//! let map_resolution = MapResolution::Fixed { width: 64, height: 64 };
-//! let settings = BakeSettings { density_per_sr: 1e3, map_resolution, ..BakeSettings::default() };
+//! # std::env::set_current_dir(&folder).expect("it is there");
+//! let scene = std::sync::Arc::new(Scene::load("builtin:ring", &LoadOptions::default())?); // or a .glb
+//! let settings = BakeSettings { max_error: Some(0.1), ..BakeSettings::default() };
 //! let control = Control::default(); // any thread may call control.cancel()
-//! let progress = |stage: nephroid::progress::Stage, done: u64, total: u64| println!("{}: {done} of {total}", stage.name());
-//! let result = BakeSession::new(scene.clone())?.bake(&settings, &progress, &control)?;
-//! assert!(!result.partial && result.maps[0].width() == 64);
-//! MapFolder::open(folder, false)?.write(&scene, &settings, &result)?; // maps and manifest.json
-//! # Ok::<(), nephroid::error::Error>(())
+//! let bake = Baker::new(scene.clone())?.bake(&settings, &(), &control)?;
+//! println!("{} maps, visible error {:?}", bake.maps.len(), bake.estimated_visible);
+//! MapFolder::open("maps", false)?.write(&scene, &settings, &bake)?; // OpenEXR files and manifest.json
+//! let mut view = View::new(scene.cameras[0].clone(), [64, 36]);
+//! let picture = render(&scene, &bake.maps, &view, &(), &control)?;
+//! view.exposure_stops = picture.auto_exposure_stops();
+//! picture.save("ring.png", &view)?;
+//! # assert!(!bake.partial && bake.maps.len() == 1);
+//! # Ok::<(), nephroid::Error>(())
 //! ```
 //!
-//! A [`session::BakeSession`] that is kept bakes again only what a change of scene or settings affects.
+//! A [`Baker`] that is kept bakes again only what a change of scene or settings affects. [`MapSet`] reads maps back,
+//! for [`write_glb`] and [`write_textures`]. [`settings`] has what [`BakeSettings`] are made of.
 //!
 //! The [guide]: [the window](guide::window), [scenes](guide::scenes), [glass and lights](guide::glass_and_lamps),
 //! [surfaces and maps](guide::surfaces), [files and units](guide::formats), [other programs](guide::engines),
 //! [many machines](guide::many_machines), [accuracy](guide::accuracy), [hard cases](guide::hard_cases),
 //! [how it works](guide::how_it_works), [contributing](guide::contributing), [changes](guide::changes).
-//!
-//! A module imports only from modules above it in `src/lib.rs`.
 
 // Units stand in brackets, as in `area [m²]`, which are no links.
 #![allow(rustdoc::broken_intra_doc_links)]
 
-pub mod effect;
-pub mod error;
-pub mod settings;
-pub mod units;
-
-pub mod files;
-#[cfg(feature = "gpu")]
-pub mod gpu;
-
-pub mod optics;
-
-pub mod geometry;
-
-pub mod scene;
-
-pub mod plan;
-
-pub mod transport;
-
-pub mod illumination;
-
-pub mod progress;
-
-pub mod light_pass;
-
-pub mod eye_pass;
-
-pub mod session;
-
-pub mod export;
-
-pub mod study;
-
-#[cfg(feature = "viewer")]
-pub mod viewer;
+pub use error::{Error, ErrorKind, Result, Warning};
+pub use export::glb::{Carrier, GlbOptions, write as write_glb};
+pub use export::map_folder::MapFolder;
+pub use export::map_set::MapSet;
+pub use export::textures::{Encoding, TextureFolder, TextureOptions, write as write_textures};
+pub use eye_pass::{Picture, ToneMap, View, render};
+pub use illumination::IlluminationMap;
+pub use progress::{Control, Progress, Stage};
+pub use scene::{Camera, LoadOptions, Scene};
+pub use session::{Bake, Baker, StopReason};
+pub use settings::{BakeSettings, Estimator, LayerKind, MapResolution};
 
 pub mod guide;
+pub mod settings;
+
+// Internals, which the crate's own program and tests reach: what is here may change without notice. A module imports only
+// from modules above it.
+#[doc(hidden)]
+pub mod effect;
+#[doc(hidden)]
+pub mod error;
+#[doc(hidden)]
+pub mod export;
+#[doc(hidden)]
+pub mod eye_pass;
+#[doc(hidden)]
+pub mod files;
+#[doc(hidden)]
+pub mod geometry;
+#[cfg(feature = "gpu")]
+#[doc(hidden)]
+pub mod gpu;
+#[doc(hidden)]
+pub mod illumination;
+#[doc(hidden)]
+pub mod light_pass;
+#[doc(hidden)]
+pub mod optics;
+#[doc(hidden)]
+pub mod plan;
+#[doc(hidden)]
+pub mod progress;
+#[doc(hidden)]
+pub mod scene;
+#[doc(hidden)]
+pub mod session;
+#[doc(hidden)]
+pub mod study;
+#[doc(hidden)]
+pub mod transport;
+#[doc(hidden)]
+pub mod units;
+#[cfg(feature = "viewer")]
+#[doc(hidden)]
+pub mod viewer;

@@ -13,7 +13,7 @@ use nephroid::light_pass::ledger::CarriedFlux;
 use nephroid::light_pass::share::Share;
 use nephroid::scene::LoadOptions;
 use nephroid::session::forecast::forecast;
-use nephroid::session::{self, BakeResult, Forecast, ForecastReport, StopReason};
+use nephroid::session::{self, Bake, Forecast, ForecastReport, StopReason};
 use nephroid::settings::{BakeSettings, Estimator, LayerKind, MapResolution};
 
 use super::bake_options::BakeOptions;
@@ -182,7 +182,7 @@ impl BakeArguments {
 }
 
 /// What people want to know of a folder of maps.
-pub fn summary(manifest: &Manifest, result: &BakeResult, folder: &str) -> String {
+pub fn summary(manifest: &Manifest, result: &Bake, folder: &str) -> String {
     let mut lines = Vec::new();
     let mut line = |name, value| lines.push((name, value));
     line("folder", folder.to_string());
@@ -274,14 +274,14 @@ fn told(report: &ForecastReport) -> String {
 }
 
 /// What the next better round target would take.
-fn next_target(result: &BakeResult, estimator: Estimator) -> Option<Forecast> {
+fn next_target(result: &Bake, estimator: Estimator) -> Option<Forecast> {
     let reached = result.course.last()?.error;
     let target = ROUND_TARGETS.into_iter().find(|target| *target < 0.9 * reached)?;
     forecast(&result.course, target, estimator)
 }
 
 /// The plan's reason for having nothing to do.
-fn why_nothing(result: &BakeResult) -> String {
+fn why_nothing(result: &Bake) -> String {
     if result.stop_reason == StopReason::Cancelled {
         return "stopped before anything was deposited".into();
     }

@@ -5,15 +5,15 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use nephroid::error::{Error, Result};
-use nephroid::export::Quantity;
 use nephroid::export::glb::{self, Bits, Carrier, GlbOptions, GlbReport, SceneLights};
-use nephroid::export::map_reader::{self, MapReader};
+use nephroid::export::map_set::MapSet;
 use nephroid::export::textures::{
     self, Content, Encoding, Exposure, Packing, TextureFolder, TextureOptions, TextureReport, Transfer,
 };
+use nephroid::export::{DEFAULT_CUT, Quantity};
 use nephroid::files;
 use nephroid::illumination::IlluminationMap;
-use nephroid::scene::{self, LoadOptions, Scene};
+use nephroid::scene::{LoadOptions, Scene};
 use nephroid::settings::options::share;
 use nephroid::settings::{LayerKind, MAX_MAP_SIDE};
 use serde::Serialize;
@@ -24,9 +24,6 @@ use super::values::{self, Named};
 
 /// Exposures beyond that many stops are a slip.
 const MAX_STOPS: f64 = 64.0;
-
-/// Share of a map's light that may be cut where nothing was asked for.
-const DEFAULT_CUT: f64 = 0.005;
 
 /// Share of texels that are white in an unlit picture where no exposure was asked for.
 const WHITE_SHARE: f64 = 0.01;
@@ -134,7 +131,6 @@ pub struct ExportArguments {
 #[derive(Serialize)]
 struct WrittenFile<'a> {
     file: &'a str,
-    bytes: usize,
     #[serde(flatten)]
     report: &'a GlbReport,
 }
@@ -241,8 +237,8 @@ impl ExportArguments {
     fn load(&self) -> Result<Scene> {
         let options = LoadOptions::default();
         match &self.scene {
-            Some(scene) => scene::load(scene, &options),
-            None => scene::load(&map_reader::source_of(&self.maps)?, &options),
+            Some(scene) => Scene::load(scene, &options),
+            None => Scene::load(&MapSet::source_of(&self.maps)?, &options),
         }
     }
 
@@ -253,19 +249,17 @@ impl ExportArguments {
             self.maps.join(format!("{name}.glb"))
         });
         check_target(&output, &scene)?;
-        let (maps, warnings) = map_reader::read(&self.maps, &scene)?;
-        let opened = scene::open_document(&scene, &LoadOptions::default())?;
-        let (bytes, report) = glb::encode(&scene, opened, &maps, self.glb_options(&scene, &maps))?;
-        files::write_atomically(&output, |writer| writer.write_all(&bytes))?;
-        console.warn(&warnings);
+        let set = MapSet::open(&self.maps, &scene)?;
+        let maps = set.read_all()?;
+        let report = glb::write(&scene, &maps, self.glb_options(&scene, &maps), &output)?;
+        console.warn(&set.warnings());
         console.warn(&report.warnings);
         let file = &output.display().to_string();
         let written = WrittenFile {
             file,
-            bytes: bytes.len(),
             report: &report,
         };
-        console.print_result(&glb_text(file, bytes.len(), &report), &written)
+        console.print_result(&glb_text(file, &report), &written)
     }
 
     fn glb_options(&self, scene: &Scene, maps: &[IlluminationMap]) -> GlbOptions {
@@ -291,16 +285,16 @@ impl ExportArguments {
 
     fn write_textures(&self, console: &Console) -> Result<()> {
         let scene = self.load()?;
-        let sequence = map_reader::sequence_of(&self.maps)?;
+        let sequence = MapSet::sequence_of(&self.maps)?;
         let scenes = sequence
             .as_ref()
             .map_or(Vec::new(), |sequence| sequence.scenes(&scene));
         let frames = scenes.iter().enumerate();
         let mut readers = frames
-            .map(|(frame, scene)| MapReader::open_frame(&self.maps, scene, frame))
+            .map(|(frame, scene)| MapSet::open_frame(&self.maps, scene, frame))
             .collect::<Result<Vec<_>>>()?;
         if readers.is_empty() {
-            readers.push(MapReader::open(&self.maps, &scene)?);
+            readers.push(MapSet::open(&self.maps, &scene)?);
         }
         let output = self.output.clone().unwrap_or_else(|| self.maps.join(self.format));
         let folder = TextureFolder::open(&output, self.force)?;
@@ -379,8 +373,8 @@ fn exposure_of(scene: &Scene, maps: &[IlluminationMap]) -> f64 {
     (-white.log2()).clamp(-MAX_STOPS, MAX_STOPS)
 }
 
-fn glb_text(file: &str, bytes: usize, report: &GlbReport) -> String {
-    let mut text = format!("{file}: {bytes} bytes\n");
+fn glb_text(file: &str, report: &GlbReport) -> String {
+    let mut text = format!("{file}: {} bytes\n", report.bytes);
     let layers: Vec<&str> = report.layers.iter().map(|layer| layer.name()).collect();
     let lights = match report.options.lights {
         SceneLights::Keep => "kept",

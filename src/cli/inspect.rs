@@ -12,7 +12,7 @@ use nephroid::optics::wavelength::VISIBLE;
 use nephroid::optics::{Glass, Metal};
 use nephroid::plan::{self, EffectPlan};
 use nephroid::scene::{Light, LightKind, LightSize, Material, Scene, SurfaceKind};
-use nephroid::session::{BYTES_PER_TEXEL, BakeSession, Forecast, Survey};
+use nephroid::session::{BYTES_PER_TEXEL, Baker, Forecast, Survey};
 use nephroid::settings::LayerKind;
 use serde_json::{Value, json};
 
@@ -48,7 +48,7 @@ impl InspectArguments {
         let settings = self.bake.settings(&[LayerKind::Caustic], self.run.threads()?)?;
         let options = self.scene_options.load_options(true);
         let scene = &LoadedScene::load(&self.scene, &options, false, console)?.scene;
-        let survey = BakeSession::new(scene.clone())?.survey(&settings, console.control())?;
+        let survey = Baker::new(scene.clone())?.survey(&settings, console.control())?;
         let camera = scene.cameras.first().map(|camera| (camera, PICTURE_ASPECT));
         let chains = plan::chains(scene, camera, settings.effects.get(Effect::Chains));
         let mut plan = survey.estimate.plan.clone();

@@ -10,8 +10,8 @@ use nephroid::effect::EffectSwitches;
 use nephroid::error::{Error, Result, Warning};
 use nephroid::files;
 use nephroid::progress::Control;
-use nephroid::scene::{self, LoadOptions, Scene};
-use nephroid::session::{BakeResult, BakeSession, Timings};
+use nephroid::scene::{LoadOptions, Scene};
+use nephroid::session::{Bake, Baker, Timings};
 use nephroid::settings::BakeSettings;
 
 use super::console::{Console, StageBar, bytes};
@@ -46,7 +46,7 @@ impl LoadedScene {
         console: &Console,
     ) -> Result<Self> {
         let started = (Instant::now(), ProcessTime::now());
-        let scene = Arc::new(moment.apply(scene::load(source, options)?, effects)?);
+        let scene = Arc::new(moment.apply(Scene::load(source, options)?, effects)?);
         if needs_light && scene.lights.is_empty() {
             return Err(Error::failure(
                 source,
@@ -79,18 +79,18 @@ impl LoadedScene {
     pub fn session<T>(
         &self,
         console: &Console,
-        work: impl FnOnce(&mut BakeSession, &StageBar, &Control) -> Result<T>,
+        work: impl FnOnce(&mut Baker, &StageBar, &Control) -> Result<T>,
     ) -> Result<T> {
         console.check(&self.scene.source)?;
-        let mut session = BakeSession::new(self.scene.clone())?;
+        let mut session = Baker::new(self.scene.clone())?;
         work(&mut session, &console.bar(), console.control())
     }
 
     /// Bakes with no more memory for maps than there is room for, and prints the bake's warnings.
     ///
     /// # Errors
-    /// Those of [`BakeSession::bake`].
-    pub fn bake(&self, settings: &BakeSettings, console: &Console) -> Result<BakeResult> {
+    /// Those of [`Baker::bake`].
+    pub fn bake(&self, settings: &BakeSettings, console: &Console) -> Result<Bake> {
         let settings = within_reach(settings, console);
         let mut result = self.session(console, |session, bar, control| {
             session.bake(&settings, bar, control)

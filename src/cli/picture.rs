@@ -6,12 +6,11 @@ use std::sync::Arc;
 use clap::Args;
 use nephroid::effect::{Effect, EffectSwitches};
 use nephroid::error::{Error, Result};
-use nephroid::export::{map_reader, picture};
+use nephroid::export::map_set::MapSet;
+pub use nephroid::export::picture::holds_radiance;
 use nephroid::eye_pass::reference::{self, ChainLimits, ReferenceSettings};
-use nephroid::eye_pass::{Picture, ToneMap, View, WhiteBalance, tone_mapping};
-use nephroid::files;
+use nephroid::eye_pass::{Picture, ToneMap, View, WhiteBalance};
 use nephroid::illumination::IlluminationMap;
-use nephroid::optics::LinearSrgb;
 use nephroid::scene::{Camera, Scene};
 use nephroid::settings::BakeSettings;
 use nephroid::transport::Tracer;
@@ -46,27 +45,10 @@ pub struct EyeOptions {
     pub backend: Option<Backend>,
 }
 
-/// Whether a picture file holds radiance [W/(m² sr)]; else display colours.
-///
-/// # Errors
-/// A name that ends neither in .png nor in .exr.
-pub fn holds_radiance(path: &Path) -> Result<bool> {
-    let extension = path.extension().unwrap_or_default();
-    match extension.to_string_lossy().to_lowercase().as_str() {
-        "png" => Ok(false),
-        "exr" => Ok(true),
-        _ => Err(Error::usage(
-            path.display().to_string(),
-            "the name does not say the picture's format",
-            "name a file that ends in .png or .exr",
-        )),
-    }
-}
-
 /// Maps that were baked before, or those of a bake that ran to its end: half-lit pictures are not made.
 ///
 /// # Errors
-/// Those of a bake, or of [`map_reader::read`].
+/// Those of a bake, or of [`MapSet::read_all`].
 pub fn maps(
     folder: Option<&Path>,
     settings: &BakeSettings,
@@ -78,8 +60,9 @@ pub fn maps(
         console.check(&loaded.scene.source)?;
         return Ok(result.maps);
     };
-    let (maps, warnings) = map_reader::read(folder, &loaded.scene)?;
-    console.warn(&warnings);
+    let set = MapSet::open(folder, &loaded.scene)?;
+    let maps = set.read_all()?;
+    console.warn(&set.warnings());
     Ok(maps)
 }
 
@@ -104,14 +87,9 @@ pub fn view(scene: &Scene, options: &PictureOptions, eye: &EyeOptions) -> Result
 
 /// What is seen by a camera, at no exposure yet.
 pub fn view_of(camera: Camera, options: &PictureOptions, eye: &EyeOptions) -> View {
-    let (width, height) = options.size;
     View {
-        camera,
-        width,
-        height,
-        exposure_stops: 0.0,
         tone_map: eye.tone_map.unwrap_or_default(),
-        background: LinearSrgb::BLACK,
+        ..View::new(camera, options.size.into())
     }
 }
 
@@ -144,16 +122,10 @@ pub fn make(
     console.check("picture")?;
     view.exposure_stops = match options.exposure {
         Some(Exposure::Stops(stops)) => stops,
-        _ => tone_mapping::auto_exposure_stops(&picture),
+        _ => picture.auto_exposure_stops(),
     };
-    let location = path.display().to_string();
-    let bytes = if holds_radiance(path)? {
-        picture::radiance_exr(&picture, &location)?
-    } else {
-        let white = eye.white_balance.unwrap_or_default().matrix(scene);
-        picture::display_png(&picture, view.exposure_stops, view.tone_map, &white, &location)?
-    };
-    files::write_atomically(path, |writer| writer.write_all(&bytes))?;
+    let white = eye.white_balance.unwrap_or_default().matrix(scene);
+    picture.white_balanced(&white).save(path, &view)?;
     Ok(MadePicture { view, made_by })
 }
 

@@ -4,11 +4,11 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use clap::Args;
+use nephroid::MapSet;
 #[cfg(feature = "gpu")]
 use nephroid::effect::{Effect, EffectSwitch};
 use nephroid::error::{Error, Result};
 use nephroid::export::frame_folder::FrameFolder;
-use nephroid::export::map_reader;
 use nephroid::export::sequence::FrameTimes;
 use nephroid::files;
 #[cfg(feature = "gpu")]
@@ -123,7 +123,7 @@ impl RenderArguments {
             for frame in 0..times.frames {
                 let scene = Arc::new(loaded.scene.at(times.time_s(frame)));
                 let maps = match &self.maps.maps {
-                    Some(maps) => map_reader::read_frame(maps, &scene, frame)?.0,
+                    Some(maps) => MapSet::open_frame(maps, &scene, frame)?.read_all()?,
                     None => {
                         session.set_scene(scene.clone())?;
                         let result = session.bake(settings, bar, control)?;

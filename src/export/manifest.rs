@@ -10,8 +10,8 @@ use crate::light_pass::ledger::{EnergyLedger, LightLedger};
 use crate::plan::EffectLine;
 use crate::scene::Scene;
 use crate::session::{
-    BYTES_PER_TEXEL, BakeCounts, BakeResult, CostPoint, ForecastReport, ItemBufferReport, SpectralBand,
-    StopReason, Timings,
+    BYTES_PER_TEXEL, Bake, BakeCounts, CostPoint, ForecastReport, ItemBufferReport, SpectralBand, StopReason,
+    Timings,
 };
 use crate::settings::{BakeSettings, LayerKind};
 
@@ -212,7 +212,6 @@ pub struct BandChannel {
     /// The wavelengths.
     #[serde(flatten)]
     pub band: SpectralBand,
-    /// Its channel.
     pub channel: String,
     /// Of its values: radiant, and by nanometre.
     pub units: String,
@@ -236,7 +235,7 @@ pub const UNITS: &str = "W/m^2";
 
 impl Manifest {
     /// The manifest of a bake whose maps are stored as `maps` say; `settings` are those it was run with.
-    pub fn new(scene: &Scene, settings: &BakeSettings, result: &BakeResult, maps: Vec<MapEntry>) -> Self {
+    pub fn new(scene: &Scene, settings: &BakeSettings, result: &Bake, maps: Vec<MapEntry>) -> Self {
         let ledger = |ledger: &LightLedger| LedgerEntry {
             layer: LayerKind::Caustic,
             ledger: ledger.clone(),

@@ -4,12 +4,12 @@ use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use super::manifest::{self, BandChannel, LightChannels, Manifest, MapEntry};
-use super::{exr, map_reader, uv_file};
+use super::{exr, map_set, uv_file};
 use crate::error::Result;
 use crate::files::{self, OutputFolder};
 use crate::illumination::{IlluminationMap, Side, UvSet};
 use crate::scene::{Light, Scene};
-use crate::session::BakeResult;
+use crate::session::Bake;
 use crate::settings::{BakeSettings, MapResolution};
 
 /// Folder of the map files within ours.
@@ -31,8 +31,9 @@ impl MapFolder {
     ///
     /// # Errors
     /// A place that cannot be written; other people's files in it.
-    pub fn open(path: &Path, force: bool) -> Result<Self> {
-        let previous = map_reader::files_of(path);
+    pub fn open(path: impl AsRef<Path>, force: bool) -> Result<Self> {
+        let path = path.as_ref();
+        let previous = map_set::files_of(path);
         let root = OutputFolder::open_own(path, previous.is_some(), force, "a bake")?;
         let maps = OutputFolder::open(&path.join(MAPS))?;
         Ok(Self {
@@ -51,7 +52,7 @@ impl MapFolder {
     ///
     /// # Errors
     /// A disk that is full, a place that cannot be written any more.
-    pub fn write(self, scene: &Scene, settings: &BakeSettings, result: &BakeResult) -> Result<Manifest> {
+    pub fn write(self, scene: &Scene, settings: &BakeSettings, result: &Bake) -> Result<Manifest> {
         let maps = self.write_maps(scene, settings, result, None)?;
         self.finish(Manifest::new(scene, settings, result, maps))
     }
@@ -61,7 +62,7 @@ impl MapFolder {
         &self,
         scene: &Scene,
         settings: &BakeSettings,
-        result: &BakeResult,
+        result: &Bake,
         frame: Option<usize>,
     ) -> Result<Vec<MapEntry>> {
         let maps = result.maps.iter();
@@ -89,7 +90,7 @@ impl MapFolder {
         scene: &Scene,
         settings: &BakeSettings,
         map: &IlluminationMap,
-        result: &BakeResult,
+        result: &Bake,
         frame: Option<usize>,
     ) -> Result<MapEntry> {
         let stem = stem(scene, map);
@@ -145,7 +146,7 @@ pub fn write_map(
     scene: &Scene,
     settings: &BakeSettings,
     map: &IlluminationMap,
-    result: &BakeResult,
+    result: &Bake,
 ) -> Result<(Parts, Option<PathBuf>)> {
     let uv_path = (map.chart.uv_set == UvSet::Generated).then(|| path.with_extension("uv"));
     if let Some(uv_path) = &uv_path {

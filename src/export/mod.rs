@@ -6,7 +6,7 @@ pub mod frame_folder;
 pub mod glb;
 pub mod manifest;
 pub mod map_folder;
-pub mod map_reader;
+pub mod map_set;
 pub mod pfm;
 pub mod picture;
 mod quantity;
@@ -16,4 +16,4 @@ pub mod textures;
 pub mod uv_file;
 
 pub use float_image::FloatImage;
-pub use quantity::Quantity;
+pub use quantity::{DEFAULT_CUT, Quantity};

@@ -1,25 +1,52 @@
 //! Writes pictures: display colours as PNG, radiance as EXR.
 
+use std::path::Path;
+
 use super::{FloatImage, exr};
 use crate::error::{Error, Result};
-use crate::eye_pass::{Picture, ToneMap, tone_mapping};
+use crate::eye_pass::{Picture, View, tone_mapping};
 use crate::files;
-use crate::optics::spectrum::xyz::Matrix3;
 
-/// The bytes of a PNG file: radiance times `white_balance` × 2^`exposure_stops`, tone-mapped and sRGB-encoded; `location`
-/// is named in errors.
+impl Picture {
+    /// Writes a `.png` of what a display shows of it, at the view's exposure and by its tone map, or an `.exr` of radiance.
+    ///
+    /// # Errors
+    /// A name that ends in neither; a size that the format cannot hold; a place that cannot be written.
+    pub fn save(&self, path: impl AsRef<Path>, view: &View) -> Result<()> {
+        let path = path.as_ref();
+        let location = path.display().to_string();
+        let bytes = if holds_radiance(path)? {
+            radiance_exr(self, &location)?
+        } else {
+            display_png(self, view, &location)?
+        };
+        files::write_atomically(path, |writer| writer.write_all(&bytes))
+    }
+}
+
+/// Whether a picture file holds radiance [W/(m² sr)]; else display colours.
+///
+/// # Errors
+/// A name that ends neither in .png nor in .exr.
+pub fn holds_radiance(path: &Path) -> Result<bool> {
+    let extension = path.extension().unwrap_or_default();
+    match extension.to_string_lossy().to_lowercase().as_str() {
+        "png" => Ok(false),
+        "exr" => Ok(true),
+        _ => Err(Error::usage(
+            path.display().to_string(),
+            "a picture's name has to say its format",
+            "name a file that ends in .png or .exr",
+        )),
+    }
+}
+
+/// The bytes of a PNG file: radiance at the view's exposure, tone-mapped and sRGB-encoded; `location` is named in errors.
 ///
 /// # Errors
 /// A size that the format cannot hold.
-pub fn display_png(
-    picture: &Picture,
-    exposure_stops: f64,
-    tone_map: ToneMap,
-    white_balance: &Matrix3,
-    location: &str,
-) -> Result<Vec<u8>> {
-    let balanced = picture.clone().white_balanced(white_balance);
-    let rgba = tone_mapping::display_rgba8(&balanced, exposure_stops, tone_map);
+pub fn display_png(picture: &Picture, view: &View, location: &str) -> Result<Vec<u8>> {
+    let rgba = tone_mapping::display_rgba8(picture, view.exposure_stops, view.tone_map);
     encode(picture.width, picture.height, rgba, location)
 }
 

@@ -44,6 +44,9 @@ impl Quantity {
     }
 }
 
+/// Share of a map's light that may be cut where nothing else is asked for.
+pub const DEFAULT_CUT: f64 = 0.005;
+
 /// The least value above which there is no more than that share of all light, so that dim light has finer steps; `None`
 /// where no value is above 0.
 pub fn white(values: impl Iterator<Item = f64>, cut: f64) -> Option<f64> {

@@ -6,7 +6,7 @@ use super::manifest::{ErrorEstimate, FrameEntry, Manifest, SceneSummary, Sequenc
 use super::map_folder::MapFolder;
 use crate::error::Result;
 use crate::scene::Scene;
-use crate::session::BakeResult;
+use crate::session::Bake;
 use crate::settings::BakeSettings;
 
 /// Moments at equal distances.
@@ -84,7 +84,7 @@ impl SequenceFolder {
         frame: usize,
         scene: &Scene,
         settings: &BakeSettings,
-        result: &BakeResult,
+        result: &Bake,
     ) -> Result<&FrameEntry> {
         let maps = self.folder.write_maps(scene, settings, result, Some(frame + 1))?;
         self.first

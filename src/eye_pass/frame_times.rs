@@ -5,8 +5,8 @@ use std::time::Instant;
 
 use serde::Serialize;
 
+use super::View;
 use super::renderer::{GpuMs, Renderer};
-use super::{View, tone_mapping};
 use crate::effect::{Effect, EffectSwitch, EffectSwitches};
 use crate::error::{Error, Result};
 use crate::gpu::{Gpu, readback};
@@ -195,7 +195,7 @@ pub fn auto_exposure_stops(gpu: &Gpu, walk: &Walk<'_>) -> Result<f64> {
         height: walk.view.height.div_ceil(8),
         ..walk.view.clone()
     };
-    Ok(tone_mapping::auto_exposure_stops(&renderer.radiance(gpu, &view)?))
+    Ok(renderer.radiance(gpu, &view)?.auto_exposure_stops())
 }
 
 fn target(gpu: &Gpu, view: &View) -> wgpu::Texture {

@@ -10,5 +10,39 @@ pub mod view;
 pub mod wavelengths;
 pub mod white_balance;
 
+use std::sync::Arc;
+
+use crate::error::Result;
+use crate::illumination::IlluminationMap;
+use crate::progress::{Control, Progress};
+use crate::scene::Scene;
+use crate::transport::Tracer;
+use reference::ReferenceSettings;
+
 pub use view::{Picture, ToneMap, View};
 pub use white_balance::WhiteBalance;
+
+/// What a view shows of a scene in the light of its maps, traced by the CPU with four samples a pixel.
+///
+/// # Errors
+/// It was cancelled.
+pub fn render(
+    scene: &Arc<Scene>,
+    maps: &[IlluminationMap],
+    view: &View,
+    progress: &dyn Progress,
+    control: &Control,
+) -> Result<Picture> {
+    let settings = ReferenceSettings {
+        samples_per_side: 2,
+        ..ReferenceSettings::default()
+    };
+    reference::render(
+        &Tracer::new(scene.clone()),
+        maps,
+        view,
+        &settings,
+        progress,
+        control,
+    )
+}

@@ -171,22 +171,24 @@ pub fn display_rgba8(picture: &Picture, exposure_stops: f64, tone_map: ToneMap) 
     picture.radiance.iter().flat_map(pixel).collect()
 }
 
-/// Exposure [stops] that brings the log-average luminance of the lit pixels, but for their darkest and their brightest
-/// tenth, to middle grey, or less where that tenth would go beyond white; 0 for a black picture.
-///
-/// Pixels more than 8 stops below the mean count as unlit, so that neither black surroundings nor the last traces of
-/// light decide.
-pub fn auto_exposure_stops(picture: &Picture) -> f64 {
-    let mut lit: Vec<f64> = picture.radiance.iter().map(luminance).collect();
-    lit.retain(|luminance| luminance.is_finite() && *luminance > 0.0);
-    let mean = lit.iter().sum::<f64>() / picture.radiance.len().max(1) as f64;
-    lit.retain(|luminance| *luminance > mean / 256.0);
-    if lit.is_empty() {
-        return 0.0;
+impl Picture {
+    /// Exposure [stops] that brings the log-average luminance of the lit pixels, but for their darkest and their brightest
+    /// tenth, to middle grey, or less where that tenth would go beyond white; 0 for a black picture.
+    ///
+    /// Pixels more than 8 stops below the mean count as unlit, so that neither black surroundings nor the last traces of
+    /// light decide.
+    pub fn auto_exposure_stops(&self) -> f64 {
+        let mut lit: Vec<f64> = self.radiance.iter().map(luminance).collect();
+        lit.retain(|luminance| luminance.is_finite() && *luminance > 0.0);
+        let mean = lit.iter().sum::<f64>() / self.radiance.len().max(1) as f64;
+        lit.retain(|luminance| *luminance > mean / 256.0);
+        if lit.is_empty() {
+            return 0.0;
+        }
+        lit.sort_unstable_by(f64::total_cmp);
+        let tenth = lit.len() / 10;
+        let (most, bright) = (&lit[tenth..lit.len() - tenth], lit[lit.len() * 9 / 10]);
+        let log_average = most.iter().map(|luminance| luminance.log2()).sum::<f64>() / most.len() as f64;
+        (MIDDLE_GREY.log2() - log_average).min(-bright.log2())
     }
-    lit.sort_unstable_by(f64::total_cmp);
-    let tenth = lit.len() / 10;
-    let (most, bright) = (&lit[tenth..lit.len() - tenth], lit[lit.len() * 9 / 10]);
-    let log_average = most.iter().map(|luminance| luminance.log2()).sum::<f64>() / most.len() as f64;
-    (MIDDLE_GREY.log2() - log_average).min(-bright.log2())
 }

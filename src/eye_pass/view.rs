@@ -59,6 +59,20 @@ pub struct View {
     pub background: LinearSrgb,
 }
 
+impl View {
+    /// What a camera sees before a black background, as bright as it is.
+    pub fn new(camera: Camera, [width, height]: [u32; 2]) -> Self {
+        Self {
+            camera,
+            width,
+            height,
+            exposure_stops: 0.0,
+            tone_map: ToneMap::default(),
+            background: LinearSrgb::BLACK,
+        }
+    }
+}
+
 /// Radiance per pixel [W/(m² sr)], linear sRGB, row 0 at the top.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picture {

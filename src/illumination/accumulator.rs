@@ -117,40 +117,4 @@ impl FluxAccumulator {
     pub fn texels_mut(&mut self) -> &mut [FluxCount] {
         &mut self.texels
     }
-
-    /// Adds all flux, smoothly spread, to a map of twice the size each way: across and down, each texel goes with the
-    /// weights 1/8, 3/8, 3/8, 1/8 to the four nearest finer ones (linear interpolation), mirrored at the borders. What
-    /// rounding leaves goes to the first of the two it covers, so that the sum stays exact.
-    pub fn spread_into(&self, fine: &mut Self) {
-        const WEIGHTS: [i64; 4] = [1, 3, 3, 1];
-        let mirrored = |index: usize, size: usize| {
-            // Indices from −1 to size, shifted by one.
-            index.max(1).min(size) - 1
-        };
-        for (index, &coarse) in self
-            .texels
-            .iter()
-            .enumerate()
-            .filter(|(_, coarse)| **coarse != [0; 3])
-        {
-            let (column, row) = (2 * (index % self.width), 2 * (index / self.width));
-            let mut rest = coarse;
-            for (dy, wy) in WEIGHTS.iter().enumerate() {
-                let begin = mirrored(row + dy, fine.height) * fine.width;
-                for (dx, wx) in WEIGHTS.iter().enumerate() {
-                    let texel = &mut fine.texels[begin + mirrored(column + dx, fine.width)];
-                    for channel in 0..3 {
-                        // Divided first: counts may be as large as 2⁶⁰.
-                        let share = coarse[channel] / 64 * (wx * wy);
-                        texel[channel] += share;
-                        rest[channel] -= share;
-                    }
-                }
-            }
-            let texel = &mut fine.texels[row * fine.width + column];
-            for channel in 0..3 {
-                texel[channel] += rest[channel];
-            }
-        }
-    }
 }

@@ -131,15 +131,16 @@ fn summed(flux: &FluxAccumulator, layout: Option<&TileLayout>, level: u32) -> Fl
     coarse
 }
 
-fn add(sum: &mut FluxCount, more: FluxCount) {
+/// Adds counts to others.
+pub fn add(sum: &mut FluxCount, more: FluxCount) {
     for (sum, more) in sum.iter_mut().zip(more) {
         *sum += more;
     }
 }
 
-/// Gives coarse texels back to the texels of a map, linearly interpolated. What rounding leaves goes to the first that
-/// a coarse texel covers.
-fn spread(coarse: &FluxAccumulator, flux: &mut FluxAccumulator, layout: Option<&TileLayout>, level: u32) {
+/// Gives the texels of a map, in place of what they hold, those of one that is 2^level times as coarse, linearly
+/// interpolated. What rounding leaves goes to the first that a coarse texel covers.
+pub fn spread(coarse: &FluxAccumulator, flux: &mut FluxAccumulator, layout: Option<&TileLayout>, level: u32) {
     let (across, down) = (coarse.width(), coarse.height());
     let side = 1_i64 << level;
     let whole = weight(side, 2 * side).pow(2);

@@ -67,7 +67,6 @@ pub struct MapError {
 /// What is known of the error of all maps of one light.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LightError {
-    /// By receiver.
     pub maps: BTreeMap<Receiver, MapError>,
     /// Root mean square of the error over the mean irradiance, over all texels by their area.
     pub relative_rmse: f64,
@@ -277,7 +276,6 @@ impl TileOf {
 /// What the round before this one knew, where this one refined only some tiles.
 #[derive(Clone, Copy, Debug)]
 pub struct Before<'a> {
-    /// Its error.
     pub error: &'a LightError,
     /// Where this round is finer.
     pub refined: &'a RoughTiles,

@@ -54,14 +54,12 @@ impl LedgerSum {
         self.counts.iter_mut().flatten()
     }
 
-    /// Books a count.
     pub fn book(&mut self, account: Account, count: FluxCount) {
         for (sum, channel) in self.counts[account as usize].iter_mut().zip(count) {
             *sum += i128::from(channel);
         }
     }
 
-    /// Books a sum of counts.
     pub fn book_sum(&mut self, account: Account, counts: [i128; 3]) {
         for (sum, channel) in self.counts[account as usize].iter_mut().zip(counts) {
             *sum += channel;

@@ -8,7 +8,7 @@ use super::caustic::path::Arrival;
 use super::caustic::splat::Coverage;
 use crate::illumination::accumulator::{FluxAccumulator, FluxCount};
 use crate::illumination::islands::Islands;
-use crate::illumination::{Chart, Receiver};
+use crate::illumination::{Chart, Receiver, smoothing};
 use crate::optics::LinearSrgb;
 
 /// One surface's map with its flux.
@@ -237,9 +237,7 @@ impl ReceiverMap {
         self.make_levels(part.levels.len() - 1);
         for (level, other) in self.levels.iter_mut().zip(&part.levels) {
             for (texel, more) in level.texels_mut().iter_mut().zip(other.texels()) {
-                for channel in 0..3 {
-                    texel[channel] += more[channel];
-                }
+                smoothing::add(texel, *more);
             }
         }
     }
@@ -249,8 +247,11 @@ impl ReceiverMap {
         let mut levels = self.levels.iter().rev();
         let mut sum = Cow::Borrowed(levels.next().expect("a map has a level"));
         for level in levels {
-            let mut finer = level.clone();
-            sum.spread_into(&mut finer);
+            let mut finer = FluxAccumulator::new(level.width(), level.height());
+            smoothing::spread(&sum, &mut finer, None, 1);
+            for (count, more) in finer.texels_mut().iter_mut().zip(level.texels()) {
+                smoothing::add(count, *more);
+            }
             sum = Cow::Owned(finer);
         }
         sum

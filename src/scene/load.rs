@@ -34,25 +34,28 @@ impl Default for LoadOptions {
     }
 }
 
-/// Reads `builtin:NAME` or a `.glb` or `.gltf` file. What was repaired or left out stands in `Scene::warnings`.
-///
-/// # Errors
-/// An unknown built-in; a file that cannot be read, is no glTF 2.0, breaks its rules where no repair is plain, requires
-/// an extension that is not supported, or does not fit the memory limit. An environment as [`environment::read`].
-pub fn load(source: &str, options: &LoadOptions) -> Result<Scene> {
-    let mut scene = match source.strip_prefix("builtin:") {
-        Some(name) => builtin::build(name).ok_or_else(|| unknown_builtin(source))?,
-        None => gltf::load(Path::new(source), options)?,
-    };
-    if let Some(path) = &options.environment {
-        add_environment(&mut scene, path, options.memory_limit_bytes)?;
+impl Scene {
+    /// Reads `builtin:NAME` or a `.glb` or `.gltf` file. What was repaired or left out stands in `warnings`.
+    ///
+    /// # Errors
+    /// An unknown built-in; a file that cannot be read, is no glTF 2.0, breaks its rules where no repair is plain,
+    /// requires an extension that is not supported, or does not fit the memory limit. An environment as
+    /// [`environment::read`].
+    pub fn load(source: &str, options: &LoadOptions) -> Result<Self> {
+        let mut scene = match source.strip_prefix("builtin:") {
+            Some(name) => builtin::build(name).ok_or_else(|| unknown_builtin(source))?,
+            None => gltf::load(Path::new(source), options)?,
+        };
+        if let Some(path) = &options.environment {
+            add_environment(&mut scene, path, options.memory_limit_bytes)?;
+        }
+        let touching = contact::warnings(&scene);
+        scene.warnings.extend(touching);
+        if options.default_light && scene.lights.is_empty() {
+            add_default_light(&mut scene);
+        }
+        Ok(scene)
     }
-    let touching = contact::warnings(&scene);
-    scene.warnings.extend(touching);
-    if options.default_light && scene.lights.is_empty() {
-        add_default_light(&mut scene);
-    }
-    Ok(scene)
 }
 
 /// Writes an edited scene as a `.glb`: the file that it was loaded from, in which only what was edited is changed, so that

@@ -45,7 +45,7 @@ pub use glow::Glow;
 pub use gltf::guard::is_guarded;
 pub use gltf::{Glb, Opened};
 pub use light::{Light, LightKind, LightList, LightSize, PanelShape};
-pub use load::{LoadOptions, load, open_document};
+pub use load::{LoadOptions, open_document};
 pub use material::AlphaMask;
 pub use material::{Material, SurfaceKind, Volume};
 pub use mesh::Mesh;
@@ -228,11 +228,11 @@ impl Scene {
 
 #[cfg(test)]
 mod tests {
-    use crate::scene::{LoadOptions, Scene, load};
+    use crate::scene::{LoadOptions, Scene};
 
     #[test]
     fn whatever_light_meets_counts() {
-        let scene = load("builtin:showroom", &LoadOptions::default()).expect("it is built in");
+        let scene = Scene::load("builtin:showroom", &LoadOptions::default()).expect("it is built in");
         let same = Scene {
             name: "other".into(),
             source: "elsewhere".into(),

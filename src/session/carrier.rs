@@ -46,7 +46,6 @@ pub(super) enum Carrier {
     /// Patches of the wavefront.
     #[default]
     Patches,
-    /// Photons.
     Photons,
     /// The paper's kernels.
     Splats,

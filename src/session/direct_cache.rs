@@ -16,7 +16,6 @@ pub(super) struct DirectChart {
     pub(super) smaller: Option<Arc<Chart>>,
 }
 
-/// By receiver.
 pub(super) type DirectCharts = BTreeMap<Receiver, DirectChart>;
 
 impl DirectChart {

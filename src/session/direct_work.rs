@@ -52,7 +52,6 @@ impl DirectWork {
         both
     }
 
-    /// The clock with this.
     pub(super) fn clock(&self, clock: &Clock) -> Clock {
         let mut both = *clock;
         both.trace.add(self.seconds);

@@ -14,7 +14,7 @@ use super::light_level::LightLevel;
 use super::map_plan::MEMORY;
 use super::map_size::{self, SizeRequest};
 use super::sizes::{ChartCache, MapMemory};
-use super::{BakeResult, LightLayer, StopReason, Timings, map_plan};
+use super::{Bake, LightLayer, StopReason, Timings, map_plan};
 use crate::error::Warning;
 use crate::illumination::accumulator::FluxAccumulator;
 use crate::illumination::gutter::fill_gutter;
@@ -63,7 +63,7 @@ impl MapAssembler<'_> {
         (mut maps, mut light_layers): (Vec<IlluminationMap>, Vec<LightLayer>),
         levels: &Levels,
         outcome: &CausticOutcome,
-    ) -> BakeResult {
+    ) -> Bake {
         let is_shown = |kind: LayerKind| plan::is_wanted(self.settings, kind);
         for map in &mut maps {
             map.layers.retain(|layer| is_shown(layer.kind));
@@ -104,7 +104,7 @@ impl MapAssembler<'_> {
         };
         let mut warnings = outcome.warnings.clone();
         warnings.extend(beyond_single(&maps));
-        BakeResult {
+        Bake {
             estimated_relative_rmse,
             estimated_visible,
             band_layers: self.band_layers(&maps, levels),

@@ -268,7 +268,6 @@ impl IndirectWork {
         warnings
     }
 
-    /// The clock with this.
     pub(super) fn clock(&self, clock: &Clock) -> Clock {
         let mut both = *clock;
         both.trace.add(self.seconds);

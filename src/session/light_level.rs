@@ -79,7 +79,6 @@ pub(super) struct LightLevel {
     pub(super) bands: Vec<LevelBand>,
     /// Radiant watts of the light over its luminous-equivalent ones, where it has a spectrum.
     pub(super) radiant: Option<f64>,
-    /// Of the flux.
     pub(super) unit: FluxUnit,
     /// From the casters to the farthest receiver [m].
     pub(super) reach_m: f64,
@@ -153,7 +152,6 @@ impl LightStates {
         self.by_light.entry(light).or_default()
     }
 
-    /// The finest level of a light.
     pub(super) fn finest(&self, light: usize) -> Option<&LightLevel> {
         self.by_light.get(&light)?.levels.last()
     }

@@ -22,7 +22,6 @@ pub(super) struct MapSize {
     pub(super) halved: u32,
 }
 
-/// Sizes of maps, by receiver.
 pub(super) type Sizes = BTreeMap<Receiver, MapSize>;
 
 impl MapSize {

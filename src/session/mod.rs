@@ -36,7 +36,7 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 
 pub use band_layers::BandLayer;
 pub use forecast::{CostPoint, Forecast, ForecastReport};
-pub use result::{BakeCounts, BakeResult, ItemBufferReport, LightLayer, StopReason, Timings};
+pub use result::{Bake, BakeCounts, ItemBufferReport, LightLayer, StopReason, Timings};
 pub use shards::{ShardSource, ShardSums};
 pub use sizes::BYTES_PER_TEXEL;
 pub use spectra::SpectralBand;
@@ -69,7 +69,7 @@ use spectra::Spectra;
 /// Owns a scene with all that is derived from it, and bakes it as often as scene or settings change. What a change does
 /// not touch is kept: hierarchy, parametrisations, item buffers, what rays met, patches, maps, and their errors.
 #[derive(Debug)]
-pub struct BakeSession {
+pub struct Baker {
     scene: Arc<Scene>,
     tracer: Option<Arc<Tracer>>,
     aim: Option<(AimKey, Arc<Aim>)>,
@@ -104,12 +104,13 @@ pub struct BakeEstimate {
     pub item_buffer_cells: u64,
 }
 
-impl BakeSession {
+impl Baker {
     /// A session on a scene; builds nothing yet.
     ///
     /// # Errors
     /// More triangles than the hierarchy can count.
-    pub fn new(scene: Arc<Scene>) -> Result<Self> {
+    pub fn new(scene: impl Into<Arc<Scene>>) -> Result<Self> {
+        let scene = scene.into();
         if u32::try_from(scene.triangle_count()).is_err() {
             return Err(Error::failure(
                 &scene.source,
@@ -241,7 +242,7 @@ impl BakeSession {
         settings: &BakeSettings,
         progress: &dyn Progress,
         control: &Control,
-    ) -> Result<BakeResult> {
+    ) -> Result<Bake> {
         self.bake_on_threads(settings, progress, control, None)
     }
 
@@ -255,8 +256,8 @@ impl BakeSession {
         settings: &BakeSettings,
         progress: &dyn Progress,
         control: &Control,
-        level: &mut (dyn FnMut(BakeResult) + Send),
-    ) -> Result<BakeResult> {
+        level: &mut (dyn FnMut(Bake) + Send),
+    ) -> Result<Bake> {
         self.bake_on_threads(settings, progress, control, Some(level))
     }
 
@@ -266,7 +267,7 @@ impl BakeSession {
         progress: &dyn Progress,
         control: &Control,
         level: Option<&mut TakeLevel>,
-    ) -> Result<BakeResult> {
+    ) -> Result<Bake> {
         settings.validate()?;
         self.threads
             .of(settings)?
@@ -351,7 +352,7 @@ impl BakeSession {
         control: &Control,
         level: Option<&mut TakeLevel>,
         role: &mut ShardRole,
-    ) -> Result<BakeResult> {
+    ) -> Result<Bake> {
         let (whole, began) = (Stopwatch::start(), Instant::now());
         let mut clock = Clock::default();
         let mut level = level;
@@ -535,7 +536,7 @@ impl Ground<'_> {
 }
 
 /// Writes down what a bake took so far.
-fn account(result: &mut BakeResult, finish: &MapAssembler, aim: &Aim, clock: &Clock) {
+fn account(result: &mut Bake, finish: &MapAssembler, aim: &Aim, clock: &Clock) {
     (result.timings_s, result.cpu_s) = clock.timings();
     result.item_buffers = item_buffers(finish.scene, aim);
 }

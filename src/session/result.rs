@@ -105,7 +105,7 @@ pub struct LightLayer {
 
 /// Maps with everything that is known of how they came about.
 #[derive(Clone, Debug)]
-pub struct BakeResult {
+pub struct Bake {
     /// One per surface that received flux, in the order of `Scene::objects`.
     pub maps: Vec<IlluminationMap>,
     /// What each light gives to them, where that is asked for: map by map, caustic before direct, in the order of lights, and all of
@@ -141,7 +141,7 @@ pub struct BakeResult {
     pub warnings: Vec<Warning>,
 }
 
-impl BakeResult {
+impl Bake {
     /// The estimated error of all maps, in a metric.
     pub fn estimated_error(&self, metric: ErrorMetric) -> Option<f64> {
         metric.of(self.estimated_visible, self.estimated_relative_rmse)

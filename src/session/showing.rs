@@ -11,7 +11,7 @@ use super::first_look::FirstLook;
 use super::indirect_cache::IndirectCache;
 use super::indirect_work::IndirectWork;
 use super::metric::{Backdrop, ComparisonView};
-use super::{BakeResult, LightLayer, account};
+use super::{Bake, LightLayer, account};
 use crate::error::Result;
 use crate::illumination::IlluminationMap;
 use crate::light_pass::caustic::pass::Stopwatch;
@@ -23,7 +23,7 @@ use crate::settings::LayerKind;
 use crate::transport::Tracer;
 
 /// Takes pictures.
-pub(super) type TakeLevel<'a> = dyn FnMut(BakeResult) + Send + 'a;
+pub(super) type TakeLevel<'a> = dyn FnMut(Bake) + Send + 'a;
 
 /// Hands the levels of a bake to a callback.
 pub(super) struct Showing<'a, 'level> {

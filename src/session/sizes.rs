@@ -52,7 +52,6 @@ impl MapMemory {
         per_texel_of_largest: 0,
     };
 
-    /// With an estimator.
     pub(super) fn with(estimator: Estimator) -> Self {
         match estimator {
             // Maps are filtered one after another.

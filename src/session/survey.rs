@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use super::forecast::{Forecast, forecast};
-use super::{BakeEstimate, BakeResult, BakeSession};
+use super::{Bake, BakeEstimate, Baker};
 use crate::error::Result;
 use crate::plan::Effect;
 use crate::progress::{Control, Progress, Stage};
@@ -34,14 +34,14 @@ pub struct Survey {
     /// The plan, and bounds.
     pub estimate: BakeEstimate,
     /// The pilot bake of the default preset: which maps there are, and what it took.
-    pub pilot: BakeResult,
+    pub pilot: Bake,
     /// All presets.
     pub presets: Vec<PresetForecast>,
     /// Wall-clock seconds that the survey took.
     pub seconds: f64,
 }
 
-impl BakeSession {
+impl Baker {
     /// Finds out what a bake would take: draft, preview and final, everything else as the settings say.
     ///
     /// # Errors
@@ -138,7 +138,7 @@ fn nothing(preset: Preset) -> Forecast {
 }
 
 /// Rays and time grow with the density.
-fn splat_forecast(pilot: &BakeResult, preset: Preset) -> Option<Forecast> {
+fn splat_forecast(pilot: &Bake, preset: Preset) -> Option<Forecast> {
     let last = pilot.course.last()?;
     let gain = preset.splat_density_per_sr() / PILOT_DENSITY_PER_SR;
     Some(Forecast {

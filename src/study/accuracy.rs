@@ -32,7 +32,6 @@ fn predicted(measured: &Measured) -> Option<(CostPoint, Forecast)> {
     (result.stop_reason == StopReason::MaxError).then_some((result.course[made], expected))
 }
 
-/// Predicted over actual.
 fn predicted_over_actual(measured: &Measured, of: fn(&Forecast) -> f64, cost: fn(&CostPoint) -> f64) -> Cell {
     let actual = measured.result.course.last().map(cost);
     number(

@@ -60,7 +60,6 @@ pub fn caustic_colours(map: &IlluminationMap) -> Vec<LinearSrgb> {
     }
 }
 
-/// Its luminance.
 pub fn caustic_luminance(map: &IlluminationMap) -> Vec<f64> {
     caustic_colours(map)
         .into_iter()

@@ -27,7 +27,7 @@ use crate::optics::LinearSrgb;
 use crate::plan::{self, Effect, EffectPlan, EffectSwitch};
 use crate::progress::{Control, Progress, Stage};
 use crate::scene::{Material, Scene};
-use crate::session::{BakeCounts, BakeResult, StopReason, Timings};
+use crate::session::{Bake, BakeCounts, StopReason, Timings};
 use crate::settings::{BakeSettings, ItemBufferKind, LayerKind, MapResolution};
 use crate::transport::{EffectSet, Microfacets, Tracer};
 
@@ -48,7 +48,7 @@ pub fn brute_force(
     rays: u64,
     progress: &dyn Progress,
     control: &Control,
-) -> Result<BakeResult> {
+) -> Result<Bake> {
     settings.validate()?;
     if !RAYS.contains(&rays) {
         return Err(Error::usage(
@@ -78,7 +78,7 @@ fn run(
     size: (usize, usize),
     progress: &dyn Progress,
     control: &Control,
-) -> Result<BakeResult> {
+) -> Result<Bake> {
     let scene = tracer.scene();
     let watch = Stopwatch::start();
     progress.advance(Stage::Plan, 0, 1);
@@ -431,8 +431,8 @@ fn unit(scene: &Scene, lights: &[VisibleLight]) -> Result<FluxUnit> {
     ))
 }
 
-fn empty_result(plan: EffectPlan, nothing_to_do: bool) -> BakeResult {
-    BakeResult {
+fn empty_result(plan: EffectPlan, nothing_to_do: bool) -> Bake {
+    Bake {
         maps: Vec::new(),
         light_layers: Vec::new(),
         band_layers: Vec::new(),

@@ -14,7 +14,7 @@ use crate::effect::{Effect, EffectSwitch};
 use crate::error::{Error, Result};
 use crate::optics::LinearSrgb;
 use crate::scene::{Light, LightKind, Scene};
-use crate::session::BakeSession;
+use crate::session::Baker;
 use crate::settings::{BakeSettings, Estimator, LayerKind, SpectralSampling, Wavelengths};
 
 /// Name and one line of each.
@@ -97,7 +97,7 @@ pub fn convergence(
 /// # Errors
 /// Settings outside their ranges.
 pub fn effects(scene: &Arc<Scene>, settings: &BakeSettings) -> Result<Sweep> {
-    let plan = BakeSession::new(Arc::clone(scene))?.plan(settings)?;
+    let plan = Baker::new(Arc::clone(scene))?.plan(settings)?;
     let planned = vec!["none".into(), "as planned".into()];
     let mut variants = vec![Variant::new(planned, scene, settings.clone())];
     for line in plan.effects.iter().filter(|line| line.on) {
@@ -201,7 +201,7 @@ pub fn spectrum(scene: &Scene, settings: &BakeSettings, wavelengths: &[u32]) -> 
             Some(split),
         )
     };
-    if !BakeSession::new(Arc::clone(&scene))?
+    if !Baker::new(Arc::clone(&scene))?
         .plan(&finest)?
         .is_on(Effect::Dispersion)
     {

@@ -19,7 +19,7 @@ use crate::light_pass::caustic::path::{PathLimits, PathTracer};
 use crate::optics::LinearSrgb;
 use crate::scene::builtin::{self, parts, pool, shapes};
 use crate::scene::{Camera, LightKind, Mesh, Scene};
-use crate::session::BakeResult;
+use crate::session::Bake;
 use crate::settings::{
     BakeSettings, Estimator, Footprint, ItemBufferKind, Kernel, KernelSampling, RayPlacement, Sigma,
 };
@@ -295,7 +295,7 @@ pub(super) fn connectivity(bench: &Bench) -> Result<Sweep> {
     let (scene, against) = scene_and_truth("ring")?;
     let density = if bench.quick { 8e3 } else { DENSITY_PER_SR };
     let variant = |name: &str, hits: Option<u64>, (_, settings): Way| Variant {
-        estimate: hits.map(|_| nearest_hits as fn(&Variant, BakeResult) -> BakeResult),
+        estimate: hits.map(|_| nearest_hits as fn(&Variant, Bake) -> Bake),
         sheet: Some("connectivity".into()),
         ..Variant::new(
             vec![name.into(), hits.map_or(Cell::Empty, Cell::Count)],
@@ -322,7 +322,7 @@ pub(super) fn connectivity(bench: &Bench) -> Result<Sweep> {
 }
 
 /// In place of what was baked: E by the density of the nearest hits, on the floor of a built-in scene.
-fn nearest_hits(variant: &Variant, mut result: BakeResult) -> BakeResult {
+fn nearest_hits(variant: &Variant, mut result: Bake) -> Bake {
     /// Half the side of the floor [m].
     const HALF_M: f64 = 1.0;
     let count = variant.labels[1].value().unwrap_or(1.0) as usize;

@@ -7,9 +7,9 @@ use cpu_time::ProcessTime;
 use super::references::{Reference, Truth, lit_side};
 use super::sweep::Bench;
 use crate::error::Result;
+use crate::eye_pass::View;
 use crate::eye_pass::reference::{self, ReferenceSettings};
-use crate::eye_pass::tone_mapping::{auto_exposure_stops, display_rgba8};
-use crate::eye_pass::{ToneMap, View};
+use crate::eye_pass::tone_mapping::display_rgba8;
 use crate::illumination::IlluminationMap;
 use crate::illumination::difference::Difference;
 use crate::illumination::difference_colours;
@@ -168,14 +168,7 @@ pub fn view(
     camera: &Camera,
 ) -> Result<(Picture, f64)> {
     let (width, height, samples_per_side) = if bench.quick { (80, 60, 1) } else { (640, 480, 2) };
-    let mut view = View {
-        camera: camera.clone(),
-        width,
-        height,
-        exposure_stops: 0.0,
-        tone_map: ToneMap::default(),
-        background: LinearSrgb::BLACK,
-    };
+    let mut view = View::new(camera.clone(), [width, height]);
     let tracer = Tracer::new(Arc::clone(scene));
     let settings = ReferenceSettings {
         samples_per_side,
@@ -184,7 +177,7 @@ pub fn view(
     let clock = ProcessTime::now();
     let seen = reference::render(&tracer, maps, &view, &settings, bench.progress, bench.control)?;
     let cpu_s = clock.elapsed().as_secs_f64();
-    view.exposure_stops = auto_exposure_stops(&seen);
+    view.exposure_stops = seen.auto_exposure_stops();
     let picture = Picture {
         file,
         caption,

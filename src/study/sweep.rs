@@ -13,7 +13,7 @@ use crate::illumination::compare::{Agreement, TexelPair};
 use crate::illumination::difference::{self, Difference};
 use crate::progress::{Control, Progress};
 use crate::scene::{Camera, Scene};
-use crate::session::{BakeResult, BakeSession};
+use crate::session::{Bake, Baker};
 use crate::settings::{BakeSettings, MapResolution};
 
 /// A bake is no reference where it stopped before it was known as well as this.
@@ -70,7 +70,6 @@ pub struct Group {
 /// What bakes are measured against.
 #[derive(Clone, Debug)]
 pub enum Against {
-    /// Nothing.
     Nothing,
     /// A map that is known.
     Known(Reference),
@@ -88,7 +87,7 @@ pub struct Variant {
     /// How.
     pub settings: BakeSettings,
     /// What becomes of the bake before it is measured.
-    pub estimate: Option<fn(&Variant, BakeResult) -> BakeResult>,
+    pub estimate: Option<fn(&Variant, Bake) -> Bake>,
     /// Pictures of the scene in the bake's light: a file's name without `.png`, and from where.
     pub views: Vec<(String, Camera)>,
     /// The sheet that its map goes into; the reference is the first of each.
@@ -145,7 +144,7 @@ pub struct Measured<'a> {
     /// What was asked for.
     pub variant: &'a Variant,
     /// The first bake.
-    pub result: &'a BakeResult,
+    pub result: &'a Bake,
     /// What it is measured against.
     pub reference: Option<&'a Reference>,
     /// Texels beside those of the reference, where they can be paired.
@@ -182,7 +181,6 @@ pub fn share(value: Option<f64>) -> Cell {
     value.map_or(Cell::Empty, Cell::Share)
 }
 
-/// A column with its name.
 pub const fn column(name: &'static str, value: fn(&Measured) -> Cell) -> Column {
     Column { name, value }
 }
@@ -249,7 +247,7 @@ impl Bench<'_> {
     }
 
     /// In a session of its own, so that no bake finds the work of another done.
-    fn bake(&self, scene: &Arc<Scene>, settings: &BakeSettings) -> Result<BakeResult> {
+    fn bake(&self, scene: &Arc<Scene>, settings: &BakeSettings) -> Result<Bake> {
         let threads = if settings.threads == 0 {
             self.threads
         } else {
@@ -259,7 +257,7 @@ impl Bench<'_> {
             threads,
             ..settings.clone()
         };
-        let result = BakeSession::new(Arc::clone(scene))?.bake(&settings, self.progress, self.control)?;
+        let result = Baker::new(Arc::clone(scene))?.bake(&settings, self.progress, self.control)?;
         if result.partial {
             return Err(Error::cancelled(&scene.source));
         }
@@ -289,7 +287,7 @@ impl Against {
 }
 
 /// Light pass without the hierarchy [s of CPU].
-fn light_pass_cpu_s(result: &BakeResult) -> f64 {
+fn light_pass_cpu_s(result: &Bake) -> f64 {
     result.cpu_s.plan + result.cpu_s.trace + result.cpu_s.deposit
 }
 
@@ -405,7 +403,7 @@ fn show(
     file: &String,
     variant: &Variant,
     reference: Option<&Reference>,
-    result: &BakeResult,
+    result: &Bake,
 ) {
     let Some((object, truth)) = reference.and_then(Image::of_reference) else {
         return;
@@ -421,7 +419,7 @@ fn show(
 }
 
 /// Texels beside those of the reference. Maps of another bake may have sizes of their own, and then have no pairs.
-fn pairs(reference: Option<&Reference>, result: &BakeResult) -> Result<Vec<TexelPair>> {
+fn pairs(reference: Option<&Reference>, result: &Bake) -> Result<Vec<TexelPair>> {
     let Some(reference) = reference else {
         return Ok(Vec::new());
     };

@@ -72,7 +72,6 @@ const LONGEST_STEP: Duration = Duration::from_millis(500);
 const MAX_LOSSES: usize = 3;
 const LOSSES_WITHIN: Duration = Duration::from_secs(60);
 
-/// The maps on the device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct MapsOnDevice {
     shown: MapsShown,

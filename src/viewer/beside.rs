@@ -8,7 +8,7 @@ use egui::{Align2, Color32, CursorIcon, FontId, Rect, Sense, Stroke, Ui, WidgetI
 
 use super::panel::control::short;
 use crate::error::{Error, Result};
-use crate::export::map_reader;
+use crate::export::map_set::MapSet;
 use crate::illumination::IlluminationMap;
 use crate::illumination::difference::difference;
 use crate::scene::Scene;
@@ -45,9 +45,9 @@ impl Reference {
     /// Maps of the scene that were baked into a folder.
     ///
     /// # Errors
-    /// As [`map_reader::read`].
+    /// As [`MapSet::read_all`].
     pub fn of_folder(folder: &Path, scene: &Arc<Scene>) -> Result<Self> {
-        let (maps, _) = map_reader::read(folder, scene)?;
+        let maps = MapSet::open(folder, scene)?.read_all()?;
         let name = folder.file_name().unwrap_or(folder.as_os_str());
         Ok(Self::new(&name.to_string_lossy(), scene, maps))
     }

@@ -100,7 +100,6 @@ pub enum CompareCommand {
     Keep,
     /// Hold the present maps against those of a folder.
     Load(PathBuf),
-    /// End it.
     End,
 }
 

@@ -27,9 +27,7 @@ pub struct EditedScene {
 /// One of the things that a step changes, as it was before the step or as it is since.
 #[derive(Clone, Debug)]
 pub enum Part {
-    /// The scene.
     Scene(Arc<EditState>),
-    /// The settings of a bake.
     Settings(Box<BakeSettings>),
     /// The camera's path.
     Film(Box<Film>),

@@ -163,13 +163,7 @@ pub fn save_picture(
     let names = |number: &str| ["png", "exr"].map(|extension| format!("{stem}-{number}.{extension}"));
     let [png, exr] = free_names(folder, names)?;
     let location = png.display().to_string();
-    let shown = display_png(
-        picture,
-        view.exposure_stops,
-        view.tone_map,
-        white_balance,
-        &location,
-    )?;
+    let shown = display_png(&picture.clone().white_balanced(white_balance), view, &location)?;
     if !has_radiance {
         files::write_atomically(&png, |writer| writer.write_all(&shown))?;
         return Ok(vec![png]);

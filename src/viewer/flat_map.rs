@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use crate::eye_pass::tone_mapping::{auto_exposure_stops, display_rgba8};
+use crate::eye_pass::tone_mapping::display_rgba8;
 use crate::eye_pass::{Picture, ToneMap};
 use crate::illumination::IlluminationMap;
 use crate::optics::luminance;
@@ -64,11 +64,12 @@ pub fn exposure_stops(map: &IlluminationMap) -> f64 {
     let step = |length: usize, index: usize| (2 * index + 1) * length / (2 * side);
     let places =
         (0..side * side).map(|index| (step(map.width(), index % side), step(map.height(), index / side)));
-    auto_exposure_stops(&Picture {
+    let picture = Picture {
         width: side as u32,
         height: side as u32,
         radiance: places.map(|(column, row)| radiance(map, column, row)).collect(),
-    })
+    };
+    picture.auto_exposure_stops()
 }
 
 /// A part of a map in a picture of so many pixels, exposed by so many stops: as white paper under that light.

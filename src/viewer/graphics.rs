@@ -12,7 +12,7 @@ use super::interface::{Interface, Painting};
 use crate::effect::EffectSwitch;
 use crate::error::{Error, Result};
 use crate::eye_pass::renderer::{EyeCounts, EyeQuality, GpuMs, MapStyle, Renderer, Uploaded};
-use crate::eye_pass::{self, View, tone_mapping};
+use crate::eye_pass::{self, View};
 use crate::gpu::Gpu;
 use crate::illumination::IlluminationMap;
 use crate::optics::spectrum::xyz::{IDENTITY, Matrix3};
@@ -209,7 +209,6 @@ impl Graphics {
         })
     }
 
-    /// The window.
     pub fn window(&self) -> &Arc<Window> {
         &self.screen.window
     }
@@ -341,7 +340,7 @@ impl Graphics {
             ..view.clone()
         };
         let picture = self.main.renderer.glance(&self.gpu, &part)?;
-        Ok(tone_mapping::auto_exposure_stops(&picture))
+        Ok(picture.auto_exposure_stops())
     }
 
     /// Radiance of every pixel of the picture that is shown.

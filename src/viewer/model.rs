@@ -37,7 +37,7 @@ use crate::light_pass::explain::Limits;
 use crate::light_pass::sketch::{PathPreview, SketchLimits};
 use crate::plan::EffectLine;
 use crate::scene::{Edit, Scene};
-use crate::session::BakeSession;
+use crate::session::Baker;
 use crate::settings::BakeSettings;
 use crate::transport::Tracer;
 use serde_json::{Value, json};
@@ -143,7 +143,7 @@ impl Model {
     /// The event log cannot be written; the system gives no thread.
     pub fn new(options: &ViewerOptions, wake: &Wake) -> Result<Self> {
         let scene = Arc::clone(&options.scene);
-        let worker = Worker::spawn(BakeSession::new, wake)?;
+        let worker = Worker::spawn(Baker::new, wake)?;
         let wanted = BakeRequest::new(Arc::clone(&scene), options.settings.clone());
         let mut model = Self {
             navigator: Navigator::new(&scene, options.camera.as_deref()),

@@ -75,7 +75,6 @@ impl NewLight {
     /// All, in the order of the panel.
     pub const ALL: [Self; 4] = [Self::Lamp, Self::Spot, Self::Sun, Self::Panel];
 
-    /// Its name.
     pub fn name(self) -> &'static str {
         match self {
             Self::Lamp => "lamp",

@@ -9,7 +9,7 @@ use glam::DVec2;
 use crate::illumination::lookup::in_chart;
 use crate::illumination::{Chart, IlluminationMap, Layer, Receiver};
 use crate::scene::Scene;
-use crate::session::BakeResult;
+use crate::session::Bake;
 use crate::settings::{BakeSettings, LayerKind, MapResolution};
 
 /// Maps a second that moving light is to have.
@@ -207,7 +207,7 @@ impl Playback {
     }
 
     /// Adds the layers that were not baked, as they last were.
-    pub fn complete(&mut self, result: &mut BakeResult) {
+    pub fn complete(&mut self, result: &mut Bake) {
         let Some(whole) = self.whole.clone() else { return };
         for whole in &*whole {
             let is_same = |map: &&mut IlluminationMap| map.chart.receiver == whole.chart.receiver;

@@ -94,7 +94,6 @@ pub enum IrradianceUnit {
 }
 
 impl IrradianceUnit {
-    /// Its symbol.
     pub fn symbol(self) -> &'static str {
         match self {
             Self::WattsPerM2 => "W/m²",

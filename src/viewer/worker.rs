@@ -11,18 +11,18 @@ use crate::error::Result;
 use crate::illumination::difference::{Difference, difference};
 use crate::progress::{Control, Progress, Stage};
 use crate::scene::Scene;
-use crate::session::{BakeResult, BakeSession, StopReason};
+use crate::session::{Bake, Baker, StopReason};
 use crate::settings::BakeSettings;
 
 /// What the worker bakes with.
-pub trait Baker {
-    /// See [`BakeSession::set_scene`].
+pub trait LevelBaker {
+    /// See [`Baker::set_scene`].
     ///
     /// # Errors
     /// As the session's.
     fn set_scene(&mut self, scene: Arc<Scene>) -> Result<()>;
 
-    /// See [`BakeSession::bake_levels`].
+    /// See [`Baker::bake_levels`].
     ///
     /// # Errors
     /// As the session's.
@@ -31,11 +31,11 @@ pub trait Baker {
         settings: &BakeSettings,
         progress: &dyn Progress,
         control: &Control,
-        level: &mut (dyn FnMut(BakeResult) + Send),
-    ) -> Result<BakeResult>;
+        level: &mut (dyn FnMut(Bake) + Send),
+    ) -> Result<Bake>;
 }
 
-impl Baker for BakeSession {
+impl LevelBaker for Baker {
     fn set_scene(&mut self, scene: Arc<Scene>) -> Result<()> {
         Self::set_scene(self, scene)
     }
@@ -45,8 +45,8 @@ impl Baker for BakeSession {
         settings: &BakeSettings,
         progress: &dyn Progress,
         control: &Control,
-        level: &mut (dyn FnMut(BakeResult) + Send),
-    ) -> Result<BakeResult> {
+        level: &mut (dyn FnMut(Bake) + Send),
+    ) -> Result<Bake> {
         Self::bake_levels(self, settings, progress, control, level)
     }
 }
@@ -142,7 +142,7 @@ pub struct BakedLevel {
     /// Whether the bake is done with it.
     pub is_final: bool,
     /// Maps and accounts.
-    pub result: BakeResult,
+    pub result: Bake,
     /// From the request to these maps, wall clock [s].
     pub seconds: f64,
 }
@@ -183,7 +183,7 @@ impl Worker {
     ///
     /// # Errors
     /// The system gives no thread.
-    pub fn spawn<B: Baker>(
+    pub fn spawn<B: LevelBaker>(
         make_baker: impl Fn(Arc<Scene>) -> Result<B> + Send + 'static,
         wake: &Wake,
     ) -> Result<Self> {
@@ -423,7 +423,7 @@ impl Shared {
 }
 
 /// The thread's life.
-fn serve<B: Baker>(shared: &Shared, make_baker: &impl Fn(Arc<Scene>) -> Result<B>) {
+fn serve<B: LevelBaker>(shared: &Shared, make_baker: &impl Fn(Arc<Scene>) -> Result<B>) {
     let mut baker = None;
     while let Some(job) = shared.next() {
         shared.wake.wake();
@@ -448,7 +448,7 @@ fn serve<B: Baker>(shared: &Shared, make_baker: &impl Fn(Arc<Scene>) -> Result<B
 }
 
 /// Bakes, hands out every level, and tells how it ended.
-fn bake_in_levels<B: Baker>(
+fn bake_in_levels<B: LevelBaker>(
     shared: &Shared,
     baker: &mut Option<B>,
     make_baker: &impl Fn(Arc<Scene>) -> Result<B>,
@@ -485,7 +485,7 @@ fn bake_in_levels<B: Baker>(
 fn worth(
     effect: Effect,
     with: &Arc<BakedLevel>,
-    without: std::result::Result<BakeResult, BakeState>,
+    without: std::result::Result<Bake, BakeState>,
 ) -> Option<Worth> {
     let difference = match without {
         Ok(without) => difference(&with.result.maps, &without.maps).map_err(|error| error.to_string()),
@@ -500,12 +500,12 @@ fn worth(
 }
 
 /// One bake; where it did not come to its end, the state that it leaves.
-fn bake<B: Baker>(
+fn bake<B: LevelBaker>(
     baker: &mut Option<B>,
     make_baker: &impl Fn(Arc<Scene>) -> Result<B>,
     job: &Job,
-    level: &mut (dyn FnMut(BakeResult) + Send),
-) -> std::result::Result<BakeResult, BakeState> {
+    level: &mut (dyn FnMut(Bake) + Send),
+) -> std::result::Result<Bake, BakeState> {
     let (asked, control) = (&job.asked, &job.control);
     let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
     let settings = BakeSettings {

@@ -16,7 +16,7 @@ use nephroid::progress::Control;
 use nephroid::scene::builtin::{self, parts, shapes};
 use nephroid::scene::edit::{Edit, LightEdit};
 use nephroid::scene::{LightKind, Scene};
-use nephroid::session::{BakeResult, BakeSession};
+use nephroid::session::{Bake, Baker};
 use nephroid::settings::{BakeSettings, Estimator, MapResolution, Sigma};
 use nephroid::transport::{MediumStack, Tracer};
 use nephroid::units::Flux;
@@ -49,11 +49,11 @@ fn at(settings: BakeSettings, density_per_sr: f64, side: usize) -> BakeSettings 
     }
 }
 
-fn session(name: &str) -> BakeSession {
-    BakeSession::new(Arc::new(builtin::build(name).unwrap())).unwrap()
+fn session(name: &str) -> Baker {
+    Baker::new(Arc::new(builtin::build(name).unwrap())).unwrap()
 }
 
-fn run(session: &mut BakeSession, settings: &BakeSettings) -> BakeResult {
+fn run(session: &mut Baker, settings: &BakeSettings) -> Bake {
     session.bake(settings, &(), &Control::default()).unwrap()
 }
 
@@ -82,7 +82,7 @@ fn live() {
 }
 
 /// Times a bake after each of many changes; prints it with what the last one traced.
-fn edits(what: &str, mut step: impl FnMut(f64) -> BakeResult) {
+fn edits(what: &str, mut step: impl FnMut(f64) -> Bake) {
     let (mut cpu_ms, mut wall_ms) = (Vec::new(), Vec::new());
     let mut last = None;
     for index in 0..TIMES {
@@ -145,7 +145,7 @@ fn first_picture(name: &str) {
         session.tracer();
         let start = ProcessTime::now();
         let mut first = None;
-        let mut see = |level: BakeResult| {
+        let mut see = |level: Bake| {
             first.get_or_insert((1e3 * start.elapsed().as_secs_f64(), level.counts.rays));
         };
         let settings = at(BakeSettings::of(Estimator::Wavefront), 25_000.0, 256);
@@ -369,7 +369,7 @@ fn segments_per_s(scene: Scene, density_per_sr: f64) {
         rays.len() as f64 / clock.elapsed().as_secs_f64()
     });
     let [bare, ..] = spread(bare.collect());
-    let mut session = BakeSession::new(Arc::clone(&scene)).unwrap();
+    let mut session = Baker::new(Arc::clone(&scene)).unwrap();
     let result = run(
         &mut session,
         &at(BakeSettings::of(Estimator::Wavefront), density_per_sr, 256),

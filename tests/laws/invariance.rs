@@ -5,7 +5,7 @@ use nephroid::illumination::IlluminationMap;
 use nephroid::optics::LinearSrgb;
 use nephroid::scene::builtin::{self, parts, shapes};
 use nephroid::scene::{LightKind, LightSize, PanelShape, Scene, Volume};
-use nephroid::session::BakeResult;
+use nephroid::session::Bake;
 use nephroid::settings::{
     BakeSettings, Footprint, Kernel, KernelSampling, LayerKind, MapResolution, RayPlacement, Sigma,
 };
@@ -180,7 +180,7 @@ fn threads(t: &mut Table) {
                 .bits_as_first("the same map, bit for bit")
                 .compare("the same ledgers, errors and counts", 0.0, |many, one| {
                     let [many, one] = [many, one].map(|bake| &bake.result);
-                    let errors = |result: &BakeResult| {
+                    let errors = |result: &Bake| {
                         result
                             .maps
                             .iter()

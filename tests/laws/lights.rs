@@ -4,8 +4,8 @@ use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
 use glam::DVec3;
+use nephroid::eye_pass::View;
 use nephroid::eye_pass::reference::{ReferenceSettings, render};
-use nephroid::eye_pass::{ToneMap, View};
 use nephroid::illumination::Side;
 use nephroid::optics::LinearSrgb;
 use nephroid::scene::builtin::{parts, shapes};
@@ -197,14 +197,7 @@ fn front_e(bake: &Baked) -> f64 {
 }
 
 fn is_picture_finite(bake: &Baked) -> bool {
-    let view = View {
-        camera: bake.scene.cameras[0].clone(),
-        width: 24,
-        height: 16,
-        exposure_stops: 0.0,
-        tone_map: ToneMap::default(),
-        background: LinearSrgb::BLACK,
-    };
+    let view = View::new(bake.scene.cameras[0].clone(), [24, 16]);
     let (tracer, settings) = (
         Tracer::new(Arc::new(bake.scene.clone())),
         ReferenceSettings::default(),

@@ -6,6 +6,7 @@ use glam::{DMat3, DVec3};
 use nephroid::export::exr;
 use nephroid::export::float_image::{Channel, FloatImage};
 use nephroid::illumination::accumulator::{FluxAccumulator, FluxUnit};
+use nephroid::illumination::smoothing::spread;
 use nephroid::optics::LinearSrgb;
 use nephroid::scene::builtin::{parts, shapes};
 use nephroid::settings::{LayerKind, MapResolution, Sigma};
@@ -125,7 +126,7 @@ fn spread_map() {
         *texel = [640_000, 1 << 58, 7 * index as i64 + 1];
     }
     let mut fine = FluxAccumulator::new(8, 8);
-    coarse.spread_into(&mut fine);
+    spread(&coarse, &mut fine, None, 1);
     for channel in 0..3 {
         let sum = |map: &FluxAccumulator| map.texels().iter().map(|t| i128::from(t[channel])).sum::<i128>();
         assert_eq!(sum(&coarse), sum(&fine));

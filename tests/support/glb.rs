@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use nephroid::error::Result;
-use nephroid::scene::{LoadOptions, Scene, load};
+use nephroid::scene::{LoadOptions, Scene};
 use serde_json::{Value, json};
 
 /// JSON and binary data of a file to be.
@@ -191,7 +191,7 @@ pub fn load_bytes(bytes: &[u8], options: &LoadOptions) -> Result<Scene> {
 
 /// Loads a file.
 pub fn load_path(path: &Path, options: &LoadOptions) -> Result<Scene> {
-    load(path.to_str().expect("path is UTF-8"), options)
+    Scene::load(path.to_str().expect("path is UTF-8"), options)
 }
 
 /// Fails unless one of the scene's warnings has all the parts.

@@ -2,7 +2,7 @@
 
 use nephroid::illumination::compare::{average_relative_difference, relative_rmse};
 use nephroid::scene::Scene;
-use nephroid::session::BakeResult;
+use nephroid::session::Bake;
 
 use crate::tools::{caustic, energy_fault, map_of};
 use crate::{assert_close, reference_map};
@@ -92,7 +92,7 @@ pub fn references() -> [Reference; 7] {
 impl Reference {
     /// Fails unless a bake of the scene, `size` times as large, has the solver's map within an error, and its watts within a
     /// share.
-    pub fn check(&self, result: &BakeResult, scene: &Scene, size: f64, (most, share): (f64, f64)) {
+    pub fn check(&self, result: &Bake, scene: &Scene, size: f64, (most, share): (f64, f64)) {
         let name = self.builtin;
         let irradiance = if self.has_sun { 1.0 } else { 1.0 / (size * size) };
         let image = caustic(map_of(result, scene, "floor"));
@@ -116,7 +116,7 @@ impl Reference {
     }
 
     /// Fails unless few rays of wavefronts are enough, here and everywhere on the map.
-    pub fn check_wavefronts(&self, result: &BakeResult, scene: &Scene) {
+    pub fn check_wavefronts(&self, result: &Bake, scene: &Scene) {
         let name = self.builtin;
         self.check(result, scene, 1.0, (self.by_wavefronts.1, 0.001));
         let image = caustic(map_of(result, scene, "floor"));

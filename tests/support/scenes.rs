@@ -123,14 +123,10 @@ pub fn view(eye: DVec3, target: DVec3, fov_rad: f64, size: [u32; 2]) -> View {
 }
 
 /// The view of a camera before a black background, without a tone map.
-pub fn view_of(camera: Camera, [width, height]: [u32; 2]) -> View {
+pub fn view_of(camera: Camera, size: [u32; 2]) -> View {
     View {
-        camera,
-        width,
-        height,
-        exposure_stops: 0.0,
         tone_map: ToneMap::None,
-        background: LinearSrgb::BLACK,
+        ..View::new(camera, size)
     }
 }
 

@@ -6,7 +6,7 @@ use glam::{DMat3, DVec3};
 use nephroid::illumination::IlluminationMap;
 use nephroid::progress::Control;
 use nephroid::scene::{Camera, LightKind, Scene, builtin};
-use nephroid::session::{BakeResult, BakeSession};
+use nephroid::session::{Bake, Baker};
 use nephroid::settings::{BakeSettings, ErrorMetric, Estimator, LayerKind, MapResolution};
 use nephroid::study::brute_force::brute_force;
 use nephroid::transport::Tracer;
@@ -54,13 +54,13 @@ pub fn photons(density_per_sr: f64, side: usize) -> BakeSettings {
 }
 
 /// Bakes a scene to the end.
-pub fn bake(scene: Scene, settings: &BakeSettings) -> BakeResult {
-    let mut session = BakeSession::new(Arc::new(scene)).expect("a session");
+pub fn bake(scene: Scene, settings: &BakeSettings) -> Bake {
+    let mut session = Baker::new(Arc::new(scene)).expect("a session");
     session.bake(settings, &(), &Control::default()).expect("a bake")
 }
 
 /// The map of the object of that name.
-pub fn map_of<'a>(result: &'a BakeResult, scene: &Scene, name: &str) -> &'a IlluminationMap {
+pub fn map_of<'a>(result: &'a Bake, scene: &Scene, name: &str) -> &'a IlluminationMap {
     result
         .maps
         .iter()
@@ -82,7 +82,7 @@ pub fn caustic(map: &IlluminationMap) -> Vec<f64> {
 
 /// The first fault of a bake's energy, if there is one: a ledger that does not close to 1e-6, or maps that do not hold
 /// what the ledgers say was deposited (to 1e-6; maps are single precision).
-pub fn energy_fault(result: &BakeResult) -> Option<String> {
+pub fn energy_fault(result: &Bake) -> Option<String> {
     for ledger in &result.ledgers {
         let imbalance = ledger.energy_w.relative_imbalance();
         if imbalance.is_nan() || imbalance > 1e-6 {
@@ -164,7 +164,7 @@ pub fn bits(map: &IlluminationMap) -> Vec<u32> {
 }
 
 /// A scene's maps by brute force.
-pub fn brute(scene: &Scene, settings: &BakeSettings, rays: u64) -> BakeResult {
+pub fn brute(scene: &Scene, settings: &BakeSettings, rays: u64) -> Bake {
     let tracer = Tracer::new(Arc::new(scene.clone()));
     brute_force(&tracer, settings, rays, &(), &Control::default()).expect("a reference")
 }

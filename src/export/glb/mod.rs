@@ -3,14 +3,16 @@
 //! those that shall not light at all (unlit).
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use super::Quantity;
+use super::{DEFAULT_CUT, Quantity};
 use crate::error::{Error, Result, Warning};
+use crate::files;
 use crate::illumination::{IlluminationMap, Side};
-use crate::scene::{Glb, Opened, Scene};
+use crate::scene::{Glb, LoadOptions, Opened, Scene, open_document};
 use crate::settings::LayerKind;
 
 mod geometry;
@@ -66,6 +68,20 @@ pub struct GlbOptions {
     pub exposure_stops: f64,
 }
 
+impl Default for GlbOptions {
+    /// Light maps in lux that browsers read, in place of the scene's lights.
+    fn default() -> Self {
+        Self {
+            carrier: Carrier::LightMap,
+            quantity: Quantity::Illuminance,
+            lights: SceneLights::Remove,
+            bits: Bits::Eight,
+            cut: DEFAULT_CUT,
+            exposure_stops: 0.0,
+        }
+    }
+}
+
 /// One surface of an exported file.
 #[derive(Clone, Debug, Serialize)]
 pub struct ExportedMap {
@@ -90,6 +106,8 @@ pub struct ExportedMap {
 /// What was written, beside the file's bytes.
 #[derive(Clone, Debug, Serialize)]
 pub struct GlbReport {
+    /// Of the file [bytes].
+    pub bytes: usize,
     /// How.
     pub options: GlbOptions,
     /// Unit of the maps' values.
@@ -100,6 +118,22 @@ pub struct GlbReport {
     pub maps: Vec<ExportedMap>,
     /// What the file cannot hold.
     pub warnings: Vec<Warning>,
+}
+
+/// Writes a scene with its maps as one `.glb` that needs no other file.
+///
+/// # Errors
+/// As [`encode`]; a scene's file that cannot be read again; a place that cannot be written.
+pub fn write(
+    scene: &Scene,
+    maps: &[IlluminationMap],
+    options: GlbOptions,
+    path: impl AsRef<Path>,
+) -> Result<GlbReport> {
+    let opened = open_document(scene, &LoadOptions::default())?;
+    let (bytes, report) = encode(scene, opened, maps, options)?;
+    files::write_atomically(path.as_ref(), |writer| writer.write_all(&bytes))?;
+    Ok(report)
 }
 
 /// The bytes of a `.glb` of a scene with its maps, and a report.
@@ -119,6 +153,7 @@ pub fn encode(
         warnings,
     } = opened;
     let mut report = GlbReport {
+        bytes: 0,
         options,
         unit: options.quantity.unit(),
         layers: layers.clone(),
@@ -154,7 +189,9 @@ pub fn encode(
         "lights": options.lights,
     });
     glb.set("/asset/extras/nephroid", about);
-    Ok((glb.into_bytes()?, report))
+    let bytes = glb.into_bytes()?;
+    report.bytes = bytes.len();
+    Ok((bytes, report))
 }
 
 /// The layers that are written, in their order.
@@ -210,7 +247,7 @@ fn add_map(
     let image = images::encode(&light, (map.width(), map.height()), options, &object.name)?;
     let image_index = glb.push_png(&format!("{} light", object.name), &image.png);
     let sampler = glb.push(
-        "samplers",
+        "/samplers",
         json!({ "magFilter": 9729, "minFilter": 9729, "wrapS": 33071, "wrapT": 33071 }),
     );
     let texture = glb.push("/textures", json!({ "source": image_index, "sampler": sampler }));

@@ -1,7 +1,7 @@
 //! Which light of a map its textures hold.
 
 use crate::error::{Error, Result, Warning};
-use crate::export::map_reader::{MapReader, StoredLight, StoredMap};
+use crate::export::map_set::{MapSet, StoredLight, StoredMap};
 use crate::files;
 use crate::settings::LayerKind;
 
@@ -72,7 +72,7 @@ impl Part {
 impl Content {
     /// # Errors
     /// A layer that no map has.
-    pub fn check(self, reader: &MapReader<'_>) -> Result<()> {
+    pub fn check(self, reader: &MapSet<'_>) -> Result<()> {
         let Self::Layer(kind) = self else {
             return Ok(());
         };

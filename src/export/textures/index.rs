@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{Encoding, TextureOptions};
 use crate::export::manifest::{MapEntry, SceneSummary};
-use crate::export::map_reader::MapReader;
+use crate::export::map_set::MapSet;
 use crate::illumination::{Side, UvSet};
 use crate::optics::luminance;
 use crate::settings::LayerKind;
@@ -65,7 +65,6 @@ pub struct TextureEntry {
     pub light: Option<String>,
     /// What the file does not hold.
     pub lost: Loss,
-    /// The maps in it.
     pub maps: Vec<PlacedMap>,
 }
 
@@ -119,7 +118,7 @@ impl Rectangle {
 impl PlacedMap {
     /// The map of a folder's entry, whose generated coordinates are in a file here.
     pub(super) fn new(
-        (reader, entry): (&MapReader<'_>, &MapEntry),
+        (reader, entry): (&MapSet<'_>, &MapEntry),
         uv_file: Option<String>,
         rectangle: Rectangle,
     ) -> Self {
@@ -139,7 +138,7 @@ impl PlacedMap {
 impl TextureIndex {
     /// Of textures that were made of a folder of maps.
     pub(super) fn new(
-        reader: &MapReader<'_>,
+        reader: &MapSet<'_>,
         options: TextureOptions,
         exposure_stops: f64,
         textures: Vec<TextureEntry>,

@@ -11,7 +11,7 @@ use self::index::{PlacedMap, Rectangle, TextureEntry, TextureIndex};
 use self::texels::Texels;
 use super::Quantity;
 use super::manifest::MapEntry;
-use super::map_reader::{MapReader, StoredMap};
+use super::map_set::{MapSet, StoredMap};
 use super::quantity::white;
 use crate::error::{Error, Result, Warning};
 use crate::files::{self, OutputFolder, StagedFolder};
@@ -58,6 +58,19 @@ pub struct TextureOptions {
     pub atlas_side: Option<usize>,
 }
 
+impl Default for TextureOptions {
+    /// OpenEXR files of half floats, one for each map: all light, in W/m².
+    fn default() -> Self {
+        Self {
+            encoding: Encoding::Half,
+            quantity: Quantity::Irradiance,
+            content: Content::Sum,
+            exposure: Exposure::Stops(0.0),
+            atlas_side: None,
+        }
+    }
+}
+
 /// What was written.
 #[derive(Clone, Debug, Serialize)]
 pub struct TextureReport {
@@ -77,7 +90,7 @@ pub struct TextureReport {
 /// Maps that cannot be read or lack the light that was asked for; light that the format cannot hold; a place that cannot
 /// be written; [`Error::cancelled`].
 pub fn write(
-    readers: &[MapReader<'_>],
+    readers: &[MapSet<'_>],
     options: TextureOptions,
     mut folder: TextureFolder,
     control: &Control,
@@ -116,7 +129,7 @@ pub fn write(
 }
 
 /// A map with what reads it.
-type MapOf<'a> = (&'a MapReader<'a>, &'a MapEntry);
+type MapOf<'a> = (&'a MapSet<'a>, &'a MapEntry);
 
 /// What the files of one export have in common.
 struct Writer<'a> {
@@ -209,7 +222,7 @@ impl Writer<'_> {
     }
 
     /// Copies the coordinates that were made for a map; `None` where it follows the scene's own.
-    fn put_coordinates(&mut self, reader: &MapReader<'_>, entry: &MapEntry) -> Result<Option<String>> {
+    fn put_coordinates(&mut self, reader: &MapSet<'_>, entry: &MapEntry) -> Result<Option<String>> {
         let bytes = reader.read_coordinates(entry)?;
         bytes
             .map(|bytes| self.put(format!("{}.uv", stem(entry)), &bytes))

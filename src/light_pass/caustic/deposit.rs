@@ -37,9 +37,7 @@ pub struct RowContext<'a> {
     pub row: &'a TracedRow,
     /// Its index in the lattice.
     pub index: usize,
-    /// The row before.
     pub before: Option<&'a TracedRow>,
-    /// The row after.
     pub after: Option<&'a TracedRow>,
 }
 

@@ -37,7 +37,6 @@ pub struct Lattice<'a> {
     pub centre: DVec2,
     /// Of the jitter.
     pub seed: u64,
-    /// Of the paths.
     pub limits: PathLimits,
     /// Of the accounts.
     pub unit: FluxUnit,

@@ -56,7 +56,6 @@ pub struct PassReport {
 /// Seconds on the wall and of all cores.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Seconds {
-    /// On the wall.
     pub wall: f64,
     /// Of the whole process.
     pub cpu: f64,

@@ -60,7 +60,6 @@ pub struct Arrival {
     pub path_m: f64,
 }
 
-/// Limits of a path.
 #[derive(Clone, Copy, Debug)]
 pub struct PathLimits {
     /// Most specular events.
@@ -90,7 +89,6 @@ struct Segment {
 #[derive(Debug)]
 pub struct PathTracer<'a> {
     tracer: &'a Tracer,
-    /// Of paths.
     pub limits: PathLimits,
     unit: FluxUnit,
     /// From paths to the light's channels.

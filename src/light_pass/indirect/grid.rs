@@ -18,7 +18,6 @@ pub struct Grid {
     pub chart: Arc<Chart>,
     /// Smooth piece of each triangle.
     pub pieces: Vec<u32>,
-    /// Its elements.
     pub elements: Elements,
     /// Number of its first element among those of all grids.
     pub first: usize,

@@ -284,7 +284,6 @@ fn set_of(band: Option<usize>, sets: usize) -> usize {
     if sets == 1 { 0 } else { band.unwrap_or(0) }
 }
 
-/// The seed of a half.
 pub fn half_seed(seed: u64, half: usize) -> u64 {
     seed.wrapping_mul(2)
         .wrapping_add(half as u64)

@@ -36,7 +36,6 @@ pub struct Hit {
 /// Where a photon arrives.
 #[derive(Clone, Copy, Debug)]
 pub enum Place {
-    /// On the surface.
     Surface {
         /// Index into the object's triangles.
         triangle: usize,

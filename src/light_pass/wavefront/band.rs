@@ -32,12 +32,10 @@ pub struct Samples {
 }
 
 impl Samples {
-    /// A sample.
     pub fn get(&self, id: SampleId) -> &LatticeRay {
         &self.chunks[id.chunk as usize][id.index as usize]
     }
 
-    /// A strand of a sample.
     pub fn strand(&self, id: SampleId, strand: u16) -> &PathSegment {
         &self.get(id).strands[usize::from(strand)]
     }

@@ -167,7 +167,6 @@ pub(super) struct Depth {
 /// coordinate; `None` where light goes the same ways at both ends.
 #[derive(Clone, Debug)]
 pub struct Cell {
-    /// Corners.
     pub corners: [Corner; 4],
     /// Bottom (0→1), right (1→2), top (3→2), left (0→3).
     pub edges: [Option<Edge>; 4],

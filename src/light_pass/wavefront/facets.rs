@@ -63,7 +63,6 @@ pub struct FacetPlace {
 pub struct Facets<'a> {
     /// Its map.
     pub surface: &'a ReceiverSurface,
-    /// Its mesh.
     pub mesh: &'a Mesh,
     /// How that hangs together.
     pub adjacency: &'a Adjacency,

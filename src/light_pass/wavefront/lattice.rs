@@ -69,13 +69,11 @@ pub struct TracedBand {
     pub rays: u64,
     /// Closest-hit queries.
     pub segments: u64,
-    /// Cells.
     pub cells: u64,
     /// Patches that stand for a single ray.
     pub splats: u64,
 }
 
-/// A row of corners.
 #[derive(Clone, Debug, Default)]
 struct CornerRow {
     /// Index of each column's sample; `NONE` where there is none.

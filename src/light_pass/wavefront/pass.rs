@@ -47,7 +47,6 @@ impl TracedLight {
 /// Memory that a run may take beyond its end [bytes].
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Room {
-    /// For bands.
     pub bands_bytes: u64,
     /// For all rays, those of earlier runs included.
     pub rays_bytes: u64,

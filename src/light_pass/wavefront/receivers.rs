@@ -108,7 +108,6 @@ pub struct ReceiverSurface {
 }
 
 impl ReceiverSurface {
-    /// Island of a triangle.
     pub fn island(&self, triangle: u32) -> u32 {
         self.islands
             .as_ref()

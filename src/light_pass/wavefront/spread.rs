@@ -46,7 +46,6 @@ pub struct Spreader<'a> {
     pub coarseness: f64,
     /// Whether the places of footprints are wanted.
     pub gathers: bool,
-    /// The light.
     pub light: LightPart<'a>,
 }
 

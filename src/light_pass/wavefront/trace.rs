@@ -31,7 +31,6 @@ pub struct StrandTracer<'a> {
     pub tracer: &'a Tracer,
     /// Where rays start.
     pub launch: &'a Launch,
-    /// Of the paths.
     pub limits: PathLimits,
     /// Distance between neighbouring rays, in units of the unit square.
     pub steps: [f64; 2],

@@ -17,7 +17,7 @@ use crate::plan;
 use crate::progress::{Control, Progress};
 use crate::session::clock::Clock;
 use crate::session::light_level::LightStates;
-use crate::session::{BakeResult, BakeSession, Timings};
+use crate::session::{Bake, Baker, Timings};
 use crate::settings::{BakeSettings, MapResolution};
 pub(super) use pass_sums::PassSums;
 pub(super) use shard_role::ShardRole;
@@ -91,7 +91,7 @@ pub fn check(settings: &BakeSettings) -> Result<()> {
     Ok(())
 }
 
-impl BakeSession {
+impl Baker {
     /// Bakes one share of the caustic layer, as sums that [`Self::merge`] puts together.
     ///
     /// # Errors
@@ -134,7 +134,7 @@ impl BakeSession {
         shards: Box<dyn ShardSource>,
         progress: &dyn Progress,
         control: &Control,
-    ) -> Result<BakeResult> {
+    ) -> Result<Bake> {
         check(settings)?;
         // What was kept of other bakes is not what the shards began from.
         self.lights = LightStates::default();

@@ -25,7 +25,6 @@ const MAX_SECONDS: f64 = 1e12;
 /// Effort of the compression: more is much slower and hardly smaller.
 const COMPRESSION: i32 = 1;
 
-/// Sums of a pass.
 #[derive(Debug)]
 pub(in crate::session) struct PassSums {
     /// One, or those of two half sets.

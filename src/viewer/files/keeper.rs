@@ -21,7 +21,6 @@ pub struct Snapshot {
     pub kept: Kept,
     /// As it was loaded.
     pub loaded: Arc<Scene>,
-    /// As it is edited.
     pub edited: Arc<Scene>,
 }
 

@@ -92,8 +92,9 @@ impl Files {
     /// The system gives no thread.
     pub fn read(&mut self, source: &str, purpose: Purpose) -> Result<()> {
         let (named, options) = (source.to_owned(), self.load.clone());
-        self.loader
-            .start((source.to_owned(), purpose), move |_| load(&named, &options))
+        self.loader.start((source.to_owned(), purpose), move |_| {
+            Scene::load(&named, &options)
+        })
     }
 
     /// The scene that was read, once, with where it comes from and what it was read for.

@@ -3,7 +3,6 @@
 use super::Model;
 use crate::error::Result;
 use crate::eye_pass::View;
-use crate::optics::LinearSrgb;
 use crate::scene::{PathPlan, turntable};
 use crate::viewer::command::FilmCommand;
 use crate::viewer::files::working_folder;
@@ -130,12 +129,9 @@ impl Model {
             maps: self.lit_maps().into_owned(),
             cameras,
             view: View {
-                camera,
-                width,
-                height,
                 exposure_stops: display.exposure_stops,
                 tone_map: display.tone_map,
-                background: LinearSrgb::BLACK,
+                ..View::new(camera, [width, height])
             },
             effects: self.choices.settings.effects.clone(),
             white_balance: display.white_balance.matrix(&scene),

@@ -20,9 +20,7 @@ pub(super) struct Restored {
     pub settings: bool,
     /// The camera; bookmarks always are.
     pub camera: bool,
-    /// The exposure.
     pub exposure: bool,
-    /// Edits.
     pub edits: bool,
 }
 

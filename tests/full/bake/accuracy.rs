@@ -5,7 +5,7 @@ use nephroid::illumination::visible::visible_error;
 use nephroid::scene::builtin::{parts, shapes};
 use nephroid::scene::{Mesh, Scene};
 use nephroid::session::forecast::{forecast, stood_at};
-use nephroid::session::{BakeResult, StopReason};
+use nephroid::session::{Bake, StopReason};
 use nephroid::settings::{BakeSettings, ErrorMetric, Estimator, LayerKind, RayPlacement};
 use nephroid::units::{Flux, Irradiance};
 use rand_pcg::Pcg64Mcg;
@@ -20,7 +20,7 @@ const SIDE: usize = 128;
 
 /// Relative RMSE against a finer bake, over all maps by area; maps that only one of both has count as black in the
 /// other.
-fn true_error(result: &BakeResult, truth: &BakeResult) -> f64 {
+fn true_error(result: &Bake, truth: &Bake) -> f64 {
     let (mut squares, mut flux_w, mut area_m2) = (0.0, 0.0, 0.0);
     for map in &truth.maps {
         let values = caustic_like(result, map);
@@ -46,7 +46,7 @@ const CONVERGED: [(&str, f64); 7] = [
 ];
 
 /// Rays expected and taken to an error, by counts: clocks tell nothing on a busy machine.
-fn check_forecast(name: &str, result: &BakeResult, target: f64) {
+fn check_forecast(name: &str, result: &Bake, target: f64) {
     let course = &result.course;
     let made = stood_at(course, 0.05).expect("more than one level");
     let expected = forecast(&course[..=made], target, Estimator::Wavefront).expect("known");
@@ -105,7 +105,7 @@ fn halved(values: &[f64], side: usize) -> Vec<f64> {
 
 /// Texels say how far off each of them is expected to be: of those that are not dark 95 in 100 are within 7 times that, 99
 /// in 100 within 18 times. It is no bound: where light folds, levels miss the same.
-fn texel_fault(name: &str, truth: &BakeResult) -> Option<String> {
+fn texel_fault(name: &str, truth: &Bake) -> Option<String> {
     // The ball's dimmest texels are off by more than they say as long as all are off by 4 % of the mean.
     let densities: &[f64] = if name == "ball" { &[2e4] } else { &[5e3, 2e4] };
     densities.iter().find_map(|&density_per_sr| {
@@ -200,7 +200,7 @@ fn random_scenes_within_a_factor_of_two() {
 
 /// Relative RMSE and visible error against two independent bakes whose own noise cancels: that of the product of both
 /// differences has no mean.
-fn errors_against(result: &BakeResult, truths: &[BakeResult; 2]) -> [f64; 2] {
+fn errors_against(result: &Bake, truths: &[Bake; 2]) -> [f64; 2] {
     let mut maps = truths[0].maps.clone();
     let (mut square, mut flux_w, mut area_m2) = (0.0, 0.0, 0.0);
     let mut products = Vec::new();
@@ -320,7 +320,7 @@ fn errors_of_lights_add_up() {
     twice.lights.push(twice.lights[0].clone());
     let settings = at(2_000.0, 32);
     let one = bake(scene.clone(), &settings);
-    let errors = |result: &BakeResult| result.maps[0].error.clone().expect("an estimate");
+    let errors = |result: &Bake| result.maps[0].error.clone().expect("an estimate");
     let single = errors(&one);
     assert!(single.iter().any(|error| *error > 0.0));
     for (own, both) in single.iter().zip(errors(&bake(twice, &settings))) {
@@ -329,7 +329,7 @@ fn errors_of_lights_add_up() {
     }
     let lit = bake(scene, &with_layers(&CAUSTIC_AND_DIRECT, settings));
     assert_eq!(errors(&lit), single);
-    let estimate = |result: &BakeResult| result.estimated_relative_rmse.expect("an estimate");
+    let estimate = |result: &Bake| result.estimated_relative_rmse.expect("an estimate");
     assert!((estimate(&lit) / estimate(&one) - 1.0).abs() < 1e-6);
 }
 

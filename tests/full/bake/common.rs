@@ -8,21 +8,21 @@ use nephroid::illumination::compare::relative_rmse;
 use nephroid::progress::Control;
 use nephroid::scene::builtin::shapes;
 use nephroid::scene::{Edit, Mesh, Scene};
-use nephroid::session::{BakeResult, BakeSession};
+use nephroid::session::{Bake, Baker};
 use nephroid::settings::{BakeSettings, LayerKind, MapResolution};
 
 use support::tools::{at, bits, brute, caustic, map_of, set, settings};
 
-pub fn session(scene: &Scene) -> BakeSession {
-    BakeSession::new(Arc::new(scene.clone())).expect("a session")
+pub fn session(scene: &Scene) -> Baker {
+    Baker::new(Arc::new(scene.clone())).expect("a session")
 }
 
-pub fn run(session: &mut BakeSession, settings: &BakeSettings) -> BakeResult {
+pub fn run(session: &mut Baker, settings: &BakeSettings) -> Bake {
     session.bake(settings, &(), &Control::default()).expect("a bake")
 }
 
 /// Applies an edit to a session's scene.
-pub fn edit(session: &mut BakeSession, edit: &Edit) {
+pub fn edit(session: &mut Baker, edit: &Edit) {
     let scene = edit.apply(session.scene()).expect("a sound edit");
     session.set_scene(Arc::new(scene)).expect("a sound scene");
 }
@@ -50,18 +50,18 @@ pub fn with_layers(layers: &[LayerKind], settings: BakeSettings) -> BakeSettings
 pub const CAUSTIC_AND_DIRECT: [LayerKind; 2] = [LayerKind::Caustic, LayerKind::Direct];
 
 /// Luminance of the floor's caustic [W/m²].
-pub fn floor(result: &BakeResult, scene: &Scene) -> Vec<f64> {
+pub fn floor(result: &Bake, scene: &Scene) -> Vec<f64> {
     caustic(map_of(result, scene, "floor"))
 }
 
 /// The map of the same receiver.
-pub fn same_map<'a>(result: &'a BakeResult, map: &IlluminationMap) -> Option<&'a IlluminationMap> {
+pub fn same_map<'a>(result: &'a Bake, map: &IlluminationMap) -> Option<&'a IlluminationMap> {
     let mut maps = result.maps.iter();
     maps.find(|found| found.chart.receiver == map.chart.receiver)
 }
 
 /// Luminance of the same receiver's caustic [W/m²]; black where the result has none.
-pub fn caustic_like(result: &BakeResult, map: &IlluminationMap) -> Vec<f64> {
+pub fn caustic_like(result: &Bake, map: &IlluminationMap) -> Vec<f64> {
     let dark = || vec![0.0; map.chart.texel_count()];
     same_map(result, map).map_or_else(dark, caustic)
 }
@@ -71,16 +71,16 @@ pub fn rmse(image: &[f64], reference: &[f64]) -> f64 {
     relative_rmse(image, reference).expect("a reference with light")
 }
 
-pub fn all_bits(result: &BakeResult) -> Vec<u32> {
+pub fn all_bits(result: &Bake) -> Vec<u32> {
     result.maps.iter().flat_map(bits).collect()
 }
 
 /// What differs between two results beside what they took; `None` where nothing does.
-pub fn difference(a: &BakeResult, b: &BakeResult) -> Option<String> {
+pub fn difference(a: &Bake, b: &Bake) -> Option<String> {
     if a.ledgers != b.ledgers {
         return Some(format!("ledgers: {:?} and {:?}", a.ledgers, b.ledgers));
     }
-    let receivers = |result: &BakeResult| -> Vec<_> {
+    let receivers = |result: &Bake| -> Vec<_> {
         let chart = |map: &IlluminationMap| (map.chart.receiver, map.width(), map.height(), map.layers.len());
         result.maps.iter().map(chart).collect()
     };
@@ -110,7 +110,7 @@ pub fn difference(a: &BakeResult, b: &BakeResult) -> Option<String> {
 }
 
 #[track_caller]
-pub fn assert_same(a: &BakeResult, b: &BakeResult, what: &str) {
+pub fn assert_same(a: &Bake, b: &Bake, what: &str) {
     assert_eq!(difference(a, b), None, "{what}");
 }
 
@@ -121,7 +121,7 @@ pub fn with_threads<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) ->
 
 /// Relative RMSE of the floor's caustic against brute force, without the latter's noise, which must not hide more than
 /// `most_noise`; and the watts of both.
-pub fn off_brute_force(result: &BakeResult, scene: &Scene, rays: u64, most_noise: f64) -> (f64, [f64; 2]) {
+pub fn off_brute_force(result: &Bake, scene: &Scene, rays: u64, most_noise: f64) -> (f64, [f64; 2]) {
     let side = map_of(result, scene, "floor").width();
     let reference = brute(scene, &settings(1.0, side), rays);
     let noise = map_of(&reference, scene, "floor").estimated_relative_rmse;

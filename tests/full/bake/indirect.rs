@@ -10,7 +10,7 @@ use nephroid::optics::LinearSrgb;
 use nephroid::plan::Effect;
 use nephroid::progress::Control;
 use nephroid::scene::{Light, LightKind, Material, Mesh, Scene, SurfaceKind, Volume};
-use nephroid::session::{BakeResult, BakeSession};
+use nephroid::session::{Bake, Baker};
 use nephroid::settings::{BakeSettings, LayerKind};
 use nephroid::transport::Tracer;
 use nephroid::units::Radiance;
@@ -52,7 +52,7 @@ fn room() -> Mesh {
     inwards(cuboid(DVec3::ZERO, DVec3::new(1.0, 1.5, 2.0)))
 }
 
-fn map(result: &BakeResult, object: usize) -> &IlluminationMap {
+fn map(result: &Bake, object: usize) -> &IlluminationMap {
     let mut maps = result.maps.iter();
     maps.find(|map| map.chart.receiver == Receiver::front(object))
         .expect("a map")
@@ -305,7 +305,7 @@ fn same_bits_for_any_threads_and_any_past() {
     });
     assert!(all_bits(&one) == all_bits(&two), "two threads");
     // A session that knows more rays already gives the same, and traces none.
-    let mut session = BakeSession::new(Arc::new(small_room())).expect("a session");
+    let mut session = Baker::new(Arc::new(small_room())).expect("a session");
     let finer = run(&mut session, &settings(&LIT, 32, 0.02));
     assert!(finer.counts.gather_rays > 0);
     let mut dimmed = Scene::clone(session.scene());

@@ -11,7 +11,7 @@ use nephroid::progress::Control;
 use nephroid::scene::builtin::{parts, shapes};
 use nephroid::scene::edit::{Edit, LightEdit, MaterialEdit};
 use nephroid::scene::{LightKind, LightSize, Motion, Scene};
-use nephroid::session::{BakeResult, BakeSession, ShardSource, ShardSums, StopReason};
+use nephroid::session::{Bake, Baker, ShardSource, ShardSums, StopReason};
 use nephroid::settings::{
     BakeSettings, Footprint, ItemBufferKind, Kernel, KernelSampling, LayerKind, MapResolution, RayPlacement,
     Sigma, Wavelengths,
@@ -28,7 +28,7 @@ use support::tools::{at, bake, builtin_scene, energy_fault, photons, set, settin
 
 /// Fails unless a session now gives what a fresh bake of its scene gives.
 #[track_caller]
-fn assert_fresh(session: &mut BakeSession, settings: &BakeSettings, what: &str) -> (BakeResult, BakeResult) {
+fn assert_fresh(session: &mut Baker, settings: &BakeSettings, what: &str) -> (Bake, Bake) {
     let now = run(session, settings);
     let fresh = bake(Scene::clone(session.scene()), settings);
     assert_same(&now, &fresh, what);
@@ -472,7 +472,7 @@ fn shards(scene: &Scene, settings: &BakeSettings, count: u32) -> Vec<ShardSums> 
     (1..=count).map(shard).collect()
 }
 
-fn merge(scene: &Scene, settings: &BakeSettings, shards: Vec<ShardSums>) -> Result<BakeResult> {
+fn merge(scene: &Scene, settings: &BakeSettings, shards: Vec<ShardSums>) -> Result<Bake> {
     session(scene).merge(settings, Box::new(Shards(shards)), &(), &Control::default())
 }
 
@@ -486,7 +486,7 @@ fn assert_adds_up(scene: &Scene, settings: &BakeSettings, counts: &[u32]) {
         assert_same(&merged, &whole, &format!("{count} shards"));
         assert_eq!(merged.warnings, whole.warnings, "{count} shards");
         // Layers of lights and bands, as text: numbers with all their digits.
-        let parts = |result: &BakeResult| format!("{:?} {:?}", result.light_layers, result.band_layers);
+        let parts = |result: &Bake| format!("{:?} {:?}", result.light_layers, result.band_layers);
         assert!(
             parts(&merged) == parts(&whole),
             "{count} shards: layers of lights or bands"

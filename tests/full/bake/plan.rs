@@ -6,7 +6,7 @@ use nephroid::illumination::IlluminationMap;
 use nephroid::optics::LinearSrgb;
 use nephroid::scene::builtin::{parts, shapes};
 use nephroid::scene::{Light, LightKind, LightSize, Mesh, Scene};
-use nephroid::session::{BakeResult, StopReason};
+use nephroid::session::{Bake, StopReason};
 use nephroid::settings::{BakeSettings, Estimator};
 use nephroid::units::{Flux, RadiantIntensity};
 
@@ -96,7 +96,7 @@ fn crowded() -> Scene {
     scene
 }
 
-fn why(result: &BakeResult, effect: Effect) -> (bool, &str) {
+fn why(result: &Bake, effect: Effect) -> (bool, &str) {
     let mut lines = result.plan.effects.iter();
     let line = lines
         .find(|line| line.effect == effect)
@@ -124,7 +124,7 @@ fn useless_things_cost_no_ray() {
 }
 
 /// Item-buffer tests are counted apart, and light by light.
-fn check_item_buffers(alone: &BakeResult, among: &BakeResult) {
+fn check_item_buffers(alone: &Bake, among: &Bake) {
     assert!(among.counts.item_buffer_tests > alone.counts.item_buffer_tests);
     let buffers = &among.item_buffers;
     let tests: u64 = buffers.iter().map(|buffer| buffer.tests).sum();
@@ -266,7 +266,7 @@ fn dim_lamps_leave_rays_to_the_bright_one() {
 }
 
 /// Σ|E₁ − E₂|·A [W] over all maps; a map that one of them lacks counts as black.
-fn difference_w(a: &BakeResult, b: &BakeResult) -> f64 {
+fn difference_w(a: &Bake, b: &Bake) -> f64 {
     let only_in_b = b.maps.iter().filter(|map| same_map(a, map).is_none());
     let of_map = |map: &IlluminationMap| -> f64 {
         let [a, b] = [a, b].map(|result| caustic_like(result, map));
@@ -279,7 +279,7 @@ fn difference_w(a: &BakeResult, b: &BakeResult) -> f64 {
 }
 
 /// What a bake gave up [W].
-fn given_up_w(result: &BakeResult) -> f64 {
+fn given_up_w(result: &Bake) -> f64 {
     let ledgers = result.ledgers.iter();
     ledgers
         .map(|ledger| ledger.energy_w.truncated.total().abs())

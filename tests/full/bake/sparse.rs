@@ -11,7 +11,7 @@ use nephroid::optics::LinearSrgb;
 use nephroid::progress::Control;
 use nephroid::scene::Scene;
 use nephroid::scene::builtin::parts;
-use nephroid::session::{BYTES_PER_TEXEL, BakeResult};
+use nephroid::session::{BYTES_PER_TEXEL, Bake};
 use nephroid::settings::{BakeSettings, LayerKind};
 use nephroid::units::{Flux, Irradiance};
 
@@ -37,7 +37,7 @@ fn torus_over_a_wide_floor() -> Scene {
 }
 
 /// Memory of all maps, and that of maps with all texels as fine [bytes].
-fn memory(result: &BakeResult) -> (u64, u64) {
+fn memory(result: &Bake) -> (u64, u64) {
     let texels = |count: fn(&IlluminationMap) -> usize| result.maps.iter().map(count).sum::<usize>() as u64;
     let (taken, dense) = (
         texels(|map| map.chart.texel_count()),
@@ -47,16 +47,16 @@ fn memory(result: &BakeResult) -> (u64, u64) {
 }
 
 /// The floor's caustic, all of it as fine.
-fn dense_floor(scene: &Scene, result: &BakeResult) -> Vec<f64> {
+fn dense_floor(scene: &Scene, result: &Bake) -> Vec<f64> {
     caustic(&map_of(result, scene, "floor").dense())
 }
 
-fn floor_size(scene: &Scene, result: &BakeResult) -> (usize, usize) {
+fn floor_size(scene: &Scene, result: &Bake) -> (usize, usize) {
     let map = map_of(result, scene, "floor");
     (map.width(), map.height())
 }
 
-fn estimate(result: &BakeResult) -> f64 {
+fn estimate(result: &Bake) -> f64 {
     result.estimated_relative_rmse.expect("an estimate")
 }
 
@@ -256,7 +256,7 @@ fn whole_pictures_come_before_the_last() {
         })
         .expect("a bake");
     assert!(levels.len() >= 3, "{} levels", levels.len());
-    let flux = |result: &BakeResult| {
+    let flux = |result: &Bake| {
         let map = map_of(result, &scene, "floor");
         map.flux_w(LayerKind::Caustic).luminance()
     };

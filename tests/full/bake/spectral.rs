@@ -11,8 +11,8 @@ use nephroid::optics::spectrum::{Spectrum, Xyz, illuminant, xyz_bar};
 use nephroid::optics::wavelength::VISIBLE;
 use nephroid::optics::{LinearSrgb, Metal, Nanometres};
 use nephroid::scene::builtin::{parts, shapes};
-use nephroid::scene::{LoadOptions, Scene, load};
-use nephroid::session::BakeResult;
+use nephroid::scene::{LoadOptions, Scene};
+use nephroid::session::Bake;
 use nephroid::settings::{BakeSettings, Estimator, LayerKind, Wavelengths};
 use nephroid::transport::{MediumStack, Tracer};
 use nephroid::units::{Flux, Irradiance};
@@ -46,7 +46,7 @@ fn glass(text: &str) -> Arc<Glass> {
 }
 
 /// Caustic light on the upper side of the object of a name, row by row.
-fn caustic(result: &BakeResult, scene: &Scene, name: &str) -> Vec<[f32; 3]> {
+fn caustic(result: &Bake, scene: &Scene, name: &str) -> Vec<[f32; 3]> {
     let is_wanted = |map: &&nephroid::illumination::IlluminationMap| {
         scene.objects[map.chart.object()].name == name && map.chart.receiver.side() == Side::Front
     };
@@ -186,7 +186,7 @@ fn prism_table(path: &std::path::Path) -> Vec<[f64; 6]> {
 
 fn shared_prism() -> Option<(Scene, Vec<[f64; 6]>)> {
     let path = support::shared_or_skip("oracle/S4.glb")?;
-    let scene = load(&path.to_string_lossy(), &LoadOptions::default()).expect("a scene");
+    let scene = Scene::load(&path.to_string_lossy(), &LoadOptions::default()).expect("a scene");
     Some((scene, prism_table(&path.with_file_name("S4_table.csv"))))
 }
 

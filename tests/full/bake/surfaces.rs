@@ -18,7 +18,7 @@ use nephroid::scene::{
     Adjacency, AlphaMask, Edit, LightKind, Material, MaterialEdit, Mesh, Scene, Texture, TextureRef, Wave,
     Waves,
 };
-use nephroid::session::BakeResult;
+use nephroid::session::Bake;
 use nephroid::settings::{BakeSettings, LayerKind};
 use nephroid::transport::Tracer;
 use nephroid::units::Flux;
@@ -392,7 +392,7 @@ fn scene_under_a(sheet: Sheet) -> Scene {
 }
 
 /// Watts that a layer brings to the named object's side.
-fn flux_w(result: &BakeResult, scene: &Scene, side: Side, kind: LayerKind) -> f64 {
+fn flux_w(result: &Bake, scene: &Scene, side: Side, kind: LayerKind) -> f64 {
     let is_sheet = |map: &&IlluminationMap| {
         map.chart.receiver.side() == side && scene.objects[map.chart.object()].name == "sheet"
     };

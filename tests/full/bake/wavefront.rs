@@ -5,8 +5,8 @@ use glam::{DMat3, DVec3};
 use nephroid::effect::Effect;
 use nephroid::illumination::IlluminationMap;
 use nephroid::optics::LinearSrgb;
-use nephroid::scene::{LoadOptions, load};
-use nephroid::session::BakeResult;
+use nephroid::scene::{LoadOptions, Scene};
+use nephroid::session::Bake;
 
 use crate::bake::common::{floor, rmse, towards};
 use support::references::references;
@@ -57,7 +57,7 @@ fn the_solvers_files_agree_with_its_maps() {
             continue;
         };
         let path = path.to_str().expect("a readable path");
-        let scene = load(path, &LoadOptions::default()).expect("a valid file");
+        let scene = Scene::load(path, &LoadOptions::default()).expect("a valid file");
         let (density, most) = reference.by_wavefronts;
         reference.check(
             &bake(scene.clone(), &at(density, 256)),
@@ -140,7 +140,7 @@ fn what_refinement_leaves_open_shrinks() {
 }
 
 /// Given up below the threshold, over what arrived.
-fn left_out(result: &BakeResult) -> f64 {
+fn left_out(result: &Bake) -> f64 {
     let energy = &result.ledgers[0].energy_w;
     energy.truncated.threshold / energy.deposited
 }
@@ -187,7 +187,7 @@ fn a_floor_of_two_objects_takes_the_same_light() {
         let [whole, cut] = [whole, cut].map(|scene| bake(scene, &at(1e4, 128)));
         assert_eq!(energy_fault(&cut), None, "{name}");
         assert_eq!(cut.maps.len(), 2, "{name}");
-        let deposited = |result: &BakeResult| result.ledgers[0].energy_w.deposited;
+        let deposited = |result: &Bake| result.ledgers[0].energy_w.deposited;
         assert_close(deposited(&cut), deposited(&whole), 5e-4, name);
     }
 }
@@ -224,7 +224,7 @@ fn real_files_bake() {
     };
     let mut lit = 0;
     for file in files {
-        let scene = load(file.to_str().expect("a readable path"), &options).expect("a valid file");
+        let scene = Scene::load(file.to_str().expect("a readable path"), &options).expect("a valid file");
         let name = scene.name.clone();
         let result = bake(scene, &photons(3e4, 64));
         assert_eq!(energy_fault(&result), None, "{name}");

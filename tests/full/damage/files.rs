@@ -11,14 +11,14 @@ use image::ImageFormat;
 use nephroid::error::Result;
 use nephroid::export::float_image::{Channel, FloatImage};
 use nephroid::export::map_folder::MapFolder;
-use nephroid::export::map_reader;
+use nephroid::export::map_set::MapSet;
 use nephroid::export::shards::{SceneOrigin, ShardFolder, ShardManifest, ShardSet};
 use nephroid::illumination::IlluminationMap;
 use nephroid::light_pass::share::Share;
 use nephroid::optics::spectrum::csv::read_lamp;
 use nephroid::progress::Control;
 use nephroid::scene::{Camera, CameraPath, LoadOptions, Scene, environment};
-use nephroid::session::{BakeResult, BakeSession, ShardSums};
+use nephroid::session::{Bake, Baker, ShardSums};
 use nephroid::settings::{BakeSettings, LayerKind};
 use serde_json::json;
 
@@ -300,7 +300,7 @@ fn maps() {
                     20_usize.div_ceil(count)
                 }
             };
-            let read = || map_reader::read(folder.path(), &scene).map(|(maps, _)| maps);
+            let read = || MapSet::open(folder.path(), &scene)?.read_all();
             assert!(read().is_ok_and(|maps| !maps.is_empty()));
             attack_files((name, &files), times, &tally, read, |maps| {
                 maps.iter().find_map(|map| map_fault(map, &scene))
@@ -311,7 +311,7 @@ fn maps() {
 }
 
 /// The first value of a bake that is no number, if there is one.
-fn result_fault(result: &BakeResult) -> Option<String> {
+fn result_fault(result: &Bake) -> Option<String> {
     let layers = result.maps.iter().flat_map(|map| &map.layers);
     let values = layers.flat_map(|layer| layer.irradiance.as_flattened());
     let errors = result.maps.iter().filter_map(|map| map.error.as_ref()).flatten();
@@ -332,7 +332,7 @@ impl Shards {
         let (scene, settings) = (Arc::new(builtin_scene("mirror")), at(1000.0, 16));
         let shard = |number| {
             let share = Share::new(number, 2).expect("one of two");
-            let mut session = BakeSession::new(scene.clone()).expect("a session");
+            let mut session = Baker::new(scene.clone()).expect("a session");
             let sums = session.bake_shard(&settings, share, &(), &Control::default());
             (share, sums.expect("a shard"))
         };
@@ -368,18 +368,18 @@ impl Shards {
         folder.write(&manifest, sums).expect("writable");
     }
 
-    fn read(&self, memory_bytes: u64) -> Result<BakeResult> {
+    fn read(&self, memory_bytes: u64) -> Result<Bake> {
         let folders: Vec<PathBuf> = self.sums.iter().map(|(share, _)| self.folder(*share)).collect();
         let shards = ShardSet::open(&folders)?;
         shards.check_scene(&self.scene)?;
         let settings = shards.manifest().settings.clone();
         let settings = set(settings, |s| s.memory_bytes = memory_bytes);
-        let mut session = BakeSession::new(self.scene.clone())?;
+        let mut session = Baker::new(self.scene.clone())?;
         session.merge(&settings, Box::new(shards), &(), &Control::default())
     }
 
     /// The same after a pass of the first shard was replaced by what a reader gives.
-    fn read_with(&self, pass: usize, bytes: impl Read, memory_bytes: u64) -> Result<BakeResult> {
+    fn read_with(&self, pass: usize, bytes: impl Read, memory_bytes: u64) -> Result<Bake> {
         let (share, mut sums) = self.sums[0].clone();
         let mut encoder = zstd::stream::Encoder::new(Vec::new(), 1).expect("it can begin");
         encoder.include_checksum(true).expect("a checksum");

@@ -9,7 +9,7 @@ use glam::DVec3;
 use nephroid::error::Result;
 use nephroid::progress::Control;
 use nephroid::scene::{LightKind, LoadOptions, Scene};
-use nephroid::session::{BakeResult, BakeSession};
+use nephroid::session::{Bake, Baker};
 use nephroid::settings::{BakeSettings, LayerKind};
 use nephroid::units::RadiantIntensity;
 use serde_json::json;
@@ -57,8 +57,8 @@ fn files_below(folder: &Path) -> Vec<PathBuf> {
 }
 
 /// Bakes as little as can be asked for, by patches but where only photons will do.
-fn bake(scene: Scene) -> Result<BakeResult> {
-    let mut session = BakeSession::new(Arc::new(scene))?;
+fn bake(scene: Scene) -> Result<Bake> {
+    let mut session = Baker::new(Arc::new(scene))?;
     let mut by = |estimator: BakeSettings| {
         let settings = BakeSettings {
             max_depth: Some(3),
@@ -79,7 +79,7 @@ fn bake(scene: Scene) -> Result<BakeResult> {
 }
 
 /// The first number that is none, or an open ledger, if there is one.
-fn bake_fault(result: &BakeResult) -> Option<String> {
+fn bake_fault(result: &Bake) -> Option<String> {
     let layers = result.maps.iter().flat_map(|map| &map.layers);
     let mut values = layers.flat_map(|layer| layer.irradiance.as_flattened());
     match values.find(|value| !value.is_finite()) {

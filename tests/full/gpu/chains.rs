@@ -6,7 +6,7 @@ use glam::{DVec2, DVec3};
 use nephroid::effect::EffectSwitch;
 use nephroid::eye_pass::reference::{ChainLimits, EyeRays, ReferenceSettings, first_hits};
 use nephroid::eye_pass::renderer::EyeQuality;
-use nephroid::eye_pass::tone_mapping::{auto_exposure_stops, display_rgba8};
+use nephroid::eye_pass::tone_mapping::display_rgba8;
 use nephroid::eye_pass::{Picture, ToneMap, View};
 use nephroid::optics::LinearSrgb;
 use nephroid::plan;
@@ -86,7 +86,7 @@ fn compare(scene: Scene) {
     rig.renderer.set_quality(EyeQuality::WALKING);
     let walking = rig.picture(&view);
 
-    let stops = auto_exposure_stops(&all_chains);
+    let stops = all_chains.auto_exposure_stops();
     let show = |picture: &Picture| display_rgba8(picture, stops, ToneMap::None);
     let flip = |a: &Picture, b: &Picture| mean_flip(&show(a), &show(b), SIZE[0] as usize);
     let (found, same) = (flip(&all_chains, &device), flip(&same_chains, &device));

@@ -4,7 +4,7 @@ use glam::DVec3;
 use nephroid::eye_pass::renderer::EyeQuality;
 use nephroid::eye_pass::{ToneMap, View};
 use nephroid::optics::LinearSrgb;
-use nephroid::scene::{Camera, LoadOptions, Scene, SurfaceKind, builtin, load};
+use nephroid::scene::{Camera, LoadOptions, Scene, SurfaceKind, builtin};
 use nephroid::settings::LayerKind;
 
 use crate::gpu::rays::Numbers;
@@ -122,7 +122,7 @@ fn flights_over_files_of_others_show_radiance() {
     };
     for name in FILES {
         let file = folder.join(format!("{name}.glb"));
-        let scene = load(file.to_str().expect("a readable path"), &options);
+        let scene = Scene::load(file.to_str().expect("a readable path"), &options);
         fly(&scene.expect("a valid file"));
     }
 }

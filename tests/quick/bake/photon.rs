@@ -4,7 +4,7 @@ use nephroid::illumination::IlluminationMap;
 use nephroid::optics::luminance;
 use nephroid::scene::Scene;
 use nephroid::scene::builtin::{parts, shapes};
-use nephroid::session::BakeResult;
+use nephroid::session::Bake;
 use nephroid::settings::{BakeSettings, Estimator, LayerKind, MapResolution};
 
 use support::hard_scenes::{cut_glass, roughened, under_square_lamp, under_the_suns_disc};
@@ -33,7 +33,7 @@ fn lamp_in_green_glass() -> Scene {
 }
 
 /// Blocks of a map whose means are more than three standard errors apart.
-fn outliers(result: &BakeResult, reference: &BakeResult, scene: &Scene, receiver: &str) -> usize {
+fn outliers(result: &Bake, reference: &Bake, scene: &Scene, receiver: &str) -> usize {
     let [ours, theirs] = [result, reference].map(|result| map_of(result, scene, receiver));
     let [a, b] = [ours, theirs].map(caustic);
     let square = |map: &IlluminationMap, texel: usize| {
@@ -89,7 +89,7 @@ fn bundles_of_a_spectrum_are_unbiased() {
     let mut scene = builtin_scene("ball");
     let glass = scene.materials.iter_mut().find(|it| it.surface.is_specular());
     *glass.expect("glass") = parts::glass("N-SF11");
-    let blocks_of = |result: &BakeResult| {
+    let blocks_of = |result: &Bake| {
         let light = caustic(map_of(result, &scene, "floor"));
         block_sums(|texel| light[texel])
     };
@@ -100,8 +100,7 @@ fn bundles_of_a_spectrum_are_unbiased() {
         };
         bake(scene.clone(), &settings)
     };
-    let bundled =
-        |result: &BakeResult| result.ledgers[0].carried_w.bundles / result.ledgers[0].energy_w.deposited;
+    let bundled = |result: &Bake| result.ledgers[0].carried_w.bundles / result.ledgers[0].energy_w.deposited;
     let few: Vec<Vec<f64>> = (0..SEEDS)
         .map(|seed| {
             let result = baked(seed, 3e4);

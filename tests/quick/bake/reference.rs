@@ -3,7 +3,7 @@
 
 use nephroid::effect::{Effect, EffectSwitch, EffectSwitches};
 use nephroid::illumination::lookup::bilinear;
-use nephroid::session::BakeResult;
+use nephroid::session::Bake;
 
 use crate::prelude::*;
 use support::effect_scenes::{EffectScene, all};
@@ -139,7 +139,7 @@ const EFFECTS: [Effect; 10] = [
     Effect::Direct,
 ];
 
-fn all_bits(result: &BakeResult) -> Vec<(usize, Vec<u32>)> {
+fn all_bits(result: &Bake) -> Vec<(usize, Vec<u32>)> {
     let maps = result.maps.iter();
     maps.map(|map| (map.chart.receiver.index(), bits(map))).collect()
 }

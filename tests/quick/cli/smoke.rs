@@ -346,7 +346,7 @@ fn a_png_shows_radiance_as_its_options_say() {
         )
     };
     let (auto, stops) = shown("");
-    assert_eq!(stops, tone_mapping::auto_exposure_stops(&seen));
+    assert_eq!(stops, seen.auto_exposure_stops());
     assert!(auto == tone_mapping::display_rgba8(&seen, stops, ToneMap::default()));
     let mut all = vec![auto];
     for (name, tone_map) in ["none", "neutral", "agx", "aces", "soft"]

@@ -4,7 +4,8 @@ use std::f64::consts::FRAC_1_PI;
 
 use nephroid::error::Result;
 use nephroid::export::glb::{self, Bits, Carrier, GlbOptions, GlbReport, SceneLights};
-use nephroid::export::{Quantity, map_reader, uv_file};
+use nephroid::export::map_set::MapSet;
+use nephroid::export::{Quantity, uv_file};
 use nephroid::scene::open_document;
 
 use super::{Baked, LUMENS_PER_WATT, boxes, linear_of_srgb};
@@ -25,7 +26,7 @@ const WHOLE: GlbOptions = GlbOptions {
 
 fn encode(baked: &Baked, options: GlbOptions) -> Result<(Vec<u8>, GlbReport)> {
     let scene = &baked.scene;
-    let (maps, _) = map_reader::read(&baked.path("out"), scene)?;
+    let maps = MapSet::open(baked.path("out"), scene)?.read_all()?;
     let opened = open_document(scene, &LoadOptions::default())?;
     glb::encode(scene, opened, &maps, options)
 }
@@ -90,7 +91,13 @@ impl Exported {
 
     /// The texels of an image that a texture names [0, 1]; codes of eight bits are 257 times smaller.
     fn image(&self, texture: &Value) -> Vec<[f64; 3]> {
-        let image = self.item("images", &self.item("textures", &texture["index"])["source"]);
+        let texture = self.item("textures", &texture["index"]);
+        assert_eq!(
+            self.item("samplers", &texture["sampler"])["wrapS"],
+            33071,
+            "clamped"
+        );
+        let image = self.item("images", &texture["source"]);
         let png = image::load_from_memory(self.view(&image["bufferView"])).expect("it is a PNG");
         let pixels = png.to_rgb16();
         pixels.pixels().map(|pixel| pixel.0.map(linear_of_srgb)).collect()

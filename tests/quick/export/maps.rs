@@ -7,7 +7,7 @@ use nephroid::error::Result;
 use nephroid::export::exr::{MapValue, decode, encode_map, rgb_values};
 use nephroid::export::frame_folder::FrameFolder;
 use nephroid::export::map_folder::MapFolder;
-use nephroid::export::map_reader;
+use nephroid::export::map_set::MapSet;
 use nephroid::export::shards::{SceneOrigin, ShardFolder, ShardManifest, ShardSet};
 use nephroid::export::textures::TextureFolder;
 use nephroid::illumination::parametrisation::DEFAULT_NOMINAL_SIDE;
@@ -15,7 +15,7 @@ use nephroid::illumination::tiles::TileLayout;
 use nephroid::illumination::{Chart, IlluminationMap, Layer, Parametrisation, parametrise};
 use nephroid::light_pass::share::Share;
 use nephroid::optics::glass::Glass;
-use nephroid::session::{BakeSession, ShardSource as _};
+use nephroid::session::{Baker, ShardSource as _};
 use nephroid::settings::Wavelengths;
 
 use super::{Baked, names, two_lamps};
@@ -126,11 +126,10 @@ fn files_are_as_large_as_asked_for() {
 fn stored_maps_are_not_trusted() {
     let baked = Baked::quick(built_in("mirror"), &[LayerKind::Caustic]);
     let out = baked.path("out");
-    let refuse = |scene: &Scene, words: &str| {
-        says(map_reader::read(&out, scene).expect_err(words), words);
-    };
+    let read = |folder: &Path, scene: &Scene| MapSet::open(folder, scene)?.read_all();
+    let refuse = |scene: &Scene, words: &str| says(read(&out, scene).expect_err(words), words);
     refuse(&built_in("ring"), "builtin:mirror | builtin:ring | geometry");
-    let missing = map_reader::read(&baked.path("nowhere"), &baked.scene).expect_err("nowhere");
+    let missing = read(&baked.path("nowhere"), &baked.scene).expect_err("nowhere");
     says(missing, "nowhere | no such file");
     let sound = baked.manifest();
     let write = |manifest: &Value| {
@@ -155,7 +154,7 @@ fn stored_maps_are_not_trusted() {
         refuse(&baked.scene, words);
     }
     write(&sound);
-    map_reader::read(&out, &baked.scene).expect("it is whole again");
+    read(&out, &baked.scene).expect("it is whole again");
     let file = out.join(map["file"].as_str().expect("a name"));
     std::fs::write(file, "no image").expect("writable");
     refuse(&baked.scene, "neither an OpenEXR");
@@ -358,7 +357,7 @@ impl Shards {
     fn bake(&self, name: &str, scene: &Scene, settings: &BakeSettings, (number, count): (u32, u32)) {
         let share = Share::new(number, count).expect("a share");
         let folder = ShardFolder::open(&self.path(name), share, false).expect("writable");
-        let mut session = BakeSession::new(Arc::new(scene.clone())).expect("a session");
+        let mut session = Baker::new(Arc::new(scene.clone())).expect("a session");
         let sums = session.bake_shard(settings, share, &(), &Control::default());
         let sums = sums.expect("a shard");
         let origin = SceneOrigin {

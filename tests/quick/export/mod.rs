@@ -8,10 +8,10 @@ use std::path::PathBuf;
 
 use nephroid::error::Error;
 use nephroid::export::map_folder::MapFolder;
-use nephroid::export::map_reader::MapReader;
+use nephroid::export::map_set::MapSet;
 use nephroid::export::textures::{Content, Encoding, Exposure, TextureFolder, TextureOptions, TextureReport};
 use nephroid::export::{FloatImage, Quantity};
-use nephroid::session::BakeResult;
+use nephroid::session::Bake;
 
 use crate::prelude::*;
 use support::program::{names, read_json};
@@ -19,7 +19,7 @@ use support::tools::{at, bake};
 
 struct Baked {
     scene: Scene,
-    result: BakeResult,
+    result: Bake,
     around: tempfile::TempDir,
 }
 
@@ -31,7 +31,7 @@ impl Baked {
             result,
             around,
         };
-        let folder = MapFolder::open(&baked.path("out"), false).expect("it can be written");
+        let folder = MapFolder::open(baked.path("out"), false).expect("it can be written");
         let written = folder.write(&baked.scene, settings, &baked.result);
         written.expect("it can be written");
         baked
@@ -65,7 +65,7 @@ impl Baked {
 
     fn textures(&self, options: TextureOptions, folder: &str) -> Result<TextureReport, Error> {
         let maps = self.path("out");
-        let reader = MapReader::open(&maps, &self.scene)?;
+        let reader = MapSet::open(&maps, &self.scene)?;
         let folder = TextureFolder::open(&self.path(folder), false)?;
         nephroid::export::textures::write(&[reader], options, folder, &Control::default())
     }

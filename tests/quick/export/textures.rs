@@ -6,7 +6,7 @@ use std::path::Path;
 
 use image::ImageDecoder as _;
 use nephroid::error::ErrorKind;
-use nephroid::export::map_reader::MapReader;
+use nephroid::export::map_set::MapSet;
 use nephroid::export::textures::index::{Rectangle, TextureEntry};
 use nephroid::export::textures::{
     Content, Encoding, Exposure, Packing, TextureFolder, TextureOptions, TextureReport, Transfer,
@@ -327,7 +327,7 @@ fn an_export_replaces_its_own_files_alone() {
     assert_eq!(names(&t), ["0000_floor.exr", "0000_floor.png", "index.json"]);
     // A cancelled export leaves nothing.
     let maps = baked.path("out");
-    let reader = MapReader::open(&maps, &baked.scene).expect("we wrote it");
+    let reader = MapSet::open(&maps, &baked.scene).expect("we wrote it");
     let folder = TextureFolder::open(&baked.path("c"), false).expect("it can be written");
     let control = Control::default();
     control.cancel();

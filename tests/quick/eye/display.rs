@@ -1,6 +1,6 @@
 //! Tone mapping, exposure and white balance on the CPU.
 
-use nephroid::eye_pass::tone_mapping::{auto_exposure_stops, display_rgba8};
+use nephroid::eye_pass::tone_mapping::display_rgba8;
 use nephroid::eye_pass::{Picture, ToneMap, WhiteBalance};
 use nephroid::optics::spectrum::Xyz;
 use nephroid::optics::spectrum::xyz::{IDENTITY, transformed};
@@ -28,7 +28,7 @@ fn bytes_keep_the_order_of_channels() {
 fn auto_exposure_finds_middle_grey() {
     let stops = |parts: &[(f32, usize)]| {
         let radiance = parts.iter().flat_map(|&(value, count)| vec![[value; 3]; count]);
-        auto_exposure_stops(&picture(radiance.collect()))
+        picture(radiance.collect()).auto_exposure_stops()
     };
     for (parts, expected, tolerance) in [
         // 0.18 / 0.045 = 4: two stops, and black does not count.

@@ -3,14 +3,13 @@
 use std::path::{Path, PathBuf};
 
 use nephroid::error::Result;
-use nephroid::scene::load;
 
 use crate::prelude::*;
 use support::shared_or_skip;
 use support::sound::scene_fault;
 
 fn load_soundly(path: &Path) -> Result<Scene> {
-    let result = load(path.to_str().expect("path is UTF-8"), &LoadOptions::default());
+    let result = Scene::load(path.to_str().expect("path is UTF-8"), &LoadOptions::default());
     if let Ok(scene) = &result {
         assert_eq!(scene_fault(scene), None, "{}", path.display());
     }

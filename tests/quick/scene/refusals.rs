@@ -1,14 +1,13 @@
 //! Bad input gets one sentence: what, where and what to do.
 
 use nephroid::error::{ErrorKind, Result};
-use nephroid::scene::load;
 
 use crate::prelude::*;
 use support::glb::{load_bytes, load_path};
 
 #[track_caller]
 fn refusal(source: &str) -> String {
-    let error = load(source, &LoadOptions::default()).expect_err("has to be refused");
+    let error = Scene::load(source, &LoadOptions::default()).expect_err("has to be refused");
     assert_eq!(error.kind, ErrorKind::Failure);
     says(&error, source);
     error.to_string()

@@ -7,7 +7,7 @@ use nephroid::optics::glass::{Dispersion, catalogue};
 use nephroid::optics::spectrum::{Spectrum, illuminant};
 use nephroid::optics::wavelength::{C_LINE, D_LINE, F_LINE};
 use nephroid::plan::EffectLine;
-use nephroid::session::BakeSession;
+use nephroid::session::Baker;
 
 use crate::prelude::*;
 use support::glb::load_path;
@@ -387,7 +387,7 @@ fn edited_colours_take_the_place_of_tables() {
 }
 
 fn planned(scene: Scene, switches: EffectSwitches) -> EffectLine {
-    let mut session = BakeSession::new(Arc::new(scene)).expect("a session");
+    let mut session = Baker::new(Arc::new(scene)).expect("a session");
     let settings = with(BakeSettings::default(), |it| it.effects = switches);
     let mut lines = session.plan(&settings).expect("a plan").effects.into_iter();
     lines

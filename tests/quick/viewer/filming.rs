@@ -252,13 +252,11 @@ fn picture() -> Picture {
 }
 
 fn save(folder: &Path, scene: &str, has_radiance: bool) -> Result<Vec<String>, String> {
+    let camera = Camera::framing("all", (-DVec3::ONE, DVec3::ONE), 1.5);
     let view = View {
-        camera: Camera::framing("all", (-DVec3::ONE, DVec3::ONE), 1.5),
-        width: 3,
-        height: 2,
         exposure_stops: -1.5,
         tone_map: ToneMap::AgX,
-        background: LinearSrgb::BLACK,
+        ..View::new(camera, [3, 2])
     };
     let saved = save_picture(folder, scene, &picture(), &view, &IDENTITY, has_radiance);
     let files = saved.map_err(|error| error.to_string())?;

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use glam::{DVec2, DVec3};
 use nephroid::illumination::{Chart, IlluminationMap, Layer, Receiver, UvSet};
 use nephroid::scene::builtin::{self, parts, shapes};
-use nephroid::scene::{Edit, Light, LightEdit, LightKind, LoadOptions, Scene, load};
+use nephroid::scene::{Edit, Light, LightEdit, LightKind, LoadOptions, Scene};
 use nephroid::settings::{BakeSettings, LayerKind, MapResolution};
 use nephroid::units::{Flux, Irradiance, RadiantIntensity};
 use nephroid::viewer::ViewerOptions;
@@ -164,7 +164,7 @@ pub fn events(log: &Path) -> Vec<serde_json::Value> {
 }
 
 pub fn read(path: &Path) -> Scene {
-    load(&path.display().to_string(), &LoadOptions::default()).expect("it can be read")
+    Scene::load(&path.display().to_string(), &LoadOptions::default()).expect("it can be read")
 }
 
 /// A scene after some edits.

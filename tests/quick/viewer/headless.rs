@@ -11,7 +11,7 @@ use egui_kittest::{Harness, Node};
 use nephroid::illumination::IlluminationMap;
 use nephroid::plan::EffectPlan;
 use nephroid::scene::{Edit, Scene};
-use nephroid::session::{BakeCounts, BakeResult, StopReason, Timings};
+use nephroid::session::{Bake, BakeCounts, StopReason, Timings};
 use nephroid::settings::{BakeSettings, LayerKind};
 use nephroid::viewer::ViewerOptions;
 use nephroid::viewer::command::Command;
@@ -74,8 +74,8 @@ fn lit() -> IlluminationMap {
 }
 
 /// What a bake that found nothing to do returns.
-pub fn nothing() -> BakeResult {
-    BakeResult {
+pub fn nothing() -> Bake {
+    Bake {
         light_layers: Vec::new(),
         band_layers: Vec::new(),
         maps: Vec::new(),

@@ -5,7 +5,6 @@ use std::collections::HashSet;
 
 use nephroid::illumination::{Chart, Receiver};
 use nephroid::light_pass::sketch::{PathPreview, SketchLimits, sketch};
-use nephroid::scene::load;
 use nephroid::scene::load::save;
 use nephroid::units::Flux;
 use nephroid::viewer::background::Wake;
@@ -101,7 +100,7 @@ fn impossible_changes_of_lights_are_refused() {
 
 fn read(path: &Path, default_light: bool) -> Scene {
     let options = crate::prelude::options(|options| options.default_light = default_light);
-    load(&path.display().to_string(), &options).expect("it is read")
+    Scene::load(&path.display().to_string(), &options).expect("it is read")
 }
 
 #[test]

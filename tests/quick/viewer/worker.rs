@@ -5,15 +5,15 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 
 use nephroid::error::{Error, Result};
 use nephroid::progress::Progress;
-use nephroid::session::BakeResult;
+use nephroid::session::Bake;
 use nephroid::viewer::background::Wake;
-use nephroid::viewer::worker::{BakeRequest, Baker, Worker, baking_threads};
+use nephroid::viewer::worker::{BakeRequest, LevelBaker, Worker, baking_threads};
 
 use super::headless::nothing;
 use super::*;
 
-fn result(rays: u64, partial: bool) -> BakeResult {
-    let mut result = BakeResult { partial, ..nothing() };
+fn result(rays: u64, partial: bool) -> Bake {
+    let mut result = Bake { partial, ..nothing() };
     result.counts.rays = rays;
     result.stop_reason = if partial {
         StopReason::Cancelled
@@ -58,7 +58,7 @@ const IN_LEVELS: f64 = 6000.0;
 /// Answers with as many rays as its scene's name has letters.
 const NAMED: f64 = 7000.0;
 
-impl Baker for Scripted {
+impl LevelBaker for Scripted {
     fn set_scene(&mut self, scene: Arc<Scene>) -> Result<()> {
         self.scene = scene;
         Ok(())
@@ -69,8 +69,8 @@ impl Baker for Scripted {
         settings: &BakeSettings,
         progress: &dyn Progress,
         control: &Control,
-        level: &mut (dyn FnMut(BakeResult) + Send),
-    ) -> Result<BakeResult> {
+        level: &mut (dyn FnMut(Bake) + Send),
+    ) -> Result<Bake> {
         let wait = || {
             let gate = self.gate.lock().expect("one thread");
             let opened = gate.recv_timeout(Duration::from_secs(20));

@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use nephroid::illumination::IlluminationMap;
 use nephroid::scene::Scene;
-use nephroid::session::BakeResult;
+use nephroid::session::Bake;
 use nephroid::settings::{BakeSettings, ErrorMetric, Estimator, LayerKind};
 
 use crate::tools::{at, bake, photons, settings};
@@ -28,7 +28,7 @@ pub fn is_long() -> bool {
 /// A scene and what a bake made of it.
 pub struct Baked {
     pub scene: Scene,
-    pub result: BakeResult,
+    pub result: Bake,
 }
 
 /// How far a law is off, after all bakes before it.
@@ -202,7 +202,7 @@ fn described(scene: &Scene) -> String {
 
 /// What ledgers leave open at worst, of what was emitted, or maps of what was deposited; infinite where a value is not
 /// finite, or below zero though no light is traced by wavelength, which knows colours beyond sRGB.
-pub fn books_open(result: &BakeResult) -> f64 {
+pub fn books_open(result: &Bake) -> f64 {
     let is_spectral = result.ledgers.iter().any(|ledger| ledger.emitted_radiant_w.is_some());
     let is_value = |e: f32| e.is_finite() && (e >= 0.0 || is_spectral);
     let mut is_sound = result.maps.iter().flat_map(values).all(is_value);

@@ -32,7 +32,6 @@ pub trait Build: Sized {
         self.lit(parts::sun("sun", direction, Irradiance(1.0)))
     }
 
-    /// With a mirror.
     #[must_use]
     fn mirror(self, mesh: Mesh) -> Self {
         self.with("mirror", mesh, parts::mirror())

@@ -74,8 +74,8 @@ pub struct StoredLight {
 
 /// A folder of maps beside their scene; maps are read one at a time.
 #[derive(Debug)]
-pub struct MapReader<'a> {
-    folder: &'a Path,
+pub struct MapSet<'a> {
+    folder: PathBuf,
     scene: &'a Scene,
     stored: StoredMaps,
     location: String,
@@ -83,31 +83,30 @@ pub struct MapReader<'a> {
     frame: Option<usize>,
 }
 
-impl<'a> MapReader<'a> {
+impl<'a> MapSet<'a> {
     /// Reads the manifest.
     ///
     /// # Errors
     /// No manifest, one of another format or scene.
-    pub fn open(folder: &'a Path, scene: &'a Scene) -> Result<Self> {
-        Self::of(folder, scene, read_manifest(folder)?, None)
+    pub fn open(folder: impl Into<PathBuf>, scene: &'a Scene) -> Result<Self> {
+        let folder = folder.into();
+        let manifest = read_manifest(&folder)?;
+        Self::of(folder, scene, manifest, None)
     }
 
     /// The maps of a frame of a sequence, counted from 0; `scene` is that at its time.
     ///
     /// # Errors
     /// As [`Self::open`]; a frame that is not there.
-    pub fn open_frame(folder: &'a Path, scene: &'a Scene, frame: usize) -> Result<Self> {
-        let (mut stored, location) = read_manifest(folder)?;
+    pub fn open_frame(folder: impl Into<PathBuf>, scene: &'a Scene, frame: usize) -> Result<Self> {
+        let folder = folder.into();
+        let (mut stored, location) = read_manifest(&folder)?;
         let frames = || stored.sequence.iter().flat_map(|sequence| &sequence.frames);
         let Some(found) = frames().find(|entry| entry.frame == frame + 1).cloned() else {
-            let what = format!(
-                "it has {} frames, and none is number {}",
-                frames().count(),
-                frame + 1
-            );
+            let count = frames().count();
             return Err(Error::failure(
                 &location,
-                what,
+                format!("it has {count} frames, and none is number {}", frame + 1),
                 "bake so many frames, or name fewer",
             ));
         };
@@ -116,7 +115,7 @@ impl<'a> MapReader<'a> {
     }
 
     fn of(
-        folder: &'a Path,
+        folder: PathBuf,
         scene: &'a Scene,
         (stored, location): (StoredMaps, String),
         frame: Option<usize>,
@@ -152,7 +151,7 @@ impl<'a> MapReader<'a> {
 
     /// The folder that the maps lie in.
     pub fn folder(&self) -> &Path {
-        self.folder
+        &self.folder
     }
 
     /// What there is.
@@ -175,6 +174,41 @@ impl<'a> MapReader<'a> {
             )
         });
         partial.into_iter().collect()
+    }
+
+    /// What the user named as the scene of the maps in a folder: a path as given, or `builtin:NAME`.
+    ///
+    /// # Errors
+    /// No manifest, or one of another format.
+    pub fn source_of(folder: &Path) -> Result<String> {
+        read_manifest(folder).map(|(stored, _)| stored.scene.source)
+    }
+
+    /// The frames in a folder; `None` where it holds one moment.
+    ///
+    /// # Errors
+    /// As [`Self::source_of`].
+    pub fn sequence_of(folder: &Path) -> Result<Option<Sequence>> {
+        read_manifest(folder).map(|(stored, _)| stored.sequence)
+    }
+
+    /// Reads all maps, without each light's part of them.
+    ///
+    /// # Errors
+    /// As [`Self::read`]; two maps of one side of a surface.
+    pub fn read_all(&self) -> Result<Vec<IlluminationMap>> {
+        let mut maps: Vec<IlluminationMap> = Vec::new();
+        for entry in self.entries() {
+            let map = self.read_with(entry, &[])?.map;
+            let mut others = maps.iter();
+            if others.any(|other| other.chart.receiver == map.chart.receiver) {
+                let what = format!("it names two maps of one side of {}", entry.surface);
+                return Err(unusable(&self.location, what));
+            }
+            maps.push(map);
+        }
+        maps.sort_by_key(|map| map.chart.receiver);
+        Ok(maps)
     }
 
     /// Reads one of the maps.
@@ -292,58 +326,6 @@ impl<'a> MapReader<'a> {
         let what = format!("it names the file {file:?}, which is none that a bake writes");
         Err(unusable(&self.location, what))
     }
-}
-
-/// Maps of a scene from a folder, with warnings about their state.
-///
-/// # Errors
-/// No manifest, one of another format or scene, files that are missing, damaged or do not fit the manifest.
-pub fn read(folder: &Path, scene: &Scene) -> Result<(Vec<IlluminationMap>, Vec<Warning>)> {
-    read_all(&MapReader::open(folder, scene)?)
-}
-
-/// Maps of a frame of a sequence, counted from 0, as [`read`].
-///
-/// # Errors
-/// As there; a frame that is not there.
-pub fn read_frame(
-    folder: &Path,
-    scene: &Scene,
-    frame: usize,
-) -> Result<(Vec<IlluminationMap>, Vec<Warning>)> {
-    read_all(&MapReader::open_frame(folder, scene, frame)?)
-}
-
-fn read_all(reader: &MapReader) -> Result<(Vec<IlluminationMap>, Vec<Warning>)> {
-    let mut maps: Vec<IlluminationMap> = Vec::new();
-    for entry in reader.entries() {
-        let map = reader.read_with(entry, &[])?.map;
-        let mut others = maps.iter();
-        if others.any(|other| other.chart.receiver == map.chart.receiver) {
-            let what = format!("it names two maps of one side of {}", entry.surface);
-            return Err(unusable(&reader.location, what));
-        }
-        maps.push(map);
-    }
-    maps.sort_by_key(|map| map.chart.receiver);
-    let warnings = reader.warnings();
-    Ok((maps, warnings))
-}
-
-/// What the user named as the scene of the maps in a folder: a path as given, or `builtin:NAME`.
-///
-/// # Errors
-/// No manifest, or one of another format.
-pub fn source_of(folder: &Path) -> Result<String> {
-    read_manifest(folder).map(|(stored, _)| stored.scene.source)
-}
-
-/// The frames in a folder; `None` where it holds one moment.
-///
-/// # Errors
-/// As [`source_of`].
-pub fn sequence_of(folder: &Path) -> Result<Option<Sequence>> {
-    read_manifest(folder).map(|(stored, _)| stored.sequence)
 }
 
 /// Files of the maps in a folder, relative to it; `None` where none are.
