@@ -6,12 +6,13 @@ use std::time::Instant;
 use super::forecast::{Forecast, forecast};
 use super::{Bake, BakeEstimate, Baker};
 use crate::error::Result;
+use crate::light_pass::caustic::pass::Stopwatch;
 use crate::plan::Effect;
 use crate::progress::{Control, Progress, Stage};
 use crate::settings::{BakeSettings, Preset};
 
-/// A pilot ends after so long once something is known of its error, and else [s].
-const PILOT_S: (f64, f64) = (0.6, 1.2);
+/// A pilot ends after so much of all processors once something is known of its error, and else [CPU s].
+const PILOT_CPU_S: (f64, f64) = (1.0, 2.0);
 
 /// Density of a pilot of splats [rays/sr].
 const PILOT_DENSITY_PER_SR: f64 = 10_000.0;
@@ -51,7 +52,7 @@ impl Baker {
         let estimate = self.estimate(settings)?;
         let is_on = estimate.plan.is_on(Effect::LightPass);
         let watch = PilotWatch {
-            began: Instant::now(),
+            taken: Stopwatch::start(),
             is_known: AtomicBool::new(false),
             control,
             own: Control::default(),
@@ -87,7 +88,7 @@ impl Baker {
 
 /// Ends a pilot in time. A bake that knows of a limit would choose what fits into it; this one is cut off.
 struct PilotWatch<'a> {
-    began: Instant,
+    taken: Stopwatch,
     /// Whether the error is known.
     is_known: AtomicBool,
     /// What the user asks.
@@ -97,10 +98,12 @@ struct PilotWatch<'a> {
 
 impl Progress for PilotWatch<'_> {
     fn advance(&self, _: Stage, _: u64, _: u64) {
-        let (known_s, unknown_s) = PILOT_S;
+        let (known_s, unknown_s) = PILOT_CPU_S;
         let is_known = self.is_known.load(Ordering::Relaxed);
         let limit_s = if is_known { known_s } else { unknown_s };
-        if self.control.is_cancelled() || self.began.elapsed().as_secs_f64() > limit_s {
+        let taken = self.taken.elapsed();
+        // Nobody waits longer than ten times that for a busy machine, or one without a clock of its processors.
+        if self.control.is_cancelled() || taken.cpu.max(0.1 * taken.wall) > limit_s {
             self.own.cancel();
         }
     }
