@@ -10,19 +10,25 @@ use nephroid::scene::camera_path::MAX_FRAMES;
 use super::values;
 
 #[derive(Debug, Default, Args)]
-#[command(next_help_heading = "Options of moving scenes")]
 pub struct MomentOptions {
-    /// Moment of a scene whose water or objects move [default: as the file has it]
+    /// Moment of a scene that moves
     #[arg(long, value_name = "SECONDS", value_parser = values::time_s)]
     time: Option<f64>,
-    /// So many moments one after the other
+    /// So many moments, one after the other
     #[arg(long, value_name = "N", value_parser = values::within(1..=MAX_FRAMES, "frames"))]
     frames: Option<usize>,
     /// Frames per second
-    #[arg(long, value_name = "F", requires = "frames", default_value = "24", value_parser = values::fps)]
+    #[arg(
+        long,
+        value_name = "F",
+        requires = "frames",
+        default_value = "24",
+        value_parser = values::fps,
+        hide_short_help = true
+    )]
     fps: f64,
-    /// Round the periods of waves so that the last frame meets the first
-    #[arg(long = "loop", requires = "frames")]
+    /// Fit the periods of waves to the frames
+    #[arg(long = "loop", requires = "frames", hide_short_help = true)]
     is_loop: bool,
 }
 

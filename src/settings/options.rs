@@ -148,7 +148,7 @@ pub const OPTIONS: &[OptionInfo] = &[
         ..choice::<ErrorMetric>("error-metric", "Error is", "METRIC")
     },
     OptionInfo {
-        brief: "Stop after this long, e.g. 10s, with the best maps so far",
+        brief: "Stop after this long, e.g. 10s, with the best so far",
         what: "Ends the bake after this long, such as 10s, with the finest complete maps; without a target error, refines \
                 as far as the time allows (not splat)",
         range: "1ms to 1e7s",

@@ -240,11 +240,7 @@ fn lamps_that_are_mostly_black_shine() {
     scene.glows.insert(2, Arc::new(glow.expect("it glows")));
     let radiance = Radiance(scene.emitted_radiance(2).luminance());
     scene.lights = vec![light(LightKind::Surface { object: 2, radiance })];
-    let settings = BakeSettings {
-        estimator: Estimator::Wavefront,
-        ..photons(1e3, 16)
-    };
-    let result = bake(scene, &settings);
+    let result = bake(scene, &photons(1e3, 16));
     assert_eq!(energy_fault(&result), None);
     assert!(result.ledgers[0].energy_w.emitted > 0.0);
 }

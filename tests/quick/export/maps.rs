@@ -146,7 +146,7 @@ fn stored_maps_are_not_trusted() {
         ("/maps/0/layers", json!(["direct"]), "direct layer"),
         ("/maps/0/uv_set", json!("generated"), "texture coordinates"),
         ("/maps", json!([map, map]), "two maps"),
-        ("", json!({}), "no manifest"),
+        ("", json!({}), "not a manifest"),
     ] {
         let mut manifest = sound.clone();
         *manifest.pointer_mut(place).expect("it is there") = value;
@@ -425,12 +425,12 @@ fn torn_shards_are_refused_by_name() {
     let [sums, json] = ["s2/sums.bin", "s2/shard.json"].map(|file| shards.path(file));
     let whole = std::fs::read(&sums).expect("written");
     for (bytes, word) in [
-        (&whole[..whole.len() - 1], "ends too early"),
-        (&whole[..50], "ends too early"),
-        (&whole[..3], "ends too early"),
-        (b"", "ends too early"),
+        (&whole[..whole.len() - 1], "ends before it should"),
+        (&whole[..50], "ends before it should"),
+        (&whole[..3], "ends before it should"),
+        (b"", "ends before it should"),
         (&[&whole[..], b"x"].concat(), "longer than it should be"),
-        (&[0; 100], "ends too early"),
+        (&[0; 100], "ends before it should"),
     ] {
         std::fs::write(&sums, bytes).expect("writable");
         shards.refuse("s1 s2", &format!("s2 | {word} | again"));

@@ -357,5 +357,9 @@ fn vertex_inputs_match_the_vertex_buffers() {
     let attributes = buffers
         .iter()
         .map(|found| (found.shader_location, found.format.size()));
-    assert!(members.iter().map(input).eq(attributes));
+    let mut attributes: Vec<(u32, u64)> = attributes.collect();
+    attributes.sort_unstable();
+    let mut inputs: Vec<(u32, u64)> = members.iter().map(input).collect();
+    inputs.sort_unstable();
+    assert_eq!(inputs, attributes);
 }

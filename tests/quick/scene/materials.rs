@@ -427,7 +427,7 @@ fn normal_textures_of_what_is_specular_are_read() {
             &plain,
             factors(0.0, 1.0),
             &image[..],
-            "normal texture, as it is matte,",
+            "normal texture, as it is diffuse,",
         ),
         (&plain, polish.clone(), b"no image", "the same everywhere"),
         (&fourth, polish.clone(), &image, "TEXCOORD_3"),
@@ -499,7 +499,12 @@ fn lacquer_is_polish_over_matte_and_adds_to_metal() {
         json!({ "specularFactor": 0.5, "specularTexture": image, "specularColorFactor": [1.0, 0.0, 0.0] });
     for (roughness, extension, stated, expected) in [
         (1.0, "KHR_materials_clearcoat", coat, (0.5, 0.1)),
-        (0.0, "KHR_materials_specular", dull, (0.25 * 0.2126, 0.0)),
+        (
+            0.0,
+            "KHR_materials_specular",
+            dull,
+            (0.25 * LinearSrgb::new(1.0, 0.0, 0.0).luminance(), 0.0),
+        ),
     ] {
         let mut json = json!({ "name": "m", "pbrMetallicRoughness": factors(0.0, roughness) });
         json["extensions"] = json!({ extension: stated });

@@ -111,8 +111,8 @@ fn buffers_come_from_the_scenes_folder_alone() {
         %2e%2e/scene/a b.bin => not a relative path within the scene's folder
         /etc/passwd => not a relative path within the scene's folder
         ..\a b.bin => not a relative path within the scene's folder
-        http://example.com/a.bin => has a scheme
-        file:///etc/passwd => has a scheme
+        http://example.com/a.bin => does not name a local file
+        file:///etc/passwd => does not name a local file
         a%2 => its URI is not valid
         => its URI is not valid
         missing.bin => there is no such file

@@ -302,7 +302,11 @@ fn lamps_may_be_measured_in_a_table() {
         ("lamp.csv", "nm,W\n900,1\n950,1\n", "`lamp.csv`: | 360 to 830"),
         ("../lamp.csv", "", "light `lamp`: | scene's folder"),
         ("/etc/lamp.csv", "", "light `lamp`: | scene's folder"),
-        ("https://example.org/lamp.csv", "", "light `lamp`: | scheme"),
+        (
+            "https://example.org/lamp.csv",
+            "",
+            "light `lamp`: | does not name a local file",
+        ),
         ("none.csv", "", "none.csv"),
     ] {
         says(beside(stated, "lamp.csv", table).expect_err("no spectrum"), parts);
