@@ -24,6 +24,9 @@ const MEDIUM_PROBES: u32 = 16;
 /// Photons that tell their mean flux.
 const FLUX_PROBES: u32 = 1 << 12;
 
+/// Places that are looked from where the middle of a lamp sees nothing.
+const MIDDLE_PROBES: u32 = 16;
+
 /// Dimension of [`even_point`] that places on lamps are drawn from; those of micro-normals follow.
 pub(super) const LAMP_DIMENSION: u32 = 0;
 
@@ -154,10 +157,17 @@ impl<'a> PhotonLaunch<'a> {
                 cells.iter().map(of_cell).sum()
             }
             Domain::Spheres(lamp) => {
-                let Some(emitter) = lamp.places.sample(LAMP_MIDDLE) else {
-                    return 0.0;
+                let seen = |square: DVec2| {
+                    let emitter = lamp.places.sample(square);
+                    emitter.map_or(0.0, |emitter| lamp.spheres.measure(&emitter))
                 };
-                lamp.spheres.measure(&emitter)
+                match seen(LAMP_MIDDLE) {
+                    // The middle may face away.
+                    0.0 => (0..MIDDLE_PROBES)
+                        .map(|probe| seen(even_point(probe, LAMP_DIMENSION, 0)))
+                        .fold(0.0, f64::max),
+                    measure => measure,
+                }
             }
         }
     }

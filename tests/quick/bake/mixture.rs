@@ -2,7 +2,6 @@
 
 use nephroid::optics::Glass;
 use nephroid::scene::{Glow, Variation};
-use nephroid::settings::Estimator;
 use nephroid::units::Radiance;
 use support::floors::texture_reference;
 use support::meshes::{floor, quad};
@@ -240,7 +239,7 @@ fn lamps_that_are_mostly_black_shine() {
     scene.glows.insert(2, Arc::new(glow.expect("it glows")));
     let radiance = Radiance(scene.emitted_radiance(2).luminance());
     scene.lights = vec![light(LightKind::Surface { object: 2, radiance })];
-    let result = bake(scene, &photons(1e3, 16));
+    let result = bake(scene, &photons(3e5, 16));
     assert_eq!(energy_fault(&result), None);
     assert!(result.ledgers[0].energy_w.emitted > 0.0);
 }

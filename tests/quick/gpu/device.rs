@@ -349,17 +349,23 @@ fn vertex_inputs_match_the_vertex_buffers() {
     };
     let input = |member: &naga::StructMember| match (&member.binding, &surface.types[member.ty].inner) {
         (Some(Binding::Location { location, .. }), TypeInner::Vector { size, .. }) => {
-            (*location, 4 * *size as u64)
+            (*location, *size as usize)
         }
         _ => panic!("{member:?}"),
     };
     let buffers = vertex_attributes();
+    let numbers = |format| match format {
+        wgpu::VertexFormat::Float32x2 => 2,
+        wgpu::VertexFormat::Float32x3 => 3,
+        wgpu::VertexFormat::Float32x4 | wgpu::VertexFormat::Unorm16x4 => 4,
+        other => panic!("{other:?}"),
+    };
     let attributes = buffers
         .iter()
-        .map(|found| (found.shader_location, found.format.size()));
-    let mut attributes: Vec<(u32, u64)> = attributes.collect();
+        .map(|found| (found.shader_location, numbers(found.format)));
+    let mut attributes: Vec<(u32, usize)> = attributes.collect();
     attributes.sort_unstable();
-    let mut inputs: Vec<(u32, u64)> = members.iter().map(input).collect();
+    let mut inputs: Vec<(u32, usize)> = members.iter().map(input).collect();
     inputs.sort_unstable();
     assert_eq!(inputs, attributes);
 }
