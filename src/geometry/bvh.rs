@@ -49,10 +49,15 @@ pub struct TriangleBvh {
     corners: Vec<[DVec3; 3]>,
     /// Finds what a ray may meet.
     wide: WideBvh,
+    frame: Frame,
+}
+
+/// Single-precision coordinates for what lies within a sphere.
+#[derive(Clone, Copy, Debug)]
+struct Frame {
     centre: DVec3,
     /// Single-precision units per metre.
     scale: f64,
-    /// Of the scene [m].
     radius_m: f64,
 }
 
@@ -67,31 +72,8 @@ impl std::fmt::Debug for TriangleBvh {
 impl TriangleBvh {
     /// Builds the hierarchy. Corners must be finite; triangles without area are allowed and never hit.
     pub fn build(triangles: &[[DVec3; 3]]) -> Self {
-        let (low, high) = triangles
-            .iter()
-            .flatten()
-            .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), corner| {
-                (low.min(*corner), high.max(*corner))
-            });
-        let centre = if triangles.is_empty() {
-            DVec3::ZERO
-        } else {
-            low * 0.5 + high * 0.5
-        };
-        let radius_m = if triangles.is_empty() {
-            1.0
-        } else {
-            (high - centre).length().max(f64::MIN_POSITIVE)
-        };
-        let scale = (-radius_m.log2().ceil()).exp2();
-        let aabbs: Vec<Aabb> = triangles
-            .iter()
-            .map(|corners| {
-                let local = corners.map(|corner| to_single((corner - centre) * scale));
-                let aabb = Aabb::from_points(&local);
-                Aabb::new(aabb.min - BOX_MARGIN, aabb.max + BOX_MARGIN)
-            })
-            .collect();
+        let frame = Frame::around(triangles.iter().flatten());
+        let aabbs: Vec<Aabb> = triangles.iter().map(|corners| frame.aabb(corners)).collect();
         let mut build_time = std::time::Duration::ZERO;
         let bvh = build_bvh2(&aabbs, BUILD, &mut build_time);
         let corners: Vec<[DVec3; 3]> = bvh
@@ -99,16 +81,20 @@ impl TriangleBvh {
             .iter()
             .map(|&triangle| triangles[triangle as usize])
             .collect();
-        let local = |corner: DVec3| (corner - centre) * scale;
+        let local = |corner: DVec3| frame.local(corner);
         let singles: Vec<[DVec3; 3]> = corners.iter().map(|corners| corners.map(local)).collect();
         Self {
             wide: WideBvh::new(&bvh, &singles),
             bvh,
             corners,
-            centre,
-            scale,
-            radius_m,
+            frame,
         }
+    }
+
+    /// Hands out the slots of all triangles that a ray may meet before `end_m`, near ones first as a rule. `meet` gives the
+    /// distance [m] beyond which nothing is looked for any more; `None` ends the search.
+    pub fn search(&self, ray: &Ray, end_m: f64, meet: impl FnMut(u32) -> Option<f64>) {
+        self.frame.search(&self.wide, ray, end_m, meet);
     }
 
     /// The nearest triangle in front of the ray's origin, from either side.
@@ -124,7 +110,7 @@ impl TriangleBvh {
     ) -> Option<TriangleHit> {
         let mut best: Option<TriangleHit> = None;
         let sheared = ShearedRay::new(ray);
-        let (local, advanced_m) = self.local_ray(ray, f64::INFINITY);
+        let (local, advanced_m) = self.frame.local_ray(ray, f64::INFINITY);
         self.wide.search(local, |slot| {
             let Some((distance_m, barycentric)) = sheared.intersect(&self.corners[slot]) else {
                 return f32::INFINITY;
@@ -143,7 +129,7 @@ impl TriangleBvh {
                 distance_m,
                 barycentric,
             });
-            self.local_distance(distance_m, advanced_m)
+            self.frame.local_distance(distance_m, advanced_m)
         });
         best
     }
@@ -161,7 +147,7 @@ impl TriangleBvh {
         is_there: impl Fn(u32, [f64; 3]) -> bool,
     ) -> bool {
         let sheared = ShearedRay::new(ray);
-        let (local, _) = self.local_ray(ray, distance_m);
+        let (local, _) = self.frame.local_ray(ray, distance_m);
         let mut is_blocked = false;
         self.wide.search(local, |slot| {
             is_blocked = sheared
@@ -194,15 +180,21 @@ impl TriangleBvh {
                 count: node.prim_count,
             })
             .collect();
-        let local = |corner: DVec3| to_single((corner - self.centre) * self.scale).to_array();
+        let Frame { centre, scale, .. } = self.frame;
+        let local = |corner: DVec3| to_single(self.frame.local(corner)).to_array();
         PackedBvh {
             corners: self.corners.iter().map(|corners| corners.map(local)).collect(),
             triangles: self.bvh.primitive_indices.clone(),
-            centre: self.centre,
-            scale: self.scale,
+            centre,
+            scale,
             depth: packed::depth(&nodes),
             nodes,
         }
+    }
+
+    /// The triangle in a slot, by its index in the order that they were given.
+    pub fn triangle(&self, slot: u32) -> u32 {
+        self.bvh.primitive_indices[slot as usize]
     }
 
     /// Corners of the triangle in a slot [m].
@@ -214,17 +206,52 @@ impl TriangleBvh {
     pub fn triangle_count(&self) -> usize {
         self.corners.len()
     }
+}
 
-    /// Centre [m] and radius [m] of a sphere around all triangles.
-    pub fn bounding_sphere(&self) -> (DVec3, f64) {
-        (self.centre, self.radius_m)
+impl Frame {
+    /// Around points; of some size where there are none.
+    fn around<'a>(points: impl Iterator<Item = &'a DVec3>) -> Self {
+        let mut points = points.peekable();
+        let is_empty = points.peek().is_none();
+        let (low, high) = points.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), point| {
+            (low.min(*point), high.max(*point))
+        });
+        let (centre, radius_m) = if is_empty {
+            (DVec3::ZERO, 1.0)
+        } else {
+            let centre = low * 0.5 + high * 0.5;
+            (centre, (high - centre).length().max(f64::MIN_POSITIVE))
+        };
+        Self {
+            centre,
+            scale: (-radius_m.log2().ceil()).exp2(),
+            radius_m,
+        }
+    }
+
+    fn local(&self, point: DVec3) -> DVec3 {
+        (point - self.centre) * self.scale
+    }
+
+    fn aabb<const N: usize>(&self, points: &[DVec3; N]) -> Aabb {
+        let aabb = Aabb::from_points(&points.map(|point| to_single(self.local(point))));
+        Aabb::new(aabb.min - BOX_MARGIN, aabb.max + BOX_MARGIN)
+    }
+
+    fn search(&self, wide: &WideBvh, ray: &Ray, end_m: f64, mut meet: impl FnMut(u32) -> Option<f64>) {
+        let (local, advanced_m) = self.local_ray(ray, end_m);
+        wide.search(local, |slot| match meet(slot as u32) {
+            Some(end_m) if end_m.is_finite() => self.local_distance(end_m, advanced_m),
+            Some(_) => f32::INFINITY,
+            None => -1.0,
+        });
     }
 
     /// The ray in single-precision coordinates, with the distance [m] by which its origin was advanced.
     fn local_ray(&self, ray: &Ray, limit_m: f64) -> (WideRay, f64) {
         let towards_centre = (self.centre - ray.origin).dot(ray.direction);
         let advanced_m = (towards_centre - FAR_RADII * self.radius_m).max(0.0);
-        let origin = to_single((ray.at(advanced_m) - self.centre) * self.scale);
+        let origin = to_single(self.local(ray.at(advanced_m)));
         // A negative zero would turn the slab test inside out.
         let direction = to_single(ray.direction) + Vec3A::ZERO;
         let limit = if limit_m.is_finite() {
@@ -246,6 +273,48 @@ impl TriangleBvh {
     }
 }
 
+/// A bounding volume hierarchy over boxes.
+pub struct BoxBvh {
+    /// Which box lies in each slot.
+    boxes: Vec<u32>,
+    wide: WideBvh,
+    frame: Frame,
+}
+
+impl std::fmt::Debug for BoxBvh {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("BoxBvh")
+            .field("boxes", &self.boxes.len())
+            .finish_non_exhaustive()
+    }
+}
+
+impl BoxBvh {
+    /// Builds the hierarchy over boxes by their minimum and maximum corners [m].
+    pub fn build(boxes: &[[DVec3; 2]]) -> Self {
+        const BUILD_BOXES: BvhBuildParams = BvhBuildParams {
+            max_prims_per_leaf: 1,
+            ..BUILD
+        };
+        let frame = Frame::around(boxes.iter().flatten());
+        let aabbs: Vec<Aabb> = boxes.iter().map(|corners| frame.aabb(corners)).collect();
+        let mut build_time = std::time::Duration::ZERO;
+        let bvh = build_bvh2(&aabbs, BUILD_BOXES, &mut build_time);
+        Self {
+            // A triangle without area is never clearly missed: its box decides.
+            wide: WideBvh::new(&bvh, &vec![[DVec3::ZERO; 3]; boxes.len()]),
+            boxes: bvh.primitive_indices,
+            frame,
+        }
+    }
+
+    /// Hands out all boxes that a ray may meet before `end_m`, as [`TriangleBvh::search`] does triangles.
+    pub fn search(&self, ray: &Ray, end_m: f64, mut meet: impl FnMut(u32) -> Option<f64>) {
+        self.frame
+            .search(&self.wide, ray, end_m, |slot| meet(self.boxes[slot as usize]));
+    }
+}
+
 /// A node of the hierarchy, for searches other than along rays.
 #[derive(Clone, Copy, Debug)]
 pub struct Node<'a> {
@@ -258,8 +327,9 @@ impl<'a> Node<'a> {
     pub fn bounds(&self) -> (DVec3, DVec3) {
         let aabb = self.hierarchy.bvh.nodes[self.index].aabb();
         // Exact: the scale is a power of two.
-        let unit_m = 1.0 / self.hierarchy.scale;
-        let metres = |local: Vec3A| self.hierarchy.centre + local.as_dvec3() * unit_m;
+        let Frame { centre, scale, .. } = self.hierarchy.frame;
+        let unit_m = 1.0 / scale;
+        let metres = |local: Vec3A| centre + local.as_dvec3() * unit_m;
         (metres(aabb.min), metres(aabb.max))
     }
 
@@ -274,7 +344,7 @@ impl<'a> Node<'a> {
     }
 
     /// Index and corners of each triangle of a leaf; nothing for other nodes.
-    pub fn triangles(&self) -> impl Iterator<Item = (u32, &'a [DVec3; 3])> {
+    pub fn triangles(&self) -> impl Iterator<Item = (u32, &'a [DVec3; 3])> + use<'a> {
         let TriangleBvh { bvh, corners, .. } = self.hierarchy;
         let node = &bvh.nodes[self.index];
         let first = node.first_index as usize;

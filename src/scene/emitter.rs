@@ -2,7 +2,7 @@
 
 use glam::{DVec2, DVec3};
 
-use super::{Light, LightKind, LightSize, Mesh, PanelShape, Scene};
+use super::{InScene, Light, LightKind, LightSize, PanelShape, Scene};
 use crate::geometry::ray;
 use crate::optics::LinearSrgb;
 
@@ -296,7 +296,7 @@ pub fn in_cap(axis: DVec3, half_angle_rad: f64, square: DVec2) -> DVec3 {
 /// An object that glows.
 #[derive(Debug)]
 struct Glowing<'a> {
-    mesh: &'a Mesh,
+    mesh: InScene<'a>,
     both_sides: bool,
     /// Area of all triangles up to each, itself included [m²].
     upto_m2: Vec<f64>,
@@ -305,9 +305,9 @@ struct Glowing<'a> {
 impl<'a> Glowing<'a> {
     /// `None` where it has no area.
     fn new(scene: &'a Scene, object: usize) -> Option<Self> {
-        let mesh = scene.objects.get(object)?.mesh_in_scene();
+        let mesh = scene.objects.get(object)?.in_scene();
         let mut sum_m2 = 0.0;
-        let upto_m2: Vec<f64> = (0..mesh.triangles.len())
+        let upto_m2: Vec<f64> = (0..mesh.triangle_count())
             .map(|triangle| {
                 let [a, b, c] = mesh.corners(triangle);
                 sum_m2 += 0.5 * (b - a).cross(c - a).length();

@@ -1,10 +1,12 @@
 //! What stands in a scene: a mesh and where it is.
 
-use std::sync::Arc;
+use std::fmt;
+use std::sync::{Arc, OnceLock};
 
 use glam::{DAffine3, DQuat, DVec3};
 use serde::{Deserialize, Serialize};
 
+use super::mesh::{InScene, Placement};
 use super::{Mesh, Scene};
 
 /// One mesh primitive of one node: the unit that has a material and, when light reaches it, an illumination map.
@@ -32,8 +34,24 @@ struct Shape {
     /// What the motion turns about [m].
     pivot: DVec3,
     world_from_object: DAffine3,
-    /// `None` where that is the mesh itself.
-    in_scene: Option<Arc<Mesh>>,
+    /// `None` where that changes nothing.
+    placement: Option<Placement>,
+    found: Arc<Found>,
+}
+
+/// What was found out about a mesh where it stands, when it was first asked for.
+#[derive(Default)]
+struct Found {
+    /// A copy in scene coordinates.
+    mesh: OnceLock<Arc<Mesh>>,
+    bounds: OnceLock<Option<(DVec3, DVec3)>>,
+}
+
+impl fmt::Debug for Found {
+    /// Objects are the same whether anybody has asked or not.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Found").finish_non_exhaustive()
+    }
 }
 
 /// How a node was moved since it was loaded: turned about the middle of its box, and then moved.
@@ -100,7 +118,8 @@ impl Object {
                 motion: Motion::default(),
                 pivot: DVec3::ZERO,
                 world_from_object: DAffine3::IDENTITY,
-                in_scene: None,
+                placement: None,
+                found: Arc::default(),
             },
         }
     }
@@ -115,9 +134,57 @@ impl Object {
         &self.shape.world_from_object
     }
 
-    /// The mesh in scene coordinates: [`mesh`](Self::mesh) itself where the transform is the identity.
+    /// What places the mesh in the scene; `None` where it stands where its coordinates say.
+    pub fn placement(&self) -> Option<&Placement> {
+        self.shape.placement.as_ref()
+    }
+
+    /// The mesh in scene coordinates: [`mesh`](Self::mesh) itself where the transform is the identity, else a copy that is
+    /// kept. What goes over many objects asks [`in_scene`](Self::in_scene), which copies nothing.
     pub fn mesh_in_scene(&self) -> &Arc<Mesh> {
-        self.shape.in_scene.as_ref().unwrap_or(&self.shape.mesh)
+        let Shape {
+            mesh,
+            placement,
+            found,
+            ..
+        } = &self.shape;
+        match placement {
+            Some(placement) => found.mesh.get_or_init(|| Arc::new(placement.of_mesh(mesh))),
+            None => mesh,
+        }
+    }
+
+    /// The same, but a copy is not kept.
+    pub fn copy_in_scene(&self) -> Arc<Mesh> {
+        let Shape {
+            mesh,
+            placement,
+            found,
+            ..
+        } = &self.shape;
+        match (placement, found.mesh.get()) {
+            (Some(placement), None) => Arc::new(placement.of_mesh(mesh)),
+            (_, kept) => Arc::clone(kept.unwrap_or(mesh)),
+        }
+    }
+
+    /// The same, triangle by triangle: by the copy where there is one.
+    pub fn in_scene(&self) -> InScene<'_> {
+        let Shape {
+            mesh,
+            placement,
+            found,
+            ..
+        } = &self.shape;
+        match (placement, found.mesh.get()) {
+            (Some(placement), None) => InScene::new(mesh, placement),
+            (_, kept) => InScene::from(&**kept.unwrap_or(mesh)),
+        }
+    }
+
+    /// Smallest box around the mesh in the scene, as minimum and maximum corner [m]; `None` without vertices.
+    pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
+        *self.shape.found.bounds.get_or_init(|| self.in_scene().bounds())
     }
 
     /// The mesh in scene coordinates, to be changed: from then on those are its own.
@@ -153,7 +220,8 @@ impl Object {
         }
         shape.world_from_object = world_from_object;
         let is_moved = world_from_object != DAffine3::IDENTITY;
-        shape.in_scene = is_moved.then(|| Arc::new(shape.mesh.placed(&world_from_object)));
+        shape.placement = is_moved.then(|| Placement::new(world_from_object));
+        shape.found = Arc::default();
     }
 
     /// Takes over mesh and place of an object that looks the same, so that who knows that one does nothing anew.
@@ -177,7 +245,7 @@ impl Scene {
         }
         let parts = self.objects.iter().filter(|part| part.node == found.node);
         let bounds = parts
-            .filter_map(|part| part.mesh_in_scene().bounds())
+            .filter_map(Object::bounds)
             .reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
         bounds.map_or(DVec3::ZERO, |(low, high)| 0.5 * (low + high))
     }

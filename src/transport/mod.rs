@@ -5,6 +5,7 @@ pub mod corners;
 pub mod curvature;
 pub mod differential;
 pub mod effects;
+mod hierarchy;
 pub mod interaction;
 pub mod medium;
 pub mod microfacets;
@@ -15,6 +16,7 @@ pub mod tracer;
 
 pub use differential::{RayDerivative, RayDifferential, SurfaceDetail, SurfaceScale};
 pub use effects::EffectSet;
+pub use hierarchy::SceneNode;
 pub use interaction::{Branch, Event, Interaction, Meeting, TurnedBy};
 pub use medium::MediumStack;
 pub use microfacets::Microfacets;

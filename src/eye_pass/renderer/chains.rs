@@ -58,8 +58,9 @@ impl ChainScene {
             Some(before) => before.tracer.edited(Arc::clone(scene)),
             None => Tracer::new(Arc::clone(scene)),
         };
-        let packed = tracer.bvh().packed();
-        check(gpu, scene, geometry, &packed)?;
+        check(gpu, scene, geometry)?;
+        let packed = tracer.packed();
+        check_hierarchy(gpu, scene, &packed)?;
         let corners = places_of_corners(scene, geometry);
         let records = packed.triangles.iter().zip(&packed.corners);
         let records: Vec<Triangle> = records
@@ -239,42 +240,78 @@ fn numbers(media: &MediumStack) -> [u32; 4] {
 }
 
 /// # Errors
-/// A scene that chains cannot be traced through on this device.
-fn check(gpu: &Gpu, scene: &Scene, geometry: &Geometry, packed: &PackedBvh) -> Result<()> {
+/// A scene that chains cannot be traced through on this device, by what is known before its instances are copied.
+fn check(gpu: &Gpu, scene: &Scene, geometry: &Geometry) -> Result<()> {
     let limits = gpu.limits();
-    let largest = (packed.nodes.len() * size_of::<Node>()).max(packed.corners.len() * size_of::<Triangle>());
-    let refused = |what: String| {
-        Err(Error::failure(
-            format!("mirrors and glass of {}", scene.name),
-            format!("{what}: they are drawn without what is seen in them"),
-            "use a larger graphics device, or `render --backend cpu`",
-        ))
-    };
     if limits.max_storage_buffers_per_shader_stage < BUFFERS {
-        return refused(format!(
-            "the device lets a shader read {} buffers, and chains take {BUFFERS}",
-            limits.max_storage_buffers_per_shader_stage
+        return Err(refused(
+            scene,
+            format!(
+                "the device lets a shader read {} buffers, and chains take {BUFFERS}",
+                limits.max_storage_buffers_per_shader_stage
+            ),
         ));
     }
-    let readable = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
-    if geometry.pages.len() > 1 || largest as u64 > readable {
-        return refused(format!(
-            "a shader of the device reads {} KiB at a time, and {} triangles take more",
-            readable >> 10,
-            packed.corners.len()
-        ));
+    if geometry.pages.len() > 1 {
+        return Err(too_many_triangles(gpu, scene));
     }
+    check_bytes(gpu, scene, scene.triangle_count() * size_of::<Triangle>())?;
     if scene.objects.len() > MOST_OBJECTS {
-        return refused(format!(
-            "{} objects are more than the {MOST_OBJECTS} that chains tell apart",
-            scene.objects.len()
-        ));
-    }
-    if packed.depth >= STACK {
-        return refused(format!(
-            "the hierarchy of its triangles is {} levels deep, and chains go through {STACK}",
-            packed.depth
+        return Err(refused(
+            scene,
+            format!(
+                "{} objects are more than the {MOST_OBJECTS} that chains tell apart",
+                scene.objects.len()
+            ),
         ));
     }
     Ok(())
+}
+
+/// # Errors
+/// A hierarchy that chains cannot be traced through on this device.
+fn check_hierarchy(gpu: &Gpu, scene: &Scene, packed: &PackedBvh) -> Result<()> {
+    check_bytes(gpu, scene, packed.nodes.len() * size_of::<Node>())?;
+    if packed.depth >= STACK {
+        return Err(refused(
+            scene,
+            format!(
+                "the hierarchy of its triangles is {} levels deep, and chains go through {STACK}",
+                packed.depth
+            ),
+        ));
+    }
+    Ok(())
+}
+
+fn check_bytes(gpu: &Gpu, scene: &Scene, bytes: usize) -> Result<()> {
+    if bytes as u64 > readable(gpu) {
+        return Err(too_many_triangles(gpu, scene));
+    }
+    Ok(())
+}
+
+/// Bytes that a shader can read of one buffer.
+fn readable(gpu: &Gpu) -> u64 {
+    let limits = gpu.limits();
+    limits.max_storage_buffer_binding_size.min(limits.max_buffer_size)
+}
+
+fn too_many_triangles(gpu: &Gpu, scene: &Scene) -> Error {
+    refused(
+        scene,
+        format!(
+            "a shader of the device reads {} KiB at a time, and {} triangles take more",
+            readable(gpu) >> 10,
+            scene.triangle_count()
+        ),
+    )
+}
+
+fn refused(scene: &Scene, what: String) -> Error {
+    Error::failure(
+        format!("mirrors and glass of {}", scene.name),
+        format!("{what}: they are drawn without what is seen in them"),
+        "use a larger graphics device, or `render --backend cpu`",
+    )
 }

@@ -91,7 +91,7 @@ pub(super) struct Geometry {
     /// One list per object of the scene.
     pub(super) segments: Vec<Vec<Segment>>,
     /// What the corners show, object by object.
-    meshes: Vec<Arc<Mesh>>,
+    shown: Vec<Object>,
     /// Where the map coordinates come from, object by object.
     pub(super) charts: Vec<Option<Arc<Chart>>>,
 }
@@ -119,7 +119,7 @@ impl Geometry {
         Self {
             pages: packing.pages,
             segments,
-            meshes: meshes(scene),
+            shown: scene.objects.clone(),
             charts: vec![None; scene.objects.len()],
         }
     }
@@ -132,14 +132,14 @@ impl Geometry {
         if changed.iter().all(|index| self.can_hold(scene, *index)) {
             let bytes = changed.iter().map(|index| self.write_corners(gpu, scene, *index));
             let bytes = bytes.sum();
-            self.meshes = meshes(scene);
+            self.shown.clone_from(&scene.objects);
             return Uploaded::other(bytes);
         }
         let charts = std::mem::take(&mut self.charts);
         *self = Self::new(gpu, scene);
         let mut uploaded = Uploaded::other(self.bytes());
         for chart in charts.iter().flatten() {
-            if chart.corner_uvs.len() == self.meshes[chart.object()].triangles.len() {
+            if chart.corner_uvs.len() == self.shown[chart.object()].mesh().triangles.len() {
                 uploaded += self.set_chart(gpu, chart);
             }
         }
@@ -147,15 +147,15 @@ impl Geometry {
     }
 
     fn is_changed(&self, scene: &Scene, index: usize) -> bool {
-        !Arc::ptr_eq(&self.meshes[index], scene.objects[index].mesh_in_scene())
-            || !self.can_hold(scene, index)
+        !self.shown[index].stands_as(&scene.objects[index]) || !self.can_hold(scene, index)
     }
 
     /// Whether an object's corners have the places that it needs: maps may cut a receiver anywhere.
     fn can_hold(&self, scene: &Scene, index: usize) -> bool {
-        let (old, new) = (&self.meshes[index], scene.objects[index].mesh_in_scene());
-        let has_same_shape = Arc::ptr_eq(old, new)
-            || (old.positions.len() == new.positions.len() && old.triangles == new.triangles);
+        let (old, new) = (&self.shown[index], &scene.objects[index]);
+        let has_same_shape = old.stands_as(new)
+            || (old.mesh().positions.len() == new.mesh().positions.len()
+                && old.in_scene().triangles().eq(new.in_scene().triangles()));
         let is_shared = self.segments[index].iter().any(|segment| segment.shares_corners);
         has_same_shape && !(is_shared && scene.material_of(index).surface.is_receiver())
     }
@@ -165,7 +165,7 @@ impl Geometry {
         let image = scene.material_of(index).coordinates();
         let mut bytes = 0;
         for segment in &self.segments[index] {
-            let corners = segment.corners(object.mesh_in_scene(), image);
+            let corners = segment.corners(&object.copy_in_scene(), image);
             let offset = (segment.first_corner * size_of::<Corner>()) as u64;
             let page = &self.pages[segment.page];
             gpu.queue
@@ -201,14 +201,6 @@ impl Geometry {
     }
 }
 
-fn meshes(scene: &Scene) -> Vec<Arc<Mesh>> {
-    scene
-        .objects
-        .iter()
-        .map(|object| Arc::clone(object.mesh_in_scene()))
-        .collect()
-}
-
 impl Segment {
     fn corners(&self, mesh: &Mesh, image: Option<&TextureRef>) -> Vec<Corner> {
         if self.shares_corners {
@@ -237,7 +229,7 @@ impl Packing<'_> {
     fn add(&mut self, scene: &Scene, object: &Object) -> Vec<Segment> {
         let material = &scene.materials[object.material];
         let image = material.coordinates();
-        let mesh = object.mesh_in_scene();
+        let mesh = &*object.copy_in_scene();
         let largest = mesh.positions.len().max(3 * mesh.triangles.len());
         if !material.surface.is_receiver() && largest <= self.page_corners {
             let segment = self.segment(largest, 0..mesh.triangles.len(), true);

@@ -195,7 +195,7 @@ impl Look {
             surface: material.surface,
             double_sided: material.double_sided,
             has_bumps: material.has_bumps(),
-            bounds: object.mesh_in_scene().bounds(),
+            bounds: object.bounds(),
             record: ObjectRecord {
                 base_colour: rgb(material.base_colour),
                 ior: material.ior as f32,
@@ -291,7 +291,7 @@ fn texels_per_m(chart: &Chart, mesh: &Mesh) -> f64 {
 fn check_chart(scene: &Scene, chart: &Chart) -> Result<()> {
     let belongs = scene.objects.get(chart.object()).is_some_and(|object| {
         scene.materials[object.material].surface.is_receiver()
-            && object.mesh_in_scene().triangles.len() == chart.corner_uvs.len()
+            && object.mesh().triangles.len() == chart.corner_uvs.len()
     });
     if belongs {
         return Ok(());

@@ -180,7 +180,7 @@ pub fn add_lights(scene: &mut Scene) {
         let emitted = material.emitted_radiance;
         let spectrum = material.emission_spectrum.clone();
         let luminance = emitted.luminance();
-        if luminance > 0.0 && part.mesh_in_scene().area_m2() > 0.0 {
+        if luminance > 0.0 && part.in_scene().area_m2() > 0.0 {
             scene.lights.push(Light {
                 name: part.name.clone(),
                 colour: emitted / luminance,

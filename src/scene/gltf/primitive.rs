@@ -24,6 +24,15 @@ const LARGEST_ROUNDING: f64 = 1e-5;
 const VERTEX_BYTES: u64 = 2 * 80;
 const TRIANGLE_BYTES: u64 = 2 * 12;
 
+/// Takes the memory of one more copy of a mesh.
+///
+/// # Errors
+/// Not so much is left.
+pub fn take_copy(mesh: &Mesh, owner: &str, budget: &mut Budget) -> Result<()> {
+    budget.take(mesh.positions.len() as u64 * VERTEX_BYTES, owner)?;
+    budget.take(3 * mesh.triangles.len() as u64 * TRIANGLE_BYTES, owner)
+}
+
 /// The primitives that were read: nodes with the same mesh share them.
 #[derive(Debug, Default)]
 pub struct Primitives {
@@ -84,14 +93,7 @@ impl Primitives {
         report: &mut Report,
     ) -> Result<Option<Arc<Mesh>>> {
         let known = match self.known.entry((mesh, index)) {
-            Entry::Occupied(known) => {
-                let known = known.into_mut();
-                if let Some((mesh, _)) = &known.source {
-                    budget.take(mesh.positions.len() as u64 * VERTEX_BYTES, owner)?;
-                    budget.take(3 * mesh.triangles.len() as u64 * TRIANGLE_BYTES, owner)?;
-                }
-                known
-            }
+            Entry::Occupied(known) => known.into_mut(),
             Entry::Vacant(place) => place.insert(Known {
                 source: read_local(reader, primitive, owner, budget, report)?,
                 made: Vec::new(),
@@ -118,6 +120,9 @@ impl Primitives {
         };
         if let Some((_, made)) = known.made.iter().find(|(made, _)| *made == variant) {
             return Ok(Some(Arc::clone(made)));
+        }
+        if !known.made.is_empty() {
+            take_copy(source, owner, budget)?;
         }
         let mut mesh = variant.of(source, *has_normals, owner, report);
         if variant.stands_at_origin {

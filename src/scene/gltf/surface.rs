@@ -1,16 +1,19 @@
 //! The objects of a scene: every primitive of every placed node.
 
+use std::collections::HashSet;
+use std::sync::Arc;
+
 use gltf::json::{Root, mesh};
 
 use super::accessor::Reader;
 use super::buffers::Buffers;
 use super::nodes::Placed;
-use super::primitive::Primitives;
+use super::primitive::{self, Primitives};
 use super::report::{Budget, Report};
 use super::{material, names};
 use crate::error::{Error, Result};
 use crate::scene::closed::is_closed;
-use crate::scene::{Material, Mesh, Object, Scene, SurfaceKind};
+use crate::scene::{Material, Mesh, Object, Scene, SurfaceKind, instances};
 
 /// What objects are read from.
 #[derive(Clone, Copy, Debug)]
@@ -77,14 +80,13 @@ pub fn add_objects(
             };
             let mut object = Object::new(placed.name.as_str(), (placed.node, index), 0, mesh);
             object.place(placed.world_from_node);
-            let mesh = object.mesh_in_scene();
             let material = materials.of_primitive(part, &owner, report);
             let material = if source.solid_glass {
-                materials.as_solid(material, mesh, &placed.name, report)
+                materials.as_solid(material, &object, report)
             } else {
                 material
             };
-            materials.check_coordinates(material, mesh, &placed.name, report);
+            materials.check_coordinates(material, object.mesh(), &placed.name, report);
             object.material = material;
             scene.objects.push(object);
         }
@@ -93,6 +95,7 @@ pub fn add_objects(
             primitives.forget(mesh_index.value());
         }
     }
+    take_copies(&scene.objects, budget)?;
     let degenerate = primitives.degenerate;
     if degenerate > 0 {
         report.warn(
@@ -100,6 +103,24 @@ pub fn add_objects(
             format!("{degenerate} triangles without area were dropped"),
             "nothing needs to be done: they can neither be seen nor lit",
         );
+    }
+    Ok(())
+}
+
+/// Takes the memory of the copies that will be made of meshes that several objects have.
+///
+/// # Errors
+/// Not so much is left.
+fn take_copies(objects: &[Object], budget: &mut Budget) -> Result<()> {
+    let mut known = HashSet::new();
+    for (object, is_instance) in objects
+        .iter()
+        .zip(instances::find(objects, instances::MOST_COPIED))
+    {
+        if !known.insert(Arc::as_ptr(object.mesh())) && !is_instance {
+            let owner = format!("node `{}`", object.name);
+            primitive::take_copy(object.mesh(), &owner, budget)?;
+        }
     }
     Ok(())
 }
@@ -156,13 +177,13 @@ impl Materials {
     }
 
     /// The material that a thin wall has as a solid, where its mesh is closed; any other stays.
-    fn as_solid(&mut self, material: usize, mesh: &Mesh, name: &str, report: &mut Report) -> usize {
+    fn as_solid(&mut self, material: usize, object: &Object, report: &mut Report) -> usize {
         if self.all[material].surface != SurfaceKind::ThinWall {
             return material;
         }
-        if !is_closed(mesh) {
+        if !is_closed(&object.copy_in_scene()) {
             report.warn(
-                format!("node `{name}`"),
+                format!("node `{}`", object.name),
                 "is not closed, so that it stays a pane without thickness",
                 "close its mesh to make it solid glass",
             );

@@ -91,7 +91,7 @@ impl Across {
 impl Judge {
     pub fn new(scene: Arc<Scene>) -> Self {
         let tracer = Tracer::new(scene.clone());
-        let packed = tracer.bvh().packed();
+        let packed = tracer.packed();
         let (centre, scale) = (packed.centre, packed.scale);
         let (mut firsts, mut corners) = (Vec::new(), Vec::new());
         for object in &scene.objects {
@@ -110,7 +110,9 @@ impl Judge {
     }
 
     pub fn bounding_sphere(&self) -> (DVec3, f64) {
-        self.tracer.bvh().bounding_sphere()
+        let (low, high) = self.tracer.scene().bounds().expect("it has triangles");
+        let centre = low * 0.5 + high * 0.5;
+        (centre, (high - centre).length())
     }
 
     pub fn all(&self, rays: &[Ray], answers: &[Answer]) -> Vec<Verdict> {
