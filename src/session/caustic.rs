@@ -482,13 +482,10 @@ impl CausticLayer<'_> {
         let is_known = |error: &KeptError| error.predecessors == predecessors && error.auditors == auditors;
         if !level.error.as_ref().is_some_and(is_known) && !course.control.is_cancelled() {
             let estimate = self.error_of(light, &level, state, climb, course)?;
-            level.error = estimate.map(|mut estimate| {
-                self.audit(light, &level, climb.rival.as_ref(), &mut estimate);
-                KeptError {
-                    predecessors,
-                    auditors,
-                    estimate,
-                }
+            level.error = estimate.map(|estimate| KeptError {
+                predecessors,
+                auditors,
+                estimate,
             });
         }
         climb.levels.push(level);
@@ -561,7 +558,11 @@ impl CausticLayer<'_> {
                     Some(Before { error, refined })
                 });
                 let fine = accuracy::images(&level.maps, level.unit);
-                let estimate = accuracy::estimate(&fine, [coarser.first(), coarser.get(1)], before, &ledger);
+                let mut estimate =
+                    accuracy::estimate(&fine, [coarser.first(), coarser.get(1)], before, &ledger);
+                if let (Some(estimate), Some(photons)) = (&mut estimate, &climb.rival) {
+                    self.audit(light, &fine, photons, estimate);
+                }
                 course.clock.deposit.add(watch.elapsed());
                 estimate
             }

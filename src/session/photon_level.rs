@@ -10,7 +10,7 @@ use super::shards::PassSums;
 use crate::error::Result;
 use crate::illumination::Receiver;
 use crate::illumination::accumulator::FluxUnit;
-use crate::light_pass::accuracy::{self, LightError};
+use crate::light_pass::accuracy::{self, Images, LightError};
 use crate::light_pass::caustic::pass::Listener;
 use crate::light_pass::caustic::setup::AimedLight;
 use crate::light_pass::ledger_sum::LedgerSum;
@@ -349,19 +349,18 @@ impl CausticLayer<'_> {
     pub(super) fn audit(
         &self,
         light: &AimedLight,
-        level: &LightLevel,
-        photons: Option<&LightLevel>,
+        patches: &Images,
+        photons: &LightLevel,
         estimate: &mut LightError,
     ) {
-        let Some((raw, photons)) = photons.and_then(|rival| Some((rival.photons.as_ref()?, rival))) else {
+        let Some(raw) = &photons.photons else {
             return;
         };
         let unit = photons.unit.times(HALVES as f64);
         let [first, second] = self
             .half_maps(light, raw)
             .map(|maps| accuracy::images(&maps, unit));
-        let patches = accuracy::images(&level.maps, level.unit);
-        if let Some(square) = accuracy::audited_square(&patches, [&first, &second]) {
+        if let Some(square) = accuracy::audited_square(patches, [&first, &second]) {
             estimate.raise_to(square);
         }
     }

@@ -13,8 +13,8 @@ use super::sweep::{
 };
 use super::table::Cell;
 use crate::error::Result;
-use crate::scene::Scene;
 use crate::scene::builtin::{self, shapes};
+use crate::scene::{Light, Scene};
 use crate::session::forecast::{forecast, stood_at};
 use crate::session::{CostPoint, Forecast, StopReason};
 use crate::settings::{BakeSettings, ErrorMetric, Estimator};
@@ -93,6 +93,10 @@ pub(super) fn accuracy(bench: &Bench) -> Result<Sweep> {
     let mut groups = Vec::new();
     for &name in names {
         let scene = scene(name)?;
+        // Neither estimator follows the light of lamps with a size.
+        if scene.lights.iter().any(Light::has_extent) {
+            continue;
+        }
         let against = match Reference::analytic(&scene)? {
             Some(reference) => Against::Known(reference),
             None => Against::Bake(Arc::clone(&scene), Box::new(towards(0.002, 60.0))),

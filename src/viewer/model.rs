@@ -487,8 +487,7 @@ impl Model {
 
     /// Edits the scene; tells whether that was possible.
     fn edit(&mut self, edit: &Edit) -> bool {
-        self.log
-            .write("edit", json!({"target": format!("{:?}", edit.target())}));
+        self.log.write("edit", json!({"target": edit.target()}));
         let outcome = self.edits.edit(edit);
         self.revision += u64::from(outcome.is_ok());
         self.refusal = outcome.err().map(|error| error.to_string());

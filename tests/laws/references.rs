@@ -12,7 +12,7 @@ use nephroid::illumination::{IlluminationMap, Layer, parametrise};
 use nephroid::progress::Control;
 use nephroid::scene::Scene;
 use nephroid::scene::builtin::parts;
-use nephroid::settings::{BakeSettings, ErrorMetric, LayerKind};
+use nephroid::settings::{BakeSettings, Estimator, LayerKind};
 use nephroid::study::agreement::{caustic_luminance, pair_maps};
 use nephroid::study::brute_force::{brute_force, relative_noise};
 use nephroid::transport::Tracer;
@@ -23,7 +23,7 @@ use support::hard_scenes::{self, Shading, TinyBall};
 use support::laws::law::deposited_w;
 use support::laws::{Baked, Table};
 use support::project_file;
-use support::tools::{bake, builtin_scene, energy_fault, map_of, settings};
+use support::tools::{at, bake, builtin_scene, energy_fault, map_of, settings};
 
 /// Texels of all maps across and down.
 const SIDE: usize = 64;
@@ -142,9 +142,13 @@ pub fn fill(t: &mut Table) {
 
 /// Relative RMSE over all maps and by area, without the reference's noise.
 fn from_reference(bake: &Baked) -> f64 {
-    let (maps, noise) = stored(&bake.scene);
+    distance(&bake.scene, &bake.result.maps)
+}
+
+fn distance(scene: &Scene, baked: &[IlluminationMap]) -> f64 {
+    let (maps, noise) = stored(scene);
     assert!(noise <= LARGEST_NOISE, "{noise}");
-    let pairs = pair_maps(&bake.result.maps, &maps).expect("maps of one size");
+    let pairs = pair_maps(baked, &maps).expect("maps of one size");
     let rmse = Agreement::of(&pairs)
         .expect("a reference with light")
         .relative_rmse;
@@ -154,14 +158,11 @@ fn from_reference(bake: &Baked) -> f64 {
 fn auto_comes_close(scene: &Scene) {
     let settings = BakeSettings {
         max_error: Some(AIM),
-        error_metric: ErrorMetric::Rmse,
-        ..settings(BakeSettings::starting_density_per_sr(AIM), SIDE)
+        estimator: Estimator::Auto,
+        ..at(BakeSettings::starting_density_per_sr(AIM), SIDE)
     };
     let result = bake(scene.clone(), &settings);
-    let (maps, noise) = stored(scene);
-    let pairs = pair_maps(&result.maps, &maps).expect("maps of one size");
-    let rmse = Agreement::of(&pairs).expect("light").relative_rmse;
-    let error = (rmse * rmse - noise * noise).max(0.0).sqrt();
+    let error = distance(scene, &result.maps);
     let estimate = result.estimated_relative_rmse.expect("an estimate");
     assert!(error <= AIM, "{}: {error}", scene.name);
     assert!(
