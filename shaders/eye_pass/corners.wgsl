@@ -27,9 +27,11 @@ struct SurfacePoint {
     map_density: f32,
 }
 
-fn corner_normal(corner: u32) -> vec3f {
+// Unit.
+fn corner_normal(corner: u32, object: ObjectRecord) -> vec3f {
     let second = corners[2u * corner + 1u];
-    return vec3f(corners[2u * corner].w, second.x, second.y);
+    let normal = vec3f(corners[2u * corner].w, second.x, second.y);
+    return normal_in_scene(normal, object.row_x.xyz, object.row_y.xyz, object.row_z.xyz);
 }
 
 fn area_ratio(a: vec2f, b: vec2f, c: vec2f, twice_area: f32) -> f32 {
@@ -45,7 +47,7 @@ fn bend(from_place: vec3f, to_place: vec3f, from_normal: vec3f, to_normal: vec3f
 }
 
 fn surface_point(hit: Hit) -> SurfacePoint {
-    let triangle = triangles[hit.triangle];
+    let triangle = met(hit);
     let weight = hit.barycentric;
     let first = corner_indices[triangle.first_index];
     let second = corner_indices[triangle.first_index + 1u];
@@ -55,9 +57,10 @@ fn surface_point(hit: Hit) -> SurfacePoint {
     let terms_c = triangle.c * weight.z;
     let across = cross(triangle.b - triangle.a, triangle.c - triangle.a);
     let twice_area = length(across);
-    let normal_a = corner_normal(first);
-    let normal_b = corner_normal(second);
-    let normal_c = corner_normal(third);
+    let object = objects[triangle.object];
+    let normal_a = corner_normal(first, object);
+    let normal_b = corner_normal(second, object);
+    let normal_c = corner_normal(third, object);
     let mixed = normal_a * weight.x + normal_b * weight.y + normal_c * weight.z;
     var point: SurfacePoint;
     point.place = terms_a + terms_b + terms_c;
@@ -74,7 +77,7 @@ fn surface_point(hit: Hit) -> SurfacePoint {
     let uv_c = corners[2u * third + 1u].zw;
     point.uv = uv_a * weight.x + uv_b * weight.y + uv_c * weight.z;
     if HAS_BUMPS {
-        let record = objects[triangle.object].bumps;
+        let record = object.bumps;
         if record != NO_IMAGE {
             let place_m = frame.camera_position + (point.place - start.eye) * start.unit_m;
             let steps = array(triangle.b - triangle.a, triangle.c - triangle.a);

@@ -14,7 +14,7 @@ use super::{Ray, triangle::ShearedRay};
 
 /// Boxes are widened by this share of the scene's size, so that no rounding of the single-precision box test can lose
 /// a hit: origin, direction and slab distances err by at most some 2⁻²⁰ of the size.
-const BOX_MARGIN: f32 = 1.0 / (1 << 19) as f32;
+pub const BOX_MARGIN: f32 = 1.0 / (1 << 19) as f32;
 
 /// Leaves hold what is tested at once.
 const BUILD: BvhBuildParams = BvhBuildParams {
@@ -52,12 +52,13 @@ pub struct TriangleBvh {
     frame: Frame,
 }
 
-/// Single-precision coordinates for what lies within a sphere.
-#[derive(Clone, Copy, Debug)]
-struct Frame {
-    centre: DVec3,
-    /// Single-precision units per metre.
-    scale: f64,
+/// Single-precision coordinates for what lies within a sphere: (place − `centre`) · `scale`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Frame {
+    /// [m]
+    pub centre: DVec3,
+    /// Single-precision units per metre, a power of two: the sphere's radius is between 1/2 and 1.
+    pub scale: f64,
     radius_m: f64,
 }
 
@@ -168,28 +169,31 @@ impl TriangleBvh {
         })
     }
 
-    /// The hierarchy for devices.
-    pub fn packed(&self) -> PackedBvh {
-        let has_triangles = !self.corners.is_empty();
-        let nodes: Vec<PackedNode> = self.bvh.nodes[..if has_triangles { self.bvh.nodes.len() } else { 0 }]
-            .iter()
-            .map(|node| PackedNode {
-                low: node.aabb().min.to_array(),
-                first: node.first_index,
-                high: node.aabb().max.to_array(),
-                count: node.prim_count,
-            })
-            .collect();
-        let Frame { centre, scale, .. } = self.frame;
-        let local = |corner: DVec3| to_single(self.frame.local(corner)).to_array();
+    /// The hierarchy for devices, in its own coordinates or in those of something larger around it.
+    pub fn packed(&self, frame: &Frame) -> PackedBvh {
+        let local = |place: DVec3| to_single(frame.local(place));
+        let mut nodes = packed::nodes(&self.bvh);
+        if *frame != self.frame {
+            for node in &mut nodes {
+                let moved = |place: [f32; 3]| local(self.frame.place(Vec3A::from_array(place)));
+                node.low = (moved(node.low) - BOX_MARGIN).to_array();
+                node.high = (moved(node.high) + BOX_MARGIN).to_array();
+            }
+        }
+        let corners = self.corners.iter();
         PackedBvh {
-            corners: self.corners.iter().map(|corners| corners.map(local)).collect(),
+            corners: corners
+                .map(|corners| corners.map(|corner| local(corner).to_array()))
+                .collect(),
             triangles: self.bvh.primitive_indices.clone(),
-            centre,
-            scale,
             depth: packed::depth(&nodes),
             nodes,
         }
+    }
+
+    /// Its own single-precision coordinates.
+    pub fn frame(&self) -> &Frame {
+        &self.frame
     }
 
     /// The triangle in a slot, by its index in the order that they were given.
@@ -210,7 +214,7 @@ impl TriangleBvh {
 
 impl Frame {
     /// Around points; of some size where there are none.
-    fn around<'a>(points: impl Iterator<Item = &'a DVec3>) -> Self {
+    pub fn around<'a>(points: impl Iterator<Item = &'a DVec3>) -> Self {
         let mut points = points.peekable();
         let is_empty = points.peek().is_none();
         let (low, high) = points.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), point| {
@@ -229,8 +233,15 @@ impl Frame {
         }
     }
 
-    fn local(&self, point: DVec3) -> DVec3 {
+    /// A place [m] in its coordinates.
+    pub fn local(&self, point: DVec3) -> DVec3 {
         (point - self.centre) * self.scale
+    }
+
+    /// And back [m].
+    fn place(&self, local: Vec3A) -> DVec3 {
+        // Exact but for the sum: the scale is a power of two.
+        self.centre + local.as_dvec3() * (1.0 / self.scale)
     }
 
     fn aabb<const N: usize>(&self, points: &[DVec3; N]) -> Aabb {
@@ -275,8 +286,7 @@ impl Frame {
 
 /// A bounding volume hierarchy over boxes.
 pub struct BoxBvh {
-    /// Which box lies in each slot.
-    boxes: Vec<u32>,
+    bvh: Bvh2,
     wide: WideBvh,
     frame: Frame,
 }
@@ -284,7 +294,7 @@ pub struct BoxBvh {
 impl std::fmt::Debug for BoxBvh {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("BoxBvh")
-            .field("boxes", &self.boxes.len())
+            .field("boxes", &self.bvh.primitive_indices.len())
             .finish_non_exhaustive()
     }
 }
@@ -292,26 +302,40 @@ impl std::fmt::Debug for BoxBvh {
 impl BoxBvh {
     /// Builds the hierarchy over boxes by their minimum and maximum corners [m].
     pub fn build(boxes: &[[DVec3; 2]]) -> Self {
+        Self::within(boxes, Frame::around(boxes.iter().flatten()))
+    }
+
+    /// In the coordinates of something larger around them.
+    pub fn within(boxes: &[[DVec3; 2]], frame: Frame) -> Self {
         const BUILD_BOXES: BvhBuildParams = BvhBuildParams {
             max_prims_per_leaf: 1,
             ..BUILD
         };
-        let frame = Frame::around(boxes.iter().flatten());
         let aabbs: Vec<Aabb> = boxes.iter().map(|corners| frame.aabb(corners)).collect();
         let mut build_time = std::time::Duration::ZERO;
         let bvh = build_bvh2(&aabbs, BUILD_BOXES, &mut build_time);
         Self {
             // A triangle without area is never clearly missed: its box decides.
             wide: WideBvh::new(&bvh, &vec![[DVec3::ZERO; 3]; boxes.len()]),
-            boxes: bvh.primitive_indices,
+            bvh,
             frame,
         }
     }
 
+    /// The nodes for devices; a leaf's `first` is a box.
+    pub fn packed(&self) -> Vec<PackedNode> {
+        let mut nodes = packed::nodes(&self.bvh);
+        for leaf in nodes.iter_mut().filter(|node| node.count > 0) {
+            leaf.first = self.bvh.primitive_indices[leaf.first as usize];
+        }
+        nodes
+    }
+
     /// Hands out all boxes that a ray may meet before `end_m`, as [`TriangleBvh::search`] does triangles.
     pub fn search(&self, ray: &Ray, end_m: f64, mut meet: impl FnMut(u32) -> Option<f64>) {
-        self.frame
-            .search(&self.wide, ray, end_m, |slot| meet(self.boxes[slot as usize]));
+        self.frame.search(&self.wide, ray, end_m, |slot| {
+            meet(self.bvh.primitive_indices[slot as usize])
+        });
     }
 }
 
@@ -326,11 +350,8 @@ impl<'a> Node<'a> {
     /// A box around all triangles of the node, a little too large, as minimum and maximum corner [m].
     pub fn bounds(&self) -> (DVec3, DVec3) {
         let aabb = self.hierarchy.bvh.nodes[self.index].aabb();
-        // Exact: the scale is a power of two.
-        let Frame { centre, scale, .. } = self.hierarchy.frame;
-        let unit_m = 1.0 / scale;
-        let metres = |local: Vec3A| centre + local.as_dvec3() * unit_m;
-        (metres(aabb.min), metres(aabb.max))
+        let frame = &self.hierarchy.frame;
+        (frame.place(aabb.min), frame.place(aabb.max))
     }
 
     /// The two nodes that share out its triangles; `None` for a leaf.

@@ -1,8 +1,6 @@
 //! A hierarchy in single precision, as devices traverse it.
 
-use glam::DVec3;
-
-use super::TriangleBvh;
+use obvhs::bvh2::Bvh2;
 
 /// A node: its box and what is in it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,33 +15,40 @@ pub struct PackedNode {
     pub count: u32,
 }
 
-/// Nodes and triangles in local coordinates: relative to a centre and scaled to a radius of at most one, where the
-/// boxes' margin covers all rounding of single precision.
+/// Nodes and triangles in the coordinates of a [`Frame`](super::bvh::Frame), where the boxes' margin covers all rounding
+/// of single precision.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PackedBvh {
     /// The root comes first; none without triangles.
     pub nodes: Vec<PackedNode>,
     /// Corners of the triangle in each slot, local.
     pub corners: Vec<[[f32; 3]; 3]>,
-    /// Which triangle lies in each slot: its place in the order that they were given to [`TriangleBvh::build`].
+    /// Which triangle lies in each slot: its place in the order that they were given to
+    /// [`TriangleBvh::build`](super::TriangleBvh::build).
     pub triangles: Vec<u32>,
-    /// Local coordinates are (place − `centre`) · `scale` [m].
-    pub centre: DVec3,
-    /// Local units per metre, a power of two.
-    pub scale: f64,
     /// Largest number of nodes above a node.
     pub depth: usize,
 }
 
-impl PackedBvh {
-    /// The hierarchy over triangles with these corners [m], which must be finite.
-    pub fn build(triangles: &[[DVec3; 3]]) -> Self {
-        TriangleBvh::build(triangles).packed()
-    }
+/// The nodes of a hierarchy; none where it is over nothing.
+pub(super) fn nodes(bvh: &Bvh2) -> Vec<PackedNode> {
+    let count = match bvh.primitive_indices.len() {
+        0 => 0,
+        _ => bvh.nodes.len(),
+    };
+    let nodes = bvh.nodes[..count].iter();
+    nodes
+        .map(|node| PackedNode {
+            low: node.aabb().min.to_array(),
+            first: node.first_index,
+            high: node.aabb().max.to_array(),
+            count: node.prim_count,
+        })
+        .collect()
 }
 
 /// Nodes above the deepest node.
-pub(super) fn depth(nodes: &[PackedNode]) -> usize {
+pub fn depth(nodes: &[PackedNode]) -> usize {
     let mut deepest = 0;
     let mut waiting: Vec<(usize, usize)> = nodes.first().map(|_| (0, 0)).into_iter().collect();
     while let Some((index, above)) = waiting.pop() {

@@ -34,17 +34,11 @@ pub fn find(objects: &[Object], most_copied: usize) -> Vec<bool> {
         let triangles = object.mesh().triangles.len();
         uses > 1 && triangles >= LEAST_SHARED && uses.saturating_mul(triangles) > most_copied
     };
-    // Boxes of those that can be shared: normals of others come from all the triangles around a vertex.
     let mut boxes: HashMap<*const Mesh, Option<(DVec3, DVec3)>> = HashMap::new();
     let mut is_instance = |object: &Object| {
         let mesh = object.mesh();
-        let has_normals = || {
-            mesh.normals
-                .iter()
-                .all(|normal| (1e-6..1e6).contains(&normal.length()))
-        };
         let bounds = boxes.entry(Arc::as_ptr(mesh));
-        let bounds = *bounds.or_insert_with(|| mesh.bounds().filter(|_| has_normals()));
+        let bounds = *bounds.or_insert_with(|| shared_box(mesh));
         bounds.is_some_and(|bounds| is_sound(object.world_from_object(), bounds))
     };
     let objects = objects.iter();
@@ -53,8 +47,20 @@ pub fn find(objects: &[Object], most_copied: usize) -> Vec<bool> {
         .collect()
 }
 
+/// Whether an object loses nothing as an instance.
+pub fn is_possible(object: &Object) -> bool {
+    shared_box(object.mesh()).is_some_and(|bounds| is_sound(object.world_from_object(), bounds))
+}
+
+/// Box [m] of a mesh that instances can share. Normals of others come from all the triangles around a vertex.
+pub fn shared_box(mesh: &Mesh) -> Option<(DVec3, DVec3)> {
+    let is_sound = |normal: &DVec3| (1e-6..1e6).contains(&normal.length());
+    let is_shared = !mesh.triangles.is_empty() && mesh.normals.iter().all(is_sound);
+    mesh.bounds().filter(|_| is_shared)
+}
+
 /// Whether rays can be brought into the coordinates of a mesh with these bounds without loss.
-fn is_sound(transform: &DAffine3, (low, high): (DVec3, DVec3)) -> bool {
+pub fn is_sound(transform: &DAffine3, (low, high): (DVec3, DVec3)) -> bool {
     let inverse = transform.inverse();
     let size = |linear: DMat3| {
         linear

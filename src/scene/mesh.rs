@@ -198,6 +198,7 @@ impl<'a> InScene<'a> {
     }
 
     /// Vertex indices of a triangle.
+    #[inline]
     pub fn triangle(&self, triangle: usize) -> [u32; 3] {
         let vertices = self.mesh.triangles[triangle];
         self.placement
@@ -231,14 +232,31 @@ impl<'a> InScene<'a> {
     }
 
     /// Corner positions of a triangle [m].
+    #[inline]
     pub fn corners(&self, triangle: usize) -> [DVec3; 3] {
-        let corners = self.mesh.corners(triangle);
-        self.placement
-            .map_or(corners, |placement| placement.corners(&corners))
+        match self.placement {
+            None => self.mesh.corners(triangle),
+            Some(placement) => self.placed_corners(placement, triangle),
+        }
     }
 
     /// Unit normals of a triangle's vertices.
+    #[inline]
     pub fn corner_normals(&self, triangle: usize) -> [DVec3; 3] {
+        match self.placement {
+            None => self.mesh.corner_normals(triangle),
+            Some(_) => self.placed_normals(triangle),
+        }
+    }
+
+    // Out of the way of the loops over meshes that nothing places.
+    #[inline(never)]
+    fn placed_corners(&self, placement: &Placement, triangle: usize) -> [DVec3; 3] {
+        placement.corners(&self.mesh.corners(triangle))
+    }
+
+    #[inline(never)]
+    fn placed_normals(&self, triangle: usize) -> [DVec3; 3] {
         self.triangle(triangle).map(|vertex| self.normal(vertex as usize))
     }
 

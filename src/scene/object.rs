@@ -169,16 +169,15 @@ impl Object {
     }
 
     /// The same, triangle by triangle: by the copy where there is one.
+    #[inline]
     pub fn in_scene(&self) -> InScene<'_> {
-        let Shape {
-            mesh,
-            placement,
-            found,
-            ..
-        } = &self.shape;
-        match (placement, found.mesh.get()) {
-            (Some(placement), None) => InScene::new(mesh, placement),
-            (_, kept) => InScene::from(&**kept.unwrap_or(mesh)),
+        let mesh = &*self.shape.mesh;
+        let Some(placement) = &self.shape.placement else {
+            return InScene::from(mesh);
+        };
+        match self.shape.found.mesh.get() {
+            Some(kept) => InScene::from(&**kept),
+            None => InScene::new(mesh, placement),
         }
     }
 

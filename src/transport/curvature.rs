@@ -58,12 +58,15 @@ impl TrianglesAround {
         &self.triangles[begin as usize..self.ends[vertex] as usize]
     }
 
-    fn operator(&self, mesh: InScene, vertex: usize) -> ShapeOperator {
-        let mut sum = Average::EMPTY;
-        for &triangle in self.at(vertex) {
-            sum.add(of_triangle(mesh, triangle as usize));
-        }
-        sum.operator()
+    #[inline(never)]
+    fn operators(&self, mesh: InScene, vertices: [usize; 3]) -> [ShapeOperator; 3] {
+        vertices.map(|vertex| {
+            let mut sum = Average::EMPTY;
+            for &triangle in self.at(vertex) {
+                sum.add(of_triangle(mesh, triangle as usize));
+            }
+            sum.operator()
+        })
     }
 }
 
@@ -111,13 +114,14 @@ impl NormalField {
 
     /// The normal's change [1] for a step along the surface [m] at a point of a triangle.
     pub fn turn(&self, mesh: InScene, triangle: usize, barycentric: [f64; 3], step: DVec3) -> DVec3 {
-        let apply = |vertex: usize| match self {
-            Self::Known(vertices) => vertices[vertex].apply(step),
-            Self::Found(around) => around.operator(mesh, vertex).apply(step),
+        let corners = mesh.triangle(triangle).map(|vertex| vertex as usize);
+        let operators = match self {
+            Self::Known(vertices) => corners.map(|vertex| vertices[vertex]),
+            Self::Found(around) => around.operators(mesh, corners),
         };
-        let vertices = mesh.triangle(triangle).into_iter().zip(barycentric);
-        vertices
-            .map(|(vertex, weight)| apply(vertex as usize) * weight)
+        let weighted = operators.iter().zip(barycentric);
+        weighted
+            .map(|(operator, weight)| operator.apply(step) * weight)
             .sum()
     }
 }

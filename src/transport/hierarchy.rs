@@ -1,5 +1,6 @@
 //! What finds the triangles of a scene: one hierarchy over those of most objects, and for each mesh with many instances one
-//! in its own coordinates, below a hierarchy over these objects.
+//! in its own coordinates, below a hierarchy over these objects. An object that is moved becomes an instance: no hierarchy
+//! of triangles is built again for it.
 //!
 //! An instance's triangles are found by the mesh's hierarchy and met as placed in the scene, so that every hit is the one
 //! that a copy of the mesh would give, to the last bit.
@@ -12,8 +13,9 @@ use glam::{DAffine3, DVec3};
 use super::curvature::TrianglesAround;
 use super::smoothing::smoothing_groups;
 use super::tracer::HitPlace;
+use crate::geometry::bvh::{self, Frame};
 use crate::geometry::triangle::ShearedRay;
-use crate::geometry::{BoxBvh, PackedBvh, Ray, TriangleBvh, bvh};
+use crate::geometry::{BoxBvh, Ray, TriangleBvh};
 use crate::scene::mesh::Placement;
 use crate::scene::{Mesh, Object, Scene, instances};
 
@@ -24,27 +26,31 @@ const FAR_RADII: f64 = 4.0;
 /// The hierarchies of a scene.
 #[derive(Debug)]
 pub(super) struct Hierarchy {
-    copied: Arc<Copied>,
-    instances: Vec<Instance>,
+    pub(super) copied: Arc<Copied>,
+    /// Of each object, whether it was moved away from its copy, which is passed over then; empty where none was.
+    pub(super) moved: Vec<bool>,
+    pub(super) instances: Vec<Instance>,
     /// Over the instances' boxes.
     above: BoxBvh,
     most_copied: usize,
+    /// Single-precision coordinates of devices.
+    pub(super) frame: Frame,
 }
 
 /// All objects but instances.
 #[derive(Debug)]
-struct Copied {
+pub(super) struct Copied {
     objects: Vec<usize>,
-    bvh: TriangleBvh,
+    pub(super) bvh: TriangleBvh,
     /// Object and triangle within it, by the hierarchy's triangle index.
-    triangles: Vec<(u32, u32)>,
+    pub(super) triangles: Vec<(u32, u32)>,
 }
 
 /// A mesh of many instances.
 #[derive(Debug)]
 pub(super) struct SharedMesh {
     mesh: Arc<Mesh>,
-    bvh: TriangleBvh,
+    pub(super) bvh: TriangleBvh,
     pub(super) around: Arc<TrianglesAround>,
     /// Smoothing group of each triangle.
     pub(super) groups: Arc<Vec<u32>>,
@@ -52,58 +58,86 @@ pub(super) struct SharedMesh {
 
 /// An object whose mesh is not copied.
 #[derive(Debug)]
-struct Instance {
-    object: u32,
-    shared: Arc<SharedMesh>,
-    placement: Option<Placement>,
+pub(super) struct Instance {
+    pub(super) object: u32,
+    pub(super) shared: Arc<SharedMesh>,
+    pub(super) placement: Option<Placement>,
     object_from_world: DAffine3,
-    bounds: (DVec3, DVec3),
+    pub(super) bounds: (DVec3, DVec3),
 }
 
 /// What a ray met, and the corners of that triangle in the scene [m].
 pub(super) type Met = (HitPlace, [DVec3; 3]);
 
 impl Hierarchy {
-    /// Of a scene; `before`: of the same objects at other places. `most_copied`: see [`instances::MOST_COPIED`].
-    pub(super) fn new(scene: &Scene, most_copied: usize, before: Option<(&Self, &Scene)>) -> Self {
+    /// Of a scene. `most_copied`: see [`instances::MOST_COPIED`].
+    pub(super) fn new(scene: &Scene, most_copied: usize) -> Self {
         let is_instance = instances::find(&scene.objects, most_copied);
-        let objects = 0..scene.objects.len();
-        let copied: Vec<usize> = objects.clone().filter(|&object| !is_instance[object]).collect();
-        let stands = |was: &Scene, object: &usize| scene.objects[*object].stands_as(&was.objects[*object]);
-        let known = before.filter(|(known, was)| {
-            known.copied.objects == copied && copied.iter().all(|object| stands(was, object))
-        });
-        let copied = match known {
-            Some((known, _)) => Arc::clone(&known.copied),
-            None => Arc::new(Copied::new(scene, copied)),
+        let copied = Arc::new(Copied::new(scene, &is_instance));
+        let none = Self {
+            frame: *copied.bvh.frame(),
+            copied,
+            moved: Vec::new(),
+            instances: Vec::new(),
+            above: BoxBvh::build(&[]),
+            most_copied,
         };
+        none.with_instances(scene, &is_instance)
+    }
+
+    /// Of the same objects, edited.
+    pub(super) fn edited(&self, was: &Scene, is: &Scene) -> Self {
+        let objects = || was.objects.iter().zip(&is.objects);
+        let can_move = |(was, is): (&Object, &Object)| {
+            was.stands_as(is) || (Arc::ptr_eq(was.mesh(), is.mesh()) && instances::is_possible(is))
+        };
+        if !objects().all(can_move) {
+            return Self::new(is, self.most_copied);
+        }
+        let is_instance = objects()
+            .enumerate()
+            .map(|(object, (was, is))| self.shared(object).is_some() || !was.stands_as(is));
+        let is_instance: Vec<bool> = is_instance.collect();
+        self.with_instances(is, &is_instance)
+    }
+
+    /// With other instances; those that were copied are passed over there.
+    fn with_instances(&self, scene: &Scene, is_instance: &[bool]) -> Self {
         let mut meshes: HashMap<*const Mesh, Arc<SharedMesh>> = HashMap::new();
-        for instance in before.iter().flat_map(|(known, _)| &known.instances) {
+        for instance in &self.instances {
             meshes.insert(Arc::as_ptr(&instance.shared.mesh), Arc::clone(&instance.shared));
         }
+        let objects = (0..scene.objects.len()).filter(|&object| is_instance[object]);
         let instance = |object: usize| {
             let mesh = scene.objects[object].mesh();
             let shared = meshes.entry(Arc::as_ptr(mesh));
             let shared = shared.or_insert_with(|| Arc::new(SharedMesh::new(mesh)));
             Instance::new(object, &scene.objects[object], Arc::clone(shared))
         };
-        let instances: Vec<Instance> = objects
-            .filter(|&object| is_instance[object])
-            .map(instance)
-            .collect();
+        let instances: Vec<Instance> = objects.map(instance).collect();
+        let mut moved = vec![false; scene.objects.len()];
+        for &object in &self.copied.objects {
+            moved[object] = is_instance[object];
+        }
+        if !moved.contains(&true) {
+            moved.clear();
+        }
         let boxes = instances.iter().map(|instance| instance.bounds.into());
-        let boxes: Vec<[DVec3; 2]> = boxes.collect();
+        let bounds = scene.objects.iter().filter_map(Object::bounds);
+        let corners: Vec<DVec3> = bounds.flat_map(|(low, high)| [low, high]).collect();
         Self {
-            copied,
+            copied: Arc::clone(&self.copied),
+            frame: Frame::around(corners.iter()),
+            moved,
+            above: BoxBvh::build(&boxes.collect::<Vec<_>>()),
             instances,
-            above: BoxBvh::build(&boxes),
-            most_copied,
+            most_copied: self.most_copied,
         }
     }
 
-    /// Of the same objects, edited.
-    pub(super) fn edited(&self, was: &Scene, is: &Scene) -> Self {
-        Self::new(is, self.most_copied, Some((self, was)))
+    /// Whether what is met of an object's copy is not there any more.
+    pub(super) fn is_moved(&self, object: u32) -> bool {
+        is_moved(&self.moved, object)
     }
 
     /// The nearest place in front of a ray's origin where something is there; of places at the same distance, that of the
@@ -117,7 +151,7 @@ impl Hierarchy {
         let Copied { bvh, triangles, .. } = &*self.copied;
         let hit = bvh.closest_hit_where(ray, |triangle, barycentric| {
             let (object, triangle) = triangles[triangle as usize];
-            is_there(object as usize, triangle as usize, barycentric)
+            !self.is_moved(object) && is_there(object as usize, triangle as usize, barycentric)
         });
         let met = hit.map(|hit| {
             let (object, triangle) = triangles[hit.triangle as usize];
@@ -136,6 +170,7 @@ impl Hierarchy {
         self.closest_instance(ray, met, is_there)
     }
 
+    #[inline(never)]
     fn closest_instance(
         &self,
         ray: &Ray,
@@ -178,7 +213,7 @@ impl Hierarchy {
         let Copied { bvh, triangles, .. } = &*self.copied;
         let by_copied = bvh.is_blocked_where(ray, distance_m, |triangle, barycentric| {
             let (object, triangle) = triangles[triangle as usize];
-            is_there(object as usize, triangle as usize, barycentric)
+            !self.is_moved(object) && is_there(object as usize, triangle as usize, barycentric)
         });
         if by_copied || self.instances.is_empty() {
             return by_copied;
@@ -210,7 +245,7 @@ impl Hierarchy {
     pub(super) fn roots(&self) -> Vec<SceneNode<'_>> {
         let copied = self.copied.bvh.root().map(|node| SceneNode {
             node,
-            owner: Owner::Copied(&self.copied.triangles),
+            owner: Owner::Copied(&self.copied.triangles, &self.moved),
         });
         let instances = self.instances.iter().filter_map(|instance| {
             Some(SceneNode {
@@ -220,22 +255,17 @@ impl Hierarchy {
         });
         copied.into_iter().chain(instances).collect()
     }
+}
 
-    /// One hierarchy over all triangles, as devices have it; they are counted object by object.
-    pub(super) fn packed(&self, scene: &Scene) -> PackedBvh {
-        if self.instances.is_empty() {
-            return self.copied.bvh.packed();
-        }
-        let corners = scene.objects.iter().flat_map(|object| {
-            let mesh = object.in_scene();
-            (0..mesh.triangle_count()).map(move |triangle| mesh.corners(triangle))
-        });
-        PackedBvh::build(&corners.collect::<Vec<_>>())
-    }
+/// By a list of what was moved, which is empty where nothing was.
+fn is_moved(moved: &[bool], object: u32) -> bool {
+    moved.get(object as usize).is_some_and(|is_moved| *is_moved)
 }
 
 impl Copied {
-    fn new(scene: &Scene, objects: Vec<usize>) -> Self {
+    fn new(scene: &Scene, is_instance: &[bool]) -> Self {
+        let objects = (0..scene.objects.len()).filter(|&object| !is_instance[object]);
+        let objects: Vec<usize> = objects.collect();
         let mut corners = Vec::new();
         let mut triangles = Vec::new();
         for &object in &objects {
@@ -299,7 +329,7 @@ impl Instance {
         });
     }
 
-    fn placed(&self, corners: &[DVec3; 3]) -> [DVec3; 3] {
+    pub(super) fn placed(&self, corners: &[DVec3; 3]) -> [DVec3; 3] {
         match &self.placement {
             Some(placement) => placement.corners(corners),
             None => *corners,
@@ -317,7 +347,8 @@ pub struct SceneNode<'a> {
 /// Whose triangles they are.
 #[derive(Clone, Copy, Debug)]
 enum Owner<'a> {
-    Copied(&'a [(u32, u32)]),
+    /// Object and triangle by index, and which of these objects were moved.
+    Copied(&'a [(u32, u32)], &'a [bool]),
     Instance(&'a Instance),
 }
 
@@ -347,18 +378,29 @@ impl<'a> SceneNode<'a> {
         Some(self.node.children()?.map(|node| Self { node, owner }))
     }
 
+    /// Whether its box may be that of an object which was moved away.
+    pub fn may_be_left(&self) -> bool {
+        matches!(self.owner, Owner::Copied(_, [_, ..]))
+    }
+
     /// Object and corners of each triangle of a leaf; nothing for other nodes.
     pub fn triangles(&self) -> impl Iterator<Item = (usize, [DVec3; 3])> + use<'a> {
         let owner = self.owner;
-        self.node.triangles().map(move |(triangle, corners)| match owner {
-            Owner::Copied(triangles) => (triangles[triangle as usize].0 as usize, *corners),
-            Owner::Instance(instance) => (instance.object as usize, instance.placed(corners)),
-        })
+        self.node
+            .triangles()
+            .filter_map(move |(triangle, corners)| match owner {
+                Owner::Copied(triangles, moved) => {
+                    let (object, _) = triangles[triangle as usize];
+                    (!is_moved(moved, object)).then_some((object as usize, *corners))
+                }
+                Owner::Instance(instance) => Some((instance.object as usize, instance.placed(corners))),
+            })
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeSet;
     use std::sync::Arc;
 
     use glam::{DAffine3, DMat3, DVec3};
@@ -464,10 +506,6 @@ mod tests {
         assert!(hits > 10_000, "{hits}");
     }
 
-    fn hierarchy(scene: &Scene) -> Hierarchy {
-        Hierarchy::new(scene, 0, None)
-    }
-
     #[test]
     fn instances_are_met_as_copies_are() {
         let scene = Arc::new(balls());
@@ -477,20 +515,36 @@ mod tests {
         compare(&copied, &shared);
         let edit = Edit::Place(7, Motion::turned(0.4, DVec3::new(0.3, 0.2, -0.1)));
         let moved = Arc::new(edit.apply(shared.scene()).expect("it can be moved"));
-        compare(&copied.edited(Arc::clone(&moved)), &shared.edited(moved));
+        let fresh = Tracer::sharing(Arc::clone(&moved), usize::MAX);
+        compare(&fresh, &copied.edited(Arc::clone(&moved)));
+        compare(&fresh, &shared.edited(moved));
     }
 
+    /// No hierarchy of triangles is built for a drag, but for one of the mesh of what is copied, when it first moves.
     #[test]
-    fn moving_an_instance_builds_nothing_of_the_others() {
-        let scene = balls();
-        let before = hierarchy(&scene);
-        assert_eq!(before.instances.len(), 24);
-        let mut moved = scene.clone();
-        moved.objects[9].place(DAffine3::from_translation(DVec3::Y));
-        let after = before.edited(&scene, &moved);
-        assert!(Arc::ptr_eq(&before.copied, &after.copied));
-        let meshes = [&before, &after].map(|hierarchy| &hierarchy.instances[0].shared);
-        assert!(Arc::ptr_eq(meshes[0], meshes[1]));
+    fn a_drag_builds_no_hierarchy_of_triangles() {
+        let mut scene = balls();
+        for (most_copied, instances) in [(0, [24, 24, 25, 25, 25]), (usize::MAX, [1, 1, 2, 2, 3])] {
+            let mut before = Hierarchy::new(&scene, most_copied);
+            for (object, instances) in [9, 9, 5, 5, 7].into_iter().zip(instances) {
+                let was = scene.clone();
+                let place = DAffine3::from_translation(DVec3::Y) * *was.objects[object].world_from_object();
+                scene.objects[object].place(place);
+                let after = before.edited(&was, &scene);
+                assert!(Arc::ptr_eq(&before.copied, &after.copied));
+                let meshes = |hierarchy: &Hierarchy| {
+                    let meshes = hierarchy
+                        .instances
+                        .iter()
+                        .map(|instance| Arc::as_ptr(&instance.shared));
+                    meshes.collect::<BTreeSet<_>>()
+                };
+                let (was, is) = (meshes(&before), meshes(&after));
+                assert!(was.is_subset(&is) && is.len() <= 2);
+                assert_eq!(after.instances.len(), instances);
+                before = after;
+            }
+        }
     }
 
     #[test]
@@ -511,10 +565,16 @@ mod tests {
             found.sort_unstable();
             found
         };
-        let all = found(&Hierarchy::new(&scene, usize::MAX, None));
+        let [copied, shared] = [usize::MAX, 0].map(|most| Hierarchy::new(&scene, most));
+        let all = found(&copied);
         assert_eq!(all.len(), scene.triangle_count());
-        assert_eq!(all, found(&hierarchy(&scene)));
-        let [a, b] = [usize::MAX, 0].map(|most| Hierarchy::new(&scene, most, None).packed(&scene));
-        assert_eq!(a.triangles.len(), b.triangles.len());
+        assert_eq!(all, found(&shared));
+        let mut moved = scene.clone();
+        moved.objects[5].place(DAffine3::from_translation(DVec3::Y));
+        let again = found(&Hierarchy::new(&moved, usize::MAX));
+        assert_ne!(all, again);
+        for hierarchy in [copied, shared] {
+            assert_eq!(again, found(&hierarchy.edited(&scene, &moved)));
+        }
     }
 }

@@ -11,7 +11,7 @@ use super::curvature::NormalField;
 use super::hierarchy::{self, Hierarchy, SceneNode};
 use super::normal_texture::{TextureBump, texel_m};
 use super::smoothing::smoothing_groups;
-use crate::geometry::{PackedBvh, Ray, ray};
+use crate::geometry::{Ray, ray};
 use crate::optics::spectrum::Spectrum;
 use crate::optics::{LinearSrgb, Nanometres};
 use crate::scene::{Adjacency, AlphaMask, InScene, Material, Scene, TextureRef, Waves, instances};
@@ -109,7 +109,7 @@ impl Tracer {
 
     /// The same, where copies of one mesh have no more than that many triangles.
     pub(super) fn sharing(scene: Arc<Scene>, most_copied: usize) -> Self {
-        let hierarchy = Arc::new(Hierarchy::new(&scene, most_copied, None));
+        let hierarchy = Arc::new(Hierarchy::new(&scene, most_copied));
         let specular = (0..scene.objects.len())
             .into_par_iter()
             .map(|object| Self::specular_shape(&scene, &hierarchy, object))
@@ -239,15 +239,15 @@ impl Tracer {
         if !scene.material_of(object).surface.is_specular() {
             return None;
         }
-        let (normals, groups) = match hierarchy.shared(object) {
-            Some(shared) => (
-                NormalField::Found(Arc::clone(&shared.around)),
-                Arc::clone(&shared.groups),
-            ),
-            None => {
-                let mesh = scene.objects[object].mesh_in_scene();
-                (NormalField::new(mesh), Arc::new(smoothing_groups(mesh)))
-            }
+        let shared = hierarchy.shared(object);
+        // A copy of what was moved takes no more memory than the one before.
+        let normals = match shared.filter(|_| !hierarchy.is_moved(object as u32)) {
+            Some(shared) => NormalField::Found(Arc::clone(&shared.around)),
+            None => NormalField::new(scene.objects[object].mesh_in_scene()),
+        };
+        let groups = match shared {
+            Some(shared) => Arc::clone(&shared.groups),
+            None => Arc::new(smoothing_groups(scene.objects[object].mesh_in_scene())),
         };
         let mesh = scene.objects[object].in_scene();
         let bending_map = scene.material_of(object).bending_map();
@@ -299,9 +299,8 @@ impl Tracer {
         self.hierarchy.roots()
     }
 
-    /// One hierarchy over all triangles for devices, which are counted object by object. Instances are copied for it.
-    pub fn packed(&self) -> PackedBvh {
-        self.hierarchy.packed(&self.scene)
+    pub(super) fn hierarchy(&self) -> &Hierarchy {
+        &self.hierarchy
     }
 
     /// The nearest surface in front of the ray's origin.

@@ -1,5 +1,5 @@
-//! What chains are traced through: the scene's triangles in their hierarchy, made when something specular first comes
-//! into view.
+//! What chains are traced through: the scene's triangles in hierarchies of their meshes, and where these stand; made when
+//! something specular first comes into view.
 
 use std::sync::Arc;
 
@@ -7,24 +7,28 @@ use glam::DVec3;
 
 use super::bindings::Storage;
 use super::bindings::bind_group;
-use super::geometry::Geometry;
+use super::geometry::{Geometry, Segment, rows};
 use super::objects::absorption_per_m;
-use super::uniforms::{ChainStart, LightRecord, Node, SeenWavelengths, Triangle, rgb};
+use super::uniforms::{ChainStart, Instance, LightRecord, Node, SeenWavelengths, Triangle, rgb};
 use crate::error::{Error, Result};
 use crate::eye_pass::View;
 use crate::eye_pass::reference::ChainLimits;
-use crate::geometry::PackedBvh;
+use crate::geometry::packed;
 use crate::gpu::Gpu;
-use crate::scene::Scene;
 use crate::scene::emitter::{Emitter, EmitterKind};
-use crate::transport::{MediumStack, Tracer, media_at};
+use crate::scene::{Object, Scene};
+use crate::transport::{MediumStack, PackedMesh, Tracer, media_at};
 
 /// Nodes that may wait while a ray is traced; `STACK` in the shader.
 const STACK: usize = 64;
 /// Largest number of a body that a chain can remember.
 const MOST_OBJECTS: usize = u16::MAX as usize - 1;
 /// Storage buffers that a fragment of a chain reads.
-const BUFFERS: u32 = 8;
+const BUFFERS: u32 = 9;
+/// Number of triangles of a leaf that is an instance; the shader's.
+const INSTANCE: u32 = u32::MAX;
+/// Stands for no object in the shader.
+const NO_OBJECT: u32 = u32::MAX;
 /// Surfaces at which both ways on can be followed; `MOST_BRANCHING` in the shader.
 pub(super) const MOST_BRANCHING: u32 = 4;
 
@@ -33,18 +37,24 @@ pub(super) const MOST_BRANCHING: u32 = 4;
 pub(super) struct ChainScene {
     /// In double precision: it tells which bodies the eye is in.
     tracer: Tracer,
-    centre: DVec3,
-    /// Local units per metre.
-    scale: f64,
+    /// Of each object.
+    firsts: Vec<First>,
+    /// Of each mesh: the node around it, and its first triangle.
+    roots: Vec<u32>,
+    starts: Vec<usize>,
+    /// Largest number of nodes above one in a mesh.
+    depth: usize,
+    /// Those over instances first, which are written again when something is moved.
     nodes: Storage,
     triangles: Storage,
+    instances: Storage,
     lights: Storage,
     light_count: u32,
     bytes: u64,
 }
 
 impl ChainScene {
-    /// Builds and uploads the hierarchy; what `before` has of it is not built again.
+    /// Builds and uploads the hierarchies; of what `before` has of them, only what stands elsewhere is uploaded again.
     ///
     /// # Errors
     /// A scene that is larger than what the device lets a shader read.
@@ -54,47 +64,111 @@ impl ChainScene {
         geometry: &Geometry,
         before: Option<Self>,
     ) -> Result<Self> {
-        let tracer = match before {
+        let tracer = match &before {
             Some(before) => before.tracer.edited(Arc::clone(scene)),
             None => Tracer::new(Arc::clone(scene)),
         };
         check(gpu, scene, geometry)?;
-        let packed = tracer.packed();
-        check_hierarchy(gpu, scene, &packed)?;
-        let corners = places_of_corners(scene, geometry);
-        let records = packed.triangles.iter().zip(&packed.corners);
-        let records: Vec<Triangle> = records
-            .map(|(&order, &[a, b, c])| {
-                let (object, first_index) = corners[order as usize];
-                Triangle {
-                    a,
-                    object,
-                    b,
-                    first_index,
-                    c,
-                    order,
-                }
-            })
-            .collect();
-        let nodes = packed.nodes.iter().map(|node| Node {
-            low: node.low,
-            first: node.first,
-            high: node.high,
-            count: node.count,
-        });
-        let nodes: Vec<Node> = nodes.collect();
+        let firsts = firsts(scene, geometry);
+        let known = before.filter(|before| before.firsts == firsts && tracer.has_meshes_of(&before.tracer));
+        let mut made = match known {
+            Some(before) => Self { tracer, ..before },
+            None => Self::with_meshes(gpu, tracer, firsts)?,
+        };
+        made.place(gpu)?;
+        Ok(made)
+    }
+
+    fn with_meshes(gpu: &Gpu, tracer: Tracer, firsts: Vec<First>) -> Result<Self> {
+        // As many as there can be over instances.
+        let (_, instances) = tracer.packed_instances();
+        let mut nodes = vec![Node::default(); 2 * instances.len()];
+        let mut triangles: Vec<Triangle> = Vec::new();
+        let (mut roots, mut starts, mut depth) = (Vec::new(), Vec::new(), 0);
+        for mesh in tracer.packed_meshes() {
+            let (first_node, first_triangle) = (nodes.len() as u32, triangles.len() as u32);
+            roots.push(first_node);
+            starts.push(triangles.len());
+            depth = depth.max(mesh.bvh.depth);
+            nodes.extend(mesh.bvh.nodes.iter().map(|node| Node {
+                low: node.low,
+                first: node.first
+                    + if node.count > 0 {
+                        first_triangle
+                    } else {
+                        first_node
+                    },
+                high: node.high,
+                count: node.count,
+            }));
+            triangles.extend(records(&mesh, &firsts));
+        }
+        let scene = tracer.scene();
+        for bytes in [
+            size_of_val(nodes.as_slice()),
+            size_of_val(triangles.as_slice()),
+            instances.len() * size_of::<Instance>(),
+        ] {
+            check_bytes(gpu, scene, bytes)?;
+        }
         let mut made = Self {
-            tracer,
-            centre: packed.centre,
-            scale: packed.scale,
+            firsts,
+            roots,
+            starts,
+            depth,
             nodes: Storage::new(gpu, "nodes"),
             triangles: Storage::new(gpu, "triangles"),
+            instances: Storage::new(gpu, "instances"),
             lights: Storage::new(gpu, "lights"),
             light_count: 0,
             bytes: 0,
+            tracer,
         };
-        made.bytes = (made.nodes.write(gpu, &nodes) + made.triangles.write(gpu, &records)) as u64;
+        made.bytes = (made.nodes.write(gpu, &nodes) + made.triangles.write(gpu, &triangles)) as u64;
         Ok(made)
+    }
+
+    /// Says where the meshes stand.
+    ///
+    /// # Errors
+    /// A hierarchy that is too deep.
+    fn place(&mut self, gpu: &Gpu) -> Result<()> {
+        let (above, instances) = self.tracer.packed_instances();
+        check_depth(self.tracer.scene(), packed::depth(&above) + self.depth)?;
+        let nodes: Vec<Node> = above
+            .iter()
+            .map(|node| Node {
+                low: node.low,
+                first: node.first,
+                high: node.high,
+                count: if node.count > 0 { INSTANCE } else { 0 },
+            })
+            .collect();
+        self.nodes.write_at(gpu, 0, &nodes);
+        let moved = self.tracer.moved_meshes();
+        let starts = &self.starts[self.starts.len() - moved.len()..];
+        for (mesh, &start) in moved.iter().zip(starts) {
+            let records: Vec<Triangle> = records(mesh, &self.firsts).collect();
+            self.triangles.write_at(gpu, start, &records);
+        }
+        let records = instances.iter().map(|instance| {
+            let object = instance.object.map(|object| object as usize);
+            let first = object.map_or(First::default(), |object| self.firsts[object]);
+            Instance {
+                from_mesh: rows(&instance.from_mesh),
+                to_nodes: rows(&instance.to_nodes),
+                root: self.roots[instance.mesh],
+                object: instance.object.unwrap_or(NO_OBJECT),
+                first_index: first.index,
+                first_order: first.order,
+                margin: instance.margin,
+                is_mirrored: u32::from(instance.from_mesh.matrix3.determinant() < 0.0),
+                ..Default::default()
+            }
+        });
+        let records: Vec<Instance> = records.collect();
+        self.instances.write(gpu, &records);
+        Ok(())
     }
 
     /// What it takes on the device [bytes].
@@ -104,17 +178,19 @@ impl ChainScene {
 
     /// A place [m] in local coordinates.
     pub(super) fn local(&self, place: DVec3) -> [f32; 3] {
-        ((place - self.centre) * self.scale).as_vec3().to_array()
+        self.tracer.frame().local(place).as_vec3().to_array()
     }
 
     /// Length of a local unit [m].
     pub(super) fn unit_m(&self) -> f64 {
-        1.0 / self.scale
+        1.0 / self.tracer.frame().scale
     }
 
-    /// Nodes and triangles.
-    pub(super) fn bindings(&self) -> [wgpu::BindingResource<'_>; 2] {
-        [self.nodes.binding(), self.triangles.binding()]
+    /// Nodes, triangles and instances, by their number.
+    pub(super) fn bindings(&self) -> [(u32, wgpu::BindingResource<'_>); 3] {
+        let bindings = [&self.nodes, &self.triangles, &self.instances].map(Storage::binding);
+        let [nodes, triangles, instances] = bindings;
+        [(1, nodes), (2, triangles), (8, instances)]
     }
 
     /// Group 1 of what traces; `None` without triangles.
@@ -139,6 +215,7 @@ impl ChainScene {
             page.indices.as_entire_binding(),
             self.lights.binding(),
             wavelengths.as_entire_binding(),
+            self.instances.binding(),
         ];
         Some(bind_group(gpu, "chains", layout, resources))
     }
@@ -208,7 +285,7 @@ impl ChainScene {
             eye: self.local(eye),
             unit_m: self.unit_m() as f32,
             media: numbers(&media_at(&self.tracer, eye)),
-            near: (view.camera.near_m * self.scale) as f32,
+            near: (view.camera.near_m / self.unit_m()) as f32,
             branch_threshold: limits.branch_threshold as f32,
             max_depth: limits.max_depth,
             branching_depth: limits.branching_depth.min(MOST_BRANCHING),
@@ -218,16 +295,44 @@ impl ChainScene {
     }
 }
 
-/// Object and place of the three corner indices of each triangle, object by object.
-fn places_of_corners(scene: &Scene, geometry: &Geometry) -> Vec<(u32, u32)> {
-    let mut places = Vec::with_capacity(scene.triangle_count());
-    for (object, segments) in (0..).zip(&geometry.segments) {
-        for segment in segments {
-            let firsts = segment.indices.clone().step_by(3);
-            places.extend(firsts.map(|first| (object, first)));
+/// What the numbers of an object's first triangle are.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct First {
+    /// Place of the indices of its corners.
+    index: u32,
+    /// Among all triangles of the scene.
+    order: u32,
+}
+
+/// Of each object, all of whose triangles are in one page.
+fn firsts(scene: &Scene, geometry: &Geometry) -> Vec<First> {
+    let mut order = 0;
+    let objects = scene.objects.iter().zip(&geometry.segments);
+    let first = |(object, segments): (&Object, &Vec<Segment>)| {
+        let first = First {
+            index: segments.first().map_or(0, |segment| segment.indices.start),
+            order,
+        };
+        order += object.mesh().triangles.len() as u32;
+        first
+    };
+    objects.map(first).collect()
+}
+
+/// Triangles of a mesh, slot by slot.
+fn records(mesh: &PackedMesh, firsts: &[First]) -> impl Iterator<Item = Triangle> {
+    let slots = mesh.owners.iter().zip(&mesh.bvh.corners);
+    slots.map(move |(&(object, triangle), &[a, b, c])| {
+        let first = object.map_or(First::default(), |object| firsts[object as usize]);
+        Triangle {
+            a,
+            object: object.unwrap_or(NO_OBJECT),
+            b,
+            first_index: first.index + 3 * triangle,
+            c,
+            order: first.order + triangle,
         }
-    }
-    places
+    })
 }
 
 /// Bodies as `medium.wgsl` has them: innermost first, 16 bits each, object index + 1.
@@ -240,7 +345,7 @@ fn numbers(media: &MediumStack) -> [u32; 4] {
 }
 
 /// # Errors
-/// A scene that chains cannot be traced through on this device, by what is known before its instances are copied.
+/// A scene that chains cannot be traced through on this device, by what is known of it at once.
 fn check(gpu: &Gpu, scene: &Scene, geometry: &Geometry) -> Result<()> {
     let limits = gpu.limits();
     if limits.max_storage_buffers_per_shader_stage < BUFFERS {
@@ -255,7 +360,9 @@ fn check(gpu: &Gpu, scene: &Scene, geometry: &Geometry) -> Result<()> {
     if geometry.pages.len() > 1 {
         return Err(too_many_triangles(gpu, scene));
     }
-    check_bytes(gpu, scene, scene.triangle_count() * size_of::<Triangle>())?;
+    if u32::try_from(scene.triangle_count()).is_err() {
+        return Err(too_many_triangles(gpu, scene));
+    }
     if scene.objects.len() > MOST_OBJECTS {
         return Err(refused(
             scene,
@@ -269,16 +376,12 @@ fn check(gpu: &Gpu, scene: &Scene, geometry: &Geometry) -> Result<()> {
 }
 
 /// # Errors
-/// A hierarchy that chains cannot be traced through on this device.
-fn check_hierarchy(gpu: &Gpu, scene: &Scene, packed: &PackedBvh) -> Result<()> {
-    check_bytes(gpu, scene, packed.nodes.len() * size_of::<Node>())?;
-    if packed.depth >= STACK {
+/// A hierarchy that chains cannot be traced through.
+fn check_depth(scene: &Scene, depth: usize) -> Result<()> {
+    if depth >= STACK {
         return Err(refused(
             scene,
-            format!(
-                "the hierarchy of its triangles is {} levels deep, and chains go through {STACK}",
-                packed.depth
-            ),
+            format!("the hierarchy of its triangles is {depth} levels deep, and chains go through {STACK}"),
         ));
     }
     Ok(())

@@ -1,23 +1,26 @@
-//! The scene's triangles on the device: few large vertex buffers, each below the device's limit.
+//! The scene's triangles on the device: few large vertex buffers, each below the device's limit. They have the coordinates
+//! of their meshes; each object's record says where it stands.
 
+use std::collections::HashMap;
 use std::ops::Range;
 use std::sync::Arc;
 
 use bytemuck::{Pod, Zeroable};
-use glam::DVec2;
+use glam::{DAffine3, DVec2, DVec3};
 
 use super::paging::Uploaded;
+use super::uniforms::ObjectRecord;
 use crate::gpu::Gpu;
 use crate::illumination::Chart;
-use crate::scene::{Mesh, Object, Scene, TextureRef};
+use crate::scene::{Material, Mesh, Object, Scene, TextureRef, instances};
 
 /// A corner of a triangle. Surfaces with a map share none between triangles, since maps may cut them anywhere.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub(super) struct Corner {
-    /// Scene coordinates [m].
+    /// In coordinates of the mesh [m].
     position: [f32; 3],
-    /// Unit.
+    /// In these too, of any length.
     normal: [f32; 3],
     /// Of the material's images, KHR_texture_transform applied.
     uv: [f32; 2],
@@ -26,7 +29,7 @@ pub(super) struct Corner {
 /// Map coordinates of a corner: they change with the maps.
 type MapUv = [f32; 2];
 
-/// The two vertex buffers of the surface pipelines.
+/// The vertex buffers of the surface pipelines.
 pub(super) const CORNER_LAYOUT: wgpu::VertexBufferLayout<'static> = wgpu::VertexBufferLayout {
     array_stride: size_of::<Corner>() as u64,
     step_mode: wgpu::VertexStepMode::Vertex,
@@ -50,6 +53,29 @@ pub(super) const MAP_UV_LAYOUT: wgpu::VertexBufferLayout<'static> = wgpu::Vertex
     attributes: &[attribute(3, 0, wgpu::VertexFormat::Float32x2)],
 };
 
+/// The objects' records: where each stands.
+pub(super) const OBJECT_LAYOUT: wgpu::VertexBufferLayout<'static> = wgpu::VertexBufferLayout {
+    array_stride: size_of::<ObjectRecord>() as u64,
+    step_mode: wgpu::VertexStepMode::Instance,
+    attributes: &[
+        attribute(
+            4,
+            std::mem::offset_of!(ObjectRecord, row_x),
+            wgpu::VertexFormat::Float32x4,
+        ),
+        attribute(
+            5,
+            std::mem::offset_of!(ObjectRecord, row_y),
+            wgpu::VertexFormat::Float32x4,
+        ),
+        attribute(
+            6,
+            std::mem::offset_of!(ObjectRecord, row_z),
+            wgpu::VertexFormat::Float32x4,
+        ),
+    ],
+};
+
 const fn attribute(shader_location: u32, offset: usize, format: wgpu::VertexFormat) -> wgpu::VertexAttribute {
     wgpu::VertexAttribute {
         format,
@@ -61,8 +87,11 @@ const fn attribute(shader_location: u32, offset: usize, format: wgpu::VertexForm
 /// Largest buffer [bytes]: one allocation that drivers serve. Chains need all of a scene in one page.
 const PAGE_BYTES: u64 = 1 << 30;
 
+/// Meshes that lie farther from the origin of their coordinates are drawn as copies [diagonals of their boxes].
+const MOST_OFF_CENTRE: f64 = 64.0;
+
 /// Part of an object within one page.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) struct Segment {
     /// Which page.
     pub(super) page: usize,
@@ -90,8 +119,9 @@ pub(super) struct Geometry {
     pub(super) pages: Vec<Page>,
     /// One list per object of the scene.
     pub(super) segments: Vec<Vec<Segment>>,
-    /// What the corners show, object by object.
+    /// The objects, and what is drawn of them.
     shown: Vec<Object>,
+    drawn: Vec<Drawn>,
     /// Where the map coordinates come from, object by object.
     pub(super) charts: Vec<Option<Arc<Chart>>>,
 }
@@ -109,31 +139,43 @@ impl Geometry {
             pages: Vec::new(),
             corners: Vec::new(),
             indices: Vec::new(),
+            shared: HashMap::new(),
         };
-        let segments = scene
-            .objects
-            .iter()
-            .map(|object| packing.add(scene, object))
+        let mut boxes = HashMap::new();
+        let objects = scene.objects.iter();
+        let drawn: Vec<Drawn> = objects.map(|object| Drawn::of(object, &mut boxes)).collect();
+        let numbered = drawn.iter().enumerate();
+        let segments = numbered
+            .map(|(object, drawn)| packing.add(scene.material_of(object), drawn))
             .collect();
         packing.close_page();
         Self {
             pages: packing.pages,
             segments,
             shown: scene.objects.clone(),
+            drawn,
             charts: vec![None; scene.objects.len()],
         }
     }
 
-    /// Takes over an edited scene with as many objects. Corners of moved objects are written again; where an object
-    /// needs others than it has, everything is uploaded anew.
+    /// Takes over an edited scene with as many objects. Where an object shows another mesh or needs other corners than
+    /// it has, everything is uploaded anew.
     pub(super) fn set_scene(&mut self, gpu: &Gpu, scene: &Scene) -> Uploaded {
-        let changed = (0..scene.objects.len()).filter(|index| self.is_changed(scene, *index));
-        let changed: Vec<usize> = changed.collect();
-        if changed.iter().all(|index| self.can_hold(scene, *index)) {
-            let bytes = changed.iter().map(|index| self.write_corners(gpu, scene, *index));
-            let bytes = bytes.sum();
+        let mut boxes = HashMap::new();
+        let mut can_stay = true;
+        for (index, object) in scene.objects.iter().enumerate() {
+            let is_receiver = scene.material_of(index).surface.is_receiver();
+            let is_shared = self.segments[index].iter().any(|segment| segment.shares_corners);
+            can_stay &= !(is_shared && is_receiver);
+            if !self.shown[index].stands_as(object) {
+                let drawn = Drawn::of(object, &mut boxes);
+                can_stay &= drawn.has_corners_of(&self.drawn[index]);
+                self.drawn[index] = drawn;
+            }
+        }
+        if can_stay {
             self.shown.clone_from(&scene.objects);
-            return Uploaded::other(bytes);
+            return Uploaded::default();
         }
         let charts = std::mem::take(&mut self.charts);
         *self = Self::new(gpu, scene);
@@ -146,33 +188,9 @@ impl Geometry {
         uploaded
     }
 
-    fn is_changed(&self, scene: &Scene, index: usize) -> bool {
-        !self.shown[index].stands_as(&scene.objects[index]) || !self.can_hold(scene, index)
-    }
-
-    /// Whether an object's corners have the places that it needs: maps may cut a receiver anywhere.
-    fn can_hold(&self, scene: &Scene, index: usize) -> bool {
-        let (old, new) = (&self.shown[index], &scene.objects[index]);
-        let has_same_shape = old.stands_as(new)
-            || (old.mesh().positions.len() == new.mesh().positions.len()
-                && old.in_scene().triangles().eq(new.in_scene().triangles()));
-        let is_shared = self.segments[index].iter().any(|segment| segment.shares_corners);
-        has_same_shape && !(is_shared && scene.material_of(index).surface.is_receiver())
-    }
-
-    fn write_corners(&self, gpu: &Gpu, scene: &Scene, index: usize) -> usize {
-        let object = &scene.objects[index];
-        let image = scene.material_of(index).coordinates();
-        let mut bytes = 0;
-        for segment in &self.segments[index] {
-            let corners = segment.corners(&object.copy_in_scene(), image);
-            let offset = (segment.first_corner * size_of::<Corner>()) as u64;
-            let page = &self.pages[segment.page];
-            gpu.queue
-                .write_buffer(&page.corners, offset, bytemuck::cast_slice(&corners));
-            bytes += size_of_val(corners.as_slice());
-        }
-        bytes
+    /// Rows of the way from an object's corners to the scene.
+    pub(super) fn rows(&self, object: usize) -> [[f32; 4]; 3] {
+        rows(&self.drawn[object].world_from_mesh)
     }
 
     fn bytes(&self) -> usize {
@@ -202,17 +220,85 @@ impl Geometry {
 }
 
 impl Segment {
-    fn corners(&self, mesh: &Mesh, image: Option<&TextureRef>) -> Vec<Corner> {
+    fn corners(&self, drawn: &Drawn, image: Option<&TextureRef>) -> Vec<Corner> {
+        let mesh = &drawn.mesh;
         if self.shares_corners {
             return (0..mesh.positions.len())
                 .map(|vertex| corner(mesh, image, vertex))
                 .collect();
         }
-        let vertices = mesh.triangles[self.triangles.clone()].iter().flatten();
+        let vertices = self
+            .triangles
+            .clone()
+            .flat_map(|triangle| drawn.triangle(triangle));
         vertices
-            .map(|vertex| corner(mesh, image, *vertex as usize))
+            .map(|vertex| corner(mesh, image, vertex as usize))
             .collect()
     }
+}
+
+/// What is drawn of an object: a mesh in its own coordinates, or a copy in those of the scene where the former do not do
+/// in single precision.
+#[derive(Clone, Debug)]
+struct Drawn {
+    mesh: Arc<Mesh>,
+    world_from_mesh: DAffine3,
+}
+
+/// Boxes of meshes that can be drawn in their own coordinates.
+type Boxes = HashMap<*const Mesh, Option<(DVec3, DVec3)>>;
+
+impl Drawn {
+    fn of(object: &Object, boxes: &mut Boxes) -> Self {
+        let (mesh, world_from_mesh) = (object.mesh(), object.world_from_object());
+        let mut suits = || {
+            let bounds = boxes.entry(Arc::as_ptr(mesh));
+            let bounds = *bounds.or_insert_with(|| instances::shared_box(mesh));
+            bounds.is_some_and(|bounds| suits_single(world_from_mesh, bounds))
+        };
+        if object.placement().is_none() || suits() {
+            return Self {
+                mesh: Arc::clone(mesh),
+                world_from_mesh: *world_from_mesh,
+            };
+        }
+        Self {
+            mesh: object.copy_in_scene(),
+            world_from_mesh: DAffine3::IDENTITY,
+        }
+    }
+
+    fn is_mirrored(&self) -> bool {
+        self.world_from_mesh.matrix3.determinant() < 0.0
+    }
+
+    /// Vertices of a triangle, counter-clockwise in the scene.
+    fn triangle(&self, triangle: usize) -> [u32; 3] {
+        let [a, b, c] = self.mesh.triangles[triangle];
+        if self.is_mirrored() { [a, c, b] } else { [a, b, c] }
+    }
+
+    fn has_corners_of(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.mesh, &other.mesh) && self.is_mirrored() == other.is_mirrored()
+    }
+}
+
+/// Whether a mesh within a box loses nothing in single precision on its way into the scene.
+fn suits_single(transform: &DAffine3, (low, high): (DVec3, DVec3)) -> bool {
+    let linear = transform.matrix3;
+    let axes = [linear.x_axis, linear.y_axis, linear.z_axis];
+    let is_moderate = |axis: &DVec3| (1e-6..1e6).contains(&axis.length());
+    low.abs().max(high.abs()).length() <= MOST_OFF_CENTRE * (high - low).length()
+        && axes.iter().all(is_moderate)
+        && instances::is_sound(transform, (low, high))
+}
+
+/// Rows of a transform in single precision.
+pub(super) fn rows(transform: &DAffine3) -> [[f32; 4]; 3] {
+    [0, 1, 2].map(|row| {
+        let row = transform.matrix3.row(row).extend(transform.translation[row]);
+        row.as_vec4().to_array()
+    })
 }
 
 /// Fills page after page.
@@ -222,21 +308,30 @@ struct Packing<'a> {
     pages: Vec<Page>,
     corners: Vec<Corner>,
     indices: Vec<u32>,
+    /// Where meshes are that need no corners for each object, mirrored ones apart, with the images they are for.
+    shared: HashMap<(*const Mesh, bool), Vec<(Option<TextureRef>, Segment)>>,
 }
 
 impl Packing<'_> {
-    /// Where an object ended up. Surfaces without maps share the corners of neighbouring triangles.
-    fn add(&mut self, scene: &Scene, object: &Object) -> Vec<Segment> {
-        let material = &scene.materials[object.material];
+    /// Where an object ended up. Surfaces without maps share the corners of neighbouring triangles, and with all other
+    /// instances of their mesh.
+    fn add(&mut self, material: &Material, drawn: &Drawn) -> Vec<Segment> {
         let image = material.coordinates();
-        let mesh = &*object.copy_in_scene();
+        let mesh = &*drawn.mesh;
         let largest = mesh.positions.len().max(3 * mesh.triangles.len());
         if !material.surface.is_receiver() && largest <= self.page_corners {
+            let key = (Arc::as_ptr(&drawn.mesh), drawn.is_mirrored());
+            let mut known = self.shared.get(&key).into_iter().flatten();
+            if let Some((_, segment)) = known.find(|(of, _)| of.as_ref() == image) {
+                return vec![segment.clone()];
+            }
             let segment = self.segment(largest, 0..mesh.triangles.len(), true);
             let first = self.corners.len() as u32;
-            self.corners.extend(segment.corners(mesh, image));
-            self.indices
-                .extend(mesh.triangles.iter().flatten().map(|vertex| first + vertex));
+            self.corners.extend(segment.corners(drawn, image));
+            let vertices = (0..mesh.triangles.len()).flat_map(|triangle| drawn.triangle(triangle));
+            self.indices.extend(vertices.map(|vertex| first + vertex));
+            let known = self.shared.entry(key).or_default();
+            known.push((image.cloned(), segment.clone()));
             return vec![segment];
         }
         let mut segments = Vec::new();
@@ -248,7 +343,7 @@ impl Packing<'_> {
             triangle = triangles.end;
             let segment = self.segment(3 * triangles.len(), triangles, false);
             let first = self.corners.len() as u32;
-            self.corners.extend(segment.corners(mesh, image));
+            self.corners.extend(segment.corners(drawn, image));
             self.indices.extend(first..self.corners.len() as u32);
             segments.push(segment);
         }

@@ -3,6 +3,7 @@
 use glam::DVec3;
 
 use super::bindings::Storage;
+use super::geometry::Geometry;
 use super::images::{Images, NO_IMAGE};
 use super::maps::ShownMap;
 use super::paging::Uploaded;
@@ -12,7 +13,7 @@ use crate::gpu::Gpu;
 use crate::illumination::false_colours::ColourScale;
 use crate::illumination::{Chart, Receiver};
 use crate::optics::glass::Dispersion;
-use crate::scene::{Material, Mesh, Scene, SurfaceKind};
+use crate::scene::{InScene, Material, Scene, SurfaceKind};
 
 /// What an object looks like but for its map.
 #[derive(Clone, Debug, PartialEq)]
@@ -47,7 +48,7 @@ pub(super) struct Objects {
 }
 
 impl Objects {
-    pub(super) fn new(gpu: &Gpu, scene: &Scene, map_budget_bytes: u64) -> Self {
+    pub(super) fn new(gpu: &Gpu, scene: &Scene, geometry: &Geometry, map_budget_bytes: u64) -> Self {
         let mut objects = Self {
             list: Vec::new(),
             images: Images::new(gpu, scene, map_budget_bytes),
@@ -56,16 +57,16 @@ impl Objects {
             texels_per_m: vec![None; 2 * scene.objects.len()],
             peak_radiance: 0.0,
         };
-        objects.set_scene(gpu, scene);
+        objects.set_scene(gpu, scene, geometry);
         objects
     }
 
     /// Takes over an edited scene; the maps stay where it has as many objects.
-    pub(super) fn set_scene(&mut self, gpu: &Gpu, scene: &Scene) -> Uploaded {
+    pub(super) fn set_scene(&mut self, gpu: &Gpu, scene: &Scene, geometry: &Geometry) -> Uploaded {
         let mut uploaded = self.images.set_scene(gpu, scene);
         self.texels_per_m.resize(2 * scene.objects.len(), None);
         self.list = (0..scene.objects.len())
-            .map(|object| Look::of(scene, object))
+            .map(|object| Look::of(scene, object, geometry.rows(object)))
             .collect();
         self.number_glasses(scene);
         uploaded += self.write_records(gpu);
@@ -110,7 +111,7 @@ impl Objects {
         for (density, map) in self.texels_per_m.iter_mut().zip(&map_of) {
             *density = map.map(|shown| {
                 let chart = &shown.chart;
-                texels_per_m(chart, scene.objects[chart.object()].mesh_in_scene())
+                texels_per_m(chart, scene.objects[chart.object()].in_scene())
             });
         }
         uploaded += self.write_records(gpu);
@@ -188,7 +189,7 @@ impl Objects {
 }
 
 impl Look {
-    fn of(scene: &Scene, index: usize) -> Self {
+    fn of(scene: &Scene, index: usize, [row_x, row_y, row_z]: [[f32; 4]; 3]) -> Self {
         let object = &scene.objects[index];
         let material = &scene.materials[object.material];
         Self {
@@ -211,6 +212,9 @@ impl Look {
                 back_map: NO_IMAGE,
                 glass: 0,
                 alpha_cutoff: alpha_cutoff(material),
+                row_x,
+                row_y,
+                row_z,
             },
             base_colour_texture: material.base_colour_texture.as_ref().map(|image| image.texture),
         }
@@ -273,7 +277,7 @@ pub(super) fn absorption_per_m(material: &Material) -> [f32; 3] {
 }
 
 /// Mean density of a map's texels along a line on its surface; 0 where the surface has no area.
-fn texels_per_m(chart: &Chart, mesh: &Mesh) -> f64 {
+fn texels_per_m(chart: &Chart, mesh: InScene) -> f64 {
     let in_map: f64 = chart
         .corner_uvs
         .iter()

@@ -1,11 +1,11 @@
 //! The eye pass's shader modules and what they share with Rust.
 
-use super::geometry::{CORNER_LAYOUT, MAP_UV_LAYOUT};
+use super::geometry::{CORNER_LAYOUT, MAP_UV_LAYOUT, OBJECT_LAYOUT};
 use super::pipelines::{DrawnHow, Faces, PipelineKey, Writes};
 use super::tone_mapping;
 use super::uniforms::{
-    Accumulation, ChainStart, DisplayWhite, Frame, LightRecord, Node, ObjectRecord, ProbeHit, ProbeRay,
-    SeenWavelengths, Triangle,
+    Accumulation, ChainStart, DisplayWhite, Frame, Instance, LightRecord, Node, ObjectRecord, ProbeHit,
+    ProbeRay, SeenWavelengths, Triangle,
 };
 use crate::eye_pass::ToneMap;
 use crate::gpu::layout::StructLayout;
@@ -120,6 +120,7 @@ pub fn shared_structs() -> Vec<StructLayout> {
         SeenWavelengths::layout(),
         Node::layout(),
         Triangle::layout(),
+        Instance::layout(),
         DisplayWhite::layout(),
         Accumulation::layout(),
         ProbeRay::layout(),
@@ -129,7 +130,7 @@ pub fn shared_structs() -> Vec<StructLayout> {
 
 /// Every attribute of the surface pass's vertex buffers, for the tests.
 pub fn vertex_attributes() -> Vec<wgpu::VertexAttribute> {
-    [CORNER_LAYOUT, MAP_UV_LAYOUT]
+    [CORNER_LAYOUT, MAP_UV_LAYOUT, OBJECT_LAYOUT]
         .iter()
         .flat_map(|layout| layout.attributes)
         .copied()

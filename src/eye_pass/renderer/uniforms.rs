@@ -119,6 +119,10 @@ shader_struct! {
         glass: u32,
         /// Alpha of its texture from which on its surface is there; 0 where it always is.
         alpha_cutoff: f32,
+        /// Rows of the way from its mesh's coordinates to the scene.
+        row_x: [f32; 4],
+        row_y: [f32; 4],
+        row_z: [f32; 4],
     }
 }
 
@@ -145,25 +149,25 @@ shader_struct! {
 }
 
 shader_struct! {
-    /// A node of the hierarchy.
+    /// A node of a hierarchy, of triangles or of instances.
     Node {
         /// Minimum corner, local.
         low: [f32; 3],
-        /// Of a leaf its first triangle, of others the first of two children.
+        /// Of a leaf its first triangle or its instance, of others the first of two children.
         first: u32,
         /// Maximum corner, local.
         high: [f32; 3],
-        /// Triangles of a leaf; 0 for other nodes.
+        /// Triangles of a leaf, or `INSTANCE`; 0 for other nodes.
         count: u32,
     }
 }
 
 shader_struct! {
-    /// A triangle of the hierarchy.
+    /// A triangle of a hierarchy. Where its mesh has instances, it has the mesh's coordinates, and they its numbers.
     Triangle {
         /// First corner, local.
         a: [f32; 3],
-        /// Index into the scene's objects.
+        /// Index into the scene's objects; `NO_OBJECT` where it is not there any more.
         object: u32,
         /// Second corner, local.
         b: [f32; 3],
@@ -173,6 +177,30 @@ shader_struct! {
         c: [f32; 3],
         /// Of triangles at the same distance the one of lowest order is met.
         order: u32,
+    }
+}
+
+shader_struct! {
+    /// A mesh where it stands.
+    Instance {
+        /// Rows of the way from its coordinates to local ones.
+        from_mesh: [[f32; 4]; 3],
+        /// From local ones to those of its nodes.
+        to_nodes: [[f32; 4]; 3],
+        /// Node around its triangles.
+        root: u32,
+        /// Index into the scene's objects; `NO_OBJECT` where its triangles are local and have their own numbers.
+        object: u32,
+        /// Added to those of its triangles.
+        first_index: u32,
+        /// The same.
+        first_order: u32,
+        /// By which boxes are widened, in coordinates of the nodes: what rounding on the way there moves rays.
+        margin: f32,
+        /// Whether its triangles are turned over.
+        is_mirrored: u32,
+        padding0: u32,
+        padding1: u32,
     }
 }
 

@@ -249,7 +249,7 @@ impl<'a> Search<'a> {
 
     /// Whether any triangle below a node is wanted.
     fn holds_wanted(&self, node: SceneNode) -> bool {
-        if !overlaps(node.bounds(), self.others) {
+        if !node.may_be_left() && !overlaps(node.bounds(), self.others) {
             return true;
         }
         let mut waiting = vec![node];

@@ -91,8 +91,7 @@ impl Across {
 impl Judge {
     pub fn new(scene: Arc<Scene>) -> Self {
         let tracer = Tracer::new(scene.clone());
-        let packed = tracer.packed();
-        let (centre, scale) = (packed.centre, packed.scale);
+        let (centre, scale) = (tracer.frame().centre, tracer.frame().scale);
         let (mut firsts, mut corners) = (Vec::new(), Vec::new());
         for object in &scene.objects {
             firsts.push(corners.len());

@@ -1,9 +1,10 @@
 //! One picture: the device against the CPU, and both against a closed form, every channel by itself.
 
+use glam::DAffine3;
 use nephroid::eye_pass::Picture;
 use nephroid::eye_pass::tone_mapping::display_rgba8;
 use nephroid::illumination::IlluminationMap;
-use nephroid::scene::Environment;
+use nephroid::scene::{Environment, Object};
 
 use crate::gpu::rig::{AS_CPU, Rig, or_skip};
 use crate::prelude::*;
@@ -94,4 +95,42 @@ fn device_shows_what_the_cpu_shows() {
     let apart = |pair: (&u8, &u8)| pair.0.abs_diff(*pair.1);
     let most = rig.drawn(&view).iter().zip(&bytes).map(apart).max();
     assert!(most <= Some(1), "{most:?}");
+}
+
+/// Two balls of one mesh, one of them mirrored, look as copies do, wherever they are moved. Only that is sent then.
+#[test]
+fn what_shares_a_mesh_is_drawn_where_it_is_moved() {
+    let (mut scene, maps) = exhibit();
+    let mesh = Arc::new(shapes::sphere(DVec3::ZERO, 0.18, 4));
+    for (index, x, sign) in [(1, 0.25, 1.0), (2, 0.75, -1.0)] {
+        let before = &scene.objects[index];
+        let mut ball = Object::new(&before.name, (before.node, 0), before.material, Arc::clone(&mesh));
+        let (scale, turn) = (dvec3(sign, 0.9, 1.1), DQuat::from_rotation_y(0.3));
+        let place = DAffine3::from_scale_rotation_translation(scale, turn, dvec3(x, 0.2, 0.35));
+        ball.place(place);
+        scene.objects[index] = ball;
+    }
+    let view = view(dvec3(0.6, 0.8, 1.9), dvec3(0.5, 0.15, 0.45), 0.75, [96, 64]);
+    let mut rig = or_skip!(Rig::at(AS_CPU, &scene, &maps));
+    let moves = [
+        (2, 0.5, dvec3(-0.1, 0.1, 0.0)),
+        (1, 0.0, dvec3(0.1, 0.0, 0.2)),
+        (2, 0.1, dvec3(0.1, 0.0, 0.1)),
+    ];
+    for (index, yaw_rad, way) in moves {
+        rig.picture(&view);
+        let edit = Edit::Place(index, Motion::turned(yaw_rad, way));
+        scene = edit.apply(&scene).expect("it can be moved");
+        let bytes = rig.set_scene(&scene).other_bytes;
+        assert!((1..=128 * scene.objects.len() as u64).contains(&bytes), "{bytes}");
+        let moved = rig.picture(&view);
+        let afresh = or_skip!(Rig::at(AS_CPU, &scene, &maps)).picture(&view);
+        assert!(moved.radiance == afresh.radiance);
+        let mut copies = scene.clone();
+        for copy in &mut copies.objects {
+            copy.mesh_in_scene_mut();
+        }
+        let copied = or_skip!(Rig::at(AS_CPU, &copies, &maps)).picture(&view);
+        assert!(unlike(&moved, &copied) < 2e-3, "{}", unlike(&moved, &copied));
+    }
 }
