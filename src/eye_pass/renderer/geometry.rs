@@ -301,6 +301,9 @@ pub(super) fn rows(transform: &DAffine3) -> [[f32; 4]; 3] {
     })
 }
 
+/// Where a mesh is with the texture coordinates of an image.
+type ForImage = (Option<TextureRef>, Segment);
+
 /// Fills page after page.
 struct Packing<'a> {
     gpu: &'a Gpu,
@@ -309,7 +312,7 @@ struct Packing<'a> {
     corners: Vec<Corner>,
     indices: Vec<u32>,
     /// Where meshes are that need no corners for each object, mirrored ones apart, with the images they are for.
-    shared: HashMap<(*const Mesh, bool), Vec<(Option<TextureRef>, Segment)>>,
+    shared: HashMap<(*const Mesh, bool), Vec<ForImage>>,
 }
 
 impl Packing<'_> {
